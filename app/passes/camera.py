@@ -456,18 +456,7 @@ class CameraPass:
     def _add_sample(self, parameters: np.ndarray, width: int, height: int, maps: CausticMaps) -> Iterator[float]:
         """Dispatch one sample, yielding the share done after each dispatch: a band of rows, or some of its listed
         pixels."""
-        row = 0
-        while row < height:
-            # Groups that overlap the next band would add its rows twice, so bands are whole groups.
-            rows = min(self._rows.units, height - row)
-            parameters["first_row"] = row
-            if self._listed is not None:
-                self._listed.clear()
-            self._rows.learn(
-                rows,
-                self._dispatch(self._program_direct(), parameters, maps, -(-width // _GROUP), -(-rows // _GROUP)),
-                self.dispatch_seconds,
-            )
+        for row, rows in self._seen_directly(parameters, width, height, maps):
             for share in self._follow_listed(parameters, maps):
                 self._within_rows = True
                 yield (row + share * rows) / height
@@ -476,8 +465,24 @@ class CameraPass:
                 self._beams.add(self._sums.textures, row, rows)
             self._within_rows = False
             self._sums.samples_of_row[row : row + rows] += 1
+            yield (row + rows) / height
+
+    def _seen_directly(
+        self, parameters: np.ndarray, width: int, height: int, maps: CausticMaps
+    ) -> Iterator[tuple[int, int]]:
+        """Look at what is seen directly, one dispatch after the other; pauses with the band's first row and their
+        number, which glass in it has been listed of."""
+        row = 0
+        while row < height:
+            # Groups that overlap the next band would add its rows twice, so bands are whole groups.
+            rows = min(self._rows.units, height - row)
+            parameters["first_row"] = row
+            if self._listed is not None:
+                self._listed.clear()
+            took = self._dispatch(self._program_direct(), parameters, maps, -(-width // _GROUP), -(-rows // _GROUP))
+            self._rows.learn(rows, took, self.dispatch_seconds)
+            yield row, rows
             row += rows
-            yield row / height
 
     def _survey(self, parameters: np.ndarray, width: int, height: int, maps: CausticMaps) -> Iterator[float]:
         """Find the pixels in which, and round which, nothing but one surface in the same light is seen directly, and
@@ -495,13 +500,7 @@ class CameraPass:
         for index, places in enumerate(looks):
             taken["sample_index"] = taken["draw_index"] = index
             taken["looks"] = places
-            row = 0
-            while row < height:
-                rows = min(self._rows.units, height - row)
-                taken["first_row"] = row
-                took = self._dispatch(self._program_direct(), taken, maps, -(-width // _GROUP), -(-rows // _GROUP))
-                self._rows.learn(rows, took, self.dispatch_seconds)
-                row += rows
+            for _ in self._seen_directly(taken, width, height, maps):
                 yield 0.0
         parameters["survey"], parameters["survey_at"] = 2, taken["survey_at"]
 
