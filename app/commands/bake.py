@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,6 +17,7 @@ from . import options
 
 if TYPE_CHECKING:
     from ..edit.opening import Opening
+    from ..model.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -31,26 +33,35 @@ class BakeRequest:
     opening: Opening | None = None
 
 
+def map_asked_for(request: BakeRequest, outputs: Iterable[Path]) -> tuple[Scene, RenderSettings]:
+    """The scene whose map is asked for, and how it is rendered. Raises `UserError` for all that can be refused
+    beforehand: numbers, memory, files that cannot be written, the scene, its receiver."""
+    from ..base.atomic import check_writable
+    from ..render import bake
+
+    width, height = bake.DEFAULT_SIZE if request.size is None else options.parse_size(request.size)
+    photons = None if request.photons is None else options.parse_photons(request.photons)
+    seed = 1 if request.seed is None else options.parse_integer("--seed", request.seed, 0, options.MAX_SEED)
+    check_picture_memory(width, height, None)
+    for path in outputs:
+        check_writable(path)
+    scene = options.open_scene(request.scene, request.opening)
+    bake.check_receiver(scene, request.receiver)
+    for note in scene.notes:
+        print(f"note: {plain(note)}", file=sys.stderr)
+    settings = RenderSettings(width=width, height=height, photons=photons, seed=seed, max_depth=scene.render.max_depth)
+    return scene, settings
+
+
 def bake_command(request: BakeRequest) -> int:
     """Bake to a file; returns the exit code. Raises `UserError`."""
-    from ..base.atomic import check_writable
     from ..base.progress import ProgressReporter
     from ..edit.parameters import Stage
     from ..render import bake
     from ..render.notices import FrameNotices
 
     bake.check_output(request.output)
-    width, height = bake.DEFAULT_SIZE if request.size is None else options.parse_size(request.size)
-    photons = None if request.photons is None else options.parse_photons(request.photons)
-    seed = 1 if request.seed is None else options.parse_integer("--seed", request.seed, 0, options.MAX_SEED)
-    check_picture_memory(width, height, None)
-    check_writable(request.output)
-    check_writable(bake.placement_path(request.output))
-    scene = options.open_scene(request.scene, request.opening)
-    bake.check_receiver(scene, request.receiver)
-    for note in scene.notes:
-        print(f"note: {plain(note)}", file=sys.stderr)
-    settings = RenderSettings(width=width, height=height, photons=photons, seed=seed, max_depth=scene.render.max_depth)
+    scene, settings = map_asked_for(request, (request.output, bake.placement_path(request.output)))
 
     from ..gpu.context import create_context
 

@@ -6,37 +6,22 @@ import math
 import sys
 import time
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING
 
 from ..base.errors import UserError, plain
 from ..base.interrupts import interrupt_flag
-from ..base.memory import check_picture_memory
-from ..model.settings import RenderSettings
-from . import options
-
-if TYPE_CHECKING:
-    from ..edit.opening import Opening
+from .bake import BakeRequest, map_asked_for
 
 
 @dataclass(frozen=True)
-class ExportRequest:
+class ExportRequest(BakeRequest):
     """The export command's options as typed; None where the user said nothing."""
 
-    scene: str
-    receiver: str
-    output: Path
     plane: bool = False
     source: str | None = None
-    size: str | None = None
-    photons: str | None = None
-    seed: str | None = None
-    opening: Opening | None = None
 
 
 def export_command(request: ExportRequest) -> int:
     """Bake and write; returns the exit code. Raises `UserError`."""
-    from ..base.atomic import check_writable
     from ..base.progress import ProgressReporter
     from ..edit.parameters import Stage
     from ..render import bake
@@ -45,17 +30,7 @@ def export_command(request: ExportRequest) -> int:
 
     source = None if request.source is None else parse_place(request.source)
     outputs = check_export(request.output, request.plane, source)
-    width, height = bake.DEFAULT_SIZE if request.size is None else options.parse_size(request.size)
-    photons = None if request.photons is None else options.parse_photons(request.photons)
-    seed = 1 if request.seed is None else options.parse_integer("--seed", request.seed, 0, options.MAX_SEED)
-    check_picture_memory(width, height, None)
-    for path in outputs:
-        check_writable(path)
-    scene = options.open_scene(request.scene, request.opening)
-    bake.check_receiver(scene, request.receiver)
-    for note in scene.notes:
-        print(f"note: {plain(note)}", file=sys.stderr)
-    settings = RenderSettings(width=width, height=height, photons=photons, seed=seed, max_depth=scene.render.max_depth)
+    scene, settings = map_asked_for(request, outputs)
 
     from ..gpu.context import create_context
 

@@ -536,7 +536,7 @@ def export(
 
     opening = options.parse_opening(up, glass, environment)
     raise typer.Exit(
-        export_command(ExportRequest(scene, receiver, output, plane, source, size, photons, seed, opening))
+        export_command(ExportRequest(scene, receiver, output, size, photons, seed, opening, plane, source))
     )
 
 
