@@ -169,7 +169,12 @@ class LiveCamera:
     def state(self) -> CameraState:
         """How far the picture is."""
         return CameraState(
-            self.is_coarse, self.owes_picture, self.is_within_cycle, self.is_done, is_full_size=self.scale == 1.0
+            self.is_coarse,
+            self.owes_picture,
+            self.is_within_cycle,
+            self.is_done,
+            is_full_size=self.scale == 1.0,
+            owes_first=self.owes_picture and (self.picture is None or self._shows_other),
         )
 
     @property

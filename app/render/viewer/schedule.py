@@ -27,6 +27,8 @@ class CameraState:
     is_done: bool = True
     is_full_size: bool = True
     """What is shown has every pixel."""
+    owes_first: bool = False
+    """Nothing of this scene is shown yet: the first picture of it is being made."""
 
 
 class Action(Enum):
@@ -219,8 +221,9 @@ class Schedule:
         return self.shows_scene and self.refines_when_still and self.first_order and not self.failed
 
     def yields_to_camera(self, camera: CameraState) -> bool:
-        """A drag gets the whole budget: what its next step throws away is not begun."""
-        return self.interacting and (camera.owes_picture or self.shows_preview)
+        """A drag gets the whole budget: what its next step throws away is not begun. So does the first picture of a
+        scene: better maps that come before it would begin it again and again."""
+        return camera.owes_first or (self.interacting and (camera.owes_picture or self.shows_preview))
 
     def finishes_preview(self, camera: CameraState) -> bool:
         """Where not even the smallest picture fits a frame, one that has begun is finished first: else nothing would be
@@ -284,7 +287,7 @@ def _examine(s: Schedule, event: Examined, now: float) -> Next:
         return (s, ()) if s.building else _build(s)
     if s.wish_is_due:
         return (s, ()) if s.finishes_preview(event.camera) else _fulfil(replace(s, wish_is_due=False), event)
-    if s.building:
+    if s.building or event.camera.owes_first:
         return s, ()
     if s.maps_are_coarse and not s.interacting:
         return s, (Action.REFIT_MAPS,)
