@@ -47,6 +47,7 @@ from .variants import (
     UNIT_EMISSION,
     UNIT_ENVIRONMENT_LIGHT,
     UNIT_PICTURES,
+    Defines,
     beside_defines,
     camera_defines,
     direct_defines,
@@ -82,6 +83,14 @@ _TARGET_SECONDS = 0.15
 """What one dispatch may take; rows are divided to fit."""
 _GROUP = 8
 _FIRST_ROWS = 16
+_VARIANTS: dict[str, Callable[[Defines], Defines]] = {
+    "all": lambda shown: shown,
+    "direct": direct_defines,
+    "single": single_defines,
+    "beside": beside_defines,
+}
+"""Programs: for all that a sample sees (where another lists pixels: beyond glass and mirrors), for what is seen
+directly, beyond glass of one wavelength, and directly where beams show the rest."""
 FALLBACKS = ("columns_dropped", "depth_reached", "stack_full", "band_uncut", "loops_ended")
 """What the shader counts, in its order."""
 
@@ -166,8 +175,6 @@ class CameraPass:
             if on
         }
         self._listed: ListedPixels | None = None
-        self._beyond: moderngl.ComputeShader | None = None
-        self._single: moderngl.ComputeShader | None = None
         if "CAMERA_SPECULAR" in shown:
             halts = context.traits.loops_may_end
             self._listed = ListedPixels(self._ctx, halted_bytes(shown) if halts else None)
@@ -179,11 +186,21 @@ class CameraPass:
         self._starts: BeamStarts | None = None
         self._beam_objects = np.zeros(len(scene.scene.objects), bool)
         self._beam_objects_buffer: moderngl.Buffer | None = None
-        self._beside: moderngl.ComputeShader | None = None
-        if "CAMERA_SPECULAR" in shown:
-            self._beyond = shader.compute(self._ctx, "camera/camera.comp", shown, structs)
-            shown = direct_defines(shown)
-        self._program = shader.compute(self._ctx, "camera/camera.comp", shown, structs)
+        self._programs: dict[str, moderngl.ComputeShader] = {}
+        """Those of `_VARIANTS` that are compiled."""
+        if not features.camera_beams:
+            # Else beams may do without them, and they are compiled when paths need them.
+            for variant in ("all",) if self._listed is None else ("all", "direct"):
+                self._compiled(variant)
+
+    def _compiled(self, variant: str) -> moderngl.ComputeShader:
+        """One of the camera's programs, compiled when it is first asked for."""
+        if variant not in self._programs:
+            shown, structs = self._source
+            self._programs[variant] = shader.compute(
+                self._ctx, "camera/camera.comp", _VARIANTS[variant](shown), structs
+            )
+        return self._programs[variant]
 
     def take_beams(
         self,
@@ -201,7 +218,7 @@ class CameraPass:
         shown, structs = self._source
         if self._beams is None:
             self._beams = ScreenBeams(self._ctx, screen_beam_defines(shown), structs, self.channels.targets)
-            self._beside = shader.compute(self._ctx, "camera/camera.comp", beside_defines(shown), structs)
+            self._compiled("beside")
             self._beam_objects_buffer = self._ctx.buffer(reserve=4 * len(self._beam_objects))
         assert self._beam_objects_buffer is not None
         self._beam_objects[:] = objects
@@ -422,9 +439,7 @@ class CameraPass:
                 beams.release()
         if self._beam_objects_buffer is not None:
             self._beam_objects_buffer.release()
-        for program in (self._program, self._beyond, self._single, self._beside):
-            if program is not None:
-                shader.release(program)
+        shader.release(*self._programs.values())
         if self._listed is not None:
             self._listed.release()
         if self._owns_pictures:
@@ -529,10 +544,10 @@ class CameraPass:
     def _program_direct(self) -> moderngl.ComputeShader:
         """What looks at what is seen directly."""
         if not self.shows_beams:
-            return self._program
-        assert self._beside is not None and self._beam_objects_buffer is not None
+            return self._compiled("all" if self._listed is None else "direct")
+        assert self._beam_objects_buffer is not None
         self._beam_objects_buffer.bind_to_storage_buffer(BIND_BEAM_OBJECTS)
-        return self._beside
+        return self._compiled("beside")
 
     def _draw_beams(self, parameters: np.ndarray, samples: int, maps: CausticMaps) -> Iterator[float]:
         """Draw what is seen by beams, yielding the share done after every portion."""
@@ -561,13 +576,7 @@ class CameraPass:
 
     def _program_beyond(self) -> moderngl.ComputeShader:
         """What follows rays beyond glass and mirrors."""
-        assert self._beyond is not None
-        if not self.spectrum.single:
-            return self._beyond
-        if self._single is None:
-            shown, structs = self._source
-            self._single = shader.compute(self._ctx, "camera/camera.comp", single_defines(shown), structs)
-        return self._single
+        return self._compiled("single" if self.spectrum.single else "all")
 
     def _no_maps(self) -> CausticMaps:
         if self._empty is None:

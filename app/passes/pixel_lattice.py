@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 
 def is_in_strips(samples: int, offset: int) -> bool:
@@ -39,6 +38,8 @@ def looks_lattice(samples: int, offset: int) -> np.ndarray:
     away = (away + 0.5) % 1.0 - 0.5
     if is_in_strips(samples, offset):
         away[..., 1] = 0.0
+    from scipy.optimize import linear_sum_assignment  # takes a fifth of the viewer's imports
+
     _, chosen = linear_sum_assignment((away**2).sum(axis=-1))
     return looks[chosen].reshape(samples, LOOKS, 2)
 

@@ -4,6 +4,8 @@
 #ifndef CAMERA_PATH_GLSL
 #define CAMERA_PATH_GLSL
 
+#include "lib/finite.glsl"
+
 #define SPATIAL 2
 #define COLUMNS_HELD (SPATIAL + SPECTRAL_GROUPS)
 // An end of a band that arrives farther off (GPU units) is beyond the facet for good.
@@ -214,13 +216,12 @@ void transfer_ends(inout CameraPath path, vec3 normal_g)
 // Columns that are not finite, or longer than anything, are dropped: the path goes on as a single ray.
 bool columns_hold(inout CameraPath path)
 {
-    float largest = 0.0;
-    for (int c = 0; c < COLUMNS_HELD; ++c)
-        largest = max(largest, max(dot(path.dposition[c], path.dposition[c]), dot(path.ddirection[c], path.ddirection[c])));
-    // Not (x < limit) is also true for NaN, which max() may lose: the sum keeps it.
-    float all = 0.0;
-    for (int c = 0; c < COLUMNS_HELD; ++c) all += dot(path.dposition[c] + path.ddirection[c], vec3(1.0));
-    if (largest < COLUMN_LIMIT * COLUMN_LIMIT && !isnan(all) && !isinf(all)) return true;
+    bool holds = true;
+    for (int c = 0; c < COLUMNS_HELD; ++c) {
+        holds = holds && is_within(dot(path.dposition[c], path.dposition[c]), COLUMN_LIMIT * COLUMN_LIMIT);
+        holds = holds && is_within(dot(path.ddirection[c], path.ddirection[c]), COLUMN_LIMIT * COLUMN_LIMIT);
+    }
+    if (holds) return true;
     for (int c = 0; c < COLUMNS_HELD; ++c) path.dposition[c] = path.ddirection[c] = vec3(0.0);
 #ifdef SPECTRAL_SWEEP
     for (int end = 0; end < 2; ++end) {

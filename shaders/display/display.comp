@@ -1,6 +1,7 @@
 // Linear light to display pixels: exposure, tone curve or false colour, and two pictures side by side or as their error.
 // Runs over the pixels of the output; row 0 is the top of both. SHOW and TONE are defines: a software renderer pays for
 // both sides of every branch.
+#include "lib/finite.glsl"
 #include "lib/tone.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -29,8 +30,6 @@ vec3 look(sampler2D picture, vec2 pixel)
 #endif
 }
 
-bool is_broken(vec3 colour) { return any(isnan(colour)) || any(isinf(colour)); }
-
 vec3 of_table(float place)
 {
     int last = COLOURS.length() - 1;
@@ -50,7 +49,7 @@ vec3 false_colour(vec3 exposed)
 
 vec3 developed(vec3 scene)
 {
-    if (is_broken(scene)) return NOT_FINITE;
+    if (!is_finite3(scene)) return NOT_FINITE;
     vec3 exposed = clamp(clamp(scene, -BRIGHTEST, BRIGHTEST) * parameters.gain, -BRIGHTEST, BRIGHTEST);
 #ifdef TONE_FALSE_COLOUR
     return false_colour(exposed);
@@ -67,7 +66,7 @@ vec3 developed(vec3 scene)
 
 vec3 error_colour(vec3 scene, vec3 reference)
 {
-    if (is_broken(scene) || is_broken(reference)) return NOT_FINITE;
+    if (!is_finite3(scene) || !is_finite3(reference)) return NOT_FINITE;
     float error = signed_error(scene * parameters.gain, reference * parameters.gain, parameters.error_floor);
     return of_table(0.5 + 0.5 * error / parameters.error_range);
 }

@@ -49,8 +49,8 @@ ShadingFrame shading_frame(Hit hit, Triangle facet, vec3 direction)
     vec3 n0 = side * corner_normal(first), n1 = side * corner_normal(first + 1u), n2 = side * corner_normal(first + 2u);
     vec3 summed = (1.0 - hit.bary.x - hit.bary.y) * n0 + hit.bary.x * n1 + hit.bary.y * n2;
     vec3 normal = normalize(summed);
-    // NaN is refused too.
-    frame.interpolated = uint(has_normals && dot(direction, normal) < -MIN_SHADING_COSINE);
+    float facing = dot(direction, normal);
+    frame.interpolated = uint(has_normals && facing < -MIN_SHADING_COSINE && is_finite(facing));
     frame.refused = uint(has_normals && frame.interpolated == 0u);
     frame.normal = frame.interpolated != 0u ? normal : frame.normal_g;
 #ifdef NORMAL_DERIVATIVES

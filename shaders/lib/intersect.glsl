@@ -10,6 +10,7 @@
 #define COUNT_ROUNDS(count)
 #endif
 
+#include "lib/finite.glsl"
 #include "lib/scene.glsl"
 
 // Set on `Hit.primitive` where it numbers a plane of a half-space solid, not a triangle.
@@ -130,8 +131,8 @@ void try_triangle(uint slot, vec3 near_p, float ahead, vec3 direction, RayOrigin
     float edge = sqrt(max(dot(facet.edge1, facet.edge1), dot(facet.edge2, facet.edge2)));
     // Of a facet seen edge-on the bound says nothing any more: no hit lies far outside it.
     float slack = min(EDGE_ERROR * edge * (sqrt(dot(to_origin, to_origin)) + edge) * abs(inverse), 0.1);
-    // Comparisons are written so that NaN (an edge-on or degenerate triangle) fails them.
-    bool inside = u >= -slack && v >= -slack && u + v <= 1.0 + 2.0 * slack && slot != origin.primitive;
+    // Of an edge-on or degenerate triangle nothing is finite.
+    bool inside = is_finite(inverse) && u >= -slack && v >= -slack && u + v <= 1.0 + 2.0 * slack && slot != origin.primitive;
 #ifdef CONTACTS
     if (inside) {
         Object thing = object_at(facet.object);

@@ -1,6 +1,7 @@
 // One thread a photon: its Gaussian footprint and spectral sweep, in texels of the map it lands on.
 // The sweep follows the chord between the landing points of the band's two ends (exact where one material
 // disperses: the spectral coordinate is then affine in its index). Elek et al. 2014; Schjoth et al. 2007.
+#include "lib/finite.glsl"
 #include "lib/gaussian.glsl"
 
 layout(local_size_x = WORKGROUP) in;
@@ -179,12 +180,6 @@ bool contains(vec4 rect, vec2 centre, float margin) {
     return all(greaterThanEqual(centre, rect.xy + margin)) && all(lessThan(centre, rect.zw - margin));
 }
 
-bool bounded(vec2 v) {
-    // Compared as integers, which order NaN last: a compiler may turn !(a < b) into a >= b.
-    uvec2 magnitude = floatBitsToUint(v) & 0x7fffffffu;
-    return all(lessThan(magnitude, uvec2(floatBitsToUint(extent_limit))));
-}
-
 void main() {
     uint i = gl_GlobalInvocationID.x;
     if (i >= photon_count) {
@@ -269,7 +264,7 @@ void main() {
     vec3 middle = 0.5 * (to_lo + to_hi);
     vec3 sweep = to_hi - to_lo;
     Footprint f = footprint_in(place, photon, middle, sweep);
-    bool accident = !(bounded(f.axis_s) && bounded(f.axis_t) && bounded(f.chord) && bounded(f.centre - to_texels(place, photon.position) - vec2(place.row_u.w, place.row_v.w)));
+    bool accident = !(is_within2(f.axis_s, extent_limit) && is_within2(f.axis_t, extent_limit) && is_within2(f.chord, extent_limit) && is_within2(f.centre - to_texels(place, photon.position) - vec2(place.row_u.w, place.row_v.w), extent_limit));
     if (accident || (photon.flags & FLAG_FOOTPRINT_DROPPED) != 0u) {
         photon.dposition_ds = vec3(0.0);
         photon.dposition_dt = vec3(0.0);

@@ -4,6 +4,7 @@
 // results do not depend on how threads were scheduled.
 layout(local_size_x = 64) in;
 
+#include "lib/finite.glsl"
 #include "lib/random.glsl"
 #include "lib/medium.glsl"
 #include "lib/band.glsl"
@@ -133,13 +134,12 @@ void land(inout RayRecord ray, uint receiver, uint triangle, float cosine, uint 
 #if SPECTRAL_GROUPS > 0
     SPECTRAL_COPY
 #endif
-    float largest = 0.0;
+    bool holds = true;
 #if COLUMNS > 0
     for (int c = 0; c < COLUMNS; ++c)
-        largest = max(largest, dot(ray.dposition[c].xyz, ray.dposition[c].xyz));
+        holds = holds && is_within(dot(ray.dposition[c].xyz, ray.dposition[c].xyz), COLUMN_LIMIT * COLUMN_LIMIT);
 #endif
-    // Not (x < limit) is also true for NaN.
-    if (!(largest < COLUMN_LIMIT * COLUMN_LIMIT)) {
+    if (!holds) {
         ray.flags |= FLAG_FOOTPRINT_DROPPED;
         outcome.what |= FELL_FOOTPRINT;
     }

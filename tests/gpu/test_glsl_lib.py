@@ -225,3 +225,21 @@ def test_the_highest_solid_around_a_ray_is_its_medium(gl) -> None:
         before, after = (outside, inside) if entering else (inside, outside)
         want = (medium(before), medium(after), after, int(medium(before) != medium(after)))
         assert tuple(int(got[name][row]) for name in outputs) == want, cases[row]
+
+
+def test_numbers_are_told_by_their_bits(gl) -> None:
+    bits = np.array(
+        [0, 1, 0x7F7FFFFF, 0x7F800000, 0x7F800001, 0x7FC00000, 0x7FFFFFFF, 0x3F800000, 0x3F7FFFFF], np.uint32
+    )
+    bits = np.concatenate([bits, bits | np.uint32(0x80000000)])
+    body = (
+        "float v = uintBitsToFloat(b); finite = uint(is_finite(v)); three = uint(is_finite3(vec3(0.0, v, 1.0)));"
+        "within = uint(is_within(v, 1.0)); two = uint(is_within2(vec2(0.0, v), 1.0));"
+    )
+    outputs = dict.fromkeys(("finite", "three", "within", "two"), "uint")
+    got = evaluate(gl.ctx, ["lib/finite.glsl"], body, {"b": bits}, outputs)
+    with np.errstate(invalid="ignore"):
+        values = bits.view(np.float32)
+        finite, within = np.isfinite(values), np.abs(values) < 1.0
+    for name, expected in (("finite", finite), ("three", finite), ("within", within), ("two", within)):
+        np.testing.assert_array_equal(got[name], expected, name)

@@ -56,6 +56,8 @@ class LiveCamera:
         self.target_samples = target_samples
         self._pass: CameraPass | None = None
         self._pictures: TextureStore | None = None
+        self._looks = 1
+        """Of a sample at what is seen directly."""
         self._average = shader.compute(context.ctx, "camera/average.comp")
         self._steps: Iterator[float] | None = None
         self._choosing: Iterator[float] | None = None
@@ -112,6 +114,7 @@ class LiveCamera:
             raise
         self._pictures = pictures
         self._pass.dispatch_seconds = DISPATCH_SECONDS
+        self._looks = self._pass.primary_samples
         self._steps = self._choosing = self._bands = None
         self._shows_other = True
         if before is not None:
@@ -174,8 +177,13 @@ class LiveCamera:
             self.is_within_cycle,
             self.is_done,
             is_full_size=self.scale == 1.0,
-            owes_first=self.owes_picture and (self.picture is None or self._shows_other),
+            owes_first=self.owes_picture and self._shows_none,
         )
+
+    @property
+    def _shows_none(self) -> bool:
+        """There is no picture of this scene yet."""
+        return self.picture is None or self._shows_other
 
     @property
     def _sampling(self) -> CameraSampling:
@@ -286,6 +294,8 @@ class LiveCamera:
         if self._steps is None:
             self._pass.spectrum = Spectrum(self._cycle)
             self._pass.max_taps = MOVING_TAPS if self._is_preview or self._is_smooth else MAX_TAPS
+            # A first picture has rough outlines for a moment, and comes in half the time.
+            self._pass.primary_samples = 1 if self._is_smooth and self._shows_none else self._looks
             self._steps = self._pass.samples(self._camera, width, height, 1, self._taken, self._maps)
             self._spent_s = 0.0
         started = time.perf_counter()
