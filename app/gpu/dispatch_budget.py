@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+DISPATCH_S = 0.02
+"""What a dispatch or draw may take on a GPU: drivers end what takes two seconds, and screens wait meanwhile. The
+processor has no such limit."""
 _GROWTH = 4
 """Most by which a portion grows at a time."""
 _MIN_S = 1e-4

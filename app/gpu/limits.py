@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from ..base.errors import UserError
+
 
 @dataclass(frozen=True)
 class Limits:
@@ -94,3 +96,28 @@ NEEDED = Limits(
 )
 BRUSH_STORAGE_BLOCKS = 10
 """Storage blocks of footprint.comp where dispersion is brushed onto glass and shown by index."""
+_BEYOND_PROMISE = {
+    "storage_blocks": "storage blocks in a compute shader",
+    "vertex_storage_blocks": "storage blocks in a vertex shader",
+    "storage_bindings": "binding points of storage blocks",
+}
+
+
+def check_splats(limits: Limits) -> None:
+    """Raise `UserError` where splats cannot be drawn, before a driver says so in words of its own."""
+    for name, words in _BEYOND_PROMISE.items():
+        found, needed = getattr(limits, name), getattr(NEEDED, name)
+        if found < needed:
+            raise UserError(
+                f"the graphics driver has {found} {words}, and splats need {needed}: update it or use another GPU "
+                "('spectrasplat doctor' lists its limits)"
+            )
+
+
+def check_brush(limits: Limits) -> None:
+    """Raise `UserError` where dispersion that was brushed onto glass cannot be shown."""
+    if limits.storage_blocks < BRUSH_STORAGE_BLOCKS:
+        raise UserError(
+            f"local dispersion takes {BRUSH_STORAGE_BLOCKS} storage blocks in a compute shader and the graphics driver "
+            f"has {limits.storage_blocks}: update it, use another GPU, or take the scene's dabs away"
+        )

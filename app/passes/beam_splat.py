@@ -6,6 +6,7 @@ values of the light's running spectrum where the texel is all inside. Additive b
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,7 @@ import numpy as np
 
 from ..beams.polygons import BeamPolygons
 from ..gpu import shader
+from ..gpu.dispatch_budget import DISPATCH_S, DispatchBudget
 from ..gpu.records import NONE
 from ..gpu.schema import Field, Struct
 from .beam_records import BEAM, PackedBeams, TexelMap, hull_boxes, levels, packed
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
 
 GROUP = 1 << 11
 """Polygons that are uploaded and drawn at a time: a software renderer sorts all of them into tiles before it draws."""
+_SMALLEST_GROUP = 16
 FLUSH = 1 << 14
 """Polygons between two flushes of the scratch textures."""
 
@@ -43,8 +46,12 @@ PARAMETERS = Struct(
 class BeamSplatter:
     """The pass that draws polygons into maps of `targets` RGBA32F targets."""
 
-    def __init__(self, ctx: moderngl.Context, targets: int = 1) -> None:
+    def __init__(self, ctx: moderngl.Context, targets: int = 1, is_capped: bool = False) -> None:
+        """`is_capped`: as many polygons at a time as take `dispatch_seconds`, where a device ends what takes long;
+        their sums are then rounded otherwise from run to run."""
         self._ctx = ctx
+        self.dispatch_seconds = DISPATCH_S
+        self._portion = DispatchBudget(GROUP, _SMALLEST_GROUP, GROUP) if is_capped else None
         self._targets = targets
         self._programs: dict[tuple[int, bool], moderngl.Program] = {}
         self._parameters = ctx.buffer(reserve=PARAMETERS.stride)
@@ -69,13 +76,19 @@ class BeamSplatter:
             to_texels = TexelMap.of(record, frames[receiver])
             reflectance_class = int(layout.receivers[receiver]["reflectance_class"])
             texel_area = float(record["texel_area"])
-            for start in range(0, len(chosen), GROUP):
-                part = chosen[start : start + GROUP]
+            done = 0
+            while done < len(chosen):
+                part = chosen[done : done + (self._portion.units if self._portion else GROUP)]
+                done += len(part)
                 curves = tables.parts(polygons.light[part], reflectance_class, polygons.x_lo[part], polygons.x_hi[part])
-                for beams in packed(polygons, part, to_texels, texel_area * weight, curves):
+                all_beams = list(packed(polygons, part, to_texels, texel_area * weight, curves))
+                started = time.perf_counter()
+                for beams in all_beams:
                     self._draw(beams, tables, atlas, record["rect"])
                 # What is drawn later is kept until then.
                 self._ctx.finish()
+                if self._portion:
+                    self._portion.learn(len(part), time.perf_counter() - started, self.dispatch_seconds)
                 atlas.pending += len(part)
                 if atlas.pending >= FLUSH:
                     atlas.flush()

@@ -79,8 +79,6 @@ _BEAMS_PROGRESS = 0.7
 """Of a frame's time, about, that drawing its beams takes."""
 _SURVEY_GRID = (4, 2)
 """Columns and rows of a survey's looks in a pixel: SURVEY_SAMPLES · LOOKS together."""
-_TARGET_SECONDS = 0.15
-"""What one dispatch may take; rows are divided to fit."""
 _GROUP = 8
 _FIRST_ROWS = 16
 _VARIANTS: dict[str, Callable[[Defines], Defines]] = {
@@ -141,7 +139,7 @@ class CameraPass:
         self._within_rows = False
         """Some listed pixels of a band of rows have this sample, others are still to get it."""
         self._map_targets = maps.targets
-        self.dispatch_seconds = _TARGET_SECONDS
+        self.dispatch_seconds = context.traits.camera_dispatch_s
         """What one dispatch should take; rows are divided to fit."""
         features = scene.features
         self.disperses = layer != "caustic" and features.camera_disperses

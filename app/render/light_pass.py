@@ -21,6 +21,8 @@ from ..base.memory import available_bytes
 from ..base.random_words import Dimension, random_word
 from ..gpu import records, splat_tables
 from ..gpu.context import Context
+from ..gpu.dispatch_budget import DISPATCH_S, DispatchBudget
+from ..gpu.limits import check_brush, check_splats
 from ..gpu.map_channels import MapChannels
 from ..gpu.scene_buffers import SceneBuffers
 from ..model.features import Features
@@ -34,7 +36,7 @@ from ..passes.map_atlas import MapAtlas
 from ..passes.map_layout import MapLayout, Window, check_map_receiver, layout_maps, pixel_side, plane_frame
 from ..passes.pilot import Pilot, landings_of, pilot_steps
 from ..passes.splat import Splatter
-from ..passes.trace import RAY_ROOM, Batch, FluxTally, TracePass, queue_bytes
+from ..passes.trace import RAY_ROOM, Batch, FluxTally, LatticeSlice, TracePass, queue_bytes
 from . import shrinking
 from .beam_light import BeamLight, BeamStats, MovingBeams, carries_everything
 from .handed_rays import handed_rays
@@ -50,6 +52,8 @@ BEAM_ROUND = 1 << 19
 """Photons' worth of beams, where they carry everything, after which a pass may be left."""
 BEAM_LEAST = 1 << 17
 """Photons, at least, whose beams are found at once, where photons are traced besides."""
+SMALLEST_PORTION = 1 << 10
+"""Rays of a batch that are not divided further, however slow the device is."""
 QUEUE_BYTES = 64 << 20
 """What the queue of a batch that nobody asked for may take; more on a GPU. Less where memory is short."""
 
@@ -103,6 +107,9 @@ class LightPass:
         """`fit` None fits maps to the scene's camera and the picture of `settings`. `photon_records` becomes the light
         pass's own. `moving`: beams are first found as fast as while something is dragged, and where they carry all,
         maps are fitted to those instead of pilots."""
+        check_splats(context.limits)
+        if features.local_gain:
+            check_brush(context.limits)
         self.context = context
         self.scene = scene
         self.settings = settings
@@ -131,6 +138,13 @@ class LightPass:
         """Asked before maps are made, which take the most memory; may refuse them."""
         self._beams: BeamLight | None = None
         self._moving = moving
+        self.dispatch_seconds = DISPATCH_S
+        """What the first event of a batch may take where the device queues work: smaller batches follow one that took
+        longer."""
+        self._portion = DispatchBudget(self.trace.batch, SMALLEST_PORTION, self.trace.batch)
+        """Rays of the next batch."""
+        self._traced_once = False
+        """A first event of all tells of compiling."""
 
     # ---- once for a scene --------------------------------------------------------------------
 
@@ -429,13 +443,22 @@ class LightPass:
                 points = len(range(j, lattice, rounds))
                 if points:
                     part = plan.slice(self.seed, number, lattice, j, rounds, points, float(photons))
-                    of = RoundOf(number, j, rounds, i + 1 == len(self.plans))
-                    for _ in self.batch_steps(self.trace.steps(part, plan.domain), of):
-                        yield PassStep(done / slices, False)
+                    for piece, is_last in self._portions(part):
+                        of = RoundOf(number, j, rounds, is_last and i + 1 == len(self.plans))
+                        for _ in self.batch_steps(self.trace.steps(piece, plan.domain), of, rays=piece.count):
+                            yield PassStep(done / slices, False)
                 if i + 1 < len(self.plans):
                     yield PassStep((done + 1) / slices, False)
             self._maps.photon_weight += photons / rounds
             yield PassStep((j + 1) / rounds, (j + 1) % together == 0 or j + 1 == rounds)
+
+    def _portions(self, part: LatticeSlice) -> Iterator[tuple[LatticeSlice, bool]]:
+        """`part`, in portions that the device has shown to manage in time, and whether each is the last."""
+        lattices, first, left = part.count // part.points, part.first, part.points
+        while left:
+            points = min(left, max(self._portion.units // lattices, 1))
+            yield replace(part, first=first, points=points), points == left
+            first, left = first + points * part.stride, left - points
 
     @property
     def has_work(self) -> bool:
@@ -489,7 +512,7 @@ class LightPass:
             if not len(pieces):
                 continue
             emission = BeamEmission(self.buffers, self.trace.ray, pieces, self._records.tables.spans)
-            for light, rays in handed_rays(emission, beams.stats.entered_w, share, self.trace.batch, self.seed, nth):
+            for light, rays in handed_rays(emission, beams.stats.entered_w, share, self._portion.units, self.seed, nth):
                 self.stats.trace_seconds += time.perf_counter() - started
                 for _ in self.batch_steps(self.trace.carry_on(rays, light), of, of_tails=tails):
                     yield PassStep(done, False)
@@ -507,10 +530,11 @@ class LightPass:
         return random_word(self.seed, 0, number, Dimension.BRANCH)
 
     def batch_steps(
-        self, steps: Generator[None, None, Batch], of: RoundOf, *, of_tails: bool = False
+        self, steps: Generator[None, None, Batch], of: RoundOf, *, of_tails: bool = False, rays: int = 0
     ) -> Iterator[None]:
         """Trace a batch (`TracePass.steps`, `carry_on`), keep and splat what landed, and count it. `of_tails`: photons
-        that carry on weak beams, for which a pass has photons besides."""
+        that carry on weak beams, for which a pass has photons besides. `rays`: of the lattice, in this batch."""
+        queued, is_first = self.context.traits.work_is_queued, True
         started = time.perf_counter()
         while True:
             try:
@@ -518,9 +542,13 @@ class LightPass:
             except StopIteration as finished:
                 batch: Batch = finished.value
                 break
-            if self._pace.waits and self.context.traits.work_is_queued:
+            if queued and (self._pace.waits or is_first):
                 self.context.finish()
-            self.stats.trace_seconds += time.perf_counter() - started
+            took, is_compiled = time.perf_counter() - started, self._traced_once
+            self.stats.trace_seconds += took
+            if queued and is_first and rays and is_compiled:
+                self._portion.learn(rays, took, self.dispatch_seconds)
+            is_first, self._traced_once = False, True
             yield
             started = time.perf_counter()
         self.stats.trace_seconds += time.perf_counter() - started
@@ -583,6 +611,8 @@ class LightPass:
 
     def show_gains(self, scene: Scene | None) -> None:
         """Splat from now on with the brush's dabs of `scene`; None without."""
+        if scene is not None:
+            check_brush(self.context.limits)
         if (scene is not None) != self.features.local_gain:
             self.features = replace(self.features, local_gain=scene is not None)
             self._maps.take(self.features)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ..gpu.dispatch_budget import DispatchBudget
+from ..gpu.dispatch_budget import DISPATCH_S, DispatchBudget
 from ..passes.accumulate import ROWS, Accumulate
 from ..passes.splat import CHUNK, FLUSH_SHARE
 from .light_plan import SMALLEST_BATCH
@@ -24,6 +24,8 @@ FLUSH_AHEAD = 0.9
 """Of the photons after which a splat pass sums its maps up by itself."""
 FIRST_SUMMED = 256
 """Rows of a map that are summed up at first, before it is known how long they take."""
+FIRST_SPLATTED, SMALLEST_PART, LARGEST_PART = 1 << 16, 1 << 10, 1 << 20
+"""Photons that a GPU splats at once: at first, and when it is known how long they take."""
 SUMMING_SECONDS = 0.01
 """What one part of it may take."""
 
@@ -64,6 +66,12 @@ class Splatting:
         self._pace = pace
         self._accumulate = Accumulate(context.ctx) if pace.sums_in_parts else None
         self.seconds = 0.0
+        self.dispatch_seconds = DISPATCH_S
+        """What a part may take where the device queues work. Elsewhere parts stay, as sums in another order are rounded
+        otherwise."""
+        self._part: DispatchBudget | None = None
+        if context.traits.work_is_queued:
+            self._part = DispatchBudget(FIRST_SPLATTED, SMALLEST_PART, LARGEST_PART)
 
     def steps(
         self,
@@ -81,9 +89,10 @@ class Splatting:
             CHUNK, atlas.size[0] * atlas.size[1] / FLUSH_SHARE
         ):
             yield from self.summing(atlas)
-        for start in range(0, count, part_max):
+        start = 0
+        while start < count:
             started = time.perf_counter()
-            part = min(part_max, count - start)
+            part = min(part_max, self._part.units if self._part else count, count - start)
             maps.splatter.run(
                 photons,
                 part,
@@ -97,10 +106,14 @@ class Splatting:
                 stride,
                 tables.reindex,
             )
-            if self._pace.waits:
+            if self._pace.waits or self._part:
                 self._context.finish()
-            self.seconds += time.perf_counter() - started
-            if start + part < count:
+            took = time.perf_counter() - started
+            self.seconds += took
+            if self._part:
+                self._part.learn(part, took, self.dispatch_seconds)
+            start += part
+            if start < count:
                 yield
 
     def summing(self, atlas: MapAtlas) -> Iterator[None]:

@@ -210,3 +210,11 @@ def test_idle_is_when_nothing_is_left() -> None:
     assert not SHOWN.is_idle(COARSE)
     for busy in ("building", "wish_is_due", "splatting", "tracing", "first_order"):
         assert not replace(SHOWN, **{busy: True}).is_idle(DONE), busy
+
+
+def test_the_first_picture_of_a_scene_comes_before_better_maps() -> None:
+    first = replace(OWED, is_coarse=False, owes_first=True)
+    schedule = replace(SHOWN, maps_are_coarse=True, tracing=True)
+    assert schedule.yields_to_camera(first)
+    assert run(schedule, Examined(first), now=9.0)[1] == []
+    assert run(schedule, Examined(replace(first, owes_first=False)), now=9.0)[1] == [Action.REFIT_MAPS]

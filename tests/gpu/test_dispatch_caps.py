@@ -1,0 +1,103 @@
+"""Where a device queues work, no dispatch or draw takes long: its portions shrink, and the light stays the same."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from spectrasplat.base.paths import shipped_scenes
+from spectrasplat.gpu import device_traits
+from spectrasplat.gpu.context import create_context
+from spectrasplat.gpu.device_traits import DeviceTraits
+from spectrasplat.gpu.dispatch_budget import DispatchBudget
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.settings import RenderSettings
+from spectrasplat.render.light_pass import LightPass, scene_buffers
+
+PHOTONS = 60_000
+SLOW = 1e-9
+"""Seconds that a dispatch may take: none does."""
+
+
+@pytest.fixture(scope="module")
+def queueing():
+    """A device that behaves like a GPU as far as work goes; its programs are the software renderer's."""
+    with create_context() as context:
+        traits = replace(context.traits, work_is_queued=True, batch_scale=1)
+    with device_traits.assumed(traits):
+        context = create_context()
+    yield context
+    context.release()
+
+
+def traced(context, name: str, seconds: float, method: str = "srd") -> LightPass:
+    scene = load_scene(shipped_scenes()[name])
+    settings = RenderSettings(width=96, height=54, photons=PHOTONS, method=method)
+    buffers = scene_buffers(context, scene, settings)
+    light = LightPass(context, scene, settings, buffers.features, buffers)
+    light.dispatch_seconds = light._splatting.dispatch_seconds = seconds
+    light.prepare()
+    for canvas in _canvases(light, seconds):
+        canvas.dispatch_seconds = seconds
+    light.begin(PHOTONS, 1)
+    sizes: list[int] = []
+    steps, splat = light.trace.steps, light.splatter.run
+    light.trace.steps = lambda piece, *rest: (sizes.append(piece.count), steps(piece, *rest))[1]  # type: ignore[method-assign]
+    light.splatter.run = lambda photons, count, *rest: (sizes.append(count), splat(photons, count, *rest))[1]  # type: ignore[method-assign]
+    for _ in range(2):
+        for _ in light.steps_until(0, PHOTONS, lambda: False):
+            pass
+    light.finish()
+    light.sizes = sizes  # type: ignore[attr-defined]
+    return light
+
+
+def _canvases(light: LightPass, seconds: float) -> list:
+    beams = light.beams
+    if beams is None:
+        return []
+    maps = light._maps
+    beams.draw_found(maps, 1.0)
+    maps.clear()
+    return [canvas.splatter for canvas in beams._canvases.values()]
+
+
+@pytest.mark.parametrize(("name", "method"), [("ball", "srd"), ("prism", "srd-photons"), ("prism", "srd")])
+def test_slow_devices_get_small_portions_and_the_same_light(queueing, name: str, method: str) -> None:
+    passes = [traced(queueing, name, seconds, method) for seconds in (1e3, SLOW)]
+    try:
+        freely, slowly = passes
+        assert len(slowly.sizes) > 4 * len(freely.sizes) or slowly.beams is not None
+        if slowly.beams is None:
+            assert min(slowly.sizes) <= 1024 and max(slowly.sizes[-8:]) <= 1024
+        if slowly.beams is not None:
+            (canvas,) = slowly.beams._canvases.values()
+            assert canvas.splatter._portion.units == 16
+        assert slowly.stats.photons == freely.stats.photons
+        for texture, other in zip(freely.atlas.total_textures, slowly.atlas.total_textures, strict=True):
+            sums, found = (np.frombuffer(t.read(), "f4").astype(float) for t in (texture, other))
+            assert np.abs(sums).max() > 0.0
+            assert np.sqrt(((sums - found) ** 2).mean()) < 2e-5 * np.sqrt((sums**2).mean())
+    finally:
+        for light in passes:
+            light.release()
+            light.buffers.release()
+
+
+def test_the_processor_has_no_caps(gl) -> None:
+    """Sums in another order would be rounded otherwise from run to run."""
+    light = traced(gl, "prism", SLOW, "srd-photons")
+    try:
+        assert light._splatting._part is None
+        assert light._portion.units == light.trace.batch
+    finally:
+        light.release()
+        light.buffers.release()
+
+
+def test_gpus_are_asked_for_short_camera_dispatches() -> None:
+    assert DeviceTraits().camera_dispatch_s <= 0.02
+    budget = DispatchBudget(1 << 16, 1 << 10, 1 << 20)
+    budget.learn(1 << 16, 2.0, 0.02)
+    assert budget.units == 1 << 10
