@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from ..model.features import Features
@@ -29,6 +29,8 @@ class FrameCost:
     trace: float
     splat: float
     camera: float
+    device: dict[str, float] = field(default_factory=dict)
+    """Of the same, by the device's own timers; empty where these do not work."""
 
     @property
     def all(self) -> float:
@@ -38,10 +40,12 @@ class FrameCost:
     @property
     def line(self) -> str:
         """For people."""
+        by_device = ", ".join(f"{name} {1e3 * spent:.2f}" for name, spent in self.device.items())
         return (
             f"{1e3 * self.all:.1f} ms: trace {1e3 * self.trace:.1f}, splat {1e3 * self.splat:.1f}, camera "
             f"{1e3 * self.camera:.1f}; {self.photons / max(self.trace, 1e-9) / 1e6:.2f} M photons/s traced, "
             f"{self.splats / max(self.splat, 1e-9) / 1e6:.2f} M splats/s"
+            + (f"; by the device's timers, ms: {by_device}" if by_device else "")
         )
 
 
@@ -70,6 +74,7 @@ def _frame(
 ) -> FrameCost:
     light.begin(photons, seed)
     before = light.stats.photons, light.stats.splats, light.stats.trace_seconds
+    on_device = dict(context.timers.seconds)
     context.finish()
     started = time.perf_counter()
     for _ in light.steps_until(0, photons, lambda: False):
@@ -83,5 +88,10 @@ def _frame(
     seen = time.perf_counter()
     trace = light.stats.trace_seconds - before[2]
     return FrameCost(
-        light.stats.photons - before[0], light.stats.splats - before[1], trace, lit - started - trace, seen - lit
+        light.stats.photons - before[0],
+        light.stats.splats - before[1],
+        trace,
+        lit - started - trace,
+        seen - lit,
+        context.timers.since(on_device),
     )

@@ -18,6 +18,7 @@ import numpy as np
 
 from ..gpu.context import Context, create_context
 from ..gpu.scene_buffers import SceneBuffers
+from ..gpu.shader import recorded
 from ..model.features import Features
 from ..model.geometry import primitives_round
 from ..model.geometry.bvh import build_bvh
@@ -38,6 +39,8 @@ from ..passes.emission_domain import emission_domain
 from ..passes.trace import Band, LatticeSlice, TracePass
 from ..render.light_pass import spectral_axis
 from . import splat_speed
+from .machine import clocks, compile_line, copied_bytes_per_second
+from .programs import unique
 
 TRIANGLES = 81_920
 LATTICE = 1 << 16
@@ -50,8 +53,12 @@ BLENDED_BYTES = 32
 def run(is_short: bool = False) -> Iterator[str]:
     """One line a figure, as each is measured. `is_short`: only what is measured in this process, with few splats."""
     with create_context() as context:
-        yield f"machine               {context.renderer}, OpenGL {context.version}"
-        dispersive, plain = _trace_rates(context)
+        yield f"machine               {context.renderer}, OpenGL {context.version}, {context.vendor}"
+        if known := clocks():
+            yield f"clocks                {known}"
+        with recorded() as programs:
+            dispersive, plain = _trace_rates(context)
+        yield f"compiled              {compile_line(unique(programs))}"
         yield (
             f"trace, 3 columns      {dispersive / 1e6:.3f} M photons/s through {TRIANGLES} triangles   (promised 0.40 "
             "on a 2-core llvmpipe)"
@@ -66,9 +73,10 @@ def run(is_short: bool = False) -> Iterator[str]:
         )
         yield f"                      {figures['draw_ratio']:.2f} of them once footprints are known   (promised 0.70)"
         fragments = 64e6 * figures["draw_m_per_s"]
+        blended, copied = fragments * BLENDED_BYTES, copied_bytes_per_second(context)
         yield (
-            f"blending              {fragments / 1e9:.3f} G fragments/s, {fragments * BLENDED_BYTES / 1e9:.1f} GB/s "
-            "read and written"
+            f"blending              {fragments / 1e9:.3f} G fragments/s, {blended / 1e9:.1f} GB/s read and written, "
+            f"{100 * blended / copied:.0f} % of the {copied / 1e9:.1f} GB/s that copying memory reaches"
         )
     yield f"tree                  {_tree_seconds():.3f} s for {TRIANGLES} triangles   (promised 0.5)"
     if is_short:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,10 +18,13 @@ import numpy as np
 
 from ..base.errors import UserError
 from ..edit.state import Selection
+from ..gpu.shader import recorded
 from ..passes.sample_picture import SamplePicture
 from ..ui.headless import HeadlessInterface
 from ..ui.session import Session
 from ..ui.viewer import Viewer, headless_viewer
+from .machine import clocks, compile_line
+from .programs import unique
 
 if TYPE_CHECKING:
     from ..gpu.context import Context
@@ -49,16 +52,19 @@ class Phase:
     """New ones: what is seen to move."""
     scale: float
     """Side of the picture shown in motion over the side asked for, on average."""
+    device_ms: dict[str, float] = field(default_factory=dict)
+    """Of a frame, by pass and by the device's own timers; empty where these do not work."""
 
     @property
     def line(self) -> str:
         """For the table."""
+        on_device = "".join(f"  {name} {spent:.2f} ms" for name, spent in self.device_ms.items())
         median, worst = np.percentile(self.frame_ms, [50, 95])
         return (
             f"{self.name:<24} {median:8.1f} ms {worst:8.1f} ms {1000 / median:8.1f} /s "
             f"{self.pictures_per_second:8.1f} /s "
             f"{self.photons_per_second / 1e6:8.3f} M/s "
-            f"{self.rays_traced:>12,} {100 * self.scale:6.0f} %"
+            f"{self.rays_traced:>12,} {100 * self.scale:6.0f} %{on_device}"
         )
 
 
@@ -66,8 +72,12 @@ def run(context: Context, scene: Path, size: tuple[int, int], seconds: float) ->
     """Lines of the report, as they are measured: `seconds` for each phase, a viewport of `size` pixels."""
     bench = _Bench(context, scene, size)
     try:
-        yield f"{scene.stem}, viewport {bench.viewport[0]}×{bench.viewport[1]}, {context.renderer}"
-        yield f"first picture after {bench.wait_for_picture():.2f} s"
+        yield f"{scene.stem}, viewport {bench.viewport[0]}×{bench.viewport[1]}, {context.renderer}, {context.version}"
+        if known := clocks():
+            yield known
+        with recorded() as programs:
+            seconds = bench.wait_for_picture()
+        yield f"first picture after {seconds:.2f} s; compiled {compile_line(unique(programs))}"
         heads = "".join(f" {head:>11}" for head in ("median", "95 %", "frames", "pictures"))
         yield f"{'':<24}{heads} {'photons':>12} {'rays traced':>12} {'side':>8}"
         yield bench.phase("accumulating", seconds, bench.rest).line
@@ -154,6 +164,7 @@ class _Bench:
         assert engine is not None
         version, pictures = engine.picture_version, 0
         before = self.session.picture.stats
+        on_device = dict(self._context.timers.seconds)
         started = time.perf_counter()
         while time.perf_counter() - started < seconds:
             act()
@@ -164,7 +175,9 @@ class _Bench:
             version = engine.picture_version
         elapsed = time.perf_counter() - started
         rays = self.session.picture.stats.rays_traced - before.rays_traced
-        return Phase(name, np.array(times), rays / elapsed, rays, pictures / elapsed, float(np.mean(scales)))
+        spent = self._context.timers.since(on_device)
+        device_ms = {name: 1e3 * seconds / len(times) for name, seconds in spent.items()}
+        return Phase(name, np.array(times), rays / elapsed, rays, pictures / elapsed, float(np.mean(scales)), device_ms)
 
     def rest(self) -> None:
         """Do nothing."""

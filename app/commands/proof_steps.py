@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import base64
 import io
-import shutil
-import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -76,22 +74,10 @@ def _doctor(_short: bool, _folder: Path) -> Iterator[Finding]:
 
 def _clocks() -> Iterator[Finding]:
     """What NVIDIA's own tool says, where it is there."""
-    tool = shutil.which("nvidia-smi")
-    if tool is None:
-        return
-    asked = "name,driver_version,clocks.sm,clocks.mem,clocks.max.sm,clocks.max.mem,memory.total,power.limit"
-    try:
-        done = subprocess.run(
-            [tool, f"--query-gpu={asked}", "--format=csv,noheader"],
-            capture_output=True,
-            text=True,
-            timeout=20,
-            check=False,
-        )
-    except (OSError, subprocess.TimeoutExpired) as error:
-        yield Finding("clocks", f"nvidia-smi does not answer ({error})")
-        return
-    yield Finding(f"nvidia-smi ({asked})", "; ".join(done.stdout.splitlines()) or done.stderr.strip()[:200])
+    from ..bench.machine import clocks
+
+    if said := clocks():
+        yield Finding("nvidia-smi", said)
 
 
 # -- programs -----------------------------------------------------------------------------

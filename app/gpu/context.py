@@ -20,6 +20,8 @@ from .limits import Limits
 if TYPE_CHECKING:
     import moderngl
 
+    from .pass_timers import PassTimers
+
 Backend = Literal["egl", "osmesa", "window"]
 """How a context was made; a window brings its own."""
 BACKENDS: tuple[Backend, ...] = ("egl", "osmesa")
@@ -65,6 +67,13 @@ class Context:
     def advice(self) -> str:
         """A sentence where a better GPU may be there than this one, and how to choose it; else ""."""
         return advice(self.renderer, self.is_software)
+
+    @cached_property
+    def timers(self) -> PassTimers:
+        """What the device itself took for each pass."""
+        from .pass_timers import PassTimers
+
+        return PassTimers(self.ctx, not self.is_software)
 
     def finish(self) -> None:
         """Wait until everything sent so far is done."""

@@ -534,8 +534,9 @@ class CameraPass:
         self._bind(maps)
         self._parameters_buffer.write(parameters.tobytes())
         start = time.perf_counter()
-        program.run(groups_x, groups_y)
-        self._ctx.memory_barrier()
+        with self.context.timers.timing("camera"):
+            program.run(groups_x, groups_y)
+            self._ctx.memory_barrier()
         self._ctx.finish()
         return time.perf_counter() - start
 

@@ -538,7 +538,11 @@ class LightPass:
         started = time.perf_counter()
         while True:
             try:
-                next(steps)
+                if self._pace.waits:
+                    with self.context.timers.timing("trace"):
+                        next(steps)
+                else:
+                    next(steps)
             except StopIteration as finished:
                 batch: Batch = finished.value
                 break

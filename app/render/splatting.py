@@ -93,19 +93,20 @@ class Splatting:
         while start < count:
             started = time.perf_counter()
             part = min(part_max, self._part.units if self._part else count, count - start)
-            maps.splatter.run(
-                photons,
-                part,
-                self._shown.variables,
-                tables.tables,
-                atlas,
-                maps.receivers,
-                smoothing,
-                self._shown.gains,
-                start * stride,
-                stride,
-                tables.reindex,
-            )
+            with self._context.timers.timing("splat"):
+                maps.splatter.run(
+                    photons,
+                    part,
+                    self._shown.variables,
+                    tables.tables,
+                    atlas,
+                    maps.receivers,
+                    smoothing,
+                    self._shown.gains,
+                    start * stride,
+                    stride,
+                    tables.reindex,
+                )
             if self._pace.waits or self._part:
                 self._context.finish()
             took = time.perf_counter() - started

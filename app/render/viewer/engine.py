@@ -178,6 +178,7 @@ class LiveEngine:
         self._times = dict.fromkeys(self._times, 0.0)
         if self._wanted is None:
             return
+        on_device = dict(self.context.timers.seconds)
         try:
             self._tell(events.FrameBegan(interacting))
             waited = self.schedule.wish_is_due and self.schedule.finishes_preview(self._camera)
@@ -191,6 +192,7 @@ class LiveEngine:
             self._building = None
             self.problem = str(error)
             self._tell(events.Failed())
+        self._times |= self.context.timers.since(on_device)
 
     def _follow(self, budget_s: float) -> None:
         """Bring what is shown nearer to what is wanted."""

@@ -1,0 +1,75 @@
+"""Timer queries: used where they tell the truth, and never on a software renderer."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+from spectrasplat.bench.machine import compile_line, copied_bytes_per_second
+from spectrasplat.gpu import pass_timers
+from spectrasplat.gpu.pass_timers import PassTimers
+
+
+class Query:
+    """A timer that says what it is told to."""
+
+    def __init__(self, elapsed_ns: float) -> None:
+        self.elapsed = elapsed_ns
+
+    def __enter__(self) -> None:
+        self.started = time.perf_counter()
+
+    def __exit__(self, *_exception: object) -> None: ...
+
+
+class Device:
+    def __init__(self, elapsed_ns: float) -> None:
+        self.elapsed_ns = elapsed_ns
+
+    def query(self, *, time: bool) -> Query:
+        return Query(self.elapsed_ns)
+
+    def buffer(self, reserve: int) -> Device:
+        return self
+
+    def copy_buffer(self, *_buffers: object) -> None:
+        time.sleep(0.001)
+
+    def finish(self) -> None: ...
+
+    def release(self) -> None: ...
+
+
+@pytest.mark.parametrize(("elapsed_ns", "works"), [(5e6, True), (0, False), (1e12, False)])
+def test_timers_are_believed_where_they_can_be_right(elapsed_ns: float, works: bool) -> None:
+    timers = PassTimers(Device(elapsed_ns), True)  # type: ignore[arg-type]
+    assert timers.work is works
+    before = dict(timers.seconds)
+    for _ in range(2):
+        with timers.timing("trace"):
+            pass
+    assert timers.since(before) == ({"trace": pytest.approx(0.01)} if works else {})
+
+
+def test_a_software_renderer_has_none(gl) -> None:
+    assert not gl.timers.work
+    with gl.timers.timing("camera"):
+        pass
+    assert gl.timers.seconds == {}
+
+
+def test_real_queries_are_read(gl, monkeypatch) -> None:
+    """Whatever they say: that the calls are right."""
+    monkeypatch.setattr(pass_timers.PassTimers, "_tells_truth", lambda self: True)
+    timers = PassTimers(gl.ctx, True)
+    source, target = (gl.ctx.buffer(reserve=1 << 16) for _ in range(2))
+    with timers.timing("copy"):
+        gl.ctx.copy_buffer(target, source)
+    assert timers.seconds["copy"] >= 0.0
+    source.release()
+    target.release()
+
+
+def test_bandwidth_and_compile_times_are_told(gl) -> None:
+    assert 1e8 < copied_bytes_per_second(gl, 2) < 1e13
+    assert compile_line([]).startswith("0 programs")
