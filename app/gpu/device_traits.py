@@ -33,8 +33,8 @@ class DeviceTraits:
     """Rays in flight, in units of the default batch."""
     work_is_queued: bool = True
     """A command only queues work: whoever keeps a deadline must wait for the device."""
-    camera_dispatch_s: float = DISPATCH_S
-    """What a dispatch of the camera's pass should take where nobody waits for frames."""
+    dispatch_s: float = DISPATCH_S
+    """What a dispatch should take where nobody waits for frames."""
     viewer_batch: int = 1 << 18
     """Rays of a batch while somebody watches …"""
     viewer_first_photons: int = 1 << 20
@@ -68,7 +68,7 @@ class DeviceTraits:
             queue_read_steps=1,
             batch_scale=1,
             work_is_queued=False,
-            camera_dispatch_s=0.15,
+            dispatch_s=0.15,
             viewer_batch=1 << 14,
             viewer_first_photons=1 << 14,
             viewer_largest_photons=1 << 22,

@@ -139,7 +139,7 @@ class CameraPass:
         self._within_rows = False
         """Some listed pixels of a band of rows have this sample, others are still to get it."""
         self._map_targets = maps.targets
-        self.dispatch_seconds = context.traits.camera_dispatch_s
+        self.dispatch_seconds = context.traits.dispatch_s
         """What one dispatch should take; rows are divided to fit."""
         features = scene.features
         self.disperses = layer != "caustic" and features.camera_disperses

@@ -48,7 +48,6 @@ RGB_NM = (612.0, 549.0, 465.0)
 """Wavelengths at which glass and mirrors tint linear red, green and blue."""
 SMOOTHING = 1.5
 """Texels over which what came by glass and mirrors is averaged: neighbours follow other paths."""
-TARGET_SECONDS = 0.1
 _GROUP = 64
 _BIND_PLACES, _BIND_ASKED, _BIND_SUMS, _UNIT_ENVIRONMENT = 8, 9, 10, 0
 _KEY = 70
@@ -176,8 +175,10 @@ class EnvironmentLightPass:
         wanted = max(FIRST_DIRECTIONS, 4 * self.shown)
         return self.asked > self.shown and (self.asked >= min(wanted, self.total) or self.is_done)
 
-    def steps(self, seconds: float = TARGET_SECONDS) -> Iterator[float]:
-        """Ask all that is left, pausing after every dispatch of about so many seconds with the share done."""
+    def steps(self, seconds: float | None = None) -> Iterator[float]:
+        """Ask all that is left, pausing after every dispatch of about so many seconds with the share done; None: as
+        many as suit the device."""
+        seconds = seconds or self._context.traits.dispatch_s
         while not self.is_done:
             self._ask(min(self._budget.units, self.total - self.asked), seconds)
             yield self.asked / self.total

@@ -33,16 +33,16 @@ RUNS = 5
 """Of a process; there are two, with one thread and with two."""
 _HASHES = """
 import hashlib, sys
+from dataclasses import replace
 import numpy as np
 from pathlib import Path
 from spectrasplat.gpu.context import create_context
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.passes import camera
 from spectrasplat.render.still import render
 context, scene = create_context(), load_scene(Path(sys.argv[1]))
 for run in range(int(sys.argv[2])):
-    camera._TARGET_SECONDS = (0.15, 0.02, 1.0, 0.003, 0.4)[run % 5]
+    context.traits = replace(context.traits, dispatch_s=(0.15, 0.02, 1.0, 0.003, 0.4)[run % 5])
     settings = RenderSettings(width=96, height=54, photons=20_000, spp=4, seed=7, tally=True)
     result = render(scene, settings, context=context)
     assert result.stats.camera_pass.fallbacks["loops_ended"] == 0, result.stats.camera_pass.fallbacks

@@ -97,7 +97,7 @@ def test_the_processor_has_no_caps(gl) -> None:
 
 
 def test_gpus_are_asked_for_short_camera_dispatches() -> None:
-    assert DeviceTraits().camera_dispatch_s <= 0.02
+    assert DeviceTraits().dispatch_s <= 0.02
     budget = DispatchBudget(1 << 16, 1 << 10, 1 << 20)
     budget.learn(1 << 16, 2.0, 0.02)
     assert budget.units == 1 << 10

@@ -3,6 +3,7 @@ the camera, and both at once. (Threads and dispatches alone change no bit: `test
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,6 @@ import pytest
 from spectrasplat.gpu.context import Context
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.passes import camera
 from spectrasplat.render.light_plan import SMALLEST_BATCH
 from spectrasplat.render.still import render
 
@@ -28,7 +28,7 @@ PHOTONS = 60_000
 def pictures(gl: Context, path: Path, monkeypatch: pytest.MonkeyPatch) -> list[np.ndarray]:
     scene, found = load_scene(path), []
     for batch, seconds in zip(BATCHES, SECONDS, strict=True):
-        monkeypatch.setattr(camera, "_TARGET_SECONDS", seconds)
+        monkeypatch.setattr(gl, "traits", replace(gl.traits, dispatch_s=seconds))
         settings = RenderSettings(width=96, height=54, photons=PHOTONS, spp=4, seed=7, batch=batch)
         found.append(render(scene, settings, context=gl).rgb.astype(float))
     return found
