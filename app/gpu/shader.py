@@ -19,9 +19,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from ..base import paths
-from .dead_code import stripped
 from .glsl_conditionals import Line
 from .schema import Struct
+from .stripped_store import stripped
 
 if TYPE_CHECKING:
     import moderngl
