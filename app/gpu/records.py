@@ -70,12 +70,13 @@ def photon_record(groups: int, hero: bool = False) -> Struct:
 PLACEMENT = Struct(
     "Placement",
     (
-        Field("row_u", "vec4", "texel x = dot(row_u.xyz, position) + row_u.w; position in GPU space"),
-        Field("row_v", "vec4", "texel y likewise"),
+        Field("row_u", "vec4", "homogeneous texel x: dot(row_u.xyz, position) + row_u.w; position in GPU space"),
+        Field("row_v", "vec4", "y likewise"),
+        Field("row_w", "vec4", "the weight W by which both are divided, likewise; positive where anything is drawn"),
         Field("rect", "vec4", "x0, y0, x1, y1 in atlas texels: nothing is drawn outside"),
-        Field("texel_area", "float", "scene unit² per texel"),
+        Field("texel_area", "float", "scene unit² per texel where W is 1, times W³ elsewhere"),
         Field("next", "uint", "the coarser placement of the same receiver, or NONE"),
-        Field("kind", "uint", "0 flat window, 1 chart triangle"),
+        Field("kind", "uint", "0 flat window, 1 chart triangle, 2 flat window on a picture's pixels"),
         Field("blurred", "uint", "the same window in texels four times as wide, for broad splats, or NONE"),
     ),
 )

@@ -14,7 +14,7 @@ import numpy as np
 from ..beams.polygons import BeamPolygons
 from ..gpu.beam_tables import CurveParts
 from ..gpu.schema import Field, Struct
-from .map_layout import PlaneFrame
+from .texel_map import TexelMap
 
 BEAM = Struct(
     "BeamRecord",
@@ -26,6 +26,8 @@ BEAM = Struct(
         Field("place", "vec2", "where the band begins on its curve, and its length there; samples"),
         Field("curve_row", "float", "the curve of target 0; the other targets' follow"),
         Field("edge_count", "float", ""),
+        Field("perspective", "vec2", "change of the texel map's 1 / W per texel, relative to that at the anchor"),
+        Field("reserved", "vec2", ""),
     ),
     texels=True,
 )
@@ -65,26 +67,6 @@ BROAD = 4.0
 
 
 @dataclass(frozen=True)
-class TexelMap:
-    """From a receiver's plane (GPU units) to the atlas (texels)."""
-
-    matrix: np.ndarray
-    """float64 (2, 2)."""
-    offset: np.ndarray
-    """float64 (2,)."""
-
-    @classmethod
-    def of(cls, placement: np.void, frame: PlaneFrame) -> TexelMap:
-        """Of one PLACEMENT record."""
-        rows = np.stack([placement["row_u"], placement["row_v"]]).astype(np.float64)
-        return cls(rows[:, :3] @ frame.axes.T, rows[:, :3] @ frame.origin + rows[:, 3])
-
-    def texels(self, points: np.ndarray) -> np.ndarray:
-        """(..., 2) points of the plane, in atlas texels."""
-        return points @ self.matrix.T + self.offset
-
-
-@dataclass(frozen=True)
 class PackedBeams:
     """What is uploaded for one draw."""
 
@@ -115,10 +97,41 @@ def _rows_of(rows: np.ndarray, first: np.ndarray, chosen: np.ndarray) -> tuple[n
     return rows[picked], np.concatenate([[0], np.cumsum(sizes)])
 
 
-def hull_boxes(polygons: BeamPolygons, corners: np.ndarray) -> np.ndarray:
-    """(n, 4): x0, y0, x1, y1 of each hull, of all hulls' `corners` (H, 2); every hull has corners."""
-    start = polygons.hull_start[:-1]
-    return np.concatenate([np.minimum.reduceat(corners, start), np.maximum.reduceat(corners, start)], axis=1)
+def texel_hulls(
+    polygons: BeamPolygons, chosen: np.ndarray, to_texels: TexelMap
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Which of the `chosen` (n,) lie in front of the camera whose pixels are texels (all of them in maps along a
+    plane's own axes), their hulls' corners (H, 2) in texels and where each hull begins."""
+    rows, counts = ragged(polygons.hull_start, chosen)
+    hulls = polygons.hulls[rows]
+    if not to_texels.is_affine:
+        hulls, counts = _in_front(hulls, counts, to_texels)
+        chosen, counts = chosen[counts > 0], counts[counts > 0]
+    return chosen, to_texels.texels(hulls), np.cumsum(counts) - counts
+
+
+def _in_front(hulls: np.ndarray, counts: np.ndarray, to_texels: TexelMap) -> tuple[np.ndarray, np.ndarray]:
+    """Convex polygons of `counts` corners each, cut where the weight becomes too little."""
+    depth = to_texels.weights(hulls) - to_texels.least_weight
+    is_in = depth >= 0.0
+    if is_in.all():
+        return hulls, counts
+    first = np.repeat(np.cumsum(counts) - counts, counts)
+    nth = np.arange(len(hulls)) - first
+    following = first + (nth + 1) % np.repeat(counts, counts)
+    crosses = is_in != is_in[following]
+    kept = is_in.astype(int) + crosses
+    rows = np.repeat(np.arange(len(hulls)), kept)
+    is_border = crosses[rows] & (np.append(rows[1:], -1) != rows)
+    share = np.where(is_border, depth[rows] / np.where(is_border, depth[rows] - depth[following[rows]], 1.0), 0.0)
+    cut = hulls[rows] + share[:, None] * (hulls[following[rows]] - hulls[rows])
+    owner = np.repeat(np.arange(len(counts)), counts)
+    return cut, np.bincount(owner, kept, len(counts)).astype(np.int64)
+
+
+def hull_boxes(hulls: np.ndarray, first: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest corner (n, 2) of hulls that begin at `first`."""
+    return np.minimum.reduceat(hulls, first), np.maximum.reduceat(hulls, first)
 
 
 def levels(polygons: BeamPolygons, chosen: np.ndarray, to_texels: TexelMap) -> np.ndarray:
@@ -127,11 +140,12 @@ def levels(polygons: BeamPolygons, chosen: np.ndarray, to_texels: TexelMap) -> n
     A polygon far narrower than its penumbrae shows their mean only; of another the sharpest edge counts."""
     rows, counts = ragged(polygons.edge_start, chosen)
     first = np.cumsum(counts) - counts
-    softness = polygons.edges[rows][:, [3, 7]] * np.sqrt(abs(np.linalg.det(to_texels.matrix)))
+    density = to_texels.density(polygons.centre[chosen])
+    softness = polygons.edges[rows][:, [3, 7]] * np.repeat(np.sqrt(density), counts)[:, None]
     windows = np.sqrt(1.0 + 4.0 * softness**2)
     mean = np.add.reduceat(windows.mean(axis=1), first) / counts
     widest = np.maximum.reduceat(windows.max(axis=1), first)
-    area = polygons.area[chosen] * abs(np.linalg.det(to_texels.matrix))
+    area = polygons.area[chosen] * density
     window = np.where(np.sqrt(area) < WIDE * widest, mean, np.minimum.reduceat(windows.min(axis=1), first))
     return np.maximum(np.floor(np.log2(window / BROAD)), 0.0).astype(np.int64)
 
@@ -144,12 +158,17 @@ def packed(
     curves: CurveParts,
 ) -> Iterator[PackedBeams]:
     """The `chosen` polygons (n,), all on one window, a draw for each kind of program that they need. `curves` of these;
-    `energy_scale`: from flux per scene unit² to what a whole texel holds."""
-    hull_rows, hull_counts = ragged(polygons.hull_start, chosen)
-    hulls = to_texels.texels(polygons.hulls[hull_rows])
-    hull_first = np.cumsum(hull_counts) - hull_counts
-    low, high = np.minimum.reduceat(hulls, hull_first), np.maximum.reduceat(hulls, hull_first)
+    `energy_scale`: from flux per scene unit² to what a whole texel holds where its weight is 1. All must be in front
+    (`texel_hulls`)."""
+    _, hulls, hull_first = texel_hulls(polygons, chosen, to_texels)
+    low, high = hull_boxes(hulls, hull_first)
+    inverse = to_texels.inverse
     anchor = np.floor(0.5 * (low + high))
+    if not to_texels.is_affine:
+        # A corner of the box may be beyond the horizon, no corner of the polygon is.
+        corners = np.floor(hulls[hull_first])
+        beyond = _homogeneous(anchor) @ inverse[2] < 0.1 * (_homogeneous(corners) @ inverse[2])
+        anchor = np.where(beyond[:, None], corners, anchor)
     diagonal = np.linalg.norm(high - low, axis=1)
 
     edge_rows, counts = ragged(polygons.edge_start, chosen)
@@ -158,22 +177,29 @@ def packed(
     is_line = (polygons.x_hi <= polygons.x_lo)[chosen]
     start, middle, end = polygons.density[chosen].T
     middle, end = np.where(is_line, start, middle), np.where(is_line, start, end)
-    lines, moves = _lines(polygons.edges[edge_rows], to_texels, anchor[owner], is_line[owner], 0.5 * diagonal[owner])
+    weight = to_texels.weights(polygons.centre[chosen])
+    lines, moves = _lines(
+        polygons.edges[edge_rows], inverse, anchor[owner], weight[owner], is_line[owner], 0.5 * diagonal[owner]
+    )
     motion = np.maximum.reduceat(moves, first)
-    area = polygons.area[chosen] * abs(np.linalg.det(to_texels.matrix))
+    area = polygons.area[chosen] * to_texels.density(polygons.centre[chosen])
     width = area / np.maximum(diagonal - motion, np.sqrt(area) + 1e-9)
     windows, widest = _windows(lines[..., 3], first, owner, width)
     is_wide = width > WIDE * widest
     edges = _edges(lines[..., :3], windows)
 
     records = BEAM.zeros(len(chosen))
-    inverse = np.linalg.inv(to_texels.matrix)
-    slope = polygons.slope[chosen] @ inverse
-    level = 1.0 + np.sum(slope * (anchor - to_texels.texels(polygons.centre[chosen])), axis=1)
+    # With q = (u, v, 1): 1 / W = r . q, the density's level = l . q / r . q, a texel's area goes as (r . q)^-3.
+    r = inverse[2]
+    slope = polygons.slope[chosen]
+    level_rows = slope @ inverse[:2] + (1.0 - np.sum(slope * polygons.centre[chosen], axis=1))[:, None] * r
+    at_anchor = _homogeneous(anchor) @ r
+    level = np.sum(level_rows * _homogeneous(anchor), axis=1) / at_anchor
     level = np.maximum(level, LEAST_LEVEL)
     parabola = np.stack([start, -3.0 * start + 4.0 * middle - end, 2.0 * (start - 2.0 * middle + end)], axis=1)
-    records["anchor"], records["slope"] = anchor, slope / level[:, None]
-    records["density"] = parabola * (energy_scale * level)[:, None]
+    records["anchor"], records["slope"] = anchor, level_rows[:, :2] / (level * at_anchor)[:, None]
+    records["perspective"] = r[:2] / at_anchor[:, None]
+    records["density"] = parabola * (energy_scale * level / at_anchor**3)[:, None]
     motion = motion / widest
     nodes = np.ceil(motion / np.clip(0.25 * width / widest, FINEST_STEP, WIDEST_STEP))
     records["nodes"] = np.where(
@@ -207,15 +233,28 @@ def packed(
         )
 
 
+def _homogeneous(texels: np.ndarray) -> np.ndarray:
+    """(n, 2) -> (n, 3), a 1 after each."""
+    return np.concatenate([texels, np.ones((len(texels), 1))], axis=1)
+
+
 def _lines(
-    edges: np.ndarray, to_texels: TexelMap, anchor: np.ndarray, is_line: np.ndarray, radius: np.ndarray
+    edges: np.ndarray,
+    inverse: np.ndarray,
+    anchor: np.ndarray,
+    weight: np.ndarray,
+    is_line: np.ndarray,
+    radius: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Edges about `anchor` (E, 2 ends, 4): x, y, c and softness in texels; and how far each moves over the band within
-    `radius`, texels."""
-    inverse = np.linalg.inv(to_texels.matrix)
-    a = edges.reshape(-1, 2, 4)[..., :2] @ inverse
-    c = edges.reshape(-1, 2, 4)[..., 2] + np.sum(a * (anchor - to_texels.offset)[:, None], axis=-1)
-    lines = np.concatenate([a, c[..., None], edges.reshape(-1, 2, 4)[..., 3:]], axis=-1)
+    `radius`, texels. A line seen by a camera is a line, and of two lines' mixture the same mixture: `inverse` as in
+    `TexelMap`, with the penumbra as wide as it is where the polygon's `weight` is."""
+    ends = edges.reshape(-1, 2, 4)
+    rows = ends[..., :3] @ inverse
+    a = rows[..., :2]
+    c = np.sum(a * anchor[:, None], axis=-1) + rows[..., 2]
+    softness = ends[..., 3] / weight[:, None]
+    lines = np.concatenate([a, c[..., None], softness[..., None]], axis=-1)
     # One factor for both ends: the line in between is a mixture of the two as they are.
     lines *= (2.0 / np.linalg.norm(a, axis=-1).sum(axis=1))[:, None, None]
     lines[is_line, 1] = lines[is_line, 0]

@@ -17,7 +17,8 @@ from ..gpu import shader
 from ..gpu.dispatch_budget import DISPATCH_S, DispatchBudget
 from ..gpu.records import NONE
 from ..gpu.schema import Field, Struct
-from .beam_records import BEAM, PackedBeams, TexelMap, hull_boxes, levels, packed
+from .beam_records import BEAM, PackedBeams, hull_boxes, levels, packed, texel_hulls
+from .texel_map import TexelMap
 from .variants import beam_defines
 
 if TYPE_CHECKING:
@@ -25,7 +26,8 @@ if TYPE_CHECKING:
 
     from ..gpu.beam_tables import BeamTables
     from .map_atlas import MapAtlas
-    from .map_layout import MapLayout, PlaneFrame
+    from .map_layout import MapLayout
+    from .plane_frame import PlaneFrame
 
 GROUP = 1 << 11
 """Polygons that are uploaded and drawn at a time: a software renderer sorts all of them into tiles before it draws."""
@@ -143,25 +145,29 @@ def _windows(
 ) -> Iterator[tuple[int, int, np.ndarray]]:
     """(placement, receiver, polygons to draw there): those that touch its rectangle, and in a coarser window only what
     is not all inside the finer one, as for splats."""
-    boxes = hull_boxes(polygons, polygons.hulls)
     for receiver in np.unique(polygons.receiver):
+        frame = frames[int(receiver)]
         chosen = np.flatnonzero(polygons.receiver == receiver)
         placement = int(layout.receivers[receiver]["placement"])
         while placement != NONE and len(chosen):
             record = layout.placements[placement]
-            corners = TexelMap.of(record, frames[int(receiver)]).texels(_corners(boxes[chosen]))
-            low, high = corners.min(axis=1), corners.max(axis=1)
+            to_texels = TexelMap.of(record, frame)
+            found, hulls, first = texel_hulls(polygons, chosen, to_texels)
+            low, high = hull_boxes(hulls, first) if len(found) else (np.zeros((0, 2)), np.zeros((0, 2)))
             rect = record["rect"]
             touches = np.all((high > rect[:2]) & (low < rect[2:]), axis=1)
             if touches.any():
-                for at, part in _by_width(polygons, chosen[touches], placement, frames[int(receiver)], layout):
+                for at, part in _by_width(polygons, found[touches], placement, frame, layout):
                     yield at, int(receiver), part
             following = int(record["next"])
             if following != NONE:
                 # The coarse map is read outside the fine window: up to its border, plus what a bilinear lookup reaches.
-                margin = 3.0 * np.sqrt(layout.placements[following]["texel_area"] / record["texel_area"])
+                corners = to_texels.points(rect[[[0, 1], [2, 1], [0, 3], [2, 3]]])
+                corners = corners[np.isfinite(corners).all(axis=1)]
+                coarse = TexelMap.of(layout.placements[following], frame).longest_step(corners).min()
+                margin = 3.0 * to_texels.longest_step(corners).max() / coarse
                 inside = np.all((low - margin > rect[:2]) & (high + margin < rect[2:]), axis=1)
-                chosen = chosen[~inside]
+                chosen = np.setdiff1d(chosen, found[inside], assume_unique=True)
             placement = following
 
 
@@ -178,8 +184,3 @@ def _by_width(
         if is_here.any():
             yield placement, chosen[is_here]
         chosen, level, placement = chosen[~is_here], level[~is_here] - 1, wider
-
-
-def _corners(boxes: np.ndarray) -> np.ndarray:
-    """(n, 4): x0, y0, x1, y1 -> (n, 4, 2)."""
-    return boxes[:, [0, 1, 2, 1, 0, 3, 2, 3]].reshape(-1, 4, 2)

@@ -32,7 +32,7 @@ from .environment_light import without_light
 from .listed_pixels import GROUP, ListedPixels
 from .picture_channels import Channels
 from .picture_sums import PictureSums
-from .pixel_lattice import LOOKS, is_in_strips, looks_lattice, pixel_lattice, shared_places
+from .pixel_lattice import LOOKS, cells_of, is_in_strips, looks_lattice, pixel_lattice, shared_places
 from .screen_beams import MOST_ENTRIES, ScreenBeams
 from .spectrum_choice import PilotRender, Spectrum, choosing_spectrum, grid_of
 from .variants import (
@@ -294,6 +294,8 @@ class CameraPass:
         if before:
             for share in self._draw_beams(parameters, samples, maps):
                 yield before * share
+        if not is_in_strips(samples, sample_offset):
+            parameters["cells"] = cells_of(samples * int(parameters["primary_samples"][0]))
         looks = np.zeros((samples, LOOKS, 2))
         if parameters["primary_samples"][0] > 1:
             looks = looks_lattice(samples, sample_offset)
@@ -506,7 +508,7 @@ class CameraPass:
         taken["survey_at"] = self._listed.survey_at(width * height)
         # The looks tile the pixel: what they are averaged over is then all of it, and nothing twice.
         columns, rows = _SURVEY_GRID
-        taken["sample_side"] = SURVEY_SAMPLES**-0.5
+        taken["sample_side"], taken["cells"] = SURVEY_SAMPLES**-0.5, 0.0
         taken["pixel_width"], taken["pixel_height"] = np.sqrt(rows / columns), np.sqrt(columns / rows)
         tiles = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1).reshape(-1, 2)
         looks = ((tiles + 0.5) / _SURVEY_GRID).reshape(SURVEY_SAMPLES, -1, 4)

@@ -72,6 +72,8 @@ CAMERA_PARAMETERS = Struct(
         Field("survey", "uint", "0: none; 1: this sample is one of a survey; 2: even pixels keep what a survey found"),
         Field("survey_at", "uint", "where the survey's pixels begin, words of the list"),
         Field("survey_gain", "float", "share of a survey that one of its samples is"),
+        Field("cells", "vec2", "columns and rows of a pixel's cells, one for each of a launch's looks; 0: none"),
+        Field("reserved", "vec2"),
     ),
 )
 

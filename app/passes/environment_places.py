@@ -17,7 +17,8 @@ from ..gpu.tiles import pack
 from ..model.contacts import world_bounds
 from ..model.features import is_flat
 from ..model.geometry.charts import ChartAtlas, build_charts
-from .map_layout import PlaneFrame, Window, plane_frame
+from .map_layout import Window
+from .plane_frame import PlaneFrame, plane_frame
 
 FINE_TEXELS, COARSE_TEXELS, CHART_TEXELS = 104 * 104, 40 * 40, 88 * 88
 """Of a flat receiver's windows, each side, and of a curved one."""

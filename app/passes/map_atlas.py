@@ -18,29 +18,31 @@ if TYPE_CHECKING:
 
     from ..gpu.tiles import Tile
 
-KIND_FLAT, KIND_CHART = 0, 1
+KIND_FLAT, KIND_CHART, KIND_PICTURE = 0, 1, 2
 
 
 def placement_rows(
     tile: Tile, world_to_texel: np.ndarray, texel_area: np.ndarray | float, rects: np.ndarray | None = None
 ) -> np.ndarray:
-    """Chart placements, one a triangle: `world_to_texel` (n, 2, 4) or (2, 4) maps GPU space to the tile's own texels.
+    """Placements: `world_to_texel` maps GPU space to the tile's own texels, (n, 2, 4) of charts, one a triangle, (2, 4)
+    of a flat window, (3, 4) of one on a picture's pixels, whose texels are the first two rows' over the last one's.
 
     `rects` (n, 4): the part of the tile each may draw to, in its own texels; None is all of it.
-    Returns PLACEMENT records whose `next` is NONE and whose kind is flat for a single (2, 4), chart otherwise.
+    `texel_area`: scene unit², where the last row is 1. Returns PLACEMENT records whose `next` is NONE.
     """
     rows = np.asarray(world_to_texel, np.float64)
     flat = rows.ndim == 2
-    rows = np.array(rows.reshape(-1, 2, 4))
-    rows[:, :, 3] += (tile.x, tile.y)
+    rows = rows.reshape(-1, *rows.shape[-2:])
+    weight = rows[:, 2] if rows.shape[1] == 3 else np.broadcast_to([0.0, 0.0, 0.0, 1.0], (len(rows), 4))
     records = PLACEMENT.zeros(len(rows))
-    records["row_u"], records["row_v"] = rows[:, 0], rows[:, 1]
+    records["row_u"], records["row_v"] = rows[:, 0] + tile.x * weight, rows[:, 1] + tile.y * weight
+    records["row_w"] = weight
     whole = np.array([[0.0, 0.0, tile.width, tile.height]])
     records["rect"] = (whole if rects is None else np.asarray(rects, np.float64)) + (tile.x, tile.y, tile.x, tile.y)
     records["texel_area"] = texel_area
     records["next"] = NONE
     records["blurred"] = NONE
-    records["kind"] = KIND_FLAT if flat else KIND_CHART
+    records["kind"] = KIND_CHART if not flat else KIND_PICTURE if rows.shape[1] == 3 else KIND_FLAT
     return records
 
 

@@ -1,13 +1,13 @@
 """Where on the receivers the caustic maps lie, fitted to where pilot photons landed.
 
-A flat receiver gets a coarse window over everything that lands on it and, where most of the light
-falls on (or the camera sees) a small part of that, a fine window inside. A curved receiver gets
-charts. All of them are tiles of one atlas.
+A flat receiver gets a coarse window over everything that lands on it and a fine one inside: for a picture that is kept
+on the camera's own pixels, for one that changes where most of the light falls on (or the camera sees) a small part of
+the plane. A curved receiver gets charts. All of them are tiles of one atlas.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +20,8 @@ from ..model.camera_rays import camera_frame, camera_rays
 from ..model.features import is_flat
 from ..model.scene import Camera, Scene
 from .map_atlas import placement_rows
+from .picture_window import PictureWindow, picture_window
+from .plane_frame import PlaneFrame, plane_frame
 
 if TYPE_CHECKING:
     from ..model.geometry.charts import ChartAtlas
@@ -47,6 +49,9 @@ class Fineness:
     """Longest sides of fine windows, texels, …"""
     coarse: int
     """… and of coarse ones."""
+    in_register: int = 0
+    """Texels along a pixel's side, at most, of windows on the picture's own pixels; 0: none is made, since each view
+    asks for others."""
 
     @property
     def least_pixels(self) -> float:
@@ -56,12 +61,13 @@ class Fineness:
 
     def times(self, factor: float) -> Fineness:
         """Coarser by `factor` below 1."""
-        return Fineness(self.texels_per_pixel * factor, round(self.fine * factor), round(self.coarse * factor))
+        fewer = round(self.fine * factor), round(self.coarse * factor)
+        return replace(self, texels_per_pixel=self.texels_per_pixel * factor, fine=fewer[0], coarse=fewer[1])
 
 
 LIVE = Fineness(2.0, 2048, 768)
 """Of a picture that somebody waits for."""
-STILL = Fineness(4.0, 3072, 1024)
+STILL = Fineness(4.0, 3072, 1024, 2)
 """Of one that is kept. `brilliant` at 240×135, beams alone: nRMSE 0.129 with 2 texels a pixel, 0.072 with 3, 0.046 with
 4, 0.036 with 6, at the same time but for the memory."""
 _SHRINK = 0.85
@@ -93,18 +99,6 @@ class Window:
 
 
 @dataclass(frozen=True)
-class PlaneFrame:
-    """A flat receiver's plane: p = origin + u axes[0] + v axes[1]."""
-
-    origin: np.ndarray
-    axes: np.ndarray
-
-    def project(self, points: np.ndarray) -> np.ndarray:
-        """Plane coordinates (..., 2) of GPU-space points."""
-        return (points - self.origin) @ self.axes.T
-
-
-@dataclass(frozen=True)
 class MapLayout:
     """Everything the atlas and the lookups need; `tiles[receiver]` lists each window's finest texels, fine window
     first."""
@@ -113,20 +107,12 @@ class MapLayout:
     placements: np.ndarray
     receivers: np.ndarray
     tiles: dict[int, list[Tile]]
-    windows: dict[int, list[Window]]
+    windows: dict[int, list[Window | PictureWindow]]
     charts: dict[int, ChartAtlas]
     folds: tuple[tuple[Tile, Tile], ...]
     """(wider texels, finer texels) of the same window, in the order in which they are added up."""
-
-
-def plane_frame(points: np.ndarray) -> PlaneFrame:
-    """The frame of coplanar `points`; its axes follow the coordinate axes where they can."""
-    centre = points.mean(axis=0)
-    normal = np.linalg.svd(points - centre, full_matrices=False)[2][2]
-    guide = np.eye(3)[0] if abs(normal[0]) < 0.9 else np.eye(3)[1]
-    first = guide - normal * (guide @ normal)
-    first /= np.linalg.norm(first)
-    return PlaneFrame(centre, np.stack([first, np.cross(normal, first)]))
+    frames: dict[int, PlaneFrame] = field(default_factory=dict)
+    """Of flat receivers."""
 
 
 def layout_maps(
@@ -165,7 +151,7 @@ def _layout_maps(
     fineness: Fineness,
 ) -> MapLayout:
     sizes: list[tuple[int, int]] = []
-    plans: list[tuple[int, PlaneFrame | None, list[Window], ChartAtlas | None]] = []
+    plans: list[tuple[int, PlaneFrame | None, list[Window | PictureWindow], ChartAtlas | None]] = []
     for receiver, object_index in enumerate(buffers.receivers):
         item = scene.objects[object_index]
         points = buffers.space.to_gpu(buffers.world_meshes[object_index].vertices)
@@ -173,24 +159,21 @@ def _layout_maps(
         if is_flat(item):
             frame = plane_frame(points)
             extent = _extent(frame.project(points))
-            seen_in = None if map_receiver is not None else picture
-            windows = _flat_windows(scene.camera, buffers, frame, extent, landed, seen_in, fineness.least_pixels)
+            windows: list[Window | PictureWindow]
             if receiver == map_receiver:
-                windows = [
-                    _with_aspect(
-                        windows[-1]
-                        if landed is None
-                        else _at_least(_extent_of_light(frame, extent, landed), 0.0, extent),
-                        picture,
-                    )
-                ]
+                around = extent if landed is None else _at_least(_extent_of_light(frame, extent, landed), 0.0, extent)
+                windows = [_with_aspect(around, picture)]
+            else:
+                seen_in = None if map_receiver is not None else picture
+                windows = _flat_windows(scene.camera, buffers, frame, extent, landed, seen_in, fineness)
             for level, window in enumerate(windows):
                 largest = fineness.coarse if level else fineness.fine
-                size = (
-                    picture
-                    if receiver == map_receiver
-                    else _tile_size(scene.camera, buffers, frame, window, picture, largest, fineness.texels_per_pixel)
-                )
+                if isinstance(window, PictureWindow):
+                    size = window.texels
+                elif receiver == map_receiver:
+                    size = picture
+                else:
+                    size = _tile_size(scene.camera, buffers, frame, window, picture, largest, fineness.texels_per_pixel)
                 sizes += [(-(-size[0] // step), -(-size[1] // step)) for step in LEVEL_STEPS]
             plans.append((receiver, frame, windows, None))
         else:
@@ -236,14 +219,7 @@ def _place(
             for level, window in enumerate(windows):
                 of_window = levels[level * len(LEVEL_STEPS) : (level + 1) * len(LEVEL_STEPS)]
                 for i, (tile, step) in enumerate(zip(of_window, LEVEL_STEPS, strict=True)):
-                    # Wider texels are exactly `step` of the finest, also where those do not fill the last one.
-                    texels = np.array([of_window[0].width, of_window[0].height]) / step
-                    scale = texels / window.size
-                    rows = (
-                        np.concatenate([frame.axes, (-(frame.axes @ frame.origin) - window.low)[:, None]], axis=1)
-                        * scale[:, None]
-                    )
-                    placed = placement_rows(tile, rows, float(np.prod(window.size / texels)) / buffers.space.scale**2)
+                    placed = _placed(window, frame, buffers.space.scale, tile, of_window[0], step)
                     first = count + level * len(LEVEL_STEPS)
                     placed["next"] = first + len(LEVEL_STEPS) if level + 1 < len(windows) else NONE
                     placed["blurred"] = first + i + 1 if i + 1 < len(LEVEL_STEPS) else NONE
@@ -267,7 +243,21 @@ def _place(
         {r: w for r, _, w, _ in plans},
         charts,
         tuple(folds),
+        {r: frame for r, frame, _, _ in plans if frame is not None},
     )
+
+
+def _placed(
+    window: Window | PictureWindow, frame: PlaneFrame, scale: float, tile: Tile, finest: Tile, step: int
+) -> np.ndarray:
+    """PLACEMENT of a window's texels that are exactly `step` of the finest wide, also where those do not fill the last
+    one."""
+    if isinstance(window, PictureWindow):
+        return placement_rows(tile, window.texel_rows(step), window.texel_area(frame, step) / scale**2)
+    texels = np.array([finest.width, finest.height]) / step
+    rows = np.concatenate([frame.axes, (-(frame.axes @ frame.origin) - window.low)[:, None]], axis=1)
+    rows *= (texels / window.size)[:, None]
+    return placement_rows(tile, rows, float(np.prod(window.size / texels)) / scale**2)
 
 
 def _extent(points: np.ndarray) -> Window:
@@ -322,8 +312,8 @@ def _flat_windows(
     extent: Window,
     landed: Landings | None,
     picture: tuple[int, int] | None,
-    least_pixels: float,
-) -> list[Window]:
+    fineness: Fineness,
+) -> list[Window | PictureWindow]:
     """Fine (where it pays) and coarse window, finest first."""
     if landed is None or len(landed.positions) == 0:
         return [extent]
@@ -332,9 +322,22 @@ def _flat_windows(
     def widened(window: Window) -> Window:
         """Where a caustic is thinner than a pixel."""
         pixel = 0.0 if picture is None else pixel_side(camera, buffers, frame, window, picture)
-        return _at_least(window, least_pixels * pixel, extent)
+        return _at_least(window, fineness.least_pixels * pixel, extent)
 
     everything = widened(_meet(_grown(_extent(flat), 0.02), extent) or extent)
+    if picture is not None and fineness.in_register:
+        on_pixels = picture_window(
+            camera,
+            buffers.space,
+            frame,
+            landed.positions,
+            landed.flux_w,
+            picture,
+            fineness.in_register,
+            fineness.fine,
+        )
+        if on_pixels is not None:
+            return [on_pixels] if on_pixels.is_all else [on_pixels, everything]
     light = _meet(_grown(_quantile_box(flat, landed.flux_w, _QUANTILE), _MARGIN), extent) or everything
     seen = _visible(camera, buffers, frame, picture) if picture is not None else None
     fine = light if seen is None else _meet(light, _grown(seen, 0.02))

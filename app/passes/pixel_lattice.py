@@ -11,17 +11,33 @@ def is_in_strips(samples: int, offset: int) -> bool:
     return offset == 0 and samples in (2, 3)
 
 
+def cells_of(samples: int) -> tuple[int, int]:
+    """Columns and rows of equal cells that a pixel is cut into, each of which holds one place of `pixel_lattice`;
+    (0, 0): there are none such."""
+    power = samples.bit_length() - 1
+    return (0, 0) if samples != 1 << power else (1 << (power + 1) // 2, 1 << power // 2)
+
+
 def pixel_lattice(samples: int, offset: int) -> np.ndarray:
-    """(samples, 2) places in a pixel: ordered as in a golden-ratio lattice, shifted as a whole from launch to launch.
+    """(samples, 2) places in a pixel, shifted as a whole from launch to launch.
 
     Every row and every column of the pixel cut into `samples` holds one sample, so that edges of any slant are filtered
-    well, and the first launch's lie about the pixel's middle, so that the picture does not move.
+    well, and the first launch's lie about the pixel's middle, so that the picture does not move. Powers of two are a
+    (0, m, 2)-net (Hammersley's, with digital shifts), so that each sample has a cell of `cells_of` to itself; others a
+    golden-ratio lattice.
     """
     if is_in_strips(samples, offset):
         return np.column_stack([(np.arange(samples) + 0.5) / samples, np.full(samples, 0.5)])
-    golden = 0.6180339887498949
     shift = offset * np.array([0.7548776662466927, 0.5698402909980532])
     index = np.arange(samples)
+    power = samples.bit_length() - 1
+    if samples == 1 << power:
+        turned = np.zeros(samples, np.int64)
+        for bit in range(power):
+            turned |= (index >> bit & 1) << (power - 1 - bit)
+        fine = np.floor((shift + 0.5 / samples) % 1.0 * (1 << 30)).astype(np.int64)
+        return ((np.column_stack([index, turned]) << (30 - power)) ^ fine) / float(1 << 30)
+    golden = 0.6180339887498949
     rank = np.argsort(np.argsort((0.5 + index * golden) % 1.0))
     return ((np.column_stack([index, rank]) + 0.5) / samples + shift) % 1.0
 

@@ -23,7 +23,7 @@ from ..gpu.context import Context
 from ..model.geometry.charts import ChartAtlas
 from ..model.scene import Scene
 from ..model.settings import RenderSettings
-from ..passes.map_layout import plane_frame
+from ..passes.plane_frame import plane_frame
 from .frames import FrameRenderer, Picture, Stop
 from .light_pass import LightPass
 from .notices import FrameNotices, light_notices

@@ -35,7 +35,8 @@ from ..gpu.scene_buffers import SceneBuffers
 from ..model.features import is_flat
 from ..model.scene import Scene
 from ..passes.beam_splat import BeamSplatter
-from ..passes.map_layout import Landings, MapLayout, plane_frame
+from ..passes.map_layout import Landings, MapLayout
+from ..passes.plane_frame import plane_frame
 from ..passes.trace import FluxTally
 from .light_maps import LightMaps
 from .shown_spectra import ShownSpectra

@@ -91,7 +91,8 @@ class FrameFit:
     def maps(self, camera: Camera) -> MapFit:
         """For the frame that `camera` sees."""
         others = tuple((survey.space, pilot) for survey in self.surveys for pilot in survey.pilots)
-        return MapFit(self.view or camera, self.settings.width, self.settings.height, others=others)
+        shared = self.view is not None
+        return MapFit(self.view or camera, self.settings.width, self.settings.height, others=others, is_shared=shared)
 
 
 def inputs_of(stage: Stage, settings: RenderSettings) -> LiveInputs:

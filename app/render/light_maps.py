@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import moderngl
@@ -16,7 +16,8 @@ from ..model.features import Features
 from ..passes.accumulate import LevelsFold, SeamFold, copy_texture
 from ..passes.caustic_maps import CausticMaps
 from ..passes.map_atlas import MapAtlas
-from ..passes.map_layout import MapLayout
+from ..passes.map_layout import MapLayout, Window
+from ..passes.picture_window import PictureWindow
 from ..passes.splat import Splatter
 
 _ROWS = 256
@@ -138,20 +139,31 @@ class LightMaps:
                         if charts is not None:
                             energy = energy[charts.owner[first : first + len(rows)] >= 0]
                         elif finer is not None:
-                            energy *= 1.0 - finer[1][first : first + len(rows), None] * finer[0]
+                            energy *= 1.0 - finer(first, first + len(rows))
                         flux += energy.sum()
         return flux
 
-    def _finer_share(self, receiver: int, level: int, tile: Tile) -> list[np.ndarray]:
-        """How much of each column and of each row of a coarse window the finer window is read for."""
+    def _finer_share(self, receiver: int, level: int, tile: Tile) -> Callable[[int, int], np.ndarray]:
+        """How much of each texel of a coarse window's rows the finer window is read for: rows `first` to `end`."""
         fine, coarse = self.layout.windows[receiver][level - 1 : level + 1]
-        return [
-            np.clip(np.minimum(high_f, edges[1:]) - np.maximum(low_f, edges[:-1]), 0.0, None) / np.diff(edges)
-            for low_f, high_f, edges in (
-                (fine.low[0], fine.high[0], np.linspace(coarse.low[0], coarse.high[0], tile.width + 1)),
-                (fine.low[1], fine.high[1], np.linspace(coarse.low[1], coarse.high[1], tile.height + 1)),
+        assert isinstance(coarse, Window)
+        x, y = (np.linspace(coarse.low[i], coarse.high[i], n + 1) for i, n in enumerate((tile.width, tile.height)))
+        if isinstance(fine, Window):
+            columns, rows = (
+                np.clip(np.minimum(fine.high[i], at[1:]) - np.maximum(fine.low[i], at[:-1]), 0.0, None) / np.diff(at)
+                for i, at in enumerate((x, y))
             )
-        ]
+            return lambda first, end: rows[first:end, None] * columns
+        return lambda first, end: self._seen_share(fine, receiver, x, y[first : end + 1])
+
+    def _seen_share(self, fine: PictureWindow, receiver: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Share of every texel between borders `x` and `y` of a receiver's plane that lies in `fine`, in sixteenths."""
+        frame = self.layout.frames[receiver]
+        parts = (np.arange(4) + 0.5) / 4.0
+        u, v = (np.add.outer(at[:-1], parts * (at[1] - at[0])).ravel() for at in (x, y))
+        places = frame.at(np.stack(np.meshgrid(u, v), axis=-1)).reshape(-1, 3)
+        held = fine.holds(places).reshape(len(y) - 1, 4, len(x) - 1, 4)
+        return held.mean(axis=(1, 3))
 
     def release(self) -> None:
         """Free everything."""

@@ -33,8 +33,10 @@ from ..passes.beam_emission import BeamEmission
 from ..passes.caustic_maps import CausticMaps
 from ..passes.emission_domain import EmissionDomain, emission_domain
 from ..passes.map_atlas import MapAtlas
-from ..passes.map_layout import MapLayout, Window, check_map_receiver, layout_maps, pixel_side, plane_frame
+from ..passes.map_layout import MapLayout, Window, check_map_receiver, layout_maps, pixel_side
+from ..passes.picture_window import PictureWindow
 from ..passes.pilot import Pilot, landings_of, pilot_steps
+from ..passes.plane_frame import plane_frame
 from ..passes.splat import Splatter
 from ..passes.trace import RAY_ROOM, Batch, FluxTally, LatticeSlice, TracePass, queue_bytes
 from . import shrinking
@@ -606,8 +608,10 @@ class LightPass:
         """Receivers that pilot photons landed on."""
         return sorted(landings_of(self.pilots.values()))
 
-    def window_pixels(self, receiver: int, window: Window) -> float:
+    def window_pixels(self, receiver: int, window: Window | PictureWindow) -> float:
         """Longest side of a flat receiver's window, pixels of the picture that maps are fitted to."""
+        if isinstance(window, PictureWindow):
+            return float(window.pixels.max())
         points = self.buffers.space.to_gpu(self.buffers.world_meshes[self.buffers.receivers[receiver]].vertices)
         size = self.fit.width, self.fit.height
         pixel = pixel_side(self.fit.view, self.buffers, plane_frame(points), window, size)

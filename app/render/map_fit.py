@@ -30,6 +30,8 @@ class MapFit:
     fineness: Fineness = STILL
     others: tuple[tuple[GpuSpace, Pilot], ...] = ()
     """Where light lands in other frames that the maps must serve as well, each in its own GPU space."""
+    is_shared: bool = False
+    """Other views see the same maps: no window is laid out on this one's pixels."""
     avoids_powers_of_two: bool = False
     """Mesa's software renderer compiles what reads a texture once more, for seconds, where a side becomes a power of
     two: for maps that are made while somebody waits."""
@@ -42,7 +44,8 @@ class MapFit:
 
     def fineness_for(self, targets: int) -> Fineness:
         """Of maps with so many textures: memory bounds the finest."""
-        return replace(self.fineness, fine=min(self.fineness.fine, next(most for n, most in FINE_MAX if targets <= n)))
+        fine = min(self.fineness.fine, next(most for n, most in FINE_MAX if targets <= n))
+        return replace(self.fineness, fine=fine, in_register=0 if self.is_shared else self.fineness.in_register)
 
     def landings(self, own: Sequence[Pilot], space: GpuSpace) -> Sequence[Pilot]:
         """The pilots to fit to: `own` alone, or with the others' landings in `space`."""

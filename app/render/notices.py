@@ -14,7 +14,9 @@ from ..model.optics.colorimetry import rgb709_to_xyz_matrix
 from ..model.scene import Camera
 from ..model.settings import RenderSettings
 from ..passes.environment_light import MAX_EVENTS, EnvironmentLightPass
-from ..passes.map_layout import plane_frame, project
+from ..passes.map_layout import project
+from ..passes.plane_frame import plane_frame
+from ..passes.texel_map import TexelMap
 from .light_pass import LightPass, LightStats
 
 LOST_SHARE = 0.01
@@ -142,11 +144,11 @@ def _pixels_of(
     if not len(luminous):
         return {}
     frame = plane_frame(space.to_gpu(light.buffers.world_meshes[number].vertices))
-    window = light.layout.windows[receiver][0]
-    step = window.size / (tile.width, tile.height)
-    at = window.low + (np.stack([columns, rows], axis=-1) + 0.5) * step
-    places = space.to_world(frame.origin + at @ frame.axes)
-    sides = [space.to_world(frame.origin + (at + step * offset) @ frame.axes) for offset in ((1.0, 0.0), (0.0, 1.0))]
+    to_texels = TexelMap.of(light.layout.placements[light.layout.receivers[receiver]["placement"]], frame)
+    corners = np.stack([columns + tile.x, rows + tile.y], axis=-1)
+    places, *sides = (
+        space.to_world(frame.at(to_texels.points(corners + at))) for at in ((0.5, 0.5), (1.5, 0.5), (0.5, 1.5))
+    )
     size = settings.width, settings.height
     middle, right, up = (project(camera, size, points) for points in (places, *sides))
     inside = np.all((middle >= 0.0) & (middle < size), axis=-1)
@@ -158,7 +160,7 @@ def _pixels_of(
     )
     if material.texture is not None:
         return {}
-    texel_area = float(np.prod(step)) / space.scale**2
+    texel_area = 1.0 / (to_texels.density(to_texels.points(corners + 0.5)) * space.scale**2)
     energy = luminous * light.map_scale / texel_area * reflectance / np.pi * area_px
     inside &= np.isfinite(energy) & ~_may_be_hidden(light, number, camera, places)
     found: dict[tuple[int, int], float] = {}

@@ -92,7 +92,8 @@ uint listed_entry(uint number, uint primary_sample, uint count)
 
 CameraPath camera_path(uvec2 pixel, uint primary_sample, float gain)
 {
-    vec2 place = picture_point(pixel, primary_sample_place(primary_sample), p.size);
+    look_place = primary_sample_place(primary_sample);
+    vec2 place = picture_point(pixel, look_place, p.size);
     CameraRay ray = camera_ray(p.position, p.forward, p.half_right, p.half_up, p.orthographic != 0u, place);
     CameraPath path;
     path.position = ray.position;

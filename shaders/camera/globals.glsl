@@ -59,6 +59,8 @@ bool saw_light = false, skipped_texels = false;
 
 // What a sample has found so far. Global: an array handed from function to function is copied there and back by some drivers.
 vec4 radiance[TARGETS];
+// Where in its pixel what is being followed lies.
+vec2 look_place;
 
 #ifdef CAMERA_BEAMS
 #include "camera/beam_cover.glsl"

@@ -188,10 +188,13 @@ vec4 map_to_channels(vec4 texel)
 // Texels that a lookup in a map averages along one side at most, and in all; what it covers beyond is met by the pixel's other samples.
 #define MAX_TEXELS 16
 #define MAX_LOOKUPS 64
+// Of a pixel's area, that of a texel that passes for one, whatever rounding does.
+#define WHOLE_PIXEL 0.99
 
-// Irradiance of the map's targets `first` to `last`: their mean over a box of this many texels.
-void caustic_values(uint placement, vec2 texel, vec2 box, out vec4 values[MAP_TARGETS], const int first, const int last)
+// Irradiance, per scene unit², of the map's targets `first` to `last`: their mean over a box of this many texels. `place` is of `find_texel`.
+void caustic_values(uint placement, vec3 place, vec2 box, out vec4 values[MAP_TARGETS], const int first, const int last)
 {
+    vec2 texel = place.xy / place.z;
     ivec2 lookups = clamp(ivec2(ceil(box)), ivec2(1), ivec2(MAX_TEXELS));
     lookups = min(lookups, max(ivec2(8), MAX_LOOKUPS / lookups.yx));
     vec2 part = box / vec2(lookups), corner = texel - 0.5 * (box - part);
@@ -199,36 +202,36 @@ void caustic_values(uint placement, vec2 texel, vec2 box, out vec4 values[MAP_TA
     skipped_texels = skipped_texels || any(greaterThan(part, vec2(1.001)));
 #endif
     COUNT_ROUNDS(lookups.x * lookups.y);
-    float share = 1.0 / float(lookups.x * lookups.y);
+    float share = 1.0 / (float(lookups.x * lookups.y) * texel_area_at(placements[placement], place));
     for (int t = 0; t < MAP_TARGETS; ++t) values[t] = vec4(0.0);
     for (int i = 0; i < lookups.x * lookups.y; ++i) {
         vec2 at = corner + part * vec2(i % lookups.x, i / lookups.x);
 #if MAP_TARGETS > 0
-    if (0 >= first && 0 <= last) values[0] += share * caustic_irradiance(caustic_map[0], placement, at, part);
+    if (0 >= first && 0 <= last) values[0] += share * caustic_energy(caustic_map[0], placement, at, part);
 #endif
 #if MAP_TARGETS > 1
-    if (1 >= first && 1 <= last) values[1] += share * caustic_irradiance(caustic_map[1], placement, at, part);
+    if (1 >= first && 1 <= last) values[1] += share * caustic_energy(caustic_map[1], placement, at, part);
 #endif
 #if MAP_TARGETS > 2
-    if (2 >= first && 2 <= last) values[2] += share * caustic_irradiance(caustic_map[2], placement, at, part);
+    if (2 >= first && 2 <= last) values[2] += share * caustic_energy(caustic_map[2], placement, at, part);
 #endif
 #if MAP_TARGETS > 3
-    if (3 >= first && 3 <= last) values[3] += share * caustic_irradiance(caustic_map[3], placement, at, part);
+    if (3 >= first && 3 <= last) values[3] += share * caustic_energy(caustic_map[3], placement, at, part);
 #endif
 #if MAP_TARGETS > 4
-    if (4 >= first && 4 <= last) values[4] += share * caustic_irradiance(caustic_map[4], placement, at, part);
+    if (4 >= first && 4 <= last) values[4] += share * caustic_energy(caustic_map[4], placement, at, part);
 #endif
 #if MAP_TARGETS > 5
-    if (5 >= first && 5 <= last) values[5] += share * caustic_irradiance(caustic_map[5], placement, at, part);
+    if (5 >= first && 5 <= last) values[5] += share * caustic_energy(caustic_map[5], placement, at, part);
 #endif
 #if MAP_TARGETS > 6
-    if (6 >= first && 6 <= last) values[6] += share * caustic_irradiance(caustic_map[6], placement, at, part);
+    if (6 >= first && 6 <= last) values[6] += share * caustic_energy(caustic_map[6], placement, at, part);
 #endif
 #if MAP_TARGETS > 7
-    if (7 >= first && 7 <= last) values[7] += share * caustic_irradiance(caustic_map[7], placement, at, part);
+    if (7 >= first && 7 <= last) values[7] += share * caustic_energy(caustic_map[7], placement, at, part);
 #endif
 #if MAP_TARGETS > 8
-    if (8 >= first && 8 <= last) values[8] += share * caustic_irradiance(caustic_map[8], placement, at, part);
+    if (8 >= first && 8 <= last) values[8] += share * caustic_energy(caustic_map[8], placement, at, part);
 #endif
     }
 }
@@ -243,18 +246,25 @@ vec4 bin_reflectance(vec3 colour, int target)
 #endif
 
 // Irradiance by what glass and mirrors threw at a place of a map.
-void add_caustic_at(CameraPath path, SurfaceInteraction seen, WavelengthInterval interval, uint receiver, uint placement, vec2 texel)
+void add_caustic_at(CameraPath path, SurfaceInteraction seen, WavelengthInterval interval, uint receiver, uint placement, vec3 texel)
 {
-    // Texels larger than pixels are interpolated, smaller ones weighed by their share of the sample.
-    vec3 row_u = placements[placement].row_u.xyz, row_v = placements[placement].row_v.xyz;
+    // Texels larger than pixels are interpolated, smaller ones, and pixels themselves, weighed by their share of the sample.
     vec2 box = vec2(0.0);
     for (int c = 0; c < 3; ++c) {
-        vec2 side = vec2(dot(row_u, seen.dposition[c]), dot(row_v, seen.dposition[c]));
+        vec2 side = texels_along(placements[placement], texel, seen.dposition[c]);
         box += side * side;
     }
     box = sqrt(box);
     float side = sample_side(path);
-    if (box.x * box.y < side * side) box = vec2(1.0);
+#if !defined(CAMERA_SPECULAR) && !defined(CAMERA_BEAMS)
+    if (p.cells.x > 1.0 || (p.cells.x > 0.0 && placements[placement].kind == PLACED_PICTURE)) {
+        // Each look stands for its cell of the pixel. Cells fill it, so texels that fill it too are read once.
+        vec2 share = side * vec2(p.pixel_width, p.pixel_height), aside = (floor(look_place * p.cells) + 0.5) / p.cells - look_place;
+        texel.xy += texel.z * texels_along(placements[placement], texel, (aside.x / share.x) * seen.dposition[0] - (aside.y / share.y) * seen.dposition[1]);
+        box /= share * p.cells;
+    }
+#endif
+    if (box.x * box.y < WHOLE_PIXEL * side * side) box = vec2(1.0);
     bool plain = receivers[receiver].reflectance_class == 0u;
     float scale = p.map_scale * INVERSE_PI;
 #ifdef MAP_BINS
@@ -325,7 +335,7 @@ void add_caustic_at(CameraPath path, SurfaceInteraction seen, WavelengthInterval
 void add_caustic(CameraPath path, SurfaceInteraction seen, WavelengthInterval interval)
 {
     uint placement;
-    vec2 texel;
+    vec3 texel;
     uint receiver = object_at(seen.object).receiver;
     bool covered = find_texel(receiver, seen.source, seen.position, placement, texel);
     WHEN(covered) add_caustic_at(path, seen, interval, receiver, placement, texel);

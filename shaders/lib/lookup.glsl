@@ -3,47 +3,49 @@
 #ifndef LOOKUP_GLSL
 #define LOOKUP_GLSL
 
+#include "lib/placement.glsl"
+
 #define RECEIVER_CHARTS 1u
 #define PLACED_CHART 1u
+#define PLACED_PICTURE 2u
 
 layout(std430, binding = BIND_RECEIVERS) readonly restrict buffer Receivers { Receiver receivers[]; };
 layout(std430, binding = BIND_PLACEMENTS) readonly restrict buffer Placements { Placement placements[]; };
 layout(binding = 0) uniform sampler2D caustic_map[MAP_TARGETS];
 
 // Where `position` (GPU space) on triangle `source` of a receiver lies in the atlas: the finest window that
-// holds it. False where no map covers it.
-bool find_texel(uint receiver, uint source, vec3 position, out uint placement, out vec2 texel)
+// holds it, and its texel times its weight (`homogeneous_texel`). False where no map covers it.
+bool find_texel(uint receiver, uint source, vec3 position, out uint placement, out vec3 at)
 {
     placement = receivers[receiver].placement;
-    texel = vec2(0.0);
+    at = vec3(0.0, 0.0, 1.0);
     if (placement == NONE) return false;
 #ifdef CHARTS
     if (receivers[receiver].kind == RECEIVER_CHARTS) placement += source - receivers[receiver].first_triangle;
 #endif
     // At most two windows are nested; a chain of four is more than enough.
     for (int level = 0; level < 4 && placement != NONE; ++level) {
-        vec4 row_u = placements[placement].row_u, row_v = placements[placement].row_v;
         vec4 rect = placements[placement].rect;
-        texel = vec2(dot(row_u.xyz, position) + row_u.w, dot(row_v.xyz, position) + row_v.w);
+        at = homogeneous_texel(placements[placement], position);
+        vec2 texel = at.xy / at.z;
         float slack = 0.0;
 #ifdef CHARTS
         // A chart's rectangle has a gutter, so rounding at its edge must not lose the place.
         slack = placements[placement].kind == PLACED_CHART ? 1.0 : 0.0;
 #endif
-        if (all(greaterThanEqual(texel, rect.xy - slack)) && all(lessThan(texel, rect.zw + slack))) return true;
+        if (at.z > 0.0 && all(greaterThanEqual(texel, rect.xy - slack)) && all(lessThan(texel, rect.zw + slack))) return true;
         placement = placements[placement].next;
     }
     return false;
 }
 
-// Irradiance, the map's unit per scene unit²: the mean of the map's texels over a box with these sides
+// The map's unit per texel: the mean of the map's texels over a box with these sides
 // (at most one texel), so that a pixel's samples together weigh every texel by its share of the pixel.
 // A side of one texel is bilinear interpolation. `map` is one of `caustic_map`, by a constant index: a software renderer takes
 // a computed one from a lane that may be asleep.
-vec4 caustic_irradiance(sampler2D map, uint placement, vec2 texel, vec2 box)
+vec4 caustic_energy(sampler2D map, uint placement, vec2 texel, vec2 box)
 {
     ivec2 low = ivec2(floor(placements[placement].rect.xy)), high = ivec2(ceil(placements[placement].rect.zw)) - 1;
-    float per_area = 1.0 / placements[placement].texel_area;
     vec2 side = clamp(box, 1e-4, 1.0);
     vec2 from = texel - 0.5 * side, to = texel + 0.5 * side;
     vec2 border = floor(to);
@@ -54,7 +56,7 @@ vec4 caustic_irradiance(sampler2D map, uint placement, vec2 texel, vec2 box)
     b = clamp(b, low, high);
     vec4 below = mix(texelFetch(map, a, 0), texelFetch(map, ivec2(b.x, a.y), 0), share.x);
     vec4 above = mix(texelFetch(map, ivec2(a.x, b.y), 0), texelFetch(map, b, 0), share.x);
-    return mix(below, above, share.y) * per_area;
+    return mix(below, above, share.y);
 }
 
 #endif

@@ -83,7 +83,9 @@ float eased(float s, float a, float b) { return mix(a, b, s * s * (3.0 - 2.0 * s
 
 void main() {
     at = gl_FragCoord.xy - anchor_slope.xy;
-    float tilt = max(1.0 + dot(anchor_slope.zw, at), 0.0);
+    // The density is linear on the receiver; a texel's area there goes as the inverse cube of 1 / W, and nothing lies beyond the horizon.
+    float nearness = 1.0 + dot(perspective, at), nearness2 = nearness * nearness;
+    float tilt = nearness < 1e-4 ? 0.0 : max(1.0 + dot(anchor_slope.zw, at), 0.0) / (nearness2 * nearness2);
 #ifdef STILL
     bool outside = false;
     for (int e = 0; e < EDGE_COUNT; ++e) {

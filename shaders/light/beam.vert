@@ -12,6 +12,7 @@ in vec2 in_position;  // atlas texels
 in uint in_polygon;
 flat out ivec2 polygon;  // its first texel
 flat out vec4 anchor_slope;
+flat out vec2 perspective;
 flat out vec4 density_nodes;
 flat out vec4 band;
 flat out vec4 whole_energy[TARGETS];
@@ -35,6 +36,7 @@ void main() {
     for (int i = 0; i < BeamRecord_TEXELS; ++i) words[i] = texel(i);
     BeamRecord beam = BeamRecord_of(words);
     anchor_slope = vec4(beam.anchor, beam.slope);
+    perspective = beam.perspective;
     density_nodes = vec4(beam.density, beam.nodes);
     band = vec4(beam.place, beam.curve_row, beam.edge_count);
 #if EDGES > 0

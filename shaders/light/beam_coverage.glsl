@@ -3,6 +3,7 @@ layout(binding = 0) uniform usampler2D beams;
 
 flat in ivec2 polygon;
 flat in vec4 anchor_slope;
+flat in vec2 perspective;
 flat in vec4 density_nodes;
 flat in vec4 band;  // place on the curve, length there, the curve's row, edges
 flat in vec4 whole_energy[TARGETS];

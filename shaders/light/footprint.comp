@@ -3,6 +3,7 @@
 // disperses: the spectral coordinate is then affine in its index). Elek et al. 2014; Schjoth et al. 2007.
 #include "lib/finite.glsl"
 #include "lib/gaussian.glsl"
+#include "lib/placement.glsl"
 
 layout(local_size_x = WORKGROUP) in;
 
@@ -101,19 +102,23 @@ float local_gain(uint receiver, vec3 position) {
 }
 #endif
 
-vec2 to_texels(Placement place, vec3 direction) {
-    return vec2(dot(place.row_u.xyz, direction), dot(place.row_v.xyz, direction));
-}
-
 #include "light/splat_shapes.glsl"
 
 Footprint footprint_in(Placement place, PhotonRecord photon, vec3 sweep_middle, vec3 sweep) {
+    vec3 at = homogeneous_texel(place, photon.position + sweep_middle);
     Footprint f;
-    f.centre = to_texels(place, photon.position + sweep_middle) + vec2(place.row_u.w, place.row_v.w);
-    f.axis_s = smoothing * to_texels(place, photon.dposition_ds);
-    f.axis_t = smoothing * to_texels(place, photon.dposition_dt);
-    f.chord = to_texels(place, sweep);
+    f.centre = at.xy / at.z;
+    f.axis_s = smoothing * texels_along(place, at, photon.dposition_ds);
+    f.axis_t = smoothing * texels_along(place, at, photon.dposition_dt);
+    f.chord = texels_along(place, at, sweep);
     return f;
+}
+
+// Whether all of the sweep is in front of the camera that a map is seen by: where it is not, it lies outside of it.
+bool in_front(Placement place, PhotonRecord photon, vec3 sweep_middle, vec3 sweep) {
+    if (place.row_w.xyz == vec3(0.0)) return true;
+    vec3 from = photon.position + sweep_middle - 0.5 * sweep, to = from + sweep;
+    return min(homogeneous_texel(place, from).z, homogeneous_texel(place, to).z) > 0.0;
 }
 
 // Smaller principal variance of the footprint, texels².
@@ -178,6 +183,14 @@ bool touches(vec4 rect, vec2 centre, vec2 extent) {
 
 bool contains(vec4 rect, vec2 centre, float margin) {
     return all(greaterThanEqual(centre, rect.xy + margin)) && all(lessThan(centre, rect.zw - margin));
+}
+
+bool bounded(vec2 v) { return is_within2(v, extent_limit); }
+
+// Whether a footprint is not a numerical accident.
+bool holds(Placement place, PhotonRecord photon, Footprint f) {
+    vec3 anchor = homogeneous_texel(place, photon.position);
+    return bounded(f.axis_s) && bounded(f.axis_t) && bounded(f.chord) && bounded(f.centre - anchor.xy / anchor.z);
 }
 
 void main() {
@@ -264,7 +277,13 @@ void main() {
     vec3 middle = 0.5 * (to_lo + to_hi);
     vec3 sweep = to_hi - to_lo;
     Footprint f = footprint_in(place, photon, middle, sweep);
-    bool accident = !(is_within2(f.axis_s, extent_limit) && is_within2(f.axis_t, extent_limit) && is_within2(f.chord, extent_limit) && is_within2(f.centre - to_texels(place, photon.position) - vec2(place.row_u.w, place.row_v.w), extent_limit));
+    bool shown = in_front(place, photon, middle, sweep);
+    bool accident = shown && !holds(place, photon, f);
+    if (accident && place.next != NONE) {
+        // Close to the camera, texels of its pixels are as small as one likes: the coarse window tells.
+        shown = false;
+        accident = !holds(placements[place.next], photon, footprint_in(placements[place.next], photon, middle, sweep));
+    }
     if (accident || (photon.flags & FLAG_FOOTPRINT_DROPPED) != 0u) {
         photon.dposition_ds = vec3(0.0);
         photon.dposition_dt = vec3(0.0);
@@ -275,12 +294,12 @@ void main() {
     }
 
     uint layer = table * uint(TARGETS);
-    bool inside = contains(place.rect, f.centre, 0.0);
+    bool inside = shown && contains(place.rect, f.centre, 0.0);
     Placement drawn_in = place;
     choose_level(drawn_in, f, photon, middle, sweep);
     SplatRecord fine = splat_of(photon, f, layer, table_band);
     fine.rect = drawn_in.rect;
-    bool drawn = touches(drawn_in.rect, fine.centre, half_extent(fine));
+    bool drawn = shown && touches(drawn_in.rect, fine.centre, half_extent(fine));
 #ifdef REINDEXED
     drawn = drawn && carries;
 #endif
@@ -299,9 +318,10 @@ void main() {
         Footprint g = footprint_in(outer, photon, middle, sweep);
         inside = inside || contains(outer.rect, g.centre, 0.0);
         choose_level(outer, g, photon, middle, sweep);
-        float margin = 3.0 * sqrt(outer.texel_area / drawn_in.texel_area);
+        vec3 in_outer = homogeneous_texel(outer, photon.position), in_fine = homogeneous_texel(drawn_in, photon.position);
+        float margin = 3.0 * texels_per_length(drawn_in, in_fine) / texels_per_length(outer, in_outer);
         vec2 extent = half_extent(fine) + margin;
-        bool only_fine = all(greaterThan(fine.centre - extent, drawn_in.rect.xy)) && all(lessThan(fine.centre + extent, drawn_in.rect.zw));
+        bool only_fine = shown && all(greaterThan(fine.centre - extent, drawn_in.rect.xy)) && all(lessThan(fine.centre + extent, drawn_in.rect.zw));
         if (!only_fine) {
             coarse = splat_of(photon, g, layer, table_band);
             coarse.rect = outer.rect;

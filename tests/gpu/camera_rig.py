@@ -123,7 +123,7 @@ def at(x, y, z) -> np.ndarray:
 def flat_maps(gl, scene: SceneBuffers, windows, channels: np.ndarray, scale=1.0) -> CausticMaps:
     """Maps of one flat receiver: `windows` are (x0, y0, world side, atlas x, atlas y, texels a side), finest first."""
     placements = PLACEMENT.zeros(len(windows))
-    placements["blurred"] = NONE
+    placements["blurred"], placements["row_w"] = NONE, (0.0, 0.0, 0.0, 1.0)
     for i, (x0, y0, side, ax, ay, count) in enumerate(windows):
         per_unit = count / side
         to_world = 1.0 / scene.space.scale  # rows act on GPU space

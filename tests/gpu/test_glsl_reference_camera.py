@@ -13,7 +13,8 @@ from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 COVERS = {
     "camera.glsl": ("camera_ray", "picture_point"),
     "lights.glsl": ("sample_light", "light_seen", "disc_seen", "stretch_seen"),
-    "lookup.glsl": ("find_texel", "caustic_irradiance"),
+    "lookup.glsl": ("find_texel", "caustic_energy"),
+    "placement.glsl": ("homogeneous_texel", "texels_along", "texel_area_at", "texels_per_length"),
 }
 COUNT = 2048
 
@@ -180,6 +181,8 @@ def test_the_finest_window_that_holds_a_place_is_found(gl) -> None:
     rng = np.random.default_rng(20)
     placements = PLACEMENT.zeros(8)
     placements["next"] = placements["blurred"] = NONE
+    placements["row_w"][:, 3] = 1.0
+    placements["row_w"][0, :3] = 0.5, -0.4, 0.3  # seen by a camera that some places lie behind
     # Placements 0 ⊂ 1 ⊂ 2 are nested windows; 4 to 6 are charts of three triangles.
     for index, half in ((0, 0.3), (1, 0.8), (2, 2.0)):
         scale = 32.0 / half
@@ -200,8 +203,8 @@ def test_the_finest_window_that_holds_a_place_is_found(gl) -> None:
     source = np.where(receiver == 1, rng.integers(100, 103, COUNT), 0).astype(np.uint32)
     position = as_f32(rng.uniform(-1.5, 1.5, (COUNT, 3)) * rng.uniform(0.05, 1, (COUNT, 1)))
     body = (
-        "uint place; vec2 at; found = find_texel(receiver, source, position, place, at) ? 1u : 0u; placement = "
-        "place; texel = at;"
+        "uint place; vec3 at; found = find_texel(receiver, source, position, place, at) ? 1u : 0u; placement = "
+        "place; texel = at.xy / at.z;"
     )
     outputs = {"found": "uint", "placement": "uint", "texel": "vec2"}
     inputs = {"receiver": receiver, "source": source, "position": position}
@@ -217,9 +220,40 @@ def test_the_finest_window_that_holds_a_place_is_found(gl) -> None:
     agrees = (got["found"] == found) & (~found | (got["placement"] == placement))
     assert agrees.mean() > 0.998  # a place within rounding of a border may fall to either side
     both = agrees & found
-    assert np.abs(got["texel"] - texel)[both].max() < 3e-5
+    assert (np.abs(got["texel"] - texel).max(axis=1) / (1.0 + np.abs(texel).max(axis=1)))[both].max() < 3e-6
     assert set(placement[both]) == {0, 1, 2, 4, 5, 6}
     assert not got["found"][receiver == 2].any()
+
+
+def test_texels_of_a_placement_seen_by_a_camera(gl) -> None:
+    rng = np.random.default_rng(21)
+    placements = PLACEMENT.zeros(COUNT)
+    for name in ("row_u", "row_v"):
+        placements[name] = rng.normal(size=(COUNT, 4)) * 20.0
+    placements["row_w"] = rng.normal(size=(COUNT, 4)) * (0.2, 0.2, 0.2, 0.0) + (0.0, 0.0, 0.0, 1.0)
+    placements["texel_area"] = rng.uniform(0.1, 10.0, COUNT)
+    position, direction = as_f32(rng.uniform(-0.6, 0.6, (COUNT, 3))), as_f32(rng.normal(size=(COUNT, 3)))
+    body = (
+        "vec3 at = homogeneous_texel(placements[row], position); along = texels_along(placements[row], at, direction); "
+        "area = texel_area_at(placements[row], at); length = texels_per_length(placements[row], at);"
+    )
+    got = evaluate(
+        gl.ctx,
+        ["lib/lookup.glsl"],
+        body,
+        {"position": position, "direction": direction},
+        {"along": "vec2", "area": "float", "length": "float"},
+        LOOKUP,
+        [RECEIVER, PLACEMENT],
+        {8: RECEIVER.zeros(1), 9: placements},
+    )
+    rows = list(zip(placements, position.astype(float), direction.astype(float), strict=True))
+    along = np.array([maps.texels_along(p, at, d) for p, at, d in rows])
+    assert np.abs(got["along"] - along).max(axis=1) == pytest.approx(0.0, abs=3e-5 * np.abs(along).max())
+    assert got["area"] == pytest.approx(np.array([maps.texel_area_of(p, at) for p, at, _ in rows]), rel=2e-5)
+    steps = [[maps.texels_along(p, at, axis) for axis in np.eye(3)] for p, at, _ in rows]
+    longest = np.linalg.norm(np.array(steps), axis=1).max(axis=1)
+    assert got["length"] == pytest.approx(longest, rel=1e-3)
 
 
 def test_a_look_up_is_the_mean_over_its_box(gl) -> None:
@@ -228,12 +262,11 @@ def test_a_look_up_is_the_mean_over_its_box(gl) -> None:
     placements = PLACEMENT.zeros(COUNT)
     placements["rect"] = [3.0, 2.0, 19.0, 17.0]
     placements["rect"][::3] = [2.6, 2.2, 18.4, 16.7]
-    placements["texel_area"] = rng.uniform(0.1, 10.0, COUNT)
     texel = as_f32(rng.uniform([2.0, 1.0], [20.0, 18.0], (COUNT, 2)))
     box = as_f32(rng.uniform(0.01, 1.5, (COUNT, 2)))
     texture = gl.ctx.texture((24, 20), 4, texels, dtype="f4")
     outputs = {"value": "vec4"}
-    body = "value = caustic_irradiance(caustic_map[0], row, texel, box);"
+    body = "value = caustic_energy(caustic_map[0], row, texel, box);"
     got = evaluate(
         gl.ctx,
         ["lib/lookup.glsl"],
@@ -247,14 +280,14 @@ def test_a_look_up_is_the_mean_over_its_box(gl) -> None:
     )
     texture.release()
     want = np.array(
-        [maps.caustic_irradiance(texels.astype(float), p, t, b) for p, t, b in zip(placements, texel, box, strict=True)]
+        [maps.caustic_energy(texels.astype(float), p, t, b) for p, t, b in zip(placements, texel, box, strict=True)]
     )
     # The box's ends are known to an eps of the atlas coordinate, a larger share of a narrow box.
-    room = 3e-6 * (1.0 + 1.0 / box.min(axis=1)) / placements["texel_area"]
+    room = 3e-6 * (1.0 + 1.0 / box.min(axis=1))
     assert (np.abs(got["value"] - want).max(axis=1) / room).max() < 1.0
     mutant = np.array(
         [
-            maps.caustic_irradiance(texels.astype(float), p, t + 0.01, b)
+            maps.caustic_energy(texels.astype(float), p, t + 0.01, b)
             for p, t, b in zip(placements, texel, box, strict=True)
         ]
     )

@@ -14,7 +14,8 @@ from spectrasplat.model.optics import spectrum
 from spectrasplat.model.optics.spectral_tables import SpectralAxis
 from spectrasplat.passes.beam_splat import BeamSplatter
 from spectrasplat.passes.map_atlas import MapAtlas, placement_rows
-from spectrasplat.passes.map_layout import MapLayout, PlaneFrame
+from spectrasplat.passes.map_layout import MapLayout
+from spectrasplat.passes.plane_frame import PlaneFrame
 
 PLANE = PlaneFrame(np.zeros(3), np.eye(3)[:2])
 ROWS = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]])

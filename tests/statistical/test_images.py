@@ -24,7 +24,7 @@ from spectrasplat.model.optics.colorimetry import K_M, cmf_xyz
 from spectrasplat.model.optics.spectrum import illuminant
 from spectrasplat.model.scene import Camera, Diffuse, Scene, SceneObject
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.passes.map_layout import plane_frame
+from spectrasplat.passes.plane_frame import plane_frame
 from spectrasplat.reference import optics
 from spectrasplat.reference.glasses import index
 from spectrasplat.render.light_pass import LightPass, spectral_axis

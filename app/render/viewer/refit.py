@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...passes.map_layout import MapLayout
+from ...passes.map_layout import MapLayout, Window
 
 if TYPE_CHECKING:
     from ...edit.live_inputs import LiveInputs
@@ -47,8 +47,8 @@ def _pays(now: MapLayout, then: MapLayout, receiver: int) -> bool:
     ]
     if side[0] > PAYS * side[1]:
         return True
-    old, new = now.windows.get(receiver), then.windows.get(receiver)
-    if not old or not new or len(old) < 2:
+    old, new = ([w for w in layout.windows.get(receiver, ()) if isinstance(w, Window)] for layout in (now, then))
+    if not new or len(old) < 2:
         return False
     overlap = np.minimum(old[0].high, new[0].high) - np.maximum(old[0].low, new[0].low)
     covered = float(np.prod(np.clip(overlap, 0.0, None)) / max(float(np.prod(new[0].size)), 1e-30))

@@ -1,0 +1,128 @@
+"""A map whose texels are a picture's pixels, or an equal part of them: what the camera sees directly is then filtered
+once, by the pixel, and neither a focus nor a spectral line is blurred by texels that lie across pixels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..gpu.scene_buffers import GpuSpace
+from ..model.camera_rays import camera_frame
+from ..model.scene import Camera
+from .plane_frame import PlaneFrame
+
+_MARGIN, _MARGIN_PIXELS = 0.04, 4.0
+"""Round where light lands: a share of that, and pixels."""
+_LEAST_COSINE = 0.02
+"""Between the plane's normal and the view in the window's middle: texels of a plane seen edge-on are of no use to what
+is seen in mirrors or through glass."""
+_LEAST_SHARE = 0.02
+"""Of the light that must land where the camera sees the plane, or that could as well be behind it."""
+
+
+@dataclass(frozen=True)
+class PictureWindow:
+    """A rectangle of whole pixels of a picture, as a window of a flat receiver."""
+
+    low: np.ndarray
+    """int (2,): pixels from the left, and from the top or the bottom, whichever does not mirror the plane's frame."""
+    high: np.ndarray
+    per_pixel: int
+    """Texels along a pixel's side."""
+    rows: np.ndarray
+    """float64 (3, 4): GPU space to homogeneous pixels; the weight is 1 about the middle of what lands there."""
+    is_all: bool
+    """Nothing lands elsewhere."""
+
+    @property
+    def pixels(self) -> np.ndarray:
+        """Its sides, pixels."""
+        return self.high - self.low
+
+    @property
+    def texels(self) -> tuple[int, int]:
+        """Its sides, texels."""
+        width, height = (int(side) for side in self.per_pixel * self.pixels)
+        return width, height
+
+    def texel_rows(self, step: int) -> np.ndarray:
+        """float64 (3, 4): GPU space to homogeneous texels of the window, `step` times as wide as the finest."""
+        scale = self.per_pixel / step
+        to_texels = np.array([[scale, 0.0, -scale * self.low[0]], [0.0, scale, -scale * self.low[1]], [0.0, 0.0, 1.0]])
+        return to_texels @ self.rows
+
+    def texel_area(self, frame: PlaneFrame, step: int) -> float:
+        """GPU units² of a texel where the weight is 1."""
+        return 1.0 / float(np.linalg.det(_on_plane(self.texel_rows(step), frame)))
+
+    def holds(self, points: np.ndarray) -> np.ndarray:
+        """bool (n,): which points (n, 3) of GPU space lie in it."""
+        found = points @ self.rows[:, :3].T + self.rows[:, 3]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            pixels = found[:, :2] / found[:, 2:]
+        return (found[:, 2] > 0.0) & np.all((pixels >= self.low) & (pixels < self.high), axis=1)
+
+
+def picture_window(
+    camera: Camera,
+    space: GpuSpace,
+    frame: PlaneFrame,
+    positions: np.ndarray,
+    weights: np.ndarray,
+    picture: tuple[int, int],
+    per_pixel: int,
+    largest: int,
+) -> PictureWindow | None:
+    """The window of the pixels in which light lands, `positions` (n, 3) in GPU space with `weights` (n,) > 0, with at
+    most `per_pixel` texels along a pixel and `largest` along a side; None where hardly any lands in sight, the plane is
+    seen edge-on, or pixels are more than that."""
+    rows = _pixel_rows(camera, space, picture)
+    found = positions @ rows[:, :3].T + rows[:, 3]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        pixels = found[:, :2] / found[:, 2:]
+    size = np.array(picture, float)
+    seen = (found[:, 2] > 0.0) & np.all((pixels >= 0.0) & (pixels <= size), axis=1)
+    if not seen.any() or weights[seen].sum() < _LEAST_SHARE * weights.sum():
+        return None
+    rows = rows / np.median(found[seen, 2])
+    if np.linalg.det(_on_plane(rows, frame)) < 0.0:
+        rows = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, size[1]], [0.0, 0.0, 1.0]]) @ rows
+        pixels[:, 1] = size[1] - pixels[:, 1]
+    low, high = pixels[seen].min(axis=0), pixels[seen].max(axis=0)
+    margin = _MARGIN * (high - low) + _MARGIN_PIXELS
+    low = np.floor(np.maximum(low - margin, 0.0)).astype(int)
+    high = np.ceil(np.minimum(high + margin, size)).astype(int)
+    for count in range(per_pixel, 0, -1):
+        if count * (high - low).max() <= largest:
+            middle = np.average(positions[seen], axis=0)
+            is_aslant = _cosine(camera, space.to_world(middle), np.cross(*frame.axes)) < _LEAST_COSINE
+            return None if is_aslant else PictureWindow(low, high, count, rows, bool(seen.all()))
+    return None
+
+
+def _on_plane(rows: np.ndarray, frame: PlaneFrame) -> np.ndarray:
+    """(3, 3): rows (3, 4) for plane coordinates (s, t, 1)."""
+    return np.concatenate([rows[:, :3] @ frame.axes.T, (rows[:, :3] @ frame.origin + rows[:, 3])[:, None]], axis=1)
+
+
+def _pixel_rows(camera: Camera, space: GpuSpace, picture: tuple[int, int]) -> np.ndarray:
+    """float64 (3, 4): GPU space to homogeneous pixels from the left and the top (`camera.comp`, `picture_point`)."""
+    right, up, forward = camera_frame(camera)
+    position = space.to_gpu(np.asarray(camera.position, float))
+    width, height = picture
+
+    def row(axis: np.ndarray, at: float = 0.0) -> np.ndarray:
+        return np.append(axis, at - axis @ position)
+
+    if camera.kind == "orthographic":
+        half, depth = 0.5 * camera.vertical_extent * space.scale, np.array([0.0, 0.0, 0.0, 1.0])
+    else:
+        half, depth = float(np.tan(np.radians(0.5 * camera.vertical_fov_deg))), row(forward)
+    scale = 0.5 * height / half
+    return np.stack([scale * row(right) + 0.5 * width * depth, 0.5 * height * depth - scale * row(up), depth])
+
+
+def _cosine(camera: Camera, at: np.ndarray, normal: np.ndarray) -> float:
+    towards = np.asarray(camera.position, float) - at if camera.kind != "orthographic" else camera_frame(camera)[2]
+    return float(abs(towards @ normal) / max(float(np.linalg.norm(towards)), 1e-30))

@@ -1,0 +1,33 @@
+"""The frame of a flat receiver's plane."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class PlaneFrame:
+    """A flat receiver's plane: p = origin + u axes[0] + v axes[1]."""
+
+    origin: np.ndarray
+    axes: np.ndarray
+
+    def project(self, points: np.ndarray) -> np.ndarray:
+        """Plane coordinates (..., 2) of GPU-space points."""
+        return (points - self.origin) @ self.axes.T
+
+    def at(self, places: np.ndarray) -> np.ndarray:
+        """GPU-space points (..., 3) of plane coordinates (..., 2)."""
+        return self.origin + places @ self.axes
+
+
+def plane_frame(points: np.ndarray) -> PlaneFrame:
+    """The frame of coplanar `points`; its axes follow the coordinate axes where they can."""
+    centre = points.mean(axis=0)
+    normal = np.linalg.svd(points - centre, full_matrices=False)[2][2]
+    guide = np.eye(3)[0] if abs(normal[0]) < 0.9 else np.eye(3)[1]
+    first = guide - normal * (guide @ normal)
+    first /= np.linalg.norm(first)
+    return PlaneFrame(centre, np.stack([first, np.cross(normal, first)]))
