@@ -455,6 +455,19 @@ def view(
 
 
 @app.command()
+def lesson(
+    name: Annotated[
+        Text,
+        typer.Argument(metavar="[NAME]", help="Which to open; nothing lists all.", autocompletion=completion.lessons),
+    ] = None,
+) -> None:
+    """Open a lesson in the viewer: a scene, a few sentences, what to try; or list them."""
+    from .lesson import lesson_command
+
+    raise typer.Exit(lesson_command(name, _print))
+
+
+@app.command()
 def bake(
     scene: SceneArgument,
     receiver: Annotated[

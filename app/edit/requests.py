@@ -27,6 +27,13 @@ class Open:
 
 
 @dataclass(frozen=True)
+class OpenLesson:
+    """Open a lesson's scene, with what the lesson is about selected."""
+
+    name: str
+
+
+@dataclass(frozen=True)
 class StandUp:
     """Take another axis of the opened mesh or glTF file to be up, and remember it for that file."""
 
@@ -185,6 +192,7 @@ class DismissMessage:
 Request = (
     NewScene
     | Open
+    | OpenLesson
     | StandUp
     | Save
     | Undo

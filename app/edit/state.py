@@ -8,13 +8,13 @@ part that the picture depends on, `scene` is what undo and saving cover.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
-from ..model.scene import Camera, Material, Scene
+from ..model.scene import Camera, Material, Scene, Vec3
 from .live_inputs import LiveInputs
 from .requests import Pull, Request
 
-Tool = Literal["select", "move", "rotate", "scale", "brush", "pull"]
+Tool = Literal["select", "move", "rotate", "scale", "brush", "pull", "measure"]
 CompareMode = Literal["off", "hold", "wipe", "error"]
 Theme = Literal["dark", "light"]
 ToneCurve = Literal["spectrasplat", "aces", "reinhard", "linear"]
@@ -44,6 +44,8 @@ class Display:
     ray_overlay: bool = False
     ray_count: int = 5
     ray_wavelengths: int = 9
+    ray_labels: bool = True
+    """Wavelengths and deviations beside the rays."""
 
 
 @dataclass(frozen=True)
@@ -87,6 +89,8 @@ class Panels:
     spectrum: bool = True
     compare: bool = False
     history: bool = False
+    rays: bool = False
+    lesson: bool = False
     shortcuts: bool = False
     start_page: bool = False
     export: bool = False
@@ -141,6 +145,10 @@ class State:
     """Where the cursor is over the picture, 0..1 from the top left; the viewport sets it in every frame."""
     clipboard: Material | None = None
     pull: Pull | None = None
+    measured: tuple[Vec3, ...] = ()
+    """Points of the ruler, world; see `measuring`."""
+    lesson: str = ""
+    """Name of the lesson that the scene is shown in; see `lessons`."""
     animation: tuple[Key, ...] = ()
     interacting: bool = False
     """Something is being dragged: answer quickly, refine later, and keep undo steps together."""
@@ -160,6 +168,10 @@ class State:
     def with_panels(self, **changes: bool) -> State:
         """With windows opened or closed."""
         return replace(self, preferences=replace(self.preferences, panels=replace(self.preferences.panels, **changes)))
+
+    def with_display(self, **changes: Any) -> State:
+        """With something else of `Display`."""
+        return replace(self, display=replace(self.display, **changes))
 
     @property
     def live_inputs(self) -> LiveInputs:

@@ -239,6 +239,7 @@ COMMANDS: tuple[Command, ...] = (
         checked=lambda state, _view_model: state.tool == "brush",
     ),
     _tool("Pull a colour", "pull", "P", "Drag a colour of the caustic: the dispersion follows."),
+    _tool("Measure", "measure", "K", "Ruler and protractor: two points give a length, a third the angle between."),
     Command(
         "Accumulate photons",
         ("Space",),
@@ -329,6 +330,8 @@ PANELS: tuple[Command, ...] = (
     panel("Timing", "timing", "Frame time by pass, photons, memory, fall-backs."),
     panel("Spectrum", "spectrum", "The spectrum under the cursor."),
     panel("Compare", "compare", "Reference, wipe, error map, error against time."),
+    panel("Rays", "rays", "Deviation and focal length of the ray overlay, by wavelength."),
+    panel("Lesson", "lesson", "Six lessons: a scene each, a few sentences, what to try."),
     panel("History", "history", "All steps that can be undone."),
     panel("Export", "export", "Screenshots, baked maps, animations."),
 )

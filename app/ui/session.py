@@ -32,6 +32,7 @@ from .sentences import brief, sentence
 if TYPE_CHECKING:
     import numpy as np
 
+    from ..edit.lessons import Lesson
     from ..gpu.context import Context
     from ..model.scene import Scene
     from ..render.viewer.engine import LiveEngine
@@ -171,12 +172,22 @@ class Session:
             selection=Selection(),
             pull=None,
             animation=(),
+            measured=(),
+            lesson="",
             solo_nm=None,
             edit_label="",
         ).with_panels(start_page=False)
         self.picture.new_scene()
         self.tell_notes()
         self._remember_file(document.source)
+
+    def show_lesson(self, lesson: Lesson) -> None:
+        """A lesson's scene, with what it is about selected and its rays drawn. Raises `UserError`."""
+        self.show_document(Document.open(lesson.path))
+        names = [item.name for item in self.state.scene.objects]
+        chosen = Selection("object", names.index(lesson.select)) if lesson.select in names else Selection()
+        state = replace(self.state, lesson=lesson.name, selection=chosen).with_display(ray_overlay=lesson.rays)
+        self.state = state.with_panels(lesson=True, rays=lesson.rays or state.preferences.panels.rays)
 
     def tell_losses(self) -> None:
         """Once a picture is whole: what of its light was lost."""

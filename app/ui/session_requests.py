@@ -11,6 +11,7 @@ from ..base.atomic import check_writable
 from ..base.errors import UserError
 from ..edit import camera_controls, requests
 from ..edit.document import Document
+from ..edit.lessons import lesson
 from ..edit.state import Selection
 from ..model.scene_defaults import bounds_of
 from .caustic_source import source_at
@@ -35,6 +36,10 @@ def _new_scene(session: Session, _request: requests.NewScene) -> None:
 
 def _open(session: Session, request: requests.Open) -> None:
     session.show_document(Document.open(request.path, session.opening_of(request.path)))
+
+
+def _open_lesson(session: Session, request: requests.OpenLesson) -> None:
+    session.show_lesson(lesson(request.name))
 
 
 def _stand_up(session: Session, request: requests.StandUp) -> None:
@@ -189,6 +194,7 @@ def _dismiss(session: Session, request: requests.DismissMessage) -> None:
 _HANDLERS: dict[type, Callable] = {
     requests.NewScene: _new_scene,
     requests.Open: _open,
+    requests.OpenLesson: _open_lesson,
     requests.StandUp: _stand_up,
     requests.Save: _save,
     requests.Undo: _undo,

@@ -12,6 +12,7 @@ from ..model.scene import Vec3
 from ..model.staging import UpAxis
 from ..passes.ray_line import RayLine
 from ..render.viewer.stats import LiveStats
+from .ray_readings import RayReading
 
 
 @dataclass(frozen=True)
@@ -125,6 +126,8 @@ class ViewModel:
     compare_stale: bool = False
     """The scene or the view has changed since it was begun."""
     rays: tuple[RayLine, ...] = ()
+    readings: tuple[RayReading, ...] = ()
+    """What those rays say in numbers."""
     job: JobInfo | None = None
     exposure_ev: float = 0.0
     """The exposure in use, automatic or not."""

@@ -39,6 +39,7 @@ def view_model_of(session: Session) -> ViewModel:
         compare_ready=comparison.picture is not None,
         compare_stale=comparison.is_stale,
         rays=session.jobs.overlay.rays,
+        readings=session.jobs.overlay.readings,
         job=session.jobs.exports.job,
         exposure_ev=picture.exposure_ev,
         delta_s=session.delta_s,

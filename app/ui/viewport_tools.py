@@ -26,6 +26,7 @@ _TOOLS: tuple[tuple[Tool, str, str], ...] = (
     ("scale", "Scale", icons.ICON_FA_UP_RIGHT_AND_DOWN_LEFT_FROM_CENTER),
     ("brush", "Dispersion brush", icons.ICON_FA_PAINTBRUSH),
     ("pull", "Pull a colour", icons.ICON_FA_EYE_DROPPER),
+    ("measure", "Measure", icons.ICON_FA_RULER_COMBINED),
 )
 
 

@@ -52,12 +52,12 @@ def open_path(state: State, view_model: ViewModel, path: Path) -> State:
     """Open `path`; asks first when work would be lost. A picture or a lamp becomes part of the scene instead."""
     if picture_choice.is_part(path):
         return picture_choice.dropped(state, path)
-    return _unless_unsaved(state, view_model, requests.Open(path))
+    return unless_unsaved(state, view_model, requests.Open(path))
 
 
 def new_scene(state: State, view_model: ViewModel) -> State:
     """Start from the default scene; asks first when work would be lost."""
-    return _unless_unsaved(state, view_model, requests.NewScene())
+    return unless_unsaved(state, view_model, requests.NewScene())
 
 
 def save_as(state: State, view_model: ViewModel) -> State:
@@ -85,7 +85,8 @@ def draw_dialogs(state: State, view_model: ViewModel) -> State:
     return state
 
 
-def _unless_unsaved(state: State, view_model: ViewModel, request: requests.Request) -> State:
+def unless_unsaved(state: State, view_model: ViewModel, request: requests.Request) -> State:
+    """`request`, after the question whether to save first where work would be lost."""
     if not view_model.unsaved:
         return state.asking(request).with_panels(start_page=False)
     _memory.pending, _memory.is_saving = [request], False

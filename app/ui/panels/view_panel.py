@@ -196,7 +196,10 @@ def _overlays(state: State) -> State:
             reset=9,
             tip="Into how many wavelengths each ray is split, from 400 to 700 nm.",
         )
-        display = replace(display, ray_count=round(count), ray_wavelengths=round(wavelengths))
+        _, labels = widgets.toggle(
+            "Ray labels", display.ray_labels, tip="Write wavelength and deviation beside the rays, and mark their foci."
+        )
+        display = replace(display, ray_count=round(count), ray_wavelengths=round(wavelengths), ray_labels=labels)
     return replace(state, display=display)
 
 
