@@ -130,6 +130,24 @@ class Screenshot:
 
 
 @dataclass(frozen=True)
+class RenderPicture:
+    """Render a finished picture to `path`: .png, .jpg and .webp as displayed, .exr and .npy linear."""
+
+    path: Path
+    size: tuple[int, int]
+    """Pixels."""
+    photons: int | None = 4_000_000
+    seconds: float | None = None
+    """Of the whole picture, instead of `photons`."""
+    samples: int | None = None
+    """Camera samples a pixel; None takes as many as the scene needs."""
+    caustic: bool = False
+    """Also write a second file with nothing but caustics."""
+    bins: int | None = None
+    """Spectral bins, in .exr only."""
+
+
+@dataclass(frozen=True)
 class Bake:
     """Write a receiver's caustic map with its placement (`.json` beside it): .exr or .png."""
 
@@ -189,6 +207,7 @@ class DismissMessage:
     text: str
 
 
+Export = Screenshot | RenderPicture | Bake | Animate
 Request = (
     NewScene
     | Open
@@ -207,6 +226,7 @@ Request = (
     | Retrace
     | ReloadShaders
     | Screenshot
+    | RenderPicture
     | Bake
     | Animate
     | CancelJob

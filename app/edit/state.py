@@ -150,6 +150,8 @@ class State:
     lesson: str = ""
     """Name of the lesson that the scene is shown in; see `lessons`."""
     animation: tuple[Key, ...] = ()
+    preview_s: float | None = None
+    """Show the animation at this time; the scene that is edited and saved stays (`preview`)."""
     interacting: bool = False
     """Something is being dragged: answer quickly, refine later, and keep undo steps together."""
     edit_label: str = ""

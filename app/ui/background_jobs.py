@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 JOB_SHARE = 0.6
 """Of a frame's budget that a running export gets."""
+RENDER_SHARE = 0.95
+"""Likewise a finished picture that somebody waits for."""
 COMPARE_SHARE = 0.4
 """Likewise what is compared with."""
 
@@ -51,7 +53,7 @@ class BackgroundJobs:
         left = budget_s
         if self.exports.job is not None:
             try:
-                note = self.exports.step(JOB_SHARE * budget_s)
+                note = self.exports.step((RENDER_SHARE if self.exports.is_rendering else JOB_SHARE) * budget_s)
             except UserError as error:
                 self.notes.append((str(error), True))
             else:
@@ -67,9 +69,7 @@ class BackgroundJobs:
         self.cursor.update(state, picture, now_s)
         self.overlay.update(state)
 
-    def export(
-        self, request: requests.Screenshot | requests.Bake | requests.Animate, state: State, picture: LivePicture
-    ) -> None:
+    def export(self, request: requests.Export, state: State, picture: LivePicture) -> None:
         """Begin what `request` asks for. Raises `UserError`."""
         if picture.shown is None or picture.radiance is None:
             raise UserError("there is no picture yet; wait a moment")

@@ -81,6 +81,10 @@ def _toggle_physical(state: State, _view_model: ViewModel) -> State:
     return replace(state, physical=not state.physical)
 
 
+def _open_panel(name: str, state: State, _view_model: ViewModel) -> State:
+    return state.with_panels(**{name: True})
+
+
 def _toggle_panel(name: str, state: State, _view_model: ViewModel) -> State:
     return state.with_panels(**{name: not getattr(state.preferences.panels, name)})
 
@@ -140,6 +144,13 @@ COMMANDS: tuple[Command, ...] = (
     Command("Save", ("Ctrl+S",), "File", "Save the scene where it came from.", _save),
     Command(
         "Save as…", ("Ctrl+Shift+S",), "File", "Save as scene TOML, or as GLB for other programs.", dialogs.save_as
+    ),
+    Command(
+        "Render…",
+        ("F12",),
+        "File",
+        "Render a finished picture: size, photons or time, samples, layers.",
+        partial(_open_panel, "export"),
     ),
     Command(
         "Export…",

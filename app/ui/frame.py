@@ -77,8 +77,9 @@ def _work(session: Session, budget_s: float) -> None:
         return
     left = _work_beside(session, budget_s)
     started = session.clock()
+    drawn = session.preview.drawn(session.state)
     try:
-        session.picture.advance(session.state, left)
+        session.picture.advance(drawn, left)
     except EngineError as error:
         session.renderer_stopped(error)
         return
@@ -91,7 +92,7 @@ def _work(session: Session, budget_s: float) -> None:
     now = session.clock()
     try:
         session.picture.show(session.state, now, session.delta_s, session.jobs.comparison)
-        session.jobs.follow(session.state, session.picture, now)
+        session.jobs.follow(drawn, session.picture, now)
         session.tell_losses()
     except UserError as error:
         session.messages.tell(sentence(str(error)), is_error=True)

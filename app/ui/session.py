@@ -18,6 +18,7 @@ from ..edit.autosave import Autosave, Recovery, recoveries
 from ..edit.document import Document
 from ..edit.opening import Opening
 from ..edit.preferences import Settings, config_dir, load_settings, save_settings
+from ..edit.preview import Preview
 from ..edit.state import Selection, State
 from ..gpu.shader_watch import ShaderWatch
 from ..model.staging import Staging
@@ -67,6 +68,7 @@ class Session:
         self.autosave = Autosave(config_dir())
         self.recovery: Recovery | None = next(iter(recoveries(config_dir())), None)
         self.picture = LivePicture(context, make_engine)
+        self.preview = Preview()
         self.jobs = BackgroundJobs(context, config_dir())
         self.window_picture: Path | None = None
         """Where a picture of the whole window is to be written once this frame is drawn."""
@@ -172,6 +174,7 @@ class Session:
             selection=Selection(),
             pull=None,
             animation=(),
+            preview_s=None,
             measured=(),
             lesson="",
             solo_nm=None,

@@ -159,7 +159,7 @@ def _reload_shaders(session: Session, _request: requests.ReloadShaders) -> None:
     session.reload_shaders()
 
 
-def _export(session: Session, request: requests.Screenshot | requests.Bake | requests.Animate) -> None:
+def _export(session: Session, request: requests.Export) -> None:
     if isinstance(request, requests.Screenshot) and request.with_interface and not request.spectral:
         if request.path.suffix.lower() != ".png":
             raise UserError(f"cannot write {request.path.name}: a picture of the whole window is a .png")
@@ -209,6 +209,7 @@ _HANDLERS: dict[type, Callable] = {
     requests.Retrace: _retrace,
     requests.ReloadShaders: _reload_shaders,
     requests.Screenshot: _export,
+    requests.RenderPicture: _export,
     requests.Bake: _export,
     requests.Animate: _export,
     requests.CancelJob: _cancel_job,

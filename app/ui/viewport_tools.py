@@ -127,6 +127,13 @@ def badges(state: State, view_model: ViewModel) -> list[Badge]:
                 "order until they are traced again (Ctrl+R).",
             )
         )
+    if state.preview_s is not None:
+        badges.append(
+            Badge(
+                f"Preview at {state.preview_s:.2f} s",
+                "The animation at that time; the Export panel ends the preview. Edits change the scene itself.",
+            )
+        )
     if state.solo_nm is not None:
         badges.append(
             Badge(

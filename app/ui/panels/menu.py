@@ -58,7 +58,7 @@ def _file(state: State, view_model: ViewModel) -> State:
                 state = dialogs.open_path(state, view_model, path)
             widgets.tooltip(str(path))
         imgui.end_menu()
-    return _items(("", "Save", "Save as…", "", "Export…", "", "Quit"), state, view_model)
+    return _items(("", "Save", "Save as…", "", "Render…", "Export…", "", "Quit"), state, view_model)
 
 
 def _edit(state: State, view_model: ViewModel) -> State:
