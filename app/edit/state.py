@@ -8,6 +8,7 @@ part that the picture depends on, `scene` is what undo and saving cover.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, Literal
 
 from ..model.scene import Camera, Material, Scene, Vec3
@@ -66,7 +67,11 @@ class Compare:
 
     mode: CompareMode = "off"
     method: str = "reference"
-    """"reference", or one of `METHODS`, run on its own in the time left over."""
+    """"reference", "glass", "file", or one of `METHODS`, run on its own in the time left over."""
+    glass: str = "N-SF11"
+    """With the method "glass": the catalogue's glass that the other picture is of."""
+    file: Path | None = None
+    """With the method "file": the picture."""
     wipe: float = 0.5
     """Place of the wipe's line, share of the width."""
     plot: bool = False

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from ..base.errors import UserError
 from ..base.paths import shipped_scenes
 from .compare import Comparison
+from .compared_with import Histogram
 from .cursor_info import Cursor
 from .export import Exports, Shown
 from .gallery import Gallery
@@ -26,6 +27,8 @@ JOB_SHARE = 0.6
 """Of a frame's budget that a running export gets."""
 RENDER_SHARE = 0.95
 """Likewise a finished picture that somebody waits for."""
+HISTOGRAM_S = 1.0
+"""Shortest time between two histograms: each reads two pictures."""
 COMPARE_SHARE = 0.4
 """Likewise what is compared with."""
 
@@ -39,6 +42,9 @@ class BackgroundJobs:
         self.overlay = RayOverlay(context)
         self.cursor = Cursor()
         self.gallery = Gallery(context, config, shipped_scenes())
+        self.histogram: Histogram | None = None
+        """Of the picture and of what it is compared with."""
+        self._histogram_s = -1e9
         self.notes: list[tuple[str, bool]] = []
         """Sentence, whether it is an error."""
 
@@ -67,6 +73,11 @@ class BackgroundJobs:
     def follow(self, state: State, picture: LivePicture, now_s: float) -> None:
         """After the picture is made: what lies under the cursor, where rays go. Raises `UserError`."""
         self.cursor.update(state, picture, now_s)
+        if not state.preferences.panels.compare:
+            self.histogram = None
+        elif now_s - self._histogram_s > HISTOGRAM_S:
+            self._histogram_s = now_s
+            self.histogram = self.comparison.histogram(picture.radiance, picture.exposure_ev)
         self.overlay.update(state)
 
     def export(self, request: requests.Export, state: State, picture: LivePicture) -> None:

@@ -173,7 +173,9 @@ def draw_wipe(canvas: Canvas, state: State, view_model: ViewModel) -> None:
         ImVec2(x - 0.5 * size.x, middle - 0.5 * size.y), theme.packed(palette.text), icons.ICON_FA_LEFT_RIGHT
     )
     y = canvas.top + theme.em(0.8)
-    left, right = (METHOD_NAMES.get(name, "Reference") for name in (state.method, state.compare.method))
+    left = METHOD_NAMES.get(state.method, state.method)
+    # Without the other picture both sides are this one: it must not carry the other's name.
+    right = view_model.compare_label if view_model.compare_ready else "On its way: this is the same picture"
     gap = theme.em(1.0)
     _label(canvas, x - gap - imgui.calc_text_size(left).x, y, left)
     _label(canvas, x + gap, y, right)

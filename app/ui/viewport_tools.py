@@ -150,7 +150,7 @@ def badges(state: State, view_model: ViewModel) -> list[Badge]:
             )
         )
     elif state.compare.holding:
-        badges.append(Badge("Reference", "Shown while C is held down.", False))
+        badges.append(Badge(view_model.compare_label or "The other picture", "Shown while C is held down.", False))
     if not state.playing:
         badges.append(Badge("Paused", "No photons are added. Space goes on.", False))
     return badges

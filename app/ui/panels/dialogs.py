@@ -6,7 +6,7 @@ ever gets the final requests.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from imgui_bundle import imgui
@@ -19,6 +19,8 @@ from ..view_model import ViewModel
 from . import file_browser, picture_choice, widgets
 
 OPENABLE = (".toml", ".glb", ".gltf", ".obj", ".ply", ".stl")
+COMPARABLE = (".exr", ".npy")
+"""Dropped while the compare panel is open, these are compared with."""
 SAVEABLE = (".toml", ".glb")
 _UNSAVED = "Unsaved changes"
 
@@ -50,6 +52,9 @@ def open_file(state: State, view_model: ViewModel) -> State:
 
 def open_path(state: State, view_model: ViewModel, path: Path) -> State:
     """Open `path`; asks first when work would be lost. A picture or a lamp becomes part of the scene instead."""
+    if state.preferences.panels.compare and path.suffix.lower() in COMPARABLE:
+        mode = "wipe" if state.compare.mode == "off" else state.compare.mode
+        return replace(state, compare=replace(state.compare, method="file", file=path, mode=mode))
     if picture_choice.is_part(path):
         return picture_choice.dropped(state, path)
     return unless_unsaved(state, view_model, requests.Open(path))
