@@ -274,7 +274,10 @@ def animate(
     output: Annotated[
         Path,
         typer.Option(
-            "-o", "--output", metavar="OUT", help="A movie (.mp4), or a folder for numbered PNGs, which can be resumed."
+            "-o",
+            "--output",
+            metavar="OUT",
+            help="A movie (.mp4), a .gif, or a folder for numbered PNGs, which can be resumed.",
         ),
     ],
     turntable: Annotated[

@@ -96,6 +96,8 @@ def _run(
         session.state = replace(session.state, preferences=preferences)
     if lesson is not None:
         session.show_lesson(lesson)
+    elif scene is None and screenshot is None:
+        session.welcome()
     viewer = Viewer(session, refresh_s=window.refresh_s)
     layout_memory.load()
     try:

@@ -73,6 +73,11 @@ class Quit:
 
 
 @dataclass(frozen=True)
+class FullScreen:
+    """The window over the whole screen, or back to where it was."""
+
+
+@dataclass(frozen=True)
 class CancelQuit:
     """The answer "Cancel" to that question, and "Save" before it saves: stay open, ask no more."""
 
@@ -160,7 +165,8 @@ class Bake:
 
 @dataclass(frozen=True)
 class Animate:
-    """Render an animation to `path` (.mp4, or a folder for PNGs): a turntable, or the keys of `State.animation`."""
+    """Render an animation to `path` (.mp4, .gif, or a folder for PNGs): a turntable, or the keys of
+    `State.animation`."""
 
     path: Path
     kind: Literal["turntable", "keys"] = "turntable"
@@ -219,6 +225,7 @@ Request = (
     | GoTo
     | Quit
     | CancelQuit
+    | FullScreen
     | Recover
     | SelectAt
     | BeginPull

@@ -141,6 +141,13 @@ COMMANDS: tuple[Command, ...] = (
         "Open a scene (.toml), glTF (.glb, .gltf) or a bare mesh (.obj, .ply, .stl).",
         dialogs.open_file,
     ),
+    Command(
+        "Import…",
+        ("Ctrl+I",),
+        "File",
+        "Bring the objects of a mesh, a glTF file or another scene into this one.",
+        dialogs.import_file,
+    ),
     Command("Save", ("Ctrl+S",), "File", "Save the scene where it came from.", _save),
     Command(
         "Save as…", ("Ctrl+Shift+S",), "File", "Save as scene TOML, or as GLB for other programs.", dialogs.save_as
@@ -222,6 +229,9 @@ COMMANDS: tuple[Command, ...] = (
         "View",
         "Save the present camera with the scene.",
         view_commands.keep_as_scene_view,
+    ),
+    Command(
+        "Full screen", ("F11",), "View", "The window over the whole screen, and back.", _ask(requests.FullScreen())
     ),
     Command(
         "Hide panels",

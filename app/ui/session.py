@@ -74,6 +74,8 @@ class Session:
         """Where a picture of the whole window is to be written once this frame is drawn."""
         self.interface_scale = self.framebuffer_scale = 1.0
         self.asks_to_quit = False
+        self.is_full_screen = False
+        """Wanted of the window."""
         self.wants_to_close = False
         self.frame_ms: deque[float] = deque(maxlen=FRAMES_REMEMBERED)
         self.interface_s = 0.0
@@ -161,6 +163,12 @@ class Session:
         if selection.index >= len(things):
             selection = Selection()
         self.state = replace(self.state, scene=scene, selection=selection, pull=None)
+
+    def welcome(self) -> None:
+        """Open the start page for somebody who has never seen it."""
+        if self.settings.is_new:
+            self.state = self.state.with_panels(start_page=True)
+            self.settings = replace(self.settings, is_new=False)
 
     def show_document(self, document: Document) -> None:
         """Take up another document; preferences and display stay as they are."""

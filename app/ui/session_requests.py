@@ -71,6 +71,10 @@ def _quit(session: Session, request: requests.Quit) -> None:
     session.quit(request.discard)
 
 
+def _full_screen(session: Session, _request: requests.FullScreen) -> None:
+    session.is_full_screen = not session.is_full_screen
+
+
 def _cancel_quit(session: Session, _request: requests.CancelQuit) -> None:
     session.asks_to_quit = False
 
@@ -202,6 +206,7 @@ _HANDLERS: dict[type, Callable] = {
     requests.GoTo: _go_to,
     requests.Quit: _quit,
     requests.CancelQuit: _cancel_quit,
+    requests.FullScreen: _full_screen,
     requests.Recover: _recover,
     requests.SelectAt: _select_at,
     requests.BeginPull: _begin_pull,

@@ -12,8 +12,9 @@ from pathlib import Path
 from imgui_bundle import imgui
 
 from ...base.paths import assets_dir
-from ...edit import requests
-from ...edit.state import State
+from ...edit import edits, requests
+from ...edit.importing import import_objects
+from ...edit.state import Selection, State
 from .. import theme
 from ..view_model import ViewModel
 from . import file_browser, picture_choice, widgets
@@ -50,6 +51,13 @@ def open_file(state: State, view_model: ViewModel) -> State:
     return state
 
 
+def import_file(state: State, view_model: ViewModel) -> State:
+    """Ask which file's objects are to join the scene."""
+    start = view_model.path.parent if view_model.path is not None else _recent_folder(view_model)
+    file_browser.ask(file_browser.Question("import", "Import into this scene", OPENABLE, start))
+    return state
+
+
 def open_path(state: State, view_model: ViewModel, path: Path) -> State:
     """Open `path`; asks first when work would be lost. A picture or a lamp becomes part of the scene instead."""
     if state.preferences.panels.compare and path.suffix.lower() in COMPARABLE:
@@ -80,6 +88,9 @@ def draw_dialogs(state: State, view_model: ViewModel) -> State:
     chosen = file_browser.take("open")
     if chosen is not None:
         state = open_path(state, view_model, chosen)
+    brought = file_browser.take("import")
+    if brought is not None:
+        state = _imported(state, brought)
     target = file_browser.take("save")
     if target is not None:
         state = state.asking(requests.Save(target))
@@ -88,6 +99,13 @@ def draw_dialogs(state: State, view_model: ViewModel) -> State:
     if (_memory.pending and not _memory.is_saving) or view_model.asks_to_quit:
         state = _unsaved_question(state, view_model)
     return state
+
+
+def _imported(state: State, path: Path) -> State:
+    """With the file's objects, the first of them selected."""
+    first = len(state.scene.objects)
+    after = edits.attempt(state, f"Import {path.name}", import_objects, path)
+    return after if after.scene is state.scene else replace(after, selection=Selection("object", first))
 
 
 def unless_unsaved(state: State, view_model: ViewModel, request: requests.Request) -> State:

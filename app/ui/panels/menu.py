@@ -58,7 +58,7 @@ def _file(state: State, view_model: ViewModel) -> State:
                 state = dialogs.open_path(state, view_model, path)
             widgets.tooltip(str(path))
         imgui.end_menu()
-    return _items(("", "Save", "Save as…", "", "Render…", "Export…", "", "Quit"), state, view_model)
+    return _items(("Import…", "", "Save", "Save as…", "", "Render…", "Export…", "", "Quit"), state, view_model)
 
 
 def _edit(state: State, view_model: ViewModel) -> State:
@@ -89,7 +89,7 @@ def _view(state: State, view_model: ViewModel) -> State:
     if imgui.begin_menu("Panels"):
         state = _items(tuple(f"Panel: {command.name}" for command in commands.PANELS), state, view_model)
         imgui.end_menu()
-    state = _items(("Hide panels",), state, view_model)
+    state = _items(("Hide panels", "Full screen"), state, view_model)
     if imgui.menu_item("Reset layout", "", False)[0]:
         layout.reset()
         state = replace(state, preferences=replace(state.preferences, panels=Panels()))
