@@ -98,6 +98,8 @@ class SelectAt:
     x: float
     y: float
     itself: bool = False
+    add: bool = False
+    """To what is selected already."""
 
 
 @dataclass(frozen=True)

@@ -23,9 +23,9 @@ ToneCurve = Literal["spectrasplat", "aces", "reinhard", "linear"]
 
 @dataclass(frozen=True)
 class Selection:
-    """An object or a light by its index; nothing when `kind` is None."""
+    """An object or a light by its index, the scene's camera, or nothing where `kind` is None."""
 
-    kind: Literal["object", "light"] | None = None
+    kind: Literal["object", "light", "camera"] | None = None
     index: int = 0
 
 
@@ -132,6 +132,12 @@ class State:
     views: tuple[Camera | None, ...] = (None,) * 9
     """Numbered views, keys 1 to 9."""
     selection: Selection = Selection()
+    also: tuple[Selection, ...] = ()
+    """Selected besides: they are moved, copied and deleted together with it."""
+    hidden: frozenset[tuple[str, str]] = frozenset()
+    """What the picture leaves out: ("object" or "light", name). Not saved."""
+    locked: frozenset[tuple[str, str]] = frozenset()
+    """What the hand in the picture cannot take, likewise."""
     tool: Tool = "select"
     display: Display = Display()
     brush: Brush = Brush()

@@ -70,15 +70,16 @@ class BackgroundJobs:
         self.comparison.advance(state, picture.engine, share * max(left, 0.0))
         return max(budget_s - (time.perf_counter() - started), 0.2 * budget_s)
 
-    def follow(self, state: State, picture: LivePicture, now_s: float) -> None:
-        """After the picture is made: what lies under the cursor, where rays go. Raises `UserError`."""
+    def follow(self, state: State, drawn: State, picture: LivePicture, now_s: float) -> None:
+        """After the picture is made: what lies under the cursor, where rays go. `drawn`: the state as
+        the picture shows it. Raises `UserError`."""
         self.cursor.update(state, picture, now_s)
         if not state.preferences.panels.compare:
             self.histogram = None
         elif now_s - self._histogram_s > HISTOGRAM_S:
             self._histogram_s = now_s
             self.histogram = self.comparison.histogram(picture.radiance, picture.exposure_ev)
-        self.overlay.update(state)
+        self.overlay.update(drawn)
 
     def export(self, request: requests.Export, state: State, picture: LivePicture) -> None:
         """Begin what `request` asks for. Raises `UserError`."""

@@ -41,13 +41,13 @@ def _ask(*what: requests.Request) -> Act:
 def _duplicate(state: State, _view_model: ViewModel) -> State:
     from .panels import outliner
 
-    return outliner.duplicate(state, state.selection)
+    return outliner.duplicate_all(state)
 
 
 def _delete(state: State, _view_model: ViewModel) -> State:
     from .panels import outliner
 
-    return outliner.delete(state, state.selection)
+    return outliner.delete_all(state)
 
 
 def _save(state: State, view_model: ViewModel) -> State:

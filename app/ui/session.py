@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING
 from ..base.errors import UserError
 from ..edit.autosave import Autosave, Recovery, recoveries
 from ..edit.document import Document
+from ..edit.drawn import Drawn
 from ..edit.opening import Opening
 from ..edit.preferences import Settings, config_dir, load_settings, save_settings
-from ..edit.preview import Preview
 from ..edit.state import Selection, State
 from ..gpu.shader_watch import ShaderWatch
 from ..model.staging import Staging
@@ -68,7 +68,7 @@ class Session:
         self.autosave = Autosave(config_dir())
         self.recovery: Recovery | None = next(iter(recoveries(config_dir())), None)
         self.picture = LivePicture(context, make_engine)
-        self.preview = Preview()
+        self.drawn = Drawn()
         self.jobs = BackgroundJobs(context, config_dir())
         self.window_picture: Path | None = None
         """Where a picture of the whole window is to be written once this frame is drawn."""
@@ -159,7 +159,7 @@ class Session:
     def show_scene(self, scene: Scene) -> None:
         """Another scene of the same document, as after undo; what was selected stays if it is still there."""
         selection = self.state.selection
-        things = {"object": scene.objects, "light": scene.lights, None: ()}[selection.kind]
+        things = {"object": scene.objects, "light": scene.lights, "camera": (scene.camera,), None: ()}[selection.kind]
         if selection.index >= len(things):
             selection = Selection()
         self.state = replace(self.state, scene=scene, selection=selection, pull=None)
@@ -183,6 +183,9 @@ class Session:
             pull=None,
             animation=(),
             preview_s=None,
+            also=(),
+            hidden=frozenset(),
+            locked=frozenset(),
             measured=(),
             lesson="",
             solo_nm=None,

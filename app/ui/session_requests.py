@@ -9,7 +9,7 @@ import numpy as np
 
 from ..base.atomic import check_writable
 from ..base.errors import UserError
-from ..edit import camera_controls, requests
+from ..edit import camera_controls, requests, selecting
 from ..edit.document import Document
 from ..edit.lessons import lesson
 from ..edit.state import Selection
@@ -100,13 +100,17 @@ def _select_at(session: Session, request: requests.SelectAt) -> None:
     hit = picture.pick((request.x, request.y))
     chosen = None if hit is None else picture.object_in(scene, hit.object_index)
     if hit is None or chosen is None:
-        session.state = replace(session.state, selection=Selection())
+        session.state = replace(session.state, selection=Selection(), also=())
         return
     if not request.itself and scene.objects[chosen].material.receives:
         source = _source_at(session, np.asarray(hit.position), hit.object_index)
         found = None if source is None else picture.object_in(scene, source)
         chosen = chosen if found is None else found
-    session.state = replace(session.state, selection=Selection("object", chosen))
+    name = scene.objects[chosen].name
+    if ("object", name) in session.state.locked:
+        session.messages.tell(f"{name} is locked: unlock it in the outliner to select it here.")
+        return
+    session.state = selecting.chosen(session.state, Selection("object", chosen), request.add)
 
 
 def _source_at(session: Session, position: np.ndarray, receiver: int) -> int | None:
@@ -170,7 +174,7 @@ def _export(session: Session, request: requests.Export) -> None:
         check_writable(request.path)
         session.window_picture = request.path
         return
-    session.jobs.export(request, session.state, session.picture)
+    session.jobs.export(request, session.drawn.visible(session.state), session.picture)
 
 
 def _cancel_job(session: Session, _request: requests.CancelJob) -> None:

@@ -48,6 +48,7 @@ class Gesture:
 
 GESTURES = (
     Gesture("Click", "Mouse in the picture", "Select an object, or the object whose caustic it is"),
+    Gesture("Shift+click", "Mouse in the picture", "Select one thing more, or one less"),
     Gesture("Ctrl+click", "Mouse in the picture", "Select the surface itself, even under a caustic"),
     Gesture("Middle drag, Alt+left drag", "Mouse in the picture", "Orbit"),
     Gesture("Shift+middle drag", "Mouse in the picture", "Pan"),

@@ -114,7 +114,7 @@ class ViewportInput:
             point = point_at(view_model, canvas, mouse.x, mouse.y)
             return state if point is None else measuring.with_point(state, point)
         if grip == "click" and self._travelled_px <= CLICK_PX and mouse.is_over:
-            return state.asking(SelectAt(mouse.x, mouse.y, imgui.get_io().key_ctrl))
+            return state.asking(SelectAt(mouse.x, mouse.y, imgui.get_io().key_ctrl, imgui.get_io().key_shift))
         return state
 
     # ---- while it lasts ---------------------------------------------------------------------

@@ -62,6 +62,12 @@ def draw_toolbar(state: State, gizmo: Gizmo, left: float, top: float) -> State:
         if _button("Gizmo axes", icon, x, y, gizmo.is_local, tip, ()):
             gizmo.is_local = not gizmo.is_local
         y += size + gap
+    if state.tool in ("move", "rotate", "scale"):
+        _ground(x, y, size, 1)
+        tip = "Handles move in steps; Ctrl moves freely." if gizmo.is_snapping else "Move in steps, as Ctrl does."
+        if _button("Snapping", icons.ICON_FA_MAGNET, x, y, gizmo.is_snapping, tip, ()):
+            gizmo.is_snapping = not gizmo.is_snapping
+        y += size + gap
     _ground(x, y, size, 2)
     what = command("Accumulate photons")
     icon, tip = (

@@ -12,7 +12,7 @@ from panel_rig import PanelRig, scene_state
 from PIL import Image
 from spectrasplat.base.errors import UserError
 from spectrasplat.edit import requests
-from spectrasplat.edit.preview import Preview, scrubbed
+from spectrasplat.edit.drawn import Drawn, scrubbed
 from spectrasplat.edit.state import Key, State
 from spectrasplat.gpu.context import Context
 from spectrasplat.ui.export import Exports, Shown, left_words
@@ -97,16 +97,16 @@ def test_the_end_is_told_by_the_clock() -> None:
 
 def test_scrubbing_shows_the_animation_and_edits_nothing() -> None:
     state = replace(scene_state(), animation=(Key(0.0, GAIN, 0.0), Key(2.0, GAIN, 3.0)))
-    preview = Preview()
-    assert preview.drawn(state) is state
+    preview = Drawn()
+    assert preview.of(state) is state
     state = scrubbed(state, 2.0)
-    drawn = preview.drawn(state)
+    drawn = preview.of(state)
     assert drawn.scene.objects[0].material.dispersion.gain == pytest.approx(3.0)
     assert state.scene.objects[0].material.dispersion.gain == pytest.approx(1.0)
-    assert preview.drawn(state).scene is drawn.scene  # nothing moves: nothing is done again
-    assert preview.drawn(scrubbed(state, 1.0)).scene.objects[0].material.dispersion.gain == pytest.approx(1.5)
+    assert preview.of(state).scene is drawn.scene  # nothing moves: nothing is done again
+    assert preview.of(scrubbed(state, 1.0)).scene.objects[0].material.dispersion.gain == pytest.approx(1.5)
     gone = replace(state, animation=(Key(0.0, "objects.vase.dispersion_gain", 0.0), *state.animation))
-    assert preview.drawn(gone) is gone
+    assert preview.of(gone) is gone
 
 
 def test_the_preview_is_dragged_along_and_ended(gl: Context) -> None:

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
+from ...edit.drawn import scrubbed
 from ...edit.parameters import Parameter, Stage, parts, paths, value_of
-from ...edit.preview import scrubbed
 from ...edit.state import Key, State
 from ...model.scene import Scene
 from .. import item_rects, theme
