@@ -87,11 +87,11 @@ def handle(state: State, view_model: ViewModel) -> State:
     if not is_free or imgui.is_mouse_down(imgui.MouseButton_.right):
         return _hold_compare(state, False)
     on_start_page = state.preferences.panels.start_page
-    if on_start_page and imgui.is_key_pressed(imgui.Key.escape):
-        return state.with_panels(start_page=False)
     closing = focused_panel["field"] or (floating_panels[-1] if floating_panels and state.tool == "select" else "")
     if closing and imgui.is_key_pressed(imgui.Key.escape):
         return state.with_panels(**{closing: False})
+    if on_start_page and imgui.is_key_pressed(imgui.Key.escape):
+        return state.with_panels(start_page=False)
     for command in _all():
         # What the page hides must not be edited blindly.
         is_reachable = not on_start_page or command.group in _ON_START_PAGE

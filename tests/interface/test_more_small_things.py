@@ -50,6 +50,9 @@ def test_help_is_seen_on_the_start_page_and_quit_works_in_a_menu(gl: Context) ->
         rig.key(imgui.Key.f1)
         rig.frame(3)
         assert rig.find("Search shortcuts")
+        rig.key(imgui.Key.escape)  # the list first, the page it lies on with the next one
+        rig.frame(3)
+        assert rig.state.preferences.panels.start_page and not rig.state.preferences.panels.shortcuts
         rig.open_panel(start_page=False, shortcuts=False)
         rig.click("Menu: View")
         rig.frame(2)
