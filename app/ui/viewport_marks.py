@@ -13,6 +13,7 @@ from ..edit.projection import View
 from ..edit.state import Brush, Selection, State
 from ..model.scene import Camera
 from . import item_rects, theme
+from .compared_with import glass_object
 from .overlay import Canvas, box_corners, draw_box, draw_outlined
 from .panels.methods import METHOD_NAMES
 from .panels.rows import tooltip
@@ -191,6 +192,10 @@ def draw_wipe(canvas: Canvas, state: State, view_model: ViewModel) -> None:
     )
     y = canvas.top + theme.em(0.8)
     left = METHOD_NAMES.get(state.method, state.method)
+    swapped = glass_object(state.scene, state.selection) if state.compare.method == "glass" else None
+    if swapped is not None:
+        dispersion = state.scene.objects[swapped].material.dispersion
+        left = dispersion.name if dispersion is not None else left
     # Without the other picture both sides are this one: it must not carry the other's name.
     right = view_model.compare_label if view_model.compare_ready else "On its way: this is the same picture"
     gap = theme.em(1.0)

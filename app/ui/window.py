@@ -202,7 +202,8 @@ class Window:
         if self._before_full_screen is not None:
             x, y, width, height = self._before_full_screen
             self._before_full_screen = None
-            glfw.set_window_monitor(self._handle, None, x, y, width, height, glfw.DONT_CARE)
+            no_monitor: Any = None
+            glfw.set_window_monitor(self._handle, no_monitor, x, y, width, height, glfw.DONT_CARE)
         else:
             monitor = glfw.get_primary_monitor()
             mode = glfw.get_video_mode(monitor) if monitor else None

@@ -48,7 +48,9 @@ _LEGEND_STEPS = 40
 def draw_compare(state: State, view_model: ViewModel) -> State:
     """Draw the panel's contents."""
     if imgui.get_content_region_avail().x < theme.em(_WIDE_EM):
-        state = _plot(_controls(state, view_model), view_model, theme.em(13))
+        state = _controls(state, view_model)
+        _values(state, view_model)
+        state = _plot(state, view_model, theme.em(13))
         if not state.compare.plot:
             _histogram(view_model, theme.em(11))
         return state
@@ -59,6 +61,7 @@ def draw_compare(state: State, view_model: ViewModel) -> State:
         imgui.table_next_column()
         state = _controls(state, view_model)
         imgui.table_next_column()
+        _values(state, view_model)
         room = max(imgui.get_content_region_avail().y, theme.em(9))
         state = _plot(state, view_model, room)
         if not state.compare.plot:
@@ -77,6 +80,12 @@ def _controls(state: State, view_model: ViewModel) -> State:
     _, method = widgets.combo("With", others, compare.method, tip=tip)
     if method != compare.method and mode == "off":
         mode = "wipe"  # who chooses what to compare with wants to see it
+    if method == "glass" and compare.method != "glass":
+        present = {
+            item.material.dispersion.name for item in state.scene.objects if item.material.dispersion is not None
+        }
+        others_of = [name for name in _GLASSES if not any(one.endswith(name) for one in present)]
+        compare = replace(compare, glass=others_of[0] if others_of else compare.glass)
     compare = replace(compare, mode=mode, method=method)
     if method == "glass":
         compare = _glass(compare)
@@ -124,8 +133,10 @@ def _file(compare: Compare, view_model: ViewModel) -> Compare:
     return compare if path is None else replace(compare, file=path)
 
 
-def _values(view_model: ViewModel) -> None:
+def _values(state: State, view_model: ViewModel) -> None:
     """Both pictures under the cursor, in numbers."""
+    if not is_comparing(state.compare):
+        return
     own = None if view_model.cursor is None else view_model.cursor.rgb
     for label, rgb in (("Here", own), ("There", view_model.compared_rgb)):
         text = "–" if rgb is None else "  ".join(f"{value:.4g}" for value in rgb)
@@ -144,16 +155,17 @@ def _histogram(view_model: ViewModel, height: float) -> None:
         return
     flags = implot.Flags_.no_menus | implot.Flags_.no_mouse_text | implot.Flags_.no_inputs
     if implot.begin_plot("##histogram", imgui.ImVec2(-theme.em(0.6), height), flags):
-        implot.setup_axes("luminance (stops about display white)", "share of pixels")
+        implot.setup_axes("luminance (stops about display white)", "√ share of pixels")
         implot.setup_axis_limits(implot.ImAxis_.x1, float(found.stops[0]), float(found.stops[-1]), implot.Cond_.always)
         top = max(float(found.own.max()), float(found.other.max()), 1e-6)
-        implot.setup_axis_limits(implot.ImAxis_.y1, 0.0, 1.15 * top, implot.Cond_.always)
+        # The root, so that a bright line on a grey table is seen beside the table.
+        implot.setup_axis_limits(implot.ImAxis_.y1, 0.0, 1.15 * top**0.5, implot.Cond_.always)
         implot.setup_legend(implot.Location_.north_east)
         for name, shares, tint in zip(
             ("This picture", view_model.compare_label or "Other"), (found.own, found.other), _tints(), strict=True
         ):
             spec = implot.Spec(line_color=tint, line_weight=1.8)
-            implot.plot_line(name, found.stops, np.ascontiguousarray(shares, float), spec)
+            implot.plot_line(name, found.stops, np.ascontiguousarray(np.sqrt(shares), float), spec)
         implot.end_plot()
     item_rects.note("Histogram")
 
@@ -171,7 +183,6 @@ def _progress(state: State, view_model: ViewModel) -> State:
         widgets.note("Scene or view has changed: this is the picture from before.")
     if view_model.compare_text:
         widgets.hint(view_model.compare_text)
-    _values(view_model)
     if widgets.button(
         "Start again", tip="Compute what it is compared with anew, for the present scene and view.", width=-1
     ):
