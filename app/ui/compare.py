@@ -72,6 +72,10 @@ class Comparison:
         self._swap = GlassSwap()
         self._file = FilePicture(context)
         self._glass_problem: str | None = None
+        self._wish: tuple[str, str] | None = None
+        """Method and glass that the engine was last given."""
+        self._version_before: int | None = None
+        """Of the engine's picture when it was given them."""
         self._selection: Selection | None = None
         """What was selected when it was begun: the solid whose glass is another."""
 
@@ -86,9 +90,14 @@ class Comparison:
             return self._composed
         if self._compare.method == FILE:
             return self._file.texture
-        if self._compare.method == GLASS and self._glass_problem is not None:
+        if (self._compare.method == GLASS and self._glass_problem is not None) or self._shows_another_wish:
             return None
         return self._engine.picture if self._engine is not None else None
+
+    @property
+    def _shows_another_wish(self) -> bool:
+        """The engine's picture is still that of the glass or the method before: it must not carry this one's name."""
+        return self._engine is not None and self._engine.picture_version == self._version_before
 
     @property
     def label(self) -> str:
@@ -293,6 +302,9 @@ class Comparison:
             except UserError as error:
                 self._glass_problem = str(error)
                 return
+        wish = self._method, self._compare.glass if self._compare.method == GLASS else ""
+        if wish != self._wish:
+            self._wish, self._version_before = wish, self._engine.picture_version
         self._engine.set(replace(self._begun, method=self._method, scene=scene))
         self._engine.advance(budget_s, False)
         self._count_seconds(self._engine, self._method)

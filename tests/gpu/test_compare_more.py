@@ -77,6 +77,13 @@ def test_another_glass_is_traced_beside_this_one(state, running, comparison) -> 
     assert comparison.label == "N-BK7" and "N-BK7" in comparison.text
     assert not np.allclose(read(comparison.picture), read(running.picture), rtol=0.05)
     assert state.scene.objects[0].material.dispersion.name == "Schott N-SF11"
+    before = read(comparison.picture)
+    other = replace(compared, compare=replace(compared.compare, glass="F2"))
+    comparison.advance(other, running, 0.0)
+    # Until F2 is there, N-BK7's picture must not be called F2.
+    assert comparison.label == "F2" and comparison.picture is None
+    until(lambda: comparison.picture is not None, lambda: comparison.advance(other, running, 0.05))
+    assert not np.array_equal(read(comparison.picture), before)
 
 
 def test_the_other_glass_is_that_of_the_selected_solid_and_made_once() -> None:
