@@ -59,6 +59,7 @@ class Gizmo:
         self.is_snapping = False
         """In steps without Ctrl, freely with it."""
         self._drag: _Drag | None = None
+        self._is_drawn = False
 
     @property
     def is_held(self) -> bool:
@@ -67,7 +68,8 @@ class Gizmo:
 
     def is_in_the_way(self) -> bool:
         """The mouse belongs to the gizmo: it is over a handle or holds one."""
-        return self.is_held or bool(_IM.is_over())
+        # ImGuizmo goes on saying what it said when it was last drawn.
+        return self.is_held or (self._is_drawn and bool(_IM.is_over()))
 
     def draw(self, state: State, view: View, rect: tuple[float, float, float, float]) -> State:
         """Draw it over the picture in `rect` (left, top, width, height in pixels) and follow its handles."""
@@ -77,8 +79,9 @@ class Gizmo:
             or selecting.is_locked(state, state.selection)
             or not placing.can_do(state.scene, state.selection, operation)
         ):
-            self._drag = None
+            self._drag, self._is_drawn = None, False
             return state
+        self._is_drawn = True
         if self._drag is not None and not self._drag.goes_on(state):
             self._drag = None
         _IM.begin_frame()
