@@ -17,6 +17,7 @@ import numpy as np
 from . import files
 from .atomic import atomic_output, check_writable
 from .errors import UserError
+from .gif import Gif
 from .locks import locked
 
 MANIFEST = "animation.json"
@@ -311,10 +312,12 @@ def _last_line(told: bytes) -> str:
 
 def open_sink(
     path: Path, size: tuple[int, int], fps: float, description: Mapping[str, object], overwrite: bool = False
-) -> Movie | Frames:
-    """The sink that `path` asks for: a `.mp4`, or a folder (a name without a suffix). Raises `UserError`."""
+) -> Movie | Gif | Frames:
+    """The sink that `path` asks for: a `.mp4`, a `.gif`, or a folder (a name without a suffix). Raises `UserError`."""
     if path.suffix.lower() == ".mp4":
         return Movie(path, size, fps)
+    if path.suffix.lower() == ".gif":
+        return Gif(path, size, fps)
     check_folder(path)
     return Frames(path, description, overwrite)
 
@@ -323,5 +326,5 @@ def check_folder(path: Path) -> None:
     """Raise `UserError` where `path` looks like a file's name."""
     if path.suffix and not os.path.isdir(path):
         raise UserError(
-            f"cannot write {path}: the suffix '{path.suffix}' is not an animation; use .mp4, or a folder for PNGs"
+            f"cannot write {path}: the suffix '{path.suffix}' is not an animation; use .mp4, .gif, or a folder for PNGs"
         )

@@ -71,7 +71,7 @@ def plan_of(request: AnimateRequest) -> Plan:
         raise UserError(
             "--skip-existing and --overwrite exclude each other: keep the frames there are, or replace them"
         )
-    if request.skip_existing and request.output.suffix.lower() == ".mp4":
+    if request.skip_existing and request.output.suffix.lower() in (".mp4", ".gif"):
         raise UserError("--skip-existing is for a folder of frames: a movie (.mp4) is written in one go")
     fps = DEFAULT_FPS if request.fps is None else _parse_fps(request.fps)
     scene = options.open_scene(request.scene, request.opening)

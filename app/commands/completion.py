@@ -14,6 +14,13 @@ from ..model.settings import CAMERA_METHODS, METHODS
 from . import options
 
 
+def lessons() -> list[str]:
+    """Lessons of the window."""
+    from ..edit.lessons import lessons
+
+    return [each.name for each in lessons()]
+
+
 def scenes() -> list[str]:
     """Shipped scenes."""
     return list(shipped_scenes())

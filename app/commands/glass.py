@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ..base.errors import UserError
-from ..model.optics.catalogue import Entry, search, search_key
+from ..model.optics.catalogue import Entry, is_guess, search, search_key
 from .glass_report import describe, list_glasses, plot
 
 MAX_PLOTTED = 6
@@ -23,6 +23,8 @@ def glass_command(query: str | None, plot_file: Path | None, show: Callable[[obj
         )
     if plot_file is not None:
         plot(hits, plot_file)  # first, so that a refused file name is all that is said
+    if hits and is_guess(query or ""):
+        show(f"Nothing in the catalogue is called '{query}'. A guess by its letters:")
     if len(hits) == 1:
         show(describe(hits[0]))
     else:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..base.atomic import atomic_output
 from ..base.errors import UserError
-from ..model.optics.catalogue import LICENCE, Entry, entries, search
+from ..model.optics.catalogue import LICENCE, Entry, entries, is_guess, search
 from ..model.optics.glass import LINE_C_NM, LINE_D_NM, LINE_F_NM
 
 if TYPE_CHECKING:
@@ -34,7 +34,8 @@ def list_glasses(query: str = "", limit: int | None = None) -> Table:
     found = search(query, limit)
     if not found:
         raise UserError(f"no glass resembles '{query}'; 'spectrasplat glass' without a name lists all")
-    table = Table(title=f"{len(found)} of {len(entries())} glasses and materials", title_justify="left")
+    what = "similar names among" if is_guess(query) else "of"
+    table = Table(title=f"{len(found)} {what} {len(entries())} glasses and materials", title_justify="left")
     for heading in ("name", "maker", "n_d", "V_d", "range nm", "also"):
         is_number = heading in ("n_d", "V_d", "range nm")
         table.add_column(heading, justify="right" if is_number else "left", no_wrap=heading != "also")

@@ -274,7 +274,10 @@ def animate(
     output: Annotated[
         Path,
         typer.Option(
-            "-o", "--output", metavar="OUT", help="A movie (.mp4), or a folder for numbered PNGs, which can be resumed."
+            "-o",
+            "--output",
+            metavar="OUT",
+            help="A movie (.mp4), a .gif, or a folder for numbered PNGs, which can be resumed.",
         ),
     ],
     turntable: Annotated[
@@ -452,6 +455,19 @@ def view(
     raise typer.Exit(
         view_command(ViewRequest(scene, size, theme, screenshot, after, options.parse_opening(up, glass, environment)))
     )
+
+
+@app.command()
+def lesson(
+    name: Annotated[
+        Text,
+        typer.Argument(metavar="[NAME]", help="Which to open; nothing lists all.", autocompletion=completion.lessons),
+    ] = None,
+) -> None:
+    """Open a lesson in the viewer: a scene, a few sentences, what to try; or list them."""
+    from .lesson import lesson_command
+
+    raise typer.Exit(lesson_command(name, _print))
 
 
 @app.command()

@@ -14,6 +14,7 @@ from ..base.interrupts import Interruption, interrupt_flag
 from . import options
 
 if TYPE_CHECKING:
+    from ..edit.lessons import Lesson
     from ..edit.opening import Opening
     from ..edit.preferences import WindowPlace
     from ..edit.state import Theme
@@ -38,6 +39,7 @@ class ViewRequest:
     screenshot: Path | None = None
     after: str | None = None
     opening: Opening | None = None
+    lesson: Lesson | None = None
 
 
 def has_display() -> bool:
@@ -70,6 +72,7 @@ def view_command(request: ViewRequest) -> int:
             theme,
             None if request.screenshot is None else (request.screenshot, after),
             interrupted,
+            request.lesson,
         )
     return interrupted.exit_code
 
@@ -81,6 +84,7 @@ def _run(
     theme: Theme | None,
     screenshot: tuple[Path, float] | None,
     interrupted: Interruption,
+    lesson: Lesson | None = None,
 ) -> None:
     from ..ui import layout_memory
     from ..ui.session import Session
@@ -90,6 +94,10 @@ def _run(
     if theme is not None:
         preferences = replace(session.state.preferences, theme=theme)
         session.state = replace(session.state, preferences=preferences)
+    if lesson is not None:
+        session.show_lesson(lesson)
+    elif scene is None and screenshot is None:
+        session.welcome()
     viewer = Viewer(session, refresh_s=window.refresh_s)
     layout_memory.load()
     try:

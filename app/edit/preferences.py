@@ -47,6 +47,8 @@ class Settings:
     recent: tuple[Path, ...] = ()
     """Files opened or saved, the last one first; some may be gone."""
     window: WindowPlace = field(default_factory=WindowPlace)
+    is_new: bool = True
+    """Nobody has seen the start page yet."""
     up: dict[str, UpAxis] = field(default_factory=dict)
     """File -> the axis that its user said is up; the last one said is the last."""
 

@@ -27,6 +27,13 @@ class Open:
 
 
 @dataclass(frozen=True)
+class OpenLesson:
+    """Open a lesson's scene, with what the lesson is about selected."""
+
+    name: str
+
+
+@dataclass(frozen=True)
 class StandUp:
     """Take another axis of the opened mesh or glTF file to be up, and remember it for that file."""
 
@@ -66,6 +73,11 @@ class Quit:
 
 
 @dataclass(frozen=True)
+class FullScreen:
+    """The window over the whole screen, or back to where it was."""
+
+
+@dataclass(frozen=True)
 class CancelQuit:
     """The answer "Cancel" to that question, and "Save" before it saves: stay open, ask no more."""
 
@@ -86,6 +98,8 @@ class SelectAt:
     x: float
     y: float
     itself: bool = False
+    add: bool = False
+    """To what is selected already."""
 
 
 @dataclass(frozen=True)
@@ -123,6 +137,24 @@ class Screenshot:
 
 
 @dataclass(frozen=True)
+class RenderPicture:
+    """Render a finished picture to `path`: .png, .jpg and .webp as displayed, .exr and .npy linear."""
+
+    path: Path
+    size: tuple[int, int]
+    """Pixels."""
+    photons: int | None = 4_000_000
+    seconds: float | None = None
+    """Of the whole picture, instead of `photons`."""
+    samples: int | None = None
+    """Camera samples a pixel; None takes as many as the scene needs."""
+    caustic: bool = False
+    """Also write a second file with nothing but caustics."""
+    bins: int | None = None
+    """Spectral bins, in .exr only."""
+
+
+@dataclass(frozen=True)
 class Bake:
     """Write a receiver's caustic map with its placement (`.json` beside it): .exr or .png."""
 
@@ -135,7 +167,8 @@ class Bake:
 
 @dataclass(frozen=True)
 class Animate:
-    """Render an animation to `path` (.mp4, or a folder for PNGs): a turntable, or the keys of `State.animation`."""
+    """Render an animation to `path` (.mp4, .gif, or a folder for PNGs): a turntable, or the keys of
+    `State.animation`."""
 
     path: Path
     kind: Literal["turntable", "keys"] = "turntable"
@@ -182,9 +215,11 @@ class DismissMessage:
     text: str
 
 
+Export = Screenshot | RenderPicture | Bake | Animate
 Request = (
     NewScene
     | Open
+    | OpenLesson
     | StandUp
     | Save
     | Undo
@@ -192,6 +227,7 @@ Request = (
     | GoTo
     | Quit
     | CancelQuit
+    | FullScreen
     | Recover
     | SelectAt
     | BeginPull
@@ -199,6 +235,7 @@ Request = (
     | Retrace
     | ReloadShaders
     | Screenshot
+    | RenderPicture
     | Bake
     | Animate
     | CancelJob

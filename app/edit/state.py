@@ -8,13 +8,14 @@ part that the picture depends on, `scene` is what undo and saving cover.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from pathlib import Path
+from typing import Any, Literal
 
-from ..model.scene import Camera, Material, Scene
+from ..model.scene import Camera, Material, Scene, Vec3
 from .live_inputs import LiveInputs
 from .requests import Pull, Request
 
-Tool = Literal["select", "move", "rotate", "scale", "brush", "pull"]
+Tool = Literal["select", "move", "rotate", "scale", "brush", "pull", "measure"]
 CompareMode = Literal["off", "hold", "wipe", "error"]
 Theme = Literal["dark", "light"]
 ToneCurve = Literal["spectrasplat", "aces", "reinhard", "linear"]
@@ -22,9 +23,9 @@ ToneCurve = Literal["spectrasplat", "aces", "reinhard", "linear"]
 
 @dataclass(frozen=True)
 class Selection:
-    """An object or a light by its index; nothing when `kind` is None."""
+    """An object or a light by its index, the scene's camera, or nothing where `kind` is None."""
 
-    kind: Literal["object", "light"] | None = None
+    kind: Literal["object", "light", "camera"] | None = None
     index: int = 0
 
 
@@ -44,6 +45,8 @@ class Display:
     ray_overlay: bool = False
     ray_count: int = 5
     ray_wavelengths: int = 9
+    ray_labels: bool = True
+    """Wavelengths and deviations beside the rays."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +67,11 @@ class Compare:
 
     mode: CompareMode = "off"
     method: str = "reference"
-    """"reference", or one of `METHODS`, run on its own in the time left over."""
+    """"reference", "glass", "file", or one of `METHODS`, run on its own in the time left over."""
+    glass: str = "N-SF11"
+    """With the method "glass": the catalogue's glass that the other picture is of."""
+    file: Path | None = None
+    """With the method "file": the picture."""
     wipe: float = 0.5
     """Place of the wipe's line, share of the width."""
     plot: bool = False
@@ -87,6 +94,8 @@ class Panels:
     spectrum: bool = True
     compare: bool = False
     history: bool = False
+    rays: bool = False
+    lesson: bool = False
     shortcuts: bool = False
     start_page: bool = False
     export: bool = False
@@ -123,6 +132,12 @@ class State:
     views: tuple[Camera | None, ...] = (None,) * 9
     """Numbered views, keys 1 to 9."""
     selection: Selection = Selection()
+    also: tuple[Selection, ...] = ()
+    """Selected besides: they are moved, copied and deleted together with it."""
+    hidden: frozenset[tuple[str, str]] = frozenset()
+    """What the picture leaves out: ("object" or "light", name). Not saved."""
+    locked: frozenset[tuple[str, str]] = frozenset()
+    """What the hand in the picture cannot take, likewise."""
     tool: Tool = "select"
     display: Display = Display()
     brush: Brush = Brush()
@@ -141,7 +156,13 @@ class State:
     """Where the cursor is over the picture, 0..1 from the top left; the viewport sets it in every frame."""
     clipboard: Material | None = None
     pull: Pull | None = None
+    measured: tuple[Vec3, ...] = ()
+    """Points of the ruler, world; see `measuring`."""
+    lesson: str = ""
+    """Name of the lesson that the scene is shown in; see `lessons`."""
     animation: tuple[Key, ...] = ()
+    preview_s: float | None = None
+    """Show the animation at this time; the scene that is edited and saved stays (`preview`)."""
     interacting: bool = False
     """Something is being dragged: answer quickly, refine later, and keep undo steps together."""
     edit_label: str = ""
@@ -160,6 +181,10 @@ class State:
     def with_panels(self, **changes: bool) -> State:
         """With windows opened or closed."""
         return replace(self, preferences=replace(self.preferences, panels=replace(self.preferences.panels, **changes)))
+
+    def with_display(self, **changes: Any) -> State:
+        """With something else of `Display`."""
+        return replace(self, display=replace(self.display, **changes))
 
     @property
     def live_inputs(self) -> LiveInputs:

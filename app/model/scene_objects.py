@@ -54,7 +54,7 @@ class ObjectReader:
         placed: list[SceneObject] = []
         if not table.has("instances"):
             name = self._unique_name(table, mesh.name)
-            placed.append(SceneObject(name, mesh, material, _rested(mesh, base, rest), painted))
+            placed.append(SceneObject(name, mesh, material, rested(mesh, base, rest), painted))
         else:
             entries = table.tables("instances")
             if not entries:
@@ -62,7 +62,7 @@ class ObjectReader:
             name = table.string("name", mesh.name)
             for i, entry in enumerate(entries):
                 label = self._unique_name(entry, f"{name} {i + 1}")
-                matrix = _rested(mesh, read_placement(entry) @ base, rest)
+                matrix = rested(mesh, read_placement(entry) @ base, rest)
                 more = read_dabs(entry, material)
                 entry.finish("an instance")
                 placed.append(SceneObject(label, mesh, material, matrix, painted + more))
@@ -123,7 +123,7 @@ def _checked(mesh: Mesh, notes: list[str]) -> Mesh:
     return mesh
 
 
-def _rested(mesh: Mesh, matrix: np.ndarray, rest: float | None) -> np.ndarray:
+def rested(mesh: Mesh, matrix: np.ndarray, rest: float | None) -> np.ndarray:
     """`matrix`, lifted along z so that the mesh's lowest point lies at z = `rest`."""
     if rest is not None:
         lowest = float((mesh.vertices @ matrix[2, :3]).min()) + matrix[2, 3]

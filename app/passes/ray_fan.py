@@ -53,19 +53,24 @@ class RayFan:
         self._low, self._high = bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
 
     def trace(
-        self, light_index: int | None, object_index: int, rays: int, wavelengths_nm: Sequence[float]
+        self,
+        light_index: int | None,
+        object_index: int,
+        rays: int,
+        wavelengths_nm: Sequence[float],
+        share: float = 1.0,
     ) -> list[RayLine]:
         """`rays` rays from a light to an object, each at every wavelength: rays × wavelengths paths.
 
         A path ends on the first surface that is neither glass nor mirror, after 24 segments, or a scene's radius beyond
         the last surface. `light_index` None takes the light that shines on the object most. Empty where the light's
-        beam passes the object by.
+        beam passes the object by. `share`: of the object's extent that the fan spreads over, about its middle.
         """
         light_index = self.brightest_light(object_index) if light_index is None else light_index
         if light_index is None or rays < 1 or not len(wavelengths_nm):
             return []
         beam = self._beam(self._scene.lights[light_index], object_index)
-        starts = self._fan(self._scene.lights[light_index], beam, object_index, rays)
+        starts = self._fan(self._scene.lights[light_index], beam, object_index, rays, share=share)
         if starts is None:
             return []
         nm = np.asarray(wavelengths_nm, float)
@@ -117,7 +122,13 @@ class RayFan:
         return _Beam(position, way / max(float(np.linalg.norm(way)), 1e-12), False, None)
 
     def _fan(
-        self, light: Light, beam: _Beam, object_index: int, rays: int, across: np.ndarray | None = None
+        self,
+        light: Light,
+        beam: _Beam,
+        object_index: int,
+        rays: int,
+        across: np.ndarray | None = None,
+        share: float = 1.0,
     ) -> tuple[np.ndarray, np.ndarray] | None:
         """Starts and directions (rays, 3); None where the beam misses the object. `across`: direction of the spread,
         found where None."""
@@ -129,7 +140,7 @@ class RayFan:
         if not across.any():
             offsets = middle[None]
         else:
-            offsets = self._spread(beam, self._points[object_index], middle, across, rays)
+            offsets = self._spread(beam, self._points[object_index], middle, across, rays, share)
         if beam.is_parallel:
             return beam.origin + offsets, np.broadcast_to(beam.axis, offsets.shape).copy()
         directions = beam.axis + offsets
@@ -187,15 +198,17 @@ class RayFan:
         level = np.cross(beam.axis, np.asarray(self._scene.camera.up, float))
         return _unit(level) if np.linalg.norm(level) > 1e-6 else orthonormal_frame(beam.axis)[0]
 
-    def _spread(self, beam: _Beam, points: np.ndarray, middle: np.ndarray, across: np.ndarray, rays: int) -> np.ndarray:
-        """Offsets (rays, 3) evenly over the object's extent along `across`, inside the beam's opening."""
+    def _spread(
+        self, beam: _Beam, points: np.ndarray, middle: np.ndarray, across: np.ndarray, rays: int, share: float
+    ) -> np.ndarray:
+        """Offsets (rays, 3) evenly over `share` of the object's extent along `across`, inside the beam's opening."""
         along = self._seen(beam, points) @ across
         low, high = float(along.min()) - middle @ across, float(along.max()) - middle @ across
         if beam.aperture is not None:
             room_low, room_high = _chord(beam.aperture, beam.is_disc, middle, across)
             low, high = max(low, room_low), min(high, room_high)
-        share = (np.arange(rays) + 0.5) / rays
-        return middle + (low + share * (high - low))[:, None] * across
+        places = 0.5 + share * ((np.arange(rays) + 0.5) / rays - 0.5)
+        return middle + (low + places * (high - low))[:, None] * across
 
 
 def _chord(aperture: np.ndarray, is_disc: bool, middle: np.ndarray, across: np.ndarray) -> tuple[float, float]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from ..base.errors import UserError
 from ..base.paths import shipped_scenes
 from .compare import Comparison
+from .compared_with import Histogram
 from .cursor_info import Cursor
 from .export import Exports, Shown
 from .gallery import Gallery
@@ -24,6 +25,10 @@ if TYPE_CHECKING:
 
 JOB_SHARE = 0.6
 """Of a frame's budget that a running export gets."""
+RENDER_SHARE = 0.95
+"""Likewise a finished picture that somebody waits for."""
+HISTOGRAM_S = 1.0
+"""Shortest time between two histograms: each reads two pictures."""
 COMPARE_SHARE = 0.4
 """Likewise what is compared with."""
 
@@ -37,6 +42,9 @@ class BackgroundJobs:
         self.overlay = RayOverlay(context)
         self.cursor = Cursor()
         self.gallery = Gallery(context, config, shipped_scenes())
+        self.histogram: Histogram | None = None
+        """Of the picture and of what it is compared with."""
+        self._histogram_s = -1e9
         self.notes: list[tuple[str, bool]] = []
         """Sentence, whether it is an error."""
 
@@ -51,7 +59,7 @@ class BackgroundJobs:
         left = budget_s
         if self.exports.job is not None:
             try:
-                note = self.exports.step(JOB_SHARE * budget_s)
+                note = self.exports.step((RENDER_SHARE if self.exports.is_rendering else JOB_SHARE) * budget_s)
             except UserError as error:
                 self.notes.append((str(error), True))
             else:
@@ -62,14 +70,18 @@ class BackgroundJobs:
         self.comparison.advance(state, picture.engine, share * max(left, 0.0))
         return max(budget_s - (time.perf_counter() - started), 0.2 * budget_s)
 
-    def follow(self, state: State, picture: LivePicture, now_s: float) -> None:
-        """After the picture is made: what lies under the cursor, where rays go. Raises `UserError`."""
+    def follow(self, state: State, drawn: State, picture: LivePicture, now_s: float) -> None:
+        """After the picture is made: what lies under the cursor, where rays go. `drawn`: the state as
+        the picture shows it. Raises `UserError`."""
         self.cursor.update(state, picture, now_s)
-        self.overlay.update(state)
+        if not state.preferences.panels.compare:
+            self.histogram = None
+        elif now_s - self._histogram_s > HISTOGRAM_S:
+            self._histogram_s = now_s
+            self.histogram = self.comparison.histogram(picture.radiance, picture.exposure_ev)
+        self.overlay.update(drawn)
 
-    def export(
-        self, request: requests.Screenshot | requests.Bake | requests.Animate, state: State, picture: LivePicture
-    ) -> None:
+    def export(self, request: requests.Export, state: State, picture: LivePicture) -> None:
         """Begin what `request` asks for. Raises `UserError`."""
         if picture.shown is None or picture.radiance is None:
             raise UserError("there is no picture yet; wait a moment")

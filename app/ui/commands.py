@@ -41,13 +41,13 @@ def _ask(*what: requests.Request) -> Act:
 def _duplicate(state: State, _view_model: ViewModel) -> State:
     from .panels import outliner
 
-    return outliner.duplicate(state, state.selection)
+    return outliner.duplicate_all(state)
 
 
 def _delete(state: State, _view_model: ViewModel) -> State:
     from .panels import outliner
 
-    return outliner.delete(state, state.selection)
+    return outliner.delete_all(state)
 
 
 def _save(state: State, view_model: ViewModel) -> State:
@@ -79,6 +79,10 @@ def _toggle_playing(state: State, _view_model: ViewModel) -> State:
 
 def _toggle_physical(state: State, _view_model: ViewModel) -> State:
     return replace(state, physical=not state.physical)
+
+
+def _open_panel(name: str, state: State, _view_model: ViewModel) -> State:
+    return state.with_panels(**{name: True})
 
 
 def _toggle_panel(name: str, state: State, _view_model: ViewModel) -> State:
@@ -137,9 +141,23 @@ COMMANDS: tuple[Command, ...] = (
         "Open a scene (.toml), glTF (.glb, .gltf) or a bare mesh (.obj, .ply, .stl).",
         dialogs.open_file,
     ),
+    Command(
+        "Import…",
+        ("Ctrl+I",),
+        "File",
+        "Bring the objects of a mesh, a glTF file or another scene into this one.",
+        dialogs.import_file,
+    ),
     Command("Save", ("Ctrl+S",), "File", "Save the scene where it came from.", _save),
     Command(
         "Save as…", ("Ctrl+Shift+S",), "File", "Save as scene TOML, or as GLB for other programs.", dialogs.save_as
+    ),
+    Command(
+        "Render…",
+        ("F12",),
+        "File",
+        "Render a finished picture: size, photons or time, samples, layers.",
+        partial(_open_panel, "export"),
     ),
     Command(
         "Export…",
@@ -213,6 +231,9 @@ COMMANDS: tuple[Command, ...] = (
         view_commands.keep_as_scene_view,
     ),
     Command(
+        "Full screen", ("F11",), "View", "The window over the whole screen, and back.", _ask(requests.FullScreen())
+    ),
+    Command(
         "Hide panels",
         ("H",),
         "View",
@@ -239,6 +260,7 @@ COMMANDS: tuple[Command, ...] = (
         checked=lambda state, _view_model: state.tool == "brush",
     ),
     _tool("Pull a colour", "pull", "P", "Drag a colour of the caustic: the dispersion follows."),
+    _tool("Measure", "measure", "K", "Ruler and protractor: two points give a length, a third the angle between."),
     Command(
         "Accumulate photons",
         ("Space",),
@@ -329,6 +351,8 @@ PANELS: tuple[Command, ...] = (
     panel("Timing", "timing", "Frame time by pass, photons, memory, fall-backs."),
     panel("Spectrum", "spectrum", "The spectrum under the cursor."),
     panel("Compare", "compare", "Reference, wipe, error map, error against time."),
+    panel("Rays", "rays", "Deviation and focal length of the ray overlay, by wavelength."),
+    panel("Lesson", "lesson", "Six lessons: a scene each, a few sentences, what to try."),
     panel("History", "history", "All steps that can be undone."),
     panel("Export", "export", "Screenshots, baked maps, animations."),
 )

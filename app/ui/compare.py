@@ -13,7 +13,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base.errors import UserError
 from ..edit.live_inputs import LiveInputs
+from ..edit.state import Selection
 from ..model.settings import RenderSettings
 from ..passes.camera import CameraPass
 from ..render.light_pass import scene_buffers
@@ -22,6 +24,7 @@ from ..render.shown_spectra import reflectance_classes
 from ..render.solo import scene_seen
 from ..render.viewer.dirty_level import DirtyLevel
 from ..render.viewer.invalidation import dirty_level
+from .compared_with import FilePicture, GlassSwap, Histogram, histogram_of
 from .error_curves import ErrorCurves
 from .panels.methods import METHOD_NAMES
 from .reference_thread import ReferenceThread, Snapshot
@@ -34,19 +37,19 @@ if TYPE_CHECKING:
 
     from ..edit.state import Compare, State
     from ..gpu.context import Context
-    from ..model.scene import Camera, Scene
+    from ..model.scene import Camera, Scene, Vec3
     from ..render.viewer.engine import LiveEngine
 
-REFERENCE = "reference"
+REFERENCE, GLASS, FILE = "reference", "glass", "file"
 STAND_IN = "stochastic-even"
 """Takes the reference's place where that cannot be computed."""
 DIRECT = CameraSampling(32, whole_spectrum=True)
 DISPATCH_SECONDS = 0.012
-SHOWN_FROM = 1.0
-"""Photons a pixel from which on a reference is shown."""
 MEASURED_FROM = 6.0
-"""And from which on errors are measured against it: before, most lit pixels have not one photon, which looks like
-certainty."""
+"""Photons a pixel from which on errors are measured against the reference: before, most lit pixels have not one, which
+looks like certainty."""
+STRIPE_PX, STRIPE_SHADE = 6, 0.25
+"""Width of the stripes over what the reference does not hold, and the share of the picture's light that they leave."""
 
 
 class Comparison:
@@ -66,6 +69,15 @@ class Comparison:
         self._seconds: dict[str, tuple[float, int]] = {}
         self._compare: Compare | None = None
         self.is_stale = False
+        self._swap = GlassSwap()
+        self._file = FilePicture(context)
+        self._glass_problem: str | None = None
+        self._wish: tuple[str, str] | None = None
+        """Method and glass that the engine was last given."""
+        self._version_before: int | None = None
+        """Of the engine's picture when it was given them."""
+        self._selection: Selection | None = None
+        """What was selected when it was begun: the solid whose glass is another."""
 
     # ---- what there is -----------------------------------------------------------------------
 
@@ -76,7 +88,31 @@ class Comparison:
             return None
         if self._shows_reference:
             return self._composed
+        if self._compare.method == FILE:
+            return self._file.texture
+        if (self._compare.method == GLASS and self._glass_problem is not None) or self._shows_another_wish:
+            return None
         return self._engine.picture if self._engine is not None else None
+
+    @property
+    def _shows_another_wish(self) -> bool:
+        """The engine's picture is still that of the glass or the method before: it must not carry this one's name."""
+        return self._engine is not None and self._engine.picture_version == self._version_before
+
+    @property
+    def label(self) -> str:
+        """What `picture` is, in a few words."""
+        if self._compare is None:
+            return ""
+        match self._compare.method:
+            case "file":
+                return "" if self._compare.file is None else self._compare.file.name
+            case "glass":
+                return self._compare.glass
+        if not self._shows_reference:
+            return METHOD_NAMES.get(self._method, self._method)
+        snapshot = self._thread.snapshot if self._thread is not None else None
+        return "Reference" if snapshot is None else f"Reference, own relMSE {snapshot.relmse:.1e}"
 
     @property
     def curves(self) -> tuple[ErrorCurve, ...]:
@@ -99,6 +135,13 @@ class Comparison:
         """What the other picture is."""
         if self._compare is None or not is_active(self._compare) or self._begun is None:
             return ""
+        if self._compare.method == FILE:
+            return self._file_text
+        if self._compare.method == GLASS:
+            if self._glass_problem is not None:
+                return f"There is nothing to compare with: {self._glass_problem}."
+            photons = 0 if self._engine is None else self._engine.stats.photons
+            return f"The same scene in {self._compare.glass}: {photons / 1e6:.2f} million photons."
         if not self._shows_reference:
             photons = 0 if self._engine is None else self._engine.stats.photons
             note = f"{METHOD_NAMES.get(self._method, self._method)}: {photons / 1e6:.2f} million photons."
@@ -108,12 +151,6 @@ class Comparison:
         snapshot = self._thread.snapshot if self._thread is not None else None
         if snapshot is None:
             return "Reference: the first photons are on their way."
-        if not self._has(snapshot, SHOWN_FROM):
-            needed = SHOWN_FROM * self._begun.width * self._begun.height
-            return (
-                f"Reference: {snapshot.photons / 1e6:.2f} million photons so far. It is shown from {needed / 1e6:.2f} "
-                "million on."
-            )
         note = (
             f"Reference: light tracing in float64 without shared code, {snapshot.photons / 1e6:.1f} million photons, "
             f"own relMSE {snapshot.relmse:.1e}."
@@ -124,7 +161,7 @@ class Comparison:
                 "million on."
             )
         if not snapshot.directly.all():
-            note += " What is seen behind glass or in mirrors is not compared."
+            note += " Striped: what is seen behind glass or in mirrors, which is not compared."
         if self._begun.local_gain and any(item.local_dispersion for item in self._begun.scene.objects):
             note += " The brush's local gain is not in it: it is not physical."
         return note
@@ -136,6 +173,23 @@ class Comparison:
             return False
         refers = self._thread is not None and not self._thread.is_done and self._thread.problem is None
         return refers or (self._engine is not None and self._needs_engine and not self._engine.is_idle)
+
+    def pixel(self, place: tuple[float, float]) -> Vec3 | None:
+        """Linear Rec.709 of `picture` at a place of it, 0..1 from the top left; None while there is none."""
+        picture = self.picture
+        if picture is None:
+            return None
+        column, row = (min(int(share * side), side - 1) for share, side in zip(place, picture.size, strict=True))
+        framebuffer = self._context.ctx.framebuffer([picture])
+        data = framebuffer.read(viewport=(column, row, 1, 1), components=3, dtype="f4")
+        framebuffer.release()
+        red, green, blue = (float(v) for v in np.frombuffer(data, np.float32))
+        return red, green, blue
+
+    def histogram(self, own: moderngl.Texture | None, exposure_ev: float) -> Histogram | None:
+        """Of the picture and of what it is compared with; both are read from the device."""
+        other = self.picture
+        return None if own is None or other is None else histogram_of(_read(own), _read(other), exposure_ev)
 
     # ---- work --------------------------------------------------------------------------------
 
@@ -154,7 +208,9 @@ class Comparison:
         wanted = state.live_inputs
         if self._begun is None:
             self._stop()
-            self._begun = wanted
+            self._begun, self._selection = wanted, state.selection
+        if state.compare.method == FILE and state.compare.file is not None:
+            self._file.show(state.compare.file, state.viewport_size)
         assert self._begun is not None
         self.is_stale = (
             dirty_level(self._begun, self._begun, replace(wanted, method=self._begun.method)) != DirtyLevel.NOTHING
@@ -179,11 +235,20 @@ class Comparison:
         if self._engine is not None:
             self._engine.release()
             self._engine = None
+        self._file.release()
+
+    @property
+    def _file_text(self) -> str:
+        if self._compare is None or self._compare.file is None:
+            return "Choose a picture, or drop one on the window while this panel is open."
+        return f"There is nothing to compare with: {self._file.problem}." if self._file.problem else self._file.words
 
     @property
     def _method(self) -> str:
         """The other method; of the reference, what stands in for it."""
         assert self._compare is not None
+        if self._compare.method == GLASS and self._begun is not None:
+            return self._begun.method
         return STAND_IN if self._compare.method == REFERENCE else self._compare.method
 
     @property
@@ -201,7 +266,7 @@ class Comparison:
 
     @property
     def _needs_engine(self) -> bool:
-        return not self._shows_reference
+        return not self._shows_reference and self._compare is not None and self._compare.method != FILE
 
     def _start_reference(self, begun: LiveInputs) -> None:
         scene = scene_seen(begun.scene, begun.camera, begun.solo_nm)
@@ -228,19 +293,27 @@ class Comparison:
         if self._engine is None:
             self._engine = self._make_engine(self._context)
         self._engine.target_photons = target_photons
-        self._engine.set(replace(self._begun, method=self._method))
+        assert self._compare is not None
+        scene = self._begun.scene
+        if self._compare.method == GLASS:
+            self._glass_problem = None
+            try:
+                scene = self._swap.scene(scene, self._selection or Selection(), self._compare.glass)
+            except UserError as error:
+                self._glass_problem = str(error)
+                return
+        wish = self._method, self._compare.glass if self._compare.method == GLASS else ""
+        if wish != self._wish:
+            self._wish, self._version_before = wish, self._engine.picture_version
+        self._engine.set(replace(self._begun, method=self._method, scene=scene))
         self._engine.advance(budget_s, False)
         self._count_seconds(self._engine, self._method)
 
     def _compose(self, running: LiveEngine) -> None:
-        """The reference's caustics on the picture without caustics; behind glass, the running picture."""
+        """The reference's caustics on the picture without caustics. Behind glass there is no reference: stripes over
+        the running picture say so."""
         snapshot = self._thread.snapshot if self._thread is not None else None
-        if (
-            snapshot is None
-            or self._direct is None
-            or snapshot.number == self._composed_from
-            or not self._has(snapshot, SHOWN_FROM)
-        ):
+        if snapshot is None or self._direct is None or snapshot.number == self._composed_from:
             return
         if not self._direct.advance():
             return
@@ -248,7 +321,9 @@ class Comparison:
         height, width = snapshot.directly.shape
         whole = self._direct.rgb + snapshot.caustic_rgb
         if shown is not None and shown.shape == whole.shape:
-            whole[~snapshot.directly] = shown[~snapshot.directly]
+            rows, columns = np.nonzero(~snapshot.directly)
+            stripes = np.where((rows + columns) // STRIPE_PX % 2, STRIPE_SHADE, 1.0).astype(np.float32)
+            whole[rows, columns] = shown[rows, columns] * stripes[:, None]
         self._composed_from = snapshot.number
         texels = np.concatenate([whole, np.ones((height, width, 1), np.float32)], axis=-1)
         if self._composed is None:
@@ -267,7 +342,7 @@ class Comparison:
 
     def _measure(self, state: State, running: LiveEngine) -> None:
         engines = {state.method: running}
-        if self._engine is not None and self._needs_engine:
+        if self._engine is not None and self._needs_engine and state.compare.method != GLASS:
             engines[self._method] = self._engine
         for method, engine in engines.items():
             stats, picture = engine.stats, engine.picture

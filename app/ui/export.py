@@ -6,6 +6,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -56,13 +57,16 @@ class Exports:
         self._job: _Job | None = None
 
     @property
+    def is_rendering(self) -> bool:
+        """The running job is a finished picture."""
+        return self._job is not None and self._job.is_picture
+
+    @property
     def job(self) -> JobInfo | None:
         """The running job, for panels."""
         return None if self._job is None else self._job.view_model
 
-    def begin(
-        self, request: requests.Screenshot | requests.Bake | requests.Animate, state: State, shown: Shown
-    ) -> str | None:
+    def begin(self, request: requests.Export, state: State, shown: Shown) -> str | None:
         """Carry out `request`, or start it. Raises `UserError`; a running job is not disturbed."""
         if isinstance(request, requests.Screenshot) and not request.spectral:
             return save_screenshot(request.path, shown)
@@ -95,9 +99,7 @@ class Exports:
         """End the job."""
         self.cancel()
 
-    def _made(
-        self, request: requests.Screenshot | requests.Bake | requests.Animate, state: State, shown: Shown
-    ) -> _Job:
+    def _made(self, request: requests.Export, state: State, shown: Shown) -> _Job:
         stage = Stage(state.scene, state.camera, shown.exposure_ev, state.solo_nm)
         name, notices = request.path.name, FrameNotices()
         if isinstance(request, requests.Screenshot):
@@ -117,6 +119,16 @@ class Exports:
                 f"Baked {name}; its place is in {request.path.with_suffix('.json').name}.",
                 "Nothing was written: a map is whole or not at all.",
                 notices,
+            )
+        if isinstance(request, requests.RenderPicture):
+            return _Job(
+                f"Rendering {name}",
+                _render(self._context, request, stage, state, notices),
+                f"Rendered {name}.",
+                "Nothing was written: a picture is whole or not at all.",
+                notices,
+                seconds=request.seconds,
+                is_picture=True,
             )
         work, frames = _animate(self._context, request, stage, state, notices)
         title = "Turntable" if request.kind == "turntable" else "Animation"
@@ -141,11 +153,16 @@ class _Job:
         cancelled: str,
         notices: FrameNotices,
         frames: int = 0,
+        seconds: float | None = None,
+        is_picture: bool = False,
     ) -> None:
+        """`seconds`: that it takes, where that is known."""
+        self.is_picture = is_picture
         self._title, self._work, self._notices = title, work, notices
         self._finished, self._cancelled = finished, cancelled
         self._frames = frames
-        self._fraction, self._worked_s = 0.0, 0.0
+        self._fraction, self._seconds = 0.0, seconds
+        self._started_s = time.monotonic()
 
     @property
     def view_model(self) -> JobInfo:
@@ -158,8 +175,6 @@ class _Job:
                 self._fraction = max(self._fraction, next(self._work))
         except StopIteration:
             return self._told(self._finished)
-        finally:
-            self._worked_s += time.perf_counter() - started
         return None
 
     def cancel(self) -> str:
@@ -179,11 +194,21 @@ class _Job:
             if self._frames
             else "Tracing photons and taking camera samples"
         )
-        if self._fraction < 0.02:
-            return frame
-        left = self._worked_s * (1.0 - self._fraction) / self._fraction
-        about = f"{left:.0f} s" if left < 90 else f"{left / 60:.0f} min"
-        return f"{frame}, about {about} of work left"
+        left = self._left_s()
+        return frame if left is None else f"{frame}, {left_words(left, datetime.now().astimezone())}"
+
+    def _left_s(self) -> float | None:
+        """Seconds until it ends at the pace so far; None where that is not known yet."""
+        worked = time.monotonic() - self._started_s
+        if self._seconds is not None:
+            return max(self._seconds - worked, 0.0)
+        return None if self._fraction < 0.02 else worked * (1.0 - self._fraction) / self._fraction
+
+
+def left_words(left_s: float, now: datetime) -> str:
+    """ "about 40 s left, until 14:05"."""
+    about = f"{left_s:.0f} s" if left_s < 90 else f"{left_s / 60:.0f} min"
+    return f"about {about} left, until {now + timedelta(seconds=left_s):%H:%M}"
 
 
 def save_screenshot(path: Path, shown: Shown) -> str:
@@ -257,6 +282,22 @@ def _spectral(
             renderer.release()
 
     return work()
+
+
+def _render(
+    context: Context, request: requests.RenderPicture, stage: Stage, state: State, notices: FrameNotices
+) -> Iterator[float]:
+    from .render_job import render_picture
+
+    def write_shown(path: Path, rgb: np.ndarray) -> None:
+        develop = _Developer(context, state.display)
+        try:
+            write_codes(path, develop(rgb, stage.exposure_ev))
+        finally:
+            develop.release()
+
+    settings = _settings(state, request.size, request.photons or MIN_PHOTONS)
+    return render_picture(context, request, stage, settings, write_shown, notices)
 
 
 def _bake(

@@ -45,6 +45,9 @@ def run_frame(session: Session, draw: Draw, budget_s: float = DEFAULT_BUDGET_S) 
 
 def _accept(session: Session, before: State, after: State) -> None:
     """Take over what the panels returned; an edited scene is a step of undo."""
+    if after.also and (after.selection != before.selection or len(after.scene.objects) != len(before.scene.objects)):
+        # Who selects something else means that alone, unless the rest was chosen with it.
+        after = replace(after, also=() if after.also == before.also else after.also)
     session.state = replace(after, requests=())
     if after.scene is not before.scene:
         session.document.history.push(
@@ -77,8 +80,9 @@ def _work(session: Session, budget_s: float) -> None:
         return
     left = _work_beside(session, budget_s)
     started = session.clock()
+    drawn = session.drawn.of(session.state)
     try:
-        session.picture.advance(session.state, left)
+        session.picture.advance(drawn, left)
     except EngineError as error:
         session.renderer_stopped(error)
         return
@@ -91,7 +95,7 @@ def _work(session: Session, budget_s: float) -> None:
     now = session.clock()
     try:
         session.picture.show(session.state, now, session.delta_s, session.jobs.comparison)
-        session.jobs.follow(session.state, session.picture, now)
+        session.jobs.follow(session.state, drawn, session.picture, now)
         session.tell_losses()
     except UserError as error:
         session.messages.tell(sentence(str(error)), is_error=True)
@@ -103,7 +107,7 @@ def _work(session: Session, budget_s: float) -> None:
 def _work_beside(session: Session, budget_s: float) -> float:
     """Exports and comparison; returns the time that is left."""
     try:
-        return session.jobs.work(session.state, session.picture, budget_s)
+        return session.jobs.work(session.drawn.of(session.state), session.picture, budget_s)
     except Exception as error:  # noqa: BLE001 - a bug in a side line must not stop the picture
         session.jobs.exports.cancel()
         session.save_from_crash("exporting or comparing", error)

@@ -12,7 +12,7 @@ import numpy as np
 from imgui_bundle import imgui, imguizmo
 
 from ..base.errors import UserError
-from ..edit import placing
+from ..edit import placing, selecting
 from ..edit.placing import Operation
 from ..edit.projection import View
 from ..edit.state import Selection, State
@@ -56,7 +56,10 @@ class Gizmo:
 
     def __init__(self) -> None:
         self.is_local = False
+        self.is_snapping = False
+        """In steps without Ctrl, freely with it."""
         self._drag: _Drag | None = None
+        self._is_drawn = False
 
     @property
     def is_held(self) -> bool:
@@ -65,14 +68,20 @@ class Gizmo:
 
     def is_in_the_way(self) -> bool:
         """The mouse belongs to the gizmo: it is over a handle or holds one."""
-        return self.is_held or bool(_IM.is_over())
+        # ImGuizmo goes on saying what it said when it was last drawn.
+        return self.is_held or (self._is_drawn and bool(_IM.is_over()))
 
     def draw(self, state: State, view: View, rect: tuple[float, float, float, float]) -> State:
         """Draw it over the picture in `rect` (left, top, width, height in pixels) and follow its handles."""
         operation = _OPERATION_OF.get(state.tool)
-        if operation is None or not placing.can_do(state.scene, state.selection, operation):
-            self._drag = None
+        if (
+            operation is None
+            or selecting.is_locked(state, state.selection)
+            or not placing.can_do(state.scene, state.selection, operation)
+        ):
+            self._drag, self._is_drawn = None, False
             return state
+        self._is_drawn = True
         if self._drag is not None and not self._drag.goes_on(state):
             self._drag = None
         _IM.begin_frame()
@@ -111,10 +120,9 @@ class Gizmo:
         )
         return _shifted(_from_guizmo(model), origin)
 
-    @staticmethod
-    def _snap(operation: Operation, visible_height: float) -> _IM.Matrix3 | None:
-        """Steps while Ctrl is held."""
-        if not imgui.get_io().key_ctrl:
+    def _snap(self, operation: Operation, visible_height: float) -> _IM.Matrix3 | None:
+        """Steps while Ctrl is held; with snapping on, while it is not."""
+        if imgui.get_io().key_ctrl == self.is_snapping:
             return None
         step = {"move": move_snap(visible_height), "rotate": ROTATION_SNAP_DEG, "scale": SCALE_SNAP}[operation]
         return _IM.Matrix3([step, step, step])
@@ -126,10 +134,16 @@ class Gizmo:
         if drag.shown is drag.scene and np.allclose(delta, np.eye(4), atol=1e-9):
             return state
         try:
-            drag.shown = placing.changed(drag.scene, drag.selection, delta)
+            shown = placing.changed(drag.scene, drag.selection, delta)
+            others = [each for each in selecting.everything(state)[1:] if not selecting.is_locked(state, each)]
+            for each in others:
+                shown = placing.changed(shown, each, delta)
+            drag.shown = shown
         except UserError:
             return state  # a place where it may not be, such as a light inside glass: it waits at the border
-        return state.edited(drag.shown, f"{_LABELS[drag.operation]} {placing.name_of(drag.scene, drag.selection)}")
+        name = placing.name_of(drag.scene, drag.selection)
+        more = f" and {len(others)} more" if others else ""
+        return state.edited(drag.shown, f"{_LABELS[drag.operation]} {name}{more}")
 
     def _note(self, view: View, frame: np.ndarray, rect: tuple[float, float, float, float]) -> None:
         """Tell tests where the gizmo is: its middle, as an item without size."""

@@ -93,7 +93,7 @@ def _build(dock: int, size: imgui.ImVec2, windows: tuple[Docked, ...]) -> None:
         nodes["right bottom if tall"] = nodes["right bottom"]
     left = min(theme.em(15.0) / (size.x * (1.0 - right)), 0.25)
     nodes["left top"], rest = _split(rest, imgui.Dir.left, left)
-    nodes["left bottom"], nodes["left top"] = _split(nodes["left top"], imgui.Dir.down, 0.36)
+    nodes["left bottom"], nodes["left top"] = _split(nodes["left top"], imgui.Dir.down, 0.46)
     nodes["bottom"], middle = _split(rest, imgui.Dir.down, min(theme.em(14.0) / size.y, 0.34))
     builder.dock_builder_dock_window(VIEWPORT, middle)
     for window in windows:

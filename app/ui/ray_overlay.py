@@ -8,6 +8,7 @@ import numpy as np
 
 from ..edit.state import State
 from ..passes.ray_line import RayLine
+from .ray_readings import RayReading, readings
 
 if TYPE_CHECKING:
     from ..gpu.context import Context
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
     from ..passes.ray_fan import RayFan
 
 FIRST_NM, LAST_NM = 400.0, 700.0
+BUNDLE_SHARE = 0.02
+"""Of the object's extent: the thin bundle that focal points are measured with."""
 
 
 class RayOverlay:
@@ -28,19 +31,31 @@ class RayOverlay:
         self._fan: RayFan | None = None
         self._key: tuple[object, ...] = ()
         self.rays: tuple[RayLine, ...] = ()
+        self.readings: tuple[RayReading, ...] = ()
 
     def update(self, state: State) -> None:
         """Trace what `state` asks for. Raises `UserError` for a scene that does not fit on the device."""
         index = self._object(state) if state.display.ray_overlay else None
         if index is None:
-            self.rays, self._key = (), ()
+            self.rays, self.readings, self._key = (), (), ()
             return
         key = (index, state.selection, state.display.ray_count, state.display.ray_wavelengths, state.solo_nm)
         if key == self._key and state.scene is self._scene:
             return
         self._key = key
         light = state.selection.index if state.selection.kind == "light" else None
-        self.rays = tuple(self._fan_of(state.scene).trace(light, index, state.display.ray_count, wavelengths_of(state)))
+        fan, wanted = self._fan_of(state.scene), wavelengths_of(state)
+        light = fan.brightest_light(index) if light is None else light
+        self.rays = tuple(fan.trace(light, index, state.display.ray_count, wanted))
+        bundle = fan.trace(light, index, 3, wanted, BUNDLE_SHARE)
+        glass = state.scene.objects[index].material
+        indices = (
+            {nm: float(glass.dispersion.index(nm)) for nm in wanted}
+            if glass.transmits and glass.dispersion is not None
+            else {}
+        )
+        is_parallel = light is not None and state.scene.lights[light].is_parallel
+        self.readings = readings(self.rays, bundle, indices, is_parallel)
 
     def release(self) -> None:
         """Free the tracer and its scene."""

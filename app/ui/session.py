@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 from ..base.errors import UserError
 from ..edit.autosave import Autosave, Recovery, recoveries
 from ..edit.document import Document
+from ..edit.drawn import Drawn
 from ..edit.opening import Opening
 from ..edit.preferences import Settings, config_dir, load_settings, save_settings
 from ..edit.state import Selection, State
@@ -32,6 +33,7 @@ from .sentences import brief, sentence
 if TYPE_CHECKING:
     import numpy as np
 
+    from ..edit.lessons import Lesson
     from ..gpu.context import Context
     from ..model.scene import Scene
     from ..render.viewer.engine import LiveEngine
@@ -66,11 +68,14 @@ class Session:
         self.autosave = Autosave(config_dir())
         self.recovery: Recovery | None = next(iter(recoveries(config_dir())), None)
         self.picture = LivePicture(context, make_engine)
+        self.drawn = Drawn()
         self.jobs = BackgroundJobs(context, config_dir())
         self.window_picture: Path | None = None
         """Where a picture of the whole window is to be written once this frame is drawn."""
         self.interface_scale = self.framebuffer_scale = 1.0
         self.asks_to_quit = False
+        self.is_full_screen = False
+        """Wanted of the window."""
         self.wants_to_close = False
         self.frame_ms: deque[float] = deque(maxlen=FRAMES_REMEMBERED)
         self.interface_s = 0.0
@@ -154,10 +159,16 @@ class Session:
     def show_scene(self, scene: Scene) -> None:
         """Another scene of the same document, as after undo; what was selected stays if it is still there."""
         selection = self.state.selection
-        things = {"object": scene.objects, "light": scene.lights, None: ()}[selection.kind]
+        things = {"object": scene.objects, "light": scene.lights, "camera": (scene.camera,), None: ()}[selection.kind]
         if selection.index >= len(things):
             selection = Selection()
         self.state = replace(self.state, scene=scene, selection=selection, pull=None)
+
+    def welcome(self) -> None:
+        """Open the start page for somebody who has never seen it."""
+        if self.settings.is_new:
+            self.state = self.state.with_panels(start_page=True)
+            self.settings = replace(self.settings, is_new=False)
 
     def show_document(self, document: Document) -> None:
         """Take up another document; preferences and display stay as they are."""
@@ -171,12 +182,26 @@ class Session:
             selection=Selection(),
             pull=None,
             animation=(),
+            preview_s=None,
+            also=(),
+            hidden=frozenset(),
+            locked=frozenset(),
+            measured=(),
+            lesson="",
             solo_nm=None,
             edit_label="",
         ).with_panels(start_page=False)
         self.picture.new_scene()
         self.tell_notes()
         self._remember_file(document.source)
+
+    def show_lesson(self, lesson: Lesson) -> None:
+        """A lesson's scene, with what it is about selected and its rays drawn. Raises `UserError`."""
+        self.show_document(Document.open(lesson.path))
+        names = [item.name for item in self.state.scene.objects]
+        chosen = Selection("object", names.index(lesson.select)) if lesson.select in names else Selection()
+        state = replace(self.state, lesson=lesson.name, selection=chosen).with_display(ray_overlay=lesson.rays)
+        self.state = state.with_panels(lesson=True, rays=lesson.rays or state.preferences.panels.rays)
 
     def tell_losses(self) -> None:
         """Once a picture is whole: what of its light was lost."""

@@ -9,8 +9,9 @@ import numpy as np
 
 from ..base.atomic import check_writable
 from ..base.errors import UserError
-from ..edit import camera_controls, requests
+from ..edit import camera_controls, requests, selecting
 from ..edit.document import Document
+from ..edit.lessons import lesson
 from ..edit.state import Selection
 from ..model.scene_defaults import bounds_of
 from .caustic_source import source_at
@@ -35,6 +36,10 @@ def _new_scene(session: Session, _request: requests.NewScene) -> None:
 
 def _open(session: Session, request: requests.Open) -> None:
     session.show_document(Document.open(request.path, session.opening_of(request.path)))
+
+
+def _open_lesson(session: Session, request: requests.OpenLesson) -> None:
+    session.show_lesson(lesson(request.name))
 
 
 def _stand_up(session: Session, request: requests.StandUp) -> None:
@@ -66,6 +71,10 @@ def _quit(session: Session, request: requests.Quit) -> None:
     session.quit(request.discard)
 
 
+def _full_screen(session: Session, _request: requests.FullScreen) -> None:
+    session.is_full_screen = not session.is_full_screen
+
+
 def _cancel_quit(session: Session, _request: requests.CancelQuit) -> None:
     session.asks_to_quit = False
 
@@ -91,13 +100,17 @@ def _select_at(session: Session, request: requests.SelectAt) -> None:
     hit = picture.pick((request.x, request.y))
     chosen = None if hit is None else picture.object_in(scene, hit.object_index)
     if hit is None or chosen is None:
-        session.state = replace(session.state, selection=Selection())
+        session.state = replace(session.state, selection=Selection(), also=())
         return
     if not request.itself and scene.objects[chosen].material.receives:
         source = _source_at(session, np.asarray(hit.position), hit.object_index)
         found = None if source is None else picture.object_in(scene, source)
         chosen = chosen if found is None else found
-    session.state = replace(session.state, selection=Selection("object", chosen))
+    name = scene.objects[chosen].name
+    if ("object", name) in session.state.locked:
+        session.messages.tell(f"{name} is locked: unlock it in the outliner to select it here.")
+        return
+    session.state = selecting.chosen(session.state, Selection("object", chosen), request.add)
 
 
 def _source_at(session: Session, position: np.ndarray, receiver: int) -> int | None:
@@ -154,14 +167,14 @@ def _reload_shaders(session: Session, _request: requests.ReloadShaders) -> None:
     session.reload_shaders()
 
 
-def _export(session: Session, request: requests.Screenshot | requests.Bake | requests.Animate) -> None:
+def _export(session: Session, request: requests.Export) -> None:
     if isinstance(request, requests.Screenshot) and request.with_interface and not request.spectral:
         if request.path.suffix.lower() != ".png":
             raise UserError(f"cannot write {request.path.name}: a picture of the whole window is a .png")
         check_writable(request.path)
         session.window_picture = request.path
         return
-    session.jobs.export(request, session.state, session.picture)
+    session.jobs.export(request, session.drawn.visible(session.state), session.picture)
 
 
 def _cancel_job(session: Session, _request: requests.CancelJob) -> None:
@@ -189,6 +202,7 @@ def _dismiss(session: Session, request: requests.DismissMessage) -> None:
 _HANDLERS: dict[type, Callable] = {
     requests.NewScene: _new_scene,
     requests.Open: _open,
+    requests.OpenLesson: _open_lesson,
     requests.StandUp: _stand_up,
     requests.Save: _save,
     requests.Undo: _undo,
@@ -196,6 +210,7 @@ _HANDLERS: dict[type, Callable] = {
     requests.GoTo: _go_to,
     requests.Quit: _quit,
     requests.CancelQuit: _cancel_quit,
+    requests.FullScreen: _full_screen,
     requests.Recover: _recover,
     requests.SelectAt: _select_at,
     requests.BeginPull: _begin_pull,
@@ -203,6 +218,7 @@ _HANDLERS: dict[type, Callable] = {
     requests.Retrace: _retrace,
     requests.ReloadShaders: _reload_shaders,
     requests.Screenshot: _export,
+    requests.RenderPicture: _export,
     requests.Bake: _export,
     requests.Animate: _export,
     requests.CancelJob: _cancel_job,

@@ -19,10 +19,12 @@ from .panels import (
     help_list,
     history_panel,
     inspector,
+    lesson_panel,
     menu,
     messages,
     opened_card,
     outliner,
+    rays_panel,
     spectrum,
     start_page,
     status_bar,
@@ -66,19 +68,23 @@ class PanelWindow:
 
 WINDOWS = (
     PanelWindow("outliner", "Outliner", "left top", outliner.draw_outliner),
+    PanelWindow("lesson", "Lesson", "left bottom", lesson_panel.draw_lesson),
     PanelWindow("history", "History", "left bottom", history_panel.draw_history),
     PanelWindow("dispersion", "Dispersion", "right bottom", draw_dispersion),
     PanelWindow("inspector", "Inspector", "right top", inspector.draw_inspector),
     PanelWindow("view", "View", "right top", view_panel.draw_view),
     PanelWindow("brush", "Brush", "right bottom", draw_brush),
     PanelWindow("export", "Export", "right bottom if tall", _draw_export, (26.0, 30.0)),
+    PanelWindow("rays", "Rays", "bottom", rays_panel.draw_rays_panel),
     PanelWindow("timing", "Timing", "bottom", timing.draw_timing),
     PanelWindow("spectrum", "Spectrum", "bottom", spectrum.draw_spectrum),
     PanelWindow("compare", "Compare", "bottom", _draw_compare),
-    PanelWindow("abbe", "Abbe diagram", "floating", draw_abbe, (44.0, 34.0)),
+    # Beside the caustic, which it is there to change.
+    PanelWindow("abbe", "Abbe diagram", "right bottom", draw_abbe, (44.0, 34.0)),
     PanelWindow("shortcuts", "Shortcuts", "floating", help_list.draw_shortcuts, (62.0, 38.0)),
     PanelWindow("about", "About SpectraSplat", "floating", about.draw_about, (32.0, 20.0)),
 )
+_OVER_START_PAGE = ("shortcuts", "about")
 _DOCKED = tuple(Docked(window.title, window.place) for window in WINDOWS)
 
 
@@ -89,9 +95,13 @@ def draw_interface(state: State, view_model: ViewModel) -> State:
     """
     state = shortcuts.handle(state, view_model)
     shortcuts.focused_panel["field"] = ""
+    shortcuts.floating_panels.clear()
     state = menu.draw_menu(state, view_model)
     if state.preferences.panels.start_page:
         state = start_page.draw_start_page(state, view_model)
+        for window in WINDOWS:
+            if window.field in _OVER_START_PAGE and getattr(state.preferences.panels, window.field):
+                state = _draw_panel(window, state, view_model)
     else:
         state = _draw_windows(state, view_model)
     state = dialogs.draw_dialogs(state, view_model)
@@ -130,8 +140,10 @@ def _draw_panel(window: PanelWindow, state: State, view_model: ViewModel) -> Sta
     imgui.set_next_window_pos(viewport.get_center(), imgui.Cond_.first_use_ever, imgui.ImVec2(0.5, 0.5))
     shown, stays = imgui.begin(window.title, True)
     item_rects.note(f"Window: {window.title}")
-    if imgui.is_window_focused(imgui.FocusedFlags_.child_windows) and not imgui.is_window_docked():
-        shortcuts.focused_panel["field"] = window.field
+    if not imgui.is_window_docked():
+        shortcuts.floating_panels.append(window.field)
+        if imgui.is_window_focused(imgui.FocusedFlags_.child_windows):
+            shortcuts.focused_panel["field"] = window.field
     if shown:
         state = window.draw(state, view_model)
     imgui.end()

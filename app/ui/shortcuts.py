@@ -18,11 +18,13 @@ _REPEATING = ("Undo", "Redo", "Brighter", "Darker")
 """A held key goes on."""
 
 _ON_START_PAGE = ("File", "Help")
-_ALWAYS = ("Shortcuts", "Quit")
-"""Even while a text is typed, of which their keys are no part."""
+_ALWAYS = ("Shortcuts", "Quit", "Full screen")
+"""Even while a text is typed or a menu is open; quitting in dialogues too."""
 
 focused_panel = {"field": ""}
 """The floating panel that had the keyboard in the last frame, of `Panels`: Esc closes it."""
+floating_panels: list[str] = []
+"""All that floated: with nothing else to leave, Esc closes the last of them."""
 
 _NAMED = {
     "Esc": imgui.Key.escape,
@@ -46,6 +48,7 @@ class Gesture:
 
 GESTURES = (
     Gesture("Click", "Mouse in the picture", "Select an object, or the object whose caustic it is"),
+    Gesture("Shift+click", "Mouse in the picture", "Select one thing more, or one less"),
     Gesture("Ctrl+click", "Mouse in the picture", "Select the surface itself, even under a caustic"),
     Gesture("Middle drag, Alt+left drag", "Mouse in the picture", "Orbit"),
     Gesture("Shift+middle drag", "Mouse in the picture", "Pan"),
@@ -76,19 +79,19 @@ def handle(state: State, view_model: ViewModel) -> State:
     io = imgui.get_io()
     _close_menus()
     is_modal = imgui.internal.get_top_most_popup_modal() is not None
-    if io.want_text_input and not is_modal:
-        for command in _all():
-            if command.name in _ALWAYS and _is_pressed(command):
-                return command.act(state, view_model)
+    for command in _all():
+        if command.name in _ALWAYS and _is_pressed(command) and (command.name == "Quit" or not is_modal):
+            return command.act(state, view_model)
     is_free = not io.want_text_input and not imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
     # The right button held means flying: its letters belong to the camera.
     if not is_free or imgui.is_mouse_down(imgui.MouseButton_.right):
         return _hold_compare(state, False)
     on_start_page = state.preferences.panels.start_page
+    closing = focused_panel["field"] or (floating_panels[-1] if floating_panels and state.tool == "select" else "")
+    if closing and imgui.is_key_pressed(imgui.Key.escape):
+        return state.with_panels(**{closing: False})
     if on_start_page and imgui.is_key_pressed(imgui.Key.escape):
         return state.with_panels(start_page=False)
-    if focused_panel["field"] and imgui.is_key_pressed(imgui.Key.escape):
-        return state.with_panels(**{focused_panel["field"]: False})
     for command in _all():
         # What the page hides must not be edited blindly.
         is_reachable = not on_start_page or command.group in _ON_START_PAGE

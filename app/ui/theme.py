@@ -156,7 +156,7 @@ def _set_sizes(style: imgui.Style, scale: float) -> None:
         "tab_rounding": 3,
         "scrollbar_rounding": 6,
         "scrollbar_size": 12,
-        "grab_min_size": 10,
+        "grab_min_size": 7,
         "indent_spacing": 16,
         "docking_separator_size": 2,
         "tab_bar_overline_size": 2,
@@ -205,7 +205,8 @@ def _colours(chosen: Palette) -> dict[str, Colour]:
         "scrollbar_grab_active": mixed(chosen.window, text, 0.42),
         "check_mark": accent,
         "checkbox_selected_bg": frame,
-        "slider_grab": mixed(frame, text, 0.38),
+        # Digits are written over it: they must stay readable.
+        "slider_grab": mixed(frame, accent, 0.62),
         "slider_grab_active": accent,
         "button": frame,
         "button_hovered": hovered,

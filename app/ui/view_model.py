@@ -12,6 +12,8 @@ from ..model.scene import Vec3
 from ..model.staging import UpAxis
 from ..passes.ray_line import RayLine
 from ..render.viewer.stats import LiveStats
+from .compared_with import Histogram
+from .ray_readings import RayReading
 
 
 @dataclass(frozen=True)
@@ -120,11 +122,19 @@ class ViewModel:
     """How far the picture that compare modes show is, 0 to 1; None where none was begun."""
     compare_text: str = ""
     """What that picture is and how good, or why there is none: one or two sentences."""
+    compare_label: str = ""
+    """What that picture is, for its side of the wipe."""
+    compared_rgb: Vec3 | None = None
+    """Linear Rec.709 of that picture under the cursor."""
+    histogram: Histogram | None = None
+    """Of both pictures, while the compare panel is open."""
     compare_ready: bool = False
     """There is a picture to compare with."""
     compare_stale: bool = False
     """The scene or the view has changed since it was begun."""
     rays: tuple[RayLine, ...] = ()
+    readings: tuple[RayReading, ...] = ()
+    """What those rays say in numbers."""
     job: JobInfo | None = None
     exposure_ev: float = 0.0
     """The exposure in use, automatic or not."""

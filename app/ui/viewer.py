@@ -76,6 +76,11 @@ class Viewer:
         return f"{document.title}{'*' if document.unsaved else ''} – SpectraSplat"
 
     @property
+    def is_full_screen(self) -> bool:
+        """Whether the window should cover the screen."""
+        return self.session.is_full_screen
+
+    @property
     def wants_to_close(self) -> bool:
         """The window may close."""
         return self.session.wants_to_close

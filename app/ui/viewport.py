@@ -15,7 +15,9 @@ from ..edit.projection import View
 from ..edit.state import State
 from . import item_rects, overlay, theme
 from .gizmo import Gizmo
+from .measure_marks import draw_measure
 from .overlay import Canvas
+from .ray_labels import draw_ray_labels
 from .view_axes import draw_axes
 from .view_model import ViewModel
 from .viewport_input import Mouse, ViewportInput
@@ -69,6 +71,8 @@ def _draw_inside(state: State, view_model: ViewModel) -> State:
     drawing.push_clip_rect(corner, ImVec2(corner.x + width, corner.y + height), True)
     if state.display.ray_overlay:
         overlay.draw_rays(canvas, view_model.rays)
+        if state.display.ray_labels:
+            draw_ray_labels(canvas, view_model.rays, view_model.readings)
     draw_marks(canvas, state, view_model, viewport_input.grip == "brush")
     state = draw_lights(canvas, state)
     state = gizmo.draw(state, canvas.view, (corner.x, corner.y, width, height))
@@ -79,6 +83,8 @@ def _draw_inside(state: State, view_model: ViewModel) -> State:
         state = draw_axes(state, canvas.view, corner.x + width - inset, corner.y + inset)
     draw_badges(badges(state, view_model), corner.x, corner.y + height)
     mouse = _mouse(canvas)
+    if state.tool == "measure":
+        draw_measure(canvas, state, view_model, (mouse.x, mouse.y) if mouse.is_over else None)
     state = viewport_input.act(state, view_model, canvas, mouse)
     state = _with_hover(state, mouse)
     if state.display.magnifier and mouse.is_over:
@@ -125,7 +131,7 @@ def _mouse(canvas: Canvas) -> Mouse:
 
 def _with_hover(state: State, mouse: Mouse) -> State:
     """The host looks at what lies there; while the camera is dragged nobody needs to know."""
-    dragging = viewport_input.grip in ("brush", "pull", "click", "wipe")
+    dragging = viewport_input.grip in ("brush", "pull", "click", "measure", "wipe")
     inside = 0.0 <= mouse.x < 1.0 and 0.0 <= mouse.y < 1.0
     hovers = (mouse.is_over and viewport_input.is_free) or (dragging and inside)
     return replace(

@@ -16,15 +16,17 @@ from imgui_bundle import imgui
 from ..base.errors import UserError
 from ..edit import brush as brushes
 from ..edit import camera_controls as controls
+from ..edit import measuring
 from ..edit import pull as pulling
 from ..edit.projection import View
 from ..edit.requests import BeginPull, Notice, SelectAt
 from ..edit.state import State
 from ..model.scene import Scene
+from .measure_marks import point_at
 from .overlay import Canvas
 from .view_model import CursorInfo, ViewModel
 
-Grip = Literal["orbit", "pan", "dolly", "fly", "click", "brush", "pull", "wipe"]
+Grip = Literal["orbit", "pan", "dolly", "fly", "click", "measure", "brush", "pull", "wipe"]
 CLICK_PX = 4.0
 """A press that moved no farther is a click, logical pixels."""
 WIPE_REACH_PX = 6.0
@@ -69,7 +71,7 @@ class ViewportInput:
     def act(self, state: State, view_model: ViewModel, canvas: Canvas, mouse: Mouse) -> State:
         """Carry out this frame's mouse and keys."""
         if self.grip is not None and not imgui.is_mouse_down(self._button):
-            state = self._let_go(state, mouse)
+            state = self._let_go(state, view_model, canvas, mouse)
         if state.pull is not None and self.grip != "pull":
             state = replace(state, pull=None)  # the button was let go before the host had found anything to hold
         if self.grip is None and mouse.is_over:
@@ -100,16 +102,19 @@ class ViewportInput:
             return self._begin_stroke(self._grip(state, "brush", 0, position), view_model)
         if state.tool == "pull":
             return self._grip(state, "pull", 0, position).asking(BeginPull(mouse.x, mouse.y, io.key_shift))
-        return self._grip(state, "click", 0, position)
+        return self._grip(state, "measure" if state.tool == "measure" else "click", 0, position)
 
     def _grip(self, state: State, grip: Grip, button: int, position: np.ndarray | None) -> State:
         self.grip, self._button, self._travelled_px, self._pivot, self._stroke = grip, button, 0.0, position, None
         return state
 
-    def _let_go(self, state: State, mouse: Mouse) -> State:
+    def _let_go(self, state: State, view_model: ViewModel, canvas: Canvas, mouse: Mouse) -> State:
         grip, self.grip, self._stroke = self.grip, None, None
+        if grip == "measure" and self._travelled_px <= CLICK_PX and mouse.is_over:
+            point = point_at(view_model, canvas, mouse.x, mouse.y)
+            return state if point is None else measuring.with_point(state, point)
         if grip == "click" and self._travelled_px <= CLICK_PX and mouse.is_over:
-            return state.asking(SelectAt(mouse.x, mouse.y, imgui.get_io().key_ctrl))
+            return state.asking(SelectAt(mouse.x, mouse.y, imgui.get_io().key_ctrl, imgui.get_io().key_shift))
         return state
 
     # ---- while it lasts ---------------------------------------------------------------------
@@ -117,7 +122,7 @@ class ViewportInput:
     def _hold(self, state: State, view_model: ViewModel, canvas: Canvas, mouse: Mouse) -> State:
         delta = imgui.get_io().mouse_delta
         self._travelled_px += (abs(delta.x) + abs(delta.y)) / canvas.scale
-        if self.grip == "click":
+        if self.grip in ("click", "measure"):
             return state
         state = replace(state, interacting=True)
         camera = state.camera

@@ -3,16 +3,17 @@ magnifier."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as icons
 
 from ..edit import brush as brushes
-from ..edit import placing, pull
+from ..edit import placing, pull, selecting
+from ..edit.projection import View
 from ..edit.state import Brush, Selection, State
+from ..model.scene import Camera
 from . import item_rects, theme
+from .compared_with import glass_object
 from .overlay import Canvas, box_corners, draw_box, draw_outlined
 from .panels.methods import METHOD_NAMES
 from .panels.rows import tooltip
@@ -35,12 +36,27 @@ def draw_marks(canvas: Canvas, state: State, view_model: ViewModel, is_painting:
 
 
 def _draw_selection(canvas: Canvas, state: State) -> None:
-    chosen = state.selection
-    if chosen.kind != "object" or chosen.index >= len(state.scene.objects):
-        return
-    item = state.scene.objects[chosen.index]
     accent = theme.DARK.accent  # over the picture, which is dark in either theme
-    draw_box(canvas, box_corners(item.mesh.vertices, item.object_to_world), (*accent[:3], 0.8))
+    for chosen in selecting.everything(state):
+        if chosen.kind == "object":
+            item = state.scene.objects[chosen.index]
+            opacity = 0.8 if chosen == state.selection else 0.45
+            draw_box(canvas, box_corners(item.mesh.vertices, item.object_to_world), (*accent[:3], opacity))
+    if state.selection.kind == "camera":
+        for line in camera_lines(state.scene.camera, canvas.view.aspect):
+            draw_outlined(canvas, line, (*accent[:3], 0.8), 1.4, closed=False)
+
+
+def camera_lines(camera: Camera, aspect: float) -> list[np.ndarray]:
+    """World polylines (n, 3) of a camera: what it sees at a fifth of its target's distance, and from where."""
+    view = View.of(camera, aspect)
+    corners = []
+    for x, y in ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)):
+        origin, direction = view.ray(x, y)
+        corners.append(origin + 0.2 * view.target_distance * direction)
+    frame = np.array(corners)
+    position = np.asarray(camera.position, float)
+    return [np.vstack([frame, frame[:1]]), *(np.stack([position, corner]) for corner in frame)]
 
 
 def _draw_ring(canvas: Canvas, state: State, cursor: CursorInfo, is_painting: bool) -> None:
@@ -112,8 +128,10 @@ def draw_lights(canvas: Canvas, state: State) -> State:
     if state.tool in ("brush", "pull"):
         return state
     for index, light in enumerate(state.scene.lights):
-        chosen = state.selection == Selection("light", index)
-        if not light.has_place and not chosen:
+        chosen = selecting.is_selected(state, Selection("light", index))
+        if (not light.has_place and not chosen) or selecting.key_of(
+            state.scene, Selection("light", index)
+        ) in state.hidden:
             continue  # it stands nowhere
         place = placing.light_place(state.scene, light)
         x, y = canvas.pixels(place)
@@ -131,7 +149,7 @@ def draw_lights(canvas: Canvas, state: State) -> State:
         tooltip(f"Light: {light.name} ({light.kind})", "Click to select it.")
         _draw_light(canvas, state, index, place, float(x), float(y), chosen, imgui.is_item_hovered())
         if pressed:
-            state = replace(state, selection=Selection("light", index))
+            state = selecting.chosen(state, Selection("light", index), imgui.get_io().key_shift)
     return state
 
 
@@ -173,7 +191,13 @@ def draw_wipe(canvas: Canvas, state: State, view_model: ViewModel) -> None:
         ImVec2(x - 0.5 * size.x, middle - 0.5 * size.y), theme.packed(palette.text), icons.ICON_FA_LEFT_RIGHT
     )
     y = canvas.top + theme.em(0.8)
-    left, right = (METHOD_NAMES.get(name, "Reference") for name in (state.method, state.compare.method))
+    left = METHOD_NAMES.get(state.method, state.method)
+    swapped = glass_object(state.scene, state.selection) if state.compare.method == "glass" else None
+    if swapped is not None:
+        dispersion = state.scene.objects[swapped].material.dispersion
+        left = dispersion.name if dispersion is not None else left
+    # Without the other picture both sides are this one: it must not carry the other's name.
+    right = view_model.compare_label if view_model.compare_ready else "On its way: this is the same picture"
     gap = theme.em(1.0)
     _label(canvas, x - gap - imgui.calc_text_size(left).x, y, left)
     _label(canvas, x + gap, y, right)

@@ -26,6 +26,7 @@ _TOOLS: tuple[tuple[Tool, str, str], ...] = (
     ("scale", "Scale", icons.ICON_FA_UP_RIGHT_AND_DOWN_LEFT_FROM_CENTER),
     ("brush", "Dispersion brush", icons.ICON_FA_PAINTBRUSH),
     ("pull", "Pull a colour", icons.ICON_FA_EYE_DROPPER),
+    ("measure", "Measure", icons.ICON_FA_RULER_COMBINED),
 )
 
 
@@ -60,6 +61,12 @@ def draw_toolbar(state: State, gizmo: Gizmo, left: float, top: float) -> State:
         )
         if _button("Gizmo axes", icon, x, y, gizmo.is_local, tip, ()):
             gizmo.is_local = not gizmo.is_local
+        y += size + gap
+    if state.tool in ("move", "rotate", "scale"):
+        _ground(x, y, size, 1)
+        tip = "Handles move in steps; Ctrl moves freely." if gizmo.is_snapping else "Move in steps, as Ctrl does."
+        if _button("Snapping", icons.ICON_FA_MAGNET, x, y, gizmo.is_snapping, tip, ()):
+            gizmo.is_snapping = not gizmo.is_snapping
         y += size + gap
     _ground(x, y, size, 2)
     what = command("Accumulate photons")
@@ -126,6 +133,13 @@ def badges(state: State, view_model: ViewModel) -> list[Badge]:
                 "order until they are traced again (Ctrl+R).",
             )
         )
+    if state.preview_s is not None:
+        badges.append(
+            Badge(
+                f"Preview at {state.preview_s:.2f} s",
+                "The animation at that time; the Export panel ends the preview. Edits change the scene itself.",
+            )
+        )
     if state.solo_nm is not None:
         badges.append(
             Badge(
@@ -142,7 +156,7 @@ def badges(state: State, view_model: ViewModel) -> list[Badge]:
             )
         )
     elif state.compare.holding:
-        badges.append(Badge("Reference", "Shown while C is held down.", False))
+        badges.append(Badge(view_model.compare_label or "The other picture", "Shown while C is held down.", False))
     if not state.playing:
         badges.append(Badge("Paused", "No photons are added. Space goes on.", False))
     return badges

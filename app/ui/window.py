@@ -57,6 +57,10 @@ class Guest(Protocol):
         """The window's close button was pressed."""
 
     @property
+    def is_full_screen(self) -> bool:
+        """Whether the window should cover the screen."""
+
+    @property
     def preferences(self) -> Preferences:
         """Theme and scale."""
 
@@ -109,6 +113,8 @@ class Window:
         self._host = ImguiHost()
         imgui.backends.glfw_init_for_opengl(ctypes.cast(self._handle, ctypes.c_void_p).value or 0, True)
         self._title = ""
+        self._before_full_screen: tuple[int, int, int, int] | None = None
+        """Position and size to go back to; None while it is a window."""
 
     def __enter__(self) -> Self:
         return self
@@ -126,7 +132,10 @@ class Window:
 
     @property
     def place(self) -> WindowPlace:
-        """To be remembered."""
+        """To be remembered; of a full screen, where it was before."""
+        if self._before_full_screen is not None:
+            x, y, width, height = self._before_full_screen
+            return WindowPlace((x, y), (width, height), False)
         width, height = glfw.get_window_size(self._handle)
         maximised = bool(glfw.get_window_attrib(self._handle, glfw.MAXIMIZED))
         if glfw.get_platform() == glfw.PLATFORM_WAYLAND:  # windows there do not know where they are
@@ -169,6 +178,7 @@ class Window:
         width = max(glfw.get_window_size(self._handle)[0], 1)
         guest.prepare(self.interface_scale, self.framebuffer_size[0] / width)
         theme.apply(guest.preferences, self.interface_scale)
+        self._cover_screen(guest.is_full_screen)
         if guest.title != self._title:
             self._title = guest.title
             glfw.set_window_title(self._handle, self._title)
@@ -184,6 +194,24 @@ class Window:
         guest.rendered()
         glfw.swap_buffers(self._handle)
         guest.finished(self.screenshot)
+
+    def _cover_screen(self, wanted: bool) -> None:
+        """Take the whole of the screen that the window is on, or go back to where it was."""
+        if wanted == (self._before_full_screen is not None):
+            return
+        if self._before_full_screen is not None:
+            x, y, width, height = self._before_full_screen
+            self._before_full_screen = None
+            no_monitor: Any = None
+            glfw.set_window_monitor(self._handle, no_monitor, x, y, width, height, glfw.DONT_CARE)
+        else:
+            monitor = glfw.get_primary_monitor()
+            mode = glfw.get_video_mode(monitor) if monitor else None
+            if mode is None:
+                return
+            self._before_full_screen = (*glfw.get_window_pos(self._handle), *glfw.get_window_size(self._handle))
+            glfw.set_window_monitor(self._handle, monitor, 0, 0, mode.size.width, mode.size.height, mode.refresh_rate)
+        self.wake()
 
     def screenshot(self) -> np.ndarray:
         """The last frame, interface and all, uint8 (height, width, 3), top row first."""

@@ -82,7 +82,8 @@ def test_the_reference_agrees_with_the_picture_and_stops_when_the_scene_changes(
     )
     live, reference = read(running.picture), read(comparison.picture)
     directly = thread().snapshot.directly
-    assert np.array_equal(reference[~directly], live[~directly])
+    # Behind glass there is no reference: stripes say so.
+    assert not np.array_equal(reference[~directly], live[~directly])
     assert reference[directly].sum() == pytest.approx(live[directly].sum(), rel=0.03)
     scale = live[directly].mean()
     assert np.median(np.abs(reference - live)[directly]) < 0.1 * scale

@@ -136,7 +136,7 @@ def test_a_movie_cancelled_before_its_first_frame_leaves_nothing(
 def test_what_cannot_be_done_is_said_at_once(exports: Exports, state: State, shown: Shown, tmp_path: Path) -> None:
     for request, told in (
         (Animate(tmp_path / "a.mp4", "keys"), "nothing to animate"),
-        (Animate(tmp_path / "a.gif"), "use .mp4"),
+        (Animate(tmp_path / "a.avi"), "use .mp4"),
         (Animate(tmp_path / "a.mp4", size=(99_999, 9)), "out of range"),
         (Bake(tmp_path / "a.exr", "nobody"), "no receiver"),
         (Screenshot(tmp_path / "gone" / "a.exr", spectral=True), "does not exist"),

@@ -28,7 +28,7 @@ def with_browser(state: State, view_model: ViewModel) -> State:
 def rig(gl, tmp_path: Path):
     export_panel.reset()
     file_browser.close()
-    with PanelRig(gl, with_browser, scene_state(), (900, 900)) as made:
+    with PanelRig(gl, with_browser, scene_state(), (900, 1250)) as made:
         made.view_model = ViewModel(path=tmp_path / "scene.toml", title="scene")
         made.frame(2)
         yield made

@@ -59,7 +59,7 @@ def test_options(name: str, here: Path, capsys: pytest.CaptureFixture[str]) -> N
 @pytest.mark.parametrize(
     ("output", "told"),
     [
-        ("out.gif", ("'.gif'", "use .mp4")),
+        ("out.avi", ("'.avi'", "use .mp4")),
         ("gone/out.mp4", ("does not exist",)),
         ("file", ("it is a file",)),
         ("pictures", ("pictures of something else", "--overwrite")),

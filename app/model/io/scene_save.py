@@ -22,15 +22,18 @@ from ...base.errors import UserError
 from ..geometry.mesh import Mesh
 from ..geometry.mesh_recipes import recipe_of
 from ..lights.light_file import light_values
+from ..placement import PLACEMENT_KEYS
 from ..scene import Scene, SceneObject
 from ..scene_camera import camera_values
 from ..scene_dabs import KEY as DABS
 from ..scene_dabs import describe_dabs
+from ..scene_defaults import environment_of
 from ..scene_environment import KEY as ENVIRONMENT
 from ..scene_environment import environment_values
 from ..scene_objects import INLINE
 from ..scene_render import render_values
 from ..texture import Environment
+from .kept_words import kept_light, kept_placement
 from .scene_file import load_scene
 from .scene_pictures import folder_beside, kept_name, relative_name
 from .toml_text import toml_text
@@ -87,9 +90,9 @@ def _kept(scene: Scene, path: Path, raw: dict[str, Any]) -> dict[str, Any]:
     if scene.name != before.name:
         values["name"] = scene.name
     if scene.camera != before.camera:
-        values["camera"] = camera_values(scene.camera)
+        values["camera"] = _changed(raw.get("camera"), camera_values(before.camera), camera_values(scene.camera))
     if scene.render != before.render:
-        values["render"] = render_values(scene.render)
+        values["render"] = _changed(raw.get("render"), render_values(before.render), render_values(scene.render))
     if scene.background_rgb != before.background_rgb or not _same_environment(scene.environment, before.environment):
         for key in ("background", ENVIRONMENT):
             values.pop(key, None)
@@ -98,13 +101,38 @@ def _kept(scene: Scene, path: Path, raw: dict[str, Any]) -> dict[str, Any]:
         else:
             values[ENVIRONMENT] = environment_values(scene.environment, path)
     if scene.lights != before.lights:
-        written = dict(zip(before.lights, raw.get("lights", []), strict=False))
-        values["lights"] = [written.get(light) or light_values(light, path) for light in scene.lights]
+        values["lights"] = _kept_lights(scene, before, raw.get("lights", []), path)
     materials = dict(raw.get("materials", {}))
     values["objects"] = _kept_objects(scene, before, raw["objects"], materials, path)
     if materials:
         values["materials"] = materials
     return values
+
+
+def _changed(raw: dict[str, Any] | None, old: dict[str, Any], new: dict[str, Any]) -> dict[str, Any]:
+    """A table as it was written, with what differs; whole where there was none, or of another kind."""
+    if raw is None or old.keys() != new.keys():
+        return new
+    return raw | {key: value for key, value in new.items() if old[key] != value}
+
+
+def _kept_lights(scene: Scene, before: Scene, raw: list[dict[str, Any]], path: Path) -> list[dict[str, Any]]:
+    """The [[lights]]: one that was there keeps its words, or those of them that still hold."""
+    pairs = list(zip(before.lights, raw, strict=False))
+    by_name = {light.name: (light, entry) for light, entry in pairs}
+    around = environment_of(scene.objects)
+    told = []
+    for index, light in enumerate(scene.lights):
+        known = by_name.get(light.name)
+        if known is None and len(scene.lights) == len(pairs):
+            known = pairs[index]  # renamed
+        if known is None:
+            told.append(light_values(light, path))
+        elif known[0] == light:
+            told.append(known[1])
+        else:
+            told.append(kept_light(known[1], known[0], light, path, index, around))
+    return told
 
 
 def _kept_objects(
@@ -122,26 +150,76 @@ def _kept_objects(
     at = 0
     while at < len(scene.objects):
         entry, old = entries.get(scene.objects[at].name, ({}, ()))
+        if not old and len(scene.objects) == len(before.objects):
+            # Renamed: what stood at its place.
+            entry, old = entries.get(before.objects[at].name, ({}, ()))
         new = scene.objects[at : at + len(old)]
         if old and len(new) == len(old) and all(map(_same_object, new, old)):
             told += [_objects(group, materials, path) for group in _groups(tuple(changed))]
             told.append(entry)
             changed = []
             at += len(old)
+        elif len(old) == 1 and "instances" not in entry:
+            told += [_objects(group, materials, path) for group in _groups(tuple(changed))]
+            told.append(_kept_object(entry, old[0], scene.objects[at], materials, path))
+            changed = []
+            at += 1
         else:
             changed.append(scene.objects[at])
             at += 1
     return told + [_objects(group, materials, path) for group in _groups(tuple(changed))]
 
 
+def _kept_object(
+    entry: dict[str, Any], old: SceneObject, new: SceneObject, materials: dict[str, dict[str, Any]], path: Path
+) -> dict[str, Any]:
+    """The entry of an object that was edited, with the words that still hold."""
+    values = {key: value for key, value in entry.items() if key not in (*PLACEMENT_KEYS, "rests_at_z")}
+    if old.name != new.name:
+        values["name"] = new.name
+    if not _same_mesh(old.mesh, new.mesh):
+        for key in recipe_of(old.mesh) or ("vertices", "triangles", "uv", "shape", "mesh"):
+            values.pop(key, None)
+        values |= _mesh(new.mesh, path)
+    if old.material.values() != new.material.values():
+        values = _kept_material(values, old, new, materials, path)
+    values.pop(DABS, None)
+    placed = kept_placement(entry, new.mesh, new.object_to_world, path)
+    # In the order in which they were written, so that comments stay where they are.
+    order = {key: i for i, key in enumerate(entry)}
+    told = values | placed | _dabs(new)
+    return dict(sorted(told.items(), key=lambda item: order.get(item[0], len(order))))
+
+
+def _kept_material(
+    values: dict[str, Any], old: SceneObject, new: SceneObject, materials: dict[str, dict[str, Any]], path: Path
+) -> dict[str, Any]:
+    """`values` with the words of another material; its glass keeps the name that it was given."""
+    wanted = new.material.values(path)
+    written, was = values.get("glass"), old.material.values().get("glass")
+    kept = {
+        key: value for key, value in values.items() if key not in ("glass", "material", "dispersion_gain", "priority")
+    }
+    if isinstance(written, str) and wanted.get("glass") == was:
+        wanted = wanted | {"glass": written}
+        if wanted.keys() <= {"glass", "dispersion_gain", "priority"}:
+            return kept | wanted
+    if isinstance(values.get("material"), dict):
+        return kept | {"material": wanted}
+    return kept | _material(new, materials, path)
+
+
+def _same_mesh(a: Mesh, b: Mesh) -> bool:
+    recipe = recipe_of(a)
+    return recipe == recipe_of(b) and (recipe is not None or np.array_equal(a.vertices, b.vertices))
+
+
 def _same_object(a: SceneObject, b: SceneObject) -> bool:
-    recipe = recipe_of(a.mesh)
     return (
         a.name == b.name
         and np.array_equal(a.object_to_world, b.object_to_world)
         and a.local_dispersion == b.local_dispersion
-        and recipe == recipe_of(b.mesh)
-        and (recipe is not None or np.array_equal(a.mesh.vertices, b.mesh.vertices))
+        and _same_mesh(a.mesh, b.mesh)
         and a.material.values() == b.material.values()
     )
 

@@ -114,8 +114,21 @@ def search(query: str = "", limit: int | None = None) -> list[Entry]:
     An exact name comes first, then names that begin with the query, then the rest in catalogue
     order. Where nothing contains the words, entries with similar names. "" gives all.
     """
+    found = _matching(query)
+    if not found and query.strip():
+        return _resembling(query, limit or 8)
+    return found[:limit]
+
+
+def is_guess(query: str) -> bool:
+    """Whether `search` has nothing that is called so, and gives what resembles it."""
+    return bool(query.strip()) and not _matching(query)
+
+
+def _matching(query: str) -> list[Entry]:
+    """Entries that contain every word of `query`, best first; all of them for none."""
     if not query.strip():
-        return list(entries())[:limit]
+        return list(entries())
     words = [key for key in (search_key(w) for w in query.replace(":", " ").split()) if key]
     if not words:
         return []
@@ -130,9 +143,7 @@ def search(query: str = "", limit: int | None = None) -> list[Entry]:
         elif all(any(word in key for key in keys) for word in words):
             begins = keys[0].startswith(whole) or any(key.startswith(whole) for key in keys[2:])
             ranked.append((1 if begins else 2, order, entry))
-    if not ranked:
-        return _resembling(query, limit or 8)
-    return [entry for _, _, entry in sorted(ranked, key=lambda item: item[:2])][:limit]
+    return [entry for _, _, entry in sorted(ranked, key=lambda item: item[:2])]
 
 
 def _resembling(name: str, count: int) -> list[Entry]:

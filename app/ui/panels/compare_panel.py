@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from imgui_bundle import imgui, implot
@@ -11,9 +12,10 @@ from ...base.colour_maps import ERROR, sample
 from ...edit.requests import ComputeReference
 from ...edit.state import Compare, CompareMode, State
 from ...model.settings import METHODS
-from .. import theme
+from .. import item_rects, theme
+from ..compared_with import LUMINANCE
 from ..view_model import ErrorCurve, ViewModel
-from . import rows, widgets
+from . import file_browser, rows, widgets
 from .methods import METHOD_NAMES, METHOD_TIPS
 
 MODES: dict[CompareMode, str] = {
@@ -29,6 +31,14 @@ MODE_TIPS = {
     "error": "Relative error of the picture: blue is too dark, red too bright.",
 }
 REFERENCE = "reference"
+_TIPS = {
+    REFERENCE: "An independent rendering in float64 that shares no code with this one, refined in the background.",
+    "glass": "The same scene with one solid of another glass, traced beside this one.",
+    "file": "A picture from a file, such as another program's of the same view.",
+}
+_GLASSES = ("N-BK7", "F2", "N-SF11", "N-SF66", "water", "diamond")
+FILES = (".exr", ".npy", ".png")
+_QUESTION = "compare with"
 ERROR_RANGE = 0.5
 """Relative error at the ends of the map's scale (`passes.display.ERROR_RANGE`)."""
 _WIDE_EM = 40.0
@@ -38,7 +48,12 @@ _LEGEND_STEPS = 40
 def draw_compare(state: State, view_model: ViewModel) -> State:
     """Draw the panel's contents."""
     if imgui.get_content_region_avail().x < theme.em(_WIDE_EM):
-        return _plot(_controls(state, view_model), view_model, theme.em(13))
+        state = _controls(state, view_model)
+        _values(state, view_model)
+        state = _plot(state, view_model, theme.em(13))
+        if not state.compare.plot:
+            _histogram(view_model, theme.em(11))
+        return state
     if imgui.begin_table("##compare", 2, imgui.TableFlags_.sizing_stretch_prop):
         imgui.table_setup_column("controls", imgui.TableColumnFlags_.width_stretch, 1.0)
         imgui.table_setup_column("plot", imgui.TableColumnFlags_.width_stretch, 1.3)
@@ -46,7 +61,11 @@ def draw_compare(state: State, view_model: ViewModel) -> State:
         imgui.table_next_column()
         state = _controls(state, view_model)
         imgui.table_next_column()
-        state = _plot(state, view_model, max(imgui.get_content_region_avail().y, theme.em(9)))
+        _values(state, view_model)
+        room = max(imgui.get_content_region_avail().y, theme.em(9))
+        state = _plot(state, view_model, room)
+        if not state.compare.plot:
+            _histogram(view_model, room)
         imgui.end_table()
     return state
 
@@ -54,13 +73,24 @@ def draw_compare(state: State, view_model: ViewModel) -> State:
 def _controls(state: State, view_model: ViewModel) -> State:
     compare = state.compare
     _, mode = widgets.combo("Show", MODES, compare.mode, tip=MODE_TIPS[compare.mode])
-    others = {REFERENCE: "Reference"} | {name: METHOD_NAMES[name] for name in METHODS if name != state.method}
-    tip = METHOD_TIPS.get(
-        compare.method,
-        "An independent rendering in float64 that shares no code with this one, refined in the background.",
-    )
+    others = {REFERENCE: "Reference", "glass": "Another glass", "file": "A picture file"} | {
+        name: METHOD_NAMES[name] for name in METHODS if name != state.method
+    }
+    tip = METHOD_TIPS.get(compare.method) or _TIPS[compare.method]
     _, method = widgets.combo("With", others, compare.method, tip=tip)
+    if method != compare.method and mode == "off":
+        mode = "wipe"  # who chooses what to compare with wants to see it
+    if method == "glass" and compare.method != "glass":
+        present = {
+            item.material.dispersion.name for item in state.scene.objects if item.material.dispersion is not None
+        }
+        others_of = [name for name in _GLASSES if not any(one.endswith(name) for one in present)]
+        compare = replace(compare, glass=others_of[0] if others_of else compare.glass)
     compare = replace(compare, mode=mode, method=method)
+    if method == "glass":
+        compare = _glass(compare)
+    elif method == "file":
+        compare = _file(compare, view_model)
     if mode == "wipe":
         _, wipe, active = widgets.slider(
             "Line at",
@@ -83,6 +113,61 @@ def _controls(state: State, view_model: ViewModel) -> State:
     if mode == "error":
         _legend()
     return _progress(state, view_model)
+
+
+def _glass(compare: Compare) -> Compare:
+    glasses = dict.fromkeys((*_GLASSES, compare.glass))
+    _, glass = widgets.combo("Glass", tuple(glasses), compare.glass, tip="Of the selected solid, or else of the first.")
+    changed, typed = widgets.text_field("Other glass", glass, tip="Any name of the catalogue, such as N-LAK33B.")
+    # One that does not exist is told below, with what was perhaps meant.
+    return replace(compare, glass=typed.strip() if changed else glass)
+
+
+def _file(compare: Compare, view_model: ViewModel) -> Compare:
+    name = "none" if compare.file is None else compare.file.name
+    tip = "A picture to compare with: .exr and .npy are linear, .png is read as displayed."
+    if widgets.file_field("File", name, tip=tip):
+        folder = view_model.path.parent if view_model.path is not None else Path.home()
+        file_browser.ask(file_browser.Question(_QUESTION, "Compare with", FILES, compare.file or folder))
+    path = file_browser.take(_QUESTION)
+    return compare if path is None else replace(compare, file=path)
+
+
+def _values(state: State, view_model: ViewModel) -> None:
+    """Both pictures under the cursor, in numbers."""
+    if not is_comparing(state.compare):
+        return
+    own = None if view_model.cursor is None else view_model.cursor.rgb
+    for label, rgb in (("Here", own), ("There", view_model.compared_rgb)):
+        text = "–" if rgb is None else "  ".join(f"{value:.4g}" for value in rgb)
+        widgets.read_out(label, text, tip="Linear red, green and blue under the cursor, lm/(sr unit²).")
+    if own is not None and view_model.compared_rgb is not None:
+        a, b = (
+            sum(w * v for w, v in zip(LUMINANCE.tolist(), rgb, strict=True)) for rgb in (own, view_model.compared_rgb)
+        )
+        text = f"{100.0 * (a - b) / b:+.2f} %" if b > 0.0 else "–"
+        widgets.read_out("Difference", text, tip="Of the luminances, relative to the other picture.")
+
+
+def _histogram(view_model: ViewModel, height: float) -> None:
+    found = view_model.histogram
+    if found is None:
+        return
+    flags = implot.Flags_.no_menus | implot.Flags_.no_mouse_text | implot.Flags_.no_inputs
+    if implot.begin_plot("##histogram", imgui.ImVec2(-theme.em(0.6), height), flags):
+        implot.setup_axes("luminance (stops about display white)", "√ share of pixels")
+        implot.setup_axis_limits(implot.ImAxis_.x1, float(found.stops[0]), float(found.stops[-1]), implot.Cond_.always)
+        top = max(float(found.own.max()), float(found.other.max()), 1e-6)
+        # The root, so that a bright line on a grey table is seen beside the table.
+        implot.setup_axis_limits(implot.ImAxis_.y1, 0.0, 1.15 * top**0.5, implot.Cond_.always)
+        implot.setup_legend(implot.Location_.north_east)
+        for name, shares, tint in zip(
+            ("This picture", view_model.compare_label or "Other"), (found.own, found.other), _tints(), strict=True
+        ):
+            spec = implot.Spec(line_color=tint, line_weight=1.8)
+            implot.plot_line(name, found.stops, np.ascontiguousarray(np.sqrt(shares), float), spec)
+        implot.end_plot()
+    item_rects.note("Histogram")
 
 
 def _progress(state: State, view_model: ViewModel) -> State:

@@ -6,19 +6,22 @@ ever gets the final requests.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from imgui_bundle import imgui
 
 from ...base.paths import assets_dir
-from ...edit import requests
-from ...edit.state import State
+from ...edit import edits, requests
+from ...edit.importing import import_objects
+from ...edit.state import Selection, State
 from .. import theme
 from ..view_model import ViewModel
 from . import file_browser, picture_choice, widgets
 
 OPENABLE = (".toml", ".glb", ".gltf", ".obj", ".ply", ".stl")
+COMPARABLE = (".exr", ".npy")
+"""Dropped while the compare panel is open, these are compared with."""
 SAVEABLE = (".toml", ".glb")
 _UNSAVED = "Unsaved changes"
 
@@ -48,16 +51,26 @@ def open_file(state: State, view_model: ViewModel) -> State:
     return state
 
 
+def import_file(state: State, view_model: ViewModel) -> State:
+    """Ask which file's objects are to join the scene."""
+    start = view_model.path.parent if view_model.path is not None else _recent_folder(view_model)
+    file_browser.ask(file_browser.Question("import", "Import into this scene", OPENABLE, start))
+    return state
+
+
 def open_path(state: State, view_model: ViewModel, path: Path) -> State:
     """Open `path`; asks first when work would be lost. A picture or a lamp becomes part of the scene instead."""
+    if state.preferences.panels.compare and path.suffix.lower() in COMPARABLE:
+        mode = "wipe" if state.compare.mode == "off" else state.compare.mode
+        return replace(state, compare=replace(state.compare, method="file", file=path, mode=mode))
     if picture_choice.is_part(path):
         return picture_choice.dropped(state, path)
-    return _unless_unsaved(state, view_model, requests.Open(path))
+    return unless_unsaved(state, view_model, requests.Open(path))
 
 
 def new_scene(state: State, view_model: ViewModel) -> State:
     """Start from the default scene; asks first when work would be lost."""
-    return _unless_unsaved(state, view_model, requests.NewScene())
+    return unless_unsaved(state, view_model, requests.NewScene())
 
 
 def save_as(state: State, view_model: ViewModel) -> State:
@@ -75,6 +88,9 @@ def draw_dialogs(state: State, view_model: ViewModel) -> State:
     chosen = file_browser.take("open")
     if chosen is not None:
         state = open_path(state, view_model, chosen)
+    brought = file_browser.take("import")
+    if brought is not None:
+        state = _imported(state, brought)
     target = file_browser.take("save")
     if target is not None:
         state = state.asking(requests.Save(target))
@@ -85,7 +101,15 @@ def draw_dialogs(state: State, view_model: ViewModel) -> State:
     return state
 
 
-def _unless_unsaved(state: State, view_model: ViewModel, request: requests.Request) -> State:
+def _imported(state: State, path: Path) -> State:
+    """With the file's objects, the first of them selected."""
+    first = len(state.scene.objects)
+    after = edits.attempt(state, f"Import {path.name}", import_objects, path)
+    return after if after.scene is state.scene else replace(after, selection=Selection("object", first))
+
+
+def unless_unsaved(state: State, view_model: ViewModel, request: requests.Request) -> State:
+    """`request`, after the question whether to save first where work would be lost."""
     if not view_model.unsaved:
         return state.asking(request).with_panels(start_page=False)
     _memory.pending, _memory.is_saving = [request], False

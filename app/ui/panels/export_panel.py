@@ -11,25 +11,13 @@ from imgui_bundle import imgui
 from ...edit.requests import Animate, Bake, CancelJob, Screenshot
 from ...edit.state import State
 from ..view_model import ViewModel
-from . import file_browser, keys_editor, rows, widgets
+from . import file_browser, keys_editor, render_section, rows, widgets
 
-SIZES = {
-    "viewport": "As the viewport",
-    "960x540": "960 × 540",
-    "1280x720": "1280 × 720",
-    "1920x1080": "1920 × 1080",
-    "3840x2160": "3840 × 2160",
-}
+SIZES = {size: words for size, words in render_section.SIZES.items() if size != "scene"}
 MAP_SIZES = {"512x512": "512 × 512", "1024x1024": "1024 × 1024", "2048x2048": "2048 × 2048", "4096x4096": "4096 × 4096"}
-PHOTONS = {
-    "250000": "250 thousand",
-    "1000000": "1 million",
-    "4000000": "4 million",
-    "16000000": "16 million",
-    "64000000": "64 million",
-}
+PHOTONS = render_section.PHOTONS
 _KINDS = {"turntable": "Turntable", "keys": "Keys"}
-_FORMATS = {"mp4": "Movie (MP4)", "png": "Sequence (PNG)"}
+_FORMATS = {"mp4": "Movie (MP4)", "gif": "GIF", "png": "Sequence (PNG)"}
 
 
 @dataclass
@@ -57,6 +45,8 @@ def draw_export(state: State, view_model: ViewModel) -> State:
     if view_model.job is not None:
         state = _running(state, view_model)
     idle = view_model.job is None
+    if widgets.section("Render"):
+        state = render_section.draw_render(state, view_model, idle)
     if widgets.section("Screenshot"):
         _screenshot(view_model, idle)
     if widgets.section("Caustic map"):
@@ -168,7 +158,10 @@ def _animation(state: State, view_model: ViewModel, idle: bool) -> State:
         "Photons##frame", PHOTONS, _choices.photons, tip="Photons of each traced frame."
     )
     _, _choices.format = widgets.combo(
-        "File", _FORMATS, _choices.format, tip="An H.264 movie, or a folder of numbered PNGs that can be resumed."
+        "File",
+        _FORMATS,
+        _choices.format,
+        tip="An H.264 movie, a GIF of 256 colours, or a folder of numbered PNGs that can be resumed.",
     )
     can = idle and (_choices.kind == "turntable" or bool(state.animation))
     tip = "Render all pictures with the present tone curve and exposure. The viewer stays usable meanwhile."
@@ -176,7 +169,7 @@ def _animation(state: State, view_model: ViewModel, idle: bool) -> State:
         _ask(
             "animate",
             "Render animation",
-            (".mp4",) if _choices.format == "mp4" else (".png",),
+            (f".{_choices.format}",),
             view_model,
             f"{view_model.title}_{_choices.kind}",
         )
@@ -204,7 +197,7 @@ def _answers(state: State) -> State:
     path = file_browser.take("export animate")
     if path is not None:
         # A sequence is a folder: the name that was given, without its ending.
-        target = path if _choices.format == "mp4" else path.with_suffix("")
+        target = path.with_suffix("") if _choices.format == "png" else path
         frames = None if _choices.kind == "keys" else _choices.frames
         size = None if _choices.size == "viewport" else _size(_choices.size, (960, 540))
         state = state.asking(Animate(target, _choices.kind, frames, _choices.fps, size, int(_choices.photons)))
@@ -218,6 +211,7 @@ def _size(text: str, default: tuple[int, int]) -> tuple[int, int]:
 
 def reset() -> None:
     """Choices as at the start."""
+    render_section.reset()
     fresh = _Choices()
     for name, value in vars(fresh).items():
         setattr(_choices, name, value)

@@ -16,6 +16,7 @@ from pathlib import Path
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
+from ...base.errors import suggestion
 from .. import item_rects, theme
 from . import widgets
 
@@ -105,8 +106,8 @@ def draw() -> None:
 
 
 def _contents(question: Question) -> None:
-    _places()
-    footer = imgui.get_frame_height_with_spacing() * (2 if question.saving else 1) + theme.em(0.6)
+    _places(question)
+    footer = imgui.get_frame_height_with_spacing() * 2 + theme.em(0.6)
     if _browser.error:
         footer += imgui.get_text_line_height_with_spacing()
     imgui.begin_child("##files", imgui.ImVec2(0, -footer), imgui.ChildFlags_.borders)
@@ -118,7 +119,7 @@ def _contents(question: Question) -> None:
     _confirm_overwrite(question)
 
 
-def _places() -> None:
+def _places(question: Question) -> None:
     """Up, home, and the folder as a field to type in."""
     if widgets.button(icons.ICON_FA_ARROW_UP + "##up", tip="To the folder above."):
         _enter(_browser.folder.parent)
@@ -135,6 +136,7 @@ def _places() -> None:
         _enter(typed if typed.is_dir() else typed.parent)
         if typed.is_file():
             _browser.name = typed.name
+            _choose(question)
 
 
 def _table(question: Question) -> None:
@@ -177,19 +179,20 @@ def _row(entry: _Entry, question: Question) -> None:
 
 
 def _footer(question: Question) -> None:
-    entered = False
-    if question.saving:
-        if _browser.wants_focus:
-            imgui.set_keyboard_focus_here()
-            _browser.wants_focus = False
-        imgui.set_next_item_width(-1)
-        entered, _browser.name = imgui.input_text_with_hint(
-            "##name", "File name", _browser.name, imgui.InputTextFlags_.enter_returns_true
-        )
-        item_rects.note("File name")
-        widgets.tooltip(f"Name of the file. The ending chooses the format: {', '.join(question.suffixes)}.")
-    else:
-        entered = imgui.is_key_pressed(imgui.Key.enter) and bool(_browser.name)
+    if _browser.wants_focus:
+        imgui.set_keyboard_focus_here()
+        _browser.wants_focus = False
+    imgui.set_next_item_width(-1)
+    hint = "File name" if question.saving else "File name, or a whole path"
+    entered, _browser.name = imgui.input_text_with_hint(
+        "##name", hint, _browser.name, imgui.InputTextFlags_.enter_returns_true
+    )
+    item_rects.note("File name")
+    tip = "The ending chooses the format" if question.saving else "Typed, or marked above"
+    widgets.tooltip(f"Name of the file. {tip}: {', '.join(question.suffixes)}.")
+    if not question.saving:
+        entered = entered or (imgui.is_key_pressed(imgui.Key.enter) and not imgui.is_any_item_active())
+    entered = entered and bool(_browser.name)
     width = theme.em(6.5)
     room = imgui.get_content_region_avail().x
     imgui.align_text_to_frame_padding()
@@ -205,7 +208,7 @@ def _footer(question: Question) -> None:
 
 def _choose(question: Question) -> None:
     """Answer the question, unless the file cannot be opened or would replace another."""
-    path = _browser.folder / _browser.name
+    path = _browser.folder / Path(_browser.name.strip()).expanduser()
     if question.saving:
         if path.suffix.lower() not in question.suffixes:
             path = path.with_name(path.name + question.suffixes[0])
@@ -218,7 +221,9 @@ def _choose(question: Question) -> None:
     elif path.is_dir():
         _enter(path)
     elif not path.is_file():
-        _browser.error = f"There is no file {path.name} here."
+        near = suggestion(path.name, [entry.path.name for entry in _browser.entries])
+        where = "here" if path.parent == _browser.folder else f"in {path.parent}"
+        _browser.error = f"There is no file {path.name} {where}{near.rstrip('?')}{'?' if near else '.'}"
     else:
         _answer(question, path)
 

@@ -51,6 +51,8 @@ def draw_glass_picker(state: State, view_model: ViewModel) -> State:
     by_enter = _draw_search()
     found = matching(_memory.query, _memory.maker, _memory.order)
     _move_by_keys(len(found))
+    if found and catalogue.is_guess(_memory.query):
+        widgets.note(f"Nothing is called '{_memory.query}'. These are guesses by its letters.")
     widgets.hint(f"{len(found)} of {len(catalogue.entries())}    ↑ ↓ move, Enter takes, Esc closes")
     clicked = _draw_table(found)
     chosen = clicked if clicked is not None else found[_memory.row] if by_enter and found else None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from ...model.scene import (
 from .. import theme
 from ..view_model import ViewModel
 from . import outliner, picture_choice, widgets
+from .camera_rows import draw_camera_rows
 from .declared_rows import draw_flags, draw_numbers
 from .environment_rows import draw_environment
 
@@ -39,7 +41,24 @@ def draw_inspector(state: State, view_model: ViewModel) -> State:
         from .light_panel import draw_light
 
         return draw_light(state, view_model)
+    if selection.kind == "camera":
+        return _scene_camera(state)
     return _scene(state, view_model)
+
+
+def _scene_camera(state: State) -> State:
+    """The view that the scene is saved with, and rendered from elsewhere."""
+    with theme.heading():
+        imgui.text_unformatted("Camera")
+    widgets.hint("The view that the scene is saved with.")
+    camera, active = draw_camera_rows(state.scene.camera)
+    if camera != state.scene.camera:
+        state = edits.attempt(state, "Camera", edits.set_camera, camera)
+    if widgets.button("Look through it", tip="Take its view (0).", width=-1):
+        state = replace(state, camera=state.scene.camera)
+    if widgets.button("Put it here", tip="Save the present view with the scene (Ctrl+0).", width=-1):
+        state = edits.attempt(state, "Camera", edits.set_camera, state.camera)
+    return widgets.holding(state, active)
 
 
 def _object(state: State, view_model: ViewModel, index: int) -> State:

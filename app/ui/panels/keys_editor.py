@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
+from ...edit.drawn import scrubbed
 from ...edit.parameters import Parameter, Stage, parts, paths, value_of
 from ...edit.state import Key, State
 from ...model.scene import Scene
@@ -63,7 +64,29 @@ def draw_keys(state: State, view_model: ViewModel) -> State:
     ):
         state = _with(state, [Key(_memory.time_s, path, value_of(stage, path)) for path in _VIEW])
         _memory.time_s += _DEFAULT_STEP_S
-    return _table(state, known)
+    return _scrub(_table(state, known))
+
+
+def _scrub(state: State) -> State:
+    """A line to drag along: the picture shows the animation at that time."""
+    times = [key.time_s for key in state.animation]
+    if len(times) < 2 or max(times) <= min(times):
+        return replace(state, preview_s=None) if state.preview_s is not None else state
+    now = min(times) if state.preview_s is None else state.preview_s
+    changed, time_s, active = widgets.slider(
+        "Preview",
+        min(max(now, min(times)), max(times)),
+        min(times),
+        max(times),
+        unit="s",
+        format="%.2f",
+        tip="Drag to see the animation at that time. The scene itself stays as it is.",
+    )
+    if changed:
+        state = scrubbed(state, time_s)
+    if state.preview_s is not None and widgets.button("End preview", tip="Show the scene itself again.", width=-1):
+        state = replace(state, preview_s=None)
+    return widgets.holding(state, active)
 
 
 def frame_count(keys: Sequence[Key], fps: float) -> int:

@@ -10,7 +10,7 @@ from ...edit.state import Panels, State, Theme
 from .. import commands, item_rects, layout, theme
 from ..commands import Command
 from ..view_model import ViewModel
-from . import dialogs, outliner, widgets
+from . import dialogs, lesson_panel, outliner, widgets
 from .methods import METHOD_NAMES, METHOD_TIPS
 
 _SCALES = (0.8, 0.9, 1.0, 1.1, 1.25, 1.5, 1.75, 2.0)
@@ -58,7 +58,7 @@ def _file(state: State, view_model: ViewModel) -> State:
                 state = dialogs.open_path(state, view_model, path)
             widgets.tooltip(str(path))
         imgui.end_menu()
-    return _items(("", "Save", "Save as…", "", "Export…", "", "Quit"), state, view_model)
+    return _items(("Import…", "", "Save", "Save as…", "", "Render…", "Export…", "", "Quit"), state, view_model)
 
 
 def _edit(state: State, view_model: ViewModel) -> State:
@@ -89,7 +89,7 @@ def _view(state: State, view_model: ViewModel) -> State:
     if imgui.begin_menu("Panels"):
         state = _items(tuple(f"Panel: {command.name}" for command in commands.PANELS), state, view_model)
         imgui.end_menu()
-    state = _items(("Hide panels",), state, view_model)
+    state = _items(("Hide panels", "Full screen"), state, view_model)
     if imgui.menu_item("Reset layout", "", False)[0]:
         layout.reset()
         state = replace(state, preferences=replace(state.preferences, panels=Panels()))
@@ -131,10 +131,18 @@ def _render(state: State, view_model: ViewModel) -> State:
 
 
 def _tools(state: State, view_model: ViewModel) -> State:
-    return _items(("Select", "Move", "Rotate", "Scale", "", "Dispersion brush", "Pull a colour"), state, view_model)
+    return _items(
+        ("Select", "Move", "Rotate", "Scale", "", "Dispersion brush", "Pull a colour", "", "Measure"), state, view_model
+    )
 
 
 def _help(state: State, view_model: ViewModel) -> State:
+    opened = imgui.begin_menu("Lessons")
+    item_rects.note("Lessons")
+    if opened:
+        state = lesson_panel.draw_lesson_items(state, view_model)
+        imgui.end_menu()
+    imgui.separator()
     return _items(("Shortcuts", "About SpectraSplat"), state, view_model)
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
-from ...edit import edits
+from ...edit import edits, selecting
 from ...edit.requests import CopyMaterial, FrameSelection
 from ...edit.state import Selection, State
 from ...model.lights import LIGHT_KINDS
@@ -33,12 +33,28 @@ def draw_outliner(state: State, _view_model: ViewModel) -> State:
     """Draw the panel's contents."""
     state = _toolbar(state)
     wanted = str(_memory["search"]).strip().lower()
+    state = _world(state)
     state = _group(state, "Lights", "light", state.scene.lights, wanted)
     state = _group(state, "Objects", "object", state.scene.objects, wanted)
     if imgui.is_window_hovered() and imgui.is_mouse_clicked(0) and not imgui.is_any_item_hovered():
         state = replace(state, selection=Selection())
     if _wants_rename(state):
         _start_renaming(state, state.selection)
+    return state
+
+
+def _world(state: State) -> State:
+    """What is neither an object nor a light: the scene's own settings with its environment, and its camera."""
+    for name, icon, selection, tip in (
+        ("World", icons.ICON_FA_GLOBE, Selection(), "The scene's settings and environment."),
+        ("Camera", icons.ICON_FA_VIDEO, Selection("camera"), "The view that the scene is saved with."),
+    ):
+        with theme.chosen_rows():
+            clicked, _ = imgui.selectable(f"{icon}  {name}###{name}", state.selection == selection)
+        item_rects.note(name)
+        widgets.tooltip(tip)
+        if clicked:
+            state = replace(state, selection=selection, also=())
     return state
 
 
@@ -73,6 +89,24 @@ def draw_add_items(state: State) -> State:
             imgui.end_menu()
         item_rects.note(f"Add {title.lower()}")
     return state
+
+
+def duplicate_all(state: State) -> State:
+    """Copy everything that is selected, in one step."""
+    copies: list[Selection] = []
+    for each in selecting.everything(state):
+        state = duplicate(state, each)
+        copies.append(state.selection)
+    label = state.edit_label if len(copies) == 1 else f"Duplicate {len(copies)} things"
+    return replace(state, selection=copies[0], also=tuple(copies[1:]), edit_label=label) if copies else state
+
+
+def delete_all(state: State) -> State:
+    """Remove everything that is selected, in one step."""
+    chosen = sorted(selecting.everything(state), key=lambda each: -each.index)
+    for each in chosen:
+        state = delete(state, each)
+    return state if len(chosen) < 2 else replace(state, also=(), edit_label=f"Delete {len(chosen)} things")
 
 
 def duplicate(state: State, selection: Selection) -> State:
@@ -153,20 +187,71 @@ def _group(state: State, title: str, kind: str, things: Sequence[Light | SceneOb
 def _row(state: State, selection: Selection, thing: SceneObject | Light) -> State:
     if _memory["renaming"] == selection:
         return _rename_field(state, selection, thing)
-    flags = imgui.SelectableFlags_.allow_double_click
+    flags = imgui.SelectableFlags_.allow_double_click | imgui.SelectableFlags_.allow_overlap
     with theme.chosen_rows():
-        clicked, _ = imgui.selectable(f"{icon_of(thing)}  {thing.name}###row", state.selection == selection, flags)
+        clicked, _ = imgui.selectable(
+            f"{icon_of(thing)}  {thing.name}###row", selecting.is_selected(state, selection), flags
+        )
     item_rects.note(thing.name)
     widgets.tooltip(_about(thing), "Double-click: frame. F2: rename. Right-click: more.")
     low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
     if clicked:
-        state = replace(state, selection=selection)
+        io = imgui.get_io()
+        state = selecting.chosen(state, selection, io.key_ctrl or io.key_shift)
         if imgui.is_mouse_double_clicked(0):
             state = state.asking(FrameSelection())
     if imgui.begin_popup_context_item("##more"):
         state = _context_menu(replace(state, selection=selection), selection)
         imgui.end_popup()
-    _aside(thing, low, high)
+    return _switches(state, selection, thing, low, high)
+
+
+def _switches(
+    state: State, selection: Selection, thing: SceneObject | Light, low: imgui.ImVec2, high: imgui.ImVec2
+) -> State:
+    """Eye and lock at the right end: of rows under the mouse, and where they are set."""
+    key = selecting.key_of(state.scene, selection)
+    assert key is not None
+    is_hidden, is_locked = key in state.hidden, key in state.locked
+    hovered = imgui.is_mouse_hovering_rect(
+        low, imgui.ImVec2(imgui.get_window_pos().x + imgui.get_window_width(), high.y)
+    )
+    side = high.y - low.y
+    for position, (name, is_set, on, off, tip) in enumerate(
+        (
+            (
+                "Hide",
+                is_hidden,
+                icons.ICON_FA_EYE_SLASH,
+                icons.ICON_FA_EYE,
+                "Leave it out of the picture, or show it again.",
+            ),
+            (
+                "Lock",
+                is_locked,
+                icons.ICON_FA_LOCK,
+                icons.ICON_FA_LOCK_OPEN,
+                "Keep it from being taken in the picture.",
+            ),
+        )
+    ):
+        if not (hovered or is_set):
+            continue
+        corner = imgui.ImVec2(high.x - (2 - position) * theme.em(1.4), low.y)
+        imgui.same_line(corner.x - imgui.get_window_pos().x + imgui.get_scroll_x())
+        pressed = imgui.invisible_button(f"##{name}", imgui.ImVec2(theme.em(1.3), side))
+        item_rects.note(f"{name} {thing.name}")
+        widgets.tooltip(tip)
+        colours = theme.palette()
+        tint = colours.text if is_set or imgui.is_item_hovered() else colours.muted
+        middle = low.y + 0.5 * (side - imgui.get_font_size())
+        imgui.get_window_draw_list().add_text(imgui.ImVec2(corner.x, middle), theme.packed(tint), on if is_set else off)
+        if pressed and name == "Hide":
+            state = replace(state, hidden=selecting.toggled(state.hidden, key))
+        elif pressed:
+            state = replace(state, locked=selecting.toggled(state.locked, key))
+    if not (hovered or is_hidden or is_locked):
+        _aside(thing, low, high)
     return state
 
 

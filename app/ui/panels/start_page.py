@@ -9,7 +9,7 @@ from ...edit.requests import Recover
 from ...edit.state import State
 from .. import item_rects, theme
 from ..view_model import SceneEntry, ViewModel
-from . import dialogs, widgets
+from . import dialogs, lesson_panel, widgets
 
 _CARD_EM, _GAP_EM = 17.0, 1.1
 _ASPECT = 9 / 16
@@ -85,6 +85,10 @@ def _side(state: State, view_model: ViewModel) -> State:
         state = dialogs.new_scene(state, view_model)
     if widgets.button(f"{icons.ICON_FA_ARROW_RIGHT}  Continue", tip=f"On with {view_model.title}.", width=-1):
         state = state.with_panels(start_page=False)
+    imgui.dummy(imgui.ImVec2(0, theme.em(0.5)))
+    with theme.heading():
+        imgui.text_unformatted("Lessons")
+    state = lesson_panel.draw_lesson_items(state, view_model)
     imgui.dummy(imgui.ImVec2(0, theme.em(0.5)))
     with theme.heading():
         imgui.text_unformatted("Recent")

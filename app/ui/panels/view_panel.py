@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 from ...edit.state import Display, Preferences, State, ToneCurve
-from ...model.scene import Camera
 from .. import view_commands
 from ..view_model import ViewModel
 from . import false_colour, spectrum_strip, widgets
+from .camera_rows import draw_camera_rows
 from .methods import METHOD_NAMES, METHOD_TIPS
 
 SWEEP_NM = (400.0, 700.0)
@@ -23,7 +22,6 @@ _TONES: dict[ToneCurve, str] = {
     "linear": "Linear, clipped",
 }
 _TARGETS = {str(n * 1_000_000): f"{n} million" for n in (1, 4, 16, 32, 64, 128, 256, 512, 1024)}
-_KINDS = {"pinhole": "Perspective", "orthographic": "Orthographic"}
 
 _sweeping = {"on": False}
 """Whether the sweep runs: memory of the interface, like a scroll position."""
@@ -196,7 +194,10 @@ def _overlays(state: State) -> State:
             reset=9,
             tip="Into how many wavelengths each ray is split, from 400 to 700 nm.",
         )
-        display = replace(display, ray_count=round(count), ray_wavelengths=round(wavelengths))
+        _, labels = widgets.toggle(
+            "Ray labels", display.ray_labels, tip="Write wavelength and deviation beside the rays, and mark their foci."
+        )
+        display = replace(display, ray_count=round(count), ray_wavelengths=round(wavelengths), ray_labels=labels)
     return replace(state, display=display)
 
 
@@ -234,45 +235,7 @@ def _sampling(state: State) -> State:
 
 
 def _camera(state: State) -> State:
-    camera: Camera = state.camera
-    _, kind = widgets.combo("Projection", _KINDS, camera.kind, tip="Perspective, or orthographic for measuring.")
-    if kind != camera.kind:
-        camera = _converted(camera, kind)
-    if camera.kind == "pinhole":
-        _, fov, active = widgets.slider(
-            "Field of view",
-            camera.vertical_fov_deg,
-            2.0,
-            120.0,
-            unit="°",
-            format="%.1f",
-            reset=35.0,
-            tip="Vertical angle of view.",
-        )
-        camera = replace(camera, vertical_fov_deg=fov)
-    else:
-        _, extent, active = widgets.drag(
-            "Height", camera.vertical_extent, 1e-4, 1e6, unit="units", tip="Height of what is seen, in scene units."
-        )
-        camera = replace(camera, vertical_extent=extent)
-    _, position, moving = widgets.vec3(
-        "Position", camera.position, unit="units", tip="Where the camera stands: x, y, z.", speed=0.02
-    )
-    _, target, aiming = widgets.vec3(
-        "Target", camera.target, unit="units", tip="The point in the middle of the picture: x, y, z.", speed=0.02
-    )
-    if position != target:  # a camera's target is not its own position
-        camera = replace(camera, position=position, target=target)
+    camera, active = draw_camera_rows(state.camera)
     if widgets.button("Scene's own view", tip="Back to the camera that the scene was saved with (0).", width=-1):
         camera = state.scene.camera
-    return widgets.holding(replace(state, camera=camera), active or moving or aiming)
-
-
-def _converted(camera: Camera, kind: str) -> Camera:
-    """The other projection, showing the target plane at the same size."""
-    distance = math.dist(camera.position, camera.target)
-    if kind == "orthographic":
-        height = 2.0 * distance * math.tan(math.radians(camera.vertical_fov_deg) / 2)
-        return replace(camera, kind="orthographic", vertical_extent=height)
-    angle = 2.0 * math.degrees(math.atan(camera.vertical_extent / (2.0 * distance)))
-    return replace(camera, kind="pinhole", vertical_fov_deg=min(max(angle, 2.0), 120.0))
+    return widgets.holding(replace(state, camera=camera), active)

@@ -1,0 +1,157 @@
+"""Saving over what a person wrote: an edited light or object keeps, key by key, the words that still say what it is.
+
+Units, rotations in degrees, `rests_at_z`, a glass's short name and the comments behind them stay where nobody changed
+what they say. What is written is read again first: words that would not give the same value give way to plain ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...base.errors import UserError
+from ..fields import write_fields
+from ..geometry.mesh import Mesh
+from ..lights import LIGHT_KINDS
+from ..lights.light import Light
+from ..lights.light_file import light_values, read_light
+from ..placement import PLACEMENT_KEYS, Surroundings, read_placement
+from ..scene_objects import rested
+from ..spectrum_file import describe_spectrum
+from .scene_table import SceneTable
+
+_REST = "rests_at_z"
+_AIM = ("target", "direction")
+_DIGITS = 9
+_SAME = 1e-8
+"""Relative difference up to which words read back as what is meant."""
+
+
+def kept_light(
+    raw: Mapping[str, Any], before: Light, after: Light, path: Path, index: int, around: Surroundings
+) -> dict[str, Any]:
+    """One of [[lights]] for `after`, told by the words `raw` of `before` where these still hold."""
+    plain = light_values(after, path)
+    if before.kind != after.kind:
+        return plain
+    values = dict(raw)
+    old, new = (write_fields(each.parts, each, path) for each in (before, after))
+    changed = {key: value for key, value in new.items() if not _alike(old.get(key), value)}
+    for key in old.keys() - new.keys():
+        values.pop(key, None)
+    values |= changed
+    if before.name != after.name:
+        values["name"] = after.name
+    if after.has_place and before.position != after.position:
+        values["position"] = _tidy(after.position)
+    if after.has_direction and (before.direction != after.direction or ("position" in changed and "target" in raw)):
+        values = _without(values, _AIM) | {"direction": _tidy(after.direction)}
+    told = describe_spectrum(after.spectral_power)
+    if told != describe_spectrum(before.spectral_power):
+        values["spectrum"] = told
+    named = next((key for key in LIGHT_KINDS[after.kind].power_keys if key.key in raw), None)
+    if named is not None and not _close(before.power(named), after.power(named)):
+        values[named.key] = _rounded(after.power(named))
+    # A target says where a light is aimed only as long as it stands where it stood.
+    candidates = (
+        values,
+        _without(values, _AIM) | ({"direction": list(after.direction)} if after.has_direction else {}),
+    )
+    for candidate in candidates:
+        if _reads_as_light(candidate, after, path, index, around):
+            return candidate
+    return plain
+
+
+def kept_placement(raw: Mapping[str, Any], mesh: Mesh, wanted: np.ndarray, path: Path) -> dict[str, Any]:
+    """Keys of an object's placement `wanted` (4, 4): those of `raw` where they say it, the fewest others where not."""
+    written = {key: raw[key] for key in (*PLACEMENT_KEYS, _REST) if key in raw}
+    place = {"position": _tidy(wanted[:3, 3])}
+    turned = place | _turned(wanted)
+    candidates = [written]
+    if "matrix" not in written:
+        candidates += [written | place, _without(written, (_REST,)) | place]
+        rests = {key: written[key] for key in (_REST, "position") if key in written}
+        candidates += [_turned(wanted) | rests, turned | rests, turned]
+    for candidate in candidates:
+        if _reads_as_placement(candidate, mesh, wanted, path):
+            return candidate
+    return {"matrix": [float(v) for v in wanted.ravel()]}
+
+
+def _turned(matrix: np.ndarray) -> dict[str, Any]:
+    """`rotation_deg` and `scale` of a matrix without shear, without those that say nothing; about x, y, z."""
+    linear = matrix[:3, :3]
+    scale = np.linalg.norm(linear, axis=0)
+    if not scale.all():
+        return {}
+    if np.linalg.det(linear) < 0.0:
+        scale[2] *= -1.0
+    rotation = linear / scale
+    level = float(np.hypot(rotation[0, 0], rotation[1, 0]))
+    y = np.arctan2(-rotation[2, 0], level)
+    if level < 1e-9:
+        x, z = 0.0, np.arctan2(-rotation[0, 1], rotation[1, 1])
+    else:
+        x, z = np.arctan2(rotation[2, 1], rotation[2, 2]), np.arctan2(rotation[1, 0], rotation[0, 0])
+    angles = _tidy(np.degrees([x, y, z]))
+    values: dict[str, Any] = {}
+    if any(angles):
+        values["rotation_deg"] = angles
+    if np.ptp(scale) <= _SAME * abs(scale[0]):
+        if not _close(scale[0], 1.0):
+            values["scale"] = _rounded(scale[0])
+    else:
+        values["scale"] = _tidy(scale)
+    return values
+
+
+def _reads_as_placement(values: Mapping[str, Any], mesh: Mesh, wanted: np.ndarray, path: Path) -> bool:
+    try:
+        found = read_placement(SceneTable(_without(values, (_REST,)), path))
+    except UserError:
+        return False
+    found = rested(mesh, found, values.get(_REST))
+    return bool(np.allclose(found, wanted, rtol=0.0, atol=_SAME * max(1.0, float(np.abs(wanted).max()))))
+
+
+def _reads_as_light(values: Mapping[str, Any], wanted: Light, path: Path, index: int, around: Surroundings) -> bool:
+    try:
+        found = read_light(SceneTable(values, path), index, around)
+    except UserError:
+        return False
+    a, b = (light_values(each, path) for each in (found, wanted))
+    return a.keys() == b.keys() and all(_alike(a[key], b[key]) for key in a)
+
+
+def _alike(a: Any, b: Any) -> bool:
+    """Numbers to `_SAME`, all else exactly."""
+    if isinstance(a, Mapping) and isinstance(b, Mapping):
+        return a.keys() == b.keys() and all(_alike(a[key], b[key]) for key in a)
+    if isinstance(a, list | tuple) and isinstance(b, list | tuple):
+        return len(a) == len(b) and all(_alike(x, y) for x, y in zip(a, b, strict=True))
+    if isinstance(a, int | float) and isinstance(b, int | float) and not isinstance(a, bool):
+        return _close(float(a), float(b))
+    return bool(a == b)
+
+
+def _close(a: float, b: float) -> bool:
+    return a == b or abs(a - b) <= _SAME * max(abs(a), abs(b), _SAME)
+
+
+def _without(values: Mapping[str, Any], keys: Iterable[str]) -> dict[str, Any]:
+    return {key: value for key, value in values.items() if key not in set(keys)}
+
+
+def _rounded(value: float) -> float:
+    return float(f"{float(value):.{_DIGITS}g}")
+
+
+def _tidy(values: Iterable[float]) -> list[float]:
+    """As many digits as somebody might read; what is next to nothing is 0."""
+    found = [_rounded(v) for v in values]
+    largest = max(map(abs, found), default=0.0)
+    return [0.0 if abs(v) < 1e-12 * max(largest, 1.0) else v for v in found]

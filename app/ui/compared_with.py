@@ -1,0 +1,114 @@
+"""What a picture may be compared with besides methods and the reference: the same scene in another glass, a picture
+file; and what two pictures say of each other, pixel by pixel and as histograms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..base.errors import UserError
+from ..base.image_io import read_image
+from ..edit import edits
+from ..model.optics import catalogue
+
+if TYPE_CHECKING:
+    import moderngl
+
+    from ..edit.state import Selection
+    from ..gpu.context import Context
+    from ..model.scene import Scene
+
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
+"""Of linear Rec.709."""
+HISTOGRAM_STOPS = (-12.0, 8.0)
+HISTOGRAM_BINS = 60
+
+
+@dataclass(frozen=True)
+class Histogram:
+    """Of two pictures' luminances."""
+
+    stops: np.ndarray
+    """Middles of the bins, stops about display white."""
+    own: np.ndarray
+    """Share of the pixels in each bin."""
+    other: np.ndarray
+
+
+class GlassSwap:
+    """A scene with one object of another glass; the same value as long as nothing changes."""
+
+    def __init__(self) -> None:
+        self._key: tuple[object, ...] = ()
+        self._scene: Scene | None = None
+
+    def scene(self, scene: Scene, selection: Selection, glass: str) -> Scene:
+        """`scene` with the selected solid, or else the first, of the catalogue's `glass`. Raises `UserError`."""
+        index = glass_object(scene, selection)
+        if index is None:
+            raise UserError("nothing in this scene is glass, so there is no other glass to compare with")
+        key = (scene, index, glass)
+        if self._scene is None or self._key[0] is not scene or self._key[1:] != key[1:]:
+            self._scene = edits.set_dispersion(scene, index, catalogue.find(glass))
+            self._key = key
+        return self._scene
+
+
+def glass_object(scene: Scene, selection: Selection) -> int | None:
+    """Index of the selected solid of glass, else of the first."""
+    solids = [i for i, item in enumerate(scene.objects) if item.material.transmits]
+    if selection.kind == "object" and selection.index in solids:
+        return selection.index
+    return solids[0] if solids else None
+
+
+class FilePicture:
+    """A picture file as a texture of the viewport's size."""
+
+    def __init__(self, context: Context) -> None:
+        self._context = context
+        self._key: tuple[object, ...] = ()
+        self.texture: moderngl.Texture | None = None
+        self.problem: str | None = None
+        self.words = ""
+
+    def show(self, path: Path, size: tuple[int, int]) -> None:
+        """Read `path`, once; `problem` says what is wrong with it."""
+        if (path, size) == self._key:
+            return
+        self.release()
+        self._key = (path, size)
+        try:
+            rgb = read_image(path).rgb.astype(np.float32)
+        except UserError as error:
+            self.problem = str(error)
+            return
+        height, width = rgb.shape[:2]
+        self.words = f"{path.name}, {width}×{height}"
+        if (width, height) != size:
+            rows, columns = ((np.arange(n) + 0.5) * m / n for n, m in ((size[1], height), (size[0], width)))
+            rgb = rgb[rows.astype(int)][:, columns.astype(int)]
+            self.words += f", shown as {size[0]}×{size[1]} by nearest pixels"
+        texels = np.concatenate([rgb, np.ones((*rgb.shape[:2], 1), np.float32)], axis=-1)
+        self.texture = self._context.ctx.texture(size, 4, np.ascontiguousarray(texels).tobytes(), dtype="f4")
+
+    def release(self) -> None:
+        """Forget it."""
+        if self.texture is not None:
+            self.texture.release()
+        self.texture, self.problem, self.words, self._key = None, None, "", ()
+
+
+def histogram_of(own: np.ndarray, other: np.ndarray, exposure_ev: float) -> Histogram:
+    """Of two linear pictures (h, w, 3) as exposed; black pixels are in no bin."""
+    edges = np.linspace(*HISTOGRAM_STOPS, HISTOGRAM_BINS + 1)
+    shares = []
+    for rgb in (own, other):
+        luminance = rgb.reshape(-1, 3) @ LUMINANCE
+        lit = luminance[luminance > 0.0]
+        stops = np.log2(np.maximum(lit, 1e-30)) + exposure_ev
+        shares.append(np.histogram(np.clip(stops, *HISTOGRAM_STOPS), edges)[0] / max(len(luminance), 1))
+    return Histogram(0.5 * (edges[:-1] + edges[1:]), *shares)

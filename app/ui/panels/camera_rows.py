@@ -1,0 +1,54 @@
+"""Rows for a camera in numbers: of the present view, and of the view that the scene is saved with."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from ...model.scene import Camera
+from . import widgets
+
+_KINDS = {"pinhole": "Perspective", "orthographic": "Orthographic"}
+
+
+def draw_camera_rows(camera: Camera) -> tuple[Camera, bool]:
+    """The camera as it was left, and whether a field of it is held."""
+    _, kind = widgets.combo("Projection", _KINDS, camera.kind, tip="Perspective, or orthographic for measuring.")
+    if kind != camera.kind:
+        camera = _converted(camera, kind)
+    if camera.kind == "pinhole":
+        _, fov, active = widgets.slider(
+            "Field of view",
+            camera.vertical_fov_deg,
+            2.0,
+            120.0,
+            unit="°",
+            format="%.1f",
+            reset=35.0,
+            tip="Vertical angle of view.",
+        )
+        camera = replace(camera, vertical_fov_deg=fov)
+    else:
+        _, extent, active = widgets.drag(
+            "Height", camera.vertical_extent, 1e-4, 1e6, unit="units", tip="Height of what is seen, in scene units."
+        )
+        camera = replace(camera, vertical_extent=extent)
+    _, position, moving = widgets.vec3(
+        "Position", camera.position, unit="units", tip="Where the camera stands: x, y, z.", speed=0.02
+    )
+    _, target, aiming = widgets.vec3(
+        "Target", camera.target, unit="units", tip="The point in the middle of the picture: x, y, z.", speed=0.02
+    )
+    if position != target:  # a camera's target is not its own position
+        camera = replace(camera, position=position, target=target)
+    return camera, active or moving or aiming
+
+
+def _converted(camera: Camera, kind: str) -> Camera:
+    """The other projection, showing the target plane at the same size."""
+    distance = math.dist(camera.position, camera.target)
+    if kind == "orthographic":
+        height = 2.0 * distance * math.tan(math.radians(camera.vertical_fov_deg) / 2)
+        return replace(camera, kind="orthographic", vertical_extent=height)
+    angle = 2.0 * math.degrees(math.atan(camera.vertical_extent / (2.0 * distance)))
+    return replace(camera, kind="pinhole", vertical_fov_deg=min(max(angle, 2.0), 120.0))

@@ -1,0 +1,83 @@
+"""The rays of the overlay in numbers: deviation, minimum deviation, focal lengths, by wavelength."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from ...edit.state import State
+from .. import item_rects, theme
+from ..ray_readings import RayReading
+from ..view_model import ViewModel
+from . import widgets
+from .spectral_colour import colour_of_nm
+
+_COLUMNS: tuple[tuple[str, str], ...] = (
+    ("nm", "Vacuum wavelength."),
+    ("n", "Refractive index of the glass."),
+    ("Deviation", "Angle between the middle ray before and behind the glass."),
+    (
+        "Minimum",
+        "Minimum deviation of a prism with these two faces: 2 asin(n sin(A/2)) - A, for rays in its principal section.",
+    ),
+    ("Focal length", "Of a thin bundle of parallel light about the middle ray; negative where the focus is virtual."),
+    ("Behind", "From the last surface to the focus, along the middle ray; scene units."),
+)
+
+
+def draw_rays_panel(state: State, view_model: ViewModel) -> State:
+    """Draw the panel's contents."""
+    if not state.display.ray_overlay:
+        if widgets.button("Draw rays", tip="Draw a fan of rays through the selected object (R)."):
+            state = state.with_display(ray_overlay=True)
+        return state
+    if not view_model.readings:
+        widgets.hint("No ray of this light meets the selected object. Select an object of glass, or another light.")
+        return state
+    apex = view_model.readings[0].apex_deg
+    if apex is not None:
+        imgui.text_unformatted(f"Prism: the faces that the rays go through make {apex:.2f}°.")
+    flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.sizing_stretch_same | imgui.TableFlags_.scroll_y
+    if not imgui.begin_table("##readings", len(_COLUMNS), flags):
+        return state
+    imgui.table_setup_scroll_freeze(0, 1)
+    for title, _ in _COLUMNS:
+        imgui.table_setup_column(title)
+    imgui.table_next_row(imgui.TableRowFlags_.headers)
+    for title, tip in _COLUMNS:
+        imgui.table_next_column()
+        imgui.table_header(title)
+        item_rects.note(f"Rays: {title}")
+        widgets.tooltip(tip)
+    for reading in view_model.readings:
+        _row(reading)
+    imgui.end_table()
+    return state
+
+
+def _row(reading: RayReading) -> None:
+    imgui.table_next_row()
+    imgui.table_next_column()
+    at, height = imgui.get_cursor_screen_pos(), imgui.get_text_line_height()
+    imgui.get_window_draw_list().add_rect_filled(
+        at, imgui.ImVec2(at.x + theme.em(0.25), at.y + height), colour_of_nm(reading.wavelength_nm)
+    )
+    imgui.set_cursor_screen_pos(imgui.ImVec2(at.x + theme.em(0.5), at.y))
+    imgui.text_unformatted(f"{reading.wavelength_nm:.1f}")
+    for text in texts(reading):
+        imgui.table_next_column()
+        imgui.text_unformatted(text)
+
+
+def texts(reading: RayReading) -> tuple[str, ...]:
+    """What stands behind the wavelength; a dash where there is no such number."""
+    return (
+        _or_dash(reading.index, "{:.5f}"),
+        f"{reading.deviation_deg:.3f}°",
+        _or_dash(reading.least_deg, "{:.3f}°"),
+        _or_dash(reading.focal_length, "{:.4f}"),
+        _or_dash(reading.focus_distance, "{:.4f}"),
+    )
+
+
+def _or_dash(value: float | None, form: str) -> str:
+    return "–" if value is None else form.format(value)

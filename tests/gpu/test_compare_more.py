@@ -1,0 +1,120 @@
+"""The reference's first sample, another glass beside this one, a picture file, values and histograms."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from spectrasplat.base.image_io import write_image
+from spectrasplat.base.paths import assets_dir
+from spectrasplat.edit.state import Compare, Selection, State
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.ui.compare import Comparison
+from spectrasplat.ui.compared_with import GlassSwap, histogram_of
+from spectrasplat.ui.reference_thread import Snapshot
+
+from tests.gpu.test_compare import SIZE, read, small_engine, until
+
+
+@pytest.fixture(scope="module")
+def state() -> State:
+    scene = load_scene(assets_dir() / "scenes" / "prism.toml")
+    return State(scene, scene.camera, viewport_size=SIZE)
+
+
+@pytest.fixture(scope="module")
+def running(gl, state: State):
+    engine = small_engine(gl)
+    engine.target_photons = 20_000
+    engine.set(state.live_inputs)
+    until(lambda: engine.picture is not None and engine.is_idle, lambda: engine.advance(0.1))
+    yield engine
+    engine.release()
+
+
+@pytest.fixture
+def comparison(gl):
+    made = Comparison(gl, small_engine)
+    yield made
+    made.release()
+
+
+def idle_thread(snapshot: Snapshot) -> SimpleNamespace:
+    nothing = lambda *_more: None  # noqa: E731
+    return SimpleNamespace(
+        snapshot=snapshot, problem=None, is_done=False, fraction=0.0, resume=nothing, pause=nothing, stop=nothing
+    )
+
+
+def test_the_first_sample_is_shown_with_its_noise(state, running, comparison, monkeypatch) -> None:
+    shape = (SIZE[1], SIZE[0])
+    directly = np.ones(shape, bool)
+    directly[:, :20] = False
+    caustic = np.full((*shape, 3), 7.0, np.float32)
+    first = Snapshot(1, caustic, np.ones((*shape, 3), np.float32), directly, 500, 0.8)
+    monkeypatch.setattr("spectrasplat.ui.compare.ReferenceThread", lambda *_more: idle_thread(first))
+    compared = replace(state, compare=Compare(mode="wipe"))
+    until(lambda: comparison.picture is not None, lambda: comparison.advance(compared, running, 0.05))
+    assert first.photons < SIZE[0] * SIZE[1] / 4  # not one photon a pixel
+    assert comparison.label == "Reference, own relMSE 8.0e-01" and "8.0e-01" in comparison.text
+    shown, own = read(comparison.picture), read(running.picture)
+    assert (shown[directly] >= 7.0).all()
+    # Nothing there is our own picture as it is: stripes leave a quarter of every other band.
+    left, mine = shown[~directly], own[~directly]
+    lit = mine.sum(axis=1) > 0
+    assert 0.3 < np.isclose(left[lit], 0.25 * mine[lit], rtol=1e-4).all(axis=1).mean() < 0.7
+
+
+def test_another_glass_is_traced_beside_this_one(state, running, comparison) -> None:
+    compared = replace(state, compare=Compare(mode="wipe", method="glass", glass="N-BK7"))
+    until(
+        lambda: comparison.picture is not None and comparison.progress > 0.5,
+        lambda: comparison.advance(compared, running, 0.05),
+    )
+    assert comparison.label == "N-BK7" and "N-BK7" in comparison.text
+    assert not np.allclose(read(comparison.picture), read(running.picture), rtol=0.05)
+    assert state.scene.objects[0].material.dispersion.name == "Schott N-SF11"
+    before = read(comparison.picture)
+    other = replace(compared, compare=replace(compared.compare, glass="F2"))
+    comparison.advance(other, running, 0.0)
+    # Until F2 is there, N-BK7's picture must not be called F2.
+    assert comparison.label == "F2" and comparison.picture is None
+    until(lambda: comparison.picture is not None, lambda: comparison.advance(other, running, 0.05))
+    assert not np.array_equal(read(comparison.picture), before)
+
+
+def test_the_other_glass_is_that_of_the_selected_solid_and_made_once() -> None:
+    scene = load_scene(assets_dir() / "scenes" / "achromat.toml")
+    swap = GlassSwap()
+    other = swap.scene(scene, Selection("object", 1), "N-BK7")
+    assert [o.material is p.material for o, p in zip(other.objects, scene.objects, strict=True)] == [
+        True,
+        False,
+        True,
+        True,
+    ]
+    assert swap.scene(scene, Selection("object", 1), "N-BK7") is other
+    assert swap.scene(scene, Selection(), "N-BK7").objects[1] is scene.objects[1]
+
+
+def test_a_picture_file_has_its_values_under_the_cursor(state, running, comparison, tmp_path: Path) -> None:
+    rgb = np.linspace(0.0, 3.0, SIZE[0] * SIZE[1] * 3, dtype=np.float32).reshape(SIZE[1], SIZE[0], 3)
+    write_image(tmp_path / "other.exr", rgb)
+    compared = replace(state, compare=Compare(mode="wipe", method="file", file=tmp_path / "other.exr"))
+    comparison.advance(compared, running, 0.01)
+    assert comparison.label == "other.exr" and comparison.picture is not None
+    assert comparison.pixel((10.5 / SIZE[0], 5.5 / SIZE[1])) == pytest.approx(rgb[5, 10].tolist())
+    gone = replace(compared, compare=replace(compared.compare, file=tmp_path / "gone.exr"))
+    comparison.advance(gone, running, 0.01)
+    assert comparison.picture is None and "no such file" in comparison.text
+
+
+def test_a_histogram_counts_stops_about_display_white() -> None:
+    grey = np.full((4, 8, 3), 0.25, np.float32)
+    black = np.zeros((4, 8, 3), np.float32)
+    found = histogram_of(grey, black, 1.0)
+    assert found.own.sum() == pytest.approx(1.0) and found.other.sum() == 0.0
+    assert found.stops[found.own.argmax()] == pytest.approx(-1.0, abs=0.35)

@@ -1,0 +1,164 @@
+"""Keys, dialogues and menus that were missed: F11, Esc for any floating panel, F1 on the start page, quitting from
+anywhere, typed names, importing, the start page at the first launch, GIF, guesses said to be guesses."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from imgui_bundle import imgui
+from PIL import Image
+from spectrasplat.base.gif import Gif, durations_ms
+from spectrasplat.base.movie import open_sink
+from spectrasplat.base.paths import assets_dir
+from spectrasplat.commands.glass import glass_command
+from spectrasplat.edit import requests
+from spectrasplat.edit.importing import import_objects
+from spectrasplat.edit.preferences import load_settings
+from spectrasplat.gpu.context import Context
+from spectrasplat.model.contacts import world_bounds
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.optics import catalogue
+from spectrasplat.ui.panels import file_browser
+from spectrasplat.ui.session import Session
+
+from tests.interface.fake_engine import FakeEngine
+from tests.interface.shell_rig import ShellRig
+
+SCENES = assets_dir() / "scenes"
+CUBE = "\n".join(
+    [f"v {x} {y} {z}" for x in (0, 90) for y in (0, 90) for z in (0, 90)]
+    + ["f 1 2 4 3", "f 5 7 8 6", "f 1 5 6 2", "f 3 4 8 7", "f 1 3 7 5", "f 2 6 8 4"]
+)
+
+
+def test_escape_closes_a_floating_panel_that_has_lost_the_keyboard(gl: Context) -> None:
+    with ShellRig(gl) as rig:
+        rig.open_panel(shortcuts=True)
+        rig.click(rig.find("Window: Outliner").at(0.5, 0.5))
+        rig.frame(2)
+        rig.key(imgui.Key.escape)
+        rig.frame(2)
+        assert not rig.state.preferences.panels.shortcuts and rig.state.preferences.panels.outliner
+
+
+def test_help_is_seen_on_the_start_page_and_quit_works_in_a_menu(gl: Context) -> None:
+    with ShellRig(gl) as rig:
+        rig.open_panel(start_page=True)
+        rig.key(imgui.Key.f1)
+        rig.frame(3)
+        assert rig.find("Search shortcuts")
+        rig.key(imgui.Key.escape)  # the list first, the page it lies on with the next one
+        rig.frame(3)
+        assert rig.state.preferences.panels.start_page and not rig.state.preferences.panels.shortcuts
+        rig.open_panel(start_page=False, shortcuts=False)
+        rig.click("Menu: View")
+        rig.frame(2)
+        rig.key(imgui.Key.q, [imgui.Key.mod_ctrl])
+        assert requests.Quit() in rig.asked
+
+
+def test_f11_asks_for_the_whole_screen(gl: Context) -> None:
+    with ShellRig(gl) as rig:
+        rig.key(imgui.Key.f11)
+        assert rig.asked == [requests.FullScreen()]
+
+
+def test_the_abbe_diagram_stands_beside_the_caustic(gl: Context) -> None:
+    with ShellRig(gl, size=(1440, 900)) as rig:
+        rig.open_panel(abbe=True)
+        rig.frame(4)
+        assert rig.find("Abbe plot").left >= rig.find("Picture").right
+
+
+def test_open_takes_a_typed_name_and_a_whole_path(gl: Context, tmp_path: Path) -> None:
+    (tmp_path / "own").mkdir()
+    path = tmp_path / "own" / "vase.toml"
+    path.write_bytes((SCENES / "prism.toml").read_bytes())
+    with ShellRig(gl) as rig:
+        rig.view_model = replace(rig.view_model, path=path)
+        for typed in ("vase.toml", str(path)):
+            rig.asked.clear()
+            rig.menu("File", "Open…")
+            rig.frame(3)
+            rig.click("File name")
+            rig.type(typed)
+            rig.key(imgui.Key.enter)
+            rig.frame(3)
+            assert rig.asked == [requests.Open(path)]
+        rig.menu("File", "Open…")
+        rig.frame(3)
+        rig.click("File name")
+        rig.type("vsae.toml")
+        rig.key(imgui.Key.enter)
+        rig.frame(3)
+        assert "did you mean 'vase.toml'?" in file_browser._browser.error
+    file_browser.close()
+
+
+def test_a_mesh_joins_the_scene_beside_the_others(tmp_path: Path) -> None:
+    (tmp_path / "cube.obj").write_text(CUBE)
+    scene = load_scene(SCENES / "prism.toml")
+    once = import_objects(scene, tmp_path / "cube.obj")
+    assert [item.name for item in once.objects] == ["prism", "table", "cube"]
+    assert once.lights == scene.lights and once.camera == scene.camera
+    low, high = world_bounds(once.objects[2])
+    assert 0.2 < np.max(high - low) < 3.0  # a cube of ninety units is millimetres
+    other_low, other_high = world_bounds(scene.objects[0])
+    assert (low >= other_high - 1e-6).any() or (high <= other_low + 1e-6).any()
+    twice = import_objects(once, SCENES / "lens.toml")
+    assert [item.name for item in twice.objects[3:]] == ["lens", "table 2"]
+
+
+def test_import_is_undone_by_its_name(gl: Context, tmp_path: Path) -> None:
+    (tmp_path / "cube.obj").write_text(CUBE)
+    with ShellRig(gl) as rig:
+        rig.view_model = replace(rig.view_model, path=tmp_path / "scene.toml")
+        rig.menu("File", "Import…")
+        rig.frame(3)
+        rig.click("File name")
+        rig.type("cube.obj")
+        rig.key(imgui.Key.enter)
+        rig.frame(3)
+        assert rig.state.edit_label == "Import cube.obj" and rig.state.selection.index == 2
+
+
+def test_the_start_page_is_shown_at_the_first_launch_only(
+    gl: Context, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SPECTRASPLAT_CONFIG", str(tmp_path / "config"))
+    for expected in (True, False):
+        session = Session(gl, make_engine=FakeEngine)
+        session.welcome()
+        assert session.state.preferences.panels.start_page is expected
+        session.state = session.state.with_panels(start_page=False)
+        session.close()
+    assert not load_settings()[0].is_new
+
+
+def test_a_gif_plays_at_its_pace_and_in_its_colours(tmp_path: Path) -> None:
+    sink = open_sink(tmp_path / "a.gif", (32, 16), 24.0, {})
+    assert isinstance(sink, Gif)
+    for level in (0, 80, 160):
+        codes = np.full((16, 32, 3), level, np.uint8)
+        codes[:, :16, 0] = 200
+        sink.write(level, codes)
+    assert not (tmp_path / "a.gif").exists()
+    sink.close()
+    with Image.open(tmp_path / "a.gif") as image:
+        assert image.n_frames == 3 and image.info["loop"] == 0
+        image.seek(2)
+        shown = np.asarray(image.convert("RGB")).astype(int)
+    assert abs(shown[:, :16] - [200, 160, 160]).max() <= 4 and abs(shown[:, 16:] - 160).max() <= 4
+    assert sum(durations_ms(24, 24.0)) == 1000 and set(durations_ms(9, 100.0)) == {20}
+
+
+def test_a_guessed_glass_is_said_to_be_a_guess() -> None:
+    told: list[object] = []
+    glass_command("diamant", None, told.append)
+    assert str(told[0]).startswith("Nothing in the catalogue is called 'diamant'.")
+    told.clear()
+    glass_command("N-BK7", None, told.append)
+    assert "Nothing" not in str(told[0]) and catalogue.is_guess("NBK77") and not catalogue.is_guess("bk7")
