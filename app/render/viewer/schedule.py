@@ -26,7 +26,9 @@ class CameraState:
     is_within_cycle: bool = False
     is_done: bool = True
     is_full_size: bool = True
-    """What is shown has every pixel."""
+    """What is shown is no preview of a movement."""
+    is_whole: bool = True
+    """Every pixel that is shown has its own path."""
 
 
 class Action(Enum):
@@ -325,9 +327,11 @@ def _built(s: Schedule) -> Schedule:
 
 
 def _maps_ready(s: Schedule, event: MapsReady) -> Next:
-    """More photons of the same kind wait until the camera has seen every band of the spectrum."""
+    """More photons of the same kind wait until the camera has seen every band of the spectrum, finer ones until all
+    pixels of glass are seen."""
     anew = s.shows_preview or s.splatting
-    if event.passes > 1 and not anew and not s.interacting and event.camera.is_within_cycle:
+    waits = event.passes > 1 or not event.camera.is_whole
+    if waits and not anew and not s.interacting and event.camera.is_within_cycle:
         return replace(s, maps_wait=True), ()
     same_view = not s.interacting and event.camera.is_full_size
     return replace(s, maps_wait=False, shows_preview=False), (ShowMaps(same_view, event.passes <= 1 or anew),)

@@ -36,7 +36,10 @@ class LiveStats:
     converged: bool = False
     """Nothing is left to do: the target is reached."""
     resolution_scale: float = 1.0
-    """Side of the shown picture over the side asked for."""
+    """Side of the shown picture over the side asked for, where glass and mirrors are seen; 1: every pixel has its own
+    path."""
+    direct_scale: float = 1.0
+    """The same for what is seen directly."""
     bytes: int = 0
     """GPU memory held."""
     fallbacks: dict[str, int] = field(default_factory=dict)
