@@ -54,7 +54,7 @@ class FirstSurfaces:
         target.clear(depth=1.0)
         self.texture.write(np.full((height, width, 2), NONE, "u4"))
         if self._draw is not None:
-            self._program["depths"].value = self._depths(parameters)
+            self._program["depths"] = self._depths(parameters)
             self._ctx.enable_only(moderngl.DEPTH_TEST)
             self._ctx.depth_func = "<"
             self._draw.render(moderngl.TRIANGLES)

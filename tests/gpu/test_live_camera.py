@@ -303,7 +303,10 @@ def test_in_motion_what_is_seen_directly_is_as_sharp_as_ever(
     assert glass.sum() > 100 and (shown[glass].sum(axis=-1) > 0).mean() > 0.95
 
 
-def test_once_still_glass_becomes_finer_until_every_pixel_has_its_own_path(engine: LiveEngine, table: Scene) -> None:
+def test_once_still_glass_becomes_finer_until_every_pixel_has_its_own_path(
+    engine: LiveEngine, table: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("spectrasplat.render.viewer.live_camera.STEPS", (24,))
     settle(engine, inputs(table))
     camera = moved(engine, table)
     engine.playing = False
@@ -317,10 +320,28 @@ def test_once_still_glass_becomes_finer_until_every_pixel_has_its_own_path(engin
                 whole.append(picture(engine))
 
     until(lambda: bool(whole), engine, look)
-    assert scales == sorted(scales) and scales[0] < 1.0 and scales[-1] == 1.0, scales
+    assert scales == sorted(scales) and scales[0] == pytest.approx(1 / 24) and scales[-1] == 1.0, scales
     glass = seen_objects(engine) == next(i for i, o in enumerate(table.objects) if o.material.is_specular)
     expected = one_sample(engine, camera)
     assert np.abs(whole[0] - expected)[glass].max() <= 1e-4 * expected[glass].max()
+
+
+def test_it_is_said_while_picture_and_scene_differ(engine: LiveEngine, stage: Scene) -> None:
+    told: list[str] = []
+    engine.set(inputs(stage))
+    engine.advance(0.0)
+    assert engine.stats.differs == "scene"
+    until(lambda: engine.picture is not None, engine)
+    assert engine.stats.differs == ""
+    glass = next(i for i, o in enumerate(stage.objects) if isinstance(o.material, Dielectric))
+    aside = np.eye(4)
+    aside[0, 3] = 0.1
+    objects = list(stage.objects)
+    objects[glass] = replace(objects[glass], object_to_world=aside @ objects[glass].object_to_world)
+    turned = inputs(replace(stage, objects=tuple(objects)))
+    engine.set(turned)
+    until(lambda: engine.inputs is turned, engine, lambda: told.append(engine.stats.differs))
+    assert told[0] == "light" and engine.stats.differs == ""
 
 
 def test_sides_in_motion_are_no_powers_of_two() -> None:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -446,6 +446,7 @@ class LiveEngine:
             camera_samples=float(camera_pass.shown_samples),
             resolution_scale=camera_pass.scale,
             direct_scale=camera_pass.direct_scale,
+            differs=self._differs,
             camera_bands=camera_pass.shown_bands,
             camera_fallbacks=camera_pass.fallbacks,
         )
@@ -476,6 +477,12 @@ class LiveEngine:
             polygons=polygons,
             only_beams=light.only_beams,
         )
+
+    @property
+    def _differs(self) -> Literal["", "light", "scene"]:
+        if self._wanted is None or not self.schedule.building:
+            return ""
+        return "scene" if self._level == DirtyLevel.BUILD else "light"
 
     @property
     def _knows_environment(self) -> bool:

@@ -290,7 +290,8 @@ def _examine(s: Schedule, event: Examined, now: float) -> Next:
         return s, ()
     if s.maps_are_coarse and not s.interacting:
         return s, (Action.REFIT_MAPS,)
-    return s, (Action.JUDGE_MAPS,) if s.is_still(now) else ()
+    # Other maps take their time to fill: the picture by these is made whole first.
+    return s, (Action.JUDGE_MAPS,) if s.is_still(now) and event.camera.is_whole else ()
 
 
 def _fulfil(s: Schedule, event: Examined) -> Next:
