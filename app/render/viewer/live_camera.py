@@ -47,8 +47,9 @@ REFINED = (6, 3, 1)
 DISPATCH_SECONDS = 0.008
 FIRST_S = 0.06
 """What glass may take in the first picture of a view that nothing moves in."""
-SOON_S = 4.0
-"""Of glass: photons wait so long for a whole picture."""
+SOON_S = 20.0
+"""Of glass, by the rate of the few paths of a picture in motion, which is a fifth of that of many: photons wait so long
+for a whole picture."""
 SETTLED = 8
 """Samples at most that a better map waits for before its picture replaces the one shown."""
 MOVING_TAPS = 8
