@@ -14,6 +14,7 @@ def test_walking_round_and_dragging_the_dispersion_trace_nothing(gl: Context, mo
     bench = viewer_speed._Bench(gl, assets_dir() / "scenes" / "ball.toml", (640, 400))
     assert abs(bench.viewport[0] - 640) <= 2 and abs(bench.viewport[1] - 400) <= 2
     bench.wait_for_picture()
+    bench.wait_for_whole()
     resting = bench.phase("accumulating", 2.0, bench.rest)  # the first of it goes into finer maps
     camera = bench.session.state.camera
     orbiting = bench.phase("orbiting", 0.3, bench.orbit, bench.holding_middle_button)
