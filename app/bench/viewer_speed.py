@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -50,8 +51,12 @@ class Phase:
     rays_traced: int
     pictures_per_second: float
     """New ones: what is seen to move."""
-    scale: float
-    """Side of the picture shown in motion over the side asked for, on average."""
+    direct: float
+    """Side of the picture over the side asked for, on average, for what is seen directly …"""
+    glass: float
+    """… and for what is seen by way of glass and mirrors."""
+    whole_s: float
+    """From the last input until every pixel has its own path again."""
     device_ms: dict[str, float] = field(default_factory=dict)
     """Of a frame, by pass and by the device's own timers; empty where these do not work."""
 
@@ -64,7 +69,8 @@ class Phase:
             f"{self.name:<24} {median:8.1f} ms {worst:8.1f} ms {1000 / median:8.1f} /s "
             f"{self.pictures_per_second:8.1f} /s "
             f"{self.photons_per_second / 1e6:8.3f} M/s "
-            f"{self.rays_traced:>12,} {100 * self.scale:6.0f} %{on_device}"
+            f"{self.rays_traced:>12,} {100 * self.direct:6.0f} % {100 * self.glass:6.0f} % {self.whole_s:7.2f} s"
+            f"{on_device}"
         )
 
 
@@ -76,21 +82,20 @@ def run(context: Context, scene: Path, size: tuple[int, int], seconds: float) ->
         if known := clocks():
             yield known
         with recorded() as programs:
-            seconds = bench.wait_for_picture()
-        yield f"first picture after {seconds:.2f} s; compiled {compile_line(unique(programs))}"
+            first = bench.wait_for_picture()
+        yield f"first picture after {first:.2f} s; compiled {compile_line(unique(programs))}"
+        yield f"whole after {first + bench.wait_for_whole():.2f} s"
         heads = "".join(f" {head:>11}" for head in ("median", "95 %", "frames", "pictures"))
-        yield f"{'':<24}{heads} {'photons':>12} {'rays traced':>12} {'side':>8}"
-        yield bench.phase("accumulating", seconds, bench.rest).line
-        with bench.holding_middle_button():
-            yield bench.phase("orbiting", seconds, bench.orbit).line
-        for _ in range(30):
-            bench.interface.frame()
-        with bench.holding_gain():
-            yield bench.phase("dragging dispersion", seconds, bench.drag_gain).line
-        for _ in range(30):
-            bench.interface.frame()
-        with bench.holding_gain():
-            yield bench.phase("turning the glass", seconds, bench.turn_glass).line
+        yield f"{'':<24}{heads} {'photons':>12} {'rays traced':>12} {'direct':>8} {'glass':>8} {'whole':>9}"
+        for name, hold, act in (
+            ("accumulating", None, bench.rest),
+            ("orbiting", bench.holding_middle_button, bench.orbit),
+            ("dragging dispersion", bench.holding_gain, bench.drag_gain),
+            ("turning the glass", bench.holding_gain, bench.turn_glass),
+        ):
+            yield bench.phase(name, seconds, act, hold).line
+            for _ in range(30):
+                bench.interface.frame()
         yield (
             f"input to picture: camera {bench.latency(bench.nudge_camera):.0f} ms, dispersion "
             f"{bench.latency(bench.nudge_gain):.0f} ms (median of {NUDGES})"
@@ -149,35 +154,55 @@ class _Bench:
         return interface
 
     def wait_for_picture(self) -> float:
-        """Seconds until the first picture in full size."""
+        """Seconds until the first picture."""
+        return self._wait(lambda: self.session.picture.stats.camera_samples >= 1)
+
+    def wait_for_whole(self) -> float:
+        """Seconds until every pixel has its own path."""
+        return self._wait(lambda: self.session.picture.stats.resolution_scale >= 1)
+
+    def _wait(self, done: Callable[[], bool]) -> float:
         started = time.perf_counter()
-        while self.session.picture.stats.camera_samples < 1 or self.session.picture.stats.resolution_scale < 1:
+        while not done():
             self.interface.frame()
             if time.perf_counter() - started > PATIENCE_S:
                 raise UserError(f"no picture after {PATIENCE_S:.0f} s")
         return time.perf_counter() - started
 
-    def phase(self, name: str, seconds: float, act: Callable[[], None]) -> Phase:
-        """Frames for `seconds`, with `act` before each."""
-        times, scales = [], []
+    def phase(
+        self, name: str, seconds: float, act: Callable[[], None], hold: Callable[[], _Held] | None = None
+    ) -> Phase:
+        """Frames for `seconds`, with `act` before each and `hold` held; then until the picture is whole again."""
+        times, direct, glass = [], [], []
         engine = self.session.picture.engine
         assert engine is not None
-        version, pictures = engine.picture_version, 0
-        before = self.session.picture.stats
+        pictures, before = 0, self.session.picture.stats
         on_device = dict(self._context.timers.seconds)
-        started = time.perf_counter()
-        while time.perf_counter() - started < seconds:
-            act()
-            self.interface.frame()
-            times.append(self.session.frame_ms[-1])
-            scales.append(self.session.picture.stats.resolution_scale)
-            pictures += engine.picture_version != version
+        with hold() if hold is not None else nullcontext():
             version = engine.picture_version
-        elapsed = time.perf_counter() - started
-        rays = self.session.picture.stats.rays_traced - before.rays_traced
-        spent = self._context.timers.since(on_device)
-        device_ms = {name: 1e3 * seconds / len(times) for name, seconds in spent.items()}
-        return Phase(name, np.array(times), rays / elapsed, rays, pictures / elapsed, float(np.mean(scales)), device_ms)
+            started = time.perf_counter()
+            while time.perf_counter() - started < seconds:
+                act()
+                self.interface.frame()
+                times.append(self.session.frame_ms[-1])
+                direct.append(self.session.picture.stats.direct_scale)
+                glass.append(self.session.picture.stats.resolution_scale)
+                pictures += engine.picture_version != version
+                version = engine.picture_version
+            elapsed = time.perf_counter() - started
+            rays = self.session.picture.stats.rays_traced - before.rays_traced
+            spent = self._context.timers.since(on_device)
+        return Phase(
+            name,
+            np.array(times),
+            rays / elapsed,
+            rays,
+            pictures / elapsed,
+            float(np.mean(direct)),
+            float(np.mean(glass)),
+            self.wait_for_whole(),
+            {name: 1e3 * seconds / len(times) for name, seconds in spent.items()},
+        )
 
     def rest(self) -> None:
         """Do nothing."""

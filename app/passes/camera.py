@@ -22,6 +22,7 @@ from ..gpu.dispatch_budget import DispatchBudget
 from ..gpu.map_channels import MapChannels
 from ..gpu.records import PLACEMENT, RECEIVER
 from ..gpu.scene_buffers import SCENE_STRUCTS, SceneBuffers
+from ..gpu.schema import Struct
 from ..gpu.texture_store import PICTURE, TextureStore
 from ..model.scene import Camera
 from .beam_starts import BeamStarts
@@ -449,6 +450,51 @@ class CameraPass:
         if self._empty is not None:
             self._empty.release()
         self._empty = None
+
+    # ---- for pictures in motion ------------------------------------------------------------
+
+    @property
+    def source(self) -> tuple[dict[str, int | float | str], tuple[Struct, ...]]:
+        """Defines and structs of the program that follows listed pixels, or of the only one."""
+        return self._source
+
+    @property
+    def follows(self) -> bool:
+        """Some paths go on beyond glass or mirrors."""
+        return self._listed is not None
+
+    @property
+    def listed(self) -> int:
+        """Pixels that are listed."""
+        return 0 if self._listed is None else self._listed.count
+
+    def moving_parameters(
+        self, camera: Camera, width: int, height: int, maps: CausticMaps, max_taps: int, seed: int
+    ) -> np.ndarray:
+        """CAMERA_PARAMETERS (1,) of one sample of the whole spectrum in every pixel's middle; sums have that size
+        then, whatever is in them."""
+        if self._sums.size != (width, height):
+            self._clear(width, height)
+        self.spectrum, self.max_taps = Spectrum(1), max_taps
+        parameters = self._parameters(camera, width, height, maps.scale, seed)
+        parameters["sample_side"] = parameters["band_side"] = 1.0
+        parameters["taps_per_pixel"] = TAPS_PER_PIXEL
+        parameters["within_pixel"] = 0.5
+        return parameters
+
+    def bind_for(self, parameters: np.ndarray, maps: CausticMaps) -> None:
+        """Bind everything that the camera's programs read."""
+        self._bind(maps)
+        self._parameters_buffer.write(parameters.tobytes())
+
+    def start_list(self) -> None:
+        """Nothing is listed."""
+        if self._listed is not None:
+            self._listed.clear()
+
+    def follow(self, parameters: np.ndarray, maps: CausticMaps) -> Iterator[float]:
+        """Follow what is listed, into the sums; pauses with the share done."""
+        yield from self._follow_listed(parameters, maps)
 
     # ---- private ---------------------------------------------------------------------------
 

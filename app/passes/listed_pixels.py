@@ -57,6 +57,11 @@ class ListedPixels:
             self._reserve()
         return self.room
 
+    @property
+    def count(self) -> int:
+        """Pixels that are listed."""
+        return self._count(_LISTED_AT)
+
     def clear(self) -> None:
         """Nothing is listed and nothing has halted."""
         assert self._list is not None

@@ -288,6 +288,18 @@ def beside_defines(beyond: Mapping[str, int | float | str]) -> Defines:
     return direct_defines(beyond) | {"BEAM_OBJECTS": 1, "BIND_BEAM_OBJECTS": BIND_BEAM_OBJECTS}
 
 
+def moving_defines(beyond: Mapping[str, int | float | str]) -> Defines:
+    """For pictures in motion: what is seen directly, and which pixels see glass or mirrors."""
+    return direct_defines(beyond) | {
+        "IN_MOTION": 1,
+        "THE_SAMPLE": "4u",
+        "NUMBER_BITS": 27,
+        "LATTICE_MAPS": "0xffffu",
+        "LATTICE_OBJECTS": "0x10000u",
+        "MOST_TEXELS": "2.0",
+    }
+
+
 def screen_beam_defines(beyond: Mapping[str, int | float | str]) -> Defines:
     """For polygons of the picture that camera beams see, from what the listed pixels are compiled with. A beam's one
     spectral column is by x itself, and its throughput holds what was absorbed."""

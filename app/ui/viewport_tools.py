@@ -125,6 +125,14 @@ def badges(state: State, view_model: ViewModel) -> list[Badge]:
                 False,
             )
         )
+    if view_model.stats.differs:
+        badges.append(
+            Badge(
+                "Preparing …" if view_model.stats.differs == "scene" else "Light is being traced …",
+                "The picture shows what was there before the last change, until the first light of the new scene has "
+                "been traced.",
+            )
+        )
     if view_model.stats.first_order:
         badges.append(
             Badge(

@@ -68,6 +68,10 @@ vec3 painted(Paint paint, SurfaceInteraction seen)
 // Two numbers for a light's extent: a Kronecker sequence over the samples, shifted by pixel and light.
 vec2 light_point(uint light, uint pixel_key)
 {
+#ifdef IN_MOTION
+    // Its middle: shadows without grain.
+    return vec2(0.5);
+#endif
     uint key = hash_combine(pixel_key, light);
     return vec2(kronecker(DRAW_INDEX, PLASTIC_1, key), kronecker(DRAW_INDEX, PLASTIC_2, hash_pcg(key)));
 }

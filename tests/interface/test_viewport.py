@@ -420,3 +420,13 @@ def test_a_comparison_that_is_not_there_yet_is_told() -> None:
     assert "Nothing to compare with yet" in told
     told = [badge.text for badge in viewport_tools.badges(state, ViewModel(compare_ready=True))]
     assert "Nothing to compare with yet" not in told
+
+
+def test_a_badge_says_that_picture_and_scene_differ() -> None:
+    state = scene_state()
+    for differs, text in (("scene", "Preparing …"), ("light", "Light is being traced …")):
+        told = [badge.text for badge in viewport_tools.badges(state, ViewModel(stats=LiveStats(differs=differs)))]
+        assert text in told
+    assert not {"Preparing …", "Light is being traced …"} & {
+        badge.text for badge in viewport_tools.badges(state, ViewModel(stats=LiveStats()))
+    }

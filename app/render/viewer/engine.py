@@ -11,7 +11,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from ...gpu.context import Context
     from ...gpu.scene_buffers import SceneBuffers
 
-PREVIEW_OVERRUN_S = 0.03
+PREVIEW_OVERRUN_S = 0.25
 """What a coarse picture may take beyond a frame's budget."""
 PREVIEW_S = 0.02
 """What a coarse picture should take on a software renderer."""
@@ -206,7 +206,11 @@ class LiveEngine:
         reserved = CAMERA_SHARE * budget_s
         if self.schedule.building:
             self._build(deadline - (reserved if sees and camera.owes_picture else 0.0))
-        elif self.schedule.has_photon_work and not self.schedule.yields_to_camera(camera):
+        elif (
+            self.schedule.has_photon_work
+            and not self.schedule.yields_to_camera(camera)
+            and not self._camera_pass.is_becoming_whole
+        ):
             self._work_on_photons(deadline - (0.0 if camera.is_done else reserved))
         self._work_on_environment(deadline, budget_s)
         if self._maps is None or self._inputs is None:
@@ -443,6 +447,8 @@ class LiveEngine:
             device_advice=context.advice,
             camera_samples=float(camera_pass.shown_samples),
             resolution_scale=camera_pass.scale,
+            direct_scale=camera_pass.direct_scale,
+            differs=self._differs,
             camera_bands=camera_pass.shown_bands,
             camera_fallbacks=camera_pass.fallbacks,
         )
@@ -473,6 +479,12 @@ class LiveEngine:
             polygons=polygons,
             only_beams=light.only_beams,
         )
+
+    @property
+    def _differs(self) -> Literal["", "light", "scene"]:
+        if self._wanted is None or not self.schedule.building:
+            return ""
+        return "scene" if self._level == DirtyLevel.BUILD else "light"
 
     @property
     def _knows_environment(self) -> bool:

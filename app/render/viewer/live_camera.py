@@ -1,7 +1,8 @@
 """The camera pass of a live rendering: camera samples within a time budget, and the last picture worth showing.
 
-A picture is published when every pixel has a whole sample. While something moves the picture is as small as one
-sample in the time that is left asks for; once still it starts over in full size and is refined.
+A picture is published when every pixel has a whole sample. The first ones of a view show what is seen directly at
+full resolution, and glass and mirrors as coarsely as the time that is left asks for (`MovingPicture`); once still these
+become finer in steps, until every pixel has its own path, and then samples are added up.
 
 Where glass disperses, a sample of a fine picture sees one band of the spectrum only, and such a picture is whole after
 as many samples as there are bands; before that it has grain in all colours. So samples of the whole spectrum, coarser
@@ -22,6 +23,8 @@ from ...gpu.map_channels import MapChannels
 from ...gpu.texture_store import TextureStore
 from ...passes.camera import MAX_TAPS, CameraPass
 from ...passes.caustic_maps import CausticMaps
+from ...passes.first_surfaces import FirstSurfaces
+from ...passes.moving_picture import MovingPicture
 from ...passes.spectrum_choice import Spectrum
 from ..sampling import CameraSampling, whole_cycles
 from .schedule import CameraState
@@ -33,9 +36,20 @@ if TYPE_CHECKING:
     from ...gpu.scene_buffers import SceneBuffers
     from ...model.scene import Camera, Scene
 
-SCALES = (1.0, 0.5, 1 / 3, 0.25, 1 / 6, 0.125, 1 / 12)
-"""Sides of a picture in motion over the side asked for."""
+SCALES = (1.0, 0.5, 1 / 3, 0.25)
+"""Sides of a picture in motion over the side asked for: less than 1 only where what is seen directly takes a device
+longer than DIRECT_S."""
+DIRECT_S = 0.5
+STEPS = (1, 2, 3, 6, 12, 24)
+"""Sides of the blocks of pixels that share one path through glass, in motion."""
+REFINED = (6, 3, 1)
+"""The same once nothing moves, one after the other."""
 DISPATCH_SECONDS = 0.008
+FIRST_S = 0.06
+"""What glass may take in the first picture of a view that nothing moves in."""
+SOON_S = 20.0
+"""Of glass, by the rate of the few paths of a picture in motion, which is a fifth of that of many: photons wait so long
+for a whole picture."""
 SETTLED = 8
 """Samples at most that a better map waits for before its picture replaces the one shown."""
 MOVING_TAPS = 8
@@ -43,8 +57,8 @@ MOVING_TAPS = 8
 SMOOTH_SHARE = 1 / 4
 """Samples of the whole spectrum that come before bands, over the number of these: edges are smooth while the bands are
 awaited."""
-_FIRST_RATE = 0.5e6
-"""Pixels per second before anything was measured: slow, so that the first picture comes at once."""
+_FIRST_STEP = 12
+"""Before anything was measured: coarse, so that the first picture comes at once."""
 _RATE_BLEND = 0.5
 
 
@@ -58,12 +72,24 @@ class LiveCamera:
         self._pictures: TextureStore | None = None
         self._looks = 1
         """Of a sample at what is seen directly."""
+        self._surfaces: FirstSurfaces | None = None
+        self._moving: MovingPicture | None = None
+        self._geometry: object = None
+        """What `_surfaces` are of."""
+        self._ladder: list[int] = []
+        """Blocks of glass that are still to be shown of this view, before samples are added up."""
+        self._drawn: moderngl.Texture | None = None
+        """Picture that what is seen directly was drawn into, for these maps; None before that."""
+        self._spare: moderngl.Texture | None = None
         self._average = shader.compute(context.ctx, "camera/average.comp")
         self._steps: Iterator[float] | None = None
         self._choosing: Iterator[float] | None = None
         self._maps: CausticMaps | None = None
         self._camera: Camera | None = None
         self._size = (0, 0)
+        self._moving_scale = 1.0
+        self._is_first = True
+        """What is seen directly was never drawn with these programs."""
         self._is_preview = False
         """The picture that runs is a preview of a movement."""
         self._is_smooth = False
@@ -79,8 +105,12 @@ class LiveCamera:
         """What is shown is of another scene than the one that was taken last."""
         self._shows_whole = False
         """What is shown is no preview and no mere first sample."""
-        self._rates: dict[bool, float] = {}
-        """Pixels per second, of previews and of others."""
+        self._direct_rate: float | None = None
+        """Pixels per second, of what is seen directly in motion."""
+        self._glass_rate: float | None = None
+        """Paths through glass per second."""
+        self._glass_pixels = 0
+        """Pixels of the last picture in motion that see glass or mirrors."""
         self.picture: moderngl.Texture | None = None
         """RGBA32F, linear Rec.709, top row first; None before the first sample."""
         self.shown_samples = 0
@@ -91,7 +121,9 @@ class LiveCamera:
         self.version = 0
         """Counts what was published."""
         self.scale = 1.0
-        self._wanted_scale = 1.0
+        """Side of the shown picture over the side asked for, where glass and mirrors are seen …"""
+        self.direct_scale = 1.0
+        """… and elsewhere."""
 
     def take_scene(
         self, buffers: SceneBuffers, scene: Scene, reflectances: list[np.ndarray | None], maps: MapChannels
@@ -116,11 +148,25 @@ class LiveCamera:
         self._pass.dispatch_seconds = DISPATCH_SECONDS
         self._looks = self._pass.primary_samples
         self._steps = self._choosing = self._bands = None
+        self._ladder, self._drawn = [], None
+        self._take_moving(buffers)
         self._shows_other = True
         if before is not None:
             before.release()
         if kept is not None and kept is not pictures:
             kept.release()
+
+    def _take_moving(self, buffers: SceneBuffers) -> None:
+        assert self._pass is not None
+        if self._moving is not None:
+            self._moving.release()
+        if self._geometry is not buffers.texels:
+            if self._surfaces is not None:
+                self._surfaces.release()
+            self._surfaces, self._geometry = FirstSurfaces(self._context.ctx, buffers), buffers.texels
+        assert self._surfaces is not None
+        self._moving = MovingPicture(self._pass, self._surfaces)
+        self._is_first = True
 
     def _store_of(self, shown: SceneBuffers) -> TextureStore:
         """The textures and the environment on the device: those that are there, unless others are shown."""
@@ -140,19 +186,19 @@ class LiveCamera:
         same_view: bool = False,
         finer_maps: bool = False,
     ) -> None:
-        """Start over. `seconds`: be done with one sample in about that time, however small the picture.
+        """Start over. `seconds`: be done with a first picture in about that time, however coarse glass is in it.
 
         `same_view`: only the maps are better: what is shown stays until the new picture is as smooth. `finer_maps`: so
         much better that more bands of the spectrum may be told apart in them."""
         assert self._pass is not None
-        scale = 1.0
-        if seconds is not None:
-            rate = self._rates.get(True, 0.5 * self._rates.get(False, _FIRST_RATE))
-            scale = next((s for s in SCALES if s * s * width * height <= rate * seconds), SCALES[-1])
+        keeps = same_view and self.scale == 1.0 and not self._shows_other
+        is_drawn = self._drawn is not None and (camera, maps) == (self._camera, self._maps) and self.scale < 1.0
+        is_drawn = is_drawn and seconds is None and self._drawn is not None and self._drawn.size == (width, height)
         self._camera, self._maps = camera, maps
+        self._is_preview = seconds is not None
+        scale = self._direct_scale(width, height) if self._is_preview else 1.0
         self._size = (width, height) if scale == 1.0 else (_side(width * scale), _side(height * scale))
-        keeps = same_view and self.scale == scale == 1.0 and not self._shows_other
-        self._wanted_scale, self._is_preview = scale, seconds is not None
+        self._moving_scale = scale
         view = camera, width, height
         if finer_maps or view != self._bands_view:
             self._bands = None
@@ -163,10 +209,33 @@ class LiveCamera:
         if keeps and not (smooth and self._needed_bands is None):
             self._settled = max(1, min(self.shown_samples, self._smooth_samples if smooth else SETTLED))
         self._begin(smooth=smooth)
+        self._drawn = self._drawn if is_drawn else None
+        if seconds is not None:
+            self._ladder = [self._step_in(seconds)]
+        elif keeps:
+            self._ladder = []
+        elif is_drawn:
+            self._ladder = [step for step in REFINED if step * self.scale < 1.0]
+        else:
+            first = self._step_in(FIRST_S)
+            if same_view and not self._shows_other:
+                first = min(first, round(1.0 / self.scale))
+            self._ladder = [first, *(step for step in REFINED if step < first)]
+
+    def _direct_scale(self, width: int, height: int) -> float:
+        most = float("inf") if self._direct_rate is None else self._direct_rate * DIRECT_S
+        return next((s for s in SCALES if s * s * width * height <= most), SCALES[-1])
+
+    def _step_in(self, seconds: float) -> int:
+        """Side of the blocks of which one path each can be followed in that time."""
+        if self._glass_rate is None:
+            return _FIRST_STEP
+        return next((s for s in STEPS if self._glass_pixels <= s * s * self._glass_rate * seconds), STEPS[-1])
 
     def pause(self) -> None:
         """Leave the maps alone, which are about to go; what is shown stays until `restart`."""
-        self._maps = self._steps = self._choosing = None
+        self._maps = self._steps = self._choosing = self._drawn = None
+        self._ladder = []
 
     @property
     def state(self) -> CameraState:
@@ -176,7 +245,8 @@ class LiveCamera:
             self.owes_picture,
             self.is_within_cycle,
             self.is_done,
-            is_full_size=self.scale == 1.0,
+            is_full_size=not self._is_preview,
+            is_whole=self.scale == 1.0,
             owes_first=self.owes_picture and self._shows_none,
         )
 
@@ -192,7 +262,7 @@ class LiveCamera:
     @property
     def is_coarse(self) -> bool:
         """The picture asked for last is less than what is wanted."""
-        return self._wanted_scale < 1.0 or (self._is_preview and self._needed_bands != 1)
+        return self._is_preview
 
     @property
     def owes_picture(self) -> bool:
@@ -201,16 +271,25 @@ class LiveCamera:
 
     @property
     def is_within_cycle(self) -> bool:
-        """Part of the bands of the first whole picture since `restart` are there: with other maps they would be
-        lost."""
+        """Part of the bands of the first whole picture since `restart` are there, or glass is becoming finer: with
+        other maps that would be lost."""
+        if self._maps is not None and self._ladder and not (self._is_preview or self._owes):
+            return True
         begun = self._maps is not None and not (self._is_preview or self._is_smooth) and self._cycle > 1
         return begun and self._taken < self._publish_from
+
+    @property
+    def is_becoming_whole(self) -> bool:
+        """Glass of a view that nothing moves in is becoming finer, and will soon be as fine as it gets."""
+        if self._maps is None or not self._ladder or self._is_preview:
+            return False
+        return self._glass_rate is None or self._glass_pixels <= SOON_S * self._glass_rate
 
     @property
     def is_done(self) -> bool:
         """Every sample is taken, in full size."""
         return self._maps is None or not (
-            self.is_coarse or self._is_smooth or self._choosing or self._taken < self._target
+            self.is_coarse or self._ladder or self._is_smooth or self._choosing or self._taken < self._target
         )
 
     def advance(self, deadline: float, *, one_sample: bool = False) -> float:
@@ -220,7 +299,7 @@ class LiveCamera:
         published = False
         while (
             now < deadline
-            and (self._choosing is not None or self._taken < self._target)
+            and (self._ladder or self._choosing is not None or self._taken < self._target)
             and not (published and one_sample)
         ):
             published = self._step()
@@ -243,6 +322,8 @@ class LiveCamera:
     @property
     def _target(self) -> int:
         """Samples after which the picture that runs is finished."""
+        if self._is_preview:
+            return 0
         if self._is_smooth:
             return 1 if self._needed_bands is None else self._smooth_samples
         return whole_cycles(self.target_samples, self._cycle)
@@ -266,6 +347,8 @@ class LiveCamera:
 
     def _step(self) -> bool:
         """One dispatch; whether it completed a picture that was published."""
+        if self._ladder:
+            return self._move()
         if self._choosing is not None:
             if next(self._choosing, None) is None:
                 assert self._pass is not None
@@ -293,20 +376,58 @@ class LiveCamera:
         width, height = self._size
         if self._steps is None:
             self._pass.spectrum = Spectrum(self._cycle)
-            self._pass.max_taps = MOVING_TAPS if self._is_preview or self._is_smooth else MAX_TAPS
+            self._pass.max_taps = MOVING_TAPS if self._is_smooth else MAX_TAPS
             # A first picture has rough outlines for a moment, and comes in half the time.
             self._pass.primary_samples = 1 if self._is_smooth and self._shows_none else self._looks
             self._steps = self._pass.samples(self._camera, width, height, 1, self._taken, self._maps)
-            self._spent_s = 0.0
+        return next(self._steps, None) is not None
+
+    # ---- pictures in motion ------------------------------------------------------------------
+
+    def _move(self) -> bool:
+        """One part of a picture in motion; whether it was published."""
+        assert self._maps is not None and self._camera is not None and self._moving is not None
+        if self._drawn is None:
+            self._drawn = self._spare_of(self._size)
+            started = time.perf_counter()
+            self._moving.direct(self._drawn, self._camera, self._maps, MOVING_TAPS)
+            self._context.finish()
+            if not self._is_first:  # drivers compile at the first use
+                self._direct_rate = _blend(self._direct_rate, self._size[0] * self._size[1], started)
+            self._is_first = False
+            self._glass_pixels = self._moving.specular
+            if not self._glass_pixels:
+                self._ladder = [1]
+            return False
+        step = self._ladder[0]
+        if self._steps is None:
+            self._steps, self._spent_s = self._moving.glass(self._drawn, self._maps, step), 0.0
         started = time.perf_counter()
         goes_on = next(self._steps, None) is not None
         self._spent_s += time.perf_counter() - started
-        if not goes_on and self._spent_s > 1e-4:
-            # Of whole pictures: rows without glass go ten times as fast.
-            measured = width * height / self._spent_s
-            rate = self._rates.setdefault(self._is_preview, measured)
-            self._rates[self._is_preview] = rate + _RATE_BLEND * (measured - rate)
-        return goes_on
+        if goes_on:
+            return False
+        self._steps = None
+        if self._moving.followed:
+            self._glass_rate = _blend(self._glass_rate, self._moving.followed, time.perf_counter() - self._spent_s)
+        self._ladder.pop(0)
+        if self.picture is not self._drawn:
+            self._spare, self.picture = self.picture, self._drawn
+        self.shown_samples = self.shown_bands = 1
+        self.scale, self.direct_scale = self._moving_scale / step, self._moving_scale
+        self._shows_whole = self._shows_other = self._owes = False
+        self.version += 1
+        return True
+
+    def _spare_of(self, size: tuple[int, int]) -> moderngl.Texture:
+        """A picture that is not shown."""
+        if self._spare is None or self._spare.size != size:
+            if self._spare is not None:
+                self._spare.release()
+            self._spare = self._context.ctx.texture(size, 4, dtype="f4")
+        return self._spare
+
+    # ---- what is shown -----------------------------------------------------------------------
 
     def _publish(self) -> None:
         assert self._pass is not None
@@ -320,8 +441,9 @@ class LiveCamera:
         self._average["scale"].value = 1.0 / self._taken
         self._average.run(-(-sums.width // 8), -(-sums.height // 8))
         self._context.ctx.memory_barrier()
-        self.shown_samples, self.shown_bands, self.scale = self._taken, self._cycle, self._wanted_scale
-        self._shows_whole, self._shows_other = not (self._is_preview or self._is_smooth), False
+        self.shown_samples, self.shown_bands = self._taken, self._cycle
+        self.scale = self.direct_scale = 1.0
+        self._shows_whole, self._shows_other = not self._is_smooth, False
         self._owes = False
         self.fallbacks = self._pass.fallbacks
         self.version += 1
@@ -329,10 +451,18 @@ class LiveCamera:
     def release(self) -> None:
         """Free everything."""
         shader.release(self._average)
-        for owned in (self._pass, self._pictures, self.picture):
+        if self._spare is self.picture:
+            self._spare = None
+        for owned in (self._moving, self._surfaces, self._pass, self._pictures, self.picture, self._spare):
             if owned is not None:
                 owned.release()
-        self._pass = self._pictures = self.picture = None
+        self._pass = self._pictures = self.picture = self._spare = self._moving = self._surfaces = None
+
+
+def _blend(rate: float | None, units: int, started: float) -> float:
+    """A rate, units per second, with those that were done since `started` (`time.perf_counter`)."""
+    measured = units / max(time.perf_counter() - started, 1e-4)
+    return measured if rate is None else rate + _RATE_BLEND * (measured - rate)
 
 
 def _side(pixels: float) -> int:

@@ -26,7 +26,9 @@ class CameraState:
     is_within_cycle: bool = False
     is_done: bool = True
     is_full_size: bool = True
-    """What is shown has every pixel."""
+    """What is shown is no preview of a movement."""
+    is_whole: bool = True
+    """Every pixel that is shown has its own path."""
     owes_first: bool = False
     """Nothing of this scene is shown yet: the first picture of it is being made."""
 
@@ -291,7 +293,8 @@ def _examine(s: Schedule, event: Examined, now: float) -> Next:
         return s, ()
     if s.maps_are_coarse and not s.interacting:
         return s, (Action.REFIT_MAPS,)
-    return s, (Action.JUDGE_MAPS,) if s.is_still(now) else ()
+    # Other maps take their time to fill: the picture by these is made whole first.
+    return s, (Action.JUDGE_MAPS,) if s.is_still(now) and event.camera.is_whole else ()
 
 
 def _fulfil(s: Schedule, event: Examined) -> Next:
@@ -328,9 +331,11 @@ def _built(s: Schedule) -> Schedule:
 
 
 def _maps_ready(s: Schedule, event: MapsReady) -> Next:
-    """More photons of the same kind wait until the camera has seen every band of the spectrum."""
+    """More photons of the same kind wait until the camera has seen every band of the spectrum, finer ones until all
+    pixels of glass are seen."""
     anew = s.shows_preview or s.splatting
-    if event.passes > 1 and not anew and not s.interacting and event.camera.is_within_cycle:
+    waits = event.passes > 1 or not event.camera.is_whole
+    if waits and not anew and not s.interacting and event.camera.is_within_cycle:
         return replace(s, maps_wait=True), ()
     same_view = not s.interacting and event.camera.is_full_size
     return replace(s, maps_wait=False, shows_preview=False), (ShowMaps(same_view, event.passes <= 1 or anew),)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Literal
 
 
 @dataclass(frozen=True)
@@ -31,12 +32,18 @@ class LiveStats:
     camera_s: float = 0.0
     photons_per_second: float = 0.0
     """Emitted photons per second of trace and splat time, over the last second."""
+    differs: Literal["", "light", "scene"] = ""
+    """What of the wanted scene the picture does not show yet: nothing is missing, its light is being traced, or all of
+    it is being prepared."""
     first_order: bool = False
     """The stored paths belong to a glass of another dispersion; the picture follows the edit to first order."""
     converged: bool = False
     """Nothing is left to do: the target is reached."""
     resolution_scale: float = 1.0
-    """Side of the shown picture over the side asked for."""
+    """Side of the shown picture over the side asked for, where glass and mirrors are seen; 1: every pixel has its own
+    path."""
+    direct_scale: float = 1.0
+    """The same for what is seen directly."""
     bytes: int = 0
     """GPU memory held."""
     fallbacks: dict[str, int] = field(default_factory=dict)

@@ -1,0 +1,97 @@
+"""Which surface every pixel sees first, by the rasteriser: on a software renderer a hundredth of what rays cost."""
+
+from __future__ import annotations
+
+import moderngl
+import numpy as np
+
+from ..gpu import bindings, shader
+from ..gpu.records import NONE
+from ..gpu.scene_buffers import SceneBuffers
+from .camera_records import CAMERA_PARAMETERS
+
+_CORNER = np.dtype([("position", "f4", 3), ("primitive", "u4"), ("object", "u4")])
+_NEAREST = 1e-4
+"""Of the farthest corner's depth: what is drawn begins there, however near the camera."""
+
+
+class FirstSurfaces:
+    """Owns a scene's corners and a texture of primitives and objects, (H, W) RG32UI, row 0 on top, NONE beyond all."""
+
+    def __init__(self, ctx: moderngl.Context, scene: SceneBuffers) -> None:
+        self._ctx = ctx
+        self._program = shader.program(
+            ctx,
+            "camera/visible.vert",
+            "camera/visible.frag",
+            {"BIND_PARAMETERS": bindings.PARAMETERS},
+            (CAMERA_PARAMETERS,),
+        )
+        counts = [len(mesh.triangles) for mesh in scene.world_meshes]
+        corners = np.zeros(3 * sum(counts), _CORNER)
+        if counts:
+            places = [scene.space.to_gpu(mesh.corners()).reshape(-1, 3) for mesh in scene.world_meshes]
+            corners["position"] = np.concatenate(places)
+            corners["object"] = np.repeat(np.arange(len(counts)), 3 * np.array(counts))
+            self._bounds = np.concatenate([np.stack([p.min(axis=0), p.max(axis=0)]) for p in places if len(p)])
+        corners["primitive"] = np.repeat(scene.primitives, 3)
+        self._corners = ctx.buffer(corners.tobytes()) if len(corners) else None
+        self._draw = (
+            ctx.vertex_array(self._program, [(self._corners, "3f 1u 1u", "position", "primitive", "object")])
+            if self._corners is not None
+            else None
+        )
+        self._target: moderngl.Framebuffer | None = None
+        self.texture: moderngl.Texture | None = None
+
+    def run(self, parameters: np.ndarray) -> moderngl.Texture:
+        """Draw what the camera of `parameters` (CAMERA_PARAMETERS, bound already) sees, in a picture of its size."""
+        width, height = (int(side) for side in parameters["size"][0])
+        target = self._of_size(width, height)
+        target.use()
+        target.viewport = (0, 0, width, height)
+        assert self.texture is not None
+        target.clear(depth=1.0)
+        self.texture.write(np.full((height, width, 2), NONE, "u4"))
+        if self._draw is not None:
+            self._program["depths"] = self._depths(parameters)
+            self._ctx.enable_only(moderngl.DEPTH_TEST)
+            self._ctx.depth_func = "<"
+            self._draw.render(moderngl.TRIANGLES)
+            self._ctx.enable_only(moderngl.NOTHING)
+        self._ctx.memory_barrier()
+        return self.texture
+
+    def _depths(self, parameters: np.ndarray) -> tuple[float, float]:
+        """Of the nearest and the farthest corner of all boxes."""
+        low, high = self._bounds[::2], self._bounds[1::2]
+        forward = parameters["forward"][0].astype(float)
+        middle = (0.5 * (low + high) - parameters["position"][0]) @ forward
+        reach = 0.5 * (high - low) @ np.abs(forward)
+        margin = 1e-3 * float(np.ptp(np.concatenate([middle - reach, middle + reach]))) + 1e-6
+        nearest, farthest = float((middle - reach).min()) - margin, float((middle + reach).max()) + margin
+        if parameters["orthographic"][0]:
+            return max(nearest, 0.0), max(farthest, nearest + 1e-6)
+        return max(nearest, _NEAREST * max(farthest, 1.0)), max(farthest, 2.0 * _NEAREST * max(farthest, 1.0))
+
+    def _of_size(self, width: int, height: int) -> moderngl.Framebuffer:
+        if self._target is None or self._target.size != (width, height):
+            self._release_target()
+            self.texture = self._ctx.texture((width, height), 2, dtype="u4")
+            self._target = self._ctx.framebuffer([self.texture], self._ctx.depth_texture((width, height)))
+        return self._target
+
+    def _release_target(self) -> None:
+        if self._target is not None:
+            depth = self._target.depth_attachment
+            for owned in (self._target, depth, self.texture):
+                if owned is not None:
+                    owned.release()
+        self._target = self.texture = None
+
+    def release(self) -> None:
+        """Free everything."""
+        self._release_target()
+        for owned in (self._draw, self._corners, self._program):
+            if owned is not None:
+                shader.release(owned)

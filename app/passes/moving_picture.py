@@ -1,0 +1,169 @@
+"""The picture while something moves: what is seen directly at full resolution, glass and mirrors coarser.
+
+What is seen directly costs a software renderer little where the rasteriser says what it is, direct light is looked at
+on a lattice of pixels where it varies slowly, and only the caustic maps are looked up by every pixel. Of what is seen
+by way of glass or mirrors one pixel of each block is followed, with the footprint of the whole block, and its
+neighbours on the same surface share what it found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import moderngl
+import numpy as np
+
+from ..gpu import shader
+from ..gpu.records import NONE
+from ..gpu.schema import Field, Struct
+from .first_surfaces import FirstSurfaces
+from .variants import moving_defines
+
+if TYPE_CHECKING:
+    from ..model.scene import Camera
+    from .camera import CameraPass
+    from .caustic_maps import CausticMaps
+
+MOVING_PARAMETERS = Struct(
+    "MovingParameters",
+    (
+        Field("lattice", "uvec2", "points of the lattice of direct light"),
+        Field("blocks", "uvec2", "of pixels of which one is followed through glass"),
+        Field("lattice_step", "uint", "pixels"),
+        Field("glass_step", "uint", "side of a block, pixels"),
+    ),
+)
+LATTICE_STEP = 4
+"""Pixels between two looks at direct light where it varies slowly."""
+BIND_MOVING = 10
+"""Of uniform blocks."""
+BIND_MOVING_LISTS = 22
+"""Of storage buffers, one that no other program of the camera has."""
+IMAGE_PICTURE, IMAGE_VISIBLE, IMAGE_PLACES, IMAGE_LIGHT, IMAGE_CHOSEN, IMAGE_FOUND = range(6)
+IMAGE_CELLS = IMAGE_CHOSEN
+_GROUP, _LISTED_GROUP = 8, 64
+
+
+class MovingPicture:
+    """Owns programs and textures for one `CameraPass`, whose scene, lights and tables it shares."""
+
+    def __init__(self, view: CameraPass, surfaces: FirstSurfaces) -> None:
+        """`surfaces`: of the same geometry, the caller's."""
+        self._view, self._surfaces = view, surfaces
+        self._ctx = view.context.ctx
+        shown, structs = view.source
+        defines = moving_defines(shown) | {
+            "BIND_MOVING": BIND_MOVING,
+            "BIND_MOVING_LISTS": BIND_MOVING_LISTS,
+            "IMAGE_PICTURE": IMAGE_PICTURE,
+            "IMAGE_VISIBLE": IMAGE_VISIBLE,
+            "IMAGE_PLACES": IMAGE_PLACES,
+            "IMAGE_LIGHT": IMAGE_LIGHT,
+            "IMAGE_CHOSEN": IMAGE_CHOSEN,
+            "IMAGE_FOUND": IMAGE_FOUND,
+            "IMAGE_CELLS": IMAGE_CELLS,
+        }
+        names = "lattice", "cells", "direct", "uneven", *(("blocks", "list", "glass") if view.follows else ())
+        self._programs = {
+            name: shader.compute(self._ctx, f"camera/moving_{name}.comp", defines, (*structs, MOVING_PARAMETERS))
+            for name in names
+        }
+        self._parameters = self._ctx.buffer(reserve=MOVING_PARAMETERS.stride)
+        self._lattice: list[moderngl.Texture] = []
+        self._chosen: moderngl.Texture | None = None
+        self._lists: moderngl.Buffer | None = None
+        self.specular = 0
+        """Pixels that see glass or mirrors first."""
+        self.followed = 0
+        """Paths that the last `glass` followed."""
+
+    def direct(
+        self, picture: moderngl.Texture, camera: Camera, maps: CausticMaps, max_taps: int, seed: int = 1
+    ) -> None:
+        """What is seen directly, into `picture` (RGBA32F, of the size that is seen); where glass or mirrors are seen it
+        is black."""
+        width, height = picture.size
+        self._camera = self._view.moving_parameters(camera, width, height, maps, max_taps, seed)
+        self._view.bind_for(self._camera, maps)
+        self._visible = self._surfaces.run(self._camera)
+        lattice = tuple(-(-(side - 1) // LATTICE_STEP) + 1 for side in picture.size)
+        if not self._lattice or self._lattice[0].size != lattice:
+            shader.release(*self._lattice)
+            self._lattice = [self._ctx.texture(lattice, 4, dtype="f4") for _ in range(2)]
+            self._lattice.append(self._ctx.texture(lattice, 1, dtype="u4"))
+        if self._lists is None or self._lists.size != 8 + 4 * width * height:
+            if self._lists is not None:
+                self._lists.release()
+            self._lists = self._ctx.buffer(reserve=8 + 4 * width * height)
+        self._tell(1)
+        self._run("lattice", lattice, maps)
+        self._run("cells", lattice, maps)
+        assert self._lists is not None
+        self._lists.write(bytes(8))
+        self._run("direct", picture.size, maps, picture)
+        uneven, self.specular = np.frombuffer(self._lists.read(8), "u4").tolist()
+        self._run_listed("uneven", uneven, maps, picture)
+
+    def glass(self, picture: moderngl.Texture, maps: CausticMaps, step: int) -> Iterator[float]:
+        """What is seen by way of glass and mirrors, one path for each block of `step`² pixels, added to what `direct`
+        drew; pauses with the share done after every dispatch but the last."""
+        self.followed = 0
+        if not self.specular:
+            return
+        blocks = self._tell(step)
+        if self._chosen is None or self._chosen.size != blocks:
+            if self._chosen is not None:
+                self._chosen.release()
+            self._chosen = self._ctx.texture(blocks, 1, dtype="u4")
+        self._chosen.write(np.full(blocks[::-1], NONE, "u4"))
+        self._camera["pixel_width"] = self._camera["pixel_height"] = step
+        self._run_listed("blocks", self.specular, maps)
+        self._view.start_list()
+        self._run("list", blocks, maps, self._view.sums[0])
+        self.followed = self._view.listed
+        yield 0.0
+        yield from self._view.follow(self._camera, maps)
+        self._run_listed("glass", self.specular, maps, picture)
+
+    def _tell(self, step: int) -> tuple[int, int]:
+        """Write the parameters for blocks of this side; how many there are."""
+        width, height = (int(side) for side in self._camera["size"][0])
+        values = MOVING_PARAMETERS.zeros(1)
+        values["lattice"], values["lattice_step"], values["glass_step"] = self._lattice[0].size, LATTICE_STEP, step
+        blocks = -(-width // step), -(-height // step)
+        values["blocks"] = blocks
+        self._parameters.write(values.tobytes())
+        return blocks
+
+    def _run_listed(self, name: str, count: int, maps: CausticMaps, picture: moderngl.Texture | None = None) -> None:
+        if count:
+            self._run(name, (-(-count // _LISTED_GROUP) * _GROUP, 1), maps, picture)
+
+    def _run(
+        self, name: str, size: tuple[int, ...], maps: CausticMaps, picture: moderngl.Texture | None = None
+    ) -> None:
+        self._view.bind_for(self._camera, maps)
+        self._parameters.bind_to_uniform_block(BIND_MOVING)
+        assert self._lists is not None
+        self._lists.bind_to_storage_buffer(BIND_MOVING_LISTS)
+        places, light, cells = self._lattice
+        for unit, texture in (
+            (IMAGE_PICTURE, picture),
+            (IMAGE_VISIBLE, self._visible),
+            (IMAGE_PLACES, places),
+            (IMAGE_LIGHT, light),
+            (IMAGE_CHOSEN, self._chosen if name in ("blocks", "list", "glass") else cells),
+            (IMAGE_FOUND, self._view.sums[0]),
+        ):
+            if texture is not None:
+                texture.bind_to_image(unit, read=True, write=True)
+        self._programs[name].run(-(-size[0] // _GROUP), -(-size[1] // _GROUP))
+        self._ctx.memory_barrier()
+
+    def release(self) -> None:
+        """Free programs, buffers and textures."""
+        shader.release(*self._programs.values(), self._parameters, *self._lattice)
+        for owned in (self._chosen, self._lists):
+            if owned is not None:
+                owned.release()

@@ -1,0 +1,57 @@
+// What the programs of a picture in motion share: which primitive every pixel sees first, as the rasteriser found it, and where its ray meets that.
+#ifndef CAMERA_MOVING_GLSL
+#define CAMERA_MOVING_GLSL
+
+#include "camera/globals.glsl"
+#include "camera/start.glsl"
+
+layout(std140, binding = BIND_MOVING) uniform Moving { MovingParameters m; };
+layout(rg32ui, binding = IMAGE_VISIBLE) uniform readonly restrict uimage2D visible;
+
+const vec2 PIXEL_MIDDLE = vec2(0.5);
+
+// Primitive and object; NONE where nothing is seen.
+uvec2 seen_first(uvec2 pixel)
+{
+    return imageLoad(visible, ivec2(pixel)).xy;
+}
+
+// Unit, outward.
+vec3 normal_of(uint primitive)
+{
+    Hit hit;
+    hit.primitive = primitive;
+    Triangle facet = hit_triangle(hit);
+    vec3 normal = normalize(cross(facet.edge1, facet.edge2));
+#ifdef CONVEX_SOLIDS
+    if (primitive != NONE && (primitive & PLANE_BIT) != 0u) normal = planes[primitive & ~PLANE_BIT].xyz;
+#endif
+    return normal;
+}
+
+// Where the path's ray meets the plane of what it sees first.
+Hit hit_on(uvec2 first, CameraPath path)
+{
+    Hit hit;
+    hit.primitive = first.x;
+    hit.object = first.y;
+    hit.normal_g = normal_of(first.x);
+    Triangle facet = hit_triangle(hit);
+    vec3 away = path.position - facet.vertex;
+    float inverse = 1.0 / dot(path.direction, cross(facet.edge1, facet.edge2));
+    vec3 q = cross(away, path.direction);
+    hit.bary = vec2(-dot(facet.edge2, q), dot(facet.edge1, q)) * inverse;
+    hit.distance = -dot(away, hit.normal_g) / dot(path.direction, hit.normal_g);
+#ifdef CONVEX_SOLIDS
+    if (first.x != NONE && (first.x & PLANE_BIT) != 0u)
+        hit.distance = (planes[first.x & ~PLANE_BIT].w - dot(hit.normal_g, path.position)) / dot(path.direction, hit.normal_g);
+#endif
+    return hit;
+}
+
+uint kind_of(uvec2 first)
+{
+    return first.y == NONE ? NONE : object_at(first.y).kind;
+}
+
+#endif

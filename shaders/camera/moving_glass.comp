@@ -1,0 +1,40 @@
+// A picture in motion, glass and mirrors: every pixel takes from the chosen ones round it what those of its own surface, facing as it does, have
+// found.
+layout(local_size_x = 64) in;
+
+#include "camera/moving.glsl"
+#include "camera/moving_lists.glsl"
+
+layout(r32ui, binding = IMAGE_CHOSEN) uniform readonly restrict uimage2D chosen;
+layout(rgba32f, binding = IMAGE_FOUND) uniform readonly restrict image2D found;
+layout(rgba32f, binding = IMAGE_PICTURE) uniform writeonly restrict image2D picture;
+
+// What a neighbour on another facet counts: it is all there is where a block shows several.
+const float OTHER_FACET = 1e-3;
+
+void main()
+{
+    uint at = gl_GlobalInvocationID.x;
+    if (at >= specular_count) return;
+    uint here = specular_pixel(at);
+    uvec2 pixel = uvec2(here % p.size.x, here / p.size.x), first = seen_first(pixel);
+    vec3 normal = normal_of(first.x);
+    ivec2 block = ivec2(pixel / m.glass_step);
+    vec4 sum = vec4(0.0);
+    for (int i = 0; i < 9; ++i) {
+        ivec2 near = block + ivec2(i % 3, i / 3) - 1;
+        bool inside = all(greaterThanEqual(near, ivec2(0))) && all(lessThan(near, ivec2(m.blocks)));
+        uint best = inside ? imageLoad(chosen, near).x : NONE;
+        WHEN(best != NONE) {
+            uint number = bitfieldExtract(best, 0, NUMBER_BITS);
+            uvec2 at = uvec2(number % p.size.x, number / p.size.x);
+            uvec2 other = seen_first(at);
+            vec2 away = (vec2(at) - vec2(pixel)) / float(m.glass_step);
+            float alike = other.y == first.y ? pow(max(dot(normal_of(other.x), normal), 0.0), 16.0) : 0.0;
+            float weight = exp(-2.0 * dot(away, away)) * max(alike, OTHER_FACET);
+            if (m.glass_step == 1u) weight = at == pixel ? 1.0 : 0.0;
+            sum += weight * vec4(imageLoad(found, ivec2(at)).rgb, 1.0);
+        }
+    }
+    imageStore(picture, ivec2(pixel), vec4(sum.rgb / max(sum.w, 1e-30), 1.0));
+}

@@ -1,0 +1,20 @@
+// Lists the chosen pixels, with nothing found yet.
+layout(local_size_x = 8, local_size_y = 8) in;
+
+#include "camera/moving.glsl"
+
+layout(r32ui, binding = IMAGE_CHOSEN) uniform readonly restrict uimage2D chosen;
+layout(rgba32f, binding = IMAGE_PICTURE) uniform writeonly restrict image2D found;
+layout(std430, binding = BIND_LISTED) restrict buffer Listed { uint listed_count; uint halted_count; uint listed[]; };
+
+void main()
+{
+    uvec2 block = gl_GlobalInvocationID.xy;
+    if (any(greaterThanEqual(block, m.blocks))) return;
+    uint best = imageLoad(chosen, ivec2(block)).x;
+    WHEN(best != NONE) {
+        uint number = bitfieldExtract(best, 0, NUMBER_BITS);
+        imageStore(found, ivec2(number % p.size.x, number / p.size.x), vec4(0.0));
+        listed[atomicAdd(listed_count, 1u)] = number | (THE_SAMPLE << NUMBER_BITS);
+    }
+}

@@ -1,0 +1,51 @@
+// How a camera path begins: at a place in its pixel, with the columns of the pixel's two sides, standing for the whole spectrum.
+#ifndef CAMERA_START_GLSL
+#define CAMERA_START_GLSL
+
+CameraPath path_from(uvec2 pixel, vec2 within_pixel, float gain)
+{
+    vec2 place = picture_point(pixel, within_pixel, p.size);
+    CameraRay ray = camera_ray(p.position, p.forward, p.half_right, p.half_up, p.orthographic != 0u, place);
+    CameraPath path;
+    path.position = ray.position;
+    path.direction = ray.direction;
+    path.origin = RayOrigin(NONE, NONE, 0u, p.inside_mask);
+    path.medium = MediumStack(p.inside_mask, p.inside_object);
+    for (int c = 0; c < COLUMNS_HELD; ++c) path.dposition[c] = path.ddirection[c] = vec3(0.0);
+    vec3 right = p.half_right * (2.0 * p.pixel_width / float(p.size.x)), up = p.half_up * (2.0 * p.pixel_height / float(p.size.y));
+    if (p.orthographic != 0u) {
+        path.dposition[0] = right;
+        path.dposition[1] = up;
+    } else {
+        // Derivative of the normalised direction.
+        float scale = inversesqrt(dot(p.forward + place.x * p.half_right + place.y * p.half_up, p.forward + place.x * p.half_right + place.y * p.half_up));
+        path.ddirection[0] = scale * (right - dot(right, ray.direction) * ray.direction);
+        path.ddirection[1] = scale * (up - dot(up, ray.direction) * ray.direction);
+    }
+    path.band = vec3(0.0, 0.5, 1.0);
+    path.weight = vec3(1.0);
+    path.inverse_pdf = gain;
+    path.branch_weight = 1.0;
+    path.key = 0u;
+    path.depth = 0;
+    path.restricted = 0u;
+    path.recut = 0u;
+    path.planar_so_far = 1u;
+    path.cuts = 0;
+#ifdef HAS_GRATING
+    path.order = 0u;
+#endif
+#ifdef SPECTRAL_SWEEP
+    for (int end = 0; end < 2; ++end) {
+        path.end_position[end] = path.position;
+        path.end_direction[end] = path.direction;
+    }
+    for (int g = 0; g < SPECTRAL_GROUPS; ++g) path.end_step[g] = vec2(0.0);
+#endif
+#ifdef ABSORPTION
+    for (int i = 0; i < ABSORBERS; ++i) path.lengths[i] = 0.0;
+#endif
+    return path;
+}
+
+#endif
