@@ -35,6 +35,7 @@ from ..gpu.scene_buffers import SceneBuffers
 from ..model.features import is_flat
 from ..model.scene import Scene
 from ..passes.beam_splat import BeamSplatter
+from ..passes.map_atlas import KIND_PICTURE
 from ..passes.map_layout import Landings, MapLayout
 from ..passes.plane_frame import plane_frame
 from ..passes.trace import FluxTally
@@ -65,6 +66,10 @@ MANY = 800.0
 stone holds much of its picture. Surveys: brilliant 3000, default 1400, step_cut 860; amici 620, prism 120."""
 _STEP_FACETS = 60
 """A step costs as much as it takes to look at so many facets, besides those of the scene."""
+_PICTURE_SHARE = 0.5
+"""Of a texel that is half a pixel, for which bands are as narrow as for others: what a sweep's chord misses is all that
+is left in such maps. `prism_case` at 512×512, nRMSE 0.0171 with 1, 0.0164 with a half, 0.0153 with a quarter and half as
+many polygons again; 0.013 is its reference's own."""
 _PAUSE_S = 0.003
 """How long a pause lasts while a search runs beside whoever draws."""
 _ENDS = {
@@ -262,7 +267,8 @@ class BeamLight:
         texels = {}
         for r in self.frames:
             record = layout.placements[layout.receivers[r]["placement"]]
-            texels[r] = float(np.sqrt(record["texel_area"])) * self._buffers.space.scale
+            finer = _PICTURE_SHARE if record["kind"] == KIND_PICTURE else 1.0
+            texels[r] = finer * float(np.sqrt(record["texel_area"])) * self._buffers.space.scale
         return texels
 
     def begin(self) -> None:
