@@ -177,7 +177,7 @@ def packed(
     is_line = (polygons.x_hi <= polygons.x_lo)[chosen]
     start, middle, end = polygons.density[chosen].T
     middle, end = np.where(is_line, start, middle), np.where(is_line, start, end)
-    weight = to_texels.weights(polygons.centre[chosen])
+    weight = to_texels.drawn_weights(polygons.centre[chosen])
     lines, moves = _lines(
         polygons.edges[edge_rows], inverse, anchor[owner], weight[owner], is_line[owner], 0.5 * diagonal[owner]
     )

@@ -66,8 +66,13 @@ class TexelMap:
         return np.where(weight[..., None] > 0.0, found, np.nan)
 
     def density(self, points: np.ndarray) -> np.ndarray:
-        """Texels per GPU unit² (...) at points of the plane."""
-        return np.linalg.det(self.matrix) / self.weights(points) ** 3
+        """Texels per GPU unit² (...) at points of the plane; of what lies too near to the camera, or behind it, as
+        where that begins."""
+        return np.linalg.det(self.matrix) / self.drawn_weights(points) ** 3
+
+    def drawn_weights(self, points: np.ndarray) -> np.ndarray:
+        """`weights`, at least that of what is drawn."""
+        return np.maximum(self.weights(points), self.least_weight)
 
     def longest_step(self, points: np.ndarray) -> np.ndarray:
         """Texels that a GPU unit along the plane is long at most (...), at points of it."""

@@ -42,8 +42,9 @@ from ..passes.trace import FluxTally
 from .light_maps import LightMaps
 from .shown_spectra import ShownSpectra
 
-PHOTONS_A_BEAM = 8.0
-"""Photons' time that there is for a beam, half of it for what it leaves to photons, …"""
+PHOTONS_A_BEAM = 2.0
+"""Photons there are for a beam, half of them for what it leaves; a beam takes the time of two to four. `brilliant`,
+240×135, relMSE after 10 s of processor time: 0.024 with 8 a beam, 0.015 with 3, 0.012 with 1.5, …"""
 _FACETS_A_BEAM = 350.0
 """… and as much again for so many facets of the scene: 14 µs a beam in a brilliant, 45 with 1,000 facets, 150 with
 4,000."""
