@@ -157,7 +157,9 @@ class LivePicture:
     def _develop(self, state: State, radiance: moderngl.Texture, other: Other | None) -> None:
         texture = other.picture if other is not None else None
         version = self.engine.picture_version if self.engine is not None else -1
-        glare = state.scene.render.glare
+        # What is compared or measured is data.
+        is_data = texture is not None or state.display.false_colour
+        glare = 0.0 if is_data else state.scene.render.glare
         key = (id(radiance), version, state.display, glare, self.exposure_ev, self._size, state.compare)
         if texture is None and self.shown is not None and key == self._developed:
             return
