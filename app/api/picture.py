@@ -65,12 +65,19 @@ class _Image:
         return self._write(path, ".exr", self.rgb, 0.0, self.spectral)
 
     def _write(
-        self, path: str | os.PathLike[str], suffix: str, rgb: Floats, exposure_ev: float, spectral: Floats | None
+        self,
+        path: str | os.PathLike[str],
+        suffix: str,
+        rgb: Floats,
+        exposure_ev: float,
+        spectral: Floats | None,
+        glare: float = 0.0,
     ) -> Path:
         target = Path(path)
         if target.suffix.lower() != suffix:
             raise UserError(f"cannot write {target}: the name must end in {suffix}")
-        write_image(target, rgb, exposure_ev=exposure_ev, spectral=spectral, bin_edges_nm=self.bin_edges_nm)
+        edges = self.bin_edges_nm
+        write_image(target, rgb, exposure_ev=exposure_ev, spectral=spectral, bin_edges_nm=edges, glare=glare)
         return target
 
 
@@ -82,17 +89,19 @@ class Picture(_Image):
     """float32 (H, W, 3) by name, of those that were asked for; the first of them is `rgb`."""
     exposure_ev: float = 0.0
     """Stops on top of the automatic exposure, as the scene has it; for `to_png` only."""
+    glare: float = 0.0
+    """Share of the light that the lens scatters, as the scene has it; for `to_png` only."""
 
     def to_png(self, path: str | os.PathLike[str], exposure_ev: float | None = None, layer: str | None = None) -> Path:
         """Write it as the eye sees it, tone-mapped 8-bit sRGB; `exposure_ev` replaces the picture's own stops.
 
         Raises `UserError` where it cannot be written.
         """
-        return self._write(path, ".png", self._layer(layer), self._stops(exposure_ev), None)
+        return self._write(path, ".png", self._layer(layer), self._stops(exposure_ev), None, self.glare)
 
     def _repr_png_(self) -> bytes:
         """As notebooks show it."""
-        return png_bytes(self.rgb, self.exposure_ev)
+        return png_bytes(self.rgb, self.exposure_ev, self.glare)
 
     def _layer(self, name: str | None) -> Floats:
         if name is None:

@@ -63,7 +63,8 @@ def render(
         result = render(model, settings, report, stopped, context, more_layers=more)
         named = {first: result.rgb} | {name: picture.rgb for name, picture in result.layers.items()}
         stats = _statistics(result, stopped())
-        return Picture(result.rgb, result.spectral, result.bin_edges_nm, stats, named, settings.exposure_ev or 0.0)
+        stops = settings.exposure_ev or 0.0
+        return Picture(result.rgb, result.spectral, result.bin_edges_nm, stats, named, stops, settings.glare)
 
     with Device() as device:
         return device.run(work, progress, cancel)

@@ -116,6 +116,7 @@ def farm_render_command(request: RenderRequest, farm: FarmRequest) -> int:
             request.output,
             result.picture.rgb,
             exposure_ev=settings.exposure_ev,
+            glare=settings.glare,
             spectral=result.picture.spectral,
             bin_edges_nm=result.picture.bin_edges_nm,
         )

@@ -72,6 +72,7 @@ def merge_command(request: MergeRequest) -> int:
         request.output,
         result.rgb,
         exposure_ev=scene.render.exposure_ev if exposure is None else exposure,
+        glare=scene.render.glare,
         spectral=result.spectral,
         bin_edges_nm=result.bin_edges_nm,
     )

@@ -17,6 +17,7 @@ from ..base.errors import UserError, nearest_names, suggestion
 from ..base.memory import MAX_SIDE_PX, memory_bytes
 from ..base.paths import SCENE_SUFFIXES, shipped_scenes
 from ..model.scene import Scene
+from ..model.scene_render import MAX_GLARE
 from ..model.settings import CAMERA_METHODS, METHODS
 
 if TYPE_CHECKING:
@@ -96,6 +97,14 @@ def parse_exposure(text: str) -> float:
         raise UserError(
             f"--exposure {text} is out of range: give between -{MAX_EXPOSURE_EV:.0f} and {MAX_EXPOSURE_EV:.0f} stops"
         )
+    return value
+
+
+def parse_glare(text: str) -> float:
+    """A share."""
+    value = _number("--glare", text, "a share, for example 0.03")
+    if not 0.0 <= value <= MAX_GLARE:
+        raise UserError(f"--glare {text} is out of range: give a share of 0 to {MAX_GLARE:g}")
     return value
 
 

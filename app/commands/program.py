@@ -179,6 +179,12 @@ def render(
     exposure: Annotated[
         Text, typer.Option(metavar="EV", help="Stops brighter (or darker) than automatic; not of .exr and .npy.")
     ] = None,
+    glare: Annotated[
+        Text,
+        typer.Option(
+            metavar="SHARE", help="Share of the light that the lens scatters, 0 to 0.5; not of .exr and .npy."
+        ),
+    ] = None,
     max_depth: Annotated[
         Text, typer.Option("--max-depth", metavar="N", help="Specular events on a light path, at most; default: 64.")
     ] = None,
@@ -229,6 +235,7 @@ def render(
         stats,
         options.parse_opening(up, glass, environment),
         passes,
+        glare,
     )
     raise typer.Exit(render_command(request))
 

@@ -47,6 +47,7 @@ class RenderRequest:
     stats: bool = False
     opening: Opening | None = None
     passes: str | None = None
+    glare: str | None = None
 
 
 def render_command(request: RenderRequest) -> int:
@@ -90,6 +91,7 @@ def render_command(request: RenderRequest) -> int:
         request.output,
         result.rgb,
         exposure_ev=settings.exposure_ev,
+        glare=settings.glare,
         spectral=result.spectral,
         bin_edges_nm=result.bin_edges_nm,
     )
@@ -162,6 +164,7 @@ def parse_settings(request: RenderRequest) -> dict[str, Any]:
         "layer": (request.layer, str),
         "bins": (request.bins, _integer("--bins", options.MIN_BINS, options.MAX_BINS)),
         "exposure_ev": (request.exposure, options.parse_exposure),
+        "glare": (request.glare, options.parse_glare),
         "max_depth": (request.max_depth, _integer("--max-depth", 1, options.MAX_DEPTH)),
         "spp": (request.spp, _integer("--spp", 1, options.MAX_SPP)),
         "camera_beams": (request.camera, options.parse_camera),
@@ -182,6 +185,7 @@ def complete_settings(asked: dict[str, Any], scene: Scene, stats: bool) -> Rende
             "height": wishes.height,
             "max_depth": wishes.max_depth,
             "exposure_ev": wishes.exposure_ev,
+            "glare": wishes.glare,
             "photons": None if "seconds" in asked else wishes.photons,
             "tally": stats,
             # Who asks for photons alone compares them with what else there is.
@@ -206,6 +210,8 @@ def _unused_options(request: RenderRequest) -> list[str]:
         notes.append("--exposure does not change a part; give it to 'merge'")
     elif request.exposure is not None and suffix not in SHOWN_SUFFIXES:
         notes.append(f"--exposure does not change a {suffix} picture, which is linear; it is for pictures to look at")
+    if request.glare is not None and suffix not in SHOWN_SUFFIXES:
+        notes.append(f"--glare does not change a {suffix} file, which is linear; it is for pictures to look at")
     return notes
 
 

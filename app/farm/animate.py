@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from ..base.glare import with_glare
 from ..base.movie import Frames
 from ..base.tone_map import auto_exposure, tone_map_8bit
 from ..edit.animation import Animation
@@ -55,5 +56,7 @@ class FarmFrames:
             return
         base_ev = self._sink.fix_exposure(auto_exposure(result.rgb))
         if 0 in self._only:
-            self._sink.write(0, tone_map_8bit(result.rgb, base_ev + self._stages[0].exposure_ev))
+            first = self._stages[0]
+            rgb = with_glare(result.rgb, first.scene.render.glare)
+            self._sink.write(0, tone_map_8bit(rgb, base_ev + first.exposure_ev))
         self._hand_out()

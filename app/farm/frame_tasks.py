@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.glare import with_glare
 from ..base.image_io import check_finite
 from ..base.movie import frame_bytes
 from ..base.tone_map import tone_map_8bit
@@ -51,4 +52,5 @@ def draw(desk: Desk, of: Frames, report: Report, index: int, base_ev: float | No
     notices = tuple(frame_notices(renderer.light, stage.camera, of.settings, rgb))
     if base_ev is None:
         return Frame(rgb, b"", notices)
-    return Frame(None, frame_bytes(tone_map_8bit(rgb, base_ev + stage.exposure_ev)), notices)
+    shown = with_glare(rgb, stage.scene.render.glare)
+    return Frame(None, frame_bytes(tone_map_8bit(shown, base_ev + stage.exposure_ev)), notices)

@@ -76,6 +76,7 @@ class SweepFolder:
             self.path(drawn.number),
             drawn.rgb,
             exposure_ev=exposure,
+            glare=self._points[drawn.number].stage.scene.render.glare,
             spectral=drawn.spectral if self._suffix == ".exr" else None,
             bin_edges_nm=drawn.bin_edges_nm if self._suffix == ".exr" else None,
         )

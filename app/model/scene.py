@@ -88,6 +88,8 @@ class RenderDefaults:
     photons: int = 1_000_000
     exposure_ev: float = 0.0
     max_depth: int = 64
+    glare: float = 0.0
+    """Share of the light that the camera's lens scatters (`base.glare`); of pictures to look at only."""
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,8 @@ from .scene import RenderDefaults, Vec3
 
 MAX_PICTURE_SIDE = 16384
 MAX_DEPTH = 4096
+MAX_GLARE = 0.5
+"""A lens that scatters more is no lens."""
 
 
 def read_background(table: SceneTable) -> Vec3:
@@ -44,6 +46,7 @@ _FIELDS = (
     Integer("photons", _USUAL.photons, at_least=1, at_most=10**12),
     Number("exposure_ev", _USUAL.exposure_ev, at_least=-64.0, at_most=64.0),
     Integer("max_depth", _USUAL.max_depth, at_least=1, at_most=MAX_DEPTH),
+    Number("glare", _USUAL.glare, at_least=0.0, at_most=MAX_GLARE),
 )
 
 

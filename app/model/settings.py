@@ -47,6 +47,8 @@ class RenderSettings:
     """"beauty", "caustic" or "map:RECEIVER"."""
     bins: int | None = None
     exposure_ev: float | None = None
+    glare: float = 0.0
+    """Share of the light that the camera's lens scatters; of pictures to look at only."""
     max_depth: int = 64
     spp: int | None = None
     """Camera samples a pixel; None chooses by the scene."""

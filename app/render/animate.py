@@ -9,6 +9,7 @@ from dataclasses import astuple
 
 import numpy as np
 
+from ..base.glare import with_glare
 from ..base.image_io import check_finite
 from ..base.movie import Frames, Sink
 from ..base.tone_map import auto_exposure, tone_map_8bit
@@ -70,7 +71,8 @@ def render_animation(
                         notices.take(frame_notices(renderer.light, stage.camera, settings, rgb), index + 1)
                     if base_ev is None:
                         base_ev = _agreed(shared, auto_exposure(rgb))
-                    sink.write(index, develop(rgb, base_ev + stage.exposure_ev))
+                    glare = stage.scene.render.glare
+                    sink.write(index, develop(with_glare(rgb, glare), base_ev + stage.exposure_ev))
             if is_ours or sink.has(index):
                 done, came = done + 1, 0
                 yield done / len(frames)
@@ -98,6 +100,7 @@ def description(animation: Animation, settings: RenderSettings, fps: float, phot
         "pictures": _pictures(start.scene),
         "camera": list(astuple(start.camera)),
         "exposure_ev": start.exposure_ev,
+        "glare": start.scene.render.glare,
         "solo_nm": start.solo_nm,
         "size": [settings.width, settings.height],
         "photons": photons,

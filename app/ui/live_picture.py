@@ -17,6 +17,7 @@ import numpy as np
 from ..edit.state import State
 from ..gpu.shader import ShaderError
 from ..passes.display import Display
+from ..passes.glare import Glare
 from ..passes.sample_picture import SamplePicture
 from ..render.viewer.stats import LiveStats
 from .auto_exposure import AutoExposure
@@ -54,6 +55,7 @@ class LivePicture:
         self._make_engine = make_engine or _live_engine
         self.engine: LiveEngine | None = self._make_engine(context)
         self._display = Display(context)
+        self._glare = Glare(context)
         self._sampler = SamplePicture(context)
         self._exposure = AutoExposure()
         self._size = (0, 0)
@@ -155,10 +157,14 @@ class LivePicture:
     def _develop(self, state: State, radiance: moderngl.Texture, other: Other | None) -> None:
         texture = other.picture if other is not None else None
         version = self.engine.picture_version if self.engine is not None else -1
-        key = (id(radiance), version, state.display, self.exposure_ev, self._size, state.compare)
+        # What is compared or measured is data.
+        is_data = texture is not None or state.display.false_colour
+        glare = 0.0 if is_data else state.scene.render.glare
+        key = (id(radiance), version, state.display, glare, self.exposure_ev, self._size, state.compare)
         if texture is None and self.shown is not None and key == self._developed:
             return
         self._developed = None if texture is not None else key
+        radiance = self._glare.run(radiance, glare)
         self.shown = self._display.run(radiance, state.display, self.exposure_ev, self._size, texture, state.compare)
 
     def _expose(self, state: State, radiance: moderngl.Texture, now_s: float, delta_s: float) -> None:
@@ -198,6 +204,7 @@ class LivePicture:
         """Free everything."""
         self.give_up()
         self._display.release()
+        self._glare.release()
         self._sampler.release()
 
     def _guarded(self) -> _Guard:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from ...edit import edits
 from ...edit.state import Display, Preferences, State, ToneCurve
+from ...model.scene_render import MAX_GLARE
 from .. import view_commands
 from ..view_model import ViewModel
 from . import false_colour, spectrum_strip, widgets
@@ -63,6 +65,19 @@ def _exposure(state: State, view_model: ViewModel) -> State:
     )
     if toggled:
         display = replace(display, auto_exposure=is_auto, exposure_ev=in_use)
+    scattered, glare, active_glare = widgets.slider(
+        "Glare",
+        100.0 * state.scene.render.glare,
+        0.0,
+        100.0 * MAX_GLARE,
+        unit="%",
+        format="%.1f",
+        reset=0.0,
+        tip="Share of the light that the lens scatters, as a halo round what is bright; linear files never have it.",
+    )
+    if scattered:
+        state = edits.attempt(state, "Glare", edits.set_render_defaults, glare=glare / 100.0)
+    active = active or active_glare
     _, tone = widgets.combo(
         "Tone curve",
         _TONES,

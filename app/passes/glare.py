@@ -1,0 +1,87 @@
+"""Veiling glare on the device: the picture of the window with the light that a lens scatters (`base.glare`).
+
+Octaves are shrunk copies of the picture; each adds its equal part on the way back up, where it is spread by as much
+as its texels are wide. What a step reads is black beyond its border, as there.
+"""
+
+from __future__ import annotations
+
+import moderngl
+
+from ..base.glare import OCTAVES, WIDEST
+from ..gpu import shader
+from ..gpu.context import Context
+
+_SPREAD = 1.3
+"""Standard deviation of an octave on its way back, texels of it: its own tent, its wider neighbours' and the shrinking
+(measured, `tests/gpu/test_glare_pass.py`)."""
+_GROUP = 8
+
+
+class Glare:
+    """Owns the programs, made when first needed, and the textures."""
+
+    def __init__(self, context: Context) -> None:
+        self._context, self._ctx = context, context.ctx
+        self._programs: dict[str, moderngl.ComputeShader] = {}
+        self._sampler = self._ctx.sampler(filter=(moderngl.LINEAR, moderngl.LINEAR))
+        self._sampler.border_color = (0.0, 0.0, 0.0, 0.0)
+        self._textures: dict[tuple[str, int], moderngl.Texture] = {}
+
+    def run(self, picture: moderngl.Texture, share: float) -> moderngl.Texture:
+        """`picture` (RGBA32F, linear) of which the lens scatters `share`; itself where that is 0. The texture stays
+        valid until the next call."""
+        if share <= 0.0:
+            return picture
+        # Rows of the finest octave, whose texels are as wide as its Gaussian.
+        rows = _SPREAD / WIDEST * 2.0 ** (OCTAVES - 1)
+        shrunk = [picture]
+        for octave in range(OCTAVES):
+            height = max(1, round(rows / 2**octave))
+            size = max(1, round(height * picture.width / picture.height)), height
+            shrunk.append(self._step("SHRINK", octave, size, (shrunk[-1], shrunk[-1])))
+        empty = self._texture(("EMPTY", 0), (1, 1))
+        spread = empty
+        for octave in reversed(range(OCTAVES)):
+            of = shrunk[octave + 1]
+            spread = self._step("SPREAD", octave, of.size, (of, spread), share / OCTAVES)
+        return self._step("JOIN", 0, picture.size, (picture, spread), share)
+
+    def release(self) -> None:
+        """Free everything."""
+        shader.release(*self._programs.values(), self._sampler, *self._textures.values())
+        self._programs.clear()
+        self._textures.clear()
+
+    def _step(
+        self,
+        step: str,
+        octave: int,
+        size: tuple[int, int],
+        read: tuple[moderngl.Texture, moderngl.Texture],
+        share: float = 0.0,
+    ) -> moderngl.Texture:
+        if step not in self._programs:
+            self._programs[step] = shader.compute(self._ctx, "display/glare.comp", {step: 1})
+        program, made = self._programs[step], self._texture((step, octave), size)
+        if "share" in program:
+            program["share"].value = share
+        self._ctx.memory_barrier()
+        for unit, texture in enumerate(read):
+            texture.use(unit)
+            self._sampler.use(unit)
+        made.bind_to_image(0, read=False, write=True)
+        program.run(-(-size[0] // _GROUP), -(-size[1] // _GROUP))
+        for unit in (0, 1):
+            self._sampler.clear(unit)
+        self._ctx.memory_barrier()
+        self._context.check("the glare pass")
+        return made
+
+    def _texture(self, key: tuple[str, int], size: tuple[int, int]) -> moderngl.Texture:
+        texture = self._textures.get(key)
+        if texture is None or texture.size != size:
+            if texture is not None:
+                texture.release()
+            texture = self._textures[key] = self._ctx.texture(size, 4, bytes(16 * size[0] * size[1]), dtype="f4")
+        return texture
