@@ -173,7 +173,8 @@ def survives_source() -> str:
         f"made.max_depth = 64u; made.split_threshold = {THRESHOLD}; made.power_row = 0u; made.lattices = {LATTICES}u;"
     )
     made = f"TraceParameters parameters() {{ TraceParameters made; {values} return made; }}"
-    return f"{softness}\n{made}\nTraceParameters p = parameters();\n{function}"
+    carried = "float carried_w(RayRecord ray) { return ray.flux_w; }"
+    return f"{softness}\n{made}\nTraceParameters p = parameters();\n{carried}\n{function}"
 
 
 def generators() -> list[int]:
