@@ -85,7 +85,7 @@ MUTANTS = {
         "light/footprint.comp",
         "vec3 middle = 0.5 * (to_lo + to_hi);",
         "vec3 middle = vec3(0.0);",
-        "gpu/test_splat.py::test_cut_bands_add_up_to_the_whole",
+        "gpu/test_splat.py::test_a_sweep_lies_between_its_band_s_ends_whichever_wavelength_is_traced",
     ),
     "cut spectrum reversed": Mutant(
         "light/splat_cut.frag",
@@ -103,7 +103,8 @@ MUTANTS = {
         "light/emit.comp",
         "coverage(inside.x, p.spacing.x) * coverage(inside.y, p.spacing.y)",
         "coverage(inside.x, p.spacing.y) * coverage(inside.y, p.spacing.x)",
-        "statistical/test_samplers_emission.py::test_a_beam_fills_its_aperture",
+        "statistical/test_samplers_emission.py::"
+        "test_a_rectangular_beam_s_edges_are_as_soft_as_its_lattice_is_wide_across_them",
     ),
     "an edge of a beam forgotten": Mutant(
         "light/beam.frag",

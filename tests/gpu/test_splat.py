@@ -106,6 +106,14 @@ def test_violet_lies_at_the_low_end_of_the_chord(rig: Rig) -> None:
         assert place[channel] == pytest.approx(expected, abs=0.03)
 
 
+def test_a_sweep_lies_between_its_band_s_ends_whichever_wavelength_is_traced(rig: Rig) -> None:
+    axes, chord, centre = frame(0.4, 1.5, 0.8), np.array([9.0, 5.0]), np.array([31.0, 33.0])
+    middle = rig.draw(photons(PLAIN, centre, *axes, chord))
+    for anchor in (0.0, 0.2, 1.0):
+        moved = rig.draw(photons(PLAIN, centre + (anchor - 0.5) * chord, *axes, chord, x_anchor=anchor))
+        assert relative_error(moved, middle) < 1e-3
+
+
 def test_cut_bands_add_up_to_the_whole(cut_rig: Rig) -> None:
     axes, chord, centre = frame(0.4, 1.5, 0.8), np.array([9.0, 5.0]), np.array([31.0, 33.0])
     whole = cut_rig.draw(photons(CUTS, centre, *axes, chord))
