@@ -44,6 +44,11 @@ class MapChannels:
         return self.first_target + -(-self.count // 4)
 
     @property
+    def power(self) -> slice:
+        """Channels whose sum is radiant power, W."""
+        return slice(3, 4) if self.edges_nm is None else slice(None)
+
+    @property
     def columns(self) -> int:
         """Channels of the map, unused ones counted."""
         return 4 * self.targets

@@ -44,7 +44,8 @@ class SplatTables:
     texture: moderngl.TextureArray
     """RGBA32F (layers, rows, width): T(xi), whose integral over xi in [-1, 1] is the band's energy."""
     band_buffer: moderngl.Buffer
-    """vec4 per (light, class, band): x_lo, x_hi, mean place of the energy in the band (0–1), 0."""
+    """vec4 per (light, class, band): x_lo, x_hi, mean place of the energy in the band (0–1), its power (W). Behind
+    them, from `first_power` on and four to a vec4, a float per (light, class) and sample of x: power below x, W."""
     integral_buffer: moderngl.Buffer
     """vec4 per layer: energy of the band."""
     density_buffer: moderngl.Buffer
@@ -86,23 +87,25 @@ class SplatTables:
         spans = np.zeros((*shape, 4), np.float32)
         density = np.zeros((*shape[:2], targets, DENSITY_CELLS, 4), np.float32)
         running = np.zeros((*shape[:2], targets, CUMULATIVE_SAMPLES, 4), np.float32)
+        power = np.zeros((*shape[:2], CUMULATIVE_SAMPLES), np.float32)
         for i, light in enumerate(lights):
             for j, reflectance in enumerate(reflectances):
                 source = FoldedSpectrum.of(axis, light, reflectance, channels)
                 density[i, j] = _by_target(source.density(), targets)
-                running[i, j] = _by_target(source.cumulative(np.linspace(0.0, 1.0, CUMULATIVE_SAMPLES)), targets)
+                below = source.cumulative(np.linspace(0.0, 1.0, CUMULATIVE_SAMPLES))
+                running[i, j], power[i, j] = _by_target(below, targets), below[:, channels.power].sum(axis=-1)
                 edges = np.array(bands[i], np.float64)
                 count = len(edges)
                 table, energy, place = source.blurred(edges, width)
                 texels[i, j, :count] = table.reshape(len(SIGMAS), width, count, targets, 4).transpose(2, 3, 0, 1, 4)
                 integrals[i, j, :count] = energy.reshape(count, targets, 4)
-                spans[i, j, :count] = np.column_stack([edges, place, np.zeros(count)])
+                spans[i, j, :count] = np.column_stack([edges, place, energy[:, channels.power].sum(axis=-1)])
         texture = ctx.texture_array((width, len(SIGMAS), texels[..., 0, 0, 0].size), 4, texels, dtype="f4")
         texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         texture.repeat_x = texture.repeat_y = False
         return cls(
             texture,
-            ctx.buffer(spans),
+            ctx.buffer(np.concatenate([spans.ravel(), power.ravel(), np.zeros(-power.size % 4, np.float32)])),
             ctx.buffer(integrals),
             ctx.buffer(density),
             ctx.buffer(running),
@@ -112,6 +115,11 @@ class SplatTables:
             rows=len(SIGMAS),
             width=width,
         )
+
+    @property
+    def first_power(self) -> int:
+        """Of `band_buffer`, where powers begin, vec4."""
+        return self.integral_buffer.size // (16 * self.targets)
 
     def release(self) -> None:
         for resource in (

@@ -77,7 +77,7 @@ PARAMETERS = Struct(
         Field("traced_row", "uint", "first row of the variables by which photons were traced"),
         Field("x_reference", "float", "spectral coordinate whose landing point a local gain leaves alone"),
         Field("stride", "uint", "step from one photon to the next that is splatted"),
-        Field("unused", "uint", ""),
+        Field("first_power", "uint", "where powers below x begin in the buffer of bands"),
         Field("y_scale", "float", "reindexed: coordinate of the tables = y_offset + y_scale · the path's variable"),
         Field("y_offset", "float", ""),
         Field("unused2", "vec2", ""),
@@ -112,7 +112,7 @@ class SpectralVariables:
 
 
 class Footprints:
-    """Owns the splat record buffer and the counts of what could not be drawn as asked."""
+    """Owns the splat record buffer, the sum of what is drawn and the counts of what could not be drawn as asked."""
 
     def __init__(self, ctx: moderngl.Context, features: SplatFeatures, group: int) -> None:
         """`group`: the most photons one dispatch covers."""
@@ -122,7 +122,7 @@ class Footprints:
         structs = (photon_record(groups, features.hero), PLACEMENT, RECEIVER, SPLAT, GAIN_BOX)
         self._program = shader.compute(ctx, "light/footprint.comp", defines, structs)
         self._parameters = ctx.buffer(reserve=PARAMETERS.stride)
-        self._unusual = ctx.buffer(np.zeros((group, 4), np.float32))
+        self._sums = ctx.buffer(np.zeros((group, 4), np.float32))
         self.commands = ctx.buffer(np.zeros(20, np.uint32))
         """Indirect draws of kinds 1 to 4, five words each."""
         self.slots_per_photon = int(defines["SLOTS"])
@@ -168,7 +168,7 @@ class Footprints:
             variables.traced_row,
             x_reference,
             stride,
-            0,
+            tables.first_power,
             scale,
             offset,
             (0.0, 0.0),
@@ -183,7 +183,7 @@ class Footprints:
                 receivers,
                 variables.buffer,
                 tables.band_buffer,
-                self._unusual,
+                self._sums,
             )
         ):
             buffer.bind_to_storage_buffer(binding)
@@ -200,19 +200,24 @@ class Footprints:
         self._list.run(1)
 
     def counts(self) -> dict[str, float]:
-        """Since the last reset: `outside_map_w` (flux of photons whose centre no window holds, W),
-        `footprints_dropped` (number of photons), `dropped_w` (their flux, W)."""
-        records = np.frombuffer(self._unusual.read(), np.float32).reshape(-1, 4)
-        outside, dropped_w, dropped, _ = records.sum(axis=0, dtype=np.float64)
-        return {"outside_map_w": float(outside), "footprints_dropped": int(dropped), "dropped_w": float(dropped_w)}
+        """Since the last reset: `splats_w` (power of all splats over their bands, W), `outside_map_w` (that of photons
+        whose centre no window holds, W), `footprints_dropped` (number of photons), `dropped_w` (their power, W)."""
+        records = np.frombuffer(self._sums.read(), np.float32).reshape(-1, 4)
+        outside, dropped_w, dropped, splats_w = records.sum(axis=0, dtype=np.float64)
+        return {
+            "splats_w": float(splats_w),
+            "outside_map_w": float(outside),
+            "footprints_dropped": int(dropped),
+            "dropped_w": float(dropped_w),
+        }
 
     @property
     def bytes(self) -> int:
         """Device memory of splat records and their lists."""
-        return self.splats.size + self.lists.size + self._unusual.size
+        return self.splats.size + self.lists.size + self._sums.size
 
     def reset_counts(self) -> None:
-        self._unusual.clear()
+        self._sums.clear()
 
     def release(self) -> None:
         shader.release(
@@ -220,7 +225,7 @@ class Footprints:
             self._list,
             self.lists,
             self._parameters,
-            self._unusual,
+            self._sums,
             self.commands,
             self.splats,
         )

@@ -160,9 +160,7 @@ class Splatter:
         ctx.enable_only(moderngl.NOTHING)
 
     def counts(self) -> dict[str, float]:
-        """Since the last reset: `outside_map_w` (flux of photons whose centre no map holds, W) and
-        `footprints_dropped` (photons splatted as one texel for want of a usable footprint; `dropped_w`: their flux,
-        W)."""
+        """Of `Footprints`, since the last reset."""
         return self._footprints.counts()
 
     def reset_counts(self) -> None:

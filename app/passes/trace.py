@@ -43,7 +43,8 @@ class Band:
 
 @dataclass
 class FluxTally:
-    """Where flux went, W, in float64; `merge` adds batches."""
+    """Where flux went, W, in float64; `merge` adds batches. What a path carries counts by its throughput over its band
+    (`carried_w` in trace.comp), as it is drawn, not by what its anchor has left."""
 
     emitted: float = 0.0
     handed: float = 0.0

@@ -13,7 +13,7 @@ from ..gpu import bindings, records
 from ..gpu.device_traits import DeviceTraits
 from ..gpu.map_channels import MapChannels
 from ..gpu.scene_buffers import SceneBuffers
-from ..gpu.splat_tables import DENSITY_CELLS
+from ..gpu.splat_tables import CUMULATIVE_SAMPLES, DENSITY_CELLS
 from ..gpu.texture_store import place_defines
 from ..model.environment_light import lighting_environment
 from ..model.features import Features
@@ -145,7 +145,7 @@ def splat_defines(features: SplatFeatures) -> Defines:
         "HERO": features.hero,
     }
     counts: Defines = {"TARGETS": features.targets, "SLOTS": 2 if features.nested_windows else 1}
-    if features.hero:
+    if features.point_spectrum:
         counts["DENSITY_CELLS"] = f"{DENSITY_CELLS}u"
     return counts | {name: 1 for name, on in switches.items() if on}
 
@@ -157,6 +157,7 @@ def footprint_defines(features: SplatFeatures) -> Defines:
         splat_defines(features)
         | {
             "GROUPS": features.spectral_groups,
+            "POWER_SAMPLES": CUMULATIVE_SAMPLES,
             "NONE": f"{records.NONE}u",
             "FLAG_FOOTPRINT_DROPPED": f"{records.FLAG_FOOTPRINT_DROPPED}u",
         }

@@ -71,12 +71,22 @@ class LightStats:
     light_points: dict[str, int] = field(default_factory=dict)
     trace_seconds: float = 0.0
     splat_seconds: float = 0.0
+    splats_w: float = 0.0
+    """Power of all splats over their bands, tinted by coloured receivers, W per pass weight."""
+    polygons_w: float = 0.0
+    """What beams left on receivers, untinted, W per pass weight."""
     outside_map_w: float = 0.0
+    """Of it, that of photons whose centre no map holds."""
     footprints_dropped: int = 0
     dropped_w: float = 0.0
     """Flux of those photons, splatted as one texel each."""
     buffers: dict[str, int] = field(default_factory=dict)
     """Device memory by what it is for, bytes, while photons were traced."""
+
+    @property
+    def drawn_w(self) -> float:
+        """What maps should hold, but for what lies outside of them."""
+        return self.splats_w + self.polygons_w
 
 
 @dataclass(frozen=True)
@@ -505,7 +515,9 @@ class LightPass:
         after = beams.stats.find_seconds, beams.stats.draw_seconds
         self.stats.trace_seconds += after[0] - before[0]
         self.stats.splat_seconds += after[1] - before[1]
-        self.stats.tally.merge(beams.tally(share))
+        thrown = beams.tally(share)
+        self.stats.tally.merge(thrown)
+        self.stats.polygons_w += thrown.ended["deposited"]
         if beams.found is None or beams.found.pieces is None:
             return
         for tails in (False, True):
@@ -638,6 +650,7 @@ class LightPass:
         }
         counts = self.splatter.counts()
         elsewhere = self._elsewhere
+        self.stats.splats_w = counts["splats_w"] + elsewhere.splats_w
         self.stats.outside_map_w = counts["outside_map_w"] + elsewhere.outside_map_w
         self.stats.footprints_dropped = int(counts["footprints_dropped"]) + elsewhere.footprints_dropped
         self.stats.dropped_w = counts["dropped_w"] + elsewhere.dropped_w

@@ -93,11 +93,9 @@ def light_notices(light: LightPass) -> list[str]:
         if light.buffers.light_power[index].band(0.0, 1.0)[3] > 0.0 and not len(light.pilots[index].whole):
             found.append(f"light '{name}': nothing that meets glass or mirrors reaches a receiver; it makes no caustic")
     outside = light.stats.outside_map_w
-    deposited = light.stats.tally.ended["deposited"]
-    if deposited and outside > LOST_SHARE * deposited:
-        found.append(
-            f"{100.0 * outside / deposited:.1f} % of the caustics lies beside all maps and lacks in the picture"
-        )
+    drawn = light.stats.drawn_w
+    if drawn and outside > LOST_SHARE * drawn:
+        found.append(f"{100.0 * outside / drawn:.1f} % of the caustics lies beside all maps and lacks in the picture")
     if light.map_receiver is not None:  # its texels are the picture's
         return found
     for receiver, windows in light.layout.windows.items():

@@ -236,8 +236,8 @@ def merged_stats(stats: Iterable[LightStats]) -> LightStats:
     merged = LightStats()
     for part in stats:
         merged.tally.merge(part.tally)
-        for name in ("photons", "splats", "trace_seconds", "splat_seconds", "outside_map_w", "footprints_dropped",
-                     "dropped_w"):  # fmt: skip
+        for name in ("photons", "splats", "trace_seconds", "splat_seconds", "splats_w", "polygons_w", "outside_map_w",
+                     "footprints_dropped", "dropped_w"):  # fmt: skip
             setattr(merged, name, getattr(merged, name) + getattr(part, name))
     return merged
 

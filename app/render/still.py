@@ -67,9 +67,9 @@ class RenderStats:
     def lines(self) -> list[str]:
         """The energy balance and the times, one line each."""
         light, tally, camera = self.light, self.light.tally, self.camera_pass
-        total, deposited = tally.emitted or 1.0, max(tally.ended["deposited"], 1e-300)
+        total, drawn = tally.emitted or 1.0, max(light.drawn_w, 1e-300)
         bands = (f"{name} {count} × {light.light_points[name]}" for name, count in light.bands.items())
-        dropped = f"{light.footprints_dropped} ({light.dropped_w / deposited:.1e} of what was deposited)"
+        dropped = f"{light.footprints_dropped} ({light.dropped_w / drawn:.1e} of what was drawn)"
         return [
             f"emitted             {tally.emitted:.6e} W of scene flux per pass weight",
             *(f"  {name:<17} {flux / total:10.6f}" for name, flux in tally.ended.items()),
@@ -77,8 +77,8 @@ class RenderStats:
             *([f"  {'handed':<17} {-tally.handed / total:10.6f}   (beams left it to photons)"] if tally.handed else []),
             f"  {'unaccounted':<17} {tally.imbalance:10.2e}   (emitted − all of the above)",
             (
-                f"map holds           {self.map_flux_w / deposited:10.6f} of what was deposited; "
-                f"outside every map {light.outside_map_w / deposited:.6f}"
+                f"map holds           {self.map_flux_w / drawn:10.6f} of what was drawn; "
+                f"outside every map {light.outside_map_w / drawn:.6f}"
             ),
             f"fall-backs          {_counted(tally.fallbacks)}, splat_footprint_dropped {dropped}",
             *self._beam_lines(),

@@ -19,7 +19,7 @@ layout(std140, binding = 0) uniform Parameters {
     uint traced_row;
     float x_reference;
     uint stride;
-    uint unused;
+    uint first_power;
     float y_scale;
     float y_offset;
     vec2 unused2;
@@ -29,8 +29,8 @@ layout(std430, binding = 1) writeonly buffer Splats { SplatRecord splats[]; };
 layout(std430, binding = 2) readonly buffer Placements { Placement placements[]; };
 layout(std430, binding = 3) readonly buffer Receivers { Receiver receivers[]; };
 layout(std430, binding = 4) readonly buffer VarTables { float var_table[]; };
-layout(std430, binding = 5) readonly buffer Bands { vec4 table_bands[]; };  // x_lo, x_hi, mean place of the light in it (0..1), unused
-layout(std430, binding = 6) buffer Unusual { vec4 unusual[]; };  // of the photons of this thread: W with the centre in no window, W drawn as one texel, how many so
+layout(std430, binding = 5) readonly buffer Bands { vec4 table_bands[]; };  // x_lo, x_hi, mean place of the light in it (0..1), W; then W below x, by light and class
+layout(std430, binding = 6) buffer Sums { vec4 sums[]; };  // of the photons of this thread: W with the centre in no window, W drawn as one texel, how many so, W of all
 
 #ifdef LOCAL_GAIN
 layout(std430, binding = 9) readonly buffer GainBoxes { GainBox gain_boxes[]; };
@@ -102,6 +102,7 @@ float local_gain(uint receiver, vec3 position) {
 }
 #endif
 
+#include "light/splat_power.glsl"
 #include "light/splat_shapes.glsl"
 
 Footprint footprint_in(Placement place, PhotonRecord photon, vec3 sweep_middle, vec3 sweep) {
@@ -147,15 +148,15 @@ void choose_level(inout Placement place, inout Footprint f, PhotonRecord photon,
     f.axis_t *= shrink;
 }
 
-SplatRecord splat_of(PhotonRecord photon, Footprint f, uint layer, vec4 band) {
+SplatRecord splat_of(PhotonRecord photon, float power_w, float mean, Footprint f, uint layer, vec4 band) {
     vec2 d = vec2(dot(f.axis_s, f.axis_s), dot(f.axis_t, f.axis_t));
     float cross_st = dot(f.axis_s, f.axis_t);
     float major = 0.5 * (d.x + d.y) + sqrt(0.25 * (d.x - d.y) * (d.x - d.y) + cross_st * cross_st);
     SplatRecord splat;
     if (major < SMALL_STD * SMALL_STD && dot(f.chord, f.chord) < SMALL_SWEEP * SMALL_SWEEP) {
-        splat = small_splat(photon, f, band);
+        splat = small_splat(photon, power_w, mean, f, band);
     } else {
-        splat = swept_splat(photon, f, band);
+        splat = swept_splat(photon, power_w, mean, f, band);
     }
     splat.layer = layer;
 #ifdef HERO
@@ -274,6 +275,12 @@ void main() {
 #endif
 #endif
 #endif
+    float power_w = photon_power(photon, table / bands, table_band);
+#ifdef REINDEXED
+    power_w = carries ? power_w : 0.0;
+#endif
+    sums[i].w += power_w;
+    float mean = mean_throughput(photon, power_w, table / bands, table_band);
     vec3 middle = 0.5 * (to_lo + to_hi);
     vec3 sweep = to_hi - to_lo;
     Footprint f = footprint_in(place, photon, middle, sweep);
@@ -290,14 +297,14 @@ void main() {
         middle = vec3(0.0);
         sweep = vec3(0.0);
         f = footprint_in(place, photon, middle, sweep);
-        unusual[i].yz += vec2(photon.flux_w, 1.0);
+        sums[i].yz += vec2(power_w, 1.0);
     }
 
     uint layer = table * uint(TARGETS);
     bool inside = shown && contains(place.rect, f.centre, 0.0);
     Placement drawn_in = place;
     choose_level(drawn_in, f, photon, middle, sweep);
-    SplatRecord fine = splat_of(photon, f, layer, table_band);
+    SplatRecord fine = splat_of(photon, power_w, mean, f, layer, table_band);
     fine.rect = drawn_in.rect;
     bool drawn = shown && touches(drawn_in.rect, fine.centre, half_extent(fine));
 #ifdef REINDEXED
@@ -323,7 +330,7 @@ void main() {
         vec2 extent = half_extent(fine) + margin;
         bool only_fine = shown && all(greaterThan(fine.centre - extent, drawn_in.rect.xy)) && all(lessThan(fine.centre + extent, drawn_in.rect.zw));
         if (!only_fine) {
-            coarse = splat_of(photon, g, layer, table_band);
+            coarse = splat_of(photon, power_w, mean, g, layer, table_band);
             coarse.rect = outer.rect;
             if (!touches(outer.rect, coarse.centre, half_extent(coarse))) {
                 coarse.kind = 0u;
@@ -340,6 +347,6 @@ void main() {
 #endif
 
     if (!inside) {
-        unusual[i].x += photon.flux_w;
+        sums[i].x += power_w;
     }
 }

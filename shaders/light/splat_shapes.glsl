@@ -14,27 +14,25 @@ float grid_sum(vec2 centre, vec2 e, vec2 m, float shear, float box, float s2, fl
     return clamp(total, 0.7, 1.4);
 }
 
-// Throughput averaged over the band (piecewise linear through low end, anchor, high end).
-float mean_throughput(PhotonRecord photon) {
+// Whether the photon has another range than its table's band: a part of it, or what a local gain put there. One of no width stands for all of it.
+bool is_cut(PhotonRecord photon, vec4 band) {
+    return photon.x_hi > photon.x_lo && any(greaterThan(abs(vec2(photon.x_lo, photon.x_hi) - band.xy), vec2(1e-5)));
+}
+
+// Throughput averaged over the light of the band. `power_w`: `photon_power`.
+float mean_throughput(PhotonRecord photon, float power_w, uint light_and_class, vec4 band) {
 #if defined(HERO)
     // Each of the four wavelengths has its own (`carry_companions`).
     return 1.0;
 #elif defined(POINT_SPECTRUM)
     return photon.throughput.y;
 #else
-    float width = photon.x_hi - photon.x_lo;
-    if (width <= 0.0) {
-        return photon.throughput.y;
-    }
-    float below = (photon.throughput.x + photon.throughput.y) * (photon.x_anchor - photon.x_lo);
-    float above = (photon.throughput.y + photon.throughput.z) * (photon.x_hi - photon.x_anchor);
-    return 0.5 * (below + above) / width;
+    float whole_w = band.w;
+#ifdef BAND_CUTS
+    if (is_cut(photon, band)) whole_w = power_until(light_and_class, photon.x_hi) - power_until(light_and_class, photon.x_lo);
 #endif
-}
-
-// Whether the photon has another range than its table's band: a part of it, or what a local gain put there. One of no width stands for all of it.
-bool is_cut(PhotonRecord photon, vec4 band) {
-    return photon.x_hi > photon.x_lo && any(greaterThan(abs(vec2(photon.x_lo, photon.x_hi) - band.xy), vec2(1e-5)));
+    return whole_w > 0.0 ? power_w / whole_w : photon.throughput.y;
+#endif
 }
 
 #ifdef HERO
@@ -47,7 +45,7 @@ void carry_companions(inout SplatRecord splat, PhotonRecord photon) {
 }
 #endif
 
-SplatRecord small_splat(PhotonRecord photon, Footprint f, vec4 band) {
+SplatRecord small_splat(PhotonRecord photon, float power_w, float mean, Footprint f, vec4 band) {
     SplatRecord splat;
     float cut = 0.0;
 #ifdef BAND_CUTS
@@ -58,7 +56,7 @@ SplatRecord small_splat(PhotonRecord photon, Footprint f, vec4 band) {
     splat.centre = f.centre + f.chord * (cut > 0.0 ? 0.0 : band.z - 0.5);
     splat.along = 0.5 + CUT * sigma;
     splat.across = SQRT_HALF / sigma;
-    splat.amplitude = mean_throughput(photon);
+    splat.amplitude = mean;
     splat.table_row = 0.0;
     splat.y_edge = 0.0;
     splat.y_box = 0.0;
@@ -75,7 +73,22 @@ float kept_by_cut(float edge, float box, float s) {
     return 1.0 - 2.0 * s / box * (normal_excess((edge - 0.5 * box) / s) - normal_excess((edge + 0.5 * box) / s));
 }
 
-SplatRecord swept_splat(PhotonRecord photon, Footprint f, vec4 band) {
+#ifndef ONE_COLOUR
+// Power that fragments (splat_swept.frag) add up to: each wavelength is blurred over places of other throughput, which is straight between the
+// low end of the band, the anchor and the high end, and even beyond. Blurred, a kink is its size times a normal variable's mean excess.
+float power_of_fragments(float xi_half, float sigma_xi, vec4 throughput) {
+    float lowest = throughput.y - throughput.z * (xi_half + throughput.x), power = 0.0;
+    vec3 kinks = vec3(-xi_half, throughput.x, xi_half), bends = vec3(throughput.z, throughput.w - throughput.z, -throughput.w);
+    for (uint k = 0u; k < 2u * POWER_STEPS; ++k) {
+        float place = (float(k % POWER_STEPS) + 0.5) / float(POWER_STEPS);
+        vec3 z = (kinks - (k < POWER_STEPS ? mix(-xi_half, throughput.x, place) : mix(throughput.x, xi_half, place))) / sigma_xi;
+        power += step_w[k] * (lowest + sigma_xi * dot(bends, vec3(normal_excess(z.x), normal_excess(z.y), normal_excess(z.z))));
+    }
+    return power;
+}
+#endif
+
+SplatRecord swept_splat(PhotonRecord photon, float power_w, float mean, Footprint f, vec4 band) {
     SplatRecord splat;
     vec3 cov = vec3(f.axis_s.x * f.axis_s.x + f.axis_t.x * f.axis_t.x, f.axis_s.x * f.axis_s.y + f.axis_t.x * f.axis_t.y,
                     f.axis_s.y * f.axis_s.y + f.axis_t.y * f.axis_t.y);  // xx, xy, yy
@@ -150,7 +163,7 @@ SplatRecord swept_splat(PhotonRecord photon, Footprint f, vec4 band) {
     splat.y_edge = y_edge * SQRT_HALF / s;
     splat.y_box = 0.5 * box * SQRT_HALF / s;
 #ifdef ONE_COLOUR
-    splat.throughput = vec4(photon.x_anchor, mean_throughput(photon), 0.0, 0.0);
+    splat.throughput = vec4(photon.x_anchor, mean, 0.0, 0.0);
 #else
     float width = photon.x_hi - photon.x_lo;
     float anchor = width > 0.0 ? clamp((photon.x_anchor - photon.x_lo) / width, 0.0, 1.0) : 0.5;
@@ -160,6 +173,10 @@ SplatRecord swept_splat(PhotonRecord photon, Footprint f, vec4 band) {
     splat.throughput = vec4(at, photon.throughput.y,
                             anchor > 1e-3 && width > 0.0 ? (photon.throughput.y - photon.throughput.x) / (at - ends.x) : 0.0,
                             anchor < 0.999 && width > 0.0 ? (photon.throughput.z - photon.throughput.y) / (ends.y - at) : 0.0);
+    if (!cut && width > 0.0 && any(notEqual(photon.throughput.xz, photon.throughput.yy))) {
+        float as_drawn = power_of_fragments(xi_half, sigma / reach, splat.throughput);
+        splat.amplitude *= as_drawn > 0.0 ? clamp(power_w / as_drawn, 0.5, 2.0) : 1.0;
+    }
 #endif
     splat.x_range = vec2(photon.x_lo, photon.x_hi);
     splat.xi_half = xi_half;

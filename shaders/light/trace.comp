@@ -31,6 +31,28 @@ vec3 normal_columns[COLUMNS];
 #define NORMAL_COLUMN(c) vec3(0.0)
 #endif
 
+// What a weight at each of the three places adds to the integral of the weights, straight between them, times the density whose running integral
+// stands in `row`. Simpson's rule for the running integral's own: exact where the density is quadratic over half a band.
+vec3 band_powers(uint row, vec3 band)
+{
+    float low = spectral_row(row, band.x), anchor = spectral_row(row, band.y), high = spectral_row(row, band.z);
+    float below = spectral_row(row, 0.5 * (band.x + band.y)), above = spectral_row(row, 0.5 * (band.y + band.z));
+    // Parts of the power of each half that count by its upper end.
+    float upper = (5.0 * (anchor - low) - 4.0 * (below - low)) / 6.0;
+    float uppermost = (5.0 * (high - anchor) - 4.0 * (above - anchor)) / 6.0;
+    return vec3(anchor - low - upper, upper + high - anchor - uppermost, uppermost);
+}
+
+// What throughput at a band's low end, anchor and high end each add to the power a ray carries, W (`band_powers`), for the rays of this event.
+vec3 band_w;
+
+// Power that a ray carries: its throughput, straight between three places, times the light's power over its band. That is what is drawn where it
+// lands, and so what is accounted for; `flux_w` is what its anchor alone would carry.
+float carried_w(RayRecord ray)
+{
+    return ray.x_hi > ray.x_lo ? dot(band_w, ray.throughput) : ray.flux_w;
+}
+
 // Share of a ray's power that must remain for a child to be followed for certain; weaker ones play
 // roulette. Roulette's numbers are a Kronecker sequence in the photon's number, so survivors are
 // again close to a lattice.
@@ -43,11 +65,11 @@ bool survives(inout RayRecord ray, inout float roulette_w, float share, uint bra
     // The count is that of the sub-lattice's own points: a multiple of an irrational may be a poor one.
     float draw = kronecker(ray.photon_id / p.lattices, depth_generator(ray.depth), ray.branch_key + (ray.photon_id % p.lattices) * 2654435769u);
     if (draw >= chance) {
-        roulette_w += ray.flux_w;
+        roulette_w += carried_w(ray);
         return false;
     }
     float boost = 1.0 / max(chance, 1e-30);
-    roulette_w -= ray.flux_w * (boost - 1.0);
+    roulette_w -= carried_w(ray) * (boost - 1.0);
     ray.flux_w *= boost;
     ray.throughput *= boost;
 #ifdef HERO
@@ -88,9 +110,10 @@ void absorb(inout RayRecord ray, float distance, inout float absorbed_w)
     if (row == NONE) return;
     vec3 alpha = spectral_row(uint(WEIGHT_ROW) + row, band_of(ray));
     vec3 kept = exp(-alpha * distance);
-    absorbed_w += ray.flux_w * (1.0 - kept.y);
+    absorbed_w += carried_w(ray);
     ray.flux_w *= kept.y;
     ray.throughput *= kept;
+    absorbed_w -= carried_w(ray);
 #ifdef HERO
     vec3 companions = exp(-spectral_row(uint(WEIGHT_ROW) + row, ray.companion_x.xyz) * distance);
     ray.companion_throughput.xyz *= companions;
@@ -105,7 +128,7 @@ void absorb(inout RayRecord ray, float distance, inout float absorbed_w)
 void land(inout RayRecord ray, uint receiver, uint triangle, float cosine, uint slot, inout Outcome outcome)
 {
     outcome.what |= ray.depth == 0u ? DIRECT : DEPOSITED;
-    outcome.flux_w = ray.flux_w;
+    outcome.flux_w = carried_w(ray);
     if (ray.depth == 0u) return;
     PhotonRecord photon;
     photon.position = ray.position;
@@ -272,8 +295,8 @@ void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint k
     if (kind == KIND_MIRROR) {
         vec3 kept = spectral_row(uint(WEIGHT_ROW) + weight_row, band_of(ray));
         outcome.what |= ABSORBED;
-        outcome.flux_w = ray.flux_w * (1.0 - kept.y);
         send_on(child, reflected, kept, outcome);
+        outcome.flux_w = carried_w(ray) - carried_w(child);
         float share = kept.y;
 #ifdef HERO
         vec3 companions = spectral_row(uint(WEIGHT_ROW) + weight_row, ray.companion_x.xyz);
@@ -410,6 +433,9 @@ void main()
     if (k >= state.alive) return;
     RayRecord ray = load_ray(indices[k]), start = ray;
     Outcome outcome = Outcome(0u, 0.0, 0.0, 0.0);
+#ifndef POINT_SPECTRUM
+    band_w = band_powers(uint(p.power_row), band_of(ray));
+#endif
 
     RayOrigin origin = RayOrigin(ray.last_primitive, ray.last_object, uint((ray.flags & FLAG_INSIDE) != 0u), ray.inside_mask);
     Hit hit;
@@ -419,7 +445,7 @@ void main()
     uint rounds = 0u;
     while (rounds < 2u) rounds += min(p.lattices, 1u);
     if (rounds < 2u) {
-        outcomes[k] = uvec4(LOST_NUMERIC, floatBitsToUint(ray.flux_w), 0u, 0u);
+        outcomes[k] = uvec4(LOST_NUMERIC, floatBitsToUint(carried_w(ray)), 0u, 0u);
         return;
     }
 #endif
@@ -439,21 +465,21 @@ void main()
 
 #ifdef BEAMS
     if (met && (ray.light_and_source >> 16) == 0xffffu && is_beam_object(hit.object)) {
-        outcome = Outcome(LEFT_TO_BEAMS, ray.flux_w, 0.0, 0.0);
+        outcome = Outcome(LEFT_TO_BEAMS, carried_w(ray), 0.0, 0.0);
     } else
 #endif
     if (kind == KIND_DIFFUSE) {
         land(ray, thing.receiver, facet.source, abs(dot(ray.direction, hit.normal_g)), k, outcome);
     } else if (kind == KIND_BLACK) {
         outcome.what |= ABSORBED;
-        outcome.flux_w = ray.flux_w;
+        outcome.flux_w = carried_w(ray);
     } else if (kind == NONE) {
         // A ray that leaves the scene from inside a solid slipped through a crack.
         outcome.what |= is_inside(medium_stack(ray)) ? LOST_NUMERIC : ESCAPED;
-        outcome.flux_w = ray.flux_w;
+        outcome.flux_w = carried_w(ray);
     } else if (ray.depth >= p.max_depth) {
         outcome.what |= LOST_DEPTH;
-        outcome.flux_w = ray.flux_w;
+        outcome.flux_w = carried_w(ray);
     } else {
         scatter(ray, start, hit, shading_frame(hit, facet, ray.direction), kind, thing.weight_row, k, outcome);
     }

@@ -46,7 +46,7 @@ bool diffract(RayRecord ray, Hit hit, ShadingFrame frame, uint row, inout RayRec
     float kept = found ? order.left * per_left : 0.0, share = found ? order.efficiency * per_left : 0.0;
     float left = at >= 0.0 ? kept : (more ? kept - share : 0.0);
     outcome.what |= ABSORBED;
-    outcome.flux_w = ray.flux_w * max(1.0 - left - (at >= 0.0 ? 0.0 : share), 0.0);
+    outcome.flux_w = carried_w(ray) * max(1.0 - left - (at >= 0.0 ? 0.0 : share), 0.0);
     outcome.absorbed_w *= 1.0 - left;
     rest.flux_w *= left;
     rest.throughput *= left;

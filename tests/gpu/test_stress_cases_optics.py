@@ -70,7 +70,7 @@ MUTANTS = {
     "lost footprints not counted": (
         "overflow",
         "light/footprint.comp",
-        "unusual[i].yz += vec2(photon.flux_w, 1.0);",
+        "sums[i].yz += vec2(power_w, 1.0);",
         "",
         "photons were degraded but only 0 fall-backs counted",
     ),

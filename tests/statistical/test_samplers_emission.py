@@ -241,6 +241,20 @@ def test_the_sun_is_even_over_its_disc_and_over_the_ground(gl) -> None:
     refuse(cells(x**1.05, y, bins=(8, 8)), uniform_expected((8, 8)))
 
 
+def test_a_rectangular_beam_s_edges_are_as_soft_as_its_lattice_is_wide_across_them(gl) -> None:
+    """Lattices are stretched as rectangles are: twice as wide, twice as soft."""
+    width, height = 0.8, 0.4
+    light = CollimatedLight(
+        "l", WHITE, position=(0.0, 0.0, 3.0), direction=(0.0, 0.0, -1.0), tangent=(1.0, 0.0, 0.0),
+        shape="rectangle", width=width, height=height,
+    )  # fmt: skip
+    rays = emit(gl, light, box(1.0), passes=8)
+    x, y = np.abs(rays.position[:, 0]) / width, np.abs(rays.position[:, 1]) / height
+    soft = (rays.weight > 0.02 * rays.weight.max()) & (rays.weight < 0.98 * rays.weight.max())
+    across_x, across_y = width * np.ptp(x[soft & (y < 0.3)]), height * np.ptp(y[soft & (x < 0.3)])
+    assert across_x / across_y == pytest.approx(width / height, rel=0.15)
+
+
 @pytest.mark.parametrize("shape", ["disc", "rectangle"])
 def test_a_beam_fills_its_aperture(gl, shape: str) -> None:
     radius, width, height = 0.5, 0.9, 0.4

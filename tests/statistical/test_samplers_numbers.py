@@ -173,7 +173,8 @@ def survives_source() -> str:
         f"made.max_depth = 64u; made.split_threshold = {THRESHOLD}; made.power_row = 0u; made.lattices = {LATTICES}u;"
     )
     made = f"TraceParameters parameters() {{ TraceParameters made; {values} return made; }}"
-    return f"{softness}\n{made}\nTraceParameters p = parameters();\n{function}"
+    carried = "float carried_w(RayRecord ray) { return ray.flux_w; }"
+    return f"{softness}\n{made}\nTraceParameters p = parameters();\n{carried}\n{function}"
 
 
 def generators() -> list[int]:
@@ -205,6 +206,7 @@ def play(
     ray.flux_w *= share; ray.throughput *= share;
     alive = survives(ray, roulette, share, 2u) ? 1u : 0u;
     flux = ray.flux_w; taken = roulette; left = ray.survival; next_key = ray.branch_key; throughput = ray.throughput.y;
+    wide = ray.footprint_scale;
     """
     inputs = {
         "photon": photon.astype(np.uint32),
@@ -220,6 +222,7 @@ def play(
         "left": "float",
         "next_key": "uint",
         "throughput": "float",
+        "wide": "float",
     }
     return evaluate(
         gl.ctx,
@@ -230,6 +233,17 @@ def play(
         structs=[ray_record(0), TRACE_PARAMETERS],
         declarations=survives_source(),
     )
+
+
+def test_survivors_of_roulette_have_the_power_and_the_place_of_those_that_died(gl) -> None:
+    """Footprints are half as wide again as the thinned lattice is, whose spacing grows as 1/sqrt(chance)."""
+    photon = np.arange(COUNT)
+    survival, share = np.full(COUNT, 0.5), np.full(COUNT, 0.15)
+    got = play(gl, photon, np.full(COUNT, 4), np.full(COUNT, 77), survival, share)
+    alive, chance = got["alive"] == 1, 0.5 * 0.15 / THRESHOLD
+    assert alive.mean() == pytest.approx(chance, abs=0.01)
+    np.testing.assert_allclose(got["throughput"][alive], 0.5 * 0.15 / chance, rtol=1e-5)
+    np.testing.assert_allclose(got["wide"][alive], 1.5 / np.sqrt(chance), rtol=1e-5)
 
 
 def test_roulette_lets_the_right_share_live_and_keeps_the_flux(gl) -> None:

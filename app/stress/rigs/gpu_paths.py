@@ -199,11 +199,17 @@ def trace_light(
         domain = emission_domain(light, scene, space, space.to_gpu(np.concatenate(specular)))
         assert domain is not None
         ends = [buffers.axis.x_of_nm(np.array(band)) for band in bands_nm]
-        bands = tuple(Band(float(lo), float(hi), float(0.5 * (lo + hi)), 1.0) for lo, hi in ends)
+        # The tally counts the light's own power; records are as if every band had 1 W.
+        powers = [float(buffers.light_power[0].band(lo, hi)[3]) if hi > lo else 1.0 for lo, hi in ends]
+        bands = tuple(
+            Band(float(lo), float(hi), float(0.5 * (lo + hi)), watts)
+            for (lo, hi), watts in zip(ends, powers, strict=True)
+        )
         batch = trace.run(LatticeSlice(0, bands, count, 0, 1, count, SHIFT, (0, 0), 0, SEED, light_place=place), domain)
         assert batch.tally.fallbacks["queue_overflow"] == 0
-        assert batch.tally.imbalance < 1e-4, "flux does not close"
-        records = np.frombuffer(trace.photons.read(), trace.photon.dtype, batch.photons)
+        assert batch.tally.imbalance < 1e-4, f"flux does not close: {batch.tally.imbalance:.3g}"
+        records = np.frombuffer(trace.photons.read(), trace.photon.dtype, batch.photons).copy()
+        records["flux_w"] /= np.array(powers, np.float32)[records["light_and_source"] >> 8 & 255]
         emitter = Emitter(light, domain, space, place)
         # Only wavelengths that part have lattices of their own.
         lattices = [emitter.lattice(count, SHIFT, k if features.spectral_groups else 0) for k in range(len(bands))]

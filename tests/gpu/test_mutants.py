@@ -1,0 +1,183 @@
+"""Mistakes in the shaders, each with the test that is there to notice it.
+
+    python -m pytest -m slow tests/gpu/test_mutants.py
+
+Each runs its test in a process of its own, which must fail in an assertion: a shader that does not compile proves
+nothing.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from tests.gpu.mutants import SHADERS_VARIABLE, mutated
+
+ROOT = Path(__file__).parents[2]
+_BALANCE = "gpu/test_power_balance.py::test_all_that_was_emitted_is_drawn_or_accounted_for_where_reflection_is_total"
+_PATHS = "gpu/test_whole_paths_gpu.py::test_position_and_throughput_at_three_wavelengths"
+_SHADOW = "gpu/test_environment_light.py::test_a_balls_shadow_is_one_minus_its_form_factor"
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """`old` of a shader became `new`; `killed_by`: a test, from `tests` on."""
+
+    file: str
+    old: str
+    new: str
+    killed_by: str
+
+
+MUTANTS = {
+    "survivor's boost dropped from throughput": Mutant(
+        "light/trace.comp", "ray.throughput *= boost;", "", f"{_BALANCE}[prism]"
+    ),
+    "unwidened footprints": Mutant(
+        "light/trace.comp",
+        "ray.footprint_scale *= SURVIVOR_SOFTNESS * sqrt(boost);",
+        "",
+        "statistical/test_samplers_numbers.py::"
+        "test_survivors_of_roulette_have_the_power_and_the_place_of_those_that_died",
+    ),
+    "what is refracted was reflected as well": Mutant(
+        "light/trace.comp",
+        "send_on(child, refracted, 1.0 - reflectance, outcome);",
+        "send_on(child, refracted, vec3(1.0), outcome);",
+        f"{_BALANCE}[prism]",
+    ),
+    "power lost on landing": Mutant(
+        "light/trace.comp",
+        "photon.throughput = ray.throughput;",
+        "photon.throughput = 0.85 * ray.throughput;",
+        f"{_BALANCE}[prism]",
+    ),
+    "power lost in swept splats": Mutant(
+        "light/splat_shapes.glsl",
+        "splat.amplitude = 1.0 / (reach",
+        "splat.amplitude = 0.85 / (reach",
+        f"{_BALANCE}[prism]",
+    ),
+    "throughput blurred with the spectrum": Mutant(
+        "light/splat_shapes.glsl", "splat.amplitude *= as_drawn", "float unused = as_drawn", f"{_BALANCE}[prism]"
+    ),
+    "band ends without direction dispersion": Mutant(
+        "light/trace.comp",
+        "theta.x += dtheta * variable_step",
+        "theta.x += 0.0 * variable_step",
+        f"{_PATHS}[steep Fresnel]",
+    ),
+    "one coefficient of absorption for the band": Mutant(
+        "light/trace.comp", "exp(-alpha * distance)", "vec3(exp(-alpha.y * distance))", f"{_PATHS}[absorption]"
+    ),
+    "grey mirror": Mutant(
+        "light/trace.comp",
+        "send_on(child, reflected, kept, outcome)",
+        "send_on(child, reflected, kept.yyy, outcome)",
+        f"{_PATHS}[coloured mirror]",
+    ),
+    "sweep centred on the anchor": Mutant(
+        "light/footprint.comp",
+        "vec3 middle = 0.5 * (to_lo + to_hi);",
+        "vec3 middle = vec3(0.0);",
+        "gpu/test_splat.py::test_a_sweep_lies_between_its_band_s_ends_whichever_wavelength_is_traced",
+    ),
+    "cut spectrum reversed": Mutant(
+        "light/splat_cut.frag",
+        "vec2 x = mix(band.xx, band.yy, 0.5 + 0.5 * ends / band.z);",
+        "vec2 x = mix(band.xx, band.yy, 0.5 - 0.5 * ends.yx / band.z);",
+        "gpu/test_splat.py::test_cut_bands_add_up_to_the_whole",
+    ),
+    "slopes of throughput swapped": Mutant(
+        "light/splat_swept.frag",
+        "min(xi, 0.0) * throughput.z + max(xi, 0.0) * throughput.w",
+        "min(xi, 0.0) * throughput.w + max(xi, 0.0) * throughput.z",
+        "gpu/test_splat.py::test_throughput_over_the_band",
+    ),
+    "soft edges of a rectangular beam swapped": Mutant(
+        "light/emit.comp",
+        "coverage(inside.x, p.spacing.x) * coverage(inside.y, p.spacing.y)",
+        "coverage(inside.x, p.spacing.y) * coverage(inside.y, p.spacing.x)",
+        "statistical/test_samplers_emission.py::"
+        "test_a_rectangular_beam_s_edges_are_as_soft_as_its_lattice_is_wide_across_them",
+    ),
+    "an edge of a beam forgotten": Mutant(
+        "light/beam.frag",
+        "        note_crossing(e, covers.x",
+        "        if (e == 0) continue;\n        note_crossing(e, covers.x",
+        "gpu/test_beam_splat.py::test_energy_at_every_size_and_place",
+    ),
+    "a beam's sweep reversed": Mutant(
+        "light/beam.frag",
+        "vec4 start = EDGE_START(e), change = EDGE_CHANGE(e);",
+        "vec4 start = EDGE_START(e) + EDGE_CHANGE(e), change = -EDGE_CHANGE(e);",
+        "gpu/test_beam_splat.py::test_swept_polygons_match_single_indices",
+    ),
+    "texels in perspective of one area": Mutant(
+        "light/beam.frag",
+        "/ (nearness2 * nearness2)",
+        "/ nearness2",
+        "gpu/test_picture_windows.py::test_swept_polygons_in_perspective",
+    ),
+    "a pixel's texels averaged over the whole pixel": Mutant(
+        "camera/receiver.glsl",
+        "box /= share * p.cells;",
+        "box /= share;",
+        "gpu/test_picture_windows.py::test_a_pixel_shows_its_own_texels_only",
+    ),
+    "camera absorption by the last chord only": Mutant(
+        "camera/camera.comp",
+        "path.lengths[i] += hit.distance",
+        "path.lengths[i] = hit.distance",
+        "gpu/test_camera_glass.py::test_absorption_follows_beers_law",
+    ),
+    "camera band ends with the anchor's index": Mutant(
+        "camera/camera.comp",
+        "interface_indices(boundary, path.band, n_i, n_t);",
+        "interface_indices(boundary, path.band.yyy, n_i, n_t);",
+        "gpu/test_camera_cuts.py",
+    ),
+    "light of the environment without its cosine": Mutant(
+        "light/environment.comp",
+        "max(dot(toward, place.normal), 0.0)",
+        "float(dot(toward, place.normal) > 0.0)",
+        _SHADOW,
+    ),
+    "light of the environment through what is in the way": Mutant(
+        "light/environment.comp", "reaches = !intersect_any", "reaches = intersect_any", _SHADOW
+    ),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", MUTANTS)
+def test_each_mistake_is_noticed(tmp_path: Path, name: str) -> None:
+    mutant = MUTANTS[name]
+    shaders = mutated(tmp_path, mutant.file, mutant.old, mutant.new)
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-n",
+        "0",
+        "-x",
+        "-q",
+        "-p",
+        "no:cacheprovider",
+        "-p",
+        "tests.gpu.mutants",
+    ]
+    done = subprocess.run(
+        [*command, f"tests/{mutant.killed_by}"],
+        cwd=ROOT,
+        env=os.environ | {SHADERS_VARIABLE: str(shaders)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1 and "AssertionError" in done.stdout, f"'{name}' lives\n{done.stdout[-2000:]}"
