@@ -125,7 +125,8 @@ def test_more_facets_ahead_than_a_flight_keeps(gl) -> None:
         share = landing(alone)
     with passed(gl, scene) as by_beams:
         assert by_beams.only_beams and landing(by_beams) == pytest.approx(share, rel=5e-3)
-        assert held(by_beams) == pytest.approx(1.0, abs=0.01)
+        # The map of a layer leaves out a hundredth of the light at each side.
+        assert held(by_beams) == pytest.approx(1.0, abs=0.04)
 
 
 def test_a_stone_is_less_noisy_than_by_photons(gl, tmp_path: Path) -> None:

@@ -12,6 +12,8 @@ from spectrasplat.gpu.scene_texels import SceneTexels, spectra_texture
 from spectrasplat.reference import optics
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
+COVERS = {"finite.glsl": ("magnitude_bits", "is_finite", "is_finite3", "is_within", "is_within2")}
+
 COUNT = 4096
 WORD = 2**32
 GOLDEN = 2654435769
