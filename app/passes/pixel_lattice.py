@@ -23,7 +23,7 @@ def pixel_lattice(samples: int, offset: int) -> np.ndarray:
 
     Every row and every column of the pixel cut into `samples` holds one sample, so that edges of any slant are filtered
     well, and the first launch's lie about the pixel's middle, so that the picture does not move. Powers of two are a
-    (0, m, 2)-net (Hammersley's, with digital shifts), so that each sample has a cell of `cells_of` to itself; others a
+    (0, m, 2)-net (Sobol's, with digital shifts), so that each sample has a cell of `cells_of` to itself; others a
     golden-ratio lattice.
     """
     if is_in_strips(samples, offset):
@@ -32,9 +32,12 @@ def pixel_lattice(samples: int, offset: int) -> np.ndarray:
     index = np.arange(samples)
     power = samples.bit_length() - 1
     if samples == 1 << power:
-        turned = np.zeros(samples, np.int64)
+        # Sobol's second dimension of the reversed index, whose first is the index itself: samples of one band, every
+        # second, fourth … of them, are a net as well.
+        turned, direction = np.zeros(samples, np.int64), samples >> 1
         for bit in range(power):
-            turned |= (index >> bit & 1) << (power - 1 - bit)
+            turned ^= (index >> (power - 1 - bit) & 1) * direction
+            direction ^= direction >> 1
         fine = np.floor((shift + 0.5 / samples) % 1.0 * (1 << 30)).astype(np.int64)
         return ((np.column_stack([index, turned]) << (30 - power)) ^ fine) / float(1 << 30)
     golden = 0.6180339887498949

@@ -81,7 +81,7 @@ def test_what_stands_still_stands_still(gl, stage: Stage) -> None:
     # to photons there changes by 8e-4 of the brightest, in maps of four texels a pixel.
     assert np.ptp(first[18:30, 72:]) > 0.1 * first.max()
     assert moved[18:30, 72:].max() <= 1.5e-3 * first.max()
-    assert moved[18:30, 72:].mean() <= 2e-5 * first.max()
+    assert moved[18:30, 72:].mean() <= 5e-5 * first.max()
 
 
 def test_a_frame_is_a_function_of_its_stage_alone(gl, stage: Stage) -> None:

@@ -46,6 +46,7 @@ def test_a_rig_renders_what_render_does_again_and_again(gl: Any, prism: Scene) -
         layer="caustic",
         method="srd-photons",
         max_depth=prism.render.max_depth,
+        spp=64,
     )
     picture = rgb709_to_xyz(render(prism, settings, context=gl).rgb.astype(float))
     assert np.allclose(first.xyz, picture, rtol=1e-4, atol=1e-5 * picture.max())

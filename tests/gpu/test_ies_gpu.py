@@ -76,8 +76,8 @@ def test_a_turn_about_the_axis_is_a_turn_of_the_c0_plane(gl, tmp_path: Path) -> 
     turned = picture(gl, replace(base, rotation_deg=40.0))
     aimed = picture(gl, replace(base, tangent=(c, s, 0.0)))
     assert np.abs(turned - aimed).max() < 2e-5 * turned.max()
-    assert np.abs(turned - picture(gl, base)).max() > 0.05 * turned.max()
-    assert np.abs(turned - picture(gl, replace(base, rotation_deg=-40.0))).max() > 0.05 * turned.max()
+    assert np.abs(turned - picture(gl, base)).max() > 0.03 * turned.max()
+    assert np.abs(turned - picture(gl, replace(base, rotation_deg=-40.0))).max() > 0.03 * turned.max()
 
 
 def test_dark_directions_get_no_photons(gl, tmp_path: Path) -> None:

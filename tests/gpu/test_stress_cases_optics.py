@@ -66,7 +66,13 @@ MUTANTS = {
         "derivative -= medium_slope(boundary.before, x)",
         "band ends",
     ),
-    "overflow not seen": ("overflow", "light/footprint.comp", "bool accident = !(", "bool accident = false && !(", ""),
+    "overflow not seen": (
+        "overflow",
+        "light/footprint.comp",
+        "bool accident = shown && ",
+        "bool accident = false && ",
+        "",
+    ),
     "lost footprints not counted": (
         "overflow",
         "light/footprint.comp",

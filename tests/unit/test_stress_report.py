@@ -81,7 +81,7 @@ def test_kept_promises_are_told_so() -> None:
         (NOT_FINITE, "3 values are not finite"),
         (NOT_FINITE, "error of energy nan"),
         (NOT_FINITE, "flux does not close"),
-        (Measurement(1.0, "x", 0, flux_imbalance=2e-4), "flux does not close"),
+        (Measurement(1.0, "x", 0, flux_imbalance=2e-3), "flux does not close"),
         (Measurement(1.0, "x", 0, dropped=2, fallbacks={"footprint_dropped": 1}), "2 photons were degraded but only 1"),
     ],
 )

@@ -78,7 +78,7 @@ def test_kinds_come_and_go(scene: Scene) -> None:
 
 
 def test_a_first_sky_is_as_bright_as_the_light_asks_for_and_follows_the_sun() -> None:
-    lit = load_scene(assets_dir() / "scenes" / "default.toml")
+    lit = load_scene(assets_dir() / "scenes" / "water.toml")
     sun = next(light for light in lit.lights if light.kind == "directional")
     sky = environment.set_environment_kind(lit, "sky").environment
     table = sun.spectral_power.luminous() / np.pi

@@ -41,7 +41,7 @@ from ...reference.glasses import sellmeier_terms
 from ...reference.optics import unit
 from ...reference.random_numbers import hash_combine
 from ...render.light_pass import spectral_axis
-from ..case import Measurement
+from ..case import FLUX_CLOSURE, Measurement
 from ..judging import not_finite, not_finite_in
 
 SHIFT = (123456789, 987654321)
@@ -207,7 +207,7 @@ def trace_light(
         )
         batch = trace.run(LatticeSlice(0, bands, count, 0, 1, count, SHIFT, (0, 0), 0, SEED, light_place=place), domain)
         assert batch.tally.fallbacks["queue_overflow"] == 0
-        assert batch.tally.imbalance < 1e-4, f"flux does not close: {batch.tally.imbalance:.3g}"
+        assert batch.tally.imbalance < FLUX_CLOSURE, f"flux does not close: {batch.tally.imbalance:.3g}"
         records = np.frombuffer(trace.photons.read(), trace.photon.dtype, batch.photons).copy()
         records["flux_w"] /= np.array(powers, np.float32)[records["light_and_source"] >> 8 & 255]
         emitter = Emitter(light, domain, space, place)
