@@ -6,16 +6,30 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from ..gpu import strict_compilers
 from ..gpu.limits import NEEDED
 from ..gpu.program_use import StageUse, uses
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
+    from ..gpu.live_state import LiveState
     from ..gpu.shader import Built
     from ..model.scene import Scene
 
-HEADINGS = ("program", "lines", "kB", "storage blocks", "uniform blocks", "textures", "images", "shared B", "driver s")
+HEADINGS = (
+    "program",
+    "lines",
+    "kB",
+    "storage blocks",
+    "uniform blocks",
+    "textures",
+    "images",
+    "shared B",
+    "live words",
+    "array words",
+    "driver s",
+)
 """Of a table of programs; numbers but for the first."""
 
 
@@ -24,6 +38,8 @@ class ProgramRow:
     """One shader of one program."""
 
     use: StageUse
+    live: LiveState | None
+    """None where the tools that tell it are not installed."""
     seconds: float | None
     """The driver's, of the whole program; None for a program's further stages."""
 
@@ -39,6 +55,8 @@ class ProgramRow:
             str(use.textures),
             str(use.images),
             f"{use.shared_bytes:,}",
+            "" if self.live is None else f"{self.live.registers:,}",
+            "" if self.live is None else f"{self.live.scratch:,}",
             "" if self.seconds is None else f"{self.seconds:.2f}",
         )
 
@@ -46,7 +64,16 @@ class ProgramRow:
 def program_rows(programs: Sequence[Built]) -> list[ProgramRow]:
     """The largest programs first, each with its stages together."""
     largest = sorted(programs, key=lambda built: -sum(map(len, built.texts)))
-    return [ProgramRow(use, None if at else built.seconds) for built in largest for at, use in enumerate(uses(built))]
+    known = not strict_compilers.missing()
+    rows = []
+    for built in largest:
+        stages = uses(built)
+        live = strict_compilers.live_states(built) if known else (None,) * len(stages)
+        rows += [
+            ProgramRow(use, held, None if at else built.seconds)
+            for at, (use, held) in enumerate(zip(stages, live, strict=True))
+        ]
+    return rows
 
 
 def beyond_promises(programs: Sequence[Built]) -> list[str]:
@@ -76,5 +103,15 @@ def programs_text(scene: Scene) -> RenderableType:
         table,
         f"{len(programs)} programs, {seconds:.1f} s in the driver; some drivers compile the rest when a program first "
         "runs.",
+        _live_words_told(),
         *beyond_promises(programs),
+    )
+
+
+def _live_words_told() -> str:
+    if absent := strict_compilers.missing():
+        return f"Live words and array words are not known: {absent}."
+    return (
+        "Live words: 32 bits each, held at once by an invocation where it holds most, as an optimiser of SPIR-V leaves "
+        "it (GPUs have some 255 registers for them). Array words: its own arrays, together; they lie in memory."
     )

@@ -13,9 +13,11 @@ import tempfile
 from pathlib import Path
 
 from ..base.errors import UserError
+from .live_state import LiveState, live_state
 from .shader import Built
 
-FRONT_END, VALIDATOR = "glslangValidator", "spirv-val"
+FRONT_END, VALIDATOR, OPTIMISER, DISASSEMBLER = "glslangValidator", "spirv-val", "spirv-opt", "spirv-dis"
+_ENVIRONMENT = "opengl4.5"
 APT_LINE = "apt-get install glslang-tools spirv-tools"
 PATIENCE_S = 60.0
 _REFLECTION = "Uniform block reflection:"
@@ -24,12 +26,12 @@ _UNKNOWN = "0:"
 
 def missing() -> str:
     """A sentence that names what is not installed and how to get it; "" where all is there."""
-    absent = [tool for tool in (FRONT_END, VALIDATOR) if shutil.which(tool) is None]
-    return f"{' and '.join(absent)} not installed: run '{APT_LINE}' as root" if absent else ""
+    absent = [tool for tool in (FRONT_END, VALIDATOR, OPTIMISER, DISASSEMBLER) if shutil.which(tool) is None]
+    return f"{', '.join(absent)} not installed: run '{APT_LINE}' as root" if absent else ""
 
 
 def complaints(built: Built) -> list[str]:
-    """What the two say against a program, with files and lines; empty where they accept it.
+    """What front end and validator say against a program, with files and lines; empty where they accept it.
 
     Raises `UserError` where they are not installed or hang."""
     with tempfile.TemporaryDirectory() as folder:
@@ -38,8 +40,8 @@ def complaints(built: Built) -> list[str]:
         if said:  # what does not compile need not be translated
             return [_located(built, line) for line in said]
         for file in files:
-            said += _run(FRONT_END, "-G", "--auto-map-locations", "-o", f"{file}.spv", file)
-            said += _run(VALIDATOR, "--target-env", "opengl4.5", f"{file}.spv")
+            said += _run(*_translation(file))
+            said += _run(VALIDATOR, "--target-env", _ENVIRONMENT, f"{file}.spv")
     return [_located(built, line) for line in said]
 
 
@@ -49,6 +51,26 @@ def blocks(built: Built) -> set[str]:
         told = _output(FRONT_END, "-q", "-l", *_written(built, Path(folder)))[1]
     _, _, after = told.partition(_REFLECTION)
     return {line.partition(":")[0] for line in after.strip().split("\n\n")[0].splitlines() if ": offset" in line}
+
+
+def live_states(built: Built) -> tuple[LiveState, ...]:
+    """What each stage of a program holds at once, after an optimiser that inlines everything.
+
+    Raises `UserError` where the tools are not installed, hang or refuse the program."""
+    with tempfile.TemporaryDirectory() as folder:
+        return tuple(_live_state(file) for file in _written(built, Path(folder)))
+
+
+def _live_state(file: str) -> LiveState:
+    optimise = (OPTIMISER, f"--target-env={_ENVIRONMENT}", "-O", f"{file}.spv", "-o", f"{file}.opt")
+    for command in (_translation(file), optimise):
+        if said := _run(*command):
+            raise UserError(f"{Path(file).name} is refused by {command[0]}: {said[0]}")
+    return live_state(_output(DISASSEMBLER, "--raw-id", "--no-header", f"{file}.opt")[1])
+
+
+def _translation(file: str) -> tuple[str, ...]:
+    return FRONT_END, "-G", "--auto-map-locations", "-o", f"{file}.spv", file
 
 
 def _written(built: Built, folder: Path) -> list[str]:
