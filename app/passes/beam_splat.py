@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping
+from contextlib import nullcontext
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     import moderngl
 
     from ..gpu.beam_tables import BeamTables
+    from ..gpu.pass_timers import PassTimers
     from .map_atlas import MapAtlas
     from .map_layout import MapLayout
     from .plane_frame import PlaneFrame
@@ -48,11 +50,14 @@ PARAMETERS = Struct(
 class BeamSplatter:
     """The pass that draws polygons into maps of `targets` RGBA32F targets."""
 
-    def __init__(self, ctx: moderngl.Context, targets: int = 1, is_capped: bool = False) -> None:
+    def __init__(
+        self, ctx: moderngl.Context, targets: int = 1, is_capped: bool = False, timers: PassTimers | None = None
+    ) -> None:
         """`is_capped`: as many polygons at a time as take `dispatch_seconds`, where a device ends what takes long;
-        their sums are then rounded otherwise from run to run."""
+        their sums are then rounded otherwise from run to run. `timers` count towards the pass "beams"."""
         self._ctx = ctx
         self.dispatch_seconds = DISPATCH_S
+        self._timers = timers
         self._portion = DispatchBudget(GROUP, _SMALLEST_GROUP, GROUP) if is_capped else None
         self._targets = targets
         self._programs: dict[tuple[int, bool], moderngl.Program] = {}
@@ -85,8 +90,9 @@ class BeamSplatter:
                 curves = tables.parts(polygons.light[part], reflectance_class, polygons.x_lo[part], polygons.x_hi[part])
                 all_beams = list(packed(polygons, part, to_texels, texel_area * weight, curves))
                 started = time.perf_counter()
-                for beams in all_beams:
-                    self._draw(beams, tables, atlas, record["rect"])
+                with self._timers.timing("beams") if self._timers else nullcontext():
+                    for beams in all_beams:
+                        self._draw(beams, tables, atlas, record["rect"])
                 # What is drawn later is kept until then.
                 self._ctx.finish()
                 if self._portion:

@@ -227,8 +227,9 @@ class EnvironmentLightPass:
         self._places.bind_to_storage_buffer(_BIND_PLACES)
         self._sums.bind_to_storage_buffer(_BIND_SUMS)
         self._levels.use(_UNIT_ENVIRONMENT)
-        self._program.run(-(-len(self.places.places) // _GROUP))
-        self._ctx.memory_barrier()
+        with self._context.timers.timing("environment"):
+            self._program.run(-(-len(self.places.places) // _GROUP))
+            self._ctx.memory_barrier()
         self._ctx.finish()
         self.asked += count
         took = time.perf_counter() - started

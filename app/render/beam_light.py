@@ -132,7 +132,7 @@ class _Canvas:
 
     def __init__(self, context: Context, targets: int) -> None:
         self._context = context
-        self._splatter = BeamSplatter(context.ctx, targets, context.traits.work_is_queued)
+        self._splatter = BeamSplatter(context.ctx, targets, context.traits.work_is_queued, context.timers)
         self._tables: BeamTables | None = None
 
     def tables(self, buffers: SceneBuffers, shown: ShownSpectra, channels: MapChannels) -> BeamTables:

@@ -5,9 +5,14 @@ from __future__ import annotations
 import time
 
 import pytest
+from spectrasplat.base.paths import assets_dir
 from spectrasplat.bench.machine import compile_line, copied_bytes_per_second
 from spectrasplat.gpu import pass_timers
+from spectrasplat.gpu.context import Context, create_context
 from spectrasplat.gpu.pass_timers import PassTimers
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.settings import RenderSettings
+from spectrasplat.render.still import render
 
 
 class Query:
@@ -68,6 +73,16 @@ def test_real_queries_are_read(gl, monkeypatch) -> None:
     assert timers.seconds["copy"] >= 0.0
     source.release()
     target.release()
+
+
+def test_every_pass_of_a_frame_is_timed(monkeypatch) -> None:
+    """By whatever the queries say: beams, photons' tracing and splats, the environment's light, the camera."""
+    monkeypatch.setattr(pass_timers.PassTimers, "_tells_truth", lambda self: True)
+    monkeypatch.setattr(Context, "is_software", property(lambda self: False))
+    scene = load_scene(assets_dir() / "scenes" / "default.toml")
+    with create_context() as context:
+        render(scene, RenderSettings(width=48, height=27, photons=2000), context=context)
+        assert {"beams", "trace", "splat", "environment", "camera"} <= set(context.timers.seconds)
 
 
 def test_bandwidth_and_compile_times_are_told(gl) -> None:

@@ -466,7 +466,7 @@ class LiveEngine:
             photons_stored=light.photons_stored,
             passes=self._shown.accumulation.number,
             trace_s=self._times["trace"],
-            splat_s=self._times["splat"],
+            splat_s=self._times["splat"] + self._times.get("beams", 0.0),  # apart only by the device's own timers
             camera_s=self._times["camera"],
             photons_per_second=sum(h[1] for h in self._history) / seconds if seconds > 0.0 else 0.0,
             first_order=light.first_order,
