@@ -199,7 +199,8 @@ QUEUE_STATE = Struct(
         Field("next_chunk_groups", "uvec4", "over the outcomes of the next step"),
         Field("gather_groups", "uvec4"),
         Field("iterations", "uint", "steps that had a ray"),
-        Field("reserved", "uint", "", 3),
+        Field("flights", "uint", "of all rays, up to what they meet, since the batch began"),
+        Field("reserved", "uint", "", 2),
     ),
 )
 MASK_SIZE = 64

@@ -24,6 +24,8 @@ from .variants import emit_defines, light_defines
 RAY_ROOM = 3
 """Rays in flight per lattice point of a batch: splitting rarely passes 1.5."""
 PHOTON_ROOM = 4
+SPLIT_THRESHOLD = 0.3
+"""Share of a photon's power below which roulette decides whether a part of it goes on."""
 _CHUNK = 64
 _GROUP = 64
 _MAX_ORDERS = 8
@@ -101,6 +103,8 @@ class Batch:
     emitted_photons: int
     tally: FluxTally
     steps: int
+    flights: int
+    """Of all rays, up to what they meet."""
 
 
 @dataclass(frozen=True)
@@ -144,7 +148,7 @@ class TracePass:
         scene: SceneBuffers,
         batch: int,
         max_depth: int,
-        split_threshold: float = 0.3,
+        split_threshold: float = SPLIT_THRESHOLD,
     ) -> None:
         self.context = context
         self.scene = scene
@@ -229,15 +233,20 @@ class TracePass:
                 return done.value
 
     def steps(
-        self, piece: LatticeSlice, domain: EmissionDomain, max_depth: int | None = None
+        self,
+        piece: LatticeSlice,
+        domain: EmissionDomain,
+        max_depth: int | None = None,
+        split_threshold: float | None = None,
     ) -> Generator[None, None, Batch]:
-        """`run`, pausing after every event of all rays: whoever draws meanwhile may bind what it likes."""
+        """`run`, pausing after every event of all rays: whoever draws meanwhile may bind what it likes.
+        `split_threshold`: by default the pass's own."""
         max_depth = self.max_depth if max_depth is None else min(max_depth, self.max_depth)
         if piece.count > self.batch:
             raise ValueError(f"{piece.count} lattice points in a batch of {self.batch}")
         if piece.beam_objects and not self._features.beams:
             raise ValueError("objects are left to beams, and the programs were made without them")
-        self._start(piece, domain, max_depth)
+        self._start(piece, domain, max_depth, split_threshold or self.split_threshold)
         self.scene.bind()
         self._bind_queue(0)
         self._emit_parameters.bind_to_storage_buffer(bindings.PARAMETERS)
@@ -257,7 +266,7 @@ class TracePass:
             raise ValueError(f"{count} rays in a batch of {self.batch}")
         chunks = -(-count // _CHUNK)
         state = self._state_zero.copy()
-        state["alive"] = count
+        state["alive"] = state["flights"] = count
         state["trace_groups"] = (-(-count // _GROUP), 1, 1, 0)
         state["next_chunk_groups"] = (-(-chunks // _GROUP), 1, 1, 0)
         self._state.write(state.tobytes())
@@ -296,9 +305,9 @@ class TracePass:
         state = self._read_state()
         ctx.memory_barrier()
         photons = int(state["photon_first"]) + int(state["photons_new"])
-        return Batch(photons, emitted, self._tally(int(state["overflow"])), step)
+        return Batch(photons, emitted, self._tally(int(state["overflow"])), step, int(state["flights"]))
 
-    def _start(self, piece: LatticeSlice, domain: EmissionDomain, max_depth: int) -> None:
+    def _start(self, piece: LatticeSlice, domain: EmissionDomain, max_depth: int, split_threshold: float) -> None:
         state = self._state_zero.copy()
         state["alive"] = piece.count
         state["dispatched"] = piece.count
@@ -336,6 +345,7 @@ class TracePass:
         self._emit_parameters.write(p.tobytes())
         lattices = len(piece.bands) * piece.light_points
         self._trace_values = self._trace_parameters_of(piece.light, lattices, max_depth, piece.beam_objects)
+        self._trace_values["split_threshold"] = split_threshold
         self._trace_parameters.write(self._trace_values.tobytes())
 
     def _trace_parameters_of(

@@ -35,7 +35,7 @@ from ..passes.emission_domain import EmissionDomain, emission_domain
 from ..passes.map_atlas import MapAtlas
 from ..passes.map_layout import MapLayout, Window, check_map_receiver, layout_maps, pixel_side
 from ..passes.picture_window import PictureWindow
-from ..passes.pilot import Pilot, landings_of, pilot_steps
+from ..passes.pilot import Pilot, landings_of, pilot_steps, split_threshold
 from ..passes.plane_frame import plane_frame
 from ..passes.splat import Splatter
 from ..passes.trace import RAY_ROOM, Batch, FluxTally, LatticeSlice, TracePass, queue_bytes
@@ -207,6 +207,9 @@ class LightPass:
             pilots[i] = yield from pilot_steps(
                 self.trace, self.scene, i, domain, self._full_power(i), self._needs_spectral_pilot
             )
+        if not self._division.counts:
+            # Frames of an animation have to agree about it.
+            self.trace.split_threshold = split_threshold(pilots.values())
         return pilots
 
     def lay_out(self, fit: MapFit) -> None:

@@ -6,5 +6,6 @@ layout(local_size_x = 1) in;
 void main()
 {
     state.alive = state.next_alive;
+    state.flights += state.alive;
     state.iterations += state.alive > 0u ? 1u : 0u;
 }

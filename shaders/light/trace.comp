@@ -14,8 +14,6 @@ layout(local_size_x = 64) in;
 #include "lib/grating.glsl"
 #endif
 
-// Survivors of roulette are only nearly a lattice: wider footprints keep their unevenness unseen.
-#define SURVIVOR_SOFTNESS 1.5
 // Narrower bands are not cut at total internal reflection.
 #define MIN_CUT_BAND 1e-4
 // A grating of up to so many orders sends each on as a whole lattice where it is met first.
@@ -75,7 +73,7 @@ bool survives(inout RayRecord ray, inout float roulette_w, float share, uint bra
 #ifdef HERO
     ray.companion_throughput *= boost;
 #endif
-    ray.footprint_scale *= SURVIVOR_SOFTNESS * sqrt(boost);
+    ray.footprint_scale *= sqrt(boost);
     ray.survival = p.split_threshold;
     return true;
 }

@@ -40,7 +40,7 @@ MUTANTS = {
     ),
     "unwidened footprints": Mutant(
         "light/trace.comp",
-        "ray.footprint_scale *= SURVIVOR_SOFTNESS * sqrt(boost);",
+        "ray.footprint_scale *= sqrt(boost);",
         "",
         "statistical/test_samplers_numbers.py::"
         "test_survivors_of_roulette_have_the_power_and_the_place_of_those_that_died",

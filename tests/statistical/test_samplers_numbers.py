@@ -167,14 +167,13 @@ LATTICES = 3
 def survives_source() -> str:
     """The tracer's roulette as it stands in trace.comp, with the parameters it reads."""
     text = (paths.shaders_dir() / "light/trace.comp").read_text()
-    softness = re.search(r"#define SURVIVOR_SOFTNESS .*", text)[0]
     function = "\n".join(re.findall(r"^bool survives\(.*?^}", text, re.MULTILINE | re.DOTALL))
     values = (
         f"made.max_depth = 64u; made.split_threshold = {THRESHOLD}; made.power_row = 0u; made.lattices = {LATTICES}u;"
     )
     made = f"TraceParameters parameters() {{ TraceParameters made; {values} return made; }}"
     carried = "float carried_w(RayRecord ray) { return ray.flux_w; }"
-    return f"{softness}\n{made}\nTraceParameters p = parameters();\n{carried}\n{function}"
+    return f"{made}\nTraceParameters p = parameters();\n{carried}\n{function}"
 
 
 def generators() -> list[int]:
@@ -236,14 +235,14 @@ def play(
 
 
 def test_survivors_of_roulette_have_the_power_and_the_place_of_those_that_died(gl) -> None:
-    """Footprints are half as wide again as the thinned lattice is, whose spacing grows as 1/sqrt(chance)."""
+    """Footprints are as wide as the thinned lattice is, whose spacing grows as 1/sqrt(chance)."""
     photon = np.arange(COUNT)
     survival, share = np.full(COUNT, 0.5), np.full(COUNT, 0.15)
     got = play(gl, photon, np.full(COUNT, 4), np.full(COUNT, 77), survival, share)
     alive, chance = got["alive"] == 1, 0.5 * 0.15 / THRESHOLD
     assert alive.mean() == pytest.approx(chance, abs=0.01)
     np.testing.assert_allclose(got["throughput"][alive], 0.5 * 0.15 / chance, rtol=1e-5)
-    np.testing.assert_allclose(got["wide"][alive], 1.5 / np.sqrt(chance), rtol=1e-5)
+    np.testing.assert_allclose(got["wide"][alive], 1.0 / np.sqrt(chance), rtol=1e-5)
 
 
 def test_roulette_lets_the_right_share_live_and_keeps_the_flux(gl) -> None:

@@ -1,0 +1,63 @@
+"""What a pass of more photons has besides more photons: bands, so that no error stays that they cannot cure, and weak
+branches that are as narrow as strong ones where that costs little."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from spectrasplat.base.paths import shipped_scenes
+from spectrasplat.gpu.context import Context
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.settings import RenderSettings
+from spectrasplat.passes import pilot
+from spectrasplat.passes.trace import SPLIT_THRESHOLD
+from spectrasplat.render.light_pass import LightPass, scene_buffers
+from spectrasplat.render.light_plan import Division
+
+SETTINGS = RenderSettings(120, 68, method="srd-photons", layer="caustic")
+
+
+def prepared(gl: Context, name: str, division: Division | None = None) -> LightPass:
+    scene = load_scene(shipped_scenes()[name])
+    buffers = scene_buffers(gl, scene, SETTINGS)
+    light = LightPass(gl, scene, SETTINGS, buffers.features, buffers, division=division)
+    light.prepare()
+    return light
+
+
+def bands(light: LightPass, photons: int) -> int:
+    light.begin(photons, 1)
+    return max(light.stats.bands.values())
+
+
+def test_bands_grow_with_the_cube_root_of_the_photons_once_footprints_are_narrow(
+    gl: Context, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    light = prepared(gl, "prism_case")
+    few, *many = (bands(light, n) for n in (15_000, 500_000, 1_000_000, 2_000_000, 4_000_000))
+    slope = np.polyfit(np.log([0.5, 1.0, 2.0, 4.0]), np.log(many), 1)[0]
+    assert many[0] > few and abs(slope - 1.0 / 3.0) < 0.05
+    # With a whole texel's tolerance they stay.
+    monkeypatch.setattr(pilot, "NARROW_TEXELS", 1e-9)
+    assert bands(light, 15_000) == bands(light, 4_000_000) == few
+
+
+def test_broad_footprints_leave_the_bands_as_they_are(gl: Context) -> None:
+    light = prepared(gl, "ball")
+    assert bands(light, 30_000) == bands(light, 1_000_000)
+
+
+def test_weak_branches_keep_their_lattices_where_that_costs_little(gl: Context) -> None:
+    """Most photons of `prism_case` end on its slit; every ray of the ball's has weak branches."""
+    slit, ball = prepared(gl, "prism_case"), prepared(gl, "ball")
+    for light, threshold in ((slit, pilot.KEPT_THRESHOLD), (ball, SPLIT_THRESHOLD)):
+        assert light.trace.split_threshold == threshold
+    by_default, kept = next(iter(slit.pilots.values())).flights
+    assert by_default < kept <= pilot.MOST_MORE_FLIGHTS * by_default
+    # Six pilots have traced the same rays, each of which flies once at least.
+    assert by_default > slit.trace.rays_traced / 6
+
+
+def test_frames_that_share_their_lattices_play_roulette_alike(gl: Context) -> None:
+    light = prepared(gl, "prism_case", Division({0: (6, 1)}))
+    assert light.trace.split_threshold == SPLIT_THRESHOLD
