@@ -16,7 +16,7 @@ from spectrasplat.model.settings import METHODS, RenderSettings
 from spectrasplat.render.still import render
 
 SCENES = sorted(p.stem for p in (assets_dir() / "scenes").glob("*.toml"))
-QUICK = ("ball", "brilliant", "default", "prism_edge", "spectrometer", "two_stones", "wine_glass")
+QUICK = ("ball", "brilliant", "prism_edge", "spectrometer", "two_stones")
 SMALL = RenderSettings(width=96, height=54, photons=20_000, spp=2)
 
 PRISM = """
