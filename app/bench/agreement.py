@@ -8,9 +8,6 @@ enough photons every bias is significant.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-
 import msgspec
 import numpy as np
 
@@ -19,6 +16,7 @@ from ..model.scene import Scene
 from ..reference.metrics import ReferencePicture
 from .reference_picture import Progress, make_reference
 from .rendering import MethodRig
+from .results import AgreementSettings
 
 BLOCK = 8
 """Pixels on a side of a block."""
@@ -63,19 +61,9 @@ class SceneAgreement(msgspec.Struct, frozen=True):
     blocks: Agreement
 
 
-@dataclass(frozen=True)
-class Settings:
-    """What is measured."""
-
-    width: int = 240
-    height: int = 135
-    photons: int = 200_000
-    seeds: int = 6
-    reference_seconds: float = 30.0
-    method: str = "srd"
-
-
-def measure(context: Context, name: str, scene: Scene, settings: Settings, progress: Progress) -> SceneAgreement:
+def measure(
+    context: Context, name: str, scene: Scene, settings: AgreementSettings, progress: Progress
+) -> SceneAgreement:
     """Compare the caustics of a scene as its camera sees them, by luminance. Raises `NothingToMeasure`."""
     reference_image, info = make_reference(
         scene,
@@ -113,7 +101,7 @@ def agreement(luminance: np.ndarray, reference_image: ReferencePicture, side: in
     """Scores of blocks of `side` × `side` pixels; `luminance`: (seeds, H, W), one picture a seed, at least two.
 
     Few seeds know a place's variance badly, so it is pooled: a place has the mean variance of its neighbours in
-    brightness, at least a quarter of which is its own."""
+    brightness where that is more than its own."""
     exact, known = _blocks(reference_image.xyz[..., 1], side), _blocks(reference_image.variance[..., 1], side)
     each = np.array([_blocks(picture, side) for picture in luminance])
     mean, own = each.mean(axis=0), each.var(axis=0, ddof=1)
@@ -166,17 +154,9 @@ HEAD = (
 def line(found: SceneAgreement) -> str:
     """A row under `HEAD`."""
     parts = [f"{found.scene:16} {found.energy:8.5f} {found.energy_score:+6.1f}  "]
-    for one in (found.pixels, found.blocks):
-        parts.append(f" {one.places:6d} {one.chi2:6.2f} {one.extreme:4d} {one.deviation:9.5f}  ")
+    parts += [
+        f" {one.places:6d} {one.chi2:6.2f} {one.extreme:4d} {one.deviation:9.5f}  "
+        for one in (found.pixels, found.blocks)
+    ]
     worst = found.blocks
     return "".join(parts) + f"{worst.largest:+.1f} ({100 * worst.worst_share:+.2f} %) at {worst.worst_place}"
-
-
-def measured(
-    context: Context, scenes: Sequence[tuple[str, Scene]], settings: Settings, progress: Progress
-) -> Iterator[SceneAgreement]:
-    """Scene after scene."""
-    for at, (name, scene) in enumerate(scenes):
-        yield measure(
-            context, name, scene, settings, lambda share, text, at=at: progress((at + share) / len(scenes), text)
-        )

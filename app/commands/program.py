@@ -735,6 +735,40 @@ def bench_beams(
     raise typer.Exit(bench_beams_command(output))
 
 
+@app.command("bench-agreement")
+def bench_agreement(
+    scenes: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[SCENE]...",
+            help="Scenes to compare; default: every shipped one that holds glass.",
+            autocompletion=completion.scenes,
+        ),
+    ] = None,
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder for agreement.json.")] = Path(
+        "bench_agreement"
+    ),
+    photons: Annotated[Text, typer.Option(metavar="N", help="Of each picture; default: 250k.")] = None,
+    seeds: Annotated[Text, typer.Option(metavar="N", help="Pictures, at least 2; default: 6.")] = None,
+    size: Annotated[Text, typer.Option(metavar="WxH", help="Pixels; default: 240x135.")] = None,
+    reference_seconds: Annotated[
+        Text,
+        typer.Option(
+            "--reference-seconds", metavar="S", help="Time added to each scene's cached reference; default: 60."
+        ),
+    ] = None,
+    method: Annotated[
+        Text, typer.Option(metavar="NAME", autocompletion=completion.methods, help="Default: srd.")
+    ] = None,
+    allow_outside: AllowOutside = False,
+) -> None:
+    """Compare a method's caustics with the float64 reference by standard scores, by pixels and in 8x8 blocks."""
+    from .bench_agreement import AgreementRequest, bench_agreement_command
+
+    request = AgreementRequest(tuple(scenes or ()), output, photons, seeds, size, reference_seconds, method)
+    raise typer.Exit(bench_agreement_command(request))
+
+
 @app.command("bench-view")
 def bench_view(
     scene: Annotated[

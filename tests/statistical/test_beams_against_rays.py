@@ -1,8 +1,8 @@
 """Beams against rays by chance: what polygons of one index hold, cell by cell and in all.
 
 The tracer (`reference.facet_rays`) shares no code with the search. With N rays landed, a missing or doubled share of
-all light of 5 / sqrt(N) is detected, and in a cell of n rays one of 5 / sqrt(n): quick, 4e5 rays sent, about 1.5 % of all
-light and 16 % of a cell of 1,000; slow, 1e8 rays, 0.1 % and 1 %.
+all light of 5 / sqrt(N) is detected, and in a cell of n rays one of 5 / sqrt(n): quick, 4e5 rays sent, about 1.5 % of
+all light and 16 % of a cell of 1,000; slow, 1e8 rays, 0.1 % and 1 %.
 """
 
 from __future__ import annotations
