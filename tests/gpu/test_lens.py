@@ -15,6 +15,7 @@ from spectrasplat.reference.camera_reference import render_camera_reference
 
 from tests.gpu.camera_rig import (
     DOWN,
+    REFLECTANCE,
     WHITE,
     at,
     flat_maps,
@@ -120,6 +121,8 @@ def test_a_blurred_map_is_averaged(gl) -> None:
         inner = camera_pass.read_rgb()[25:35, 40:50, 1]
         spread.append(float(inner.std() / inner.mean()))
     released(camera_pass)
+    # Half of the texels have 1 lm each.
+    assert inner.mean() == pytest.approx(REFLECTANCE / np.pi * 0.5 * 64.0**2, rel=0.02)
     assert spread[1] < 0.05 and spread[0] > 0.5, spread
 
 
