@@ -60,8 +60,8 @@ from .variants import (
     start_defines,
 )
 
-SPLIT_THRESHOLD = 0.001
-"""Share of a sample's power above which both parts of a split path are followed. Four times as much leaves the third
+SPLIT_THRESHOLD = 0.0008
+"""Share of a sample's power above which both parts of a split path are followed. Five times as much leaves the third
 reflection in a ball to chance, which shows as grain where it meets what is bright: twice the error of `ball`, for an
 eighth less time."""
 START_SHARE = 0.25
