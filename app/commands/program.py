@@ -185,6 +185,20 @@ def render(
             metavar="SHARE", help="Share of the light that the lens scatters, 0 to 0.5; not of .exr and .npy."
         ),
     ] = None,
+    lens_radius: Annotated[
+        Text,
+        typer.Option(
+            "--lens-radius",
+            metavar="R",
+            help="Half the aperture of the camera's lens, scene units: what is out of focus is blurred.",
+        ),
+    ] = None,
+    focus_distance: Annotated[
+        Text,
+        typer.Option(
+            "--focus-distance", metavar="D", help="From the lens to what is in focus; default: the camera's target."
+        ),
+    ] = None,
     max_depth: Annotated[
         Text, typer.Option("--max-depth", metavar="N", help="Specular events on a light path, at most; default: 64.")
     ] = None,
@@ -236,6 +250,8 @@ def render(
         options.parse_opening(up, glass, environment),
         passes,
         glare,
+        lens_radius,
+        focus_distance,
     )
     raise typer.Exit(render_command(request))
 
