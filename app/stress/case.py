@@ -12,9 +12,8 @@ from dataclasses import dataclass, field
 
 from ..gpu.context import Context
 
-FLUX_CLOSURE = 1e-3
-"""Largest |emitted − everything that ended| / emitted. Counted by what each part carries over its band: where a band
-may not be cut although its middle is totally reflected, what its ends would let through is lost (gem-bands 1.8e-4)."""
+FLUX_CLOSURE = 1e-4
+"""Largest |emitted − everything that ended| / emitted, counted by what each part carries over its band."""
 
 
 @dataclass(frozen=True)

@@ -237,16 +237,61 @@ vec3 incidence_over_band(RayRecord ray, ShadingFrame frame)
 #endif
 
 #ifdef BAND_CUTS
-// Where the band is cut because total internal reflection sets in inside it; negative: nowhere. `start`: the ray before its flight, from
-// which both parts set out again.
-float cut_of_band(RayRecord ray, RayRecord start, ShadingFrame frame, float distance, MediumInterface boundary, vec3 cosine2)
+// Where the band is cut because total internal reflection sets in inside it, at `onset`; negative: nowhere. `start`: the ray before its
+// flight, from which both parts set out again.
+float cut_of_band(RayRecord ray, RayRecord start, ShadingFrame frame, float distance, MediumInterface boundary, vec3 cosine2, out float onset)
 {
     bvec3 passes = greaterThan(cosine2, vec3(0.0));
-    bool cut = any(passes) && !all(passes) && (ray.flags & FLAG_BAND_FINAL) == 0u && ray.x_hi - ray.x_lo > MIN_CUT_BAND;
-    if (!cut) return -1.0;
+    onset = -1.0;
+    if (!any(passes) || all(passes)) return -1.0;
     float dtheta[SPECTRAL_GROUPS];
     for (int g = 0; g < SPECTRAL_GROUPS; ++g) dtheta[g] = incidence_column(ray, frame, g);
-    return clear_cut(ray, start, total_reflection_onset(band_of(ray), dot(ray.direction, frame.normal), dtheta, vec2(0.0), boundary, passes), distance);
+    onset = total_reflection_onset(band_of(ray), dot(ray.direction, frame.normal), dtheta, vec2(0.0), boundary, passes);
+    bool is_final = (ray.flags & FLAG_BAND_FINAL) != 0u || ray.x_hi - ray.x_lo <= MIN_CUT_BAND;
+    return is_final ? -1.0 : clear_cut(ray, start, onset, distance);
+}
+
+// The part of a ray's band that goes through a surface which its anchor does not pass, where that band may not be cut: from where the ray
+// itself is, at an anchor of its own.
+struct PassingPart {
+    vec3 band;          // x: lowest, anchor, highest
+    vec3 throughput;    // there, before the surface
+    vec3 let_through;   // shares there
+    vec3 direction;     // of incidence at its anchor
+    float power_w;      // behind the surface
+};
+
+// `n_i`, `n_t` and `refracted` become the part's, `reflectance` what is left of the whole band: both together carry what the ray did.
+PassingPart passing_part(RayRecord ray, ShadingFrame frame, MediumInterface boundary, float onset, vec3 cosine2, inout vec3 reflectance, inout vec3 n_i, inout vec3 n_t, inout Deflection refracted)
+{
+    bool low = cosine2.x > 0.0;
+    PassingPart part;
+    part.band = low ? vec3(ray.x_lo, 0.5 * (ray.x_lo + onset), onset) : vec3(onset, 0.5 * (onset + ray.x_hi), ray.x_hi);
+    part.throughput = band_weights(band_of(ray), ray.throughput, part.band);
+    interface_indices(boundary, part.band, n_i, n_t);
+    float theta = dot(ray.direction, frame.normal);
+    vec3 moved = ray.direction;
+    for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
+        float change = variable_step(uint(g), part.band.y, ray.x_anchor);
+        theta += change * incidence_column(ray, frame, g);
+        moved += change * ray.ddirection[SPATIAL + g].xyz;
+    }
+    theta = clamp(theta, -1.0, -1e-6);
+    vec3 tangential = moved - dot(moved, frame.normal) * frame.normal;
+    float sine2 = (1.0 - theta) * (1.0 + theta), eta_it = n_i.y / n_t.y;
+    part.direction = theta * frame.normal + sqrt(sine2 / max(dot(tangential, tangential), 1e-20)) * tangential;
+    refracted = refract_at(frame, part.direction, eta_it);
+    float anchors = 1.0 - fresnel_reflectance(theta, eta_it, transmitted_cosine2(theta, eta_it));
+    part.let_through = refracted.exists ? vec3(low ? 1.0 - reflectance.x : 0.0, anchors, low ? 0.0 : 1.0 - reflectance.z) : vec3(0.0);
+    vec3 density_w = band_powers(uint(p.power_row), part.band);
+    part.power_w = dot(density_w, part.throughput * part.let_through);
+    // What the ray's end has: more cannot leave it.
+    float most_w = max(low ? band_w.x * ray.throughput.x : band_w.z * ray.throughput.z, 0.0);
+    part.let_through *= part.power_w > most_w ? most_w / part.power_w : 1.0;
+    part.power_w = clamp(part.power_w, 0.0, most_w);
+    float kept = 1.0 - part.power_w / max(most_w, 1e-30);
+    reflectance = low ? vec3(kept, 1.0, 1.0) : vec3(1.0, 1.0, kept);
+    return part;
 }
 #endif
 #endif
@@ -344,7 +389,7 @@ void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint k
     refracted_share = stay ? common_share(ray, 1.0 - reflectance.y, 1.0 - companion_reflectance) : 1.0 - reflectance.y;
 #endif
 #ifdef BAND_CUTS
-    float at = splits ? cut_of_band(ray, start, frame, hit.distance, boundary, cosine2) : -1.0, below = 0.0;
+    float onset = -1.0, at = splits ? cut_of_band(ray, start, frame, hit.distance, boundary, cosine2, onset) : -1.0, below = 0.0;
     if (at >= 0.0) {
         // Back to the start of the flight.
         splits = false;
@@ -355,6 +400,9 @@ void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint k
         child = part_of_band(start, start.x_lo, at, below, 5u);
         lives = true;
     }
+    bool parts = splits && cosine2.y <= 0.0 && onset >= 0.0;
+    PassingPart part;
+    if (parts) part = passing_part(ray, frame, boundary, onset, cosine2, reflectance, n_i, n_t, refracted);
 #endif
     if (splits) {
         send_on(child, reflected, reflectance, outcome);
@@ -392,6 +440,23 @@ void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint k
         lives = true;
     }
 #endif
+    vec3 incident = ray.direction;
+    float x_anchor = ray.x_anchor;
+#ifdef BAND_CUTS
+    if (parts) {
+        vec3 power = spectral_row(uint(p.power_row), part.band), whole = spectral_row(uint(p.power_row), band_of(ray));
+        child.flux_w *= clamp((power.z - power.x) / max(whole.z - whole.x, 1e-30), 0.0, 1.0);
+        child.throughput = part.throughput;
+        child.x_lo = part.band.x;
+        child.x_anchor = x_anchor = part.band.y;
+        child.x_hi = part.band.z;
+        incident = part.direction;
+        reflectance = 1.0 - part.let_through;
+        refracted_share = part.power_w / max(carried_w(ray), 1e-30);
+        // From here on it is this part's power that counts.
+        band_w = band_powers(uint(p.power_row), part.band);
+    }
+#endif
     if (splits && refracted.exists) {
         send_on(child, refracted, 1.0 - reflectance, outcome);
 #ifdef HERO
@@ -404,9 +469,9 @@ void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint k
         for (int c = 0; c < COLUMNS; ++c) {
             float deta_it = 0.0;
 #if SPECTRAL_GROUPS > 0
-            if (c >= SPATIAL) deta_it = index_ratio_derivative(boundary, uint(c - SPATIAL), ray.x_anchor, n_i.y, n_t.y);
+            if (c >= SPATIAL) deta_it = index_ratio_derivative(boundary, uint(c - SPATIAL), x_anchor, n_i.y, n_t.y);
 #endif
-            child.ddirection[c].xyz = refracted_column(refracted, ray.direction, ray.ddirection[c].xyz, NORMAL_COLUMN(c), n_i.y / n_t.y, deta_it);
+            child.ddirection[c].xyz = refracted_column(refracted, incident, ray.ddirection[c].xyz, NORMAL_COLUMN(c), n_i.y / n_t.y, deta_it);
         }
 #endif
         lives = survives(child, outcome.roulette_w, refracted_share, 2u);

@@ -83,9 +83,8 @@ def test_flux_closes_in_every_shipped_scene(gl, name: str) -> None:
     throws = name not in ("brilliant_studio", "prism_edge")
     assert result.stats.light.tally.emitted > 0.0 or not throws
     assert (result.stats.light.tally.ended["deposited"] > 0.0) == throws
-    # Beams are counted at three places of each band, and so few of them a band are wide. A band that is not cut, though
-    # its anchor alone is totally reflected, loses what its ends would let through.
-    assert result.stats.light.tally.imbalance < (1e-3 if result.stats.beams is None else 0.04)
+    # Beams are counted at three places of each band, and so few of them a band are wide.
+    assert result.stats.light.tally.imbalance < (1e-4 if result.stats.beams is None else 0.04)
     assert result.stats.light.tally.ended["lost_numeric"] <= 2e-4 * result.stats.light.tally.emitted
     assert result.stats.light.tally.fallbacks["queue_overflow"] == 0
     assert np.isfinite(result.rgb).all()
@@ -101,8 +100,9 @@ def test_a_bubble_in_a_flint_block_neither_breeds_rays_nor_loses_them(gl, tmp_pa
     assert tally.fallbacks["band_cut"] > 100
     assert tally.fallbacks["queue_overflow"] == 0
     assert tally.ended["lost_numeric"] < 1e-4 * tally.emitted
-    # Bands that may not be cut (halves of halves) lose what their ends would let through where the anchor lets nothing.
-    assert tally.imbalance < 0.08
+    # Where a band may not be cut (its start would move too far) and its anchor is totally reflected, the part that
+    # passes goes on with an anchor of its own. Without it 5.4 % of the light vanished here.
+    assert tally.imbalance < 1e-4
 
 
 @pytest.mark.parametrize("shape", ["prism", pytest.param("sphere", marks=pytest.mark.slow)])
