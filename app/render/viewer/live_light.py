@@ -20,6 +20,7 @@ from ..map_fit import PREVIEW_FINENESS, MapFit
 from ..solo import solo, solo_scene
 from ..splatting import Pace
 from .invalidation import shown_glasses
+from .moved_light import MovedLight
 from .photon_store import PhotonStore
 from .spectrum_guess import SpectrumGuess
 from .stored_passes import StoredPass, StoredPasses
@@ -78,6 +79,7 @@ class LiveLight:
         self.judged_view: object = None
         """The view for which `refit` last looked whether the maps fit."""
         self._preview: LightMaps | None = None
+        self._moved: MovedLight | None = None
         self._guess: SpectrumGuess | None = None
         self.is_coarse = True
         """The maps are those of a first preview: `fit_to` makes proper ones."""
@@ -90,7 +92,10 @@ class LiveLight:
     def caustic_maps(self, maps: LightMaps) -> CausticMaps:
         """`maps`, this light's, as the camera reads them: what was splatted in colour only gets a likely spectrum."""
         textures = maps.resolved_textures()
-        if maps is self._preview and self.light_pass.features.map_tents:
+        if maps is not self.light_pass.maps and self.light_pass.features.map_tents:
+            if self._guess is not None and self._guess.textures[0].size != maps.atlas.size:
+                self._guess.release()
+                self._guess = None
             if self._guess is None:
                 channels, lights = self.light_pass.map_channels, self.light_pass.scene.lights
                 self._guess = SpectrumGuess(self._context.ctx, channels, lights, maps.atlas.size)
@@ -158,6 +163,15 @@ class LiveLight:
     def fit_of(inputs: LiveInputs) -> MapFit:
         """Proper maps for what `inputs` shows."""
         return MapFit(inputs.camera, inputs.width, inputs.height, LIVE, avoids_powers_of_two=True)
+
+    def move(self, scene: Scene) -> LightMaps | None:
+        """A few photons through `scene`, in which the same things stand elsewhere: buffers are moved there, and what is
+        stored or accumulated no longer belongs to them. None, and nothing done, where buffers cannot be moved."""
+        if scene is not self.buffers.scene and not self.buffers.move(scene):
+            return None
+        if self._moved is None:
+            self._moved = MovedLight(self._context, self.light_pass, self._preview_features)
+        return self._moved.follow(scene)
 
     # ---- stored photons ----------------------------------------------------------------------
 
@@ -297,6 +311,6 @@ class LiveLight:
     def release(self) -> None:
         """Free everything, the stored photons and the scene's buffers too."""
         self._samples.clear()
-        for owned in (self._preview, self._guess, self.environment, self.light_pass, self.buffers):
+        for owned in (self._moved, self._preview, self._guess, self.environment, self.light_pass, self.buffers):
             if owned is not None:
                 owned.release()
