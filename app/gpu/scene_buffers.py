@@ -21,6 +21,7 @@ from ..model.features import (
     half_spaces,
 )
 from ..model.geometry.bvh import Bvh, build_bvh
+from ..model.geometry.mesh import Mesh
 from ..model.optics.colorimetry import VISIBLE_NM, mirror_reflectance
 from ..model.optics.glass import Dispersion
 from ..model.optics.spectral_tables import (
@@ -191,19 +192,21 @@ class SceneBuffers:
         self.scene = scene
         self.features = features
         self.axis = axis
-        self.space = GpuSpace.of(scene) if like is None else like.space
+        self.space: GpuSpace = GpuSpace.of(scene) if like is None else like.space
         self.groups = Groups.of(scene, features)
         self.receivers = [i for i, o in enumerate(scene.objects) if o.material.receives]
         self.traced_glasses = [o.material.dispersion for o in scene.objects]
         """Each object's glass as the records number it, whatever `scene` is replaced by to be shown."""
         self.first_triangle = np.cumsum([0] + [len(o.mesh.triangles) for o in scene.objects])
-        self.world_meshes = [
+        self.world_meshes: list[Mesh] = [
             like.world_meshes[i]
             if like is not None and like.scene.objects[i].object_to_world is o.object_to_world
             else o.mesh.transformed(o.object_to_world)
             for i, o in enumerate(scene.objects)
         ]
-        self.corner_turn = np.tile(np.arange(3), (self.first_triangle[-1], 1)) if like is None else like.corner_turn
+        self.corner_turn: np.ndarray = (
+            np.tile(np.arange(3), (self.first_triangle[-1], 1)) if like is None else like.corner_turn
+        )
         """int (T, 3): which of its own corners each triangle's first, second and third are on the GPU; T counts all
         objects' triangles."""
         self._tree: Bvh | None = None
@@ -420,7 +423,7 @@ class SceneBuffers:
         """Orders of the grating that has most."""
         # bit -> (medium, weight row) for the medium stack.
         by_bit = {bit: index for index, bit in stack_bits.items()}
-        self.stack_objects = [by_bit[bit] for bit in range(len(by_bit))]
+        self.stack_objects: list[int] = [by_bit[bit] for bit in range(len(by_bit))]
 
         index_rows = index_table(self.axis, media, SAMPLES) if media else np.ones((0, SAMPLES))
         variables = self.groups.variables(self.axis)
