@@ -147,6 +147,8 @@ class LightPass:
         """Standard deviation of a footprint in lattice spacings; where passes shrink it, of the first one's."""
         self._sample_pilots: dict[int, Pilot] = {}
         """Where nothing else asks for them."""
+        self.widening = 1.0
+        """Footprints of what is traced are so many times wider still, in pictures on the way to a better one."""
         self.maps: LightMaps | None = None
         self.before_maps: Callable[[MapLayout], None] = lambda layout: None
         """Asked before maps are made, which take the most memory; may refuse them."""
@@ -594,7 +596,9 @@ class LightPass:
             self._records.keep(self.trace.photons, batch, self.trace.photon.stride, of)
         yield
         yield from self.splat_steps(
-            self.trace.photons, batch.photons, shrinking.kernel_scale(of.number) if self._shrinks else 1.0
+            self.trace.photons,
+            batch.photons,
+            self.widening * (shrinking.kernel_scale(of.number) if self._shrinks else 1.0),
         )
         self.stats.photons += 0 if of_tails else batch.emitted_photons
         self.stats.splats += batch.photons

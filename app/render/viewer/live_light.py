@@ -24,6 +24,7 @@ from .moved_light import MovedLight
 from .photon_store import PhotonStore
 from .spectrum_guess import SpectrumGuess
 from .stored_passes import StoredPass, StoredPasses
+from .widening import needs_widening, widening
 
 if TYPE_CHECKING:
     from ...edit.live_inputs import LiveInputs
@@ -76,6 +77,9 @@ class LiveLight:
         """Light goes as beams while nothing is painted."""
         self.beam_seconds = 0.0
         """What beams took in the last preview."""
+        self.finest = 0
+        """Photons of the finest pass that there will be; 0: the one that there is."""
+        self._widens = needs_widening(scene)
         self.judged_view: object = None
         """The view for which `refit` last looked whether the maps fit."""
         self._preview: LightMaps | None = None
@@ -171,7 +175,11 @@ class LiveLight:
             return None
         if self._moved is None:
             self._moved = MovedLight(self._context, self.light_pass, self._preview_features)
-        return self._moved.follow(scene)
+        return self._moved.follow(scene, self.widening(self._moved.photons))
+
+    def widening(self, photons: float) -> float:
+        """Of footprints in pictures by so few photons."""
+        return widening(photons, self.finest) if self._widens else 1.0
 
     # ---- stored photons ----------------------------------------------------------------------
 
@@ -205,6 +213,7 @@ class LiveLight:
             share = 1.0
         for slab in store.of_rounds(0, store.rounds):
             coarsening = 1.0 if of_running else share**-0.5
+            coarsening *= self.widening(kept.pass_photons * (1.0 if of_running else share))
             yield from self.light_pass.splat_steps(slab.buffer, slab.count, coarsening, kept.tables.full)
             yield
         yield from self.light_pass.beam_steps_again(kept.pass_photons * share)
@@ -240,9 +249,10 @@ class LiveLight:
         # Records follow a space-filling curve over the lattice: every so manieth is nearly a lattice again.
         stride = max(1, sum(slab.count for slab in slabs) // photons)
         share = rounds / kept.store.rounds_of_pass / stride
+        wider = share**-0.5 * self.widening(kept.pass_photons * share)
         for slab in slabs:
             for _ in self.light_pass.splat_steps(
-                slab.buffer, -(-slab.count // stride), share**-0.5, kept.tables.preview, maps, stride
+                slab.buffer, -(-slab.count // stride), wider, kept.tables.preview, maps, stride
             ):
                 pass
         maps.photon_weight = kept.pass_photons * share

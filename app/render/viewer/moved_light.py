@@ -45,8 +45,8 @@ class MovedLight:
         self._store = PhotonStore(context.ctx, _BYTES)
         self.maps: LightMaps | None = None
 
-    def follow(self, scene: Scene) -> LightMaps:
-        """Photons through `scene`, in maps that are fitted to where they land."""
+    def follow(self, scene: Scene, widening: float = 1.0) -> LightMaps:
+        """Photons through `scene`, in maps that are fitted to where they land, with footprints so much wider."""
         light_pass, photons, started = self._light_pass, self.photons, time.perf_counter()
         plans = self._plans_for(scene)
         self._store.clear()
@@ -61,7 +61,7 @@ class MovedLight:
         self.maps.clear()
         assert self._tables is not None
         for slab in slabs:
-            for _ in light_pass.splat_steps(slab.buffer, slab.count, 1.0, self._tables.preview, self.maps):
+            for _ in light_pass.splat_steps(slab.buffer, slab.count, widening, self._tables.preview, self.maps):
                 pass
         self.maps.photon_weight = float(photons)
         took = time.perf_counter() - started
