@@ -92,6 +92,8 @@ class FirstSurfaces:
 
     def _release_target(self) -> None:
         if self._target is not None:
+            # moderngl binds again what was bound, whenever it makes a framebuffer: that must still be there.
+            self._ctx.detect_framebuffer(0).use()
             depth = self._target.depth_attachment
             for owned in (self._target, depth, self.texture):
                 if owned is not None:

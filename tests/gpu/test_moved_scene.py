@@ -14,6 +14,8 @@ from spectrasplat.gpu.context import Context
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.scene import Dielectric, Scene
 from spectrasplat.model.settings import RenderSettings
+from spectrasplat.passes.camera_records import camera_parameters
+from spectrasplat.passes.first_surfaces import FirstSurfaces
 from spectrasplat.passes.pick import Picker
 from spectrasplat.render.light_pass import scene_buffers
 from spectrasplat.render.viewer.engine import Budget, LiveEngine
@@ -177,3 +179,19 @@ def test_what_else_changes_is_no_move() -> None:
     assert not only_moves(inputs(scene), replace(inputs(scene), method="srd-photons"))
     brighter = replace(scene, background_rgb=(0.5, 0.5, 0.5))
     assert not only_moves(inputs(scene), inputs(brighter))
+
+
+def test_surfaces_of_another_size_leave_no_error(gl: Context) -> None:
+    scene = shipped("prism")
+    buffers = scene_buffers(gl, scene, SETTINGS)
+    surfaces = FirstSurfaces(gl.ctx, buffers)
+    try:
+        for size in ((60, 34), (120, 68), (60, 34)):
+            surfaces.run(camera_parameters(buffers, scene.camera, *size))
+            assert surfaces.texture is not None and surfaces.texture.size == size
+            gl.check("drawing surfaces")
+    finally:
+        surfaces.release()
+        buffers.release()
+    gl.ctx.framebuffer([gl.ctx.texture((4, 4), 4)]).release()
+    gl.check("making a framebuffer after it")
