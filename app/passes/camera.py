@@ -128,9 +128,7 @@ class CameraPass:
         self._tables = CameraTables.build(self._ctx, scene, self.channels, reflectances, maps)
         self._owns_pictures = pictures is None
         self.pictures = pictures or TextureStore(self._ctx, scene.scene, scene.first_triangle, scene.corner_turn)
-        lights = CAMERA_LIGHT.zeros(len(scene.scene.lights) + 1)
-        for i, light in enumerate(scene.scene.lights):
-            lights[i] = light_record(light, scene)
+        lights = self._light_records()
         self._lights = self._ctx.buffer(lights.tobytes())
         self._lights_in_storage = lights.nbytes > self._ctx.info["GL_MAX_UNIFORM_BLOCK_SIZE"]
         self._counters = self._ctx.buffer(bytes(4 * len(FALLBACKS)))
@@ -196,6 +194,17 @@ class CameraPass:
             # Else beams may do without them, and they are compiled when paths need them.
             for variant in ("all",) if self._listed is None else ("all", "direct"):
                 self._compiled(variant)
+
+    def _light_records(self) -> np.ndarray:
+        lights = CAMERA_LIGHT.zeros(len(self.scene.scene.lights) + 1)
+        for i, light in enumerate(self.scene.scene.lights):
+            lights[i] = light_record(light, self.scene)
+        return lights
+
+    def move(self, scene: SceneBuffers) -> None:
+        """The same objects and lights stand elsewhere (`SceneBuffers.move`)."""
+        self.scene = scene
+        self._lights.write(self._light_records().tobytes())
 
     def _compiled(self, variant: str) -> moderngl.ComputeShader:
         """One of the camera's programs, compiled when it is first asked for."""
