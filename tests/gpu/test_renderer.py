@@ -79,8 +79,8 @@ def scene_of(tmp_path: Path, shape: str = "prism") -> Scene:
 )
 def test_flux_closes_in_every_shipped_scene(gl, name: str) -> None:
     result = render(load_scene(assets_dir() / "scenes" / f"{name}.toml"), SMALL, context=gl)
-    # The one has no light, the other's lamp throws next to nothing through the glass onto what is there: 2e-6 of it, after
-    # many reflections inside.
+    # The one has no light, the other's lamp throws next to nothing through the glass onto what is there: 2e-6 of it,
+    # after many reflections inside.
     throws = name not in ("brilliant_studio", "prism_edge")
     assert result.stats.light.tally.emitted > 0.0 or not throws
     tally = result.stats.light.tally
