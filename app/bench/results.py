@@ -52,6 +52,19 @@ class BenchSettings(msgspec.Struct, frozen=True):
         return 10.0 * self.seconds if self.horizon is None else self.horizon
 
 
+class AgreementSettings(msgspec.Struct, frozen=True):
+    """What `agreement` compares."""
+
+    width: int = 240
+    height: int = 135
+    photons: int = 250_000
+    """Of each seed's picture."""
+    seeds: int = 6
+    reference_seconds: float = 60.0
+    """Most time spent on each scene's reference; what earlier runs made is used as well."""
+    method: str = "srd"
+
+
 class Sample(msgspec.Struct, frozen=True):
     """One rendering: a method, a photon budget and a seed."""
 

@@ -50,6 +50,8 @@ def camera_line(scene: Scene) -> str:
         lens = f"orthographic, {camera.vertical_extent:.4g} units high"
     else:
         lens = f"pinhole, {camera.vertical_fov_deg:.4g}° vertical field of view"
+    if camera.lens_radius > 0.0:
+        lens += f", lens of radius {camera.lens_radius:.4g} focused at {camera.plane_of_focus:.4g}"
     render = scene.render
     return (
         f"Camera: {lens}, at {_point(camera.position)} towards {_point(camera.target)}; "

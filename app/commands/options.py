@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,6 +18,7 @@ from ..base.errors import UserError, nearest_names, suggestion
 from ..base.memory import MAX_SIDE_PX, memory_bytes
 from ..base.paths import SCENE_SUFFIXES, shipped_scenes
 from ..model.scene import Scene
+from ..model.scene_camera import FOCUS_DISTANCE, LENS_RADIUS
 from ..model.scene_render import MAX_GLARE
 from ..model.settings import CAMERA_METHODS, METHODS
 
@@ -106,6 +108,23 @@ def parse_glare(text: str) -> float:
     if not 0.0 <= value <= MAX_GLARE:
         raise UserError(f"--glare {text} is out of range: give a share of 0 to {MAX_GLARE:g}")
     return value
+
+
+def with_lens(scene: Scene, radius: str | None, distance: str | None) -> Scene:
+    """The scene with another lens on its camera; None: its own."""
+    lens: dict[str, float] = {}
+    for option, text, field in (("--lens-radius", radius, LENS_RADIUS), ("--focus-distance", distance, FOCUS_DISTANCE)):
+        if text is None:
+            continue
+        value = _number(option, text, "a length in the scene's unit, for example 0.05")
+        if not field.holds(value):
+            least = "0 or more" if field is LENS_RADIUS else "more than 0"
+            raise UserError(f"{option} {text} is out of range: give {least} and up to {field.at_most:g}")
+        lens[field.attribute] = value
+    camera = replace(scene.camera, **lens)  # type: ignore[arg-type]
+    if distance is not None and camera.lens_radius == 0.0:
+        raise UserError("--focus-distance changes nothing where the lens has no radius: give --lens-radius as well")
+    return replace(scene, camera=camera)
 
 
 def parse_integer(option: str, text: str, low: int, high: int) -> int:

@@ -185,6 +185,20 @@ def render(
             metavar="SHARE", help="Share of the light that the lens scatters, 0 to 0.5; not of .exr and .npy."
         ),
     ] = None,
+    lens_radius: Annotated[
+        Text,
+        typer.Option(
+            "--lens-radius",
+            metavar="R",
+            help="Half the aperture of the camera's lens, scene units: what is out of focus is blurred.",
+        ),
+    ] = None,
+    focus_distance: Annotated[
+        Text,
+        typer.Option(
+            "--focus-distance", metavar="D", help="From the lens to what is in focus; default: the camera's target."
+        ),
+    ] = None,
     max_depth: Annotated[
         Text, typer.Option("--max-depth", metavar="N", help="Specular events on a light path, at most; default: 64.")
     ] = None,
@@ -236,6 +250,8 @@ def render(
         options.parse_opening(up, glass, environment),
         passes,
         glare,
+        lens_radius,
+        focus_distance,
     )
     raise typer.Exit(render_command(request))
 
@@ -733,6 +749,40 @@ def bench_beams(
     from .bench_beams import bench_beams_command
 
     raise typer.Exit(bench_beams_command(output))
+
+
+@app.command("bench-agreement")
+def bench_agreement(
+    scenes: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[SCENE]...",
+            help="Scenes to compare; default: every shipped one that holds glass.",
+            autocompletion=completion.scenes,
+        ),
+    ] = None,
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder for agreement.json.")] = Path(
+        "bench_agreement"
+    ),
+    photons: Annotated[Text, typer.Option(metavar="N", help="Of each picture; default: 250k.")] = None,
+    seeds: Annotated[Text, typer.Option(metavar="N", help="Pictures, at least 2; default: 6.")] = None,
+    size: Annotated[Text, typer.Option(metavar="WxH", help="Pixels; default: 240x135.")] = None,
+    reference_seconds: Annotated[
+        Text,
+        typer.Option(
+            "--reference-seconds", metavar="S", help="Time added to each scene's cached reference; default: 60."
+        ),
+    ] = None,
+    method: Annotated[
+        Text, typer.Option(metavar="NAME", autocompletion=completion.methods, help="Default: srd.")
+    ] = None,
+    allow_outside: AllowOutside = False,
+) -> None:
+    """Compare a method's caustics with the float64 reference by standard scores, by pixels and in 8x8 blocks."""
+    from .bench_agreement import AgreementRequest, bench_agreement_command
+
+    request = AgreementRequest(tuple(scenes or ()), output, photons, seeds, size, reference_seconds, method)
+    raise typer.Exit(bench_agreement_command(request))
 
 
 @app.command("bench-view")

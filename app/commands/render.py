@@ -48,6 +48,8 @@ class RenderRequest:
     opening: Opening | None = None
     passes: str | None = None
     glare: str | None = None
+    lens_radius: str | None = None
+    focus_distance: str | None = None
 
 
 def render_command(request: RenderRequest) -> int:
@@ -69,6 +71,7 @@ def render_command(request: RenderRequest) -> int:
     check_writable(request.output)
 
     scene = options.open_scene(request.scene, request.opening)
+    scene = options.with_lens(scene, request.lens_radius, request.focus_distance)
     settings = complete_settings(asked, scene, request.stats)
     # Before the work: who waits for minutes should know what was assumed, and also if it fails.
     for note in (*scene.notes, *_unused_options(request)):

@@ -152,6 +152,12 @@ def frame(camera: Camera, low: Vec3 | np.ndarray, high: Vec3 | np.ndarray, aspec
     return replace(camera, position=vec3(centre - distance * view.forward), target=vec3(centre))
 
 
+def focus_at(camera: Camera, point: Vec3 | np.ndarray) -> Camera:
+    """The lens focused on the plane through a point; where that lies behind it, as it was."""
+    depth = float(camera_frame(camera)[2] @ np.subtract(point, camera.position))
+    return replace(camera, focus_distance=depth) if depth > 0.0 else camera
+
+
 def look_along(camera: Camera, direction: Vec3 | np.ndarray) -> Camera:
     """Round the target, to look along a world `direction`; along `up` itself as steeply as orbiting allows."""
     axis = np.asarray(camera.up, float) / np.linalg.norm(camera.up)

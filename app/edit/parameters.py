@@ -67,6 +67,8 @@ _ORBIT = {
     "distance": Parameter("Distance from the camera to its target", "units", 1e-6, _FAR, 1),
     "fov_deg": Parameter("Vertical field of view", "°", 0.01, 179.0),
     "extent": Parameter("Height of the picture of an orthographic camera", "units", 1e-9, _FAR),
+    "lens_radius": Parameter("Half the aperture of the camera's lens; 0: all is in focus", "units", 0.0, 1e6),
+    "focus_distance": Parameter("Distance from the lens to the plane of focus", "units", 1e-6, 1e9),
 }
 _PLACE = {f"position.{axis}": Parameter(f"Position along {axis}", "units", -_FAR, _FAR) for axis in _AXES}
 _TARGET = {f"target.{axis}": Parameter(f"Point looked at, along {axis}", "units", -_FAR, _FAR) for axis in _AXES}
@@ -186,6 +188,10 @@ def _camera_value(camera: Camera, name: str) -> float:
             return camera.vertical_fov_deg
         case ["extent"]:
             return camera.vertical_extent
+        case ["lens_radius"]:
+            return camera.lens_radius
+        case ["focus_distance"]:
+            return camera.plane_of_focus
     return 0.0
 
 
@@ -197,6 +203,10 @@ def _with_camera(camera: Camera, name: str, value: float) -> Camera:
             return replace(camera, vertical_fov_deg=value)
         case ["extent"]:
             return replace(camera, vertical_extent=value)
+        case ["lens_radius"]:
+            return replace(camera, lens_radius=value)
+        case ["focus_distance"]:
+            return replace(camera, focus_distance=value)
     target, arm = np.asarray(camera.target), np.subtract(camera.position, camera.target)
     up = np.asarray(camera.up, float) / np.linalg.norm(camera.up)
     if name == "distance":

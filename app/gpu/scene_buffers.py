@@ -20,7 +20,8 @@ from ..model.features import (
     dispersive_materials,
     half_spaces,
 )
-from ..model.geometry.bvh import build_bvh
+from ..model.geometry.bvh import Bvh, build_bvh
+from ..model.geometry.mesh import Mesh
 from ..model.optics.colorimetry import VISIBLE_NM, mirror_reflectance
 from ..model.optics.glass import Dispersion
 from ..model.optics.spectral_tables import (
@@ -177,26 +178,43 @@ class SpectraLayout:
 class SceneBuffers:
     """Owns the scene's textures and storage buffers; `bind()` before every dispatch that reads them."""
 
-    def __init__(self, ctx: moderngl.Context, scene: Scene, features: Features, axis: SpectralAxis) -> None:
+    def __init__(
+        self,
+        ctx: moderngl.Context,
+        scene: Scene,
+        features: Features,
+        axis: SpectralAxis,
+        like: SceneBuffers | None = None,
+    ) -> None:
+        """`like`: of a scene whose objects only stood elsewhere: GPU space, corners' turns, the tree's shape and what
+        nests in what are taken from there."""
         self.ctx = ctx
         self.scene = scene
         self.features = features
         self.axis = axis
-        self.space = GpuSpace.of(scene)
+        self.space: GpuSpace = GpuSpace.of(scene) if like is None else like.space
         self.groups = Groups.of(scene, features)
         self.receivers = [i for i, o in enumerate(scene.objects) if o.material.receives]
         self.traced_glasses = [o.material.dispersion for o in scene.objects]
         """Each object's glass as the records number it, whatever `scene` is replaced by to be shown."""
         self.first_triangle = np.cumsum([0] + [len(o.mesh.triangles) for o in scene.objects])
-        self.world_meshes = [o.mesh.transformed(o.object_to_world) for o in scene.objects]
-        self.corner_turn = np.tile(np.arange(3), (self.first_triangle[-1], 1))
+        self.world_meshes: list[Mesh] = [
+            like.world_meshes[i]
+            if like is not None and like.scene.objects[i].object_to_world is o.object_to_world
+            else o.mesh.transformed(o.object_to_world)
+            for i, o in enumerate(scene.objects)
+        ]
+        self.corner_turn: np.ndarray = (
+            np.tile(np.arange(3), (self.first_triangle[-1], 1)) if like is None else like.corner_turn
+        )
         """int (T, 3): which of its own corners each triangle's first, second and third are on the GPU; T counts all
         objects' triangles."""
+        self._tree: Bvh | None = None
         self._buffers: dict[int, moderngl.Buffer] = {}
         self._sections: dict[str, np.ndarray] = {}
         self.defines: dict[str, int | str] = {**bindings.SCENE_DEFINES, "SPECTRAL_SAMPLES": SAMPLES}
-        self._pack_geometry()
-        self._pack_objects()
+        self._pack_geometry(like)
+        self._pack_objects(like)
         self._pack_profiles()
         self.texels = SceneTexels(ctx, self._sections)
         self._sections.clear()
@@ -270,7 +288,19 @@ class SceneBuffers:
         """Where the light's intensity table begins among the profiles; 0 without one."""
         return 0 if light.profile is None else self._profile_start[light.profile]
 
-    def _pack_geometry(self) -> None:
+    def move(self, scene: Scene) -> bool:
+        """Take over `scene`, in which other objects stand elsewhere and nothing else differs that buffers hold, in the
+        GPU space that there is. False, and nothing done, where programs made for these buffers do not fit it."""
+        moved = SceneBuffers(self.ctx, scene, self.features, self.axis, self)
+        if moved.defines != self.defines:
+            moved.release()
+            return False
+        self.release()
+        self.__dict__.pop("primitives", None)
+        self.__dict__.update(moved.__dict__)
+        return True
+
+    def _pack_geometry(self, like: SceneBuffers | None) -> None:
         corners, owner, source = [], [], []
         normals: list[np.ndarray] = []
         solids: list[tuple[int, int, int, int]] = []
@@ -279,7 +309,7 @@ class SceneBuffers:
             mesh = self.world_meshes[index]
             untransformed = half_spaces(item)
             if untransformed is not None:
-                own = mesh.convex_planes
+                own = mesh.convex_planes if like is None else None
                 if own is None:  # a transform may push a borderline solid over the tolerance
                     own = _transformed_planes(untransformed, item.object_to_world)
                 solids.append((sum(len(p) for p in planes), len(own), index, 0))
@@ -297,7 +327,7 @@ class SceneBuffers:
             record["first_plane"], record["plane_count"], record["object"], _ = values
         self.solid_count = len(solids)
         self._solids, self._triangle_order = solids, np.zeros(0, int)
-        all_planes = np.concatenate(planes).astype("f4") if planes else np.zeros((0, 4), "f4")
+        all_planes = np.ascontiguousarray(np.concatenate(planes), "f4") if planes else np.zeros((0, 4), "f4")
         self.defines["PLANE_COUNT"] = len(all_planes)
         self._in_storage = max(all_planes.nbytes, solid_records.nbytes) > self.ctx.info["GL_MAX_UNIFORM_BLOCK_SIZE"]
         if self._in_storage:
@@ -314,12 +344,16 @@ class SceneBuffers:
             self.defines |= {"TRIANGLE_COUNT": 0, "SOLID_COUNT": self.solid_count}
             return
         all_corners = np.concatenate(corners).astype("f4")
-        turned = _best_corner_first(all_corners)
-        self.corner_turn[np.concatenate(source)] = turned[..., 0]
+        if like is None:
+            turned = _best_corner_first(all_corners)
+            self.corner_turn[np.concatenate(source)] = turned[..., 0]
+        else:
+            turned = self.corner_turn[np.concatenate(source)][..., None]
         all_corners = np.take_along_axis(all_corners, turned, axis=1)
         order = np.arange(len(all_corners))
         if self.features.tree:
-            bvh = build_bvh(all_corners)
+            before = None if like is None else like._tree
+            bvh = self._tree = build_bvh(all_corners) if before is None else before.refitted(all_corners)
             order = bvh.order
             self._sections["TREE"] = tree_texels(bvh.nodes)
             self.defines |= {"TREE_STACK": max(bvh.depth, 1)}
@@ -340,13 +374,17 @@ class SceneBuffers:
         self._sections |= {"TRIANGLES": records, "NORMALS": packed}
         self.defines |= {"TRIANGLE_COUNT": self.triangle_count, "SOLID_COUNT": self.solid_count}
 
-    def _pack_objects(self) -> None:
+    def _pack_objects(self, like: SceneBuffers | None) -> None:
         media: list[Dispersion] = []
         weights: list[np.ndarray] = []
         gratings: list[np.ndarray] = []
         x = np.linspace(0.0, 1.0, SAMPLES)
         nm = self.axis.nm_of_samples(SAMPLES)
-        stack_bits = _stack_bits(self.scene) if self.features.medium_stack else {}
+        stack_bits: dict[int, int] = {}
+        if like is not None:
+            stack_bits = {index: bit for bit, index in enumerate(like.stack_objects)}
+        elif self.features.medium_stack:
+            stack_bits = _stack_bits(self.scene)
         records = OBJECT.zeros(len(self.scene.objects))
         for name in ("medium", "weight_row", "stack_bit", "receiver", "group", "texture"):
             records[name] = NONE
@@ -385,7 +423,7 @@ class SceneBuffers:
         """Orders of the grating that has most."""
         # bit -> (medium, weight row) for the medium stack.
         by_bit = {bit: index for index, bit in stack_bits.items()}
-        self.stack_objects = [by_bit[bit] for bit in range(len(by_bit))]
+        self.stack_objects: list[int] = [by_bit[bit] for bit in range(len(by_bit))]
 
         index_rows = index_table(self.axis, media, SAMPLES) if media else np.ones((0, SAMPLES))
         variables = self.groups.variables(self.axis)

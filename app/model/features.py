@@ -104,6 +104,8 @@ class Features:
     """Random wavelengths are drawn by radiant power instead of brightness: for maps of spectral bins."""
     environment_lights: bool = False
     """What lies beyond everything lights receivers: camera rays look up how much."""
+    lens: bool = False
+    """The camera has a lens: its rays begin all over it, and carry columns of the place there."""
     hero: bool = False
     """Three more wavelengths share the path of the one that is followed, as long as it is theirs too."""
 
@@ -199,6 +201,7 @@ class Features:
             light_profiles=any(light.profile is not None for light in scene.lights),
             draws_by_power=random and settings.bins is not None,
             environment_lights=why_no_environment_light(scene) is None and settings.layer == "beauty",
+            lens=scene.camera.lens_radius > 0.0,
             hero=settings.method == "hero",
         )
 
@@ -267,6 +270,8 @@ def why_no_camera_beams(scene: Scene, settings: RenderSettings) -> str | None:
         return "no glass and no mirror is in view"
     if settings.bins:
         return "the picture is in bins"
+    if scene.camera.lens_radius > 0.0:
+        return "the camera has a lens"
     aspect = settings.width / settings.height
     if not any(settings.any_view or in_view(scene.objects[i], scene.camera, aspect) for i in beam_objects(scene)):
         return "no flat-faceted glass or mirror is in view"
@@ -295,18 +300,14 @@ def in_view(item: SceneObject, camera: Camera, aspect: float) -> bool:
         camera.position
     )
     x, y, depth = corners @ right, corners @ up, corners @ forward
+    # A lens sees by as much more as a point there is out of focus.
+    beside = camera.lens_radius * np.abs(1.0 - depth / camera.plane_of_focus)
     if camera.kind == "orthographic":
-        half = 0.5 * camera.vertical_extent
-        outside = [x > half * aspect, x < -half * aspect, y > half, y < -half, depth < 0.0]
+        half = 0.5 * camera.vertical_extent * np.ones_like(depth)
     else:
-        half = np.tan(np.radians(0.5 * camera.vertical_fov_deg))
-        outside = [
-            x > half * aspect * depth,
-            x < -half * aspect * depth,
-            y > half * depth,
-            y < -half * depth,
-            depth < 0.0,
-        ]
+        half = np.tan(np.radians(0.5 * camera.vertical_fov_deg)) * depth
+    across, up_to = aspect * half + beside, half + beside
+    outside = [x > across, x < -across, y > up_to, y < -up_to, depth < 0.0]
     return not any(side.all() for side in outside)
 
 
@@ -478,6 +479,15 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
             else "no caustic is seen through dispersive glass",
         ),
         ("spectral bins", features.targets > 1, _target_words(features)),
+        (
+            "lens",
+            features.lens,
+            f"radius {scene.camera.lens_radius:.4g}, focused at {scene.camera.plane_of_focus:.4g}"
+            if features.lens
+            else "the camera is a pinhole"
+            if scene.camera.kind == "pinhole"
+            else "the camera has no lens",
+        ),
         ("textures", bool(worn), f"on {names(worn)}" if worn else "no surface wears a picture"),
         (
             "environment map",

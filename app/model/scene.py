@@ -7,6 +7,7 @@ packs it. Lengths are in the scene's own unit, angles in names say their unit.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -38,7 +39,8 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Camera:
-    """Pinhole or orthographic camera; rows of the picture run along `up`."""
+    """Pinhole or orthographic camera, with a thin lens where `lens_radius` is not 0; rows of the picture run along
+    `up`."""
 
     position: Vec3
     target: Vec3
@@ -47,6 +49,15 @@ class Camera:
     vertical_fov_deg: float = 35.0
     vertical_extent: float = 1.0
     """Height of the picture in scene units (orthographic only)."""
+    lens_radius: float = 0.0
+    """Half the lens's aperture, scene units; 0: no lens, all is in focus."""
+    focus_distance: float | None = None
+    """Of the plane of focus from the lens, along the view, scene units; None: the target is in focus."""
+
+    @property
+    def plane_of_focus(self) -> float:
+        """`focus_distance`, or what stands for it."""
+        return math.dist(self.position, self.target) if self.focus_distance is None else self.focus_distance
 
 
 @dataclass(frozen=True)

@@ -12,20 +12,23 @@ from .placement import Surroundings
 from .scene import Camera
 
 _PLACE = (Vector("position"), Vector("target", None), Vector("up", (0.0, 0.0, 1.0), nonzero=True))
-_LENS = {
+_VIEW = {
     "pinhole": Number("vertical_fov_deg", 35.0, above=0.0, below=180.0),
     "orthographic": Number("vertical_extent", None, above=0.0),
 }
+LENS_RADIUS = Number("lens_radius", 0.0, at_least=0.0, at_most=1e6, optional=True)
+FOCUS_DISTANCE = Number("focus_distance", None, above=0.0, at_most=1e9)
+LENS = (LENS_RADIUS, FOCUS_DISTANCE)
 
 
 def read_camera(table: SceneTable, around: Surroundings) -> Camera:
     """A [camera] table; what it leaves out is fitted to `around`."""
-    kind = table.choice("kind", tuple(_LENS), "pinhole")
+    kind = table.choice("kind", tuple(_VIEW), "pinhole")
     x, y, z = (float(v) for v in around.centre)
     fitted: dict[str, Any] = {"target": (x, y, z)}
     if kind == "orthographic":
         fitted["vertical_extent"] = 4.0 * around.radius
-    given = read_fields((*_PLACE, _LENS[kind]), table)
+    given = read_fields((*_PLACE, _VIEW[kind], *LENS), table)
     camera = Camera(kind=kind, **fitted | {k: v for k, v in given.items() if v is not None})  # type: ignore[arg-type]
     up, forward = camera.up, np.subtract(camera.target, camera.position)
     if np.linalg.norm(forward) < 1e-150:
@@ -39,4 +42,4 @@ def read_camera(table: SceneTable, around: Surroundings) -> Camera:
 
 def camera_values(camera: Camera) -> dict[str, Any]:
     """The [camera] table of a scene file."""
-    return {"kind": camera.kind} | write_fields((*_PLACE, _LENS[camera.kind]), camera)
+    return {"kind": camera.kind} | write_fields((*_PLACE, _VIEW[camera.kind], *LENS), camera)

@@ -18,7 +18,11 @@ def scene_key(scene: Scene, *more: object) -> str:
     """
     key = ContentKey()
     key.add("scene", *more)
-    key.add("camera", *astuple(scene.camera))
+    camera = astuple(scene.camera)
+    # Without a lens there is no plane of focus.
+    key.add(
+        "camera", *(camera if scene.camera.lens_radius > 0.0 else camera[: -len(("lens_radius", "focus_distance"))])
+    )
     for light in scene.lights:
         spectrum = light.spectral_power
         fields = {name: value for name, value in vars(light).items() if name not in ("name", "spectral_power")}

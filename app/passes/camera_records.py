@@ -73,7 +73,8 @@ CAMERA_PARAMETERS = Struct(
         Field("survey_at", "uint", "where the survey's pixels begin, words of the list"),
         Field("survey_gain", "float", "share of a survey that one of its samples is"),
         Field("cells", "vec2", "columns and rows of a pixel's cells, one for each of a launch's looks; 0: none"),
-        Field("reserved", "vec2"),
+        Field("lens_radius", "float", "GPU units"),
+        Field("focus_distance", "float", "of the plane of focus, along `forward`, GPU units"),
     ),
 )
 
@@ -116,6 +117,8 @@ def camera_parameters(scene: SceneBuffers, camera: Camera, width: int, height: i
     parameters["forward"] = forward
     parameters["half_right"] = right * half_height * width / height
     parameters["half_up"] = up * half_height
+    parameters["lens_radius"] = camera.lens_radius * space.scale
+    parameters["focus_distance"] = camera.plane_of_focus * space.scale
     for name, row in zip(("red_of_xyz", "green_of_xyz", "blue_of_xyz"), xyz_to_rgb709_matrix(), strict=True):
         parameters[name][0, :3] = row
     parameters["size"] = width, height

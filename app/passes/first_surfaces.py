@@ -27,14 +27,7 @@ class FirstSurfaces:
             {"BIND_PARAMETERS": bindings.PARAMETERS},
             (CAMERA_PARAMETERS,),
         )
-        counts = [len(mesh.triangles) for mesh in scene.world_meshes]
-        corners = np.zeros(3 * sum(counts), _CORNER)
-        if counts:
-            places = [scene.space.to_gpu(mesh.corners()).reshape(-1, 3) for mesh in scene.world_meshes]
-            corners["position"] = np.concatenate(places)
-            corners["object"] = np.repeat(np.arange(len(counts)), 3 * np.array(counts))
-            self._bounds = np.concatenate([np.stack([p.min(axis=0), p.max(axis=0)]) for p in places if len(p)])
-        corners["primitive"] = np.repeat(scene.primitives, 3)
+        corners = self._corners_of(scene)
         self._corners = ctx.buffer(corners.tobytes()) if len(corners) else None
         self._draw = (
             ctx.vertex_array(self._program, [(self._corners, "3f 1u 1u", "position", "primitive", "object")])
@@ -43,6 +36,22 @@ class FirstSurfaces:
         )
         self._target: moderngl.Framebuffer | None = None
         self.texture: moderngl.Texture | None = None
+
+    def _corners_of(self, scene: SceneBuffers) -> np.ndarray:
+        counts = [len(mesh.triangles) for mesh in scene.world_meshes]
+        corners = np.zeros(3 * sum(counts), _CORNER)
+        if counts:
+            places = [scene.space.to_gpu(mesh.corners()).reshape(-1, 3) for mesh in scene.world_meshes]
+            corners["position"] = np.concatenate(places)
+            corners["object"] = np.repeat(np.arange(len(counts)), 3 * np.array(counts))
+            self._bounds = np.concatenate([np.stack([p.min(axis=0), p.max(axis=0)]) for p in places if len(p)])
+        corners["primitive"] = np.repeat(scene.primitives, 3)
+        return corners
+
+    def move(self, scene: SceneBuffers) -> None:
+        """The same objects stand elsewhere."""
+        if self._corners is not None:
+            self._corners.write(self._corners_of(scene).tobytes())
 
     def run(self, parameters: np.ndarray) -> moderngl.Texture:
         """Draw what the camera of `parameters` (CAMERA_PARAMETERS, bound already) sees, in a picture of its size."""
@@ -83,6 +92,8 @@ class FirstSurfaces:
 
     def _release_target(self) -> None:
         if self._target is not None:
+            # moderngl binds again what was bound, whenever it makes a framebuffer: that must still be there.
+            self._ctx.detect_framebuffer(0).use()
             depth = self._target.depth_attachment
             for owned in (self._target, depth, self.texture):
                 if owned is not None:

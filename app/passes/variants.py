@@ -258,6 +258,11 @@ def camera_defines(scene: SceneBuffers, channels: Channels, layer: str, maps: Ma
     return defines | {name: 1 for name, on in switches.items() if on}
 
 
+def lens_defines(shown: Mapping[str, int | float | str]) -> Defines:
+    """For a camera with a lens."""
+    return dict(shown) | {"LENS": 1}
+
+
 def halting_defines(beyond: Mapping[str, int | float | str]) -> Defines:
     """For listed pixels whose samples halt when their loops have run long."""
     return dict(beyond) | {
@@ -270,7 +275,8 @@ def halting_defines(beyond: Mapping[str, int | float | str]) -> Defines:
 
 def halted_bytes(beyond: Mapping[str, int | float | str]) -> int:
     """Room that surely holds one halted sample: its paths, and what it knows besides."""
-    path = 312 + 40 * int(beyond["SPECTRAL_GROUPS"]) + 4 * int(beyond.get("ABSORBERS", 0))
+    columns = int(beyond["SPECTRAL_GROUPS"]) + 2 * int("LENS" in beyond)
+    path = 312 + 40 * columns + 4 * int(beyond.get("ABSORBERS", 0))
     return (STACK + 1) * path + 16 * int(beyond["TARGETS"]) + 64
 
 

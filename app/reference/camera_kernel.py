@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .camera_lights import light_seen, sample_light
-from .camera_rays import camera_ray
+from .camera_rays import lens_ray
 from .camera_scene import beyond, picture_at
 from .compiling import compiled, inlined
 from .environment_draw import draw_direction
@@ -27,6 +27,8 @@ from .photon_scene import BLACK, DIFFUSE
 from .sampling import DIMENSIONS, FIRST_CHOICE, choice, mixed, sobol_next, sobol_start, unit
 from .scattering import AIR, scatter, side_met, transmitted
 
+_LENS = np.uint64(0xD1B54A32D192ED03)
+"""Sets the numbers for the place on the lens apart from those of Fresnel choices."""
 LOST_DEPTH, LOST_NUMERIC = range(2)
 """Places in a tally of paths that were given up: too many events, or nothing met inside a solid."""
 
@@ -168,6 +170,12 @@ def _wavelength(spectra, chance):
 
 
 @inlined
+def _on_lens(noise, number):
+    """The first (0) or second (1) number in [0, 1) for the place on the lens."""
+    return float(mixed(noise + np.uint64(number + 1) * _LENS) >> np.uint64(11)) * 2.0**-53
+
+
+@inlined
 def sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_depth, tally, scratch):
     """Add what a camera ray sees to `scratch.xyz`.
 
@@ -264,8 +272,9 @@ def trace_camera(
             for i in range(first, first + count):
                 if i > first:
                     sobol_next(sequence, i, state)
-                ray = camera_ray(camera, column + unit(state[0] ^ shift[0]), row + unit(state[1] ^ shift[1]))
                 noise = mixed(key ^ mixed(np.uint64(i)))
+                x, y = column + unit(state[0] ^ shift[0]), row + unit(state[1] ^ shift[1])
+                ray = lens_ray(camera, x, y, _on_lens(noise, 0), _on_lens(noise, 1))
                 sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_depth, tally, scratch)
             for c in range(3):
                 sums[row, column, c] += xyz[c]
@@ -287,8 +296,9 @@ def seen_points(scene, camera, start, sequence, count, nm, max_depth, side, poin
     for i in range(count):
         if i > 0:
             sobol_next(sequence, i, state)
-        px, py, pz, dx, dy, dz = camera_ray(camera, unit(state[0]) * camera.width, unit(state[1]) * camera.height)
         noise = mixed(sequence.key ^ mixed(np.uint64(i)))
+        x, y = unit(state[0]) * camera.width, unit(state[1]) * camera.height
+        px, py, pz, dx, dy, dz = lens_ray(camera, x, y, _on_lens(noise, 0), _on_lens(noise, 1))
         last, last_object, within, mask, alone, events, way = -1, -1, False, start.mask, start.alone, 0, 0.0
         while events <= max_depth:
             t, triangle, u, v = nearest(

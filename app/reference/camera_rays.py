@@ -24,6 +24,24 @@ def camera_ray(camera, column, row):
     return ox, oy, oz, dx / length, dy / length, dz / length
 
 
+@inlined
+def lens_ray(camera, column, row, a, b):
+    """`camera_ray` from the place on the thin lens that two numbers in [0, 1) draw: both meet in the plane of focus."""
+    ox, oy, oz, dx, dy, dz = camera_ray(camera, column, row)
+    if camera.lens_radius <= 0.0:
+        return ox, oy, oz, dx, dy, dz
+    radius, angle = camera.lens_radius * math.sqrt(a), 2.0 * math.pi * b
+    x, y = radius * math.cos(angle), radius * math.sin(angle)
+    sx = x * camera.right[0] + y * camera.up[0]
+    sy = x * camera.right[1] + y * camera.up[1]
+    sz = x * camera.right[2] + y * camera.up[2]
+    depth = dx * camera.forward[0] + dy * camera.forward[1] + dz * camera.forward[2]
+    reach = camera.focus_distance / depth
+    dx, dy, dz = reach * dx - sx, reach * dy - sy, reach * dz - sz
+    length = math.sqrt(dx * dx + dy * dy + dz * dz)
+    return ox + sx, oy + sy, oz + sz, dx / length, dy / length, dz / length
+
+
 @compiled
 def project(camera, px, py, pz):
     """(row, column, film area per area across the way to the camera, toward the camera (3), its distance); row −1: not

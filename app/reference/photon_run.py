@@ -93,8 +93,13 @@ class ReferenceRun(PartsRun[ReferencePicture]):
     def __init__(self, scene: Scene, width: int, height: int, max_depth: int = 64, seed: int = 1) -> None:
         """Reads the scene and sends a pilot, which sets where photons start and how many each light has.
 
-        Raises UserError where numba is missing or solids nest beyond reach.
+        Raises UserError where numba is missing, solids nest beyond reach or the camera has a lens.
         """
+        if scene.camera.lens_radius > 0.0:
+            raise UserError(
+                f"the reference of the caustic layer has no lens: set lens_radius of '{scene.name}' to 0, or compare "
+                "the beauty layer"
+            )
         try:
             from . import photon_emission, photon_kernel, photon_scene, sampling
         except ImportError as error:

@@ -101,6 +101,9 @@ class Viewpoint(NamedTuple):
     orthographic: bool
     width: int
     height: int
+    lens_radius: float
+    focus_distance: float
+    """Of the plane of focus, along `forward`."""
 
 
 class Colours(NamedTuple):
@@ -213,6 +216,8 @@ def viewpoint(camera: Camera, width: int, height: int, centre: np.ndarray) -> Vi
         orthographic,
         width,
         height,
+        float(camera.lens_radius),
+        float(camera.plane_of_focus),
     )
 
 

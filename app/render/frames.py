@@ -223,7 +223,8 @@ class FrameRenderer:
             sampling = CameraSampling.of(settings)
             if budget is not None:
                 sampling = replace(sampling, budget=max(budget.samples(), 1))
-            if self._traced.camera_beams is not None:
+            # An animation may open the lens, through which polygons are not seen.
+            if self._traced.camera_beams is not None and stage.camera.lens_radius == 0.0:
                 for _ in self._traced.camera_beams.choosing(*view, sampling.budget, settings.seed):
                     yield self._share(self._light_share)
             for _ in sampling.choosing(camera_pass, *view, maps):

@@ -33,7 +33,7 @@ from ..passes.beam_emission import BeamEmission
 from ..passes.caustic_maps import CausticMaps
 from ..passes.emission_domain import EmissionDomain, emission_domain
 from ..passes.map_atlas import MapAtlas
-from ..passes.map_layout import MapLayout, Window, check_map_receiver, layout_maps, pixel_side
+from ..passes.map_layout import Landings, MapLayout, Window, check_map_receiver, layout_maps, pixel_side
 from ..passes.picture_window import PictureWindow
 from ..passes.pilot import Pilot, landings_of, pilot_steps, split_threshold
 from ..passes.plane_frame import plane_frame
@@ -43,7 +43,7 @@ from . import shrinking
 from .beam_light import BeamLight, BeamStats, MovingBeams, carries_everything
 from .handed_rays import handed_rays
 from .light_maps import LightMaps
-from .light_plan import SMALLEST_BATCH, Division, Planner
+from .light_plan import SMALLEST_BATCH, Division, LightPlan, Planner
 from .map_fit import MapFit
 from .photon_records import NoRecords, PhotonRecords, RoundOf
 from .shown_spectra import ShownSpectra, ShownTables
@@ -145,6 +145,10 @@ class LightPass:
         self._shrinks = features.method == shrinking.METHOD
         self.smoothing = settings.smoothing * (shrinking.FIRST_KERNEL if self._shrinks else 1.0)
         """Standard deviation of a footprint in lattice spacings; where passes shrink it, of the first one's."""
+        self._sample_pilots: dict[int, Pilot] = {}
+        """Where nothing else asks for them."""
+        self.widening = 1.0
+        """Footprints of what is traced are so many times wider still, in pictures on the way to a better one."""
         self.maps: LightMaps | None = None
         self.before_maps: Callable[[MapLayout], None] = lambda layout: None
         """Asked before maps are made, which take the most memory; may refuse them."""
@@ -230,6 +234,10 @@ class LightPass:
             landings = self._beams.landings()
         else:
             landings = landings_of(fit.landings(list(self.pilots.values()), self.buffers.space))
+        return self.layout_about(landings, fit)
+
+    def layout_about(self, landings: dict[int, Landings], fit: MapFit) -> MapLayout:
+        """Where maps fitted to `fit` lie, if light lands so."""
         layout = layout_maps(
             replace(self.scene, camera=fit.view),
             self.buffers,
@@ -370,8 +378,22 @@ class LightPass:
     def sample_steps(self, photons: int, keep: Callable[[moderngl.Buffer, int, int, RoundOf], None]) -> Iterator[None]:
         """Trace about `photons` as if there were no beams and hand them to `keep` (records, how many, bytes of one,
         where they belong); the maps stay as they are."""
-        pilots = self.pilots or (yield from self._pilot_steps())
-        plans = self._planner(pilots).plans(photons, self._texel_size())
+        plans = yield from self.sample_plans(photons)
+        yield from self.throw(plans, photons, keep)
+
+    def sample_plans(self, photons: int) -> Generator[None, None, list[LightPlan]]:
+        """Of `sample_steps`."""
+        self._sample_pilots = self.pilots or self._sample_pilots or (yield from self._pilot_steps())
+        return self._planner(self._sample_pilots).plans(photons, self._texel_size())
+
+    def throw(
+        self,
+        plans: Sequence[LightPlan],
+        photons: int,
+        keep: Callable[[moderngl.Buffer, int, int, RoundOf], None],
+        max_depth: int | None = None,
+    ) -> Iterator[None]:
+        """Trace about `photons` by `plans`, as `sample_steps` does."""
         counts = [plan.lattice_count(photons) for plan in plans]
         rounds = max(
             (-(-n // (self.trace.batch // plan.lattices)) for n, plan in zip(counts, plans, strict=True)), default=0
@@ -381,7 +403,7 @@ class LightPass:
                 points = len(range(j, lattice, rounds))
                 if points:
                     part = plan.slice(self.settings.seed, 0, lattice, j, rounds, points, float(photons))
-                    batch = yield from self.trace.steps(part, plan.domain)
+                    batch = yield from self.trace.steps(part, plan.domain, max_depth)
                     keep(
                         self.trace.photons,
                         batch.photons,
@@ -577,7 +599,9 @@ class LightPass:
             self._records.keep(self.trace.photons, batch, self.trace.photon.stride, of)
         yield
         yield from self.splat_steps(
-            self.trace.photons, batch.photons, shrinking.kernel_scale(of.number) if self._shrinks else 1.0
+            self.trace.photons,
+            batch.photons,
+            self.widening * (shrinking.kernel_scale(of.number) if self._shrinks else 1.0),
         )
         self.stats.photons += 0 if of_tails else batch.emitted_photons
         self.stats.splats += batch.photons

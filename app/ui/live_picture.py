@@ -179,10 +179,16 @@ class LivePicture:
         shown."""
         return self.engine.pick(*place) if self.engine is not None else None
 
+    @property
+    def shown_scene(self) -> Scene | None:
+        """What the picture shows, or is about to."""
+        inputs = self.engine.inputs if self.engine is not None else None
+        return None if inputs is None else inputs.scene
+
     def object_in(self, scene: Scene, index: int) -> int | None:
         """Index in `scene` of object `index` of the scene that is shown; None for one that is no longer there."""
-        inputs = self.engine.inputs if self.engine is not None else None
-        return None if inputs is None else index_in(scene, inputs.scene, index)
+        shown = self.shown_scene
+        return None if shown is None else index_in(scene, shown, index)
 
     @property
     def is_settling(self) -> bool:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..edit.history import HistoryEntry
-from ..model.scene import Vec3
+from ..model.scene import Scene, Vec3
 from ..model.staging import UpAxis
 from ..passes.ray_line import RayLine
 from ..render.viewer.stats import LiveStats
@@ -89,6 +89,8 @@ class ViewModel:
     """One frame's."""
 
     stats: LiveStats = LiveStats()
+    shown: Scene | None = None
+    """What the picture shows, or is about to; another one while something is being prepared."""
     picture: int | None = None
     """Texture id of the displayed picture, top row first."""
     picture_size: tuple[int, int] = (0, 0)

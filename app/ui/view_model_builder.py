@@ -13,6 +13,7 @@ def view_model_of(session: Session) -> ViewModel:
     stats, comparison = picture.stats, session.jobs.comparison
     return ViewModel(
         stats=stats,
+        shown=picture.shown_scene,
         picture=None if shown is None else shown.glo,
         picture_size=(0, 0) if shown is None else shown.size,
         frame_ms=tuple(session.frame_ms),

@@ -11,10 +11,10 @@ from ..edit import brush as brushes
 from ..edit import placing, pull, selecting
 from ..edit.projection import View
 from ..edit.state import Brush, Selection, State
-from ..model.scene import Camera
+from ..model.scene import Camera, Scene, SceneObject
 from . import item_rects, theme
 from .compared_with import glass_object
-from .overlay import Canvas, box_corners, draw_box, draw_outlined
+from .overlay import Canvas, box_corners, draw_box, draw_outlined, lines
 from .panels.methods import METHOD_NAMES
 from .panels.rows import tooltip
 from .panels.spectral_colour import colour_of_nm
@@ -28,11 +28,42 @@ _ARROW_EM = 3.2
 
 def draw_marks(canvas: Canvas, state: State, view_model: ViewModel, is_painting: bool) -> None:
     """What lies in the scene: selection, the ring of the brush, a colour being pulled."""
+    if view_model.stats.differs == "scene" and view_model.shown is not None:
+        for item in not_shown(state.scene, view_model.shown):
+            _draw_proxy(canvas, item)
     _draw_selection(canvas, state)
     if state.tool == "brush" and view_model.cursor is not None:
         _draw_ring(canvas, state, view_model.cursor, is_painting)
     if state.pull is not None:
         _draw_pull(canvas, state)
+
+
+def not_shown(scene: Scene, shown: Scene) -> list[SceneObject]:
+    """Objects that `scene` has and a picture of `shown` lacks: added, or standing elsewhere."""
+    there = {(id(item.mesh), item.object_to_world.tobytes()) for item in shown.objects}
+    return [item for item in scene.objects if (id(item.mesh), item.object_to_world.tobytes()) not in there]
+
+
+def _draw_proxy(canvas: Canvas, item: SceneObject) -> None:
+    """The outline of what the picture does not show yet, filled like clear glass."""
+    places = canvas.pixels(item.mesh.vertices @ item.object_to_world[:3, :3].T + item.object_to_world[:3, 3])
+    outline = outline_of(places[np.isfinite(places).all(axis=1)])
+    if len(outline) < 3:
+        return
+    points: list[ImVec2 | tuple[int | float, int | float] | list[int | float]]
+    points = [ImVec2(float(x), float(y)) for x, y in outline]
+    canvas.drawing.add_convex_poly_filled(points, theme.packed((0.75, 0.85, 0.95, 0.22)))
+    edges = np.stack([outline, np.roll(outline, -1, axis=0)], axis=1)
+    lines(canvas, edges, theme.packed((0.9, 0.95, 1.0, 0.75)), 1.4)
+
+
+def outline_of(places: np.ndarray) -> np.ndarray:
+    """Corners of the convex hull of `places` (n, 2), in order, as far as 48 directions tell."""
+    if not len(places):
+        return places
+    angles = np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
+    farthest = (places @ np.stack([np.cos(angles), np.sin(angles)])).argmax(axis=0)
+    return places[farthest[np.diff(farthest, prepend=farthest[-1]) != 0]]
 
 
 def _draw_selection(canvas: Canvas, state: State) -> None:

@@ -125,7 +125,16 @@ def badges(state: State, view_model: ViewModel) -> list[Badge]:
                 False,
             )
         )
-    if view_model.stats.differs:
+    if view_model.stats.differs == "moved":
+        badges.append(
+            Badge(
+                "A few photons while it moves",
+                "Light follows what is held by a few photons; let go, and it is traced properly. Soft light of an "
+                "environment stays where it was until then.",
+                False,
+            )
+        )
+    elif view_model.stats.differs:
         badges.append(
             Badge(
                 "Preparing …" if view_model.stats.differs == "scene" else "Light is being traced …",

@@ -73,6 +73,13 @@ PathEnd ended[ENDS_HELD];
 // of them, chosen by chance; as the sample itself, which lies at one of them, where all do.
 #define THE_SAMPLE 4u
 
+#ifdef LENS
+// 2^32 times the fractions of the cube roots of 2 and 4: badly approximable together, and of no other field than the plastic number's, by which
+// places on lights are drawn.
+#define LENS_1 1116352409u
+#define LENS_2 2522868307u
+#endif
+
 vec2 primary_sample_place(uint primary_sample)
 {
     if (primary_sample == THE_SAMPLE) return p.within_pixel;
@@ -94,6 +101,13 @@ uint listed_entry(uint number, uint primary_sample, uint count)
 CameraPath camera_path(uvec2 pixel, uint primary_sample, float gain)
 {
     look_place = primary_sample_place(primary_sample);
+#ifdef LENS
+    // Looks are shared out over the lens as over the pixel, by a sequence any part of which is even too: samples of one band, every so many of
+    // them, see through all of the lens.
+    uint look = p.draw_index * p.primary_samples + (primary_sample == THE_SAMPLE ? 0u : primary_sample);
+    uint key = hash_combine(hash_combine(hash_combine(p.seed, pixel.x), pixel.y), 79u);
+    lens_place = vec2(kronecker(look, LENS_1, key), kronecker(look, LENS_2, hash_pcg(key)));
+#endif
     return path_from(pixel, look_place, gain);
 }
 
@@ -371,7 +385,13 @@ void main()
         return;
     }
     WHEN(specular_samples > 0u) {
-        listed[atomicAdd(listed_count, 1u)] = listed_entry(number, specular_samples == p.primary_samples ? THE_SAMPLE : chosen, specular_samples);
+#ifdef LENS
+        // A place in the pixel goes with one on the lens: another pair may meet no glass.
+        bool is_any = p.primary_samples == 1u;
+#else
+        bool is_any = specular_samples == p.primary_samples;
+#endif
+        listed[atomicAdd(listed_count, 1u)] = listed_entry(number, is_any ? THE_SAMPLE : chosen, specular_samples);
     }
 #elif defined(CAMERA_SPECULAR)
     int events = 0;

@@ -27,7 +27,7 @@ void diffract_path(inout CameraPath path, PathFrame frame, Grating grating, Grat
     for (int c = 0; c < COLUMNS_HELD; ++c) {
         float dstep = 0.0;
 #if SPECTRAL_GROUPS > 0
-        if (c >= SPATIAL) dstep = order_step_derivative(order, object, current_medium(path.medium), uint(c - SPATIAL), path.band.y);
+        if (c >= SPATIAL && c < SPATIAL + SPECTRAL_GROUPS) dstep = order_step_derivative(order, object, current_medium(path.medium), uint(c - SPATIAL), path.band.y);
 #endif
         path.ddirection[c] = diffracted_column(turned, path.direction, path.ddirection[c], NORMAL_COLUMN(frame, c), grating.lines, side, steps.y, dstep, reflects);
     }

@@ -55,7 +55,7 @@ void refract_path(inout CameraPath path, Deflection turned, PathFrame frame, Med
     for (int c = 0; c < COLUMNS_HELD; ++c) {
         float deta_it = 0.0;
 #if SPECTRAL_GROUPS > 0
-        if (c >= SPATIAL) deta_it = index_ratio_derivative(boundary, uint(c - SPATIAL), path.band.y, n_i.y, n_t.y);
+        if (c >= SPATIAL && c < SPATIAL + SPECTRAL_GROUPS) deta_it = index_ratio_derivative(boundary, uint(c - SPATIAL), path.band.y, n_i.y, n_t.y);
 #endif
         path.ddirection[c] = refracted_column(turned, path.direction, path.ddirection[c], NORMAL_COLUMN(frame, c), eta_it, deta_it);
     }

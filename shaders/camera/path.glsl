@@ -7,7 +7,13 @@
 #include "lib/finite.glsl"
 
 #define SPATIAL 2
+#ifdef LENS
+// Columns of the place on the lens come last: of the two sides of a square as large as it is.
+#define LENS_COLUMNS (SPATIAL + SPECTRAL_GROUPS)
+#define COLUMNS_HELD (LENS_COLUMNS + 2)
+#else
 #define COLUMNS_HELD (SPATIAL + SPECTRAL_GROUPS)
+#endif
 // An end of a band that arrives farther off (GPU units) is beyond the facet for good.
 #define END_LIMIT 1.0
 

@@ -28,6 +28,12 @@ SurfaceInteraction seen_on(CameraPath path, Hit hit, Triangle facet, vec3 positi
     seen.source = facet.source;
     for (int c = 0; c < 2; ++c)
         seen.dposition[c] = sample_side(path) * transfer_column(path.dposition[c], path.ddirection[c], path.direction, hit.normal_g, hit.distance);
+#ifdef LENS
+    vec3 by_lens[2];
+    for (int c = 0; c < 2; ++c)
+        by_lens[c] = sample_side(path) * transfer_column(path.dposition[LENS_COLUMNS + c], path.ddirection[LENS_COLUMNS + c], path.direction, hit.normal_g, hit.distance);
+    join_sides(hit.normal_g, seen.dposition[0], seen.dposition[1], by_lens[0], by_lens[1]);
+#endif
     seen.dposition[2] = vec3(0.0);
     seen.reflectance = object_colours[hit.object].rgb;
     return seen;

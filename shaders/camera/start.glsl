@@ -2,6 +2,37 @@
 #ifndef CAMERA_START_GLSL
 #define CAMERA_START_GLSL
 
+#ifdef LENS
+// Where on the lens the next path begins, in the unit square.
+vec2 lens_place;
+
+// Side of a square as large as a disc of radius 1.
+const float DISC_SIDE = 1.7724538509;
+
+// From the middle of the lens, a pinhole, to a place on it: a thin lens sends what comes from one point of the plane of focus, wherever it passes,
+// to one point of the film [Cook, Porter and Carpenter 1984].
+void begin_on_lens(inout CameraPath path)
+{
+    vec3 across[2] = vec3[](normalize(p.half_right), normalize(p.half_up));
+    vec2 at = p.lens_radius * concentric_disc(lens_place);
+    vec3 offset = at.x * across[0] + at.y * across[1];
+    float reach = p.focus_distance / dot(path.direction, p.forward);
+    vec3 way = reach * path.direction - offset;
+    float way_length = length(way);
+    vec3 direction = way / way_length;
+    for (int c = 0; c < 2; ++c) {
+        // The point in focus moves, of an orthographic camera the lens with it.
+        vec3 moves = transfer_column(path.dposition[c], path.ddirection[c], path.direction, p.forward, reach) - path.dposition[c];
+        vec3 side = DISC_SIDE * p.lens_radius * across[c];
+        path.ddirection[c] = (moves - dot(moves, direction) * direction) / way_length;
+        path.dposition[LENS_COLUMNS + c] = side;
+        path.ddirection[LENS_COLUMNS + c] = (dot(side, direction) * direction - side) / way_length;
+    }
+    path.position += offset;
+    path.direction = direction;
+}
+#endif
+
 CameraPath path_from(uvec2 pixel, vec2 within_pixel, float gain)
 {
     vec2 place = picture_point(pixel, within_pixel, p.size);
@@ -22,6 +53,9 @@ CameraPath path_from(uvec2 pixel, vec2 within_pixel, float gain)
         path.ddirection[0] = scale * (right - dot(right, ray.direction) * ray.direction);
         path.ddirection[1] = scale * (up - dot(up, ray.direction) * ray.direction);
     }
+#ifdef LENS
+    begin_on_lens(path);
+#endif
     path.band = vec3(0.0, 0.5, 1.0);
     path.weight = vec3(1.0);
     path.inverse_pdf = gain;

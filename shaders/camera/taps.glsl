@@ -59,6 +59,9 @@ void add_sky(CameraPath path, WavelengthInterval interval, vec3 direction, vec3 
     vec3 columns[3];
     columns[0] = sample_side(path) * path.ddirection[0];
     columns[1] = sample_side(path) * path.ddirection[1];
+#ifdef LENS
+    join_sides(path.direction, columns[0], columns[1], sample_side(path) * path.ddirection[LENS_COLUMNS], sample_side(path) * path.ddirection[LENS_COLUMNS + 1]);
+#endif
     columns[2] = sweep;
     add_colour(path, interval, uint(WHITE_ROW), sky_colour(direction, columns));
 }
@@ -70,11 +73,26 @@ vec2 sample_width(CameraPath path)
     return sample_side(path) * sqrt(vec2(length(cross(path.dposition[0], path.dposition[1])), length(cross(path.ddirection[0], path.ddirection[1]))));
 }
 
+#ifdef LENS
+// The same of lights infinitely far away, where a place on the lens is but a direction.
+vec2 far_width(CameraPath path, vec2 width)
+{
+    float by_lens = sample_side(path) * sample_side(path) * length(cross(path.ddirection[LENS_COLUMNS], path.ddirection[LENS_COLUMNS + 1]));
+    return vec2(width.x, sqrt(width.y * width.y + by_lens));
+}
+#define WIDTH_OF(light) (light.kind == LIGHT_KIND_DIRECTIONAL ? by_lens : width)
+#else
+#define WIDTH_OF(light) width
+#endif
+
 // Lights that can be seen over the distance `far`; edges are as soft as what the ray stands for is wide.
 void add_lights(CameraPath path, float far)
 {
     vec2 width = sample_width(path), sweep = vec2(0.0);
     int taps = 1;
+#ifdef LENS
+    vec2 by_lens = far_width(path, width);
+#endif
 #ifdef SPECTRAL_SWEEP
     if (path.restricted != 0u) {
         vec3 p_lo = path.end_position[0], d_lo = path.end_direction[0], p_hi = path.end_position[1], d_hi = path.end_direction[1];
@@ -86,7 +104,7 @@ void add_lights(CameraPath path, float far)
     // Few rays come near a light: only they look along their sweep.
     bool near = false;
     for (uint i = 0u; i < uint(LIGHT_COUNT); ++i)
-        near = near || (lights[i].measure > 0.0 && light_seen(lights[i], path.position, path.direction, far, 2.0 * (width + sweep)) > 0.0);
+        near = near || (lights[i].measure > 0.0 && light_seen(lights[i], path.position, path.direction, far, 2.0 * (WIDTH_OF(lights[i]) + sweep)) > 0.0);
 #ifdef LISTS_SPECULAR
     saw_light = saw_light || near;
 #endif
@@ -103,7 +121,7 @@ void add_lights(CameraPath path, float far)
 #endif
         WavelengthInterval interval = wavelength_interval(path, lo, hi);
         for (uint i = 0u; i < uint(LIGHT_COUNT); ++i) {
-            float seen = lights[i].measure > 0.0 ? light_seen(lights[i], position, direction, far, width + sweep * part) : 0.0;
+            float seen = lights[i].measure > 0.0 ? light_seen(lights[i], position, direction, far, WIDTH_OF(lights[i]) + sweep * part) : 0.0;
             WHEN(seen > 0.0) add_spectrum(path, interval, uint(LIGHT_ROW) + i * uint(ROWS_PER_LIGHT), seen);
         }
     }

@@ -170,6 +170,12 @@ void land(inout RayRecord ray, uint receiver, uint triangle, float cosine, uint 
 }
 
 #ifdef BAND_CUTS
+// Whether `at` leaves a band too little on one side of it to be worth a path of its own.
+bool leaves_sliver(RayRecord ray, float at)
+{
+    return min(at - ray.x_lo, ray.x_hi - at) <= 0.01 * MIN_CUT_BAND;
+}
+
 // `at`, where the parts [lo, at] and [at, hi] of a ray's band may set out again from where its flight started; else a negative number.
 float clear_cut(RayRecord ray, RayRecord start, float at, float distance)
 {
@@ -178,9 +184,7 @@ float clear_cut(RayRecord ray, RayRecord start, float at, float distance)
         low += variable_step(uint(g), 0.5 * (ray.x_lo + at), ray.x_anchor) * start.dposition[SPATIAL + g].xyz;
         high += variable_step(uint(g), 0.5 * (at + ray.x_hi), ray.x_anchor) * start.dposition[SPATIAL + g].xyz;
     }
-    // A sliver of a band is not worth a path of its own.
-    bool sliver = min(at - ray.x_lo, ray.x_hi - at) <= 0.01 * MIN_CUT_BAND;
-    return !sliver && starts_stay_near(low, high, distance) ? at : -1.0;
+    return !leaves_sliver(ray, at) && starts_stay_near(low, high, distance) ? at : -1.0;
 }
 
 // The part [lo, hi] of a ray's band, with this share of its power, traced at its own middle: position and direction follow the spectral
@@ -398,7 +402,8 @@ void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint k
         child = part_of_band(start, start.x_lo, at, below, 5u);
         lives = true;
     }
-    bool parts = splits && cosine2.y <= 0.0 && onset >= 0.0;
+    // A part that was cut here ends at the onset: which side of it that end falls on is rounding.
+    bool parts = splits && cosine2.y <= 0.0 && onset >= 0.0 && !leaves_sliver(ray, onset);
     PassingPart part;
     if (parts) part = passing_part(ray, frame, boundary, onset, cosine2, reflectance, n_i, n_t, refracted);
 #endif

@@ -84,6 +84,7 @@ def test_what_stands_still_stands_still(gl, stage: Stage) -> None:
     assert moved[18:30, 72:].mean() <= 5e-5 * first.max()
 
 
+@pytest.mark.slow
 def test_a_frame_is_a_function_of_its_stage_alone(gl, stage: Stage) -> None:
     edited = apply(stage, GAIN, 2.0)
     alone = FrameRenderer(gl, SMALL, [edited])

@@ -79,6 +79,7 @@ def test_where_nothing_disperses_there_is_nothing_to_measure(gl: Any) -> None:
         CameraRig(gl, plain, "srd", WIDTH, HEIGHT, light)
 
 
+@pytest.mark.slow
 def test_a_tiny_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     """Two methods against the real reference of one second, through the command line: a prism before an edge."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))

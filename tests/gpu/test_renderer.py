@@ -16,7 +16,7 @@ from spectrasplat.model.settings import METHODS, RenderSettings
 from spectrasplat.render.still import render
 
 SCENES = sorted(p.stem for p in (assets_dir() / "scenes").glob("*.toml"))
-QUICK = ("ball", "brilliant", "default", "prism_edge", "spectrometer", "two_stones", "wine_glass")
+QUICK = ("ball", "brilliant", "prism_edge", "spectrometer", "two_stones")
 SMALL = RenderSettings(width=96, height=54, photons=20_000, spp=2)
 
 PRISM = """
@@ -79,10 +79,12 @@ def scene_of(tmp_path: Path, shape: str = "prism") -> Scene:
 )
 def test_flux_closes_in_every_shipped_scene(gl, name: str) -> None:
     result = render(load_scene(assets_dir() / "scenes" / f"{name}.toml"), SMALL, context=gl)
-    # The one has no light, the other's lamp throws nothing through the glass onto what is there.
+    # The one has no light, the other's lamp throws next to nothing through the glass onto what is there: 2e-6 of it,
+    # after many reflections inside.
     throws = name not in ("brilliant_studio", "prism_edge")
     assert result.stats.light.tally.emitted > 0.0 or not throws
-    assert (result.stats.light.tally.ended["deposited"] > 0.0) == throws
+    tally = result.stats.light.tally
+    assert (tally.ended["deposited"] > 1e-4 * tally.emitted) == throws
     # Beams are counted at three places of each band, and so few of them a band are wide.
     assert result.stats.light.tally.imbalance < (1e-4 if result.stats.beams is None else 0.04)
     assert result.stats.light.tally.ended["lost_numeric"] <= 2e-4 * result.stats.light.tally.emitted

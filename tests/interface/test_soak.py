@@ -89,6 +89,7 @@ def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 def test_25_random_actions(gl: Context, own_folder: Path) -> None:
     soak(gl, own_folder, 25, seed=1)
 

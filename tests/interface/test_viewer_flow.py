@@ -85,6 +85,7 @@ def test_dragging_the_dispersion_moves_the_caustic_and_traces_nothing(hands: Han
     assert len(hands.session.document.history.entries) == 2  # one step for the whole drag
 
 
+@pytest.mark.slow
 def test_undo_and_redo_bring_the_pictures_back(hands: Hands) -> None:
     before, traced = hands.settle(), hands.rays_traced
     select_glass(hands)
@@ -118,6 +119,7 @@ def test_brushing_widens_the_colours_where_it_paints(hands: Hands) -> None:
     assert difference(hands.settle(), painted) < SAME
 
 
+@pytest.mark.slow
 def test_walking_round_traces_nothing(hands: Hands) -> None:
     before, traced = hands.settle(), hands.rays_traced
     middle = hands.interface.find("Picture").centre

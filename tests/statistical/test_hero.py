@@ -98,7 +98,10 @@ def chroma_noise(shown: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize(
-    "scene", [mirrored, twice_mirrored, tinted_without_dispersion, dispersing, prism_case], ids=lambda s: s.__name__
+    "scene",
+    [mirrored, dispersing]
+    + [pytest.param(s, marks=pytest.mark.slow) for s in (twice_mirrored, tinted_without_dispersion, prism_case)],
+    ids=lambda s: s.__name__,
 )
 def test_hero_shows_the_reference(gl, scene) -> None:
     made = scene()
@@ -116,11 +119,13 @@ def test_hero_shows_the_reference(gl, scene) -> None:
     assert (excess > 0.0).mean() < 0.01, float(excess.max())
 
 
+@pytest.mark.slow
 def test_companions_take_colour_noise_away_where_they_stay(gl) -> None:
     one, four = (chroma_noise(pictures(gl, mirrored(), method)) for method in ("stochastic", "hero"))
     assert four < 0.4 * one, (one, four)
 
 
+@pytest.mark.slow
 def test_spectral_bins_hold_the_same_light(gl) -> None:
     """All four wavelengths land in their own bins: the bins' shares are those of photons with the whole spectrum."""
     sums = {}

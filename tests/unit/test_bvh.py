@@ -299,3 +299,15 @@ def test_build_time_is_told(capsys) -> None:
     with capsys.disabled():
         print(f"\n{len(triangles)} triangles: {seconds:.3f} s, depth {tree.depth}, expected work {tree.sah_cost():.1f}")
     assert len(tree.nodes) <= 2 * len(triangles) - 1
+
+
+def test_a_refitted_tree_holds_what_has_moved() -> None:
+    for count in (1, 3, 5, 400):
+        before = soup(count)
+        after = before.copy()
+        after[: count // 2 + 1] += np.float32([0.7, -0.2, 0.1])
+        tree = build_bvh(before, use_cache=False)
+        refitted = tree.refitted(after)
+        check_structure(refitted, after)
+        assert np.array_equal(refitted.nodes["left_or_first"], tree.nodes["left_or_first"])
+        check_structure(tree, before)

@@ -57,6 +57,7 @@ EVERYTHING = Features(
     map_tents=8,
     beams=True,
     environment_lights=True,
+    lens=True,
 )
 PLAIN_CAMERA = {"camera_disperses": False, "map_tents": 0}
 """What the camera sees disperses nothing: the camera carries the spectrum in the same way as the light pass."""
@@ -64,6 +65,7 @@ WITHOUT = {
     "beams": {"beams": False},
     "light profiles": {"light_profiles": False},
     "environment light": {"environment_lights": False},
+    "lens": {"lens": False},
     "spectral columns": {
         "spectral_groups": 0,
         "merged_groups": False,
@@ -203,6 +205,7 @@ def camera_sources(
         "SPECTRAL_SWEEP": single > 0,
         "ABSORPTION": features.absorption and features.camera_specular,
         "NORMAL_DERIVATIVES": features.smooth_normals,
+        "LENS": features.lens,
         **(images or {}),
     }
     for name in switches:

@@ -218,3 +218,26 @@ def test_the_first_picture_of_a_scene_comes_before_better_maps() -> None:
     assert schedule.yields_to_camera(first)
     assert run(schedule, Examined(first), now=9.0)[1] == []
     assert run(schedule, Examined(replace(first, owes_first=False)), now=9.0)[1] == [Action.REFIT_MAPS]
+
+
+def moving(level: DirtyLevel = DirtyLevel.TRACE, camera: CameraState = DONE) -> Examined:
+    return Examined(camera, level, moves_things=True)
+
+
+def test_what_is_held_and_moved_is_followed_until_it_is_let_go() -> None:
+    schedule, done = run(replace(SHOWN, tracing=True, splatting=True), FrameBegan(True), Wished(), moving())
+    assert done == [Action.FOLLOW_MOVE]
+    assert schedule.moved and not (schedule.building or schedule.has_photon_work or schedule.will_retrace)
+    schedule, done = run(schedule, FrameBegan(False), moving())
+    assert done == [Action.BUILD]
+    schedule, done = run(schedule, Failed(), moving(DirtyLevel.NOTHING), now=2 * STILL_S)
+    assert done == [] and schedule.moved, "old photons are never shown in what was moved"
+    assert not run(schedule, Built())[0].moved
+
+
+def test_a_move_goes_before_what_is_being_built() -> None:
+    building, _ = run(SHOWN, Wished(), asked(DirtyLevel.TRACE))
+    schedule, done = run(building, FrameBegan(True), Wished(), moving())
+    assert done == [Action.FOLLOW_MOVE] and not schedule.building
+    # A number that is typed is no drag.
+    assert run(SHOWN, Wished(), moving())[1] == [Action.BUILD]

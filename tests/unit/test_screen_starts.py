@@ -45,9 +45,8 @@ def triangles(count: int) -> ScreenPolygons:
     return ScreenPolygons(**blank | shapes)
 
 
-def expected(polygons: ScreenPolygons) -> np.ndarray:
+def expected(polygons: ScreenPolygons, fine: int = 24, steps: int = 64) -> np.ndarray:
     """(9, 12): what each pixel has of light whose spectrum is what looks bright, by a fine grid of places and x."""
-    fine, steps = 24, 64
     at = (np.arange(12 * fine) + 0.5) / fine
     x, y = np.meshgrid(at, at[: 9 * fine])
     total = np.zeros((9 * fine, 12 * fine))
@@ -96,7 +95,7 @@ def test_few_paths_stand_for_many_weak_polygons():
     polygons = triangles(200)
     polygons.throughput[:] *= 1e-3
     picture, count, largest = drawn(polygons, 0.05)
-    total = expected(polygons).sum()
+    total = expected(polygons, fine=8, steps=16).sum()
     assert count == pytest.approx(total / 0.05, abs=2 + 0.2 * total / 0.05)
     assert picture.sum() == pytest.approx(total, rel=0.3) and largest < 33 * 0.05
 

@@ -78,6 +78,7 @@ FEATURE_SYMBOLS: dict[str, tuple[str, ...]] = {
     "spectral maps": ("BIN_ROW", "BIN_SPECTRUM_ROW", "BIN_TARGET"),
     "beams": ("is_beam_object",),
     "environment light": ("environment_irradiance", "add_environment_light"),
+    "lens": ("lens_place", "join_sides", "begin_on_lens"),
     "light profiles": ("profile_intensity", "profile_stretch"),
     "spectral bins": ("define TARGETS [2-9]", "define TARGETS 1[0-9]"),
 }

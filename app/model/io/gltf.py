@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from ...base.errors import UserError
+from ..fields import read_fields
 from ..geometry.mesh import Mesh, make_mesh
 from ..geometry.mesh_health import examine, repair
 from ..lights import LIGHT_KINDS, DirectionalLight, PointLight, SpotLight
@@ -30,6 +31,7 @@ from ..scene import (
     Scene,
     SceneObject,
 )
+from ..scene_camera import LENS
 from ..scene_defaults import (
     default_table,
     environment_of,
@@ -321,7 +323,11 @@ class _Reader:
         self._check_turn(world, f"camera '{node.get('name', entry.get('name', 'camera'))}'")
         distance = float(own_extras(node).get("target_distance", _DEFAULT_DISTANCE))
         position, forward, up = world[:3, 3], -_unit(world[:3, 2]), _unit(world[:3, 1])
-        camera = Camera(vec3(position), vec3(position + distance * forward), vec3(up))
+        own = {
+            field.attribute: own_extras(node)[field.attribute] for field in LENS if field.attribute in own_extras(node)
+        }
+        lens = read_fields(LENS, SceneTable(own, self.document.path, f"camera.extras.{EXTRAS}"))
+        camera = Camera(vec3(position), vec3(position + distance * forward), vec3(up), **lens)
         if entry.get("type") == "orthographic":
             extent = 2.0 * float(entry["orthographic"]["ymag"])
             if not extent > 0.0:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from ...base.errors import UserError
+from ..fields import write_fields
 from ..geometry.mesh import Mesh
 from ..geometry.mesh_health import weld_map
 from ..lights import DirectionalLight, PointLight, SpotLight
@@ -27,6 +28,7 @@ from ..scene import (
     Scene,
     SceneObject,
 )
+from ..scene_camera import LENS
 from .gltf import LIGHTS, Origins, open_document, read_scene
 from .gltf_document import GltfDocument, save_document
 from .gltf_extras import write_node_dabs, write_scene_extras
@@ -296,7 +298,7 @@ class _Writer:
             lens = {**self.json["cameras"][old["camera"]], **lens}
             del old["camera"]
         entry["camera"] = self._append("cameras", lens)
-        entry["extras"] = {EXTRAS: {"target_distance": float(np.linalg.norm(offset))}}
+        entry["extras"] = {EXTRAS: {"target_distance": float(np.linalg.norm(offset))} | write_fields(LENS, camera)}
         # First in the scene, so that it is the camera a reader finds.
         self._add_node(entry, world, first=True)
 

@@ -80,6 +80,8 @@ class Accumulation:
 
     def _pass(self) -> Iterator[None]:
         light_pass = self.light.light_pass
+        self.light.finest = self.largest
+        light_pass.widening = self.light.widening(self.photons)
         if not self.begun:
             light_pass.begin(self.photons, self.seed)
             self.begun = True

@@ -28,8 +28,8 @@ from ..solo import scene_seen
 from . import schedule as events
 from .building import Budget, Shown, build
 from .dirty_level import DirtyLevel
-from .invalidation import appearance_differs, dirty_level
-from .live_camera import LiveCamera
+from .invalidation import appearance_differs, dirty_level, only_moves
+from .live_camera import DIRECT_S, MOVED_S, LiveCamera
 from .live_light import LiveLight
 from .photon_queries import CausticSpectrum, caustic_spectrum, reach_of, world_photons
 from .refit import is_judged, wants_new_maps
@@ -121,7 +121,7 @@ class LiveEngine:
         if self._shown is not None and photons != self._shown.accumulation.target:
             accumulation = self._shown.accumulation
             accumulation.aim_at(photons, self._largest)
-            if not self.schedule.tracing and not accumulation.is_done:
+            if not (self.schedule.tracing or self.schedule.moved or accumulation.is_done):
                 self._tracing = accumulation.steps()
                 self._tell(events.TracingBegan())
 
@@ -146,7 +146,13 @@ class LiveEngine:
         assert self._wanted is not None
         if self._shown is None or self._inputs is None:
             return DirtyLevel.BUILD
-        return dirty_level(self._shown.traced, self._inputs, self._wanted, self._shown.light.may_have_beams)
+        level = dirty_level(self._shown.traced, self._inputs, self._wanted, self._shown.light.may_have_beams)
+        return max(level, DirtyLevel.TRACE) if self.schedule.moved else level
+
+    @property
+    def _only_moves(self) -> bool:
+        """What is wanted differs from what was traced in where things stand alone."""
+        return self._shown is not None and self._wanted is not None and only_moves(self._shown.traced, self._wanted)
 
     def retrace(self) -> None:
         """Trace with the glass that is shown, where the picture followed an edit to first order only."""
@@ -199,7 +205,8 @@ class LiveEngine:
         due = self.schedule.wish_is_due
         level = self._level if due else DirtyLevel.NOTHING
         moves = due and _moves_view(self._inputs, self._wanted)
-        self._tell(events.Examined(self._camera, level, moves), budget_s)
+        things = due and self.schedule.interacting and level >= DirtyLevel.TRACE and self._only_moves
+        self._tell(events.Examined(self._camera, level, moves, things), budget_s)
 
     def _work(self, deadline: float, budget_s: float) -> None:
         sees, camera = self._maps is not None and self._inputs is not None, self._camera
@@ -254,6 +261,8 @@ class LiveEngine:
                 self._follow_photons(self._wanted, 0.4 * budget_s)
             case Action.FOLLOW_CAMERA | Action.MOVE_CAMERA:
                 self._follow_camera(self._wanted, view_only=action == Action.MOVE_CAMERA)
+            case Action.FOLLOW_MOVE:
+                self._follow_move(self._wanted)
             case Action.REFIT_MAPS:
                 self._refit(self._wanted)
             case Action.JUDGE_MAPS:
@@ -296,6 +305,22 @@ class LiveEngine:
             self._inputs = wanted
         self._restart_camera(same_view=False)
 
+    def _follow_move(self, wanted: LiveInputs) -> None:
+        shown = self._shown
+        assert shown is not None
+        self._building, self._splatting, self._tracing = None, iter(()), iter(())
+        self._camera_pass.pause()
+        if shown.light.light_pass.beams is not None:
+            shown.light.light_pass.beams.pause()
+        maps = shown.light.move(replace(wanted.scene, camera=wanted.camera))
+        if maps is None:
+            self._tell(events.BuildAsked())
+            return
+        self._camera_pass.move(shown.light.buffers, scene_seen(wanted.scene, wanted.camera, wanted.solo_nm))
+        self._inputs = wanted
+        self._set_maps(maps)
+        self._restart_camera(same_view=False)
+
     def _refit(self, wanted: LiveInputs) -> None:
         assert self._shown is not None
         self._camera_pass.pause()
@@ -333,7 +358,10 @@ class LiveEngine:
         shared = self.context.is_software and self.schedule.shows_preview
         seconds = None if same_view else (0.6 if shared else 1.0) * self.preview_seconds
         view = self._inputs.camera, self._inputs.width, self._inputs.height
-        self._camera_pass.restart(*view, self._maps, seconds=seconds, same_view=same_view, finer_maps=finer_maps)
+        direct_s = MOVED_S if self.schedule.moved else DIRECT_S
+        self._camera_pass.restart(
+            *view, self._maps, seconds=seconds, same_view=same_view, finer_maps=finer_maps, direct_s=direct_s
+        )
 
     def _set_maps(self, maps: LightMaps) -> None:
         assert self._shown is not None
@@ -481,7 +509,9 @@ class LiveEngine:
         )
 
     @property
-    def _differs(self) -> Literal["", "light", "scene"]:
+    def _differs(self) -> Literal["", "light", "scene", "moved"]:
+        if self.schedule.moved and not self.schedule.building:
+            return "moved"
         if self._wanted is None or not self.schedule.building:
             return ""
         return "scene" if self._level == DirtyLevel.BUILD else "light"
@@ -506,13 +536,15 @@ class LiveEngine:
 
     def stored_photons(self, limit: int = QUERIED_PHOTONS) -> StoredPhotons:
         """About `limit` stored photons in world space, as they are shown."""
-        if self._shown is None or self._inputs is None:
+        if self._shown is None or self._inputs is None or self.schedule.moved:
             return StoredPhotons.none()
         return world_photons(self._shown.light, self._inputs, limit)
 
     def caustic_spectrum(self, receiver: int, position: np.ndarray) -> CausticSpectrum | None:
         """The caustic's spectral irradiance at a world position on object `receiver`."""
-        if self._shown is None or self._inputs is None or receiver not in self._shown.light.buffers.receivers:
+        if self._shown is None or self._inputs is None or self.schedule.moved:
+            return None
+        if receiver not in self._shown.light.buffers.receivers:
             return None
         light = self._shown.light
         traced, shown = (

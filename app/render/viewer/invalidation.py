@@ -40,6 +40,30 @@ def dirty_level(traced: LiveInputs, shown: LiveInputs, new: LiveInputs, beams: b
     return min(max(_inputs(shown, new), _scene(shown.scene, new.scene)), DirtyLevel.SPLAT)
 
 
+def only_moves(traced: LiveInputs, new: LiveInputs) -> bool:
+    """Objects or lights may stand elsewhere, and whoever looks; everything else is as it was traced."""
+    if replace(new, scene=traced.scene, camera=traced.camera, width=traced.width, height=traced.height) != traced:
+        return False
+    a, b = traced.scene, new.scene
+    kept = replace(b, name=a.name, notes=a.notes, camera=a.camera, objects=a.objects, lights=a.lights)
+    return (
+        len(a.objects) == len(b.objects)
+        and len(a.lights) == len(b.lights)
+        and all(
+            x is y or (x.mesh is y.mesh and replace(y, name=x.name, object_to_world=x.object_to_world) == x)
+            for x, y in zip(a.objects, b.objects, strict=True)
+        )
+        and all(
+            x.spectral_power == y.spectral_power and _light(x, y) <= DirtyLevel.TRACE
+            for x, y in zip(a.lights, b.lights, strict=True)
+        )
+        and all(
+            getattr(kept, f.name) is getattr(a, f.name) or getattr(kept, f.name) == getattr(a, f.name)
+            for f in fields(Scene)
+        )
+    )
+
+
 def _inputs(old: LiveInputs, new: LiveInputs) -> DirtyLevel:
     cost = DirtyLevel.NOTHING
     for item in fields(LiveInputs):

@@ -40,6 +40,8 @@ SCALES = (1.0, 0.5, 1 / 3, 0.25)
 """Sides of a picture in motion over the side asked for: less than 1 only where what is seen directly takes a device
 longer than DIRECT_S."""
 DIRECT_S = 0.5
+MOVED_S = 0.1
+"""The same while things are moved, whose light and tree take their time as well."""
 STEPS = (1, 2, 3, 6, 12, 24)
 """Sides of the blocks of pixels that share one path through glass, in motion."""
 REFINED = (6, 3, 1)
@@ -156,6 +158,16 @@ class LiveCamera:
         if kept is not None and kept is not pictures:
             kept.release()
 
+    def move(self, buffers: SceneBuffers, scene: Scene) -> None:
+        """Objects or lights stand elsewhere: `buffers` were moved in place, nothing else of `scene` differs."""
+        assert self._pass is not None and self._surfaces is not None
+        shown = copy.copy(buffers)
+        shown.scene = scene
+        self._pass.move(shown)
+        self._surfaces.move(buffers)
+        self._geometry = buffers.texels
+        self.pause()
+
     def _take_moving(self, buffers: SceneBuffers) -> None:
         assert self._pass is not None
         if self._moving is not None:
@@ -185,8 +197,10 @@ class LiveCamera:
         seconds: float | None = None,
         same_view: bool = False,
         finer_maps: bool = False,
+        direct_s: float = DIRECT_S,
     ) -> None:
         """Start over. `seconds`: be done with a first picture in about that time, however coarse glass is in it.
+        `direct_s`: what is seen directly becomes coarser where it takes longer.
 
         `same_view`: only the maps are better: what is shown stays until the new picture is as smooth. `finer_maps`: so
         much better that more bands of the spectrum may be told apart in them."""
@@ -196,7 +210,7 @@ class LiveCamera:
         is_drawn = is_drawn and seconds is None and self._drawn is not None and self._drawn.size == (width, height)
         self._camera, self._maps = camera, maps
         self._is_preview = seconds is not None
-        scale = self._direct_scale(width, height) if self._is_preview else 1.0
+        scale = self._direct_scale(width, height, direct_s) if self._is_preview else 1.0
         self._size = (width, height) if scale == 1.0 else (_side(width * scale), _side(height * scale))
         self._moving_scale = scale
         view = camera, width, height
@@ -222,8 +236,8 @@ class LiveCamera:
                 first = min(first, round(1.0 / self.scale))
             self._ladder = [first, *(step for step in REFINED if step < first)]
 
-    def _direct_scale(self, width: int, height: int) -> float:
-        most = float("inf") if self._direct_rate is None else self._direct_rate * DIRECT_S
+    def _direct_scale(self, width: int, height: int, seconds: float) -> float:
+        most = float("inf") if self._direct_rate is None else self._direct_rate * seconds
         return next((s for s in SCALES if s * s * width * height <= most), SCALES[-1])
 
     def _step_in(self, seconds: float) -> int:

@@ -20,9 +20,11 @@ from ..map_fit import PREVIEW_FINENESS, MapFit
 from ..solo import solo, solo_scene
 from ..splatting import Pace
 from .invalidation import shown_glasses
+from .moved_light import MovedLight
 from .photon_store import PhotonStore
 from .spectrum_guess import SpectrumGuess
 from .stored_passes import StoredPass, StoredPasses
+from .widening import needs_widening, widening
 
 if TYPE_CHECKING:
     from ...edit.live_inputs import LiveInputs
@@ -75,9 +77,13 @@ class LiveLight:
         """Light goes as beams while nothing is painted."""
         self.beam_seconds = 0.0
         """What beams took in the last preview."""
+        self.finest = 0
+        """Photons of the finest pass that there will be; 0: the one that there is."""
+        self._widens = needs_widening(scene)
         self.judged_view: object = None
         """The view for which `refit` last looked whether the maps fit."""
         self._preview: LightMaps | None = None
+        self._moved: MovedLight | None = None
         self._guess: SpectrumGuess | None = None
         self.is_coarse = True
         """The maps are those of a first preview: `fit_to` makes proper ones."""
@@ -90,7 +96,10 @@ class LiveLight:
     def caustic_maps(self, maps: LightMaps) -> CausticMaps:
         """`maps`, this light's, as the camera reads them: what was splatted in colour only gets a likely spectrum."""
         textures = maps.resolved_textures()
-        if maps is self._preview and self.light_pass.features.map_tents:
+        if maps is not self.light_pass.maps and self.light_pass.features.map_tents:
+            if self._guess is not None and self._guess.textures[0].size != maps.atlas.size:
+                self._guess.release()
+                self._guess = None
             if self._guess is None:
                 channels, lights = self.light_pass.map_channels, self.light_pass.scene.lights
                 self._guess = SpectrumGuess(self._context.ctx, channels, lights, maps.atlas.size)
@@ -159,6 +168,19 @@ class LiveLight:
         """Proper maps for what `inputs` shows."""
         return MapFit(inputs.camera, inputs.width, inputs.height, LIVE, avoids_powers_of_two=True)
 
+    def move(self, scene: Scene) -> LightMaps | None:
+        """A few photons through `scene`, in which the same things stand elsewhere: buffers are moved there, and what is
+        stored or accumulated no longer belongs to them. None, and nothing done, where buffers cannot be moved."""
+        if scene is not self.buffers.scene and not self.buffers.move(scene):
+            return None
+        if self._moved is None:
+            self._moved = MovedLight(self._context, self.light_pass, self._preview_features)
+        return self._moved.follow(scene, self.widening(self._moved.photons))
+
+    def widening(self, photons: float) -> float:
+        """Of footprints in pictures by so few photons."""
+        return widening(photons, self.finest) if self._widens else 1.0
+
     # ---- stored photons ----------------------------------------------------------------------
 
     @property
@@ -191,6 +213,7 @@ class LiveLight:
             share = 1.0
         for slab in store.of_rounds(0, store.rounds):
             coarsening = 1.0 if of_running else share**-0.5
+            coarsening *= self.widening(kept.pass_photons * (1.0 if of_running else share))
             yield from self.light_pass.splat_steps(slab.buffer, slab.count, coarsening, kept.tables.full)
             yield
         yield from self.light_pass.beam_steps_again(kept.pass_photons * share)
@@ -226,9 +249,10 @@ class LiveLight:
         # Records follow a space-filling curve over the lattice: every so manieth is nearly a lattice again.
         stride = max(1, sum(slab.count for slab in slabs) // photons)
         share = rounds / kept.store.rounds_of_pass / stride
+        wider = share**-0.5 * self.widening(kept.pass_photons * share)
         for slab in slabs:
             for _ in self.light_pass.splat_steps(
-                slab.buffer, -(-slab.count // stride), share**-0.5, kept.tables.preview, maps, stride
+                slab.buffer, -(-slab.count // stride), wider, kept.tables.preview, maps, stride
             ):
                 pass
         maps.photon_weight = kept.pass_photons * share
@@ -297,6 +321,6 @@ class LiveLight:
     def release(self) -> None:
         """Free everything, the stored photons and the scene's buffers too."""
         self._samples.clear()
-        for owned in (self._preview, self._guess, self.environment, self.light_pass, self.buffers):
+        for owned in (self._moved, self._preview, self._guess, self.environment, self.light_pass, self.buffers):
             if owned is not None:
                 owned.release()

@@ -46,6 +46,8 @@ class Action(Enum):
     """Take over the view alone: the rest is being built."""
     REFIT_MAPS = auto()
     """Lay the maps out anew for what is wanted and fill them again."""
+    FOLLOW_MOVE = auto()
+    """Show the same things where they stand now by a few photons; what was being built is not wanted any more."""
     JUDGE_MAPS = auto()
     """Refit where that would show more."""
     OFFER_MAPS = auto()
@@ -98,6 +100,8 @@ class Examined:
     """What it asks for."""
     moves_view: bool = False
     """Camera or picture size are others."""
+    moves_things: bool = False
+    """Of what photons were traced for, nothing is another but where things stand."""
 
 
 @dataclass(frozen=True)
@@ -204,6 +208,8 @@ class Schedule:
     maps_are_coarse: bool = True
     """They are those of a first preview."""
     shows_preview: bool = False
+    moved: bool = False
+    """A few photons show things where a hand has moved them: what was traced before is of no use any more."""
     maps_wait: bool = False
     """Better maps are there, but the camera is within a cycle of bands."""
 
@@ -289,7 +295,7 @@ def _examine(s: Schedule, event: Examined, now: float) -> Next:
         return (s, ()) if s.building else _build(s)
     if s.wish_is_due:
         return (s, ()) if s.finishes_preview(event.camera) else _fulfil(replace(s, wish_is_due=False), event)
-    if s.building or event.camera.owes_first:
+    if s.building or s.moved or event.camera.owes_first:
         return s, ()
     if s.maps_are_coarse and not s.interacting:
         return s, (Action.REFIT_MAPS,)
@@ -299,6 +305,9 @@ def _examine(s: Schedule, event: Examined, now: float) -> Next:
 
 def _fulfil(s: Schedule, event: Examined) -> Next:
     """The least that shows what is wanted."""
+    if s.interacting and event.moves_things and event.level >= DirtyLevel.TRACE:
+        moved = replace(s, building=False, failed=False, splatting=False, tracing=False, first_order=False)
+        return replace(moved, moved=True, maps_wait=False), (Action.FOLLOW_MOVE,)
     if event.level >= DirtyLevel.TRACE:
         # A build that runs is finished first and shown; then the newest wish is examined.
         s, actions = (replace(s, wish_is_due=s.wish_is_newer), ()) if s.building else _build(s)
@@ -326,6 +335,7 @@ def _built(s: Schedule) -> Schedule:
         tracing=True,
         first_order=False,
         maps_are_coarse=True,
+        moved=False,
         maps_wait=False,
     )
 

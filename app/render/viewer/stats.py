@@ -32,9 +32,9 @@ class LiveStats:
     camera_s: float = 0.0
     photons_per_second: float = 0.0
     """Emitted photons per second of trace and splat time, over the last second."""
-    differs: Literal["", "light", "scene"] = ""
-    """What of the wanted scene the picture does not show yet: nothing is missing, its light is being traced, or all of
-    it is being prepared."""
+    differs: Literal["", "light", "scene", "moved"] = ""
+    """What of the wanted scene the picture does not show yet: nothing is missing, its light is being traced, all of it
+    is being prepared, or light is shown by a few photons while something is moved."""
     first_order: bool = False
     """The stored paths belong to a glass of another dispersion; the picture follows the edit to first order."""
     converged: bool = False

@@ -39,9 +39,44 @@ def draw_camera_rows(camera: Camera) -> tuple[Camera, bool]:
     _, target, aiming = widgets.vec3(
         "Target", camera.target, unit="units", tip="The point in the middle of the picture: x, y, z.", speed=0.02
     )
+    camera, focusing = _lens_rows(camera)
     if position != target:  # a camera's target is not its own position
         camera = replace(camera, position=position, target=target)
-    return camera, active or moving or aiming
+    return camera, active or moving or aiming or focusing
+
+
+def _lens_rows(camera: Camera) -> tuple[Camera, bool]:
+    """How wide the lens is open and what is in focus."""
+    distance = camera.plane_of_focus
+    _, radius, opening = widgets.slider(
+        "Lens radius",
+        camera.lens_radius,
+        0.0,
+        0.1 * distance,
+        unit="units",
+        format="%.4f",
+        reset=0.0,
+        clamp=False,
+        tip="Half the lens's aperture: the larger, the more blurred is what is out of focus. 0: all is in focus.",
+    )
+    camera = replace(camera, lens_radius=max(radius, 0.0))
+    focusing = False
+    if camera.lens_radius > 0.0:
+        _, distance, focusing = widgets.drag(
+            "Focus distance",
+            distance,
+            1e-6,
+            1e9,
+            unit="units",
+            tip="From the lens to the plane of focus.",
+        )
+        if distance != camera.plane_of_focus:
+            camera = replace(camera, focus_distance=distance)
+        if camera.focus_distance is not None and widgets.button(
+            "Focus on the target", tip="Keep the target in focus, wherever the camera goes."
+        ):
+            camera = replace(camera, focus_distance=None)
+    return camera, opening or focusing
 
 
 def _converted(camera: Camera, kind: str) -> Camera:

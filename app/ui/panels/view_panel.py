@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ...edit import edits
+from ...edit.camera_controls import focus_at
 from ...edit.state import Display, Preferences, State, ToneCurve
+from ...model.contacts import world_bounds
 from ...model.scene_render import MAX_GLARE
 from .. import view_commands
 from ..view_model import ViewModel
@@ -251,6 +253,13 @@ def _sampling(state: State) -> State:
 
 def _camera(state: State) -> State:
     camera, active = draw_camera_rows(state.camera)
+    selected = state.selection
+    may_focus = selected.kind == "object" and selected.index < len(state.scene.objects)
+    if camera.lens_radius > 0.0 and widgets.button(
+        "Focus on the selected", tip="Click a thing in the picture, then this: it is in focus.", enabled=may_focus
+    ):
+        low, high = world_bounds(state.scene.objects[selected.index])
+        camera = focus_at(camera, 0.5 * (low + high))
     if widgets.button("Scene's own view", tip="Back to the camera that the scene was saved with (0).", width=-1):
         camera = state.scene.camera
     return widgets.holding(replace(state, camera=camera), active)

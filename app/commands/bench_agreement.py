@@ -1,0 +1,79 @@
+"""The bench-agreement command: checks what was typed, compares scene after scene, keeps what is found."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..base.atomic import atomic_output, make_output_folder
+from ..base.interrupts import exit_code_of
+from ..base.memory import check_picture_memory
+from ..bench.results import AgreementSettings as Settings
+from . import options
+from .bench import MAX_SEEDS, load_scenes
+
+
+@dataclass(frozen=True)
+class AgreementRequest:
+    """The options as typed."""
+
+    scenes: tuple[str, ...] = ()
+    output: Path = Path("bench_agreement")
+    photons: str | None = None
+    seeds: str | None = None
+    size: str | None = None
+    reference_seconds: str | None = None
+    method: str | None = None
+
+
+def bench_agreement_command(request: AgreementRequest) -> int:
+    """Measure and print; returns the exit code. Raises `UserError`."""
+    import msgspec
+
+    from ..base.progress import ProgressReporter
+    from ..bench import agreement
+    from ..bench.rendering import NothingToMeasure
+    from ..gpu.context import create_context
+
+    settings = _settings(request)
+    scenes = load_scenes(request.scenes)
+    make_output_folder(request.output, "agreement.json")
+    found: list[agreement.SceneAgreement] = []
+    print(agreement.HEAD, flush=True)
+    try:
+        with create_context() as context:
+            for name, scene in scenes.items():
+                try:
+                    with ProgressReporter(f"bench-agreement {name}") as progress:
+                        found.append(agreement.measure(context, name, scene, settings, progress))
+                except NothingToMeasure as reason:
+                    if request.scenes:
+                        raise
+                    print(f"note: {reason}", file=sys.stderr)
+                    continue
+                print(agreement.line(found[-1]), flush=True)
+                with atomic_output(request.output / "agreement.json") as temporary:
+                    temporary.write_bytes(msgspec.json.format(msgspec.json.encode(found)))
+    except KeyboardInterrupt as interrupt:
+        print(f"spectrasplat: stopped; {len(found)} scenes kept", file=sys.stderr)
+        return exit_code_of(interrupt)
+    print(f"wrote {request.output / 'agreement.json'}")
+    return 0
+
+
+def _settings(request: AgreementRequest) -> Settings:
+    asked: dict[str, Any] = {}
+    if request.size is not None:
+        asked["width"], asked["height"] = options.parse_size(request.size)
+        check_picture_memory(asked["width"], asked["height"], None)
+    if request.photons is not None:
+        asked["photons"] = options.parse_photons(request.photons)
+    if request.seeds is not None:
+        asked["seeds"] = options.parse_integer("--seeds", request.seeds, 2, MAX_SEEDS)
+    if request.reference_seconds is not None:
+        asked["reference_seconds"] = options.parse_seconds(request.reference_seconds)
+    if request.method is not None:
+        asked["method"] = options.parse_method(request.method)
+    return Settings(**asked)

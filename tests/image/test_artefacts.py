@@ -1,0 +1,30 @@
+"""What once spoilt pictures: each with a measure of it that the picture of then would fail."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.ndimage import median_filter
+from spectrasplat.base.paths import assets_dir
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.settings import RenderSettings
+from spectrasplat.render.still import render
+
+
+def grain(picture: np.ndarray) -> float:
+    """What single pixels differ by from those round them, as a share of the light; the brightest hundredth left out:
+    the sun's own image is one pixel."""
+    luminance = picture @ [0.2126, 0.7152, 0.0722]
+    away = np.abs(luminance - median_filter(luminance, 3))
+    return float(np.sort(away, axis=None)[: round(0.99 * away.size)].mean() / luminance.mean())
+
+
+def test_reflections_within_a_ball_have_no_grain(gl) -> None:
+    """What was reflected three times inside meets the caustic below: followed, not drawn by chance. Measured: 0.0044,
+    and 0.094 where parts of up to 0.004 were left to chance."""
+    scene = load_scene(assets_dir() / "scenes" / "ball.toml")
+    camera = replace(scene.camera, target=(-0.2, -0.3, 0.85), vertical_fov_deg=3.0)
+    settings = RenderSettings(64, 48, photons=30_000, spp=8)
+    picture = render(replace(scene, camera=camera), settings, context=gl).rgb.astype(float)
+    assert grain(picture) < 0.015
