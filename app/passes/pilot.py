@@ -43,6 +43,8 @@ KEPT_THRESHOLD = 0.003
 """Share of a photon's power below which roulette decides, where parts that weak add little work."""
 MOST_MORE_FLIGHTS = 1.4
 """How many times the flights of a pilot that may take."""
+_FLIGHTS_OF_EVERY = 8
+"""Of so many points one tells how many flights that takes: weak branches are many, and this is but a ratio."""
 MAX_LIGHT_POINTS = 256
 MAX_POINTS = 1 << 16
 """Lattice points of a pilot, however little of the domain holds glass."""
@@ -75,12 +77,18 @@ def pilot_steps(
     slices = -(-count // trace.batch)
 
     def traced(
-        band: Band, depth: int, place: tuple[float, float] = (0.5, 0.5), split_threshold: float | None = None
+        band: Band,
+        depth: int,
+        place: tuple[float, float] = (0.5, 0.5),
+        split_threshold: float | None = None,
+        every: int = 1,
     ) -> Generator[None, None, tuple[np.ndarray, FluxTally, int]]:
         raw, tally, flights = b"", FluxTally(), 0
-        for first in range(slices):
-            points = len(range(first, count, slices))
-            piece = LatticeSlice(light, (band,), count, first, slices, points, (0, 0), (0, 0), 0, 1, light_place=place)
+        for first in range(0, slices * every, every):
+            points = len(range(first, count, slices * every))
+            piece = LatticeSlice(
+                light, (band,), count, first, slices * every, points, (0, 0), (0, 0), 0, 1, light_place=place
+            )
             batch = yield from trace.steps(piece, domain, depth, split_threshold)
             raw += trace.photons.read(size=batch.photons * trace.photon.stride) if batch.photons else b""
             tally.merge(batch.tally)
@@ -92,7 +100,7 @@ def pilot_steps(
     if tally.ended["lost_depth"] > tally.ended["deposited"]:
         depth = trace.max_depth
         whole, _, flights = yield from traced(everything, depth)
-    _, _, kept_flights = yield from traced(everything, depth, split_threshold=KEPT_THRESHOLD)
+    _, _, kept = yield from traced(everything, depth, split_threshold=KEPT_THRESHOLD, every=_FLIGHTS_OF_EVERY)
     at_places, from_rim = [], []
     for x in PLACES if spectral else ():
         record, *_ = yield from traced(Band(x, x, x, power_w), depth)
@@ -100,7 +108,7 @@ def pilot_steps(
     for place in RIM if scene.lights[light].has_extent else ():
         record, *_ = yield from traced(everything, depth, place)
         from_rim.append(record)
-    return Pilot(count, whole, at_places, from_rim, (flights, kept_flights))
+    return Pilot(count, whole, at_places, from_rim, (flights, kept * _FLIGHTS_OF_EVERY))
 
 
 def split_threshold(pilots: Iterable[Pilot]) -> float:

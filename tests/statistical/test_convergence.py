@@ -1,7 +1,7 @@
 """The error of `srd` against the independent reference keeps falling where it once stayed.
 
-`prism_case`'s footprints are narrow from half a million photons on, and six bands whose chords may miss by a quarter of a
-texel left an nRMSE of 0.006 however many photons followed (`whole_texels`, kept here as a mutant).
+`prism_case`'s footprints are narrow from half a million photons on, and six bands whose chords may miss by a quarter of
+a texel left an nRMSE of 0.006 however many photons followed (kept here as a mutant).
 """
 
 from __future__ import annotations
@@ -38,9 +38,10 @@ def squared_errors(gl: Context, reference: ReferencePicture) -> np.ndarray:
     """nRMSE² (SEEDS, PHOTONS), freed of the reference's variance."""
     rig = MethodRig(gl, load_scene(shipped_scenes()["prism_case"]), "srd-photons", *SIZE)
     try:
-        return np.array(
-            [[measure(rig.render(n, seed).xyz, reference)["nrmse"] ** 2 for n in PHOTONS] for seed in range(1, SEEDS + 1)]
-        )
+        errors = [
+            [measure(rig.render(n, seed).xyz, reference)["nrmse"] for n in PHOTONS] for seed in range(1, SEEDS + 1)
+        ]
+        return np.square(errors)
     finally:
         rig.release()
 
