@@ -66,6 +66,7 @@ def test_a_turntable_traces_once_and_its_first_frame_is_the_picture(gl, stage: S
     assert pictures[0].sum() == pytest.approx(alone.sum(), rel=0.02)
 
 
+@pytest.mark.slow
 def test_what_stands_still_stands_still(gl, stage: Stage) -> None:
     """The dispersion of the prism grows: its fan changes, the diamond's sparks and the table do not."""
     made = keyed(stage, [Track(GAIN, (0.0, 1.0), (0.8, 1.3), ("linear", "linear"))], 2, 2.0)
@@ -97,6 +98,7 @@ def test_a_frame_is_a_function_of_its_stage_alone(gl, stage: Stage) -> None:
     assert np.array_equal(got, want)
 
 
+@pytest.mark.slow
 def test_dispersion_may_begin_at_nothing(gl, stage: Stage) -> None:
     """Photons of a glass without dispersion carry other columns, and such frames stand beside ordinary ones."""
     stages = [apply(stage, GAIN, gain) for gain in (0.0, 2.0)]
@@ -166,6 +168,7 @@ def read_movie(path: Path, width: int, height: int) -> np.ndarray:
     return np.frombuffer(raw, np.uint8).reshape(-1, height, width, 3)
 
 
+@pytest.mark.slow
 def test_a_movie_stopped_early_plays(gl, stage: Stage, tmp_path: Path) -> None:
     made = turntable(stage, 6, 24.0)
     path = tmp_path / "out.mp4"

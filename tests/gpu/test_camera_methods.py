@@ -157,6 +157,7 @@ def behind_panes(gl) -> tuple[np.ndarray, np.ndarray]:
     return pictures[0], pictures[1]
 
 
+@pytest.mark.slow
 def test_a_caustic_behind_matched_glass_keeps_its_light(behind_panes) -> None:
     through, plain = behind_panes
     lit = plain.sum(axis=-1) > 0.05 * plain.sum(axis=-1).max()
