@@ -111,8 +111,8 @@ def test_a_tiny_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pyt
     """Two methods against the real reference of one second, through the command line."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.setattr(runner, "POINTS", 3)
-    # On a loaded machine the smallest budget alone may take the time asked for; what a rig proposes is tested above, what
-    # is made of it in test_bench_tuning.
+    # On a loaded machine the smallest budget alone may take the time asked for; what a rig proposes is tested above,
+    # what is made of it in test_bench_tuning.
     budgets = [256, 2048, 16_384]
     trials = [Trial(256, kernel, 0.01, 0.5 * kernel) for kernel in (0.45, 0.9)]
     monkeypatch.setattr(
