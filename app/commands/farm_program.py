@@ -12,25 +12,13 @@ import typer
 
 from . import options
 from .animate import AnimateRequest
+from .arguments import SchedulerOption, WorkersOption
 from .bench import BenchRequest
 from .farm import FarmRequest, farm_animate_command, farm_bench_command, farm_render_command
 from .render import RenderRequest
 
 _OPENING = ("up", "glass", "environment")
 """Options that together say how a scene is opened."""
-
-
-WorkersOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="N",
-        help="Workers on this machine, each with its share of the cores, or a GPU of its own where there are several.",
-    ),
-]
-SchedulerOption = Annotated[
-    str | None,
-    typer.Option(metavar="ADDRESS", help="A Dask scheduler that runs already, for example tcp://10.0.0.1:8786."),
-]
 
 
 def farm_options(workers: WorkersOption = None, scheduler: SchedulerOption = None) -> None:

@@ -44,6 +44,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
     return frames_of(folder)
 
 
+@pytest.mark.slow
 def test_ranges_are_the_frames_of_the_whole(whole: dict[str, bytes], tmp_path: Path) -> None:
     """The last first: its exposure is still the first frame's."""
     assert main(arguments(tmp_path / "a", f"4-5/{COUNT}")) == 0
@@ -59,6 +60,7 @@ def test_workers_that_meet_make_every_frame_once(whole: dict[str, bytes], tmp_pa
     assert frames_of(tmp_path / "a") == whole
 
 
+@pytest.mark.slow
 def test_a_killed_workers_frame_is_made_by_another(whole: dict[str, bytes], tmp_path: Path) -> None:
     folder = tmp_path / "a"
     killed = worker(folder, str(COUNT))

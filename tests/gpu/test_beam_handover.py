@@ -178,8 +178,12 @@ def test_beams_need_their_programs(gl, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("two_events", "shape", "more"),
-    [(False, "prism", BESIDE), (True, "prism", BESIDE), (True, "box", BESIDE), (False, "prism", WITHIN)],
-    ids=["entered", "left", "box", "ball within"],
+    [
+        pytest.param(False, "prism", BESIDE, id="entered"),
+        pytest.param(True, "prism", BESIDE, id="left", marks=pytest.mark.slow),
+        pytest.param(True, "box", BESIDE, id="box"),
+        pytest.param(False, "prism", WITHIN, id="ball within", marks=pytest.mark.slow),
+    ],
 )
 def test_pieces_go_on_as_photons_would(gl, tmp_path: Path, two_events: bool, shape: str, more: str) -> None:
     """Against many more photons, pieces miss no more than as many photons of the emission lattice do."""

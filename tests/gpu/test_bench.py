@@ -14,7 +14,8 @@ from spectrasplat.base.errors import UserError
 from spectrasplat.bench import runner
 from spectrasplat.bench.measured_passes import LIGHT
 from spectrasplat.bench.rendering import KERNELS, MethodRig
-from spectrasplat.bench.results import BenchResult
+from spectrasplat.bench.results import BenchResult, Trial
+from spectrasplat.bench.tuning import Tuning
 from spectrasplat.commands.options import find_scene
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.optics.colorimetry import rgb709_to_xyz
@@ -110,8 +111,13 @@ def test_a_tiny_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pyt
     """Two methods against the real reference of one second, through the command line."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.setattr(runner, "POINTS", 3)
-    # On a loaded machine the smallest budget alone may take the time asked for; what a rig proposes is tested above.
-    monkeypatch.setattr(MethodRig, "budgets", lambda *_: [256, 2048, 16_384])
+    # On a loaded machine the smallest budget alone may take the time asked for; what a rig proposes is tested above,
+    # what is made of it in test_bench_tuning.
+    budgets = [256, 2048, 16_384]
+    trials = [Trial(256, kernel, 0.01, 0.5 * kernel) for kernel in (0.45, 0.9)]
+    monkeypatch.setattr(
+        runner, "tune", lambda rig, *_: Tuning(budgets, [0.45] * 3, trials) if rig.kernels else Tuning(budgets, [], [])
+    )
     monkeypatch.setattr("spectrasplat.bench.machine.program_hash", lambda: "as it is")  # an editor may be at work
     out = tmp_path / "out"
     arguments = [

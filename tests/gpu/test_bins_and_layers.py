@@ -318,6 +318,7 @@ def test_a_glb_is_opened_as_a_scene(render: Render) -> None:
     assert luminance(picture).sum() > 0.0 and abs(share(render, "unaccounted")) <= 0.03
 
 
+@pytest.mark.slow
 def test_a_bare_mesh_is_glass_on_a_table(render: Render) -> None:
     render(assets_dir() / "meshes" / "trefoil_knot.ply", "--stats")
     assert "it was made of N-BK7" in render.notes and "table" in render.notes  # type: ignore[attr-defined]

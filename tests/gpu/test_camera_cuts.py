@@ -59,6 +59,7 @@ def drawn(gl, edge: Scene) -> np.ndarray:
     return picture(gl, edge, 1024, "stochastic-even")
 
 
+@pytest.mark.slow
 def test_parted_colours_go_their_own_ways(gl, edge: Scene, drawn, monkeypatch, tmp_path) -> None:
     """One band, cut, has what single wavelengths have. A band that is never cut does not, however many samples it
     gets."""
@@ -85,6 +86,7 @@ def test_a_part_chosen_by_chance_stands_for_both(gl, edge: Scene, monkeypatch) -
     assert error(chosen, both) < 5e-4
 
 
+@pytest.mark.slow
 def test_a_part_that_is_lost_is_noticed(gl, edge: Scene, monkeypatch, tmp_path) -> None:
     """Seeds and all else same_hit: what differs is the lost light."""
     right = picture(gl, edge, 32)
@@ -112,6 +114,7 @@ def test_single_wavelengths_of_a_pass_of_bands_are_those_of_their_own_method(
     assert single_wavelengths.fallbacks["band_uncut"] == 0
 
 
+@pytest.mark.slow
 def test_looks_round_a_sample_smooth_outlines_and_change_nothing_else(gl, edge: Scene) -> None:
     many = picture(gl, edge, 256, primary_samples=1)
     one, four = (error(picture(gl, edge, 1, primary_samples=looks), many) for looks in (1, 4))

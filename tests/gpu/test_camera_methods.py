@@ -157,6 +157,7 @@ def behind_panes(gl) -> tuple[np.ndarray, np.ndarray]:
     return pictures[0], pictures[1]
 
 
+@pytest.mark.slow
 def test_a_caustic_behind_matched_glass_keeps_its_light(behind_panes) -> None:
     through, plain = behind_panes
     lit = plain.sum(axis=-1) > 0.05 * plain.sum(axis=-1).max()
@@ -168,6 +169,7 @@ def test_a_caustic_behind_matched_glass_keeps_its_light(behind_panes) -> None:
         assert abs(int(through[..., channel].sum(axis=0).argmax()) - int(plain[..., channel].sum(axis=0).argmax())) <= 1
 
 
+@pytest.mark.slow
 def test_a_caustic_behind_matched_glass_has_its_colours(behind_panes) -> None:
     """What coarse spectra lack of XYZ is given back: without it they were 20 % off here."""
     assert difference(*behind_panes) < 0.02

@@ -43,7 +43,14 @@ def shares(found: Probe) -> dict[str, float]:
     return {name: share for name, share in found.shares.items() if name != "direct"}
 
 
-@pytest.mark.parametrize("material", [Mirror(), Black(), Diffuse()], ids=["silver", "black", "paint"])
+@pytest.mark.parametrize(
+    "material",
+    [
+        pytest.param(Mirror(), id="silver"),
+        pytest.param(Black(), id="black", marks=pytest.mark.slow),
+        pytest.param(Diffuse(), id="paint", marks=pytest.mark.slow),
+    ],
+)
 def test_a_coat_on_glass_loses_nothing_and_is_what_the_reference_says(gl, material: Material) -> None:
     for gap in GAPS:
         beams, photons = (probe(gl, coated(material, gap), settings) for settings in (CAUSTIC, PHOTONS))
@@ -66,6 +73,7 @@ def test_silver_reflects_all_whether_or_not_air_is_below(gl) -> None:
     np.testing.assert_allclose(deposited, deposited[0], atol=1e-3)
 
 
+@pytest.mark.slow
 def test_the_camera_sees_the_same_silver(gl) -> None:
     camera = Camera((-4.0, -3.0, 3.0), (0.0, 0.0, 1.0), vertical_fov_deg=30.0)
     pictures = [

@@ -116,6 +116,7 @@ def colour_grain(rgb: np.ndarray, mask: np.ndarray) -> float:
     return float(np.sqrt((step**2).mean()))
 
 
+@pytest.mark.slow
 def test_a_moving_camera_sees_no_colour_grain_in_glass(
     engine: LiveEngine, stage: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -159,6 +160,7 @@ def test_only_whole_cycles_of_bands_are_shown_and_smooth_samples_before(engine: 
     assert np.abs(rgb[mask][:, 0] - rgb[mask][:, 2]).max() > 0.1 * WHITE  # fringes
 
 
+@pytest.mark.slow
 def test_better_maps_wait_for_a_cycle_and_the_last_are_shown(engine: LiveEngine, stage: Scene) -> None:
     engine.target_photons = 1 << 16
     wanted = inputs(with_dispersion(edged(stage), 3.0))
@@ -179,6 +181,7 @@ def test_better_maps_wait_for_a_cycle_and_the_last_are_shown(engine: LiveEngine,
     assert engine.stats.photons == pytest.approx(engine._shown.light.light_pass.maps.photon_weight, abs=1)
 
 
+@pytest.mark.slow
 def test_an_edited_dispersion_changes_what_is_seen_in_glass_and_traces_nothing(
     engine: LiveEngine, gl: Context, stage: Scene
 ) -> None:

@@ -22,7 +22,13 @@ def test_there_are_three() -> None:
     assert [path.name for path in NOTEBOOKS] == ["achromat.ipynb", "error_and_time.ipynb", "prism.ipynb"]
 
 
-@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "notebook",
+    [
+        pytest.param(path, marks=[pytest.mark.slow] if path.stem != "achromat" else [], id=path.stem)
+        for path in NOTEBOOKS
+    ],
+)
 def test_a_notebook_runs_from_top_to_bottom(notebook: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     import matplotlib
 

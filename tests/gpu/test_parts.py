@@ -34,7 +34,7 @@ def lens(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     return parts(tmp_path_factory.mktemp("lens"), "lens", 3)
 
 
-@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("scene", [pytest.param("lens", marks=pytest.mark.slow), "prism"])
 def test_merged_parts_are_the_picture_of_one_process(scene: str, tmp_path: Path) -> None:
     """To a few millionths of its largest value: the sums are the same float32 numbers, added in another order."""
     whole, merged = tmp_path / "whole.exr", tmp_path / "merged.exr"
@@ -72,6 +72,7 @@ def test_no_part_counts_twice(lens: list[Path], tmp_path: Path, capsys: pytest.C
     assert np.array_equal(np.load(tmp_path / "a.npy"), np.load(tmp_path / "b.npy"))
 
 
+@pytest.mark.slow
 def test_parts_of_others_are_refused(lens: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     other = tmp_path / "other.ssp"
     for scene, changed, share, sentence in (
@@ -90,8 +91,8 @@ def test_parts_of_others_are_refused(lens: list[Path], tmp_path: Path, capsys: p
 def test_a_damaged_part_is_a_sentence(lens: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     data, bad = lens[0].read_bytes(), tmp_path / "bad.ssp"
     generator = np.random.default_rng(1)
-    damaged = [data[: len(data) * k // 8] for k in range(8)] + [b"PK" * 40, b"{}"]
-    places = generator.integers(30, len(data), 12)
+    damaged = [data[: len(data) * k // 8] for k in (0, 3, 7)] + [b"PK" * 40]
+    places = generator.integers(30, len(data), 3)
     damaged += [data[:at] + bytes([data[at] ^ 0x55]) + data[at + 1 :] for at in places]
     whole = 0
     for text in damaged:

@@ -15,6 +15,7 @@ GAIN = "objects.prism.dispersion_gain"
 ASKED = ("--size", "64x36", "--photons", "50k", "--spp", "8")
 
 
+@pytest.mark.slow
 def test_a_dispersion_sweep_traces_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     scene = ss.load("prism")
     points = list(ss.sweep(scene, {GAIN: GAINS}, size=(64, 36), photons=50_000, spp=8))

@@ -6,6 +6,7 @@ Taken whole for all of them, what such photons throw stood out as coloured spots
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from spectrasplat.base.paths import shipped_scenes
 from spectrasplat.gpu.context import Context
 from spectrasplat.model.io.scene_file import load_scene
@@ -15,6 +16,7 @@ from spectrasplat.render.still import render
 SEEDS = (1, 2, 3)
 
 
+@pytest.mark.slow
 def test_no_photon_stands_out_at_the_onset_of_total_reflection(gl: Context) -> None:
     """With one share for the whole band, seeds 1 and 2 have pixels 187 and 76 from the median (brightest: 301)."""
     scene = load_scene(shipped_scenes()["lens_text"])

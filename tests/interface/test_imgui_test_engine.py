@@ -9,11 +9,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from spectrasplat.base.paths import assets_dir
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
+@pytest.mark.slow
 def test_select_edit_undo_redo(tmp_path: Path) -> None:
     """In a process of its own: the engine runs the main loop, and GLFW can be started on one platform only."""
     done = subprocess.run(

@@ -100,6 +100,7 @@ def test_undo_and_redo_bring_the_pictures_back(hands: Hands) -> None:
     assert traced <= hands.rays_traced < 1.1 * traced
 
 
+@pytest.mark.slow
 def test_brushing_widens_the_colours_where_it_paints(hands: Hands) -> None:
     before = hands.settle()
     hands.interface.key(imgui.Key.b)
@@ -131,6 +132,7 @@ def test_walking_round_traces_nothing(hands: Hands) -> None:
     assert difference(before, hands.settle()) < SAME
 
 
+@pytest.mark.slow
 def test_saving_and_opening_again_keeps_what_was_edited(hands: Hands, scene_file: Path, gl: Context) -> None:
     start = hands.settle()
     select_glass(hands)

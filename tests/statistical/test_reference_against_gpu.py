@@ -186,7 +186,7 @@ class Comparison:
         return float(np.mean((excess > 3.0 * np.sqrt(self.variance[..., 1]))[lit]))
 
 
-SLOW = {"wine_glass", "lamp_lit"}
+SLOW = {"wine_glass", "lamp_lit", "nested"}
 
 
 @pytest.fixture(

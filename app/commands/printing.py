@@ -1,0 +1,32 @@
+"""What commands print: text as it is, and tables."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from ..base.errors import visible
+
+if TYPE_CHECKING:
+    from rich.text import Text as RichText
+
+PIPE_WIDTH = 200
+"""Columns where no terminal sets a limit: tables are then not cut."""
+
+
+def show(content: object) -> None:
+    """Print text as it is, and rich's tables in colour where the terminal has it."""
+    if isinstance(content, str):
+        print(visible(content))
+        return
+    from rich.console import Console
+
+    class PlainConsole(Console):
+        """Names out of a file are shown as they are: they neither choose colours nor command the terminal."""
+
+        def render_str(self, text: str, **more: Any) -> RichText:
+            return super().render_str(visible(text), **more)
+
+    console = PlainConsole(highlight=False, markup=False, emoji=False)
+    if not console.is_terminal:
+        console.width = PIPE_WIDTH
+    console.print(content)
