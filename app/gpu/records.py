@@ -200,7 +200,8 @@ QUEUE_STATE = Struct(
         Field("gather_groups", "uvec4"),
         Field("iterations", "uint", "steps that had a ray"),
         Field("flights", "uint", "of all rays, up to what they meet, since the batch began"),
-        Field("reserved", "uint", "", 2),
+        Field("most_alive", "uint", "rays of the fullest step"),
+        Field("reserved", "uint"),
     ),
 )
 MASK_SIZE = 64

@@ -43,6 +43,8 @@ KEPT_THRESHOLD = 0.003
 """Share of a photon's power below which roulette decides, where parts that weak add little work."""
 MOST_MORE_FLIGHTS = 1.4
 """How many times the flights of a pilot that may take."""
+_FULL = 0.8
+"""Of a queue's room: a pilot's few points are not every batch."""
 _FLIGHTS_OF_EVERY = 8
 """Of so many points one tells how many flights that takes: weak branches are many, and this is but a ratio."""
 MAX_LIGHT_POINTS = 256
@@ -65,6 +67,8 @@ class Pilot:
     """One from each of `RIM` (empty for a light without extent)."""
     flights: tuple[int, int] = (0, 0)
     """Of all rays of `whole`, as roulette is played by default, and with `KEPT_THRESHOLD`."""
+    fullness: float = 0.0
+    """Of the queues with `KEPT_THRESHOLD`, at most."""
 
 
 def pilot_steps(
@@ -82,8 +86,8 @@ def pilot_steps(
         place: tuple[float, float] = (0.5, 0.5),
         split_threshold: float | None = None,
         every: int = 1,
-    ) -> Generator[None, None, tuple[np.ndarray, FluxTally, int]]:
-        raw, tally, flights = b"", FluxTally(), 0
+    ) -> Generator[None, None, tuple[np.ndarray, FluxTally, int, float]]:
+        raw, tally, flights, fullness = b"", FluxTally(), 0, 0.0
         for first in range(0, slices * every, every):
             points = len(range(first, count, slices * every))
             piece = LatticeSlice(
@@ -93,14 +97,15 @@ def pilot_steps(
             raw += trace.photons.read(size=batch.photons * trace.photon.stride) if batch.photons else b""
             tally.merge(batch.tally)
             flights += batch.flights
-        return np.frombuffer(raw, trace.photon.dtype), tally, flights
+            fullness = max(fullness, batch.fullness)
+        return np.frombuffer(raw, trace.photon.dtype), tally, flights, fullness
 
     depth, everything = MAX_DEPTH, Band(0.0, 1.0, 0.5, power_w)
-    whole, tally, flights = yield from traced(everything, depth)
+    whole, tally, flights, _ = yield from traced(everything, depth)
     if tally.ended["lost_depth"] > tally.ended["deposited"]:
         depth = trace.max_depth
-        whole, _, flights = yield from traced(everything, depth)
-    _, _, kept = yield from traced(everything, depth, split_threshold=KEPT_THRESHOLD, every=_FLIGHTS_OF_EVERY)
+        whole, _, flights, _ = yield from traced(everything, depth)
+    _, _, kept, fullness = yield from traced(everything, depth, split_threshold=KEPT_THRESHOLD, every=_FLIGHTS_OF_EVERY)
     at_places, from_rim = [], []
     for x in PLACES if spectral else ():
         record, *_ = yield from traced(Band(x, x, x, power_w), depth)
@@ -108,15 +113,16 @@ def pilot_steps(
     for place in RIM if scene.lights[light].has_extent else ():
         record, *_ = yield from traced(everything, depth, place)
         from_rim.append(record)
-    return Pilot(count, whole, at_places, from_rim, (flights, kept * _FLIGHTS_OF_EVERY))
+    return Pilot(count, whole, at_places, from_rim, (flights, kept * _FLIGHTS_OF_EVERY), fullness)
 
 
 def split_threshold(pilots: Iterable[Pilot]) -> float:
     """Share of a photon's power below which roulette decides: so low that weak branches keep lattices of their own,
-    with footprints as narrow as those of strong ones, where that costs little."""
-    counts = [pilot.flights for pilot in pilots]
-    by_default, kept = sum(a for a, _ in counts), sum(b for _, b in counts)
-    return KEPT_THRESHOLD if kept <= MOST_MORE_FLIGHTS * by_default else SPLIT_THRESHOLD
+    with footprints as narrow as those of strong ones, where that costs little and the queues have room."""
+    pilots = list(pilots)
+    by_default, kept = (sum(pilot.flights[i] for pilot in pilots) for i in range(2))
+    fits = all(pilot.fullness < _FULL for pilot in pilots)
+    return KEPT_THRESHOLD if fits and kept <= MOST_MORE_FLIGHTS * by_default else SPLIT_THRESHOLD
 
 
 def landings_of(pilots: Iterable[Pilot]) -> dict[int, Landings]:

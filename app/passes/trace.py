@@ -105,6 +105,8 @@ class Batch:
     steps: int
     flights: int
     """Of all rays, up to what they meet."""
+    fullness: float
+    """Of the fuller queue, of rays or of photons, for lattice points that fill a batch."""
 
 
 @dataclass(frozen=True)
@@ -266,7 +268,7 @@ class TracePass:
             raise ValueError(f"{count} rays in a batch of {self.batch}")
         chunks = -(-count // _CHUNK)
         state = self._state_zero.copy()
-        state["alive"] = state["flights"] = count
+        state["alive"] = state["flights"] = state["most_alive"] = count
         state["trace_groups"] = (-(-count // _GROUP), 1, 1, 0)
         state["next_chunk_groups"] = (-(-chunks // _GROUP), 1, 1, 0)
         self._state.write(state.tobytes())
@@ -305,7 +307,8 @@ class TracePass:
         state = self._read_state()
         ctx.memory_barrier()
         photons = int(state["photon_first"]) + int(state["photons_new"])
-        return Batch(photons, emitted, self._tally(int(state["overflow"])), step, int(state["flights"]))
+        fullness = max(int(state["most_alive"]) / RAY_ROOM, photons / PHOTON_ROOM) / max(emitted, 1)
+        return Batch(photons, emitted, self._tally(int(state["overflow"])), step, int(state["flights"]), fullness)
 
     def _start(self, piece: LatticeSlice, domain: EmissionDomain, max_depth: int, split_threshold: float) -> None:
         state = self._state_zero.copy()

@@ -7,5 +7,6 @@ void main()
 {
     state.alive = state.next_alive;
     state.flights += state.alive;
+    state.most_alive = max(state.most_alive, state.alive);
     state.iterations += state.alive > 0u ? 1u : 0u;
 }

@@ -58,6 +58,15 @@ def test_weak_branches_keep_their_lattices_where_that_costs_little(gl: Context) 
     assert by_default > slit.trace.rays_traced / 6
 
 
+def test_weak_branches_that_the_queues_have_no_room_for_play_roulette(gl: Context) -> None:
+    """Little work besides, but each of a grating's orders is a lattice of its own, all in flight at once."""
+    light = prepared(gl, "spectrometer")
+    by_default, kept = (sum(pilot.flights[i] for pilot in light.pilots.values()) for i in range(2))
+    assert kept < pilot.MOST_MORE_FLIGHTS * by_default
+    assert max(pilot.fullness for pilot in light.pilots.values()) > 1.0
+    assert light.trace.split_threshold == SPLIT_THRESHOLD
+
+
 def test_frames_that_share_their_lattices_play_roulette_alike(gl: Context) -> None:
     light = prepared(gl, "prism_case", Division({0: (6, 1)}))
     assert light.trace.split_threshold == SPLIT_THRESHOLD

@@ -140,7 +140,7 @@ MUTANTS = {
         "camera/camera.comp",
         "interface_indices(boundary, path.band, n_i, n_t);",
         "interface_indices(boundary, path.band.yyy, n_i, n_t);",
-        "gpu/test_camera_cuts.py",
+        "gpu/test_camera_cuts.py::test_parted_colours_go_their_own_ways",
     ),
     "light of the environment without its cosine": Mutant(
         "light/environment.comp",
@@ -167,6 +167,8 @@ def test_each_mistake_is_noticed(tmp_path: Path, name: str) -> None:
         "0",
         "-x",
         "-q",
+        "-m",
+        "",
         "-p",
         "no:cacheprovider",
         "-p",
