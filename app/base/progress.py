@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 SHOW_AFTER_S = 2.0
 LOG_EVERY_S = 10.0
 _BAR_EVERY_S = 0.05
+_TELLING_SHARE = 1e-3
+"""Of the whole: less since the last line says nothing about what is left."""
 
 
 class ProgressReporter:
@@ -85,7 +87,7 @@ class ProgressReporter:
         detail = f", {text}" if text else ""
         # Of late: one phase may be slower than those before it.
         (before, then), self._last = self._last, (fraction, now)
-        if fraction > before:
+        if fraction - before > _TELLING_SHARE:
             detail += f", about {(1.0 - fraction) * (now - then) / (fraction - before):.0f} s left"
         print(
             f"{self._title}: {100.0 * fraction:.0f} % after {elapsed:.0f} s{detail}",

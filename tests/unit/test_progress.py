@@ -43,6 +43,16 @@ def test_log_gets_a_line_every_ten_seconds(clock: Clock) -> None:
     ]
 
 
+def test_what_hardly_moved_foretells_nothing(clock: Clock) -> None:
+    """A first phase that cannot tell its share: 40 million years were foretold."""
+    stream = io.StringIO()
+    reporter = ProgressReporter("ball", stream, clock)
+    for fraction in (1e-8, 2e-8, 0.5):
+        clock.now += 10.0
+        reporter(fraction)
+    assert [line.partition(", ")[2] for line in stream.getvalue().splitlines()] == ["", "", "about 10 s left"]
+
+
 def test_quick_jobs_are_silent(clock: Clock) -> None:
     for stream in (io.StringIO(), Terminal()):
         with ProgressReporter("ball", stream, clock) as reporter:
