@@ -20,7 +20,7 @@ from .leaves import Leaves
 from .rays import PARALLEL, PINHOLE, SOURCE
 from .screen_polygons import ScreenPolygons
 from .search import LEAF_OPEN, LEAF_PIECE, LEAF_TAIL, SUM_BEAMS, SUM_ENTERED, SUM_LEAVES, SUMS
-from .sources import mask_at
+from .sources import colour_edges, mask_at
 
 TOLERANCE_PX = 0.1
 """How far, in pixels at the objects' distance, places and edges may be from linear."""
@@ -120,10 +120,12 @@ class CameraView:
         source["kind"], source["origin"], source["forward"] = kind, place, forward
         source["right"], source["up"], source["axis"], source["cone"] = scale * right, -scale * up, forward, 4.0
         room = np.array([0.0, 0.0, 0.5 * footprint * max(size) + footprint])
-        bright = cumulative(self._axis, Spectrum(daylight_per_lumen())).at(np.linspace(0.0, 1.0, SAMPLES))
+        daylight = Spectrum(daylight_per_lumen())
+        bright = cumulative(self._axis, daylight).at(np.linspace(0.0, 1.0, SAMPLES))
         power = 0.5 * bright[:, 1] / bright[-1, 1] + 0.5 * bright[:, 3] / bright[-1, 3]
         mask = mask_at(place, self.scene, self._meshes)
-        return Emission(source, limits, room, power, power, (), (), True, 1.0, mask), footprint
+        edges = colour_edges(self.scene, daylight, self._axis)
+        return Emission(source, limits, room, power, power, (), (), True, edges, 1.0, mask), footprint
 
 
 def _screen_polygons(leaves: list[Leaves], scene: BeamScene, middle: np.ndarray, footprint: float) -> ScreenPolygons:

@@ -17,6 +17,7 @@ from ..model.geometry.mesh import Mesh
 from ..model.optics.colorimetry import VISIBLE_NM, mirror_reflectance
 from ..model.optics.spectral_tables import SpectralAxis
 from ..model.scene import Scene
+from ..model.tint_bands import tint_curves
 
 DIELECTRIC, MIRROR, BLACK, RECEIVER = 0, 1, 2, 3
 MAX_SOLIDS = 62
@@ -93,6 +94,8 @@ class BeamScene:
     """Some medium absorbs."""
     coloured: bool
     """Some mirror reflects one colour more than another."""
+    tints: np.ndarray
+    """(N, 401): what that does to light, `model.tint_bands.tint_curves`."""
     beam_objects: tuple[int, ...]
     """Objects of glass and mirrors whose light is carried by beams."""
     why_not: dict[int, str]
@@ -155,6 +158,7 @@ def beam_scene(
         np.array([meshes[i].bounds() for i in obstacles], float).reshape(-1, 2, 3),
         any(o.material.transmits and o.material.absorption is not None for o in scene.objects),
         any(o.material.is_mirror and len(set(o.material.reflectance_rgb)) > 1 for o in scene.objects),
+        tint_curves(scene),
         tuple(i for i in outlines if scene.objects[i].material.is_specular),
         why_not,
     )
@@ -165,7 +169,7 @@ def shown_as(beams: BeamScene, scene: Scene, axis: SpectralAxis, unit: float) ->
     tables, glass, tint = _tables(scene, axis, unit)
     solids = beams.solids.copy()
     solids["glass"][: len(glass)], solids["tint"][: len(tint)] = glass, tint
-    return replace(beams, tables=tables, solids=solids)
+    return replace(beams, tables=tables, solids=solids, tints=tint_curves(scene))
 
 
 _KEPT: WeakKeyDictionary[Mesh, list[tuple[np.ndarray, int]]] = WeakKeyDictionary()

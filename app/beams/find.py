@@ -48,6 +48,8 @@ class Emission:
     """Share of its power that each of them holds."""
     is_continuous: bool
     """Whether it has a spectrum besides them."""
+    edges: tuple[float, ...]
+    """x at which that is cut before any beam is followed, both ends included."""
     density: float
     """Flux per unit of q (parallel: GPU unit²; point: sr) and of spectral power."""
     mask: int = 0
@@ -89,8 +91,8 @@ def search(
     tables = np.vstack([scene.tables, emission.power, emission.watts])
     bands = [(x, x, share) for x, share in zip(emission.lines, emission.line_shares, strict=True)]
     if emission.is_continuous:
-        # In one piece: for the same time that is half the error of four bands in a cut stone.
-        bands.append((0.0, 1.0, 1.0))
+        # In one piece where nothing is coloured: for the same time that is half the error of four bands in a cut stone.
+        bands += [(lo, hi, 1.0) for lo, hi in pairwise(emission.edges)]
     sources = np.concatenate([emission.source, *emission.beside])
     args = scene.facets, scene.solids, tables, sources
     starts: list[tuple[int, np.ndarray, np.ndarray]] = []

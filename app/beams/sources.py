@@ -11,6 +11,7 @@ from ..model.geometry.mesh import Mesh
 from ..model.lights.light import Light
 from ..model.optics.spectral_tables import SpectralAxis, cumulative
 from ..model.optics.spectrum import Spectrum
+from ..model.tint_bands import cut_by_tints
 from .facets import BLACK, SAMPLES, BeamScene
 from .find import Emission
 from .rays import PARALLEL, POINT, SOURCE
@@ -19,6 +20,8 @@ _RIM = 64
 """Corners of the polygon that stands for a round aperture or a cone, of the same area."""
 _WIDEST = math.tan(math.radians(55.0))
 """Half side of a gnomonic plane up to which one is enough; else the six sides of a cube are taken."""
+_MOST_BANDS = 32
+"""Into which a light's spectrum is cut where something is coloured."""
 _GOLDEN = math.pi * (3.0 - math.sqrt(5.0))
 
 
@@ -55,10 +58,16 @@ def emissions(
         "lines": tuple(lines),
         "line_shares": tuple(s / total for s in shares),
         "is_continuous": bool(np.any(light.spectral_power.density > 0.0)),
+        "edges": colour_edges(scene, Spectrum(light.spectral_power.density), axis),
         "mask": inside,
     }
     make = _parallel if light.is_parallel else _diverging
     return make(light, corners, to_gpu, unit, parts, common)
+
+
+def colour_edges(scene: BeamScene, light: Spectrum, axis: SpectralAxis) -> tuple[float, ...]:
+    """x between which three weights a beam follow what absorbs and what is coloured."""
+    return tuple(cut_by_tints((0.0, 1.0), 1, _MOST_BANDS, scene.tints, light, axis).tolist())
 
 
 def _specular_corners(scene: BeamScene) -> np.ndarray:

@@ -305,14 +305,18 @@ class SceneBuffers:
         normals: list[np.ndarray] = []
         solids: list[tuple[int, int, int, int]] = []
         planes: list[np.ndarray] = []
+        plane_count, known_meshes, convex = 0, set(), half_spaces(self.scene)
         for index, item in enumerate(self.scene.objects):
             mesh = self.world_meshes[index]
-            untransformed = half_spaces(item)
+            untransformed = convex.get(index)
             if untransformed is not None:
-                own = mesh.convex_planes if like is None else None
+                # Of a mesh that stands in many places, they are found once.
+                own = mesh.convex_planes if like is None and id(item.mesh) not in known_meshes else None
+                known_meshes.add(id(item.mesh))
                 if own is None:  # a transform may push a borderline solid over the tolerance
                     own = _transformed_planes(untransformed, item.object_to_world)
-                solids.append((sum(len(p) for p in planes), len(own), index, 0))
+                solids.append((plane_count, len(own), index, 0))
+                plane_count += len(own)
                 offset = own[:, 3] - own[:, :3] @ self.space.centre
                 planes.append(np.column_stack([own[:, :3], offset * self.space.scale]))
                 continue

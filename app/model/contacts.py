@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -15,6 +15,7 @@ _SLACK = 1e-4
 shaders/lib/intersect.glsl)."""
 _SOLID_SLACK = 1e-5
 """Of the glass's longest side, between two solids."""
+_PAIRS_AT_ONCE = 1 << 20
 
 
 def world_bounds(item: SceneObject) -> np.ndarray:
@@ -35,25 +36,26 @@ def contacts(scene: Scene) -> list[tuple[int, int]]:
     """Pairs of objects, at least one of them not glass, whose surfaces may touch: some triangle's bounds meet the
     other's bounds, both ways (of glass, which has an inside, one way)."""
     objects = scene.objects
-    bounds = [world_bounds(item) for item in objects]
-    chosen = np.array([b for b, o in zip(bounds, objects, strict=True) if o.material.is_specular] or bounds)
-    if not len(chosen):
+    if not objects:
         return []
+    bounds = np.stack([world_bounds(item) for item in objects])
+    specular = np.array([item.material.is_specular for item in objects])
+    chosen = bounds[specular] if specular.any() else bounds
     slack = 0.5 * _SLACK * float(np.linalg.norm(chosen[:, 1].max(axis=0) - chosen[:, 0].min(axis=0)))
+    glass = np.array([item.material.transmits for item in objects])
 
     def reaches(i: int, j: int) -> bool:
-        if objects[i].material.transmits:
+        if glass[i]:
             return True
         corners = objects[i].mesh.transformed(objects[i].object_to_world).corners()
         return bool(_meet((corners.min(axis=1), corners.max(axis=1)), bounds[j], slack).any())
 
-    pairs = []
-    for i in range(len(objects)):
-        for j in range(i):
-            glass = objects[i].material.transmits and objects[j].material.transmits
-            if not glass and _meet(bounds[i], bounds[j], slack).all() and reaches(i, j) and reaches(j, i):
-                pairs.append((j, i))
-    return pairs
+    return sorted(
+        (int(i), int(j))
+        for pairs in _meeting(bounds, slack)
+        for i, j in pairs[~glass[pairs].all(axis=1)]
+        if reaches(i, j) and reaches(j, i)
+    )
 
 
 def _nested(scene: Scene) -> list[int]:
@@ -62,10 +64,29 @@ def _nested(scene: Scene) -> list[int]:
         return []
     bounds = np.stack([world_bounds(scene.objects[i]) for i in indices])
     slack = _SOLID_SLACK * np.ptp(bounds, axis=(0, 1)).max()
-    low, high = bounds[:, 0], bounds[:, 1]
-    overlap = _meet((low[:, None], high[:, None]), (low[None], high[None]), 2.0 * slack)
-    np.fill_diagonal(overlap, False)
-    return [indices[i] for i in np.flatnonzero(overlap.any(axis=1))]
+    found = np.zeros(len(indices), bool)
+    for pairs in _meeting(bounds, 2.0 * slack):
+        found[pairs] = True
+    return [indices[i] for i in np.flatnonzero(found)]
+
+
+def _meeting(bounds: np.ndarray, slack: float) -> Iterator[np.ndarray]:
+    """Pairs i < j (P, 2) of boxes (N, 2, 3) that overlap or are nearer than `slack`, a part at a time: swept along the
+    axis over which they are spread the most."""
+    axis = int(np.argmax(np.ptp(bounds[:, 0], axis=0)))
+    order = np.argsort(bounds[:, 0, axis], kind="stable")
+    low, high = bounds[order, 0], bounds[order, 1]
+    ends = np.searchsorted(low[:, axis], high[:, axis] + slack, side="right")
+    later = np.maximum(ends - np.arange(1, len(order) + 1), 0)
+    first = 0
+    while first < len(order):
+        last = max(first + 1, int(np.searchsorted(np.cumsum(later[first:]), _PAIRS_AT_ONCE, side="right")) + first)
+        count = later[first:last]
+        a = np.repeat(np.arange(first, last), count)
+        b = a + 1 + np.arange(len(a)) - np.repeat(np.cumsum(count) - count, count)
+        meet = _meet((low[a], high[a]), (low[b], high[b]), slack)
+        yield np.sort(np.column_stack([order[a[meet]], order[b[meet]]]), axis=1)
+        first = last
 
 
 def _meet(a: Box, b: Box, slack: float) -> np.ndarray:

@@ -15,14 +15,13 @@ from ..model.features import Features
 from ..model.optics.spectral_tables import CumulativeSpectrum
 from ..model.scene import Scene
 from ..model.settings import RenderSettings, divides_spectrum
+from ..model.tint_bands import cut_by_tints, tint_curves
 from ..passes.emission_domain import EmissionDomain
 from ..passes.pilot import MAX_LIGHT_POINTS, Pilot, PilotFit
 from ..passes.trace import Band, LatticeSlice
 
 SMALLEST_BATCH = MAX_BANDS * MAX_LIGHT_POINTS
 """One point of every sub-lattice a light may have."""
-TINTED_BANDS = 16
-"""Least number of bands where glass absorbs or mirrors are coloured."""
 
 
 @dataclass(frozen=True)
@@ -161,14 +160,11 @@ class Planner:
         else:
             count = fit.band_count() if divides_spectrum(method) and self.features.spectral_groups else 1
             lo_nm, hi_nm = max(lo_nm - 0.5, 380.0), min(hi_nm + 0.5, 780.0)
-            edges = np.linspace(float(axis.x_of_nm(lo_nm)), float(axis.x_of_nm(hi_nm)), count + 1)
-            if self._tinted and count < TINTED_BANDS:
-                # Three weights a band cannot follow a colour over the whole spectrum; steps even in both measures.
-                nm = np.linspace(lo_nm, hi_nm, 401)
-                even = 0.5 * (nm - lo_nm) / (hi_nm - lo_nm) + 0.5 * (axis.x_of_nm(nm) - edges[0]) / (
-                    edges[-1] - edges[0]
-                )
-                edges = axis.x_of_nm(np.interp(np.linspace(0.0, 1.0, TINTED_BANDS + 1), even, nm))
+            ends = float(axis.x_of_nm(lo_nm)), float(axis.x_of_nm(hi_nm))
+            edges = np.linspace(*ends, count + 1)
+            if self._tinted:
+                spectrum = self.scene.lights[light].spectral_power
+                edges = cut_by_tints(ends, count, MAX_BANDS, tint_curves(self.scene), spectrum, axis)
             middles = 0.5 * (edges[:-1] + edges[1:])
         return tuple(
             Band(float(lo), float(hi), float(mid), float(power.band(lo, hi)[3]))

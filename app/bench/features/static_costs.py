@@ -11,7 +11,7 @@ from ...gpu.mip_chain import level_count
 from ...gpu.records import photon_record, ray_record
 from ...gpu.scene_buffers import SAMPLES, TRIANGLE
 from ...model.contacts import contacts, overlapping_solids
-from ...model.features import Features, beam_objects, half_spaces, is_convex_solid
+from ...model.features import Features, beam_objects, half_spaces
 from ...model.scene import Scene
 from ...model.texture import Environment, Texture
 from ...passes.footprint import SPLAT
@@ -58,10 +58,11 @@ def static_costs(scene: Scene, features: Features) -> dict[str, str]:
     unspectral = RecordSizes.of(replace(features, spectral_groups=0))
     unspatial = RecordSizes.of(replace(features, footprints=False))
     specular = [o for o in scene.objects if o.material.is_specular]
-    loose = [o for o in scene.objects if not is_convex_solid(o)]
+    convex = half_spaces(scene)
+    loose = [o for i, o in enumerate(scene.objects) if i not in convex]
     triangles = sum(len(o.mesh.triangles) for o in loose)
     smooth = sum(len(o.mesh.triangles) for o in specular if o.mesh.corner_normals is not None)
-    planes = sum(len(own) for o in scene.objects if (own := half_spaces(o)) is not None)
+    planes = sum(len(own) for own in convex.values())
     row = SAMPLES * 8
     glasses = {o.material.dispersion for o in scene.objects if o.material.transmits}
     absorbing = sum(o.material.absorption is not None for o in scene.objects)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...model.features import Features, explain, is_convex_solid
+from ...model.features import Features, explain, half_spaces
 from ...model.geometry.mesh import Mesh
 from ...model.scene import Absorption, Scene, SceneObject
 
@@ -139,7 +139,8 @@ def _left_out(name: str, scene: Scene, base: Features, asked: Variant) -> tuple[
         case "medium stack":
             return asked, Variant(scene, replace(base, medium_stack=False)), "without it nested solids refract wrongly"
         case "triangle tree":
-            loose = sum(len(o.mesh.triangles) for o in scene.objects if not is_convex_solid(o))
+            convex = half_spaces(scene)
+            loose = sum(len(o.mesh.triangles) for i, o in enumerate(scene.objects) if i not in convex)
             if loose > MAX_LOOPED_TRIANGLES:
                 return None, None, f"cannot be left out here: a loop would test {loose:,} triangles for every ray"
             return asked, Variant(scene, replace(base, tree=False)), "against a loop"
@@ -196,7 +197,7 @@ def _forced_in(name: str, scene: Scene, base: Features, asked: Variant) -> tuple
         case "gratings":
             return Variant(scene, replace(base, gratings=True)), asked, ""
         case "interpolated normals" | "normal derivatives":
-            every = all(is_convex_solid(o) for o in _specular(scene))
+            every = len(half_spaces(scene)) == len(_specular(scene))
             note = (
                 "half-spaces have no corners to interpolate: the code is there and waits"
                 if every
@@ -250,13 +251,15 @@ def _specular(scene: Scene) -> list[SceneObject]:
 def _with_normals(scene: Scene) -> Scene:
     """Every specular facet with its own normal at all three corners: smooth in name, flat in truth."""
 
-    def smoothed(item: SceneObject) -> SceneObject:
-        if not item.material.is_specular or item.mesh.corner_normals is not None or is_convex_solid(item):
+    convex = half_spaces(scene)
+
+    def smoothed(index: int, item: SceneObject) -> SceneObject:
+        if not item.material.is_specular or item.mesh.corner_normals is not None or index in convex:
             return item
         normals = np.repeat(item.mesh.face_normals()[:, None, :], 3, axis=1)
         return replace(item, mesh=replace(item.mesh, corner_normals=normals))
 
-    return replace(scene, objects=tuple(smoothed(o) for o in scene.objects))
+    return replace(scene, objects=tuple(smoothed(i, o) for i, o in enumerate(scene.objects)))
 
 
 def _with_absorption(scene: Scene) -> Scene:
@@ -273,10 +276,12 @@ def _with_absorption(scene: Scene) -> Scene:
 def _as_triangles(scene: Scene) -> Scene:
     """Convex solids as the triangles they came from."""
 
-    def opened(item: SceneObject) -> SceneObject:
-        return replace(item, mesh=_no_half_spaces(item.mesh)) if is_convex_solid(item) else item
+    convex = half_spaces(scene)
 
-    return replace(scene, objects=tuple(opened(o) for o in scene.objects))
+    def opened(index: int, item: SceneObject) -> SceneObject:
+        return replace(item, mesh=_no_half_spaces(item.mesh)) if index in convex else item
+
+    return replace(scene, objects=tuple(opened(i, o) for i, o in enumerate(scene.objects)))
 
 
 def _no_half_spaces(mesh: Mesh) -> Mesh:

@@ -18,7 +18,7 @@ from ...model.scene import Scene
 from ..case import Case, Measurement
 from ..rigs.probe import Held, measurement, probe
 from ..rigs.scene_parts import SUN, solid, stage
-from . import contact_cases, light_cases, loss_cases, mesh_file_cases
+from . import contact_cases, crowd_cases, light_cases, line_cases, loss_cases, mesh_file_cases
 from .sweep_cases import against_single_wavelengths, scene_sweep
 
 LEFT_IN_MAPS = {"lens_text": 0.05, "water": 0.05, "wine_glass": 0.03}
@@ -110,6 +110,8 @@ CASES: tuple[Case, ...] = (
     *light_cases.CASES,
     *loss_cases.CASES,
     *mesh_file_cases.CASES,
+    *crowd_cases.CASES,
+    *line_cases.CASES,
     Case(
         "gems",
         "A prism, a ball, a diamond and a cube of glass that no maker sells, against one-wavelength photons",
