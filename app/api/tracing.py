@@ -94,7 +94,7 @@ def fan(
     def work(context: Context, report: Callable[[float, str], None], stopped: Callable[[], bool]) -> Fan:
         from ..model.settings import RenderSettings
         from ..passes.ray_fan import RayFan
-        from ..render.light_pass import scene_buffers
+        from ..render.device_scene import scene_buffers
 
         buffers = scene_buffers(context, model, RenderSettings(any_view=True))
         try:

@@ -25,7 +25,7 @@ from ..model.optics.spectrum import illuminant
 from ..model.scene import Camera, Dielectric, Diffuse, Scene, SceneObject
 from ..model.settings import RenderSettings
 from ..render.beam_light import BeamLight
-from ..render.light_pass import scene_buffers
+from ..render.device_scene import scene_buffers
 from ..render.shown_spectra import ShownSpectra
 
 FACETS = (6, 57, 200, 1_000, 4_000, 10_000)

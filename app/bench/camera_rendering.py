@@ -23,7 +23,8 @@ from ..model.settings import RenderSettings
 from ..passes.camera import CameraPass
 from ..passes.caustic_maps import CausticMaps
 from ..passes.spectrum_choice import Spectrum
-from ..render.light_pass import LightPass, scene_buffers, spectral_axis
+from ..render.device_scene import scene_buffers, spectral_axis
+from ..render.light_pass import LightPass
 from ..render.sampling import CameraSampling
 from .rendering import NothingToMeasure, Rendering, Rig
 

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 from ..model.features import Features
 from ..model.settings import RenderSettings
 from ..passes.camera import CameraPass
-from ..render.light_pass import LightPass, scene_buffers
+from ..render.device_scene import scene_buffers
+from ..render.light_pass import LightPass
 from ..render.splatting import Pace
 
 if TYPE_CHECKING:

@@ -23,7 +23,8 @@ from ..model.scene import Scene
 from ..model.settings import RenderSettings
 from ..passes.camera import CameraPass
 from ..passes.pixel_lattice import LOOKS
-from ..render.light_pass import LightPass, scene_buffers
+from ..render.device_scene import scene_buffers
+from ..render.light_pass import LightPass
 from ..render.sampling import DEFAULT_SAMPLES
 from ..render.shrinking import passes
 from .results import OWN_METHODS

@@ -37,7 +37,7 @@ from ..model.scene import (
 from ..model.settings import RenderSettings
 from ..passes.emission_domain import emission_domain
 from ..passes.trace import Band, LatticeSlice, TracePass
-from ..render.light_pass import spectral_axis
+from ..render.device_scene import spectral_axis
 from . import splat_speed
 from .machine import clocks, compile_line, copied_bytes_per_second
 from .programs import unique

@@ -12,7 +12,7 @@ from ..gpu.mip_chain import level_count
 from ..model.features import Features
 from ..model.scene import Scene
 from ..model.texture import Environment, Texture
-from ..render.light_pass import spectral_axis
+from ..render.device_scene import spectral_axis
 
 _FILTER = "interpolated, the level by the footprint, more lookups along a long one"
 

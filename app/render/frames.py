@@ -29,8 +29,9 @@ from ..passes.caustic_maps import CausticMaps
 from ..passes.environment_light import LEAST_DIRECTIONS, EnvironmentLightPass
 from ..passes.map_layout import MapLayout
 from .camera_beams import CameraBeams
+from .device_scene import scene_buffers, spectral_axis
 from .frame_fit import FrameFit, Survey, inputs_of, share_light, stages_to_survey
-from .light_pass import LightPass, scene_buffers, spectral_axis
+from .light_pass import LightPass
 from .map_picture import map_picture
 from .memory_estimate import MemoryEstimate, check_room, estimate
 from .sampling import CameraSampling, LightSampling, camera_settings, has_own_method

@@ -12,21 +12,19 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import moderngl
 import numpy as np
 
-from ..base.memory import available_bytes
 from ..base.random_words import Dimension, random_word
-from ..gpu import records, splat_tables
+from ..gpu import splat_tables
 from ..gpu.context import Context
 from ..gpu.dispatch_budget import DISPATCH_S, DispatchBudget
 from ..gpu.limits import check_brush, check_splats
 from ..gpu.map_channels import MapChannels
 from ..gpu.scene_buffers import SceneBuffers
 from ..model.features import Features
-from ..model.optics.spectral_tables import SpectralAxis
 from ..model.scene import Scene
 from ..model.settings import RenderSettings
 from ..passes.beam_emission import BeamEmission
@@ -38,65 +36,25 @@ from ..passes.picture_window import PictureWindow
 from ..passes.pilot import Pilot, landings_of, pilot_steps, split_threshold
 from ..passes.plane_frame import plane_frame
 from ..passes.splat import Splatter
-from ..passes.trace import RAY_ROOM, Batch, FluxTally, LatticeSlice, TracePass, queue_bytes
+from ..passes.trace import Batch, LatticeSlice, TracePass
 from . import shrinking
+from .batch_size import batch_size
 from .beam_light import BeamLight, BeamStats, MovingBeams, carries_everything
 from .handed_rays import handed_rays
 from .light_maps import LightMaps
-from .light_plan import SMALLEST_BATCH, Division, LightPlan, Planner
+from .light_plan import Division, LightPlan, Planner
+from .light_stats import LightStats, PassStep
 from .map_fit import MapFit
 from .photon_records import NoRecords, PhotonRecords, RoundOf
 from .shown_spectra import ShownSpectra, ShownTables
 from .splatting import Pace, Splatting
 
-DEFAULT_BATCH = 1 << 16
 BEAM_ROUND = 1 << 19
 """Photons' worth of beams, where they carry everything, after which a pass may be left."""
 BEAM_LEAST = 1 << 17
 """Photons, at least, whose beams are found at once, where photons are traced besides."""
 SMALLEST_PORTION = 1 << 10
 """Rays of a batch that are not divided further, however slow the device is."""
-QUEUE_BYTES = 64 << 20
-"""What the queue of a batch that nobody asked for may take; more on a GPU. Less where memory is short."""
-
-
-@dataclass
-class LightStats:
-    """What the light pass did."""
-
-    tally: FluxTally = field(default_factory=FluxTally)
-    photons: int = 0
-    splats: int = 0
-    bands: dict[str, int] = field(default_factory=dict)
-    light_points: dict[str, int] = field(default_factory=dict)
-    trace_seconds: float = 0.0
-    splat_seconds: float = 0.0
-    splats_w: float = 0.0
-    """Power of all splats over their bands, tinted by coloured receivers, W per pass weight."""
-    polygons_w: float = 0.0
-    """What beams left on receivers, untinted, W per pass weight."""
-    outside_map_w: float = 0.0
-    """Of it, that of photons whose centre no map holds."""
-    footprints_dropped: int = 0
-    dropped_w: float = 0.0
-    """Flux of those photons, splatted as one texel each."""
-    buffers: dict[str, int] = field(default_factory=dict)
-    """Device memory by what it is for, bytes, while photons were traced."""
-
-    @property
-    def drawn_w(self) -> float:
-        """What maps should hold, but for what lies outside of them."""
-        return self.splats_w + self.polygons_w
-
-
-@dataclass(frozen=True)
-class PassStep:
-    """A pause within a pass."""
-
-    fraction: float
-    """Share of the pass that is done."""
-    round_done: bool
-    """What is summed up is an even lattice: the maps may be shown."""
 
 
 class LightPass:
@@ -135,10 +93,7 @@ class LightPass:
         self._division = division or Division()
         self._records = photon_records or NoRecords()
         self._pace = pace or Pace.of(context)
-        batch = settings.batch or DEFAULT_BATCH * context.traits.batch_scale
-        if settings.batch is None:
-            batch = min(batch, _batch_that_fits(features, QUEUE_BYTES * context.traits.batch_scale))
-        batch = max(min(batch, _largest_batch(context, features)), self._pace.min_batch)
+        batch = max(batch_size(context, features, settings.batch), self._pace.min_batch)
         self.trace = TracePass(context, features, buffers, batch, settings.max_depth)
         self.shown = ShownSpectra(context.ctx, scene, buffers, settings.bins)
         self._splatting = Splatting(context, self.shown, self._pace)
@@ -707,31 +662,3 @@ class LightPass:
         for owned in (self.trace, self._records, self._splatting, self.shown, self.maps, self._beams):
             if owned is not None:
                 owned.release()
-
-
-def spectral_axis(scene: Scene, features: Features) -> SpectralAxis:
-    """The axis of a rendering: by the scene's glasses, or plain wavelength for methods linear in λ."""
-    if not features.spectral_groups or (features.merged_groups and features.spectral_groups == 1):
-        return SpectralAxis.build([])
-    return SpectralAxis.build([o.material.dispersion for o in scene.objects if o.material.dispersion is not None])
-
-
-def scene_buffers(context: Context, scene: Scene, settings: RenderSettings) -> SceneBuffers:
-    """`scene` on the device, with the features that it and `settings` decide; the caller's."""
-    features = Features.of(scene, settings)
-    return SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features))
-
-
-def _batch_that_fits(features: Features, most_bytes: int) -> int:
-    """The largest power of two whose queue takes no more than that, nor more than an eighth of the memory there is."""
-    batch = DEFAULT_BATCH << 2
-    while batch > SMALLEST_BATCH and queue_bytes(features, batch) > min(most_bytes, available_bytes() // 8):
-        batch >>= 1
-    return batch
-
-
-def _largest_batch(context: Context, features: Features) -> int:
-    """Lattice points whose queue fits the device's largest storage buffer."""
-    ray = records.ray_record(features.defines()["COLUMNS"], features.hero).stride
-    limit = context.limits.storage_block_bytes
-    return max(64, int(limit // (2 * RAY_ROOM * ray)) // 64 * 64)

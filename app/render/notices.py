@@ -17,7 +17,8 @@ from ..passes.environment_light import MAX_EVENTS, EnvironmentLightPass
 from ..passes.map_layout import project
 from ..passes.plane_frame import plane_frame
 from ..passes.texel_map import TexelMap
-from .light_pass import LightPass, LightStats
+from .light_pass import LightPass
+from .light_stats import LightStats
 
 LOST_SHARE = 0.01
 """Of the light that meets glass or mirrors, beyond which its loss is told."""

@@ -23,7 +23,8 @@ from ..model.settings import RenderSettings
 from ..passes.trace import FluxTally
 from . import shrinking
 from .frames import FrameRenderer, Stop
-from .light_pass import LightPass, LightStats
+from .light_pass import LightPass
+from .light_stats import LightStats
 from .sampling import LightSampling
 
 _SETTINGS = (

@@ -15,7 +15,7 @@ from ..passes.spectrum_choice import Spectrum
 from .beam_light import BeamStats
 from .camera_beams import CameraBeamStats
 from .frames import Fill, FrameRenderer, Picture
-from .light_pass import LightStats
+from .light_stats import LightStats
 from .notices import environment_notices, frame_notices
 
 Progress = Callable[[float, str], None]

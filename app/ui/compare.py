@@ -18,7 +18,7 @@ from ..edit.live_inputs import LiveInputs
 from ..edit.state import Selection
 from ..model.settings import RenderSettings
 from ..passes.camera import CameraPass
-from ..render.light_pass import scene_buffers
+from ..render.device_scene import scene_buffers
 from ..render.sampling import CameraSampling
 from ..render.shown_spectra import reflectance_classes
 from ..render.solo import scene_seen

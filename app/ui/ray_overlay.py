@@ -68,7 +68,7 @@ class RayOverlay:
     def _fan_of(self, scene: Scene) -> RayFan:
         from ..model.settings import RenderSettings
         from ..passes.ray_fan import RayFan
-        from ..render.light_pass import scene_buffers
+        from ..render.device_scene import scene_buffers
 
         if self._fan is None or scene is not self._scene:
             self.release()

@@ -18,7 +18,7 @@ from spectrasplat.model.scene import Camera, Diffuse, Scene, SceneObject
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes.camera import CameraPass
 from spectrasplat.passes.caustic_maps import CausticMaps
-from spectrasplat.render.light_pass import spectral_axis
+from spectrasplat.render.device_scene import spectral_axis
 
 REFLECTANCE = 0.5
 WHITE = spectrum.illuminant("D65").scaled_to_luminous(1000.0)  # R = G = B = 1000

@@ -19,7 +19,8 @@ from spectrasplat.model.optics.spectrum import constant, laser
 from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes.beam_emission import BeamEmission
-from spectrasplat.render.light_pass import LightPass, spectral_axis
+from spectrasplat.render.device_scene import spectral_axis
+from spectrasplat.render.light_pass import LightPass
 from spectrasplat.render.light_plan import Division
 from spectrasplat.render.photon_records import RoundOf
 

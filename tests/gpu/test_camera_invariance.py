@@ -26,7 +26,7 @@ from spectrasplat.model.settings import RenderSettings
 from spectrasplat.model.texture import Environment
 from spectrasplat.passes.camera import CameraPass
 from spectrasplat.passes.spectrum_choice import Spectrum
-from spectrasplat.render.light_pass import spectral_axis
+from spectrasplat.render.device_scene import spectral_axis
 from spectrasplat.stress.rigs.gpu_paths import glass
 
 from tests.gpu.camera_rig import WHITE, at, quad

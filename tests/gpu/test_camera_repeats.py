@@ -23,7 +23,7 @@ from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes import variants
 from spectrasplat.passes.camera import CameraPass
 from spectrasplat.passes.caustic_maps import CausticMaps
-from spectrasplat.render.light_pass import spectral_axis
+from spectrasplat.render.device_scene import spectral_axis
 
 from tests.gpu.camera_rig import released
 

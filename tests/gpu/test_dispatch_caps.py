@@ -13,7 +13,8 @@ from spectrasplat.gpu.device_traits import DeviceTraits
 from spectrasplat.gpu.dispatch_budget import DispatchBudget
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.render.light_pass import LightPass, scene_buffers
+from spectrasplat.render.device_scene import scene_buffers
+from spectrasplat.render.light_pass import LightPass
 
 PHOTONS = 60_000
 SLOW = 1e-9

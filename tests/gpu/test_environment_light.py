@@ -21,8 +21,8 @@ from spectrasplat.model.scene import Black, Camera, Dielectric, Diffuse, Materia
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.model.texture import Environment
 from spectrasplat.passes.environment_light import EnvironmentLightPass
+from spectrasplat.render.device_scene import scene_buffers
 from spectrasplat.render.frames import FrameRenderer
-from spectrasplat.render.light_pass import scene_buffers
 from spectrasplat.render.viewer.engine import LiveEngine
 
 from tests.gpu.mutants import mutate

@@ -21,7 +21,8 @@ from spectrasplat.model.features import Features, explain
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.render.light_pass import LightPass, spectral_axis
+from spectrasplat.render.device_scene import spectral_axis
+from spectrasplat.render.light_pass import LightPass
 
 LAMP = '[[lights]]\nname = "lamp"\nkind = "point"\nposition = [0.4, 0.2, 6]\nspectrum = "D65"\nintensity_cd = 100\n'
 FLOOR = (

@@ -22,7 +22,7 @@ from spectrasplat.model.scene import Camera, Dielectric, Diffuse, Grating, Scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes.ray_paths import RayPaths
 from spectrasplat.reference.optics import dot, times, unit
-from spectrasplat.render.light_pass import scene_buffers, spectral_axis
+from spectrasplat.render.device_scene import scene_buffers, spectral_axis
 from spectrasplat.render.still import render
 from spectrasplat.stress.rigs.camera_probe import white_furnace
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate

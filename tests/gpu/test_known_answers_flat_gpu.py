@@ -21,7 +21,7 @@ from spectrasplat.model.settings import RenderSettings
 from spectrasplat.reference import glasses
 from spectrasplat.reference.glasses import C_NM, D_NM, F_NM
 from spectrasplat.reference.optics import dot
-from spectrasplat.render.light_pass import spectral_axis
+from spectrasplat.render.device_scene import spectral_axis
 from spectrasplat.stress.rigs.glsl_function import evaluate
 from spectrasplat.stress.rigs.gpu_paths import (
     REFLECTED,

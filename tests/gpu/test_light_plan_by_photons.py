@@ -11,7 +11,8 @@ from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes import pilot
 from spectrasplat.passes.trace import SPLIT_THRESHOLD
-from spectrasplat.render.light_pass import LightPass, scene_buffers
+from spectrasplat.render.device_scene import scene_buffers
+from spectrasplat.render.light_pass import LightPass
 from spectrasplat.render.light_plan import Division
 
 SETTINGS = RenderSettings(120, 68, method="srd-photons", layer="caustic")

@@ -17,7 +17,7 @@ from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes.camera_records import camera_parameters
 from spectrasplat.passes.first_surfaces import FirstSurfaces
 from spectrasplat.passes.pick import Picker
-from spectrasplat.render.light_pass import scene_buffers
+from spectrasplat.render.device_scene import scene_buffers
 from spectrasplat.render.viewer.engine import Budget, LiveEngine
 from spectrasplat.render.viewer.invalidation import only_moves
 from spectrasplat.render.viewer.live_light import LiveLight

@@ -21,6 +21,7 @@ from tests.gpu.mutants import SHADERS_VARIABLE, mutated
 ROOT = Path(__file__).parents[2]
 _BALANCE = "gpu/test_power_balance.py::test_all_that_was_emitted_is_drawn_or_accounted_for_where_reflection_is_total"
 _PATHS = "gpu/test_whole_paths_gpu.py::test_position_and_throughput_at_three_wavelengths"
+_CUTS = "gpu/test_whole_paths_gpu.py::test_cut_bands_against_exact_paths"
 _SHADOW = "gpu/test_environment_light.py::test_a_balls_shadow_is_one_minus_its_form_factor"
 
 
@@ -141,6 +142,59 @@ MUTANTS = {
         "interface_indices(boundary, path.band, n_i, n_t);",
         "interface_indices(boundary, path.band.yyy, n_i, n_t);",
         "gpu/test_camera_cuts.py::test_parted_colours_go_their_own_ways",
+    ),
+    "one polarisation": Mutant("lib/optics.glsl", "0.5 * (rs * rs + rp * rp)", "rs * rs", f"{_PATHS}[steep Fresnel]"),
+    "power not absorbed": Mutant(
+        "light/trace.comp", "ray.flux_w *= kept.y", "ray.flux_w *= 1.0", f"{_PATHS}[absorption without dispersion]"
+    ),
+    "absorption of the lower priority": Mutant(
+        "lib/medium.glsl",
+        "stack_objects[findMSB(mask)]",
+        "stack_objects[findLSB(mask)]",
+        f"{_PATHS}[nested, the outer decides]",
+    ),
+    "a covered surface bends light": Mutant(
+        "lib/medium.glsl", "boundary.before != boundary.after", "true", f"{_PATHS}[nested, the outer decides]"
+    ),
+    "a cut part anchored at its end": Mutant("light/trace.comp", "float x = 0.5 * (lo + hi);", "float x = lo;", _CUTS),
+    "a cut part starts where the whole did": Mutant(
+        "light/trace.comp", "ray.position += change * ray.dposition[SPATIAL + g].xyz;", "", _CUTS
+    ),
+    "columns end before the surface's tilt": Mutant(
+        "lib/optics.glsl",
+        "(dot(moved, normal_g) / dot(direction, normal_g))",
+        "0.0",
+        "gpu/test_known_answers_gpu.py::test_t4_ball_lens",
+    ),
+    "refraction without the index's own derivative": Mutant(
+        "lib/optics.glsl",
+        "(deta_it / omega)",
+        "(0.0 / omega)",
+        "gpu/test_known_answers_gpu.py::test_t2_prism_at_minimum_deviation",
+    ),
+    "orders of a grating to the other side": Mutant(
+        "lib/grating.glsl",
+        "return side * normalize",
+        "return -side * normalize",
+        "gpu/test_grating_gpu.py::test_functions_against_float64",
+    ),
+    "waves as long in water as in air": Mutant(
+        "lib/grating.glsl",
+        "return order.shift_per_um * wavelength_um / n;",
+        "return order.shift_per_um * wavelength_um;",
+        "gpu/test_grating_gpu.py::test_water_shortens_waves",
+    ),
+    "a small splat without its height": Mutant(
+        "light/splat_small.frag",
+        "gaussian_box(at.x, half_texel.x) * gaussian_box(at.y, half_texel.y)",
+        "gaussian_box(at.x, half_texel.x)",
+        "gpu/test_splat.py::test_no_footprint_and_no_sweep_still_deposits_everything",
+    ),
+    "violet at the chord's high end": Mutant(
+        "light/splat.vert",
+        "table_u.x * xi + table_u.y",
+        "table_u.y - table_u.x * xi",
+        "gpu/test_splat.py::test_violet_lies_at_the_low_end_of_the_chord",
     ),
     "light of the environment without its cosine": Mutant(
         "light/environment.comp",

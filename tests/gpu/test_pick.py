@@ -26,7 +26,7 @@ from spectrasplat.model.scene import (
 )
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes.pick import Picker
-from spectrasplat.render.light_pass import spectral_axis
+from spectrasplat.render.device_scene import spectral_axis
 
 SIZE = (160, 90)
 PINHOLE = Camera(position=(1.0, -6.0, 3.5), target=(0.3, 0.2, 0.0), vertical_fov_deg=28.0)

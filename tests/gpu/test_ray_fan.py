@@ -31,7 +31,7 @@ from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes.ray_fan import RayFan
 from spectrasplat.passes.ray_paths import RayPaths
 from spectrasplat.reference import optics
-from spectrasplat.render.light_pass import spectral_axis
+from spectrasplat.render.device_scene import spectral_axis
 
 SCENES = Path(__file__).parents[2] / "assets" / "scenes"
 LINES_NM = (440.0, 546.0, 640.0)

@@ -12,8 +12,8 @@ from spectrasplat.__main__ import main
 from spectrasplat.gpu import records
 from spectrasplat.model.geometry.primitives import box
 from spectrasplat.model.lights import PointLight
-from spectrasplat.render import still
-from spectrasplat.stress.cases import contact_cases, loss_cases, sweep_cases
+from spectrasplat.render import light_plan, still
+from spectrasplat.stress.cases import contact_cases, crowd_cases, line_cases, loss_cases, sweep_cases
 from spectrasplat.stress.rigs import probe
 from spectrasplat.stress.rigs.probe import WatchedRecords, with_photons
 from spectrasplat.stress.rigs.scene_parts import (
@@ -48,6 +48,25 @@ def test_gap_and_contact_hold(gl, monkeypatch) -> None:
     found = list(contact_cases.measure_gaps(gl))
     assert [m.note for m in found] == ["a film of air", "optical contact"]
     assert [m.broken() for m in found] == [[], []]
+
+
+def test_lines_narrower_than_even_bands_are_absorbed(gl, monkeypatch) -> None:
+    """Bands are cut about the lines; sixteen even ones, as there once were, miss one part in fifty or more."""
+    monkeypatch.setattr(line_cases, "WIDTHS_NM", (5.0,))
+    (found,) = line_cases.measure_lines(gl)
+    assert found.broken() == []
+    monkeypatch.setattr(light_plan, "cut_by_tints", lambda ends, *_: np.linspace(*ends, 17))
+    (found,) = line_cases.measure_lines(gl)
+    assert any("error of power" in sentence for sentence in found.broken()), found.errors
+
+
+def test_more_lights_and_objects_than_a_photon_can_tell_are_refused(gl, monkeypatch) -> None:
+    monkeypatch.setattr(crowd_cases, "LIGHTS", (300,))
+    monkeypatch.setattr(crowd_cases, "OBJECTS", (70_000,))
+    monkeypatch.setattr(crowd_cases, "probe", lambda *_: None)
+    for case in (crowd_cases.measure_lights, crowd_cases.measure_objects):
+        (found,) = case(gl)
+        assert found.broken() == [] and "at most" in found.note
 
 
 def test_a_pile_of_sixteen_keeps_its_light(gl, monkeypatch) -> None:

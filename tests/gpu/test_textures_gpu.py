@@ -30,7 +30,7 @@ from spectrasplat.model.scene import (
 )
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.model.texture import Environment, Texture
-from spectrasplat.render.light_pass import spectral_axis
+from spectrasplat.render.device_scene import spectral_axis
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
 COVERS = {

@@ -27,7 +27,8 @@ from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes.plane_frame import plane_frame
 from spectrasplat.reference import optics
 from spectrasplat.reference.glasses import index
-from spectrasplat.render.light_pass import LightPass, spectral_axis
+from spectrasplat.render.device_scene import spectral_axis
+from spectrasplat.render.light_pass import LightPass
 from spectrasplat.stress.rigs.gpu_paths import extruded, glass, screen
 
 ALPHA = 1e-4

@@ -21,7 +21,7 @@ from spectrasplat.passes.emission_domain import emission_domain
 from spectrasplat.passes.trace import Band, LatticeSlice, TracePass
 from spectrasplat.reference import optics
 from spectrasplat.reference.glasses import index
-from spectrasplat.render.light_pass import spectral_axis
+from spectrasplat.render.device_scene import spectral_axis
 from spectrasplat.stress.rigs.gpu_paths import glass, screen
 
 from tests.statistical.emitted import BATCH, box

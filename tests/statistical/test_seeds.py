@@ -21,7 +21,8 @@ from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.reference.emission_maps import GOLDEN
 from spectrasplat.render import light_plan
-from spectrasplat.render.light_pass import LightPass, spectral_axis
+from spectrasplat.render.device_scene import spectral_axis
+from spectrasplat.render.light_pass import LightPass
 
 from tests.statistical.chi_square import ALPHA, chi_square, smallest_tilt
 

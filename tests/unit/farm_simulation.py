@@ -21,7 +21,7 @@ from spectrasplat.__main__ import main
 from spectrasplat.farm import jobs
 from spectrasplat.farm.jobs import Foreman, Job, News
 from spectrasplat.farm.weighing import Weighing
-from spectrasplat.render.light_pass import LightStats
+from spectrasplat.render.light_stats import LightStats
 from spectrasplat.render.part_file import merged_sums, read_header, write_part
 from spectrasplat.render.parts import Part, PartHeader, Share, _plain
 

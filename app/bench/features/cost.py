@@ -18,7 +18,8 @@ from ... import __version__
 from ...base.errors import UserError
 from ...model.features import Features, explain
 from ...model.settings import RenderSettings
-from ...render.light_pass import LightPass, spectral_axis
+from ...render.device_scene import spectral_axis
+from ...render.light_pass import LightPass
 from . import report as report_page
 from .results import Absence, FeatureCost, FeatureReport, Percent, ProgramSize
 from .rig import Rig, Work, map_difference

@@ -26,7 +26,7 @@ from ...model.settings import RenderSettings
 from ...model.texture import Environment
 from ...passes.camera import CameraPass
 from ...passes.spectrum_choice import Spectrum
-from ...render.light_pass import spectral_axis
+from ...render.device_scene import spectral_axis
 from ..case import Measurement
 from .probe import nonfinite
 

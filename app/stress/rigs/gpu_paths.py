@@ -40,7 +40,7 @@ from ...reference.emission import Emitter
 from ...reference.glasses import sellmeier_terms
 from ...reference.optics import unit
 from ...reference.random_numbers import hash_combine
-from ...render.light_pass import spectral_axis
+from ...render.device_scene import spectral_axis
 from ..case import FLUX_CLOSURE, Measurement
 from ..judging import not_finite, not_finite_in
 

@@ -16,7 +16,9 @@ import numpy as np
 from ...gpu import records
 from ...model.settings import RenderSettings
 from ...passes.camera import CameraPass
-from ...render.light_pass import LightPass, LightStats, scene_buffers
+from ...render.device_scene import scene_buffers
+from ...render.light_pass import LightPass
+from ...render.light_stats import LightStats
 from ...render.photon_records import NoRecords
 from ..case import Measurement
 
