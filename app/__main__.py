@@ -28,7 +28,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):  # a terminal without × or ° shows "?" instead of failing
             stream.reconfigure(errors="replace")
-    with signals_raise() as ended, redirect_stderr(_Patient(sys.stderr)):
+    stderr = sys.stderr
+    with signals_raise() as ended, redirect_stderr(_Patient(stderr)):
         try:
             code = _run(arguments)
             # Typer knows of Ctrl-C only.
@@ -46,6 +47,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if sentence is None:
                 raise
             return _tell(sentence)
+        finally:
+            try:
+                stderr.flush()
+            except OSError:
+                _to_nowhere(stderr)
 
 
 class _Patient:
@@ -105,9 +111,14 @@ def _lost(error: OSError) -> int:
     """Nothing can be printed any more, the interpreter's own flush included."""
     if error.errno != errno.EPIPE:  # else the reader (head, less) has seen enough
         _tell(f"what was to be printed is lost: {error.strerror}")
-    with suppress(OSError, ValueError):  # ValueError: a test's stream, without a number
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    _to_nowhere(sys.stdout)
     return NOT_PRINTED
+
+
+def _to_nowhere(stream: TextIO) -> None:
+    """What could not be written would be tried once more by the interpreter, which then exits with 120."""
+    with suppress(OSError, ValueError):  # ValueError: a test's stream, without a number
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def _tell(message: str, code: int = USER_ERROR) -> int:

@@ -35,6 +35,7 @@ def test_the_linter_is_content() -> None:
 
 
 @needs_mypy
+@pytest.mark.slow
 def test_the_types_hold() -> None:
     """Half a minute on two cores the first time, two seconds with its cache (.mypy_cache, which git ignores)."""
     assert complaints("mypy", "--no-error-summary") == ""
