@@ -76,3 +76,12 @@ SchedulerOption = Annotated[
     typer.Option(metavar="ADDRESS", help="A Dask scheduler that runs already, for example tcp://10.0.0.1:8786."),
 ]
 Text = str | None
+SeedOption = Annotated[Text, typer.Option(metavar="K", help="Seed of the random numbers; default: 1.")]
+StatsOption = Annotated[bool, typer.Option("--stats", help="Print the energy balance and the times of all stages.")]
+PixelsOption = Annotated[Text, typer.Option(metavar="WxH", help="Pixels; default: the scene's.")]
+TexelsOption = Annotated[Text, typer.Option(metavar="WxH", help="Texels; default: 1024x1024.")]
+PhotonsOption = Annotated[Text, typer.Option(metavar="N", help="Photons to emit; default: the scene's.")]
+ReferenceSecondsOption = Annotated[
+    Text,
+    typer.Option("--reference-seconds", metavar="S", help="Time added to each scene's cached reference; default: 60."),
+]

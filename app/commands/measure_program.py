@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from . import completion
-from .arguments import AllowOutside, Text
+from .arguments import AllowOutside, ReferenceSecondsOption, Text
 from .printing import show
 
 
@@ -37,12 +37,7 @@ def bench(
         typer.Option(metavar="A,B", help="Methods to compare; default: all.", autocompletion=completion.method_lists),
     ] = None,
     size: Annotated[Text, typer.Option(metavar="WxH", help="Pixels; default: 480 wide, in the scene's aspect.")] = None,
-    reference_seconds: Annotated[
-        Text,
-        typer.Option(
-            "--reference-seconds", metavar="S", help="Time added to each scene's cached reference; default: 60."
-        ),
-    ] = None,
+    reference_seconds: ReferenceSecondsOption = None,
     horizon: Annotated[
         Text,
         typer.Option(
@@ -149,12 +144,7 @@ def bench_agreement(
     photons: Annotated[Text, typer.Option(metavar="N", help="Of each picture; default: 250k.")] = None,
     seeds: Annotated[Text, typer.Option(metavar="N", help="Pictures, at least 2; default: 6.")] = None,
     size: Annotated[Text, typer.Option(metavar="WxH", help="Pixels; default: 240x135.")] = None,
-    reference_seconds: Annotated[
-        Text,
-        typer.Option(
-            "--reference-seconds", metavar="S", help="Time added to each scene's cached reference; default: 60."
-        ),
-    ] = None,
+    reference_seconds: ReferenceSecondsOption = None,
     method: Annotated[
         Text, typer.Option(metavar="NAME", autocompletion=completion.methods, help="Default: srd.")
     ] = None,

@@ -14,8 +14,11 @@ from .arguments import (
     EnvironmentOption,
     GlassOption,
     MethodOption,
+    PixelsOption,
     SceneArgument,
     SchedulerOption,
+    SeedOption,
+    StatsOption,
     Text,
     UpOption,
     WorkersOption,
@@ -43,7 +46,7 @@ def render(
     seconds: Annotated[
         Text, typer.Option(metavar="S", help="Seconds that the picture may take in all, instead.")
     ] = None,
-    seed: Annotated[Text, typer.Option(metavar="K", help="Seed of the random numbers; default: 1.")] = None,
+    seed: SeedOption = None,
     method: MethodOption = None,
     camera_method: CameraMethodOption = None,
     layer: Annotated[
@@ -95,9 +98,7 @@ def render(
     batch: Annotated[
         Text, typer.Option(metavar="N", help="Photons in flight at once (never changes the picture).")
     ] = None,
-    stats: Annotated[
-        bool, typer.Option("--stats", help="Print the energy balance and the times of all stages.")
-    ] = False,
+    stats: StatsOption = False,
     up: UpOption = None,
     glass: GlassOption = None,
     environment: EnvironmentOption = None,
@@ -161,9 +162,7 @@ def merge(
     partial: Annotated[
         bool, typer.Option("--partial", help="Make a noisier picture of the parts there are, where some are missing.")
     ] = False,
-    stats: Annotated[
-        bool, typer.Option("--stats", help="Print the energy balance and the times of all stages.")
-    ] = False,
+    stats: StatsOption = False,
     allow_outside: AllowOutside = False,
 ) -> None:
     """Make a picture of its parts, traced one by one or on many machines."""
@@ -213,7 +212,7 @@ def animate(
         ),
     ] = None,
     fps: Annotated[Text, typer.Option(metavar="F", help="Pictures a second; default: 24.")] = None,
-    size: Annotated[Text, typer.Option(metavar="WxH", help="Pixels; default: the scene's.")] = None,
+    size: PixelsOption = None,
     photons: Annotated[
         Text, typer.Option(metavar="N", help="Photons of each traced frame; default: the scene's.")
     ] = None,
@@ -283,7 +282,7 @@ def sweep(
     picture_format: Annotated[
         Text, typer.Option("--format", metavar="NAME", help="png (default), jpg, webp, exr or npy.")
     ] = None,
-    size: Annotated[Text, typer.Option(metavar="WxH", help="Pixels; default: the scene's.")] = None,
+    size: PixelsOption = None,
     photons: Annotated[Text, typer.Option(metavar="N", help="Photons of each tracing; default: the scene's.")] = None,
     spp: Annotated[Text, typer.Option(metavar="N", help="Camera samples a pixel; default: 32.")] = None,
     bins: Annotated[
@@ -292,7 +291,7 @@ def sweep(
     exposure: Annotated[
         Text, typer.Option(metavar="EV", help="Stops brighter (or darker) than is automatic in the first picture.")
     ] = None,
-    seed: Annotated[Text, typer.Option(metavar="K", help="Seed of the random numbers; default: 1.")] = None,
+    seed: SeedOption = None,
     method: MethodOption = None,
     exact: Annotated[
         bool, typer.Option("--exact", help="Trace every point, also where kept photons follow to first order.")

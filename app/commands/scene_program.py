@@ -8,7 +8,17 @@ from typing import Annotated
 import typer
 
 from . import completion, options
-from .arguments import AllowOutside, EnvironmentOption, GlassOption, SceneArgument, Text, UpOption
+from .arguments import (
+    AllowOutside,
+    EnvironmentOption,
+    GlassOption,
+    PhotonsOption,
+    SceneArgument,
+    SeedOption,
+    TexelsOption,
+    Text,
+    UpOption,
+)
 from .printing import show
 
 
@@ -72,9 +82,9 @@ def bake(
             ".json beside it.",
         ),
     ],
-    size: Annotated[Text, typer.Option(metavar="WxH", help="Texels; default: 1024x1024.")] = None,
-    photons: Annotated[Text, typer.Option(metavar="N", help="Photons to emit; default: the scene's.")] = None,
-    seed: Annotated[Text, typer.Option(metavar="K", help="Seed of the random numbers; default: 1.")] = None,
+    size: TexelsOption = None,
+    photons: PhotonsOption = None,
+    seed: SeedOption = None,
     up: UpOption = None,
     glass: GlassOption = None,
     environment: EnvironmentOption = None,
@@ -121,9 +131,9 @@ def export(
             help="Where the cookie's spot stands; default: at the scene's only lamp, or straight above.",
         ),
     ] = None,
-    size: Annotated[Text, typer.Option(metavar="WxH", help="Texels; default: 1024x1024.")] = None,
-    photons: Annotated[Text, typer.Option(metavar="N", help="Photons to emit; default: the scene's.")] = None,
-    seed: Annotated[Text, typer.Option(metavar="K", help="Seed of the random numbers; default: 1.")] = None,
+    size: TexelsOption = None,
+    photons: PhotonsOption = None,
+    seed: SeedOption = None,
     up: UpOption = None,
     glass: GlassOption = None,
     environment: EnvironmentOption = None,
