@@ -32,6 +32,7 @@ from ..model.optics.spectral_tables import (
     wavelength_cdf,
 )
 from ..model.scene import Grating, Light, Scene
+from ..model.tint_bands import tint_curves
 from . import bindings
 from .records import NONE
 from .scene_texels import SceneTexels, spectra_texture, tree_texels
@@ -272,6 +273,11 @@ class SceneBuffers:
             self._buffers[bindings.PROFILES] = self.ctx.buffer(np.concatenate(packed).astype("f4"))
 
     @cached_property
+    def tints(self) -> np.ndarray:
+        """`tint_curves` of the scene: every pass asks, and a mean chord takes all of a mesh's triangles."""
+        return tint_curves(self.scene)
+
+    @cached_property
     def primitives(self) -> np.ndarray:
         """uint32 (T,): what a ray that left each triangle has as `last_primitive`; T counts all objects' triangles."""
         numbers = np.full(self.first_triangle[-1], NONE, np.uint32)
@@ -296,7 +302,8 @@ class SceneBuffers:
             moved.release()
             return False
         self.release()
-        self.__dict__.pop("primitives", None)
+        for kept in ("primitives", "tints"):
+            self.__dict__.pop(kept, None)
         self.__dict__.update(moved.__dict__)
         return True
 

@@ -15,7 +15,7 @@ from ..model.features import Features
 from ..model.optics.spectral_tables import CumulativeSpectrum
 from ..model.scene import Scene
 from ..model.settings import RenderSettings, divides_spectrum
-from ..model.tint_bands import cut_by_tints, tint_curves
+from ..model.tint_bands import cut_by_tints
 from ..passes.emission_domain import EmissionDomain
 from ..passes.pilot import MAX_LIGHT_POINTS, Pilot, PilotFit
 from ..passes.trace import Band, LatticeSlice
@@ -164,7 +164,7 @@ class Planner:
             edges = np.linspace(*ends, count + 1)
             if self._tinted:
                 spectrum = self.scene.lights[light].spectral_power
-                edges = cut_by_tints(ends, count, MAX_BANDS, tint_curves(self.scene), spectrum, axis)
+                edges = cut_by_tints(ends, count, MAX_BANDS, self.buffers.tints, spectrum, axis)
             middles = 0.5 * (edges[:-1] + edges[1:])
         return tuple(
             Band(float(lo), float(hi), float(mid), float(power.band(lo, hi)[3]))

@@ -6,21 +6,21 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 
-from ...base.errors import UserError
 from ...gpu.context import Context
 from ...model.geometry.primitives import box
 from ...model.geometry.primitives_gem import brilliant
 from ...model.geometry.primitives_round import sphere
 from ...model.optics.glass import Dispersion, from_abbe
 from ...model.scene import Scene, SceneObject
-from ...model.scene_checks import MAX_LIGHTS, MAX_OBJECTS, check_scene
+from ...model.scene_checks import MAX_LIGHTS, MAX_OBJECTS
 from ..case import Case, Measurement
 from ..rigs.probe import SMALL, Held, energy_error, measurement, picture_error, probe
 from ..rigs.scene_parts import BEAM, CROWN, FLINT, SUN, brighter, solid, stage
+from .light_cases import refused
 from .sweep_cases import SAME_ENERGY, SAME_PICTURE, against_single_wavelengths
 
 LIGHTS = (1, 16, 255, 256, 300)
@@ -34,8 +34,6 @@ FACETED = 0.05
 """nRMSE of a ball of 1,280 triangles with smooth normals; the finest is compared with the one before it."""
 DIVIDED = 0.03
 """Sum over a picture whose photons are shared by many lights, each with a lattice of its own."""
-BYTES_A_TRIANGLE = 400
-"""Device memory: corners, edges, normals, and a tree of at most two nodes a triangle."""
 
 
 def measure_lights(context: Context) -> Iterator[Measurement]:
@@ -43,7 +41,7 @@ def measure_lights(context: Context) -> Iterator[Measurement]:
     whole = probe(context, _in_light_of(1))
     for count in LIGHTS:
         if count > MAX_LIGHTS:
-            yield refused(count, f"{count} lights", _in_light_of(count))
+            yield refused(count, f"{count} lights", partial(_in_light_of, count))
             continue
         found = probe(context, _in_light_of(count))
         errors = {"energy": energy_error(found.picture, whole.picture)}
@@ -54,12 +52,11 @@ def measure_objects(context: Context) -> Iterator[Measurement]:
     """A ball in a beam, and a city of glass boxes far from it."""
     alone = probe(context, stage(_ball(1_280)))
     for count in OBJECTS:
-        scene = stage(_ball(1_280), *_city(count - 2))
-        if len(scene.objects) > MAX_OBJECTS:
-            yield refused(count, f"{count:,} objects", scene)
+        if count > MAX_OBJECTS:
+            yield refused(count, f"{count:,} objects", partial(_beside_a_city, count))
             continue
         started = time.perf_counter()
-        found = probe(context, scene)
+        found = probe(context, _beside_a_city(count))
         held = Held(
             {
                 "picture": picture_error(found.picture, alone.picture),
@@ -77,9 +74,7 @@ def measure_instances(context: Context) -> Iterator[Measurement]:
     for count in INSTANCES:
         side = int(np.ceil(count**0.5))
         places = [(1.2 * (i % side - 0.5 * side), 1.2 * (i // side - 0.5 * side), 0.8) for i in range(count)]
-        rows = [
-            SceneObject(f"{i}", stone, replace(solid("", stone, FLINT).material), _at(p)) for i, p in enumerate(places)
-        ]
+        rows = [solid(f"{i}", stone, FLINT, place) for i, place in enumerate(places)]
         found = probe(context, stage(*rows, lights=[SUN]), replace(SMALL, photons=65_536))
         ended = found.shares
         gone = 1.0 - sum(ended.values())
@@ -89,7 +84,7 @@ def measure_instances(context: Context) -> Iterator[Measurement]:
 
 
 def measure_triangles(context: Context) -> Iterator[Measurement]:
-    """A ball ever finer: its caustic settles, and its memory is in proportion."""
+    """A ball ever finer: its caustic settles."""
     before: np.ndarray | None = None
     for count in TRIANGLES:
         started = time.perf_counter()
@@ -118,15 +113,6 @@ def measure_glasses(context: Context) -> Iterator[Measurement]:
         yield against_single_wavelengths(context, scene, count, f"{count} glasses", 0.0)
 
 
-def refused(severity: float, label: str, scene: Scene) -> Measurement:
-    """A scene that must not be taken, and the sentence that says so."""
-    try:
-        check_scene(scene, "scene")
-    except UserError as error:
-        return Measurement(severity, label, 0, {"accepted": 0.0}, {"accepted": 0.0}, note=str(error))
-    return Measurement(severity, label, 0, {"accepted": 1.0}, {"accepted": 0.0}, note="accepted")
-
-
 def _in_light_of(count: int) -> Scene:
     spectrum = brighter(SUN.spectral_power, 1.0 / count)
     lights = [replace(SUN, name=f"sun {i}", spectral_power=spectrum) for i in range(count)]
@@ -138,20 +124,16 @@ def _ball(triangles: int) -> SceneObject:
     return solid("ball", sphere(0.5, triangles), CROWN, (BEAM.position[0], 0.0, 0.9))
 
 
+def _beside_a_city(count: int) -> Scene:
+    """So many objects in all."""
+    return stage(_ball(1_280), *_city(count - 2))
+
+
 def _city(count: int) -> list[SceneObject]:
     """Boxes that share one mesh, in a square beside the table."""
-    house = solid("house", box((0.5, 0.5, 0.5)), FLINT)
+    house = box((0.5, 0.5, 0.5))
     side = int(np.ceil(count**0.5))
-    return [
-        replace(house, name=f"house {i}", object_to_world=_at((APART + i % side, float(i // side), 0.5)))
-        for i in range(count)
-    ]
-
-
-def _at(place: tuple[float, float, float]) -> np.ndarray:
-    matrix = np.eye(4)
-    matrix[:3, 3] = place
-    return matrix
+    return [solid(f"house {i}", house, FLINT, (APART + i % side, float(i // side), 0.5)) for i in range(count)]
 
 
 def _glass(i: int) -> Dispersion:

@@ -82,12 +82,17 @@ def measure_places(context: Context) -> Iterator[Measurement]:
 def measure_refusals(_: Context) -> Iterator[Measurement]:
     """Scenes that cannot be right are refused in one sentence before anything is traced."""
     for number, (label, scene) in enumerate(REFUSED, 1):
-        try:
-            check_scene(scene(), "scene")
-            refused, note = 0.0, "accepted"
-        except UserError as error:
-            refused, note = 1.0, str(error)
-        yield Measurement(number, label, 0, {"accepted": 1.0 - refused}, {"accepted": 0.0}, note=note)
+        yield refused(number, label, scene)
+
+
+def refused(severity: float, label: str, scene: Callable[[], Scene]) -> Measurement:
+    """A scene that must not be taken, and the sentence that says so."""
+    try:
+        check_scene(scene(), "scene")
+        accepted, note = 1.0, "accepted"
+    except UserError as error:
+        accepted, note = 0.0, str(error)
+    return Measurement(severity, label, 0, {"accepted": accepted}, {"accepted": 0.0}, note=note)
 
 
 def measure_powers(context: Context) -> Iterator[Measurement]:
