@@ -98,6 +98,8 @@ class ViewModel:
     """Durations of the last frames, newest last."""
     pass_ms: dict[str, float] = field(default_factory=dict)
     """Of the last frame, by pass: trace, splat, resolve, camera, display, interface."""
+    process_bytes: int = 0
+    """Resident memory of this process while a panel shows it; 0 where the system does not say."""
     cursor: CursorInfo | None = None
     title: str = "untitled"
     path: Path | None = None

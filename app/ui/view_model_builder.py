@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ..base.memory import resident_bytes
 from .session import Session
 from .view_model import ViewModel
 
@@ -18,6 +19,7 @@ def view_model_of(session: Session) -> ViewModel:
         picture_size=(0, 0) if shown is None else shown.size,
         frame_ms=tuple(session.frame_ms),
         pass_ms=_pass_ms(session),
+        process_bytes=resident_bytes() if session.state.preferences.panels.timing else 0,
         cursor=session.jobs.cursor.view_model,
         title=document.title,
         path=document.path,

@@ -19,10 +19,13 @@ from spectrasplat.passes.pick import PickHit
 from spectrasplat.ui.crash_log import FILE_NAME
 from spectrasplat.ui.frame import run_frame
 from spectrasplat.ui.live_picture import LivePicture
+from spectrasplat.ui.panels import numbers
+from spectrasplat.ui.panels.timing import counts_of
 from spectrasplat.ui.session import LAYOUT_FRAMES, Session
 from spectrasplat.ui.view_model import ViewModel
 
 from tests.interface.fake_engine import FakeEngine
+from tests.interface.soak import resident_bytes
 
 Edit = Callable[[State], State]
 
@@ -347,3 +350,15 @@ def test_the_live_picture_frees_what_it_owns(gl: Context) -> None:
     engine = picture.engine
     picture.release()
     assert isinstance(engine, FakeEngine) and engine.released
+
+
+def test_the_timing_panel_tells_the_memory_of_the_whole_program(rig: Rig) -> None:
+    rig.frame(lambda state: state.with_panels(timing=True))
+    rig.frame()
+    resident = resident_bytes()  # read in another way than the program does
+    assert rig.view_model.process_bytes == pytest.approx(resident, rel=0.02)
+    counts = {name: value for name, value, _ in counts_of(rig.session.state, rig.view_model)}
+    assert counts["Process"] == numbers.size(rig.view_model.process_bytes) != counts["Maps, photons"]
+    rig.frame(lambda state: state.with_panels(timing=False))
+    rig.frame()
+    assert rig.view_model.process_bytes == 0

@@ -72,12 +72,12 @@ def draw_timing(state: State, view_model: ViewModel) -> State:
         imgui.table_next_column()
         _passes(view_model)
         imgui.table_next_column()
-        _numbers(state, view_model.stats)
+        _numbers(state, view_model)
         imgui.end_table()
     elif not wide:
         _frame_plot(view_model, theme.em(7))
         _passes(view_model)
-        _numbers(state, view_model.stats)
+        _numbers(state, view_model)
     return state
 
 
@@ -173,8 +173,9 @@ def _right_aligned(text: str, width: float) -> None:
     imgui.text_unformatted(text)
 
 
-def _numbers(state: State, stats: LiveStats) -> None:
-    target = state.preferences.target_photons
+def counts_of(state: State, view_model: ViewModel) -> list[tuple[str, str, str]]:
+    """What the panel counts: names, values as they are shown, and what they mean."""
+    stats, target = view_model.stats, state.preferences.target_photons
     lines = [
         (
             "Photons",
@@ -213,9 +214,20 @@ def _numbers(state: State, stats: LiveStats) -> None:
             f"{stats.resolution_scale:.0%}",
             "Side of the shown picture over the viewport's: less while something moves.",
         ),
-        ("Memory", numbers.size(stats.bytes), "GPU memory held by maps, photons and scene."),
+        (
+            "Maps, photons",
+            numbers.size(stats.bytes),
+            "Held on the device by maps, photons and scene; a software renderer holds them in the process.",
+        ),
     ]
-    _table("##numbers", lines)
+    if view_model.process_bytes:
+        lines.append(("Process", numbers.size(view_model.process_bytes), "Resident memory of the whole program, now."))
+    return lines
+
+
+def _numbers(state: State, view_model: ViewModel) -> None:
+    stats = view_model.stats
+    _table("##numbers", counts_of(state, view_model))
     dropped = [(_named(k), numbers.count(v), _tip(k)) for k, v in stats.fallbacks.items() if v]
     lost = [(_named(k), numbers.percent(v), _tip(k)) for k, v in stats.lost.items() if v]
     camera_rows = [(_named(k), numbers.count(v), _tip(k)) for k, v in stats.camera_fallbacks.items() if v]
