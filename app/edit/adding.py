@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -54,7 +55,7 @@ def add_object(scene: Scene, shape: str) -> Scene:
     matrix[:3, :3] = up_frame(scene) * scale
     matrix[:3, 3] = around.centre - matrix[:3, :3] @ (0.5 * (low + high))
     item = _standing(scene, replace(item, object_to_world=matrix), below=receiver)
-    changed = replace(scene, objects=(*scene.objects, item if receiver else beside(scene, item)))
+    changed = replace(scene, objects=(*scene.objects, item if receiver else beside(scene, [item])[0]))
     check_scene(changed, scene.name)
     return changed
 
@@ -68,9 +69,9 @@ def up_frame(scene: Scene) -> np.ndarray:
     return np.eye(3) if axis == 2 else np.array([(0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)])
 
 
-def beside(scene: Scene, item: SceneObject) -> SceneObject:
-    """`item` moved sideways to the first place where it overlaps no other object and holds no light."""
-    low, high = world_bounds(item)
+def beside(scene: Scene, items: Sequence[SceneObject]) -> list[SceneObject]:
+    """`items` moved sideways together to the first place where they overlap no other object and hold no light."""
+    low, high = bounds_of(items)
     sideways, forward, _ = up_frame(scene).T
     solid = [world_bounds(o) for o in scene.objects if not o.material.receives]
     lights = [np.array(light.position) for light in scene.lights if light.has_place]
@@ -81,8 +82,8 @@ def beside(scene: Scene, item: SceneObject) -> SceneObject:
             box = (low + offset, high + offset)
             free = not any(_overlap(box, other) for other in solid)
             if free and not any((box[0] <= p).all() and (p <= box[1]).all() for p in lights):
-                return _moved(item, offset)
-    return _moved(item, 64 * step * sideways)
+                return [_moved(item, offset) for item in items]
+    return [_moved(item, 64 * step * sideways) for item in items]
 
 
 def _standing(scene: Scene, item: SceneObject, below: bool) -> SceneObject:

@@ -8,10 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from ..base.errors import UserError
+from ..model.io.bare_mesh import objects_of_mesh
 from ..model.scene import Scene
 from ..model.scene_checks import check_scene
 from ..model.scene_defaults import environment_of
 from ..model.scene_objects import MESH_SUFFIXES
+from ..model.staging import AS_FOUND
 from .adding import beside
 from .names import free_name
 from .opening import open_scene
@@ -24,12 +26,12 @@ def import_objects(scene: Scene, path: Path) -> Scene:
     """`scene` with the objects of the file at `path` at its end, under names of their own.
 
     A bare mesh, which knows no unit, is brought to the scene's size where it is off by more than twenty times, and
-    stands beside the others; objects of scenes and glTF files stay where those have them. Lights, cameras and what was
-    added to light and to catch a bare file's caustic are left out. Raises UserError for what cannot be opened.
+    its parts stand together beside the others; objects of scenes and glTF files stay where those have them. Lights,
+    cameras and what was added to light and to catch a bare file's caustic are left out. Raises UserError for what
+    cannot be opened.
     """
-    other = open_scene(path)
     is_mesh = path.suffix.lower() in MESH_SUFFIXES
-    brought = list(other.objects[:1] if is_mesh else other.objects)
+    brought = objects_of_mesh(path, AS_FOUND, []) if is_mesh else list(open_scene(path).objects)
     if not brought:
         raise UserError(f"{path.name} holds no objects to import")
     if is_mesh and scene.objects:
@@ -38,7 +40,7 @@ def import_objects(scene: Scene, path: Path) -> Scene:
         if not _TOO_SMALL < share < _TOO_LARGE:
             scaled = np.diag([*(3 * [0.6 / share]), 1.0])
             brought = [replace(item, object_to_world=scaled @ item.object_to_world) for item in brought]
-        brought = [beside(scene, item) for item in brought]
+        brought = beside(scene, brought)
     taken = [item.name for item in scene.objects]
     named = []
     for item in brought:

@@ -67,7 +67,7 @@ def duplicate(scene: Scene, index: int) -> Scene:
     """With a copy of object `index` at the end, beside the original and sharing its mesh."""
     item = scene.objects[index]
     copy = replace(item, name=free_name(item.name, [o.name for o in scene.objects]))
-    return _appended(scene, beside(scene, copy))
+    return _appended(scene, beside(scene, [copy])[0])
 
 
 def delete(scene: Scene, index: int) -> Scene:

@@ -103,7 +103,7 @@ class ObjectReader:
             except UserError as error:
                 table.fail("shape", f"cannot be made: {error}")
             if recipe["shape"] == INLINE:
-                mesh = _checked(mesh, notes)
+                mesh = checked_mesh(mesh, notes)
         note_recipe(mesh, recipe)
         return mesh
 
@@ -112,10 +112,11 @@ def load_checked_mesh(path: Path, smooth: bool | float | None, notes: list[str])
     """A mesh file, repaired where that is safe; what was found goes to `notes`."""
     from .io.mesh_io import load_mesh
 
-    return _checked(load_mesh(path, smooth), notes)
+    return checked_mesh(load_mesh(path, smooth), notes)
 
 
-def _checked(mesh: Mesh, notes: list[str]) -> Mesh:
+def checked_mesh(mesh: Mesh, notes: list[str]) -> Mesh:
+    """`mesh` repaired where that is safe; what was found goes to `notes`."""
     from .geometry.mesh_health import examine, repair
 
     mesh, found = repair(mesh, examine(mesh))

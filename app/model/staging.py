@@ -83,7 +83,7 @@ def with_glass(objects: Sequence[SceneObject], staging: Staging, file_name: str)
         names = [item.name for item in objects]
         if name is not None and name not in names:
             hint = suggestion(name, names) or ","
-            raise UserError(f"--glass: {file_name} holds no object '{name}'{hint} it holds {_listed(names)}")
+            raise UserError(f"--glass: {file_name} holds no object '{name}'{hint} it holds {listed(names)}")
         chosen = [names.index(name)] if name is not None else _bodies(objects)
         for index in chosen:
             changed[index] = replace(changed[index], material=material)
@@ -104,10 +104,11 @@ def opaque_note(objects: Sequence[SceneObject]) -> str | None:
     return (
         "Nothing here is glass, so there is no caustic: the file's materials are opaque. Make it glass with --glass "
         f"diamond, or one part with --glass {names[0]}=N-SF11, in the window with Make glass. "
-        f"The file holds {_listed(names)}."
+        f"The file holds {listed(names)}."
     )
 
 
-def _listed(names: Sequence[str], most: int = 6) -> str:
+def listed(names: Sequence[str], most: int = 6) -> str:
+    """Names for a sentence, the first `most` of them."""
     told = ", ".join(f"'{name}'" for name in names[:most])
     return told if len(names) <= most else f"{told} and {len(names) - most} more"

@@ -17,7 +17,7 @@ from ...base import files
 from ...base.errors import UserError
 from ..geometry.mesh import Mesh, make_mesh
 from ..geometry.mesh_health import weld_map
-from .mesh_raw import RawMesh
+from .mesh_raw import Groups, RawMesh
 
 MESH_SUFFIXES = (".ply", ".obj", ".stl")
 MAX_COORDINATE = 1e30
@@ -39,12 +39,7 @@ def load_mesh(path: str | os.PathLike[str], smooth: bool | float | None = None, 
         raise UserError(f"{path}: unknown mesh format '{suffix}'; use one of {', '.join(MESH_SUFFIXES)}")
     if smooth is not None and not isinstance(smooth, bool) and not 0.0 <= smooth <= 180.0:
         raise UserError(f"{path}: smooth must be true, false or a crease angle from 0 to 180 degrees, not {smooth:g}")
-    raw = _read(path, suffix)
-    mesh = make_mesh(name or path.stem, raw.vertices, raw.triangles, raw.corner_normals, raw.uv, str(path))
-    if len(far := np.flatnonzero((np.abs(mesh.vertices) > MAX_COORDINATE).any(axis=1))):
-        raise UserError(
-            f"{path}: vertex {far[0]} lies beyond {MAX_COORDINATE:g} units; export the mesh in larger units"
-        )
+    mesh, _ = load_grouped_mesh(path, name)
     if smooth is None:
         return mesh
     if smooth is False:
@@ -55,7 +50,19 @@ def load_mesh(path: str | os.PathLike[str], smooth: bool | float | None = None, 
     return replace(mesh, corner_normals=normals)
 
 
-def _read(path: Path, suffix: str) -> RawMesh:
+def load_grouped_mesh(path: Path, name: str | None = None) -> tuple[Mesh, Groups | None]:
+    """As `load_mesh` with the file's own normals, and the parts that the file tells apart where its format can."""
+    raw = _read(path)
+    mesh = make_mesh(name or path.stem, raw.vertices, raw.triangles, raw.corner_normals, raw.uv, str(path))
+    if len(far := np.flatnonzero((np.abs(mesh.vertices) > MAX_COORDINATE).any(axis=1))):
+        raise UserError(
+            f"{path}: vertex {far[0]} lies beyond {MAX_COORDINATE:g} units; export the mesh in larger units"
+        )
+    return mesh, raw.groups
+
+
+def _read(path: Path) -> RawMesh:
+    suffix = path.suffix.lower()
     try:
         data = files.read_bytes(path, files.DATA_BYTES)
     except FileNotFoundError:

@@ -1,4 +1,5 @@
-"""Wavefront OBJ: positions, texture coordinates, normals and polygons; everything else is passed over.
+"""Wavefront OBJ: positions, texture coordinates, normals and polygons, and what they belong to; everything else is
+passed over.
 
 Almost every file writes all its faces in one form with positive numbers; that form is read
 in bulk. Any other, and any mistake, goes line by line, so that a sentence can name the line.
@@ -9,18 +10,19 @@ from __future__ import annotations
 import numpy as np
 
 from ...base.errors import UserError
-from .mesh_raw import RawMesh, fan_corners
+from .mesh_raw import Groups, RawMesh, fan_corners
 
 _POSITION, _TEXTURE, _NORMAL = range(3)
 _LARGEST = 1 << 40
 """Number of a vertex that no file can hold."""
 _WIDTHS = {"v": 3, "vt": 2, "vn": 3}
+_STATEMENTS = (*_WIDTHS, "f", "o", "g", "usemtl", "mtllib")
 
 
 def read_obj(data: bytes, path: str) -> RawMesh:
-    """The file's one mesh; objects and groups are joined."""
+    """The file's triangles, all in one; `groups` tells objects, groups and materials apart."""
     lines = data.decode("utf-8", "replace").replace("\\\r\n", " ").replace("\\\n", " ").split("\n")
-    kinds: dict[str, list[tuple[int, str]]] = {"v": [], "vt": [], "vn": [], "f": []}
+    kinds: dict[str, list[tuple[int, str]]] = {word: [] for word in _STATEMENTS}
     for number, line in enumerate(lines, start=1):
         word, _, rest = line.lstrip().partition(" ")
         if word in kinds:
@@ -48,6 +50,32 @@ def read_obj(data: bytes, path: str) -> RawMesh:
         picked[..., _POSITION],
         _looked_up(tables[_NORMAL], picked[..., _NORMAL]),
         _looked_up(tables[_TEXTURE], picked[..., _TEXTURE]),
+        _groups(kinds, np.maximum(sizes - 2, 0)),
+    )
+
+
+def _groups(kinds: dict[str, list[tuple[int, str]]], triangles: np.ndarray) -> Groups:
+    """What each face, of so many `triangles`, stands under: its object, or its group where there is only one object,
+    and its material."""
+    lines = np.array([number for number, _ in kinds["f"]])
+
+    def told(word: str) -> tuple[np.ndarray, list[str]]:
+        """For each face the last such statement above it, 0 for none, and their texts."""
+        texts = ["", *(" ".join(rest.split()) for _, rest in kinds[word])]
+        distinct = {text: i for i, text in enumerate(dict.fromkeys(texts))}
+        place = np.searchsorted(np.array([number for number, _ in kinds[word]], np.int64), lines)
+        return np.array([distinct[text] for text in texts])[place], list(distinct)
+
+    (objects, object_names), (groups, group_names) = told("o"), told("g")
+    by_object = len(np.unique(objects)) > 1
+    which, names = (objects, object_names) if by_object else (groups, group_names)
+    materials, material_names = told("usemtl")
+    pairs, of_face = np.unique(np.stack([which, materials], axis=1), axis=0, return_inverse=True)
+    return Groups(
+        np.repeat(of_face.reshape(-1), triangles),
+        tuple(names[i] or object_names[objects[0]] for i in pairs[:, 0]),
+        tuple(material_names[i] or None for i in pairs[:, 1]),
+        tuple(dict.fromkeys(name for _, rest in kinds["mtllib"] for name in [rest.strip()] if name)),
     )
 
 

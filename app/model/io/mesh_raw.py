@@ -8,6 +8,19 @@ import numpy as np
 
 
 @dataclass(frozen=True)
+class Groups:
+    """Parts that a file tells apart."""
+
+    of_triangle: np.ndarray
+    """int64 (T,), index into the others."""
+    names: tuple[str, ...]
+    materials: tuple[str | None, ...]
+    """Name of each part's material."""
+    libraries: tuple[str, ...]
+    """Files of materials, as they are named."""
+
+
+@dataclass(frozen=True)
 class RawMesh:
     """Arrays as a file holds them; shapes as in `Mesh`."""
 
@@ -15,6 +28,8 @@ class RawMesh:
     triangles: np.ndarray
     corner_normals: np.ndarray | None = None
     uv: np.ndarray | None = None
+    groups: Groups | None = None
+    """None for a format that knows no parts."""
 
 
 def as_float64(values: np.ndarray) -> np.ndarray:

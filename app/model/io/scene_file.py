@@ -13,18 +13,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ...base import files
 from ...base.errors import UserError
 from ..geometry.mesh import Mesh
 from ..lights.light_file import read_light
-from ..materials.dielectric import DEFAULT_GLASS
 from ..materials.material_file import read_materials
 from ..placement import Surroundings
 from ..scene import (
     Camera,
-    Dielectric,
     Light,
     Scene,
     SceneObject,
@@ -37,15 +33,17 @@ from ..scene_defaults import (
     default_table,
     environment_of,
     framing_camera,
+    parts_of,
     studio_environment,
     studio_lights,
 )
 from ..scene_environment import read_environment
-from ..scene_objects import MESH_SUFFIXES, ObjectReader, load_checked_mesh
+from ..scene_objects import MESH_SUFFIXES, ObjectReader
 from ..scene_render import read_render
 from ..scene_textures import TextureReader
-from ..staging import AS_FOUND, Y_UP_TO_Z_UP, Staging, guessed_up, with_glass
+from ..staging import AS_FOUND, Staging, with_glass
 from ..texture import Environment
+from ..unique_names import Names
 from ..vectors import Vec3
 from .scene_table import SceneTable
 
@@ -74,7 +72,12 @@ def load_scene(path: str | os.PathLike[str], staging: Staging = AS_FOUND) -> Sce
 
         scene = load_gltf(path, staging)
     elif suffix in MESH_SUFFIXES:
-        scene = _scene_around_mesh(path, staging)
+        from .bare_mesh import objects_of_mesh
+
+        notes: list[str] = []
+        objects = objects_of_mesh(path, staging, notes)
+        lights, camera, environment = _studio(objects, notes, len(parts_of(objects)) == len(objects))
+        scene = Scene(path.stem, camera, lights, tuple(objects), environment=environment, notes=tuple(notes))
     else:
         raise UserError(
             f"{path}: '{path.suffix}' is not a kind of scene; use .toml, {', '.join(GLTF_SUFFIXES + MESH_SUFFIXES)}"
@@ -187,47 +190,28 @@ def _read_camera(table: SceneTable, around: Surroundings, notes: list[str]) -> C
     return read_camera(inner, around)
 
 
-def _add_table(objects: list[SceneObject], notes: list[str]) -> None:
-    """A receiver for a file that gives neither camera nor lights nor anything diffuse."""
-    if not _has_diffuse(objects):
-        objects.append(default_table(objects))
-        notes.append("Nothing diffuse given: a grey table was put below the objects.")
+def _add_table(objects: list[SceneObject], notes: list[str], needed: bool = False) -> None:
+    """A receiver for a file that gives neither camera nor lights nor anything diffuse, or that is `needed` all the
+    same."""
+    diffuse = _has_diffuse(objects)
+    if diffuse and not needed:
+        return
+    table, names = default_table(objects), Names()
+    names.update(item.name for item in objects)
+    objects.append(replace(table, name=names.unique(table.name)))
+    notes.append(f"Nothing {'to stand on' if diffuse else 'diffuse'} given: a grey table was put below the objects.")
 
 
 def _has_diffuse(objects: list[SceneObject]) -> bool:
     return any(o.material.receives for o in objects)
 
 
-def _studio(objects: list[SceneObject], notes: list[str]) -> tuple[tuple[Light, ...], Camera, Environment]:
-    """For a file that says nothing of light or camera: a table where nothing receives, lamps, a camera, a room."""
+def _studio(
+    objects: list[SceneObject], notes: list[str], needs_table: bool = False
+) -> tuple[tuple[Light, ...], Camera, Environment]:
+    """For a file that says nothing of light or camera: a table where nothing receives or it `needs_table`, lamps, a
+    camera, a room."""
     lights, camera = studio_lights(environment_of(objects)), framing_camera(objects)
-    _add_table(objects, notes)
+    _add_table(objects, notes, needs_table)
     notes.append("A lamp, weak light from above, a camera and a quiet studio round it were added.")
     return lights, camera, studio_environment()
-
-
-def _scene_around_mesh(path: Path, staging: Staging) -> Scene:
-    """A bare mesh as a piece of glass on a table in a studio."""
-    from ..geometry.mesh_normals import SMOOTH_CREASE_DEG, angle_weighted_normals, is_finely_cut
-    from ..optics import catalogue
-
-    notes: list[str] = []
-    mesh = load_checked_mesh(path, None, notes)
-    if mesh.corner_normals is None and is_finely_cut(mesh):
-        mesh = replace(mesh, corner_normals=angle_weighted_normals(mesh, SMOOTH_CREASE_DEG))
-        notes.append(
-            f"{path.name} holds no normals: it was smoothed where it bends by less than {SMOOTH_CREASE_DEG:g}°; a "
-            "scene file with smooth = false keeps its facets."
-        )
-    if staging.up is None:
-        up, reason = guessed_up(mesh, path.suffix.lower())
-        notes.append(f"{path.name} does not say which way is up: {up} was taken, for {reason}; --up y or z says it.")
-    else:
-        up = staging.up
-    matrix = Y_UP_TO_Z_UP if up == "y" else np.eye(4)
-    made = [SceneObject(path.stem, mesh, Dielectric(catalogue.find(DEFAULT_GLASS)), matrix)]
-    objects = with_glass(made, staging, path.name)
-    if not staging.glass:
-        notes.insert(0, f"{path.name} is a bare mesh: it was made of {DEFAULT_GLASS}; --glass takes another.")
-    lights, camera, environment = _studio(objects, notes)
-    return Scene(path.stem, camera, lights, tuple(objects), environment=environment, notes=tuple(notes))

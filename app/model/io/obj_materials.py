@@ -1,0 +1,105 @@
+"""Materials of an OBJ file (Wavefront .mtl): which of them are glass, of which index, and the colour of the others.
+
+Statements are those of Wavefront's specification (Advanced Visualizer manual, appendix B2): `Kd`, `d` or `Tr`, `Ni`,
+`illum`. Nothing in the format knows dispersion.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from ...base import files
+from ..optics import glass
+from ..scene import Dielectric, Diffuse, Material
+from ..vectors import Vec3
+
+_REFRACTS = (4, 6, 7, 9)
+"""Values of `illum` that stand for glass or refraction."""
+_LARGEST_INDEX = 4.0
+_LIKE_DEFAULT = 0.07
+"""Of n_d: programs write 1.45 or 1.5 where nobody chose an index."""
+
+
+@dataclass(frozen=True)
+class ObjMaterial:
+    """What a .mtl file says of a material."""
+
+    colour: Vec3 = (0.8, 0.8, 0.8)
+    """Kd, taken as linear Rec.709."""
+    dissolve: float = 1.0
+    """1: opaque."""
+    index: float = 1.0
+    illum: int = 2
+
+    @property
+    def transmits(self) -> bool:
+        """Whether it is meant to be seen through."""
+        return self.illum in _REFRACTS or self.dissolve < 0.5
+
+    def material(self) -> Material:
+        """Glass, or a diffuse surface."""
+        if not self.transmits:
+            return Diffuse(self.colour)
+        usual = Dielectric.usual()
+        if not 1.0 < self.index <= _LARGEST_INDEX or abs(self.index - usual.dispersion.n_d) < _LIKE_DEFAULT:
+            return usual
+        return Dielectric(glass.from_abbe(self.index, usual.dispersion.V_d, f"n_d {self.index:g}"))
+
+
+def read_materials(obj: Path, libraries: tuple[str, ...], notes: list[str]) -> dict[str, ObjMaterial]:
+    """The materials of the files that an OBJ file names, by their names; what cannot be read goes to `notes`."""
+    found: dict[str, ObjMaterial] = {}
+    for library in libraries:
+        path = obj.parent / library
+        if not files.may_read(path, obj.parent):
+            notes.append(f"{obj.name} names materials in {library}, which {files.OUTSIDE}.")
+            continue
+        try:
+            text = files.read_text(path, files.TABLE_BYTES)
+        except (OSError, ValueError) as error:
+            notes.append(f"{obj.name} names materials in {library}, which cannot be read ({files.reason_of(error)}).")
+            continue
+        found |= _materials(text, path.name, notes)
+    return found
+
+
+def _materials(text: str, file: str, notes: list[str]) -> dict[str, ObjMaterial]:
+    found: dict[str, ObjMaterial] = {}
+    name = None
+    for number, line in enumerate(text.split("\n"), start=1):
+        word, *rest = line.partition("#")[0].split() or [""]
+        if word == "newmtl":
+            name = " ".join(rest)
+            found[name] = ObjMaterial()
+        elif name is not None:
+            try:
+                found[name] = _with(found[name], word, rest)
+            except (ValueError, IndexError, OverflowError):
+                notes.append(f"{file}: line {number}: '{word}' needs numbers; it was passed over.")
+    return found
+
+
+def _with(material: ObjMaterial, word: str, rest: list[str]) -> ObjMaterial:
+    """`material` after one statement. Raises ValueError or IndexError for one that is damaged."""
+    if word == "Kd" and rest[:1] not in (["spectral"], ["xyz"]):
+        rgb = [_number(part) for part in rest[:3]]
+        r, g, b = (min(max(c, 0.0), 1.0) for c in (rgb if len(rgb) == 3 else 3 * rgb[:1]))
+        return replace(material, colour=(r, g, b))
+    if word == "d":
+        return replace(material, dissolve=_number(rest[-1]))  # `d -halo 0.5`
+    if word == "Tr":
+        return replace(material, dissolve=1.0 - _number(rest[0]))
+    if word == "Ni":
+        return replace(material, index=_number(rest[0]))
+    if word == "illum":
+        return replace(material, illum=int(rest[0]))
+    return material
+
+
+def _number(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(text)
+    return value
