@@ -22,8 +22,23 @@ BLOCK = 8
 """Pixels on a side of a block."""
 FEWEST_HITS = 50.0
 """Photons of the reference that a place must have for its score to be nearly normal; a place with fewer is left out."""
+SELDOM = 3.0
+"""Chance alone brings a score beyond it once in 370 places."""
 EXTREME = 5.0
-"""Scores beyond it are counted."""
+"""Chance alone hardly ever brings a score beyond it."""
+SHOWN = 8
+"""Places that are named, the worst first."""
+
+
+class Place(msgspec.Struct, frozen=True):
+    """Where the two differ."""
+
+    column: int
+    row: int
+    """Pixels, upper left corner."""
+    score: float
+    share: float
+    """Method over reference, minus 1."""
 
 
 class Agreement(msgspec.Struct, frozen=True):
@@ -33,17 +48,15 @@ class Agreement(msgspec.Struct, frozen=True):
     """With enough photons of the reference."""
     chi2: float
     """Mean of the squared scores: 1 where nothing but chance tells the two apart."""
+    seldom: int
+    """Places beyond ±`SELDOM`."""
     extreme: int
     """Places beyond ±`EXTREME`."""
-    largest: float
-    """The largest score, with its sign."""
     deviation: float
     """Root mean square of method minus reference, noise of both taken out, over the reference's root mean square; 0
     where the noise explains all."""
-    worst_place: tuple[int, int]
-    """(column, row), pixels, where the largest score is."""
-    worst_share: float
-    """Method over reference, minus 1, there."""
+    worst: list[Place]
+    """At most `SHOWN`, by the size of their score."""
 
 
 class SceneAgreement(msgspec.Struct, frozen=True):
@@ -110,20 +123,22 @@ def agreement(luminance: np.ndarray, reference_image: ReferencePicture, side: in
     enough &= known > 0.0
     rows, columns = np.nonzero(enough)
     if not len(rows):
-        return Agreement(0, 1.0, 0, 0.0, 0.0, (0, 0), 0.0)
+        return Agreement(0, 1.0, 0, 0, 0.0, [])
     exact, known, mean, own = (values[enough] for values in (exact, known, mean, own))
     spread = np.maximum(own, _pooled(exact, own)) / len(each) + known
     score = (mean - exact) / np.sqrt(spread)
-    worst = int(np.abs(score).argmax())
+    size = np.abs(score)
     excess = float(np.sum((mean - exact) ** 2 - own / len(each) - known))
     return Agreement(
         len(score),
         float(np.mean(score**2)),
-        int(np.count_nonzero(np.abs(score) > EXTREME)),
-        float(score[worst]),
+        int(np.count_nonzero(size > SELDOM)),
+        int(np.count_nonzero(size > EXTREME)),
         float(np.sqrt(max(excess, 0.0) / np.sum(exact**2))),
-        (int(columns[worst]) * side, int(rows[worst]) * side),
-        float(mean[worst] / exact[worst] - 1.0),
+        [
+            Place(int(columns[i]) * side, int(rows[i]) * side, float(score[i]), float(mean[i] / exact[i] - 1.0))
+            for i in np.argsort(-size, kind="stable")[:SHOWN]
+        ],
     )
 
 
@@ -146,8 +161,8 @@ def _pooled(exact: np.ndarray, own: np.ndarray, neighbours: int = 32) -> np.ndar
 
 
 HEAD = (
-    f"{'scene':16} {'energy':>8} {'score':>6}   {'pixels':>6} {'chi2':>6} {'>5':>4} {'deviation':>9}   "
-    f"{'blocks':>6} {'chi2':>6} {'>5':>4} {'deviation':>9}  worst block"
+    f"{'scene':16} {'energy':>8} {'score':>6}   {'pixels':>6} {'chi2':>6} {'>3':>6} {'>5':>6} {'deviation':>9}   "
+    f"{'blocks':>6} {'chi2':>6} {'>3':>6} {'>5':>6} {'deviation':>9}  worst block"
 )
 
 
@@ -155,8 +170,13 @@ def line(found: SceneAgreement) -> str:
     """A row under `HEAD`."""
     parts = [f"{found.scene:16} {found.energy:8.5f} {found.energy_score:+6.1f}  "]
     parts += [
-        f" {one.places:6d} {one.chi2:6.2f} {one.extreme:4d} {one.deviation:9.5f}  "
+        f" {one.places:6d} {one.chi2:6.2f} {_share(one.seldom, one)} {_share(one.extreme, one)} {one.deviation:9.5f}  "
         for one in (found.pixels, found.blocks)
     ]
-    worst = found.blocks
-    return "".join(parts) + f"{worst.largest:+.1f} ({100 * worst.worst_share:+.2f} %) at {worst.worst_place}"
+    worst = found.blocks.worst[:1]
+    parts += [f"{place.score:+.1f} ({100 * place.share:+.2f} %) at {(place.column, place.row)}" for place in worst]
+    return "".join(parts)
+
+
+def _share(places: int, of: Agreement) -> str:
+    return f"{100.0 * places / max(of.places, 1):5.1f}%"

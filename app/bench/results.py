@@ -30,6 +30,10 @@ OTHER_MEASURES = ("relmse_whole", "relmse_trimmed", "nrmse", "smape", "chroma")
 """Measures beside relMSE by which times to equal error are given, so that no conclusion hangs on one."""
 
 
+REFERENCES = ("exact", "mesh")
+"""What a reference meets where a shape has an equation: that surface, or the triangles that the renderer has."""
+
+
 class BenchSettings(msgspec.Struct, frozen=True):
     """What was asked for; results of other settings are never mixed."""
 
@@ -41,6 +45,8 @@ class BenchSettings(msgspec.Struct, frozen=True):
     """Width and height in pixels; None: 480 wide, in each scene's own aspect."""
     reference_seconds: float = 60.0
     """Most time that one run spends on a scene's reference; what earlier runs made is used as well."""
+    reference: str = "exact"
+    """One of `REFERENCES`."""
     measured_pass: str = "light"
     """Which pass of the renderer is measured, a key of `measured_passes.MEASURED_PASSES`. Below, what is said of
     photons and photon time holds for camera samples a pixel and camera time where it is the camera's."""
@@ -63,6 +69,8 @@ class AgreementSettings(msgspec.Struct, frozen=True):
     reference_seconds: float = 60.0
     """Most time spent on each scene's reference; what earlier runs made is used as well."""
     method: str = "srd"
+    reference: str = "exact"
+    """One of `REFERENCES`."""
 
 
 class Sample(msgspec.Struct, frozen=True):

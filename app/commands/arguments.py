@@ -81,6 +81,15 @@ StatsOption = Annotated[bool, typer.Option("--stats", help="Print the energy bal
 PixelsOption = Annotated[Text, typer.Option(metavar="WxH", help="Pixels; default: the scene's.")]
 TexelsOption = Annotated[Text, typer.Option(metavar="WxH", help="Texels; default: 1024x1024.")]
 PhotonsOption = Annotated[Text, typer.Option(metavar="N", help="Photons to emit; default: the scene's.")]
+ReferenceOption = Annotated[
+    Text,
+    typer.Option(
+        "--reference",
+        metavar="KIND",
+        help="What the reference meets: true spheres, lenses, tori and solids of revolution (exact), so that "
+        "tessellation counts as an error, or the renderer's triangles (mesh); default: exact.",
+    ),
+]
 ReferenceSecondsOption = Annotated[
     Text,
     typer.Option("--reference-seconds", metavar="S", help="Time added to each scene's cached reference; default: 60."),

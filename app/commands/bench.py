@@ -47,6 +47,7 @@ class BenchRequest:
     features: str | None = None
     fresh: bool = False
     camera_pass: bool = False
+    reference: str | None = None
 
 
 def bench_command(request: BenchRequest, show: Callable[[object], None]) -> int:
@@ -62,6 +63,7 @@ def bench_command(request: BenchRequest, show: Callable[[object], None]) -> int:
     # a scene's file and the OpenGL context.
     start_s, started = time.process_time(), time.perf_counter()
     scenes = load_scenes(request.scenes or (CAMERA_SCENES if request.camera_pass else ()))
+    scenes = met_by(settings.reference, scenes)
 
     start_s += (time.perf_counter() - started) / len(scenes)
 
@@ -124,6 +126,8 @@ def parse_settings(request: BenchRequest) -> BenchSettings:
             )
     if request.reference_seconds is not None:
         asked["reference_seconds"] = _seconds("--reference-seconds", request.reference_seconds)
+    if request.reference is not None:
+        asked["reference"] = options.parse_reference(request.reference)
     if request.seeds is not None:
         asked["seeds"] = options.parse_integer("--seeds", request.seeds, 1, MAX_SEEDS)
     if request.methods is not None:
@@ -178,6 +182,15 @@ def load_scenes(names: Sequence[str]) -> dict[str, Scene]:
     return scenes
 
 
+def met_by(reference: str, scenes: dict[str, Scene]) -> dict[str, Scene]:
+    """The scenes as a reference of this kind (`REFERENCES`) is to meet them; their pictures stay the same."""
+    if reference == "exact":
+        return scenes
+    from ..reference.exact_shapes import as_triangles
+
+    return {name: as_triangles(scene) for name, scene in scenes.items()}
+
+
 def repeat_command(scenes: Sequence[str], request: BenchRequest) -> str:
     """The one command that repeats this run."""
     given = {
@@ -187,6 +200,7 @@ def repeat_command(scenes: Sequence[str], request: BenchRequest) -> str:
         "--methods": request.methods,
         "--size": request.size,
         "--reference-seconds": request.reference_seconds,
+        "--reference": request.reference,
     }
     words = [
         "spectrasplat",

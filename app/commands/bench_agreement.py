@@ -12,7 +12,7 @@ from ..base.interrupts import exit_code_of
 from ..base.memory import check_picture_memory
 from ..bench.results import AgreementSettings as Settings
 from . import options
-from .bench import MAX_SEEDS, load_scenes
+from .bench import MAX_SEEDS, load_scenes, met_by
 
 
 @dataclass(frozen=True)
@@ -26,6 +26,7 @@ class AgreementRequest:
     size: str | None = None
     reference_seconds: str | None = None
     method: str | None = None
+    reference: str | None = None
 
 
 def bench_agreement_command(request: AgreementRequest) -> int:
@@ -38,7 +39,7 @@ def bench_agreement_command(request: AgreementRequest) -> int:
     from ..gpu.context import create_context
 
     settings = _settings(request)
-    scenes = load_scenes(request.scenes)
+    scenes = met_by(settings.reference, load_scenes(request.scenes))
     make_output_folder(request.output, "agreement.json")
     found: list[agreement.SceneAgreement] = []
     print(agreement.HEAD, flush=True)
@@ -76,4 +77,6 @@ def _settings(request: AgreementRequest) -> Settings:
         asked["reference_seconds"] = options.parse_seconds(request.reference_seconds)
     if request.method is not None:
         asked["method"] = options.parse_method(request.method)
+    if request.reference is not None:
+        asked["reference"] = options.parse_reference(request.reference)
     return Settings(**asked)

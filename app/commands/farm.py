@@ -17,7 +17,7 @@ from ..base.errors import UserError, plain
 from ..base.interrupts import interrupt_flag
 from . import options
 from .animate import AnimateRequest, plan_of
-from .bench import CAMERA_SCENES, BenchRequest, kept_text, load_scenes, repeat_command, write_and_show
+from .bench import CAMERA_SCENES, BenchRequest, kept_text, load_scenes, met_by, repeat_command, write_and_show
 from .bench import parse_settings as parse_bench_settings
 from .render import RenderRequest, complete_settings, parse_settings
 
@@ -200,6 +200,7 @@ def farm_bench_command(request: BenchRequest, farm: FarmRequest, show: Callable[
     settings, count = parse_bench_settings(request), workers_of(farm)
     start_s, started = time.process_time(), time.perf_counter()
     scenes = load_scenes(request.scenes or (CAMERA_SCENES if request.camera_pass else ()))
+    scenes = met_by(settings.reference, scenes)
     start_s += (time.perf_counter() - started) / len(scenes)
     if count is not None and count > 1:
         note("workers of one machine slow each other: times compare within this run only")

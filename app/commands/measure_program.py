@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from . import completion
-from .arguments import AllowOutside, ReferenceSecondsOption, Text
+from .arguments import AllowOutside, ReferenceOption, ReferenceSecondsOption, Text
 from .printing import show
 
 
@@ -38,6 +38,7 @@ def bench(
     ] = None,
     size: Annotated[Text, typer.Option(metavar="WxH", help="Pixels; default: 480 wide, in the scene's aspect.")] = None,
     reference_seconds: ReferenceSecondsOption = None,
+    reference: ReferenceOption = None,
     horizon: Annotated[
         Text,
         typer.Option(
@@ -80,6 +81,7 @@ def bench(
         features,
         fresh,
         camera_pass,
+        reference,
     )
     raise typer.Exit(bench_command(request, show))
 
@@ -145,6 +147,7 @@ def bench_agreement(
     seeds: Annotated[Text, typer.Option(metavar="N", help="Pictures, at least 2; default: 6.")] = None,
     size: Annotated[Text, typer.Option(metavar="WxH", help="Pixels; default: 240x135.")] = None,
     reference_seconds: ReferenceSecondsOption = None,
+    reference: ReferenceOption = None,
     method: Annotated[
         Text, typer.Option(metavar="NAME", autocompletion=completion.methods, help="Default: srd.")
     ] = None,
@@ -153,7 +156,7 @@ def bench_agreement(
     """Compare a method's caustics with the float64 reference by standard scores, by pixels and in 8x8 blocks."""
     from .bench_agreement import AgreementRequest, bench_agreement_command
 
-    request = AgreementRequest(tuple(scenes or ()), output, photons, seeds, size, reference_seconds, method)
+    request = AgreementRequest(tuple(scenes or ()), output, photons, seeds, size, reference_seconds, method, reference)
     raise typer.Exit(bench_agreement_command(request))
 
 

@@ -145,6 +145,15 @@ def parse_method(text: str) -> str:
     return text
 
 
+def parse_reference(text: str) -> str:
+    """What a reference meets, one of `REFERENCES`."""
+    from ..bench.results import REFERENCES
+
+    if text not in REFERENCES:
+        raise UserError(f"--reference '{text}' is unknown{suggestion(text, REFERENCES) or ','} known are exact, mesh")
+    return text
+
+
 def parse_camera_method(text: str) -> str:
     """One of those that camera rays may follow."""
     if text not in CAMERA_METHODS:

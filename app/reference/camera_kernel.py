@@ -22,7 +22,7 @@ from .camera_scene import beyond, picture_at
 from .compiling import compiled, inlined
 from .environment_draw import draw_direction
 from .photon_emit import search
-from .photon_intersect import blocked, nearest
+from .photon_intersect import blocked, nearest, normal_at
 from .photon_scene import BLACK, DIFFUSE
 from .sampling import DIMENSIONS, FIRST_CHOICE, choice, mixed, sobol_next, sobol_start, unit
 from .scattering import AIR, scatter, side_met, transmitted
@@ -114,7 +114,8 @@ def gain_of_light(scene, lights, i, triangle, side, px, py, pz, a, b, stack):
     # The plastic number's fractions turn the sample's place on from light to light.
     at, bt = a + i * 0.7548776662466927, b + i * 0.5698402909980532
     tx, ty, tz, distance, gain = sample_light(lights, i, px, py, pz, at - math.floor(at), bt - math.floor(bt))
-    gain *= sign * (tx * scene.normals[triangle, 0] + ty * scene.normals[triangle, 1] + tz * scene.normals[triangle, 2])
+    nx, ny, nz = normal_at(scene, triangle, px, py, pz)
+    gain *= sign * (tx * nx + ty * ny + tz * nz)
     # A hair less than the way, so that a surface the light lies on does not hide it.
     if gain <= 0.0 or blocked(scene, px, py, pz, tx, ty, tz, distance * (1.0 - 1e-9), triangle, stack):
         return 0.0
@@ -213,14 +214,14 @@ def sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_dept
         if atom >= 0:
             weight *= transmitted(scene, mask, alone, nm, t)
         px, py, pz = px + t * dx, py + t * dy, pz + t * dz
+        place = px, py, pz
         thing = scene.owner[triangle]
         kind = scene.kind[thing]
         if kind == BLACK or weight <= 0.0 or (lit and kind == DIFFUSE):
             break
         if kind == DIFFUSE:
             a, b = unit(state[3] ^ shift[3]), unit(state[4] ^ shift[4])
-            side = side_met(scene, triangle, dx, dy, dz)
-            place = px, py, pz
+            side = side_met(scene, triangle, place, dx, dy, dz)
             found += weight * _diffuse(
                 scene, lights, spectra, pictures, tables, atom, triangle, u, v, place, side, a, b, scratch
             )
@@ -231,10 +232,9 @@ def sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_dept
             row, red, green, blue = _surface(scene, pictures, triangle, u, v)
             basis = spectra.basis[atom]
             weight *= spectra.classes[row, atom] if row > 0 else red * basis[0] + green * basis[1] + blue * basis[2]
-            sign, normal = 1.0 if side == 0 else -1.0, scene.normals[triangle]
-            dx, dy, dz, share = draw_direction(
-                pictures.draw, sign * normal[0], sign * normal[1], sign * normal[2], a, b
-            )
+            sign = 1.0 if side == 0 else -1.0
+            nx, ny, nz = normal_at(scene, triangle, px, py, pz)
+            dx, dy, dz, share = draw_direction(pictures.draw, sign * nx, sign * ny, sign * nz, a, b)
             weight *= share
             last, last_object, within, lit = triangle, thing, side == 1, True
             continue
@@ -246,7 +246,7 @@ def sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_dept
         last, last_object = triangle, thing
         draw = choice(state, shift, FIRST_CHOICE + events, noise, events)
         dx, dy, dz, mask, alone, within, is_event, kept, _ = scatter(
-            scene, triangle, u, v, dx, dy, dz, mask, alone, nm, draw
+            scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw
         )
         weight *= kept
         events += is_event
@@ -307,10 +307,11 @@ def seen_points(scene, camera, start, sequence, count, nm, max_depth, side, poin
             if triangle < 0:
                 break
             px, py, pz, way = px + t * dx, py + t * dy, pz + t * dz, way + t
+            place = px, py, pz
             thing = scene.owner[triangle]
             kind = scene.kind[thing]
             if kind == DIFFUSE:
-                at = side[thing, side_met(scene, triangle, dx, dy, dz)]
+                at = side[thing, side_met(scene, triangle, place, dx, dy, dz)]
                 if at >= 0:
                     points[found, 0], points[found, 1], points[found, 2], points[found, 3] = px, py, pz, way
                     which[found, 0], which[found, 1] = at, events
@@ -321,7 +322,7 @@ def seen_points(scene, camera, start, sequence, count, nm, max_depth, side, poin
             last, last_object = triangle, thing
             draw = choice(state, shift, FIRST_CHOICE + events, noise, events)
             dx, dy, dz, mask, alone, within, is_event, _, _ = scatter(
-                scene, triangle, u, v, dx, dy, dz, mask, alone, nm, draw
+                scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw
             )
             events += is_event
     return found

@@ -23,6 +23,7 @@ from ..model.scene import Scene
 from ..model.scene_key import picture_key
 from .camera_run import MAX_DEPTH, CameraPicture, CameraRun, summed_camera
 from .code_key import code_key
+from .exact_shapes import description
 from .kept import continue_kept, kept_path
 from .photon_run import TALLY_SIZE
 from .rounds import PARTS, Cancelled, Limits, Progress, continue_run
@@ -38,7 +39,7 @@ _CAUSTIC_SHARE = 0.5
 def camera_reference_key(scene: Scene, width: int, height: int, max_depth: int, caustic: CausticPlan | None) -> str:
     """SHA-256 over everything the picture depends on, the code that makes it included."""
     plan = None if caustic is None else astuple(caustic)
-    return picture_key(scene, code_key("camera_run"), width, height, max_depth, plan)
+    return picture_key(scene, code_key("camera_run"), description(scene), width, height, max_depth, plan)
 
 
 def render_camera_reference(

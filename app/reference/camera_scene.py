@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..model.geometry.bvh import build_bvh
 from ..model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz, daylight_per_lumen, rgb_basis
 from ..model.optics.spectrum import cmf_at
 from ..model.scene import Scene
@@ -199,14 +198,11 @@ def _coordinates(
     row = np.full(len(photons.owner), -1, np.int32)
     if not (texture >= 0).any():
         return row, np.zeros((1, 6))
-    meshes = [item.mesh.transformed(item.object_to_world) for item in scene.objects]
-    corners = np.concatenate([mesh.corners() for mesh in meshes]) - centre
-    order = build_bvh(corners.astype(np.float32)).order  # the same tree again: building is deterministic
-    if not np.array_equal(corners[order][:, 0], photons.corners[:, :3]):
-        raise AssertionError("the tree's order changed between two builds")
-    uv = np.concatenate([np.zeros((len(m.triangles), 6)) if m.uv is None else m.uv.reshape(-1, 6) for m in meshes])[
-        order
-    ]
+    uv = np.zeros((len(photons.owner), 6))
+    for index, item in enumerate(scene.objects):
+        if texture[index] >= 0 and item.mesh.uv is not None:
+            own = photons.owner == index
+            uv[own] = item.mesh.transformed(item.object_to_world).uv.reshape(-1, 6)[photons.facet[own]]
     worn = np.flatnonzero(texture[photons.owner] >= 0)
     row[worn] = np.arange(len(worn))
     return row, np.ascontiguousarray(uv[worn])

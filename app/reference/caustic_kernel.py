@@ -44,12 +44,13 @@ def land(scene, domain, colour, band_of, side, sequence, first, count, share, ma
                 break
             watt *= transmitted(scene, mask, alone, nm, t)
             px, py, pz = px + t * dx, py + t * dy, pz + t * dz
+            place = px, py, pz
             thing = scene.owner[triangle]
             kind = scene.kind[thing]
             if kind == BLACK or (kind != DIFFUSE and events >= max_depth):
                 break
             if kind == DIFFUSE:
-                at = side[thing, side_met(scene, triangle, dx, dy, dz)]
+                at = side[thing, side_met(scene, triangle, place, dx, dy, dz)]
                 if events > 0 and at >= 0:  # straight from the light it is no caustic
                     points[landed, 0], points[landed, 1], points[landed, 2] = px, py, pz
                     watts[landed] = watt
@@ -59,7 +60,7 @@ def land(scene, domain, colour, band_of, side, sequence, first, count, share, ma
             last, last_object = triangle, thing
             draw = choice(state, shift, FIRST_CHOICE + events, noise, events)
             dx, dy, dz, mask, alone, within, is_event, kept, _ = scatter(
-                scene, triangle, u, v, dx, dy, dz, mask, alone, nm, draw
+                scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw
             )
             watt *= kept
             events += is_event

@@ -14,7 +14,7 @@ from ..model.scene import Scene
 from .camera_kernel import gain_of_light
 from .camera_lights import CameraLights, camera_lights
 from .compiling import compiled
-from .photon_intersect import nearest
+from .photon_intersect import nearest, normal_at
 from .photon_scene import PhotonScene, photon_scene
 from .sampling import scratch
 
@@ -70,13 +70,9 @@ def _gather(scene, lights, start, normal, height, found, scratch):
     )
     if triangle < 0 or distance > 100.0 * height:
         return
-    facing = (
-        scene.normals[triangle, 0] * normal[0]
-        + scene.normals[triangle, 1] * normal[1]
-        + scene.normals[triangle, 2] * normal[2]
-    )
-    side = 0 if facing > 0.0 else 1
     px, py, pz = start[0] + distance * dx, start[1] + distance * dy, start[2] + distance * dz
+    nx, ny, nz = normal_at(scene, triangle, px, py, pz)
+    side = 0 if nx * normal[0] + ny * normal[1] + nz * normal[2] > 0.0 else 1
     for i in range(lights.kind.shape[0]):
         total = 0.0
         for j in range(_SAMPLES):

@@ -1,4 +1,4 @@
-"""Rays against triangles in float64, compiled: the reference renderer's own walk through the tree.
+"""Rays against triangles and curved surfaces in float64, compiled: the reference renderer's own walk through the tree.
 
 The side of a surface a photon is on decides near the place it left, not an offset: on the object
 just left only the opposite crossing can be true, and of two touching solids the photon's own
@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from .compiling import compiled, inlined
+from .curved_surfaces import crossings, curved_normal
 from .photon_scene import DIELECTRIC, GRATING
 
 SLACK = 1e-10
@@ -50,7 +51,7 @@ def _inverse(component):
 
 @inlined
 def _meets(scene, i, ox, oy, oz, dx, dy, dz):
-    """(whether the ray's line meets facet i, distance, u, v, which way it crosses: > 0 inwards); Möller and Trumbore
+    """(whether the ray's line meets facet i, distance, u, v, which way it crosses: > 0 outwards); Möller and Trumbore
     1997."""
     e1x, e1y, e1z = scene.corners[i, 3], scene.corners[i, 4], scene.corners[i, 5]
     e2x, e2y, e2z = scene.corners[i, 6], scene.corners[i, 7], scene.corners[i, 8]
@@ -78,26 +79,49 @@ def _crossed_already(bit, mask, facing):
 
 
 @inlined
-def _height(scene, i, t, dx, dy, dz):
-    """Way to facet i along its normal, of a ray that meets it at distance t."""
-    n = scene.normals[i]
-    return t * abs(dx * n[0] + dy * n[1] + dz * n[2])
+def normal_at(scene, i, x, y, z):
+    """Unit outward normal of facet or curved surface i, which holds the place."""
+    row = scene.curved[i]
+    if row >= 0:
+        return curved_normal(scene.forms[row], x, y, z)
+    return scene.normals[i, 0], scene.normals[i, 1], scene.normals[i, 2]
 
 
 @inlined
-def _behind(scene, i, t, dx, dy, dz, last):
-    """Whether a sheet's facet i, at distance t, is one interface with facet `last`, which the ray has left."""
-    n, m = scene.normals[i], scene.normals[last]
-    if abs(n[0] * m[0] + n[1] * m[1] + n[2] * m[2]) <= _LEANING:
+def _steepness(scene, i, t, ox, oy, oz, dx, dy, dz):
+    """Way along the normal of surface i to each unit of the ray's, where it meets that at distance t."""
+    nx, ny, nz = normal_at(scene, i, ox + t * dx, oy + t * dy, oz + t * dz)
+    return abs(dx * nx + dy * ny + dz * nz)
+
+
+@inlined
+def _behind(scene, i, t, ox, oy, oz, dx, dy, dz, last):
+    """Whether a sheet's surface i, at distance t, is one interface with surface `last`, which the ray has left."""
+    nx, ny, nz = normal_at(scene, i, ox + t * dx, oy + t * dy, oz + t * dz)
+    mx, my, mz = normal_at(scene, last, ox, oy, oz)
+    if abs(nx * mx + ny * my + nz * mz) <= _LEANING:
         return False
-    return _height(scene, i, t, dx, dy, dz) <= (scene.contact if scene.kind[scene.owner[i]] == GRATING else scene.near)
+    height = t * abs(dx * nx + dy * ny + dz * nz)
+    return height <= (scene.contact if scene.kind[scene.owner[i]] == GRATING else scene.near)
+
+
+@inlined
+def _met(scene, i, last, ox, oy, oz, dx, dy, dz):
+    """Where a ray's line crosses surface i: (how often, distances (4), which way (4): > 0 outwards, u, v). A facet that
+    the ray starts on it does not cross."""
+    row = scene.curved[i]
+    if row >= 0:
+        count, t, facing = crossings(scene.forms[row], ox, oy, oz, dx, dy, dz)
+        return count, t, facing, 0.0, 0.0
+    hit, t, u, v, facing = _meets(scene, i, ox, oy, oz, dx, dy, dz)
+    return 1 if hit and i != last else 0, (t, 0.0, 0.0, 0.0), (facing, 0.0, 0.0, 0.0), u, v
 
 
 @compiled
 def nearest(scene, ox, oy, oz, dx, dy, dz, last, last_object, within, mask, stack, stack_distance):
-    """(distance, triangle, u, v) of the nearest surface; triangle −1: none.
+    """(distance, triangle or curved surface, u, v) of the nearest surface; −1: none.
 
-    `last`, `last_object`: facet and object the ray starts on (−1: none), `within`: on its inner
+    `last`, `last_object`: surface and object the ray starts on (−1: none), `within`: on its inner
     side; `mask`: solids it is inside of; `stack`, `stack_distance`: scratch (STACK_SIZE,).
     """
     ix, iy, iz = _inverse(dx), _inverse(dy), _inverse(dz)
@@ -111,36 +135,35 @@ def nearest(scene, ox, oy, oz, dx, dy, dz, last, last_object, within, mask, stac
         if scene.node_count[node] > 0:
             first = scene.node_first[node]
             for i in range(first, first + scene.node_count[node]):
-                if i == last:
-                    continue
-                hit, t, u, v, facing = _meets(scene, i, ox, oy, oz, dx, dy, dz)
-                if not hit:
-                    continue
+                count, ways, facings, u, v = _met(scene, i, last, ox, oy, oz, dx, dy, dz)
                 owner = scene.owner[i]
                 sheet = scene.kind[owner] != DIELECTRIC
-                key = t + near if nested and facing > 0.0 else t
-                if sheet:  # `contact` is meant along its normal
-                    key = t - scene.contact / max(_height(scene, i, 1.0, dx, dy, dz), _GRAZING)
-                if sheet and best_triangle >= 0 and abs(key - best_key) < near and owner != scene.owner[best_triangle]:
-                    if owner > scene.owner[best_triangle]:
+                for k in range(count):
+                    t, facing = ways[k], facings[k]
+                    key = t + near if nested and facing > 0.0 else t
+                    if sheet:  # `contact` is meant along its normal
+                        key = t - scene.contact / max(_steepness(scene, i, t, ox, oy, oz, dx, dy, dz), _GRAZING)
+                    beside = best_triangle >= 0 and abs(key - best_key) < near and owner != scene.owner[best_triangle]
+                    if sheet and beside:
+                        if owner > scene.owner[best_triangle]:
+                            continue
+                    elif key >= best_key:
                         continue
-                elif key >= best_key:
-                    continue
-                if owner == last_object:
-                    if t <= -near or (t < near and (t <= 0.0 or within == (facing < 0.0))):
+                    if owner == last_object:
+                        if t <= -near or (t < near and (t <= 0.0 or within == (facing < 0.0))):
+                            continue
+                    elif sheet:
+                        if t <= -near or (last >= 0 and _behind(scene, i, t, ox, oy, oz, dx, dy, dz, last)):
+                            continue
+                    elif scene.bit[owner] >= 0:
+                        if t <= -behind or (
+                            (t < near or t * _steepness(scene, i, t, ox, oy, oz, dx, dy, dz) < 2.0 * scene.contact)
+                            and _crossed_already(scene.bit[owner], mask, facing)
+                        ):
+                            continue
+                    elif t <= -near:
                         continue
-                elif sheet:
-                    if t <= -near or (last >= 0 and _behind(scene, i, t, dx, dy, dz, last)):
-                        continue
-                elif scene.bit[owner] >= 0:
-                    if t <= -behind or (
-                        (t < near or _height(scene, i, t, dx, dy, dz) < 2.0 * scene.contact)
-                        and _crossed_already(scene.bit[owner], mask, facing)
-                    ):
-                        continue
-                elif t <= -near:
-                    continue
-                best_key, best, best_triangle, best_u, best_v = key, t, i, u, v
+                    best_key, best, best_triangle, best_u, best_v = key, t, i, u, v
         else:
             left = scene.node_first[node]
             far = best_key + behind + near
@@ -166,7 +189,7 @@ def nearest(scene, ox, oy, oz, dx, dy, dz, last, last_object, within, mask, stac
 
 @compiled
 def blocked(scene, ox, oy, oz, dx, dy, dz, far, last, stack):
-    """Whether any surface but facet `last` lies between the start and `far`."""
+    """Whether any surface but the place on `last` lies between the start and `far`."""
     ix, iy, iz = _inverse(dx), _inverse(dy), _inverse(dz)
     node = 0
     top = 0
@@ -174,11 +197,10 @@ def blocked(scene, ox, oy, oz, dx, dy, dz, far, last, stack):
         if scene.node_count[node] > 0:
             first = scene.node_first[node]
             for i in range(first, first + scene.node_count[node]):
-                if i == last:
-                    continue
-                hit, t, _, _, _ = _meets(scene, i, ox, oy, oz, dx, dy, dz)
-                if hit and scene.near < t < far:
-                    return True
+                count, ways, _, _, _ = _met(scene, i, last, ox, oy, oz, dx, dy, dz)
+                for k in range(count):
+                    if scene.near < ways[k] < far:
+                        return True
         else:
             left = scene.node_first[node]
             if _enter(scene.node_bounds, left, ox, oy, oz, ix, iy, iz, far, 0.0) < np.inf:

@@ -15,7 +15,7 @@ import numpy as np
 from .camera_rays import project
 from .compiling import compiled
 from .photon_emit import emit_coloured
-from .photon_intersect import blocked, nearest
+from .photon_intersect import blocked, nearest, normal_at
 from .photon_scene import BLACK, DIFFUSE
 from .sampling import DIMENSIONS, FIRST_CHOICE, choice, mixed, sobol_next, sobol_start
 from .scattering import AIR, scatter, side_met, transmitted
@@ -33,7 +33,7 @@ def _deposit(scene, camera, colour, atom, triangle, place, from_front, watt, pic
     row, column, factor, tx, ty, tz, distance = project(camera, px, py, pz)
     if row < 0:
         return -1, -1, 0.0
-    nx, ny, nz = scene.normals[triangle, 0], scene.normals[triangle, 1], scene.normals[triangle, 2]
+    nx, ny, nz = normal_at(scene, triangle, px, py, pz)
     cosine = tx * nx + ty * ny + tz * nz
     # An opaque sheet: light on one side is not seen from the other.
     if (cosine > 0.0) != from_front or cosine == 0.0:
@@ -102,6 +102,7 @@ def trace(
             if watt <= 0.0:
                 break
             px, py, pz = px + t * dx, py + t * dy, pz + t * dz
+            place = px, py, pz
             thing = scene.owner[triangle]
             kind = scene.kind[thing]
             if kind == DIFFUSE:
@@ -109,8 +110,7 @@ def trace(
                     tally[DIRECT] += watt
                     break
                 tally[DEPOSITED] += watt
-                is_front = side_met(scene, triangle, dx, dy, dz) == 0
-                place = px, py, pz
+                is_front = side_met(scene, triangle, place, dx, dy, dz) == 0
                 y, x, added = _deposit(scene, camera, colour, atom, triangle, place, is_front, watt, picture, stack)
                 if y >= 0:
                     tally[COUNTED + 1] += 1.0
@@ -126,7 +126,7 @@ def trace(
             last, last_object = triangle, thing
             draw = choice(state, shift, dimension, noise, dimension - DIMENSIONS + 1)
             dx, dy, dz, mask, alone, within, is_event, kept, drawn = scatter(
-                scene, triangle, u, v, dx, dy, dz, mask, alone, nm, draw
+                scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw
             )
             depth += is_event
             dimension += drawn

@@ -20,6 +20,7 @@ import numpy as np
 from ..model.scene import Scene
 from ..model.scene_key import scene_key
 from .code_key import code_key
+from .exact_shapes import description
 from .kept import continue_kept, kept_path
 from .photon_run import TALLY_SIZE, ReferencePicture, ReferenceRun, summed
 from .rounds import PARTS, Cancelled, Limits, Progress, continue_run
@@ -29,7 +30,7 @@ _SEED = 1
 
 def reference_key(scene: Scene, width: int, height: int, max_depth: int) -> str:
     """SHA-256 over everything the picture depends on, the code that makes it included."""
-    return scene_key(scene, code_key("photon_run"), width, height, max_depth)
+    return scene_key(scene, code_key("photon_run"), description(scene), width, height, max_depth)
 
 
 def render_reference(

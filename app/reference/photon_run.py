@@ -16,6 +16,7 @@ from ..base.errors import UserError
 from ..model.optics.colorimetry import rgb709_to_xyz, rgb709_to_xyz_matrix
 from ..model.scene import Scene
 from .rounds import PARTS, Pace, PartsRun
+from .scene_surfaces import specular_corners
 
 if TYPE_CHECKING:
     from .photon_emission import Domain
@@ -111,7 +112,7 @@ class ReferenceRun(PartsRun[ReferencePicture]):
         self._camera_pass = photon_scene.viewpoint(scene.camera, width, height, centre)
         self._max_depth, self._seed = max_depth, seed
         classes, _ = photon_scene.reflectance_classes(scene)
-        corners = photon_scene.specular_corners(self._scene)
+        corners = specular_corners(scene, centre)
         points = self._scene.corners[:, :3]
         reach = float(
             np.linalg.norm(points, axis=1).max()

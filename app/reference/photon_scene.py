@@ -23,6 +23,7 @@ from ..model.scene import (
     Grating,
     Scene,
 )
+from .scene_surfaces import Surfaces
 
 BLACK, DIFFUSE, MIRROR, DIELECTRIC, GRATING = range(5)
 OUTSIDE = -1
@@ -40,20 +41,26 @@ _MAX_STACK = 60
 
 
 class PhotonScene(NamedTuple):
-    """Everything a photon meets. T triangles in tree order, O objects, N tree nodes."""
+    """Everything a photon meets. T surfaces in tree order, triangles or curved ones; O objects, N tree nodes."""
 
     node_bounds: np.ndarray
     """float64 (N, 6): low and high corner; children of a node are neighbours."""
     node_first: np.ndarray
-    """int32 (N,): left child, or first triangle of a leaf."""
+    """int32 (N,): left child, or first surface of a leaf."""
     node_count: np.ndarray
-    """int32 (N,): triangles of a leaf, 0 for an inner node."""
+    """int32 (N,): surfaces of a leaf, 0 for an inner node."""
     corners: np.ndarray
-    """float64 (T, 9): first corner, then both edges from it."""
+    """float64 (T, 9): first corner, then both edges from it; of a curved surface, the diagonal of its box."""
     normals: np.ndarray
-    """float64 (T, 3): unit geometric normal, outward."""
+    """float64 (T, 3): unit geometric normal, outward; 0 of a curved surface."""
     owner: np.ndarray
     """int32 (T,): object."""
+    facet: np.ndarray
+    """int32 (T,): triangle of the object's mesh, or −1."""
+    curved: np.ndarray
+    """int32 (T,): row of `forms`, or −1 for a triangle."""
+    forms: np.ndarray
+    """float64 (Q, `curved_surfaces.FORM_SIZE`)."""
     smooth: np.ndarray
     """int32 (T,): row of `corner_normals`, or −1 for a flat facet."""
     corner_normals: np.ndarray
@@ -127,13 +134,14 @@ def photon_scene(scene: Scene) -> tuple[PhotonScene, np.ndarray]:
     """
     meshes = [item.mesh.transformed(item.object_to_world) for item in scene.objects]
     centre, size = _middle(scene, meshes)
-    corners = np.concatenate([mesh.corners() for mesh in meshes]) - centre
-    owner = np.repeat(np.arange(len(meshes)), [len(mesh.triangles) for mesh in meshes])
+    surfaces = Surfaces()
+    for index, (mesh, item) in enumerate(zip(meshes, scene.objects, strict=True)):
+        surfaces.add(index, item, mesh, centre)
+    corners, owner, facet, curved = surfaces.arrays()
     tree = build_bvh(corners.astype(np.float32))
     order = tree.order
-    corners, owner = corners[order], owner[order].astype(np.int32)
-    normals = np.concatenate([mesh.face_normals() for mesh in meshes])[order]
-    smooth, corner_normals = _corner_normals(scene, meshes, order)
+    corners, owner, facet, curved = corners[order], owner[order], facet[order], curved[order]
+    normals, smooth, corner_normals = surfaces.normals(order)
     rank = _ranks(scene)
     media, weights = _Rows(), _Rows()
     kinds, medium, weight = [], [], []
@@ -162,6 +170,9 @@ def photon_scene(scene: Scene) -> tuple[PhotonScene, np.ndarray]:
         np.concatenate([corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=1),
         np.ascontiguousarray(normals),
         owner,
+        facet,
+        curved,
+        surfaces.forms(),
         smooth,
         corner_normals,
         np.array(kinds, np.int32),
@@ -267,13 +278,6 @@ def reflectance_classes(scene: Scene) -> tuple[list[np.ndarray | None], np.ndarr
     return classes, row
 
 
-def specular_corners(photons: PhotonScene) -> np.ndarray:
-    """Triangles of glass and mirrors, float64 (S, 3, 3)."""
-    chosen = photons.corners[photons.kind[photons.owner] >= MIRROR].reshape(-1, 3, 3).copy()
-    chosen[:, 1:] += chosen[:, :1]
-    return chosen
-
-
 class _Rows:
     """Distinct table rows."""
 
@@ -297,20 +301,6 @@ def _middle(scene: Scene, meshes: list[Mesh]) -> tuple[np.ndarray, float]:
     low = np.min([m.bounds()[0] for m in chosen], axis=0)
     high = np.max([m.bounds()[1] for m in chosen], axis=0)
     return 0.5 * (low + high), max(0.5 * float(np.linalg.norm(high - low)), 1e-300)
-
-
-def _corner_normals(scene: Scene, meshes: list[Mesh], order: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Row of each triangle's corner normals (−1: flat, or not specular), and the rows (S, 9)."""
-    rows: list[np.ndarray] = []
-    for mesh, item in zip(meshes, scene.objects, strict=True):
-        own = mesh.corner_normals if item.material.is_specular else None
-        rows.append(np.zeros((len(mesh.triangles), 3, 3)) if own is None else own)
-    normals = np.concatenate(rows)[order]
-    known = (np.abs(normals).sum(axis=2) > 0.0).all(axis=1)
-    index = np.full(len(order), -1, np.int32)
-    index[known] = np.arange(np.count_nonzero(known))
-    packed = normals[known].reshape(-1, 9)
-    return index, np.ascontiguousarray(packed) if len(packed) else np.zeros((1, 9))
 
 
 def _ranks(scene: Scene) -> dict[int, int]:

@@ -12,6 +12,8 @@ import math
 import numpy as np
 
 from .compiling import compiled, inlined
+from .curved_surfaces import turned_normal
+from .photon_intersect import normal_at
 from .photon_scene import GRATING, MIRROR
 
 AIR = -1
@@ -64,23 +66,27 @@ def transmitted(scene, mask, alone, nm, distance):
 
 
 @inlined
-def side_met(scene, triangle, dx, dy, dz):
-    """0 where a ray comes to a facet's front (against its normal), else 1."""
-    n = scene.normals[triangle]
-    return 1 if dx * n[0] + dy * n[1] + dz * n[2] > 0.0 else 0
+def side_met(scene, triangle, place, dx, dy, dz):
+    """0 where a ray comes to a surface's front (against its normal) at a place, else 1."""
+    nx, ny, nz = normal_at(scene, triangle, place[0], place[1], place[2])
+    return 1 if dx * nx + dy * ny + dz * nz > 0.0 else 0
 
 
 @inlined
-def _shading_normal(scene, triangle, u, v, dx, dy, dz, gx, gy, gz, entering):
-    """Unit normal against the ray: interpolated where that faces the ray, else the facet's (gx, gy, gz)."""
+def _shading_normal(scene, triangle, place, u, v, dx, dy, dz, gx, gy, gz, entering):
+    """Unit normal against the ray: interpolated where that faces the ray, else the surface's (gx, gy, gz)."""
     row = scene.smooth[triangle]
-    if row < 0:
+    curved = scene.curved[triangle]
+    if curved >= 0:
+        nx, ny, nz = turned_normal(scene.forms[curved], place[0], place[1], place[2])
+    elif row < 0:
         return gx, gy, gz
-    m = scene.corner_normals[row]
-    w = 1.0 - u - v
-    nx = w * m[0] + u * m[3] + v * m[6]
-    ny = w * m[1] + u * m[4] + v * m[7]
-    nz = w * m[2] + u * m[5] + v * m[8]
+    else:
+        m = scene.corner_normals[row]
+        w = 1.0 - u - v
+        nx = w * m[0] + u * m[3] + v * m[6]
+        ny = w * m[1] + u * m[4] + v * m[7]
+        nz = w * m[2] + u * m[5] + v * m[8]
     length = math.sqrt(nx * nx + ny * ny + nz * nz)
     if length == 0.0:
         return gx, gy, gz
@@ -109,14 +115,14 @@ def _diffracted(dx, dy, dz, nx, ny, nz, lines, step, reflects):
 
 
 @compiled
-def _diffract(scene, triangle, u, v, dx, dy, dz, mask, alone, nm, draw):
+def _diffract(scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw):
     """`scatter` at a grating: `draw` chooses an order as they are strong; what they leave, and an order that is
     evanescent, is absorbed."""
     thing = scene.owner[triangle]
-    gx, gy, gz = scene.normals[triangle, 0], scene.normals[triangle, 1], scene.normals[triangle, 2]
+    gx, gy, gz = normal_at(scene, triangle, place[0], place[1], place[2])
     entering = dx * gx + dy * gy + dz * gz < 0.0
     side = 1.0 if entering else -1.0
-    nx, ny, nz = _shading_normal(scene, triangle, u, v, dx, dy, dz, side * gx, side * gy, side * gz, entering)
+    nx, ny, nz = _shading_normal(scene, triangle, place, u, v, dx, dy, dz, side * gx, side * gy, side * gz, entering)
     first, end = scene.first_order[thing], scene.first_order[thing + 1]
     efficiency = 0.0
     for row in range(first, end):
@@ -137,16 +143,16 @@ def _diffract(scene, triangle, u, v, dx, dy, dz, mask, alone, nm, draw):
 
 
 @inlined
-def scatter(scene, triangle, u, v, dx, dy, dz, mask, alone, nm, draw):
-    """One event at glass or a mirror: (direction (3), mask, alone, on the object's inner side, is an event, share
-    kept, whether `draw` mattered).
+def scatter(scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw):
+    """One event at a place (3) of glass or a mirror: (direction (3), mask, alone, on the object's inner side, is an
+    event, share kept, whether `draw` mattered).
 
     `draw` in [0, 1) decides by Fresnel's reflectance, unless all is reflected. "Is an event" is false where the same
     substance lies on both sides; a mirror keeps its reflectance, glass everything.
     """
     if scene.kind[scene.owner[triangle]] == GRATING:
-        return _diffract(scene, triangle, u, v, dx, dy, dz, mask, alone, nm, draw)
-    gx, gy, gz = scene.normals[triangle, 0], scene.normals[triangle, 1], scene.normals[triangle, 2]
+        return _diffract(scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw)
+    gx, gy, gz = normal_at(scene, triangle, place[0], place[1], place[2])
     cosine_g = -(dx * gx + dy * gy + dz * gz)
     entering = cosine_g > 0.0
     thing = scene.owner[triangle]
@@ -167,7 +173,7 @@ def scatter(scene, triangle, u, v, dx, dy, dz, mask, alone, nm, draw):
             alone_after = after
     if not entering:
         gx, gy, gz, cosine_g = -gx, -gy, -gz, -cosine_g
-    nx, ny, nz = _shading_normal(scene, triangle, u, v, dx, dy, dz, gx, gy, gz, entering)
+    nx, ny, nz = _shading_normal(scene, triangle, place, u, v, dx, dy, dz, gx, gy, gz, entering)
     cosine = -(dx * nx + dy * ny + dz * nz)
     kept, reflects, drawn, cosine_t, eta_it = 1.0, True, False, 0.0, 1.0
     if mirror:

@@ -37,6 +37,7 @@ from .photon_run import RELMSE_EPSILON
 from .photon_scene import Colours
 from .rounds import PARTS, Progress, trace_parts
 from .sampling import Sequence, scrambled, scratch
+from .scene_surfaces import specular_corners
 
 __all__ = ["CausticPlan", "CausticRun", "SpectralCaustic", "build_caustic", "no_caustic"]
 
@@ -224,7 +225,7 @@ class CausticRun:
         return (tables, wanted, counts) if counts.any() else nothing
 
     def _domains(self, centre: np.ndarray) -> tuple[list[Domain], list[Colours]]:
-        specular = photon_scene.specular_corners(self.photon_scene)
+        specular = specular_corners(self.scene, centre)
         corners = self.photon_scene.corners
         reach = float(
             np.linalg.norm(corners[:, :3], axis=1).max() + np.linalg.norm(corners[:, 3:].reshape(-1, 3), axis=1).max()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from spectrasplat.bench.agreement import BLOCK, EXTREME, agreement
+from spectrasplat.bench.agreement import BLOCK, EXTREME, SHOWN, agreement
 from spectrasplat.reference.metrics import ReferencePicture
 
 SHAPE = (64, 96)
@@ -36,6 +36,7 @@ def test_chance_scores_as_chance(side: int) -> None:
     found = agreement(pictures(rng), reference(rng), side)
     assert found.places == truth().size // side**2
     assert 0.75 < found.chi2 < 1.15 and found.extreme == 0 and found.deviation < 0.004
+    assert found.seldom < 0.01 * found.places
 
 
 def test_a_deviation_is_found_with_its_size_and_place() -> None:
@@ -43,8 +44,11 @@ def test_a_deviation_is_found_with_its_size_and_place() -> None:
     wrong = np.zeros(SHAPE)
     wrong[16:24, 40:48] = 0.1
     found = agreement(pictures(rng, wrong), reference(rng), BLOCK)
-    assert found.extreme == 1 and found.largest > EXTREME and found.worst_place == (40, 16)
-    assert found.worst_share == pytest.approx(0.1, abs=0.01)
+    assert found.extreme == 1 and found.seldom <= 3
+    worst, *others = found.worst
+    assert worst.score > EXTREME and (worst.column, worst.row) == (40, 16)
+    assert worst.share == pytest.approx(0.1, abs=0.01)
+    assert len(others) == SHOWN - 1 and all(abs(other.score) < EXTREME for other in others)
     everywhere = agreement(pictures(rng, 0.05), reference(rng), 1)
     assert everywhere.deviation == pytest.approx(0.05, rel=0.1) and everywhere.chi2 > 2.0
 

@@ -68,6 +68,15 @@ def solid_of_revolution(
     the axis open, repeated points, or one that crosses itself.
     """
     segments = count("solid of revolution", "segments", segments, 3, 1 << 16)
+    points, start, end, loop = profile_with_normals(profile, crease_deg)
+    return revolve(name, points, start, end, segments, loop)
+
+
+def profile_with_normals(
+    profile: Sequence[tuple[float, float]] | np.ndarray, crease_deg: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
+    """(points (K, 2) with the solid on the left, outward normals at the start and at the end of each segment, whether
+    the profile is a loop) of `solid_of_revolution`, which says what is refused."""
     crease = math.radians(in_range("solid of revolution", "crease_deg", crease_deg, -1e-9, 180.000001))
     points = np.array(profile, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] != 2 or len(points) < 3 or not np.isfinite(points).all():
@@ -92,7 +101,7 @@ def solid_of_revolution(
     if np.sum(points[:, 0] * np.roll(points[:, 1], -1) - np.roll(points[:, 0], -1) * points[:, 1]) < 0.0:
         points = points[::-1]
     start, end = _creased_normals(points, loop, crease)
-    return revolve(name, points, start, end, segments, loop)
+    return points, start, end, loop
 
 
 def revolve(

@@ -1,0 +1,219 @@
+"""Where rays meet curved surfaces, and the normals there, in closed form and compiled: no triangle, no interpolation.
+
+Two kinds do for every shape that the reference knows exactly. A quadric of revolution,
+a (x² + y²) + b z² + c z + d = 0, is a sphere, the conic cap of a lens, a cylinder, a cone or a plane; in stretched axes
+an ellipsoid. A torus is a quartic, whose roots are enclosed between the extrema of its polynomial. Inside, f < 0.
+"""
+
+from __future__ import annotations
+
+import math
+
+from .compiling import compiled, inlined
+from .exact_shapes import COEFFICIENTS, KIND, OUTWARD, RANGE, SHEET, TORUS, TURNS
+
+_STEPS = 100
+"""Of a safeguarded Newton iteration; halving alone needs about 60."""
+
+
+@inlined
+def local_point(form, x, y, z):
+    """A place in the surface's own frame."""
+    return (
+        form[0] * x + form[1] * y + form[2] * z + form[3],
+        form[4] * x + form[5] * y + form[6] * z + form[7],
+        form[8] * x + form[9] * y + form[10] * z + form[11],
+    )
+
+
+@inlined
+def _local_direction(form, x, y, z):
+    return (
+        form[0] * x + form[1] * y + form[2] * z,
+        form[4] * x + form[5] * y + form[6] * z,
+        form[8] * x + form[9] * y + form[10] * z,
+    )
+
+
+@inlined
+def _turned_back(form, gx, gy, gz):
+    """Unit vector along the gradient whose local components are given, in the reference's frame."""
+    x = form[0] * gx + form[4] * gy + form[8] * gz
+    y = form[1] * gx + form[5] * gy + form[9] * gz
+    z = form[2] * gx + form[6] * gy + form[10] * gz
+    length = math.sqrt(x * x + y * y + z * z)
+    return (x / length, y / length, z / length) if length > 0.0 else (0.0, 0.0, 1.0)
+
+
+@compiled
+def curved_normal(form, x, y, z):
+    """Unit outward normal at a place of the surface."""
+    px, py, pz = local_point(form, x, y, z)
+    out = form[OUTWARD]
+    if form[KIND] == TORUS:
+        large = form[COEFFICIENTS]
+        radius = math.sqrt(px * px + py * py)
+        share = 1.0 - large / radius if radius > 0.0 else 0.0
+        return _turned_back(form, out * share * px, out * share * py, out * pz)
+    a, b, c = form[COEFFICIENTS], form[COEFFICIENTS + 1], form[COEFFICIENTS + 2]
+    return _turned_back(form, out * 2.0 * a * px, out * 2.0 * a * py, out * (2.0 * b * pz + c))
+
+
+@compiled
+def turned_normal(form, x, y, z):
+    """Unit outward normal between those of a profile's ends; the surface's own where they do not turn."""
+    if form[TURNS] == 0.0:
+        return curved_normal(form, x, y, z)
+    px, py, pz = local_point(form, x, y, z)
+    radius = math.sqrt(px * px + py * py)
+    w = form[29] + form[30] * radius + form[31] * pz
+    w = min(max(w, 0.0), 1.0)
+    radial = (1.0 - w) * form[25] + w * form[27]
+    along = (1.0 - w) * form[26] + w * form[28]
+    if radius > 0.0:
+        return _turned_back(form, radial * px / radius, radial * py / radius, along)
+    return _turned_back(form, 0.0, 0.0, along)
+
+
+@inlined
+def _is_there(form, x, y, z):
+    r2 = x * x + y * y
+    return (
+        form[RANGE] <= z <= form[RANGE + 1]
+        and form[RANGE + 2] <= r2 <= form[RANGE + 3]
+        and form[SHEET] + form[SHEET + 1] * z >= 0.0
+    )
+
+
+@compiled
+def crossings(form, ox, oy, oz, dx, dy, dz):
+    """(how many, their distances (4), which way each crosses (4): > 0 outwards) of a ray's whole line; in no order."""
+    px, py, pz = local_point(form, ox, oy, oz)
+    qx, qy, qz = _local_direction(form, dx, dy, dz)
+    if form[KIND] == TORUS:
+        return _torus(form, px, py, pz, qx, qy, qz)
+    return _quadric(form, px, py, pz, qx, qy, qz)
+
+
+@inlined
+def _quadric(form, px, py, pz, qx, qy, qz):
+    a, b = form[COEFFICIENTS], form[COEFFICIENTS + 1]
+    c, d = form[COEFFICIENTS + 2], form[COEFFICIENTS + 3]
+    # From the place nearest the middle, where least is lost to cancellation.
+    start = -(px * qx + py * qy + pz * qz) / (qx * qx + qy * qy + qz * qz)
+    px, py, pz = px + start * qx, py + start * qy, pz + start * qz
+    second = a * (qx * qx + qy * qy) + b * qz * qz
+    half = a * (px * qx + py * qy) + (b * pz + 0.5 * c) * qz
+    first = a * (px * px + py * py) + (b * pz + c) * pz + d
+    count, t0, t1, f0, f1 = 0, 0.0, 0.0, 0.0, 0.0
+    square = half * half - second * first
+    if square > 0.0:
+        root = math.sqrt(square)
+        if half < 0.0:
+            root = -root
+        q = -(half + root)
+        far, near = q / second if second != 0.0 else math.inf, first / q
+        # Half the polynomial's slope is second · t + half, at the roots ∓ root.
+        if abs(far) < math.inf and _is_there(form, px + far * qx, py + far * qy, pz + far * qz):
+            count, t0, f0 = 1, start + far, -root * form[OUTWARD]
+        if _is_there(form, px + near * qx, py + near * qy, pz + near * qz):
+            if count == 0:
+                t0, f0 = start + near, root * form[OUTWARD]
+            else:
+                t1, f1 = start + near, root * form[OUTWARD]
+            count += 1
+    return count, (t0, t1, 0.0, 0.0), (f0, f1, 0.0, 0.0)
+
+
+@inlined
+def _quartic(t, c2, c1, c0):
+    return ((t * t + c2) * t + c1) * t + c0
+
+
+@inlined
+def _cubic(t, c2, c1):
+    return (4.0 * t * t + 2.0 * c2) * t + c1
+
+
+@compiled
+def _extremum(low, high, c2, c1):
+    """Where the quartic's slope vanishes between two places; `high` where it does not."""
+    at_low = _cubic(low, c2, c1)
+    if (at_low < 0.0) == (_cubic(high, c2, c1) < 0.0):
+        return high
+    left, right, t, last = low, high, 0.5 * (low + high), math.inf
+    for _ in range(_STEPS):
+        value = _cubic(t, c2, c1)
+        if (value < 0.0) == (at_low < 0.0):
+            left = t
+        else:
+            right = t
+        slope = 12.0 * t * t + 2.0 * c2
+        step = t - value / slope if slope != 0.0 else left
+        step = step if left < step < right else 0.5 * (left + right)
+        if abs(step - t) <= 1e-16 or step == last:
+            break
+        t, last = step, t
+    return t
+
+
+@compiled
+def _zero(low, high, c2, c1, c0):
+    """The quartic's one zero between two places where its signs differ."""
+    is_low = _quartic(low, c2, c1, c0) < 0.0
+    left, right, t, last = low, high, 0.5 * (low + high), math.inf
+    for _ in range(_STEPS):
+        value = _quartic(t, c2, c1, c0)
+        if (value < 0.0) == is_low:
+            left = t
+        else:
+            right = t
+        slope = _cubic(t, c2, c1)
+        step = t - value / slope if slope != 0.0 else left
+        step = step if left < step < right else 0.5 * (left + right)
+        if abs(step - t) <= 1e-16 or step == last:
+            break
+        t, last = step, t
+    return t
+
+
+@inlined
+def _torus(form, px, py, pz, qx, qy, qz):
+    """As a depressed quartic about the ray's nearest place, in units of the torus's own size."""
+    size = form[COEFFICIENTS] + form[COEFFICIENTS + 1]
+    large, small = form[COEFFICIENTS] / size, form[COEFFICIENTS + 1] / size
+    speed = math.sqrt(qx * qx + qy * qy + qz * qz)
+    qx, qy, qz = qx / speed, qy / speed, qz / speed
+    px, py, pz = px / size, py / size, pz / size
+    start = -(px * qx + py * qy + pz * qz)
+    px, py, pz = px + start * qx, py + start * qy, pz + start * qz
+    away = px * px + py * py + pz * pz
+    reach = 1.0 - away
+    count, t0, t1, t2, t3, f0, f1, f2, f3 = 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    if reach > 0.0:
+        end = math.sqrt(reach) + 1e-9
+        k = away + large * large - small * small
+        four = 4.0 * large * large
+        c2 = 2.0 * k - four * (qx * qx + qy * qy)
+        c1 = -2.0 * four * (px * qx + py * qy)
+        c0 = k * k - four * (px * px + py * py)
+        bend = math.sqrt(-c2 / 6.0) if c2 < 0.0 else 0.0
+        bend = min(bend, end)
+        e1, e2, e3 = _extremum(-end, -bend, c2, c1), _extremum(-bend, bend, c2, c1), _extremum(bend, end, c2, c1)
+        low = -end
+        for high in (e1, e2, e3, end):
+            falls = _quartic(low, c2, c1, c0) >= 0.0
+            if falls != (_quartic(high, c2, c1, c0) >= 0.0):
+                t = (start + _zero(low, high, c2, c1, c0)) * size / speed
+                f = -form[OUTWARD] if falls else form[OUTWARD]
+                if count == 0:
+                    t0, f0 = t, f
+                elif count == 1:
+                    t1, f1 = t, f
+                elif count == 2:
+                    t2, f2 = t, f
+                else:
+                    t3, f3 = t, f
+                count += 1
+            low = high
+    return count, (t0, t1, t2, t3), (f0, f1, f2, f3)
