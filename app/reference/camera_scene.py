@@ -200,9 +200,10 @@ def _coordinates(
         return row, np.zeros((1, 6))
     uv = np.zeros((len(photons.owner), 6))
     for index, item in enumerate(scene.objects):
-        if texture[index] >= 0 and item.mesh.uv is not None:
+        coordinates = item.mesh.transformed(item.object_to_world).uv
+        if texture[index] >= 0 and coordinates is not None:
             own = photons.owner == index
-            uv[own] = item.mesh.transformed(item.object_to_world).uv.reshape(-1, 6)[photons.facet[own]]
+            uv[own] = coordinates.reshape(-1, 6)[photons.facet[own]]
     worn = np.flatnonzero(texture[photons.owner] >= 0)
     row[worn] = np.arange(len(worn))
     return row, np.ascontiguousarray(uv[worn])

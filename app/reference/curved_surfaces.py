@@ -68,11 +68,14 @@ def turned_normal(form, x, y, z):
     radius = math.sqrt(px * px + py * py)
     w = form[29] + form[30] * radius + form[31] * pz
     w = min(max(w, 0.0), 1.0)
-    radial = (1.0 - w) * form[25] + w * form[27]
-    along = (1.0 - w) * form[26] + w * form[28]
     if radius > 0.0:
-        return _turned_back(form, radial * px / radius, radial * py / radius, along)
-    return _turned_back(form, 0.0, 0.0, along)
+        px, py = px / radius, py / radius
+    # Unit vectors where the object stands, and then between them: as a mesh's corners have it, also of a stretched one.
+    ax, ay, az = _turned_back(form, form[25] * px, form[25] * py, form[26])
+    bx, by, bz = _turned_back(form, form[27] * px, form[27] * py, form[28])
+    x, y, z = (1.0 - w) * ax + w * bx, (1.0 - w) * ay + w * by, (1.0 - w) * az + w * bz
+    length = math.sqrt(x * x + y * y + z * z)
+    return x / length, y / length, z / length
 
 
 @inlined

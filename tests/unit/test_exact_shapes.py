@@ -22,7 +22,7 @@ from spectrasplat.model.scene_objects import make_shape
 from spectrasplat.model.texture import Texture
 from spectrasplat.reference import photon_run
 from spectrasplat.reference.direct_view import seen_directly
-from spectrasplat.reference.exact_shapes import as_triangles, pieces
+from spectrasplat.reference.exact_shapes import FORM_SIZE, TURNS, as_triangles, pieces
 from spectrasplat.reference.photon_intersect import blocked, nearest, normal_at
 from spectrasplat.reference.photon_reference import reference_key, render_reference
 from spectrasplat.reference.photon_scene import PhotonScene, photon_scene
@@ -250,6 +250,24 @@ def test_rod_bends_as_a_ball_does_across_its_axis() -> None:
     mesh = make_shape("revolution", profile=profile, segments=12, crease_deg=30.0)
     lying = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]], float)
     assert crossing_of_axis(SceneObject("rod", mesh, GLASS, lying), 0.5) == pytest.approx(1.363890, abs=1e-6)
+
+
+def test_normals_of_a_smooth_profile_turn_as_the_mesh_s_do() -> None:
+    """A profile is given by points, smooth where it bends little: exact all round, and along itself as fine meshes."""
+    matrix = placement(8)
+    scene = scene_of((shape("vase", 60_000), GLASS, matrix))
+    starts, ways = rays(matrix, 40, 9)
+    exact, meshed = photon_scene(scene), photon_scene(as_triangles(scene))
+    aside, flat = [], []
+    for start, way in zip(starts - exact[1], ways, strict=True):
+        try:
+            (_, one), (_, two) = (refracted_path(photons, start, way) for photons, _ in (exact, meshed))
+        except AssertionError:
+            continue  # light that stays inside
+        unturned = exact[0]._replace(forms=np.where(np.arange(FORM_SIZE) == TURNS, 0.0, exact[0].forms))
+        aside.append(np.linalg.norm(one - two))
+        flat.append(np.linalg.norm(one - refracted_path(unturned, start, way)[1]))
+    assert len(aside) > 20 and np.median(aside) < 1e-4 and np.median(flat) > 1e-2
 
 
 # ---- whole pictures ---------------------------------------------------------------------------
