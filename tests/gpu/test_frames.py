@@ -157,8 +157,11 @@ def test_samples_that_are_asked_for_are_taken_within_the_seconds(gl: Context) ->
 
 def test_too_few_seconds_still_give_a_picture(gl: Context) -> None:
     scene = load_scene(assets_dir() / "scenes" / "prism.toml")
-    result = render(scene, RenderSettings(width=48, height=27, seconds=0.01), context=gl)
+    told: list[float] = []
+    settings = RenderSettings(width=48, height=27, seconds=0.01)
+    result = render(scene, settings, progress=lambda share, text: told.append(share), context=gl)
     assert result.stats.camera_pass.samples >= 1 and result.rgb.max() > 0.0 and result.stats.photons > 0
+    assert 0.98 < max(told) < 1.0  # over time, but not said to be done while it works
 
 
 @pytest.mark.parametrize("samples", [1, 2, 7, 8, 15, 16, 17, 31, 32, 100, 256, 4096])
