@@ -5,8 +5,9 @@ from __future__ import annotations
 SOFTWARE_FRAME_S = 0.04
 """A frame on the software renderer: with the batch that runs over its end, within the 50 ms in which input must
 have its effect."""
-FIRST_FRAME_S = 0.15
-"""Until the first whole picture, while nobody touches anything: what the interface costs is then spent less often."""
+PATIENT_FRAME_S = 0.15
+"""While nobody touches anything, and the first whole picture or a finished one is waited for: what the interface costs
+is then spent less often."""
 GPU_SHARE = 0.75
 """Of the time between two pictures of the screen; the rest is the driver's and the window system's."""
 MIN_SHARE = 0.25
@@ -28,9 +29,9 @@ class Pace:
         return self._left_of(self.frame_s)
 
     @property
-    def first_budget_s(self) -> float:
-        """The same where there is no whole picture yet that an input could change."""
-        return self._left_of(max(self.frame_s, FIRST_FRAME_S) if self._is_software else self.frame_s)
+    def patient_budget_s(self) -> float:
+        """The same where somebody waits and touches nothing."""
+        return self._left_of(max(self.frame_s, PATIENT_FRAME_S) if self._is_software else self.frame_s)
 
     def _left_of(self, frame_s: float) -> float:
         return max(frame_s - self._besides_s, MIN_SHARE * frame_s)

@@ -38,8 +38,8 @@ class Viewer:
         """One frame."""
         stats = self.session.picture.stats
         self._has_shown |= stats.camera_samples >= 1 and stats.resolution_scale >= 1
-        waits = not self._has_shown and not _is_touched()
-        run_frame(self.session, self._draw, self.pace.first_budget_s if waits else self.pace.budget_s)
+        waits = (not self._has_shown or self.session.jobs.exports.is_rendering) and not _is_touched()
+        run_frame(self.session, self._draw, self.pace.patient_budget_s if waits else self.pace.budget_s)
 
     def rendered(self) -> None:
         """imgui has drawn; the screen has not been waited for."""

@@ -6,6 +6,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +15,8 @@ from spectrasplat.edit import requests
 from spectrasplat.edit.state import Selection
 from spectrasplat.gpu.context import Context
 from spectrasplat.ui import viewport_tools
+from spectrasplat.ui.background_jobs import RENDER_SHARE
+from spectrasplat.ui.pace import PATIENT_FRAME_S, SOFTWARE_FRAME_S
 from spectrasplat.ui.session_requests import carry_out
 from spectrasplat.ui.view_model_builder import view_model_of
 
@@ -75,6 +78,25 @@ def test_a_dragged_handle_carries_glass_and_light_along(hands: Hands) -> None:
     places = [middle_of_light(picture) for picture in (before, moving, after)]
     assert abs(places[2] - places[0]) > 0.03
     assert abs(places[1] - places[2]) < 0.2 * abs(places[2] - places[0]), places
+
+
+def test_a_picture_that_is_waited_for_gets_most_of_the_time(hands: Hands, tmp_path: Path) -> None:
+    session = hands.session
+    hands.settle()
+    asked: list[float] = []
+    step = session.jobs.exports.step
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(session.jobs.exports, "step", lambda budget_s: asked.append(budget_s) or step(budget_s))
+        carry_out(session, requests.RenderPicture(tmp_path / "a.png", (320, 180), 100_000, None, 4, False, None))
+        assert session.jobs.exports.is_rendering
+        hands.interface.frame(2)
+        still = asked[-1]
+        hands.interface.move((400, 300))  # a hand on the mouse wants its answer soon
+        touched = asked[-1]
+        session.jobs.cancel_export()
+    # Whatever the interface costs, which is at most a short frame of the software renderer.
+    assert still >= RENDER_SHARE * (PATIENT_FRAME_S - SOFTWARE_FRAME_S) > 2.0 * RENDER_SHARE * SOFTWARE_FRAME_S
+    assert touched <= RENDER_SHARE * SOFTWARE_FRAME_S
 
 
 def test_another_scene_is_announced_at_once_and_soon_seen(hands: Hands) -> None:
