@@ -21,6 +21,8 @@ FLAG_BAND_FINAL = 2
 """The band was just cut at total internal reflection: do not cut again at this surface."""
 FLAG_INSIDE = 4
 """The ray travels on the inner side of `last_object`."""
+LATTICE_BIT = 8
+"""From here on a photon's flags are the number of points of the golden-ratio lattice that it lies on; 0: on none."""
 
 
 _COMPANIONS = (
@@ -57,7 +59,7 @@ def photon_record(groups: int, hero: bool = False) -> Struct:
             Field("photon_id", "uint", "index on the emission lattice of the pass"),
             Field("light_and_source", "uint", "bits 0-7 light, 8-15 spectral band of the pass, 16-31 object first met"),
             Field("branch_key", "uint", "hash of the choices of the path"),
-            Field("flags", "uint", "FLAG_*"),
+            Field("flags", "uint", "FLAG_*; from LATTICE_BIT on, points of its sub-lattice"),
             Field("depth", "uint", "specular events on the path"),
             Field("cosine", "float", "|cos| of incidence on the receiver"),
             *spectral,
@@ -257,6 +259,10 @@ TRACE_PARAMETERS = Struct(
         Field("split_threshold", "float", "survival below which a child plays roulette"),
         Field("power_row", "uint", "row of the light's cumulative power over x"),
         Field("lattices", "uint", "sub-lattices of the pass: photon_id = lattice point · lattices + sub-lattice"),
+        Field("lattice_bits", "uint", "points of each sub-lattice, from LATTICE_BIT on; 0: rays lie on none"),
+        Field("lattice_shift", "uint", "of the first sub-lattice's points across, as emitted"),
+        Field("lattices_together", "uint", "so many sub-lattices after each other have one shift"),
+        Field("unused", "uint", ""),
         Field(
             "beam_objects", "uvec4", "one bit an object: who meets it first is left to beams", -(-MAX_OBJECTS // 128)
         ),

@@ -58,6 +58,12 @@ SPLAT = Struct(
         Field("x_range", "vec2", "the photon's band, spectral coordinate"),
         Field("xi_half", "float", "half of the band in xi (small: 1 where the band was cut, else 0)"),
         Field("inverse_sigma_xi", "float", "1 / (sqrt(2) standard deviations along, in xi)"),
+        Field(
+            "waves",
+            "vec4",
+            "swept: cycles of two of its lattice's waves per unit of xi and of eta, one after the other",
+        ),
+        Field("ripple", "vec4", "swept: what is taken off by those two waves and, z, by their sum"),
         Field("rect", "vec4", "x0, y0, x1, y1: nothing is drawn outside, atlas texels"),
     ),
 )

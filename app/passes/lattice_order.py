@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 GOLDEN = 2654435769
-"""2^32 / golden ratio: the lattice's second coordinate (shaders/lib/emission.glsl)."""
+"""2^32 / golden ratio: the lattice's second coordinate (shaders/lib/lattice.glsl)."""
 _BITS = 12
 """Bits of each coordinate: 4096² cells tell more points apart than a batch has."""
 

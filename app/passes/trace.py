@@ -349,6 +349,10 @@ class TracePass:
         lattices = len(piece.bands) * piece.light_points
         self._trace_values = self._trace_parameters_of(piece.light, lattices, max_depth, piece.beam_objects)
         self._trace_values["split_threshold"] = split_threshold
+        if piece.lattice_count < 1 << (32 - records.LATTICE_BIT):
+            self._trace_values["lattice_bits"] = piece.lattice_count << records.LATTICE_BIT
+        self._trace_values["lattice_shift"] = piece.shift[1]
+        self._trace_values["lattices_together"] = 1 if self._features.spectral_groups else len(piece.bands)
         self._trace_parameters.write(self._trace_values.tobytes())
 
     def _trace_parameters_of(
@@ -356,6 +360,7 @@ class TracePass:
     ) -> np.ndarray:
         p = records.TRACE_PARAMETERS.zeros(1)
         p["max_depth"], p["split_threshold"], p["lattices"] = max_depth, self.split_threshold, lattices
+        p["lattices_together"] = 1
         p["power_row"] = self.scene.layout.power_row + light
         bits = np.zeros(p["beam_objects"].size * 32, bool)
         bits[list(beam_objects)] = True

@@ -90,6 +90,7 @@ def light_defines(features: Features, traits: DeviceTraits) -> Defines:
         "FLAG_FOOTPRINT_DROPPED": f"{records.FLAG_FOOTPRINT_DROPPED}u",
         "FLAG_BAND_FINAL": f"{records.FLAG_BAND_FINAL}u",
         "FLAG_INSIDE": f"{records.FLAG_INSIDE}u",
+        "LATTICE_BIT": records.LATTICE_BIT,
         "MASK_SIZE": records.MASK_SIZE,
         "CATEGORY_COUNT": f"{len(records.CATEGORIES)}u",
         "FALLBACK_COUNT": f"{len(records.FALLBACKS)}u",
@@ -160,6 +161,7 @@ def footprint_defines(features: SplatFeatures) -> Defines:
             "POWER_SAMPLES": CUMULATIVE_SAMPLES,
             "NONE": f"{records.NONE}u",
             "FLAG_FOOTPRINT_DROPPED": f"{records.FLAG_FOOTPRINT_DROPPED}u",
+            "LATTICE_BIT": records.LATTICE_BIT,
         }
         | {name: 1 for name, on in switches.items() if on}
     )

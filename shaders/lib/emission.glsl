@@ -6,21 +6,7 @@
 #ifndef EMISSION_GLSL
 #define EMISSION_GLSL
 
-#include "lib/random.glsl"
-
-// 2^32 / golden ratio, and 2^32 / (plastic number)^k: badly approximable, so every projection and
-// every rectangle's aspect keeps a good shortest vector.
-#define GOLDEN 2654435769u
-#define PLASTIC_1 3242174889u
-#define PLASTIC_2 2447445414u
-
-// Point of the lattice in the unit square: a golden-ratio Kronecker lattice of `count` points,
-// shifted by `shift` (modulo 2^32).
-vec2 lattice_point(uint i, uint count, uvec2 shift)
-{
-    float along = (float(i) + unit_float(shift.x)) / float(count);
-    return vec2(along, kronecker(i, GOLDEN, shift.y));
-}
+#include "lib/lattice.glsl"
 
 // Direction at the point q of Lambert's azimuthal equal-area plane (|q| <= 2), local frame with z
 // the axis, and its derivatives along both axes of the plane.

@@ -3,6 +3,7 @@
 // disperses: the spectral coordinate is then affine in its index). Elek et al. 2014; Schjoth et al. 2007.
 #include "lib/finite.glsl"
 #include "lib/gaussian.glsl"
+#include "lib/lattice.glsl"
 #include "lib/placement.glsl"
 
 layout(local_size_x = WORKGROUP) in;
@@ -69,6 +70,7 @@ struct Footprint {
     vec2 axis_s;
     vec2 axis_t;
     vec2 chord;
+    float per_spacing;  // the axes over the lattice's own steps
 };
 
 float spectral_variable(uint group, float x) {
@@ -112,6 +114,7 @@ Footprint footprint_in(Placement place, PhotonRecord photon, vec3 sweep_middle, 
     f.axis_s = smoothing * texels_along(place, at, photon.dposition_ds);
     f.axis_t = smoothing * texels_along(place, at, photon.dposition_dt);
     f.chord = texels_along(place, at, sweep);
+    f.per_spacing = smoothing;
     return f;
 }
 
@@ -146,6 +149,7 @@ void choose_level(inout Placement place, inout Footprint f, PhotonRecord photon,
     float shrink = blurred ? sqrt(max(1.0 - LEVEL_BLUR / max(thin, LEVEL_BLUR), 0.0)) : 1.0;
     f.axis_s *= shrink;
     f.axis_t *= shrink;
+    f.per_spacing *= shrink;
 }
 
 SplatRecord splat_of(PhotonRecord photon, float power_w, float mean, Footprint f, uint layer, vec4 band) {

@@ -21,6 +21,8 @@ flat out vec2 half_texel;  // along x, y in units of sqrt(2) sigma
 #else
 noperspective out vec3 at;  // across, along xi, table u
 flat out vec3 shape;        // half texel across, table row, layer
+noperspective out vec2 wave;  // cycles
+flat out vec3 ripple;
 #ifndef ONE_COLOUR
 flat out vec4 throughput;
 flat out vec4 band;
@@ -106,6 +108,8 @@ void main() {
     vec2 position = splat.centre + xi * splat.along + corner.y * splat.across;
     at = vec3(corner.y * splat.y_edge, xi, table_u.x * xi + table_u.y);
     shape = vec3(splat.y_box, splat.table_row, float(splat.layer));
+    wave = xi * splat.waves.xz + corner.y * splat.waves.yw;
+    ripple = splat.ripple.xyz;
 #ifdef ONE_COLOUR
     for (int g = 0; g < TARGETS; ++g) {
 #ifdef HERO

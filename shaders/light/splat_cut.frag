@@ -15,6 +15,8 @@ layout(std430, binding = 7) readonly buffer Curves { vec4 curve[]; };
 flat in vec4 rect;
 noperspective in vec3 at;
 flat in vec3 shape;
+noperspective in vec2 wave;
+flat in vec3 ripple;
 flat in vec4 throughput;
 flat in vec4 band;  // x_lo, x_hi, half of the sweep in xi, 1 / (sqrt(2) sigma) in xi
 flat in float curve_row;
@@ -32,7 +34,7 @@ vec4 energy_below(uint row, float x) {
 void main() {
     bvec4 within = bvec4(greaterThan(gl_FragCoord.xy, rect.xy), lessThan(gl_FragCoord.xy, rect.zw));
     float half_box = sqrt(1.5) / band.w;
-    float share = !all(within) ? 0.0 : gaussian_box_fast(at.x, shape.x) / (2.0 * half_box);
+    float share = !all(within) ? 0.0 : gaussian_box_fast(at.x, shape.x) * flatness(wave, ripple) / (2.0 * half_box);
     vec2 ends = clamp(at.y + vec2(-half_box, half_box), -band.z, band.z);
     vec2 x = mix(band.xx, band.yy, 0.5 + 0.5 * ends / band.z);
     float middle = 0.5 * (x.x + x.y) - throughput.x;

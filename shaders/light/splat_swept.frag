@@ -5,6 +5,8 @@
 flat in vec4 rect;
 noperspective in vec3 at;
 flat in vec3 shape;
+noperspective in vec2 wave;
+flat in vec3 ripple;
 #ifdef ONE_COLOUR
 flat in vec4 splat_colour[TARGETS];
 #else
@@ -15,7 +17,7 @@ layout(binding = 0) uniform sampler2DArray spectra;
 layout(location = 0) out vec4 deposited[TARGETS];
 
 void main() {
-    float share = gaussian_box_fast(at.x, shape.x);
+    float share = gaussian_box_fast(at.x, shape.x) * flatness(wave, ripple);
 #ifdef EDGE
     // Clip distances would do, but llvmpipe loses triangles that two of them cut.
     bvec4 within = bvec4(greaterThan(gl_FragCoord.xy, rect.xy), lessThan(gl_FragCoord.xy, rect.zw));

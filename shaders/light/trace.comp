@@ -6,6 +6,7 @@ layout(local_size_x = 64) in;
 
 #include "lib/finite.glsl"
 #include "lib/random.glsl"
+#include "lib/lattice.glsl"
 #include "lib/medium.glsl"
 #include "lib/band.glsl"
 #include "lib/interface.glsl"
@@ -51,38 +52,7 @@ float carried_w(RayRecord ray)
     return ray.x_hi > ray.x_lo ? dot(band_w, ray.throughput) : ray.flux_w;
 }
 
-// Share of a ray's power that must remain for a child to be followed for certain; weaker ones play
-// roulette. Roulette's numbers are a Kronecker sequence in the photon's number, so survivors are
-// again close to a lattice.
-bool survives(inout RayRecord ray, inout float roulette_w, float share, uint branch, bool keeps_lattice)
-{
-    ray.survival *= share;
-    ray.branch_key = hash_combine(ray.branch_key, branch);
-    float chance = ray.survival / p.split_threshold;
-    if (chance >= 1.0 || keeps_lattice) return true;
-    // The count is that of the sub-lattice's own points: a multiple of an irrational may be a poor one.
-    float draw = kronecker(ray.photon_id / p.lattices, depth_generator(ray.depth), ray.branch_key + (ray.photon_id % p.lattices) * 2654435769u);
-    if (draw >= chance) {
-        roulette_w += carried_w(ray);
-        return false;
-    }
-    float boost = 1.0 / max(chance, 1e-30);
-    roulette_w -= carried_w(ray) * (boost - 1.0);
-    ray.flux_w *= boost;
-    ray.throughput *= boost;
-#ifdef HERO
-    ray.companion_throughput *= boost;
-#endif
-    ray.footprint_scale *= sqrt(boost);
-    ray.survival = p.split_threshold;
-    return true;
-}
-
-// What a first surface throws back is seen all round the glass: it keeps its whole lattice.
-bool survives(inout RayRecord ray, inout float roulette_w, float share, uint branch)
-{
-    return survives(ray, roulette_w, share, branch, ray.depth == 1u);
-}
+#include "light/roulette.glsl"
 
 #ifdef HERO
 // From here on the hero's path is not that of its companions: none of them would have led to it, and it has all of its weight.
@@ -164,7 +134,7 @@ void land(inout RayRecord ray, uint receiver, uint triangle, float cosine, uint 
         ray.flags |= FLAG_FOOTPRINT_DROPPED;
         outcome.what |= FELL_FOOTPRINT;
     }
-    photon.flags = ray.flags & FLAG_FOOTPRINT_DROPPED;
+    photon.flags = (ray.flags & FLAG_FOOTPRINT_DROPPED) | p.lattice_bits;
     store_photon(slot, photon);
     outcome.what |= LEFT_PHOTON;
 }

@@ -18,7 +18,8 @@ from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
 COVERS = {
     "random.glsl": ("hash_pcg", "hash_combine", "unit_float", "kronecker"),
-    "emission.glsl": ("lattice_point", "azimuthal_direction", "concentric_disc"),
+    "lattice.glsl": ("lattice_point",),
+    "emission.glsl": ("azimuthal_direction", "concentric_disc"),
     "spot.glsl": ("angle_between", "spot_falloff"),
     "profile.glsl": ("profile_stretch", "profile_intensity"),
     "wavelength.glsl": ("drawn_wavelength",),

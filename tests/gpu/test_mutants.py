@@ -37,14 +37,26 @@ class Mutant:
 
 MUTANTS = {
     "survivor's boost dropped from throughput": Mutant(
-        "light/trace.comp", "ray.throughput *= boost;", "", f"{_BALANCE}[prism]"
+        "light/roulette.glsl", "ray.throughput *= boost;", "", f"{_BALANCE}[prism]"
     ),
     "unwidened footprints": Mutant(
-        "light/trace.comp",
+        "light/roulette.glsl",
         "ray.footprint_scale *= sqrt(boost);",
         "",
         "statistical/test_samplers_numbers.py::"
         "test_survivors_of_roulette_have_the_power_and_the_place_of_those_that_died",
+    ),
+    "survivors of roulette scattered over their lattice": Mutant(
+        "light/roulette.glsl",
+        "uint along = hash_pcg(key),",
+        "uint along = hash_pcg(key ^ place.y),",
+        "statistical/test_samplers_numbers.py::test_survivors_of_roulette_are_a_coarser_lattice",
+    ),
+    "a lattice's ripple left in the splats": Mutant(
+        "light/splat_shapes.glsl",
+        "splat.ripple[i] = 2.0 * heights[i]",
+        "splat.ripple[i] = 0.0 * heights[i]",
+        "gpu/test_emission_lattice.py::test_splats_about_a_lattice_add_up_to_an_even_plane[0]",
     ),
     "what is refracted was reflected as well": Mutant(
         "light/trace.comp",

@@ -11,9 +11,10 @@ import re
 
 import numpy as np
 import pytest
+from scipy.spatial import KDTree
 from spectrasplat.base import paths
 from spectrasplat.base.random_words import PASS_GENERATORS
-from spectrasplat.gpu.records import TRACE_PARAMETERS, ray_record
+from spectrasplat.gpu.records import LATTICE_BIT, TRACE_PARAMETERS, ray_record
 from spectrasplat.passes.pixel_lattice import cells_of, pixel_lattice
 from spectrasplat.reference.emission_maps import GOLDEN, PLASTIC, lattice_point
 from spectrasplat.reference.random_numbers import hash_combine, hash_pcg, kronecker, unit_float
@@ -164,16 +165,19 @@ THRESHOLD = 0.3
 LATTICES = 3
 
 
-def survives_source() -> str:
-    """The tracer's roulette as it stands in trace.comp, with the parameters it reads."""
-    text = (paths.shaders_dir() / "light/trace.comp").read_text()
-    function = "\n".join(re.findall(r"^bool survives\(.*?^}", text, re.MULTILINE | re.DOTALL))
+LATTICE_SHIFT = 123456789
+
+
+def survives_source(lattice_count: int = 0) -> str:
+    """The tracer's roulette with the parameters it reads; `lattice_count` 0: rays lie on no lattice."""
+    text = (paths.shaders_dir() / "light/roulette.glsl").read_text()
     values = (
-        f"made.max_depth = 64u; made.split_threshold = {THRESHOLD}; made.power_row = 0u; made.lattices = {LATTICES}u;"
+        f"made.split_threshold = {THRESHOLD}; made.lattices = {LATTICES}u; made.lattices_together = 1u; "
+        f"made.lattice_bits = {lattice_count << LATTICE_BIT}u; made.lattice_shift = {LATTICE_SHIFT}u;"
     )
     made = f"TraceParameters parameters() {{ TraceParameters made; {values} return made; }}"
     carried = "float carried_w(RayRecord ray) { return ray.flux_w; }"
-    return f"{made}\nTraceParameters p = parameters();\n{carried}\n{function}"
+    return f"{made}\n#define LATTICE_BIT {LATTICE_BIT}\nTraceParameters p = parameters();\n{carried}\n{text}"
 
 
 def generators() -> list[int]:
@@ -194,13 +198,20 @@ def draws(depth: int, key: np.ndarray | int, photon: np.ndarray, irrationals: li
 
 
 def play(
-    gl, photon: np.ndarray, depth: np.ndarray, key: np.ndarray, survival: np.ndarray, share: np.ndarray
+    gl,
+    photon: np.ndarray,
+    depth: np.ndarray,
+    key: np.ndarray,
+    survival: np.ndarray,
+    share: np.ndarray,
+    scale: float = 1.0,
+    lattice_count: int = 0,
 ) -> dict[str, np.ndarray]:
     body = """
     RayRecord ray;
     ray.flux_w = survival; ray.throughput = vec3(survival); ray.survival = survival;
     ray.photon_id = photon; ray.depth = depth; ray.branch_key = key;
-    ray.footprint_scale = 1.0;
+    ray.footprint_scale = scale;
     float roulette = 0.0;
     ray.flux_w *= share; ray.throughput *= share;
     alive = survives(ray, roulette, share, 2u) ? 1u : 0u;
@@ -213,6 +224,7 @@ def play(
         "key": key.astype(np.uint32),
         "survival": survival,
         "share": share,
+        "scale": np.full(len(photon), scale),
     }
     outputs = {
         "alive": "uint",
@@ -225,12 +237,12 @@ def play(
     }
     return evaluate(
         gl.ctx,
-        ["lib/random.glsl"],
+        ["lib/lattice.glsl"],
         body,
         inputs,
         outputs,
         structs=[ray_record(0), TRACE_PARAMETERS],
-        declarations=survives_source(),
+        declarations=survives_source(lattice_count),
     )
 
 
@@ -281,6 +293,34 @@ def test_roulette_lets_the_right_share_live_and_keeps_the_flux(gl) -> None:
     np.testing.assert_allclose(got["flux"][living_rays], THRESHOLD, rtol=1e-5)
     np.testing.assert_allclose(got["throughput"][living_rays], got["flux"][living_rays], rtol=1e-6)
     np.testing.assert_allclose(got["left"][living_rays], THRESHOLD, rtol=1e-6)
+
+
+def test_survivors_of_roulette_are_a_coarser_lattice(gl) -> None:
+    """Every second point of every second row, and of those every third: steps are as many times as long. Each of the 36
+    parts that leaves of the lattice has its turn as often, over all keys. A draw of its own for every point leaves
+    neighbours."""
+    count, sub, keys = 1000, 2, 720
+    point = np.arange(count)
+    shift = (LATTICE_SHIFT + sub * PLASTIC[1]) % WORD
+    position = lattice_point(point, count, (0, shift)) * np.sqrt(count)
+    shortest = KDTree(position).query(position, k=2)[0][:, 1].min()
+    photon, depth = np.tile(point * LATTICES + sub, keys), np.full(keys * count, 4)
+    key, survival = np.repeat(np.arange(keys) * 7919, count), np.full(keys * count, 0.5)
+    lives, every = np.ones((keys, count), bool), 1
+    for chance, steps in ((1.0 / 4.2, 2), (1.0 / 8.7, 3)):
+        share = np.full(keys * count, 2.0 * chance * THRESHOLD)
+        got = play(gl, photon, depth, key + every, survival, share, float(every), count)
+        lives &= got["alive"].reshape(keys, count) == 1
+        every *= steps
+        np.testing.assert_allclose(got["flux"][lives.ravel()], steps**2 * chance * THRESHOLD, rtol=1e-5)
+        np.testing.assert_allclose(got["left"][lives.ravel()], steps**2 * chance * THRESHOLD, rtol=1e-5)
+        np.testing.assert_allclose(got["wide"][lives.ravel()], every, rtol=1e-6)
+        nearest = [KDTree(position[alive]).query(position[alive], k=2)[0][:, 1] for alive in lives[:20]]
+        assert min(away.min() for away in nearest) > 0.999 * every * shortest
+        assert max(np.median(away) for away in nearest) < 1.001 * every * shortest
+        assert lives.mean() == pytest.approx(every**-2.0, rel=0.02)
+    turns = np.unique(lives, axis=1).sum(axis=0)
+    assert len(turns) == every**2 and chi_square(turns.astype(float), np.ones(every**2)).p_value > ALPHA
 
 
 def test_a_first_surface_splits_and_never_plays(gl) -> None:
