@@ -6,7 +6,7 @@ import numpy as np
 
 from .compiling import part
 from .hand import HAND, SPARE, faint_share, halve, push_both
-from .leaves import density_slope, lay_leaf, passes, plane_map
+from .leaves import anchor_density, density_slope, lay_leaf, passes, plane_map
 from .nodes import STATIC, copy, first_place, last_place, lay_out
 from .rays import PARALLEL, follow
 from .search import (
@@ -81,6 +81,7 @@ def end(nodes, facets, solids, tables, sources, leaf, edge, corner, work):
         return
     if work.sources > 1:
         soften(nodes, kind, facets, solids, tables, sources, leaf, edge, corner, work)
+    anchor_density(hand, new, work)
     flux = flux_of(hand, tables, work)
     new.flux = flux
     work.count[0] += 1

@@ -245,5 +245,20 @@ def density_slope(beam, facets, solids, tables, source, kind, new, work):
             return
         new.slope[0] = (change[0] * m[2, 1] - change[1] * m[1, 1]) / det
         new.slope[1] = (change[1] * m[1, 0] - change[0] * m[2, 0]) / det
+        plane_map(facets[beam.facet], beam.position[0], beam.direction[0], m, work)
     else:
         new.slope[0], new.slope[1] = change[0], change[1]
+
+
+@part
+def anchor_density(beam, new, work):
+    """Make the densities of the leaf just laid ones for a slope about its centre in the middle of the band.
+
+    They are those at the centre of each place, which moves along the slope: what rises on the way does so once."""
+    if first_place(beam) > 0:
+        return
+    for a in (0, 2):
+        rise = 0.0
+        for w in range(2):
+            rise += new.slope[w] * (work.map[a, 0, w] - new.centre[w])
+        new.density[a] /= max(1.0 + rise, 0.5)

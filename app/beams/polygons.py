@@ -64,12 +64,13 @@ class BeamPolygons(Outlines):
     x_hi: np.ndarray
     """(N,), its end; equal to `x_lo` for an emission line: then only the first of each pair of ends counts."""
     density: np.ndarray
-    """(N, 3), at x_lo, in the middle and at x_hi (a parabola between): flux per scene unit² on the receiver, per
-    unit of the light's spectral power (`SceneBuffers.light_power`, what `emit.comp`'s `weight` multiplies)."""
+    """(N, 3), at x_lo, in the middle and at x_hi (a parabola between), carried to `centre` along `slope`: flux per scene
+    unit² on the receiver, per unit of the light's spectral power (`SceneBuffers.light_power`, what `emit.comp`'s
+    `weight` multiplies)."""
     slope: np.ndarray
     """(N, 2), relative change of the density per GPU unit along u and v, about `centre`."""
     centre: np.ndarray
-    """(N, 2), where `density` is taken (middle of the band)."""
+    """(N, 2), where `density` is taken: where the beam's middle lands in the middle of the band."""
     flux: np.ndarray
     """(N,), W that the polygon holds, per W that the light has over its whole spectrum."""
     edge_start: np.ndarray
