@@ -64,8 +64,8 @@ class BeamPolygons(Outlines):
     x_hi: np.ndarray
     """(N,), its end; equal to `x_lo` for an emission line: then only the first of each pair of ends counts."""
     density: np.ndarray
-    """(N, 3), at x_lo, in the middle and at x_hi (a parabola between), carried to `centre` along `slope`: flux per scene
-    unit² on the receiver, per unit of the light's spectral power (`SceneBuffers.light_power`, what `emit.comp`'s
+    """(N, 3), at x_lo, in the middle and at x_hi (a parabola between), carried to `centre` along `slope`: flux per
+    scene unit² on the receiver, per unit of the light's spectral power (`SceneBuffers.light_power`, what `emit.comp`'s
     `weight` multiplies)."""
     slope: np.ndarray
     """(N, 2), relative change of the density per GPU unit along u and v, about `centre`."""
