@@ -101,6 +101,8 @@ class RenderDefaults:
     max_depth: int = 64
     glare: float = 0.0
     """Share of the light that the camera's lens scatters (`base.glare`); of pictures to look at only."""
+    polarisation: bool = False
+    """Light keeps its polarisation from surface to surface; otherwise every event takes the mean of s and p."""
 
 
 @dataclass(frozen=True)

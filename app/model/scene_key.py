@@ -17,7 +17,7 @@ def scene_key(scene: Scene, *more: object) -> str:
     Names, notes, textures and the background do not count.
     """
     key = ContentKey()
-    key.add("scene", *more)
+    key.add("scene", *more, *(("polarised",) if scene.render.polarisation else ()))
     camera = astuple(scene.camera)
     # Without a lens there is no plane of focus.
     key.add(

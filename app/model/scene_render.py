@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from .fields import Integer, Number, Part, read_fields, write_fields
+from .fields import Flag, Integer, Number, Part, read_fields, write_fields
 from .io.scene_table import SceneTable
 from .scene import RenderDefaults, Vec3
 
@@ -47,6 +47,7 @@ _FIELDS = (
     Number("exposure_ev", _USUAL.exposure_ev, at_least=-64.0, at_most=64.0),
     Integer("max_depth", _USUAL.max_depth, at_least=1, at_most=MAX_DEPTH),
     Number("glare", _USUAL.glare, at_least=0.0, at_most=MAX_GLARE),
+    Flag("polarisation", _USUAL.polarisation, optional=True),
 )
 
 

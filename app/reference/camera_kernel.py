@@ -24,6 +24,7 @@ from .environment_draw import draw_direction
 from .photon_emit import search
 from .photon_intersect import blocked, nearest, normal_at
 from .photon_scene import BLACK, DIFFUSE
+from .polarised import begin_unpolarised
 from .sampling import DIMENSIONS, FIRST_CHOICE, choice, mixed, sobol_next, sobol_start, unit
 from .scattering import AIR, scatter, side_met, transmitted
 
@@ -187,6 +188,8 @@ def sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_dept
     state, shift, xyz = scratch.state, scratch.shift, scratch.xyz
     last, last_object, within, mask, alone, events = -1, -1, False, start.mask, start.alone, 0
     atom, nm, found, weight, lit = -1, 0.0, 0.0, 1.0, False
+    if scene.polarised:  # by reciprocity a path loses what light that came along it would
+        begin_unpolarised(scratch.field, dx, dy, dz)
     if mask != np.uint64(0) or alone != AIR:  # in glass wavelengths part at once
         atom, nm = _wavelength(spectra, unit(state[2] ^ shift[2]))
     while True:
@@ -235,6 +238,8 @@ def sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_dept
             sign = 1.0 if side == 0 else -1.0
             nx, ny, nz = normal_at(scene, triangle, px, py, pz)
             dx, dy, dz, share = draw_direction(pictures.draw, sign * nx, sign * ny, sign * nz, a, b)
+            if scene.polarised:  # a diffuse surface depolarises
+                begin_unpolarised(scratch.field, dx, dy, dz)
             weight *= share
             last, last_object, within, lit = triangle, thing, side == 1, True
             continue
@@ -246,7 +251,7 @@ def sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_dept
         last, last_object = triangle, thing
         draw = choice(state, shift, FIRST_CHOICE + events, noise, events)
         dx, dy, dz, mask, alone, within, is_event, kept, _ = scatter(
-            scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw
+            scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw, scratch.field
         )
         weight *= kept
         events += is_event
@@ -300,6 +305,8 @@ def seen_points(scene, camera, start, sequence, count, nm, max_depth, side, poin
         x, y = unit(state[0]) * camera.width, unit(state[1]) * camera.height
         px, py, pz, dx, dy, dz = lens_ray(camera, x, y, _on_lens(noise, 0), _on_lens(noise, 1))
         last, last_object, within, mask, alone, events, way = -1, -1, False, start.mask, start.alone, 0, 0.0
+        if scene.polarised:
+            begin_unpolarised(scratch.field, dx, dy, dz)
         while events <= max_depth:
             t, triangle, u, v = nearest(
                 scene, px, py, pz, dx, dy, dz, last, last_object, within, mask, stack, stack_distance
@@ -322,7 +329,7 @@ def seen_points(scene, camera, start, sequence, count, nm, max_depth, side, poin
             last, last_object = triangle, thing
             draw = choice(state, shift, FIRST_CHOICE + events, noise, events)
             dx, dy, dz, mask, alone, within, is_event, _, _ = scatter(
-                scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw
+                scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw, scratch.field
             )
             events += is_event
     return found

@@ -14,6 +14,7 @@ from .compiling import compiled
 from .photon_emit import emit_coloured
 from .photon_intersect import nearest
 from .photon_scene import BLACK, DIFFUSE
+from .polarised import begin_unpolarised
 from .sampling import FIRST_CHOICE, choice, mixed, sobol_next, sobol_start
 from .scattering import AIR, scatter, side_met, transmitted
 
@@ -36,6 +37,8 @@ def land(scene, domain, colour, band_of, side, sequence, first, count, share, ma
         px, py, pz, dx, dy, dz, watt, row, column, atom, nm = emit_coloured(domain, colour, share, state)
         noise = mixed(sequence.key ^ mixed(np.uint64(i)))
         last, last_object, within, mask, alone, events = -1, -1, False, np.uint64(0), AIR, 0
+        if scene.polarised:
+            begin_unpolarised(scratch.field, dx, dy, dz)
         while watt > 0.0:
             t, triangle, u, v = nearest(
                 scene, px, py, pz, dx, dy, dz, last, last_object, within, mask, stack, stack_distance
@@ -60,7 +63,7 @@ def land(scene, domain, colour, band_of, side, sequence, first, count, share, ma
             last, last_object = triangle, thing
             draw = choice(state, shift, FIRST_CHOICE + events, noise, events)
             dx, dy, dz, mask, alone, within, is_event, kept, _ = scatter(
-                scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw
+                scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw, scratch.field
             )
             watt *= kept
             events += is_event

@@ -17,6 +17,7 @@ from .compiling import compiled
 from .photon_emit import emit_coloured
 from .photon_intersect import blocked, nearest, normal_at
 from .photon_scene import BLACK, DIFFUSE
+from .polarised import begin_unpolarised
 from .sampling import DIMENSIONS, FIRST_CHOICE, choice, mixed, sobol_next, sobol_start
 from .scattering import AIR, scatter, side_met, transmitted
 
@@ -84,6 +85,8 @@ def trace(
         px, py, pz, dx, dy, dz, watt, row, column, atom, nm = emit_coloured(domain, colour, share, state)
         if watt <= 0.0:
             continue
+        if scene.polarised:
+            begin_unpolarised(scratch.field, dx, dy, dz)
         tally[EMITTED] += watt
         tally[COUNTED] += 1.0
         noise = mixed(sequence.key ^ mixed(np.uint64(i)))
@@ -126,7 +129,7 @@ def trace(
             last, last_object = triangle, thing
             draw = choice(state, shift, dimension, noise, dimension - DIMENSIONS + 1)
             dx, dy, dz, mask, alone, within, is_event, kept, drawn = scatter(
-                scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw
+                scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw, scratch.field
             )
             depth += is_event
             dimension += drawn

@@ -93,6 +93,8 @@ class PhotonScene(NamedTuple):
     """Distances below this are the same place."""
     contact: float
     """Nearer than this, what is no glass is silver, black or paint on what it touches."""
+    polarised: bool
+    """Paths carry their light's polarisation."""
 
 
 class Viewpoint(NamedTuple):
@@ -187,6 +189,7 @@ def photon_scene(scene: Scene) -> tuple[PhotonScene, np.ndarray]:
         *_gratings(scene),
         _NEAR * size,
         _CONTACT * 2.0 ** round(float(np.log2(size))),
+        scene.render.polarisation,
     ), centre
 
 

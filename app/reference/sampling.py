@@ -81,12 +81,22 @@ class Scratch(NamedTuple):
     first)."""
     xyz: np.ndarray
     """float64 (3,)."""
+    field: np.ndarray
+    """complex128 (2, 3): a path's electric fields (`polarised`)."""
 
 
 def scratch() -> Scratch:
     """Fresh working memory."""
     beginning, state, shift = np.zeros((3, DIMENSIONS), np.uint32)
-    return Scratch(np.zeros(STACK_SIZE, np.int64), np.zeros(STACK_SIZE), beginning, state, shift, np.zeros(3))
+    return Scratch(
+        np.zeros(STACK_SIZE, np.int64),
+        np.zeros(STACK_SIZE),
+        beginning,
+        state,
+        shift,
+        np.zeros(3),
+        np.zeros((2, 3), complex),
+    )
 
 
 @compiled

@@ -15,6 +15,7 @@ from .compiling import compiled, inlined
 from .curved_surfaces import turned_normal
 from .photon_intersect import normal_at
 from .photon_scene import GRATING, MIRROR
+from .polarised import amplitudes, senkrecht, share_of, turn_fields
 
 AIR = -1
 _TABLE_SCALE = 20.0
@@ -115,9 +116,9 @@ def _diffracted(dx, dy, dz, nx, ny, nz, lines, step, reflects):
 
 
 @compiled
-def _diffract(scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw):
+def _diffract(scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw, field):
     """`scatter` at a grating: `draw` chooses an order as they are strong; what they leave, and an order that is
-    evanescent, is absorbed."""
+    evanescent, is absorbed. Both polarisations fare alike."""
     thing = scene.owner[triangle]
     gx, gy, gz = normal_at(scene, triangle, place[0], place[1], place[2])
     entering = dx * gx + dy * gy + dz * gz < 0.0
@@ -139,19 +140,23 @@ def _diffract(scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw):
     if wrong:
         rx, ry, rz, real = _diffracted(dx, dy, dz, gx, gy, gz, scene.lines[thing], step, reflects)
     inner = entering != reflects
+    if scene.polarised and real:
+        sx, sy, sz = senkrecht(dx, dy, dz, rx, ry, rz)
+        turn_fields(field, dx, dy, dz, rx, ry, rz, sx, sy, sz, complex(-1.0 if reflects else 1.0), complex(1.0))
     return rx, ry, rz, mask, alone, inner, True, efficiency if real else 0.0, True
 
 
 @inlined
-def scatter(scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw):
+def scatter(scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw, field):
     """One event at a place (3) of glass or a mirror: (direction (3), mask, alone, on the object's inner side, is an
     event, share kept, whether `draw` mattered).
 
     `draw` in [0, 1) decides by Fresnel's reflectance, unless all is reflected. "Is an event" is false where the same
-    substance lies on both sides; a mirror keeps its reflectance, glass everything.
+    substance lies on both sides; a mirror keeps its reflectance, glass everything. In a polarised scene
+    `field` complex (2, 3), the two of `polarised`, turns with the ray.
     """
     if scene.kind[scene.owner[triangle]] == GRATING:
-        return _diffract(scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw)
+        return _diffract(scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw, field)
     gx, gy, gz = normal_at(scene, triangle, place[0], place[1], place[2])
     cosine_g = -(dx * gx + dy * gy + dz * gz)
     entering = cosine_g > 0.0
@@ -176,11 +181,20 @@ def scatter(scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw):
     nx, ny, nz = _shading_normal(scene, triangle, place, u, v, dx, dy, dz, gx, gy, gz, entering)
     cosine = -(dx * nx + dy * ny + dz * nz)
     kept, reflects, drawn, cosine_t, eta_it = 1.0, True, False, 0.0, 1.0
+    sx, sy, sz, a_s, a_p = 0.0, 0.0, 0.0, complex(-1.0), complex(1.0)
+    if scene.polarised:
+        sx, sy, sz = senkrecht(dx, dy, dz, nx, ny, nz)
     if mirror:
         kept = table(scene.weights, scene.weight[thing], nm)
     else:
         eta_it = _refractive_index(scene, before, nm) / _refractive_index(scene, after, nm)
         reflectance, cosine_t = fresnel(cosine, eta_it)
+        if scene.polarised:
+            a_s, a_p, t_s, t_p = amplitudes(cosine, eta_it)
+            if reflectance < 1.0:
+                reflectance = share_of(field, dx, dy, dz, sx, sy, sz, a_s, a_p)
+            if draw >= reflectance:
+                a_s, a_p = t_s, t_p
         reflects, drawn = draw < reflectance, reflectance < 1.0
     if reflects:
         rx, ry, rz = dx + 2.0 * cosine * nx, dy + 2.0 * cosine * ny, dz + 2.0 * cosine * nz
@@ -196,4 +210,7 @@ def scatter(scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw):
             rx, ry, rz = eta_it * dx + k * gx, eta_it * dy + k * gy, eta_it * dz + k * gz
         inner = entering
     length = math.sqrt(rx * rx + ry * ry + rz * rz)
-    return rx / length, ry / length, rz / length, mask_after, alone_after, inner, True, kept, drawn
+    rx, ry, rz = rx / length, ry / length, rz / length
+    if scene.polarised:
+        turn_fields(field, dx, dy, dz, rx, ry, rz, sx, sy, sz, a_s, a_p)
+    return rx, ry, rz, mask_after, alone_after, inner, True, kept, drawn
