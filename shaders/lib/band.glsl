@@ -5,6 +5,9 @@
 
 #include "lib/medium.glsl"
 #include "lib/optics.glsl"
+#ifdef POLARISED
+#include "lib/polarisation.glsl"
+#endif
 
 // GPU units that a cut may move a path's start.
 #define MAX_MOVED_START 0.01
@@ -20,6 +23,16 @@ vec3 band_weights(vec3 band, vec3 weight, vec3 x)
     vec3 above = clamp((x - band.y) / max(band.z - band.y, 1e-9), 0.0, 1.0);
     return mix(mix(vec3(weight.x), vec3(weight.y), below), vec3(weight.z), above);
 }
+
+#ifdef POLARISED
+// State of polarisation at the places x of a band: Stokes parameters times weights are straight between the three known ones.
+Polarisation band_polarisation(Polarisation state, vec3 band, vec3 weight, vec3 x)
+{
+    vec3 per_weight = 1.0 / max(band_weights(band, weight, x), 1e-30);
+    return Polarisation(state.axis, band_weights(band, weight * state.q, x) * per_weight,
+        band_weights(band, weight * state.u, x) * per_weight, band_weights(band, weight * state.v, x) * per_weight);
+}
+#endif
 
 // Whether both parts of a cut band may set out again from starts moved by `low` and `high` from the path's own: so far that another surface
 // may lie in between they may not. `distance`: to the surface ahead, GPU units.

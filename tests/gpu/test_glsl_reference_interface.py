@@ -24,7 +24,7 @@ COVERS = {
         "refracted_column",
         "surface_point",
     ),
-    "band.glsl": ("band_weights", "starts_stay_near", "variable_step", "total_reflection_onset"),
+    "band.glsl": ("band_weights", "band_polarisation", "starts_stay_near", "variable_step", "total_reflection_onset"),
     "random.glsl": ("depth_generator",),
 }
 COUNT = 3000
@@ -206,6 +206,23 @@ def test_weights_over_a_band_are_straight_between_its_ends_and_its_anchor(gl) ->
     moved = np.maximum(np.linalg.norm(low, axis=1), np.linalg.norm(high, axis=1))
     assert ((got["near"] == 1) == (moved < np.minimum(0.01, 0.1 * distance))).all()
     assert 0.1 < got["near"].mean() < 0.9
+
+
+def test_polarisation_over_a_band_goes_with_its_power(gl) -> None:
+    rng = np.random.default_rng(9)
+    band = as_f32(0.3 * np.sort(rng.random((COUNT, 3)), axis=1) + np.array([0.0, 0.1, 0.2]))
+    x = as_f32(band[:, :1] + (band[:, 2:] - band[:, :1]) * rng.random((COUNT, 3)))
+    weight, q, u, v = as_f32(rng.uniform(0.1, 1.0, (4, COUNT, 3)))
+    body = """
+        Polarisation part = band_polarisation(Polarisation(vec3(1.0, 0.0, 0.0), q, u, v), band, weight, x);
+        pq = part.q; pu = part.u; pv = part.v;
+    """
+    inputs = {"band": band, "x": x, "weight": weight, "q": q, "u": u, "v": v}
+    got = evaluated(gl, body, inputs, {"pq": "vec3", "pu": "vec3", "pv": "vec3"}, {"POLARISED": 1})
+    for name, each in (("pq", q), ("pu", u), ("pv", v)):
+        rows = zip(x, band, weight, each, strict=True)
+        want = np.array([np.interp(at, b, w * e) / np.interp(at, b, w) for at, b, w, e in rows])
+        assert np.abs(got[name] - want).max() < 5e-5
 
 
 SAMPLES = 401

@@ -1,0 +1,148 @@
+"""lib/polarisation.glsl against coherency matrices in float64, and against closed forms of whole paths."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from reference import polarisation
+from spectrasplat.reference import optics
+from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
+
+COVERS = {
+    "polarisation.glsl": (
+        "across_direction",
+        "unpolarised",
+        "incidence_axis",
+        "counted_from",
+        "in_plane",
+        "out_of_plane",
+        "fresnel_reflection",
+        "fresnel_transmission",
+        "mirror_reflection",
+        "polarised_share",
+        "behind_interface",
+    ),
+}
+LIBRARY = ["lib/optics.glsl", "lib/polarisation.glsl"]
+COUNT = 2000
+ROTATE = """
+    Polarisation state = Polarisation(across_direction(d), q, u, v);
+    vec3 other = cross(d, state.axis);
+    vec3 s[3] = vec3[](cos(angle.x) * state.axis + sin(angle.x) * other, cos(angle.y) * state.axis + sin(angle.y) * other,
+        cos(angle.z) * state.axis + sin(angle.z) * other);
+    Polarisation seen = in_plane(state, d, s);
+"""
+
+
+def states(rng: np.random.Generator, count: int) -> np.ndarray:
+    """Stokes parameters (count, 3) of every degree of polarisation."""
+    return as_f32(optics.unit(rng.normal(size=(count, 3))) * rng.uniform(0.0, 0.999, (count, 1)))
+
+
+def test_axes_are_across(gl) -> None:
+    rng = np.random.default_rng(2)
+    d = as_f32(optics.unit(np.concatenate([rng.normal(size=(COUNT, 3)), np.eye(3), -np.eye(3)])))
+    n = as_f32(optics.unit(rng.normal(size=d.shape)))
+    n[:10] = -d[:10]
+    body = """
+        Polarisation state = unpolarised(d);
+        a = state.axis;
+        s = incidence_axis(d, n, a);
+        q = state.q + state.u + state.v;
+    """
+    got = evaluate(gl.ctx, LIBRARY, body, {"d": d, "n": n}, {"a": "vec3", "s": "vec3", "q": "vec3"})
+    for axis in (got["a"], got["s"]):
+        assert np.abs(np.einsum("ij,ij->i", axis, d)).max() < 1e-5
+        np.testing.assert_allclose(np.linalg.norm(axis, axis=1), 1.0, atol=1e-6)
+    np.testing.assert_array_equal(got["s"][:10], got["a"][:10])
+    assert np.abs(np.einsum("ij,ij->i", got["s"], n)).max() < 1e-4
+    assert not got["q"].any()
+
+
+@pytest.mark.parametrize("event", ["reflection", "transmission", "total", "mirror"])
+def test_an_event_is_that_of_jones_vectors(gl, event: str) -> None:
+    """Into the plane of incidence, through it by complex amplitudes, at three places each with its own state."""
+    rng = np.random.default_rng(5)
+    d = as_f32(optics.unit(rng.normal(size=(COUNT, 3))))
+    angle = as_f32(rng.uniform(-3.0, 3.0, (COUNT, 3)))
+    each = np.stack([states(rng, COUNT) for _ in range(3)], axis=2)  # (COUNT, quv, places)
+    eta = as_f32(rng.uniform(1.2, 1.9, (COUNT, 3)) if event == "total" else rng.uniform(0.4, 1.9, (COUNT, 3)))
+    critical = np.sqrt(np.maximum(1.0 - eta**-2.0, 0.0))
+    share = rng.uniform(0.02, 0.98, (COUNT, 3))
+    theta = -as_f32(critical * share if event == "total" else critical + (1.0 - critical) * share)
+    pairs = {
+        "reflection": "fresnel_reflection(theta, eta, cosine2)",
+        "transmission": "fresnel_transmission(fresnel_reflection(theta, eta, cosine2))",
+        "total": "fresnel_reflection(theta, eta, cosine2)",
+        "mirror": "mirror_reflection()",
+    }
+    body = f"""
+        {ROTATE}
+        vec3 cosine2 = transmitted_cosine2(theta, eta);
+        FresnelPair pair = {pairs[event]};
+        share = polarised_share(seen, pair);
+        Polarisation left = behind_interface(seen, pair);
+        lq = left.q; lu = left.u; lv = left.v;
+    """
+    inputs = {"d": d, "angle": angle, "theta": theta, "eta": eta}
+    inputs |= {name: each[:, i] for i, name in enumerate("quv")}
+    got = evaluate(gl.ctx, LIBRARY, body, inputs, {name: "vec3" for name in ("share", "lq", "lu", "lv")})
+    r_s, r_p, t_s, t_p = polarisation.amplitudes(-theta, eta)
+    ones = np.ones_like(theta)
+    a_s, a_p = {"transmission": (t_s, t_p), "mirror": (-ones, ones)}.get(event, (r_s, r_p))
+    matrix = polarisation.seen_from(polarisation.coherency(np.moveaxis(each, 1, 2)), angle)
+    wanted, stokes = polarisation.stokes_of(polarisation.after(matrix, a_s, a_p))
+    np.testing.assert_allclose(got["share"], wanted, atol=3e-6)
+    found = np.stack([got["lq"], got["lu"], got["lv"]], axis=-1)
+    off = np.abs(found - stokes).max(axis=-1)
+    # Near Brewster's angle next to nothing is left, and its state is rounding's.
+    assert (off * wanted).max() < 2e-5
+    assert np.median(off) < 1e-6
+
+
+def test_ends_of_a_band_are_counted_from_their_own_planes(gl) -> None:
+    """Into three planes and back is nothing; along another direction the angle between them counts about that."""
+    rng = np.random.default_rng(8)
+    d = as_f32(optics.unit(rng.normal(size=(COUNT, 3))))
+    angle = as_f32(rng.uniform(-0.4, 0.4, (COUNT, 3)))
+    each = np.stack([states(rng, COUNT) for _ in range(3)], axis=2)
+    inputs = {"d": d, "angle": angle} | {name: each[:, i] for i, name in enumerate("quv")}
+    body = (
+        ROTATE
+        + """
+        Polarisation back = out_of_plane(seen, d, s), mirrored = out_of_plane(seen, -d, s);
+        bq = back.q; bu = back.u; bv = back.v; axis = back.axis; wanted = s[1]; mu = mirrored.u; mq = mirrored.q;
+    """
+    )
+    names = ("bq", "bu", "bv", "axis", "wanted", "mq", "mu")
+    got = evaluate(gl.ctx, LIBRARY, body, inputs, dict.fromkeys(names, "vec3"))
+    # The anchor's axis, all over the band.
+    matrix = polarisation.seen_from(polarisation.coherency(np.moveaxis(each, 1, 2)), angle[:, 1:2])
+    _, stokes = polarisation.stokes_of(matrix)
+    for i, name in enumerate(("bq", "bu", "bv")):
+        np.testing.assert_allclose(got[name], stokes[..., i], atol=2e-6)
+    np.testing.assert_allclose(got["axis"], got["wanted"], atol=1e-6)
+    apart = angle - angle[:, 1:2]
+    matrix = polarisation.seen_from(polarisation.coherency(np.moveaxis(each, 1, 2)), angle)
+    _, stokes = polarisation.stokes_of(polarisation.seen_from(matrix, apart))
+    np.testing.assert_allclose(got["mq"], stokes[..., 0], atol=2e-6)
+    np.testing.assert_allclose(got["mu"], stokes[..., 1], atol=2e-6)
+
+
+def test_fresnels_rhomb_by_shader(gl) -> None:
+    """Two total reflections of 45° each make light at 45° circular [Born and Wolf, 1.5.4]."""
+    n = 1.5168
+    angle = np.linspace(np.radians(42.0), np.radians(50.0), 100001)
+    retardance = 2.0 * np.arctan(np.cos(angle) * np.sqrt(np.sin(angle) ** 2 - n**-2) / np.sin(angle) ** 2)
+    theta = as_f32(np.full(1, -np.cos(angle[np.argmin(np.abs(retardance - np.pi / 4.0))])))
+    body = f"""
+        vec3 cosines = vec3(theta), eta = vec3({n});
+        FresnelPair pair = fresnel_reflection(cosines, eta, transmitted_cosine2(cosines, eta));
+        Polarisation state = Polarisation(vec3(1.0, 0.0, 0.0), vec3(0.0), vec3(1.0), vec3(0.0));
+        state = behind_interface(behind_interface(state, pair), pair);
+        stokes = vec3(state.q.y, state.u.y, abs(state.v.y));
+        share = polarised_share(state, pair);
+    """
+    got = evaluate(gl.ctx, LIBRARY, body, {"theta": theta}, {"stokes": "vec3", "share": "vec3"})
+    np.testing.assert_allclose(got["stokes"][0], [0.0, 0.0, 1.0], atol=3e-4)
+    np.testing.assert_allclose(got["share"], 1.0)
