@@ -160,7 +160,8 @@ def _lights_table(lights: tuple[Light, ...]) -> Table:
 
 def _compiled(scene: Scene) -> list[RenderableType]:
     from ..bench.features.static_costs import RecordSizes, static_costs
-    from ..model.features import Features, explain
+    from ..model.features import Features
+    from ..model.features_explained import explain
     from ..model.settings import RenderSettings
 
     wishes = scene.render

@@ -117,8 +117,22 @@ GAIN_BOX = Struct(
 """Where one receiver's local gains of dispersion lie (`model.local_dispersion.GainGrid`)."""
 
 
-def ray_record(columns: int, hero: bool = False) -> Struct:
-    """State of one ray between two surfaces; `columns` derivative columns, spatial ones first; `hero` as above."""
+_POLARISATION = (
+    Field("stokes_q", "vec3", "of intensity 1, at x_lo, x_anchor, x_hi; 1: along the axis"),
+    Field("axis_x", "float", "unit vector across the ray"),
+    Field("stokes_u", "vec3", "1: halfway from the axis to cross(direction, axis)"),
+    Field("axis_y", "float"),
+    Field("stokes_v", "vec3", "circular"),
+    Field("axis_z", "float"),
+)
+_COMPANIONS_POLARISATION = tuple(
+    Field(f"companion_{name}", "vec4", f"xyz: stokes_{name} of the wavelengths that share the path") for name in "quv"
+)
+
+
+def ray_record(columns: int, hero: bool = False, polarised: bool = False) -> Struct:
+    """State of one ray between two surfaces; `columns` derivative columns, spatial ones first; `hero` as above;
+    `polarised`: with its state of polarisation."""
     fields = [
         Field("position", "vec3", "GPU space"),
         Field("flux_w", "float", "accounted radiant flux of the band, W"),
@@ -146,7 +160,10 @@ def ray_record(columns: int, hero: bool = False) -> Struct:
             ),
             Field("ddirection", "vec4", "xyz: per the same", columns),
         ]
-    return Struct("RayRecord", (*fields, *(_COMPANIONS if hero else ())), texels=True)
+    fields += _COMPANIONS if hero else ()
+    fields += _POLARISATION if polarised else ()
+    fields += _COMPANIONS_POLARISATION if hero and polarised else ()
+    return Struct("RayRecord", tuple(fields), texels=True)
 
 
 OUTCOME = Struct(

@@ -13,7 +13,6 @@ import numpy as np
 from .camera_rays import camera_frame
 from .contacts import contacts, overlapping_solids, world_bounds
 from .environment_light import why_no_environment_light
-from .environment_sun import with_sun
 from .scene import (
     Camera,
     Scene,
@@ -111,6 +110,8 @@ class Features:
     """The camera has a lens: its rays begin all over it, and carry columns of the place there."""
     hero: bool = False
     """Three more wavelengths share the path of the one that is followed, as long as it is theirs too."""
+    polarised: bool = False
+    """Paths carry their light's state of polarisation from surface to surface."""
 
     def defines(self) -> dict[str, int]:
         """Preprocessor symbols; a feature that is out is not defined at all (use #ifdef) — counts are numbers."""
@@ -142,6 +143,7 @@ class Features:
             "LIGHT_PROFILES": self.light_profiles,
             "BEAMS": self.beams,
             "HERO": self.hero,
+            "POLARISED": self.polarised,
         }
         return numbers | {name: 1 for name, on in switches.items() if on}
 
@@ -207,6 +209,7 @@ class Features:
             environment_lights=why_no_environment_light(scene) is None and settings.layer == "beauty",
             lens=scene.camera.lens_radius > 0.0,
             hero=settings.method == "hero",
+            polarised=scene.render.polarisation and bool(dielectrics),
         )
 
 
@@ -351,219 +354,3 @@ def is_flat(item: SceneObject) -> bool:
     centred = points - points.mean(axis=0)
     singular = np.linalg.svd(centred, compute_uv=False)
     return bool(singular[-1] <= 1e-5 * max(singular[0], np.finfo(float).tiny))
-
-
-def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
-    """(feature, compiled in, reason) for every choice, for people."""
-    glasses = [o.material.dispersion.name for i, o in enumerate(scene.objects) if i in dispersive_materials(scene)]
-    convex = half_spaces(scene)
-    loose = sum(len(o.mesh.triangles) for i, o in enumerate(scene.objects) if i not in convex)
-    solids = [scene.objects[i].name for i in convex]
-    touching = [scene.objects[i].name for i in overlapping_solids(scene)]
-    in_contact = [f"{scene.objects[i].name} and {scene.objects[j].name}" for i, j in contacts(scene)]
-    diffuse = [o for o in scene.objects if o.material.receives]
-    worn = [o.name for o in diffuse if o.material.texture is not None]
-    black = sum(o.material.is_black for o in scene.objects)
-
-    def names(items: list[str]) -> str:
-        return ", ".join(items[:4]) + (f" and {len(items) - 4} more" if len(items) > 4 else "")
-
-    return [
-        (
-            "spectral columns",
-            features.spectral_groups > 0,
-            f"{features.spectral_groups} column(s): {names(glasses)}"
-            if features.spectral_groups
-            else ("one wavelength a photon" if features.point_spectrum else "nothing disperses"),
-        ),
-        (
-            "shared spectral variable",
-            features.merged_groups,
-            "more glasses than columns, or the λ-column was asked for"
-            if features.merged_groups
-            else "each glass has a column of its own",
-        ),
-        (
-            "weights over the band",
-            features.spectral_weights,
-            "Fresnel, absorption or mirrors differ over a band"
-            if features.spectral_weights
-            else "nothing differs over a band",
-        ),
-        (
-            "band cuts",
-            features.band_cuts,
-            "total internal reflection may cut a band" if features.band_cuts else "no band to cut",
-        ),
-        (
-            "spatial columns",
-            features.footprints,
-            "footprints are anisotropic" if features.footprints else "the method splats single texels",
-        ),
-        ("refraction", features.dielectrics, "there is glass" if features.dielectrics else "there is no glass"),
-        ("mirrors", features.mirrors, "there are mirrors" if features.mirrors else "there are no mirrors"),
-        (
-            "gratings",
-            features.gratings,
-            "there are gratings" if features.gratings else "there is no grating",
-        ),
-        (
-            "interpolated normals",
-            features.smooth_normals,
-            "some specular surface is smooth" if features.smooth_normals else "all specular facets are flat",
-        ),
-        (
-            "normal derivatives",
-            features.normal_derivatives,
-            "columns bend with the normals"
-            if features.normal_derivatives
-            else ("no columns" if features.smooth_normals else "all specular facets are flat"),
-        ),
-        ("absorption", features.absorption, "some glass absorbs" if features.absorption else "all glass is clear"),
-        (
-            "medium stack",
-            features.medium_stack,
-            f"{names(touching)} nest or touch" if features.medium_stack else "no two solids nest or touch",
-        ),
-        (
-            "contacts",
-            features.contacts,
-            f"may touch: {names(in_contact)}"
-            if features.contacts
-            else "no mirror, receiver or blocker touches another surface",
-        ),
-        (
-            "triangle tree",
-            features.tree,
-            f"{loose} triangles" if features.tree else f"{loose} loose triangle(s) are looped over",
-        ),
-        (
-            "half-space solids",
-            features.convex_solids,
-            names(solids) if features.convex_solids else "no convex faceted solid",
-        ),
-        (
-            "charts",
-            features.charts,
-            f"{sum(not is_flat(o) for o in diffuse)} curved receiver(s)"
-            if features.charts
-            else "all receivers are flat",
-        ),
-        (
-            "nested windows",
-            features.nested_windows,
-            "flat receivers may get a fine window inside a coarse one"
-            if features.nested_windows
-            else "no receiver has two windows",
-        ),
-        (
-            "local gain",
-            features.local_gain,
-            "the dispersion brush was used on a receiver" if features.local_gain else "no receiver was painted on",
-        ),
-        (
-            "photons by index",
-            features.reindexed,
-            "an edit or the brush may move wavelengths between paths"
-            if features.reindexed
-            else "every path keeps its wavelengths",
-        ),
-        (
-            "camera refraction",
-            features.camera_specular,
-            "the camera may see glass or mirrors" if features.camera_specular else "no glass and no mirror is in view",
-        ),
-        (
-            "camera spectral taps",
-            features.camera_disperses,
-            "the camera may see through dispersive glass"
-            if features.camera_disperses
-            else ("no dispersive glass is in view" if glasses else "nothing disperses"),
-        ),
-        (
-            "spectral maps",
-            features.map_tents > 0,
-            f"{features.map_tents} channels beside XYZ: light and camera disperse"
-            if features.map_tents
-            else "no caustic is seen through dispersive glass",
-        ),
-        ("spectral bins", features.targets > 1, _target_words(features)),
-        (
-            "lens",
-            features.lens,
-            f"radius {scene.camera.lens_radius:.4g}, focused at {scene.camera.plane_of_focus:.4g}"
-            if features.lens
-            else "the camera is a pinhole"
-            if scene.camera.kind == "pinhole"
-            else "the camera has no lens",
-        ),
-        ("textures", bool(worn), f"on {names(worn)}" if worn else "no surface wears a picture"),
-        (
-            "environment map",
-            scene.environment is not None,
-            f"a {scene.environment.kind} lies beyond" if scene.environment is not None else "one colour lies beyond",
-        ),
-        (
-            "environment light",
-            features.environment_lights,
-            "every diffuse surface is lit by it, with visibility, also through glass and over mirrors"
-            + ("; its sun is a light of its own" if with_sun(scene) is not scene else "")
-            if features.environment_lights
-            else why_no_environment_light(scene) or "the picture shows caustics only",
-        ),
-        (
-            "light profiles",
-            features.light_profiles,
-            f"measured lamps: {names([light.name for light in scene.lights if light.profile is not None])}"
-            if features.light_profiles
-            else "no light comes from a photometric file",
-        ),
-        (
-            "beams",
-            features.beams,
-            _beam_words(scene, features),
-        ),
-        (
-            "camera beams",
-            features.camera_beams,
-            "flat facets in view may be seen by beams, where that is cheaper"
-            if features.camera_beams
-            else _no_camera_beams_words(scene, features),
-        ),
-        ("blockers", black > 0, f"{black} black object(s)" if black else "no black object"),
-    ]
-
-
-def _no_camera_beams_words(scene: Scene, features: Features) -> str:
-    if not divides_spectrum(features.method):
-        return f"method {features.method} follows paths"
-    if not features.camera_specular:
-        return "no glass and no mirror is in view"
-    return "--camera beams would try them" if beam_objects(scene) else "no glass and no mirror has flat facets only"
-
-
-def _beam_words(scene: Scene, features: Features) -> str:
-    specular = [o for o in scene.objects if o.material.is_specular]
-    if features.beams:
-        carried = [scene.objects[i].name for i in beam_objects(scene)]
-        others = [f"{o.name}: {why_no_beams(o)}" for o in specular if why_no_beams(o)]
-        return (
-            f"what {', '.join(carried)} throw(s) goes as polygons, unless a survey finds that photons are cheaper"
-            + (f"; photons for {'; '.join(others)}" if others else "")
-        )
-    if features.method != "srd":
-        return f"method {features.method} follows photons"
-    reasons = [f"{o.name}: {why_no_beams(o)}" for o in specular if why_no_beams(o)]
-    if not specular or len(reasons) == len(specular):
-        return "; ".join(reasons) or "there is neither glass nor mirror"
-    if not any(o.material.receives and is_flat(o) for o in scene.objects):
-        return "no receiver is flat"
-    if any(o.local_dispersion for o in scene.objects):
-        return "the dispersion brush was used on a receiver"
-    return "no light can be followed as beams"
-
-
-def _target_words(features: Features) -> str:
-    if features.targets == 1:
-        return "XYZ in one target"
-    return f"{features.targets} targets" + (": XYZ and the spectral maps' channels" if features.map_tents else "")

@@ -114,4 +114,14 @@ Polarisation behind_interface(Polarisation state, FresnelPair pair)
     return Polarisation(state.axis, q * per_degree, u * per_degree, v * per_degree);
 }
 
+// What an order of a grating leaves a ray in that it turns from one direction to another: both polarisations fare alike.
+Polarisation behind_grating(Polarisation state, vec3 direction, vec3 turned, bool reflects)
+{
+    vec3 axis = incidence_axis(direction, turned, state.axis);
+    vec3 s[3] = vec3[](axis, axis, axis);
+    FresnelPair pair = mirror_reflection();
+    pair.real = vec3(reflects ? -1.0 : 1.0);
+    return out_of_plane(behind_interface(in_plane(state, direction, s), pair), turned, s);
+}
+
 #endif

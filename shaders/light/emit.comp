@@ -10,6 +10,9 @@ layout(local_size_x = 64) in;
 #ifdef LIGHT_PROFILE
 #include "lib/profile.glsl"
 #endif
+#ifdef POLARISED
+#include "lib/polarisation.glsl"
+#endif
 
 layout(std430, binding = BIND_PARAMETERS) readonly restrict buffer Parameters { EmitParameters p; };
 layout(std430, binding = BIND_RAYS_OUT) writeonly restrict buffer RaysOut { uvec4 rays[]; };
@@ -124,6 +127,16 @@ void main()
             ray.companion_x.w = 1.0;
             ray.throughput *= 0.25;
         }
+#endif
+#endif
+#ifdef POLARISED
+        vec3 axis = across_direction(direction);
+        ray.axis_x = axis.x;
+        ray.axis_y = axis.y;
+        ray.axis_z = axis.z;
+        ray.stokes_q = ray.stokes_u = ray.stokes_v = vec3(0.0);
+#ifdef HERO
+        ray.companion_q = ray.companion_u = ray.companion_v = vec4(0.0);
 #endif
 #endif
         ray.survival = 1.0;

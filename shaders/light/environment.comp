@@ -7,6 +7,9 @@ layout(local_size_x = 64) in;
 #include "lib/medium.glsl"
 #include "lib/interface.glsl"
 #include "lib/random.glsl"
+#ifdef POLARISED
+#include "lib/polarisation.glsl"
+#endif
 
 layout(std140, binding = BIND_PARAMETERS) uniform Parameters { EnvironmentParameters p; };
 layout(std430, binding = BIND_PLACES) readonly restrict buffer Places { EnvironmentPlace places[]; };
@@ -42,6 +45,9 @@ vec3 by_specular(vec3 position, vec3 direction, RayOrigin origin, uvec4 level, u
 {
     MediumStack medium = MediumStack(0u, NONE);
     vec3 weight = vec3(1.0), found = vec3(0.0);
+#ifdef POLARISED
+    Polarisation polarisation = unpolarised(direction);
+#endif
     bool follows = true;
     for (uint event = 0u; event < uint(MAX_EVENTS) && follows; ++event) {
         Hit hit;
@@ -62,6 +68,12 @@ vec3 by_specular(vec3 position, vec3 direction, RayOrigin origin, uvec4 level, u
 #endif
             Deflection turned = reflect_at(frame, direction);
             bool passes = false;
+#ifdef POLARISED
+            vec3 axis = incidence_axis(direction, frame.normal, polarisation.axis), s[3] = vec3[](axis, axis, axis);
+            Polarisation seen = in_plane(polarisation, direction, s);
+            FresnelPair pair = mirror_reflection();
+            bool changes = true;
+#endif
 #ifdef HAS_MIRROR
             if (kind == KIND_MIRROR) weight *= at_rgb(uint(WEIGHT_ROW) + object_at(hit.object).weight_row);
 #endif
@@ -72,14 +84,27 @@ vec3 by_specular(vec3 position, vec3 direction, RayOrigin origin, uvec4 level, u
                 if (boundary.changes) {
                     float eta_it = medium_index(boundary.before, p.x_of_rgb.w) / medium_index(boundary.after, p.x_of_rgb.w);
                     Deflection refracted = refract_at(frame, direction, eta_it);
+#ifdef POLARISED
+                    vec3 cosine2 = vec3(transmitted_cosine2(refracted.theta, eta_it));
+                    pair = fresnel_reflection(vec3(refracted.theta), vec3(eta_it), cosine2);
+                    float reflectance = polarised_share(seen, pair).x;
+#else
                     float reflectance = fresnel_reflectance(refracted.theta, eta_it, refracted.exists ? transmitted_cosine2(refracted.theta, eta_it) : 0.0);
+#endif
                     passes = refracted.exists && unit_float(hash_combine(key, event)) >= reflectance;
                     if (passes) turned = refracted;
                 } else turned.direction = direction;
+#ifdef POLARISED
+                changes = boundary.changes;
+                if (passes) pair = fresnel_transmission(pair);
+#endif
                 if (passes) medium = boundary.behind;
             }
 #endif
             direction = turned.direction;
+#ifdef POLARISED
+            if (changes) polarisation = out_of_plane(behind_interface(seen, pair), direction, s);
+#endif
             origin = RayOrigin(hit.primitive, hit.object, uint(passes ? entering : !entering), medium.mask);
             lost = float(event + 1u == uint(MAX_EVENTS));
         }

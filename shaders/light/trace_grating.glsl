@@ -70,6 +70,9 @@ bool diffract(RayRecord ray, Hit hit, ShadingFrame frame, uint row, inout RayRec
     Deflection turned = diffract_at(frame, ray.direction, grating.lines, side, steps.y, order.reflects != 0u);
     if (order.reflects == 0u) child.flags ^= FLAG_INSIDE;
     send_on(child, turned, vec3(share), outcome);
+#ifdef POLARISED
+    polarise_order(child, ray, order.reflects != 0u);
+#endif
 #ifdef HERO
     child.companion_throughput *= share;
     if (steps.y != 0.0) leave_companions(child);

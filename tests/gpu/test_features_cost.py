@@ -17,7 +17,8 @@ from spectrasplat.bench.features.symbol_proof import FEATURE_SYMBOLS, compiled_s
 from spectrasplat.bench.features.variants import DISPERSION, Trial, Variant, trials
 from spectrasplat.gpu.context import Context
 from spectrasplat.gpu.scene_buffers import SceneBuffers
-from spectrasplat.model.features import Features, explain
+from spectrasplat.model.features import Features
+from spectrasplat.model.features_explained import explain
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings

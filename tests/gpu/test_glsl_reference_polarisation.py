@@ -28,8 +28,8 @@ COUNT = 2000
 ROTATE = """
     Polarisation state = Polarisation(across_direction(d), q, u, v);
     vec3 other = cross(d, state.axis);
-    vec3 s[3] = vec3[](cos(angle.x) * state.axis + sin(angle.x) * other, cos(angle.y) * state.axis + sin(angle.y) * other,
-        cos(angle.z) * state.axis + sin(angle.z) * other);
+    vec3 s[3];
+    for (int place = 0; place < 3; ++place) s[place] = cos(angle[place]) * state.axis + sin(angle[place]) * other;
     Polarisation seen = in_plane(state, d, s);
 """
 
@@ -86,7 +86,7 @@ def test_an_event_is_that_of_jones_vectors(gl, event: str) -> None:
     """
     inputs = {"d": d, "angle": angle, "theta": theta, "eta": eta}
     inputs |= {name: each[:, i] for i, name in enumerate("quv")}
-    got = evaluate(gl.ctx, LIBRARY, body, inputs, {name: "vec3" for name in ("share", "lq", "lu", "lv")})
+    got = evaluate(gl.ctx, LIBRARY, body, inputs, dict.fromkeys(("share", "lq", "lu", "lv"), "vec3"))
     r_s, r_p, t_s, t_p = polarisation.amplitudes(-theta, eta)
     ones = np.ones_like(theta)
     a_s, a_p = {"transmission": (t_s, t_p), "mirror": (-ones, ones)}.get(event, (r_s, r_p))

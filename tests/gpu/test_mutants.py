@@ -80,7 +80,7 @@ MUTANTS = {
         "light/splat_shapes.glsl", "splat.amplitude *= as_drawn", "float unused = as_drawn", f"{_BALANCE}[prism]"
     ),
     "band ends without direction dispersion": Mutant(
-        "light/trace.comp",
+        "light/trace_bands.glsl",
         "theta.x += dtheta * variable_step",
         "theta.x += 0.0 * variable_step",
         f"{_PATHS}[steep Fresnel]",
@@ -168,9 +168,11 @@ MUTANTS = {
     "a covered surface bends light": Mutant(
         "lib/medium.glsl", "boundary.before != boundary.after", "true", f"{_PATHS}[nested, the outer decides]"
     ),
-    "a cut part anchored at its end": Mutant("light/trace.comp", "float x = 0.5 * (lo + hi);", "float x = lo;", _CUTS),
+    "a cut part anchored at its end": Mutant(
+        "light/trace_bands.glsl", "float x = 0.5 * (lo + hi);", "float x = lo;", _CUTS
+    ),
     "a cut part starts where the whole did": Mutant(
-        "light/trace.comp", "ray.position += change * ray.dposition[SPATIAL + g].xyz;", "", _CUTS
+        "light/trace_bands.glsl", "ray.position += change * ray.dposition[SPATIAL + g].xyz;", "", _CUTS
     ),
     "columns end before the surface's tilt": Mutant(
         "lib/optics.glsl",

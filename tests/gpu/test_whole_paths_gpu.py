@@ -95,6 +95,9 @@ class Case:
     lattice: int = 60
     tolerance: float = 1e-4
     """Relative. A mirror's colour has kinks at whole nanometres, which the spectral table rounds by 1e-3."""
+    polarisation: bool = False
+    compared: int = 24
+    """Paths at most."""
 
 
 CASES = {
@@ -145,14 +148,14 @@ CASES = {
 def weights_agree(gl: Context, case: Case) -> None:
     """Compare; AssertionError where a path is elsewhere or weaker."""
     objects = (*case.objects(), placed("room", box((16.0, 16.0, 16.0)), Diffuse()))
-    photons = trace_light(gl, objects, LIGHT, [BAND], case.lattice, case.depth)
-    reference = ReferenceScene.of(objects)
+    photons = trace_light(gl, objects, LIGHT, [BAND], case.lattice, case.depth, polarisation=case.polarisation)
+    reference = replace(ReferenceScene.of(objects), polarisation=case.polarisation)
     choices = photons.choices(case.depth)
     compared, covered, skipped, spread = 0, 0, 0, []
     rows = [
         i for i in np.random.default_rng(2).permutation(len(choices)) if choices[i].count(REFRACTED) >= case.refractions
     ]
-    for i in rows[:24]:
+    for i in rows[: case.compared]:
         lo, anchor, hi = photons.nm[i]
         path = reference.path(photons, photons.q[i], choices[i], reference.bodies(anchor))
         if np.linalg.norm(path.ray.position - photons.position[i]) > 1e-3 or len(path.reflections) != len(choices[i]):
@@ -231,7 +234,7 @@ def test_mutants_are_caught(gl, name: str, tmp_path: Path, monkeypatch: pytest.M
         weights_agree(gl, CASES[case])
 
 
-def cuts_agree(gl: Context) -> None:
+def cuts_agree(gl: Context, polarisation: bool = False) -> None:
     """A band that total reflection cuts at a face where it arrives dispersed in place and direction; both parts against
     exact paths."""
     apex, n = np.pi / 3, float(glasses.index("N-BK7", 503.0))
@@ -252,8 +255,8 @@ def cuts_agree(gl: Context) -> None:
     )
     objects = (*solids, placed("room", box((16.0, 16.0, 16.0)), Diffuse()))
     light = beam_light(np.append(entry - 4 * along, 0.0), np.append(along, 0.0), 0.1)
-    photons = trace_light(gl, objects, light, [(500.0, 506.0)], 150, 5)
-    reference = ReferenceScene.of(objects)
+    photons = trace_light(gl, objects, light, [(500.0, 506.0)], 150, 5, polarisation=polarisation)
+    reference = replace(ReferenceScene.of(objects), polarisation=polarisation)
     choices = photons.choices(7)
     parts = {
         part: [i for i, made in enumerate(choices) if made[:4] == (REFRACTED, REFRACTED, REFRACTED, part)]
@@ -278,8 +281,9 @@ def cuts_agree(gl: Context) -> None:
         )
 
 
-def test_cut_bands_against_exact_paths(gl) -> None:
-    cuts_agree(gl)
+@pytest.mark.parametrize("polarisation", [False, True], ids=["unpolarised", "polarised"])
+def test_cut_bands_against_exact_paths(gl, polarisation: bool) -> None:
+    cuts_agree(gl, polarisation)
 
 
 @pytest.mark.parametrize(
@@ -292,6 +296,6 @@ def test_cut_bands_against_exact_paths(gl) -> None:
     ids=["position stays", "direction stays", "anchored at the end"],
 )
 def test_mutants_of_cuts_are_caught(gl, old: str, new: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    mutate(monkeypatch, tmp_path, "light/trace.comp", old, new)
+    mutate(monkeypatch, tmp_path, "light/trace_bands.glsl", old, new)
     with pytest.raises(AssertionError):
         cuts_agree(gl)

@@ -40,6 +40,8 @@ class ReferenceScene:
     triangles: TriangleList
     around_light: frozenset[int] = frozenset()
     """Glasses that the light stands in."""
+    polarisation: bool = False
+    """Paths carry their light's polarisation."""
 
     @staticmethod
     def of(objects: Sequence[SceneObject]) -> ReferenceScene:
@@ -93,6 +95,7 @@ class ReferenceScene:
             len(events),
             along,
             self.around_light,
+            self.polarisation,
         )
 
     def columns(self, photons: Photons, i: int, choices: Sequence[int], along: Sequence[int]) -> np.ndarray:

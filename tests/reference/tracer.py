@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 from reference.grating import diffract_columns
 from reference.surfaces import Facet, Surface
-from spectrasplat.reference import optics
+from spectrasplat.reference import optics, polarised
 
 
 def _no_columns() -> np.ndarray:
@@ -218,6 +218,7 @@ def follow(
     max_depth: int = 64,
     along: Sequence[int] | None = None,
     inside: frozenset[int] | None = None,
+    polarisation: bool = False,
 ) -> Path:
     """Follow one path among glasses that may nest or touch, mirrors and receivers.
 
@@ -228,6 +229,8 @@ def follow(
     `inside`: glasses that the ray starts in, found by counting boundaries where it is not given.
     """
     inside = scene.holding(ray) if inside is None else inside
+    field = np.zeros((2, 3), complex)
+    polarised.begin_unpolarised(field, *ray.direction)
     triangles: list[int] = []
     reflections: list[bool] = []
     factor, margin = 1.0, 1.0
@@ -253,6 +256,7 @@ def follow(
             return Path(arrived, tuple(triangles), tuple(reflections), True, factor, margin)
         if body.kind == "mirror":
             ray = reflected(arrived, normal, dnormal)
+            _turned(field, arrived, ray, normal, -1.0, 1.0)
             factor *= body.reflectance
             reflections.append(True)
             continue
@@ -275,10 +279,23 @@ def follow(
         reflectance = float(optics.fresnel_reflectance(arrived.direction, normal, eta_it))
         margin = min(margin, float(np.sqrt(abs(optics.transmitted_cosine2(arrived.direction, normal, eta_it)))))
         beyond = None if reflects(len(reflections)) else refracted(arrived, normal, dnormal, n_i.index, n_t.index)
-        factor *= reflectance if beyond is None else 1.0 - reflectance
+        sent = reflected(arrived, normal, dnormal) if beyond is None else beyond
+        if polarisation:
+            r_s, r_p, t_s, t_p = polarised.amplitudes(-float(arrived.direction @ normal), eta_it)
+            factor *= _turned(field, arrived, sent, normal, *((r_s, r_p) if beyond is None else (t_s, t_p)))
+        else:
+            factor *= reflectance if beyond is None else 1.0 - reflectance
         reflections.append(beyond is None)
-        ray, inside = (reflected(arrived, normal, dnormal), before) if beyond is None else (beyond, after)
+        ray, inside = sent, before if beyond is None else after
     return Path(ray, tuple(triangles), tuple(reflections), False, factor, margin)
+
+
+def _turned(field: np.ndarray, before: Ray, after: Ray, normal: np.ndarray, a_s: complex, a_p: complex) -> float:
+    """Turn electric fields with the ray by amplitudes for s and p; returns the share of their power that goes on."""
+    s = polarised.senkrecht(*before.direction, *normal)
+    share = polarised.share_of(field, *before.direction, *s, complex(a_s), complex(a_p))
+    polarised.turn_fields(field, *before.direction, *after.direction, *s, complex(a_s), complex(a_p))
+    return float(share)
 
 
 def _diffracted(ray: Ray, normal_out: np.ndarray, body: Body, index: Index) -> Ray | None:

@@ -18,8 +18,10 @@ from spectrasplat.gpu.limits import BRUSH_STORAGE_BLOCKS, NEEDED
 from spectrasplat.gpu.program_use import use_of
 from spectrasplat.gpu.scene_buffers import SCENE_STRUCTS
 from spectrasplat.gpu.texture_store import PICTURE
-from spectrasplat.model.features import Features, explain
+from spectrasplat.model.features import Features
+from spectrasplat.model.features_explained import explain
 from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes.camera_records import CAMERA_LIGHT, CAMERA_PARAMETERS
 from spectrasplat.passes.footprint import SPLAT
@@ -98,6 +100,7 @@ WITHOUT = {
         "merged_groups": False,
         **PLAIN_CAMERA,
     },
+    "polarisation": {"polarised": False},
     "mirrors": {"mirrors": False},
     "gratings": {"gratings": False},
     "interpolated normals": {"smooth_normals": False, "normal_derivatives": False},
@@ -120,7 +123,8 @@ WITHOUT = {
 
 def sources(features: Features) -> list[shader.Source]:
     """The light pass's and the camera's sources, with stand-ins for the numbers that only a scene's data give."""
-    ray, photon = records.ray_record(features.defines()["COLUMNS"]), records.photon_record(features.spectral_groups)
+    ray = records.ray_record(features.defines()["COLUMNS"], polarised=features.polarised)
+    photon = records.photon_record(features.spectral_groups)
     structs = (*SCENE_STRUCTS, ray, photon, records.OUTCOME, records.TRACE_PARAMETERS, records.EMIT_PARAMETERS)
     copies = " ".join(
         f"photon.dposition_dvar{g} = ray.dposition[SPATIAL + {g}];" for g in range(features.spectral_groups)
@@ -206,6 +210,7 @@ def camera_sources(
         "ABSORPTION": features.absorption and features.camera_specular,
         "NORMAL_DERIVATIVES": features.smooth_normals,
         "LENS": features.lens,
+        "POLARISED": features.polarised and features.camera_specular,
         **(images or {}),
     }
     for name in switches:
@@ -231,9 +236,11 @@ def scene_features(name: str) -> Features:
 def test_symbols_come_and_go_with_their_feature(feature: str) -> None:
     """Every symbol listed is in some program with the feature in, and in none with it out."""
     symbols = tuple(s for s in FEATURE_SYMBOLS[feature] if "1[0-9]" not in s)
-    present = {s for source in sources(EVERYTHING) for s in occurring(source.text, symbols)}
+    # Polarised light has no mean reflectance of its own.
+    everything = replace(EVERYTHING, polarised=feature == "polarisation")
+    present = {s for source in sources(everything) for s in occurring(source.text, symbols)}
     assert present == set(symbols)
-    for source in sources(replace(EVERYTHING, **WITHOUT[feature])):
+    for source in sources(replace(everything, **WITHOUT[feature])):
         assert occurring(source.text, symbols) == (), source.name
 
 
@@ -282,6 +289,23 @@ def test_a_scene_without_dispersion_has_no_spectral_code_nor_columns() -> None:
     plain, carrying = RecordSizes.of(features), RecordSizes.of(forced)
     assert (carrying.ray - plain.ray, carrying.photon - plain.photon) == (32, 16)
     assert (plain.columns, carrying.columns) == (2, 3)
+
+
+def _reasons(scene: Scene) -> dict[str, str]:
+    return {name: reason for name, _, reason in explain(scene, Features.of(scene, RenderSettings()))}
+
+
+def test_states_of_polarisation_cost_nothing_where_they_are_not_asked_for() -> None:
+    scene = load_scene(paths.assets_dir() / "scenes" / "prism.toml")
+    asked = replace(scene, render=replace(scene.render, polarisation=True))
+    plain, polarised = (Features.of(each, RenderSettings()) for each in (scene, asked))
+    assert not plain.polarised and replace(polarised, polarised=False) == plain
+    assert RecordSizes.of(polarised).ray - RecordSizes.of(plain).ray == 48
+    assert static_costs(asked, polarised)["polarisation"] == "48 B a ray"
+    assert "asks for it" in _reasons(asked)["polarisation"]
+    without = replace(asked, objects=tuple(o for o in asked.objects if not o.material.transmits))
+    assert not Features.of(without, RenderSettings()).polarised
+    assert "no glass" in _reasons(without)["polarisation"]
 
 
 IMAGES = {"HAS_IMAGES": 1, "TEXTURE_COUNT": 1, "BIND_PICTURES": 13, "UNIT_PICTURES": 11, "UNIT_CORNERS": 12}

@@ -16,7 +16,8 @@ import numpy as np
 
 from ... import __version__
 from ...base.errors import UserError
-from ...model.features import Features, explain
+from ...model.features import Features
+from ...model.features_explained import explain
 from ...model.settings import RenderSettings
 from ...render.device_scene import spectral_axis
 from ...render.light_pass import LightPass

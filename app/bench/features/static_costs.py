@@ -37,7 +37,7 @@ class RecordSizes:
         columns = features.defines()["COLUMNS"]
         slots = (2 if features.nested_windows else 1) * SPLAT.stride
         return RecordSizes(
-            ray_record(columns, features.hero).stride,
+            ray_record(columns, features.hero, features.polarised).stride,
             photon_record(features.spectral_groups, features.hero).stride,
             slots,
             features.targets * _TEXEL,
@@ -57,6 +57,7 @@ def static_costs(scene: Scene, features: Features) -> dict[str, str]:
     sizes = RecordSizes.of(features)
     unspectral = RecordSizes.of(replace(features, spectral_groups=0))
     unspatial = RecordSizes.of(replace(features, footprints=False))
+    unpolarised = RecordSizes.of(replace(features, polarised=False))
     specular = [o for o in scene.objects if o.material.is_specular]
     convex = half_spaces(scene)
     loose = [o for i, o in enumerate(scene.objects) if i not in convex]
@@ -83,6 +84,7 @@ def static_costs(scene: Scene, features: Features) -> dict[str, str]:
         "band cuts": (features.band_cuts, "one program more; a cut ray becomes two"),
         "spatial columns": (features.footprints, f"{sizes.ray - unspatial.ray} B a ray"),
         "refraction": (features.dielectrics, f"{size_words(row * len(glasses))} of indices; two children a surface"),
+        "polarisation": (features.polarised, f"{sizes.ray - unpolarised.ray} B a ray"),
         "mirrors": (features.mirrors, f"{size_words(row * mirrors)} of reflectances"),
         "gratings": (features.gratings, f"{_TEXEL} B an order; a step of the queue for each"),
         "interpolated normals": (features.smooth_normals, f"{3 * _TEXEL} B a facet, {size_words(3 * _TEXEL * smooth)}"),

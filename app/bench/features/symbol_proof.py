@@ -53,6 +53,7 @@ FEATURE_SYMBOLS: dict[str, tuple[str, ...]] = {
         "cross_boundary",
         "cross_glass",
     ),
+    "polarisation": ("stokes_q", "incidence_axis", "fresnel_reflection", "behind_interface", "polarise_path"),
     "mirrors": (r"\(kind == KIND_MIRROR\) ",),
     "gratings": ("grating_at", "diffract_direction", "GRATINGS_AT"),
     "interpolated normals": (

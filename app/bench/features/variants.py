@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...model.features import Features, explain, half_spaces
+from ...model.features import Features, half_spaces
+from ...model.features_explained import explain
 from ...model.geometry.mesh import Mesh
 from ...model.scene import Absorption, Scene, SceneObject
 
@@ -36,7 +37,7 @@ class Trial:
     """One feature: two variants that differ in it alone, or why there are none."""
 
     feature: str
-    """As `spectrasplat.model.features.explain` calls it."""
+    """As `spectrasplat.model.features_explained.explain` calls it."""
     included: bool
     reason: str
     carried: Variant | None
@@ -134,6 +135,8 @@ def _left_out(name: str, scene: Scene, base: Features, asked: Variant) -> tuple[
             )
         case "absorption":
             return asked, Variant(scene, replace(base, absorption=False)), ""
+        case "polarisation":
+            return asked, Variant(scene, replace(base, polarised=False)), "without it light is weighed another way"
         case "contacts":
             return asked, Variant(scene, replace(base, contacts=False)), "without it light is lost between surfaces"
         case "medium stack":
@@ -231,6 +234,8 @@ def _forced_in(name: str, scene: Scene, base: Features, asked: Variant) -> tuple
             )
         case "shared spectral variable":
             return None, None, "cannot be forced in: light would be drawn another way"
+        case "polarisation":
+            return None, None, "cannot be forced in: light would be weighed another way"
         case "spectral maps":
             return None, None, "cannot be forced in: the channels are those of glass that the camera sees"
         case _ if name in _CAMERA:

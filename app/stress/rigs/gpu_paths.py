@@ -29,6 +29,7 @@ from ...model.scene import (
     Light,
     Material,
     Mirror,
+    RenderDefaults,
     Scene,
     SceneObject,
 )
@@ -181,13 +182,15 @@ def trace_light(
     max_depth: int = 3,
     method: str = "srd",
     place: tuple[float, float] = (0.5, 0.5),
+    polarisation: bool = False,
 ) -> Photons:
     """All landings of `count` lattice points for each spectral band.
 
     Every interface splits and nothing plays roulette, so each path is there once and with its true flux (1 W
     per unit of the light's quantity and band). `place` is where on an extended light the rays start.
     """
-    scene = Scene("question", Camera((0, 0, 9), (0, 0, 0), up=(0, 1, 0)), (light,), tuple(objects))
+    camera, render = Camera((0, 0, 9), (0, 0, 0), up=(0, 1, 0)), RenderDefaults(polarisation=polarisation)
+    scene = Scene("question", camera, (light,), tuple(objects), render=render)
     features = Features.of(scene, RenderSettings(method=method))
     buffers = SceneBuffers(gl.ctx, scene, features, spectral_axis(scene, features))
     trace = TracePass(
@@ -263,6 +266,7 @@ def trace_beam(
     count: int = 256,
     max_depth: int = 3,
     method: str = "srd",
+    polarisation: bool = False,
 ) -> Photons:
     """Send about `count` lattice points of a disc beam through `solid` (a mesh of `material`, or several objects).
 
@@ -276,7 +280,8 @@ def trace_beam(
     bands = [(nm, nm)] if isinstance(nm, float) else [nm] if isinstance(nm, tuple) else list(nm)
     objects = (*solid, placed("screen", screen_mesh, Diffuse()))
     count = int(np.ceil(count * wider**2))
-    everything = trace_light(gl, objects, beam_light(start, direction, radius * wider), bands, count, max_depth, method)
+    light = beam_light(start, direction, radius * wider)
+    everything = trace_light(gl, objects, light, bands, count, max_depth, method, polarisation=polarisation)
 
     def inside(points: np.ndarray) -> np.ndarray:
         from_axis = np.cross(points - np.asarray(start, float), everything.emitter.domain.axis)
