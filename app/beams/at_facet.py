@@ -111,7 +111,7 @@ def onset(hand, facets, solids, tables, source, before, after, low, high, work):
     for turn in range(45):
         x = low if turn == 0 else 0.5 * (low + high)
         u, v = hand.centre[0], hand.centre[1]
-        follow(source, facets, solids, tables, hand.path, hand.flight, x, u, v, position, direction)
+        follow(source, facets, solids, tables, hand.path, hand.flight, x, u, v, position, direction, work.state)
         cosine = facing(facets[hand.facet], direction)
         is_total = transmitted(cosine, index_of(tables, before, x) / index_of(tables, after, x)) <= 0.0
         if turn == 0:
@@ -186,7 +186,9 @@ def child(nodes, action, before, after, mask, facets, solids, tables, work):
     row[0], row[1], row[2], row[3] = hand.facet, action, before, after
     row[4] = solids[inside].tint if inside >= 0 else -1
     for a in range(first_place(hand), last_place(hand)):
-        new.weight[a] *= meet(facets, solids, tables, new.path, flight, new.x[a], new.position[a], new.direction[a])
+        new.weight[a] *= meet(
+            facets, solids, tables, new.path, flight, new.x[a], new.position[a], new.direction[a], new.state[a]
+        )
     new.flight, new.depth, new.mask = flight + 1, depth, mask
     new.facet, new.total = -1, UNKNOWN
     new.key = mixed(hand.key, 3 + action)

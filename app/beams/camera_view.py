@@ -17,6 +17,7 @@ from .convert import hulls_around, objects_of, of_kind
 from .facets import BLACK, SAMPLES, BeamScene, beam_scene, in_gpu_space
 from .find import Emission, GoOn, Search, search
 from .leaves import Leaves
+from .polarised_arrays import from_one_axis
 from .rays import PARALLEL, PINHOLE, SOURCE
 from .screen_polygons import ScreenPolygons
 from .search import LEAF_OPEN, LEAF_PIECE, LEAF_TAIL, SUM_BEAMS, SUM_ENTERED, SUM_LEAVES, SUMS
@@ -158,6 +159,7 @@ def _screen_polygons(leaves: list[Leaves], scene: BeamScene, middle: np.ndarray,
         ray[:, 1],
         np.concatenate([part.density for part, _ in parts]),
         np.concatenate([part.slope for part, _ in parts]) * footprint,
+        from_one_axis(np.concatenate([part.state for part, _ in parts]), ray[:, 1, 1, 0]),
         scene.facets["triangle"][last].astype(np.int32),
         scene.facets["owner"][last].astype(np.int32),
         towards < 0.0,

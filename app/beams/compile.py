@@ -49,7 +49,7 @@ def _square() -> BeamPieces:
     one, corner = np.zeros(1, np.int32), np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     ray, starts, edges = np.ones((1, 3, 3, 3)), np.array([0, 3], np.int32), np.zeros((3, 6))
     floats = np.zeros(1), np.ones(1), np.zeros((1, 2)), ray, ray, np.ones((1, 3))
-    facet = one, one, one > 0, one.astype(np.uint64), one.astype(np.int64), one > 0, one
+    facet = one, one, one > 0, one.astype(np.uint64), one.astype(np.int64), one > 0, one, np.zeros((1, 3, 6))
     return BeamPieces(one, one, one, *floats, *facet, starts, edges, starts, corner)
 
 

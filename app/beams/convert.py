@@ -8,6 +8,7 @@ from .compiling import jit
 from .facets import BeamScene
 from .leaves import Leaves
 from .lifetimes import lifetimes_of
+from .polarised_arrays import from_one_axis
 from .polygons import BeamPieces, BeamPolygons, parabola_at
 from .search import LEAF_PIECE, LEAF_RECEIVER, LEAF_TAIL
 
@@ -129,6 +130,7 @@ def pieces_of(leaves: list[Leaves], scene: BeamScene, light: int, measure: float
         head[:, 8],
         head[:, 0] == LEAF_TAIL,
         chosen.flux,
+        from_one_axis(chosen.state, chosen.ray[:, 1, 1, 0]),
         np.concatenate([[0], np.cumsum(counts)]).astype(np.int32),
         edges,
         hull_start,

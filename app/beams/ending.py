@@ -98,7 +98,7 @@ def strays(hand, facets, solids, tables, source, work):
     u, v = hand.centre[0], hand.centre[1]
     for turn in range(2):
         x = hand.x[2 * turn] + (0.25 - 0.5 * turn) * (hand.x[2] - hand.x[0])
-        follow(source, facets, solids, tables, hand.path, hand.flight, x, u, v, position, direction)
+        follow(source, facets, solids, tables, hand.path, hand.flight, x, u, v, position, direction, work.state)
         off = across = along = 0.0
         near, middle, far = hand.direction[2 * turn], hand.direction[1], hand.direction[2 - 2 * turn]
         for k in range(3):

@@ -100,6 +100,8 @@ class BeamScene:
     """Objects of glass and mirrors whose light is carried by beams."""
     why_not: dict[int, str]
     """Specular objects that beams do not carry, and why."""
+    polarised: bool
+    """Beams carry their light's state of polarisation."""
 
 
 def in_gpu_space(world_meshes: list[Mesh], to_gpu: Callable[[np.ndarray], np.ndarray], unit: float) -> list[Mesh]:
@@ -161,6 +163,7 @@ def beam_scene(
         tint_curves(scene),
         tuple(i for i in outlines if scene.objects[i].material.is_specular),
         why_not,
+        scene.render.polarisation,
     )
 
 

@@ -94,6 +94,7 @@ def search(
         # In one piece where nothing is coloured: for the same time that is half the error of four bands in a cut stone.
         bands += [(lo, hi, 1.0) for lo, hi in pairwise(emission.edges)]
     sources = np.concatenate([emission.source, *emission.beside])
+    sources["polarised"] = scene.polarised
     args = scene.facets, scene.solids, tables, sources
     starts: list[tuple[int, np.ndarray, np.ndarray]] = []
     blocked: set[int] = set()

@@ -8,6 +8,7 @@ import numpy as np
 
 from .compiling import part
 from .nodes import first_place, last_place
+from .polarised import STATE
 from .rays import PARALLEL, advance, at_x, follow
 from .search import medium
 
@@ -31,6 +32,8 @@ class Leaves:
     """(L,)."""
     ray: np.ndarray
     """(L, 2, 3, 3, 3): position and direction about q = the beam's centre; of pieces and open leaves."""
+    state: np.ndarray
+    """(L, 3, 6): of polarisation, at the three places (`polarised`)."""
     edge: np.ndarray
     """(E, 3, 3): a_u, a_v, c at the three places; |a| = 1."""
     soft: np.ndarray
@@ -60,6 +63,7 @@ LEAF = np.dtype(
         ("slope", "f8", 2),
         ("flux", "f8"),
         ("ray", "f8", (2, 3, 3, 3)),
+        ("state", "f8", (3, STATE)),
     ]
 )
 EDGE = np.dtype([("line", "f8", (3, 3)), ("soft", "f8")])
@@ -92,6 +96,7 @@ class Store:
             slope=leaf["slope"],
             flux=leaf["flux"],
             ray=leaf["ray"],
+            state=leaf["state"],
             edge=edge["line"],
             soft=edge["soft"],
             corner=self.corner[: count[2]].copy(),
@@ -191,6 +196,8 @@ def lay_leaf(beam, facets, kind, leaf, edge, corner, work):
     for a in range(3):
         b = a if lo == 0 else 1
         new.x[a] = beam.x[a]
+        for c in range(STATE):
+            new.state[a, c] = beam.state[b, c]
         for c in range(3):
             for k in range(3):
                 new.ray[0, a, c, k] = beam.position[b, c, k]
@@ -227,7 +234,18 @@ def density_slope(beam, facets, solids, tables, source, kind, new, work):
             at[0], at[1] = beam.centre[0], beam.centre[1]
             at[w] += step * (2 * sign - 1)
             value = follow(
-                source, facets, solids, tables, beam.path, beam.flight, beam.x[1], at[0], at[1], position, direction
+                source,
+                facets,
+                solids,
+                tables,
+                beam.path,
+                beam.flight,
+                beam.x[1],
+                at[0],
+                at[1],
+                position,
+                direction,
+                work.state,
             )
             if kind == 0:
                 distance, det = plane_map(facets[beam.facet], position, direction, m, work)

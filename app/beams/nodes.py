@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from .compiling import part
+from .polarised import STATE, begin
 from .rays import PARALLEL, edge_line, emit, emit_straight, emitted, meet, moments, total_line
 
 CORNERS, LINES, LEVELS = 84, 96, 160
@@ -37,10 +38,11 @@ NODE = np.dtype(
         ("line", "f8", (LINES, 3, 3)),
         ("made", "i4", (LINES, 4)),
         ("lines", "i8"),
-        # Rays of the flight that is going on, at the three places, about q = `centre`.
+        # Rays of the flight that is going on, at the three places, about q = `centre`; states of polarisation.
         ("position", "f8", (3, 3, 3)),
         ("direction", "f8", (3, 3, 3)),
         ("weight", "f8", 3),
+        ("state", "f8", (3, STATE)),
         ("x", "f8", 3),
         ("centre", "f8", 2),
         # Facets met and specular events so far.
@@ -136,6 +138,8 @@ def copy_head(beam, other):
             for k in range(3):
                 other.position[a, c, k] = beam.position[a, c, k]
                 other.direction[a, c, k] = beam.direction[a, c, k]
+        for c in range(STATE):
+            other.state[a, c] = beam.state[a, c]
         other.weight[a] = beam.weight[a]
         other.x[a] = beam.x[a]
     other.centre[0], other.centre[1] = beam.centre[0], beam.centre[1]
@@ -303,9 +307,10 @@ def lay_out(beam, facets, solids, tables, source, work):
         weight = 1.0
         for k in range(-1, beam.flight):
             if k >= 0:
-                weight *= meet(facets, solids, tables, beam.path, k, beam.x[a], position, direction)
+                weight *= meet(facets, solids, tables, beam.path, k, beam.x[a], position, direction, beam.state[a])
             else:
                 emit(source, beam.centre[0], beam.centre[1], position, direction)
+                begin(source, direction, beam.state[a])
                 weight = emitted(source, beam.centre[0], beam.centre[1], direction)
                 if source.kind != PARALLEL:
                     emit_straight(source, beam.centre[0], beam.centre[1], work.rays[2], work.rays[3])

@@ -131,6 +131,8 @@ class BeamPieces(Outlines):
     """bool (M,), whether it was merely too weak to be followed on."""
     flux: np.ndarray
     """(M,), per unit of spectral power, middle of the band."""
+    state: np.ndarray
+    """(M, 3, 6): of polarisation, as `polarised`; zeros where it is not followed."""
     edge_start: np.ndarray
     edges: np.ndarray
     """(E, 6): a_u, a_v, c about q - centre at x_lo, the same at x_hi; |a| = 1."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from .compiling import jit, part
+from .polarised import begin, behind_glass, behind_mirror, count_from_s, is_followed
 
 PARALLEL, POINT, PINHOLE = 0, 1, 2
 """Kinds of sources. Rays of the last two diverge; a pinhole's weigh the same all over the picture."""
@@ -26,11 +27,13 @@ SOURCE = np.dtype(
         ("axis", "f8", 3),
         ("cone", "f8", 2),
         ("lambert", "?"),
+        ("polarised", "?"),
     ]
 )
 """Where beams set out from. Parallel: from origin + q_u right + q_v up along `forward`. Diverging: from `origin` along
 forward + q_u right + q_v up, made a unit vector (a gnomonic plane: straight edges stay straight). `axis` and `cone`: of
-a spot, and the half angles between which it fades, rad; beyond pi: none; `lambert`: by the cosine to `axis`. Records
+a spot, and the half angles between which it fades, rad; beyond pi: none; `lambert`: by the cosine to `axis`;
+`polarised`: its beams carry states of polarisation. Records
 instead of tuples of arrays throughout: what numba compiles takes a hundredth of the time."""
 
 
@@ -198,9 +201,9 @@ def index_of(tables, glass, x):
 
 
 @part
-def meet(facets, solids, tables, path, k, x, position, direction):
-    """End flight k of a bundle at its facet and send it on as the path says; returns the share of its power that goes
-    this way, what the medium absorbed on the flight included."""
+def meet(facets, solids, tables, path, k, x, position, direction, state):
+    """End flight k of a bundle, whose chief ray has a state of polarisation, at its facet and send it on as the path
+    says; returns the share of its power that goes this way, what the medium absorbed on the flight included."""
     facet = path[k, FACET]
     plane = facets[facet].plane
     distance = advance(position, direction, plane)
@@ -209,26 +212,39 @@ def meet(facets, solids, tables, path, k, x, position, direction):
         weight = np.exp(-at_x(tables, np.int64(path[k, ABSORBS]), x) * max(distance, 0.0))
     if path[k, ACTION] == PASS:
         return weight
+    followed = is_followed(state)
+    if followed:
+        count_from_s(state, direction, plane)
     if facets[facet].kind == 1:
         reflect(direction, plane)
+        if followed:
+            behind_mirror(state)
         return weight * at_x(tables, solids[facets[facet].owner].tint, x)
     theta = plane[0] * direction[0, 0] + plane[1] * direction[0, 1] + plane[2] * direction[0, 2]
     eta = index_of(tables, np.int64(path[k, BEFORE]), x) / index_of(tables, np.int64(path[k, AFTER]), x)
-    share = reflectance(abs(theta), eta, transmitted(theta, eta))
-    if path[k, ACTION] == REFLECT:
+    cosine2 = transmitted(theta, eta)
+    reflects = path[k, ACTION] == REFLECT
+    if followed:
+        weight *= behind_glass(state, abs(theta), eta, cosine2, reflects)
+    else:
+        share = reflectance(abs(theta), eta, cosine2)
+        weight *= share if reflects else 1.0 - share
+    if reflects:
         reflect(direction, plane)
-        return weight * share
-    refract(direction, plane, eta)
-    return weight * (1.0 - share)
+    else:
+        refract(direction, plane, eta)
+    return weight
 
 
 @part
-def follow(source, facets, solids, tables, path, flights, x, u, v, position, direction):
-    """A bundle about q = (u, v) from the source through the first `flights` facets of its path; returns its weight."""
+def follow(source, facets, solids, tables, path, flights, x, u, v, position, direction, state):
+    """A bundle about q = (u, v) from the source through the first `flights` facets of its path, and its state of
+    polarisation; returns its weight."""
     emit(source, u, v, position, direction)
     weight = emitted(source, u, v, direction)
+    begin(source, direction, state)
     for k in range(flights):
-        weight *= meet(facets, solids, tables, path, k, x, position, direction)
+        weight *= meet(facets, solids, tables, path, k, x, position, direction, state)
     return weight
 
 

@@ -48,6 +48,8 @@ class ScreenPolygons(Outlines):
     at x_hi: Fresnel, absorption, tints of mirrors, and one over the probability that the beam was kept."""
     slope: np.ndarray
     """(N, 2): relative change of the throughput with the place, per pixel."""
+    state: np.ndarray
+    """(N, 3, 6): of polarisation, as `polarised`; zeros where it is not followed."""
     last_triangle: np.ndarray
     """int32 (N,), some triangle (of the scene's, in the object's order) of the facet that was left last."""
     last_object: np.ndarray

@@ -25,6 +25,7 @@ from .nodes import (
     last_place,
     lay_out,
 )
+from .polarised import STATE
 from .rays import advance, at_x, edge_line, follow
 
 LEAF_RECEIVER, LEAF_PIECE, LEAF_OPEN, LEAF_TAIL = 0, 1, 2, 3
@@ -99,6 +100,7 @@ WORK = np.dtype(
         ("renamed", "i8", LINES),
         ("moment", "f8", (4, 3, 6)),
         ("rays", "f8", (4, 3, 3)),
+        ("state", "f8", STATE),
         ("map", "f8", (3, 3, 2)),
         ("det", "f8", 3),
         ("point", "f8", 2),
@@ -279,7 +281,7 @@ def is_curved(beam, facets, solids, tables, source, tolerance, work):
     worst = 0.0
     for c in range(beam.corners[a]):
         u, v = beam.corner[a, c, 0], beam.corner[a, c, 1]
-        follow(source, facets, solids, tables, beam.path, beam.flight, beam.x[a], u, v, exact, direction)
+        follow(source, facets, solids, tables, beam.path, beam.flight, beam.x[a], u, v, exact, direction, work.state)
         advance(exact, direction, plane)
         u -= beam.centre[0]
         v -= beam.centre[1]

@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..beams.piece_lattice import PieceLattice, PieceRays
+from ..beams.polarised_arrays import across, stokes_over_band
 from ..beams.polygons import BeamPieces, parabola_at
 from ..gpu.records import FLAG_INSIDE
 from ..gpu.reindex import Spans
@@ -105,7 +106,20 @@ class BeamEmission:
             at = np.arange(len(rays)), spatial + group
             records["dposition"][*at, :3] = rays.dposition[:, 2] * per_variable[:, None]
             records["ddirection"][*at, :3] = rays.ddirection[:, 2] * per_variable[:, None]
+        if self._features.polarised:
+            self._polarise(records, own, rays.band)
         return records
+
+    def _polarise(self, records: np.ndarray, own: np.ndarray, band: np.ndarray) -> None:
+        """States at the three places of each ray's band, by the parabola through those of its piece."""
+        pieces = self.pieces
+        width = (pieces.x_hi - pieces.x_lo)[own]
+        t = np.where(width[:, None] > 0.0, (band - pieces.x_lo[own, None]) / np.maximum(width, 1e-300)[:, None], 0.5)
+        stokes = stokes_over_band(pieces.state[own], t)
+        axis = across(pieces.state[own, 1, 3:], records["direction"].astype(float))
+        for k, name in enumerate("quv"):
+            records[f"stokes_{name}"] = stokes[..., k]
+            records[f"axis_{'xyz'[k]}"] = axis[:, k]
 
     def _intervals(self, spans: Spans) -> tuple[np.ndarray, np.ndarray]:
         """Ends of all that a line's photons stand for, (M,) each: up to half the way to the next line, unless the line

@@ -253,6 +253,7 @@ def _leave(found: _Found, beam: _Beam, about) -> None:
             "last_object": solid,
             "is_inside": False,
             "inside": 0,
+            "state": np.zeros((3, 6)),
         }
     )
     # An edge that others leave nothing to cut is no edge.
@@ -267,7 +268,14 @@ def _leave(found: _Found, beam: _Beam, about) -> None:
 def _joined(found: _Found) -> ScreenPolygons:
     kinds = {"is_handed": bool, "is_inside": bool, "key": np.uint32, "inside": np.uint64}
     kinds |= dict.fromkeys(("source", "depth", "last_triangle", "last_object"), np.int32)
-    shapes = {"centre": (2,), "position": (3, 3, 3), "direction": (3, 3, 3), "throughput": (3,), "slope": (2,)}
+    shapes = {
+        "centre": (2,),
+        "position": (3, 3, 3),
+        "direction": (3, 3, 3),
+        "throughput": (3,),
+        "slope": (2,),
+        "state": (3, 6),
+    }
     names = [n for n in ScreenPolygons.__dataclass_fields__ if n not in ("edges", "hulls", "edge_start", "hull_start")]
     values = {
         name: np.array([row[name] for row in found.rows], kinds.get(name, float)).reshape(-1, *shapes.get(name, ()))

@@ -62,6 +62,7 @@ def piece(
         key=np.array([next(_KEYS)]),
         is_tail=np.zeros(1, bool),
         flux=np.ones(1),
+        state=np.zeros((1, 3, 6)),
         edge_start=np.array([0, len(corners)], np.int32),
         edges=edges_of(corners, move),
         hull_start=np.array([0, len(hull)], np.int32),
