@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 import moderngl
 import numpy as np
 
+from ..beams.polarised_arrays import across, bounded
 from ..beams.polygons import parabola_at
 from ..beams.screen_polygons import ScreenPolygons
 from ..beams.screen_starts import ScreenStarts
@@ -39,20 +40,34 @@ BEAM_START = Struct(
     ),
 )
 
+POLARISED_START = Struct(
+    "BeamStart",
+    (
+        *BEAM_START.fields,
+        Field("axis", "vec3", "across the direction"),
+        Field("stokes_q", "float", "from the axis, as in `RayRecord`"),
+        Field("stokes_u", "float"),
+        Field("stokes_v", "float"),
+        Field("reserved", "uvec2"),
+    ),
+)
+"""With the state of polarisation."""
+
 
 class BeamStarts:
     """Owns the program and the starts of one portion."""
 
     def __init__(self, ctx: moderngl.Context, defines: Defines, structs: Sequence[Struct], room: int) -> None:
         """`defines`: `start_defines` of the camera's; `room`: paths of a portion."""
-        self._program = shader.compute(ctx, "camera/camera.comp", defines, (*structs, BEAM_START))
-        self._buffer = ctx.buffer(reserve=BEAM_START.stride * room)
+        self._struct = POLARISED_START if "POLARISED" in defines else BEAM_START
+        self._program = shader.compute(ctx, "camera/camera.comp", defines, (*structs, self._struct))
+        self._buffer = ctx.buffer(reserve=self._struct.stride * room)
         self._room = room
-        self._records = BEAM_START.zeros(0)
+        self._records = self._struct.zeros(0)
 
     def take(self, starts: ScreenStarts, polygons: ScreenPolygons, scene: SceneBuffers, width: int) -> None:
         """Pack paths of these polygons of a picture so wide."""
-        self._records = packed(starts, polygons, scene, width)
+        self._records = packed(starts, polygons, scene, width, self._struct)
 
     def follow(
         self,
@@ -87,9 +102,11 @@ class BeamStarts:
         shader.release(self._program, self._buffer)
 
 
-def packed(starts: ScreenStarts, polygons: ScreenPolygons, scene: SceneBuffers, width: int) -> np.ndarray:
-    """BEAM_START records."""
-    records = BEAM_START.zeros(len(starts))
+def packed(
+    starts: ScreenStarts, polygons: ScreenPolygons, scene: SceneBuffers, width: int, struct: Struct = BEAM_START
+) -> np.ndarray:
+    """Records of `struct`."""
+    records = struct.zeros(len(starts))
     of = starts.polygon
     off = starts.place - polygons.centre[of]
     for name in ("position", "direction"):
@@ -112,4 +129,8 @@ def packed(starts: ScreenStarts, polygons: ScreenPolygons, scene: SceneBuffers, 
     records["last_primitive"] = scene.primitive_of(polygons.last_object[of], polygons.last_triangle[of])
     mask, inside_object = scene.media_of(polygons.inside)
     records["inside_mask"], records["inside_object"] = mask[of], inside_object[of]
+    if struct is POLARISED_START:
+        records["axis"] = across(polygons.state[of, 1, 3:], direction)
+        stokes = bounded(parabola_at(polygons.state[of, :, :3], starts.t))
+        records["stokes_q"], records["stokes_u"], records["stokes_v"] = stokes.T
     return records

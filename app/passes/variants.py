@@ -74,6 +74,7 @@ _BEYOND_ONLY = (
     "MAP_BINS",
     "ABSORPTION",
     "NORMAL_DERIVATIVES",
+    "POLARISED",
 )
 """What only rays beyond glass and mirrors need."""
 
@@ -254,6 +255,7 @@ def camera_defines(scene: SceneBuffers, channels: Channels, layer: str, maps: Ma
         "VISIBLE_LIGHTS": beauty and any(light.has_extent for light in lights),
         "ABSORPTION": specular and (coloured or absorbs),
         "NORMAL_DERIVATIVES": features.smooth_normals,
+        "POLARISED": specular and features.polarised,
     }
     for name in switches:
         defines.pop(name, None)
@@ -278,7 +280,7 @@ def halting_defines(beyond: Mapping[str, int | float | str]) -> Defines:
 def halted_bytes(beyond: Mapping[str, int | float | str]) -> int:
     """Room that surely holds one halted sample: its paths, and what it knows besides."""
     columns = int(beyond["SPECTRAL_GROUPS"]) + 2 * int("LENS" in beyond)
-    path = 312 + 40 * columns + 4 * int(beyond.get("ABSORBERS", 0))
+    path = 312 + 40 * columns + 4 * int(beyond.get("ABSORBERS", 0)) + 64 * int("POLARISED" in beyond)
     return (STACK + 1) * path + 16 * int(beyond["TARGETS"]) + 64
 
 
@@ -313,6 +315,7 @@ def screen_beam_defines(beyond: Mapping[str, int | float | str]) -> Defines:
     """For polygons of the picture that camera beams see, from what the listed pixels are compiled with. A beam's one
     spectral column is by x itself, and its throughput holds what was absorbed."""
     left_out = {"CAMERA_SPECULAR", "ABSORPTION", "ABSORBERS", "NORMAL_DERIVATIVES", "RANDOM_WAVELENGTH", "HALTS"}
+    left_out.add("POLARISED")
     return {name: value for name, value in beyond.items() if name not in left_out} | {
         "CAMERA_BEAMS": 1,
         "SPECTRAL_GROUPS": 1 if "SPECTRAL_SWEEP" in beyond else 0,

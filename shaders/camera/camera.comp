@@ -112,31 +112,7 @@ CameraPath camera_path(uvec2 pixel, uint primary_sample, float gain)
 }
 
 #ifdef BEAM_STARTS
-// The path that a beam has brought so far. It is of one cell of the table; a band's border may lie within, but how often its wavelengths are drawn
-// is told by whole cells.
-CameraPath started_path(BeamStart start)
-{
-    CameraPath path = camera_path(uvec2(0u), THE_SAMPLE, 1.0);
-    path.position = start.position;
-    path.direction = start.direction;
-    path.origin = RayOrigin(start.last_primitive, start.last_object, uint(start.is_inside != 0u), start.inside_mask);
-    path.medium = MediumStack(start.inside_mask, start.inside_object);
-    path.dposition[0] = start.dposition_x;
-    path.dposition[1] = start.dposition_y;
-    path.ddirection[0] = start.ddirection_x;
-    path.ddirection[1] = start.ddirection_y;
-    path.inverse_pdf = start.weight;
-    path.branch_weight = p.start_share;
-    path.key = start.key;
-    path.depth = int(start.depth);
-#ifdef HAS_DISPERSION
-    uint cell = min(uint(start.x * float(EMISSION_CELLS)), uint(EMISSION_CELLS - 1));
-    path.band = vec3(float(cell), start.x * float(EMISSION_CELLS), float(cell + 1u)) / float(EMISSION_CELLS);
-    path.inverse_pdf /= max(cell_cdf[cell + 1u] - cell_cdf[cell], 1e-9);
-    path.restricted = 1u;
-#endif
-    return path;
-}
+#include "camera/beam_start.glsl"
 #endif
 
 #ifdef CAMERA_SPECULAR
@@ -169,12 +145,21 @@ void cross_glass(inout CameraPath path, CameraPath whole, Hit hit, Triangle face
     PathFrame frame = path_frame(path, hit, facet);
     CameraPath mirrored = path;
     vec3 n_i, n_t, theta3, cosine2, reflectance, mirror_weight;
+#ifdef POLARISED
+    PolarisedEvent event, mirror_event;
+#endif
     bool begins = false;
     for (int round = 0; round < 2; ++round) {
         interface_indices(boundary, path.band, n_i, n_t);
         theta3 = incidence_over_band(path, frame);
         cosine2 = transmitted_cosine2(theta3, n_i / n_t);
+#ifdef POLARISED
+        event = polarised_event(path, frame, fresnel_reflection(theta3, n_i / n_t, cosine2));
+        reflectance = polarised_share(event.seen, event.reflection);
+        if (!begins) mirror_event = event;
+#else
         reflectance = fresnel_reflectance(theta3, n_i / n_t, cosine2);
+#endif
         mirror_weight = begins ? mirror_weight : reflectance;
 #ifdef HAS_DISPERSION
         // What is reflected off the outside of glass knows no wavelength but in its strength: it stays whole. What goes on is one band.
@@ -218,6 +203,9 @@ void cross_glass(inout CameraPath path, CameraPath whole, Hit hit, Triangle face
         mirrored.origin = origin_back;
         mirrored.key = hash_combine(mirrored.key, 1u);
         reflect_path(mirrored, frame);
+#ifdef POLARISED
+        polarise_path(mirrored, mirror_event, true);
+#endif
         pending_path = mirrored;
         pushes_path = true;
     }
@@ -235,6 +223,9 @@ void cross_glass(inout CameraPath path, CameraPath whole, Hit hit, Triangle face
     }
     path.origin = reflects ? origin_back : origin_beyond;
     WHEN(reflects) reflect_path(path, frame);
+#ifdef POLARISED
+    polarise_path(path, event, reflects);
+#endif
 }
 #endif
 
@@ -261,7 +252,14 @@ void meet_surface(inout CameraPath path, Hit hit, uint kind, uint pixel_key)
     path.depth += 1;
 #ifdef HAS_MIRROR
     WHEN(kind == KIND_MIRROR) {
-        reflect_path(path, path_frame(path, hit, facet));
+        PathFrame frame = path_frame(path, hit, facet);
+#ifdef POLARISED
+        PolarisedEvent event = polarised_event(path, frame, mirror_reflection());
+#endif
+        reflect_path(path, frame);
+#ifdef POLARISED
+        polarise_path(path, event, true);
+#endif
         path.origin = RayOrigin(hit.primitive, hit.object, uint(dot(path.direction, hit.normal_g) < 0.0), path.origin.inside_mask);
         path.recut = 0u;
         vec3 colour = object_colours[hit.object].rgb;

@@ -148,7 +148,13 @@ void meet_grating(inout CameraPath path, CameraPath whole, Hit hit, Triangle fac
     path.key = hash_combine(path.key, 16u + number);
     path.order = 0u;
     path.recut = 0u;
+#ifdef POLARISED
+    vec3 before = path.direction;
+#endif
     diffract_path(path, frame, grating, order, hit.object, side, steps);
+#ifdef POLARISED
+    path.polarisation = behind_grating(path.polarisation, before, path.direction, order.reflects != 0u);
+#endif
     path.origin = RayOrigin(hit.primitive, hit.object, uint(dot(path.direction, hit.normal_g) < 0.0), path.origin.inside_mask);
 }
 

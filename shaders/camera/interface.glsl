@@ -98,6 +98,39 @@ float onset_of(CameraPath path, vec3 theta, MediumInterface boundary, bvec3 pass
 #endif
 #endif
 
+#ifdef POLARISED
+// What polarised light meets at a surface.
+struct PolarisedEvent {
+    vec3 s[3];              // of the planes of incidence at the three places of the band
+    Polarisation seen;      // the path's state, counted from these
+    FresnelPair reflection;
+};
+
+PolarisedEvent polarised_event(CameraPath path, PathFrame frame, FresnelPair reflection)
+{
+    PolarisedEvent event;
+    event.s[1] = incidence_axis(path.direction, frame.shading.normal, path.polarisation.axis);
+    event.s[0] = event.s[2] = event.s[1];
+#ifdef SPECTRAL_SWEEP
+    if (path.restricted != 0u) {
+        event.s[0] = incidence_axis(path.end_direction[0], frame.end_normal[0], event.s[1]);
+        event.s[2] = incidence_axis(path.end_direction[1], frame.end_normal[1], event.s[1]);
+    }
+#endif
+    event.seen = in_plane(path.polarisation, path.direction, event.s);
+    event.reflection = reflection;
+    return event;
+}
+
+// The state of a path that has been turned.
+void polarise_path(inout CameraPath path, PolarisedEvent event, bool reflects)
+{
+    FresnelPair pair = event.reflection;
+    if (!reflects) pair = fresnel_transmission(pair);
+    path.polarisation = out_of_plane(behind_interface(event.seen, pair), path.direction, event.s);
+}
+#endif
+
 #ifdef SPECTRAL_SWEEP
 // Whether anchoring the parts [x, at] and [at, z] of the band leaves a path's start where it is known to be clear.
 bool cut_is_near(CameraPath whole, float at, float distance)

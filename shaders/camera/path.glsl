@@ -34,6 +34,9 @@ struct CameraPath {
     uint recut;  // 1: its band was cut before the surface ahead, and is not again
     uint planar_so_far;  // 1: its band's ends have kept to its own facets: it met flat ones only
     int cuts;                       // of its band, where paths diverged
+#ifdef POLARISED
+    Polarisation polarisation;      // of light that would come along the path backwards: by reciprocity it loses as much
+#endif
 #ifdef HAS_GRATING
     uint order;                     // of the grating ahead, the next to be followed; see camera/grating.glsl
 #endif
@@ -161,6 +164,9 @@ void restrict_to_band(inout CameraPath path, uint pixel_key)
     band.y = clamp(quantile(brightness_of(band), 0.5), mix(band.x, band.z, 0.1), mix(band.x, band.z, 0.9));
     path.inverse_pdf *= float(p.bands);
 #endif
+#ifdef POLARISED
+    path.polarisation = band_polarisation(path.polarisation, path.band, path.weight, band);
+#endif
     path.weight = band_weights(path.band, path.weight, band);
     path.band = band;
 #ifdef SPECTRAL_SWEEP
@@ -187,6 +193,10 @@ void restrict_to_part(inout CameraPath path, float lo, float hi)
     path.weight = band_weights(before.band, before.weight, band);
     if (band.y != path.band.y) ray_at(before, band.y, path.position, path.direction);
     path.band = band;
+#ifdef POLARISED
+    path.polarisation = band_polarisation(before.polarisation, before.band, before.weight, band);
+    path.polarisation.axis = normalize(path.polarisation.axis - dot(path.polarisation.axis, path.direction) * path.direction);
+#endif
 #ifdef SPECTRAL_SWEEP
     ray_at(before, lo, path.end_position[0], path.end_direction[0]);
     ray_at(before, hi, path.end_position[1], path.end_direction[1]);

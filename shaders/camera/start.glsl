@@ -66,6 +66,9 @@ CameraPath path_from(uvec2 pixel, vec2 within_pixel, float gain)
     path.recut = 0u;
     path.planar_so_far = 1u;
     path.cuts = 0;
+#ifdef POLARISED
+    path.polarisation = unpolarised(path.direction);
+#endif
 #ifdef HAS_GRATING
     path.order = 0u;
 #endif
