@@ -19,7 +19,7 @@ from . import options
 from .animate import AnimateRequest, plan_of
 from .bench import CAMERA_SCENES, BenchRequest, kept_text, load_scenes, met_by, repeat_command, write_and_show
 from .bench import parse_settings as parse_bench_settings
-from .render import RenderRequest, complete_settings, parse_settings
+from .render import RenderRequest, complete_settings, parse_settings, scene_as_asked
 
 if TYPE_CHECKING:
     from ..bench.store import Store
@@ -86,7 +86,7 @@ def farm_render_command(request: RenderRequest, farm: FarmRequest) -> int:
     if os.path.exists(request.output) and request.output.samefile(scene_file):
         raise UserError(f"cannot write {request.output}: it is the scene itself; choose another name")
     check_writable(request.output)
-    scene = options.open_scene(request.scene, request.opening)
+    scene = scene_as_asked(request)
     settings = complete_settings(asked, scene, request.stats)
     for told in scene.notes:
         note(told)

@@ -98,6 +98,13 @@ def render(
     batch: Annotated[
         Text, typer.Option(metavar="N", help="Photons in flight at once (never changes the picture).")
     ] = None,
+    polarisation: Annotated[
+        bool | None,
+        typer.Option(
+            "--polarisation/--no-polarisation",
+            help="Light keeps its polarisation from surface to surface (default: as the scene has it).",
+        ),
+    ] = None,
     stats: StatsOption = False,
     up: UpOption = None,
     glass: GlassOption = None,
@@ -135,6 +142,7 @@ def render(
         glare,
         lens_radius,
         focus_distance,
+        polarisation,
     )
     raise typer.Exit(render_command(request))
 

@@ -6,7 +6,7 @@ import os
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -50,6 +50,7 @@ class RenderRequest:
     glare: str | None = None
     lens_radius: str | None = None
     focus_distance: str | None = None
+    polarisation: bool | None = None
 
 
 def render_command(request: RenderRequest) -> int:
@@ -70,8 +71,7 @@ def render_command(request: RenderRequest) -> int:
         raise UserError(f"cannot write {request.output}: it is the scene itself; choose another name")
     check_writable(request.output)
 
-    scene = options.open_scene(request.scene, request.opening)
-    scene = options.with_lens(scene, request.lens_radius, request.focus_distance)
+    scene = scene_as_asked(request)
     settings = complete_settings(asked, scene, request.stats)
     # Before the work: who waits for minutes should know what was assumed, and also if it fails.
     for note in (*scene.notes, *_unused_options(request)):
@@ -102,6 +102,15 @@ def render_command(request: RenderRequest) -> int:
     if request.stats:
         print("\n".join(result.stats.lines()))
     return interrupted.exit_code if stopped else 0
+
+
+def scene_as_asked(request: RenderRequest) -> Scene:
+    """The scene with what options say of it. Raises `UserError`."""
+    scene = options.open_scene(request.scene, request.opening)
+    scene = options.with_lens(scene, request.lens_radius, request.focus_distance)
+    if request.polarisation is None:
+        return scene
+    return replace(scene, render=replace(scene.render, polarisation=request.polarisation))
 
 
 def _parse_passes(request: RenderRequest) -> tuple[int, int] | None:

@@ -122,8 +122,8 @@ def set_background(scene: Scene, rgb: Vec3) -> Scene:
 
 
 def set_render_defaults(scene: Scene, **changes: float) -> Scene:
-    """Picture size (`width`, `height`), `photons`, `exposure_ev`, `max_depth` and `glare` that the scene asks
-    for."""
+    """Picture size (`width`, `height`), `photons`, `exposure_ev`, `max_depth`, `glare` and `polarisation` that the
+    scene asks for."""
     render: RenderDefaults = replace(scene.render, **changes)  # type: ignore[arg-type]
     limits: dict[str, tuple[float, float]] = {
         "width": (1, MAX_PICTURE_SIDE),

@@ -18,7 +18,11 @@ def coherency(stokes: Array) -> Array:
 def stokes_of(matrix: Array) -> tuple[Array, Array]:
     """Intensity, and (q, u, v) over it, of a coherency matrix."""
     intensity = np.trace(matrix, axis1=-2, axis2=-1).real
-    parts = [matrix[..., 0, 0].real - matrix[..., 1, 1].real, 2.0 * matrix[..., 0, 1].real, 2.0 * matrix[..., 0, 1].imag]
+    parts = [
+        matrix[..., 0, 0].real - matrix[..., 1, 1].real,
+        2.0 * matrix[..., 0, 1].real,
+        2.0 * matrix[..., 0, 1].imag,
+    ]
     return intensity, np.stack(parts, -1) / np.maximum(intensity, 1e-300)[..., None]
 
 

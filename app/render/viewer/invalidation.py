@@ -19,6 +19,7 @@ from ...model.optics.glass import Dispersion
 from ...model.scene import (
     Light,
     Material,
+    RenderDefaults,
     Scene,
     SceneObject,
 )
@@ -104,10 +105,15 @@ def _scene(old: Scene, new: Scene) -> DirtyLevel:
             if (lighting_environment(old) is None) != (lighting_environment(new) is None):
                 cost = DirtyLevel.BUILD
         elif item.name == "render":
-            cost = max(cost, DirtyLevel.BUILD if a.max_depth != b.max_depth else DirtyLevel.NOTHING)
+            cost = max(cost, DirtyLevel.BUILD if _path_rules(a) != _path_rules(b) else DirtyLevel.NOTHING)
         else:
             cost = DirtyLevel.BUILD
     return max(cost, DirtyLevel.NOTHING if cost >= DirtyLevel.TRACE else _glasses(old, new))
+
+
+def _path_rules(render: RenderDefaults) -> tuple[int, bool]:
+    """What programs and queues are made for."""
+    return render.max_depth, render.polarisation
 
 
 def _objects(old: tuple[SceneObject, ...], new: tuple[SceneObject, ...]) -> DirtyLevel:

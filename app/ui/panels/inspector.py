@@ -266,6 +266,13 @@ def _scene(state: State, view_model: ViewModel) -> State:
         if depth_changed and round(depth) != scene.render.max_depth:
             state = edits.attempt(state, "Longest path", edits.set_render_defaults, max_depth=round(depth))
         state = widgets.holding(state, active)
+        toggled, polarisation = widgets.toggle(
+            "Polarisation",
+            scene.render.polarisation,
+            tip="Light keeps its polarisation from surface to surface; else every surface meets unpolarised light.",
+        )
+        if toggled:
+            state = edits.attempt(state, "Polarisation", edits.set_render_defaults, polarisation=polarisation)
     if widgets.section("Environment"):
         state = draw_environment(state, view_model)
     if scene.notes and widgets.section("Notes"):
