@@ -19,7 +19,17 @@ from spectrasplat.stress.cases import optics_cases, path_cases, splat_cases
 from tests.gpu.mutants import mutate
 
 CASES = {case.name: case for case in (*optics_cases.CASES, *path_cases.CASES, *splat_cases.CASES)}
-QUICK = ("tir-margin", "grazing", "index-matched", "gem-bands", "long-chain", "collapse", "one-texel", "overflow")
+QUICK = (
+    "tir-margin",
+    "grazing",
+    "index-matched",
+    "polarised-chain",
+    "gem-bands",
+    "long-chain",
+    "collapse",
+    "one-texel",
+    "overflow",
+)
 
 
 @pytest.mark.parametrize("name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in CASES])
@@ -44,6 +54,13 @@ MUTANTS = {
         "- mu * dnormal",
         "+ mu * dnormal",
         "column s",
+    ),
+    "a reference axis turned the wrong way": (
+        "polarised-chain",
+        "lib/polarisation.glsl",
+        "cosine * state.u - sine * q",
+        "cosine * state.u + sine * q",
+        "state",
     ),
     "the textbook's mu": (
         "index-matched",

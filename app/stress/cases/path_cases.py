@@ -9,5 +9,6 @@ from .chain_cases import CASES as CHAINS
 from .grating_cases import CASES as GRATINGS
 from .material_cases import CASES as MATERIALS
 from .mesh_cases import CASES as MESHES
+from .polarisation_cases import CASES as POLARISATION
 
-CASES: tuple[Case, ...] = (*MATERIALS, *CAUSTICS, *CHAINS, *GRATINGS, *MESHES, *BEAMS)
+CASES: tuple[Case, ...] = (*MATERIALS, *CAUSTICS, *CHAINS, *GRATINGS, *POLARISATION, *MESHES, *BEAMS)
