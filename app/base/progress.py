@@ -43,6 +43,7 @@ class ProgressReporter:
         self._told = self._started
         self._last = (0.0, self._started)
         """What was told last, and when."""
+        self._furthest = 0.0
         self._bar: Progress | None = None
         self._task: TaskID | None = None
 
@@ -51,7 +52,8 @@ class ProgressReporter:
         now = self._clock()
         if now - self._started < SHOW_AFTER_S:
             return
-        fraction = min(max(fraction, 0.0), 1.0)
+        # What is left may turn out to be more than was thought; the bar then stands still.
+        self._furthest = fraction = min(max(fraction, self._furthest), 1.0)
         if not self._stream.isatty():
             if now - self._told >= LOG_EVERY_S:
                 self._told = now

@@ -65,6 +65,24 @@ class Source:
         return _NVIDIA_LINE.sub(locate, _MESA_LINE.sub(locate, compiler_log))
 
 
+_files: dict[Path, tuple[tuple[int, int], list[tuple[Line, str]]]] = {}
+"""Of each shader file its time and size when it was read, and its lines: most programs include the same dozen."""
+
+
+def _read(root: Path, file: str) -> list[tuple[Line, str]]:
+    """A file's lines, each with the name of the file that it includes or "". Raises OSError."""
+    path = root / file
+    status = path.stat()
+    stamp = status.st_mtime_ns, status.st_size
+    if path not in _files or _files[path][0] != stamp:
+        lines = []
+        for number, text in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
+            include = _INCLUDE.match(text) if "#include" in text else None
+            lines.append((Line(text, file, number), include.group(1) if include else ""))
+        _files[path] = stamp, lines
+    return _files[path][1]
+
+
 def load_source(
     name: str,
     defines: Mapping[str, int | float | str] | None = None,
@@ -98,15 +116,14 @@ def load_source(
             return
         seen.add(file)
         try:
-            text = (root / file).read_text(encoding="utf-8")
+            read = _read(root, file)
         except OSError as error:
             raise ShaderError(f"shader {file} asked for by {asked_by} cannot be read: {error.strerror}") from error
-        for number, line in enumerate(text.splitlines(), start=1):
-            include = _INCLUDE.match(line)
-            if include:
-                flatten(include.group(1), f"{file}:{number}")
+        for line, included in read:
+            if included:
+                flatten(included, f"{file}:{line.number}")
             else:
-                emit(line, file, number)
+                lines.append(line)
 
     flatten(name, "the program")
     kept = stripped(lines)

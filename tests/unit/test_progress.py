@@ -75,3 +75,13 @@ def test_fractions_outside_are_clamped(clock: Clock) -> None:
     clock.now += 10.0
     reporter(1.7)
     assert stream.getvalue() == "ball: 100 % after 10 s, about 0 s left\n"
+
+
+def test_a_share_is_never_taken_back(clock: Clock) -> None:
+    """A rendering of the default scene said 19 %, 2 % and 19 % again while it learnt how long its parts take."""
+    stream = io.StringIO()
+    reporter = ProgressReporter("ball", stream, clock)
+    for fraction in (0.19, 0.02, 0.3):
+        clock.now += 10.0
+        reporter(fraction)
+    assert [line.split(": ")[1].split(" %")[0] for line in stream.getvalue().splitlines()] == ["19", "19", "30"]

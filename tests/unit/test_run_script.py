@@ -94,7 +94,7 @@ def test_first_run_sets_up_and_the_second_starts_at_once(machine: Machine) -> No
 
 def test_without_arguments_the_default_scene_is_rendered(machine: Machine) -> None:
     assert machine.call("run").stdout == (
-        "program: render default --photons 150k --spp 4 -o spectrasplat-default.png\n"
+        "program: render default --size 768x432 --photons 150k --spp 4 -o spectrasplat-default.png\n"
     )
 
 
