@@ -59,8 +59,8 @@ def looks_lattice(samples: int, offset: int) -> np.ndarray:
         away[..., 1] = 0.0
     columns, rows = cells_of(samples)
     if columns and not is_in_strips(samples, offset):
-        # Each sample's cell holds as many looks, for these are a net as well: no search, and no import of scipy, which takes the
-        # viewer's start a tenth longer.
+        # Each sample's cell holds as many looks, for these are a net as well: no search, and no import of scipy, a
+        # tenth of the viewer's start.
         cells = [np.floor(places * (columns, rows)) @ (rows, 1) for places in (pixel_lattice(samples, offset), looks)]
         of_cell = np.argsort(cells[1], kind="stable").reshape(samples, LOOKS)
         return looks[of_cell[cells[0].astype(int)]]
