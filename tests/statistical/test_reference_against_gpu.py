@@ -128,7 +128,8 @@ def nested() -> Scene:
 def wine_glass() -> Scene:
     """The shipped scene from nearer, where its caustic is seen directly."""
     scene = load_scene(assets_dir() / "scenes" / "wine_glass.toml")
-    return replace(scene, camera=replace(scene.camera, target=(1.9, -0.6, 0.0), vertical_fov_deg=14.0))
+    camera = replace(scene.camera, target=(1.9, -0.6, 0.0), vertical_fov_deg=14.0)
+    return replace(scene, camera=camera, environment=None)
 
 
 def prism_case() -> Scene:
