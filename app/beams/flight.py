@@ -32,6 +32,8 @@ _WORTHLESS = 1e-6
 """Share of the threshold below which a beam with too many facets ahead is lost instead of halved."""
 _COATS = 3e-5
 """GPU units: what is opaque and this close to glass is a coat on it (NEAR_DISTANCE of shaders/lib/intersect.glsl)."""
+_LEANING = 0.9
+"""Surfaces whose normals' cosine is less meet in an edge at most (CONTACT_COSINE there)."""
 
 
 @part
@@ -97,7 +99,10 @@ def is_nearer(facets, solids, hand, one, other, t_one, t_other, cosine):
     """Whether facet `one` is met before `other`, at distances along a ray that meets them at such a `cosine`. Of
     surfaces in contact a solid is entered before one is left, and what is opaque comes before glass: a coat is met from
     inside as from outside."""
-    is_coat = (facets[one].kind == 0) != (facets[other].kind == 0)
+    leaning = 0.0
+    for k in range(3):
+        leaning += facets[one].plane[k] * facets[other].plane[k]
+    is_coat = (facets[one].kind == 0) != (facets[other].kind == 0) and abs(leaning) > _LEANING
     if abs(t_one - t_other) * (abs(cosine) if is_coat else 1.0) > (_COATS if is_coat else _TOUCHES):
         return t_one < t_other
     return rank(facets, solids, hand, one) < rank(facets, solids, hand, other)

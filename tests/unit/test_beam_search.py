@@ -14,6 +14,10 @@ from spectrasplat.beams.search import SUM_ENTERED, SUM_ROULETTE
 from spectrasplat.beams.sources import emissions
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.optics.spectral_tables import SpectralAxis
+from spectrasplat.stress.cases.beam_cases import kept as books_of
+from spectrasplat.stress.rigs.gpu_paths import beam_light, extruded, glass, placed
+
+BK7 = glass("N-BK7")
 
 
 @pytest.fixture(scope="module")
@@ -41,6 +45,13 @@ def test_what_enters_ends_somewhere(stone: tuple[BeamScene, Emission]) -> None:
     _, sums = fluxes((scene, single), 1, 1)
     assert sums[SUM_ENTERED] > 0.0
     assert sums[: SUM_ROULETTE + 1].sum() == pytest.approx(sums[SUM_ENTERED], rel=1e-6)
+
+
+@pytest.mark.parametrize("angle_rad", [1e-5, 1e-8])
+def test_what_lies_ahead_of_a_grazed_facet_is_no_coat_on_it(angle_rad: float) -> None:
+    """The floor was taken for one: a sliver of the light left the glass through no facet."""
+    block = placed("block", extruded("block", np.array([(-0.3, -0.3), (0.3, -0.3), (0.3, 0.3), (-0.3, 0.3)])), BK7)
+    assert books_of([block], beam_light((0.1, 0.0, 2.0), (angle_rad, 0.0, -1.0), 0.4), angle_rad, "").broken() == []
 
 
 def test_threads_do_not_matter(stone: tuple[BeamScene, Emission]) -> None:
