@@ -251,6 +251,16 @@ def test_turning_index_is_not_called_affine() -> None:
     assert not SpectralAxis.build([catalogue.find("diamond")]).affine_in_n  # clamped above 760 nm
 
 
+def test_tables_know_the_power_of_light_where_no_index_changes() -> None:
+    """Half of the light lies where n is held at 1: the shaders' samples over x must tell it from the rest."""
+    axis = SpectralAxis.build([glass.from_abbe(1.5, 1e-3)])
+    running = cumulative(axis, sp.constant(1.0))
+    samples = np.linspace(0.0, 1.0, 1025)
+    x = axis.x_of_nm(WAVES).astype(np.float32).astype(float)
+    known = np.interp(x, samples, running.at(samples)[:, 3])
+    assert known == pytest.approx(running.at(axis.x_of_nm(WAVES))[:, 3], abs=1e-3 * running.values[-1, 3])
+
+
 def test_index_table_interpolates_well() -> None:
     glasses = [catalogue.find("N-BK7"), catalogue.find("N-SF11"), catalogue.find("water"), glass.constant(1.3)]
     axis = SpectralAxis.build(glasses)

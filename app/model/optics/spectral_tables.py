@@ -25,7 +25,9 @@ _LO_NM, _HI_NM = float(VISIBLE_NM[0]), float(VISIBLE_NM[-1])
 _FINE_NM = np.linspace(_LO_NM, _HI_NM, 4001)
 
 FILL = 1e-6
-"""Share of x given to plain wavelength where no index changes (outside the fits' ranges)."""
+"""Least share of x given to plain wavelength where no index changes (outside the fits' ranges). More is given where
+more is seen of the light there: tables of so many samples over x have to tell its power, and float32 its
+wavelengths."""
 
 
 _MAX_STEPS = 60
@@ -43,7 +45,7 @@ class SpectralAxis:
     total: float
     """Summed variation over 380–780 nm (nm where there is no dispersion)."""
     fill: float
-    """x given to λ itself: 0, or `FILL` where otherwise x would stand still, or 1."""
+    """x given to λ itself: 0, or where otherwise x would stand still at least `FILL`, or 1."""
     affine_in_n: bool
     """Whether x = a + b n exactly, for the one dispersive glass there is."""
 
@@ -114,7 +116,9 @@ def _axis_of(glasses: tuple[Dispersion, ...]) -> SpectralAxis:
     stands_still = bool(np.any(speed <= 0.0)) or any(len(t) > 2 for t in turning)
     variation = [_variation(g, t, np.array(_HI_NM)) for g, t in zip(glasses, turning, strict=True)]
     monotone = len(glasses) == 1 and not stands_still
-    return SpectralAxis(glasses, turning, float(sum(variation)), FILL if stands_still else 0.0, monotone)
+    seen = np.interp(_FINE_NM, VISIBLE_NM, cmf_xyz().sum(axis=1))
+    fill = max(FILL, float(seen[speed <= 0.0].sum() / seen.sum())) if stands_still else 0.0
+    return SpectralAxis(glasses, turning, float(sum(variation)), fill, monotone)
 
 
 def _turning_points(glass: Dispersion) -> np.ndarray:
