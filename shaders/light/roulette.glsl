@@ -18,6 +18,11 @@ bool survives(inout RayRecord ray, inout float roulette_w, float share, uint bra
 {
     ray.survival *= share;
     ray.branch_key = hash_combine(ray.branch_key, branch);
+    // What carries nothing, or less than a float can say, has no chance, whatever the threshold.
+    if (ray.survival <= 0.0) {
+        roulette_w += carried_w(ray);
+        return false;
+    }
     float chance = ray.survival / p.split_threshold;
     if (chance >= 1.0 || keeps_lattice) return true;
     uint key = ray.branch_key + (ray.photon_id % p.lattices) * 2654435769u;

@@ -130,8 +130,10 @@ void land(inout RayRecord ray, uint receiver, uint triangle, float cosine, uint 
 #endif
     bool holds = true;
 #if COLUMNS > 0
-    for (int c = 0; c < COLUMNS; ++c)
-        holds = holds && is_within(dot(ray.dposition[c].xyz, ray.dposition[c].xyz), COLUMN_LIMIT * COLUMN_LIMIT);
+    for (int c = 0; c < COLUMNS; ++c) {
+        float widened = c < SPATIAL ? ray.footprint_scale * ray.footprint_scale : 1.0;
+        holds = holds && is_within(widened * dot(ray.dposition[c].xyz, ray.dposition[c].xyz), COLUMN_LIMIT * COLUMN_LIMIT);
+    }
 #endif
     if (!holds) {
         ray.flags |= FLAG_FOOTPRINT_DROPPED;

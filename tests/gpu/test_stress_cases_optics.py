@@ -11,10 +11,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from spectrasplat.gpu import scene_buffers
+from spectrasplat.gpu.records import FLAG_FOOTPRINT_DROPPED
+from spectrasplat.model.geometry.primitives_round import ellipsoid
+from spectrasplat.model.scene import Diffuse
 from spectrasplat.reference import optics
 from spectrasplat.stress import judging
 from spectrasplat.stress.case import Case
 from spectrasplat.stress.cases import optics_cases, path_cases, splat_cases
+from spectrasplat.stress.rigs.gpu_paths import beam_light, glass, placed, screen, trace_light
 
 from tests.gpu.mutants import mutate
 
@@ -40,6 +44,17 @@ def test_case_keeps_its_promises(gl, name: str) -> None:
     assert [sentence for m in measured for sentence in m.broken()] == []
     assert len({m.severity for m in measured}) == case.steps
     assert all(m.errors.keys() == m.bounds.keys() for m in measured)
+
+
+def test_a_branch_that_carries_nothing_is_not_followed(gl) -> None:
+    """Without a threshold for roulette its chance was 0 / 0, and its footprint grew by the root of 1e30."""
+    gem = placed("gem", ellipsoid((1.0, 0.8, 0.6), 1280), glass("diamond"))
+    below = placed("screen", screen([0, 0, -1.5], [0, 0, 1], 20.0), Diffuse())
+    light = beam_light((0.25, 0.1, 3.0), (0.05, 0.03, -1.0), 0.5)
+    photons = trace_light(gl, (gem, below), light, [(450.0, 650.0)], 100, 26)
+    assert (photons.records["flux_w"] > 0.0).all()
+    kept = (photons.records["flags"] & FLAG_FOOTPRINT_DROPPED) == 0
+    assert np.linalg.norm(photons.records["dposition_ds"][kept], axis=-1).max() < 1e6
 
 
 def broken(case: Case, gl) -> list[str]:
