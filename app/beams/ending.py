@@ -65,6 +65,9 @@ def end(nodes, facets, solids, tables, sources, leaf, edge, corner, work):
         halve(nodes, 0.5 * (hand.x[0] + hand.x[2]), facets, solids, tables, sources, work)
         return
     most = _COLOURED if work.coloured else _UNEVEN
+    # What photons carry on where nothing disperses, they carry over their own bands (`passes.beam_emission`).
+    uneven = uneven if work.disperses or kind == LEAF_RECEIVER else 0.0
+    bent = bent if work.disperses else 0.0
     if room and hand.x[2] - hand.x[0] > NARROWEST and (bent > tolerance or uneven > most):
         halve(nodes, 0.5 * (hand.x[0] + hand.x[2]), facets, solids, tables, sources, work)
         return

@@ -103,6 +103,12 @@ class BeamScene:
     polarised: bool
     """Beams carry their light's state of polarisation."""
 
+    @property
+    def disperses(self) -> bool:
+        """Whether some glass bends one wavelength more than another."""
+        rows = self.tables[np.unique(self.solids["glass"][self.solids["glass"] >= 0])]
+        return bool(np.any(rows != rows[:, :1]))
+
 
 def in_gpu_space(world_meshes: list[Mesh], to_gpu: Callable[[np.ndarray], np.ndarray], unit: float) -> list[Mesh]:
     """Meshes as `beam_scene` takes them. `to_gpu`, `unit`: scene to GPU space, GPU units a scene unit."""

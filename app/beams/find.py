@@ -169,7 +169,7 @@ def _work(scene: BeamScene, emission: Emission, how: Search, share: float, sourc
     work["power"], work["seed"], work["depth"] = len(scene.tables), how.seed, how.depth
     work["density"], work["tolerance"], work["drift"] = emission.density, how.tolerance, how.drift
     work["line_share"], work["room"], work["sees"], work["absorbing"] = share, emission.room, how.sees, scene.absorbs
-    work["coloured"] = scene.absorbs or scene.coloured
+    work["disperses"], work["coloured"] = scene.disperses, scene.absorbs or scene.coloured
     work["objects"], work["sources"] = len(scene.solids), sources
     return work
 

@@ -44,11 +44,11 @@ the side it comes from and behind (-1: air), row of what the flight's medium abs
 
 @part
 def at_x(table, row, x):
-    """A row of a spectral table at x, linear between its samples."""
+    """A row of a spectral table at x, linear between its samples; what is constant is so to the last bit."""
     place = min(max(x, 0.0), 1.0) * (table.shape[1] - 1)
     i = min(int(place), table.shape[1] - 2)
     part = place - i
-    return (1.0 - part) * table[row, i] + part * table[row, i + 1]
+    return table[row, i] + part * (table[row, i + 1] - table[row, i])
 
 
 @part

@@ -77,6 +77,8 @@ WORK = np.dtype(
         ("room", "f8", 3),
         # Beams from the camera: what leaves the facets is kept.
         ("sees", "?"),
+        # Some glass bends one wavelength more than another: else no outline moves over a band.
+        ("disperses", "?"),
         # Some medium absorbs.
         ("absorbing", "?"),
         # Something may take steps over the spectrum that three places do not see.
@@ -236,7 +238,7 @@ def recentre(beam):
 def drifts(beam, power, work):
     """Whether a beam's outline moves too far over its band, or exists at one end only. What is strong may move less:
     halving a weak beam costs as much, and spares less error."""
-    if beam.x[2] - beam.x[0] <= NARROWEST:
+    if not work.disperses or beam.x[2] - beam.x[0] <= NARROWEST:
         return False
     there, size, first, last = 0, 0.0, -1, -1
     for a in range(3):

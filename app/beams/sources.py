@@ -22,6 +22,8 @@ _WIDEST = math.tan(math.radians(55.0))
 """Half side of a gnomonic plane up to which one is enough; else the six sides of a cube are taken."""
 _MOST_BANDS = 32
 """Into which a light's spectrum is cut where something is coloured."""
+_ON_FACET = 2e-7
+"""GPU units: so near to a facet a light or a camera lies on it (START_DISTANCE of shaders/lib/intersect.glsl)."""
 _GOLDEN = math.pi * (3.0 - math.sqrt(5.0))
 
 
@@ -230,24 +232,29 @@ def _unit(vector: np.ndarray) -> np.ndarray:
     return vector / np.linalg.norm(vector)
 
 
+def _is_within(facet: np.ndarray, point: np.ndarray) -> bool:
+    """Whether a point (3,) of a facet's plane lies within its edges."""
+    corners = facet["corner"][: facet["corners"]]
+    along = np.roll(corners, -1, axis=0) - corners
+    return bool((np.cross(along, point - corners) @ facet["plane"][:3] >= 0.0).all())
+
+
 def mask_at(point: np.ndarray, scene: BeamScene, meshes: list[Mesh]) -> int:
-    """Solids that a point in GPU space lies in: those on whose inner side it is of the nearest facet along some line
-    [crossing parity]."""
+    """Solids that a point in GPU space lies in: those whose facets some line from it crosses an odd number of times.
+    What lies on a facet is outside: from there light enters."""
     mask = 0
     towards = _unit(np.array([0.3713, 0.5471, 0.7502]))
     for solid in scene.solids[: len(meshes)]:
         if solid["bit"] < 0:
             continue
-        crossings = 0
+        crossings, lies_on = 0, False
         for facet in scene.facets[solid["first"] : solid["last"]]:
             facing = facet["plane"][:3] @ towards
+            height = facet["plane"][3] - facet["plane"][:3] @ point
+            lies_on = lies_on or (abs(height) <= _ON_FACET and _is_within(facet, point))
             if abs(facing) < 1e-12:
                 continue
-            t = (facet["plane"][3] - facet["plane"][:3] @ point) / facing
-            corners = facet["corner"][: facet["corners"]]
-            at = point + t * towards
-            along = np.roll(corners, -1, axis=0) - corners
-            inside = np.cross(along, at - corners) @ facet["plane"][:3] >= 0.0
-            crossings += bool(t > 0.0 and inside.all())
-        mask |= (crossings & 1) << int(solid["bit"])
+            t = height / facing
+            crossings += bool(t > 0.0 and _is_within(facet, point + t * towards))
+        mask |= (0 if lies_on else crossings & 1) << int(solid["bit"])
     return mask
