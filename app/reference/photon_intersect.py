@@ -143,6 +143,9 @@ def nearest(scene, ox, oy, oz, dx, dy, dz, last, last_object, within, mask, stac
                     key = t + near if nested and facing > 0.0 else t
                     if sheet:  # `contact` is meant along its normal
                         key = t - scene.contact / max(_steepness(scene, i, t, ox, oy, oz, dx, dy, dz), _GRAZING)
+                    # Rays from a lamp or a camera that lies on a surface leave it, unless it is glass that they enter.
+                    if last_object < 0 and abs(t) <= near and (sheet or facing > 0.0):
+                        continue
                     beside = best_triangle >= 0 and abs(key - best_key) < near and owner != scene.owner[best_triangle]
                     if sheet and beside:
                         if owner > scene.owner[best_triangle]:

@@ -32,7 +32,7 @@ vec3 left_normal = vec3(0.0);
 #define BEHIND NEAR_DISTANCE
 #endif
 #define FAR_DISTANCE 1e30
-// Rays from a lamp that lies on a surface leave it.
+// A lamp or a camera as near as this lies on a surface: its rays leave it, unless it is glass that they enter.
 #define START_DISTANCE 2e-7
 // Rays that start farther than this from the middle of the scene are met from nearby.
 #define FAR_START 4.0
@@ -67,9 +67,14 @@ bool accept_hit(float distance, float facing, uint object, RayOrigin origin)
         repeated = bit != NONE && is_inside == (facing < 0.0);
     }
 #endif
-    // What is no surface, a lamp or a camera, has nothing in contact with it.
-    float least = origin.object == NONE ? START_DISTANCE : -BEHIND;
-    return !repeated && distance > (same ? 0.0 : least);
+    float least = same ? 0.0 : -BEHIND;
+    // What is no surface, a lamp or a camera, has nothing in contact with it. No lamp stands in glass: what shines from a face into it enters
+    // there, on whichever side of the face rounding has put it.
+    if (origin.object == NONE) {
+        least = START_DISTANCE;
+        if (abs(distance) <= START_DISTANCE && facing < 0.0 && object_at(object).kind == KIND_DIELECTRIC) least = -FAR_DISTANCE;
+    }
+    return !repeated && distance > least;
 }
 
 // Touching solids: of two crossings at one place the entering one comes first, so that no film of
@@ -141,7 +146,7 @@ void try_triangle(uint slot, vec3 near_p, float ahead, vec3 direction, RayOrigin
         float cosine = abs(dot(direction, unit_normal)), height = distance * cosine;
         key = sheet ? distance - NEAR_DISTANCE / max(cosine, GRAZING) : key;
         bool meets = accept_hit(distance, facing, facet.object, origin);
-        if (sheet && facet.object != origin.object) meets = accept_sheet(distance, height, unit_normal, thing.kind, near_p);
+        if (sheet && origin.object != NONE && facet.object != origin.object) meets = accept_sheet(distance, height, unit_normal, thing.kind, near_p);
 #ifdef MEDIUM_STACK
         meets = meets && !crossed_in_contact(height, facing, thing.stack_bit, origin);
 #endif

@@ -36,6 +36,8 @@ SAMPLES = 65
 ORDER = (4, 0, 2)
 """Objects of the stack by rising priority; 1 and 3 lie alone."""
 OBJECTS = 5
+DIFFUSE, GLASS = 1, 3
+KINDS = GLASS, GLASS, GLASS, DIFFUSE, GLASS
 STACK = {"MEDIUM_STACK": 1, "STACK_SIZE": len(ORDER), "STACK_OBJECTS": "uint[](4u, 0u, 2u)"}
 COMMON = {
     "SPECTRAL_SAMPLES": SAMPLES,
@@ -56,6 +58,7 @@ class Scene:
         rng = np.random.default_rng(1)
         self.ctx = gl.ctx
         self.objects = OBJECT.zeros(OBJECTS)
+        self.objects["kind"] = KINDS
         self.objects["medium"] = 0, 1, 2, 0, 1
         self.objects["group"] = 0, 1, NONE, 0, 1
         self.objects["weight_row"] = 7, NONE, 9, 3, 1
@@ -287,9 +290,9 @@ def test_which_hits_count(scene: Scene) -> None:
     near = 3e-5
     cases = [
         (distance, facing, obj, from_object, inside, mask)
-        for distance in (-1.0, -2e-5, 0.0, 1e-5, 1.0)
+        for distance in (-1.0, -2e-5, -1e-7, 0.0, 1e-7, 1e-5, 1.0)
         for facing in (-0.5, 0.5)
-        for obj in (0, 1)
+        for obj in (0, 1, 3)
         for from_object in (0, 1, NONE)
         for inside in (0, 1)
         for mask in range(0, 8, 3)
@@ -311,11 +314,13 @@ def test_which_hits_count(scene: Scene) -> None:
             same, enters = obj == from_object, facing < 0
             if same:  # a solid is not left twice nor entered from within at once
                 want = distance > 0 and not (distance < near and bool(inside) == enters)
-            elif stack and obj in ORDER and distance < near:  # what the mask knows to be crossed is not crossed again
-                least = 2e-7 if from_object == NONE else -near
-                want = distance > least and (mask >> ORDER.index(obj) & 1 == 1) != enters
-            else:  # nothing is in contact with a lamp or a camera
-                want = distance > (2e-7 if from_object == NONE else -near)
+            else:
+                want = distance > -near
+                if from_object == NONE:  # nothing is in contact with a lamp, which leaves what it lies on or enters it
+                    enters_glass = abs(distance) < 2e-7 and enters and KINDS[obj] == GLASS
+                    want = distance > 2e-7 or enters_glass
+                if stack and obj in ORDER and distance < near:  # what the mask knows to be crossed is not crossed again
+                    want = want and (mask >> ORDER.index(obj) & 1 == 1) != enters
             assert got["ok"][row] == want, (stack, cases[row])
         leaves = np.array([facing > 0 for _, facing, *_ in cases])
         np.testing.assert_allclose(got["key"] - inputs["distance"], np.where(leaves & stack, near, 0.0), atol=1e-7)

@@ -281,6 +281,18 @@ def test_touching_blocks_of_one_glass_are_one_block() -> None:
     assert balance["deposited"] / balance["emitted"] == pytest.approx((1 - rest) ** 2 / (1 - rest**2), rel=3e-3)
 
 
+def test_a_lamp_on_a_face_stands_outside_of_the_glass() -> None:
+    block = place(primitives.box((1.6, 1.6, 0.6)), Dielectric(constant_index(1.5)), (0.0, 0.0, 0.7))
+    table = place(primitives.plane(8.0, 8.0), Diffuse())
+    landed = []
+    for z in (1.0 + 1e-6, 1.0):
+        lamp = PointLight("lamp", ONE, (0.1, 0.1, z))
+        balance = render_reference(scene_of(lamp, block, table), 4, 4, photons=20_000).balance
+        landed.append(balance["deposited"])
+        assert balance["lost_numeric"] < 1e-3 * balance["emitted"]
+    assert landed[1] == pytest.approx(landed[0], rel=0.02)
+
+
 def test_its_own_error_is_true(busy: Scene) -> None:
     """The scatter of eight whole runs is the variance they claim: the ratio's 4 σ is 25 % over 768 pixels and three
     seeds' noise."""
