@@ -77,6 +77,10 @@ float disc_seen(float offset, float blur)
     return height * clamp((rim + blur - offset) / max(2.0 * blur, 1e-9), 0.0, 1.0);
 }
 
+// How soft a look is (`blur`: half the width of what it stands for, in those of the light): up to twice as soft at a light hardly larger than
+// that. Else but two or three looks have a part in it, and what they see of it in all depends on where it lies between them.
+float softened(float blur) { return blur * (1.0 + clamp(4.0 * blur - 1.0, 0.0, 1.0)); }
+
 // Radiance per unit of the light's own quantity that a ray meets within `far`: discs and
 // rectangles from their front, the sun's disc where nothing else is met (far = 1e30).
 // `width`: diameter of what the ray stands for, GPU units at its start and more of them per unit of distance: a light's edge is as soft.
@@ -87,7 +91,7 @@ float light_seen(CameraLight light, vec3 position, vec3 direction, float far, ve
         vec3 off = (direction + along * light.axis) / max(along, 1e-9);
         // half_u is as long as the tangent of the disc's angular radius.
         float radius = length(light.half_u);
-        float seen = along > 0.0 && far >= 1e30 ? disc_seen(length(off) / radius, 0.5 * width.y / radius) : 0.0;
+        float seen = along > 0.0 && far >= 1e30 ? disc_seen(length(off) / radius, softened(0.5 * width.y / radius)) : 0.0;
         return seen * light.measure;
     }
     float facing = dot(direction, light.axis);
@@ -97,8 +101,9 @@ float light_seen(CameraLight light, vec3 position, vec3 direction, float far, ve
     vec2 size = vec2(length(light.half_u), length(light.half_v));
     vec2 at = vec2(dot(off, light.half_u), dot(off, light.half_v)) / size;
     float blur = 0.5 * (width.x + distance * width.y);
-    return light.is_disc != 0u ? disc_seen(length(at) / size.x, blur / size.x)
-                               : stretch_seen(at.x, size.x, blur) * stretch_seen(at.y, size.y, blur);
+    vec2 soft = vec2(softened(blur / size.x), softened(blur / size.y));
+    return light.is_disc != 0u ? disc_seen(length(at) / size.x, soft.x)
+                               : stretch_seen(at.x, size.x, size.x * soft.x) * stretch_seen(at.y, size.y, size.y * soft.y);
 }
 
 #endif

@@ -12,7 +12,7 @@ from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
 COVERS = {
     "camera.glsl": ("camera_ray", "picture_point"),
-    "lights.glsl": ("sample_light", "light_seen", "disc_seen", "stretch_seen"),
+    "lights.glsl": ("sample_light", "light_seen", "softened", "disc_seen", "stretch_seen"),
     "lookup.glsl": ("find_texel", "caustic_energy"),
     "placement.glsl": ("homogeneous_texel", "texels_along", "texel_area_at", "texels_per_length"),
 }
@@ -165,6 +165,16 @@ def test_a_soft_look_keeps_what_the_light_sends(gl, blur: float) -> None:
     assert 2.0 * stretch.sum() * 0.7 * step == pytest.approx(1.4, rel=room)
     assert (np.diff(disc) <= 1e-7).all() and (np.diff(stretch) <= 1e-7).all()
     assert disc[-1] == stretch[-1] == 0.0
+
+
+@pytest.mark.parametrize("radius", [0.02, 0.3, 0.5, 1.0])
+def test_where_a_small_light_lies_between_looks_hardly_matters(gl, radius: float) -> None:
+    """Looks a unit apart, each as wide: their sum over a light's places is its area to some per cent of it."""
+    rng = np.random.default_rng(7)
+    middle, grid = rng.random((64, 1, 2)), np.stack(np.meshgrid(*[np.arange(-6.0, 7.0)] * 2), axis=-1).reshape(-1, 2)
+    offset = as_f32(np.linalg.norm(grid - middle, axis=-1).ravel() / radius)
+    seen = soft_amounts(gl, "seen = disc_seen(offset, softened(blur));", offset, 0.5 / radius).reshape(64, -1)
+    assert np.abs(seen.sum(axis=1) / (np.pi * radius**2) - 1.0).max() < 0.05
 
 
 LOOKUP = {

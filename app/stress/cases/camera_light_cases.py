@@ -122,7 +122,7 @@ def measure_lamps(context: Context) -> Iterator[Measurement]:
         judged = Judged().hold(
             "brighter than the lamp", max(0.0, sight.picture.max() * np.pi * radius**2 / 1.02 - 1.0), 0.0
         )
-        judged.hold("light in all", abs(total / first - 1.0), 0.2)
+        judged.hold("light in all", abs(total / first - 1.0), 0.1)
         judged.tell("brightest over mean", sight.picture.max() / sight.picture.mean())
         yield measurement_of(radius, f"radius {radius:g}", sight, judged, ANY)
 
