@@ -56,6 +56,9 @@ CUT_NM = 503.239
 """Where N-BK7 begins to reflect totally at 41.10° inside (n = 1/sin i)."""
 GRAZING_DEG = (80.0, 89.0, 89.9, 89.99, 89.999)
 CUT_BINS = 32
+TRIANGLES = 5120
+"""Of a ball whose limb is to be as wide as its index makes it, not as a facet is: with 1,280 twice as many bands are
+left uncut."""
 SLAB_THICKNESS = 0.2
 SLAB = rectangle(4.0, SLAB_THICKNESS)
 DIFFERENCES = (1e-2, -1e-2, 1e-4, -1e-4, 1e-6, -1e-6)
@@ -185,7 +188,7 @@ def measure_index_matched(context: Context) -> Iterator[Measurement]:
                 if disperses
                 else constant(1.0 + delta, "hardly glass")
             )
-            scene = with_sky(solid("ball", sphere(0.7, 1280), glass), camera=camera, environment=environment)
+            scene = with_sky(solid("ball", sphere(0.7, TRIANGLES), glass), camera=camera, environment=environment)
             sight = render_probe(context, scene, PROBE, 1)
             bound = 10.0 * abs(delta) + 0.5 * np.sqrt(2.0 * abs(delta)) + 1e-5
             judged = Judged().hold("picture", difference(sight.picture, empty.picture), bound)
