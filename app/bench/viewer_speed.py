@@ -24,7 +24,7 @@ from ..passes.sample_picture import SamplePicture
 from ..ui.headless import HeadlessInterface
 from ..ui.session import Session
 from ..ui.viewer import Viewer, headless_viewer
-from .machine import clocks, compile_line
+from .machine import clocks, compile_line, process_age_s
 from .programs import unique
 
 if TYPE_CHECKING:
@@ -84,7 +84,9 @@ def run(context: Context, scene: Path, size: tuple[int, int], seconds: float) ->
         with recorded() as programs:
             first = bench.wait_for_picture()
         yield f"first picture after {first:.2f} s; compiled {compile_line(unique(programs))}"
-        yield f"whole after {first + bench.wait_for_whole():.2f} s"
+        whole = f"whole after {first + bench.wait_for_whole():.2f} s"
+        age = process_age_s()
+        yield whole if age is None else f"{whole}, {age:.2f} s from the start of the process"
         heads = "".join(f" {head:>11}" for head in ("median", "95 %", "frames", "pictures"))
         yield f"{'':<24}{heads} {'photons':>12} {'rays traced':>12} {'direct':>8} {'glass':>8} {'whole':>9}"
         for name, hold, act in (
