@@ -87,10 +87,11 @@ class ProgressReporter:
     def _log(self, fraction: float, text: str, now: float) -> None:
         elapsed = now - self._started
         detail = f", {text}" if text else ""
-        # Of late: one phase may be slower than those before it.
+        # One phase may be slower than those before it, and begin with compiling: halfway between of late and so far.
         (before, then), self._last = self._last, (fraction, now)
         if fraction - before > _TELLING_SHARE:
-            detail += f", about {(1.0 - fraction) * (now - then) / (fraction - before):.0f} s left"
+            rate = 0.5 * ((fraction - before) / (now - then) + fraction / elapsed)
+            detail += f", about {(1.0 - fraction) / rate:.0f} s left"
         print(
             f"{self._title}: {100.0 * fraction:.0f} % after {elapsed:.0f} s{detail}",
             file=self._stream,

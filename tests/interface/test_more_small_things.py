@@ -22,6 +22,7 @@ from spectrasplat.model.contacts import world_bounds
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.optics import catalogue
 from spectrasplat.ui.panels import file_browser
+from spectrasplat.ui.panels.abbe import place_of_name
 from spectrasplat.ui.session import Session
 
 from tests.interface.fake_engine import FakeEngine
@@ -71,6 +72,11 @@ def test_the_abbe_diagram_stands_beside_the_caustic(gl: Context) -> None:
         rig.open_panel(abbe=True)
         rig.frame(4)
         assert rig.find("Abbe plot").left >= rig.find("Picture").right
+
+
+def test_the_name_of_a_glass_stays_within_the_abbe_diagram() -> None:
+    assert place_of_name(100.0, 40.0, 8.0, 400.0) == 108.0
+    assert place_of_name(380.0, 40.0, 8.0, 400.0) + 40.0 == 372.0  # left of the ring, and it ends before it
 
 
 def test_open_takes_a_typed_name_and_a_whole_path(gl: Context, tmp_path: Path) -> None:

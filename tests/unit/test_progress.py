@@ -50,7 +50,17 @@ def test_what_hardly_moved_foretells_nothing(clock: Clock) -> None:
     for fraction in (1e-8, 2e-8, 0.5):
         clock.now += 10.0
         reporter(fraction)
-    assert [line.partition(", ")[2] for line in stream.getvalue().splitlines()] == ["", "", "about 10 s left"]
+    assert [line.partition(", ")[2] for line in stream.getvalue().splitlines()] == ["", "", "about 15 s left"]
+
+
+def test_a_pause_does_not_foretell_hours(clock: Clock) -> None:
+    """While the camera's program was compiled, half an hour was foretold of what took a minute."""
+    stream = io.StringIO()
+    reporter = ProgressReporter("ball", stream, clock)
+    for seconds, fraction in ((50.0, 0.39), (76.0, 0.395)):
+        clock.now = 100.0 + seconds
+        reporter(fraction)
+    assert stream.getvalue().splitlines()[-1].endswith("about 225 s left")
 
 
 def test_quick_jobs_are_silent(clock: Clock) -> None:

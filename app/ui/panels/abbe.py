@@ -191,6 +191,7 @@ def _draw_objects(state: State) -> None:
     drawing, colours = implot.get_plot_draw_list(), theme.palette()
     implot.push_plot_clip_rect()
     taken: list[ImVec2] = []
+    right = implot.get_plot_pos().x + implot.get_plot_size().x
     for index, item, material in glasses_of(state.scene):
         n_d, v_d = own_numbers(material.dispersion)
         if not np.isfinite(v_d):
@@ -202,10 +203,16 @@ def _draw_objects(state: State) -> None:
         # Names of objects of one glass stand below each other.
         line = sum(abs(at.x - other.x) < theme.em(2.0) and abs(at.y - other.y) < theme.em(1.0) for other in taken)
         taken.append(at)
-        _draw_name(
-            drawing, ImVec2(at.x + theme.em(0.65), at.y - theme.em(0.55) + line * theme.em(1.1)), item.name, tint
-        )
+        x = place_of_name(at.x, imgui.calc_text_size(item.name).x, theme.em(0.65), right)
+        _draw_name(drawing, ImVec2(x, at.y - theme.em(0.55) + line * theme.em(1.1)), item.name, tint)
     implot.pop_plot_clip_rect()
+
+
+def place_of_name(ring: float, width: float, gap: float, right: float) -> float:
+    """Where a name of `width` begins: right of the ring, or left of it where it would pass the plot's `right` border;
+    pixels."""
+    beyond = ring + gap + width > right
+    return ring - gap - width if beyond else ring + gap
 
 
 def _draw_name(drawing: imgui.ImDrawList, at: ImVec2, name: str, tint: int) -> None:
