@@ -147,6 +147,17 @@ def _objs() -> tuple[bytes, ...]:
     return tuple((corners + more).encode() for more in (plain, extra + full, extra + mixed))
 
 
+def _materials(path: Path) -> object:
+    from spectrasplat.model.io.obj_materials import read_materials
+
+    return [told.material() for told in read_materials(path.with_suffix(".obj"), (path.name,), []).values()]
+
+
+def _material_texts() -> tuple[bytes, ...]:
+    glass = b"newmtl glass\nKd 1 1 1\nNi 1.78\nd -halo 0.1\nillum 7\n"
+    return (glass + b"newmtl wood # oak\nKd 0.4 0.2 0.08\nTr 0.0\nKa 1 1 1\nmap_Kd oak.png\n",)
+
+
 def _plys() -> tuple[bytes, ...]:
     names = "".join(f"property float {n}\n" for n in ("x", "y", "z"))
     head = "element vertex 4\n" + names + "element face 4\nproperty list uchar int vertex_indices\nend_header\n"
@@ -432,6 +443,8 @@ READERS = {
     "gltf": Reader("scene.gltf", _scene, _gltf_texts),
     "glb": Reader("scene.glb", _scene, _glbs),
     "obj": Reader("mesh.obj", _mesh, _objs),
+    "obj-parts": Reader("mesh.obj", _scene, _objs),
+    "mtl": Reader("own.mtl", _materials, _material_texts),
     "ply": Reader("mesh.ply", _mesh, _plys),
     "stl": Reader("mesh.stl", _mesh, _stls),
     "png": Reader("picture.png", _picture, _pngs),
