@@ -73,6 +73,14 @@ def test_what_shares_a_vertex_stays_one_solid(tmp_path: Path) -> None:
     assert names(scene) == ["own"] and scene.objects[0].mesh.is_closed
 
 
+def test_a_part_without_area_is_left_out(tmp_path: Path) -> None:
+    file = Writer()
+    file.box((0, 0, 0), 1.0, "o body")
+    file.box((3, 0, 0), 1.0, "o lid")
+    file.box((7, 0, 0), 0.0, "o point")
+    assert names(file.load(tmp_path)) == ["body", "lid"]
+
+
 def test_what_faces_inward_is_the_cavity_of_what_holds_it(tmp_path: Path) -> None:
     file = Writer()
     file.box((0, 0, 0), 4.0, "g outside")

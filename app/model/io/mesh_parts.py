@@ -34,10 +34,14 @@ def parts_of_mesh(mesh: Mesh, groups: Groups | None) -> list[MeshPart]:
     """The solids of a file's `mesh`; the whole where the file tells none apart."""
     if groups is None:
         return [MeshPart(mesh, None)]
+    if len(groups.names) == 1:
+        return [MeshPart(mesh, groups.materials[0])]
     of_triangle = _solids(mesh, groups)
     order = np.argsort(of_triangle, kind="stable")
     pieces = np.split(order, np.flatnonzero(np.diff(of_triangle[order])) + 1)
-    if len(pieces) == 1:
+    areas = mesh.areas()
+    pieces = [triangles for triangles in pieces if areas[triangles].any()]  # helpers of modellers: points and lines
+    if len(pieces) < 2:
         return [MeshPart(mesh, _commonest(groups.of_triangle, groups.materials))]
     names, parts = Names(), []
     for triangles in pieces:
