@@ -18,6 +18,7 @@ from spectrasplat.model.optics.glass import from_abbe
 from spectrasplat.model.optics.spectrum import constant as white
 from spectrasplat.model.scene import Black, Camera, Dielectric, Diffuse, Material, RenderDefaults, Scene, SceneObject
 from spectrasplat.model.settings import RenderSettings
+from spectrasplat.model.texture import Environment
 from spectrasplat.reference import glasses
 from spectrasplat.reference.glasses import D_NM
 from spectrasplat.reference.photon_reference import render_reference
@@ -247,3 +248,26 @@ def test_what_a_camera_sees_through_panes_across_each_other(gl, v_d: float) -> N
         known.append(known_share(polarisation, v_d))
     assert seen == pytest.approx(known, rel=8e-3)
     assert seen[0] / seen[1] == pytest.approx(known[0] / known[1], rel=4e-3)
+
+
+def test_light_of_the_environment_through_a_slab(gl) -> None:
+    """A bright patch of sky, 12° across and 70° from the zenith, lights a floor below a slab that hides all the sky."""
+    rows, columns = np.mgrid[0:180, 0:360] + 0.5
+    zenith, azimuth = np.radians(rows), np.radians(columns - 180.0)
+    cosine = np.cos(ANGLE) * np.cos(zenith) + np.sin(ANGLE) * np.sin(zenith) * np.cos(azimuth)
+    sky = np.where(cosine[..., None] > np.cos(np.radians(6.0)), np.ones(3), 0.0).astype(np.float32)
+    raised = np.eye(4)
+    raised[2, 3] = 3.0
+    objects = (
+        SceneObject("slab", primitives.box((60.0, 60.0, 0.5)), Dielectric(from_abbe(INDEX, np.inf)), raised),
+        SceneObject("floor", primitives.plane(4.0, 4.0), Diffuse()),
+    )
+    camera = Camera((0.0, 0.0, 2.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0), vertical_fov_deg=50.0)
+    seen = []
+    for polarisation in (True, False):
+        scene = Scene("sky", camera, (), objects, environment=Environment(sky, lights=True))
+        scene = replace(scene, render=RenderDefaults(polarisation=polarisation))
+        seen.append(float(render(scene, RenderSettings(16, 16, photons=1000, spp=4), context=gl).rgb.mean()))
+    assert seen[1] > 0.0
+    # Each asks by chance, but the same directions: between them a per cent.
+    assert seen[0] / seen[1] == pytest.approx(passed(True) / passed(False), rel=0.02)

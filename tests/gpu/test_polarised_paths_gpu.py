@@ -8,8 +8,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
+from spectrasplat.model.geometry.primitives import box, plane
 from spectrasplat.model.geometry.primitives_gem import brilliant
+from spectrasplat.model.placement import rotation_about
 from spectrasplat.model.scene import Mirror, SceneObject
 from spectrasplat.stress.rigs.gpu_paths import glass, placed
 
@@ -22,10 +25,29 @@ def stone() -> tuple[SceneObject, ...]:
     return (placed("stone", brilliant(), glass("diamond")),)
 
 
+def mirrored() -> tuple[SceneObject, ...]:
+    """Steep panes before and behind a mirror, askew to each other."""
+    pane = box((0.3, 2.4, 2.4))
+    places = (
+        ("before", pane, (0.0, 0.6, 0.8), 60.0, (-1.5, 0.2, 0.15), glass("N-SF11")),
+        ("behind", pane, (0.6, 0.5, 0.7), 65.0, (0.6, 1.8, 0.0), glass("N-SF11")),
+        ("mirror", plane(2.0, 2.0), (1.0, 1.0, 0.0), -90.0, (0.6, 0.0, 0.0), Mirror((0.9, 0.9, 0.9))),
+    )
+    things = []
+    for name, mesh, axis, turn_deg, place, material in places:
+        matrix = np.eye(4)
+        matrix[:3, :3], matrix[:3, 3] = rotation_about(axis, np.radians(turn_deg)), place
+        things.append(placed(name, mesh.transformed(matrix), material))
+    return tuple(things)
+
+
 CASES = {
     "stone": Case(stone, depth=5, refractions=2, tinted=False, lattice=120, polarisation=True, compared=60),
     "touching glass": Case(touching, refractions=3, lattice=200, polarisation=True),
-    "curved, with a mirror": Case(
+    "panes with a mirror between": Case(
+        mirrored, depth=5, refractions=4, tinted=False, lattice=400, polarisation=True, compared=60
+    ),
+    "curved": Case(
         lambda: (ball(glass("N-SF11"), (0.0, 0.6, 0.0), 0.8), ball(Mirror((0.9, 0.9, 0.9)), (0.3, -0.9, 0.1), 0.6)),
         depth=4,
         tinted=False,
@@ -49,9 +71,9 @@ MUTANTS = {
         LIBRARY,
         "vec3(-1.0), vec3(0.0));",
         "vec3(1.0), vec3(0.0));",
-        "curved, with a mirror",
+        "panes with a mirror between",
     ),
-    "unpolarised again": (FLIGHT, "ray.stokes_q = state.q;", "ray.stokes_q = vec3(0.0);", "touching glass"),
+    "unpolarised again": (FLIGHT, "ray.stokes_q = state.q;", "ray.stokes_q = vec3(0.0);", "stone"),
 }
 QUICK = ("planes do not turn",)
 
