@@ -23,12 +23,14 @@ from spectrasplat.model.lights import AreaLight, DirectionalLight, IesLight, Poi
 from spectrasplat.model.optics.colorimetry import rgb709_to_xyz
 from spectrasplat.model.optics.glass import sellmeier
 from spectrasplat.model.optics.spectrum import blackbody, illuminant
+from spectrasplat.model.placement import rotation_about
 from spectrasplat.model.scene import (
     Absorption,
     Camera,
     Dielectric,
     Diffuse,
     Mirror,
+    RenderDefaults,
     Scene,
     SceneObject,
 )
@@ -125,6 +127,19 @@ def nested() -> Scene:
     return Scene("nested", VIEW, (sun,), (*shells, FLOOR))
 
 
+def polarised() -> Scene:
+    """Light that keeps its polarisation through two steep panes of flint, across each other, under a point lamp: with
+    unpolarised light at every surface the picture would have 2.1 % less."""
+    panes = []
+    for axis, height in (((0.0, 1.0, 0.0), 1.9), ((1.0, 0.0, 0.0), 0.9)):
+        matrix = np.eye(4)
+        matrix[:3, :3], matrix[:3, 3] = rotation_about(axis, np.radians(66.0)), (0.0, 0.0, height)
+        panes.append(SceneObject(f"pane {height}", primitives.box((1.6, 1.6, 0.1)), Dielectric(FLINT), matrix))
+    lamp = PointLight("lamp", illuminant("A").scaled_to_luminous(1000.0), (0.0, 0.0, 6.0))
+    view = replace(VIEW, target=(0.0, 0.0, 0.0), vertical_fov_deg=24.0)
+    return Scene("panes", view, (lamp,), (*panes, FLOOR), render=RenderDefaults(polarisation=True))
+
+
 def wine_glass() -> Scene:
     """The shipped scene from nearer, where its caustic is seen directly."""
     scene = load_scene(assets_dir() / "scenes" / "wine_glass.toml")
@@ -138,7 +153,9 @@ def prism_case() -> Scene:
     return replace(scene, camera=replace(scene.camera, target=(22.5, 0.0, 0.0), vertical_fov_deg=9.0))
 
 
-SCENES = {scene.__name__: scene for scene in (tinted, mirrored, area_lit, lamp_lit, nested, wine_glass, prism_case)}
+SCENES = {
+    scene.__name__: scene for scene in (tinted, mirrored, area_lit, lamp_lit, nested, polarised, wine_glass, prism_case)
+}
 
 
 def blocks(picture: np.ndarray, side: int = BLOCK) -> np.ndarray:
@@ -187,7 +204,7 @@ class Comparison:
         return float(np.mean((excess > 3.0 * np.sqrt(self.variance[..., 1]))[lit]))
 
 
-SLOW = {"wine_glass", "lamp_lit", "nested"}
+SLOW = {"wine_glass", "lamp_lit", "nested", "polarised"}
 
 
 @pytest.fixture(
