@@ -267,6 +267,9 @@ EMIT_PARAMETERS = Struct(
             "one bit a cell of the domain: may a ray from it meet a specular object?",
             MASK_SIZE * MASK_SIZE // 32,
         ),
+        Field("thinned", "uint", "one bit a cell: are only some of its points emitted?", MASK_SIZE * MASK_SIZE // 32),
+        Field("thinned_chance", "float", "of a point in such a cell to be emitted"),
+        Field("reserved", "uint", "", 3),
     ),
 )
 TRACE_PARAMETERS = Struct(

@@ -50,11 +50,17 @@ class EmissionDomain:
     aperture_centre: np.ndarray
     is_disc: bool
     cone: tuple[float, float]
+    thinned: np.ndarray | None = None
+    """bool, as `mask`: cells of it of which only some points are emitted, for all (`guided_emission`); None: none."""
+    thinned_chance: float = 1.0
+    """Of a point in such a cell to be emitted."""
 
     @property
     def active_share(self) -> float:
-        """Share of the rectangle that the mask keeps."""
-        return float(self.mask.mean())
+        """Share of a lattice over the rectangle that is emitted: what the mask keeps, less what is thinned."""
+        if self.thinned is None:
+            return float(self.mask.mean())
+        return float(self.mask.mean() - (1.0 - self.thinned_chance) * self.thinned.mean())
 
     def spacing(self, count: int) -> np.ndarray:
         """Distances (2,) along the axes between neighbours of a lattice of `count` points over the rectangle.

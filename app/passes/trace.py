@@ -167,7 +167,7 @@ class TracePass:
         self._features = features
         self._defines = defines
         self._structs = structs
-        self._emit: dict[str, moderngl.ComputeShader] = {}
+        self._emit: dict[tuple[str, bool], moderngl.ComputeShader] = {}
         self._orders: dict[tuple[int, int, int], moderngl.Buffer] = {}
         self._trace = shader.compute(ctx, "light/trace.comp", defines, (*structs, records.TRACE_PARAMETERS))
         queue = {
@@ -253,7 +253,7 @@ class TracePass:
         self._bind_queue(0)
         self._emit_parameters.bind_to_storage_buffer(bindings.PARAMETERS)
         self._order(piece).bind_to_storage_buffer(bindings.INDICES)
-        self._emit_program(domain.kind).run(-(-piece.count // _GROUP))
+        self._emit_program(domain).run(-(-piece.count // _GROUP))
         self._indices.bind_to_storage_buffer(bindings.INDICES)
         self._list_children(first=True, chunks=-(-piece.count // _CHUNK))
         emitted = int(self._read_state()["alive"])
@@ -345,6 +345,9 @@ class TracePass:
         p["light_place"] = piece.light_place
         p["light"], p["stride"] = piece.light, piece.stride
         p["mask"] = np.packbits(domain.mask.ravel(), bitorder="little").view("<u4")
+        if domain.thinned is not None:
+            p["thinned"] = np.packbits(domain.thinned.ravel(), bitorder="little").view("<u4")
+        p["thinned_chance"] = domain.thinned_chance
         self._emit_parameters.write(p.tobytes())
         lattices = len(piece.bands) * piece.light_points
         self._trace_values = self._trace_parameters_of(piece.light, lattices, max_depth, piece.beam_objects)
@@ -407,13 +410,14 @@ class TracePass:
             self._orders[key] = self.context.ctx.buffer(morton_order(*key).tobytes())
         return self._orders[key]
 
-    def _emit_program(self, kind: str) -> moderngl.ComputeShader:
-        if kind not in self._emit:
-            defines = self._defines | emit_defines(self._features, kind)
-            self._emit[kind] = shader.compute(
+    def _emit_program(self, domain: EmissionDomain) -> moderngl.ComputeShader:
+        variant = domain.kind, domain.thinned is not None
+        if variant not in self._emit:
+            defines = self._defines | emit_defines(self._features, *variant)
+            self._emit[variant] = shader.compute(
                 self.context.ctx, "light/emit.comp", defines, (*self._structs, records.EMIT_PARAMETERS)
             )
-        return self._emit[kind]
+        return self._emit[variant]
 
     def _read_state(self) -> np.void:
         return np.frombuffer(self._state.read(), records.QUEUE_STATE.dtype)[0]

@@ -102,11 +102,13 @@ def light_defines(features: Features, traits: DeviceTraits) -> Defines:
     return features.defines() | bindings.LIGHT_HALF_DEFINES | defines
 
 
-def emit_defines(features: Features, kind: str) -> Defines:
-    """What emit.comp has besides: the kind of its light's emission domain, and how it draws wavelengths."""
+def emit_defines(features: Features, kind: str, thins: bool = False) -> Defines:
+    """What emit.comp has besides: the kind of its light's emission domain, whether some cells of that are thinned, and
+    how it draws wavelengths."""
     random = features.point_spectrum and features.random_wavelength
     switches = {
         f"LIGHT_{kind.upper()}": True,
+        "THINNED_CELLS": thins,
         "RANDOM_WAVELENGTH": random,
         "EVEN_WAVELENGTHS": random and features.even_wavelengths,
     }

@@ -1,5 +1,6 @@
 // Emission: one thread a lattice point. Compiled once per kind of light (LIGHT_POINT covers spots,
-// LIGHT_PROFILE lamps from photometric files, LIGHT_PLANE directional and collimated light, LIGHT_AREA area lights).
+// LIGHT_PROFILE lamps from photometric files, LIGHT_PLANE directional and collimated light, LIGHT_AREA area lights);
+// THINNED_CELLS where emission is guided (app/passes/guided_emission.py).
 layout(local_size_x = 64) in;
 
 #include "lib/emission.glsl"
@@ -57,6 +58,13 @@ void main()
 
     vec3 position, direction, dposition_ds = vec3(0.0), dposition_dt = vec3(0.0), ddirection_ds = vec3(0.0), ddirection_dt = vec3(0.0);
     float weight = p.weight;
+#ifdef THINNED_CELLS
+    // Few points of a cell from which a pilot's light landed nowhere stand for all of them. Roulette on the way has the generators from 1 on.
+    bool is_thinned = (p.thinned[bit >> 5u] & (1u << (bit & 31u))) != 0u;
+    alive = alive && (!is_thinned || kronecker(point, depth_generator(0u), p.seed + own_lattice * 2654435769u) < p.thinned_chance);
+    float stands_for = is_thinned ? 1.0 / p.thinned_chance : 1.0;
+    weight *= stands_for;
+#endif
 #ifndef LIGHT_PLANE
     alive = alive && dot(q, q) < 4.0;
     vec3 dx, dy;
@@ -96,7 +104,11 @@ void main()
         ray.position = position;
         ray.direction = direction;
         ray.flux_w = weight * band.w;
+#ifdef THINNED_CELLS
+        ray.footprint_scale = sqrt(stands_for);
+#else
         ray.footprint_scale = 1.0;
+#endif
         ray.throughput = vec3(weight);
         ray.x_lo = band.x;
         ray.x_hi = band.y;
