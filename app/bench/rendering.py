@@ -25,8 +25,8 @@ from ..passes.camera import CameraPass
 from ..passes.pixel_lattice import LOOKS
 from ..render.device_scene import scene_buffers
 from ..render.light_pass import LightPass
+from ..render.pass_sizes import pass_sizes
 from ..render.sampling import DEFAULT_SAMPLES
-from ..render.shrinking import passes
 from .results import OWN_METHODS
 
 KERNELS = tuple(float(width) for width in np.geomspace(0.45, 32.0, 13))
@@ -190,22 +190,24 @@ class MethodRig:
         """Fill the maps; seconds by stage. All that a pass does beside tracing counts as splatting."""
         light = self._light
         light.forget_tables()
+        sizes, planning, filling = pass_sizes(light.features.method, photons), 0.0, 0.0
         started = self._finished()
-        count, photons = passes(light.features.method, photons)
-        light.begin(photons, seed)
-        _ = light.tables  # made when they are first asked for
-        planned = self._finished()
-        for number in range(count):
-            light.run_pass(number, photons, self._wait)
-        filled = self._finished()
+        light.begin(sizes[0], seed)
+        for number, size in enumerate(sizes):
+            light.plan(size, number)
+            _ = light.tables  # made when they are first asked for
+            planned = self._finished()
+            light.run_pass(number, size, self._wait)
+            filled = self._finished()
+            planning, filling, started = planning + planned - started, filling + filled - planned, filled
         self._textures = light.resolved_textures()
         resolved = self._finished()
         self._context.check("a rendering of the bench")
         trace = light.stats.trace_seconds
         return {
-            "plan": planned - started,
+            "plan": planning,
             "trace": trace,
-            "splat": filled - planned - trace,
+            "splat": filling - trace,
             "resolve": resolved - filled,
         }
 

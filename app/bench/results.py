@@ -15,6 +15,7 @@ DEFAULT_METHODS = (
     "regular-7",
     "regular-16",
     "srd-lambda",
+    "progressive",
     "srd-photons",
     "srd",
 )

@@ -18,7 +18,7 @@ from .scene import (
     Scene,
     SceneObject,
 )
-from .settings import RANDOM_METHODS, RenderSettings, divides_spectrum
+from .settings import RANDOM_METHODS, RenderSettings, divides_spectrum, has_beams
 
 MAX_GROUPS = 4
 """Spectral columns a photon may carry; further dispersive materials share the last one."""
@@ -266,12 +266,12 @@ def _has_beams(scene: Scene, settings: RenderSettings) -> bool:
     painted = is_painted(scene, settings.local_gain)
     receives = any(o.material.receives and is_flat(o) for o in scene.objects)
     shines = any(light.profile is None for light in scene.lights)
-    return settings.method == "srd" and receives and shines and not painted and bool(beam_objects(scene))
+    return has_beams(settings.method) and receives and shines and not painted and bool(beam_objects(scene))
 
 
 def why_no_camera_beams(scene: Scene, settings: RenderSettings) -> str | None:
     """Why the camera sees glass and mirrors by paths alone; None: beams may serve it (where they were asked for)."""
-    if settings.method not in ("srd", "srd-photons"):
+    if not divides_spectrum(settings.method):
         return f"method {settings.method} follows paths"
     if not camera_needs(scene, settings)[0]:
         return "no glass and no mirror is in view"

@@ -7,7 +7,7 @@ from .environment_light import why_no_environment_light
 from .environment_sun import with_sun
 from .features import Features, beam_objects, dispersive_materials, half_spaces, is_flat, why_no_beams
 from .scene import Scene
-from .settings import divides_spectrum
+from .settings import divides_spectrum, has_beams
 
 
 def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
@@ -209,7 +209,7 @@ def _beam_words(scene: Scene, features: Features) -> str:
             f"what {', '.join(carried)} throw(s) goes as polygons, unless a survey finds that photons are cheaper"
             + (f"; photons for {'; '.join(others)}" if others else "")
         )
-    if features.method != "srd":
+    if not has_beams(features.method):
         return f"method {features.method} follows photons"
     reasons = [f"{o.name}: {why_no_beams(o)}" for o in specular if why_no_beams(o)]
     if not specular or len(reasons) == len(specular):

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 METHODS = (
     "srd",
     "srd-photons",
+    "progressive",
     "srd-lambda",
     "stochastic",
     "stochastic-even",
@@ -19,16 +20,28 @@ METHODS = (
 """Sampling methods that every comparison holds (README, "Methods")."""
 RANDOM_METHODS = ("stochastic", "stochastic-even", "stochastic-point", "progressive-stochastic", "hero")
 """Of those, the ones whose photons have wavelengths drawn at random."""
-LIGHT_METHODS = ("stochastic-point", "progressive-stochastic", "hero")
-"""The ones that only photons may follow; camera rays then follow `stochastic`."""
+LIGHT_METHODS = ("progressive", "stochastic-point", "progressive-stochastic", "hero")
+"""The ones that only photons may follow; camera rays then follow `srd` or `stochastic`, see `camera_method_of`."""
 CAMERA_METHODS = tuple(name for name in METHODS if name not in LIGHT_METHODS)
 """Of those, the ones that camera rays may follow too."""
 
 
 def divides_spectrum(method: str) -> bool:
     """Whether photons and camera rays are swept along as many spectral bands as the scene asks for, one column a glass:
-    `srd`, with or without beams."""
-    return method in ("srd", "srd-photons")
+    `srd`, with or without beams, in one pass or many."""
+    return method in ("srd", "srd-photons", "progressive")
+
+
+def has_beams(method: str) -> bool:
+    """Whether what flat facets throw goes as beams."""
+    return method in ("srd", "progressive")
+
+
+def camera_method_of(method: str) -> str:
+    """What camera rays follow where photons follow `method`."""
+    if method not in LIGHT_METHODS:
+        return method
+    return "srd" if divides_spectrum(method) else "stochastic"
 
 
 @dataclass(frozen=True)

@@ -150,6 +150,8 @@ class PilotFit:
     smoothing: float
     budget: int
     """Photons of the light in a pass."""
+    active_share: float
+    """Of a pass's lattices: what is emitted (`EmissionDomain`)."""
 
     def band_count(self) -> int:
         """Bands needed so that nine tenths of the flux keep the chord's error below the tolerance."""
@@ -202,7 +204,8 @@ class PilotFit:
 
     def _coarsening(self, lattices: int) -> float:
         """Spacing of a sub-lattice of the pass over that of the pilot."""
-        return float(np.sqrt(PHOTONS * lattices / max(self.budget, 1)))
+        points = max(self.budget, 1) / (lattices * self.active_share)
+        return float(np.sqrt(self.pilot.lattice_count / points))
 
     def _footprint_texels(self, lattices: int) -> float:
         """Typical standard deviation of a footprint (the geometric mean of its two), texels."""

@@ -8,7 +8,6 @@ all frames (`FrameFit`), so that what stands still in the scene stands still in 
 
 from __future__ import annotations
 
-import itertools
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -35,12 +34,10 @@ from .light_pass import LightPass
 from .map_picture import map_picture
 from .memory_estimate import MemoryEstimate, check_room, estimate
 from .sampling import CameraSampling, LightSampling, camera_settings, has_own_method
-from .shrinking import METHOD, PASS_PHOTONS, passes
 from .solo import scene_seen
 from .time_budget import TimeBudget
+from .traced_light import traced_light
 
-FIRST_PASS_PHOTONS = 1 << 17
-"""Photons of a timed rendering's first pass, which finds out how fast the scene goes."""
 _ENVIRONMENT_SHARE = 0.25
 """Of a timed rendering, at most, for the light of the environment."""
 _ENVIRONMENT_PROGRESS = 0.1
@@ -386,57 +383,3 @@ class FrameRenderer:
 def _with_sun(stage: Stage) -> Stage:
     scene = with_sun(stage.scene)
     return stage if scene is stage.scene else replace(stage, scene=scene)
-
-
-def traced_light(light: LightPass, sampling: LightSampling, stop: Stop) -> Iterator[float]:
-    """Fill the maps of a prepared light pass, pausing with the share done."""
-    if sampling.seconds is not None:
-        yield from _traced_for(light, sampling.seconds, sampling.seed, stop)
-        return
-    count, photons = passes(light.features.method, sampling.photons)
-    light.begin(photons, sampling.seed)
-    for number in range(count):
-        for share in light.steps_until(number, photons, stop):
-            yield (number + share) / count
-        if number + 1 < count and stop():
-            return
-
-
-def _traced_for(light: LightPass, seconds: float, seed: int, stop: Stop) -> Iterator[float]:
-    """Passes as fine as `seconds` allow.
-
-    Coarse footprints blur, and what they blurred stays in the sum: so a first small pass only tells how
-    fast this scene goes, and everything starts anew with one pass that fills the time that is left.
-    """
-    begun = time.perf_counter()
-
-    def spent() -> float:
-        return min((time.perf_counter() - begun) / seconds, 1.0)
-
-    def ends() -> bool:
-        return spent() >= 1.0 or stop()
-
-    def one_pass(number: int, photons: int) -> Iterator[float]:
-        for _ in light.steps_until(number, photons, ends):
-            yield spent()
-
-    if light.features.method == METHOD:
-        light.begin(PASS_PHOTONS, seed)
-        for number in itertools.count():
-            yield from one_pass(number, PASS_PHOTONS)
-            if ends() or not light.has_work:
-                return
-    photons = FIRST_PASS_PHOTONS
-    light.begin(photons, seed)
-    yield from one_pass(0, photons)
-    took = light.stats.trace_seconds + light.stats.splat_seconds
-    left = seconds - (time.perf_counter() - begun)
-    affordable = int(left * light.stats.photons / max(took, 1e-6))
-    if ends() or affordable < 2 * photons:
-        number = 1
-    else:
-        number, photons = 0, affordable
-        light.begin(photons, seed)
-    while not ends() and light.has_work:
-        yield from one_pass(number, photons)
-        number += 1

@@ -20,13 +20,14 @@ _FEWEST = 256
 
 
 def handed_rays(
-    emission: BeamEmission, entered_w: float, photons: float, most: int, seed: int, number: int
+    emission: BeamEmission, entered_w: float, photons: float, weight: float, most: int, seed: int, number: int
 ) -> Iterator[tuple[int, np.ndarray]]:
     """Light and ray records, at most `most` at once, of photons that carry on pieces, all tails or none, in round
     `number` of all passes.
 
-    `entered_w`: W that met facets, `photons`: of the round. What something curved may meet is as dense as the lattices
-    of emission; tails, which are little light, are denser, and shared out among lights by the root of their flux."""
+    `entered_w`: W that met facets, `photons`: of the round, `weight`: factor on their flux. What something curved may
+    meet is as dense as the lattices of emission; tails, which are little light, are denser, and shared out among lights
+    by the root of their flux."""
     pieces = emission.pieces
     flux_w = {int(light): emission.flux_w(int(light)) for light in np.unique(pieces.light)}
     entered_w, total = max(entered_w, 1e-300), sum(flux_w.values())
@@ -41,5 +42,5 @@ def handed_rays(
                 continue  # less than a 64th of a photon's power
         shifts = shift(seed, light, number, Dimension.LATTICE_U), shift(seed, light, number, Dimension.LATTICE_V)
         key = random_word(seed, light, number, Dimension.BRANCH)
-        for rays in emission.batches(light, max(_FEWEST, int(count)), photons, shifts, key, most):
+        for rays in emission.batches(light, max(_FEWEST, int(count)), weight, shifts, key, most):
             yield light, rays

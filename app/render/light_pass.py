@@ -30,6 +30,7 @@ from ..model.settings import RenderSettings
 from ..passes.beam_emission import BeamEmission
 from ..passes.caustic_maps import CausticMaps
 from ..passes.emission_domain import EmissionDomain, emission_domain
+from ..passes.guided_emission import guided
 from ..passes.map_atlas import MapAtlas
 from ..passes.map_layout import Landings, MapLayout, Window, check_map_receiver, layout_maps, pixel_side
 from ..passes.picture_window import PictureWindow
@@ -45,9 +46,11 @@ from .light_maps import LightMaps
 from .light_plan import Division, LightPlan, Planner
 from .light_stats import LightStats, PassStep
 from .map_fit import MapFit
+from .pass_sizes import PROGRESSIVE, emphasis
 from .photon_records import NoRecords, PhotonRecords, RoundOf
 from .shown_spectra import ShownSpectra, ShownTables
 from .splatting import Pace, Splatting
+from .thrown_photons import Keep, thrown
 
 BEAM_ROUND = 1 << 19
 """Photons' worth of beams, where they carry everything, after which a pass may be left."""
@@ -112,6 +115,8 @@ class LightPass:
         self.dispatch_seconds = DISPATCH_S
         """What the first event of a batch may take where the device queues work: smaller batches follow one that took
         longer."""
+        self._planned: tuple[int, tuple[int, int] | None] | None = None
+        """Photons and anchors of the plan."""
         self._portion = DispatchBudget(self.trace.batch, SMALLEST_PORTION, self.trace.batch)
         """Rays of the next batch."""
         self._traced_once = False
@@ -169,6 +174,7 @@ class LightPass:
         if not self._division.counts:
             # Frames of an animation have to agree about it.
             self.trace.split_threshold = split_threshold(pilots.values())
+            self.domains = {i: guided(domain, pilots[i]) for i, domain in self.domains.items()}
         return pilots
 
     def lay_out(self, fit: MapFit) -> None:
@@ -302,8 +308,21 @@ class LightPass:
         self.seed = seed
         self.stats, self._elsewhere = LightStats(), LightStats()
         self._maps.clear()
+        if self._beams is not None:
+            self._beams.begin()
+        self._first_photons, self._planned = photons, None
+        self.plan(photons, 0)
+
+    def plan(self, photons: int, number: int) -> None:
+        """Plan pass `number`, of about `photons`; what was summed before stays, each pass with its own weight
+        (`pass_sizes.emphasis`). Where bands are the same in all passes of so many photons, they share one plan."""
+        anchors = (self.seed, number) if self.features.method == PROGRESSIVE else None
+        if self._planned == (photons, anchors):
+            return
+        self._planned = photons, anchors
         # Without pilots beams carry everything.
-        self.plans = self._planner(self.pilots).plans(photons, self._texel_size()) if self.pilots else []
+        planner = self._planner(self.pilots)
+        self.plans = planner.plans(photons, self._texel_size(), anchors) if self.pilots else []
         for plan in self.plans:
             name = self.scene.lights[plan.index].name
             self.stats.bands[name], self.stats.light_points[name] = len(plan.bands), plan.light_points
@@ -311,7 +330,6 @@ class LightPass:
         spans = [limits.get(i, [(0.0, 1.0)]) for i in range(len(self.scene.lights))]
         self._records.begin(self.shown, spans, photons)
         if self._beams is not None:
-            self._beams.begin()
             self.plans = [
                 replace(plan, beam_objects=self._beams.carried.get(plan.index, ()))
                 for plan in self.plans
@@ -330,42 +348,15 @@ class LightPass:
             self._division,
         )
 
-    def sample_steps(self, photons: int, keep: Callable[[moderngl.Buffer, int, int, RoundOf], None]) -> Iterator[None]:
-        """Trace about `photons` as if there were no beams and hand them to `keep` (records, how many, bytes of one,
-        where they belong); the maps stay as they are."""
+    def sample_steps(self, photons: int, keep: Keep) -> Iterator[None]:
+        """Trace about `photons` as if there were no beams and hand them to `keep`; the maps stay as they are."""
         plans = yield from self.sample_plans(photons)
-        yield from self.throw(plans, photons, keep)
+        yield from thrown(self.trace, self.settings.seed, plans, photons, keep)
 
     def sample_plans(self, photons: int) -> Generator[None, None, list[LightPlan]]:
         """Of `sample_steps`."""
         self._sample_pilots = self.pilots or self._sample_pilots or (yield from self._pilot_steps())
         return self._planner(self._sample_pilots).plans(photons, self._texel_size())
-
-    def throw(
-        self,
-        plans: Sequence[LightPlan],
-        photons: int,
-        keep: Callable[[moderngl.Buffer, int, int, RoundOf], None],
-        max_depth: int | None = None,
-    ) -> Iterator[None]:
-        """Trace about `photons` by `plans`, as `sample_steps` does."""
-        counts = [plan.lattice_count(photons) for plan in plans]
-        rounds = max(
-            (-(-n // (self.trace.batch // plan.lattices)) for n, plan in zip(counts, plans, strict=True)), default=0
-        )
-        for j in range(rounds):
-            for i, (plan, lattice) in enumerate(zip(plans, counts, strict=True)):
-                points = len(range(j, lattice, rounds))
-                if points:
-                    part = plan.slice(self.settings.seed, 0, lattice, j, rounds, points, float(photons))
-                    batch = yield from self.trace.steps(part, plan.domain, max_depth)
-                    keep(
-                        self.trace.photons,
-                        batch.photons,
-                        self.trace.photon.stride,
-                        RoundOf(0, j, rounds, i + 1 == len(plans)),
-                    )
-                yield
 
     def run_pass(self, number: int, photons: int, proceed: Callable[[float], bool]) -> bool:
         """One shifted set of lattices with about `photons` points over all lights. `proceed(fraction)` is asked after
@@ -412,12 +403,12 @@ class LightPass:
 
         `first_round`: where a pass goes on that was left before. `first_group`, `stride`: of the groups of rounds that
         have their beams together, this one and every so manieth after it, where others trace the rest."""
-        rounds = self.rounds(photons)
+        rounds, weight = self.rounds(photons), photons * emphasis(photons, self._first_photons)
         if not self.plans:
             for j in range(first_round + first_group, rounds, stride):
-                for step in self._beam_steps(number, photons, RoundOf(number, j, rounds, True)):
+                for step in self._beam_steps(number, photons, weight, RoundOf(number, j, rounds, True)):
                     yield PassStep((j + step.fraction) / rounds, False)
-                self._maps.photon_weight += photons / rounds
+                self._maps.photon_weight += weight / rounds
                 self.stats.photons += photons * (j + 1) // rounds - photons * j // rounds
                 yield PassStep((j + 1) / rounds, True)
             return
@@ -429,19 +420,20 @@ class LightPass:
                 continue
             if j == first_round or j % together == 0:
                 end = min((j // together + 1) * together, rounds)
-                yield from self._beam_steps(number, photons, RoundOf(number, j, rounds, False), j / rounds, end - j)
+                of = RoundOf(number, j, rounds, False)
+                yield from self._beam_steps(number, photons, weight, of, j / rounds, end - j)
             for i, (plan, lattice) in enumerate(zip(self.plans, counts, strict=True)):
                 done = j * len(self.plans) + i
                 points = len(range(j, lattice, rounds))
                 if points:
-                    part = plan.slice(self.seed, number, lattice, j, rounds, points, float(photons))
+                    part = plan.slice(self.seed, number, lattice, j, rounds, points, weight)
                     for piece, is_last in self._portions(part):
                         of = RoundOf(number, j, rounds, is_last and i + 1 == len(self.plans))
                         for _ in self.batch_steps(self.trace.steps(piece, plan.domain), of, rays=piece.count):
                             yield PassStep(done / slices, False)
                 if i + 1 < len(self.plans):
                     yield PassStep((done + 1) / slices, False)
-            self._maps.photon_weight += photons / rounds
+            self._maps.photon_weight += weight / rounds
             yield PassStep((j + 1) / rounds, (j + 1) % together == 0 or j + 1 == rounds)
 
     def _portions(self, part: LatticeSlice) -> Iterator[tuple[LatticeSlice, bool]]:
@@ -482,20 +474,20 @@ class LightPass:
         return self.beams.stats if self.beams is not None else None
 
     def _beam_steps(
-        self, number: int, photons: int, of: RoundOf, done: float = 0.0, rounds: int = 1
+        self, number: int, photons: int, weight: float, of: RoundOf, done: float = 0.0, rounds: int = 1
     ) -> Iterator[PassStep]:
-        """The beams of so many `rounds` from one on, and what they hand to photons."""
+        """The beams of so many `rounds` from one on, and what they hand to photons; `weight`: of the whole pass."""
         beams, nth = self.beams, number * of.count + of.index
         if beams is None:
             return
-        share = photons * rounds / of.count
+        share, weight = photons * rounds / of.count, weight * rounds / of.count
         before = beams.stats.find_seconds, beams.stats.draw_seconds
-        for part in beams.steps(share, share, self._word(nth), self._maps):
+        for part in beams.steps(share, weight, self._word(nth), self._maps):
             yield PassStep(done if self.plans else part, False)
         after = beams.stats.find_seconds, beams.stats.draw_seconds
         self.stats.trace_seconds += after[0] - before[0]
         self.stats.splat_seconds += after[1] - before[1]
-        thrown = beams.tally(share)
+        thrown = beams.tally(weight)
         self.stats.tally.merge(thrown)
         self.stats.polygons_w += thrown.ended["deposited"]
         if beams.found is None or beams.found.pieces is None:
@@ -506,7 +498,8 @@ class LightPass:
             if not len(pieces):
                 continue
             emission = BeamEmission(self.buffers, self.trace.ray, pieces, self._records.tables.spans)
-            for light, rays in handed_rays(emission, beams.stats.entered_w, share, self._portion.units, self.seed, nth):
+            most = self._portion.units
+            for light, rays in handed_rays(emission, beams.stats.entered_w, share, weight, most, self.seed, nth):
                 self.stats.trace_seconds += time.perf_counter() - started
                 for _ in self.batch_steps(self.trace.carry_on(rays, light), of, of_tails=tails):
                     yield PassStep(done, False)

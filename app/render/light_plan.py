@@ -112,9 +112,10 @@ class Planner:
     """Rays in flight at once: a sub-lattice of each kind must have a point in them."""
     division: Division = Division()
 
-    def plans(self, photons: int, texel: np.ndarray) -> list[LightPlan]:
+    def plans(self, photons: int, texel: np.ndarray, anchors: tuple[int, int] | None = None) -> list[LightPlan]:
         """Photons, bands and points of each light that reaches a receiver; `texel`: side of each receiver's finest
-        window, GPU units."""
+        window, GPU units. `anchors`: seed and number of a pass whose bands begin and end elsewhere than those of
+        others; None: they are equally wide."""
         power = {
             i: max(float(self.buffers.light_power[i].band(0.0, 1.0)[1]) * d.measure * d.active_share, 0.0)
             for i, d in self.domains.items()
@@ -126,8 +127,16 @@ class Planner:
             # Half by power, half evenly: a dim light must not be left coarse.
             share = 0.5 * power[i] / total + 0.5 / len(lit)
             budget = int(photons * share)
-            fit = PilotFit(self.pilots[i], texel, self.buffers.variable_table, self.settings.smoothing, budget)
-            bands = self._bands(i, fit)
+            fit = PilotFit(
+                self.pilots[i],
+                texel,
+                self.buffers.variable_table,
+                self.settings.smoothing,
+                budget,
+                self.domains[i].active_share,
+            )
+            aside = 0.0 if anchors is None else shift(anchors[0], i, anchors[1], Dimension.SPECTRAL) / 2.0**32 - 0.5
+            bands = self._bands(i, fit, aside)
             points = (
                 fit.light_points(len(bands))
                 if self.features.footprints
@@ -145,7 +154,8 @@ class Planner:
             min(SMALLEST_BATCH // bands, max(1, budget // (16 * bands))) if self.scene.lights[light].has_extent else 1
         )
 
-    def _bands(self, light: int, fit: PilotFit) -> tuple[Band, ...]:
+    def _bands(self, light: int, fit: PilotFit, aside: float) -> tuple[Band, ...]:
+        """`aside`: how far the borders between bands are shifted, in bands."""
         power = self.buffers.light_power[light]
         axis = self.buffers.axis
         lo_nm, hi_nm = self.scene.lights[light].spectral_power.support_nm()
@@ -162,6 +172,7 @@ class Planner:
             lo_nm, hi_nm = max(lo_nm - 0.5, 380.0), min(hi_nm + 0.5, 780.0)
             ends = float(axis.x_of_nm(lo_nm)), float(axis.x_of_nm(hi_nm))
             edges = np.linspace(*ends, count + 1)
+            edges[1:-1] += aside * (edges[1] - edges[0])
             if self._tinted:
                 spectrum = self.scene.lights[light].spectral_power
                 edges = cut_by_tints(ends, count, MAX_BANDS, self.buffers.tints, spectrum, axis)

@@ -21,10 +21,10 @@ from ..model.scene import Scene
 from ..model.scene_key import picture_key
 from ..model.settings import RenderSettings
 from ..passes.trace import FluxTally
-from . import shrinking
 from .frames import FrameRenderer, Stop
 from .light_pass import LightPass
 from .light_stats import LightStats
+from .pass_sizes import pass_sizes
 from .sampling import LightSampling
 
 _SETTINGS = (
@@ -126,21 +126,22 @@ def trace_part(
     made: list[Part] = []
 
     def fill(light: LightPass, sampling: LightSampling, stopped: Stop) -> Iterator[float]:
-        count, photons = shrinking.passes(light.features.method, sampling.photons)
-        light.begin(photons, sampling.seed)
-        rounds, groups = light.rounds(photons), _groups(light, photons)
-        if count * groups < share.count:
+        sizes = pass_sizes(light.features.method, sampling.photons)
+        rounds, groups = _rounds_and_groups(light, sampling)
+        if sum(groups) < share.count:
             way_out = "ask for fewer parts, more photons or a smaller --batch"
             if light.only_beams:
                 way_out = "its light goes as beams, in rounds of a million photons: --method srd-photons has more"
             raise UserError(
-                f"{share.count} parts: this rendering is traced in {count * groups} rounds, which are not enough to "
+                f"{share.count} parts: this rendering is traced in {sum(groups)} rounds, which are not enough to "
                 f"share out; {way_out}"
             )
-        mine = len(range(share.index - 1, count * groups, share.count))
+        mine = len(range(share.index - 1, sum(groups), share.count))
         done = 0
-        for number in range(count):
-            first = (share.index - 1 - number * groups) % share.count
+        light.begin(sizes[0], sampling.seed)
+        for number, photons in enumerate(sizes):
+            light.plan(photons, number)
+            first = (share.index - 1 - sum(groups[:number])) % share.count
             for step in light.pass_steps(number, photons, 0, first, share.count):
                 done += step.round_done
                 progress(done / mine)
@@ -154,7 +155,7 @@ def trace_part(
             rendering_key(scene, settings),
             {name: getattr(settings, name) for name in _SETTINGS},
             share,
-            count * rounds,
+            rounds,
             layout_key(light),
             light.atlas.size,
             light.atlas.targets,
@@ -184,9 +185,7 @@ def parts_at_most(context: Context, scene: Scene, settings: RenderSettings) -> i
     found: list[int] = []
 
     def fill(light: LightPass, sampling: LightSampling, stopped: Stop) -> Iterator[float]:
-        count, photons = shrinking.passes(light.features.method, sampling.photons)
-        light.begin(photons, sampling.seed)
-        found.append(count * _groups(light, photons))
+        found.append(sum(_rounds_and_groups(light, sampling)[1]))
         yield 1.0
 
     stage = Stage(scene, scene.camera)
@@ -202,9 +201,17 @@ def parts_at_most(context: Context, scene: Scene, settings: RenderSettings) -> i
     return max(found[0], 1)
 
 
-def _groups(light: LightPass, photons: int) -> int:
-    """Rounds of a pass that may be traced apart: what has its beams together belongs to one part."""
-    return -(-light.rounds(photons) // light.rounds_together(photons))
+def _rounds_and_groups(light: LightPass, sampling: LightSampling) -> tuple[int, list[int]]:
+    """Rounds of all passes, and for each pass how many groups of rounds may be traced apart: what has its beams
+    together belongs to one part."""
+    sizes = pass_sizes(light.features.method, sampling.photons)
+    light.begin(sizes[0], sampling.seed)
+    rounds, groups = 0, []
+    for number, photons in enumerate(sizes):
+        light.plan(photons, number)
+        rounds += light.rounds(photons)
+        groups.append(-(-light.rounds(photons) // light.rounds_together(photons)))
+    return rounds, groups
 
 
 def layout_key(light: LightPass) -> str:
@@ -250,7 +257,7 @@ def merged_light(
     light pass is another than the parts'."""
 
     def fill(light: LightPass, sampling: LightSampling, stopped: Stop) -> Iterator[float]:
-        light.begin(shrinking.passes(light.features.method, sampling.photons)[1], sampling.seed)
+        light.begin(pass_sizes(light.features.method, sampling.photons)[0], sampling.seed)
         refuse(light)
         weight = sum(header.photon_weight for header in headers)
         light.take(sums, weight, merged_stats(header.light_stats() for header in headers))

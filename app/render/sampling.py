@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from ..model.features import Features
 from ..model.scene import Camera, Scene
-from ..model.settings import LIGHT_METHODS, RenderSettings
+from ..model.settings import RenderSettings, camera_method_of
 from ..passes.camera import CameraPass
 from ..passes.caustic_maps import CausticMaps
 from ..passes.spectrum_choice import MAX_BANDS, MIN_SAMPLES, SAMPLES_A_BAND, Spectrum
@@ -102,7 +102,7 @@ def whole_cycles(samples: int, bands: int) -> int:
 def camera_settings(settings: RenderSettings) -> RenderSettings:
     """`settings` with the camera's own method, where it has one."""
     method = settings.camera_method or settings.method
-    return replace(settings, method="stochastic" if method in LIGHT_METHODS else method)
+    return replace(settings, method=camera_method_of(method))
 
 
 def has_own_method(settings: RenderSettings) -> bool:

@@ -21,9 +21,3 @@ def kernel_scale(number: int) -> float:
     (Knaus and Zwicker 2011, eq. 15)."""
     log2 = math.lgamma(number + 1 + ALPHA) - math.lgamma(1 + ALPHA) - math.lgamma(number + 2)
     return math.exp(0.5 * log2)
-
-
-def passes(method: str, photons: int) -> tuple[int, int]:
-    """(number of passes, photons of each) that a rendering of `photons` consists of."""
-    count = max(1, round(photons / PASS_PHOTONS)) if method == METHOD else 1
-    return count, max(1, round(photons / count))

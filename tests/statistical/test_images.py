@@ -11,7 +11,7 @@ texel at most): `ALLOWED` gives texels that much, in shares of the brightest; th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -41,6 +41,7 @@ ALLOWED = {
     "stochastic-even": 0.01,
     "progressive-stochastic": 0.01,
     "srd-photons": 0.01,
+    "progressive": 0.01,
 }
 DETECTABLE = {
     "stochastic-point": 0.09,
@@ -48,10 +49,17 @@ DETECTABLE = {
     "stochastic-even": 0.01,
     "progressive-stochastic": 0.045,
     "srd-photons": 0.01,
+    "progressive": 0.01,
 }
 """Smallest error of the whole map that is seen: wavelengths drawn by chance leave more noise than a lattice of them."""
-PASSES = {"progressive-stochastic": 16}
-"""Of a quarter of `PHOTONS` each, where a method shrinks its kernel from one to the next."""
+PASSES = {
+    "progressive-stochastic": (PHOTONS // 4,) * 16,
+    "progressive": (PHOTONS // 16, PHOTONS // 4, PHOTONS),
+}
+"""Photons of each, where a method has several."""
+
+PASSES_SHRINK = ((1, True), (2, True), (3, True), (3, False))
+"""How many of `progressive`'s passes are rendered, and whether their footprints shrink."""
 
 APEX = np.radians(30.0)
 LAMP = np.array([-4.0, 0.6, 0.1])
@@ -97,24 +105,29 @@ class Window:
     high: np.ndarray
 
 
-def rendered(gl: Context, method: str, kernel: float = 1.0, shrinks: bool = True) -> tuple[np.ndarray, Window]:
-    """Maps (SEEDS, H, W, 3): X, Y, Z a texel. `kernel`: times as wide; `shrinks` False: a mutant that keeps it."""
+def rendered(
+    gl: Context, method: str, kernel: float = 1.0, shrinks: bool = True, passes: int | None = None, beams: bool = True
+) -> tuple[np.ndarray, Window]:
+    """Maps (SEEDS, H, W, 3): X, Y, Z a texel. `kernel`: times as wide; `shrinks` False: a mutant that keeps it.
+    `passes`: so many of the method's first; without `beams` photons carry everything."""
     width, height = SIZE
     settings = RenderSettings(width=width, height=height, method=method, layer="map:screen", max_depth=2)
     question = scene()
     features = Features.of(question, settings)
+    features = replace(features, beams=features.beams and beams)
     buffers = SceneBuffers(gl.ctx, question, features, spectral_axis(question, features))
     half = LightPass(gl, question, settings, features, buffers)
     try:
         half.prepare()
         half.smoothing *= kernel
-        count = PASSES.get(method, 1)
-        photons = PHOTONS if count == 1 else PHOTONS // 4
+        sizes = PASSES.get(method, (PHOTONS,))[:passes]
         maps = []
         for seed in range(SEEDS):
-            half.begin(photons, 100 + seed)
-            for number in range(count):
+            half.begin(sizes[0], 100 + seed)
+            for number, photons in enumerate(sizes):
                 half._shrinks = half._shrinks and shrinks
+                half.widening = 1.0 if shrinks else (photons / sizes[0]) ** 0.5
+                half.plan(photons, number)
                 half.run_pass(number, photons, lambda _: True)
             maps.append(half.resolved_map(0)[..., :3].astype(float) * half.map_scale)
         frame = plane_frame(buffers.space.to_gpu(buffers.world_meshes[1].vertices))
@@ -230,13 +243,14 @@ def reference(gl) -> tuple[np.ndarray, np.ndarray, Window]:
 
 
 @pytest.mark.parametrize(
-    "method", ["stochastic-point", "stochastic", "stochastic-even", "progressive-stochastic", "srd-photons"]
+    "method",
+    ["stochastic-point", "stochastic", "stochastic-even", "progressive-stochastic", "srd-photons", "progressive"],
 )
 def test_maps_are_the_histogram_of_random_photons(
     gl, reference: tuple[np.ndarray, np.ndarray, Window], method: str
 ) -> None:
     theirs, by_points, window = reference
-    ours, own_window = (by_points, window) if method == "stochastic-point" else rendered(gl, method)
+    ours, own_window = (by_points, window) if method == "stochastic-point" else rendered(gl, method, beams=False)
     if not np.array_equal(own_window.low, window.low):  # a method's pilot fits its own window
         theirs = histogram(own_window)
     allowed = ALLOWED[method]
@@ -265,3 +279,17 @@ def test_a_kernel_that_shrinks_takes_its_bias_along(gl, reference: tuple[np.ndar
         assert np.array_equal(window.low, reference[2].low)
         bias2[shrinks] = float(np.sum((maps.mean(axis=0) - truth) ** 2 - maps.var(axis=0, ddof=1) / len(maps) - noise))
     assert bias2[False] > 0.0 and bias2[True] < 0.5 * bias2[False], bias2
+
+
+def test_passes_that_grow_take_their_bias_along(gl) -> None:
+    """With kernels that blur, bias² of `progressive` by photons falls with every pass, as its footprints become half as
+    wide; that of a mutant whose footprints stay as wide hardly falls."""
+    found = [rendered(gl, "progressive", 6.0, shrinks, passes, beams=False) for passes, shrinks in PASSES_SHRINK]
+    theirs = histogram(found[0][1])
+    truth, noise = theirs.mean(axis=0), theirs.var(axis=0, ddof=1) / len(theirs)
+    first, second, third, frozen = (
+        float(np.sum((maps.mean(axis=0) - truth) ** 2 - maps.var(axis=0, ddof=1) / len(maps) - noise))
+        for maps, _ in found
+    )
+    assert 0.0 < second < 0.5 * first and third < 0.3 * second, (first, second, third)
+    assert frozen > 0.7 * first, (first, frozen)

@@ -201,7 +201,7 @@ class TestRender:
             ("--seconds inf", "--seconds inf is out of range"),
             ("--photons 5 --seconds 5", "exclude each other"),
             ("--method srd-lamda", "--method 'srd-lamda' is unknown, did you mean 'srd-lambda'"),
-            ("--method zzz", "known are srd, srd-photons, srd-lambda, stochastic"),
+            ("--method zzz", "known are srd, srd-photons, progressive, srd-lambda"),
             ("--layer beuty", "did you mean 'beauty'"),
             ("--layer map:flor", "it has 'map:floor', 'map:wall'"),
             ("--layer map:stop", "names no receiver"),

@@ -17,6 +17,7 @@ from ...passes.emission_domain import EmissionDomain, emission_domain
 from ...passes.pilot import Pilot, landings_of
 from ..light_maps import LightMaps
 from ..shown_spectra import PassTables
+from ..thrown_photons import thrown
 from .photon_store import PhotonStore
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ class MovedLight:
         light_pass, photons, started = self._light_pass, self.photons, time.perf_counter()
         plans = self._plans_for(scene)
         self._store.clear()
-        for _ in light_pass.throw(plans, photons, self._store.keep, DEPTH):
+        for _ in thrown(light_pass.trace, light_pass.settings.seed, plans, photons, self._store.keep, DEPTH):
             pass
         slabs = self._store.of_rounds(0, self._store.rounds)
         records = self._store.read(len(slabs) and 1 << 30, light_pass.trace.photon.dtype)

@@ -5,6 +5,7 @@ from __future__ import annotations
 METHOD_NAMES = {
     "srd": "Spectral ray differentials",
     "srd-photons": "Differentials, photons only",
+    "progressive": "Differentials, passes without end",
     "srd-lambda": "Differentials by wavelength",
     "stochastic": "Random wavelengths",
     "stochastic-even": "Even random wavelengths",
@@ -19,6 +20,7 @@ METHOD_NAMES = {
 METHOD_TIPS = {
     "srd": "The default: flat facets throw polygons, all else photons, both swept along the spectrum in closed form.",
     "srd-photons": "The same without polygons: photons carry all light.",
+    "progressive": "The default in passes that grow, each finer than the last: its error falls for as long as it runs.",
     "srd-lambda": "One derivative by wavelength and one anchor a photon: the published method.",
     "stochastic": "One random wavelength a photon with a footprint: the usual way.",
     "stochastic-even": "The same with wavelengths from a low-discrepancy sequence: the usual way at its best.",

@@ -1,0 +1,63 @@
+"""Of how many photons the passes of a rendering are, and what each counts in the sum of all.
+
+A lattice of N photons errs less than two of N/2 each: footprints are narrower, bands too, and neighbours are evenly
+spaced. So a rendering of a given number of photons is one pass, and one without end (`progressive`) takes passes that
+grow: each is planned anew for its own number, and three quarters of all photons are always in the finest.
+
+Errors of independent passes average out best when each has a weight inverse to its squared error. Every pass counts by
+a power of its photons: coarse ones, whose blur would stay in an even mean, fade as finer ones come, and yet none is
+thrown away.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+
+from . import shrinking
+
+PROGRESSIVE = "progressive"
+FIRST_PHOTONS = 1 << 13
+"""Of the first pass without end: a picture within a tenth of a second, and set-up is not all of it."""
+GROWTH = 4
+"""Photons of a pass over those of the one before it. What has been traced by the
+end of a pass errs GROWTH / (GROWTH - 1) times as much as one pass of all of it, and GROWTH times that just before the
+next has ended: 1.3 to 5.3 with four, 2 to 4 with two."""
+LARGEST_PHOTONS = 1 << 28
+"""Passes grow no further: points of a lattice are counted in 32 bits, and bands are as many as there may be."""
+WEIGHT_POWER = 3.0
+"""As for errors that are blur: where they are noise, all that is lost is the quarter of the photons that is not in the
+finest pass. Measured on `ball` (120×68, 0.5 M photons in the last of doubling passes, relMSE): 0.0076 with 1, 0.0050
+with 1.5, 0.0042 with 2, 0.0037 with 3, 0.0036 with the last pass alone."""
+
+
+def endless_passes(method: str) -> Iterator[int]:
+    """Photons of one pass after another of a method that is made to go on for ever."""
+    if method == shrinking.METHOD:
+        yield from itertools.repeat(shrinking.PASS_PHOTONS)
+    photons = FIRST_PHOTONS
+    while True:
+        yield photons
+        photons = min(GROWTH * photons, LARGEST_PHOTONS)
+
+
+def pass_sizes(method: str, photons: int) -> list[int]:
+    """Photons of the passes, in turn, that a rendering of about `photons` consists of. Doubling ones end with a whole
+    pass: the first is as much larger as that takes."""
+    photons = max(photons, 1)
+    if method == shrinking.METHOD:
+        count = max(1, round(photons / shrinking.PASS_PHOTONS))
+        return [max(1, round(photons / count))] * count
+    if method != PROGRESSIVE:
+        return [photons]
+    count = max(1, math.floor(math.log(1.0 + photons / FIRST_PHOTONS * (GROWTH - 1.0), GROWTH)))
+    first = photons * (GROWTH - 1.0) / (GROWTH**count - 1.0)
+    ends = [round(first * (GROWTH**k - 1.0) / (GROWTH - 1.0)) for k in range(count + 1)]
+    return [end - begin for begin, end in pairwise(ends)]
+
+
+def emphasis(photons: float, first: float) -> float:
+    """What a photon of a pass of `photons` counts, over one of a pass of `first`."""
+    return (photons / first) ** (WEIGHT_POWER - 1.0)

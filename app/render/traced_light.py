@@ -1,0 +1,61 @@
+"""Photons of a rendering, pass after pass: of a given number, or as many as some time allows."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+
+from . import shrinking
+from .light_pass import LightPass
+from .pass_sizes import FIRST_PHOTONS, endless_passes, pass_sizes
+from .sampling import LightSampling
+
+_TRIALS_SHARE = 0.1
+"""Of the time, for doubling passes that find out how fast a scene goes."""
+_SMALLEST_PASS = FIRST_PHOTONS // 2
+"""Photons; what time is left for fewer is given back."""
+
+
+def traced_light(light: LightPass, sampling: LightSampling, stop: Callable[[], bool]) -> Iterator[float]:
+    """Fill the maps of a prepared light pass, pausing with the share done."""
+    if sampling.seconds is not None:
+        yield from _traced_for(light, sampling.seconds, sampling.seed, stop)
+        return
+    sizes = pass_sizes(light.features.method, sampling.photons)
+    light.begin(sizes[0], sampling.seed)
+    for number, photons in enumerate(sizes):
+        light.plan(photons, number)
+        for share in light.steps_until(number, photons, stop):
+            yield (sum(sizes[:number]) + share * photons) / sum(sizes)
+        if number + 1 < len(sizes) and stop():
+            return
+
+
+def _traced_for(light: LightPass, seconds: float, seed: int, stop: Callable[[], bool]) -> Iterator[float]:
+    """As many photons as `seconds` allow.
+
+    Doubling passes find out how fast the scene goes; when they have taken a tenth of the time, one pass fills what is
+    left of it, as one lattice is better than several. What it leaves in turn, since photons of a large pass take less
+    each, is filled in the same way. All stay in the sum, each with its weight."""
+    begun, number, trials = time.perf_counter(), 0, endless_passes(light.features.method)
+    photons = next(trials)
+    light.begin(photons, seed)
+
+    def spent() -> float:
+        return min((time.perf_counter() - begun) / seconds, 1.0)
+
+    while light.has_work:
+        started = time.perf_counter()
+        light.plan(photons, number)
+        for _ in light.steps_until(number, photons, lambda: spent() >= 1.0 or stop()):
+            yield spent()
+        if spent() >= 1.0 or stop():
+            return
+        number += 1
+        if spent() < _TRIALS_SHARE or light.features.method == shrinking.METHOD:
+            photons = next(trials)
+        else:
+            affordable = (1.0 - spent()) * seconds / (time.perf_counter() - started) * photons
+            if affordable < _SMALLEST_PASS:
+                return
+            photons = int(affordable)
