@@ -28,6 +28,8 @@ FILL = 1e-6
 """Least share of x given to plain wavelength where no index changes (outside the fits' ranges). More is given where
 more is seen of the light there: tables of so many samples over x have to tell its power, and float32 its
 wavelengths."""
+MOST_FILL = 0.25
+"""What is left is for the indices: of a glass whose index takes one step, bands have to divide that."""
 
 
 _MAX_STEPS = 60
@@ -117,7 +119,8 @@ def _axis_of(glasses: tuple[Dispersion, ...]) -> SpectralAxis:
     variation = [_variation(g, t, np.array(_HI_NM)) for g, t in zip(glasses, turning, strict=True)]
     monotone = len(glasses) == 1 and not stands_still
     seen = np.interp(_FINE_NM, VISIBLE_NM, cmf_xyz().sum(axis=1))
-    fill = max(FILL, float(seen[speed <= 0.0].sum() / seen.sum())) if stands_still else 0.0
+    still = float(seen[speed <= 0.0].sum() / seen.sum())
+    fill = min(max(FILL, still), MOST_FILL) if stands_still else 0.0
     return SpectralAxis(glasses, turning, float(sum(variation)), fill, monotone)
 
 
