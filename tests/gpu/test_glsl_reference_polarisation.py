@@ -21,6 +21,7 @@ COVERS = {
         "mirror_reflection",
         "polarised_share",
         "behind_interface",
+        "behind_grating",
     ),
 }
 LIBRARY = ["lib/optics.glsl", "lib/polarisation.glsl"]
@@ -127,6 +128,31 @@ def test_ends_of_a_band_are_counted_from_their_own_planes(gl) -> None:
     _, stokes = polarisation.stokes_of(polarisation.seen_from(matrix, apart))
     np.testing.assert_allclose(got["mq"], stokes[..., 0], atol=2e-6)
     np.testing.assert_allclose(got["mu"], stokes[..., 1], atol=2e-6)
+
+
+@pytest.mark.parametrize("reflects", [False, True])
+def test_a_grating_turns_the_field_with_the_ray(gl, reflects: bool) -> None:
+    """About the direction across both rays: what is along that stays, what is across it turns; a mirror's order takes
+    the sign of one of them."""
+    rng = np.random.default_rng(11)
+    d, turned = (as_f32(optics.unit(rng.normal(size=(COUNT, 3)))) for _ in range(2))
+    axis = as_f32(optics.unit(np.cross(d, rng.normal(size=d.shape))))
+    each = np.stack([states(rng, COUNT) for _ in range(3)], axis=2)
+    body = f"""
+        Polarisation left = behind_grating(Polarisation(axis, q, u, v), d, turned, {str(reflects).lower()});
+        lq = left.q; lu = left.u; lv = left.v; la = left.axis;
+    """
+    inputs = {"d": d, "turned": turned, "axis": axis} | {name: each[:, i] for i, name in enumerate("quv")}
+    got = evaluate(gl.ctx, LIBRARY, body, inputs, dict.fromkeys(("lq", "lu", "lv", "la"), "vec3"))
+    s = optics.unit(np.cross(d, turned))
+    angle = np.arctan2(np.sum(np.cross(d, axis) * s, axis=1), np.sum(axis * s, axis=1))
+    matrix = polarisation.seen_from(polarisation.coherency(np.moveaxis(each, 1, 2)), angle[:, None])
+    _, stokes = polarisation.stokes_of(polarisation.after(matrix, -1.0 if reflects else 1.0, 1.0))
+    # Rays that are hardly turned have no such direction.
+    plain = np.linalg.norm(np.cross(d, turned), axis=1) > 0.01
+    for i, name in enumerate(("lq", "lu", "lv")):
+        np.testing.assert_allclose(got[name][plain], stokes[plain][..., i], atol=3e-4)
+    np.testing.assert_allclose(got["la"][plain], s[plain], atol=1e-4)
 
 
 def test_fresnels_rhomb_by_shader(gl) -> None:
