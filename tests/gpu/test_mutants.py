@@ -222,6 +222,13 @@ MUTANTS = {
 }
 
 
+def test_mutants_are_of_todays_shaders() -> None:
+    """Quick, for the mutants themselves are slow: whoever moves or rewords a line hears of it at once."""
+    shaders = ROOT / "shaders"
+    gone = [name for name, mutant in MUTANTS.items() if mutant.old not in (shaders / mutant.file).read_text("utf-8")]
+    assert not gone
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", MUTANTS)
 def test_each_mistake_is_noticed(tmp_path: Path, name: str) -> None:
