@@ -15,10 +15,9 @@ import numpy as np
 
 from ..gpu.records import MASK_SIZE
 from .emission_domain import EmissionDomain
+from .lattice_order import GOLDEN
 from .pilot import Pilot
 
-_GOLDEN = 2654435769
-"""Generator of the second coordinate of an emission lattice, 2⁻³² (`lattice_point` in lib/emission.glsl)."""
 _REACH = 2
 """Cells round one that threw light which keep all their points: a pilot has about one point a cell."""
 _DARK_SHARE = 0.25
@@ -48,7 +47,7 @@ def _cells_that_threw(pilot: Pilot) -> np.ndarray:
     landed = np.unique(np.concatenate([r["photon_id"] for r in (pilot.whole, *pilot.spectral, *pilot.rim)]))
     points = landed.astype(np.uint64)
     u = points / pilot.lattice_count
-    v = (points * np.uint64(_GOLDEN) % np.uint64(1 << 32)) / 2.0**32
+    v = (points * np.uint64(GOLDEN) % np.uint64(1 << 32)) / 2.0**32
     cells = np.zeros((MASK_SIZE, MASK_SIZE), bool)
     column, row = (np.minimum((at * MASK_SIZE).astype(int), MASK_SIZE - 1) for at in (u, v))
     cells[row, column] = True

@@ -52,18 +52,19 @@ LOOKS = 4
 def looks_lattice(samples: int, offset: int) -> np.ndarray:
     """(samples, LOOKS, 2) places in a pixel at which the samples of `pixel_lattice` look at what is seen directly: one
     lattice all together, shared out so that each sample's lie about it."""
-    looks = pixel_lattice(LOOKS * samples, offset)
-    away = looks - np.repeat(pixel_lattice(samples, offset), LOOKS, axis=0)[:, None]
-    away = (away + 0.5) % 1.0 - 0.5
-    if is_in_strips(samples, offset):
-        away[..., 1] = 0.0
+    looks, places = pixel_lattice(LOOKS * samples, offset), pixel_lattice(samples, offset)
+    in_strips = is_in_strips(samples, offset)
     columns, rows = cells_of(samples)
-    if columns and not is_in_strips(samples, offset):
+    if columns and not in_strips:
         # Each sample's cell holds as many looks, for these are a net as well: no search, and no import of scipy, a
         # tenth of the viewer's start.
-        cells = [np.floor(places * (columns, rows)) @ (rows, 1) for places in (pixel_lattice(samples, offset), looks)]
-        of_cell = np.argsort(cells[1], kind="stable").reshape(samples, LOOKS)
-        return looks[of_cell[cells[0].astype(int)]]
+        of_sample, of_look = (np.floor(lattice * (columns, rows)) @ (rows, 1) for lattice in (places, looks))
+        of_cell = np.argsort(of_look, kind="stable").reshape(samples, LOOKS)
+        return looks[of_cell[of_sample.astype(int)]]
+    away = looks - np.repeat(places, LOOKS, axis=0)[:, None]
+    away = (away + 0.5) % 1.0 - 0.5
+    if in_strips:
+        away[..., 1] = 0.0
     from scipy.optimize import linear_sum_assignment
 
     _, chosen = linear_sum_assignment((away**2).sum(axis=-1))
