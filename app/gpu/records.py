@@ -8,6 +8,7 @@ Flux stays in watts of the scene; only lengths are scaled.
 
 from __future__ import annotations
 
+from ..model.features import Features
 from ..model.scene_checks import MAX_OBJECTS
 from .schema import Field, Struct
 
@@ -164,6 +165,11 @@ def ray_record(columns: int, hero: bool = False, polarised: bool = False) -> Str
     fields += _POLARISATION if polarised else ()
     fields += _COMPANIONS_POLARISATION if hero and polarised else ()
     return Struct("RayRecord", tuple(fields), texels=True)
+
+
+def ray_record_of(features: Features) -> Struct:
+    """`ray_record` as a scene's programs have it."""
+    return ray_record(features.defines()["COLUMNS"], features.hero, features.polarised)
 
 
 OUTCOME = Struct(

@@ -89,7 +89,7 @@ class FluxTally:
 
 def queue_bytes(features: Features, batch: int) -> int:
     """Device memory that tracing `batch` lattice points at once takes."""
-    ray = records.ray_record(features.defines()["COLUMNS"], features.hero, features.polarised).stride
+    ray = records.ray_record_of(features).stride
     photon = records.photon_record(features.spectral_groups, features.hero).stride
     room = RAY_ROOM * batch
     return room * (4 * ray + records.OUTCOME.stride + photon + 8) + PHOTON_ROOM * batch * photon
@@ -159,7 +159,7 @@ class TracePass:
         self.rays_traced = 0
         """Rays emitted since this pass was made, pilots and all."""
         self.split_threshold = split_threshold
-        self.ray = records.ray_record(features.defines()["COLUMNS"], features.hero, features.polarised)
+        self.ray = records.ray_record_of(features)
         self.photon = records.photon_record(features.spectral_groups, features.hero)
         ctx = context.ctx
         structs = (*SCENE_STRUCTS, self.ray, self.photon, records.OUTCOME, records.CHUNK_COUNT, records.QUEUE_STATE)

@@ -32,6 +32,6 @@ def _batch_that_fits(features: Features, most_bytes: int) -> int:
 
 def _largest_batch(context: Context, features: Features) -> int:
     """Lattice points whose queue fits the device's largest storage buffer."""
-    ray = records.ray_record(features.defines()["COLUMNS"], features.hero, features.polarised).stride
+    ray = records.ray_record_of(features).stride
     limit = context.limits.storage_block_bytes
     return max(64, int(limit // (2 * RAY_ROOM * ray)) // 64 * 64)

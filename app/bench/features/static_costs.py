@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from ...gpu.mip_chain import level_count
-from ...gpu.records import photon_record, ray_record
+from ...gpu.records import photon_record, ray_record_of
 from ...gpu.scene_buffers import SAMPLES, TRIANGLE
 from ...model.contacts import contacts, overlapping_solids
 from ...model.features import Features, beam_objects, half_spaces
@@ -37,7 +37,7 @@ class RecordSizes:
         columns = features.defines()["COLUMNS"]
         slots = (2 if features.nested_windows else 1) * SPLAT.stride
         return RecordSizes(
-            ray_record(columns, features.hero, features.polarised).stride,
+            ray_record_of(features).stride,
             photon_record(features.spectral_groups, features.hero).stride,
             slots,
             features.targets * _TEXEL,
