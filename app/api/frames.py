@@ -67,7 +67,8 @@ class Frames:
         now = time.monotonic()
         exposure = self._exposure.follow(lambda: self._sampler.run(radiance), now, now - self._last_s)
         self._last_s = now
-        shown = self._display.run(radiance, _LOOK, exposure + exposure_ev, radiance.size)
+        antialias = engine.inputs is None or engine.inputs.scene.render.antialias_highlights
+        shown = self._display.run(radiance, _LOOK, exposure + exposure_ev, radiance.size, antialias=antialias)
         codes = np.frombuffer(shown.read(), np.uint8).reshape(shown.height, shown.width, 4)[..., :3]
         file = io.BytesIO()
         quality = _MOVING_QUALITY if is_moving else _STILL_QUALITY

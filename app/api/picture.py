@@ -72,12 +72,21 @@ class _Image:
         exposure_ev: float,
         spectral: Floats | None,
         glare: float = 0.0,
+        antialias: bool = True,
     ) -> Path:
         target = Path(path)
         if target.suffix.lower() != suffix:
             raise UserError(f"cannot write {target}: the name must end in {suffix}")
         edges = self.bin_edges_nm
-        write_image(target, rgb, exposure_ev=exposure_ev, spectral=spectral, bin_edges_nm=edges, glare=glare)
+        write_image(
+            target,
+            rgb,
+            exposure_ev=exposure_ev,
+            spectral=spectral,
+            bin_edges_nm=edges,
+            glare=glare,
+            antialias=antialias,
+        )
         return target
 
 
@@ -91,17 +100,20 @@ class Picture(_Image):
     """Stops on top of the automatic exposure, as the scene has it; for `to_png` only."""
     glare: float = 0.0
     """Share of the light that the lens scatters, as the scene has it; for `to_png` only."""
+    antialias_highlights: bool = True
+    """Edges of what is overexposed have no steps, as the scene has it; for `to_png` only."""
 
     def to_png(self, path: str | os.PathLike[str], exposure_ev: float | None = None, layer: str | None = None) -> Path:
         """Write it as the eye sees it, tone-mapped 8-bit sRGB; `exposure_ev` replaces the picture's own stops.
 
         Raises `UserError` where it cannot be written.
         """
-        return self._write(path, ".png", self._layer(layer), self._stops(exposure_ev), None, self.glare)
+        stops, antialias = self._stops(exposure_ev), self.antialias_highlights
+        return self._write(path, ".png", self._layer(layer), stops, None, self.glare, antialias)
 
     def _repr_png_(self) -> bytes:
         """As notebooks show it."""
-        return png_bytes(self.rgb, self.exposure_ev, self.glare)
+        return png_bytes(self.rgb, self.exposure_ev, self.glare, self.antialias_highlights)
 
     def _layer(self, name: str | None) -> Floats:
         if name is None:

@@ -63,8 +63,8 @@ def render(
         result = render(model, settings, report, stopped, context, more_layers=more)
         named = {first: result.rgb} | {name: picture.rgb for name, picture in result.layers.items()}
         stats = _statistics(result, stopped())
-        stops = settings.exposure_ev or 0.0
-        return Picture(result.rgb, result.spectral, result.bin_edges_nm, stats, named, stops, settings.glare)
+        stops, antialias = settings.exposure_ev or 0.0, model.render.antialias_highlights
+        return Picture(result.rgb, result.spectral, result.bin_edges_nm, stats, named, stops, settings.glare, antialias)
 
     with Device() as device:
         return device.run(work, progress, cancel)

@@ -228,8 +228,9 @@ class Scene:
         for entry, (item, *_) in zip(objects, _split(model.objects, objects), strict=True):
             if entry is values:
                 told = _object_table(item) | {"position": [float(v) for v in item.object_to_world[:3, 3]]}
-                if item.material.transmits:
-                    told |= {"dispersion_gain": item.material.dispersion.gain, "priority": item.material.priority}
+                if isinstance(glass := item.material, values_of.Dielectric):
+                    told |= {"dispersion_gain": glass.dispersion.gain, "priority": glass.priority}
+                    told |= {"roughness": glass.roughness}
                 return told
         return {}
 

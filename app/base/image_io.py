@@ -71,11 +71,13 @@ def write_image(
     bin_edges_nm: np.ndarray | None = None,
     metadata: Mapping[str, str] | None = None,
     glare: float = 0.0,
+    antialias: bool = True,
 ) -> None:
     """Write a picture; row 0 of the arrays is its top.
 
     rgb: (H, W, 3) linear Rec.709 radiance. exposure_ev: stops added to the automatic exposure
-    (of pictures for looking at only). glare: share that the lens scatters, of those too. spectral: (H, W, B) radiance
+    (of pictures for looking at only). glare: share that the lens scatters, of those too; antialias:
+    whether edges of what is overexposed have no steps (`highlights`), of those too. spectral: (H, W, B) radiance
     per bin in W/(m² sr), written as the channels
     `S0.<centre>nm` of an .exr; bin_edges_nm: (B + 1,) rising. metadata: short texts kept in .png
     and .exr. Raises `UserError` for an unknown suffix or a place that cannot be written, `BrokenPictureError` for
@@ -83,7 +85,7 @@ def write_image(
     """
     check_suffix(path)
     with atomic_output(path) as temporary:
-        write_into(temporary, rgb, exposure_ev, spectral, bin_edges_nm, metadata, str(path), glare)
+        write_into(temporary, rgb, exposure_ev, spectral, bin_edges_nm, metadata, str(path), glare, antialias)
 
 
 def write_into(
@@ -95,6 +97,7 @@ def write_into(
     metadata: Mapping[str, str] | None = None,
     name: str = "",
     glare: float = 0.0,
+    antialias: bool = True,
 ) -> None:
     """As `write_image`, into a file that the caller got from `atomic_outputs`, together with others; `name`: what
     messages call it."""
@@ -105,9 +108,10 @@ def write_into(
     check_finite(name or part.name, rgb, spectral)
     metadata = dict(metadata or {})
     if suffix == ".png":
-        _write_png(part, rgb, exposure_ev or 0.0, metadata, glare)
+        _write_png(part, rgb, exposure_ev or 0.0, metadata, glare, antialias)
     elif suffix in SHOWN_SUFFIXES:
-        save_codes(part, tone_map_8bit(with_glare(rgb, glare), auto_exposure(rgb) + (exposure_ev or 0.0)))
+        ev = auto_exposure(rgb) + (exposure_ev or 0.0)
+        save_codes(part, tone_map_8bit(with_glare(rgb, glare), ev, antialias))
     elif suffix == ".exr":
         _write_exr(part, rgb, _spectral_channels(rgb, spectral, bin_edges_nm), bin_edges_nm, metadata)
     else:
@@ -126,11 +130,11 @@ def check_finite(name: str, *pictures: np.ndarray | None) -> None:
         )
 
 
-def png_bytes(rgb: np.ndarray, exposure_ev: float = 0.0, glare: float = 0.0) -> bytes:
+def png_bytes(rgb: np.ndarray, exposure_ev: float = 0.0, glare: float = 0.0, antialias: bool = True) -> bytes:
     """The .png that `write_image` would write of `rgb`, float32 (H, W, 3)."""
     check_finite("the picture", rgb)
     buffer = io.BytesIO()
-    _write_png(buffer, rgb, exposure_ev, {}, glare)
+    _write_png(buffer, rgb, exposure_ev, {}, glare, antialias)
     return buffer.getvalue()
 
 
@@ -178,7 +182,12 @@ def save_codes(path: Path, codes: np.ndarray) -> None:
 
 
 def _write_png(
-    file: Path | io.BytesIO, rgb: np.ndarray, exposure_ev: float, metadata: dict[str, str], glare: float
+    file: Path | io.BytesIO,
+    rgb: np.ndarray,
+    exposure_ev: float,
+    metadata: dict[str, str],
+    glare: float,
+    antialias: bool,
 ) -> None:
     from PIL import Image, PngImagePlugin
 
@@ -188,7 +197,8 @@ def _write_png(
         texts.add_itxt(key, str(value))
     texts.add(b"sRGB", b"\x00")  # rendering intent: perceptual
     # Level 6 is three times smaller than 1 on caustics and still takes less than a tone map.
-    Image.fromarray(tone_map_8bit(with_glare(rgb, glare), ev)).save(file, format="PNG", pnginfo=texts, compress_level=6)
+    codes = tone_map_8bit(with_glare(rgb, glare), ev, antialias)
+    Image.fromarray(codes).save(file, format="PNG", pnginfo=texts, compress_level=6)
 
 
 def _read_png(path: Path) -> Picture:

@@ -21,6 +21,8 @@ from functools import cache
 
 import numpy as np
 
+from .highlights import find_steps
+
 LUMINANCE_709 = np.array([0.2126390, 0.7151687, 0.0721923], np.float32)
 """Y of linear Rec.709 (ITU-R BT.709-6, primaries and D65 white to seven digits)."""
 
@@ -60,11 +62,12 @@ def auto_exposure(rgb: np.ndarray) -> float:
     return float(min(key_ev, highlight_ev))
 
 
-def to_display(rgb: np.ndarray, exposure_ev: float) -> np.ndarray:
+def to_display(rgb: np.ndarray, exposure_ev: float, antialias: bool = False) -> np.ndarray:
     """Linear display RGB in [0, 1], float32 (…, 3), of scene colours `rgb` (…, 3).
 
     `exposure_ev` is absolute: scene values are multiplied by 2^exposure_ev first. Pixels that
-    are not finite come out as `NOT_FINITE_RGB`.
+    are not finite come out as `NOT_FINITE_RGB`. `antialias`: of a picture (H, W, 3), edges of what is overexposed have
+    no steps (`highlights`).
     """
     scene = np.asarray(rgb, np.float32)
     finite = np.asarray(np.isfinite(scene).all(axis=-1))
@@ -74,6 +77,8 @@ def to_display(rgb: np.ndarray, exposure_ev: float) -> np.ndarray:
     gain = np.float32(np.clip(2.0 ** float(np.clip(exposure_ev, -60, 60)), 1e-18, 1e18))
     exposed = np.clip(exposed * gain, -limit, limit)
     display = _roll_off(into_gamut(exposed))
+    if antialias:
+        _antialias(display, exposed)
     display[~finite] = NOT_FINITE_RGB
     return display
 
@@ -95,9 +100,20 @@ def _encoding_table() -> np.ndarray:
     return np.rint(255 * srgb_oetf(np.linspace(0.0, 1.0, 65536))).astype(np.uint8)
 
 
-def tone_map_8bit(rgb: np.ndarray, exposure_ev: float) -> np.ndarray:
-    """Display picture uint8 (…, 3) of linear Rec.709 scene colours; `exposure_ev` as in `to_display`."""
-    return _encoding_table()[np.rint(to_display(rgb, exposure_ev) * np.float32(65535)).astype(np.uint16)]
+def tone_map_8bit(rgb: np.ndarray, exposure_ev: float, antialias: bool = False) -> np.ndarray:
+    """Display picture uint8 (…, 3) of linear Rec.709 scene colours; `exposure_ev`, `antialias` as in `to_display`."""
+    display = to_display(rgb, exposure_ev, antialias)
+    return _encoding_table()[np.rint(display * np.float32(65535)).astype(np.uint16)]
+
+
+def _antialias(display: np.ndarray, exposed: np.ndarray) -> None:
+    """Show pixels with a step at something overexposed by what either side covers."""
+    norm = _p_norm(np.maximum(exposed, 0))[..., 0] * np.float32(3 ** (-1 / CORNER_POWER))
+    steps = find_steps(exposed, norm)
+    bright, dark, mixed = (_roll_off(into_gamut(side)) for side in (steps.bright, steps.dark, steps.mixed))
+    straight = dark + steps.share * (bright - dark)
+    fall = np.minimum(straight / np.maximum(mixed, np.float32(1e-6)), 1)
+    display[steps.rows, steps.columns] *= 1 + steps.weight * (fall - 1)
 
 
 def _p_norm(channels: np.ndarray) -> np.ndarray:

@@ -18,7 +18,7 @@ from .facets import beam_scene, in_gpu_space, shown_as
 from .find import Emission, GoOn, Search, search
 from .polygons import BeamPieces, BeamPolygons, joined
 from .search import SUM_BEAMS, SUMS
-from .sources import emissions, mask_at, why_no_beams
+from .sources import emissions, is_beside_facets, mask_at, why_no_beams
 
 LIGHT_PARTS = 16
 """Points that stand for an extended light; penumbrae blur each into the next."""
@@ -60,6 +60,9 @@ class BeamFinder:
         self.meshes = in_gpu_space(world_meshes, to_gpu, unit)
         self.scene = beam_scene(scene, self.meshes, frames, axis, unit)
         self._scene, self._axis, self._to_gpu, self._unit = scene, axis, to_gpu, unit
+        lights = enumerate(scene.lights)
+        self._beside = frozenset(i for i, light in lights if is_beside_facets(light, self.scene, to_gpu, unit))
+        """Lamps too near to facets."""
         self.set_texels(texels)
 
     def set_texels(self, texels: dict[int, float]) -> None:
@@ -90,7 +93,9 @@ class BeamFinder:
         return [
             i
             for i, light in enumerate(self._scene.lights)
-            if why_no_beams(light) is None and not (light.is_parallel and self._is_thin(light))
+            if why_no_beams(light) is None
+            and not (light.is_parallel and self._is_thin(light))
+            and i not in self._beside
         ]
 
     def _is_thin(self, light: Light) -> bool:

@@ -18,8 +18,11 @@ from .rays import PARALLEL, POINT, SOURCE
 
 _RIM = 64
 """Corners of the polygon that stands for a round aperture or a cone, of the same area."""
-_WIDEST = math.tan(math.radians(55.0))
+_WIDEST = math.tan(math.radians(75.0))
 """Half side of a gnomonic plane up to which one is enough; else the six sides of a cube are taken."""
+_NEAREST = 2.0
+"""Of an extended lamp's half extent: from nearer facets penumbrae are wider than what casts them. A disc 1.3 radii
+above a block draws 8 % more than lands, one 2 radii above it 0.004 %."""
 _MOST_BANDS = 32
 """Into which a light's spectrum is cut where something is coloured."""
 _ON_FACET = 2e-7
@@ -32,6 +35,31 @@ def why_no_beams(light: Light) -> str | None:
     if light.emission == "profile":
         return "its intensity is a table over directions"
     return None
+
+
+def is_beside_facets(light: Light, scene: BeamScene, to_gpu: Callable[[np.ndarray], np.ndarray], unit: float) -> bool:
+    """Whether an extended lamp is so near to the facets of beams that penumbrae, or the seams of a cube about it, would
+    draw more than lands: photons carry its light. Arguments as of `emissions`."""
+    if light.is_parallel or not light.has_outline:
+        return False
+    place, reach = to_gpu(np.array(light.position)), max(light.half_extent) * unit
+    facets = [f for f in scene.facets[scene.facets["kind"] < BLACK] if int(f["owner"]) in scene.beam_objects]
+    if any(_distance(place, f["corner"][: f["corners"]]) < _NEAREST * reach for f in facets):
+        return True
+    corners = _specular_corners(scene)
+    edges = reach * light.axes()[:, :2].T
+    return any(len(_charts(place + edge, corners)) > 1 for edge in (*edges, *-edges))
+
+
+def _distance(place: np.ndarray, corners: np.ndarray) -> float:
+    """From a point to a flat convex polygon (n, 3)."""
+    starts = corners - place
+    along = np.roll(starts, -1, axis=0) - starts
+    normal = np.cross(along[0], along[1])
+    if np.all(np.cross(along, -starts) @ normal >= 0.0):
+        return abs(float(starts[0] @ normal)) / float(np.linalg.norm(normal))
+    share = -np.einsum("ij,ij->i", starts, along) / np.maximum(np.einsum("ij,ij->i", along, along), 1e-300)
+    return float(np.linalg.norm(starts + np.clip(share, 0.0, 1.0)[:, None] * along, axis=1).min())
 
 
 def emissions(

@@ -39,6 +39,7 @@ class SplatFeatures:
     spectral_groups: int = 1
     band_cuts: bool = False
     nested_windows: bool = False
+    contact_lines: bool = False
     charts: bool = False
     targets: int = 1
     point_spectrum: bool = False

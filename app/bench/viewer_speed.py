@@ -18,13 +18,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.errors import UserError
+from ..base.process_age import process_age_s
 from ..edit.state import Selection
 from ..gpu.shader import recorded
 from ..passes.sample_picture import SamplePicture
 from ..ui.headless import HeadlessInterface
 from ..ui.session import Session
 from ..ui.viewer import Viewer, headless_viewer
-from .machine import clocks, compile_line, process_age_s
+from .machine import clocks, compile_line
 from .programs import unique
 
 if TYPE_CHECKING:
@@ -47,6 +48,8 @@ class Phase:
 
     name: str
     frame_ms: np.ndarray
+    processor_ms: float
+    """Of a frame on all cores, which other programs change less than they change the clock's time."""
     photons_per_second: float
     rays_traced: int
     pictures_per_second: float
@@ -67,6 +70,7 @@ class Phase:
         median, worst = np.percentile(self.frame_ms, [50, 95])
         return (
             f"{self.name:<24} {median:8.1f} ms {worst:8.1f} ms {1000 / median:8.1f} /s "
+            f"{self.processor_ms:8.1f} ms "
             f"{self.pictures_per_second:8.1f} /s "
             f"{self.photons_per_second / 1e6:8.3f} M/s "
             f"{self.rays_traced:>12,} {100 * self.direct:6.0f} % {100 * self.glass:6.0f} % {self.whole_s:7.2f} s"
@@ -87,7 +91,7 @@ def run(context: Context, scene: Path, size: tuple[int, int], seconds: float) ->
         whole = f"whole after {first + bench.wait_for_whole():.2f} s"
         age = process_age_s()
         yield whole if age is None else f"{whole}, {age:.2f} s from the start of the process"
-        heads = "".join(f" {head:>11}" for head in ("median", "95 %", "frames", "pictures"))
+        heads = "".join(f" {head:>11}" for head in ("median", "95 %", "frames", "processor", "pictures"))
         yield f"{'':<24}{heads} {'photons':>12} {'rays traced':>12} {'direct':>8} {'glass':>8} {'whole':>9}"
         for name, hold, act in (
             ("accumulating", None, bench.rest),
@@ -182,7 +186,7 @@ class _Bench:
         on_device = dict(self._context.timers.seconds)
         with hold() if hold is not None else nullcontext():
             version = engine.picture_version
-            started = time.perf_counter()
+            started, worked = time.perf_counter(), time.process_time()
             while time.perf_counter() - started < seconds:
                 act()
                 self.interface.frame()
@@ -191,12 +195,13 @@ class _Bench:
                 glass.append(self.session.picture.stats.resolution_scale)
                 pictures += engine.picture_version != version
                 version = engine.picture_version
-            elapsed = time.perf_counter() - started
+            elapsed, worked = time.perf_counter() - started, time.process_time() - worked
             rays = self.session.picture.stats.rays_traced - before.rays_traced
             spent = self._context.timers.since(on_device)
         return Phase(
             name,
             np.array(times),
+            1e3 * worked / len(times),
             rays / elapsed,
             rays,
             pictures / elapsed,

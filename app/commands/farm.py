@@ -117,6 +117,7 @@ def farm_render_command(request: RenderRequest, farm: FarmRequest) -> int:
             result.picture.rgb,
             exposure_ev=settings.exposure_ev,
             glare=settings.glare,
+            antialias=scene.render.antialias_highlights,
             spectral=result.picture.spectral,
             bin_edges_nm=result.picture.bin_edges_nm,
         )

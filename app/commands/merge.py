@@ -73,6 +73,7 @@ def merge_command(request: MergeRequest) -> int:
         result.rgb,
         exposure_ev=scene.render.exposure_ev if exposure is None else exposure,
         glare=scene.render.glare,
+        antialias=scene.render.antialias_highlights,
         spectral=result.spectral,
         bin_edges_nm=result.bin_edges_nm,
     )

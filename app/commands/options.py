@@ -19,7 +19,7 @@ from ..base.memory import MAX_SIDE_PX, memory_bytes
 from ..base.paths import SCENE_SUFFIXES, shipped_scenes
 from ..model.scene import Scene
 from ..model.scene_camera import FOCUS_DISTANCE, LENS_RADIUS
-from ..model.scene_render import MAX_GLARE
+from ..model.scene_render import MAX_BOUNCES, MAX_GLARE
 from ..model.settings import CAMERA_METHODS, METHODS
 
 if TYPE_CHECKING:
@@ -108,6 +108,11 @@ def parse_glare(text: str) -> float:
     if not 0.0 <= value <= MAX_GLARE:
         raise UserError(f"--glare {text} is out of range: give a share of 0 to {MAX_GLARE:g}")
     return value
+
+
+def parse_bounces(text: str) -> int:
+    """How often light goes on from one diffuse surface to another."""
+    return parse_integer("--bounces", text, 0, MAX_BOUNCES)
 
 
 def with_lens(scene: Scene, radius: str | None, distance: str | None) -> Scene:

@@ -105,6 +105,21 @@ def render(
             help="Light keeps its polarisation from surface to surface (default: as the scene has it).",
         ),
     ] = None,
+    antialias_highlights: Annotated[
+        bool | None,
+        typer.Option(
+            "--antialias-highlights/--no-antialias-highlights",
+            help="Edges of what is overexposed without steps (default: as the scene has it; not of .exr and .npy).",
+        ),
+    ] = None,
+    bounces: Annotated[
+        Text,
+        typer.Option(
+            metavar="N",
+            help=f"How often light goes on from one diffuse surface to another, 0 to {options.MAX_BOUNCES} "
+            "(default: as the scene has it).",
+        ),
+    ] = None,
     stats: StatsOption = False,
     up: UpOption = None,
     glass: GlassOption = None,
@@ -143,6 +158,8 @@ def render(
         lens_radius,
         focus_distance,
         polarisation,
+        antialias_highlights,
+        bounces,
     )
     raise typer.Exit(render_command(request))
 

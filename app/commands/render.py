@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from ..base.errors import UserError, plain
 from ..base.interrupts import interrupt_flag
 from ..base.memory import check_picture_memory
+from ..base.process_age import process_age_s
 from ..model.scene import Scene
 from ..model.settings import RenderSettings
 from . import options
@@ -21,8 +22,13 @@ if TYPE_CHECKING:
     from ..edit.opening import Opening
 
 
-AROUND_S = 0.5
-"""What a process takes to start, to write its picture and to end: --seconds holds that too."""
+START_S, FRESH_S = 0.3, 20.0
+"""What a process takes to start, where the system does not tell: --seconds holds that too …; an older one was not
+started for this picture."""
+ENDING_SHARE = 0.7
+"""… and what it takes to end, over that: on a machine that others work on both take longer."""
+WRITING_SHARE = 1.4
+"""The same of writing a million pixels."""
 
 
 @dataclass(frozen=True)
@@ -51,11 +57,15 @@ class RenderRequest:
     lens_radius: str | None = None
     focus_distance: str | None = None
     polarisation: bool | None = None
+    antialias_highlights: bool | None = None
+    bounces: str | None = None
 
 
 def render_command(request: RenderRequest) -> int:
     """Render to a file; returns the exit code. Raises `UserError`."""
-    begun = time.perf_counter() - AROUND_S
+    starting_s = process_age_s() or START_S
+    starting_s = starting_s if starting_s < FRESH_S else START_S
+    begun = time.perf_counter() - starting_s
     from ..base.atomic import check_writable
     from ..base.image_io import check_suffix, write_image
     from ..base.progress import ProgressReporter
@@ -73,6 +83,7 @@ def render_command(request: RenderRequest) -> int:
 
     scene = scene_as_asked(request)
     settings = complete_settings(asked, scene, request.stats)
+    begun -= starting_s * (ENDING_SHARE + WRITING_SHARE * 1e-6 * settings.width * settings.height)
     # Before the work: who waits for minutes should know what was assumed, and also if it fails.
     for note in (*scene.notes, *_unused_options(request)):
         print(f"note: {plain(note)}", file=sys.stderr)
@@ -95,6 +106,7 @@ def render_command(request: RenderRequest) -> int:
         result.rgb,
         exposure_ev=settings.exposure_ev,
         glare=settings.glare,
+        antialias=scene.render.antialias_highlights,
         spectral=result.spectral,
         bin_edges_nm=result.bin_edges_nm,
     )
@@ -108,9 +120,14 @@ def scene_as_asked(request: RenderRequest) -> Scene:
     """The scene with what options say of it. Raises `UserError`."""
     scene = options.open_scene(request.scene, request.opening)
     scene = options.with_lens(scene, request.lens_radius, request.focus_distance)
-    if request.polarisation is None:
-        return scene
-    return replace(scene, render=replace(scene.render, polarisation=request.polarisation))
+    bounces = None if request.bounces is None else options.parse_bounces(request.bounces)
+    wishes: dict[str, Any] = {
+        "polarisation": request.polarisation,
+        "antialias_highlights": request.antialias_highlights,
+        "bounces": bounces,
+    }
+    asked = {name: wish for name, wish in wishes.items() if wish is not None}
+    return replace(scene, render=replace(scene.render, **asked)) if asked else scene
 
 
 def _parse_passes(request: RenderRequest) -> tuple[int, int] | None:
@@ -224,6 +241,8 @@ def _unused_options(request: RenderRequest) -> list[str]:
         notes.append(f"--exposure does not change a {suffix} picture, which is linear; it is for pictures to look at")
     if request.glare is not None and suffix not in SHOWN_SUFFIXES:
         notes.append(f"--glare does not change a {suffix} file, which is linear; it is for pictures to look at")
+    if request.antialias_highlights is not None and suffix not in SHOWN_SUFFIXES:
+        notes.append(f"--antialias-highlights does not change a {suffix} file, which is linear")
     return notes
 
 

@@ -170,7 +170,8 @@ def set_texture(scene: Scene, index: int, path: Path, wrap: Literal["repeat", "c
     reader = TextureReader()
     texture = _worn_already(scene, path, wrap) or reader.load(path, wrap)
     colour: Vec3 = material.reflectance_rgb if material.texture is not None else (1.0, 1.0, 1.0)
-    return _with_material(replace(scene, notes=(*scene.notes, *reader.notes)), index, Diffuse(colour, texture=texture))
+    worn = material.changed(reflectance_rgb=colour, reflectance=None, texture=texture)
+    return _with_material(replace(scene, notes=(*scene.notes, *reader.notes)), index, worn)
 
 
 def set_texture_wrap(scene: Scene, index: int, wrap: Literal["repeat", "clamp"]) -> Scene:

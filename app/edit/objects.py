@@ -119,7 +119,7 @@ def set_diffuse_colour(scene: Scene, index: int, rgb: Vec3) -> Scene:
     colour = (float(rgb[0]), float(rgb[1]), float(rgb[2]))
     match item.material:
         case Diffuse():
-            material: Material = Diffuse(colour, texture=item.material.texture)
+            material: Material = item.material.changed(reflectance_rgb=colour, reflectance=None)
         case Mirror():
             material = Mirror(colour)
         case _:

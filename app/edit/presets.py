@@ -158,10 +158,11 @@ def view_presets() -> tuple[ViewPreset, ...]:
 
 
 def apply_material(scene: Scene, index: int, preset: MaterialPreset) -> Scene:
-    """Give object `index` the preset's material; a glass keeps the priority among overlapping solids it had."""
+    """Give object `index` the preset's material; a glass keeps its surface and its priority among overlapping
+    solids."""
     before, material = scene.objects[index].material, preset.material
     if before.transmits and material.transmits:
-        material = material.changed(priority=before.priority)
+        material = material.changed(priority=before.priority, roughness=before.roughness)
     return set_material(scene, index, material)
 
 

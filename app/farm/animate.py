@@ -57,6 +57,7 @@ class FarmFrames:
         base_ev = self._sink.fix_exposure(auto_exposure(result.rgb))
         if 0 in self._only:
             first = self._stages[0]
-            rgb = with_glare(result.rgb, first.scene.render.glare)
-            self._sink.write(0, tone_map_8bit(rgb, base_ev + first.exposure_ev))
+            look = first.scene.render
+            rgb = with_glare(result.rgb, look.glare)
+            self._sink.write(0, tone_map_8bit(rgb, base_ev + first.exposure_ev, look.antialias_highlights))
         self._hand_out()

@@ -52,5 +52,6 @@ def draw(desk: Desk, of: Frames, report: Report, index: int, base_ev: float | No
     notices = tuple(frame_notices(renderer.light, stage.camera, of.settings, rgb))
     if base_ev is None:
         return Frame(rgb, b"", notices)
-    shown = with_glare(rgb, stage.scene.render.glare)
-    return Frame(None, frame_bytes(tone_map_8bit(shown, base_ev + stage.exposure_ev)), notices)
+    look = stage.scene.render
+    codes = tone_map_8bit(with_glare(rgb, look.glare), base_ev + stage.exposure_ev, look.antialias_highlights)
+    return Frame(None, frame_bytes(codes), notices)

@@ -72,11 +72,13 @@ class SweepFolder:
                 self._base_ev = auto_exposure(drawn.rgb)
                 self._save()
             exposure = self._base_ev - auto_exposure(drawn.rgb) + self._points[drawn.number].stage.exposure_ev
+        stage = self._points[drawn.number].stage
         write_image(
             self.path(drawn.number),
             drawn.rgb,
             exposure_ev=exposure,
-            glare=self._points[drawn.number].stage.scene.render.glare,
+            glare=stage.scene.render.glare,
+            antialias=stage.scene.render.antialias_highlights,
             spectral=drawn.spectral if self._suffix == ".exr" else None,
             bin_edges_nm=drawn.bin_edges_nm if self._suffix == ".exr" else None,
         )

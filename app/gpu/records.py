@@ -288,7 +288,7 @@ TRACE_PARAMETERS = Struct(
         Field("lattice_bits", "uint", "points of each sub-lattice, from LATTICE_BIT on; 0: rays lie on none"),
         Field("lattice_shift", "uint", "of the first sub-lattice's points across, as emitted"),
         Field("lattices_together", "uint", "so many sub-lattices after each other have one shift"),
-        Field("unused", "uint", ""),
+        Field("surface_key", "uint", "of the numbers for microfacets of rough surfaces"),
         Field(
             "beam_objects", "uvec4", "one bit an object: who meets it first is left to beams", -(-MAX_OBJECTS // 128)
         ),

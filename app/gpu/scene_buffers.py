@@ -76,7 +76,7 @@ OBJECT = Struct(
         Field("group", "uint", "spectral group of the glass, or NONE"),
         Field("first_triangle", "uint", "global source index of its first triangle"),
         Field("texture", "uint", "its picture in the texture store, or NONE"),
-        Field("colour", "vec4", "linear Rec.709 reflectance (diffuse, mirror) or n_d in w (dielectric)"),
+        Field("colour", "vec4", "linear Rec.709 reflectance (diffuse, mirror); dielectric: GGX's width in x, n_d in w"),
     ),
     texels=True,
 )
@@ -330,7 +330,7 @@ class SceneBuffers:
             corners.append(self.space.to_gpu(mesh.corners()))
             owner.append(np.full(len(mesh.triangles), index))
             source.append(self.first_triangle[index] + np.arange(len(mesh.triangles)))
-            known = mesh.corner_normals if item.material.is_specular else None
+            known = mesh.corner_normals if item.material.is_specular or item.material.has_coat else None
             normals.append(np.full((len(mesh.triangles), 3, 3), np.nan) if known is None else known)
 
         solid_records = SOLID.zeros(len(solids))
@@ -419,6 +419,8 @@ class SceneBuffers:
                     media.append(material.dispersion)
                 record["medium"] = media.index(material.dispersion)
                 record["colour"][3] = material.dispersion.n_d
+                if material.transmits:
+                    record["colour"][0] = material.microfacet_width
                 if index in stack_bits:
                     record["stack_bit"] = stack_bits[index]
                 if material.dispersion in self.groups.glasses and self.groups.count:

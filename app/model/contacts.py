@@ -15,6 +15,8 @@ _SLACK = 1e-4
 shaders/lib/intersect.glsl)."""
 _SOLID_SLACK = 1e-5
 """Of the glass's longest side, between two solids."""
+_STANDING_SLACK = 1e-2
+"""Of what stands: its longest side. Shipped scenes keep a thousandth between a glass and its table."""
 _PAIRS_AT_ONCE = 1 << 20
 
 
@@ -56,6 +58,18 @@ def contacts(scene: Scene) -> list[tuple[int, int]]:
         for i, j in pairs[~glass[pairs].all(axis=1)]
         if reaches(i, j) and reaches(j, i)
     )
+
+
+def standing(scene: Scene) -> list[tuple[int, int]]:
+    """Pairs of a diffuse object and another one that stands on it, or is sunk into it, by their bounds."""
+    receivers = [i for i, item in enumerate(scene.objects) if item.material.receives]
+    bounds = [world_bounds(item) for item in scene.objects] if receivers else []
+    return [
+        (i, j)
+        for i in receivers
+        for j, other in enumerate(bounds)
+        if i != j and _meet(bounds[i], other, _STANDING_SLACK * float(np.ptp(other, axis=0).max()))
+    ]
 
 
 def _nested(scene: Scene) -> list[int]:

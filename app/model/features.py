@@ -10,8 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .bounces import why_no_bounces
 from .camera_rays import camera_frame
-from .contacts import contacts, overlapping_solids, world_bounds
+from .contacts import contacts, overlapping_solids, standing, world_bounds
 from .environment_light import why_no_environment_light
 from .scene import (
     Camera,
@@ -112,13 +113,28 @@ class Features:
     """Three more wavelengths share the path of the one that is followed, as long as it is theirs too."""
     polarised: bool = False
     """Paths carry their light's state of polarisation from surface to surface."""
+    bounces: int = 0
+    """How often light goes on from one diffuse surface to another: camera rays look up what arrived."""
+    contact_lines: bool = False
+    """Something stands on a flat receiver: in a still, what lands beneath it is kept from what lands beside it."""
+    coats: bool = False
+    """Some receiver has a glossy coat: camera rays go on from it."""
+    rough_diffuse: bool = False
+    """Some receiver is rougher than Lambert's law has it."""
+    rough: bool = False
+    """Some glass has a ground surface, whose microfacets turn paths by chance."""
+
+    @property
+    def has_lobe_columns(self) -> bool:
+        """Photons carry how the light of a microfacet spreads beside the spatial columns."""
+        return self.rough and self.footprints
 
     def defines(self) -> dict[str, int]:
         """Preprocessor symbols; a feature that is out is not defined at all (use #ifdef) — counts are numbers."""
         numbers = {
             "SPECTRAL_GROUPS": self.spectral_groups,
             "TARGETS": self.targets,
-            "COLUMNS": (2 if self.footprints else 0) + self.spectral_groups,
+            "COLUMNS": (2 if self.footprints else 0) + self.spectral_groups + (2 if self.has_lobe_columns else 0),
         }
         switches = {
             "MERGED_GROUPS": self.merged_groups,
@@ -144,6 +160,8 @@ class Features:
             "BEAMS": self.beams,
             "HERO": self.hero,
             "POLARISED": self.polarised,
+            "ROUGH_SURFACES": self.rough,
+            "LOBE_COLUMNS": self.has_lobe_columns,
         }
         return numbers | {name: 1 for name, on in switches.items() if on}
 
@@ -159,7 +177,9 @@ class Features:
         loose = [o for i, o in enumerate(scene.objects) if i not in convex]
         loose_triangles = sum(len(o.mesh.triangles) for o in loose)
         absorbing = any(o.material.absorption is not None for o in dielectrics)
-        smooth = any(o.mesh.corner_normals is not None for o in scene.objects if o.material.is_specular)
+        smooth = any(
+            o.mesh.corner_normals is not None for o in scene.objects if o.material.is_specular or o.material.has_coat
+        )
         footprints = settings.method != "stochastic-point"
         camera_specular, camera_disperses = camera_needs(scene, settings)
         tents = (
@@ -210,6 +230,11 @@ class Features:
             lens=scene.camera.lens_radius > 0.0,
             hero=settings.method == "hero",
             polarised=scene.render.polarisation and bool(dielectrics),
+            bounces=scene.render.bounces if settings.layer == "beauty" and why_no_bounces(scene) is None else 0,
+            contact_lines=bool(standing(scene)),
+            coats=settings.layer == "beauty" and any(o.material.has_coat for o in scene.objects),
+            rough_diffuse=settings.layer == "beauty" and any(o.material.diffuse_roughness for o in scene.objects),
+            rough=any(o.material.is_rough for o in dielectrics),
         )
 
 
@@ -245,6 +270,8 @@ def why_no_beams(item: SceneObject) -> str | None:
     """Why beams cannot carry what an object of glass or a mirror throws; None: they can."""
     if item.material.is_grating:
         return "a grating sends light into several orders"
+    if item.material.is_rough:
+        return "its surface is rough"
     if len(item.mesh.triangles) > MAX_BEAM_TRIANGLES:
         return f"it has {len(item.mesh.triangles)} triangles"
     if not is_faceted(item):
@@ -279,6 +306,8 @@ def why_no_camera_beams(scene: Scene, settings: RenderSettings) -> str | None:
         return "the picture is in bins"
     if scene.camera.lens_radius > 0.0:
         return "the camera has a lens"
+    if any(o.material.has_coat for o in scene.objects):
+        return "a receiver is glossy"
     aspect = settings.width / settings.height
     if not any(settings.any_view or in_view(scene.objects[i], scene.camera, aspect) for i in beam_objects(scene)):
         return "no flat-faceted glass or mirror is in view"
@@ -286,10 +315,11 @@ def why_no_camera_beams(scene: Scene, settings: RenderSettings) -> str | None:
 
 
 def camera_needs(scene: Scene, settings: RenderSettings) -> tuple[bool, bool]:
-    """Whether the camera may see glass or mirrors, and whether it may see through glass that disperses."""
+    """Whether the camera may see glass, mirrors or what is glossy, and whether it may see through glass that
+    disperses."""
     if settings.layer != "beauty":
         return False, False
-    mirrors = any(o.material.is_mirror for o in scene.objects)
+    mirrors = any(o.material.is_mirror or o.material.has_coat for o in scene.objects)
     glass = [o for o in scene.objects if o.material.transmits or o.material.is_grating]
     if not (settings.any_view or mirrors):
         # What is refracted or reflected first must be seen first; all else follows from it.

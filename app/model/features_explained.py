@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from .contacts import contacts, overlapping_solids
+from .bounces import why_no_bounces
+from .contacts import contacts, overlapping_solids, standing
 from .environment_light import why_no_environment_light
 from .environment_sun import with_sun
 from .features import Features, beam_objects, dispersive_materials, half_spaces, is_flat, why_no_beams
@@ -17,6 +18,7 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
     loose = sum(len(o.mesh.triangles) for i, o in enumerate(scene.objects) if i not in convex)
     solids = [scene.objects[i].name for i in convex]
     touching = [scene.objects[i].name for i in overlapping_solids(scene)]
+    on_receivers = list(dict.fromkeys(scene.objects[j].name for _, j in standing(scene)))
     in_contact = [f"{scene.objects[i].name} and {scene.objects[j].name}" for i, j in contacts(scene)]
     diffuse = [o for o in scene.objects if o.material.receives]
     worn = [o.name for o in diffuse if o.material.texture is not None]
@@ -77,6 +79,27 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
             else ("no columns" if features.smooth_normals else "all specular facets are flat"),
         ),
         ("polarisation", features.polarised, _polarisation_words(scene, features)),
+        (
+            "coats",
+            features.coats,
+            f"glossy: {names([o.name for o in diffuse if o.material.has_coat])}"
+            if features.coats
+            else "no receiver is glossy",
+        ),
+        (
+            "rough diffuse",
+            features.rough_diffuse,
+            f"rough: {names([o.name for o in diffuse if o.material.diffuse_roughness])}"
+            if features.rough_diffuse
+            else "what is diffuse is Lambertian",
+        ),
+        (
+            "rough surfaces",
+            features.rough,
+            f"of {names([o.name for o in scene.objects if o.material.is_rough])}"
+            if features.rough
+            else "all glass is polished",
+        ),
         ("absorption", features.absorption, "some glass absorbs" if features.absorption else "all glass is clear"),
         (
             "medium stack",
@@ -115,6 +138,11 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
             else "no receiver has two windows",
         ),
         (
+            "contact lines",
+            features.contact_lines,
+            f"on a receiver: {names(on_receivers)}" if features.contact_lines else "nothing stands on a receiver",
+        ),
+        (
             "local gain",
             features.local_gain,
             "the dispersion brush was used on a receiver" if features.local_gain else "no receiver was painted on",
@@ -129,7 +157,9 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
         (
             "camera refraction",
             features.camera_specular,
-            "the camera may see glass or mirrors" if features.camera_specular else "no glass and no mirror is in view",
+            "the camera may see glass, mirrors or coats"
+            if features.camera_specular
+            else "no glass and no mirror is in view",
         ),
         (
             "camera spectral taps",
@@ -170,6 +200,13 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
             else why_no_environment_light(scene) or "the picture shows caustics only",
         ),
         (
+            "bounces",
+            features.bounces > 0,
+            f"diffuse surfaces light each other, {features.bounces} time(s) over"
+            if features.bounces
+            else why_no_bounces(scene) or "the picture shows caustics only",
+        ),
+        (
             "light profiles",
             features.light_profiles,
             f"measured lamps: {names([light.name for light in scene.lights if light.profile is not None])}"
@@ -197,6 +234,8 @@ def _no_camera_beams_words(scene: Scene, features: Features) -> str:
         return f"method {features.method} follows paths"
     if not features.camera_specular:
         return "no glass and no mirror is in view"
+    if any(o.material.has_coat for o in scene.objects):
+        return "a receiver is glossy"
     return "--camera beams would try them" if beam_objects(scene) else "no glass and no mirror has flat facets only"
 
 

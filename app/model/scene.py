@@ -101,8 +101,12 @@ class RenderDefaults:
     max_depth: int = 64
     glare: float = 0.0
     """Share of the light that the camera's lens scatters (`base.glare`); of pictures to look at only."""
+    antialias_highlights: bool = True
+    """Edges of what is overexposed have no steps (`base.highlights`); of pictures to look at only."""
     polarisation: bool = False
     """Light keeps its polarisation from surface to surface; otherwise every event takes the mean of s and p."""
+    bounces: int = 0
+    """How often light goes on from one diffuse surface to another; 0: these do not light each other."""
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,8 @@ MAX_SIZE_RATIO = 1e12
 """Largest to smallest object; also to the side of an area light."""
 MAX_FAR_RATIO = 1e9
 """Distance from the origin to the largest object's size: float64 then tells a millionth of it."""
+ON_SURFACE = 1e-9
+"""Of a mesh's longest side: a point so near to a facet lies on it."""
 MIN_SIZE = 1e-12
 """Of the largest object, and one over its greatest: areas in their inverse squares are numbers in float32 then."""
 
@@ -58,12 +60,28 @@ def check_scene(scene: Scene, file_name: str) -> list[str]:
 
 
 def contains(item: SceneObject, point: np.ndarray) -> bool:
-    """Whether `point` (3,), in the world, lies inside the object's closed surface; slightly open meshes are judged
-    too."""
+    """Whether `point` (3,), in the world, lies inside the object's closed surface, and not on it, whichever way it
+    faces there; slightly open meshes are judged too."""
     local = np.linalg.solve(item.object_to_world[:3, :3], np.asarray(point) - item.object_to_world[:3, 3])
-    if item.mesh.is_closed:
-        return _crossings(item.mesh, local) != 0
-    return abs(_winding(item.mesh, local)) > 0.5
+    winds = _crossings(item.mesh, local) != 0 if item.mesh.is_closed else abs(_winding(item.mesh, local)) > 0.5
+    return winds and not _touches(item.mesh, local)
+
+
+def _touches(mesh: Mesh, point: np.ndarray) -> bool:
+    """Whether `point` lies on a facet, up to what rounding does to a place (`ON_SURFACE`)."""
+    near = ON_SURFACE * float(np.ptp(mesh.vertices, axis=0).max())
+    corners = mesh.corners() - point
+    beside = (corners.min(axis=1) > near).any(axis=1) | (corners.max(axis=1) < -near).any(axis=1)
+    for first, second, third in corners[~beside]:
+        normal = np.cross(second - first, third - first)
+        length = float(np.linalg.norm(normal))
+        if length == 0.0 or abs(float(first @ normal)) > near * length:
+            continue
+        # What lies on the inner side of all three edges is on the facet.
+        ends = ((first, second), (second, third), (third, first))
+        if all(np.cross(a, b) @ normal >= -near * length * float(np.linalg.norm(b - a)) for a, b in ends):
+            return True
+    return False
 
 
 def _crossings(mesh: Mesh, point: np.ndarray) -> int:

@@ -17,7 +17,8 @@ def scene_key(scene: Scene, *more: object) -> str:
     Names, notes, textures and the background do not count.
     """
     key = ContentKey()
-    key.add("scene", *more, *(("polarised",) if scene.render.polarisation else ()))
+    rules = (("polarised", scene.render.polarisation), (f"bounces {scene.render.bounces}", scene.render.bounces))
+    key.add("scene", *more, *(name for name, holds in rules if holds))
     camera = astuple(scene.camera)
     # Without a lens there is no plane of focus.
     key.add(

@@ -13,6 +13,8 @@ MAX_PICTURE_SIDE = 16384
 MAX_DEPTH = 4096
 MAX_GLARE = 0.5
 """A lens that scatters more is no lens."""
+MAX_BOUNCES = 3
+"""From one diffuse surface to another."""
 
 
 def read_background(table: SceneTable) -> Vec3:
@@ -47,7 +49,9 @@ _FIELDS = (
     Number("exposure_ev", _USUAL.exposure_ev, at_least=-64.0, at_most=64.0),
     Integer("max_depth", _USUAL.max_depth, at_least=1, at_most=MAX_DEPTH),
     Number("glare", _USUAL.glare, at_least=0.0, at_most=MAX_GLARE),
+    Flag("antialias_highlights", _USUAL.antialias_highlights, optional=True),
     Flag("polarisation", _USUAL.polarisation, optional=True),
+    Integer("bounces", _USUAL.bounces, optional=True, at_least=0, at_most=MAX_BOUNCES),
 )
 
 

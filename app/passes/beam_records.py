@@ -62,6 +62,9 @@ BORDER = 2.0
 """Texels that a triangle costs besides its own, per texel of its sides: they are filled in blocks of 4 x 4."""
 WIDE = 2.0
 """Windows; a wider polygon has texels that are all inside."""
+MOSTLY_INSIDE = 4.0
+"""Windows; a wider polygon has so many of these that little is looked at in few parts, where its edges pass. With 2
+windows `prism_case` at 160×90 held 0.1 % more than was thrown, at the same cost."""
 BROAD = 4.0
 """Texels that a penumbra keeps at least where it is drawn in a map of wider ones."""
 
@@ -185,7 +188,7 @@ def packed(
     area = polygons.area[chosen] * to_texels.density(polygons.centre[chosen])
     width = area / np.maximum(diagonal - motion, np.sqrt(area) + 1e-9)
     windows, widest = _windows(lines[..., 3], first, owner, width)
-    is_wide = width > WIDE * widest
+    is_wide = width > MOSTLY_INSIDE * widest
     edges = _edges(lines[..., :3], windows)
 
     records = BEAM.zeros(len(chosen))

@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 GROUP = 1 << 11
 """Polygons that are uploaded and drawn at a time: a software renderer sorts all of them into tiles before it draws."""
 _SMALLEST_GROUP = 16
+UNIT_CONTACT = 2
+"""Texture unit of the words of `contact_lines`."""
 FLUSH = 1 << 14
 """Polygons between two flushes of the scratch textures."""
 
@@ -60,7 +62,7 @@ class BeamSplatter:
         self._timers = timers
         self._portion = DispatchBudget(GROUP, _SMALLEST_GROUP, GROUP) if is_capped else None
         self._targets = targets
-        self._programs: dict[tuple[int, bool], moderngl.Program] = {}
+        self._programs: dict[tuple[int, bool, bool], moderngl.Program] = {}
         self._parameters = ctx.buffer(reserve=PARAMETERS.stride)
 
     def run(
@@ -117,10 +119,14 @@ class BeamSplatter:
         texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         vertices, indices = ctx.buffer(beams.vertices), ctx.buffer(beams.indices)
         array = ctx.vertex_array(
-            self._program(beams.edges, beams.is_still), [(vertices, "2f4 1u4", "in_position", "in_polygon")], indices
+            self._program(beams.edges, beams.is_still, atlas.contact_words is not None),
+            [(vertices, "2f4 1u4", "in_position", "in_polygon")],
+            indices,
         )
         texture.use(0)
         tables.texture.use(1)
+        if atlas.contact_words is not None:
+            atlas.contact_words.use(UNIT_CONTACT)
         x0, y0, x1, y1 = (int(v) for v in rect)
         atlas.framebuffer.use()
         ctx.scissor = x0, y0, x1 - x0, y1 - y0
@@ -133,11 +139,11 @@ class BeamSplatter:
         for resource in (array, vertices, indices, texture):
             resource.release()
 
-    def _program(self, edges: int, is_still: bool) -> moderngl.Program:
+    def _program(self, edges: int, is_still: bool, contact_lines: bool) -> moderngl.Program:
         """Compiled when it is first needed."""
-        kind = edges, is_still
+        kind = edges, is_still, contact_lines
         if kind not in self._programs:
-            defines = beam_defines(self._targets, edges, is_still)
+            defines = beam_defines(self._targets, edges, is_still, contact_lines)
             self._programs[kind] = shader.program(self._ctx, "light/beam.vert", "light/beam.frag", defines, (BEAM,))
         return self._programs[kind]
 

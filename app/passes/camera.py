@@ -46,8 +46,8 @@ from .variants import (
     BIND_PLACEMENTS,
     BIND_RECEIVERS,
     UNIT_EMISSION,
-    UNIT_ENVIRONMENT_LIGHT,
     UNIT_PICTURES,
+    UNIT_RECEIVER_LIGHT,
     Defines,
     beside_defines,
     camera_defines,
@@ -135,7 +135,7 @@ class CameraPass:
         self._parameters_buffer = self._ctx.buffer(reserve=CAMERA_PARAMETERS.stride)
         self._empty: CausticMaps | None = None
         self._dark: moderngl.Texture | None = None
-        """Light of an environment of which nothing is known."""
+        """Light of an environment, or of other receivers, of which nothing is known."""
         self._sums = PictureSums(self._ctx, self.channels.targets)
         self._rows = DispatchBudget(1, 1, 1)
         self._within_rows = False
@@ -180,7 +180,7 @@ class CameraPass:
             # A viewer may open the lens later.
             self._listed = ListedPixels(self._ctx, halted_bytes(lens_defines(shown)) if halts else None)
             shown = halting_defines(shown) if halts else shown
-        if "ENVIRONMENT_LIGHTS" in shown:
+        if "RECEIVER_LIGHT" in shown:
             self._dark = without_light(self._ctx, len(scene.receivers))
         self._source = (shown, structs)
         self._beams: ScreenBeams | None = None
@@ -265,7 +265,7 @@ class CameraPass:
         progress: Callable[[float], None] | None = None,
         cancelled: Callable[[], bool] | None = None,
     ) -> bool:
-        """Add `samples` camera samples to every pixel; False when `cancelled` stopped it.
+        """Add `samples` camera samples to every pixel; False when `cancelled` stopped it, after one at least.
 
         `sample_offset` is the number of samples already there; 0 starts anew. `maps` None shows
         direct light only. `progress` gets the share done, 0 to 1.
@@ -275,7 +275,7 @@ class CameraPass:
             if progress is not None:
                 progress(share)
             stops = stops or (cancelled is not None and cancelled())
-            if stops and not self._within_rows:
+            if stops and self.is_even and self.samples_taken:
                 return False
         return True
 
@@ -419,7 +419,7 @@ class CameraPass:
         for unit, texture in enumerate(maps.textures):
             texture.use(location=unit)
         if self._dark is not None:
-            (maps.environment or self._dark).use(location=UNIT_ENVIRONMENT_LIGHT)
+            (maps.environment or self._dark).use(location=UNIT_RECEIVER_LIGHT)
         self._sums.bind()
 
     @property

@@ -17,6 +17,8 @@ import numpy as np
 from ..gpu.map_channels import MapChannels
 from ..gpu.scene_buffers import SAMPLES, SceneBuffers, index_slope
 from ..gpu.scene_texels import spectra_texture
+from ..model.materials.finish import SMOOTH_ROUGHNESS
+from ..model.optics.coat import coat_tables
 from ..model.optics.colorimetry import VISIBLE_NM, daylight_per_lumen, rgb_basis
 from ..model.optics.glass import Dispersion
 from ..model.optics.spectral_tables import SpectralAxis, cumulative, index_table
@@ -65,6 +67,9 @@ class CameraTables:
         cell_cdf = _cell_cdf(axis, channels)
         spectra, defines = _spectra(scene, glasses, axis, absorptions, cell_cdf, maps)
         emission, rows = _emission(shown, axis, channels, reflectances, maps, scene.space.scale)
+        finishes, coats = _finishes(shown, len(spectra))
+        if finishes is not None:
+            spectra, rows = np.concatenate([spectra, coats]), rows | {"FINISHES_AT": len(shown.objects)}
         colours = np.zeros((len(shown.objects), 4), "f4")
         colours[:, 3] = -1.0
         for row, item in zip(colours, shown.objects, strict=True):
@@ -75,7 +80,7 @@ class CameraTables:
         return cls(
             spectra_texture(ctx, spectra),
             _texture(ctx, emission),
-            ctx.buffer(colours.tobytes()),
+            ctx.buffer((colours if finishes is None else np.concatenate([colours, finishes])).tobytes()),
             ctx.buffer(cell_cdf.astype("f4").tobytes()),
             defines | rows,
             axis,
@@ -120,6 +125,25 @@ def _absorption(material: Material, scale: float) -> np.ndarray | None:
         case Mirror(reflectance_rgb=rgb) if len(set(rgb)) > 1:
             return -np.log(np.maximum(rgb_basis() @ np.asarray(rgb, float), 1e-30))
     return None
+
+
+def _finishes(scene: Scene, first_row: int) -> tuple[np.ndarray | None, np.ndarray]:
+    """What camera rays know of each object's finish, float32 (O, 4): the coat's alpha (below 0: none; 0: perfectly
+    smooth), its index, its first row of tables, the base's roughness; None where all is plain. The tables
+    (rows, SAMPLES), over the cosine, stand after `first_row` others (`optics.coat.coat_tables`)."""
+    materials = [item.material for item in scene.objects]
+    if not any(m.has_coat or m.diffuse_roughness for m in materials):
+        return None, np.zeros((0, SAMPLES))
+    finishes, tables = np.zeros((len(materials), 4), "f4"), dict[tuple[float, float], np.ndarray]()
+    for row, material in zip(finishes, materials, strict=True):
+        row[:] = -1.0, 1.0, 0.0, material.diffuse_roughness
+        if material.has_coat:
+            alpha = material.roughness**2 if material.roughness >= SMOOTH_ROUGHNESS else 0.0
+            key = alpha, material.coat_index
+            if key not in tables:
+                tables[key] = coat_tables(alpha, material.coat_index, SAMPLES)
+            row[:3] = *key, first_row + 2 * list(tables).index(key)
+    return finishes, np.concatenate([np.zeros((0, SAMPLES)), *tables.values()])
 
 
 def _spectra(

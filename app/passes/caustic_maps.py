@@ -24,7 +24,8 @@ class CausticMaps:
     scale: float = 1.0
     """Factor on every texel: one over the number of passes summed in it."""
     environment: moderngl.Texture | None = None
-    """Light of the environment on receivers (`environment_light`); None: nothing is known of it."""
+    """Light of the environment on receivers (`environment_light`), and what these give each other (`bounce_light`);
+    None: nothing is known of it."""
 
     @classmethod
     def without_light(cls, ctx: moderngl.Context, receivers: int, targets: int) -> CausticMaps:

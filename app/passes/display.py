@@ -25,6 +25,7 @@ DISPLAY_PARAMETERS = Struct(
     (
         Field("origin", "vec2", "texture coordinate of the output's corner"),
         Field("step_uv", "vec2", "texture coordinates an output pixel covers"),
+        Field("beside_px", "vec2", "output pixels to the pixel beside one: one of the picture's where that is larger"),
         Field("false_stops", "vec2", "ends of the false-colour scale, stops about display white"),
         Field("gain", "float", "2^exposure"),
         Field("wipe_px", "float", "place of the wipe's line"),
@@ -42,6 +43,7 @@ NEAREST_FROM = 4.0
 """Enlarged more than this, pixels are shown as squares."""
 _MAX_TAPS = 4
 _GROUP = 8
+_ROWS = 16
 
 
 @dataclass(frozen=True)
@@ -53,10 +55,24 @@ class _Variant:
     shows: Shows
     taps: int
     """Lookups along a side of an output pixel."""
+    antialias: bool
+    """Whether edges of what is overexposed have no steps."""
+    same_size: bool = False
+    """Output pixels are the picture's."""
+    enlarged: bool = True
+    """Output pixels are smaller than the picture's."""
+
+    @property
+    def rows(self) -> int:
+        """Pixels of a column that an invocation develops."""
+        return _ROWS if self.antialias and self.tone != "false_colour" and self.shows == "picture" else 1
 
     def defines(self) -> dict[str, int | str]:
         table = ERROR if self.shows == "error" else FALSE_COLOUR
         return {
+            **({"ANTIALIAS": 1, "ROWS": self.rows} if self.rows > 1 else {}),
+            **({"SAME_SIZE": 1} if self.same_size else {}),
+            **({} if self.enlarged else {"BESIDE_IS_NEXT": 1}),
             "COLOUR_TABLE": glsl_table(table),
             "TAPS": self.taps,
             f"TONE_{self.tone.upper()}": 1,
@@ -87,15 +103,18 @@ class Display:
         size: tuple[int, int],
         other: moderngl.Texture | None = None,
         compare: Compare | None = None,
+        antialias: bool = False,
     ) -> moderngl.Texture:
         """`picture` (RGBA32F, linear Rec.709, row 0 on top) as an RGBA8 texture of `size` (width, height), sRGB codes,
         row 0 on top.
 
         `exposure_ev` is absolute (as `tone_map.to_display` takes it). `other` is what `compare` shows beside it, over
-        it or takes the error against; without it the picture alone is shown.
+        it or takes the error against; without it the picture alone is shown. `antialias`: see
+        `base.highlights`; of a picture that is shown alone.
         """
         parameters = self._develop(settings, exposure_ev)
         parameters["step_uv"] = 1.0 / size[0], 1.0 / size[1]
+        parameters["beside_px"] = np.maximum(np.array(size, float) / picture.size, 1.0)
         shows: Shows = "picture"
         if other is not None and compare is not None:
             shows = _shown(compare)
@@ -103,8 +122,9 @@ class Display:
         if shows == "other" and other is not None:
             picture = other
         shrunk = max(picture.width / size[0], picture.height / size[1])
-        variant = _Variant(_tone(settings), shows, int(np.clip(np.ceil(shrunk - 0.01), 1, _MAX_TAPS)))
+        taps = int(np.clip(np.ceil(shrunk - 0.01), 1, _MAX_TAPS))
         enlarged = max(size[0] / picture.width, size[1] / picture.height)
+        variant = _Variant(_tone(settings), shows, taps, antialias, picture.size == size, enlarged > 1.0)
         # Pixel for pixel nothing is blended, so that one broken pixel stays one.
         nearest = enlarged > NEAREST_FROM or picture.size == size
         return self._dispatch("picture", variant, parameters, (picture, other or picture), size, nearest)
@@ -117,6 +137,7 @@ class Display:
         exposure_ev: float,
         zoom: int = 12,
         pixels: int = 15,
+        antialias: bool = False,
     ) -> moderngl.Texture:
         """`pixels`² pixels of `picture` about `pixel` (column, row from the top), each `zoom`² large, as `run` would
         show them.
@@ -127,7 +148,8 @@ class Display:
         corner = np.array(pixel, float) - (pixels - 1) / 2
         parameters["origin"] = corner / picture.size
         parameters["step_uv"] = 1.0 / (zoom * np.array(picture.size, float))
-        variant = _Variant(_tone(settings), "picture", 1)
+        parameters["beside_px"] = zoom
+        variant = _Variant(_tone(settings), "picture", 1, antialias)
         return self._dispatch(
             "magnifier", variant, parameters, (picture, picture), (pixels * zoom, pixels * zoom), nearest=True
         )
@@ -173,14 +195,14 @@ class Display:
     ) -> moderngl.Texture:
         output = self._output(name, size)
         self._parameters.write(parameters.tobytes())
-        self._parameters.bind_to_storage_buffer(0)
+        self._parameters.bind_to_uniform_block(0)
         sampler = self._samplers[moderngl.NEAREST if nearest else moderngl.LINEAR]
         self._ctx.memory_barrier()
         for unit, texture in enumerate(pictures):
             texture.use(unit)
             sampler.use(unit)
         output.bind_to_image(0, read=False, write=True)
-        self._program(variant).run(-(-size[0] // _GROUP), -(-size[1] // _GROUP))
+        self._program(variant).run(-(-size[0] // _GROUP), -(-size[1] // (_GROUP * variant.rows)))
         for unit in (0, 1):
             sampler.clear(unit)
         self._ctx.memory_barrier()

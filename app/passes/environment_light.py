@@ -6,7 +6,8 @@ drawn by brightness (`model.environment_light`), as the ratio of what arrives to
 without anything in the way, which is known: where nothing hides anything, and where all is hidden, it is exact. Glass
 or a mirror: that path is followed backwards to the environment, with Fresnel's reflectance by chance and Beer's law,
 and finds there the mean of as wide a patch as it stands for. So what glass transmits of the environment's light, its
-focus included, is here, and photons carry none of it. Anything else: nothing, receivers do not light each other.
+focus included, is here, and photons carry none of it. Anything else: nothing; what receivers give to each other
+`bounce_light` finds.
 
 Every directions' number is a counter: the picture depends neither on how many are asked at once nor on timing.
 """
@@ -125,7 +126,7 @@ class EnvironmentLightPass:
         self._asked_buffer = self._ctx.buffer(reserve=MOST_ASKED * ASKED.stride)
         self._parameters = self._ctx.buffer(reserve=PARAMETERS.stride)
         self._levels: moderngl.Texture | None = None
-        self._sphere = _specular_sphere(buffers)
+        self._sphere = specular_sphere(buffers)
         self._budget = DispatchBudget(PER_FOLLOWED, PER_FOLLOWED, MOST_ASKED * PER_FOLLOWED // (PER_FOLLOWED + 1))
         defines = buffers.features.defines() | bindings.SCENE_DEFINES | buffers.defines
         defines |= {
@@ -273,14 +274,7 @@ class EnvironmentLightPass:
         self.shown = self.asked
 
     def _write(self, irradiance: np.ndarray) -> None:
-        width, height = self.places.size
-        image = np.zeros((height, width, 4), np.float32)
-        image[: len(self.places.records)] = self.places.records
-        x, y = self.places.texel_xy.T
-        image[y, x, :3] = irradiance
-        x, y = self.places.filled_xy.T
-        image[y, x, :3] = irradiance[self.places.source]
-        self.texture.write(image.tobytes())
+        self.texture.write(self.places.image(irradiance).tobytes())
 
     @property
     def bytes(self) -> int:
@@ -301,8 +295,9 @@ def without_light(ctx: moderngl.Context, receivers: int) -> moderngl.Texture:
     return ctx.texture((max(1, receivers), 1), 4, bytes(16 * max(1, receivers)), dtype="f4")
 
 
-def _specular_sphere(buffers: SceneBuffers) -> np.ndarray | None:
-    """What holds all glass and mirrors: centre and radius, float64 (4,), GPU space; None where there are none."""
+def specular_sphere(buffers: SceneBuffers) -> np.ndarray | None:
+    """What holds all glass and mirrors that rays are followed by: centre and radius, float64 (4,), GPU space; None
+    where there are none."""
     corners = [
         buffers.space.to_gpu(mesh.vertices)
         for mesh, item in zip(buffers.world_meshes, buffers.scene.objects, strict=True)

@@ -1,8 +1,10 @@
-"""Where on the receivers the environment's light is found: texels of few windows and charts, coarser than caustic maps.
+"""Where on the receivers the light of the environment, and of other receivers, is found: texels of few windows and
+charts, coarser than caustic maps.
 
 A flat receiver has a coarse window over all of it and, where other things stand on or near a part of it, a fine one
-round those, since only there shadows are sharp; of an open sheet both sides. A curved receiver has charts. Positions,
-normals and facets of all texels are worked out here, so that the program that asks knows nothing of windows.
+round those, since only there shadows are sharp; of an open sheet both sides, of a room that holds anything its inside.
+A curved receiver has charts. Positions, normals and facets of all texels are worked out here, so that the programs that
+ask know nothing of windows.
 """
 
 from __future__ import annotations
@@ -16,7 +18,8 @@ from ..gpu.schema import Field, Struct
 from ..gpu.tiles import pack
 from ..model.contacts import world_bounds
 from ..model.features import is_flat
-from ..model.geometry.charts import ChartAtlas, build_charts
+from ..model.geometry.charts import DEFAULT_GUTTER, ChartAtlas, build_charts
+from ..model.scene_checks import contains
 from .map_layout import Window
 from .plane_frame import PlaneFrame, plane_frame
 
@@ -40,6 +43,10 @@ PLACE = Struct(
         Field("inside", "uint", "1: the facet's back is lit"),
         Field("step_v", "vec3", "likewise"),
         Field("reserved", "uint", ""),
+        Field("span_u", "vec3", "side of what the texel covers, GPU space; on charts too"),
+        Field("reserved_too", "uint", ""),
+        Field("span_v", "vec3", "likewise"),
+        Field("reserved_three", "uint", ""),
     ),
 )
 
@@ -62,6 +69,36 @@ class EnvironmentPlaces:
     """int (m, 2): texels beside charts that are looked up too …"""
     source: np.ndarray
     """int (m,): … and the place whose light they show."""
+    on_top: np.ndarray
+    """bool (n,): of a window, in a part of it that no finer one covers: looked up at its own middle."""
+    is_window: np.ndarray
+    """bool (n,): of a window, not of charts."""
+
+    @property
+    def areas(self) -> np.ndarray:
+        """float64 (n,): what each texel covers, GPU unit²."""
+        u, v = self.places["span_u"].astype(float), self.places["span_v"].astype(float)
+        return np.linalg.norm(np.cross(u, v), axis=1)
+
+    @property
+    def rows(self) -> np.ndarray:
+        """int (k + 1,): first place of each row of texels of each tile, and the number of places."""
+        ends = np.zeros(len(self.places), bool)
+        ends[[first for first, end in self.tiles if end > first]] = True
+        ends[1:] |= np.diff(self.texel_xy[:, 1]) != 0
+        return np.append(np.flatnonzero(ends), len(self.places))
+
+    def image(self, values: np.ndarray) -> np.ndarray:
+        """float32 (height, width, 4): the texture with `values` (n, 3 or 4) in its texels."""
+        width, height = self.size
+        image = np.zeros((height, width, 4), np.float32)
+        image[: len(self.records)] = self.records
+        channels = values.shape[1]
+        x, y = self.texel_xy.T
+        image[y, x, :channels] = values
+        x, y = self.filled_xy.T
+        image[y, x, :3] = values[self.source, :3]
+        return image
 
     def smoothed(self, values: np.ndarray, texels: float) -> np.ndarray:
         """`values` (n, 3) averaged over neighbours by a Gaussian of so many texels, within each tile."""
@@ -76,6 +113,17 @@ class EnvironmentPlaces:
             image[y, x, :3], image[y, x, 3] = values[first:end], 1.0
             mean = gaussian_filter(image, (texels, texels, 0.0), mode="constant", truncate=2.5)
             found[first:end] = mean[y, x, :3] / mean[y, x, 3:]
+        return found
+
+    def spread(self, values: np.ndarray) -> np.ndarray:
+        """`values` (n,) as means over each window's texel and the eight about it; 0 on charts."""
+        from scipy.ndimage import uniform_filter
+
+        found = np.zeros(len(values))
+        for first, end in self.tiles:
+            if self.is_window[first:end].any():
+                width = int(np.ptp(self.texel_xy[first:end, 0])) + 1
+                found[first:end] = uniform_filter(values[first:end].reshape(-1, width), 3, mode="nearest").ravel()
         return found
 
     @property
@@ -94,18 +142,20 @@ class _Side:
     window: Window | None = None
     back: bool = False
     atlas: ChartAtlas | None = None
+    finer: Window | None = None
+    """The window that lies over a part of this one."""
 
 
-def environment_places(buffers: SceneBuffers, finer: float = 1.0) -> EnvironmentPlaces:
-    """All texels of the scene's receivers; `finer`: factor on their number."""
+def environment_places(buffers: SceneBuffers, finer: float = 1.0, gutter: int = DEFAULT_GUTTER) -> EnvironmentPlaces:
+    """All texels of the scene's receivers; `finer`: factor on their number; `gutter`: texels round each chart."""
     scene, receivers = buffers.scene, buffers.receivers
     tiles: list[_Side] = []
     share = finer * min(1.0, MOST_TEXELS / (max(len(receivers), 1) * (FINE_TEXELS + COARSE_TEXELS)))
     for receiver, index in enumerate(receivers):
         item, mesh = scene.objects[index], buffers.world_meshes[index]
         if not is_flat(item):
-            atlas = build_charts(mesh, total_texels=max(256, int(share * CHART_TEXELS)))
-            sides = (False,) if mesh.is_closed else (False, True)
+            atlas = build_charts(mesh, total_texels=max(256, int(share * CHART_TEXELS)), gutter=gutter)
+            sides = (False,) if mesh.is_closed and not _holds_anything(buffers, index) else (False, True)
             tiles += [_Side(receiver, (atlas.width, atlas.height), back=back, atlas=atlas) for back in sides]
             continue
         frame = plane_frame(buffers.space.to_gpu(mesh.vertices))
@@ -114,12 +164,23 @@ def environment_places(buffers: SceneBuffers, finer: float = 1.0) -> Environment
             for number, window in enumerate(windows):
                 texels = COARSE_TEXELS if number and len(windows) > 1 else FINE_TEXELS
                 size = _size(window, share * texels * (0.25 if back else 1.0))
-                tiles.append(_Side(receiver, size, frame, window, back))
+                tiles.append(_Side(receiver, size, frame, window, back, finer=windows[0] if number else None))
     placed, size = pack([tile.size for tile in tiles], 4096)
     # Mesa compiles its programs once more for sides that are powers of two.
     width = max(size[0], 64)
     width += 1 if width & (width - 1) == 0 else 0
     return _packed(buffers, tiles, placed, (width, size[1]))
+
+
+def _holds_anything(buffers: SceneBuffers, index: int) -> bool:
+    """Whether a closed receiver is a room whose walls light each other: a lamp, the camera or another thing is in
+    it."""
+    scene = buffers.scene
+    if not buffers.features.bounces:
+        return False
+    within = [np.array(light.position) for light in scene.lights] + [np.array(scene.camera.position)]
+    within += [world_bounds(o).mean(axis=0) for i, o in enumerate(scene.objects) if i != index]
+    return any(contains(scene.objects[index], point) for point in within)
 
 
 def _windows(buffers: SceneBuffers, index: int, frame: PlaneFrame) -> list[Window]:
@@ -158,6 +219,7 @@ def _packed(buffers: SceneBuffers, tiles: list[_Side], placed, size: tuple[int, 
     records: list[np.ndarray] = []
     parts: list[tuple[np.ndarray, np.ndarray]] = []
     filled: list[np.ndarray] = []
+    on_top: list[np.ndarray] = []
     sources: list[np.ndarray] = []
     rows = _record_rows(buffers, tiles, size[0])
     for tile, at in zip(tiles, placed, strict=True):
@@ -172,12 +234,14 @@ def _packed(buffers: SceneBuffers, tiles: list[_Side], placed, size: tuple[int, 
             head[3] = 2 if tile.back else 1
             records.append(_window_record(tile, offset))
             parts.append(_window_places(buffers, tile, offset))
+            on_top.append(_on_top(tile))
         else:
             index = buffers.receivers[tile.receiver]
             head[1:] = len(tile.atlas.rows), 1 + buffers.first_triangle[index], 2 if tile.back else 1
             records.append(_chart_records(buffers, tile.atlas, offset))
             places, texel_xy, beside, nearest = _chart_places(buffers, tile, index, offset)
             parts.append((places, texel_xy))
+            on_top.append(np.zeros(len(places), bool))
             filled.append(beside)
             sources.append(first + nearest)
     texels = np.concatenate([heads, *records]) if records else heads
@@ -193,6 +257,8 @@ def _packed(buffers: SceneBuffers, tiles: list[_Side], placed, size: tuple[int, 
         tuple((end - len(places), end) for (places, _), end in zip(parts, ends, strict=True)),
         np.concatenate([none, *filled]),
         np.concatenate([np.zeros(0, int), *sources]),
+        np.concatenate([np.zeros(0, bool), *on_top]),
+        np.repeat([tile.atlas is None for tile in tiles], [len(places) for places, _ in parts]).astype(bool),
     )
 
 
@@ -219,16 +285,31 @@ def _window_places(buffers: SceneBuffers, tile: _Side, offset: np.ndarray) -> tu
     width, height = tile.size
     x, y = (g.ravel() for g in np.meshgrid(np.arange(width), np.arange(height)))
     step = tile.window.size / np.array(tile.size)
-    flat = tile.window.low + (np.stack([x, y], axis=-1) + 0.5) * step
     found = PLACE.zeros(len(x))
-    found["position"] = tile.frame.origin + flat @ tile.frame.axes
+    found["position"] = tile.frame.origin + _middles(tile) @ tile.frame.axes
     found["step_u"], found["step_v"] = step[0] * tile.frame.axes[0], step[1] * tile.frame.axes[1]
+    found["span_u"], found["span_v"] = found["step_u"], found["step_v"]
     outward = mesh.face_normals()[int(np.argmax(mesh.areas()))]
     found["normal"] = -outward if tile.back else outward
     found["inside"] = tile.back
     found["object"] = index
     found["primitive"] = buffers.primitives[buffers.first_triangle[index]]
     return found, np.stack([x, y], axis=-1) + offset
+
+
+def _middles(tile: _Side) -> np.ndarray:
+    """Of a window's texels, row by row, on its plane: float64 (n, 2)."""
+    assert tile.window is not None
+    width, height = tile.size
+    x, y = (g.ravel() for g in np.meshgrid(np.arange(width), np.arange(height)))
+    return tile.window.low + (np.stack([x, y], axis=-1) + 0.5) * tile.window.size / np.array(tile.size)
+
+
+def _on_top(tile: _Side) -> np.ndarray:
+    middles = _middles(tile)
+    if tile.finer is None:
+        return np.ones(len(middles), bool)
+    return np.any((middles < tile.finer.low) | (middles >= tile.finer.high), axis=1)
 
 
 def _chart_records(buffers: SceneBuffers, atlas: ChartAtlas, offset: np.ndarray) -> np.ndarray:
@@ -238,6 +319,18 @@ def _chart_records(buffers: SceneBuffers, atlas: ChartAtlas, offset: np.ndarray)
     rows[..., 3] += offset
     found = np.concatenate([rows, (atlas.triangle_rects + np.tile(offset, 2))[:, None]], axis=1)
     return found.reshape(-1, 4).astype(np.float32)
+
+
+def _sides_of_texels(rows: np.ndarray) -> np.ndarray:
+    """Sides of a texel on each triangle's plane, float64 (T, 2, 3), of maps to texels (T, 2, 3): their
+    pseudo-inverses."""
+    products = np.einsum("tik,tjk->tij", rows, rows)
+    determinant = products[:, 0, 0] * products[:, 1, 1] - products[:, 0, 1] ** 2
+    inverse = np.stack([products[:, 1, 1], -products[:, 0, 1], -products[:, 0, 1], products[:, 0, 0]], axis=-1)
+    inverse = np.where(
+        determinant[:, None] > 0.0, inverse / np.where(determinant > 0.0, determinant, 1.0)[:, None], 0.0
+    )
+    return np.einsum("tij,tjk->tik", inverse.reshape(-1, 2, 2), rows)
 
 
 def _chart_places(
@@ -261,6 +354,8 @@ def _chart_places(
     world = corners[:, 0] + np.einsum("nk,nkj->nj", shares, corners[:, 1:] - corners[:, :1])
     found = PLACE.zeros(len(x))
     found["position"] = buffers.space.to_gpu(world)
+    spans = buffers.space.scale * _sides_of_texels(atlas.rows[..., :3])[triangle]
+    found["span_u"], found["span_v"] = spans[:, 0], spans[:, 1]
     found["normal"] = mesh.face_normals()[triangle] * (-1.0 if tile.back else 1.0)
     found["inside"] = tile.back
     found["object"] = index

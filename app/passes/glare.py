@@ -40,12 +40,13 @@ class Glare:
             height = max(1, round(rows / 2**octave))
             size = max(1, round(height * picture.width / picture.height)), height
             shrunk.append(self._step("SHRINK", octave, size, (shrunk[-1], shrunk[-1])))
-        empty = self._texture(("EMPTY", 0), (1, 1))
-        spread = empty
+        softened = self._texture(("EMPTY", 0), (1, 1))
         for octave in reversed(range(OCTAVES)):
             of = shrunk[octave + 1]
-            spread = self._step("SPREAD", octave, of.size, (of, spread), share / OCTAVES)
-        return self._step("JOIN", 0, picture.size, (picture, spread), share)
+            spread = self._step("SPREAD", octave, of.size, (of, softened), share / OCTAVES)
+            ring = spread.width + 2, spread.height + 2
+            softened = self._step("SOFTEN", octave, ring, (spread, spread))
+        return self._step("JOIN", 0, picture.size, (picture, softened), share)
 
     def release(self) -> None:
         """Free everything."""

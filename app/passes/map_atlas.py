@@ -75,6 +75,8 @@ class MapAtlas:
         self._accumulate = Accumulate(ctx)
         self.pending = 0
         """Photons in the scratch textures."""
+        self.contact_words: moderngl.Texture | None = None
+        """Of `contact_lines`, where such lines lie in the maps; the atlas's own."""
         self.clear()
 
     def _texture(self) -> moderngl.Texture:
@@ -143,6 +145,8 @@ class MapAtlas:
         shader.release(
             self.framebuffer, self._accumulate, *self.scratch_textures, *self.total_textures, self.placements
         )
+        if self.contact_words is not None:
+            self.contact_words.release()
 
 
 def park(ctx: moderngl.Context) -> None:

@@ -41,8 +41,10 @@ BIND_MOVING = 10
 BIND_MOVING_LISTS = 22
 """Of storage buffers, one that no other program of the camera has."""
 IMAGE_PICTURE, IMAGE_VISIBLE, IMAGE_PLACES, IMAGE_LIGHT, IMAGE_CHOSEN, IMAGE_FOUND = range(6)
-IMAGE_CELLS = IMAGE_CHOSEN
-_GROUP, _LISTED_GROUP = 8, 64
+_GROUP = 8, 8
+_CELLS_GROUP = 32, 8
+"""Many: a software renderer hands every group out by itself, which takes as long as thirty of its cells."""
+_LISTED_GROUP = 64
 
 
 class MovingPicture:
@@ -62,9 +64,8 @@ class MovingPicture:
             "IMAGE_LIGHT": IMAGE_LIGHT,
             "IMAGE_CHOSEN": IMAGE_CHOSEN,
             "IMAGE_FOUND": IMAGE_FOUND,
-            "IMAGE_CELLS": IMAGE_CELLS,
         }
-        names = "lattice", "cells", "direct", "uneven", *(("blocks", "list", "glass") if view.follows else ())
+        names = "lattice", "direct", "uneven", *(("blocks", "list", "glass") if view.follows else ())
         self._programs = {
             name: shader.compute(self._ctx, f"camera/moving_{name}.comp", defines, (*structs, MOVING_PARAMETERS))
             for name in names
@@ -74,7 +75,7 @@ class MovingPicture:
         self._chosen: moderngl.Texture | None = None
         self._lists: moderngl.Buffer | None = None
         self.specular = 0
-        """Pixels that see glass or mirrors first."""
+        """Pixels that see glass, mirrors or coats first."""
         self.followed = 0
         """Paths that the last `glass` followed."""
 
@@ -87,21 +88,22 @@ class MovingPicture:
         self._camera = self._view.moving_parameters(camera, width, height, maps, max_taps, seed)
         self._view.bind_for(self._camera, maps)
         self._visible = self._surfaces.run(self._camera)
-        lattice = tuple(-(-(side - 1) // LATTICE_STEP) + 1 for side in picture.size)
+        cells = tuple(-(-side // LATTICE_STEP) for side in picture.size)
+        lattice = cells[0] + 1, cells[1] + 1
         if not self._lattice or self._lattice[0].size != lattice:
             shader.release(*self._lattice)
             self._lattice = [self._ctx.texture(lattice, 4, dtype="f4") for _ in range(2)]
-            self._lattice.append(self._ctx.texture(lattice, 1, dtype="u4"))
-        if self._lists is None or self._lists.size != 8 + 4 * width * height:
+        # A pixel that sees a coat may be on both lists.
+        room = 8 + 4 * width * height * (2 if "COATS" in self._view.source[0] else 1)
+        if self._lists is None or self._lists.size != room:
             if self._lists is not None:
                 self._lists.release()
-            self._lists = self._ctx.buffer(reserve=8 + 4 * width * height)
+            self._lists = self._ctx.buffer(reserve=room)
         self._tell(1)
         self._run("lattice", lattice, maps)
-        self._run("cells", lattice, maps)
         assert self._lists is not None
         self._lists.write(bytes(8))
-        self._run("direct", picture.size, maps, picture)
+        self._run("direct", cells, maps, picture, _CELLS_GROUP)
         uneven, self.specular = np.frombuffer(self._lists.read(8), "u4").tolist()
         self._run_listed("uneven", uneven, maps, picture)
 
@@ -138,27 +140,32 @@ class MovingPicture:
 
     def _run_listed(self, name: str, count: int, maps: CausticMaps, picture: moderngl.Texture | None = None) -> None:
         if count:
-            self._run(name, (-(-count // _LISTED_GROUP) * _GROUP, 1), maps, picture)
+            self._run(name, (count, 1), maps, picture, (_LISTED_GROUP, 1))
 
     def _run(
-        self, name: str, size: tuple[int, ...], maps: CausticMaps, picture: moderngl.Texture | None = None
+        self,
+        name: str,
+        size: tuple[int, ...],
+        maps: CausticMaps,
+        picture: moderngl.Texture | None = None,
+        group: tuple[int, int] = _GROUP,
     ) -> None:
         self._view.bind_for(self._camera, maps)
         self._parameters.bind_to_uniform_block(BIND_MOVING)
         assert self._lists is not None
         self._lists.bind_to_storage_buffer(BIND_MOVING_LISTS)
-        places, light, cells = self._lattice
+        places, light = self._lattice
         for unit, texture in (
             (IMAGE_PICTURE, picture),
             (IMAGE_VISIBLE, self._visible),
             (IMAGE_PLACES, places),
             (IMAGE_LIGHT, light),
-            (IMAGE_CHOSEN, self._chosen if name in ("blocks", "list", "glass") else cells),
+            (IMAGE_CHOSEN, self._chosen if name in ("blocks", "list", "glass") else None),
             (IMAGE_FOUND, self._view.sums[0]),
         ):
             if texture is not None:
                 texture.bind_to_image(unit, read=True, write=True)
-        self._programs[name].run(-(-size[0] // _GROUP), -(-size[1] // _GROUP))
+        self._programs[name].run(-(-size[0] // group[0]), -(-size[1] // group[1]))
         self._ctx.memory_barrier()
 
     def release(self) -> None:

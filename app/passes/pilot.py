@@ -32,6 +32,12 @@ BAND_TOLERANCE = 0.25
 
 Measured on the prism scene (256×144, 1.6 M photons): 0.35 left an error along the spectrum of
 nRMSE 0.031, 0.15 left 0.028 at half the footprints' density."""
+BLURRED = 0.4
+"""Of the standard deviation that a tenth of the light's footprints exceed, as a width below which nothing is told apart
+anyway: with few photons broad footprints err by more than chords do, and every band widens them.
+
+Measured on `ball` (120×68, one band and two): relMSE 0.23, 0.47 with 10,000 photons, 0.037, 0.081 with 40,000, 0.018,
+0.016 with 160,000; nRMSE 0.093, 0.105; 0.068, 0.062; 0.057, 0.041."""
 NARROW_TEXELS = 0.125
 """Where footprints are narrower than this, a chord may miss by less than a texel: in proportion to their area, and so
 to the error that footprints themselves make. Bands then grow with the cube root of the photons, and what chords err by,
@@ -177,8 +183,9 @@ class PilotFit:
         typical = _weighted_quantile(np.concatenate(errors), np.concatenate(weights), 0.9)
         for count in range(1, MAX_BANDS):
             # The miss shrinks with the square of the bands, while footprints grow with their root.
-            narrow = min(self._broad_texels(count) / NARROW_TEXELS, 1.0)
-            allowed = max(narrow**2, self._footprint_texels(count))
+            broad = self._broad_texels(count)
+            narrow = min(broad / NARROW_TEXELS, 1.0)
+            allowed = max(narrow**2, self._footprint_texels(count), BLURRED * broad)
             if typical / count**2 <= BAND_TOLERANCE * allowed:
                 return count
         return MAX_BANDS

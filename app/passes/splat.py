@@ -17,6 +17,7 @@ from ..gpu.context import device_sentence
 from ..gpu.schema import Field, Struct
 from .footprint import (
     SPLAT,
+    UNIT_CONTACT,
     VERTICES,
     Footprints,
     SpectralVariables,
@@ -150,6 +151,8 @@ class Splatter:
         ):
             buffer.bind_to_storage_buffer(binding)
         tables.texture.use(0)
+        if atlas.contact_words is not None:
+            atlas.contact_words.use(UNIT_CONTACT)
         atlas.framebuffer.use()
         ctx.enable_only(moderngl.BLEND)
         ctx.blend_equation = moderngl.FUNC_ADD, moderngl.FUNC_ADD

@@ -355,6 +355,7 @@ class TracePass:
         if piece.lattice_count < 1 << (32 - records.LATTICE_BIT):
             self._trace_values["lattice_bits"] = piece.lattice_count << records.LATTICE_BIT
         self._trace_values["lattice_shift"] = piece.shift[1]
+        self._trace_values["surface_key"] = piece.seed
         self._trace_values["lattices_together"] = 1 if self._features.spectral_groups else len(piece.bands)
         self._trace_parameters.write(self._trace_values.tobytes())
 

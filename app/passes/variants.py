@@ -57,7 +57,7 @@ TINT_STEPS = 48
     BIND_BEAM_ORDER,
     BIND_BEAM_FOUND,
 ) = range(8, 22)
-UNIT_ENVIRONMENT_LIGHT, UNIT_EMISSION, UNIT_PICTURES, UNIT_POLYGONS = 9, 10, 11, 13
+UNIT_RECEIVER_LIGHT, UNIT_EMISSION, UNIT_PICTURES, UNIT_POLYGONS = 9, 10, 11, 13
 BIND_BEAM_VIEW = 9
 """Of uniform blocks."""
 IMAGE_POLYGONS = 0
@@ -136,6 +136,8 @@ class SplatFeatures(Protocol):
     def reindexed(self) -> bool: ...
     @property
     def hero(self) -> bool: ...
+    @property
+    def contact_lines(self) -> bool: ...
 
 
 def splat_defines(features: SplatFeatures) -> Defines:
@@ -156,7 +158,11 @@ def splat_defines(features: SplatFeatures) -> Defines:
 
 def footprint_defines(features: SplatFeatures) -> Defines:
     """Defines of footprint.comp."""
-    switches = {"LOCAL_GAIN": features.local_gain, "REINDEXED": features.reindexed}
+    switches = {
+        "LOCAL_GAIN": features.local_gain,
+        "REINDEXED": features.reindexed,
+        "CONTACT_LINES": features.contact_lines,
+    }
     return (
         splat_defines(features)
         | {
@@ -179,14 +185,21 @@ def draw_variants(features: SplatFeatures) -> dict[int, tuple[str, Defines]]:
     if features.band_cuts and not features.point_spectrum:
         variants[3] = ("light/splat_cut.frag", {"CUT": 1, "CLIPPED": 1})
     variants[4] = ("light/splat_swept.frag", {"SWEPT": 1, "EDGE": 1, "CLIPPED": 1})
+    if features.contact_lines:
+        # The same beside a line of contact; of swept ones those that an edge cuts as well.
+        beside: Defines = {"CONTACT_LINES": 1}
+        for kind, of in ((5, 1), (6, 4), (7, 3)):
+            if of in variants:
+                variants[kind] = (variants[of][0], variants[of][1] | beside)
     return variants
 
 
-def beam_defines(targets: int, edges: int, is_still: bool) -> Defines:
+def beam_defines(targets: int, edges: int, is_still: bool, contact_lines: bool = False) -> Defines:
     """Defines of the programs that draw beam polygons of up to `edges` edges (0: any number), moving over their band or
-    not."""
+    not, into maps in which lines of contact lie or not."""
     counts: Defines = {"TARGETS": targets, "EDGES": edges}
-    return counts | ({"STILL": 1} if is_still else {})
+    switches = {"STILL": is_still, "CONTACT_LINES": contact_lines}
+    return counts | {name: 1 for name, on in switches.items() if on}
 
 
 # -- camera pass --------------------------------------------------------------------------
@@ -225,7 +238,7 @@ def camera_defines(scene: SceneBuffers, channels: Channels, layer: str, maps: Ma
         "BIND_LISTED": BIND_LISTED,
         "BIND_RECEIVERS": BIND_RECEIVERS,
         "BIND_PLACEMENTS": BIND_PLACEMENTS,
-        "UNIT_ENVIRONMENT_LIGHT": UNIT_ENVIRONMENT_LIGHT,
+        "UNIT_RECEIVER_LIGHT": UNIT_RECEIVER_LIGHT,
         "UNIT_EMISSION": UNIT_EMISSION,
         "EMISSION_CELLS": EMISSION_CELLS,
         "TINT_STEPS": TINT_STEPS,
@@ -243,10 +256,11 @@ def camera_defines(scene: SceneBuffers, channels: Channels, layer: str, maps: Ma
     materials = [item.material for item in scene.scene.objects]
     coloured = any(m.is_mirror and m.is_coloured for m in materials)
     absorbs = any(m.absorption is not None for m in materials)
+    lit = features.environment_lights and lighting_environment(scene.scene) is not None
     switches = {
         "LAYER_BEAUTY": beauty,
         "CAMERA_SPECULAR": specular,
-        "ENVIRONMENT_LIGHTS": beauty and features.environment_lights and lighting_environment(scene.scene) is not None,
+        "RECEIVER_LIGHT": beauty and (lit or features.bounces > 0),
         "HAS_DISPERSION": disperses,
         "SPECTRAL_SWEEP": groups > 0,
         "RANDOM_WAVELENGTH": features.random_wavelength,
@@ -258,6 +272,8 @@ def camera_defines(scene: SceneBuffers, channels: Channels, layer: str, maps: Ma
         "ABSORPTION": specular and (coloured or absorbs),
         "NORMAL_DERIVATIVES": features.smooth_normals,
         "POLARISED": specular and features.polarised,
+        "COATS": features.coats,
+        "ROUGH_DIFFUSE": features.rough_diffuse,
     }
     for name in switches:
         defines.pop(name, None)
@@ -283,6 +299,7 @@ def halted_bytes(beyond: Mapping[str, int | float | str]) -> int:
     """Room that surely holds one halted sample: its paths, and what it knows besides."""
     columns = int(beyond["SPECTRAL_GROUPS"]) + 2 * int("LENS" in beyond)
     path = 312 + 40 * columns + 4 * int(beyond.get("ABSORBERS", 0)) + 64 * int("POLARISED" in beyond)
+    path += 16 * int("COATS" in beyond)
     return (STACK + 1) * path + 16 * int(beyond["TARGETS"]) + 64
 
 
@@ -309,7 +326,6 @@ def moving_defines(beyond: Mapping[str, int | float | str]) -> Defines:
         "NUMBER_BITS": 27,
         "LATTICE_MAPS": "0xffffu",
         "LATTICE_OBJECTS": "0x10000u",
-        "MOST_TEXELS": "2.0",
     }
 
 

@@ -3,8 +3,9 @@
 Reflection or refraction is drawn with Fresnel's probability, so that a path's weight changes by
 absorption and mirrors only; lights are seen along the way, the environment at its end. At a diffuse surface one
 random point of every light is asked for (anything between hides it, glass too: what comes through glass is the
-caustic's), and the spectral caustic is looked up. Where the environment lights it the path goes on from there, in a
-direction towards what is bright, until it leaves the scene or meets something else than glass and mirrors.
+caustic's), and the spectral caustic is looked up. Where the environment lights it, or other diffuse surfaces do, the
+path goes on from there, in a direction by the cosine or towards what is bright, until it leaves the scene or has met
+as many diffuse surfaces as light may bounce between, and one.
 
 Numbers: a scrambled Sobol sequence a part, shifted from pixel to pixel.
 """
@@ -16,11 +17,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .camera_coat import base_reflectance, coat_albedo, coat_lobe, reflected_by_coat, under_coat
 from .camera_lights import light_seen, sample_light
 from .camera_rays import lens_ray
 from .camera_scene import beyond, picture_at
 from .compiling import compiled, inlined
-from .environment_draw import draw_direction
+from .environment_draw import draw_by_cosine, draw_direction
 from .photon_emit import search
 from .photon_intersect import blocked, nearest, normal_at
 from .photon_scene import BLACK, DIFFUSE
@@ -30,6 +32,10 @@ from .scattering import AIR, scatter, side_met, transmitted
 
 _LENS = np.uint64(0xD1B54A32D192ED03)
 """Sets the numbers for the place on the lens apart from those of Fresnel choices."""
+_BOUNCE = np.uint64(0x8CB92BA72F3D8DD7)
+"""Likewise those at the second diffuse surface of a path and later ones."""
+_COAT = np.uint64(0x2545F4914F6CDD1D)
+"""Sets those for coats apart."""
 LOST_DEPTH, LOST_NUMERIC = range(2)
 """Places in a tally of paths that were given up: too many events, or nothing met inside a solid."""
 
@@ -133,8 +139,68 @@ def _added(table, i, row, red, green, blue, factor, xyz):
 
 
 @inlined
+def _toward_light(lights, i, place, a, b):
+    """Unit direction to the point of light i that `gain_of_light` asks for."""
+    at, bt = a + i * 0.7548776662466927, b + i * 0.5698402909980532
+    tx, ty, tz, _, _ = sample_light(lights, i, place[0], place[1], place[2], at - math.floor(at), bt - math.floor(bt))
+    return tx, ty, tz
+
+
+@inlined
+def _finished(scene, pictures, spectra, atom, triangle, u, v, o, i, n):
+    """Reflectance in an atom of a finished surface's base, under its coat, for light from `i` (0: from all sides)."""
+    made, thing = pictures.finishes, scene.owner[triangle]
+    row, red, green, blue = _surface(scene, pictures, triangle, u, v)
+    cosine = o[0] * n[0] + o[1] * n[1] + o[2] * n[2]
+    basis, rough = spectra.basis[atom], made.roughness[thing]
+    reflectance = spectra.classes[row, atom]
+    if row == 0:
+        reflectance = basis[0] * base_reflectance(red, rough, cosine, o, i, n)
+        reflectance += basis[1] * base_reflectance(green, rough, cosine, o, i, n)
+        reflectance += basis[2] * base_reflectance(blue, rough, cosine, o, i, n)
+    directed = i[0] * i[0] + i[1] * i[1] + i[2] * i[2] > 0.5
+    from_cosine = i[0] * n[0] + i[1] * n[1] + i[2] * n[2] if directed else -1.0
+    return reflectance * under_coat(made, thing, cosine, from_cosine)
+
+
+@inlined
+def _coat_highlights(scene, lights, spectra, pictures, atom, triangle, place, side, o, n, a, b, scratch):
+    """Radiance in an atom that a coat reflects of lights without extent, which no path runs into."""
+    px, py, pz = place
+    found = 0.0
+    for i in range(lights.kind.shape[0]):
+        if lights.measure[i] == 0.0 and spectra.lights[i, atom] > 0.0:
+            gain = gain_of_light(scene, lights, i, triangle, side, px, py, pz, a, b, scratch.stack)
+            if gain > 0.0:
+                toward = _toward_light(lights, i, place, a, b)
+                cosine = toward[0] * n[0] + toward[1] * n[1] + toward[2] * n[2]
+                lobe = coat_lobe(pictures.finishes, scene.owner[triangle], o, toward, n)
+                found += spectra.lights[i, atom] * gain / cosine * lobe
+    return found
+
+
+@inlined
+def _finished_base(scene, lights, spectra, pictures, tables, atom, triangle, u, v, place, side, o, n, a, b, scratch):
+    """Radiance in an atom that a finished surface's base sends back."""
+    px, py, pz = place
+    total = 0.0
+    for i in range(lights.kind.shape[0]):
+        if spectra.lights[i, atom] > 0.0:
+            gain = gain_of_light(scene, lights, i, triangle, side, px, py, pz, a, b, scratch.stack)
+            if gain > 0.0:
+                toward = _toward_light(lights, i, place, a, b)
+                seen = _finished(scene, pictures, spectra, atom, triangle, u, v, o, toward, n)
+                total += spectra.lights[i, atom] * gain * seen
+    texel = _caustic_texel(tables, tables.side[scene.owner[triangle], side], px, py, pz)
+    if texel >= 0:
+        irradiance = spectra.share[atom] * tables.irradiance[texel + spectra.bin[atom]]
+        total += irradiance * _finished(scene, pictures, spectra, atom, triangle, u, v, o, (0.0, 0.0, 0.0), n)
+    return total / math.pi
+
+
+@inlined
 def _diffuse(scene, lights, spectra, pictures, tables, atom, triangle, u, v, place, side, a, b, scratch):
-    """Radiance in an atom that a diffuse surface sends back from a side; without atom (−1) all wavelengths go to
+    """Radiance in an atom that a Lambertian surface sends back from a side; without atom (−1) all wavelengths go to
     `scratch.xyz`."""
     px, py, pz = place
     xyz = scratch.xyz
@@ -178,8 +244,24 @@ def _on_lens(noise, number):
 
 
 @inlined
-def sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_depth, tally, scratch):
-    """Add what a camera ray sees to `scratch.xyz`.
+def _at_diffuse(state, shift, noise, number):
+    """Two numbers in [0, 1) for the diffuse surface `number` of a path."""
+    if number == 0:
+        return unit(state[3] ^ shift[3]), unit(state[4] ^ shift[4])
+    a, b = mixed(noise + np.uint64(2 * number) * _BOUNCE), mixed(noise + np.uint64(2 * number + 1) * _BOUNCE)
+    return float(a >> np.uint64(11)) * 2.0**-53, float(b >> np.uint64(11)) * 2.0**-53
+
+
+@inlined
+def _of_coat(noise, events, number):
+    """The choice between coat and base (0) after so many events, or a number for its facet (1, 2): in [0, 1)."""
+    word = mixed(mixed(noise + np.uint64(events + 1) * _COAT) + np.uint64(number) * _LENS)
+    return float(word >> np.uint64(11)) * 2.0**-53
+
+
+@inlined
+def sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_depth, bounces, tally, scratch):
+    """Add what a camera ray sees to `scratch.xyz`; diffuse surfaces light each other `bounces` times over.
 
     Up to the first event at glass or a mirror nothing depends on a wavelength, and all are added at once;
     then one is drawn and stands for all by its probability.
@@ -187,7 +269,7 @@ def sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_dept
     px, py, pz, dx, dy, dz = ray
     state, shift, xyz = scratch.state, scratch.shift, scratch.xyz
     last, last_object, within, mask, alone, events = -1, -1, False, start.mask, start.alone, 0
-    atom, nm, found, weight, lit = -1, 0.0, 0.0, 1.0, False
+    atom, nm, found, weight, surfaces = -1, 0.0, 0.0, 1.0, 0
     if scene.polarised:  # by reciprocity a path loses what light that came along it would
         begin_unpolarised(scratch.field, dx, dy, dz)
     if mask != np.uint64(0) or alone != AIR:  # in glass wavelengths part at once
@@ -197,7 +279,7 @@ def sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_dept
             scene, px, py, pz, dx, dy, dz, last, last_object, within, mask, scratch.stack, scratch.stack_distance
         )
         far = t if triangle >= 0 else np.inf
-        for i in range(0 if lit else lights.kind.shape[0]):
+        for i in range(0 if surfaces > 0 else lights.kind.shape[0]):
             seen = light_seen(lights, i, px, py, pz, dx, dy, dz, far)
             if seen > 0.0 and atom < 0:
                 _added(spectra.light_xyz, i, 0, 1.0, 1.0, 1.0, seen, xyz)
@@ -220,28 +302,60 @@ def sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_dept
         place = px, py, pz
         thing = scene.owner[triangle]
         kind = scene.kind[thing]
-        if kind == BLACK or weight <= 0.0 or (lit and kind == DIFFUSE):
+        if kind == BLACK or weight <= 0.0 or (surfaces > bounces and kind == DIFFUSE):
             break
         if kind == DIFFUSE:
-            a, b = unit(state[3] ^ shift[3]), unit(state[4] ^ shift[4])
+            a, b = _at_diffuse(state, shift, noise, surfaces)
             side = side_met(scene, triangle, place, dx, dy, dz)
-            found += weight * _diffuse(
-                scene, lights, spectra, pictures, tables, atom, triangle, u, v, place, side, a, b, scratch
-            )
-            if not pictures.draw.lights:
-                break
-            if atom < 0:
-                atom, nm = _wavelength(spectra, unit(state[2] ^ shift[2]))
-            row, red, green, blue = _surface(scene, pictures, triangle, u, v)
-            basis = spectra.basis[atom]
-            weight *= spectra.classes[row, atom] if row > 0 else red * basis[0] + green * basis[1] + blue * basis[2]
             sign = 1.0 if side == 0 else -1.0
             nx, ny, nz = normal_at(scene, triangle, px, py, pz)
-            dx, dy, dz, share = draw_direction(pictures.draw, sign * nx, sign * ny, sign * nz, a, b)
+            nx, ny, nz = sign * nx, sign * ny, sign * nz
+            made, n, o = pictures.finishes, (nx, ny, nz), (-dx, -dy, -dz)
+            ends = surfaces == bounces and not pictures.draw.lights
+            # What one surface sends to another, it sends as if it were plain.
+            coated = surfaces == 0 and made.alpha[thing] >= 0.0
+            finished = coated or (surfaces == 0 and made.roughness[thing] > 0.0)
+            if atom < 0 and (finished or not ends):
+                atom, nm = _wavelength(spectra, unit(state[2] ^ shift[2]))
+            if coated:
+                found += weight * _coat_highlights(
+                    scene, lights, spectra, pictures, atom, triangle, place, side, o, n, a, b, scratch
+                )
+                # To the coat or to its base, by what the coat reflects.
+                cosine = -(dx * nx + dy * ny + dz * nz)
+                by_coat = min(max(coat_albedo(made, thing, cosine), 0.3), 0.7)
+                if _of_coat(noise, events, 0) < by_coat:
+                    facet_a, facet_b = _of_coat(noise, events, 1), _of_coat(noise, events, 2)
+                    dx, dy, dz, share = reflected_by_coat(made, thing, dx, dy, dz, n, facet_a, facet_b)
+                    weight *= share / by_coat
+                    if scene.polarised:  # a coat takes light as unpolarised, and leaves it so
+                        begin_unpolarised(scratch.field, dx, dy, dz)
+                    last, last_object, within, events = triangle, thing, side == 1, events + 1
+                    if weight <= 0.0 or events >= max_depth:
+                        break
+                    continue
+                weight /= 1.0 - by_coat
+            if finished:
+                found += weight * _finished_base(
+                    scene, lights, spectra, pictures, tables, atom, triangle, u, v, place, side, o, n, a, b, scratch
+                )
+            else:
+                found += weight * _diffuse(
+                    scene, lights, spectra, pictures, tables, atom, triangle, u, v, place, side, a, b, scratch
+                )
+            if ends:
+                break
+            row, red, green, blue = _surface(scene, pictures, triangle, u, v)
+            basis = spectra.basis[atom]
+            dx, dy, dz, share = draw_direction(pictures.draw, nx, ny, nz, a, b)
+            if finished:
+                weight *= _finished(scene, pictures, spectra, atom, triangle, u, v, o, (dx, dy, dz), n)
+            else:
+                weight *= spectra.classes[row, atom] if row > 0 else red * basis[0] + green * basis[1] + blue * basis[2]
             if scene.polarised:  # a diffuse surface depolarises
                 begin_unpolarised(scratch.field, dx, dy, dz)
             weight *= share
-            last, last_object, within, lit = triangle, thing, side == 1, True
+            last, last_object, within, surfaces = triangle, thing, side == 1, surfaces + 1
             continue
         if events >= max_depth:
             tally[LOST_DEPTH] += 1.0
@@ -251,7 +365,7 @@ def sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_dept
         last, last_object = triangle, thing
         draw = choice(state, shift, FIRST_CHOICE + events, noise, events)
         dx, dy, dz, mask, alone, within, is_event, kept, _ = scatter(
-            scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw, scratch.field
+            scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw, noise, events, scratch.field
         )
         weight *= kept
         events += is_event
@@ -262,7 +376,21 @@ def sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_dept
 
 @compiled
 def trace_camera(
-    scene, camera, lights, spectra, pictures, tables, start, sequence, first, count, max_depth, sums, tally, scratch
+    scene,
+    camera,
+    lights,
+    spectra,
+    pictures,
+    tables,
+    start,
+    sequence,
+    first,
+    count,
+    max_depth,
+    bounces,
+    sums,
+    tally,
+    scratch,
 ):
     """Add samples [first, first + count) of every pixel to `sums` (H, W, 3), XYZ of each: divide by their number."""
     beginning, state, shift, xyz = scratch.beginning, scratch.state, scratch.shift, scratch.xyz
@@ -280,20 +408,19 @@ def trace_camera(
                 noise = mixed(key ^ mixed(np.uint64(i)))
                 x, y = column + unit(state[0] ^ shift[0]), row + unit(state[1] ^ shift[1])
                 ray = lens_ray(camera, x, y, _on_lens(noise, 0), _on_lens(noise, 1))
-                sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_depth, tally, scratch)
+                sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_depth, bounces, tally, scratch)
             for c in range(3):
                 sums[row, column, c] += xyz[c]
                 xyz[c] = 0.0
 
 
 @compiled
-def seen_points(scene, camera, start, sequence, count, nm, max_depth, side, points, which, scratch):
-    """Where `count` camera paths spread over the picture end on sides of receivers, for fitting windows: the number
-    found.
+def seen_points(scene, camera, start, sequence, count, nm, max_depth, bounces, side, points, which, scratch):
+    """Where `count` camera paths spread over the picture meet sides of receivers, with so many bounces, for fitting
+    windows: the number found.
 
-    `side` (O, 2) as in `CausticTables`; fills `points` (count, 4): place, and length of the way there; `which` (count,
-    2):
-    side, events on the way.
+    `side` (O, 2) as in `CausticTables`; fills `points` (count × (bounces + 1), 4): place, and length of the way there;
+    `which` (…, 2): side, events on the way.
     """
     stack, stack_distance, state, shift = scratch.stack, scratch.stack_distance, scratch.state, scratch.shift
     sobol_start(sequence, 0, state)
@@ -305,6 +432,7 @@ def seen_points(scene, camera, start, sequence, count, nm, max_depth, side, poin
         x, y = unit(state[0]) * camera.width, unit(state[1]) * camera.height
         px, py, pz, dx, dy, dz = lens_ray(camera, x, y, _on_lens(noise, 0), _on_lens(noise, 1))
         last, last_object, within, mask, alone, events, way = -1, -1, False, start.mask, start.alone, 0, 0.0
+        surfaces = 0
         if scene.polarised:
             begin_unpolarised(scratch.field, dx, dy, dz)
         while events <= max_depth:
@@ -318,18 +446,29 @@ def seen_points(scene, camera, start, sequence, count, nm, max_depth, side, poin
             thing = scene.owner[triangle]
             kind = scene.kind[thing]
             if kind == DIFFUSE:
-                at = side[thing, side_met(scene, triangle, place, dx, dy, dz)]
+                met = side_met(scene, triangle, place, dx, dy, dz)
+                at = side[thing, met]
                 if at >= 0:
                     points[found, 0], points[found, 1], points[found, 2], points[found, 3] = px, py, pz, way
                     which[found, 0], which[found, 1] = at, events
                     found += 1
-                break
+                if surfaces == bounces:
+                    break
+                sign = 1.0 if met == 0 else -1.0
+                nx, ny, nz = normal_at(scene, triangle, px, py, pz)
+                surfaces += 1
+                a, b = _at_diffuse(state, shift, noise, surfaces)
+                dx, dy, dz = draw_by_cosine(sign * nx, sign * ny, sign * nz, a, b)
+                if scene.polarised:
+                    begin_unpolarised(scratch.field, dx, dy, dz)
+                last, last_object, within = triangle, thing, met == 1
+                continue
             if kind == BLACK:
                 break
             last, last_object = triangle, thing
             draw = choice(state, shift, FIRST_CHOICE + events, noise, events)
             dx, dy, dz, mask, alone, within, is_event, _, _ = scatter(
-                scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw, scratch.field
+                scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw, noise, events, scratch.field
             )
             events += is_event
     return found

@@ -4,8 +4,8 @@ It shares no code with the shaders, the maps or the camera pass: float64 paths o
 glass and over mirrors, exact Fresnel by chance, textures and environments looked up at random points. With a
 `SpectralCaustic` the caustic lies on what is seen, each wavelength of it where that wavelength sees it.
 
-Known bounds: a diffuse surface sends back direct light, the caustic and the environment's light, nothing that came
-from other diffuse surfaces, as in the renderer; caustics need flat receivers.
+Diffuse surfaces send back direct light, the caustic, the environment's light, and what the scene's `bounces` bring of
+other diffuse surfaces. Known bound: caustics need flat receivers.
 
 Pictures are kept by the content of their scene beside those of `photon_reference`, in the same kind of file, and grow.
 """

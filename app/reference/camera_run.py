@@ -111,7 +111,7 @@ class CameraRun(PartsRun[CameraPicture]):
         )
         self._spectra = camera_scene.spectra(scene, caustic.plan.bins if caustic else 1)
         self._sequences = [sampling.scrambled(seed, part) for part in range(PARTS)]
-        self._max_depth = max_depth
+        self._max_depth, self._bounces = max_depth, scene.render.bounces
         self._caustic_noted = caustic.photons if caustic else 0, caustic_relmse
         super().__init__((height, width, 3), TALLY_SIZE)
 
@@ -158,6 +158,7 @@ class CameraRun(PartsRun[CameraPicture]):
             int(self.units[part]),
             count,
             self._max_depth,
+            self._bounces,
             self.sums[part],
             self.tallies[part],
             self._scratch(),

@@ -17,6 +17,7 @@ from ..model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz, daylight_per_lu
 from ..model.optics.spectrum import cmf_at
 from ..model.scene import Scene
 from ..model.texture import Texture
+from .camera_coat import Finishes, finishes
 from .compiling import inlined
 from .environment_draw import EnvironmentDraw, environment_draw
 from .photon_scene import TABLE_NM, PhotonScene, reflectance_classes
@@ -74,6 +75,8 @@ class Pictures(NamedTuple):
     """float64 (U, 6): u, v at each corner."""
     to_local: np.ndarray
     """float64 (3, 3): the environment's frame."""
+    finishes: Finishes
+    """Coats, and how rough bases are."""
     draw: EnvironmentDraw
     """How paths go on towards it from what it lights."""
 
@@ -187,6 +190,7 @@ def pictures(scene: Scene, photons: PhotonScene, centre: np.ndarray) -> Pictures
         uv_row,
         uv,
         np.array(beyond.world_to_local, float) if beyond else np.eye(3),
+        finishes(scene),
         environment_draw(scene),
     )
 

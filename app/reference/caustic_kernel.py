@@ -63,7 +63,7 @@ def land(scene, domain, colour, band_of, side, sequence, first, count, share, ma
             last, last_object = triangle, thing
             draw = choice(state, shift, FIRST_CHOICE + events, noise, events)
             dx, dy, dz, mask, alone, within, is_event, kept, _ = scatter(
-                scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw, scratch.field
+                scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw, noise, events, scratch.field
             )
             watt *= kept
             events += is_event

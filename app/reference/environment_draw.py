@@ -56,8 +56,11 @@ def draw_direction(drawn, nx, ny, nz, a, b):
     numbers in [0, 1); weight 0 where it comes from behind."""
     height, width = drawn.density.shape
     m = drawn.to_local
+    if not drawn.lights:
+        dx, dy, dz = draw_by_cosine(nx, ny, nz, a, b)
+        return dx, dy, dz, 1.0
     if a < 0.5:
-        dx, dy, dz = _by_cosine(nx, ny, nz, 2.0 * a, b)
+        dx, dy, dz = draw_by_cosine(nx, ny, nz, 2.0 * a, b)
     else:
         a = 2.0 * a - 1.0
         row = search(drawn.rows, a)
@@ -86,7 +89,8 @@ def draw_direction(drawn, nx, ny, nz, a, b):
 
 
 @inlined
-def _by_cosine(nx, ny, nz, a, b):
+def draw_by_cosine(nx, ny, nz, a, b):
+    """Unit direction (3) about a unit normal, as likely as its cosine, by two numbers in [0, 1)."""
     # Any two directions across the normal.
     if abs(nz) < 0.9:
         ux, uy, uz = ny, -nx, 0.0

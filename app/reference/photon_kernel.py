@@ -129,7 +129,7 @@ def trace(
             last, last_object = triangle, thing
             draw = choice(state, shift, dimension, noise, dimension - DIMENSIONS + 1)
             dx, dy, dz, mask, alone, within, is_event, kept, drawn = scatter(
-                scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw, scratch.field
+                scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw, noise, depth, scratch.field
             )
             depth += is_event
             dimension += drawn

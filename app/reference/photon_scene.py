@@ -89,6 +89,8 @@ class PhotonScene(NamedTuple):
     """int32 (O + 1,): where the orders of each object's grating begin, and the last's end."""
     orders: np.ndarray
     """float64 (R, 3): order / line spacing in 1/µm, efficiency, whether it is reflected."""
+    microfacet_width: np.ndarray
+    """float64 (O,): GGX's α of an object's surface; 0: it is polished."""
     near: float
     """Distances below this are the same place."""
     contact: float
@@ -187,6 +189,7 @@ def photon_scene(scene: Scene) -> tuple[PhotonScene, np.ndarray]:
         media.array(),
         weights.array(),
         *_gratings(scene),
+        np.array([item.material.microfacet_width for item in scene.objects], float),
         _NEAR * size,
         _CONTACT * 2.0 ** round(float(np.log2(size))),
         scene.render.polarisation,

@@ -2,7 +2,9 @@
 
 The light tracer (`photon_kernel`), the camera tracer (`camera_kernel`) and the caustic's (`caustic_kernel`) call these
 functions: Fresnel's exact reflectance decides by chance, nested solids follow their rank, an interpolated normal that
-would send a ray through its own facet gives way to the facet's, Beer's law thins what passes.
+would send a ray through its own facet gives way to the facet's, Beer's law thins what passes. Rough glass has
+microfacets drawn by their area (Walter et al. 2007, eq. 35, 36, 41), whether the ray sees them or not: another way
+than the shaders', with the same mean.
 """
 
 from __future__ import annotations
@@ -15,7 +17,8 @@ from .compiling import compiled, inlined
 from .curved_surfaces import turned_normal
 from .photon_intersect import normal_at
 from .photon_scene import GRATING, MIRROR
-from .polarised import amplitudes, senkrecht, share_of, turn_fields
+from .polarised import across, amplitudes, senkrecht, share_of, turn_fields
+from .sampling import mixed
 
 AIR = -1
 _TABLE_SCALE = 20.0
@@ -146,14 +149,40 @@ def _diffract(scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw, f
     return rx, ry, rz, mask, alone, inner, True, efficiency if real else 0.0, True
 
 
+_TILT, _TURN = np.uint64(0xA24BAED4963EE407), np.uint64(0x9FB21C651E98DF25)
+"""Set the numbers for a microfacet apart from those of Fresnel choices."""
+
+
+@compiled
+def microfacet(nx, ny, nz, width, a, b):
+    """Normal of a microfacet of GGX about (nx, ny, nz), by two numbers in [0, 1); density D(m) |m · n|."""
+    slope = width * math.sqrt(a / (1.0 - a))
+    cosine = 1.0 / math.sqrt(1.0 + slope * slope)
+    sine = slope * cosine
+    sx, sy, sz = across(nx, ny, nz)
+    tx, ty, tz = ny * sz - nz * sy, nz * sx - nx * sz, nx * sy - ny * sx
+    c, s = sine * math.cos(2.0 * math.pi * b), sine * math.sin(2.0 * math.pi * b)
+    return c * sx + s * tx + cosine * nx, c * sy + s * ty + cosine * ny, c * sz + s * tz + cosine * nz
+
+
+@compiled
+def masking(cosine, width):
+    """Smith's G1 of GGX for a direction at this cosine to the surface's normal: 1 where nothing is hidden."""
+    if cosine <= 0.0:
+        return 0.0
+    tangent2 = max(1.0 - cosine * cosine, 0.0) / (cosine * cosine)
+    return 2.0 / (1.0 + math.sqrt(1.0 + width * width * tangent2))
+
+
 @inlined
-def scatter(scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw, field):
+def scatter(scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw, noise, event, field):
     """One event at a place (3) of glass or a mirror: (direction (3), mask, alone, on the object's inner side, is an
     event, share kept, whether `draw` mattered).
 
     `draw` in [0, 1) decides by Fresnel's reflectance, unless all is reflected. "Is an event" is false where the same
-    substance lies on both sides; a mirror keeps its reflectance, glass everything. In a polarised scene
-    `field` complex (2, 3), the two of `polarised`, turns with the ray.
+    substance lies on both sides; a mirror keeps its reflectance, polished glass everything, and rough glass the weight
+    of a microfacet that words `event` of the hash `noise` draw (its mean is below 1). In a polarised scene `field`
+    complex (2, 3), the two of `polarised`, turns with the ray.
     """
     if scene.kind[scene.owner[triangle]] == GRATING:
         return _diffract(scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw, field)
@@ -180,6 +209,15 @@ def scatter(scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw, fie
         gx, gy, gz, cosine_g = -gx, -gy, -gz, -cosine_g
     nx, ny, nz = _shading_normal(scene, triangle, place, u, v, dx, dy, dz, gx, gy, gz, entering)
     cosine = -(dx * nx + dy * ny + dz * nz)
+    width, wx, wy, wz, facing = scene.microfacet_width[thing], nx, ny, nz, cosine
+    if width > 0.0:
+        word = noise + np.uint64(event + 1) * np.uint64(0x9E3779B97F4A7C15)
+        tilt = float(mixed(word ^ _TILT) >> np.uint64(11)) * 2.0**-53
+        turn = float(mixed(word ^ _TURN) >> np.uint64(11)) * 2.0**-53
+        nx, ny, nz = microfacet(nx, ny, nz, width, tilt, turn)
+        cosine = -(dx * nx + dy * ny + dz * nz)
+        if cosine <= 0.0:  # seen from behind
+            return dx, dy, dz, mask, alone, not entering, True, 0.0, False
     kept, reflects, drawn, cosine_t, eta_it = 1.0, True, False, 0.0, 1.0
     sx, sy, sz, a_s, a_p = 0.0, 0.0, 0.0, complex(-1.0), complex(1.0)
     if scene.polarised:
@@ -198,19 +236,26 @@ def scatter(scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw, fie
         reflects, drawn = draw < reflectance, reflectance < 1.0
     if reflects:
         rx, ry, rz = dx + 2.0 * cosine * nx, dy + 2.0 * cosine * ny, dz + 2.0 * cosine * nz
-        if rx * gx + ry * gy + rz * gz <= 0.0:  # into the facet
+        if width <= 0.0 and rx * gx + ry * gy + rz * gz <= 0.0:  # into the facet
             rx, ry, rz = dx + 2.0 * cosine_g * gx, dy + 2.0 * cosine_g * gy, dz + 2.0 * cosine_g * gz
         mask_after, alone_after, inner = mask, alone, not entering
     else:
         k = eta_it * cosine - cosine_t
         rx, ry, rz = eta_it * dx + k * nx, eta_it * dy + k * ny, eta_it * dz + k * nz
-        if rx * gx + ry * gy + rz * gz >= 0.0:  # back out of the facet
+        if width <= 0.0 and rx * gx + ry * gy + rz * gz >= 0.0:  # back out of the facet
             cosine2 = (1.0 - eta_it) * (1.0 + eta_it) + eta_it * eta_it * cosine_g * cosine_g
             k = eta_it * cosine_g - math.sqrt(max(cosine2, 1e-12))
             rx, ry, rz = eta_it * dx + k * gx, eta_it * dy + k * gy, eta_it * dz + k * gz
         inner = entering
     length = math.sqrt(rx * rx + ry * ry + rz * rz)
     rx, ry, rz = rx / length, ry / length, rz / length
-    if scene.polarised:
+    if width > 0.0:
+        side = 1.0 if reflects else -1.0
+        leaving = side * (rx * wx + ry * wy + rz * wz)
+        upright = nx * wx + ny * wy + nz * wz
+        kept *= cosine * masking(facing, width) * masking(leaving, width) / (facing * upright)
+        if side * (rx * gx + ry * gy + rz * gz) <= 0.0:
+            kept = 0.0
+    if scene.polarised and kept > 0.0:
         turn_fields(field, dx, dy, dz, rx, ry, rz, sx, sy, sz, a_s, a_p)
     return rx, ry, rz, mask_after, alone_after, inner, True, kept, drawn

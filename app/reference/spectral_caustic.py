@@ -241,7 +241,9 @@ class CausticRun:
         return domains, colours
 
     def _seen(self) -> VisiblePoints:
-        points, which = np.empty((_PILOT, 4)), np.empty((_PILOT, 2), np.int32)
+        bounces = self.scene.render.bounces
+        points = np.empty((_PILOT * (bounces + 1), 4))
+        which = np.empty((len(points), 2), np.int32)
         found = camera_kernel.seen_points(
             self.photon_scene,
             self.camera,
@@ -250,6 +252,7 @@ class CausticRun:
             _PILOT,
             _PILOT_NM,
             self.plan.max_depth,
+            bounces,
             self.planes.side,
             points,
             which,

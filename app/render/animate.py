@@ -21,8 +21,9 @@ from ..model.settings import RenderSettings
 from .frames import FrameRenderer
 from .notices import FrameNotices, frame_notices
 
-Develop = Callable[[np.ndarray, float], np.ndarray]
-"""(linear Rec.709 (H, W, 3), absolute exposure in EV) → sRGB codes uint8 (H, W, 3)."""
+Develop = Callable[[np.ndarray, float, bool], np.ndarray]
+"""(linear Rec.709 (H, W, 3), absolute exposure in EV, whether highlights are antialiased) → sRGB codes uint8
+(H, W, 3)."""
 
 
 def render_animation(
@@ -71,8 +72,8 @@ def render_animation(
                         notices.take(frame_notices(renderer.light, stage.camera, settings, rgb), index + 1)
                     if base_ev is None:
                         base_ev = _agreed(shared, auto_exposure(rgb))
-                    glare = stage.scene.render.glare
-                    sink.write(index, develop(with_glare(rgb, glare), base_ev + stage.exposure_ev))
+                    look, exposure_ev = stage.scene.render, base_ev + stage.exposure_ev
+                    sink.write(index, develop(with_glare(rgb, look.glare), exposure_ev, look.antialias_highlights))
             if is_ours or sink.has(index):
                 done, came = done + 1, 0
                 yield done / len(frames)
@@ -101,6 +102,7 @@ def description(animation: Animation, settings: RenderSettings, fps: float, phot
         "camera": list(astuple(start.camera)),
         "exposure_ev": start.exposure_ev,
         "glare": start.scene.render.glare,
+        "antialias_highlights": start.scene.render.antialias_highlights,
         "solo_nm": start.solo_nm,
         "size": [settings.width, settings.height],
         "photons": photons,

@@ -113,7 +113,7 @@ def bake(
     if path.suffix.lower() == ".png":
         told["exposure_ev"] = auto_exposure(rgb)
     with atomic_outputs(path, placement_path(path)) as (picture, note):
-        write_into(picture, rgb)
+        write_into(picture, rgb, antialias=False)  # a texture: a pixel stays what it is
         note.write_text(json.dumps(told, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     yield 1.0
 

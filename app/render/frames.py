@@ -23,6 +23,8 @@ from ..model.features import Features
 from ..model.optics.spectral_tables import SpectralAxis
 from ..model.scene import Camera, Scene
 from ..model.settings import RenderSettings
+from ..passes.bounce_light import LEAST_DIRECTIONS as LEAST_OF_BOUNCES
+from ..passes.bounce_light import BounceLightPass
 from ..passes.camera import CameraPass
 from ..passes.caustic_maps import CausticMaps
 from ..passes.environment_light import LEAST_DIRECTIONS, EnvironmentLightPass
@@ -40,12 +42,15 @@ from .traced_light import traced_light
 
 _ENVIRONMENT_SHARE = 0.25
 """Of a timed rendering, at most, for the light of the environment."""
+_BOUNCES_SHARE = 0.15
+"""Likewise for what receivers give to each other."""
 _ENVIRONMENT_PROGRESS = 0.1
 """Of the progress where light is traced, where it is not timed."""
 _PHOTON_S, _SAMPLE_S = 10e-6, 3e-6
 """What a photon and a camera sample of a pixel take, one to the other: progress is weighted by them."""
 _PREPARING, _TRACING, _SEEING = "preparing", "tracing photons", "taking camera samples"
 _ASKING = "asking for the environment's light"
+_BOUNCING = "asking what surfaces give to each other"
 
 Stop = Callable[[], bool]
 Fill = Callable[[LightPass, LightSampling, Stop], Iterator[float]]
@@ -71,7 +76,9 @@ class _Traced:
     buffers: SceneBuffers
     light: LightPass
     environment: EnvironmentLightPass | None = None
-    """Where its scene's features have it."""
+    """Where its scene's features have it …"""
+    bounces: BounceLightPass | None = None
+    """… and likewise."""
     camera_buffers: SceneBuffers | None = None
     """The camera's own, where it has a method of its own."""
     camera_pass: CameraPass | None = None
@@ -81,11 +88,11 @@ class _Traced:
     @property
     def maps(self) -> CausticMaps:
         """All light that surfaces get by way of maps."""
-        lit = None if self.environment is None else self.environment.texture
-        return replace(self.light.caustic_maps(), environment=lit)
+        known = self.bounces or self.environment
+        return replace(self.light.caustic_maps(), environment=None if known is None else known.texture)
 
     def release(self) -> None:
-        for owned in (self.camera_pass, self.environment, self.camera_buffers, self.light, self.buffers):
+        for owned in (self.camera_pass, self.bounces, self.environment, self.camera_buffers, self.light, self.buffers):
             if owned is not None:
                 owned.release()
 
@@ -178,6 +185,7 @@ class FrameRenderer:
                 yield done if budget is None else budget.spent
             light.finish()
             light.settle()
+            yield from self._ask_bounces(traced, stop)
             if traced.camera_pass is None and not self._shows_map:
                 self._add_camera_pass(traced)
         except BaseException:
@@ -234,7 +242,10 @@ class FrameRenderer:
             return
         for share in camera_pass.samples(*view, samples, 0, maps, settings.seed):
             yield self._share(self._light_share + (1.0 - self._light_share) * share)
-            if not stops_at_once and stop() and camera_pass.is_even:
+            # A survey and beams come before the first sample: without it all is black, and without a turn of bands
+            # colours are missing.
+            turn = min(camera_pass.spectrum.bands, samples)
+            if not stops_at_once and stop() and camera_pass.is_even and camera_pass.samples_taken >= turn:
                 break
         self.seconds.camera += time.perf_counter() - started
 
@@ -242,7 +253,8 @@ class FrameRenderer:
         """Whole turns of samples until the time is over, one at least."""
         assert self._traced is not None and self._traced.camera_pass is not None
         camera_pass, view = self._traced.camera_pass, self._view(stage)
-        yield from budget.measuring(camera_pass, *view, maps)
+        if budget.samples():  # else there is nothing to decide
+            yield from budget.measuring(camera_pass, *view, maps)
         turn, taken, started = camera_pass.spectrum.bands, 0, time.perf_counter()
         while (count := budget.samples(taken) // turn * turn) or not taken or budget.has_time_for_part(taken):
             if taken and not count and turn > 1:
@@ -298,6 +310,11 @@ class FrameRenderer:
     def environment(self) -> EnvironmentLightPass | None:
         """Of the last frame; None where nothing beyond it lights it."""
         return self._traced.environment if self._traced is not None else None
+
+    @property
+    def bounces(self) -> BounceLightPass | None:
+        """Of the last frame; None where receivers do not light each other."""
+        return self._traced.bounces if self._traced is not None else None
 
     @property
     def camera_pass(self) -> CameraPass | None:
@@ -372,6 +389,23 @@ class FrameRenderer:
             if light.asked >= LEAST_DIRECTIONS and (light.seconds >= longest or stop()):
                 break
         light.show()
+
+    def _ask_bounces(self, traced: _Traced, stop: Stop) -> Iterator[float]:
+        """What receivers give to each other, of the light that they have got by now."""
+        if self._only_light or not traced.buffers.features.bounces:
+            return
+        self.phase = _BOUNCING
+        light = traced.light
+        traced.bounces = bounces = BounceLightPass(
+            self._context, traced.buffers, traced.environment, self._settings.seed
+        )
+        bounces.take(light.scene, light.caustic_maps(), light.map_channels)
+        longest = float("inf") if self._settings.seconds is None else _BOUNCES_SHARE * self._settings.seconds
+        for _ in bounces.steps():
+            yield self._share(self._light_share)
+            if bounces.asked >= LEAST_OF_BOUNCES and (bounces.seconds >= longest or stop()):
+                break
+        bounces.show()
 
     def _axis(self, scene: Scene, features: Features) -> SpectralAxis:
         """One axis for all frames: bands of equal places on it are then the same wavelengths in all."""

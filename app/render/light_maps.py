@@ -15,6 +15,7 @@ from ..gpu.tiles import Tile
 from ..model.features import Features
 from ..passes.accumulate import LevelsFold, SeamFold, copy_texture
 from ..passes.caustic_maps import CausticMaps
+from ..passes.contact_lines import read_words, seen_shares
 from ..passes.map_atlas import MapAtlas
 from ..passes.map_layout import MapLayout, Window
 from ..passes.picture_window import PictureWindow
@@ -27,15 +28,27 @@ _ROWS = 256
 class LightMaps:
     """Owns atlas, splat pass and resolved textures of one layout; empty at first."""
 
-    def __init__(self, ctx: moderngl.Context, layout: MapLayout, features: Features) -> None:
+    def __init__(
+        self,
+        ctx: moderngl.Context,
+        layout: MapLayout,
+        features: Features,
+        contact_words: moderngl.Texture | None = None,
+    ) -> None:
+        """`contact_words` (`passes.contact_lines`) becomes the maps' own."""
         self._ctx = ctx
         self.layout = layout
         # Only the layout tells whether a fine window pays: without one no splat is drawn twice.
-        self.features = replace(features, nested_windows=any(len(windows) > 1 for windows in layout.windows.values()))
+        self.features = replace(
+            features,
+            nested_windows=any(len(windows) > 1 for windows in layout.windows.values()),
+            contact_lines=contact_words is not None,
+        )
         self.splatter = Splatter(ctx, self.features)
         # Tents only say how XYZ are shared out over the spectrum.
         scratched = 1 if features.map_tents else None
         self.atlas = MapAtlas(ctx, layout.size, layout.placements, features.targets, scratched)
+        self.atlas.contact_words = contact_words
         self.receivers = ctx.buffer(
             np.ascontiguousarray(layout.receivers if len(layout.receivers) else RECEIVER.zeros(1)).tobytes()
         )
@@ -49,7 +62,9 @@ class LightMaps:
     def take(self, features: Features) -> None:
         """Splat from now on with other features of the same layout (the brush came or went)."""
         self.splatter.release()
-        self.features = replace(features, nested_windows=self.features.nested_windows)
+        self.features = replace(
+            features, nested_windows=self.features.nested_windows, contact_lines=self.features.contact_lines
+        )
         self.splatter = Splatter(self._ctx, self.features)
 
     def clear(self) -> None:
@@ -128,6 +143,7 @@ class LightMaps:
     def flux(self, is_xyz: bool) -> float:
         """What the maps hold where they are read: the sum of XYZ maps' last channel (W), or of all bins."""
         flux = 0.0
+        words = None if self.atlas.contact_words is None else read_words(self.atlas.contact_words)
         targets = 1 if is_xyz else len(self.resolved_textures())
         for receiver, tiles in self.layout.tiles.items():
             charts = self.layout.charts.get(receiver)
@@ -140,6 +156,9 @@ class LightMaps:
                             energy = energy[charts.owner[first : first + len(rows)] >= 0]
                         elif finer is not None:
                             energy *= 1.0 - finer(first, first + len(rows))
+                        if words is not None:
+                            row = tile.y + first
+                            energy *= seen_shares(words[row : row + len(rows), tile.x : tile.x + tile.width])
                         flux += energy.sum()
         return flux
 

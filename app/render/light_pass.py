@@ -29,6 +29,7 @@ from ..model.scene import Scene
 from ..model.settings import RenderSettings
 from ..passes.beam_emission import BeamEmission
 from ..passes.caustic_maps import CausticMaps
+from ..passes.contact_lines import contact_words
 from ..passes.emission_domain import EmissionDomain, emission_domain
 from ..passes.guided_emission import guided
 from ..passes.map_atlas import MapAtlas
@@ -87,6 +88,8 @@ class LightPass:
         self.scene = scene
         self.settings = settings
         self.features = features
+        self._has_contacts = features.contact_lines
+        """Before maps tell whether they hold any."""
         self.buffers = buffers
         self.fit = fit or MapFit(scene.camera, settings.width, settings.height)
         """What `maps` are fitted to."""
@@ -184,7 +187,10 @@ class LightPass:
         self.maps, self.fit = None, fit
         layout = self.layout_for(fit)
         self.before_maps(layout)
-        self.maps = LightMaps(self.context.ctx, layout, self.features)
+        words = None
+        if self._has_contacts:
+            words = contact_words(self.context.ctx, self.buffers, layout, fit.view)
+        self.maps = LightMaps(self.context.ctx, layout, self.features, words)
         self.features = self.maps.features
         if self._beams is not None:
             self._beams.lay_out(self.maps.layout)

@@ -13,6 +13,7 @@ from ..model.contacts import world_bounds
 from ..model.optics.colorimetry import rgb709_to_xyz_matrix
 from ..model.scene import Camera
 from ..model.settings import RenderSettings
+from ..passes.bounce_light import BounceLightPass
 from ..passes.environment_light import MAX_EVENTS, EnvironmentLightPass
 from ..passes.map_layout import project
 from ..passes.plane_frame import plane_frame
@@ -71,13 +72,17 @@ def loss_notices(lost: dict[str, float], max_depth: int | None = None) -> list[s
     ]
 
 
-def environment_notices(environment: EnvironmentLightPass | None) -> list[str]:
-    """What the environment's light on receivers lacks."""
-    if environment is None or environment.lost <= LOST_SHARE:
-        return []
-    share = 100.0 * environment.lost
-    told = f"{share:.1f} % of what glass and mirrors bring of the environment's light was given up"
-    return [f"{told} after {MAX_EVENTS} surfaces: it lacks on what is diffuse"]
+def environment_notices(environment: EnvironmentLightPass | None, bounces: BounceLightPass | None) -> list[str]:
+    """What the environment's light on receivers lacks, and what these give each other."""
+    lost = {} if environment is None else {"the environment's light": environment.lost}
+    if bounces is not None:
+        lost["what diffuse surfaces send out"] = bounces.lost
+    return [
+        f"{100.0 * share:.1f} % of what glass and mirrors bring of {source} was given up after {MAX_EVENTS} surfaces: "
+        "it lacks on what is diffuse"
+        for source, share in lost.items()
+        if share > LOST_SHARE
+    ]
 
 
 def shares(stats: LightStats) -> dict[str, float]:

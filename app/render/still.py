@@ -156,7 +156,7 @@ def render(
             progress(share, frames.phase)
         picture = frames.picture
         notices = tuple(frame_notices(frames.light, scene.camera, settings, picture.rgb))
-        notices += tuple(environment_notices(frames.environment))
+        notices += tuple(environment_notices(frames.environment, frames.bounces))
         stats = replace(_stats(context, frames, settings), notices=notices)
         layers = {}
         for layer in more_layers:

@@ -15,8 +15,10 @@ from ..passes.camera import CameraPass
 from ..passes.caustic_maps import CausticMaps
 from .sampling import DEFAULT_SAMPLES
 
-_PROBE = 2
-"""Side of the picture over that of the small one."""
+_PROBES = 4, 2
+"""Sides of the picture over those of small ones, which tell the more the larger they are."""
+_PROBE_SHARE = 0.02
+"""Of the time, for a larger one than the first."""
 _MOST_FOR_CAMERA = 0.5
 """Of the time that is left after preparing, where nobody says how many samples there shall be."""
 _LEAST_FOR_LIGHT = 0.02
@@ -61,16 +63,19 @@ class TimeBudget:
     ) -> Iterator[float]:
         """Find out what a sample costs in the way `camera_pass` takes them now, pausing; `first`: it has to be compiled
         before, which is no part of that."""
-        size = max(width // _PROBE, 1), max(height // _PROBE, 1)
-        took = []
-        for _ in range(1 + first):
-            started = time.perf_counter()
-            for _ in camera_pass.samples(camera, *size, 1, 0, maps):
-                yield self.spent
-            took.append(time.perf_counter() - started)
-        self.sample_s = took[-1] * width * height / (size[0] * size[1])
-        if first:
-            self.compile_s = took[0] - took[1]
+        for probe in _PROBES:
+            if probe != _PROBES[0] and self.sample_s / probe**2 > _PROBE_SHARE * self.seconds:
+                return
+            size = max(width // probe, 1), max(height // probe, 1)
+            took = []
+            for _ in range(1 + first):
+                started = time.perf_counter()
+                for _ in camera_pass.samples(camera, *size, 1, 0, maps):
+                    yield self.spent
+                took.append(time.perf_counter() - started)
+            self.sample_s = took[-1] * width * height / (size[0] * size[1])
+            if first:
+                self.compile_s, first = took[0] - took[1], False
 
     def for_light(self, samples: int | None) -> float:
         """Seconds for photons, after `measuring`; `samples`: those a pixel that were asked for."""

@@ -292,7 +292,7 @@ def _render(
     def write_shown(path: Path, rgb: np.ndarray) -> None:
         develop = _Developer(context, state.display)
         try:
-            write_codes(path, develop(rgb, stage.exposure_ev))
+            write_codes(path, develop(rgb, stage.exposure_ev, stage.scene.render.antialias_highlights))
         finally:
             develop.release()
 
@@ -354,7 +354,7 @@ class _Developer:
         self._context, self._settings = context, settings
         self._display: Display | None = None
 
-    def __call__(self, rgb: np.ndarray, exposure_ev: float) -> np.ndarray:
+    def __call__(self, rgb: np.ndarray, exposure_ev: float, antialias: bool) -> np.ndarray:
         self._display = self._display or Display(self._context)
         height, width = rgb.shape[:2]
         texels = np.concatenate([rgb, np.ones((height, width, 1), np.float32)], axis=-1)
@@ -362,7 +362,8 @@ class _Developer:
             (width, height), 4, np.ascontiguousarray(texels, np.float32).tobytes(), dtype="f4"
         )
         try:
-            return texture_codes(self._display.run(texture, self._settings, exposure_ev, (width, height)))
+            shown = self._display.run(texture, self._settings, exposure_ev, (width, height), antialias=antialias)
+            return texture_codes(shown)
         finally:
             texture.release()
 

@@ -158,7 +158,8 @@ def _entry(name: str, path: Path) -> SceneEntry:
         if not line.startswith("#"):
             break
         lines.append(line.removeprefix("#").strip())
-    return SceneEntry(path, title[:1].upper() + title[1:], " ".join(lines), None)
+    # Names stand in backticks there.
+    return SceneEntry(path, title[:1].upper() + title[1:], " ".join(lines).replace("`", ""), None)
 
 
 def _render(scene: Path, output: Path) -> subprocess.Popen[bytes]:

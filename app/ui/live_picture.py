@@ -67,6 +67,9 @@ class LivePicture:
         self.shown: moderngl.Texture | None = None
         """RGBA8, sRGB codes, row 0 on top."""
         self.magnified: moderngl.Texture | None = None
+        self.awaits_scene = False
+        """Another document was opened and nothing of it has been drawn: its objects' outlines, rays and marks would lie
+        on the picture of what was there before."""
         self.exposure_ev = 0.0
         self.display_s = 0.0
 
@@ -127,6 +130,7 @@ class LivePicture:
     def new_scene(self) -> None:
         """Another scene: its exposure is found at once."""
         self._exposure.restart()
+        self.awaits_scene = self.radiance is not None
 
     def advance(self, state: State, budget_s: float) -> None:
         """Let the engine follow `state`. Raises `EngineError`."""
@@ -139,6 +143,7 @@ class LivePicture:
             self.engine.set(state.live_inputs)
             self.engine.advance(budget_s, state.interacting)
             self.stats = self.engine.stats
+            self.awaits_scene &= self.stats.shows_other and self.problem is None
 
     def show(self, state: State, now_s: float, delta_s: float, other: Other | None = None) -> None:
         """Develop the engine's picture for the screen."""
@@ -151,7 +156,9 @@ class LivePicture:
         self.magnified = None
         if state.display.magnifier and state.hover is not None:
             pixel = pixel_of(state.hover, radiance.size)
-            self.magnified = self._display.magnify(radiance, pixel, state.display, self.exposure_ev)
+            self.magnified = self._display.magnify(
+                radiance, pixel, state.display, self.exposure_ev, antialias=_antialiases(state, other)
+            )
         self.display_s = time.perf_counter() - started
 
     def _develop(self, state: State, radiance: moderngl.Texture, other: Other | None) -> None:
@@ -160,12 +167,15 @@ class LivePicture:
         # What is compared or measured is data.
         is_data = texture is not None or state.display.false_colour
         glare = 0.0 if is_data else state.scene.render.glare
-        key = (id(radiance), version, state.display, glare, self.exposure_ev, self._size, state.compare)
+        antialias = _antialiases(state, other)
+        key = (id(radiance), version, state.display, glare, antialias, self.exposure_ev, self._size, state.compare)
         if texture is None and self.shown is not None and key == self._developed:
             return
         self._developed = None if texture is not None else key
         radiance = self._glare.run(radiance, glare)
-        self.shown = self._display.run(radiance, state.display, self.exposure_ev, self._size, texture, state.compare)
+        self.shown = self._display.run(
+            radiance, state.display, self.exposure_ev, self._size, texture, state.compare, antialias
+        )
 
     def _expose(self, state: State, radiance: moderngl.Texture, now_s: float, delta_s: float) -> None:
         if not state.display.auto_exposure:
@@ -235,6 +245,12 @@ class _Guard:
 def pixel_of(place: tuple[float, float], size: tuple[int, int]) -> tuple[int, int]:
     """Column and row (from the top) of a place 0..1 in a picture of `size`."""
     return min(max(int(place[0] * size[0]), 0), size[0] - 1), min(max(int(place[1] * size[1]), 0), size[1] - 1)
+
+
+def _antialiases(state: State, other: Other | None) -> bool:
+    """What is compared or measured is data; while something is dragged a picture is better soon than fine."""
+    is_data = state.display.false_colour or (other is not None and other.picture is not None)
+    return state.scene.render.antialias_highlights and not is_data and not state.interacting
 
 
 def _live_engine(context: Context) -> LiveEngine:

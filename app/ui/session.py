@@ -99,7 +99,8 @@ class Session:
             self.messages.tell(notice, is_error=True)
         if path is not None and self.recovery is not None:
             self.messages.tell("Work of a session that ended badly can be recovered: File, Start page.")
-        self.tell_notes()
+        if path is not None:  # of the scene to begin with nobody has asked anything
+            self.tell_notes()
         self._remember_file(path)
 
     # The frame

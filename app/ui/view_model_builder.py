@@ -15,7 +15,7 @@ def view_model_of(session: Session) -> ViewModel:
     return ViewModel(
         stats=stats,
         shown=picture.shown_scene,
-        picture=None if shown is None else shown.glo,
+        picture=None if shown is None or picture.awaits_scene else shown.glo,
         picture_size=(0, 0) if shown is None else shown.size,
         frame_ms=tuple(session.frame_ms),
         pass_ms=_pass_ms(session),

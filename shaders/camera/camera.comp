@@ -65,6 +65,9 @@ PathEnd ended[ENDS_HELD];
 #endif
 
 #include "camera/interface.glsl"
+#ifdef CAMERA_SPECULAR
+#include "camera/rough.glsl"
+#endif
 #if defined(CAMERA_SPECULAR) && defined(SPECTRAL_SWEEP)
 #include "camera/cuts.glsl"
 #endif
@@ -116,7 +119,7 @@ CameraPath camera_path(uvec2 pixel, uint primary_sample, float gain)
 #endif
 
 #ifdef CAMERA_SPECULAR
-#if defined(HAS_DIELECTRIC) || defined(HAS_GRATING)
+#if defined(HAS_DIELECTRIC) || defined(HAS_GRATING) || defined(COATS)
 // A number for a choice at this depth: a Kronecker sequence over a pixel's samples (the first generator is the wavelength's).
 float choice(CameraPath path, uint pixel_key)
 {
@@ -127,6 +130,10 @@ float choice(CameraPath path, uint pixel_key)
 
 #ifdef HAS_GRATING
 #include "camera/grating.glsl"
+#endif
+
+#ifdef COATS
+#include "camera/coat.glsl"
 #endif
 
 #ifdef HAS_DIELECTRIC
@@ -143,6 +150,9 @@ void cross_glass(inout CameraPath path, CameraPath whole, Hit hit, Triangle face
         return;
     }
     PathFrame frame = path_frame(path, hit, facet);
+#ifdef ROUGH_SURFACES
+    RoughPlace rough = meet_microfacet(path, frame, hit.object, pixel_key);
+#endif
     CameraPath mirrored = path;
     vec3 n_i, n_t, theta3, cosine2, reflectance, mirror_weight;
 #ifdef POLARISED
@@ -191,6 +201,9 @@ void cross_glass(inout CameraPath path, CameraPath whole, Hit hit, Triangle face
     if (cut) return;
 #endif
     path.recut = mirrored.recut = 0u;
+#ifdef ROUGH_SURFACES
+    bool is_rough = rough.width > 0.0;
+#endif
     Deflection refracted = refract_at(frame.shading, path.direction, n_i.y / n_t.y);
     bool total = !refracted.exists, reflects = total;
     float likely = total ? 1.0 : dot(reflectance, vec3(0.25, 0.5, 0.25));
@@ -202,12 +215,19 @@ void cross_glass(inout CameraPath path, CameraPath whole, Hit hit, Triangle face
         mirrored.branch_weight *= likely;
         mirrored.origin = origin_back;
         mirrored.key = hash_combine(mirrored.key, 1u);
+#ifdef ROUGH_SURFACES
+        bool into_facet = reflect_at(frame.shading, mirrored.direction).geometric;
+#endif
         reflect_path(mirrored, frame);
 #ifdef POLARISED
         polarise_path(mirrored, mirror_event, true);
 #endif
-        pending_path = mirrored;
         pushes_path = true;
+#ifdef ROUGH_SURFACES
+        if (is_rough) shadow(mirrored, leaving_share(rough, mirrored, into_facet, 1.0));
+        pushes_path = mirrored.inverse_pdf > 0.0;
+#endif
+        pending_path = mirrored;
     }
     if (!total && !splits) {
         reflects = choice(path, pixel_key) < likely;
@@ -222,9 +242,15 @@ void cross_glass(inout CameraPath path, CameraPath whole, Hit hit, Triangle face
         path.medium = boundary.behind;
     }
     path.origin = reflects ? origin_back : origin_beyond;
+#ifdef ROUGH_SURFACES
+    bool wrong_side = reflects ? reflect_at(frame.shading, path.direction).geometric : refracted.geometric;
+#endif
     WHEN(reflects) reflect_path(path, frame);
 #ifdef POLARISED
     polarise_path(path, event, reflects);
+#endif
+#ifdef ROUGH_SURFACES
+    if (is_rough) shadow(path, leaving_share(rough, path, wrong_side, reflects ? 1.0 : -1.0));
 #endif
 }
 #endif
@@ -250,6 +276,10 @@ void meet_surface(inout CameraPath path, Hit hit, uint kind, uint pixel_key)
     WHEN(path.restricted != 0u) transfer_ends(path, hit.normal_g);
 #endif
     path.depth += 1;
+#ifdef COATS
+    path.coat_pdf = 0.0;
+    WHEN(kind == KIND_DIFFUSE) meet_coat(path, hit, facet, pixel_key);
+#endif
 #ifdef HAS_MIRROR
     WHEN(kind == KIND_MIRROR) {
         PathFrame frame = path_frame(path, hit, facet);
@@ -343,6 +373,10 @@ void main()
     uint number = pixel.y * p.size.x + pixel.x;
     WHEN(p.survey == SURVEY_KEPT) {
         uint key = even_key(pixel), sees = key & KIND_BITS;
+#ifdef COATS
+        if (sees == SEES_COATED) listed[atomicAdd(listed_count, 1u)] = listed_entry(number, THE_SAMPLE, p.primary_samples);
+        if (sees == SEES_COATED) sees = SEES_DIRECTLY;
+#endif
         if (sees == SEES_DIRECTLY) imageStore(picture[0], ivec2(pixel), imageLoad(picture[0], ivec2(pixel)) + vec4(surveyed_mean(pixel), 0.0));
         if (sees == SEES_SPECULAR) listed[atomicAdd(listed_count, 1u)] = listed_entry(number, THE_SAMPLE, p.primary_samples);
         if (key != 0u) return;
@@ -366,6 +400,15 @@ void main()
         const bool by_beams = false;
 #endif
         uint sees = by_beams ? SEES_BEAMS : (is_specular(kind) ? SEES_SPECULAR : SEES_DIRECTLY);
+#ifdef COATS
+        // The base is seen directly; a path goes on from the coat.
+        WHEN(kind == KIND_DIFFUSE && is_coated(hit.object)) {
+            sees = SEES_COATED;
+            specular_samples += 1u;
+            draw = hash_pcg(draw);
+            if (unit_float(draw) * float(specular_samples) < 1.0) chosen = k;
+        }
+#endif
         if (by_beams) {
             // The polygons of the picture show it.
         } else if (is_specular(kind)) {
@@ -411,6 +454,9 @@ void main()
             uint kind = met ? object_at(hit.object).kind : NONE;
             bool ends = !met || kind == KIND_DIFFUSE, same_hit = true, parts = false, event_limit_reached = events >= MAX_EVENTS;
             pushes_path = false;
+#ifdef COATS
+            bool coated = met && kind == KIND_DIFFUSE && is_coated(hit.object);
+#endif
 #ifdef SPECTRAL_SWEEP
             cut_at = -1.0;
             bool asks = path.restricted != 0u && !event_limit_reached && (ends || (path.planar_so_far != 0u && kind != KIND_BLACK && asked < MAX_ASKED));
@@ -425,6 +471,10 @@ void main()
 #else
                 bool met_before = path.recut != 0u;
 #endif
+#ifdef COATS
+                // Before a coat that is seen first, the program for what is seen directly has added them.
+                met_before = met_before || (coated && path.depth == 0);
+#endif
                 WHEN(!met_before) add_lights(path, met ? hit.distance : FAR_DISTANCE);
 #endif
                 // Light that would still be caught inside is as if it left here.
@@ -435,8 +485,11 @@ void main()
 #endif
                 WHEN(ends || leaves) ended[found++] = PathEnd(path, hit, uint(met && ends), uint(same_hit || leaves));
                 goes_on = specular && !leaves;
+#ifdef COATS
+                goes_on = goes_on || (coated && !event_limit_reached && path.depth < MAX_DEPTH);
+#endif
                 WHEN(goes_on) meet_surface(path, hit, kind, pixel_key);
-#ifdef HAS_GRATING
+#if defined(HAS_GRATING) || defined(COATS) || defined(ROUGH_SURFACES)
                 goes_on = goes_on && path.inverse_pdf > 0.0;
 #endif
             }

@@ -69,10 +69,11 @@ vec2 look_place;
 #define MEAN_COVER(lo, hi)
 #endif
 #include "camera/emission.glsl"
-#include "camera/footprint.glsl"
+#include "lib/footprint.glsl"
+#include "camera/finish.glsl"
 #include "camera/receiver.glsl"
-#ifdef ENVIRONMENT_LIGHTS
-#include "camera/environment_light.glsl"
+#ifdef RECEIVER_LIGHT
+#include "camera/receiver_light.glsl"
 #endif
 #include "camera/taps.glsl"
 

@@ -1,53 +1,152 @@
-// A picture in motion, what is seen directly: every pixel looks the caustic maps up. Direct light lies between the points of a lattice round it
-// where these agree; other pixels, at outlines and at the edges of shadows, are listed for moving_uneven.comp: a program that holds all that these
-// need would take twice as long on a software renderer, even where none is.
-layout(local_size_x = 8, local_size_y = 8) in;
+// A picture in motion, what is seen directly: every pixel looks the caustic maps up. One invocation is for one cell between four points of the
+// lattice and reads once what all its pixels share: on a software renderer reading that for every pixel takes five times as long as the lookups do.
+// Where the points all round a cell agree, on direct light and on which map of which object is shown, both lie between its corners; of shadows and
+// outlines as thin as a cell some point next to it tells. Other pixels are listed for moving_uneven.comp: a program that holds all that these need
+// would take twice as long, even where none is.
+layout(local_size_x = 32, local_size_y = 8) in;
 
 #include "camera/moving.glsl"
 
 layout(rgba32f, binding = IMAGE_PICTURE) uniform writeonly restrict image2D picture;
 layout(rgba32f, binding = IMAGE_PLACES) uniform readonly restrict image2D places;
 layout(rgba32f, binding = IMAGE_LIGHT) uniform readonly restrict image2D light;
-layout(r32ui, binding = IMAGE_CELLS) uniform readonly restrict uimage2D cells;
 #include "camera/moving_lists.glsl"
+
+// Texels that a pixel is long from which on two lookups stand for it, and up to which these do.
+const float TWO_LOOKUPS = 1.25, MOST_TEXELS = 2.0;
+
+// Which map of which object all of the cell shows; NONE where its pixels look themselves.
+uint map_of(ivec2 cell)
+{
+    ivec2 last = ivec2(m.lattice) - 1;
+    uint key = floatBitsToUint(imageLoad(light, cell).w), map = floatBitsToUint(imageLoad(places, cell).w);
+    bool even = key != 0u;
+    for (int i = 0; i < 16; ++i) {
+        ivec2 off = ivec2(i % 4, i / 4) - 1, point = clamp(cell + off, ivec2(0), last);
+        bool corner = all(greaterThanEqual(off, ivec2(0))) && all(lessThan(off, ivec2(2)));
+        even = even && floatBitsToUint(imageLoad(light, point).w) == key && (!corner || floatBitsToUint(imageLoad(places, point).w) == map);
+    }
+    return even ? map : NONE;
+}
+
+// What lies between a cell's corners.
+struct Corners { vec4 here; vec4 right; vec4 down; vec4 across; };
+
+vec4 between(Corners c, vec2 share)
+{
+    return mix(mix(c.here, c.right, share.x), mix(c.down, c.across, share.x), share.y);
+}
+
+#ifdef HAS_RECEIVERS
+// How a cell's pixels look the map up.
+struct MapLook {
+    bool covered;    // there is one
+    vec4 factor;     // from a texel's energy to radiance
+    vec2 low, high;  // middles of the outermost texels: beyond its border a map keeps its own value
+    vec2 apart;      // half the way between two lookups
+    float lookups;
+};
+
+// `side`: of a pixel, of the cell's.
+MapLook look_of(uint map, Corners places, vec2 side)
+{
+    MapLook look = MapLook(map != NONE && map / LATTICE_OBJECTS != LATTICE_MAPS, vec4(0.0), vec2(0.0), vec2(0.0), vec2(0.0), 1.0);
+    WHEN(look.covered) {
+        uint placement = map / LATTICE_OBJECTS, object = map % LATTICE_OBJECTS;
+        vec4 rect = placements[placement].rect;
+        look.low = floor(rect.xy) + 0.5;
+        look.high = ceil(rect.zw) - 0.5;
+        // The pixel's longer side, in texels. Two bilinear lookups along it have the second moment of a box of its length, taken of texels that
+        // are boxes themselves: d² = (length² - 1) / 12.
+        vec2 texel = places.here.xy / places.here.z;
+        vec2 right = side.x * (places.right.xy / places.right.z - texel), down = side.y * (places.down.xy / places.down.z - texel);
+        vec2 longer = dot(right, right) > dot(down, down) ? right : down;
+        float texels = length(longer), told_apart = min(texels, MOST_TEXELS);
+        if (texels > TWO_LOOKUPS) {
+            look.lookups = 2.0;
+            look.apart = sqrt((told_apart * told_apart - 1.0) / 12.0) / texels * longer;
+        }
+        bool plain = receivers[object_at(object).receiver].reflectance_class == 0u;
+        look.factor = p.map_scale * INVERSE_PI / (look.lookups * texel_area_at(placements[placement], vec3(0.0, 0.0, 1.0)))
+#if defined(COATS) || defined(ROUGH_DIFFUSE)
+                    * vec4(1.0);  // `albedo_of` has the rest
+#else
+                    * (plain ? object_colours[object] : vec4(1.0));
+#endif
+    }
+    return look;
+}
+
+// Radiance by the caustic, at a texel.
+vec4 caustic(MapLook look, vec2 texel)
+{
+    vec2 to_uv = 1.0 / vec2(textureSize(caustic_map[0], 0));
+    vec4 sum = vec4(0.0);
+    for (float i = 0.0; i < look.lookups; i += 1.0)
+        sum += textureLod(caustic_map[0], clamp(texel + (2.0 * i - 1.0) * look.apart, look.low, look.high) * to_uv, 0.0);
+    return look.factor * map_to_channels(sum);
+}
+#endif
+
+#if defined(COATS) || defined(ROUGH_DIFFUSE)
+// Reflectance of the base that a pixel sees, for what the maps hold.
+vec3 albedo_of(uvec2 pixel, uvec2 first)
+{
+    SurfaceInteraction seen;
+    seen.object = first.y;
+    seen.direction = path_from(pixel, PIXEL_MIDDLE, 1.0).direction;
+    seen.normal_g = normal_of(first.x);
+    seen.reflectance = object_colours[first.y].rgb;
+#ifdef COATS
+    seen.coat_normal = dot(seen.direction, seen.normal_g) < 0.0 ? seen.normal_g : -seen.normal_g;
+#endif
+    return base_albedo(seen, receivers[object_at(first.y).receiver].reflectance_class == 0u);
+}
+#endif
 
 void main()
 {
-    uvec2 pixel = gl_GlobalInvocationID.xy;
-    if (any(greaterThanEqual(pixel, p.size))) return;
-    uvec2 first = seen_first(pixel);
-    uint kind = kind_of(first);
-    radiance[0] = vec4(0.0);
-    uvec2 low = min(pixel / m.lattice_step, max(m.lattice, 2u) - 2u), high = min(low + 1u, m.lattice - 1u);
-    vec2 from = vec2(low * m.lattice_step), to = vec2(min(high * m.lattice_step, p.size - 1u));
-    vec2 share = clamp((vec2(pixel) - from) / max(to - from, vec2(1.0)), 0.0, 1.0);
-    uint map = imageLoad(cells, ivec2(low)).x;
-    bool even = kind == KIND_DIFFUSE && map != NONE && first.y == map % LATTICE_OBJECTS;
+    ivec2 cell = ivec2(gl_GlobalInvocationID.xy);
+    if (any(greaterThanEqual(cell, ivec2(m.lattice) - 1))) return;
+    uvec2 from = uvec2(cell) * m.lattice_step;
+    uint map = map_of(cell);
+    Corners lights = Corners(imageLoad(light, cell), imageLoad(light, cell + ivec2(1, 0)), imageLoad(light, cell + ivec2(0, 1)), imageLoad(light, cell + 1));
+    // The last points of the lattice lie on the picture's border.
+    vec2 side = 1.0 / vec2(max(min(from + m.lattice_step, p.size - 1u) - from, uvec2(1u)));
 #ifdef HAS_RECEIVERS
-    WHEN(even) {
-        vec4 light_a = imageLoad(light, ivec2(low)), light_b = imageLoad(light, ivec2(high.x, low.y));
-        vec4 light_c = imageLoad(light, ivec2(low.x, high.y)), light_d = imageLoad(light, ivec2(high));
-        radiance[0] = mix(mix(light_a, light_b, share.x), mix(light_c, light_d, share.x), share.y);
-        uint placement = map / LATTICE_OBJECTS;
-        WHEN(placement != LATTICE_MAPS) {
-            vec4 place_a = imageLoad(places, ivec2(low)), place_b = imageLoad(places, ivec2(high.x, low.y));
-            vec4 place_c = imageLoad(places, ivec2(low.x, high.y)), place_d = imageLoad(places, ivec2(high));
-            vec3 at = mix(mix(place_a.xyz, place_b.xyz, share.x), mix(place_c.xyz, place_d.xyz, share.x), share.y);
-            // Sides of the pixel in texels, from the lattice's own.
-            vec2 right = place_b.xy / place_b.z - place_a.xy / place_a.z, down = place_c.xy / place_c.z - place_a.xy / place_a.z;
-            vec2 side = vec2(1.0) / max(to - from, vec2(1.0));
-            vec2 box = sqrt(right * right * (side.x * side.x) + down * down * (side.y * side.y));
-            box = box.x * box.y < 1.0 ? vec2(1.0) : min(box, vec2(MOST_TEXELS));
-            vec4 values[MAP_TARGETS];
-            caustic_values(placement, vec3(at.xy / at.z, 1.0), box, values, 0, 0);
-            bool plain = receivers[object_at(first.y).receiver].reflectance_class == 0u;
-            radiance[0] += p.map_scale * INVERSE_PI * vec4(plain ? object_colours[first.y].rgb : vec3(1.0), 1.0) * map_to_channels(values[0]);
-        }
-    }
+    Corners texels = Corners(imageLoad(places, cell), imageLoad(places, cell + ivec2(1, 0)), imageLoad(places, cell + ivec2(0, 1)), imageLoad(places, cell + 1));
+    MapLook look = look_of(map, texels, side);
 #endif
-    bool specular = is_specular(kind);
-    uint number = pixel.y * p.size.x + pixel.x;
-    WHEN(!even && !specular) pixels[atomicAdd(uneven_count, 1u)] = number;
-    WHEN(specular) pixels[p.size.x * p.size.y - 1u - atomicAdd(specular_count, 1u)] = number;
-    imageStore(picture, ivec2(pixel), vec4(radiance[0].rgb, 1.0));
+    for (uint i = 0u; i < m.lattice_step * m.lattice_step; ++i) {
+        uvec2 off = uvec2(i % m.lattice_step, i / m.lattice_step), pixel = from + off;
+        vec2 share = vec2(off) * side;
+        bool inside = all(lessThan(pixel, p.size));
+        uvec2 first = inside ? seen_first(pixel) : uvec2(NONE);
+        bool even = map != NONE && first.y == map % LATTICE_OBJECTS;
+        vec4 found = even ? between(lights, share) : vec4(0.0);
+#ifdef HAS_RECEIVERS
+        // Without a loop round it, which would take longer than the lookups that it may save.
+        vec4 texel = between(texels, share), by_caustic = caustic(look, texel.xy / texel.z);
+#if defined(COATS) || defined(ROUGH_DIFFUSE)
+        WHEN(even && look.covered) found += by_caustic * vec4(albedo_of(pixel, first), 1.0);
+#else
+        if (even && look.covered) found += by_caustic;
+#endif
+#endif
+        WHEN(!even && inside) {
+            bool specular = is_specular(kind_of(first));
+            uint number = pixel.y * p.size.x + pixel.x;
+            WHEN(!specular) pixels[atomicAdd(uneven_count, 1u)] = number;
+#ifndef COATS
+            WHEN(specular) pixels[p.size.x * p.size.y - 1u - atomicAdd(specular_count, 1u)] = number;
+#endif
+        }
+#ifdef COATS
+        // What a coat reflects is followed besides.
+        uint kind = inside ? kind_of(first) : NONE;
+        WHEN(is_specular(kind) || (kind == KIND_DIFFUSE && is_coated(first.y)))
+            pixels[2u * p.size.x * p.size.y - 1u - atomicAdd(specular_count, 1u)] = pixel.y * p.size.x + pixel.x;
+#endif
+        WHEN(inside) imageStore(picture, ivec2(pixel), vec4(found.rgb, 1.0));
+    }
 }

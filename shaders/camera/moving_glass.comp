@@ -7,7 +7,11 @@ layout(local_size_x = 64) in;
 
 layout(r32ui, binding = IMAGE_CHOSEN) uniform readonly restrict uimage2D chosen;
 layout(rgba32f, binding = IMAGE_FOUND) uniform readonly restrict image2D found;
+#ifdef COATS
+layout(rgba32f, binding = IMAGE_PICTURE) uniform restrict image2D picture;
+#else
 layout(rgba32f, binding = IMAGE_PICTURE) uniform writeonly restrict image2D picture;
+#endif
 
 // What a neighbour on another facet counts: it is all there is where a block shows several.
 const float OTHER_FACET = 1e-3;
@@ -36,5 +40,10 @@ void main()
             sum += weight * vec4(imageLoad(found, ivec2(at)).rgb, 1.0);
         }
     }
-    imageStore(picture, ivec2(pixel), vec4(sum.rgb / max(sum.w, 1e-30), 1.0));
+    vec3 followed = sum.rgb / max(sum.w, 1e-30);
+#ifdef COATS
+    // A coat adds to its base.
+    if (kind_of(first) == KIND_DIFFUSE) followed += imageLoad(picture, ivec2(pixel)).rgb;
+#endif
+    imageStore(picture, ivec2(pixel), vec4(followed, 1.0));
 }

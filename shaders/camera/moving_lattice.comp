@@ -34,8 +34,8 @@ void main()
         SurfaceInteraction seen = seen_on(path, hit, facet, surface_point(hit, facet, path.position, path.direction), path.direction);
         WavelengthInterval interval = wavelength_interval(path, path.band.x, path.band.z);
         add_direct(path, seen, interval, 0u, no_steady_lights());
-#ifdef ENVIRONMENT_LIGHTS
-        add_environment_light(path, seen, interval);
+#ifdef RECEIVER_LIGHT
+        add_receiver_light(path, seen, interval);
 #endif
         bool covered = find_texel(thing.receiver, facet.source, seen.position, placement, texel);
         if (!covered) placement = NONE;

@@ -4,5 +4,10 @@ layout(std430, binding = BIND_MOVING_LISTS) restrict buffer MovingLists { uint u
 
 uint specular_pixel(uint i)
 {
+#ifdef COATS
+    // A coated pixel may be on both.
+    return pixels[2u * p.size.x * p.size.y - 1u - i];
+#else
     return pixels[p.size.x * p.size.y - 1u - i];
+#endif
 }

@@ -37,6 +37,9 @@ struct CameraPath {
 #ifdef POLARISED
     Polarisation polarisation;      // of light that would come along the path backwards: by reciprocity it loses as much
 #endif
+#ifdef COATS
+    float coat_pdf;                 // of its direction, where it comes from a coat: density by steradian; else 0
+#endif
 #ifdef HAS_GRATING
     uint order;                     // of the grating ahead, the next to be followed; see camera/grating.glsl
 #endif

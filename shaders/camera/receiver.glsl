@@ -15,6 +15,9 @@ struct SurfaceInteraction {
     uint object;
     uint source;         // triangle
     vec3 reflectance;    // coefficients of the reflectance basis
+#ifdef COATS
+    vec3 coat_normal;    // unit, against the ray: interpolated where the mesh is smooth
+#endif
 };
 
 SurfaceInteraction seen_on(CameraPath path, Hit hit, Triangle facet, vec3 position, vec3 direction)
@@ -32,10 +35,14 @@ SurfaceInteraction seen_on(CameraPath path, Hit hit, Triangle facet, vec3 positi
     vec3 by_lens[2];
     for (int c = 0; c < 2; ++c)
         by_lens[c] = sample_side(path) * transfer_column(path.dposition[LENS_COLUMNS + c], path.ddirection[LENS_COLUMNS + c], path.direction, hit.normal_g, hit.distance);
+    // What is out of focus is averaged over its share of the pixel and of the lens.
     join_sides(hit.normal_g, seen.dposition[0], seen.dposition[1], by_lens[0], by_lens[1]);
 #endif
     seen.dposition[2] = vec3(0.0);
     seen.reflectance = object_colours[hit.object].rgb;
+#ifdef COATS
+    seen.coat_normal = shading_frame(hit, facet, direction).normal;
+#endif
     return seen;
 }
 
@@ -107,6 +114,49 @@ bool hidden_from(LightSample s, SurfaceInteraction seen)
     return intersect_any(seen.position, s.toward, s.distance * 0.99999, origin);
 }
 
+#if defined(COATS) || defined(ROUGH_DIFFUSE)
+// The normal that its finish goes by.
+vec3 finish_normal(SurfaceInteraction seen)
+{
+#ifdef COATS
+    return seen.coat_normal;
+#else
+    return dot(seen.direction, seen.normal_g) < 0.0 ? seen.normal_g : -seen.normal_g;
+#endif
+}
+
+// Reflectance of the base, under its coat, for light from all sides: what is only known as irradiance counts as if it came so.
+vec3 base_albedo(SurfaceInteraction seen, bool is_plain)
+{
+    Finish finish = finish_of(seen.object);
+    float cosine = clamp(-dot(seen.direction, finish_normal(seen)), 0.0, 1.0);
+    vec3 albedo = is_plain ? seen.reflectance : vec3(1.0);
+#ifdef ROUGH_DIFFUSE
+    if (is_plain && finish.roughness > 0.0) albedo = rough_albedo(albedo, finish.roughness, cosine);
+#endif
+#ifdef COATS
+    albedo *= share_under(finish, cosine);
+#endif
+    return albedo;
+}
+
+// … and for light from the direction `from`.
+vec3 base_response(SurfaceInteraction seen, vec3 from, bool is_plain)
+{
+    Finish finish = finish_of(seen.object);
+    vec3 normal = finish_normal(seen);
+    float cosine = clamp(-dot(seen.direction, normal), 0.0, 1.0), from_cosine = clamp(dot(from, normal), 0.0, 1.0);
+    vec3 response = is_plain ? seen.reflectance : vec3(1.0);
+#ifdef ROUGH_DIFFUSE
+    if (is_plain && finish.roughness > 0.0) response = rough_response(response, finish.roughness, -seen.direction, from, cosine, from_cosine);
+#endif
+#ifdef COATS
+    response *= share_under(finish, cosine) * share_from(finish, from_cosine);
+#endif
+    return response;
+}
+#endif
+
 // Lights whose direct light is known all along a sweep, from both of its ends; the first ones, as many as there is room for.
 #define STEADY_LIGHTS 8
 #define STEADY_ROOM (LIGHT_COUNT < STEADY_LIGHTS ? LIGHT_ROOM : STEADY_LIGHTS)
@@ -128,6 +178,11 @@ void add_direct(CameraPath path, SurfaceInteraction seen, WavelengthInterval int
     for (uint i = 0u; i < uint(LIGHT_COUNT); ++i) {
         bool known = i < uint(STEADY_ROOM) && (steady.lights & (1u << (i & 31u))) != 0u;
         float gain = 0.0;
+#if defined(COATS) || defined(ROUGH_DIFFUSE)
+        // Where its light comes from counts, too.
+        known = known && !is_finished(seen.object);
+        vec3 toward = vec3(0.0);
+#endif
         if (known) gain = mix(steady.gains[2u * i], steady.gains[2u * i + 1u], share);
         WHEN(!known) {
             LightSample s;
@@ -139,13 +194,48 @@ void add_direct(CameraPath path, SurfaceInteraction seen, WavelengthInterval int
                 if (p.survey == 1u) gain = unshadowed(i, seen, even_light_point(), s);
             }
 #endif
+#if defined(COATS) || defined(ROUGH_DIFFUSE)
+            toward = s.toward;
+#endif
         }
         uint row = uint(LIGHT_ROW) + i * uint(ROWS_PER_LIGHT);
         // Other classes than 0 have their reflectance in the light's own row.
+#if defined(COATS) || defined(ROUGH_DIFFUSE)
+        WHEN(gain > 0.0)
+            add_colour(path, interval, reflectance_class == 0u ? row : row + 3u + reflectance_class, base_response(seen, toward, reflectance_class == 0u) * (INVERSE_PI * gain));
+#else
         WHEN(gain > 0.0)
             add_colour(path, interval, reflectance_class == 0u ? row : row + 3u + reflectance_class, (reflectance_class == 0u ? seen.reflectance : vec3(1.0)) * (INVERSE_PI * gain));
+#endif
     }
 }
+
+#if defined(COATS) && defined(CAMERA_SPECULAR)
+// What a coat reflects of the lights themselves, each by one of its points; `share_of_lobe` weighs what the path that goes on sees of them.
+void add_coat_lights(CameraPath path, SurfaceInteraction seen, WavelengthInterval interval, uint pixel_key)
+{
+    Finish finish = finish_of(seen.object);
+    vec3 first, second;
+    axes_across(seen.coat_normal, first, second);
+    mat3 to_surface = transpose(mat3(first, second, seen.coat_normal));
+    vec3 toward = to_surface * -seen.direction;
+    // Chance seldom leads from a rough coat into a smooth one's highlight of a lamp that is a point: that is as wide as few samples can find it
+    // [Kaplanyan and Dachsbacher 2013].
+    float wide = path.coat_pdf > 0.0 ? max(finish.alpha, 0.5 * sqrt(sample_side(path) / path.coat_pdf)) : finish.alpha;
+    // A perfectly smooth coat shows lights of some extent only, to the path that goes on.
+    for (uint i = 0u; i < uint(LIGHT_COUNT) && finish.alpha > 0.0; ++i) {
+        LightSample s;
+        float gain = unshadowed(i, seen, light_point(i, pixel_key), s) > 0.0 ? s.gain : 0.0;
+        vec3 from = to_surface * s.toward;
+        gain *= coat_response(lights[i].measure > 0.0 ? finish.alpha : min(wide, 1.0), finish.index, toward, from);
+        if (lights[i].measure > 0.0)
+            gain *= share_of_points(coat_direction_density(finish.alpha, toward, normalize(toward + from)),
+                                    lights[i].kind == LIGHT_KIND_AREA ? s.gain : 1.0 / lights[i].measure);
+        WHEN(gain > 0.0) gain = hidden_from(s, seen) ? 0.0 : gain;
+        WHEN(gain > 0.0) add_spectrum(path, interval, uint(LIGHT_ROW) + i * uint(ROWS_PER_LIGHT), gain);
+    }
+}
+#endif
 
 Steady no_steady_lights()
 {
@@ -255,6 +345,19 @@ vec4 bin_reflectance(vec3 colour, int target)
 }
 #endif
 
+#if defined(MAP_BINS) && defined(RGB_CHANNELS)
+// Share of a map's spectrum that an interval has, by luminance: the part's of the whole's. Splats that take a ripple off may leave texels
+// less light than none in some channels; these can cancel, and their quotient may be anything. There the share is white light's: over the whole
+// spectrum both add up to one.
+float spectrum_share(WavelengthInterval interval, bool positive, float part, float whole)
+{
+    const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722);
+    if (positive && whole > 0.0) return part / whole;
+    vec4 white = emission_until(uint(WHITE_ROW), 0, interval.cell_hi) - emission_until(uint(WHITE_ROW), 0, interval.cell_lo);
+    return dot(white.rgb, LUMINANCE) / dot(emission_until(uint(WHITE_ROW), 0, EMISSION_CELLS).rgb, LUMINANCE);
+}
+#endif
+
 // Irradiance by what glass and mirrors threw at a place of a map.
 void add_caustic_at(CameraPath path, SurfaceInteraction seen, WavelengthInterval interval, uint receiver, uint placement, vec3 texel)
 {
@@ -277,6 +380,11 @@ void add_caustic_at(CameraPath path, SurfaceInteraction seen, WavelengthInterval
     if (box.x * box.y < WHOLE_PIXEL * side * side) box = vec2(1.0);
     bool plain = receivers[receiver].reflectance_class == 0u;
     float scale = p.map_scale * INVERSE_PI;
+#if defined(COATS) || defined(ROUGH_DIFFUSE)
+    seen.reflectance = base_albedo(seen, plain);
+    // Of one number where the map holds the colour.
+    if (!plain) scale *= seen.reflectance.r;
+#endif
 #ifdef MAP_BINS
     // The caustic's own dispersion meets the camera's: every spectral channel that the interval touches is read by itself.
     WHEN(path.restricted != 0u) {
@@ -299,11 +407,13 @@ void add_caustic_at(CameraPath path, SurfaceInteraction seen, WavelengthInterval
         // as they are: where nothing is swept all of it is there again.
         vec4 whole[TARGETS];
         float whole_sum = 0.0, part_sum = 0.0;
+        bool positive = true;
         for (int t = 0; t < TARGETS; ++t) whole[t] = vec4(0.0);
         for (int k = 0; k < BIN_COUNT && lit; ++k) {
             float watt = watts[BIN_TARGET + (k >> 2)][k & 3];
             uint row = uint(BIN_SPECTRUM_ROW + k);
             bool within = k >= from && k <= to;
+            positive = positive && watt >= 0.0;
             for (int t = 0; t < TARGETS; ++t) {
                 vec4 all = emission_until(row, t, EMISSION_CELLS);
                 vec4 part = within ? emission_until(row, t, interval.cell_hi) - emission_until(row, t, interval.cell_lo) : vec4(0.0);
@@ -319,7 +429,7 @@ void add_caustic_at(CameraPath path, SurfaceInteraction seen, WavelengthInterval
 #ifdef RGB_CHANNELS
         WHEN(lit) {
             vec4 lacking = map_to_channels(watts[0]) - whole[0];
-            radiance[0] += factor * interval.through * (part_sum / max(whole_sum, 1e-30)) * lacking;
+            radiance[0] += factor * interval.through * spectrum_share(interval, positive, part_sum, whole_sum) * lacking;
         }
 #endif
     }

@@ -7,7 +7,11 @@
 
 const uint SURVEY_TAKES = 1u, SURVEY_KEPT = 2u;
 // What a pixel's looks have in common, in a key's lowest bits. A key of 0: nothing.
+#ifdef COATS
+const uint SEES_DIRECTLY = 1u, SEES_SPECULAR = 2u, SEES_BEAMS = 3u, SEES_COATED = 4u, KIND_BITS = 7u;
+#else
 const uint SEES_DIRECTLY = 1u, SEES_SPECULAR = 2u, SEES_BEAMS = 3u, KIND_BITS = 3u;
+#endif
 // Cosine between normals that two looks of an even pixel may have at the least.
 const float EVEN_NORMALS = 0.99;
 
@@ -27,6 +31,9 @@ void survey_look(inout Survey survey, uint look, uint sees, bool met, Hit hit, u
     uint key = (hash_combine(met ? hit.object : NONE, lights_met) & ~KIND_BITS) | sees;
     if (look == 0u) survey = Survey(key, hit.normal_g);
     bool even = key == survey.key && !saw_light && !skipped_texels && (sees != SEES_DIRECTLY || !met || dot(hit.normal_g, survey.normal) >= EVEN_NORMALS);
+#ifdef COATS
+    even = even && (sees != SEES_COATED || dot(hit.normal_g, survey.normal) >= EVEN_NORMALS);
+#endif
     if (!even) survey.key = 0u;
 }
 

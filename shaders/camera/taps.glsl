@@ -122,6 +122,9 @@ void add_lights(CameraPath path, float far)
         WavelengthInterval interval = wavelength_interval(path, lo, hi);
         for (uint i = 0u; i < uint(LIGHT_COUNT); ++i) {
             float seen = lights[i].measure > 0.0 ? light_seen(lights[i], position, direction, far, WIDTH_OF(lights[i]) + sweep * part) : 0.0;
+#ifdef COATS
+            seen *= share_of_lobe(path, lights[i], position, direction);
+#endif
             WHEN(seen > 0.0) add_spectrum(path, interval, uint(LIGHT_ROW) + i * uint(ROWS_PER_LIGHT), seen);
         }
     }
@@ -275,12 +278,21 @@ void add_end(CameraPath path, bool met, Hit hit, bool same_hit, uint pixel_key)
 #ifdef HAS_TEXTURES
             WHEN(texture != NONE) seen.reflectance = object_colours[seen.object].rgb * painted(paint, seen);
 #endif
+#if defined(COATS) && defined(CAMERA_SPECULAR)
+            bool coated = is_coated(seen.object);
+            WHEN(coated) add_coat_lights(path, seen, interval, pixel_key);
+            // The base of what is seen first is left to the program for what is seen directly.
+            WHEN(!coated || path.depth > 0) {
+#endif
             add_caustic(path, seen, interval);
 #ifdef LAYER_BEAUTY
             add_direct(path, seen, interval, pixel_key, steady);
-#ifdef ENVIRONMENT_LIGHTS
-            add_environment_light(path, seen, interval);
+#ifdef RECEIVER_LIGHT
+            add_receiver_light(path, seen, interval);
 #endif
+#endif
+#if defined(COATS) && defined(CAMERA_SPECULAR)
+            }
 #endif
         }
 #endif

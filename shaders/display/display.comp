@@ -3,12 +3,16 @@
 // both sides of every branch.
 #include "lib/finite.glsl"
 #include "lib/tone.glsl"
+#ifdef ANTIALIAS
+#include "lib/highlights.glsl"
+#endif
 
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(binding = 0) uniform sampler2D shown;
 layout(binding = 1) uniform sampler2D other;
 layout(rgba8, binding = 0) uniform writeonly restrict image2D display;
-layout(std430, binding = 0) readonly restrict buffer Parameters { DisplayParameters parameters; };
+// A software renderer reads a storage buffer ray by ray, and took as long for that as for all the rest.
+layout(std140, binding = 0) uniform Parameters { DisplayParameters parameters; };
 
 const vec3 COLOURS[] = COLOUR_TABLE;
 const float BRIGHTEST = 1e30;
@@ -18,7 +22,9 @@ const vec3 NOT_FINITE = vec3(1.0, 0.0, 1.0);
 // Mean of the picture over an output pixel: one lookup where the picture is enlarged, TAPS² where it is shrunk.
 vec3 look(sampler2D picture, vec2 pixel)
 {
-#if TAPS == 1
+#ifdef SAME_SIZE
+    return texelFetch(picture, ivec2(pixel), 0).rgb;
+#elif TAPS == 1
     return textureLod(picture, parameters.origin + (pixel + 0.5) * parameters.step_uv, 0.0).rgb;
 #else
     vec3 sum = vec3(0.0);
@@ -47,20 +53,75 @@ vec3 false_colour(vec3 exposed)
     return of_table((stops - parameters.false_stops.x) / (parameters.false_stops.y - parameters.false_stops.x));
 }
 
+vec3 exposed(vec3 scene)
+{
+    return clamp(clamp(scene, -BRIGHTEST, BRIGHTEST) * parameters.gain, -BRIGHTEST, BRIGHTEST);
+}
+
+// Linear, as the display shows it.
+vec3 toned(vec3 colour)
+{
+#ifdef TONE_FALSE_COLOUR
+    return false_colour(colour);
+#elif defined(TONE_SPECTRASPLAT)
+    return tone_spectrasplat(colour);
+#elif defined(TONE_ACES)
+    return tone_aces(colour);
+#elif defined(TONE_REINHARD)
+    return tone_reinhard(colour);
+#else
+    return clamp(colour, 0.0, 1.0);
+#endif
+}
+
+#ifdef ANTIALIAS
+// What the picture has beside a pixel, so many of the larger of its pixels and the output's away; the border's go on beyond it.
+vec3 scene_beside(sampler2D picture, vec2 pixel, ivec2 pixels)
+{
+#ifdef SAME_SIZE
+    return texelFetch(picture, clamp(ivec2(pixel) + pixels, ivec2(0), textureSize(picture, 0) - 1), 0).rgb;
+#else
+    vec2 half_uv = 0.5 * parameters.beside_px * parameters.step_uv;
+    vec2 at = parameters.origin + (pixel + 0.5 + vec2(pixels) * parameters.beside_px) * parameters.step_uv;
+    return look(picture, (clamp(at, half_uv, 1.0 - half_uv) - parameters.origin) / parameters.step_uv - 0.5);
+#endif
+}
+
+vec3 exposed_beside(sampler2D picture, vec2 pixel, ivec2 pixels)
+{
+    vec3 scene = scene_beside(picture, pixel, pixels);
+    return is_finite3(scene) ? exposed(scene) : vec3(0.0);
+}
+
+bool is_hot(vec3 scene)
+{
+    return max(max(scene.r, scene.g), scene.b) * parameters.gain > STEP_WHITE;
+}
+
+// A pixel beside something overexposed.
+vec3 antialiased(sampler2D picture, vec2 pixel)
+{
+    vec3 colour = exposed(look(picture, pixel)), factor = vec3(1.0);
+    PixelStep found = PixelStep(colour, colour, 0.0, 0.0, 0.0);
+    for (int line = 0; line < 2; ++line) {
+        ivec2 next = line == 0 ? ivec2(1, 0) : ivec2(0, 1);
+        find_step(found, colour, exposed_beside(picture, pixel, -2 * next), exposed_beside(picture, pixel, -next),
+            exposed_beside(picture, pixel, next), exposed_beside(picture, pixel, 2 * next));
+    }
+    float share = step_share(found, exposed_norm(colour));
+    vec3 mixture = toned(mix(found.dark, found.bright, share));
+    return srgb_encode(toned(colour) * step_factor(toned(found.bright), toned(found.dark), mixture, share, step_weight(found)));
+}
+#endif
+
 vec3 developed(vec3 scene)
 {
     if (!is_finite3(scene)) return NOT_FINITE;
-    vec3 exposed = clamp(clamp(scene, -BRIGHTEST, BRIGHTEST) * parameters.gain, -BRIGHTEST, BRIGHTEST);
+    vec3 shown = toned(exposed(scene));
 #ifdef TONE_FALSE_COLOUR
-    return false_colour(exposed);
-#elif defined(TONE_SPECTRASPLAT)
-    return srgb_encode(tone_spectrasplat(exposed));
-#elif defined(TONE_ACES)
-    return srgb_encode(tone_aces(exposed));
-#elif defined(TONE_REINHARD)
-    return srgb_encode(tone_reinhard(exposed));
+    return shown;
 #else
-    return srgb_encode(clamp(exposed, 0.0, 1.0));
+    return srgb_encode(shown);
 #endif
 }
 
@@ -80,6 +141,38 @@ vec3 wiped(vec2 pixel)
     return abs(from_line) <= LINE_HALF_PX + 1.0 ? 0.4 * colour : colour;
 }
 
+#ifdef ANTIALIAS
+// A column of pixels. A software renderer runs both sides of an `if`, and a loop once at least: so those that need more than the others come in a
+// loop of their own after all of them.
+void main()
+{
+    ivec2 first = ivec2(gl_GlobalInvocationID.xy) * ivec2(1, ROWS);
+    int rows = min(ROWS, imageSize(display).y - first.y);
+    if (first.x >= imageSize(display).x || rows <= 0) return;
+    uint beside_hot = 0u;
+    vec3 scene = look(shown, vec2(first));
+    bool is_hot_above = is_hot(scene_beside(shown, vec2(first), ivec2(0, -1)));
+    for (int row = 0; row < rows; ++row) {
+        ivec2 pixel = first + ivec2(0, row);
+        imageStore(display, pixel, vec4(developed(scene), 1.0));
+        vec3 below = scene_beside(shown, vec2(pixel), ivec2(0, 1));
+        bool hot = is_hot_above || is_hot(below) || is_hot(scene_beside(shown, vec2(pixel), ivec2(-1, 0))) || is_hot(scene_beside(shown, vec2(pixel), ivec2(1, 0)));
+        if (hot && is_finite3(scene)) beside_hot |= 1u << uint(row);
+#ifdef BESIDE_IS_NEXT
+        is_hot_above = is_hot(scene);
+        scene = below;
+#else
+        vec2 next = vec2(pixel + ivec2(0, 1));
+        is_hot_above = is_hot(scene_beside(shown, next, ivec2(0, -1)));
+        scene = look(shown, next);
+#endif
+    }
+    for (; beside_hot != 0u; beside_hot &= beside_hot - 1u) {
+        ivec2 pixel = first + ivec2(0, findLSB(beside_hot));
+        imageStore(display, pixel, vec4(antialiased(shown, vec2(pixel)), 1.0));
+    }
+}
+#else
 void main()
 {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
@@ -93,3 +186,4 @@ void main()
 #endif
     imageStore(display, pixel, vec4(colour, 1.0));
 }
+#endif

@@ -1,22 +1,32 @@
 // Veiling glare on the device (app/base/glare.py): a picture is shrunk by octaves, each octave's halo is spread on the way back, and the
-// share that the lens scatters is put in place of as much of the picture. Which step this is: SHRINK, SPREAD or JOIN.
+// share that the lens scatters is put in place of as much of the picture. Which step this is: SHRINK, SPREAD, SOFTEN or JOIN.
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(binding = 0) uniform sampler2D fine;     // black beyond its border
-layout(binding = 1) uniform sampler2D coarse;   // likewise
+layout(binding = 1) uniform sampler2D coarse;   // likewise, softened
 layout(rgba32f, binding = 0) uniform writeonly restrict image2D made;
 uniform float share;
 
-const vec2 TENT[3] = vec2[3](vec2(-1.0, 0.25), vec2(0.0, 0.5), vec2(1.0, 0.25));
+const float TENT[3] = float[3](0.25, 0.5, 0.25);
 
-// Mean over a tent as wide as two texels to each side.
-vec3 spread(sampler2D of, vec2 at)
+// Mean over a tent as wide as two texels to each side, about a texel; black beyond the border.
+vec3 spread(sampler2D of, ivec2 texel)
 {
-    vec2 texel = 1.0 / vec2(textureSize(of, 0));
+    ivec2 size = textureSize(of, 0);
     vec3 sum = vec3(0.0);
     for (int j = 0; j < 3; ++j)
-        for (int i = 0; i < 3; ++i)
-            sum += TENT[i].y * TENT[j].y * textureLod(of, at + vec2(TENT[i].x, TENT[j].x) * texel, 0.0).rgb;
+        for (int i = 0; i < 3; ++i) {
+            ivec2 at = texel + ivec2(i, j) - 1;
+            bool inside = all(greaterThanEqual(at, ivec2(0))) && all(lessThan(at, size));
+            sum += inside ? TENT[i] * TENT[j] * texelFetch(of, clamp(at, ivec2(0), size - 1), 0).rgb : vec3(0.0);
+        }
     return sum;
+}
+
+// One lookup between texels that were softened first (SOFTEN) is the same as one for every part of the tent.
+vec3 between_softened(sampler2D of, vec2 at)
+{
+    vec2 within = vec2(textureSize(of, 0) - 2);
+    return textureLod(of, (at * within + 1.0) / (within + 2.0), 0.0).rgb;
 }
 
 void main()
@@ -33,9 +43,12 @@ void main()
             found += textureLod(fine, (vec2(texel) + (vec2(i, j) + 0.5) / vec2(taps)) / vec2(size), 0.0).rgb;
     found /= float(taps.x * taps.y);
 #elif defined(SPREAD)
-    vec3 found = share * spread(fine, at) + spread(coarse, at);
+    vec3 found = share * spread(fine, texel) + between_softened(coarse, at);
+#elif defined(SOFTEN)
+    // One texel wider all round than what is softened, since what lies beyond its border is lit by it too.
+    vec3 found = spread(fine, texel - 1);
 #else
-    vec3 found = (1.0 - share) * texelFetch(fine, texel, 0).rgb + spread(coarse, at);
+    vec3 found = (1.0 - share) * texelFetch(fine, texel, 0).rgb + between_softened(coarse, at);
 #endif
     imageStore(made, texel, vec4(found, 1.0));
 }

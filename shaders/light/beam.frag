@@ -4,6 +4,12 @@
 // band is `nodes` equal parts, the same for all texels of a polygon, in each of which the polygon stands still where it is in the middle of it: so whatever its
 // shape and size, its texels add up to its area.
 #include "light/beam_coverage.glsl"
+#ifdef CONTACT_LINES
+#include "lib/contact.glsl"
+layout(binding = 2) uniform usampler2D contact_words;
+// Side of what stands for a part of a texel: about its middle, by which it is seen or not.
+const float PART_WINDOW = 1.0 / 16.0;
+#endif
 
 layout(location = 0) out vec4 deposited[TARGETS];
 
@@ -81,8 +87,8 @@ float eased(float s, float a, float b) { return mix(a, b, s * s * (3.0 - 2.0 * s
 }
 #endif
 
-void main() {
-    at = gl_FragCoord.xy - anchor_slope.xy;
+// What falls on a texel, or the part of one, about `at`.
+void deposit() {
     // The density is linear on the receiver; a texel's area there goes as the inverse cube of 1 / W, and nothing lies beyond the horizon.
     float nearness = 1.0 + dot(perspective, at), nearness2 = nearness * nearness;
     float tilt = nearness < 1e-4 ? 0.0 : max(1.0 + dot(anchor_slope.zw, at), 0.0) / (nearness2 * nearness2);
@@ -152,5 +158,33 @@ void main() {
     ADD_PARTS(intervals, several, covered_share)
     // Differences of the running spectrum are rounded: what divides by the maps must never meet a negative sum.
     for (int g = 0; g < TARGETS; ++g) deposited[g] = max(tilt * deposited[g], 0.0);
+#endif
+}
+
+void main() {
+    at = gl_FragCoord.xy - anchor_slope.xy;
+#ifdef CONTACT_LINES
+    // A texel in which a line of contact lies keeps what falls on those parts that are seen.
+    uint word = texelFetch(contact_words, ivec2(gl_FragCoord.xy), 0).x, seen = word & 0xffffu;
+    bool is_cut = is_contact(word) && seen != 0u;
+    vec2 middle = at;
+    vec4 sum[TARGETS];
+    for (int g = 0; g < TARGETS; ++g) sum[g] = vec4(0.0);
+    window_less = is_cut ? 1.0 - PART_WINDOW * PART_WINDOW : 0.0;
+    uint left = is_cut ? seen : 1u;
+    float weight = is_cut ? 1.0 / float(bitCount(seen)) : 1.0;
+    while (left != 0u) {
+        at = is_cut ? middle + part_place(uint(findLSB(left))) : middle;
+        left &= left - 1u;
+        crossings = 0;
+#if EDGES > 0
+        crossing = 0u;
+#endif
+        deposit();
+        for (int g = 0; g < TARGETS; ++g) sum[g] += weight * deposited[g];
+    }
+    for (int g = 0; g < TARGETS; ++g) deposited[g] = sum[g];
+#else
+    deposit();
 #endif
 }

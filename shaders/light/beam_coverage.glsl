@@ -27,11 +27,19 @@ flat in vec4 edge[2 * EDGES];
 
 vec2 at;  // the texel's centre, about the anchor
 
+#ifdef CONTACT_LINES
+// How much smaller than a texel that is which is looked at, by the squares of their sides.
+float window_less = 0.0;
+float window_of(float window) { return sqrt(max(window * window - window_less, 1.0 - window_less)); }
+#else
+#define window_of(window) (window)
+#endif
+
 // A line's unit normal and distance inside, in units of its window: a texel, or a square as wide as the penumbra.
-vec3 normalized_line(vec3 line, float window) { return vec3(line.xy, line.z / window) * inversesqrt(dot(line.xy, line.xy)); }
+vec3 normalized_line(vec3 line, float window) { return vec3(line.xy, line.z / window_of(window)) * inversesqrt(dot(line.xy, line.xy)); }
 
 // Half of what the window spans across a line.
-float reach_of(vec4 line) { return 0.5 * (abs(line.x) + abs(line.y)) * line.w; }
+float reach_of(vec4 line) { return 0.5 * (abs(line.x) + abs(line.y)) * window_of(line.w); }
 
 // Part of the line `own` (a point of it is -h n + s perpendicular) within the half-plane `other`, as an interval of s. Of two lines that are the same one counts.
 vec2 cut(vec2 interval, vec3 own, vec3 other, bool own_first) {

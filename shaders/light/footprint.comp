@@ -23,7 +23,8 @@ layout(std140, binding = 0) uniform Parameters {
     uint first_power;
     float y_scale;
     float y_offset;
-    vec2 unused2;
+    float narrowed;
+    float unused2;
 };
 layout(std430, binding = 0) readonly buffer Photons { PhotonRecord photons[]; };
 layout(std430, binding = 1) writeonly buffer Splats { SplatRecord splats[]; };
@@ -46,6 +47,12 @@ struct TracedBand {
 layout(std430, binding = 11) readonly buffer TracedBands { TracedBand traced_bands[]; };
 #endif
 
+#ifdef CONTACT_LINES
+#include "lib/contact.glsl"
+#define PLACED_PICTURE 2u
+layout(binding = 1) uniform usampler2D contact_words;
+#endif
+
 #define RECEIVER_CHARTS 1u
 
 const float TEXEL_VARIANCE = 1.0 / 12.0;
@@ -54,7 +61,7 @@ const float SMALL_STD = 0.4;
 const float SMALL_SWEEP = 0.75;
 const float ACROSS_FLOOR = 0.1;
 // Sampling at texel centres needs this much blur where no box average does the work.
-const float SAMPLED_VARIANCE = 0.2;
+const float SAMPLED_VARIANCE = 0.12;
 const float THIN_VARIANCE = 0.15;
 const float CUT = 3.0;
 // Splats of three texels' standard deviation at least go to a map with texels twice as wide.
@@ -104,17 +111,32 @@ float local_gain(uint receiver, vec3 position) {
 }
 #endif
 
+// The number of the photon's lattice, 0 where what is splatted is none: every so manieth photon of a lattice is none.
+uint lattice_of(PhotonRecord photon) { return stride == 1u ? photon.flags >> LATTICE_BIT : 0u; }
+
 #include "light/splat_power.glsl"
 #include "light/splat_shapes.glsl"
 
+// Share of the smoothing that a footprint needs. What ripple it leaves with less is taken off (`flatten_lattice`), the better the less of the light at
+// a place is of many wavelengths, each with waves of its own: none need be left where the spectrum stays within a tenth of a spacing, most is beyond a half.
+// Lattices finer than texels are not flattened.
+float needed_smoothing(PhotonRecord photon, vec2 step_s, vec2 step_t, vec2 chord) {
+    float area = step_s.x * step_t.y - step_s.y * step_t.x;
+    if (narrowed >= 1.0 || lattice_of(photon) == 0u || abs(area) < 1e-6) return 1.0;
+    vec2 spacings = vec2(chord.x * step_t.y - chord.y * step_t.x, step_s.x * chord.y - step_s.y * chord.x) / area;
+    float parted = 2.5 * length(spacings) - 0.25, fine = 4.0 - 4.0 * sqrt(abs(area));
+    return mix(narrowed, 1.0, clamp(max(parted, fine), 0.0, 1.0));
+}
+
 Footprint footprint_in(Placement place, PhotonRecord photon, vec3 sweep_middle, vec3 sweep) {
     vec3 at = homogeneous_texel(place, photon.position + sweep_middle);
+    vec2 step_s = texels_along(place, at, photon.dposition_ds), step_t = texels_along(place, at, photon.dposition_dt);
     Footprint f;
     f.centre = at.xy / at.z;
-    f.axis_s = smoothing * texels_along(place, at, photon.dposition_ds);
-    f.axis_t = smoothing * texels_along(place, at, photon.dposition_dt);
     f.chord = texels_along(place, at, sweep);
-    f.per_spacing = smoothing;
+    f.per_spacing = smoothing * needed_smoothing(photon, step_s, step_t, f.chord);
+    f.axis_s = f.per_spacing * step_s;
+    f.axis_t = f.per_spacing * step_t;
     return f;
 }
 
@@ -152,7 +174,11 @@ void choose_level(inout Placement place, inout Footprint f, PhotonRecord photon,
     f.per_spacing *= shrink;
 }
 
-SplatRecord splat_of(PhotonRecord photon, float power_w, float mean, Footprint f, uint layer, vec4 band) {
+#ifdef CONTACT_LINES
+#include "light/splat_contact.glsl"
+#endif
+
+SplatRecord splat_of(PhotonRecord photon, float power_w, float mean, Footprint f, uint table, vec4 band) {
     vec2 d = vec2(dot(f.axis_s, f.axis_s), dot(f.axis_t, f.axis_t));
     float cross_st = dot(f.axis_s, f.axis_t);
     float major = 0.5 * (d.x + d.y) + sqrt(0.25 * (d.x - d.y) * (d.x - d.y) + cross_st * cross_st);
@@ -160,9 +186,9 @@ SplatRecord splat_of(PhotonRecord photon, float power_w, float mean, Footprint f
     if (major < SMALL_STD * SMALL_STD && dot(f.chord, f.chord) < SMALL_SWEEP * SMALL_SWEEP) {
         splat = small_splat(photon, power_w, mean, f, band);
     } else {
-        splat = swept_splat(photon, power_w, mean, f, band);
+        splat = swept_splat(photon, power_w, mean, f, table / bands, band);
     }
-    splat.layer = layer;
+    splat.layer = table * uint(TARGETS);
 #ifdef HERO
     carry_companions(splat, photon);
 #endif
@@ -304,11 +330,16 @@ void main() {
         sums[i].yz += vec2(power_w, 1.0);
     }
 
-    uint layer = table * uint(TARGETS);
     bool inside = shown && contains(place.rect, f.centre, 0.0);
     Placement drawn_in = place;
+#ifdef CONTACT_LINES
+    float held = 1.0, lost = 0.0;
+    uint side = shown ? side_of_contact(place, f, photon.photon_id, held, lost) : 0u;
+    sums[i].x += lost * power_w;
+    if (side == 0u)
+#endif
     choose_level(drawn_in, f, photon, middle, sweep);
-    SplatRecord fine = splat_of(photon, power_w, mean, f, layer, table_band);
+    SplatRecord fine = splat_of(photon, power_w, mean, f, table, table_band);
     fine.rect = drawn_in.rect;
     bool drawn = shown && touches(drawn_in.rect, fine.centre, half_extent(fine));
 #ifdef REINDEXED
@@ -318,6 +349,9 @@ void main() {
         fine.kind = 0u;
     }
     mark_edge(fine);
+#ifdef CONTACT_LINES
+    keep_to_side(fine, side, held);
+#endif
     uint slot = i * uint(SLOTS);
     splats[slot] = fine;
 
@@ -334,7 +368,7 @@ void main() {
         vec2 extent = half_extent(fine) + margin;
         bool only_fine = shown && all(greaterThan(fine.centre - extent, drawn_in.rect.xy)) && all(lessThan(fine.centre + extent, drawn_in.rect.zw));
         if (!only_fine) {
-            coarse = splat_of(photon, power_w, mean, g, layer, table_band);
+            coarse = splat_of(photon, power_w, mean, g, table, table_band);
             coarse.rect = outer.rect;
             if (!touches(outer.rect, coarse.centre, half_extent(coarse))) {
                 coarse.kind = 0u;

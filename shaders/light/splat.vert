@@ -15,6 +15,9 @@ layout(std430, binding = 6) readonly buffer Integrals { vec4 band_integral[]; };
 layout(std430, binding = 7) readonly buffer Curves { vec4 curve[]; };  // by light and class: density over x, or its running integral
 
 flat out vec4 rect;
+#ifdef CONTACT_LINES
+flat out uint side;
+#endif
 #ifdef SMALL
 noperspective out vec2 at;
 flat out vec2 half_texel;  // along x, y in units of sqrt(2) sigma
@@ -87,6 +90,10 @@ vec4 part_inside(SplatRecord splat) {
 void main() {
 #ifdef SMALL
     SplatRecord splat = splats[lists[FIRST_OF_KIND + uint(gl_VertexID / 3)]];
+#ifdef CONTACT_LINES
+    side = splat.layer >> 30u;
+    splat.layer &= 0x3fffffffu;
+#endif
     int third = gl_VertexID % 3;
     vec2 corner = vec2(third == 1 ? 3.0 : -1.0, third == 2 ? 3.0 : -1.0);
     vec2 reach = corner * splat.along;
@@ -98,6 +105,10 @@ void main() {
     }
 #else
     SplatRecord splat = splats[lists[FIRST_OF_KIND + uint(gl_VertexID >> 2)]];
+#ifdef CONTACT_LINES
+    side = splat.layer >> 30u;
+    splat.layer &= 0x3fffffffu;
+#endif
     vec2 corner = vec2(float(gl_VertexID & 1), float((gl_VertexID >> 1) & 1)) * 2.0 - 1.0;
 #ifdef CLIPPED
     vec4 inside = part_inside(splat);

@@ -12,6 +12,11 @@ layout(std140, binding = 0) uniform DrawParameters {
 };
 layout(std430, binding = 7) readonly buffer Curves { vec4 curve[]; };
 
+#ifdef CONTACT_LINES
+#include "lib/contact.glsl"
+layout(binding = 1) uniform usampler2D contact_words;
+flat in uint side;
+#endif
 flat in vec4 rect;
 noperspective in vec3 at;
 flat in vec3 shape;
@@ -35,6 +40,9 @@ void main() {
     bvec4 within = bvec4(greaterThan(gl_FragCoord.xy, rect.xy), lessThan(gl_FragCoord.xy, rect.zw));
     float half_box = sqrt(1.5) / band.w;
     float share = !all(within) ? 0.0 : gaussian_box_fast(at.x, shape.x) * flatness(wave, ripple) / (2.0 * half_box);
+#ifdef CONTACT_LINES
+    share *= takes_side(texelFetch(contact_words, ivec2(gl_FragCoord.xy), 0).x, side);
+#endif
     vec2 ends = clamp(at.y + vec2(-half_box, half_box), -band.z, band.z);
     vec2 x = mix(band.xx, band.yy, 0.5 + 0.5 * ends / band.z);
     float middle = 0.5 * (x.x + x.y) - throughput.x;

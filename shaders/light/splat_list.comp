@@ -3,16 +3,15 @@
 // which splats are added is a function of the photons alone.
 layout(local_size_x = WORKGROUP) in;
 
-const uint KINDS = 4u;
 
 layout(std430, binding = 1) readonly buffer Splats { SplatRecord splats[]; };
-layout(std430, binding = 7) buffer Commands { uint draw_words[20]; };
+layout(std430, binding = 7) buffer Commands { uint draw_words[5 * KINDS]; };
 layout(std430, binding = 8) writeonly buffer Lists { uint lists[]; };  // `capacity` a kind
 
 uniform uint slots;
 uniform uint capacity;
 
-shared uint counts[WORKGROUP * KINDS];
+shared uint counts[WORKGROUP * int(KINDS)];
 
 void main() {
     uint me = gl_LocalInvocationID.x;

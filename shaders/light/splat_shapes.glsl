@@ -45,16 +45,21 @@ void flatten_lattice(inout SplatRecord splat, Blur blur, Footprint f, uint latti
     float share = swept / (own + swept);
     blur.sweep = 0.0;
     vec2 k[3];
-    vec3 heights = vec3(0.0);
+    vec3 heights, kept;
     for (int i = 0; i < 3; ++i) {
         k[i] = steps[i].x * along_s + steps[i].y * along_t;
-        // Waves shorter than two texels would be those of others' centres.
+        // A wave as short as a texel is not there: the texel has the mean of it.
         float coarse = max(abs(k[i].x), abs(k[i].y)), along = TWO_PI * dot(k[i], blur.e);
-        heights[i] = damping(blur, k[i]) * clamp(2.0 - 2.0 * coarse, 0.0, 1.0);
-        splat.ripple[i] = 2.0 * heights[i] * exp(-0.5 * along * along * share * own);
+        // As a footprint's own Gaussian damps it, or more; of a needle's width float32 knows nothing, nor of waves across it.
+        float own_cycles = f.per_spacing * length(steps[i]), most = 2.0 * exp(-0.5 * TWO_PI * TWO_PI * own_cycles * own_cycles);
+        heights[i] = min(damping(blur, k[i]), most) * clamp(5.0 - 5.0 * coarse, 0.0, 1.0);
+        kept[i] = 2.0 * exp(-0.5 * along * along * share * own);
     }
+    // Each splat's own waves are summed over the lattice too: what that adds at the others' frequencies is second order.
+    vec3 taken = heights - 2.0 * heights.yxx * heights.zzy;
+    splat.ripple = vec4(taken * kept, 0.0);
     splat.waves = vec4((1.0 - share) * dot(k[0], splat.along), dot(k[0], splat.across), (1.0 - share) * dot(k[1], splat.along), dot(k[1], splat.across));
-    splat.amplitude /= 1.0 - 2.0 * dot(heights, heights);
+    splat.amplitude /= 1.0 - 2.0 * dot(heights, taken);
 }
 
 // Whether the photon has another range than its table's band: a part of it, or what a local gain put there. One of no width stands for all of it.
@@ -133,7 +138,25 @@ float power_of_fragments(float xi_half, float sigma_xi, vec4 throughput) {
 }
 #endif
 
-SplatRecord swept_splat(PhotonRecord photon, float power_w, float mean, Footprint f, vec4 band) {
+#if defined(BAND_CUTS) && !defined(ONE_COLOUR)
+const int WINDOWS = 8;
+
+// Mean throughput of what fragments (splat_cut.frag) add up to: each has the light of a window on the band, `reach` to both sides as a share of the sweep,
+// times the throughput in the window's middle. Over that of the light itself it is what they draw too much.
+float throughput_of_windows(PhotonRecord photon, float reach, vec4 throughput, uint light_and_class) {
+    vec2 sums = vec2(0.0);
+    for (int i = 0; i < WINDOWS; ++i) {
+        float middle = (0.5 + reach) * (2.0 * (float(i) + 0.5) / float(WINDOWS) - 1.0);
+        vec2 x = mix(vec2(photon.x_lo), vec2(photon.x_hi), 0.5 + clamp(middle + vec2(-reach, reach), -0.5, 0.5));
+        float aside = 0.5 * (x.x + x.y) - throughput.x;
+        float power = power_until(light_and_class, x.y) - power_until(light_and_class, x.x);
+        sums += power * vec2(1.0, throughput.y + min(aside, 0.0) * throughput.z + max(aside, 0.0) * throughput.w);
+    }
+    return sums.x > 0.0 ? sums.y / sums.x : 0.0;
+}
+#endif
+
+SplatRecord swept_splat(PhotonRecord photon, float power_w, float mean, Footprint f, uint light_and_class, vec4 band) {
     SplatRecord splat;
     vec3 cov = vec3(f.axis_s.x * f.axis_s.x + f.axis_t.x * f.axis_t.x, f.axis_s.x * f.axis_s.y + f.axis_t.x * f.axis_t.y,
                     f.axis_s.y * f.axis_s.y + f.axis_t.y * f.axis_t.y);  // xx, xy, yy
@@ -168,14 +191,15 @@ SplatRecord swept_splat(PhotonRecord photon, float power_w, float mean, Footprin
     float s2 = max(c, ACROSS_FLOOR * ACROSS_FLOOR) + narrow * narrow * TEXEL_VARIANCE;
     float c_total = s2 + box * box * TEXEL_VARIANCE;
     float shear = b / c_total;
-    float along2 = max(a + TEXEL_VARIANCE - b * shear, SAMPLED_VARIANCE * (1.0 + shear * shear));
-    float sigma = sqrt(along2);
-
-    sigma = max(sigma, sweep * MIN_SIGMA_TO_SWEEP);
+    float along2 = a + TEXEL_VARIANCE - b * shear, sampled = SAMPLED_VARIANCE * (1.0 + shear * shear);
     bool cut = false;
 #ifdef BAND_CUTS
-    cut = is_cut(photon, band);
+    // Of what is thinner along the sweep than sampling allows, the texel's average is taken as of a cut band: no light reaches beyond its texels.
+    cut = is_cut(photon, band) || (along2 < sampled && photon.x_hi > photon.x_lo);
 #endif
+    // There it is a box that texels side by side in their rows, or along their diagonals, share out.
+    along2 = max(along2, cut ? TEXEL_VARIANCE / (box * box) : sampled);
+    float sigma = max(sqrt(along2), sweep * MIN_SIGMA_TO_SWEEP);
     float row = 0.0;
     if (cut) {
         sweep = max(sweep, 0.05 * sigma);
@@ -222,13 +246,18 @@ SplatRecord swept_splat(PhotonRecord photon, float power_w, float mean, Footprin
         float as_drawn = power_of_fragments(xi_half, sigma / reach, splat.throughput);
         splat.amplitude *= as_drawn > 0.0 ? clamp(power_w / as_drawn, 0.5, 2.0) : 1.0;
     }
+#ifdef BAND_CUTS
+    if (cut && any(notEqual(photon.throughput.xz, photon.throughput.yy))) {
+        float as_drawn = throughput_of_windows(photon, sqrt(3.0) * sigma / sweep, splat.throughput, light_and_class);
+        splat.amplitude *= as_drawn > 0.0 ? clamp(mean / as_drawn, 0.5, 2.0) : 1.0;
+    }
+#endif
 #endif
     splat.x_range = vec2(photon.x_lo, photon.x_hi);
     splat.xi_half = xi_half;
     splat.inverse_sigma_xi = SQRT_HALF * reach / sigma;
     splat.kind = cut ? 3u : 2u;
-    // Every so manieth photon of a lattice is no lattice.
-    flatten_lattice(splat, drawn, f, stride == 1u ? photon.flags >> LATTICE_BIT : 0u);
+    flatten_lattice(splat, drawn, f, lattice_of(photon));
     return splat;
 }
 

@@ -2,6 +2,11 @@
 // spectrum blurred as this fragment sees it. Its cost does not depend on the number of wavelengths.
 #include "lib/gaussian.glsl"
 
+#ifdef CONTACT_LINES
+#include "lib/contact.glsl"
+layout(binding = 1) uniform usampler2D contact_words;
+flat in uint side;
+#endif
 flat in vec4 rect;
 noperspective in vec3 at;
 flat in vec3 shape;
@@ -22,6 +27,9 @@ void main() {
     // Clip distances would do, but llvmpipe loses triangles that two of them cut.
     bvec4 within = bvec4(greaterThan(gl_FragCoord.xy, rect.xy), lessThan(gl_FragCoord.xy, rect.zw));
     share = all(within) ? share : 0.0;
+#endif
+#ifdef CONTACT_LINES
+    share *= takes_side(texelFetch(contact_words, ivec2(gl_FragCoord.xy), 0).x, side);
 #endif
 #ifdef ONE_COLOUR
     // No sweep: a Gaussian cut at three standard deviations, which holds 0.9973 of it.

@@ -14,6 +14,10 @@ layout(local_size_x = 64) in;
 #ifdef HAS_GRATING
 #include "lib/grating.glsl"
 #endif
+#ifdef ROUGH_SURFACES
+#include "lib/footprint.glsl"
+#include "lib/rough_surface.glsl"
+#endif
 
 // Narrower bands are not cut at total internal reflection.
 #define MIN_CUT_BAND 1e-4
@@ -22,7 +26,8 @@ layout(local_size_x = 64) in;
 // Bits of `flags` from which on the order of a grating stands that is to be sent on next.
 #define ORDER_BIT 8
 
-#ifdef NORMAL_DERIVATIVES
+#if defined(NORMAL_DERIVATIVES) || defined(LOBE_COLUMNS)
+#define HAS_NORMAL_COLUMNS
 // Derivatives of the shading normal by the ray's columns.
 vec3 normal_columns[COLUMNS];
 #define NORMAL_COLUMN(c) normal_columns[c]
@@ -31,6 +36,10 @@ vec3 normal_columns[COLUMNS];
 #endif
 #ifdef POLARISED
 #include "light/trace_polarisation.glsl"
+#endif
+#ifdef ROUGH_SURFACES
+// Width of GGX of the object that a ray has met; 0: it is polished.
+float surface_width;
 #endif
 
 // What a weight at each of the three places adds to the integral of the weights, straight between them, times the density whose running integral
@@ -95,8 +104,11 @@ void absorb(inout RayRecord ray, float distance, inout float absorbed_w)
 }
 #endif
 
+#include "light/trace_bands.glsl"
+#include "light/trace_rough.glsl"
+
 // A photon on a receiver. The share that no specular event precedes the camera pass draws.
-void land(inout RayRecord ray, uint receiver, uint triangle, float cosine, uint slot, inout Outcome outcome)
+void land(inout RayRecord ray, uint receiver, uint triangle, vec3 normal_g, uint slot, inout Outcome outcome)
 {
     outcome.what |= ray.depth == 0u ? DIRECT : DEPOSITED;
     outcome.flux_w = carried_w(ray);
@@ -109,6 +121,10 @@ void land(inout RayRecord ray, uint receiver, uint triangle, float cosine, uint 
 #ifdef FOOTPRINTS
     photon.dposition_ds = ray.dposition[0].xyz * ray.footprint_scale;
     photon.dposition_dt = ray.dposition[1].xyz * ray.footprint_scale;
+#endif
+    uint lattice_bits = p.lattice_bits;
+#ifdef LOBE_COLUMNS
+    if (widen_by_lobe(ray, normal_g, photon.dposition_ds, photon.dposition_dt)) lattice_bits = 0u;
 #endif
     photon.x_lo = ray.x_lo;
     photon.x_hi = ray.x_hi;
@@ -124,7 +140,7 @@ void land(inout RayRecord ray, uint receiver, uint triangle, float cosine, uint 
     photon.light_and_source = ray.light_and_source;
     photon.branch_key = ray.branch_key;
     photon.depth = ray.depth;
-    photon.cosine = cosine;
+    photon.cosine = abs(dot(ray.direction, normal_g));
 #if SPECTRAL_GROUPS > 0
     SPECTRAL_COPY
 #endif
@@ -139,12 +155,10 @@ void land(inout RayRecord ray, uint receiver, uint triangle, float cosine, uint 
         ray.flags |= FLAG_FOOTPRINT_DROPPED;
         outcome.what |= FELL_FOOTPRINT;
     }
-    photon.flags = (ray.flags & FLAG_FOOTPRINT_DROPPED) | p.lattice_bits;
+    photon.flags = (ray.flags & FLAG_FOOTPRINT_DROPPED) | lattice_bits;
     store_photon(slot, photon);
     outcome.what |= LEFT_PHOTON;
 }
-
-#include "light/trace_bands.glsl"
 
 // A ray that goes on from what it has hit, on that object's inner side or not.
 RayRecord child_of(RayRecord ray, Hit hit, bool inside)
@@ -162,6 +176,10 @@ void send_on(inout RayRecord child, Deflection turned, vec3 share, inout Outcome
     child.direction = turned.direction;
     child.flux_w *= share.y;
     child.throughput *= share;
+#ifdef ROUGH_SURFACES
+    // Behind a microfacet that is no fall-back but shadow.
+    if (surface_width > 0.0) return;
+#endif
     outcome.what |= turned.geometric ? FELL_NORMAL : 0u;
 }
 
@@ -178,6 +196,11 @@ void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint k
 
 #ifdef NORMAL_DERIVATIVES
     for (int c = 0; c < COLUMNS; ++c) normal_columns[c] = normal_column(frame, ray.dposition[c].xyz);
+#elif defined(HAS_NORMAL_COLUMNS)
+    for (int c = 0; c < COLUMNS; ++c) normal_columns[c] = vec3(0.0);
+#endif
+#ifdef ROUGH_SURFACES
+    RoughPlace rough = meet_microfacet(ray, frame);
 #endif
     RayRecord child = child_of(ray, hit, !entering);
     bool lives = false;
@@ -241,6 +264,10 @@ void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint k
     reflectance = vec3(reflectance.y);
 #endif
     // Where only the facet's normal forbids it, nothing is transmitted at any wavelength; at total reflection each has its own share.
+#ifdef ROUGH_SURFACES
+    // A microfacet's share is its own, also where the light that it lets through does not leave the surface.
+    if (rough.width <= 0.0)
+#endif
     if (!refracted.exists && cosine2.y > 0.0) reflectance = vec3(1.0);
     float reflected_share = reflectance.y, refracted_share = 1.0 - reflectance.y;
 #ifdef HERO
@@ -253,6 +280,9 @@ void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint k
     vec3 companion_reflectance = polarised_share(companions_seen, companion_reflection);
 #else
     vec3 companion_reflectance = fresnel_reflectance(theta, companion_eta, transmitted_cosine2(theta, companion_eta));
+#endif
+#ifdef ROUGH_SURFACES
+    if (rough.width <= 0.0)
 #endif
     if (!refracted.exists && cosine2.y > 0.0) companion_reflectance = vec3(1.0);
     reflected_share = common_share(ray, reflectance.y, companion_reflectance);
@@ -279,6 +309,11 @@ void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint k
 #endif
     if (splits) {
         send_on(child, reflected, reflectance, outcome);
+#ifdef ROUGH_SURFACES
+        // What neither of both parts has in the end, the surface keeps.
+        if (rough.width > 0.0) outcome.absorbed_w += carried_w(ray);
+        shadow(rough, child, reflected, 1.0, reflected_share, outcome);
+#endif
 #ifdef POLARISED
         polarise(child, seen, reflection, s);
 #ifdef HERO
@@ -361,10 +396,13 @@ void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint k
         for (int c = 0; c < COLUMNS; ++c) {
             float deta_it = 0.0;
 #if SPECTRAL_GROUPS > 0
-            if (c >= SPATIAL) deta_it = index_ratio_derivative(boundary, uint(c - SPATIAL), x_anchor, n_i.y, n_t.y);
+            if (c >= SPATIAL && c < LOBE) deta_it = index_ratio_derivative(boundary, uint(c - SPATIAL), x_anchor, n_i.y, n_t.y);
 #endif
             child.ddirection[c].xyz = refracted_column(refracted, incident, ray.ddirection[c].xyz, NORMAL_COLUMN(c), n_i.y / n_t.y, deta_it);
         }
+#endif
+#ifdef ROUGH_SURFACES
+        shadow(rough, child, refracted, -1.0, refracted_share, outcome);
 #endif
         lives = survives(child, outcome.roulette_w, refracted_share, 2u);
     }
@@ -414,6 +452,9 @@ void main()
 #ifdef ABSORPTION
     if (met) absorb(ray, hit.distance, outcome.absorbed_w);
 #endif
+#ifdef ROUGH_SURFACES
+    surface_width = kind == KIND_DIELECTRIC ? thing.colour.x : 0.0;
+#endif
     if (met) ray.position = surface_point(hit, facet, ray.position, ray.direction);
 #if COLUMNS > 0
     for (int c = 0; c < COLUMNS; ++c)
@@ -426,7 +467,7 @@ void main()
     } else
 #endif
     if (kind == KIND_DIFFUSE) {
-        land(ray, thing.receiver, facet.source, abs(dot(ray.direction, hit.normal_g)), k, outcome);
+        land(ray, thing.receiver, facet.source, hit.normal_g, k, outcome);
     } else if (kind == KIND_BLACK) {
         outcome.what |= ABSORBED;
         outcome.flux_w = carried_w(ray);

@@ -81,7 +81,7 @@ bool diffract(RayRecord ray, Hit hit, ShadingFrame frame, uint row, inout RayRec
     for (int c = 0; c < COLUMNS; ++c) {
         float dstep = 0.0;
 #if SPECTRAL_GROUPS > 0
-        if (c >= SPATIAL) dstep = order_step_derivative(order, hit.object, medium, uint(c - SPATIAL), ray.x_anchor);
+        if (c >= SPATIAL && c < LOBE) dstep = order_step_derivative(order, hit.object, medium, uint(c - SPATIAL), ray.x_anchor);
 #endif
         child.ddirection[c].xyz = diffracted_column(turned, ray.direction, ray.ddirection[c].xyz, NORMAL_COLUMN(c), grating.lines, side, steps.y, dstep, order.reflects != 0u);
     }

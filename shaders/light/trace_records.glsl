@@ -32,6 +32,8 @@ layout(std430, binding = BIND_STATE) readonly restrict buffer StateBlock { Queue
 #else
 #define SPATIAL 0
 #endif
+// Columns after the spectral ones: how far microfacets of rough surfaces spread light.
+#define LOBE (SPATIAL + SPECTRAL_GROUPS)
 
 RayRecord load_ray(uint slot)
 {

@@ -72,7 +72,7 @@ def test_a_baseline_is_rendered_with_any_kernel(gl: Any, prism: Scene) -> None:
     finally:
         rig.release()
     assert np.allclose(again, narrow, rtol=1e-5, atol=1e-6 * narrow.max())
-    assert wide.max() < 0.9 * narrow.max()
+    assert (wide**2).mean() < 0.95 * (narrow**2).mean()
     for method in ("srd", "stochastic-point"):
         rig = MethodRig(gl, prism, method, WIDTH, HEIGHT)
         rig.release()

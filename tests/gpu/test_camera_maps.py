@@ -178,6 +178,24 @@ def test_spectral_bins(gl):
     assert camera_pass.read_rgb().shape == (16, 16, 3)
 
 
+def test_spectra_of_less_light_than_none_keep_the_colour_of_the_map(gl):
+    """Where splats cancel, some channels of a texel's spectrum are negative and their sum is anything. Shares of
+    it that were quotients of such sums put 1e30 into `wine_glass`."""
+    tents = MapChannels(tents_nm=tuple(np.linspace(400.0, 700.0, 4)))
+    pane = SceneObject("pane", primitives.box((9.0, 9.0, 0.5)), Dielectric(glass.from_abbe(1.0005, 20.0)), at(0, 0, 1))
+    camera_pass = opened_camera_pass(gl, [floor(), pane], channels=tents)
+    pictures = []
+    for watts in ([0.01] * 4, [0.01, -0.08, 0.03, 0.02], [0.01, -0.02, 0.0103, 0.0], [-0.01] * 4):
+        texels = np.concatenate([white_texels(np.full((4, 4), 3.0)), np.full((4, 4, 4), watts)], axis=-1)
+        maps = flat_maps(gl, camera_pass.scene, [(-2, -2, 4.0, 0, 0, 4)], texels)
+        camera_pass.run(ABOVE, 16, 16, 2, maps=maps)
+        pictures.append(camera_pass.read_rgb()[4:12, 4:12])
+    released(camera_pass)
+    assert pictures[0].mean() == pytest.approx(3.0 * REFLECTANCE / np.pi, rel=0.01)
+    for picture in pictures[1:]:
+        assert picture == pytest.approx(pictures[0], rel=0.01)
+
+
 @pytest.mark.parametrize("shown", ["background", "light"])
 def test_a_bin_is_shown_in_its_own_colour(gl, shown):
     """White light cut into 32 bins is still white: each bin's colour is that of its own waves."""

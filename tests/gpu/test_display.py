@@ -26,6 +26,15 @@ COVERS = {
         "srgb_encode",
         "signed_error",
     ),
+    "highlights.glsl": (
+        "exposed_norm",
+        "seen_norm",
+        "step_flatness",
+        "find_step",
+        "step_share",
+        "step_weight",
+        "step_factor",
+    ),
 }
 COUNT = 4096
 
@@ -66,6 +75,122 @@ def test_each_tone_function_has_its_twin(gl) -> None:
     want = tone.signed_error(rgb, other, floor_value)
     sure = np.abs(tone.luminance_709(rgb - other)) > 1e-5 * np.abs(rgb - other).max(axis=1)
     assert (np.abs(got["error"] - want)[sure] <= 1e-5 * np.abs(want[sure]) + 1e-6).all()
+
+
+def test_each_function_of_highlights_has_its_twin(gl) -> None:
+    """Five pixels on a line each; the brighter side above white and below, flat and not."""
+    rng = np.random.default_rng(6)
+    base = 2.0 ** rng.uniform(-3, 5, (5, COUNT, 1))
+    base[:, : COUNT // 2].sort(axis=0)  # half of the lines rise
+    line = as_f32(base * rng.uniform(0.6, 1.4, (5, COUNT, 3)))
+    inputs = dict(zip(("before2", "before", "pixel", "after", "after2"), line, strict=True))
+    body = """
+    PixelStep s = PixelStep(pixel, pixel, 0.0, 0.0, 0.0); find_step(s, pixel, before2, before, after, after2);
+    bright = s.bright; dark = s.dark; contrast = s.contrast; norm = exposed_norm(pixel);
+    seen = seen_norm(norm); flatness = step_flatness(after.r - before.r, pixel.r);
+    share = step_share(s, norm); weight = step_weight(s);
+    vec3 mixture = tone_spectrasplat(mix(dark, bright, share));
+    factor = step_factor(tone_spectrasplat(bright), tone_spectrasplat(dark), mixture, share, weight);
+    """
+    outputs = dict.fromkeys(("contrast", "norm", "seen", "flatness", "share", "weight"), "float")
+    outputs |= dict.fromkeys(("bright", "dark", "factor"), "vec3")
+    got = evaluate(gl.ctx, ["lib/tone.glsl", "lib/highlights.glsl"], body, inputs, outputs)
+    before2, before, pixel, after, after2 = line.astype(float)
+    assert np.abs(got["norm"] / tone.exposed_norm(pixel) - 1.0).max() < 1e-5
+    assert np.abs(got["seen"] - 1.0 + 1.0 / (1.0 + tone.exposed_norm(pixel))).max() < 1e-5
+    want = 1.0 - np.clip(4.0 * np.maximum(after - before, 0.0)[:, 0] / pixel[:, 0], 0.0, 1.0)
+    assert np.abs(got["flatness"] - want).max() < 1e-5
+    steps = 0
+    for i in range(COUNT):
+        step = tone.step_between(pixel[i], (before[i], before2[i]), (after[i], after2[i]))
+        if step is None or step.contrast <= 1e-4 or step.high - step.low < 1e-3:
+            assert got["contrast"][i] < 1e-3
+            continue
+        steps += 1
+        own = float(tone.exposed_norm(pixel[i]))
+        share = np.clip((own - step.low) / (step.high - step.low), 0.0, 1.0)
+        assert got["contrast"][i] == pytest.approx(step.contrast, abs=1e-5)
+        assert got["share"][i] == pytest.approx(share, abs=1e-3) and got["weight"][i] == pytest.approx(
+            step.weight, abs=1e-3
+        )
+        assert got["bright"][i] == pytest.approx(step.bright, rel=1e-3) and got["dark"][i] == pytest.approx(
+            step.dark, rel=1e-3
+        )
+        bright, dark, mixture = (
+            tone.tone_spectrasplat(c) for c in (step.bright, step.dark, share * step.bright + (1 - share) * step.dark)
+        )
+        straight = share * bright + (1 - share) * dark
+        factor = 1.0 + step.weight * (np.minimum(straight / mixture, 1.0) - 1.0)
+        assert got["factor"][i] == pytest.approx(factor, abs=3e-3)
+    assert steps > COUNT // 5
+
+
+def overexposed_edges(size: tuple[int, int] = (48, 40)) -> np.ndarray:
+    """(H, W, 3): a beam twenty times white across dark paper, a coloured one, a glint, a soft glow, and colours at
+    random: every pixel the mean of 8 by 8 points."""
+    width, height = size
+    y, x = np.mgrid[0 : 8 * height, 0 : 8 * width] / 8.0
+    rgb = np.full((*x.shape, 3), 0.12)
+    rgb[np.abs(y - 6.0 - 0.23 * x) < 1.7] = 20.0
+    rgb[np.abs(y + 0.6 * x - 33.0) < 1.2] = (0.1, 9.0, 2.0)
+    rgb[(x - 40.3) ** 2 + (y - 5.4) ** 2 < 0.8] = 300.0
+    rgb += 6.0 * np.exp(-((x - 37.0) ** 2 + (y - 31.0) ** 2) / 20.0)[..., None] * np.array([1.0, 0.6, 0.2])
+    rgb = rgb.reshape(height, 8, width, 8, 3).mean(axis=(1, 3))
+    rgb[-8:, :10] = 2.0 ** np.random.default_rng(8).uniform(-3, 4, (8, 10, 1)) * (1.0, 0.7, 0.5)
+    return rgb.astype(np.float32)
+
+
+@pytest.mark.parametrize("name", ["spectrasplat", "aces", "reinhard", "linear"])
+def test_highlights_are_antialiased_alike_in_window_files_and_float64(gl, display, name: str) -> None:
+    curve = {"aces": tone.tone_aces, "reinhard": tone.tone_reinhard, "linear": lambda rgb: np.clip(rgb, 0, 1)}
+    rgb = overexposed_edges()
+    rgb[12, 20] = np.nan
+    source, settings = texture_of(gl, rgb), Settings(tone=name)
+    size = (rgb.shape[1], rgb.shape[0])
+    shown = codes(display.run(source, settings, 0.5, size, antialias=True)).astype(int)
+    plain = codes(display.run(source, settings, 0.5, size)).astype(int)
+    magnified = codes(display.magnify(source, (9, 8), settings, 0.5, zoom=3, pixels=7, antialias=True)).astype(int)
+    source.release()
+    clean = np.where(np.isfinite(rgb), rgb, 0.0).astype(float) * 2.0**0.5
+    want = 255 * tone.srgb_encode(tone.antialiased(clean, curve.get(name, tone.tone_spectrasplat)))
+    want[12, 20] = 255, 0, 255
+    assert np.abs(shown - want).max() <= 1.5
+    if name == "spectrasplat":
+        assert np.abs(shown - tone_map.tone_map_8bit(rgb, 0.5, antialias=True)).max() <= 1
+        assert (plain - shown).max() > 60
+    assert (magnified[1::3, 1::3] == shown[5:12, 6:13]).all()
+
+
+@pytest.mark.parametrize("size", [(48, 40), (24, 20), (96, 80)])
+def test_highlights_of_pictures_of_other_sizes(gl, display, size: tuple[int, int]) -> None:
+    """Shrunk: as the shrunk picture's own, to the pixel. Enlarged: something is smoothed, at edges only, and no pixel
+    becomes brighter."""
+    rgb = overexposed_edges()
+    source = texture_of(gl, rgb)
+    plain, shown = (
+        codes(display.run(source, Settings(), 0.0, size, antialias=antialias)).astype(int)
+        for antialias in (False, True)
+    )
+    source.release()
+    if size[0] <= rgb.shape[1]:
+        k = rgb.shape[1] // size[0]
+        small = rgb.reshape(size[1], k, size[0], k, 3).mean(axis=(1, 3))
+        assert np.abs(shown - tone_map.tone_map_8bit(small, 0.0, antialias=True)).max() <= 1
+    assert (shown <= plain).all() and 0.02 < (shown < plain - 10).any(axis=-1).mean() < 0.3
+
+
+def test_false_colour_and_errors_are_not_antialiased(gl, display) -> None:
+    rgb = overexposed_edges()
+    source, other = texture_of(gl, rgb), texture_of(gl, rgb[::-1])
+    size = (rgb.shape[1], rgb.shape[0])
+    for settings, compare in ((Settings(false_colour=True), None), (Settings(), Compare(mode="error"))):
+        pair = [
+            codes(display.run(source, settings, 0.0, size, other if compare else None, compare, antialias)).copy()
+            for antialias in (False, True)
+        ]
+        assert (pair[0] == pair[1]).all()
+    source.release()
+    other.release()
 
 
 @pytest.fixture

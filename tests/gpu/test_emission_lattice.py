@@ -16,6 +16,8 @@ COVERS = {
 }
 COUNTS = (7, 64, 400, 1000, 1500, 2600, 33_333, 65_536, 1_000_003, 16_000_001)
 RATIO = GOLDEN / 2.0**32
+NEEDLES = 600
+"""A hundredth of them threw less light than none."""
 
 
 def reduced(basis: np.ndarray) -> np.ndarray:
@@ -80,8 +82,9 @@ def test_flatness_is_one_less_three_waves(gl) -> None:
 
 @pytest.mark.parametrize("sweep", [0, 3, 30])
 def test_splats_about_a_lattice_add_up_to_an_even_plane(gl, sweep: int) -> None:
-    """Deviation of luminance from its mean: 3.5 to 4 % of Gaussians of 0.45 spacings, a tenth of that as they are
-    drawn. Where a sweep is as long as a spacing it is the whole spectrum's that is uneven, and half of it is left."""
+    """Deviation of luminance from its mean: 3.5 to 4 % of Gaussians of 0.45 spacings, a fifth of that as they are
+    drawn, of 0.4. Where a sweep is as long as a spacing it is the whole spectrum's that is uneven, and half of it is
+    left."""
     size, worst = 128, 0.0
     rig = Rig(gl.ctx, SplatFeatures(), size=(size, size))
     sides = np.array([[100.0, 30.0], [-20.0, 90.0]])
@@ -99,5 +102,21 @@ def test_splats_about_a_lattice_add_up_to_an_even_plane(gl, sweep: int) -> None:
             ripple.append(inner.std() / inner.mean())
             assert inner.mean() == pytest.approx(rig.light.xyz()[1] * count / abs(np.linalg.det(sides)), rel=3e-3)
         worst = max(worst, ripple[1] / ripple[0])
-        assert sweep > 0 or (ripple[0] > 0.03 and ripple[1] < 0.006)
-    assert worst < {0: 0.16, 3: 0.6, 30: 1.02}[sweep]
+        assert sweep > 0 or (ripple[0] > 0.03 and ripple[1] < 0.009)
+    assert worst < {0: 0.2, 3: 0.6, 30: 1.02}[sweep]
+
+
+def test_needles_throw_no_less_light_than_none(gl) -> None:
+    """Footprints ten thousand texels long: float32 does not know how wide they are, nor what waves run across them. For
+    such waves more was taken off than is there: in `wine_glass` a streak of texels with minus a thousand times the
+    light round them."""
+    rng, rig = np.random.default_rng(2), Rig(gl.ctx, SplatFeatures(), size=(96, 96))
+    for _ in range(NEEDLES):
+        turn, length = rng.uniform(0.0, np.pi), 10.0 ** rng.uniform(4.0, 4.5)
+        along = length * np.array([np.cos(turn), np.sin(turn)])
+        aside = length * 10.0 ** rng.uniform(-5.0, -3.0) * np.array([-np.sin(turn), np.cos(turn)])
+        side_s, side_t = along + rng.normal() * aside, rng.uniform(-1.0, 1.0) * along + rng.normal() * aside
+        needle = photons(SplatFeatures(), np.array([[48.0, 48.0]]), side_s, side_t)
+        needle["flags"] = int(rng.choice([50, 1000, 30_000, 200_000])) << LATTICE_BIT
+        shown = rig.draw(needle, smoothing=0.45)[..., 1]
+        assert shown.min() >= -1e-6 * shown.max()

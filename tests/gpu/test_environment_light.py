@@ -180,7 +180,7 @@ MUTANTS = {
         "float(dot(toward, place.normal) > 0.0)",
     ),
     "visibility": ("light/environment.comp", "reaches = !intersect_any", "reaches = intersect_any"),
-    "pi": ("camera/environment_light.glsl", "seen.reflectance * INVERSE_PI", "seen.reflectance"),
+    "pi": ("camera/receiver_light.glsl", "seen.reflectance * INVERSE_PI", "seen.reflectance"),
 }
 
 

@@ -54,7 +54,7 @@ class First:
     def claimed(self, index: int) -> AbstractContextManager[bool]:
         return nullcontext(True)
 
-    def develop(self, rgb: np.ndarray, exposure_ev: float) -> np.ndarray:
+    def develop(self, rgb: np.ndarray, exposure_ev: float, antialias: bool) -> np.ndarray:
         self.rgb = rgb if self.rgb is None else self.rgb
         return np.zeros(rgb.shape, np.uint8)
 
@@ -127,6 +127,26 @@ def test_a_stop_while_tracing_still_gives_a_picture(gl: Context) -> None:
     assert 50_000 < result.stats.photons < 200_000
     assert result.stats.camera_pass.samples == 1 and result.rgb.max() > 0.0
     assert [share for share, _ in told] == sorted(share for share, _ in told)
+
+
+@pytest.mark.parametrize("name", ["prism", "brilliant"])
+def test_a_stop_before_the_first_camera_sample_waits_for_it(gl: Context, name: str) -> None:
+    """While a survey looks at the picture and while beams are drawn no pixel has a sample: what was written was
+    black."""
+    scene = load_scene(assets_dir() / "scenes" / f"{name}.toml")
+    settings = RenderSettings(width=64, height=36, photons=20_000, spp=16)
+    told: list[tuple[float, str]] = []
+    result = render(
+        scene,
+        settings,
+        progress=lambda share, text: told.append((share, text)),
+        cancelled=lambda: told[-1][1] == "taking camera samples",
+        context=gl,
+    )
+    camera = result.stats.camera_pass
+    assert 1 <= camera.samples < 16
+    assert camera.samples >= min(camera.spectrum.bands, 16)
+    assert (result.rgb.max(axis=(1, 2)) > 0.0).mean() > 0.5
 
 
 # Ten per cent is for a machine that has nothing else to do (slow: alone, without other tests beside it).

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
+COVERS = {"footprint.glsl": ("box_of_covariance", "box_of_three")}
 COUNT = 4096
 
 
@@ -21,7 +22,7 @@ def test_the_box_of_three_sides_has_their_covariance(gl) -> None:
     sides = as_f32(sides)
     body = "vec2 first, second; box_of_three(a, b, c, first, second); longer = first; shorter = second;"
     inputs = {"a": sides[:, 0], "b": sides[:, 1], "c": sides[:, 2]}
-    got = evaluate(gl.ctx, ["camera/footprint.glsl"], body, inputs, {"longer": "vec2", "shorter": "vec2"})
+    got = evaluate(gl.ctx, ["lib/footprint.glsl"], body, inputs, {"longer": "vec2", "shorter": "vec2"})
     longer, shorter = got["longer"], got["shorter"]
     assert np.isfinite(longer).all() and np.isfinite(shorter).all()
     want = np.einsum("nki,nkj->nij", sides, sides)

@@ -226,6 +226,13 @@ def test_batches_do_not_show(gl, original: np.ndarray) -> None:
     assert difference(picture(gl, scene(), batch=8192), original) < EXACT
 
 
+def test_batches_do_not_show_in_passes_that_grow(gl) -> None:
+    """Borders of bands, shifts and weights of `progressive`'s passes depend on the photons asked for only."""
+    whole = picture(gl, scene(), method="progressive", photons=60_000)
+    assert difference(picture(gl, scene(), method="progressive", photons=60_000, batch=8192), whole) < EXACT
+    assert difference(picture(gl, scene(), method="progressive", photons=60_000, seed=2), whole) > EXACT
+
+
 @pytest.mark.parametrize(
     "change",
     [pytest.param(subdivided, marks=SLOW), unwelded, pytest.param(shuffled, marks=SLOW)],

@@ -7,15 +7,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from spectrasplat.model.geometry.primitives import box
+from spectrasplat.beams import light_beams
+from spectrasplat.model.geometry.primitives import box, plane
 from spectrasplat.model.lights import AreaLight, PointLight
 from spectrasplat.model.optics.glass import constant
 from spectrasplat.model.optics.spectrum import illuminant
-from spectrasplat.model.scene import Light, Scene
+from spectrasplat.model.scene import Diffuse, Light, Scene, SceneObject
+from spectrasplat.model.scene_checks import contains
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.render.still import render
 from spectrasplat.stress.cases.contact_cases import plates
-from spectrasplat.stress.rigs.scene_parts import BEAM, solid, stage
+from spectrasplat.stress.rigs.probe import SMALL, probe
+from spectrasplat.stress.rigs.scene_parts import BEAM, solid, stage, turn
 
 TOP = 1.0
 HEIGHTS = (0.0, 1e-7)
@@ -51,9 +54,50 @@ def test_a_point_on_a_face_lights_what_one_just_above_does(gl, method: str) -> N
     assert landed[1] == pytest.approx(landed[0], rel=0.05)
 
 
-def test_the_tail_of_glass_without_dispersion_stays_in_the_bands_of_photons(gl) -> None:
+@pytest.mark.parametrize("method", ["srd", "srd-photons"])
+def test_a_beam_from_the_underside_of_a_plate_passes_both_faces(gl, method: str) -> None:
+    """As from its top: which way a face looks makes a light on it neither inside nor outside."""
+    block = solid("block", box((1.6, 1.6, 0.6)), constant(1.5, "n 1.5"), (0.0, 0.0, 1.5))
+    up = replace(BEAM, position=(0.0, 0.0, 1.5 - 0.3), direction=(0.0, 0.0, 1.0), radius=0.3)
+    place = np.eye(4)
+    place[2, 3] = 3.0
+    scene = stage(block, lights=[up], table=SceneObject("ceiling", plane(20.0, 20.0), Diffuse(), place))
+    tally = render(scene, replace(SETTINGS, method=method), context=gl).stats.light.tally
+    assert tally.ended["deposited"] / tally.emitted == pytest.approx(plates([1.5]), abs=2e-3)
+
+
+@pytest.mark.parametrize("turned", [0.0, 25.0])
+def test_a_point_on_any_face_is_outside_and_one_below_it_inside(turned: float) -> None:
+    item = solid("block", box((1.6, 1.2, 0.6)), constant(1.5, "n 1.5"))
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = turn((1.0, 0.4, 0.2), turned), (0.1, -0.2, 1.7)
+    item = replace(item, object_to_world=matrix)
+    for axis, half in enumerate((0.8, 0.6, 0.3)):
+        for side in (-1.0, 1.0):
+            for depth, inside in ((0.0, False), (1e-6, True), (-1e-6, False)):
+                local = np.array([0.11, 0.07, 0.05])
+                local[axis] = side * (half - depth)
+                assert contains(item, matrix[:3, :3] @ local + matrix[:3, 3]) == inside, (axis, side, depth)
+
+
+@pytest.mark.parametrize(("height", "radius", "by_beams"), [(0.5, 0.3, False), (0.62, 0.3, True), (0.4, 0.1, True)])
+def test_maps_hold_what_lands_of_a_lamp_near_a_face(gl, height: float, radius: float, by_beams: bool) -> None:
+    """A panel half a unit above a block drew 11 % more by beams than landed: their penumbrae were wider than they, and
+    where facets reach far aside the light was cut along the sides of a cube."""
+    scene = on_block(AreaLight("panel", WHITE, (0.0, 0.0, TOP + height), (0.0, 0.0, -1.0), radius=radius))
+    found, photons = (
+        probe(gl, scene, replace(SMALL, method=method, layer="caustic", photons=20_000))
+        for method in ("srd", "srd-photons")
+    )
+    assert (found.stats.polygons_w > 0.0) == by_beams
+    assert found.map_error < 3e-3
+    assert found.picture.sum() == pytest.approx(photons.picture.sum(), rel=0.01)
+
+
+def test_the_tail_of_glass_without_dispersion_stays_in_the_bands_of_photons(gl, monkeypatch) -> None:
     """Beams from an area light close to a face end with corners that rounding decides; a band halved for that had no
     photons to carry it."""
+    monkeypatch.setattr(light_beams, "is_beside_facets", lambda *_: False)
     scene = on_block(AreaLight("panel", WHITE, (0.0, 0.0, TOP + 1e-3), (0.0, 0.0, -1.0), radius=0.3))
     result = render(scene, replace(SETTINGS, photons=1024), context=gl)
     assert np.isfinite(result.rgb).all() and result.stats.light.tally.handed > 0.0

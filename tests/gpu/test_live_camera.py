@@ -264,6 +264,12 @@ def seen_objects(engine: LiveEngine) -> np.ndarray:
     return np.frombuffer(texture.read(), np.uint32).reshape(texture.height, texture.width, 2)[..., 1]
 
 
+def glass_of(table: Scene) -> int:
+    """The prism, of the two things that there are."""
+    assert len(table.objects) == 2
+    return next(i for i, o in enumerate(table.objects) if o.material.is_specular)
+
+
 def one_sample(engine: LiveEngine, camera: Camera) -> np.ndarray:
     """The picture of one whole sample in every pixel's middle."""
     view = engine._camera_pass._pass
@@ -304,6 +310,30 @@ def test_in_motion_what_is_seen_directly_is_as_sharp_as_ever(
     # Nothing of the glass is missing, and no pixel of it is black where the whole sample is not.
     glass = ~on_table
     assert glass.sum() > 100 and (shown[glass].sum(axis=-1) > 0).mean() > 0.95
+
+
+@pytest.mark.parametrize("size", [(161, 89), (158, 91)])
+def test_in_motion_the_last_rows_and_columns_are_as_sharp_as_the_others(
+    engine: LiveEngine, table: Scene, size: tuple[int, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Pictures whose sides are no multiples of the lattice's cells."""
+    monkeypatch.setattr("spectrasplat.render.viewer.live_camera.STEPS", (24,))
+    monkeypatch.setattr("spectrasplat.render.viewer.live_camera.SCALES", (1.0,))
+    wanted = replace(inputs(table), width=size[0], height=size[1])
+    settle(engine, wanted)
+    camera = replace(table.camera, position=tuple(np.add(table.camera.position, (0.3, 0.1, 0.0))))
+    engine.set(replace(wanted, camera=camera))
+    engine.advance(5.0, interacting=True)
+    shown, on_table = picture(engine), seen_objects(engine) == 1 - glass_of(table)
+    view = engine._camera_pass._pass
+    view.primary_samples, view.max_taps, view.spectrum = 1, MOVING_TAPS, Spectrum(1)
+    view.run(camera, *size, 1, 0, engine._maps)
+    expected = view.read_rgb().astype(float)
+    edge = np.zeros_like(on_table)
+    edge[-3:], edge[:, -3:] = True, True
+    where = edge & on_table
+    assert where.sum() > 100
+    assert np.abs(shown - expected)[where].mean() < 0.03 * expected[where].mean()
 
 
 def test_once_still_glass_becomes_finer_until_every_pixel_has_its_own_path(

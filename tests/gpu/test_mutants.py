@@ -54,8 +54,8 @@ MUTANTS = {
     ),
     "a lattice's ripple left in the splats": Mutant(
         "light/splat_shapes.glsl",
-        "splat.ripple[i] = 2.0 * heights[i]",
-        "splat.ripple[i] = 0.0 * heights[i]",
+        "splat.ripple = vec4(taken * kept, 0.0);",
+        "splat.ripple = vec4(0.0);",
         "gpu/test_emission_lattice.py::test_splats_about_a_lattice_add_up_to_an_even_plane[0]",
     ),
     "what is refracted was reflected as well": Mutant(

@@ -53,6 +53,11 @@ def test_all_that_was_emitted_is_drawn_or_accounted_for_where_reflection_is_tota
     assert abs(found.held) < 1e-3
 
 
+def test_maps_hold_what_beams_of_a_lamp_throw(gl) -> None:
+    """Through a slit and a prism, whose image is two to four texels wide and swept over hundreds."""
+    assert abs(balance(gl, "prism_case", "srd").held) < 5e-4
+
+
 @pytest.mark.parametrize("method", ["stochastic-even", "hero", "srd-lambda"])
 def test_single_wavelengths_are_drawn_with_the_power_that_landed(gl, method: str) -> None:
     found = balance(gl, "prism", method)

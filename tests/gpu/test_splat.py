@@ -73,6 +73,15 @@ def test_shape_of_resolved_splats_matches_quadrature(rig: Rig, case: int) -> Non
     assert image.sum(axis=(0, 1)) == pytest.approx(reference.sum(axis=(0, 1)), rel=8e-3)
 
 
+@pytest.mark.parametrize("long_axis", [0.02, 1.0])
+def test_light_thin_along_its_sweep_stays_in_its_texels(cut_rig: Rig, long_axis: float) -> None:
+    """A focus that a band sweeps over eight tenths of a texel lies in that column of texels; sampled at their middles,
+    a sixth of it lay in the two beside."""
+    image = cut_rig.draw(photons(CUTS, np.array([32.5, 32.5]), (0.02, 0.0), (0.0, long_axis), (0.8, 0.0)))
+    assert image[:, 32].sum(axis=0) == pytest.approx(image.sum(axis=(0, 1)), rel=0.01)
+    assert image.sum(axis=(0, 1)) == pytest.approx(xyzw(cut_rig.light), rel=8e-3)
+
+
 @pytest.mark.parametrize(("angle_deg", "limit"), [(0.0, 0.02), (20.0, 0.06), (45.0, 0.06), (80.0, 0.06)])
 def test_thin_line_keeps_its_width(rig: Rig, angle_deg: float, limit: float) -> None:
     axes = frame(np.radians(angle_deg), 3.0, 0.15)

@@ -116,8 +116,8 @@ MUTANTS = {
     "branches put away and forgotten": (
         "eye-shells",
         "camera/camera.comp",
-        "pending_path = mirrored;\n        pushes_path = true;",
-        "",
+        "        pending_path = mirrored;\n",
+        "        pushes_path = false;\n",
         "energy",
     ),
     "leaving taken for entering": (

@@ -12,9 +12,11 @@ from spectrasplat.edit.lessons import lesson
 from spectrasplat.edit.projection import View
 from spectrasplat.edit.state import Selection
 from spectrasplat.gpu.context import Context
+from spectrasplat.ui.frame import run_frame
 from spectrasplat.ui.ray_labels import labelled
 from spectrasplat.ui.ray_overlay import RayOverlay
 from spectrasplat.ui.session import Session
+from spectrasplat.ui.view_model_builder import view_model_of
 
 from tests.interface.fake_engine import FakeEngine
 from tests.interface.shell_rig import ShellRig
@@ -45,6 +47,41 @@ def test_a_lesson_selects_what_it_is_about_and_says_the_next(gl: Context) -> Non
         rig.click("Next: The rainbow drop")
         rig.frame(2)
         assert rig.asked[-1] == requests.OpenLesson("rainbow_drop")
+
+
+def test_nobody_is_asked_for_glass_where_a_grating_parts_the_light(gl: Context) -> None:
+    session = Session(gl, make_engine=FakeEngine)
+    session.show_lesson(lesson("spectrometer"))
+    state = session.state
+    session.autosave.close()
+    session.release()
+    with ShellRig(gl, state) as rig:
+        assert "Window: opened" not in rig.items.items
+
+
+def test_no_other_scenes_picture_lies_below_a_lesson_that_is_being_prepared(gl: Context) -> None:
+    """Its rays and outlines lay on what was there before, for as long as the scene took to be prepared."""
+    session = Session(gl, make_engine=FakeEngine)
+    session.state = replace(session.state, viewport_size=(64, 36)).with_panels(start_page=False)
+    run = lambda: (session.prepare(), run_frame(session, lambda state, _: state))  # noqa: E731
+    for _ in range(6):
+        run()
+    assert view_model_of(session).picture is not None
+    engine = session.picture.engine
+    session.show_lesson(lesson("achromat"))
+    engine.stats = replace(engine.stats, shows_other=True)
+    for _ in range(3):
+        run()
+        assert view_model_of(session).picture is None
+    engine.stats = replace(engine.stats, shows_other=False)
+    run()
+    assert view_model_of(session).picture is not None
+    # An edit of the scene that is shown keeps its picture while light is traced.
+    engine.stats = replace(engine.stats, shows_other=True)
+    run()
+    assert view_model_of(session).picture is not None
+    session.autosave.close()
+    session.release()
 
 
 def test_the_ruler_takes_hold_of_rays_and_measures_the_deviation(gl: Context) -> None:

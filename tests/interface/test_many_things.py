@@ -125,6 +125,11 @@ def test_world_and_camera_stand_in_the_outliner(gl: Context, state: State) -> No
         rig.click("World")
         rig.frame(2)
         assert rig.state.selection == Selection() and "Longest path" in rig.items.items
+        assert rig.state.scene.render.bounces == 0
+        x, y = rig.find("Bounces").centre
+        rig.drag((x - 20, y), (x + 20, y))
+        rig.frame(2)
+        assert rig.state.scene.render.bounces > 0 and rig.state.edit_label == "Bounces"
 
 
 def test_choosing_again_takes_away() -> None:

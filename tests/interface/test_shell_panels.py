@@ -144,6 +144,13 @@ def test_glare_slider_belongs_to_the_scene(rig: ShellRig) -> None:
     assert rig.state.scene.render.glare == 0.0
 
 
+def test_highlights_switch_belongs_to_the_scene(rig: ShellRig) -> None:
+    rig.show_tab("View")
+    assert rig.state.scene.render.antialias_highlights
+    rig.click("Antialias highlights")
+    assert not rig.state.scene.render.antialias_highlights
+
+
 def test_solo_strip_picks_and_sweep_runs_until_touched(rig: ShellRig) -> None:
     rig.show_tab("View")
     strip = rig.find("Spectrum strip")

@@ -1,6 +1,9 @@
-"""Float64 reference of shaders/lib/tone.glsl: from linear Rec.709 to what a display shows."""
+"""Float64 reference of shaders/lib/tone.glsl and highlights.glsl: from linear Rec.709 to what a display shows."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -69,3 +72,67 @@ def signed_error(shown: Array, reference: Array, floor_value: Array) -> Array:
     apart = shown - reference
     size = np.sqrt(np.sum(apart**2, axis=-1)) / (np.sqrt(np.sum(reference**2, axis=-1)) + floor_value)
     return np.where(luminance_709(apart) < 0.0, -size, size)
+
+
+def exposed_norm(rgb: Array) -> Array:
+    """Norm (…,) of colours (…, 3): of a grey its value."""
+    return p_norm(np.maximum(rgb, 0.0)) / 3.0**0.2
+
+
+class Step(NamedTuple):
+    """Within a pixel: colours (3,) and norms of its two sides, and how much they are seen to differ."""
+
+    bright: Array
+    dark: Array
+    high: float
+    low: float
+    contrast: float
+
+    @property
+    def weight(self) -> float:
+        """How far its brighter side is overexposed."""
+        return min(max(self.high - 1.0, 0.0), 1.0)
+
+
+def step_between(pixel: Array, before: tuple[Array, Array], after: tuple[Array, Array]) -> Step | None:
+    """The step within a pixel between two pixels before it and two after it (the nearer one first); None where
+    brightness does not rise or fall all the way."""
+    sides = sorted((before, after), key=lambda side: float(exposed_norm(side[0])))
+    own = float(exposed_norm(pixel))
+    colours, norms = [], []
+    for (near, far), is_bright in zip(sides, (False, True), strict=True):
+        n_near, n_far = float(exposed_norm(near)), float(exposed_norm(far))
+        if (n_near > own) != is_bright or n_near == own:
+            return None
+        if is_bright:
+            way, slope = (1.0 / (1.0 + a) - 1.0 / (1.0 + b) for a, b in ((own, n_near), (n_near, n_far)))
+        else:
+            way, slope = own - n_near, n_near - n_far
+        flat = 1.0 - min(4.0 * max(slope, 0.0) / way, 1.0)
+        colours.append(pixel + flat * (near - pixel))
+        norms.append(own + flat * (n_near - own))
+    contrast = norms[1] / (1.0 + norms[1]) - norms[0] / (1.0 + norms[0])
+    return Step(colours[1], colours[0], norms[1], norms[0], contrast)
+
+
+def antialiased(exposed: Array, curve: Callable[[Array], Array]) -> Array:
+    """A picture (H, W, 3), display white at 1, through a tone curve that is straight across steps at what is
+    overexposed: pixel by pixel."""
+    padded = np.pad(exposed, ((2, 2), (2, 2), (0, 0)), mode="edge")
+    shown = curve(exposed)
+    for row in range(len(exposed)):
+        for column in range(exposed.shape[1]):
+            pixel, found = exposed[row, column], []
+            for down, right in ((0, 1), (1, 0)):
+                line = [padded[row + 2 + k * down, column + 2 + k * right] for k in (-2, -1, 1, 2)]
+                step = step_between(pixel, (line[1], line[0]), (line[2], line[3]))
+                if step is not None and step.contrast > 0.0:
+                    found.append(step)
+            if not found:
+                continue
+            step = max(found, key=lambda step: step.contrast)
+            share = min(max((float(exposed_norm(pixel)) - step.low) / max(step.high - step.low, 1e-20), 0.0), 1.0)
+            straight = share * curve(step.bright) + (1.0 - share) * curve(step.dark)
+            bent = curve(share * step.bright + (1.0 - share) * step.dark)
+            shown[row, column] *= 1.0 + step.weight * (np.minimum(straight / np.maximum(bent, 1e-6), 1.0) - 1.0)
+    return shown

@@ -1,7 +1,8 @@
 """The error of `srd` against the independent reference keeps falling where it once stayed.
 
-`prism_case`'s footprints are narrow from half a million photons on, and six bands whose chords may miss by a quarter of
-a texel left an nRMSE of 0.006 however many photons followed (kept here as a mutant).
+`prism_case`'s footprints are narrow, and six bands whose chords may miss by a quarter of a texel left an nRMSE of 0.006
+however many photons followed (kept here as a mutant). From half a million photons on nRMSE 0.002 is left, where pixels
+hold a beam's edge.
 """
 
 from __future__ import annotations
@@ -20,9 +21,9 @@ from spectrasplat.reference.metrics import ReferencePicture, measure
 from spectrasplat.reference.photon_reference import render_reference
 
 SIZE = (96, 54)
-PHOTONS = (125_000, 500_000, 2_000_000)
+PHOTONS = (25_000, 125_000, 500_000)
 SEEDS = 4
-REFERENCE_PHOTONS = 8_000_000
+REFERENCE_PHOTONS = 24_000_000
 
 pytestmark = pytest.mark.slow
 
@@ -34,9 +35,9 @@ def reference() -> ReferencePicture:
     return ReferencePicture(picture.xyz(), picture.xyz_variance())
 
 
-def squared_errors(gl: Context, reference: ReferencePicture) -> np.ndarray:
+def squared_errors(gl: Context, reference: ReferencePicture, method: str = "srd-photons") -> np.ndarray:
     """nRMSE² (SEEDS, PHOTONS), freed of the reference's variance."""
-    rig = MethodRig(gl, load_scene(shipped_scenes()["prism_case"]), "srd-photons", *SIZE)
+    rig = MethodRig(gl, load_scene(shipped_scenes()["prism_case"]), method, *SIZE)
     try:
         errors = [
             [measure(rig.render(n, seed).xyz, reference)["nrmse"] for n in PHOTONS] for seed in range(1, SEEDS + 1)
@@ -58,9 +59,17 @@ def test_the_error_keeps_falling(gl: Context, reference: ReferencePicture, monke
     found, half = slope(errors)
     assert found + half < -0.5, (found, half, errors.mean(axis=0))
     tail = log(errors[:, 2].mean() / errors[:, 1].mean()) / log(PHOTONS[2] / PHOTONS[1])
-    assert tail < -0.35
+    assert tail < -0.25
     # The mutant: a texel's tolerance for ever.
     monkeypatch.setattr(pilot, "NARROW_TEXELS", 1e-9)
     flat = squared_errors(gl, reference).mean(axis=0)
     assert log(flat[2] / flat[1]) / log(PHOTONS[2] / PHOTONS[1]) > -0.2
     assert flat[2] > 2.0 * errors[:, 2].mean()
+
+
+def test_growing_passes_need_four_times_the_photons_at_most(gl: Context, reference: ReferencePicture) -> None:
+    """`progressive` against one pass that knows how many photons there will be: by beams here, so every seed is the
+    same."""
+    grown, whole = (squared_errors(gl, reference, method).mean(axis=0) for method in ("progressive", "srd"))
+    assert (grown[1:] < 1.1 * whole[:-1]).all(), (grown, whole)
+    assert grown[2] < 0.3 * grown[0]

@@ -45,12 +45,12 @@ def sample(gl) -> np.ndarray:
 
 def test_energy_is_exact_on_average(sample: np.ndarray) -> None:
     assert abs(sample.mean() - 1.0) < BIAS_LIMIT
-    assert sample.std() / np.sqrt(len(sample)) < BIAS_LIMIT / 5.0
+    assert sample.std() / np.sqrt(len(sample)) < BIAS_LIMIT / 4.0
 
 
 def test_ripple_over_the_grid_is_small(sample: np.ndarray) -> None:
-    assert np.abs(sample - 1.0).max() < 0.04
-    assert np.sqrt(np.mean((sample - 1.0) ** 2)) < 0.005
+    assert np.abs(sample - 1.0).max() < 0.06
+    assert np.sqrt(np.mean((sample - 1.0) ** 2)) < 0.008
 
 
 def test_the_mean_would_show_a_cut_that_is_not_given_back(sample: np.ndarray) -> None:

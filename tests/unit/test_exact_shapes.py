@@ -175,7 +175,7 @@ def refracted_path(photons: PhotonScene, start: np.ndarray, way: np.ndarray) -> 
             return start, way
         start, last, thing = start + t * way, surface, int(photons.owner[surface])
         *way, mask, alone, within, _, _, _ = scatter(
-            photons, surface, tuple(start), u, v, *way, mask, alone, 587.6, 1.0, memory.field
+            photons, surface, tuple(start), u, v, *way, mask, alone, 587.6, 1.0, np.uint64(1), 0, memory.field
         )
         way = np.array(way)
     raise AssertionError("the ray stays inside")
@@ -230,7 +230,9 @@ def test_ellipsoid_focuses_perfectly() -> None:
         nothing = (np.uint64(0), memory.stack, memory.stack_distance)
         t, surface, u, v = nearest(photons, *start, *way, -1, -1, False, *nothing)
         place = start + t * np.array(way)
-        x, y, z, *_ = scatter(photons, surface, tuple(place), u, v, *way, np.uint64(0), AIR, 587.6, 1.0, memory.field)
+        x, y, z, *_ = scatter(
+            photons, surface, tuple(place), u, v, *way, np.uint64(0), AIR, 587.6, 1.0, np.uint64(0), 0, memory.field
+        )
         place = place + centre
         assert place[2] - z * place[0] / x == pytest.approx(1.0 / CROWN, abs=1e-12) and abs(y) < 1e-15
 

@@ -23,7 +23,9 @@ from spectrasplat.model.features_explained import explain
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings
+from spectrasplat.passes import bounce_light, environment_light
 from spectrasplat.passes.camera_records import CAMERA_LIGHT, CAMERA_PARAMETERS
+from spectrasplat.passes.environment_places import PLACE
 from spectrasplat.passes.footprint import SPLAT
 from spectrasplat.passes.variants import direct_defines, footprint_defines, splat_defines
 
@@ -59,7 +61,12 @@ EVERYTHING = Features(
     map_tents=8,
     beams=True,
     environment_lights=True,
+    bounces=3,
     lens=True,
+    contact_lines=True,
+    coats=True,
+    rough_diffuse=True,
+    rough=True,
 )
 PLAIN_CAMERA = {"camera_disperses": False, "map_tents": 0}
 """What the camera sees disperses nothing: the camera carries the spectrum in the same way as the light pass."""
@@ -67,7 +74,10 @@ WITHOUT = {
     "beams": {"beams": False},
     "light profiles": {"light_profiles": False},
     "environment light": {"environment_lights": False},
+    "bounces": {"bounces": 0},
     "lens": {"lens": False},
+    "coats": {"coats": False},
+    "rough diffuse": {"rough_diffuse": False},
     "spectral columns": {
         "spectral_groups": 0,
         "merged_groups": False,
@@ -101,6 +111,7 @@ WITHOUT = {
         **PLAIN_CAMERA,
     },
     "polarisation": {"polarised": False},
+    "rough surfaces": {"rough": False},
     "mirrors": {"mirrors": False},
     "gratings": {"gratings": False},
     "interpolated normals": {"smooth_normals": False, "normal_derivatives": False},
@@ -112,6 +123,7 @@ WITHOUT = {
     "half-space solids": {"convex_solids": False},
     "charts": {"charts": False},
     "nested windows": {"nested_windows": False},
+    "contact lines": {"contact_lines": False},
     "spectral bins": {"targets": 1, "map_tents": 0},
     "local gain": {"local_gain": False},
     "photons by index": {"reindexed": False},
@@ -157,6 +169,13 @@ def sources(features: Features) -> list[shader.Source]:
     )
     for fragment, kind in draws.items():
         made += [shader.load_source(name, splat | {kind: 1}, (SPLAT,)) for name in ("light/splat.vert", fragment)]
+    soft = light | {"MOST_ASKED": 24, "BIND_PLACES": 8, "BIND_ASKED": 9, "BIND_SUMS": 10}
+    if features.environment_lights:
+        structs = (*SCENE_STRUCTS, PLACE, environment_light.PARAMETERS, environment_light.ASKED, environment_light.SUM)
+        made.append(shader.load_source("light/environment.comp", soft, structs))
+    if features.bounces:
+        structs = (*SCENE_STRUCTS, PLACE, bounce_light.PARAMETERS, bounce_light.ASKED, bounce_light.SUM)
+        made.append(shader.load_source("light/bounce.comp", soft, structs))
     return made + camera_sources(features, light)
 
 
@@ -185,6 +204,7 @@ def camera_sources(
             "SPECTRAL_GROUPS": single,
             "ABSORBERS": 1,
             "EMISSION_CELLS": 1023,
+            "FINISHES_AT": 1,
         }
     )
     camera_pass |= {
@@ -205,12 +225,14 @@ def camera_sources(
         "MAP_BINS": features.map_tents > 0,
         "CAMERA_SPECULAR": features.camera_specular,
         "HAS_DISPERSION": features.camera_disperses,
-        "ENVIRONMENT_LIGHTS": features.environment_lights,
+        "RECEIVER_LIGHT": features.environment_lights or features.bounces > 0,
         "SPECTRAL_SWEEP": single > 0,
         "ABSORPTION": features.absorption and features.camera_specular,
         "NORMAL_DERIVATIVES": features.smooth_normals,
         "LENS": features.lens,
         "POLARISED": features.polarised and features.camera_specular,
+        "COATS": features.coats,
+        "ROUGH_DIFFUSE": features.rough_diffuse,
         **(images or {}),
     }
     for name in switches:
@@ -306,6 +328,19 @@ def test_states_of_polarisation_cost_nothing_where_they_are_not_asked_for() -> N
     without = replace(asked, objects=tuple(o for o in asked.objects if not o.material.transmits))
     assert not Features.of(without, RenderSettings()).polarised
     assert "no glass" in _reasons(without)["polarisation"]
+
+
+def test_what_surfaces_give_each_other_costs_nothing_where_it_is_not_asked_for() -> None:
+    scene = load_scene(paths.assets_dir() / "scenes" / "prism.toml")
+    asked = replace(scene, render=replace(scene.render, bounces=2))
+    plain, bounces = (Features.of(each, RenderSettings()) for each in (scene, asked))
+    assert plain.bounces == 0 and bounces.bounces == 2 and replace(bounces, bounces=0) == plain
+    assert all(occurring(source.text, ("receiver_light", "add_receiver_light")) == () for source in sources(plain))
+    assert any(occurring(source.text, ("add_receiver_light",)) for source in sources(bounces))
+    assert _reasons(scene)["bounces"] == "[render] bounces is 0" and "2 time(s)" in _reasons(asked)["bounces"]
+    # Nothing is left for a plane to see itself in.
+    alone = replace(asked, objects=tuple(o for o in asked.objects if o.material.receives))
+    assert not Features.of(alone, RenderSettings()).bounces and "in one plane" in _reasons(alone)["bounces"]
 
 
 IMAGES = {"HAS_IMAGES": 1, "TEXTURE_COUNT": 1, "BIND_PICTURES": 13, "UNIT_PICTURES": 11, "UNIT_CORNERS": 12}

@@ -145,6 +145,21 @@ MATERIALS: dict[str, tuple[dict[str, Any], Any]] = {
         {"pbrMetallicRoughness": {"baseColorFactor": [0.1, 0.2, 0.3, 1], "metallicFactor": 0}},
         Diffuse((0.1, 0.2, 0.3)),
     ),
+    "varnish": (
+        {
+            "pbrMetallicRoughness": {
+                "baseColorFactor": [0.1, 0.2, 0.3, 1],
+                "metallicFactor": 0,
+                "roughnessFactor": 0.3,
+            },
+            "extensions": {"KHR_materials_ior": {"ior": 1.7}},
+        },
+        Diffuse((0.1, 0.2, 0.3), roughness=0.3, coat_index=1.7),
+    ),
+    "sheen": (
+        {"pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0.5}},
+        Diffuse((1.0, 1.0, 1.0)),
+    ),
     "mirror": (
         {"pbrMetallicRoughness": {"baseColorFactor": [0.9, 0.8, 0.7, 1], "roughnessFactor": 0.05}},
         Mirror((0.9, 0.8, 0.7)),

@@ -72,6 +72,9 @@ def _rich_scene() -> Scene:
             SceneObject("mirror", primitives.disc(), Mirror((0.9, 0.8, 0.7))),
             SceneObject("stop", primitives.plane(), Black()),
             SceneObject("paint", primitives.plane(4.0, 4.0), Diffuse((0.4, 0.4, 0.4), grey)),
+            SceneObject("varnish", primitives.disc(), Diffuse((0.5, 0.6, 0.7), roughness=0.25, coat_index=1.6)),
+            SceneObject("clay", primitives.disc(), Diffuse((0.5, 0.3, 0.2), roughness=0.9, diffuse_roughness=0.5)),
+            SceneObject("coated paint", primitives.disc(), Diffuse((0.4, 0.4, 0.4), grey, roughness=0.3)),
             SceneObject("floor", primitives.plane(9.0, 9.0), Diffuse((0.5, 0.6, 0.7))),
         ),
     )
@@ -128,6 +131,8 @@ def test_saved_file_is_read_by_others(tmp_path: Path) -> None:
     dispersion = document.materials[0].extensions["KHR_materials_dispersion"]["dispersion"]
     assert dispersion == pytest.approx(20.0 / catalogue.find("N-SF11").V_d)
     assert document.materials[0].extensions["KHR_materials_ior"]["ior"] == pytest.approx(1.78472, abs=1e-4)
+    varnish = next(m for m in document.materials if m.pbrMetallicRoughness.roughnessFactor == 0.25)
+    assert varnish.extensions["KHR_materials_ior"]["ior"] == 1.6 and varnish.pbrMetallicRoughness.metallicFactor == 0.0
     assert set(document.extensionsUsed) >= {"KHR_lights_punctual", "KHR_materials_dispersion"}
     assert document.accessors[document.meshes[0].primitives[0].attributes.POSITION].max == pytest.approx(
         [0.5] * 3, abs=0.01

@@ -6,9 +6,9 @@ import subprocess
 import sys
 
 import pytest
-from spectrasplat.bench.machine import process_age_s
+from spectrasplat.base.process_age import process_age_s
 
-LATE = "import time; time.sleep(0.5); from spectrasplat.bench.machine import process_age_s; print(process_age_s())"
+LATE = "import time; time.sleep(0.5); from spectrasplat.base.process_age import process_age_s; print(process_age_s())"
 
 
 @pytest.mark.skipif(process_age_s() is None, reason="this system does not tell when a process began")

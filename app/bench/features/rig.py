@@ -6,7 +6,7 @@ scene as it is, so that two rigs do the same work but for what their programs ho
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -87,7 +87,8 @@ class Rig:
         ctx, scene = context.ctx, light.scene
         self._buffers = SceneBuffers(ctx, variant.scene, variant.features, light.buffers.axis)
         self._trace = TracePass(context, variant.features, self._buffers, work.batch, light.settings.max_depth)
-        self._splatter = Splatter(ctx, variant.features)
+        # Its maps have no pixels for lines of contact to lie in.
+        self._splatter = Splatter(ctx, replace(variant.features, contact_lines=False))
         self._atlas = MapAtlas(ctx, light.layout.size, light.layout.placements, variant.features.targets)
         self._variables = SpectralVariables.build(ctx, self._buffers.variables)
         spans = {plan.index: [(band.x_lo, band.x_hi) for band in plan.bands] for plan in light.plans}

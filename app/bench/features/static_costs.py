@@ -57,6 +57,7 @@ def static_costs(scene: Scene, features: Features) -> dict[str, str]:
     sizes = RecordSizes.of(features)
     unspectral = RecordSizes.of(replace(features, spectral_groups=0))
     unspatial = RecordSizes.of(replace(features, footprints=False))
+    polished = RecordSizes.of(replace(features, rough=False))
     unpolarised = RecordSizes.of(replace(features, polarised=False))
     specular = [o for o in scene.objects if o.material.is_specular]
     convex = half_spaces(scene)
@@ -85,6 +86,12 @@ def static_costs(scene: Scene, features: Features) -> dict[str, str]:
         "spatial columns": (features.footprints, f"{sizes.ray - unspatial.ray} B a ray"),
         "refraction": (features.dielectrics, f"{size_words(row * len(glasses))} of indices; two children a surface"),
         "polarisation": (features.polarised, f"{sizes.ray - unpolarised.ray} B a ray"),
+        "coats": (
+            features.coats,
+            f"a path goes on from every coat that is seen; {size_words(2 * row)} a coat",
+        ),
+        "rough diffuse": (features.rough_diffuse, "one more function a light and surface"),
+        "rough surfaces": (features.rough, f"{sizes.ray - polished.ray} B a ray"),
         "mirrors": (features.mirrors, f"{size_words(row * mirrors)} of reflectances"),
         "gratings": (features.gratings, f"{_TEXEL} B an order; a step of the queue for each"),
         "interpolated normals": (features.smooth_normals, f"{3 * _TEXEL} B a facet, {size_words(3 * _TEXEL * smooth)}"),
@@ -100,6 +107,7 @@ def static_costs(scene: Scene, features: Features) -> dict[str, str]:
         "charts": (features.charts, f"{len(curved)} receiver(s) with a placement a facet"),
         "local gain": (features.local_gain, "eight voxels a photon"),
         "photons by index": (features.reindexed, "32 B a band"),
+        "contact lines": (features.contact_lines, "4 B a texel; splats beside them have a program each"),
         "nested windows": (features.nested_windows, f"{SPLAT.stride} B a photon: a splat for each window"),
         "camera refraction": (features.camera_specular, "a second program; 4 B a pixel list what it has to do"),
         "camera spectral taps": (
@@ -115,6 +123,10 @@ def static_costs(scene: Scene, features: Features) -> dict[str, str]:
         "environment light": (
             features.environment_lights,
             "up to six lookups a diffuse surface; a texture of some thousand texels a receiver",
+        ),
+        "bounces": (
+            features.bounces > 0,
+            "up to six lookups a diffuse surface; a texture of some thousand texels a receiver, and one a bounce",
         ),
         "beams": (features.beams, f"{len(beam_objects(scene))} object(s) searched on the processor; one bit an object"),
         "spectral bins": (features.targets > 1, f"{sizes.texel} B a texel instead of {_TEXEL}"),

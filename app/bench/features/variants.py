@@ -137,6 +137,8 @@ def _left_out(name: str, scene: Scene, base: Features, asked: Variant) -> tuple[
             return asked, Variant(scene, replace(base, absorption=False)), ""
         case "polarisation":
             return asked, Variant(scene, replace(base, polarised=False)), "without it light is weighed another way"
+        case "rough surfaces":
+            return asked, Variant(scene, replace(base, rough=False)), "without it all glass is polished"
         case "contacts":
             return asked, Variant(scene, replace(base, contacts=False)), "without it light is lost between surfaces"
         case "medium stack":
@@ -158,6 +160,8 @@ def _left_out(name: str, scene: Scene, base: Features, asked: Variant) -> tuple[
             )
         case "nested windows":
             return asked, Variant(scene, replace(base, nested_windows=False)), "against the finest window alone"
+        case "contact lines":
+            return None, None, "asks the picture's own pixels, which the map that is drawn here does not have"
         case "refraction" | "mirrors" | "gratings":
             return None, None, "cannot be left out here: light would end there"
         case "interpolated normals" | "charts":
@@ -195,6 +199,8 @@ def _forced_in(name: str, scene: Scene, base: Features, asked: Variant) -> tuple
             )
         case "refraction":
             return Variant(scene, replace(base, dielectrics=True)), asked, ""
+        case "rough surfaces":
+            return Variant(scene, replace(base, rough=True)), asked, "every surface of width zero"
         case "mirrors":
             return Variant(scene, replace(base, mirrors=True)), asked, ""
         case "gratings":

@@ -3,7 +3,7 @@
 A scene file's own words, kept under `extras.spectrasplat`, win over everything: `glass`
 names a catalogue glass, `material` is a whole material table. Without them transmission,
 ior, dispersion and volume make a glass, a smooth metal makes a mirror, and the base colour
-anything else a diffuse surface.
+anything else a diffuse surface, with a coat where that is smooth.
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from ..fields import write_fields
+from ..materials.finish import USUAL_COAT_INDEX, read_finish
 from ..materials.material_file import read_material
 from ..optics import catalogue, glass
 from ..optics.colorimetry import attenuation_from_colour
@@ -31,6 +33,9 @@ TRANSMISSION, VOLUME, IOR, DISPERSION = (f"KHR_materials_{n}" for n in ("transmi
 EXTRAS = "spectrasplat"
 _GLASS_EXTENSIONS = (TRANSMISSION, VOLUME, IOR, DISPERSION)
 _MIRROR_ROUGHNESS = 0.2
+_COAT_ROUGHNESS = 0.5
+"""From here on what a dielectric reflects is a faint sheen, which is left out: 0.5 is what modellers give to all."""
+_FINISH = "finish"
 _BASE_COLOUR = "baseColorTexture"
 
 
@@ -62,14 +67,20 @@ def read_gltf_material(document: GltfDocument, index: int | None, textures: Gltf
     roughness = float(pbr.get("roughnessFactor", 1.0))
     transmission = float(extensions.get(TRANSMISSION, {}).get("transmissionFactor", 0.0))
     if transmission >= 0.5:
-        if roughness > 0.1:
-            notes.append(f"{label}: its roughness {roughness:g} is taken as polished glass.")
         return _with_textures_told(_glass(document, values, label, where, notes), values, label, notes)
     if transmission > 0.0:
         notes.append(f"{label}: transmission {transmission:g} is less than one half and is taken as opaque.")
-    if float(pbr.get("metallicFactor", 1.0)) >= 0.5 and roughness <= _MIRROR_ROUGHNESS:
+    is_metal = float(pbr.get("metallicFactor", 1.0)) >= 0.5
+    if is_metal and roughness <= _MIRROR_ROUGHNESS:
         return _with_textures_told(Mirror(rgb), values, label, notes)
-    return _with_textures_told(Diffuse(rgb, texture=textures.base_colour(values, label)), values, label, notes)
+    finish: dict[str, Any] = {}
+    if _FINISH in own:
+        finish = read_finish(SceneTable(own[_FINISH], document.path, f"materials[{index}].extras.{EXTRAS}.{_FINISH}"))
+    elif roughness < _COAT_ROUGHNESS and not is_metal:
+        ior = float(extensions.get(IOR, {}).get("ior", USUAL_COAT_INDEX))
+        finish = {"roughness": max(roughness, 0.0), "coat_index": min(max(ior, 1.0), 4.0)}
+    material = Diffuse(rgb, texture=textures.base_colour(values, label), **finish)
+    return _with_textures_told(material, values, label, notes)
 
 
 def _with_textures_told(material: Material, values: dict[str, Any], label: str, notes: list[str]) -> Material:
@@ -98,7 +109,11 @@ def _glass(document: GltfDocument, values: dict[str, Any], label: str, where: st
     strength = float(extensions.get(DISPERSION, {}).get("dispersion", 0.0))
     name = str(values.get("name", ""))
     dispersion = glass.from_abbe(n_d, glass.gltf_dispersion_to_abbe(strength), name, f"{where}.extensions.{IOR}.ior")
-    return Dielectric(dispersion, _absorption(extensions, where))
+    given = values.get("pbrMetallicRoughness", {}).get("roughnessFactor")
+    if given is None:
+        notes.append(f"{label} names no roughnessFactor, and is taken as polished instead of fully rough.")
+    roughness = min(1.0, max(0.0, float(given or 0.0)))
+    return Dielectric(dispersion, _absorption(extensions, where), roughness=roughness)
 
 
 def _absorption(extensions: dict[str, Any], where: str) -> Absorption | None:
@@ -121,16 +136,22 @@ def write_gltf_material(values: dict[str, Any], material: Material, thickness: f
     extensions = {k: v for k, v in values.pop("extensions", {}).items() if k not in _GLASS_EXTENSIONS}
     extras = values.pop("extras", None)
     extras = dict(extras) if isinstance(extras, dict) else ({} if extras is None else {"value": extras})
-    own = {k: v for k, v in extras.pop(EXTRAS, {}).items() if k not in ("material", "glass")}
+    own = {k: v for k, v in extras.pop(EXTRAS, {}).items() if k not in ("material", "glass", _FINISH)}
     extras.pop("glass", None)
     rgb = (1.0, 1.0, 1.0)
     metallic, roughness = 0.0, 0.0
     if isinstance(material, Dielectric):
         extensions |= _glass_extensions(material, thickness)
+        roughness = material.roughness
     elif material.is_mirror:
         rgb, metallic = material.reflectance_rgb, 1.0
     elif not material.is_specular:
         rgb, roughness = (0.0, 0.0, 0.0) if material.is_black else material.reflectance_rgb, 1.0
+        if material.has_coat:
+            roughness = float(material.roughness)
+            extensions |= {} if material.coat_index == USUAL_COAT_INDEX else {IOR: {"ior": material.coat_index}}
+        if finish := write_fields(material.shown_numbers(), material):
+            own[_FINISH] = finish
     pbr |= {"baseColorFactor": [*map(float, rgb), 1.0], "metallicFactor": metallic, "roughnessFactor": roughness}
     if material.receives:
         _wear(pbr, texture)

@@ -1,7 +1,7 @@
 """Materials of an OBJ file (Wavefront .mtl): which of them are glass, of which index, and the colour of the others.
 
 Statements are those of Wavefront's specification (Advanced Visualizer manual, appendix B2): `Kd`, `d` or `Tr`, `Ni`,
-`illum`. Nothing in the format knows dispersion.
+`illum`; `Pr`, a roughness, is of the extension for physically based materials. Nothing in the format knows dispersion.
 """
 
 from __future__ import annotations
@@ -32,6 +32,8 @@ class ObjMaterial:
     """1: opaque."""
     index: float = 1.0
     illum: int = 2
+    roughness: float = 0.0
+    """Of glass."""
 
     @property
     def transmits(self) -> bool:
@@ -44,8 +46,9 @@ class ObjMaterial:
             return Diffuse(self.colour)
         usual = Dielectric.usual()
         if not 1.0 < self.index <= _LARGEST_INDEX or abs(self.index - usual.dispersion.n_d) < _LIKE_DEFAULT:
-            return usual
-        return Dielectric(glass.from_abbe(self.index, usual.dispersion.V_d, f"n_d {self.index:g}"))
+            return usual.changed(roughness=self.roughness)
+        dispersion = glass.from_abbe(self.index, usual.dispersion.V_d, f"n_d {self.index:g}")
+        return Dielectric(dispersion, roughness=self.roughness)
 
 
 def read_materials(obj: Path, libraries: tuple[str, ...], notes: list[str]) -> dict[str, ObjMaterial]:
@@ -93,6 +96,8 @@ def _with(material: ObjMaterial, word: str, rest: list[str]) -> ObjMaterial:
         return replace(material, dissolve=1.0 - _number(rest[0]))
     if word == "Ni":
         return replace(material, index=_number(rest[0]))
+    if word == "Pr":
+        return replace(material, roughness=min(max(_number(rest[0]), 0.0), 1.0))
     if word == "illum":
         return replace(material, illum=int(rest[0]))
     return material

@@ -38,6 +38,8 @@ from .scene_file import load_scene
 from .scene_pictures import folder_beside, kept_name, relative_name
 from .toml_text import toml_text
 
+_OVER_GLASS = ("dispersion_gain", "priority", "roughness")
+"""Keys that an object may have beside its `glass`."""
 INLINE_TRIANGLES = 64
 """Flat meshes of no more triangles than this go into the scene file itself."""
 
@@ -197,12 +199,10 @@ def _kept_material(
     """`values` with the words of another material; its glass keeps the name that it was given."""
     wanted = new.material.values(path)
     written, was = values.get("glass"), old.material.values().get("glass")
-    kept = {
-        key: value for key, value in values.items() if key not in ("glass", "material", "dispersion_gain", "priority")
-    }
+    kept = {key: value for key, value in values.items() if key not in ("glass", "material", *_OVER_GLASS)}
     if isinstance(written, str) and wanted.get("glass") == was:
         wanted = wanted | {"glass": written}
-        if wanted.keys() <= {"glass", "dispersion_gain", "priority"}:
+        if wanted.keys() <= {"glass", *_OVER_GLASS}:
             return kept | wanted
     if isinstance(values.get("material"), dict):
         return kept | {"material": wanted}

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
-from ..fields import Integer
+from ..fields import Animated, Integer, Number, Row
 from ..optics import catalogue
 from ..optics.colorimetry import VISIBLE_NM
 from ..optics.glass import Dispersion
@@ -17,6 +17,23 @@ from .material import Material
 DEFAULT_GLASS = "N-BK7"
 MAX_PRIORITY = 1_000_000
 PRIORITY = Integer("priority", 0, optional=True, at_least=-MAX_PRIORITY, at_most=MAX_PRIORITY)
+ROUGHNESS = Number(
+    "roughness",
+    0.0,
+    optional=True,
+    at_least=0.0,
+    at_most=1.0,
+    row=Row(
+        "Roughness",
+        "How rough all of its surface is ground: 0 polished, 0.3 frosted, 1 as matt as may be.",
+        0.0,
+        1.0,
+        0.0,
+        "%.3f",
+        is_slider=True,
+    ),
+    animated=Animated("Roughness of a glass's surface; 0 is polished", 0.0, 1.0),
+)
 
 
 @dataclass(frozen=True)
@@ -27,11 +44,13 @@ class Dielectric(Material):
     absorption: Absorption | None = None
     priority: int = 0
     """Where solids overlap, the higher priority decides; equal ones: the later object."""
+    roughness: float = 0.0
+    """Of all its surface: 0 is polished, and GGX's width α the square of it."""
 
     kind: ClassVar = "glass"
     title: ClassVar = "Glass"
     gpu_code: ClassVar = 3
-    parts: ClassVar = (DispersionPart(), AbsorptionPart(), PRIORITY)
+    parts: ClassVar = (DispersionPart(), AbsorptionPart(), PRIORITY, ROUGHNESS)
     is_specular: ClassVar = True
     transmits: ClassVar = True
 
@@ -47,9 +66,9 @@ class Dielectric(Material):
         return values
 
     def content(self) -> tuple[object, ...]:
-        """Its index on the visible grid, its priority and what it absorbs."""
+        """Its index on the visible grid, its priority, what it absorbs and how rough it is."""
         absorbed = None if self.absorption is None else self.absorption.coefficient
-        return self.dispersion.index(VISIBLE_NM), self.priority, absorbed
+        return self.dispersion.index(VISIBLE_NM), self.priority, absorbed, self.roughness
 
     def words(self) -> str:
         """Its glass, and what sets it apart from it."""
@@ -57,4 +76,5 @@ class Dielectric(Material):
         words = glass.name or f"glass of n_d {glass.n_d:.4f}"
         words += "" if glass.gain == 1.0 else f", {glass.gain:g} times as dispersive"
         words += ", absorbing" if self.absorption is not None else ""
+        words += f", roughness {self.roughness:g}" if self.is_rough else ""
         return words + (f", priority {self.priority}" if self.priority else "")

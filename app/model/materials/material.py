@@ -44,14 +44,34 @@ class Material:
     """(401,) on the visible grid, instead of `reflectance_rgb`."""
     texture = cast(Any, None)
     absorption = cast(Any, None)
+    roughness = cast(Any, None)
+    """Of a coat over what is diffuse, None: there is none; of a dielectric's surface, 0: it is polished."""
+    coat_index = 1.0
+    diffuse_roughness = 0.0
     dispersion = cast(Any, None)
     """What its deflection of light is a function of: a glass's index, a grating's wavelength."""
     priority = 0
 
     @property
+    def has_coat(self) -> bool:
+        """It is diffuse, and glossy besides."""
+        return False
+
+    @property
     def is_black(self) -> bool:
         """It ends paths and sends nothing on."""
         return not (self.is_specular or self.receives)
+
+    @property
+    def is_rough(self) -> bool:
+        """Its surface is ground, so that paths go on from it by chance."""
+        return self.transmits and self.roughness > 0.0
+
+    @property
+    def microfacet_width(self) -> float:
+        """GGX's α, the tangent of the slope that half of its microfacets exceed; 0 is polished. As in glTF, the square
+        of the roughness."""
+        return self.roughness**2 if self.is_rough else 0.0
 
     @property
     def is_coloured(self) -> bool:
@@ -82,10 +102,9 @@ class Material:
     def check_on(self, mesh: Mesh, name: str, file_name: str) -> None:
         """Raise UserError where the mesh of object `name` cannot be of this material."""
 
-    @classmethod
-    def shown_numbers(cls) -> tuple[Number, ...]:
+    def shown_numbers(self) -> tuple[Number, ...]:
         """Its plain numbers with a row in the panel."""
-        return tuple(part for part in cls.parts if isinstance(part, Number) and part.row is not None)
+        return tuple(part for part in self.parts if isinstance(part, Number) and part.row is not None)
 
     def is_like(self, other: Material) -> bool:
         """Whether programs and buffers made for the one serve the other, so that only values differ."""

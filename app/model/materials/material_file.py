@@ -6,7 +6,7 @@ from ...base.errors import suggestion
 from ..io.scene_table import SceneTable
 from ..scene_textures import TextureReader
 from . import MATERIAL_KINDS
-from .dielectric import DEFAULT_GLASS, PRIORITY, Dielectric
+from .dielectric import DEFAULT_GLASS, PRIORITY, ROUGHNESS, Dielectric
 from .dispersion_file import GAIN, named_glass, with_gain
 from .material import Material
 
@@ -22,8 +22,8 @@ def read_object_material(
 ) -> Material:
     """The material of one object: `glass = "…"`, `material = "NAME"`, `material = {…}` or the default glass.
 
-    "mirror", "diffuse" and "black" are known without being defined. The object's `priority`
-    and `dispersion_gain` go above the material's own.
+    "mirror", "diffuse" and "black" are known without being defined. The object's `priority`,
+    `roughness` and `dispersion_gain` go above the material's own.
     """
     key = table.one_of(("glass", "material"), "the material")
     if key == "material" and isinstance(table.raw(key), str):
@@ -49,6 +49,10 @@ def read_object_material(
         if not material.transmits:
             table.fail("priority", "decides between overlapping solids of glass; this object has none")
         material = material.changed(**PRIORITY.read(table))
+    if table.has(ROUGHNESS.attribute):
+        if not material.transmits:
+            table.fail(ROUGHNESS.attribute, "is for the surface of glass; this object has none")
+        material = material.changed(**ROUGHNESS.read(table))
     return material
 
 

@@ -95,7 +95,7 @@ def build(
                 yield None
                 if light.environment.is_worth_showing:
                     break
-            light.environment.show()
+            light.show_environment()
         published: list[bool] = []
         first = min(budget.first_photons, largest)
         accumulation = Accumulation(light, first, largest, target, wanted.seed, lambda: published.append(True))

@@ -366,13 +366,14 @@ class LiveEngine:
     def _set_maps(self, maps: LightMaps) -> None:
         assert self._shown is not None
         self._maps = self._shown.light.caustic_maps(maps)
+        if not self.schedule.moved:  # places on what is moved stay where it was
+            self._shown.light.bounce_caustics(self._maps)
         self._published_photons = maps.photon_weight
 
     def _take_scene(self, inputs: LiveInputs, light: LiveLight) -> None:
         scene = scene_seen(inputs.scene, inputs.camera, inputs.solo_nm)
         light_pass = light.light_pass
-        if light.environment is not None:
-            light.environment.take(scene)
+        light.take_seen(scene)
         self._camera_pass.take_scene(light.buffers, scene, light_pass.reflectances, light_pass.map_channels)
 
     # ---- building ----------------------------------------------------------------------------
@@ -432,12 +433,17 @@ class LiveEngine:
         self._history.append((time.perf_counter(), max(stats.photons - before[2], 0), traced + splatted))
 
     def _work_on_environment(self, deadline: float, budget_s: float) -> None:
-        """A part of a frame or what is left of it, while the camera has a picture to show."""
+        """A part of a frame or what is left of it, while the camera has a picture to show: for the environment's light,
+        then for what surfaces give each other."""
         if self._shown is None or self.schedule.building or self._camera.owes_picture:
             return
         end = max(deadline - CAMERA_SHARE * budget_s, time.perf_counter() + ENVIRONMENT_SHARE * budget_s)
-        if self._shown.light.ask_environment(end, 0.5 * ENVIRONMENT_SHARE * budget_s, self.schedule.interacting):
-            self._restart_camera(same_view=not self.schedule.interacting)
+        seconds, interacting = 0.5 * ENVIRONMENT_SHARE * budget_s, self.schedule.interacting
+        found = self._shown.light.ask_environment(end, seconds, interacting)
+        if not self.schedule.moved:
+            found = self._shown.light.ask_bounces(end, seconds, interacting) or found
+        if found:
+            self._restart_camera(same_view=not interacting)
 
     # ---- what there is -----------------------------------------------------------------------
 
@@ -476,6 +482,7 @@ class LiveEngine:
             camera_samples=float(camera_pass.shown_samples),
             resolution_scale=camera_pass.scale,
             direct_scale=camera_pass.direct_scale,
+            shows_other=self._differs == "scene" or self._camera.owes_first,
             differs=self._differs,
             camera_bands=camera_pass.shown_bands,
             camera_fallbacks=camera_pass.fallbacks,
@@ -518,7 +525,7 @@ class LiveEngine:
 
     @property
     def _knows_environment(self) -> bool:
-        return self._shown is None or self._shown.light.environment is None or self._shown.light.environment.is_done
+        return self._shown is None or (self._shown.light.knows_environment and self._shown.light.knows_bounces)
 
     @property
     def is_idle(self) -> bool:

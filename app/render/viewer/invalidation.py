@@ -111,9 +111,9 @@ def _scene(old: Scene, new: Scene) -> DirtyLevel:
     return max(cost, DirtyLevel.NOTHING if cost >= DirtyLevel.TRACE else _glasses(old, new))
 
 
-def _path_rules(render: RenderDefaults) -> tuple[int, bool]:
+def _path_rules(render: RenderDefaults) -> tuple[int, bool, int]:
     """What programs and queues are made for."""
-    return render.max_depth, render.polarisation
+    return render.max_depth, render.polarisation, render.bounces
 
 
 def _objects(old: tuple[SceneObject, ...], new: tuple[SceneObject, ...]) -> DirtyLevel:
@@ -139,9 +139,12 @@ def _object(old: SceneObject, new: SceneObject) -> DirtyLevel:
     if type(a) is not type(b):
         return DirtyLevel.BUILD
     if a.receives and b.receives:
+        # What there is at all, the programs know: a coat, a rough base.
+        if a.has_coat != b.has_coat or (a.diffuse_roughness > 0.0) != (b.diffuse_roughness > 0.0):
+            return DirtyLevel.BUILD
         if a.reflectance is None and b.reflectance is None and (a.texture is None) == (b.texture is None):
             # Another picture is only seen; whether there is one, the objects' records on the device know.
-            same = a.reflectance_rgb == b.reflectance_rgb and a.texture is b.texture
+            same = a.changed(texture=None) == b.changed(texture=None) and a.texture is b.texture
             return max(cost, DirtyLevel.NOTHING if same else DirtyLevel.CAMERA)
         return DirtyLevel.BUILD
     if a.transmits and b.transmits:
@@ -152,7 +155,10 @@ def _object(old: SceneObject, new: SceneObject) -> DirtyLevel:
         )
         if not same_absorption:
             return DirtyLevel.BUILD if (a.absorption is None) != (b.absorption is None) else max(cost, DirtyLevel.TRACE)
-        return max(cost, DirtyLevel.TRACE) if a.priority != b.priority else cost
+        if a.is_rough != b.is_rough:
+            return DirtyLevel.BUILD
+        same = a.priority == b.priority and a.microfacet_width == b.microfacet_width
+        return cost if same else max(cost, DirtyLevel.TRACE)
     if a == b:
         return cost
     return max(cost, DirtyLevel.TRACE if a.is_like(b) else DirtyLevel.BUILD)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...model.features import Features
+from ...passes.bounce_light import BounceLightPass
 from ...passes.environment_light import EnvironmentLightPass
 from ...passes.map_layout import LIVE
 from ..beam_light import MovingBeams
@@ -74,6 +75,12 @@ class LiveLight:
         """Light of what lies beyond everything, where the scene has it."""
         if self.buffers.features.environment_lights:
             self.environment = EnvironmentLightPass(context, self.buffers, settings.seed)
+        self.bounces: BounceLightPass | None = None
+        """What receivers give each other, where the scene asks for it."""
+        if self.buffers.features.bounces:
+            self.bounces = BounceLightPass(context, self.buffers, self.environment, settings.seed)
+        self._seen: Scene | None = None
+        """Colours and spectra that it is asked with."""
         self.may_have_beams = Features.of(scene, replace(settings, local_gain=False)).beams
         """Light goes as beams while nothing is painted."""
         self.beam_seconds = 0.0
@@ -106,8 +113,8 @@ class LiveLight:
                 self._guess = SpectrumGuess(self._context.ctx, channels, lights, maps.atlas.size)
             self._guess.run(textures[0])
             textures = [*textures, *self._guess.textures]
-        lit = None if self.environment is None else self.environment.texture
-        return replace(maps.caustic_maps(textures), environment=lit)
+        known = self.bounces or self.environment
+        return replace(maps.caustic_maps(textures), environment=None if known is None else known.texture)
 
     # ---- what is shown -----------------------------------------------------------------------
 
@@ -272,8 +279,53 @@ class LiveLight:
                 break
         if not environment.is_worth_showing:
             return False
-        environment.show()
+        self.show_environment()
         return True
+
+    def show_environment(self) -> None:
+        """What is known of the environment's light becomes what the camera looks up."""
+        if self.environment is not None:
+            self.environment.show()
+        if self.bounces is not None:
+            self.bounces.show()
+
+    # ---- what receivers give each other ------------------------------------------------------
+
+    def take_seen(self, scene: Scene) -> None:
+        """Other colours, spectra or another environment of the same things."""
+        self._seen = scene
+        if self.environment is not None:
+            self.environment.take(scene)
+        if self.bounces is not None:
+            self.bounces.take(scene)
+
+    def bounce_caustics(self, maps: CausticMaps) -> None:
+        """Other caustics are there for surfaces to hand on."""
+        if self.bounces is not None and self._seen is not None:
+            self.bounces.take(self._seen, maps, self.light_pass.map_channels)
+
+    def ask_bounces(self, end: float, seconds: float, interacting: bool) -> bool:
+        """As `ask_environment`, of what receivers give each other, once all of the environment's light is known; not
+        while something is dragged."""
+        if self.bounces is None or interacting or not self.knows_environment:
+            return False
+        for _ in self.bounces.steps(seconds):
+            if time.perf_counter() >= end:
+                break
+        if not self.bounces.is_worth_showing:
+            return False
+        self.bounces.show()
+        return True
+
+    @property
+    def knows_environment(self) -> bool:
+        """All of it was asked for."""
+        return self.environment is None or self.environment.is_done
+
+    @property
+    def knows_bounces(self) -> bool:
+        """All of what receivers give each other was asked for."""
+        return self.bounces is None or self.bounces.is_done
 
     # ---- beams -------------------------------------------------------------------------------
 
@@ -316,12 +368,21 @@ class LiveLight:
     def bytes(self) -> int:
         """Device memory of photons, queues, maps and scene."""
         maps = sum(maps.bytes for maps in (self.light_pass.maps, self._preview) if maps is not None)
-        maps += self.environment.bytes if self.environment is not None else 0
+        maps += sum(light.bytes for light in (self.environment, self.bounces) if light is not None)
         return self.stored.bytes + self._samples.bytes + self.light_pass.trace.bytes + self.buffers.bytes + maps
 
     def release(self) -> None:
         """Free everything, the stored photons and the scene's buffers too."""
         self._samples.clear()
-        for owned in (self._moved, self._preview, self._guess, self.environment, self.light_pass, self.buffers):
+        owners = (
+            self._moved,
+            self._preview,
+            self._guess,
+            self.bounces,
+            self.environment,
+            self.light_pass,
+            self.buffers,
+        )
+        for owned in owners:
             if owned is not None:
                 owned.release()

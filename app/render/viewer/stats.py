@@ -32,6 +32,8 @@ class LiveStats:
     camera_s: float = 0.0
     photons_per_second: float = 0.0
     """Emitted photons per second of trace and splat time, over the last second."""
+    shows_other: bool = False
+    """Of the scene that is prepared or was, there is no picture yet: what is shown is what was there before."""
     differs: Literal["", "light", "scene", "moved"] = ""
     """What of the wanted scene the picture does not show yet: nothing is missing, its light is being traced, all of it
     is being prepared, or light is shown by a few photons while something is moved."""

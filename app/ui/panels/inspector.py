@@ -11,12 +11,15 @@ from imgui_bundle import imgui
 from ...edit import edits, environments
 from ...edit.state import State
 from ...model.materials import MATERIAL_KINDS
+from ...model.materials.finish import USUAL_COAT_INDEX, USUAL_ROUGHNESS
 from ...model.scene import (
+    Diffuse,
     Grating,
     Material,
     SceneObject,
     Vec3,
 )
+from ...model.scene_render import MAX_BOUNCES
 from .. import theme
 from ..view_model import ViewModel
 from . import outliner, picture_choice, widgets
@@ -141,10 +144,13 @@ def _material(state: State, view_model: ViewModel, index: int) -> State:
     if changed:
         return edits.attempt(state, f"Make {thing.name} {wanted.lower()}", edits.set_material, index, _fresh(wanted))
     if material.transmits:
-        return _glass(state, material)
+        return _glass(_declared(state, index, material), material)
     if material.is_black:
         widgets.hint("Absorbs all light that meets it.")
         return state
+    if isinstance(material, Diffuse):
+        state = _coat(state, index, material)
+        material = state.scene.objects[index].material
     state = _declared(state, index, material)
     if isinstance(material, Grating):
         _orders(material)
@@ -184,6 +190,20 @@ def _declared(state: State, index: int, material: Material) -> State:
         return state
     label = f"{material.title} of {state.scene.objects[index].name}"
     return edits.attempt(state, label, edits.set_material, index, changed)
+
+
+def _coat(state: State, index: int, material: Diffuse) -> State:
+    """Whether it is glossy."""
+    changed, on = widgets.toggle(
+        "Coat",
+        material.has_coat,
+        tip="A clear coat like varnish: the surface reflects what is round it, besides its colour.",
+    )
+    if not changed:
+        return state
+    coated = material.changed(roughness=USUAL_ROUGHNESS if on else None, coat_index=USUAL_COAT_INDEX)
+    label = f"Coat of {state.scene.objects[index].name}"
+    return edits.attempt(state, label, edits.set_material, index, coated)
 
 
 def _orders(material: Grating) -> None:
@@ -273,6 +293,19 @@ def _scene(state: State, view_model: ViewModel) -> State:
         )
         if toggled:
             state = edits.attempt(state, "Polarisation", edits.set_render_defaults, polarisation=polarisation)
+        bounces_changed, bounces, active = widgets.slider(
+            "Bounces",
+            scene.render.bounces,
+            0,
+            MAX_BOUNCES,
+            unit="",
+            format="%.0f",
+            reset=0,
+            tip="How often light goes on from one diffuse surface to another; 0: they do not light each other.",
+        )
+        if bounces_changed and round(bounces) != scene.render.bounces:
+            state = edits.attempt(state, "Bounces", edits.set_render_defaults, bounces=round(bounces))
+        state = widgets.holding(state, active)
     if widgets.section("Environment"):
         state = draw_environment(state, view_model)
     if scene.notes and widgets.section("Notes"):

@@ -33,7 +33,8 @@ def draw_opened_card(state: State, view_model: ViewModel, middle_x: float, botto
     """This file's questions on the picture, whose lower border has its middle at `middle_x`, `bottom`; nothing where
     there are none or they were closed."""
     parts = [item.name for item in state.scene.objects]
-    nothing_is_glass = bool(parts) and not any(item.material.transmits for item in state.scene.objects)
+    # What mirrors or diffracts throws caustics too.
+    nothing_is_glass = bool(parts) and not any(item.material.is_specular for item in state.scene.objects)
     if view_model.up is None and not nothing_is_glass:
         return state
     if _memory["closed"] == view_model.title:

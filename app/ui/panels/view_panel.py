@@ -80,6 +80,14 @@ def _exposure(state: State, view_model: ViewModel) -> State:
     if scattered:
         state = edits.attempt(state, "Glare", edits.set_render_defaults, glare=glare / 100.0)
     active = active or active_glare
+    toggled, antialias = widgets.toggle(
+        "Antialias highlights",
+        state.scene.render.antialias_highlights,
+        tip="Edges of what is overexposed without steps: pixels show how much of them it covers. Linear files never "
+        "have it.",
+    )
+    if toggled:
+        state = edits.attempt(state, "Highlights", edits.set_render_defaults, antialias_highlights=antialias)
     _, tone = widgets.combo(
         "Tone curve",
         _TONES,

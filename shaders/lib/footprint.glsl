@@ -1,6 +1,7 @@
-// What a lookup is averaged over: the sides of a sample's share of its pixel, and the way from one lookup along the sweep to the next.
-#ifndef CAMERA_FOOTPRINT_GLSL
-#define CAMERA_FOOTPRINT_GLSL
+// Footprints of several sides as one of two: what a lookup of the camera is averaged over (the sides of a sample's share of its pixel, of the lens,
+// and the way from one lookup along the sweep to the next), what a photon is drawn over behind a rough surface.
+#ifndef FOOTPRINT_GLSL
+#define FOOTPRINT_GLSL
 
 // The two axes of a box of about this covariance, times 12.
 void box_of_covariance(float xx, float yy, float xy, out vec2 major, out vec2 minor)
@@ -21,9 +22,7 @@ void box_of_three(vec2 a, vec2 b, vec2 c, out vec2 major, out vec2 minor)
     box_of_covariance(a.x * a.x + b.x * b.x + c.x * c.x, a.y * a.y + b.y * b.y + c.y * c.y, a.x * a.y + b.x * b.y + c.x * c.y, major, minor);
 }
 
-#ifdef LENS
-// A sample's share of its pixel, sides `a` and `b` in the plane across `normal`, joined with its share of the lens, `c` and `d`: what is out of
-// focus is averaged over both.
+// A footprint of sides `a` and `b` in the plane across `normal`, joined with another one's, `c` and `d`.
 void join_sides(vec3 normal, inout vec3 a, inout vec3 b, vec3 c, vec3 d)
 {
     vec3 s = normalize(cross(normal, abs(normal.z) < 0.9 ? vec3(0.0, 0.0, 1.0) : vec3(1.0, 0.0, 0.0))), t = cross(normal, s);
@@ -33,6 +32,5 @@ void join_sides(vec3 normal, inout vec3 a, inout vec3 b, vec3 c, vec3 d)
     a = major.x * s + major.y * t;
     b = minor.x * s + minor.y * t;
 }
-#endif
 
 #endif

@@ -1,0 +1,87 @@
+"""Edges of what is overexposed, as a display shows them without steps.
+
+A pixel's radiance is its mean over the pixel; the tone curve comes after. Where a tenth of a pixel is covered by
+something a hundred times brighter than white, the mean is ten times white and the pixel is shown as white as if all of
+it were covered: edges have steps. Tone mapped first and averaged then, as by a larger picture made smaller, a tenth of
+white would be shown. That is what is found here from the linear picture alone: where what lies on both sides of a pixel
+is flat there is a step within it (subcell resolution: Harten 1989, *ENO Schemes with Subcell Resolution*, Journal of
+Computational Physics 83), its place is known from the three values, and so is how much of the pixel either side covers.
+A tone curve is straight between two such sides, by what they cover, instead of bent between them.
+
+Where nothing near is brighter than white nothing changes, nor where brightness has a slope and not a step: spectra,
+penumbrae, caustics. Only pictures to look at have it, never linear data. `shaders/lib/highlights.glsl` is the same on
+the device.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+WHITE = 1.0
+"""Norm (of a grey its value) from which the bright side is overexposed; from twice that all of the correction is
+made."""
+STEEPNESS = 4.0
+"""A side is flat where its own slope is this much less than the way to the pixel."""
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Of n pixels, each with a step in it."""
+
+    rows: np.ndarray
+    columns: np.ndarray
+    bright: np.ndarray
+    """float32 (n, 3): the colour on the brighter side; on its darker side; of the pixel were it made of both."""
+    dark: np.ndarray
+    mixed: np.ndarray
+    share: np.ndarray
+    """float32 (n, 1): of the pixel that the brighter side covers."""
+    weight: np.ndarray
+    """float32 (n, 1): how far it is overexposed, 0 to 1."""
+
+
+def find_steps(exposed: np.ndarray, norm: np.ndarray) -> Steps:
+    """Steps at what is overexposed in a picture, float32 (H, W, 3) with display white at 1; `norm` (H, W): of each
+    colour, at most its largest channel."""
+    hot = np.pad(exposed.max(axis=-1) > WHITE, 1)
+    rows, columns = np.nonzero(hot[:-2, 1:-1] | hot[2:, 1:-1] | hot[1:-1, :-2] | hot[1:-1, 2:])
+    colour, own = exposed[rows, columns], norm[rows, columns]
+    best = np.zeros_like(own)
+    bright, dark = colour.copy(), colour.copy()
+    high, low = own.copy(), own.copy()
+    for down, right in ((0, 1), (1, 0)):
+        places = [
+            (np.clip(rows + k * down, 0, exposed.shape[0] - 1), np.clip(columns + k * right, 0, exposed.shape[1] - 1))
+            for k in (-2, -1, 1, 2)
+        ]
+        colours, norms = [exposed[place] for place in places], [norm[place] for place in places]
+        rises = norms[2] > norms[1]
+        a, b = (np.where(rises[:, None], colours[i], colours[3 - i]) for i in (2, 1))
+        n_a, n_a2, n_b, n_b2 = (np.where(rises, norms[i], norms[3 - i]) for i in (2, 3, 1, 0))
+        # Of the bright side what is seen of its slope counts.
+        flat_a = _flatness(_seen(n_a2) - _seen(n_a), _seen(n_a) - _seen(own))
+        flat_b = _flatness(n_b - n_b2, own - n_b)
+        n_bright, n_dark = own + flat_a * (n_a - own), own + flat_b * (n_b - own)
+        contrast = np.where((n_a > own) & (own > n_b), _seen(n_bright) - _seen(n_dark), 0)
+        better = contrast > best
+        best = np.where(better, contrast, best)
+        bright = np.where(better[:, None], colour + flat_a[:, None] * (a - colour), bright)
+        dark = np.where(better[:, None], colour + flat_b[:, None] * (b - colour), dark)
+        high, low = np.where(better, n_bright, high), np.where(better, n_dark, low)
+    share = np.clip((own - low) / np.maximum(high - low, np.float32(1e-20)), 0, 1)[:, None]
+    weight = np.clip(high / np.float32(WHITE) - 1, 0, 1)[:, None]
+    found = (best > 0) & (weight[:, 0] > 0)
+    parts = (rows, columns, bright, dark, dark + share * (bright - dark), share, weight)
+    return Steps(*(part[found] for part in parts))
+
+
+def _seen(norm: np.ndarray) -> np.ndarray:
+    """A norm about as a display shows it, 0 to 1."""
+    return norm / (1 + norm)
+
+
+def _flatness(beyond: np.ndarray, within: np.ndarray) -> np.ndarray:
+    """1 where the slope beyond a pixel's neighbour is nothing beside the way `within` from the pixel to it."""
+    return 1 - np.clip(np.float32(STEEPNESS) * np.maximum(beyond, 0) / np.maximum(within, np.float32(1e-20)), 0, 1)

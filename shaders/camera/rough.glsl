@@ -1,0 +1,52 @@
+// A camera path at a rough surface: it meets one microfacet, the same all over its band (which all meets it as probably as its anchor
+// does), and is turned as by a polished surface that lies as this one does. By reciprocity it loses what light that came along it would.
+#ifdef ROUGH_SURFACES
+#include "lib/rough_surface.glsl"
+
+// What a rough surface makes of a path.
+struct RoughPlace {
+    float width;          // GGX's, of the surface that is met; 0: it is polished
+    PathFrame surface;    // its own normals, before the microfacet's took their place
+};
+
+// The microfacet takes the place of the frame's normals, and turns with them. Samples of a pixel share out the microfacets between them, and
+// none is averaged over the lobe: lookups along the sweep would be fewer than the band's wavelengths part.
+RoughPlace meet_microfacet(CameraPath path, inout PathFrame frame, uint object, uint pixel_key)
+{
+    RoughPlace place = RoughPlace(object_at(object).colour.x, frame);
+    if (place.width <= 0.0) return place;
+    // Parts of a band that was cut here meet it again, and find the same microfacet.
+    uint key = hash_combine(pixel_key, 80u), depth = uint(path.depth);
+    vec3 normal = frame.shading.normal;
+    vec3 microfacet = visible_microfacet(-path.direction, normal, place.width, microfacet_numbers(p.draw_index, depth, key));
+#ifdef NORMAL_DERIVATIVES
+    for (int c = 0; c < COLUMNS_HELD; ++c) frame.columns[c] = turned_with(microfacet, normal, frame.columns[c]);
+#endif
+#ifdef SPECTRAL_SWEEP
+    for (int end = 0; end < 2; ++end) frame.end_normal[end] = normalize(microfacet + turned_with(microfacet, normal, frame.end_normal[end] - normal));
+#endif
+    frame.shading.normal = microfacet;
+    return place;
+}
+
+// What is left of a path that a microfacet has turned, at three places of its band: what others do not hide; nothing, where it does not leave the
+// surface. `side`: 1 where it was reflected, -1 where it was refracted.
+vec3 leaving_share(RoughPlace place, CameraPath path, bool geometric, float side)
+{
+    vec3 cosine = vec3(dot(path.direction, place.surface.shading.normal));
+#ifdef SPECTRAL_SWEEP
+    if (path.restricted != 0u) {
+        cosine.x = dot(path.end_direction[0], place.surface.end_normal[0]);
+        cosine.z = dot(path.end_direction[1], place.surface.end_normal[1]);
+    }
+#endif
+    return geometric || side * cosine.y <= 0.0 ? vec3(0.0) : smith_share(side * cosine, place.width);
+}
+
+// A path that has lost all goes nowhere.
+void shadow(inout CameraPath path, vec3 left)
+{
+    path.weight *= left;
+    if (left.y <= 0.0) path.inverse_pdf = 0.0;
+}
+#endif

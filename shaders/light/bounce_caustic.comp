@@ -1,0 +1,67 @@
+// What the caustic maps hold of places on receivers, averaged over each, and the colour of the picture that a receiver wears there.
+layout(local_size_x = 64) in;
+
+#include "lib/intersect.glsl"
+#include "lib/lookup.glsl"
+#ifdef HAS_TEXTURES
+#include "lib/textures.glsl"
+#endif
+
+layout(std140, binding = BIND_PARAMETERS) uniform Parameters { BounceCausticParameters p; };
+layout(std430, binding = BIND_PLACES) readonly restrict buffer Places { EnvironmentPlace places[]; };
+layout(std430, binding = BIND_SOURCES) restrict buffer Sources { BounceSource sources[]; };
+
+// Parts of a place along either side, each looked up by itself …
+#define PARTS 4
+// … with so many lookups a side at most.
+#define MAX_TEXELS 16
+
+#ifdef HAS_TEXTURES
+// Mean colour of the picture over a place; a ray straight down tells on which facet that lies.
+vec3 colour_worn(EnvironmentPlace place, uint worn)
+{
+    float side = sqrt(max(dot(place.span_u, place.span_u), dot(place.span_v, place.span_v)));
+    Hit hit;
+    bool met = intersect_closest(place.position + 0.01 * side * place.normal, -place.normal, 0.02 * side, RayOrigin(NONE, NONE, 0u, 0u), hit);
+    Triangle facet = triangle_at(met && hit.object == place.object ? hit.primitive : place.primitive);
+    vec3 gradient_u, gradient_v;
+    vec2 uv;
+    hit_uv(pictures[worn], facet.source, vec2(0.0), uv);
+    uv_gradients(pictures[worn], facet.source, facet.edge1, facet.edge2, gradient_u, gradient_v);
+    vec3 along = place.position - facet.vertex;
+    uv += vec2(dot(gradient_u, along), dot(gradient_v, along));
+    vec2 ds = vec2(dot(gradient_u, place.span_u), dot(gradient_v, place.span_u));
+    vec2 dt = vec2(dot(gradient_u, place.span_v), dot(gradient_v, place.span_v));
+    return texture_filtered(pictures[worn], uv, ds, dt);
+}
+#endif
+
+void main()
+{
+    uint id = gl_GlobalInvocationID.x;
+    if (id >= p.count) return;
+    EnvironmentPlace place = places[id];
+    Object thing = object_at(place.object);
+    uint source = triangle_at(place.primitive).source;
+    vec3 sum = vec3(0.0);
+    for (uint part = 0u; part < uint(PARTS * PARTS); ++part) {
+        vec2 within = (vec2(part % uint(PARTS), part / uint(PARTS)) + 0.5) / float(PARTS) - 0.5;
+        uint placement;
+        vec3 at;
+        bool covered = find_texel(thing.receiver, source, place.position + within.x * place.span_u + within.y * place.span_v, placement, at);
+        for (bool wanted = covered; wanted; wanted = false) {
+            vec2 box = (abs(texels_along(placements[placement], at, place.span_u)) + abs(texels_along(placements[placement], at, place.span_v))) / float(PARTS);
+            ivec2 lookups = clamp(ivec2(ceil(box)), ivec2(1), ivec2(MAX_TEXELS));
+            vec2 step = box / vec2(lookups), corner = at.xy / at.z - 0.5 * (box - step);
+            float share = 1.0 / (float(PARTS * PARTS * lookups.x * lookups.y) * texel_area_at(placements[placement], at));
+            for (int i = 0; i < lookups.x * lookups.y; ++i) {
+                vec4 energy = caustic_energy(caustic_map[0], placement, corner + step * vec2(i % lookups.x, i / lookups.x), step);
+                sum += share * (energy.x * p.colours[0].rgb + energy.y * p.colours[1].rgb + energy.z * p.colours[2].rgb + energy.w * p.colours[3].rgb);
+            }
+        }
+    }
+    sources[id].caustic += p.scale * sum;
+#ifdef HAS_TEXTURES
+    if (thing.texture != NONE) sources[id].paint = colour_worn(place, thing.texture);
+#endif
+}

@@ -1,0 +1,15 @@
+// What stands before a receiver, drawn as its map's camera sees it.
+in vec3 position;  // GPU space
+in uint object;
+uniform mat4 to_clip;
+uniform vec4 plane;  // the receiver's; its value at a place: how far that lies off, in units of what counts as close
+uniform uint receiver;
+out float height;
+flat out uint is_receiver;
+
+void main()
+{
+    height = dot(plane, vec4(position, 1.0));
+    is_receiver = object == receiver ? 1u : 0u;
+    gl_Position = to_clip * vec4(position, 1.0);
+}

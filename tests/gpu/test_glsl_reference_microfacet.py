@@ -1,0 +1,121 @@
+"""lib/microfacet.glsl, lib/rough_surface.glsl and lib/footprint.glsl against float64: shadowing by the area that is
+seen, visible normals by Heitz's listing, derivatives by moved normals, numbers bit for bit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from reference import microfacet
+from spectrasplat.reference import optics, random_numbers
+from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
+
+COVERS = {
+    "microfacet.glsl": ("visible_microfacet",),
+    "rough_surface.glsl": (
+        "microfacet_numbers",
+        "smith_share",
+        "turned_with",
+        "lobe_axes",
+        "lobe_part",
+    ),
+    "footprint.glsl": ("join_sides",),
+}
+LIBRARY = ["lib/rough_surface.glsl"]
+COUNT = 4000
+GENERATORS = tuple(int((n**0.5 % 1.0) * 2.0**32) for n in (29, 31, 37, 41, 43, 47, 53, 59))
+
+
+def surfaces(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Normals, directions back along rays on their side, widths."""
+    normal = as_f32(optics.unit(rng.normal(size=(count, 3))))
+    direction = optics.unit(rng.normal(size=(count, 3)))
+    direction *= np.sign(optics.dot(direction, normal))[:, None]
+    return normal, as_f32(direction), as_f32(10.0 ** rng.uniform(-4.0, 0.0, count))
+
+
+@pytest.mark.parametrize("width", [0.01, 0.09, 0.36, 1.0])
+def test_what_is_not_hidden_covers_the_surface_as_it_is_seen(gl, width: float) -> None:
+    angle = np.radians([0.0, 10.0, 30.0, 50.0, 70.0, 82.0, 120.0])
+    cosine = as_f32(np.repeat(np.cos(angle)[:, None], 3, axis=1))
+    body = "share = smith_share(cosine, width);"
+    inputs = {"cosine": cosine, "width": as_f32(np.full(len(angle), width))}
+    got = evaluate(gl.ctx, LIBRARY, body, inputs, {"share": "vec3"})["share"]
+    wanted = [microfacet.unhidden(a, width) for a in angle[:-1]]
+    np.testing.assert_allclose(got[:-1], np.repeat(np.array(wanted)[:, None], 3, axis=1), rtol=2e-4)
+    assert not got[-1].any()
+
+
+def test_visible_microfacets_are_those_of_the_listing(gl) -> None:
+    rng = np.random.default_rng(3)
+    normal, direction, width = surfaces(rng, COUNT)
+    u = as_f32(rng.uniform(0.0, 1.0 - 1e-6, (COUNT, 2)))
+    inputs = {"n": normal, "d": direction, "width": width, "u": u}
+    body = "m = visible_microfacet(d, n, width, u);"
+    got = evaluate(gl.ctx, LIBRARY, body, inputs, {"m": "vec3"})["m"]
+    wanted = microfacet.visible_normal(direction, optics.unit(normal), width, u)
+    assert np.isfinite(got).all()
+    assert np.abs(got - wanted).max() < 2e-3 and np.median(np.abs(got - wanted)) < 1e-6
+    assert optics.dot(got, normal).min() > 0.0 and optics.dot(got, direction).min() > -1e-4
+    # Straight on there is no first axis to choose; the numbers may be any.
+    same = evaluate(gl.ctx, LIBRARY, body, inputs | {"d": normal}, {"m": "vec3"})["m"]
+    slope = np.tan(np.arccos(np.clip(optics.dot(same, normal), 0.0, 1.0)))
+    steep = width > 0.01
+    np.testing.assert_allclose(slope[steep], (width * np.sqrt(u[:, 0] / (1.0 - u[:, 0])))[steep], rtol=2e-2, atol=1e-3)
+
+
+def test_microfacets_turn_with_their_surface(gl) -> None:
+    rng = np.random.default_rng(5)
+    normal, direction, width = surfaces(rng, COUNT)
+    met = as_f32(optics.unit(normal + 0.4 * direction))
+    axis = optics.cross(normal, direction)
+    step = 1e-4
+    turn = np.cos(step) * normal + np.sin(step) * optics.cross(axis, normal)  # about `axis`, which is across the normal
+    length = np.linalg.norm(axis, axis=1)
+    body = """
+        turned = turned_with(m, n, dn);
+        vec3 a, b;
+        lobe_axes(m, n, width, a, b);
+        first = a; second = b; part = lobe_part(count);
+    """
+    count = as_f32(10.0 ** rng.uniform(0.0, 8.0, COUNT))
+    inputs = {"m": met, "n": normal, "dn": as_f32((turn - normal) / step), "width": width, "count": count}
+    outputs = {"turned": "vec3", "first": "vec3", "second": "vec3", "part": "float"}
+    got = evaluate(gl.ctx, LIBRARY, body, inputs, outputs)
+    wanted = optics.cross(axis, met)
+    wide = length > 0.1
+    assert np.abs(got["turned"] - wanted)[wide].max() < 2e-3
+    for one, other in (("first", "second"), ("second", "first")):
+        assert np.abs(optics.dot(got[one], met)).max() < 1e-5
+        assert np.abs(optics.dot(got[one], got[other])).max() < 1e-5
+        tilt = np.arccos(np.clip(optics.dot(met, normal), -1.0, 1.0))
+        spread = 0.5 * np.hypot(width * np.cos(tilt), np.sin(tilt))
+        np.testing.assert_allclose(np.linalg.norm(got[one], axis=1), spread, rtol=2e-3, atol=2e-4)
+    np.testing.assert_allclose(got["part"], np.minimum(4.4 * count ** (-1.0 / 6.0), 1.1), rtol=1e-4)
+
+
+def test_numbers_are_kronecker_sequences(gl) -> None:
+    rng = np.random.default_rng(6)
+    i, key = rng.integers(0, 2**32, (2, COUNT), dtype=np.uint32)
+    depth = rng.integers(0, 12, COUNT, dtype=np.uint32)
+    body = "u = microfacet_numbers(i, depth, key);"
+    got = evaluate(gl.ctx, LIBRARY, body, {"i": i, "depth": depth, "key": key}, {"u": "vec2"})["u"]
+    own = random_numbers.hash_combine(key, depth)
+    for k in range(2):
+        deep = random_numbers.hash_pcg(2 * depth.astype(np.uint64) + 0x5BD1E995 + k) | np.uint32(1)
+        generator = np.where(depth < 4, np.array(GENERATORS)[np.minimum(2 * depth + k, 7)], deep)
+        shift = own if k == 0 else random_numbers.hash_pcg(own)
+        np.testing.assert_array_equal(got[:, k], random_numbers.kronecker(i, generator, shift))
+
+
+def test_joined_sides_have_both_covariances(gl) -> None:
+    rng = np.random.default_rng(7)
+    normal = as_f32(optics.unit(rng.normal(size=(COUNT, 3))))
+    sides = rng.normal(size=(4, COUNT, 3)) * 10.0 ** rng.uniform(-2.0, 0.0, (4, COUNT, 1))
+    sides = as_f32(sides - optics.times(np.einsum("knc,nc->kn", sides, normal), normal))
+    body = "vec3 first = a, second = b; join_sides(n, first, second, c, d); u = first; v = second;"
+    inputs = {"n": normal} | dict(zip("abcd", sides, strict=True))
+    got = evaluate(gl.ctx, ["lib/footprint.glsl"], body, inputs, {"u": "vec3", "v": "vec3"})
+    wanted = np.einsum("kni,knj->nij", sides, sides)
+    made = sum(np.einsum("ni,nj->nij", got[name], got[name]) for name in "uv")
+    assert np.abs(made - wanted).max(axis=(1, 2)).max() < 1e-5 * np.trace(wanted, axis1=1, axis2=2).max()
+    assert np.abs(optics.dot(got["u"], normal)).max() < 1e-4
