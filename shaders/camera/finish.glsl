@@ -23,6 +23,9 @@ bool is_finished(uint object)
 }
 #endif
 
+// Outside of any condition: a file is put where it is first asked for, and rough glass needs this one where nothing is coated.
+#include "lib/microfacet.glsl"
+
 #ifdef COATS
 #include "lib/coat.glsl"
 
