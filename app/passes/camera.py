@@ -155,6 +155,8 @@ class CameraPass:
         is compiled when it is needed."""
         self.max_taps = MAX_TAPS
         self.primary_samples = PRIMARY_SAMPLES if self._may_choose else 1
+        self.only_directly = False
+        """Leave what is seen in glass and mirrors black where a program of its own follows it."""
         """Of a sample, at what is seen directly, while a pixel has few samples."""
         self.split_threshold = SPLIT_THRESHOLD
         structs = (
@@ -588,7 +590,7 @@ class CameraPass:
 
     def _follow_listed(self, parameters: np.ndarray, maps: CausticMaps) -> Iterator[float]:
         """Follow what the listed pixels of a band of rows see, yielding the share done."""
-        if self._listed is None:
+        if self._listed is None or self.only_directly:
             return
 
         def dispatch(count: int) -> float:

@@ -29,6 +29,10 @@ RENDER_SHARE = 0.95
 """Likewise a finished picture that somebody waits for."""
 HISTOGRAM_S = 1.0
 """Shortest time between two histograms: each reads two pictures."""
+FIRST_COMPARE_SHARE = 0.8
+"""The same until there is something to compare with."""
+REFERENCE_WAIT_S = 0.06
+"""Of every frame, for the reference until it shows something: it is compiled in Python, whose lock drawing holds."""
 COMPARE_SHARE = 0.4
 """Likewise what is compared with."""
 
@@ -67,7 +71,11 @@ class BackgroundJobs:
                     self.notes.append((note, False))
             left = budget_s - (time.perf_counter() - started)
         share = COMPARE_SHARE if picture.engine is not None and not picture.stats.converged else 1.0
+        if self.comparison.picture is None:
+            share = max(share, FIRST_COMPARE_SHARE)
         self.comparison.advance(state, picture.engine, share * max(left, 0.0))
+        if self.comparison.is_waiting and not state.interacting:
+            time.sleep(REFERENCE_WAIT_S)
         return max(budget_s - (time.perf_counter() - started), 0.2 * budget_s)
 
     def follow(self, state: State, drawn: State, picture: LivePicture, now_s: float) -> None:

@@ -7,6 +7,7 @@ picture without caustics; what is seen behind glass is not compared.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -18,8 +19,8 @@ from ..edit.live_inputs import LiveInputs
 from ..edit.state import Selection
 from ..model.settings import RenderSettings
 from ..passes.camera import CameraPass
+from ..passes.spectrum_choice import Spectrum
 from ..render.device_scene import scene_buffers
-from ..render.sampling import CameraSampling
 from ..render.shown_spectra import reflectance_classes
 from ..render.solo import scene_seen
 from ..render.viewer.dirty_level import DirtyLevel
@@ -27,7 +28,7 @@ from ..render.viewer.invalidation import dirty_level
 from .compared_with import FilePicture, GlassSwap, Histogram, histogram_of
 from .error_curves import ErrorCurves
 from .panels.methods import METHOD_NAMES
-from .reference_thread import ReferenceThread, Snapshot
+from .reference_thread import MEASURED_FROM, ReferenceThread, Snapshot
 from .view_model import ErrorCurve
 
 if TYPE_CHECKING:
@@ -43,11 +44,10 @@ if TYPE_CHECKING:
 REFERENCE, GLASS, FILE = "reference", "glass", "file"
 STAND_IN = "stochastic-even"
 """Takes the reference's place where that cannot be computed."""
-DIRECT = CameraSampling(32, whole_spectrum=True)
+DIRECT_SAMPLES = (1, 4, 16, 32)
+"""Of the picture without caustics, at which it is shown anew: something at once, and it becomes finer."""
 DISPATCH_SECONDS = 0.012
-MEASURED_FROM = 6.0
-"""Photons a pixel from which on errors are measured against the reference: before, most lit pixels have not one, which
-looks like certainty."""
+_NOTHING = (0, 0)
 STRIPE_PX, STRIPE_SHADE = 6, 0.25
 """Width of the stripes over what the reference does not hold, and the share of the picture's light that they leave."""
 
@@ -64,7 +64,7 @@ class Comparison:
         self._engine: LiveEngine | None = None
         self._direct: _DirectPicture | None = None
         self._composed: moderngl.Texture | None = None
-        self._composed_from = 0
+        self._composed_from = _NOTHING
         self._curves = ErrorCurves()
         self._seconds: dict[str, tuple[float, int]] = {}
         self._compare: Compare | None = None
@@ -112,7 +112,7 @@ class Comparison:
         if not self._shows_reference:
             return METHOD_NAMES.get(self._method, self._method)
         snapshot = self._thread.snapshot if self._thread is not None else None
-        return "Reference" if snapshot is None else f"Reference, own relMSE {snapshot.relmse:.1e}"
+        return "Reference" if snapshot is None else f"Reference, {self._noise(snapshot)}"
 
     @property
     def curves(self) -> tuple[ErrorCurve, ...]:
@@ -150,12 +150,12 @@ class Comparison:
             )
         snapshot = self._thread.snapshot if self._thread is not None else None
         if snapshot is None:
-            return "Reference: the first photons are on their way."
+            return "Reference: the first photons are on their way; the first time, its code is compiled before."
         note = (
-            f"Reference: light tracing in float64 without shared code, {snapshot.photons / 1e6:.1f} million photons, "
-            f"own relMSE {snapshot.relmse:.1e}."
+            f"Reference: light tracing in float64 without shared code, {_counted(snapshot.photons)}, "
+            f"{self._noise(snapshot)}."
         )
-        if self._compare.plot and not self._has(snapshot, MEASURED_FROM):
+        if self._compare.plot and not self._is_known(snapshot):
             note += (
                 f" Errors are measured from {MEASURED_FROM * self._begun.width * self._begun.height / 1e6:.1f} "
                 "million on."
@@ -173,6 +173,11 @@ class Comparison:
             return False
         refers = self._thread is not None and not self._thread.is_done and self._thread.problem is None
         return refers or (self._engine is not None and self._needs_engine and not self._engine.is_idle)
+
+    @property
+    def is_waiting(self) -> bool:
+        """The reference is wanted and has nothing to show yet."""
+        return self.is_busy and self._shows_reference and self._thread is not None and self._thread.snapshot is None
 
     def pixel(self, place: tuple[float, float]) -> Vec3 | None:
         """Linear Rec.709 of `picture` at a place of it, 0..1 from the top left; None while there is none."""
@@ -225,7 +230,7 @@ class Comparison:
                 self._thread.resume()
         if self._needs_engine:
             self._advance_engine(running.target_photons, budget_s)
-        self._compose(running)
+        self._compose(running, budget_s)
         if state.compare.plot:
             self._measure(state, running)
 
@@ -285,7 +290,7 @@ class Comparison:
             if owned is not None:
                 owned.release()
         self._thread = self._direct = self._composed = None
-        self._composed_from = 0
+        self._composed_from = _NOTHING
         self._curves = ErrorCurves()
 
     def _advance_engine(self, target_photons: int, budget_s: float) -> None:
@@ -309,13 +314,15 @@ class Comparison:
         self._engine.advance(budget_s, False)
         self._count_seconds(self._engine, self._method)
 
-    def _compose(self, running: LiveEngine) -> None:
+    def _compose(self, running: LiveEngine, budget_s: float) -> None:
         """The reference's caustics on the picture without caustics. Behind glass there is no reference: stripes over
         the running picture say so."""
-        snapshot = self._thread.snapshot if self._thread is not None else None
-        if snapshot is None or self._direct is None or snapshot.number == self._composed_from:
+        if self._direct is None:
             return
-        if not self._direct.advance():
+        self._direct.advance(budget_s)
+        snapshot = self._thread.snapshot if self._thread is not None else None
+        made_from = (0 if snapshot is None else snapshot.number, self._direct.version)
+        if snapshot is None or self._direct.version == 0 or made_from == self._composed_from:
             return
         shown = _read(running.picture) if running.picture is not None else None
         height, width = snapshot.directly.shape
@@ -324,21 +331,22 @@ class Comparison:
             rows, columns = np.nonzero(~snapshot.directly)
             stripes = np.where((rows + columns) // STRIPE_PX % 2, STRIPE_SHADE, 1.0).astype(np.float32)
             whole[rows, columns] = shown[rows, columns] * stripes[:, None]
-        self._composed_from = snapshot.number
+        self._composed_from = made_from
         texels = np.concatenate([whole, np.ones((height, width, 1), np.float32)], axis=-1)
         if self._composed is None:
             self._composed = self._context.ctx.texture((width, height), 4, dtype="f4")
         self._composed.write(np.ascontiguousarray(texels))
-        if not self._has(snapshot, MEASURED_FROM):
+        if not self._is_known(snapshot) or not self._direct.is_done:
             return
         self._curves.set_reference(self._direct.rgb + snapshot.caustic_rgb, snapshot.variance_xyz, snapshot.directly)
 
-    def _has(self, snapshot: Snapshot, photons_a_pixel: float) -> bool:
-        """Whether the reference has come so far, or will not come farther."""
-        height, width = snapshot.directly.shape
-        return snapshot.photons >= photons_a_pixel * width * height or (
-            self._thread is not None and self._thread.is_done
-        )
+    def _is_known(self, snapshot: Snapshot) -> bool:
+        """Whether the reference's own error is known, or will not be known better."""
+        return snapshot.known >= 1.0 or (self._thread is not None and self._thread.is_done)
+
+    def _noise(self, snapshot: Snapshot) -> str:
+        """The reference's own error in words."""
+        return f"own relMSE {'' if self._is_known(snapshot) else '> '}{snapshot.relmse:.1e}"
 
     def _measure(self, state: State, running: LiveEngine) -> None:
         engines = {state.method: running}
@@ -368,7 +376,7 @@ def is_active(compare: Compare) -> bool:
 
 
 class _DirectPicture:
-    """The picture without any caustic: direct light, glass and mirrors."""
+    """What is seen directly in direct light, without any caustic."""
 
     def __init__(self, context: Context, scene: Scene, inputs: LiveInputs) -> None:
         settings = RenderSettings(width=inputs.width, height=inputs.height, method=inputs.method)
@@ -376,25 +384,37 @@ class _DirectPicture:
         reflectances, _ = reflectance_classes(scene, self._buffers)
         self._camera_pass = CameraPass(context, self._buffers, "beauty", reflectances)
         self._camera_pass.dispatch_seconds = DISPATCH_SECONDS
-        self._steps: Iterator[float] | None = self._sampled(scene.camera, inputs)
+        self._camera_pass.spectrum = Spectrum()  # what is seen directly alone needs no bands
+        self._camera_pass.primary_samples = 1
+        self._camera_pass.only_directly = True
+        self._steps = self._sampled(scene.camera, inputs)
         self._rgb: np.ndarray | None = None
+        self.version = 0
+        """0 while there is nothing; another number for another `rgb`."""
+
+    @property
+    def is_done(self) -> bool:
+        """It becomes no better."""
+        return self.version == len(DIRECT_SAMPLES)
 
     def _sampled(self, camera: Camera, inputs: LiveInputs) -> Iterator[float]:
         """Without maps."""
-        view = camera, inputs.width, inputs.height
-        yield from DIRECT.choosing(self._camera_pass, *view, None)
-        yield from self._camera_pass.samples(*view, DIRECT.samples(self._camera_pass), 0, None, inputs.seed)
-
-    def advance(self) -> bool:
-        """One dispatch of work; True once it is done."""
-        if self._steps is not None and next(self._steps, None) is None:
-            self._steps = None
+        view, taken = (camera, inputs.width, inputs.height), 0
+        for samples in DIRECT_SAMPLES:
+            yield from self._camera_pass.samples(*view, samples - taken, taken, None, inputs.seed)
+            taken = samples
             self._rgb = self._camera_pass.read_rgb()
-        return self._steps is None
+            self.version += 1
+
+    def advance(self, budget_s: float) -> None:
+        """Work for about `budget_s`, one dispatch at least."""
+        started = time.perf_counter()
+        while next(self._steps, None) is not None and time.perf_counter() - started < budget_s:
+            pass
 
     @property
     def rgb(self) -> np.ndarray:
-        """float32 (H, W, 3), once done."""
+        """float32 (H, W, 3), from the first version on."""
         assert self._rgb is not None
         return self._rgb
 
@@ -402,6 +422,10 @@ class _DirectPicture:
         """Free everything."""
         self._camera_pass.release()
         self._buffers.release()
+
+
+def _counted(photons: int) -> str:
+    return f"{photons / 1e6:.1f} million photons" if photons >= 100_000 else f"{photons:,} photons"
 
 
 def _read(picture: moderngl.Texture) -> np.ndarray:

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
 TARGET_RELMSE = 2e-4
 MAX_SECONDS = 900.0
+MEASURED_FROM = 6.0
+"""Photons a pixel from which on its error is known: before, most lit pixels have not one, which looks like
+certainty."""
 _GROWTH = 1.4
 """Photons from one snapshot to the next."""
 _NICENESS = 4
@@ -42,6 +45,12 @@ class Snapshot:
     """bool (H, W): pixels for which that is all there is of caustics."""
     photons: int
     relmse: float
+    """Of itself as an estimate; too small while it is not known."""
+
+    @property
+    def known(self) -> float:
+        """How far its error is known, 0 to 1, by the photons that pixels have."""
+        return min(self.photons / (MEASURED_FROM * self.directly.size), 1.0)
 
 
 class ReferenceThread:
@@ -67,7 +76,8 @@ class ReferenceThread:
             return 1.0
         if self.snapshot is None or self.snapshot.relmse <= 0.0:
             return 0.0
-        return min(max(math.log(self.snapshot.relmse) / math.log(TARGET_RELMSE), 0.0), 0.99)
+        decades = math.log(self.snapshot.relmse) / math.log(TARGET_RELMSE)
+        return min(max(decades * self.snapshot.known, 0.0), 0.99)
 
     def pause(self) -> None:
         """Leave the processor alone until `resume`."""

@@ -134,3 +134,9 @@ def test_curves_are_drawn_even_where_an_error_is_zero(gl) -> None:
         rig.view_model = ViewModel(curves=curves)
         rig.frame(3)
         assert np.any(rig.screenshot() != before)
+
+
+def test_values_stand_within_a_wide_panel(gl) -> None:
+    with PanelRig(gl, draw_compare, replace(scene_state(), compare=Compare(mode="wipe")), (900, 320)) as rig:
+        rig.frame(2)
+        assert 450 < rig.find("Here").left < rig.find("Here").right < 900

@@ -30,7 +30,8 @@ def begin_row(label: str) -> bool:
         hit = double_clicked()
         column = max(column, imgui.calc_text_size(shown).x)
         if room - column - gap >= theme.em(_MIN_FIELD_EM):
-            imgui.same_line(start + column + gap)
+            imgui.same_line()  # its offset would count from a table's column, the cursor's place does not
+            imgui.set_cursor_pos_x(start + column + gap)
     else:
         imgui.set_cursor_pos_x(start + column + gap)
     imgui.set_next_item_width(-1.0)
