@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from ..base.glare import with_glare
 from ..base.movie import Frames
-from ..base.tone_map import auto_exposure, tone_map_8bit
+from ..base.tone_map import auto_exposure
 from ..edit.animation import Animation
 from ..model.settings import RenderSettings
+from ..render.animate import developed
 from ..render.notices import FrameNotices
 from . import frame_tasks
 from .cluster import DaskCrew
@@ -57,7 +57,5 @@ class FarmFrames:
         base_ev = self._sink.fix_exposure(auto_exposure(result.rgb))
         if 0 in self._only:
             first = self._stages[0]
-            look = first.scene.render
-            rgb = with_glare(result.rgb, look.glare)
-            self._sink.write(0, tone_map_8bit(rgb, base_ev + first.exposure_ev, look.antialias_highlights))
+            self._sink.write(0, developed(result.rgb, base_ev + first.exposure_ev, first.scene.render))
         self._hand_out()

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.glare import with_glare
 from ..base.image_io import check_finite
 from ..base.movie import frame_bytes
-from ..base.tone_map import tone_map_8bit
 from ..edit.parameters import Stage
 from ..model.settings import RenderSettings
+from ..render.animate import developed
 from ..render.frames import FrameRenderer
 from ..render.notices import frame_notices
 from .desk import Desk, Report
@@ -52,6 +51,5 @@ def draw(desk: Desk, of: Frames, report: Report, index: int, base_ev: float | No
     notices = tuple(frame_notices(renderer.light, stage.camera, of.settings, rgb))
     if base_ev is None:
         return Frame(rgb, b"", notices)
-    look = stage.scene.render
-    codes = tone_map_8bit(with_glare(rgb, look.glare), base_ev + stage.exposure_ev, look.antialias_highlights)
+    codes = developed(rgb, base_ev + stage.exposure_ev, stage.scene.render)
     return Frame(None, frame_bytes(codes), notices)

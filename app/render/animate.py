@@ -15,15 +15,19 @@ from ..base.movie import Frames, Sink
 from ..base.tone_map import auto_exposure, tone_map_8bit
 from ..edit.animation import Animation
 from ..gpu.context import Context
-from ..model.scene import Scene
+from ..model.scene import RenderDefaults, Scene
 from ..model.scene_key import scene_key
 from ..model.settings import RenderSettings
 from .frames import FrameRenderer
 from .notices import FrameNotices, frame_notices
 
-Develop = Callable[[np.ndarray, float, bool], np.ndarray]
-"""(linear Rec.709 (H, W, 3), absolute exposure in EV, whether highlights are antialiased) → sRGB codes uint8
-(H, W, 3)."""
+Develop = Callable[[np.ndarray, float, RenderDefaults], np.ndarray]
+"""(linear Rec.709 (H, W, 3), absolute exposure in EV, the scene's lens and highlights) → sRGB codes uint8 (H, W, 3)."""
+
+
+def developed(rgb: np.ndarray, exposure_ev: float, look: RenderDefaults) -> np.ndarray:
+    """A picture to look at, with the glare of its lens."""
+    return tone_map_8bit(with_glare(rgb, look.glare), exposure_ev, look.antialias_highlights)
 
 
 def render_animation(
@@ -32,7 +36,7 @@ def render_animation(
     settings: RenderSettings,
     sink: Sink,
     base_ev: float | None = None,
-    develop: Develop = tone_map_8bit,
+    develop: Develop = developed,
     notices: FrameNotices | None = None,
     only: range | None = None,
 ) -> Generator[float]:
@@ -72,8 +76,7 @@ def render_animation(
                         notices.take(frame_notices(renderer.light, stage.camera, settings, rgb), index + 1)
                     if base_ev is None:
                         base_ev = _agreed(shared, auto_exposure(rgb))
-                    look, exposure_ev = stage.scene.render, base_ev + stage.exposure_ev
-                    sink.write(index, develop(with_glare(rgb, look.glare), exposure_ev, look.antialias_highlights))
+                    sink.write(index, develop(rgb, base_ev + stage.exposure_ev, stage.scene.render))
             if is_ours or sink.has(index):
                 done, came = done + 1, 0
                 yield done / len(frames)

@@ -14,12 +14,14 @@ import numpy as np
 
 from ..base.atomic import atomic_output, check_writable
 from ..base.errors import UserError
+from ..base.glare import with_glare
 from ..base.image_io import SHOWN_SUFFIXES, check_finite, check_suffix, save_codes, write_image
 from ..base.memory import MAX_SIDE_PX, check_picture_memory
 from ..edit import requests
 from ..edit.parameters import Stage
 from ..edit.state import Display as DisplaySettings
 from ..edit.state import State
+from ..model.scene import RenderDefaults
 from ..model.settings import RenderSettings
 from ..passes.display import Display
 from ..render.notices import FrameNotices, frame_notices
@@ -292,7 +294,7 @@ def _render(
     def write_shown(path: Path, rgb: np.ndarray) -> None:
         develop = _Developer(context, state.display)
         try:
-            write_codes(path, develop(rgb, stage.exposure_ev, stage.scene.render.antialias_highlights))
+            write_codes(path, develop(rgb, stage.exposure_ev, stage.scene.render))
         finally:
             develop.release()
 
@@ -348,14 +350,18 @@ def _animate(
 
 
 class _Developer:
-    """Linear pictures to codes as the window shows them: tone curve or false colour."""
+    """Linear pictures to codes as the window shows them: tone curve with the lens's glare, or false colour, which is
+    data and has none."""
 
     def __init__(self, context: Context, settings: DisplaySettings) -> None:
         self._context, self._settings = context, settings
         self._display: Display | None = None
 
-    def __call__(self, rgb: np.ndarray, exposure_ev: float, antialias: bool) -> np.ndarray:
+    def __call__(self, rgb: np.ndarray, exposure_ev: float, look: RenderDefaults) -> np.ndarray:
         self._display = self._display or Display(self._context)
+        is_data = self._settings.false_colour
+        rgb = rgb if is_data else with_glare(rgb, look.glare)
+        antialias = look.antialias_highlights and not is_data
         height, width = rgb.shape[:2]
         texels = np.concatenate([rgb, np.ones((height, width, 1), np.float32)], axis=-1)
         texture = self._context.ctx.texture(

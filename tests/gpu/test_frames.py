@@ -16,6 +16,7 @@ from spectrasplat.edit.parameters import Stage
 from spectrasplat.gpu import shader
 from spectrasplat.gpu.context import Context
 from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.scene import RenderDefaults
 from spectrasplat.model.settings import CAMERA_METHODS, METHODS, RenderSettings
 from spectrasplat.render.animate import render_animation
 from spectrasplat.render.frames import FrameRenderer
@@ -54,7 +55,7 @@ class First:
     def claimed(self, index: int) -> AbstractContextManager[bool]:
         return nullcontext(True)
 
-    def develop(self, rgb: np.ndarray, exposure_ev: float, antialias: bool) -> np.ndarray:
+    def develop(self, rgb: np.ndarray, exposure_ev: float, look: RenderDefaults) -> np.ndarray:
         self.rgb = rgb if self.rgb is None else self.rgb
         return np.zeros(rgb.shape, np.uint8)
 

@@ -15,7 +15,7 @@ from spectrasplat.edit import requests
 from spectrasplat.edit.drawn import Drawn, scrubbed
 from spectrasplat.edit.state import Key, State
 from spectrasplat.gpu.context import Context
-from spectrasplat.ui.export import Exports, Shown, left_words
+from spectrasplat.ui.export import Exports, Shown, _Developer, left_words
 from spectrasplat.ui.panels import export_panel, file_browser, keys_editor
 from spectrasplat.ui.panels.export_panel import draw_export
 from spectrasplat.ui.view_model import ViewModel
@@ -78,6 +78,20 @@ def test_a_picture_and_its_caustics_are_written_whole(gl: Context, tmp_path: Pat
     beauty, caustic = (np.asarray(Image.open(p)) for p in (path, tmp_path / "a_caustic.png"))
     assert beauty.shape == caustic.shape == (54, 96, 3)
     assert beauty.mean() > caustic.mean() and caustic.max() > 0
+
+
+def test_a_written_picture_has_the_glare_of_its_lens_and_a_measured_one_has_not(gl: Context) -> None:
+    rgb = np.zeros((32, 32, 3), np.float32)
+    rgb[16, 16] = 100.0
+    look = replace(scene_state().scene.render, glare=0.2)
+    for settings, has_glare in (
+        (scene_state().display, True),
+        (replace(scene_state().display, false_colour=True), False),
+    ):
+        develop = _Developer(gl, settings)
+        dark, codes = develop(rgb, 0.0, replace(look, glare=0.0)), develop(rgb, 0.0, look)
+        develop.release()
+        assert (codes[12:20, 12:20].sum() > dark[12:20, 12:20].sum() + 200) == has_glare
 
 
 def test_what_cannot_be_rendered_is_refused_at_once(gl: Context, tmp_path: Path) -> None:
