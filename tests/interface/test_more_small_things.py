@@ -101,6 +101,13 @@ def test_open_takes_a_typed_name_and_a_whole_path(gl: Context, tmp_path: Path) -
         rig.key(imgui.Key.enter)
         rig.frame(3)
         assert "did you mean 'vase.toml'?" in file_browser._browser.error
+        rig.asked.clear()
+        rig.click("File name")
+        rig.key(imgui.Key.a, [imgui.Key.mod_ctrl])
+        rig.type("lens")
+        rig.key(imgui.Key.enter)
+        rig.frame(3)
+        assert rig.asked == [requests.Open(SCENES / "lens.toml")]  # a shipped one is found from anywhere
     file_browser.close()
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from imgui_bundle import imgui
 
-from ...base.paths import assets_dir
+from ...base.paths import assets_dir, shipped_scenes
 from ...edit import edits, requests
 from ...edit.importing import import_objects
 from ...edit.state import Selection, State
@@ -47,14 +47,14 @@ def reset() -> None:
 def open_file(state: State, view_model: ViewModel) -> State:
     """Ask which file to open."""
     start = view_model.path.parent if view_model.path is not None else _recent_folder(view_model)
-    file_browser.ask(file_browser.Question("open", "Open", OPENABLE, start))
+    file_browser.ask(file_browser.Question("open", "Open", OPENABLE, start, known=shipped_scenes()))
     return state
 
 
 def import_file(state: State, view_model: ViewModel) -> State:
     """Ask which file's objects are to join the scene."""
     start = view_model.path.parent if view_model.path is not None else _recent_folder(view_model)
-    file_browser.ask(file_browser.Question("import", "Import into this scene", OPENABLE, start))
+    file_browser.ask(file_browser.Question("import", "Import into this scene", OPENABLE, start, known=shipped_scenes()))
     return state
 
 

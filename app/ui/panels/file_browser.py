@@ -8,7 +8,7 @@ One question is open at a time; a new one replaces it.
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
@@ -32,6 +32,8 @@ class Question:
     start: Path
     """Folder to begin in, or a file whose name is proposed."""
     saving: bool = False
+    known: Mapping[str, Path] = field(default_factory=dict)
+    """Files that are found by a bare name from any folder."""
 
 
 @dataclass(frozen=True)
@@ -140,6 +142,9 @@ def _places(question: Question) -> None:
 
 
 def _table(question: Question) -> None:
+    if not _browser.entries:
+        widgets.hint(f"No folders and no {', '.join(question.suffixes)} files here.")
+        return
     flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.scroll_y | imgui.TableFlags_.sortable
     if not imgui.begin_table("##entries", 3, flags):
         return
@@ -157,8 +162,6 @@ def _table(question: Question) -> None:
         imgui.table_next_column()
         imgui.text_disabled("" if entry.is_folder else _size_text(entry.size))
     imgui.end_table()
-    if not _browser.entries:
-        widgets.hint(f"No folders and no {', '.join(question.suffixes)} files here.")
 
 
 def _row(entry: _Entry, question: Question) -> None:
@@ -184,6 +187,8 @@ def _footer(question: Question) -> None:
         _browser.wants_focus = False
     imgui.set_next_item_width(-1)
     hint = "File name" if question.saving else "File name, or a whole path"
+    if question.known:
+        hint += ", or a shipped scene"
     entered, _browser.name = imgui.input_text_with_hint(
         "##name", hint, _browser.name, imgui.InputTextFlags_.enter_returns_true
     )
@@ -220,8 +225,10 @@ def _choose(question: Question) -> None:
             _answer(question, path)
     elif path.is_dir():
         _enter(path)
+    elif not path.is_file() and _browser.name.strip() in question.known:
+        _answer(question, question.known[_browser.name.strip()])
     elif not path.is_file():
-        near = suggestion(path.name, [entry.path.name for entry in _browser.entries])
+        near = suggestion(path.name, [*(entry.path.name for entry in _browser.entries), *question.known])
         where = "here" if path.parent == _browser.folder else f"in {path.parent}"
         _browser.error = f"There is no file {path.name} {where}{near.rstrip('?')}{'?' if near else '.'}"
     else:
