@@ -46,11 +46,17 @@ def tint_curves(scene: Scene) -> np.ndarray:
 
 
 def cut_by_tints(
-    ends: tuple[float, float], least: int, most: int, curves: np.ndarray, light: Spectrum, axis: SpectralAxis
+    ends: tuple[float, float],
+    least: int,
+    most: int,
+    curves: np.ndarray,
+    light: Spectrum,
+    axis: SpectralAxis,
+    tolerance: float = TOLERANCE,
 ) -> np.ndarray:
     """Edges (B + 1,), in x, of `least` to `most` bands between `ends`, none wider than `least` even ones: as many as
-    straight weights need to follow `curves` (N, 401) under `light`, and where these err least. By dynamic programming
-    over the nanometres, as curves are fitted by segments (Bellman 1961)."""
+    straight weights need to follow `curves` (N, 401) under `light` within `tolerance`, and where these err least. By
+    dynamic programming over the nanometres, as curves are fitted by segments (Bellman 1961)."""
     power = np.array(light.density)
     for nm, line in light.lines:
         power[round(nm - VISIBLE_NM[0])] += line
@@ -60,11 +66,11 @@ def cut_by_tints(
     if not len(curves):
         return np.linspace(*ends, least + 1)
     x = np.asarray(axis.x_of_nm(VISIBLE_NM), np.float64)
-    return np.array(_cut(tuple(ends), least, most, x.tobytes(), curves.tobytes(), weights.tobytes()))
+    return np.array(_cut(tuple(ends), least, most, tolerance, x.tobytes(), curves.tobytes(), weights.tobytes()))
 
 
 @lru_cache(maxsize=64)
-def _cut(ends: tuple[float, float], least: int, most: int, *arrays: bytes) -> tuple[float, ...]:
+def _cut(ends: tuple[float, float], least: int, most: int, tolerance: float, *arrays: bytes) -> tuple[float, ...]:
     """Every pass of a light asks again; the arrays as in `cut_by_tints`."""
     x, *rows = (np.frombuffer(array, np.float64) for array in arrays)
     curves, weights = (row.reshape(-1, len(x)) for row in rows)
@@ -81,7 +87,7 @@ def _cut(ends: tuple[float, float], least: int, most: int, *arrays: bytes) -> tu
     # `best[j]`: the least that bands from the low end to place j miss; `before`: where the last of them begins.
     best, before = missed[0], []
     for count in range(2, most + 1):
-        if count > least and best[-1] <= TOLERANCE**2:
+        if count > least and best[-1] <= tolerance**2:
             break
         sums = best[:, None] + missed
         before.append(np.argmin(sums, axis=0))

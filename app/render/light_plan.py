@@ -175,7 +175,8 @@ class Planner:
             edges[1:-1] += aside * (edges[1] - edges[0])
             if self._tinted:
                 spectrum = self.scene.lights[light].spectral_power
-                edges = cut_by_tints(ends, count, MAX_BANDS, self.buffers.tints, spectrum, axis)
+                tolerance = fit.tint_tolerance()
+                edges = cut_by_tints(ends, count, MAX_BANDS, self.buffers.tints, spectrum, axis, tolerance)
             middles = 0.5 * (edges[:-1] + edges[1:])
         return tuple(
             Band(float(lo), float(hi), float(mid), float(power.band(lo, hi)[3]))

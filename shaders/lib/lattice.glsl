@@ -19,6 +19,14 @@ vec2 lattice_point(uint i, uint count, uvec2 shift)
     return vec2(along, kronecker(i, GOLDEN, shift.y));
 }
 
+// Point of `count` in the unit square, each with its mirror image in the square's middle: few points on a lamp then have their mean in its middle, and
+// what they light is blurred, not moved.
+vec2 mirrored_lattice_point(uint i, uint count, uvec2 shift)
+{
+    vec2 unit = vec2(0.5, 1.0) * lattice_point(i >> 1u, (count + 1u) >> 1u, shift);
+    return (i & 1u) == 0u ? unit : 1.0 - unit;
+}
+
 const float GOLDEN_RATIO = 1.618033989;
 const float ROOT_5 = 2.236067977;
 

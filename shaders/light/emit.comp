@@ -54,7 +54,7 @@ void main()
     bool alive = (p.mask[bit >> 5u] & (1u << (bit & 31u))) != 0u;
     vec2 q = p.rect.xy + unit * p.rect.zw;
     uint place = sub / p.band_count;
-    vec2 on_disc = p.light_points > 1u ? lattice_point(place, p.light_points, p.shift_light) : p.light_place;
+    vec2 on_disc = p.light_points > 1u ? mirrored_lattice_point(place, p.light_points, p.shift_light) : p.light_place;
 
     vec3 position, direction, dposition_ds = vec3(0.0), dposition_dt = vec3(0.0), ddirection_ds = vec3(0.0), ddirection_dt = vec3(0.0);
     float weight = p.weight;
