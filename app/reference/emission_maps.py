@@ -22,6 +22,14 @@ def lattice_point(i: Array, count: int, shift: tuple[Array | int, Array | int]) 
     return np.stack(np.broadcast_arrays(along, kronecker(i, GOLDEN, shift[1])), axis=-1)
 
 
+def mirrored_lattice_point(i: Array, count: int, shift: tuple[Array | int, Array | int]) -> Array:
+    """Point i of `count`: even ones are a lattice in the left half of the unit square, each odd one is the mirror image
+    in the square's middle of the one before it."""
+    i = np.asarray(i)
+    unit = lattice_point(i // 2, (count + 1) // 2, shift) * (0.5, 1.0)
+    return np.where(i[..., None] % 2 == 0, unit, 1.0 - unit)
+
+
 def azimuthal_direction(q: Array) -> Array:
     """Lambert's azimuthal equal-area map: |q| <= 2 is the chord 2 sin(angle/2) from the z axis."""
     radius = np.linalg.norm(q, axis=-1)

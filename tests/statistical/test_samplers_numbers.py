@@ -16,7 +16,7 @@ from spectrasplat.base import paths
 from spectrasplat.base.random_words import PASS_GENERATORS
 from spectrasplat.gpu.records import LATTICE_BIT, TRACE_PARAMETERS, ray_record
 from spectrasplat.passes.pixel_lattice import cells_of, pixel_lattice
-from spectrasplat.reference.emission_maps import GOLDEN, PLASTIC, lattice_point
+from spectrasplat.reference.emission_maps import GOLDEN, PLASTIC, lattice_point, mirrored_lattice_point
 from spectrasplat.reference.random_numbers import hash_combine, hash_pcg, kronecker, unit_float
 from spectrasplat.stress.rigs.glsl_function import evaluate
 
@@ -114,6 +114,20 @@ def test_sub_lattices_of_bands_and_places_are_shifted_evenly() -> None:
     assert box_discrepancy(points, 16) < 0.02
 
 
+@pytest.mark.parametrize("count", [2, 4, 6, 16, 64, 256])
+def test_places_on_a_lamp_have_their_mean_in_its_middle_and_are_even(count: int) -> None:
+    """What few places light is blurred, not moved; over many passes every place is as likely as any other."""
+    shift = hash_combine(np.arange(512), 17), hash_combine(np.arange(512), 18)
+    places = np.stack(
+        [mirrored_lattice_point(np.arange(count), count, (int(a), int(b))) for a, b in zip(*shift, strict=True)]
+    )
+    assert ((places >= 0.0) & (places <= 1.0)).all()
+    assert np.abs(places.mean(axis=1) - 0.5).max() < 1e-6
+    # Each column of the square cut into `count` holds one.
+    assert (np.sort(places[..., 0] * count, axis=1).astype(int) == np.arange(count)).mean() > 0.999
+    assert box_discrepancy(places.reshape(-1, 2), 16) < 0.05 / np.sqrt(count)
+
+
 @pytest.mark.parametrize("light_points", [1, 3, 16, 256, 4096, 8192])
 def test_one_wavelength_a_photon_is_even_whatever_the_number_of_places(light_points: int) -> None:
     """`stochastic-even`: with every number of places on a light the wavelengths of a pass are even, alone and with the
@@ -123,7 +137,7 @@ def test_one_wavelength_a_photon_is_even_whatever_the_number_of_places(light_poi
     colour = kronecker(photon, 3774877043, 0)
     assert star_discrepancy(colour) < 3.0 * np.log(len(photon)) / len(photon)
     point, place = photon // light_points, photon % light_points
-    on_light = lattice_point(place, light_points, (0, 0))
+    on_light = mirrored_lattice_point(place, light_points, (0, 0))
     for other in (
         ([point / points] if points > 64 else [])
         + [kronecker(point, GOLDEN, 0)] * (points > 64)
