@@ -12,7 +12,7 @@ from functools import partial
 
 from ..edit import requests
 from ..edit.state import State, Tool
-from . import view_commands
+from . import layout, view_commands
 from .panels import dialogs
 from .view_model import ViewModel
 
@@ -70,7 +70,7 @@ def _set_tool(tool: Tool, state: State, _view_model: ViewModel) -> State:
 
 def _take_brush(state: State, _view_model: ViewModel) -> State:
     """With its panel, which shows radius and strength and how to compare with the physical picture."""
-    return replace(state, tool="brush").with_panels(brush=True)
+    return _open_panel("brush", replace(state, tool="brush"), _view_model)
 
 
 def _toggle_playing(state: State, _view_model: ViewModel) -> State:
@@ -82,6 +82,7 @@ def _toggle_physical(state: State, _view_model: ViewModel) -> State:
 
 
 def _open_panel(name: str, state: State, _view_model: ViewModel) -> State:
+    layout.raise_panel(name)
     return state.with_panels(**{name: True})
 
 

@@ -76,6 +76,8 @@ class Comparison:
         """Method and glass that the engine was last given."""
         self._version_before: int | None = None
         """Of the engine's picture when it was given them."""
+        self._size = (0, 0)
+        """Of the picture that is compared."""
         self._selection: Selection | None = None
         """What was selected when it was begun: the solid whose glass is another."""
 
@@ -83,7 +85,12 @@ class Comparison:
 
     @property
     def picture(self) -> moderngl.Texture | None:
-        """RGBA32F as the engine's; None while there is nothing to show."""
+        """RGBA32F as the engine's; None while there is nothing of the window's size to show."""
+        found = self._picture
+        return None if found is None or found.size != self._size else found
+
+    @property
+    def _picture(self) -> moderngl.Texture | None:
         if self._compare is None or not is_active(self._compare):
             return None
         if self._shows_reference:
@@ -211,6 +218,9 @@ class Comparison:
             self._pause()
             return
         wanted = state.live_inputs
+        before, self._size = self._size, (wanted.width, wanted.height)
+        if self._begun is not None and before == self._size != (self._begun.width, self._begun.height):
+            self.restart()  # the window was made larger or smaller, and keeps its size now
         if self._begun is None:
             self._stop()
             self._begun, self._selection = wanted, state.selection

@@ -36,6 +36,10 @@ class Docked:
     place: Place
 
 
+_raised: set[str] = set()
+"""Fields of the panels that somebody wants to see in front."""
+
+
 def dockspace(windows: tuple[Docked, ...], bottom_margin: float) -> None:
     """Submit the dock space below the menu bar, `bottom_margin` pixels above the lower edge; before every docked
     window."""
@@ -100,6 +104,18 @@ def _build(dock: int, size: imgui.ImVec2, windows: tuple[Docked, ...]) -> None:
         if window.place in nodes:
             builder.dock_builder_dock_window(window.title, nodes[window.place])
     builder.dock_builder_finish(dock)
+
+
+def raise_panel(field: str) -> None:
+    """Show this panel before the tabs beside it in the next frame."""
+    _raised.add(field)
+
+
+def is_raised(field: str) -> bool:
+    """Whether somebody asked for it since the last time."""
+    found = field in _raised
+    _raised.discard(field)
+    return found
 
 
 def _bring_to_front(windows: tuple[Docked, ...]) -> None:

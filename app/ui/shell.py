@@ -140,6 +140,8 @@ def _draw_panel(window: PanelWindow, state: State, view_model: ViewModel) -> Sta
     height = min(theme.em(window.size_em[1]), viewport.work_size.y * 0.85)
     imgui.set_next_window_size((width, height), imgui.Cond_.first_use_ever)
     imgui.set_next_window_pos(viewport.get_center(), imgui.Cond_.first_use_ever, imgui.ImVec2(0.5, 0.5))
+    if layout.is_raised(window.field):
+        imgui.set_next_window_focus()
     shown, stays = imgui.begin(window.title, True)
     item_rects.note(f"Window: {window.title}")
     if not imgui.is_window_docked():

@@ -118,3 +118,22 @@ def test_a_histogram_counts_stops_about_display_white() -> None:
     found = histogram_of(grey, black, 1.0)
     assert found.own.sum() == pytest.approx(1.0) and found.other.sum() == 0.0
     assert found.stops[found.own.argmax()] == pytest.approx(-1.0, abs=0.35)
+
+
+def test_a_picture_of_another_size_is_not_shown_and_begun_anew(state, running, comparison, monkeypatch) -> None:
+    begun: list[tuple[int, int]] = []
+
+    def begin(_scene, width: int, height: int) -> SimpleNamespace:
+        begun.append((width, height))
+        shape = (height, width)
+        picture = np.ones((*shape, 3), np.float32)
+        return idle_thread(Snapshot(1, picture, picture, np.ones(shape, bool), 500, 0.8))
+
+    monkeypatch.setattr("spectrasplat.ui.compare.ReferenceThread", begin)
+    compared = replace(state, compare=Compare(mode="wipe"))
+    until(lambda: comparison.picture is not None, lambda: comparison.advance(compared, running, 0.05))
+    larger = replace(compared, viewport_size=(SIZE[0] + 20, SIZE[1]))
+    comparison.advance(larger, running, 0.05)
+    assert comparison.picture is None
+    until(lambda: comparison.picture is not None, lambda: comparison.advance(larger, running, 0.05))
+    assert begun == [SIZE, (SIZE[0] + 20, SIZE[1])]

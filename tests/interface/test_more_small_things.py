@@ -67,6 +67,17 @@ def test_f11_asks_for_the_whole_screen(gl: Context) -> None:
         assert rig.asked == [requests.FullScreen()]
 
 
+def test_render_comes_before_the_tabs_beside_it(gl: Context) -> None:
+    with ShellRig(gl, size=(1440, 900)) as rig:
+        for _ in range(2):
+            rig.key(imgui.Key.f12)
+            rig.frame(3)
+            assert "Render…" in rig.items.items
+            rig.key(imgui.Key.b)  # the brush's panel comes to the same place
+            rig.frame(3)
+            assert "Render…" not in rig.items.items and "Radius" in rig.items.items
+
+
 def test_the_abbe_diagram_stands_beside_the_caustic(gl: Context) -> None:
     with ShellRig(gl, size=(1440, 900)) as rig:
         rig.open_panel(abbe=True)
