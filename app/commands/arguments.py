@@ -54,7 +54,7 @@ GlassOption = Annotated[
     typer.Option(
         "--glass",
         metavar="GLASS",
-        help="Make all solids of a catalogue glass (diamond), or one (OBJECT=N-SF11); may be repeated.",
+        help="Make all solids of a glass (diamond, 'cobalt blue'), or one (OBJECT=N-SF11); may be repeated.",
         autocompletion=completion.glasses,
     ),
 ]

@@ -14,6 +14,7 @@ from ..model.materials.dielectric import MAX_PRIORITY
 from ..model.optics import glass
 from ..model.optics.colorimetry import attenuation_from_colour
 from ..model.optics.glass import Dispersion
+from ..model.optics.tints import Tint
 from ..model.scene import Absorption, Dielectric, Scene, Vec3
 from ..model.scene_checks import check_lines
 
@@ -96,6 +97,15 @@ def set_absorption(scene: Scene, index: int, colour: Vec3 | None, distance: floa
             f"{_where(scene, index)}: the glass would be opaque within {1.0 / MAX_ATTENUATION:g} units; choose a "
             "longer distance"
         )
+    alpha.setflags(write=False)
+    return _with_glass(scene, index, replace(_glass(scene, index), absorption=Absorption(alpha)))
+
+
+def set_tint(scene: Scene, index: int, tint: Tint, distance: float) -> Scene:
+    """Colour object `index` so that daylight is half as bright after `distance` scene units."""
+    if not (math.isfinite(distance) and distance > 0.0):
+        raise UserError(f"{_where(scene, index)}: the distance of the tint is {distance:g}; give a length above 0")
+    alpha = tint.coefficient / distance
     alpha.setflags(write=False)
     return _with_glass(scene, index, replace(_glass(scene, index), absorption=Absorption(alpha)))
 

@@ -16,6 +16,7 @@ import numpy as np
 from ..model.lights.directional import SUN_DIAMETER_DEG
 from ..model.lights.light import made
 from ..model.optics import catalogue
+from ..model.optics.tints import Tint, tints
 from ..model.scene import (
     Camera,
     Dielectric,
@@ -25,6 +26,7 @@ from ..model.scene import (
     Vec3,
 )
 from ..model.scene_defaults import environment_of
+from ..model.staging import tinted
 from ..model.vectors import vec3
 from .adding import up_frame
 from .lights import SpectrumKind, light_power, set_light, set_light_power, set_light_spectrum
@@ -39,6 +41,8 @@ class MaterialPreset:
     material: Material
     remark: str = ""
     """One line for the tooltip."""
+    tint: Tint | None = None
+    """How deep it is follows the object's size."""
 
 
 @dataclass(frozen=True)
@@ -143,8 +147,14 @@ _VIEWS = (
 
 @cache
 def material_presets() -> tuple[MaterialPreset, ...]:
-    """Glasses from the catalogue, by what people call them, least refracting families first."""
-    return tuple(MaterialPreset(name, Dielectric(catalogue.find(glass)), remark) for name, glass, remark in _GLASSES)
+    """Glasses from the catalogue, by what people call them, least refracting families first; then tinted ones."""
+    clear = (MaterialPreset(name, Dielectric(catalogue.find(glass)), remark) for name, glass, remark in _GLASSES)
+    return (*clear, *(_tinted_preset(tint) for tint in tints()))
+
+
+def _tinted_preset(tint: Tint) -> MaterialPreset:
+    remark = f"Approximated by its bands; {tint.colourant}"
+    return MaterialPreset(tint.name.capitalize(), Dielectric(tint.dispersion), remark, tint)
 
 
 def light_presets() -> tuple[LightPreset, ...]:
@@ -161,6 +171,8 @@ def apply_material(scene: Scene, index: int, preset: MaterialPreset) -> Scene:
     """Give object `index` the preset's material; a glass keeps its surface and its priority among overlapping
     solids."""
     before, material = scene.objects[index].material, preset.material
+    if preset.tint is not None:
+        material = tinted(scene.objects[index], preset.tint)
     if before.transmits and material.transmits:
         material = material.changed(priority=before.priority, roughness=before.roughness)
     return set_material(scene, index, material)

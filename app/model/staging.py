@@ -14,8 +14,9 @@ import numpy as np
 
 from ..base.errors import UserError, suggestion
 from .geometry.mesh import Mesh
-from .optics import catalogue
-from .scene import Dielectric, SceneObject
+from .optics import catalogue, tints
+from .optics.tints import Tint
+from .scene import Absorption, Dielectric, SceneObject
 
 UpAxis = Literal["y", "z"]
 UP_AXES: tuple[UpAxis, ...] = ("y", "z")
@@ -35,7 +36,8 @@ class Staging:
 
     up: UpAxis | None = None
     glass: tuple[tuple[str | None, str], ...] = ()
-    """Object (None: all that is no receiver below the others) and catalogue name of its glass, later ones above."""
+    """Object (None: all that is no receiver below the others) and name of its glass, of the catalogue or a tint; later
+    ones above."""
 
 
 AS_FOUND = Staging()
@@ -79,15 +81,28 @@ def with_glass(objects: Sequence[SceneObject], staging: Staging, file_name: str)
     """`objects` with the glasses asked for. Raises UserError for an object or a glass that there is not."""
     changed = list(objects)
     for name, glass in staging.glass:
-        material = Dielectric(catalogue.find(glass, f"--glass {glass}" if name is None else f"--glass {name}={glass}"))
+        tint = tints.tint(glass)
+        where = f"--glass {glass}" if name is None else f"--glass {name}={glass}"
+        material = Dielectric(catalogue.find(glass, where) if tint is None else tint.dispersion)
         names = [item.name for item in objects]
         if name is not None and name not in names:
             hint = suggestion(name, names) or ","
             raise UserError(f"--glass: {file_name} holds no object '{name}'{hint} it holds {listed(names)}")
         chosen = [names.index(name)] if name is not None else _bodies(objects)
         for index in chosen:
-            changed[index] = replace(changed[index], material=material)
+            changed[index] = replace(
+                changed[index], material=material if tint is None else tinted(changed[index], tint)
+            )
     return changed
+
+
+def tinted(item: SceneObject, tint: Tint) -> Dielectric:
+    """What is usually coloured so, as deep that daylight is half as bright across half of `item`'s narrowest side."""
+    points = item.mesh.vertices @ item.object_to_world[:3, :3].T
+    depth = 0.5 * float(np.ptp(points, axis=0).min()) or 1.0
+    coefficient = tint.coefficient / depth
+    coefficient.setflags(write=False)
+    return Dielectric(tint.dispersion, Absorption(coefficient))
 
 
 def _bodies(objects: Sequence[SceneObject]) -> list[int]:

@@ -112,7 +112,9 @@ def raise_panel(field: str) -> None:
 
 
 def is_raised(field: str) -> bool:
-    """Whether somebody asked for it since the last time."""
+    """Whether somebody asked for it since the last time; not before a new window's tabs are in their order."""
+    if imgui.get_frame_count() <= _SETTLED_AFTER + 2:
+        return False
     found = field in _raised
     _raised.discard(field)
     return found

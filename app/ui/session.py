@@ -23,6 +23,7 @@ from ..edit.state import Selection, State
 from ..gpu.shader_watch import ShaderWatch
 from ..model.staging import Staging
 from ..render.notices import loss_notices
+from . import layout
 from .background_jobs import BackgroundJobs
 from .crash_log import write_crash
 from .export import write_codes
@@ -201,6 +202,8 @@ class Session:
         self.show_document(Document.open(lesson.path))
         names = [item.name for item in self.state.scene.objects]
         chosen = Selection("object", names.index(lesson.select)) if lesson.select in names else Selection()
+        if lesson.rays:
+            layout.raise_panel("rays")
         state = replace(self.state, lesson=lesson.name, selection=chosen).with_display(ray_overlay=lesson.rays)
         self.state = state.with_panels(lesson=True, rays=lesson.rays or state.preferences.panels.rays)
 

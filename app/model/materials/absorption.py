@@ -9,8 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from ...base.errors import suggestion
 from ..fields import Part
 from ..io.scene_table import SceneTable
+from ..optics import tints
 from ..optics.colorimetry import VISIBLE_NM, attenuation_from_colour, rgb_partition
 from ..optics.spectrum import read_csv
 from ..spectrum_file import SAME, same_curve
@@ -29,14 +31,15 @@ class Absorption:
 
 
 class AbsorptionPart(Part):
-    """`absorption`: a colour, or a spectrum of transmittance, reached at a distance; or the coefficient itself."""
+    """`absorption`: a colour or a spectrum of transmittance, reached at a distance; a tint that halves light there; or
+    the coefficient itself."""
 
     def read(self, table: SceneTable) -> dict[str, Any]:
         """The absorption, None without one."""
         return {"absorption": _read_absorption(table)}
 
     def write(self, value: Any, path: Path | None) -> dict[str, Any]:
-        """A colour at a distance where one explains it, else the coefficient."""
+        """A tint or a colour at a distance where one explains it, else the coefficient."""
         return {} if value.absorption is None else {"absorption": _describe_absorption(value.absorption)}
 
 
@@ -52,7 +55,10 @@ def _read_absorption(table: SceneTable) -> Absorption | None:
         alpha = _on_visible_grid(inner, "coefficient", np.array(wavelengths), values)
     else:
         distance = inner.number("distance", above=0.0)
-        if inner.one_of(("colour", *_SPECTRUM_SOURCES), "the colour") == "colour":
+        key = inner.one_of(("colour", "tint", *_SPECTRUM_SOURCES), "the colour")
+        if key == "tint":
+            alpha = _tint(inner) / distance
+        elif key == "colour":
             alpha = attenuation_from_colour(inner.colour("colour"), distance, inner.where("colour"))
         else:
             source, transmittance = read_curve(inner, "transmittance")
@@ -68,6 +74,15 @@ def _read_absorption(table: SceneTable) -> Absorption | None:
         )
     inner.finish("absorption")
     return Absorption(alpha)
+
+
+def _tint(table: SceneTable) -> np.ndarray:
+    name = table.string("tint")
+    found = tints.tint(name)
+    if found is None:
+        names = [each.name for each in tints.tints()]
+        table.fail("tint", f"'{name}' is unknown{suggestion(name, names) or ','} there are {', '.join(names)}")
+    return found.coefficient
 
 
 def read_curve(table: SceneTable, value_key: str) -> tuple[str, np.ndarray]:
@@ -93,6 +108,9 @@ def _on_visible_grid(table: SceneTable, key: str, wavelength_nm: np.ndarray, val
 
 def _describe_absorption(absorption: Absorption) -> dict[str, Any]:
     alpha = absorption.coefficient
+    tinted = tints.tint_of(alpha)
+    if tinted is not None:
+        return {"tint": tinted[0].name, "distance": tinted[1]}
     strength, *_ = np.linalg.lstsq(rgb_partition(), alpha, rcond=None)
     strongest = float(strength.max())
     if strongest > 0.0 and strength.min() > -SAME * strongest and same_curve(rgb_partition() @ strength, alpha):

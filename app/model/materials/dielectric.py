@@ -10,6 +10,7 @@ from ..fields import Animated, Integer, Number, Row
 from ..optics import catalogue
 from ..optics.colorimetry import VISIBLE_NM
 from ..optics.glass import Dispersion
+from ..optics.tints import tint_of
 from .absorption import Absorption, AbsorptionPart
 from .dispersion_file import DispersionPart
 from .material import Material
@@ -75,6 +76,7 @@ class Dielectric(Material):
         glass = self.dispersion
         words = glass.name or f"glass of n_d {glass.n_d:.4f}"
         words += "" if glass.gain == 1.0 else f", {glass.gain:g} times as dispersive"
-        words += ", absorbing" if self.absorption is not None else ""
+        tint = None if self.absorption is None else tint_of(self.absorption.coefficient)
+        words += "" if self.absorption is None else ", absorbing" if tint is None else f", tinted {tint[0].name}"
         words += f", roughness {self.roughness:g}" if self.is_rough else ""
         return words + (f", priority {self.priority}" if self.priority else "")

@@ -8,13 +8,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...edit import edits
+from ...edit.glass import set_tint
 from ...edit.state import State
 from ...model.optics.colorimetry import rgb_partition
+from ...model.optics.tints import Tint, half_distance, tint, tint_of, tints
 from ...model.scene import Absorption, Vec3
+from ...model.staging import tinted
 from . import widgets
 
 _FIRST_COLOUR, _FIRST_DISTANCE = (0.55, 0.85, 0.75), 1.0
 """What a glass starts with when it is tinted: bottle green."""
+
+
+_OWN = "own"
 
 
 @dataclass
@@ -41,7 +47,48 @@ def draw_absorption(state: State, index: int) -> State:
         return _tinted(state, index, _memory.rgb if tinted else None, _memory.distance)
     if material.absorption is None:
         return state
+    known = tint_of(material.absorption.coefficient)
+    present = _OWN if known is None else known[0].name
+    choices = {_OWN: "A colour of its own"} | {each.name: each.name.capitalize() for each in tints()}
+    tip = "What colours the glass. " + (
+        "Tints are approximated by the bands of their colourants." if known is None else f"{known[0].colourant}."
+    )
+    _, chosen = widgets.combo("Tint", choices, present, tip=tip)
+    if chosen != present:
+        return _chosen(state, index, chosen, known)
+    if known is not None:
+        return _draw_depth(state, index, *known)
     return _draw_colour(state, index, material.absorption)
+
+
+def _chosen(state: State, index: int, name: str, known: tuple[Tint, float] | None) -> State:
+    """Another tint as deep as the last, or the colour of one's own."""
+    found = tint(name)
+    if found is None:
+        return _tinted(state, index, _memory.rgb, _memory.distance)
+    item = state.scene.objects[index]
+    absorption = tinted(item, found).absorption
+    assert absorption is not None
+    distance = half_distance(absorption.coefficient) if known is None else known[1]
+    return edits.attempt(state, f"Tint of {item.name}", set_tint, index, found, distance)
+
+
+def _draw_depth(state: State, index: int, present: Tint, distance: float) -> State:
+    tip = "How far daylight travels inside until it is half as bright. Shorter is deeper."
+    changed, distance, active = widgets.drag(
+        "Half at a depth of",
+        distance,
+        1e-4,
+        1e6,
+        unit="units",
+        tip=tip,
+        reset=_FIRST_DISTANCE,
+        format="%.3f",
+        logarithmic=True,
+    )
+    state = widgets.holding(state, active)
+    label = f"Tint of {state.scene.objects[index].name}"
+    return edits.attempt(state, label, set_tint, index, present, distance) if changed else state
 
 
 def _draw_colour(state: State, index: int, absorption: Absorption) -> State:

@@ -266,7 +266,9 @@ def _aside(thing: SceneObject | Light, low: imgui.ImVec2, high: imgui.ImVec2) ->
 
 
 def _material_words(material: Material) -> str:
-    return (material.dispersion.name if material.dispersion is not None else "") or material.kind
+    if material.dispersion is None or material.is_grating:
+        return material.kind
+    return material.dispersion.name or material.kind
 
 
 def _about(thing: SceneObject | Light) -> str:
