@@ -14,7 +14,7 @@ import numpy as np
 
 from ..base.errors import UserError
 from ..model.scene import Camera, RenderDefaults, Scene, Vec3
-from ..model.scene_render import MAX_BOUNCES, MAX_DEPTH, MAX_GLARE, MAX_PICTURE_SIDE
+from ..model.scene_render import MAX_ANISOTROPY, MAX_BOUNCES, MAX_DEPTH, MAX_GLARE, MAX_HAZE, MAX_PICTURE_SIDE
 from .adding import RECEIVERS, SHAPES, add_object
 from .glass import (
     abbe_numbers,
@@ -123,7 +123,7 @@ def set_background(scene: Scene, rgb: Vec3) -> Scene:
 
 def set_render_defaults(scene: Scene, **changes: float) -> Scene:
     """Picture size (`width`, `height`), `photons`, `exposure_ev`, `max_depth`, `glare`, `antialias_highlights`,
-    `polarisation` and `bounces` that the scene asks for."""
+    `polarisation`, `bounces`, `haze` and `haze_anisotropy` that the scene asks for."""
     render: RenderDefaults = replace(scene.render, **changes)  # type: ignore[arg-type]
     limits: dict[str, tuple[float, float]] = {
         "width": (1, MAX_PICTURE_SIDE),
@@ -131,7 +131,8 @@ def set_render_defaults(scene: Scene, **changes: float) -> Scene:
         "photons": (1, 10**12),
     }
     limits |= {"max_depth": (1, MAX_DEPTH), "exposure_ev": (-64, 64), "glare": (0, MAX_GLARE)}
-    limits["bounces"] = (0, MAX_BOUNCES)
+    limits |= {"bounces": (0, MAX_BOUNCES), "haze": (0, MAX_HAZE)}
+    limits["haze_anisotropy"] = (-MAX_ANISOTROPY, MAX_ANISOTROPY)
     for key, (low, high) in limits.items():
         value = getattr(render, key)
         if not low <= value <= high:

@@ -6,6 +6,8 @@ SOLIDS, PLANES, PROFILES = 3, 4, 5
 PARAMETERS = 7
 RAYS_IN, RAYS_OUT, OUTCOMES, PHOTON_SLOTS, INDICES, COUNTS, STATE, PHOTONS = range(8, 16)
 
+FLIGHTS = 16
+
 UNIT_SCENE, UNIT_SPECTRA = 14, 15
 """Texture units of the scene; a pass is free to use 0-13 as it likes."""
 IMAGE_SCENE, IMAGE_SPECTRA = 8, 9

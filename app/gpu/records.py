@@ -131,9 +131,9 @@ _COMPANIONS_POLARISATION = tuple(
 )
 
 
-def ray_record(columns: int, hero: bool = False, polarised: bool = False) -> Struct:
+def ray_record(columns: int, hero: bool = False, polarised: bool = False, flights: bool = False) -> Struct:
     """State of one ray between two surfaces; `columns` derivative columns, spatial ones first; `hero` as above;
-    `polarised`: with its state of polarisation."""
+    `polarised`: with its state of polarisation; `flights`: with how far it has come through haze."""
     fields = [
         Field("position", "vec3", "GPU space"),
         Field("flux_w", "float", "accounted radiant flux of the band, W"),
@@ -164,12 +164,38 @@ def ray_record(columns: int, hero: bool = False, polarised: bool = False) -> Str
     fields += _COMPANIONS if hero else ()
     fields += _POLARISATION if polarised else ()
     fields += _COMPANIONS_POLARISATION if hero and polarised else ()
+    fields += (Field("flown", "vec4", "x: way outside glass so far, GPU units"),) if flights else ()
     return Struct("RayRecord", tuple(fields), texels=True)
 
 
 def ray_record_of(features: Features) -> Struct:
     """`ray_record` as a scene's programs have it."""
-    return ray_record(features.defines()["COLUMNS"], features.hero, features.polarised)
+    return ray_record(features.defines()["COLUMNS"], features.hero, features.polarised, features.flights)
+
+
+FLIGHT = Struct(
+    "Flight",
+    (
+        Field("position", "vec3", "where it begins, GPU space"),
+        Field("distance", "float", "to what it meets, GPU units; FAR_DISTANCE where it meets nothing"),
+        Field("direction", "vec3", "unit, propagation"),
+        Field("flux_w", "float", "of its band, W; 0: inside glass"),
+        Field("dposition_ds", "vec3", "GPU space per lattice spacing"),
+        Field("flown", "float", "way outside glass before it, GPU units"),
+        Field("dposition_dt", "vec3", "likewise"),
+        Field("light_and_source", "uint", "as in PhotonRecord"),
+        Field("ddirection_ds", "vec3", "change of the direction per lattice spacing"),
+        Field("x_lo", "float", "band, spectral coordinates"),
+        Field("ddirection_dt", "vec3", "likewise"),
+        Field("x_hi", "float"),
+        Field("dposition_dband", "vec3", "from one end of the band to the other"),
+        Field("photon_id", "uint", "as in PhotonRecord"),
+        Field("ddirection_dband", "vec3", "likewise"),
+        Field("what", "uint", "bit 0: it ends on glass or a mirror; from bit 8: specular events before it"),
+    ),
+    texels=True,
+)
+"""A stretch between two surfaces, of rays that are traced for haze (`Features.flights`)."""
 
 
 OUTCOME = Struct(

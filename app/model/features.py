@@ -121,6 +121,10 @@ class Features:
     """Some receiver has a glossy coat: camera rays go on from it."""
     rough_diffuse: bool = False
     """Some receiver is rougher than Lambert's law has it."""
+    haze: bool = False
+    """The air scatters: the camera sees light on its way (`passes.haze`)."""
+    flights: bool = False
+    """Where rays fly outside glass is recorded: of photons that are traced for haze alone."""
     rough: bool = False
     """Some glass has a ground surface, whose microfacets turn paths by chance."""
 
@@ -162,6 +166,7 @@ class Features:
             "POLARISED": self.polarised,
             "ROUGH_SURFACES": self.rough,
             "LOBE_COLUMNS": self.has_lobe_columns,
+            "FLIGHTS": self.flights,
         }
         return numbers | {name: 1 for name, on in switches.items() if on}
 
@@ -234,8 +239,18 @@ class Features:
             contact_lines=bool(standing(scene)),
             coats=settings.layer == "beauty" and any(o.material.has_coat for o in scene.objects),
             rough_diffuse=settings.layer == "beauty" and any(o.material.diffuse_roughness for o in scene.objects),
+            haze=settings.layer == "beauty" and why_no_haze(scene) is None,
             rough=any(o.material.is_rough for o in dielectrics),
         )
+
+
+def why_no_haze(scene: Scene) -> str | None:
+    """Why no light is seen on its way; None: it is."""
+    if scene.render.haze == 0.0:
+        return "[render] haze is 0"
+    if not scene.lights:
+        return "no light shines (an environment's light is not seen in haze)"
+    return None
 
 
 def _reindexed(scene: Scene, settings: RenderSettings, groups: int, *, coloured: bool) -> bool:

@@ -6,7 +6,7 @@ from .bounces import why_no_bounces
 from .contacts import contacts, overlapping_solids, standing
 from .environment_light import why_no_environment_light
 from .environment_sun import with_sun
-from .features import Features, beam_objects, dispersive_materials, half_spaces, is_flat, why_no_beams
+from .features import Features, beam_objects, dispersive_materials, half_spaces, is_flat, why_no_beams, why_no_haze
 from .scene import Scene
 from .settings import divides_spectrum, has_beams
 
@@ -205,6 +205,13 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
             f"diffuse surfaces light each other, {features.bounces} time(s) over"
             if features.bounces
             else why_no_bounces(scene) or "the picture shows caustics only",
+        ),
+        (
+            "haze",
+            features.haze,
+            f"light is seen on its way: {scene.render.haze:.4g} of it is scattered per scene unit"
+            if features.haze
+            else why_no_haze(scene) or "the picture shows caustics only",
         ),
         (
             "light profiles",

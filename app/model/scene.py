@@ -107,6 +107,10 @@ class RenderDefaults:
     """Light keeps its polarisation from surface to surface; otherwise every event takes the mean of s and p."""
     bounces: int = 0
     """How often light goes on from one diffuse surface to another; 0: these do not light each other."""
+    haze: float = 0.0
+    """Scattering coefficient of the haze round all objects, 1/scene unit; 0: the air is clear."""
+    haze_anisotropy: float = 0.0
+    """Mean cosine of the angle by which it scatters (Henyey and Greenstein's g)."""
 
 
 @dataclass(frozen=True)

@@ -44,6 +44,8 @@ def picture_key(scene: Scene, *more: object) -> str:
     else:
         lights = ("lights",) if scene.environment.lights else ()
         key.add("environment", scene.environment.rgb, np.asarray(scene.environment.world_to_local, float), *lights)
+    if scene.render.haze:
+        key.add("haze", float(scene.render.haze), float(scene.render.haze_anisotropy))
     for index, item in enumerate(scene.objects):
         if item.material.texture is not None:
             key.add("texture", index, item.material.texture.rgb, item.material.texture.wrap, item.mesh.uv)

@@ -15,6 +15,10 @@ MAX_GLARE = 0.5
 """A lens that scatters more is no lens."""
 MAX_BOUNCES = 3
 """From one diffuse surface to another."""
+MAX_HAZE = 1e9
+"""1/scene unit."""
+MAX_ANISOTROPY = 0.99
+"""Either way; at 1 light would only go straight on."""
 
 
 def read_background(table: SceneTable) -> Vec3:
@@ -43,6 +47,10 @@ class _Size(Part):
 
 
 _USUAL = RenderDefaults()
+HAZE = Number("haze", _USUAL.haze, optional=True, at_least=0.0, at_most=MAX_HAZE)
+HAZE_ANISOTROPY = Number(
+    "haze_anisotropy", _USUAL.haze_anisotropy, optional=True, at_least=-MAX_ANISOTROPY, at_most=MAX_ANISOTROPY
+)
 _FIELDS = (
     _Size(),
     Integer("photons", _USUAL.photons, at_least=1, at_most=10**12),
@@ -52,6 +60,8 @@ _FIELDS = (
     Flag("antialias_highlights", _USUAL.antialias_highlights, optional=True),
     Flag("polarisation", _USUAL.polarisation, optional=True),
     Integer("bounces", _USUAL.bounces, optional=True, at_least=0, at_most=MAX_BOUNCES),
+    HAZE,
+    HAZE_ANISOTROPY,
 )
 
 

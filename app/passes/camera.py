@@ -30,6 +30,7 @@ from .camera_records import CAMERA_LIGHT, CAMERA_PARAMETERS, camera_parameters, 
 from .camera_tables import CameraTables
 from .caustic_maps import CausticMaps
 from .environment_light import without_light
+from .haze import Haze
 from .listed_pixels import GROUP, ListedPixels
 from .picture_channels import Channels
 from .picture_sums import PictureSums
@@ -187,6 +188,9 @@ class CameraPass:
         self._source = (shown, structs)
         self._beams: ScreenBeams | None = None
         self._starts: BeamStarts | None = None
+        self._haze = Haze(context, scene, self.channels) if features.haze and layer == "beauty" else None
+        self._is_hazy = False
+        """The samples that are being taken are of the picture that haze was drawn for."""
         self._beam_objects = np.zeros(len(scene.scene.objects), bool)
         self._beam_objects_buffer: moderngl.Buffer | None = None
         self._programs: dict[tuple[str, bool], moderngl.ComputeShader] = {}
@@ -207,6 +211,8 @@ class CameraPass:
         """The same objects and lights stand elsewhere (`SceneBuffers.move`)."""
         self.scene = scene
         self._lights.write(self._light_records().tobytes())
+        if self._haze is not None:
+            self._haze.move(scene)
 
     def _compiled(self, variant: str) -> moderngl.ComputeShader:
         """One of the camera's programs, compiled when it is first asked for."""
@@ -295,6 +301,9 @@ class CameraPass:
         if sample_offset == 0 or self._sums.size != (width, height):
             self._clear(width, height)
         maps = maps or self._no_maps()
+        if self._haze is not None:
+            self._haze.draw(camera, width, height)
+            self._is_hazy = True
         parameters = self._parameters(camera, width, height, maps.scale, seed)
         parameters["sample_side"] = 1.0 / np.sqrt(samples + sample_offset)
         if is_in_strips(samples, sample_offset):
@@ -377,7 +386,7 @@ class CameraPass:
         """Few pixels of the picture, each as large as the picture's own."""
         columns, rows = grid_of(width, height)
         self._clear(columns, rows)
-        self.spectrum = look.spectrum
+        self.spectrum, self._is_hazy = look.spectrum, False
         parameters = self._parameters(camera, columns, rows, maps.scale, look.seed)
         parameters["dithered"], parameters["counts_turns"], parameters["sample_side"], parameters["band_side"] = (
             0,
@@ -457,7 +466,7 @@ class CameraPass:
     def release(self) -> None:
         """Free every buffer, texture and program."""
         shader.release(self._tables, self._lights, self._counters, self._sums, self._parameters_buffer)
-        for beams in (self._beams, self._starts):
+        for beams in (self._beams, self._starts, self._haze):
             if beams is not None:
                 beams.release()
         if self._beam_objects_buffer is not None:
@@ -547,6 +556,8 @@ class CameraPass:
             if self.shows_beams:
                 assert self._beams is not None
                 self._beams.add(self._sums.textures, row, rows)
+            if self._haze is not None and self._is_hazy:
+                self._haze.add(self._sums.textures, row, rows)
             self._within_rows = False
             self._sums.samples_of_row[row : row + rows] += 1
             yield (row + rows) / height

@@ -11,26 +11,34 @@ from ..gpu.scene_buffers import SceneBuffers
 from .camera_records import CAMERA_PARAMETERS
 
 _CORNER = np.dtype([("position", "f4", 3), ("primitive", "u4"), ("object", "u4")])
+FAR = 1e30
 _NEAREST = 1e-4
 """Of the farthest corner's depth: what is drawn begins there, however near the camera."""
 
 
 class FirstSurfaces:
-    """Owns a scene's corners and a texture of primitives and objects, (H, W) RG32UI, row 0 on top, NONE beyond all."""
+    """Owns a scene's corners and a texture of primitives and objects, (H, W) RG32UI, row 0 on top, NONE beyond all; or
+    one of distances along the camera's rays, R32F, GPU units, FAR beyond all."""
 
-    def __init__(self, ctx: moderngl.Context, scene: SceneBuffers) -> None:
+    def __init__(self, ctx: moderngl.Context, scene: SceneBuffers, distances: bool = False) -> None:
         self._ctx = ctx
+        self._distances = distances
         self._program = shader.program(
             ctx,
             "camera/visible.vert",
             "camera/visible.frag",
-            {"BIND_PARAMETERS": bindings.PARAMETERS},
+            {"BIND_PARAMETERS": bindings.PARAMETERS} | ({"DISTANCES": 1} if distances else {}),
             (CAMERA_PARAMETERS,),
         )
         corners = self._corners_of(scene)
         self._corners = ctx.buffer(corners.tobytes()) if len(corners) else None
         self._draw = (
-            ctx.vertex_array(self._program, [(self._corners, "3f 1u 1u", "position", "primitive", "object")])
+            ctx.vertex_array(
+                self._program,
+                [(self._corners, "3f 8x", "position")]
+                if distances
+                else [(self._corners, "3f 1u 1u", "position", "primitive", "object")],
+            )
             if self._corners is not None
             else None
         )
@@ -61,7 +69,8 @@ class FirstSurfaces:
         target.viewport = (0, 0, width, height)
         assert self.texture is not None
         target.clear(depth=1.0)
-        self.texture.write(np.full((height, width, 2), NONE, "u4"))
+        beyond = np.full((height, width), FAR, "f4") if self._distances else np.full((height, width, 2), NONE, "u4")
+        self.texture.write(beyond)
         if self._draw is not None:
             self._program["depths"] = self._depths(parameters)
             self._ctx.enable_only(moderngl.DEPTH_TEST)
@@ -86,7 +95,11 @@ class FirstSurfaces:
     def _of_size(self, width: int, height: int) -> moderngl.Framebuffer:
         if self._target is None or self._target.size != (width, height):
             self._release_target()
-            self.texture = self._ctx.texture((width, height), 2, dtype="u4")
+            self.texture = (
+                self._ctx.texture((width, height), 1, dtype="f4")
+                if self._distances
+                else self._ctx.texture((width, height), 2, dtype="u4")
+            )
             self._target = self._ctx.framebuffer([self.texture], self._ctx.depth_texture((width, height)))
         return self._target
 

@@ -22,7 +22,7 @@ from ..gpu.dispatch_budget import DispatchBudget
 from ..gpu.scene_texels import ROW_TEXELS
 from ..gpu.schema import Field, Struct
 from ..model.scene import Scene
-from .map_atlas import park
+from .added_picture import AddedPicture
 from .pixel_lattice import MOST_SHARED
 from .variants import (
     BIND_BEAM_ENTRIES,
@@ -91,13 +91,9 @@ class ScreenBeams:
     def __init__(self, ctx: moderngl.Context, defines: Defines, structs: Sequence[Struct], targets: int) -> None:
         """`defines`: `screen_beam_defines` of the camera's; `structs`: the camera's records."""
         self._ctx = ctx
-        self._targets = targets
         self._look = shader.compute(ctx, "camera/beam.comp", defines, (*structs, SCREEN_POLYGON, _VIEW))
         self._gather = shader.compute(ctx, "camera/beam_gather.comp", {"TARGETS": targets} | GATHER_DEFINES, ())
-        self._sum_program = shader.program(
-            ctx, "camera/beam_sum.vert", "camera/beam_sum.frag", {"TARGETS": targets}, ()
-        )
-        self._triangle = ctx.vertex_array(self._sum_program, [])
+        self._picture = AddedPicture(ctx, targets)
         self._view = ctx.buffer(reserve=_VIEW.stride)
         words = {BIND_BEAM_ENTRIES: 2, BIND_BEAM_RUNS: 4, BIND_BEAM_ORDER: 1, BIND_BEAM_FOUND: 4 * targets}
         self._lists = {binding: ctx.buffer(reserve=4 * count * MOST_ENTRIES) for binding, count in words.items()}
@@ -105,7 +101,6 @@ class ScreenBeams:
         self._sees_edges = True
         self._records = SCREEN_POLYGON.zeros(0)
         self._texels: moderngl.Texture | None = None
-        self._pictures: list[moderngl.Texture] = []
         self._budget = DispatchBudget(_FIRST, _GROUP, MOST_ENTRIES)
 
     def take(self, polygons: ScreenPolygons, scene: SceneBuffers, brightness: np.ndarray | None) -> None:
@@ -122,7 +117,7 @@ class ScreenBeams:
         `places`: (points, 2) of a pixel, 0 to 1, at which its edges are told; `bind`: binds what the camera's programs
         read; `seconds`: what a portion should take."""
         assert self._polygons is not None
-        self._resize(size)
+        self._picture.clear(size)
         places = ordered(places)
         view = self._view_of(size, places)
         parts = self._records["parts"].astype(np.int64)
@@ -171,7 +166,7 @@ class ScreenBeams:
             self._lists[binding].write(values.tobytes())
         for binding in (BIND_BEAM_RUNS, BIND_BEAM_ORDER, BIND_BEAM_FOUND):
             self._lists[binding].bind_to_storage_buffer(binding)
-        for unit, picture in enumerate(self._pictures):
+        for unit, picture in enumerate(self._picture.textures):
             picture.bind_to_image(unit, read=True, write=True)
         self._gather["run_count"].value = len(runs)
         self._gather.run(-(-len(runs) // _GROUP))
@@ -200,39 +195,15 @@ class ScreenBeams:
 
     def add(self, sums: Sequence[moderngl.Texture], first_row: int, rows: int) -> None:
         """Add what was drawn to these rows of the camera's sums."""
-        framebuffer = self._ctx.framebuffer(list(sums))
-        framebuffer.use()
-        framebuffer.scissor = 0, first_row, framebuffer.size[0], rows
-        for unit, picture in enumerate(self._pictures):
-            picture.use(unit)
-        self._blend()
-        self._triangle.render(moderngl.TRIANGLES, 3)
-        self._ctx.enable_only(moderngl.NOTHING)
-        park(self._ctx)
-        framebuffer.release()
-
-    def _blend(self) -> None:
-        self._ctx.enable_only(moderngl.BLEND)
-        self._ctx.blend_equation = moderngl.FUNC_ADD, moderngl.FUNC_ADD
-        self._ctx.blend_func = moderngl.ONE, moderngl.ONE
-
-    def _resize(self, size: tuple[int, int]) -> None:
-        if not self._pictures or self._pictures[0].size != size:
-            for picture in self._pictures:
-                picture.release()
-            self._pictures = [self._ctx.texture(size, 4, dtype="f4") for _ in range(self._targets)]
-        zeros = bytes(16 * size[0] * size[1])
-        for picture in self._pictures:
-            picture.write(zeros)
+        self._picture.add(sums, first_row, rows)
 
     def release(self) -> None:
         """Free everything."""
-        self._triangle.release()
-        shader.release(self._look, self._gather, self._sum_program)
-        for owned in (self._view, *self._lists.values(), *self._pictures, self._texels):
+        shader.release(self._look, self._gather)
+        for owned in (self._picture, self._view, *self._lists.values(), self._texels):
             if owned is not None:
                 owned.release()
-        self._pictures, self._lists, self._texels = [], {}, None
+        self._lists, self._texels = {}, None
 
 
 def sees_edges(scene: Scene) -> bool:

@@ -24,6 +24,8 @@ from .variants import emit_defines, light_defines
 RAY_ROOM = 3
 """Rays in flight per lattice point of a batch: splitting rarely passes 1.5."""
 PHOTON_ROOM = 4
+FLIGHT_ROOM = 24
+"""Flights per lattice point of a batch, where they are recorded; most of glass splits into ten."""
 SPLIT_THRESHOLD = 0.3
 """Share of a photon's power below which roulette decides whether a part of it goes on."""
 _CHUNK = 64
@@ -163,6 +165,7 @@ class TracePass:
         self.photon = records.photon_record(features.spectral_groups, features.hero)
         ctx = context.ctx
         structs = (*SCENE_STRUCTS, self.ray, self.photon, records.OUTCOME, records.CHUNK_COUNT, records.QUEUE_STATE)
+        structs += (records.FLIGHT,) if features.flights else ()
         defines = light_defines(features, context.traits) | scene.defines
         self._features = features
         self._defines = defines
@@ -189,6 +192,8 @@ class TracePass:
         self._counts_zero = bytes(chunks * records.CHUNK_COUNT.stride)
         self._state = ctx.buffer(self._state_zero.tobytes())
         self.photons = ctx.buffer(reserve=PHOTON_ROOM * batch * self.photon.stride)
+        self.flights = ctx.buffer(reserve=FLIGHT_ROOM * batch * records.FLIGHT.stride) if features.flights else None
+        """What every ray of the last batch flew, in order, where the features have it: FLIGHT records."""
         self._emit_parameters = ctx.buffer(reserve=records.EMIT_PARAMETERS.stride)
         self._trace_parameters = ctx.buffer(reserve=records.TRACE_PARAMETERS.stride)
 
@@ -216,6 +221,7 @@ class TracePass:
             self._advance,
             *self._emit.values(),
             *self._orders.values(),
+            *([] if self.flights is None else [self.flights]),
         )
 
     @property
@@ -381,6 +387,8 @@ class TracePass:
         self._counts.bind_to_storage_buffer(bindings.COUNTS)
         self._state.bind_to_storage_buffer(bindings.STATE)
         self.photons.bind_to_storage_buffer(bindings.PHOTONS)
+        if self.flights is not None:
+            self.flights.bind_to_storage_buffer(bindings.FLIGHTS)
 
     def _list_children(self, *, first: bool, chunks: int = 0) -> None:
         ctx = self.context.ctx

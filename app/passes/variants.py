@@ -57,6 +57,9 @@ TINT_STEPS = 48
     BIND_BEAM_ORDER,
     BIND_BEAM_FOUND,
 ) = range(8, 22)
+BIND_FLIGHTS, BIND_HAZE_COLOURS, BIND_HAZE = 8, 9, 10
+"""Of the program that draws haze; the last is of uniform blocks."""
+UNIT_DISTANCES = 0
 UNIT_RECEIVER_LIGHT, UNIT_EMISSION, UNIT_PICTURES, UNIT_POLYGONS = 9, 10, 11, 13
 BIND_BEAM_VIEW = 9
 """Of uniform blocks."""
@@ -99,6 +102,8 @@ def light_defines(features: Features, traits: DeviceTraits) -> Defines:
     }
     if features.tree and traits.loops_may_end:
         defines["LOOPS_MAY_END"] = 1
+    if features.flights:
+        defines["BIND_FLIGHTS"] = bindings.FLIGHTS
     return features.defines() | bindings.LIGHT_HALF_DEFINES | defines
 
 
@@ -362,4 +367,18 @@ def single_defines(beyond: Mapping[str, int | float | str]) -> Defines:
         "SPECTRAL_GROUPS": 0,
         "RANDOM_WAVELENGTH": 1,
         "EVEN_WAVELENGTHS": 1,
+    }
+
+
+def haze_defines(targets: int, subpixels: int) -> Defines:
+    """Of the program that draws beams of light in haze, into so many textures; distances are known `subpixels` times
+    in a pixel, both ways."""
+    return {
+        "TARGETS": targets,
+        "SUBPIXELS": subpixels,
+        "BIND_PARAMETERS": bindings.PARAMETERS,
+        "BIND_FLIGHTS": BIND_FLIGHTS,
+        "BIND_HAZE_COLOURS": BIND_HAZE_COLOURS,
+        "BIND_HAZE": BIND_HAZE,
+        "UNIT_DISTANCES": UNIT_DISTANCES,
     }

@@ -161,6 +161,9 @@ void main()
         ray.last_object = 0xffffffffu;
         ray.inside_mask = 0u;
         ray.inside_object = 0xffffffffu;
+#ifdef FLIGHTS
+        ray.flown = vec4(0.0);
+#endif
 #if COLUMNS > 0
         for (int c = 0; c < COLUMNS; ++c) {
             ray.dposition[c] = vec4(0.0);

@@ -422,6 +422,40 @@ bool is_beam_object(uint object)
 }
 #endif
 
+#ifdef FLIGHTS
+// The ray's way to what it meets; it has come so far through haze then.
+Flight flight_of(inout RayRecord ray, float distance)
+{
+    // What is left of a grating's orders has flown here before.
+    bool outside = !is_inside(medium_stack(ray)) && (ray.flags >> uint(ORDER_BIT)) == 0u;
+    Flight flight;
+    flight.position = ray.position;
+    flight.direction = ray.direction;
+    flight.distance = distance;
+    flight.flux_w = outside ? carried_w(ray) : 0.0;
+    flight.flown = ray.flown.x;
+    flight.x_lo = ray.x_lo;
+    flight.x_hi = ray.x_hi;
+    flight.light_and_source = ray.light_and_source;
+    flight.photon_id = ray.photon_id;
+    flight.what = ray.depth << 8u;
+    flight.dposition_ds = ray.footprint_scale * ray.dposition[0].xyz;
+    flight.dposition_dt = ray.footprint_scale * ray.dposition[1].xyz;
+    flight.ddirection_ds = ray.footprint_scale * ray.ddirection[0].xyz;
+    flight.ddirection_dt = ray.footprint_scale * ray.ddirection[1].xyz;
+    flight.dposition_dband = flight.ddirection_dband = vec3(0.0);
+#if SPECTRAL_GROUPS > 0
+    for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
+        float over_band = variable_step(uint(g), ray.x_hi, ray.x_lo);
+        flight.dposition_dband += over_band * ray.dposition[SPATIAL + g].xyz;
+        flight.ddirection_dband += over_band * ray.ddirection[SPATIAL + g].xyz;
+    }
+#endif
+    ray.flown.x += is_inside(medium_stack(ray)) ? 0.0 : distance;
+    return flight;
+}
+#endif
+
 void main()
 {
     uint k = gl_GlobalInvocationID.x;
@@ -449,6 +483,9 @@ void main()
     Triangle facet = hit_triangle(hit);
     uint kind = met ? thing.kind : NONE;
 
+#ifdef FLIGHTS
+    Flight flight = flight_of(ray, met ? hit.distance : FAR_DISTANCE);
+#endif
 #ifdef ABSORPTION
     if (met) absorb(ray, hit.distance, outcome.absorbed_w);
 #endif
@@ -481,5 +518,11 @@ void main()
     } else {
         scatter(ray, start, hit, shading_frame(hit, facet, ray.direction), kind, thing.weight_row, k, outcome);
     }
+#ifdef FLIGHTS
+    // The parts of a band that is cut fly again.
+    if ((outcome.what & FELL_BAND) != 0u) flight.flux_w = 0.0;
+    flight.what |= kind == KIND_DIFFUSE || kind == KIND_BLACK || kind == NONE ? 0u : 1u;
+    store_flight(state.flights - state.alive + k, flight);
+#endif
     store_outcome(k, outcome);
 }

@@ -56,6 +56,18 @@ void store_photon(uint slot, PhotonRecord photon)
     for (uint i = 0u; i < uint(PhotonRecord_TEXELS); ++i) photon_slots[slot * uint(PhotonRecord_TEXELS) + i] = texels[i];
 }
 
+#ifdef FLIGHTS
+layout(std430, binding = BIND_FLIGHTS) writeonly restrict buffer Flights { uvec4 flights[]; };
+
+void store_flight(uint slot, Flight flight)
+{
+    uvec4 texels[Flight_TEXELS];
+    to_texels(flight, texels);
+    if ((slot + 1u) * uint(Flight_TEXELS) > uint(flights.length())) return;  // told by their number
+    for (uint i = 0u; i < uint(Flight_TEXELS); ++i) flights[slot * uint(Flight_TEXELS) + i] = texels[i];
+}
+#endif
+
 void store_outcome(uint slot, Outcome outcome)
 {
     uvec4 texels[Outcome_TEXELS];
