@@ -1,0 +1,162 @@
+"""Light on its way through haze: closed forms of a beam's radiance and power, the directions of a prism's fan."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from reference import haze as reference
+from spectrasplat.gpu.context import Context
+from spectrasplat.model.geometry import primitives
+from spectrasplat.model.lights import CollimatedLight
+from spectrasplat.model.optics.glass import from_abbe
+from spectrasplat.model.optics.spectrum import illuminant
+from spectrasplat.model.scene import Black, Camera, Dielectric, RenderDefaults, Scene, SceneObject
+from spectrasplat.model.settings import RenderSettings
+from spectrasplat.passes.flights import trace_flights
+from spectrasplat.passes.haze import Haze
+from spectrasplat.passes.picture_channels import Channels
+from spectrasplat.reference.optics import unit
+from spectrasplat.render.device_scene import scene_buffers
+from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
+
+COVERS = {"haze.glsl": ("henyey_greenstein", "blur_1d", "cross_beam")}
+COUNT = 512
+LUX = 500.0
+WIDTH = 0.2
+SIZE = 64, 64
+
+
+def at(*place: float) -> np.ndarray:
+    matrix = np.eye(4)
+    matrix[:3, 3] = place
+    return matrix
+
+
+def beam_scene(camera: Camera, scattering: float, g: float = 0.0, *objects: SceneObject) -> Scene:
+    """A square beam along x through the origin, from 2 before it to a black plate 2 behind it."""
+    light = CollimatedLight(
+        "beam",
+        illuminant("D65").scaled_to_luminous(LUX),
+        position=(-2.0, 0.0, 0.0),
+        direction=(1.0, 0.0, 0.0),
+        width=WIDTH,
+        height=WIDTH,
+        shape="rect",
+        tangent=(0.0, 1.0, 0.0),
+    )
+    end = SceneObject("end", primitives.box((0.1, 1.0, 1.0)), Black(), at(2.05, 0.0, 0.0))
+    render = RenderDefaults(haze=scattering, haze_anisotropy=g)
+    return Scene("haze", camera, (light,), (end, *objects), render=render)
+
+
+def picture_of(gl: Context, scene: Scene) -> np.ndarray:
+    """Luminance (H, W), lm/(sr unit²), of haze alone."""
+    buffers = scene_buffers(gl, scene, RenderSettings())
+    haze = Haze(gl, buffers, Channels())
+    try:
+        haze.draw(scene.camera, *SIZE)
+        (texture,) = haze.textures
+        rgb = np.frombuffer(texture.read(), "f4").reshape(SIZE[1], SIZE[0], 4)[..., :3].astype(float)
+        return rgb @ np.array([0.2126, 0.7152, 0.0722])
+    finally:
+        haze.release()
+        buffers.release()
+
+
+def seen_from(angle_deg: float, distance: float = 3.0, **more) -> Camera:
+    """A camera that looks at the origin, its view so far from the beam's own direction."""
+    angle = math.radians(angle_deg)
+    return Camera((-distance * math.cos(angle), -distance * math.sin(angle), 0.0), (0.0, 0.0, 0.0), **more)
+
+
+@pytest.mark.parametrize(("angle_deg", "scattering", "g"), [(90.0, 0.01, 0.0), (60.0, 0.2, 0.6), (130.0, 0.05, -0.3)])
+def test_a_beam_is_as_bright_as_its_chord(gl: Context, angle_deg: float, scattering: float, g: float) -> None:
+    camera = seen_from(angle_deg, vertical_fov_deg=20.0)
+    picture = picture_of(gl, beam_scene(camera, scattering, g))
+    middle = picture[SIZE[1] // 2 - 2 : SIZE[1] // 2 + 2, SIZE[0] // 2 - 2 : SIZE[0] // 2 + 2].mean()
+    sine = math.sin(math.radians(angle_deg))
+    # Light goes towards the eye against the view.
+    cosine = -math.cos(math.radians(angle_deg))
+    expected = reference.beam_radiance(LUX, WIDTH / sine, scattering, g, cosine, 2.0, 3.0)
+    assert middle == pytest.approx(expected, rel=0.01)
+
+
+def test_all_that_is_scattered_is_seen(gl: Context) -> None:
+    """Φ σ L p, over the picture of a parallel projection: what little haze there is takes nothing."""
+    scattering, extent = 1e-4, 5.0
+    camera = seen_from(90.0, kind="orthographic", vertical_extent=extent)
+    picture = picture_of(gl, beam_scene(camera, scattering))
+    power = picture.sum() * (extent / SIZE[1]) ** 2
+    expected = LUX * WIDTH**2 * scattering * 4.0 / (4.0 * math.pi)
+    assert power == pytest.approx(expected, rel=0.005)
+    cosines, weights = np.polynomial.legendre.leggauss(64)
+    for g in (0.0, 0.7, -0.4):
+        assert 2.0 * math.pi * weights @ reference.henyey_greenstein(cosines, g) == pytest.approx(1.0, rel=1e-9)
+
+
+def test_what_stands_before_a_beam_hides_it(gl: Context) -> None:
+    camera = seen_from(90.0, kind="orthographic", vertical_extent=1.0)
+    screen = SceneObject("screen", primitives.box((0.5, 0.05, 1.0)), Black(), at(0.25, -1.0, 0.0))
+    picture = picture_of(gl, beam_scene(camera, 0.01, 0.0, screen))[SIZE[1] // 2]
+    assert picture[SIZE[0] // 2 :].max() == 0.0 or picture[: SIZE[0] // 2].max() == 0.0
+    assert picture.max() > 0.0
+
+
+def test_a_prism_opens_the_beam_as_snell_has_it(gl: Context) -> None:
+    """Directions behind a prism at both ends of every band, against two refractions in float64."""
+    glass = from_abbe(1.7, 30.0)
+    prism = SceneObject("prism", primitives.prism(60.0, 1.0, 1.0), Dielectric(glass), np.eye(4))
+    turn = math.radians(28.0)  # about least deviation
+    tilted = np.eye(4)
+    tilted[:3, :3] = [[math.cos(turn), 0, math.sin(turn)], [0, 1, 0], [-math.sin(turn), 0, math.cos(turn)]]
+    scene = beam_scene(seen_from(90.0), 0.01, 0.0, replace(prism, object_to_world=tilted))
+    flights = trace_flights(gl, scene, Channels().observer(), 4096).records
+    behind = flights[(flights["what"] >> 8 == 2) & (flights["direction"][:, 2] < -0.7)]
+    assert len(behind) > 100
+    normals = [tilted[:3, :3] @ np.array([side * math.cos(math.pi / 6), 0.0, math.sin(math.pi / 6)]) for side in (-1, 1)]
+
+    def leaving(nm: np.ndarray) -> np.ndarray:
+        n, d = glass.index(nm), np.broadcast_to([1.0, 0.0, 0.0], (len(nm), 3))
+        for eta, normal in zip((1.0 / n, n), (normals[0], -normals[1]), strict=True):
+            cosine = -(d @ normal)
+            rest = np.sqrt(1.0 - eta**2 * (1.0 - cosine**2))
+            d = eta[:, None] * d + (eta * cosine - rest)[:, None] * normal
+        return d
+
+    buffers = scene_buffers(gl, scene, RenderSettings())
+    low, high = (leaving(buffers.axis.nm_of_x(behind[name].astype(float))) for name in ("x_lo", "x_hi"))
+    buffers.release()
+    found = behind["ddirection_dband"].astype(float)
+    assert np.abs(behind["direction"] - 0.5 * (low + high)).max() < 1e-4
+    assert np.abs(found - (high - low)).max() < 0.02 * np.linalg.norm(high - low, axis=1).max()
+
+
+def test_the_shader_library_against_float64(gl: Context) -> None:
+    rng = np.random.default_rng(4)
+    cosine, g = as_f32(rng.uniform(-1, 1, COUNT)), as_f32(rng.uniform(-0.9, 0.9, COUNT))
+    deviation = as_f32(rng.uniform(0.1, 2.0, COUNT))
+    distance = as_f32(rng.uniform(-6, 6, COUNT))
+    start = as_f32(rng.uniform(-3, 3, (COUNT, 3)))
+    beam, ray = (as_f32(unit(rng.normal(size=(COUNT, 3)))) for _ in range(2))
+    body = """
+    phase = henyey_greenstein(cosine, g);
+    blur = blur_1d(distance, deviation);
+    BeamCrossing c = cross_beam(start, beam, ray);
+    on_beam = c.on_beam; on_ray = c.on_ray; offset = c.offset; across = c.across;
+    """
+    inputs = {"cosine": cosine, "g": g, "distance": distance, "deviation": deviation}
+    inputs |= {"start": start, "beam": beam, "ray": ray}
+    outputs = {name: "float" for name in ("phase", "blur", "on_beam", "on_ray", "offset")} | {"across": "vec3"}
+    got = evaluate(gl.ctx, ["lib/haze.glsl"], body, inputs, outputs)
+    assert np.allclose(got["phase"], reference.henyey_greenstein(cosine, g), rtol=2e-5)
+    assert np.allclose(got["blur"], reference.blur_1d(distance, deviation), atol=2e-6)
+    sine = np.linalg.norm(np.cross(beam, ray), axis=1)
+    clear = sine > 0.1
+    on_beam, on_ray = reference.nearest(start, beam, ray)
+    for name, wanted in (("on_beam", on_beam), ("on_ray", on_ray)):
+        assert np.abs(got[name] - wanted)[clear].max() < 3e-3
+    apart = start + on_beam[:, None] * beam - on_ray[:, None] * ray
+    assert np.abs(got["offset"][:, None] * got["across"] - apart)[clear].max() < 3e-5
