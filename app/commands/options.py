@@ -19,7 +19,7 @@ from ..base.memory import MAX_SIDE_PX, memory_bytes
 from ..base.paths import SCENE_SUFFIXES, shipped_scenes
 from ..model.scene import Scene
 from ..model.scene_camera import FOCUS_DISTANCE, LENS_RADIUS
-from ..model.scene_render import MAX_BOUNCES, MAX_GLARE
+from ..model.scene_render import HAZE, HAZE_ANISOTROPY, MAX_ANISOTROPY, MAX_BOUNCES, MAX_GLARE, MAX_HAZE
 from ..model.settings import CAMERA_METHODS, METHODS
 
 if TYPE_CHECKING:
@@ -113,6 +113,22 @@ def parse_glare(text: str) -> float:
 def parse_bounces(text: str) -> int:
     """How often light goes on from one diffuse surface to another."""
     return parse_integer("--bounces", text, 0, MAX_BOUNCES)
+
+
+def parse_haze(text: str) -> float:
+    """Scattering coefficient of the haze round all objects, 1/scene unit."""
+    value = _number("--haze", text, "what is scattered per scene unit, for example 0.03")
+    if not HAZE.holds(value):
+        raise UserError(f"--haze {text} is out of range: give 0 (clear air) to {MAX_HAZE:g} per scene unit")
+    return value
+
+
+def parse_haze_anisotropy(text: str) -> float:
+    """Mean cosine of the angle by which haze scatters."""
+    value = _number("--haze-anisotropy", text, "a mean cosine, for example 0.3")
+    if not HAZE_ANISOTROPY.holds(value):
+        raise UserError(f"--haze-anisotropy {text} is out of range: give -{MAX_ANISOTROPY:g} to {MAX_ANISOTROPY:g}")
+    return value
 
 
 def with_lens(scene: Scene, radius: str | None, distance: str | None) -> Scene:

@@ -120,6 +120,21 @@ def render(
             "(default: as the scene has it).",
         ),
     ] = None,
+    haze: Annotated[
+        Text,
+        typer.Option(
+            metavar="K",
+            help="Haze in which light is seen on its way: what is scattered per scene unit, for example 0.03 "
+            "(default: as the scene has it).",
+        ),
+    ] = None,
+    haze_anisotropy: Annotated[
+        Text,
+        typer.Option(
+            metavar="G",
+            help="Mean cosine of the angle by which haze scatters, -0.99 to 0.99 (default: as the scene has it).",
+        ),
+    ] = None,
     stats: StatsOption = False,
     up: UpOption = None,
     glass: GlassOption = None,
@@ -160,6 +175,8 @@ def render(
         polarisation,
         antialias_highlights,
         bounces,
+        haze,
+        haze_anisotropy,
     )
     raise typer.Exit(render_command(request))
 

@@ -59,6 +59,8 @@ class RenderRequest:
     polarisation: bool | None = None
     antialias_highlights: bool | None = None
     bounces: str | None = None
+    haze: str | None = None
+    haze_anisotropy: str | None = None
 
 
 def render_command(request: RenderRequest) -> int:
@@ -125,6 +127,10 @@ def scene_as_asked(request: RenderRequest) -> Scene:
         "polarisation": request.polarisation,
         "antialias_highlights": request.antialias_highlights,
         "bounces": bounces,
+        "haze": None if request.haze is None else options.parse_haze(request.haze),
+        "haze_anisotropy": None
+        if request.haze_anisotropy is None
+        else options.parse_haze_anisotropy(request.haze_anisotropy),
     }
     asked = {name: wish for name, wish in wishes.items() if wish is not None}
     return replace(scene, render=replace(scene.render, **asked)) if asked else scene

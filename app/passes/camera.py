@@ -214,6 +214,22 @@ class CameraPass:
         if self._haze is not None:
             self._haze.move(scene)
 
+    def inherit(self, before: CameraPass) -> None:
+        """Take over what stays as it was of `before`, which is about to be released."""
+        if self._haze is not None and before._haze is not None:
+            self._haze.inherit(before._haze)
+
+    @property
+    def has_haze(self) -> bool:
+        """Light is seen on its way."""
+        return self._haze is not None
+
+    def add_haze(self, picture: moderngl.Texture, camera: Camera, *, coarse: bool) -> None:
+        """Add what haze shows to a picture of radiance; `coarse`: by fewer beams."""
+        assert self._haze is not None
+        self._haze.draw(camera, *picture.size, coarse=coarse)
+        self._haze.add([picture], 0, picture.height)
+
     def _compiled(self, variant: str) -> moderngl.ComputeShader:
         """One of the camera's programs, compiled when it is first asked for."""
         key = variant, self._has_lens

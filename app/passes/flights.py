@@ -8,6 +8,7 @@ has elsewhere, in narrow bands; all other light flies one stretch, in one band.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -132,9 +133,7 @@ def _bands(buffers: SceneBuffers, light: int, count: int) -> tuple[Band, ...]:
         return (Band(low, low, low, float(power.values[-1, 3])),)
     low, high = (float(buffers.axis.x_of_nm(nm)) for nm in (max(low_nm - 0.5, 380.0), min(high_nm + 0.5, 780.0)))
     edges = np.linspace(low, high, count + 1).tolist()
-    bands = (
-        Band(a, b, 0.5 * (a + b), float(power.band(a, b)[3])) for a, b in zip(edges[:-1], edges[1:], strict=True)
-    )
+    bands = (Band(a, b, 0.5 * (a + b), float(power.band(a, b)[3])) for a, b in pairwise(edges))
     return tuple(band for band in bands if band.power_w > 0.0)
 
 

@@ -79,6 +79,14 @@ class Haze:
         self._scene = scene
         self._forget()
 
+    def inherit(self, before: Haze) -> None:
+        """Take over the beams of `before`, which is of no use then, where these are the same."""
+        mine, theirs = self._scene, before._scene
+        same_space = mine.space.scale == theirs.space.scale and np.array_equal(mine.space.centre, theirs.space.centre)
+        if same_space and self._channels == before._channels and _same_ways(mine.scene, theirs.scene):
+            self._beams, before._beams = before._beams, self._beams
+            self._surfaces, before._surfaces = before._surfaces, self._surfaces
+
     def draw(self, camera: Camera, width: int, height: int, *, coarse: bool = False) -> None:
         """Draw all beams as `camera` sees them, through the middle of its lens; nothing where that was done last.
         `coarse`: fewer of them."""
@@ -178,3 +186,19 @@ class Haze:
         if self._surfaces is not None:
             self._surfaces.release()
         self._beams, self._surfaces, self._view = {}, None, None
+
+
+def _same_ways(a: Scene, b: Scene) -> bool:
+    """Whether light takes the same ways in both."""
+    if len(a.objects) != len(b.objects) or len(a.lights) != len(b.lights):
+        return False
+    return (
+        a.render.max_depth == b.render.max_depth
+        and all(x is y or x == y for x, y in zip(a.lights, b.lights, strict=True))
+        and all(
+            x.mesh is y.mesh
+            and x.object_to_world is y.object_to_world
+            and (x.material is y.material or not (x.material.is_specular or y.material.is_specular))
+            for x, y in zip(a.objects, b.objects, strict=True)
+        )
+    )

@@ -164,8 +164,10 @@ class TracePass:
         self.ray = records.ray_record_of(features)
         self.photon = records.photon_record(features.spectral_groups, features.hero)
         ctx = context.ctx
-        structs = (*SCENE_STRUCTS, self.ray, self.photon, records.OUTCOME, records.CHUNK_COUNT, records.QUEUE_STATE)
-        structs += (records.FLIGHT,) if features.flights else ()
+        structs = (
+            *(*SCENE_STRUCTS, self.ray, self.photon, records.OUTCOME, records.CHUNK_COUNT, records.QUEUE_STATE),
+            *([records.FLIGHT] if features.flights else []),
+        )
         defines = light_defines(features, context.traits) | scene.defines
         self._features = features
         self._defines = defines

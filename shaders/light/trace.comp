@@ -519,8 +519,10 @@ void main()
         scatter(ray, start, hit, shading_frame(hit, facet, ray.direction), kind, thing.weight_row, k, outcome);
     }
 #ifdef FLIGHTS
+#ifdef BAND_CUTS
     // The parts of a band that is cut fly again.
     if ((outcome.what & FELL_BAND) != 0u) flight.flux_w = 0.0;
+#endif
     flight.what |= kind == KIND_DIFFUSE || kind == KIND_BLACK || kind == NONE ? 0u : 1u;
     store_flight(state.flights - state.alive + k, flight);
 #endif

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from reference import haze as reference
+from spectrasplat.edit.live_inputs import LiveInputs
+from spectrasplat.edit.parameters import Stage
 from spectrasplat.gpu.context import Context
 from spectrasplat.model.geometry import primitives
 from spectrasplat.model.lights import CollimatedLight
@@ -15,11 +18,13 @@ from spectrasplat.model.optics.glass import from_abbe
 from spectrasplat.model.optics.spectrum import illuminant
 from spectrasplat.model.scene import Black, Camera, Dielectric, RenderDefaults, Scene, SceneObject
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.passes.flights import trace_flights
+from spectrasplat.passes.flights import PHOTONS, Flights, trace_flights
 from spectrasplat.passes.haze import Haze
 from spectrasplat.passes.picture_channels import Channels
 from spectrasplat.reference.optics import unit
 from spectrasplat.render.device_scene import scene_buffers
+from spectrasplat.render.frames import FrameRenderer
+from spectrasplat.render.viewer.engine import LiveEngine
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
 COVERS = {"haze.glsl": ("henyey_greenstein", "blur_1d", "cross_beam")}
@@ -116,7 +121,9 @@ def test_a_prism_opens_the_beam_as_snell_has_it(gl: Context) -> None:
     flights = trace_flights(gl, scene, Channels().observer(), 4096).records
     behind = flights[(flights["what"] >> 8 == 2) & (flights["direction"][:, 2] < -0.7)]
     assert len(behind) > 100
-    normals = [tilted[:3, :3] @ np.array([side * math.cos(math.pi / 6), 0.0, math.sin(math.pi / 6)]) for side in (-1, 1)]
+    normals = [
+        tilted[:3, :3] @ np.array([side * math.cos(math.pi / 6), 0.0, math.sin(math.pi / 6)]) for side in (-1, 1)
+    ]
 
     def leaving(nm: np.ndarray) -> np.ndarray:
         n, d = glass.index(nm), np.broadcast_to([1.0, 0.0, 0.0], (len(nm), 3))
@@ -134,6 +141,42 @@ def test_a_prism_opens_the_beam_as_snell_has_it(gl: Context) -> None:
     assert np.abs(found - (high - low)).max() < 0.02 * np.linalg.norm(high - low, axis=1).max()
 
 
+def test_the_viewer_shows_the_same_and_traces_once(gl: Context) -> None:
+    """The viewer's picture against a still's; thicker haze, seen from elsewhere, by the same beams."""
+    scene = beam_scene(seen_from(90.0, vertical_fov_deg=20.0), 0.01)
+    settings = RenderSettings(width=SIZE[0], height=SIZE[1], spp=1, photons=1000)
+    frames = FrameRenderer(gl, settings, [Stage(scene, scene.camera)])
+    still = frames.run(Stage(scene, scene.camera))
+    frames.release()
+    engine = LiveEngine(gl)
+
+    def shown(scene: Scene) -> np.ndarray:
+        engine.set(LiveInputs(scene, scene.camera, *SIZE))
+        until = time.monotonic() + 120.0
+        while not engine.is_idle and time.monotonic() < until:
+            engine.advance(0.05)
+        assert engine.is_idle and engine.problem is None
+        return np.frombuffer(engine.picture.read(), "f4").reshape(SIZE[1], SIZE[0], 4)[..., :3].astype(float)
+
+    try:
+        first = shown(scene)
+        assert first.max() > 0.0 and np.abs(first - still).max() < 1e-4 * still.max()
+        calls: list[int] = []
+
+        def counted(*args) -> Flights:
+            calls.append(args[3])
+            return trace_flights(*args)
+
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("spectrasplat.passes.haze.trace_flights", counted)
+            render = replace(scene.render, haze=0.02)
+            thicker = shown(replace(scene, render=render, camera=seen_from(80.0, vertical_fov_deg=20.0)))
+        # Fewer beams, for pictures in motion, may have been asked for first.
+        assert PHOTONS not in calls and 1.8 < thicker.sum() / first.sum() < 2.1
+    finally:
+        engine.release()
+
+
 def test_the_shader_library_against_float64(gl: Context) -> None:
     rng = np.random.default_rng(4)
     cosine, g = as_f32(rng.uniform(-1, 1, COUNT)), as_f32(rng.uniform(-0.9, 0.9, COUNT))
@@ -149,7 +192,7 @@ def test_the_shader_library_against_float64(gl: Context) -> None:
     """
     inputs = {"cosine": cosine, "g": g, "distance": distance, "deviation": deviation}
     inputs |= {"start": start, "beam": beam, "ray": ray}
-    outputs = {name: "float" for name in ("phase", "blur", "on_beam", "on_ray", "offset")} | {"across": "vec3"}
+    outputs = dict.fromkeys(("phase", "blur", "on_beam", "on_ray", "offset"), "float") | {"across": "vec3"}
     got = evaluate(gl.ctx, ["lib/haze.glsl"], body, inputs, outputs)
     assert np.allclose(got["phase"], reference.henyey_greenstein(cosine, g), rtol=2e-5)
     assert np.allclose(got["blur"], reference.blur_1d(distance, deviation), atol=2e-6)

@@ -130,6 +130,10 @@ def test_world_and_camera_stand_in_the_outliner(gl: Context, state: State) -> No
         rig.drag((x - 20, y), (x + 20, y))
         rig.frame(2)
         assert rig.state.scene.render.bounces > 0 and rig.state.edit_label == "Bounces"
+        x, y = rig.find("Haze").centre
+        rig.drag((x - 20, y), (x + 20, y))
+        rig.frame(2)
+        assert rig.state.scene.render.haze > 0 and "Haze anisotropy" in rig.items.items
 
 
 def test_choosing_again_takes_away() -> None:

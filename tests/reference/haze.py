@@ -21,7 +21,9 @@ def blur_1d(distance: np.ndarray, deviation: np.ndarray) -> np.ndarray:
 def nearest(start: np.ndarray, beam: np.ndarray, ray: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Ways (n,) along two lines, from `start` along unit `beam` and from the origin along unit `ray`, to where they are
     nearest: by least squares, line by line."""
-    ways = [np.linalg.lstsq(np.stack([-b, r], axis=1), s, rcond=None)[0] for s, b, r in zip(start, beam, ray, strict=True)]
+    ways = [
+        np.linalg.lstsq(np.stack([-b, r], axis=1), s, rcond=None)[0] for s, b, r in zip(start, beam, ray, strict=True)
+    ]
     on_beam, on_ray = np.array(ways).T
     return on_beam, on_ray
 

@@ -27,7 +27,8 @@ from spectrasplat.passes import bounce_light, environment_light
 from spectrasplat.passes.camera_records import CAMERA_LIGHT, CAMERA_PARAMETERS
 from spectrasplat.passes.environment_places import PLACE
 from spectrasplat.passes.footprint import SPLAT
-from spectrasplat.passes.variants import direct_defines, footprint_defines, splat_defines
+from spectrasplat.passes.haze import HAZE_PARAMETERS
+from spectrasplat.passes.variants import direct_defines, footprint_defines, haze_defines, splat_defines
 
 EVERYTHING = Features(
     method="srd",
@@ -67,6 +68,8 @@ EVERYTHING = Features(
     coats=True,
     rough_diffuse=True,
     rough=True,
+    haze=True,
+    flights=True,
 )
 PLAIN_CAMERA = {"camera_disperses": False, "map_tents": 0}
 """What the camera sees disperses nothing: the camera carries the spectrum in the same way as the light pass."""
@@ -111,6 +114,7 @@ WITHOUT = {
         **PLAIN_CAMERA,
     },
     "polarisation": {"polarised": False},
+    "haze": {"haze": False, "flights": False},
     "rough surfaces": {"rough": False},
     "mirrors": {"mirrors": False},
     "gratings": {"gratings": False},
@@ -135,9 +139,10 @@ WITHOUT = {
 
 def sources(features: Features) -> list[shader.Source]:
     """The light pass's and the camera's sources, with stand-ins for the numbers that only a scene's data give."""
-    ray = records.ray_record(features.defines()["COLUMNS"], polarised=features.polarised)
+    ray = records.ray_record(features.defines()["COLUMNS"], polarised=features.polarised, flights=features.flights)
     photon = records.photon_record(features.spectral_groups)
     structs = (*SCENE_STRUCTS, ray, photon, records.OUTCOME, records.TRACE_PARAMETERS, records.EMIT_PARAMETERS)
+    structs += (records.FLIGHT,) if features.flights else ()
     copies = " ".join(
         f"photon.dposition_dvar{g} = ray.dposition[SPATIAL + {g}];" for g in range(features.spectral_groups)
     )
@@ -149,6 +154,7 @@ def sources(features: Features) -> list[shader.Source]:
         "INDEX_ROW": 0,
         "SLOPE_ROW": 1,
         "VARIABLE_ROW": 2,
+        "BIND_FLIGHTS": 16,
     }
     numbers |= {"STACK_SIZE": 1, "STACK_OBJECTS": "uint[](0u)", "SOLID_COUNT": 1, "PLANE_COUNT": 6, "TRIANGLE_COUNT": 9}
     light = features.defines() | numbers
@@ -176,6 +182,9 @@ def sources(features: Features) -> list[shader.Source]:
     if features.bounces:
         structs = (*SCENE_STRUCTS, PLACE, bounce_light.PARAMETERS, bounce_light.ASKED, bounce_light.SUM)
         made.append(shader.load_source("light/bounce.comp", soft, structs))
+    if features.haze:
+        structs = (records.FLIGHT, CAMERA_PARAMETERS, HAZE_PARAMETERS)
+        made += [shader.load_source(f"camera/haze.{s}", haze_defines(1, 2), structs) for s in ("vert", "frag")]
     return made + camera_sources(features, light)
 
 

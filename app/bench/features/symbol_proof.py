@@ -82,6 +82,7 @@ FEATURE_SYMBOLS: dict[str, tuple[str, ...]] = {
     "beams": ("is_beam_object",),
     "environment light": ("EnvironmentSum", "EnvironmentAsked"),
     "bounces": ("BounceSum", "gathered", "cosine_direction"),
+    "haze": ("henyey_greenstein", "blur_1d", "store_flight", "flown"),
     "lens": ("lens_place", "by_lens", "begin_on_lens"),
     "light profiles": ("profile_intensity", "profile_stretch"),
     "spectral bins": ("define TARGETS [2-9]", "define TARGETS 1[0-9]"),

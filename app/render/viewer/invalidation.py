@@ -106,14 +106,19 @@ def _scene(old: Scene, new: Scene) -> DirtyLevel:
                 cost = DirtyLevel.BUILD
         elif item.name == "render":
             cost = max(cost, DirtyLevel.BUILD if _path_rules(a) != _path_rules(b) else DirtyLevel.NOTHING)
+            cost = max(cost, DirtyLevel.CAMERA if _haze(a) != _haze(b) else DirtyLevel.NOTHING)
         else:
             cost = DirtyLevel.BUILD
     return max(cost, DirtyLevel.NOTHING if cost >= DirtyLevel.TRACE else _glasses(old, new))
 
 
-def _path_rules(render: RenderDefaults) -> tuple[int, bool, int]:
+def _path_rules(render: RenderDefaults) -> tuple[int, bool, int, bool]:
     """What programs and queues are made for."""
-    return render.max_depth, render.polarisation, render.bounces
+    return render.max_depth, render.polarisation, render.bounces, render.haze > 0.0
+
+
+def _haze(render: RenderDefaults) -> tuple[float, float]:
+    return render.haze, render.haze_anisotropy
 
 
 def _objects(old: tuple[SceneObject, ...], new: tuple[SceneObject, ...]) -> DirtyLevel:
@@ -228,6 +233,8 @@ def appearance_differs(old: LiveInputs, new: LiveInputs) -> bool:
     """Whether what the camera sees without the maps differs: colours, lights, what lies behind everything, glass that
     bends its own rays otherwise."""
     a, b = old.scene, new.scene
+    if _haze(a.render) != _haze(b.render):
+        return True
     if old.solo_nm != new.solo_nm or a.background_rgb != b.background_rgb or a.environment is not b.environment:
         return True
     if a.lights is not b.lights and any(x is not y for x, y in zip(a.lights, b.lights, strict=True)):

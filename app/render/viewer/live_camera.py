@@ -154,6 +154,7 @@ class LiveCamera:
         self._take_moving(buffers)
         self._shows_other = True
         if before is not None:
+            self._pass.inherit(before)
             before.release()
         if kept is not None and kept is not pictures:
             kept.release()
@@ -425,7 +426,13 @@ class LiveCamera:
         if self._moving.followed:
             self._glass_rate = _blend(self._glass_rate, self._moving.followed, time.perf_counter() - self._spent_s)
         self._ladder.pop(0)
-        if self.picture is not self._drawn:
+        assert self._pass is not None
+        if self._pass.has_haze:
+            # Glass is still to become finer in what was drawn.
+            self._show(self._drawn, 1.0)
+            assert self.picture is not None
+            self._pass.add_haze(self.picture, self._camera, coarse=self._is_preview)
+        elif self.picture is not self._drawn:
             self._spare, self.picture = self.picture, self._drawn
         self.shown_samples = self.shown_bands = 1
         self.scale, self.direct_scale = self._moving_scale / step, self._moving_scale
@@ -446,21 +453,25 @@ class LiveCamera:
     def _publish(self) -> None:
         assert self._pass is not None
         (sums,) = self._pass.sums
-        if self.picture is None or self.picture.size != sums.size:
-            if self.picture is not None:
-                self.picture.release()
-            self.picture = self._context.ctx.texture(sums.size, 4, dtype="f4")
-        sums.bind_to_image(0, read=True, write=False)
-        self.picture.bind_to_image(1, read=False, write=True)
-        self._average["scale"].value = 1.0 / self._taken
-        self._average.run(-(-sums.width // 8), -(-sums.height // 8))
-        self._context.ctx.memory_barrier()
+        self._show(sums, 1.0 / self._taken)
         self.shown_samples, self.shown_bands = self._taken, self._cycle
         self.scale = self.direct_scale = 1.0
         self._shows_whole, self._shows_other = not self._is_smooth, False
         self._owes = False
         self.fallbacks = self._pass.fallbacks
         self.version += 1
+
+    def _show(self, radiance: moderngl.Texture, scale: float) -> None:
+        """`scale` times this, copied, is the picture from now on."""
+        if self.picture is None or self.picture.size != radiance.size:
+            if self.picture is not None:
+                self.picture.release()
+            self.picture = self._context.ctx.texture(radiance.size, 4, dtype="f4")
+        radiance.bind_to_image(0, read=True, write=False)
+        self.picture.bind_to_image(1, read=False, write=True)
+        self._average["scale"].value = scale
+        self._average.run(-(-radiance.width // 8), -(-radiance.height // 8))
+        self._context.ctx.memory_barrier()
 
     def release(self) -> None:
         """Free everything."""

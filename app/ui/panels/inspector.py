@@ -19,7 +19,7 @@ from ...model.scene import (
     SceneObject,
     Vec3,
 )
-from ...model.scene_render import MAX_BOUNCES
+from ...model.scene_render import MAX_ANISOTROPY, MAX_BOUNCES
 from .. import theme
 from ..view_model import ViewModel
 from . import outliner, picture_choice, widgets
@@ -29,6 +29,8 @@ from .environment_rows import draw_environment
 
 _KINDS = {cls.title: cls for cls in MATERIAL_KINDS.values()}
 _UNITS = "units"
+_MOST_HAZE = 1.0
+"""On the slider: thicker haze is not thin."""
 _WRAPS = {"repeat": "Repeats", "clamp": "Its border goes on"}
 
 _keeps_proportions = {"on": True}
@@ -306,9 +308,44 @@ def _scene(state: State, view_model: ViewModel) -> State:
         if bounces_changed and round(bounces) != scene.render.bounces:
             state = edits.attempt(state, "Bounces", edits.set_render_defaults, bounces=round(bounces))
         state = widgets.holding(state, active)
+        state = _draw_haze(state)
     if widgets.section("Environment"):
         state = draw_environment(state, view_model)
     if scene.notes and widgets.section("Notes"):
         for note in scene.notes:
             widgets.hint(note)
     return state
+
+
+def _draw_haze(state: State) -> State:
+    """What the air is like round all objects."""
+    render = state.scene.render
+    changed, haze, active = widgets.slider(
+        "Haze",
+        render.haze,
+        0.0,
+        _MOST_HAZE,
+        unit="",
+        format="%.4f",
+        logarithmic=True,
+        reset=0.0,
+        clamp=False,
+        tip="Share of light that thin haze scatters on the way of one scene unit; 0: light is not seen on its way.",
+    )
+    if changed:
+        state = edits.attempt(state, "Haze", edits.set_render_defaults, haze=haze)
+    state = widgets.holding(state, active)
+    if not render.haze:
+        return state
+    changed, anisotropy, active = widgets.slider(
+        "Haze anisotropy",
+        render.haze_anisotropy,
+        -MAX_ANISOTROPY,
+        MAX_ANISOTROPY,
+        unit="",
+        reset=0.0,
+        tip="Mean cosine of the angle by which haze scatters; above 0: mostly onwards.",
+    )
+    if changed:
+        state = edits.attempt(state, "Haze anisotropy", edits.set_render_defaults, haze_anisotropy=anisotropy)
+    return widgets.holding(state, active)
