@@ -22,6 +22,7 @@ from ..model.features import (
 )
 from ..model.geometry.bvh import Bvh, build_bvh
 from ..model.geometry.mesh import Mesh
+from ..model.optics import rough_glass
 from ..model.optics.colorimetry import VISIBLE_NM, mirror_reflectance
 from ..model.optics.glass import Dispersion
 from ..model.optics.spectral_tables import (
@@ -76,7 +77,11 @@ OBJECT = Struct(
         Field("group", "uint", "spectral group of the glass, or NONE"),
         Field("first_triangle", "uint", "global source index of its first triangle"),
         Field("texture", "uint", "its picture in the texture store, or NONE"),
-        Field("colour", "vec4", "linear Rec.709 reflectance (diffuse, mirror); dielectric: GGX's width in x, n_d in w"),
+        Field(
+            "colour",
+            "vec4",
+            "linear Rec.709 reflectance (diffuse, mirror); dielectric: GGX's width, its table's row, 0, n_d",
+        ),
     ),
     texels=True,
 )
@@ -173,6 +178,8 @@ class SpectraLayout:
     """First of one row per light: cumulative radiant power over x, W per unit weight."""
     brightness_row: int
     """Likewise, where wavelengths are drawn at random: share of the draws below x (`wavelength_cdf`)."""
+    rough_row: int
+    """`rough_glass.tables`."""
     rows: int
 
 
@@ -389,6 +396,7 @@ class SceneBuffers:
         media: list[Dispersion] = []
         weights: list[np.ndarray] = []
         gratings: list[np.ndarray] = []
+        widths = rough_glass.distinct(item.material.microfacet_width for item in self.scene.objects)
         x = np.linspace(0.0, 1.0, SAMPLES)
         nm = self.axis.nm_of_samples(SAMPLES)
         stack_bits: dict[int, int] = {}
@@ -419,8 +427,9 @@ class SceneBuffers:
                     media.append(material.dispersion)
                 record["medium"] = media.index(material.dispersion)
                 record["colour"][3] = material.dispersion.n_d
-                if material.transmits:
-                    record["colour"][0] = material.microfacet_width
+                if material.is_rough:
+                    width = material.microfacet_width
+                    record["colour"][:2] = width, rough_glass.ROWS * widths.index(width)
                 if index in stack_bits:
                     record["stack_bit"] = stack_bits[index]
                 if material.dispersion in self.groups.glasses and self.groups.count:
@@ -456,7 +465,7 @@ class SceneBuffers:
             cumulative(self.axis, light.spectral_power) for light in self.scene.lights
         ]
         rows.append(np.array([power.at(x)[:, 3] for power in self.light_power]).reshape(-1, SAMPLES))
-        rows.append(self._draws())
+        rows += [self._draws(), rough_glass.tables(widths, SAMPLES)]
         counts = np.cumsum([0] + [len(r) for r in rows])
         self.layout = SpectraLayout(*counts.tolist())
         self.variables = variables
@@ -473,6 +482,7 @@ class SceneBuffers:
             "STACK_SIZE": max(1, len(self.stack_objects)),
             "STACK_OBJECTS": "uint[](" + ", ".join(f"{o}u" for o in (self.stack_objects or [0])) + ")",
         }
+        self.defines |= rough_glass.row_defines(widths, self.layout.rough_row)
 
     def _draws(self) -> np.ndarray:
         """Each light's density of random wavelengths as a running integral, (lights, SAMPLES); none where none are

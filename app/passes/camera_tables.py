@@ -18,6 +18,7 @@ from ..gpu.map_channels import MapChannels
 from ..gpu.scene_buffers import SAMPLES, SceneBuffers, index_slope
 from ..gpu.scene_texels import spectra_texture
 from ..model.materials.finish import SMOOTH_ROUGHNESS
+from ..model.optics import rough_glass
 from ..model.optics.coat import coat_tables
 from ..model.optics.colorimetry import VISIBLE_NM, daylight_per_lumen, rgb_basis
 from ..model.optics.glass import Dispersion
@@ -45,7 +46,7 @@ class CameraTables:
     emission: moderngl.Texture
     object_colours: moderngl.Buffer
     cell_cdf: moderngl.Buffer
-    defines: dict[str, int]
+    defines: dict[str, int | str]
     axis: SpectralAxis
 
     @classmethod
@@ -82,7 +83,7 @@ class CameraTables:
             _texture(ctx, emission),
             ctx.buffer((colours if finishes is None else np.concatenate([colours, finishes])).tobytes()),
             ctx.buffer(cell_cdf.astype("f4").tobytes()),
-            defines | rows,
+            {**defines, **rows},
             axis,
         )
 
@@ -153,7 +154,7 @@ def _spectra(
     absorptions: list[np.ndarray],
     cell_cdf: np.ndarray,
     maps: MapChannels,
-) -> tuple[np.ndarray, dict[str, int]]:
+) -> tuple[np.ndarray, dict[str, int | str]]:
     """Rows over x as `lib/scene.glsl` reads them, and where they begin."""
     x = np.linspace(0.0, 1.0, SAMPLES)
     nm = axis.nm_of_samples(SAMPLES)
@@ -163,6 +164,7 @@ def _spectra(
         index_slope(groups, scene.groups.glasses.index(g) if g in scene.groups.glasses else None, axis, variables)
         for g in glasses
     ]
+    widths = [item.material.microfacet_width for item in scene.scene.objects]
     sections = {
         "INDEX_ROW": np.asarray(index_table(axis, list(glasses.values()), SAMPLES), float),
         "SLOPE_ROW": np.array(slopes).reshape(-1, SAMPLES),
@@ -172,9 +174,11 @@ def _spectra(
         "BASIS_ROW": np.array([np.interp(nm, VISIBLE_NM, column) for column in rgb_basis().T]),
         "BIN_ROW": maps.coordinate(axis, x)[None],
         "QUANTILE_ROW": np.interp(x, cell_cdf, np.linspace(0.0, 1.0, EMISSION_CELLS + 1))[None],
+        "ROUGH_ROW": rough_glass.tables(widths, SAMPLES),
     }
     starts = np.cumsum([0] + [len(rows) for rows in sections.values()])
-    defines = dict(zip(sections, starts.tolist(), strict=False))
+    defines: dict[str, int | str] = dict(zip(sections, starts.tolist(), strict=False))
+    defines |= rough_glass.row_defines(widths, int(defines.pop("ROUGH_ROW")))
     return np.concatenate(list(sections.values())), defines | {"ABSORBERS": len(absorptions)}
 
 

@@ -16,7 +16,8 @@ from ..model.materials.finish import SMOOTH_ROUGHNESS
 from ..model.optics.coat import coat_tables
 from ..model.scene import Scene
 from .compiling import inlined
-from .scattering import fresnel, masking, microfacet
+from .rough_albedo import masking
+from .scattering import fresnel, microfacet
 
 _COSINES = 1025
 

@@ -23,6 +23,7 @@ from ..model.scene import (
     Grating,
     Scene,
 )
+from .rough_albedo import albedo_tables
 from .scene_surfaces import Surfaces
 
 BLACK, DIFFUSE, MIRROR, DIELECTRIC, GRATING = range(5)
@@ -91,6 +92,8 @@ class PhotonScene(NamedTuple):
     """float64 (R, 3): order / line spacing in 1/µm, efficiency, whether it is reflected."""
     microfacet_width: np.ndarray
     """float64 (O,): GGX's α of an object's surface; 0: it is polished."""
+    albedo: np.ndarray
+    """float64 (O or 1, ratios, nodes): what one microfacet of it sends on (`rough_albedo`)."""
     near: float
     """Distances below this are the same place."""
     contact: float
@@ -167,6 +170,7 @@ def photon_scene(scene: Scene) -> tuple[PhotonScene, np.ndarray]:
         for o in scene.objects
     ]
     bounds, first, count = _exact_nodes(tree, corners)
+    widths = np.array([item.material.microfacet_width for item in scene.objects], float)
     return PhotonScene(
         bounds,
         first,
@@ -189,7 +193,8 @@ def photon_scene(scene: Scene) -> tuple[PhotonScene, np.ndarray]:
         media.array(),
         weights.array(),
         *_gratings(scene),
-        np.array([item.material.microfacet_width for item in scene.objects], float),
+        widths,
+        albedo_tables(widths),
         _NEAR * size,
         _CONTACT * 2.0 ** round(float(np.log2(size))),
         scene.render.polarisation,

@@ -4,7 +4,8 @@ The light tracer (`photon_kernel`), the camera tracer (`camera_kernel`) and the 
 functions: Fresnel's exact reflectance decides by chance, nested solids follow their rank, an interpolated normal that
 would send a ray through its own facet gives way to the facet's, Beer's law thins what passes. Rough glass has
 microfacets drawn by their area (Walter et al. 2007, eq. 35, 36, 41), whether the ray sees them or not: another way
-than the shaders', with the same mean.
+than the shaders', with the same mean; light that microfacets throw at each other goes both ways as the rest does
+(Turquin 2019).
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from .curved_surfaces import turned_normal
 from .photon_intersect import normal_at
 from .photon_scene import GRATING, MIRROR
 from .polarised import across, amplitudes, senkrecht, share_of, turn_fields
+from .rough_albedo import masking, sent_on
 from .sampling import mixed
 
 AIR = -1
@@ -165,15 +167,6 @@ def microfacet(nx, ny, nz, width, a, b):
     return c * sx + s * tx + cosine * nx, c * sy + s * ty + cosine * ny, c * sz + s * tz + cosine * nz
 
 
-@compiled
-def masking(cosine, width):
-    """Smith's G1 of GGX for a direction at this cosine to the surface's normal: 1 where nothing is hidden."""
-    if cosine <= 0.0:
-        return 0.0
-    tangent2 = max(1.0 - cosine * cosine, 0.0) / (cosine * cosine)
-    return 2.0 / (1.0 + math.sqrt(1.0 + width * width * tangent2))
-
-
 @inlined
 def scatter(scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw, noise, event, field):
     """One event at a place (3) of glass or a mirror: (direction (3), mask, alone, on the object's inner side, is an
@@ -181,7 +174,7 @@ def scatter(scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw, noi
 
     `draw` in [0, 1) decides by Fresnel's reflectance, unless all is reflected. "Is an event" is false where the same
     substance lies on both sides; a mirror keeps its reflectance, polished glass everything, and rough glass the weight
-    of a microfacet that words `event` of the hash `noise` draw (its mean is below 1). In a polarised scene `field`
+    of a microfacet that words `event` of the hash `noise` draw (its mean is 1). In a polarised scene `field`
     complex (2, 3), the two of `polarised`, turns with the ray.
     """
     if scene.kind[scene.owner[triangle]] == GRATING:
@@ -254,6 +247,7 @@ def scatter(scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw, noi
         leaving = side * (rx * wx + ry * wy + rz * wz)
         upright = nx * wx + ny * wy + nz * wz
         kept *= cosine * masking(facing, width) * masking(leaving, width) / (facing * upright)
+        kept /= sent_on(scene.albedo, thing, facing, eta_it)
         if side * (rx * gx + ry * gy + rz * gz) <= 0.0:
             kept = 0.0
     if scene.polarised and kept > 0.0:

@@ -203,9 +203,15 @@ void cross_glass(inout CameraPath path, CameraPath whole, Hit hit, Triangle face
     path.recut = mirrored.recut = 0u;
 #ifdef ROUGH_SURFACES
     bool is_rough = rough.width > 0.0;
+    if (is_rough) rough.regained = regained(rough.table, -dot(path.direction, rough.surface.shading.normal), n_i / n_t);
 #endif
     Deflection refracted = refract_at(frame.shading, path.direction, n_i.y / n_t.y);
-    bool total = !refracted.exists, reflects = total;
+    bool total = !refracted.exists;
+#ifdef ROUGH_SURFACES
+    // A microfacet's share is its own, also where what it lets through does not leave the surface.
+    if (is_rough) total = cosine2.y <= 0.0;
+#endif
+    bool reflects = total;
     float likely = total ? 1.0 : dot(reflectance, vec3(0.25, 0.5, 0.25));
     bool strong = !total && (begins || path.depth <= 1 || min(path.branch_weight * likely, path.branch_weight * (1.0 - likely)) > p.split_threshold);
     bool splits = strong && stack_size < STACK;

@@ -2,18 +2,22 @@
 // does), and is turned as by a polished surface that lies as this one does. By reciprocity it loses what light that came along it would.
 #ifdef ROUGH_SURFACES
 #include "lib/rough_surface.glsl"
+#include "lib/rough_energy.glsl"
 
 // What a rough surface makes of a path.
 struct RoughPlace {
     float width;          // GGX's, of the surface that is met; 0: it is polished
     PathFrame surface;    // its own normals, before the microfacet's took their place
+    float table;          // of what it sends on
+    vec3 regained;        // factor for what its microfacets send on after all
 };
 
 // The microfacet takes the place of the frame's normals, and turns with them. Samples of a pixel share out the microfacets between them, and
 // none is averaged over the lobe: lookups along the sweep would be fewer than the band's wavelengths part.
 RoughPlace meet_microfacet(CameraPath path, inout PathFrame frame, uint object, uint pixel_key)
 {
-    RoughPlace place = RoughPlace(object_at(object).colour.x, frame);
+    vec4 told = object_at(object).colour;
+    RoughPlace place = RoughPlace(told.x, frame, told.y, vec3(1.0));
     if (place.width <= 0.0) return place;
     // Parts of a band that was cut here meet it again, and find the same microfacet.
     uint key = hash_combine(pixel_key, 80u), depth = uint(path.depth);
@@ -29,7 +33,7 @@ RoughPlace meet_microfacet(CameraPath path, inout PathFrame frame, uint object, 
     return place;
 }
 
-// What is left of a path that a microfacet has turned, at three places of its band: what others do not hide; nothing, where it does not leave the
+// What is left of a path that a microfacet has turned, at three places of its band: what others do not hide or send on; nothing, where it does not leave the
 // surface. `side`: 1 where it was reflected, -1 where it was refracted.
 vec3 leaving_share(RoughPlace place, CameraPath path, bool geometric, float side)
 {
@@ -40,7 +44,7 @@ vec3 leaving_share(RoughPlace place, CameraPath path, bool geometric, float side
         cosine.z = dot(path.end_direction[1], place.surface.end_normal[1]);
     }
 #endif
-    return geometric || side * cosine.y <= 0.0 ? vec3(0.0) : smith_share(side * cosine, place.width);
+    return geometric || side * cosine.y <= 0.0 ? vec3(0.0) : place.regained * smith_share(side * cosine, place.width);
 }
 
 // A path that has lost all goes nowhere.

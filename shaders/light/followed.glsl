@@ -11,6 +11,7 @@
 #endif
 #ifdef ROUGH_SURFACES
 #include "lib/rough_surface.glsl"
+#include "lib/rough_energy.glsl"
 #endif
 
 struct FollowedRay {
@@ -63,7 +64,8 @@ FollowedRay follow_specular(vec3 position, vec3 direction, RayOrigin origin, uin
 #ifdef ROUGH_SURFACES
             // One microfacet, which the path loses by as a camera's does.
             vec3 surface = frame.normal;
-            float width = kind == KIND_DIELECTRIC ? object_at(hit.object).colour.x : 0.0;
+            vec4 told = object_at(hit.object).colour;
+            float width = kind == KIND_DIELECTRIC ? told.x : 0.0, cosine = -dot(direction, surface);
             uint own = hash_combine(key, event + 0x100u);
             if (width > 0.0) frame.normal = visible_microfacet(-direction, surface, width, vec2(unit_float(own), unit_float(hash_pcg(own))));
 #endif
@@ -103,7 +105,7 @@ FollowedRay follow_specular(vec3 position, vec3 direction, RayOrigin origin, uin
                     if (passes) turned = refracted;
 #ifdef ROUGH_SURFACES
                     float leaving = dot(turned.direction, surface) * (passes ? -1.0 : 1.0);
-                    if (width > 0.0) ray.weight *= turned.geometric ? 0.0 : smith_share(vec3(leaving), width).x;
+                    if (width > 0.0) ray.weight *= turned.geometric ? 0.0 : regained(told.y, cosine, vec3(eta_it)).x * smith_share(vec3(leaving), width).x;
 #endif
                 } else turned.direction = direction;
 #ifdef POLARISED

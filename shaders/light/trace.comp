@@ -38,8 +38,8 @@ vec3 normal_columns[COLUMNS];
 #include "light/trace_polarisation.glsl"
 #endif
 #ifdef ROUGH_SURFACES
-// Width of GGX of the object that a ray has met; 0: it is polished.
-float surface_width;
+// Width of GGX of the object that a ray has met; 0: it is polished. And the table of what that sends on.
+float surface_width, surface_table;
 #endif
 
 // What a weight at each of the three places adds to the integral of the weights, straight between them, times the density whose running integral
@@ -252,6 +252,9 @@ void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint k
     vec3 theta = vec3(dot(ray.direction, frame.normal));
 #endif
     vec3 cosine2 = transmitted_cosine2(theta, n_i / n_t);
+#ifdef ROUGH_SURFACES
+    if (splits && rough.width > 0.0) rough.regained = regained(surface_table, -dot(ray.direction, rough.normal), n_i / n_t);
+#endif
 #ifdef POLARISED
     Polarisation seen = met_in_plane(ray, s);
     FresnelPair reflection = fresnel_reflection(theta, n_i / n_t, cosine2);
@@ -491,6 +494,7 @@ void main()
 #endif
 #ifdef ROUGH_SURFACES
     surface_width = kind == KIND_DIELECTRIC ? thing.colour.x : 0.0;
+    surface_table = thing.colour.y;
 #endif
     if (met) ray.position = surface_point(hit, facet, ray.position, ray.direction);
 #if COLUMNS > 0

@@ -2,17 +2,19 @@
 // as the anchor does), and goes on as from a polished surface that lies as this one does. Its neighbours on the lattice meet other ones, so what a
 // photon stands for is told by two columns of their own: how far the light of other microfacets lands beside it.
 #ifdef ROUGH_SURFACES
+#include "lib/rough_energy.glsl"
 
 // What a rough surface makes of a ray.
 struct RoughPlace {
     float width;    // GGX's, of the surface that is met; 0: it is polished
     vec3 normal;    // the surface's own, against the ray
+    vec3 regained;  // factor for what its microfacets send on after all
 };
 
 // The microfacet takes the place of the frame's normal, and turns with it.
 RoughPlace meet_microfacet(RayRecord ray, inout ShadingFrame frame)
 {
-    RoughPlace place = RoughPlace(surface_width, frame.normal);
+    RoughPlace place = RoughPlace(surface_width, frame.normal, vec3(1.0));
     if (place.width <= 0.0) return place;
     uint sub = ray.photon_id % p.lattices, i = ray.photon_id / p.lattices;
     // Parts of a band that was cut here meet it again, and find the same microfacet.
@@ -34,7 +36,7 @@ RoughPlace meet_microfacet(RayRecord ray, inout ShadingFrame frame)
     return place;
 }
 
-// Leaves a ray that a microfacet has turned what other microfacets do not hide of it, at three places of its band, and nothing where it does not
+// Leaves a ray that a microfacet has turned what other microfacets do not hide of it or send on, at three places of its band, and nothing where it does not
 // leave the surface. `side`: 1 where it is reflected, -1 where it is refracted; `share`: of the power, by which roulette asks.
 void shadow(RoughPlace place, inout RayRecord child, Deflection turned, float side, inout float share, inout Outcome outcome)
 {
@@ -48,7 +50,7 @@ void shadow(RoughPlace place, inout RayRecord child, Deflection turned, float si
     }
 #endif
     bool leaves = side * cosine.y > 0.0 && !turned.geometric;
-    vec3 kept = leaves ? smith_share(side * cosine, place.width) : vec3(0.0);
+    vec3 kept = leaves ? place.regained * smith_share(side * cosine, place.width) : vec3(0.0);
     child.flux_w *= kept.y;
     child.throughput *= kept;
 #ifdef HERO

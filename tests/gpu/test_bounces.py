@@ -135,7 +135,11 @@ def test_the_floor_colours_the_wall(gl: Context) -> None:
     np.testing.assert_allclose(red, grey * [1.0, 0.5, 0.0], atol=1e-3 * grey.max())
 
 
-@pytest.mark.parametrize("material", [Dielectric(CROWN), Mirror((1.0, 1.0, 1.0))], ids=["glass", "mirror"])
+@pytest.mark.parametrize(
+    "material",
+    [Dielectric(CROWN), Dielectric(CROWN, roughness=0.7), Mirror((1.0, 1.0, 1.0))],
+    ids=["glass", "ground glass", "mirror"],
+)
 def test_in_a_furnace_everything_gets_the_same(gl: Context, material) -> None:
     """Walls of radiance 1 all round: what lossless glass and mirrors hide of them they show elsewhere, so that every
     place gets π, once."""

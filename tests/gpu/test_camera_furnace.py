@@ -6,6 +6,7 @@ Also textures seen through glass, whose mean must be kept when pixels are far la
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -113,6 +114,16 @@ def test_a_loss_of_two_per_cent_a_surface_would_be_seen(gl, monkeypatch, tmp_pat
     )
     rgb = render(gl, solids("slab"), background=(1, 1, 1), camera=NEAR, size=SIZE, samples=16)
     assert 1.0 - rgb[8:16, 8:16].mean() > 0.02
+
+
+@pytest.mark.parametrize("roughness", [0.2, 0.5, 1.0])
+def test_rough_glass_vanishes_too(gl, roughness: float) -> None:
+    """What microfacets throw at each other comes out again: the mean to 1 %, where following one of them alone leaves
+    0.98, 0.88 and 0.59. Nothing is coated here: what coats share with rough surfaces is there without them."""
+    objects = [SceneObject("ball", ball(0.6), Dielectric(from_abbe(1.5, 50.0), roughness=roughness))]
+    inside = replace(NEAR, vertical_fov_deg=10.0)
+    rgb = render(gl, objects, background=(1, 1, 1), camera=inside, size=(16, 16), samples=256, method="srd-lambda")
+    assert np.abs(rgb.mean(axis=(0, 1), dtype=float) - 1.0).max() < 0.01
 
 
 # ---- textures behind glass ---------------------------------------------------------------------

@@ -6,7 +6,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from reference import microfacet
-from spectrasplat.reference import optics, random_numbers
+from spectrasplat.gpu import bindings
+from spectrasplat.gpu.scene_buffers import SAMPLES, SCENE_STRUCTS
+from spectrasplat.gpu.scene_texels import spectra_texture
+from spectrasplat.model.optics import rough_glass
+from spectrasplat.reference import optics, random_numbers, rough_albedo
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
 COVERS = {
@@ -18,6 +22,7 @@ COVERS = {
         "lobe_axes",
         "lobe_part",
     ),
+    "rough_energy.glsl": ("regained",),
     "footprint.glsl": ("join_sides",),
 }
 LIBRARY = ["lib/rough_surface.glsl"]
@@ -61,6 +66,39 @@ def test_visible_microfacets_are_those_of_the_listing(gl) -> None:
     slope = np.tan(np.arccos(np.clip(optics.dot(same, normal), 0.0, 1.0)))
     steep = width > 0.01
     np.testing.assert_allclose(slope[steep], (width * np.sqrt(u[:, 0] / (1.0 - u[:, 0])))[steep], rtol=2e-2, atol=1e-3)
+
+
+def test_what_microfacets_throw_at_each_other_is_given_back(gl) -> None:
+    """The table that shaders read, the reference's and the quadrature of both over all microfacets, to one per cent:
+    as much as the edge of total reflection makes of a table's steps where surfaces are roughest."""
+    widths, ratios, angles = [1.0, 0.16], [1.0 / 1.52, 1.52, 1.0 / 1.333], [0.0, 30.0, 60.0, 80.0]
+    width, ratio, angle = (part.ravel() for part in np.meshgrid(widths, ratios, np.radians(angles), indexing="ij"))
+    texture = spectra_texture(gl.ctx, np.concatenate([np.ones((3, SAMPLES)), rough_glass.tables(widths, SAMPLES)]))
+    first = np.array([rough_glass.ROWS * rough_glass.distinct(widths).index(w) for w in width])
+    got = evaluate(
+        gl.ctx,
+        ["lib/rough_energy.glsl"],
+        "factor = regained(first, cosine, vec3(1.0, ratio, 2.0)).y;",
+        {"first": as_f32(first), "cosine": as_f32(np.cos(angle)), "ratio": as_f32(ratio)},
+        {"factor": "float"},
+        {
+            **bindings.SCENE_DEFINES,
+            **dict.fromkeys(("TRIANGLES_AT", "NORMALS_AT", "OBJECTS_AT"), 0),
+            **rough_glass.row_defines(widths, 3),
+            "SPECTRAL_SAMPLES": SAMPLES,
+        },
+        SCENE_STRUCTS,
+        binders=[lambda: texture.use(bindings.UNIT_SPECTRA)],
+    )["factor"]
+    texture.release()
+    own = rough_albedo.albedo_tables(np.array(widths))
+    cases = list(zip(width, ratio, angle, strict=True))
+    kept = np.array([rough_albedo.sent_on(own, widths.index(w), np.cos(a), eta) for w, eta, a in cases])
+    np.testing.assert_allclose(got, 1.0 / kept, rtol=1e-2)
+    for case in (1, 6):
+        w, eta, a = cases[case]
+        assert kept[case] == pytest.approx(sum(microfacet.shares(a, w, eta)), rel=5e-3)
+    assert got.max() > 2.0 and got.min() < 1.003
 
 
 def test_microfacets_turn_with_their_surface(gl) -> None:

@@ -71,8 +71,9 @@ def black_block(angle: float, roughness: float) -> Scene:
 def test_one_surface_reflects_what_its_microfacets_do(gl: Context, angle_deg: float, roughness: float) -> None:
     angle = np.radians(angle_deg)
     found = shares_of(caustic(gl, black_block(angle, roughness), 40_000, (8, 8)))
-    reflected, _ = microfacet.shares(angle, roughness**2, 1.0 / INDEX)
-    assert found["deposited"] == pytest.approx(reflected, rel=0.01)
+    reflected, transmitted = microfacet.shares(angle, roughness**2, 1.0 / INDEX)
+    # What others throw on is shared out as what is seen of one.
+    assert found["deposited"] == pytest.approx(reflected / (reflected + transmitted), rel=0.01)
     assert abs(found["unaccounted"]) < 1e-5
 
 
@@ -81,12 +82,13 @@ def test_without_shadowing_a_surface_reflects_too_much(gl: Context, monkeypatch,
     old, new = "smith_share(side * cosine, place.width)", "vec3(1.0)"
     mutate(monkeypatch, tmp_path, "light/trace_rough.glsl", old, new)
     found = shares_of(caustic(gl, black_block(np.radians(70.0), 0.6), 40_000, (8, 8)))
-    assert found["deposited"] > 1.05 * microfacet.shares(np.radians(70.0), 0.36, 1.0 / INDEX)[0]
+    reflected, transmitted = microfacet.shares(np.radians(70.0), 0.36, 1.0 / INDEX)
+    assert found["deposited"] > 1.05 * reflected / (reflected + transmitted)
 
 
 @pytest.mark.parametrize("roughness", [0.25, 0.6])
 def test_a_slab_lets_through_what_the_reference_does(gl: Context, roughness: float) -> None:
-    """Both surfaces, all reflections between them; what the microfacets keep is what the first two quadratures say."""
+    """Both surfaces, all reflections between them; the microfacets keep nothing."""
     scene = lit_slab(roughness)
     found = shares_of(caustic(gl, scene, 60_000, (8, 8)))
     balance = render_reference(scene, 4, 4, photons=400_000).balance
@@ -94,8 +96,7 @@ def test_a_slab_lets_through_what_the_reference_does(gl: Context, roughness: flo
     assert found["deposited"] == pytest.approx(balance["deposited"] / emitted, rel=4e-3)
     assert found["absorbed"] == pytest.approx(balance["absorbed"] / emitted, abs=4e-3)
     assert abs(found["unaccounted"]) < 1e-5
-    kept = 1.0 - sum(microfacet.shares(0.0, roughness**2, 1.0 / INDEX))
-    assert found["absorbed"] > kept
+    assert abs(found["absorbed"]) < 6e-3 and abs(balance["absorbed"] / emitted) < 6e-3
 
 
 def lit_slab(roughness: float, radius: float = 0.05, dispersion: Dispersion = GLASS, tilt_deg: float = 0.0) -> Scene:

@@ -54,7 +54,7 @@ FEATURE_SYMBOLS: dict[str, tuple[str, ...]] = {
     "polarisation": ("stokes_q", "incidence_axis", "fresnel_reflection", "behind_interface", "polarise_path"),
     "coats": ("coat_pdf", "coat_weight", "coat_response"),
     "rough diffuse": ("rough_response", "rough_albedo"),
-    "rough surfaces": ("lobe_axes", "smith_share", "microfacet_numbers"),
+    "rough surfaces": ("lobe_axes", "smith_share", "microfacet_numbers", "regained"),
     "mirrors": (r"\(kind == KIND_MIRROR\) ",),
     "gratings": ("grating_at", "diffract_direction", "GRATINGS_AT"),
     "interpolated normals": (
