@@ -120,7 +120,7 @@ CameraPath camera_path(uvec2 pixel, uint primary_sample, float gain)
 
 #ifdef CAMERA_SPECULAR
 #if defined(HAS_DIELECTRIC) || defined(HAS_GRATING) || defined(COATS)
-// A number for a choice at this depth: a Kronecker sequence over a pixel's samples (the first generator is the wavelength's).
+// A number for a choice at this depth: a Kronecker sequence over a pixel's samples.
 float choice(CameraPath path, uint pixel_key)
 {
     return kronecker(p.draw_index, depth_generator(uint(path.depth)), hash_combine(pixel_key, path.key + uint(path.depth) * 2654435769u));

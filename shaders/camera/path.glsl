@@ -144,8 +144,8 @@ void restrict_to_band(inout CameraPath path, uint pixel_key)
 #ifdef RANDOM_WAVELENGTH
     // One of the table's cells, by how bright it looks.
 #ifdef EVEN_WAVELENGTHS
-    // Not by the golden ratio: the places in a pixel go by that, and each height would have a colour of its own.
-    float u = kronecker(p.draw_index, depth_generator(0u), hash_combine(pixel_key, 77u));
+    // With the places in the pixel one net: each part of it that holds a few samples has wavelengths from all of the spectrum.
+    float u = radical_inverse(p.draw_index, hash_combine(pixel_key, 77u));
 #else
     float u = unit_float(hash_combine(hash_combine(pixel_key, 77u), p.draw_index));
 #endif

@@ -28,6 +28,13 @@ float kronecker(uint i, uint generator, uint shift)
     return unit_float(i * generator + shift);
 }
 
+// The digits of i behind the point, and others in place of some (van der Corput's sequence with a digital shift): together with a (0, m, 2)-net's
+// coordinates, whose first is i itself, a (0, m, 3)-net.
+float radical_inverse(uint i, uint shift)
+{
+    return unit_float(bitfieldReverse(i) ^ shift);
+}
+
 // Generator of a path's draws at this depth, one irrational a depth: the square roots of primes, as far from rational as from the light's
 // golden-ratio lattice. Deeper ones are hashed: with one that comes again a path's later draws would follow from its earlier ones.
 uint depth_generator(uint depth)

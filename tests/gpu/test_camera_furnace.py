@@ -126,6 +126,23 @@ def test_rough_glass_vanishes_too(gl, roughness: float) -> None:
     assert np.abs(rgb.mean(axis=(0, 1), dtype=float) - 1.0).max() < 0.01
 
 
+def colour_noise(gl) -> float:
+    """Of a ball of flint in white, seen by 64 single wavelengths a pixel: root mean square about each pixel's mean."""
+    near = replace(NEAR, vertical_fov_deg=6.0)
+    rgb = render(
+        gl, solids("ball"), background=(1, 1, 1), camera=near, size=(12, 12), samples=64, method="stochastic-even"
+    )
+    return float(np.sqrt(np.mean((rgb - rgb.mean(axis=-1, keepdims=True)) ** 2)))
+
+
+def test_single_wavelengths_hardly_colour_a_pixel(gl, monkeypatch, tmp_path) -> None:
+    """0.7 % of white; 3.1 % where wavelengths are a sequence of their own (the mutant), as once they were."""
+    assert colour_noise(gl) < 0.012
+    old, new = "radical_inverse(p.draw_index, hash", "kronecker(p.draw_index, depth_generator(0u), hash"
+    mutate(monkeypatch, tmp_path, "camera/path.glsl", old, new)
+    assert colour_noise(gl) > 0.02
+
+
 # ---- textures behind glass ---------------------------------------------------------------------
 
 

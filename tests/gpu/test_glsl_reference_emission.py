@@ -17,7 +17,7 @@ from spectrasplat.reference.optics import unit
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
 COVERS = {
-    "random.glsl": ("hash_pcg", "hash_combine", "unit_float", "kronecker"),
+    "random.glsl": ("hash_pcg", "hash_combine", "unit_float", "kronecker", "radical_inverse"),
     "lattice.glsl": ("lattice_point", "mirrored_lattice_point"),
     "emission.glsl": ("azimuthal_direction", "concentric_disc"),
     "spot.glsl": ("angle_between", "spot_falloff"),
@@ -37,17 +37,19 @@ def words(seed: int) -> np.ndarray:
 def test_random_numbers_are_the_same_to_the_bit(gl) -> None:
     a, b, c = (words(seed) for seed in (1, 2, 3))
     body = "h = hash_pcg(a); hc = hash_combine(a, b); u = unit_float(a); k = kronecker(a, b, c);"
+    body += "r = radical_inverse(a, b);"
     got = evaluate(
         gl.ctx,
         ["lib/random.glsl"],
         body,
         {"a": a, "b": b, "c": c},
-        {"h": "uint", "hc": "uint", "u": "float", "k": "float"},
+        {"h": "uint", "hc": "uint", "u": "float", "k": "float", "r": "float"},
     )
     np.testing.assert_array_equal(got["h"], random_numbers.hash_pcg(a))
     np.testing.assert_array_equal(got["hc"], random_numbers.hash_combine(a, b))
     np.testing.assert_array_equal(got["u"], random_numbers.unit_float(a))
     np.testing.assert_array_equal(got["k"], random_numbers.kronecker(a, b, c))
+    np.testing.assert_array_equal(got["r"], random_numbers.radical_inverse(a, b))
     assert (random_numbers.hash_combine(a, b) != random_numbers.hash_combine(b, a)).mean() > 0.99
 
 
@@ -56,9 +58,10 @@ def test_random_numbers_are_the_same_to_the_bit(gl) -> None:
 def test_lattice_points(gl, count: int, function: str) -> None:
     i = words(4) % np.uint32(count)
     shift = np.column_stack([words(5), words(6)])
-    got = evaluate(
-        gl.ctx, ["lib/emission.glsl"], f"p = {function}(i, {count}u, s);", {"i": i, "s": shift}, {"p": "vec2"}
-    )["p"]
+    call = f"p = mirrored_lattice_point(i, {count}u, s);"
+    if function == "lattice_point":
+        call = f"p = lattice_point(i, {count}u, s);"
+    got = evaluate(gl.ctx, ["lib/emission.glsl"], call, {"i": i, "s": shift}, {"p": "vec2"})["p"]
     want = getattr(emission_maps, function)(i, count, (shift[:, 0], shift[:, 1]))
     # float(i) + a fraction keeps 24 bits: an eps of the whole axis.
     assert np.abs(got[:, 0] - want[:, 0]).max() < 1.5e-7

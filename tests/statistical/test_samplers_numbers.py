@@ -17,7 +17,7 @@ from spectrasplat.base.random_words import PASS_GENERATORS
 from spectrasplat.gpu.records import LATTICE_BIT, TRACE_PARAMETERS, ray_record
 from spectrasplat.passes.pixel_lattice import cells_of, pixel_lattice
 from spectrasplat.reference.emission_maps import GOLDEN, PLASTIC, lattice_point, mirrored_lattice_point
-from spectrasplat.reference.random_numbers import hash_combine, hash_pcg, kronecker, unit_float
+from spectrasplat.reference.random_numbers import hash_combine, hash_pcg, kronecker, radical_inverse, unit_float
 from spectrasplat.stress.rigs.glsl_function import evaluate
 
 from tests.statistical.chi_square import (
@@ -163,16 +163,18 @@ def test_places_in_a_pixel_are_even_in_one_launch_and_over_many() -> None:
 
 
 def test_single_wavelengths_are_even_over_the_places_in_a_pixel() -> None:
-    """Of camera samples: with the places' own ratio every height in the pixel had a colour of its own, and more samples
-    did not help. Powers of two have a net instead."""
-    generator = generators()[0]
-    for samples in (64, 100, 204, 1000, 1024):
-        places = pixel_lattice(samples, 0)
-        is_net = cells_of(samples) != (0, 0)
-        for of_wavelength, even in ((generator, True), *(() if is_net else ((GOLDEN, False),))):
-            colour = kronecker(np.arange(samples), of_wavelength, 0)
+    """Of camera samples: with a ratio of their own a height in the pixel had colours of its own (2.5 to 3 at 64 and 256
+    samples), and with the places' ratio all heights did, however many samples. Powers of two are a net with them."""
+    for samples in (64, 100, 204, 256, 1000, 1024):
+        places, index = pixel_lattice(samples, 0), np.arange(samples)
+        for colour, even in ((radical_inverse(index, 0), True), (kronecker(index, GOLDEN, 0), False)):
             worst = max(box_discrepancy(np.column_stack([colour, places[:, axis]])) for axis in range(2))
-            assert (worst < 2.5 * samples**-0.75) is even, (samples, of_wavelength, worst)
+            if even or cells_of(samples) == (0, 0):
+                assert (worst < 1.25 * samples**-0.75) is even, (samples, worst)
+    places, colour = pixel_lattice(64, 0), radical_inverse(np.arange(64), 0x9E3779B9)
+    for cells, bands in ((4, 4), (2, 16), (8, 1)):
+        boxes = np.column_stack([np.floor(places * cells), np.floor(colour * bands)])
+        assert len(np.unique(boxes, axis=0)) == 64
 
 
 THRESHOLD = 0.3
