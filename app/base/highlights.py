@@ -8,6 +8,10 @@ is flat there is a step within it (subcell resolution: Harten 1989, *ENO Schemes
 Computational Physics 83), its place is known from the three values, and so is how much of the pixel either side covers.
 A tone curve is straight between two such sides, by what they cover, instead of bent between them.
 
+What is smaller than a pixel, such as the sun's image in a curved glass, is one pixel, all white and square: nothing in
+the picture tells how much of it is covered. It is shown as a lens would, as a dot: a little of what is shown of it lies
+on the four pixels round it.
+
 Where nothing near is brighter than white nothing changes, nor where brightness has a slope and not a step: spectra,
 penumbrae, caustics. Only pictures to look at have it, never linear data. `shaders/lib/highlights.glsl` is the same on
 the device.
@@ -24,6 +28,44 @@ WHITE = 1.0
 made."""
 STEEPNESS = 4.0
 """A side is flat where its own slope is this much less than the way to the pixel."""
+
+GLINT_SPREAD = 0.135
+"""Of what is shown of a pixel that is overexposed alone, on those beside it: a Gaussian of half a pixel."""
+
+
+@dataclass(frozen=True)
+class Glints:
+    """Of n pixels, each beside one that is overexposed alone."""
+
+    rows: np.ndarray
+    columns: np.ndarray
+    bright: np.ndarray
+    """int64 (2, n): row and column of that one."""
+    share: np.ndarray
+    """float32 (n, 1): of what is shown of it."""
+
+
+def find_glints(norm: np.ndarray) -> Glints:
+    """What lies beside single overexposed pixels of a picture whose colours have these norms (H, W); beside two of
+    them the stronger counts. A pixel is single where all four round it are below white, surely where below half."""
+    height, width = norm.shape
+    rows, columns = np.nonzero(norm > WHITE)
+    beside = [(np.clip(rows + d, 0, height - 1), np.clip(columns + r, 0, width - 1)) for d, r in _BESIDE]
+    around = np.max([norm[place] for place in beside], axis=0)
+    over = np.clip(norm[rows, columns] / np.float32(WHITE) - 1, 0, 1)
+    share = np.float32(GLINT_SPREAD) * over * np.clip(2 - 2 * around / np.float32(WHITE), 0, 1)
+    single = share > 0
+    # At the border there is nothing beyond, and `around` is the pixel itself.
+    places = np.concatenate([np.stack(place)[:, single] for place in beside], axis=1)
+    bright = np.tile(np.stack([rows, columns])[:, single], len(_BESIDE))
+    shares = np.tile(share[single], len(_BESIDE))
+    order = np.argsort(-shares, kind="stable")
+    _, first = np.unique(places[0, order] * width + places[1, order], return_index=True)
+    chosen = order[first]
+    return Glints(places[0, chosen], places[1, chosen], bright[:, chosen], shares[chosen, None])
+
+
+_BESIDE = ((0, -1), (0, 1), (-1, 0), (1, 0))
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from functools import cache
 
 import numpy as np
 
-from .highlights import find_steps
+from .highlights import find_glints, find_steps
 
 LUMINANCE_709 = np.array([0.2126390, 0.7151687, 0.0721923], np.float32)
 """Y of linear Rec.709 (ITU-R BT.709-6, primaries and D65 white to seven digits)."""
@@ -107,13 +107,17 @@ def tone_map_8bit(rgb: np.ndarray, exposure_ev: float, antialias: bool = False) 
 
 
 def _antialias(display: np.ndarray, exposed: np.ndarray) -> None:
-    """Show pixels with a step at something overexposed by what either side covers."""
+    """Show pixels with a step at something overexposed by what either side covers, and single overexposed ones as
+    dots."""
     norm = _p_norm(np.maximum(exposed, 0))[..., 0] * np.float32(3 ** (-1 / CORNER_POWER))
     steps = find_steps(exposed, norm)
     bright, dark, mixed = (_roll_off(into_gamut(side)) for side in (steps.bright, steps.dark, steps.mixed))
     straight = dark + steps.share * (bright - dark)
     fall = np.minimum(straight / np.maximum(mixed, np.float32(1e-6)), 1)
     display[steps.rows, steps.columns] *= 1 + steps.weight * (fall - 1)
+    glints = find_glints(norm)
+    own, bright = display[glints.rows, glints.columns], display[tuple(glints.bright)]
+    display[glints.rows, glints.columns] = own + glints.share * np.maximum(bright - own, 0)
 
 
 def _p_norm(channels: np.ndarray) -> np.ndarray:

@@ -110,7 +110,19 @@ vec3 antialiased(sampler2D picture, vec2 pixel)
     }
     float share = step_share(found, exposed_norm(colour));
     vec3 mixture = toned(mix(found.dark, found.bright, share));
-    return srgb_encode(toned(colour) * step_factor(toned(found.bright), toned(found.dark), mixture, share, step_weight(found)));
+    vec3 result = toned(colour) * step_factor(toned(found.bright), toned(found.dark), mixture, share, step_weight(found)), glint = vec3(0.0);
+    float most = 0.0;
+    for (int side = 0; side < 4; ++side) {
+        ivec2 next = (side & 1) == 0 ? ivec2(1 - (side & 2), 0) : ivec2(0, 1 - (side & 2)), aside = ivec2(next.y, next.x);
+        vec3 bright = exposed_beside(picture, pixel, next);
+        float around = max(exposed_norm(colour), exposed_norm(exposed_beside(picture, pixel, 2 * next)));
+        around = max(around, exposed_norm(exposed_beside(picture, pixel, next + aside)));
+        around = max(around, exposed_norm(exposed_beside(picture, pixel, next - aside)));
+        float shows = glint_share(exposed_norm(bright), around);
+        if (shows > most) glint = bright;
+        most = max(most, shows);
+    }
+    return srgb_encode(result + most * max(toned(glint) - result, 0.0));
 }
 #endif
 

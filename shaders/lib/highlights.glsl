@@ -70,4 +70,10 @@ vec3 step_factor(vec3 bright, vec3 dark, vec3 mixture, float share, float weight
     return 1.0 + weight * (min(straight / max(mixture, 1e-6), 1.0) - 1.0);
 }
 
+// What a pixel shows of one beside it that is overexposed alone: `around` is the greatest norm beside that one. A Gaussian of half a pixel.
+float glint_share(float norm, float around)
+{
+    return 0.135 * clamp(norm / STEP_WHITE - 1.0, 0.0, 1.0) * clamp(2.0 - 2.0 * around / STEP_WHITE, 0.0, 1.0);
+}
+
 #endif

@@ -34,6 +34,7 @@ COVERS = {
         "step_share",
         "step_weight",
         "step_factor",
+        "glint_share",
     ),
 }
 COUNT = 4096
@@ -88,11 +89,11 @@ def test_each_function_of_highlights_has_its_twin(gl) -> None:
     PixelStep s = PixelStep(pixel, pixel, 0.0, 0.0, 0.0); find_step(s, pixel, before2, before, after, after2);
     bright = s.bright; dark = s.dark; contrast = s.contrast; norm = exposed_norm(pixel);
     seen = seen_norm(norm); flatness = step_flatness(after.r - before.r, pixel.r);
-    share = step_share(s, norm); weight = step_weight(s);
+    share = step_share(s, norm); weight = step_weight(s); glint = glint_share(norm, before.r);
     vec3 mixture = tone_spectrasplat(mix(dark, bright, share));
     factor = step_factor(tone_spectrasplat(bright), tone_spectrasplat(dark), mixture, share, weight);
     """
-    outputs = dict.fromkeys(("contrast", "norm", "seen", "flatness", "share", "weight"), "float")
+    outputs = dict.fromkeys(("contrast", "norm", "seen", "flatness", "share", "weight", "glint"), "float")
     outputs |= dict.fromkeys(("bright", "dark", "factor"), "vec3")
     got = evaluate(gl.ctx, ["lib/tone.glsl", "lib/highlights.glsl"], body, inputs, outputs)
     before2, before, pixel, after, after2 = line.astype(float)
@@ -100,6 +101,8 @@ def test_each_function_of_highlights_has_its_twin(gl) -> None:
     assert np.abs(got["seen"] - 1.0 + 1.0 / (1.0 + tone.exposed_norm(pixel))).max() < 1e-5
     want = 1.0 - np.clip(4.0 * np.maximum(after - before, 0.0)[:, 0] / pixel[:, 0], 0.0, 1.0)
     assert np.abs(got["flatness"] - want).max() < 1e-5
+    glints = [tone.glint_share(float(tone.exposed_norm(p)), b) for p, b in zip(pixel, before[:, 0], strict=True)]
+    assert got["glint"] == pytest.approx(np.array(glints), abs=1e-5) and (got["glint"] > 0.0).mean() > 0.02
     steps = 0
     for i in range(COUNT):
         step = tone.step_between(pixel[i], (before[i], before2[i]), (after[i], after2[i]))
@@ -126,14 +129,15 @@ def test_each_function_of_highlights_has_its_twin(gl) -> None:
 
 
 def overexposed_edges(size: tuple[int, int] = (48, 40)) -> np.ndarray:
-    """(H, W, 3): a beam twenty times white across dark paper, a coloured one, a glint, a soft glow, and colours at
-    random: every pixel the mean of 8 by 8 points."""
+    """(H, W, 3): a beam twenty times white across dark paper, a coloured one, a disc, a glint within one pixel, a soft
+    glow, and colours at random: every pixel the mean of 8 by 8 points."""
     width, height = size
     y, x = np.mgrid[0 : 8 * height, 0 : 8 * width] / 8.0
     rgb = np.full((*x.shape, 3), 0.12)
     rgb[np.abs(y - 6.0 - 0.23 * x) < 1.7] = 20.0
     rgb[np.abs(y + 0.6 * x - 33.0) < 1.2] = (0.1, 9.0, 2.0)
     rgb[(x - 40.3) ** 2 + (y - 5.4) ** 2 < 0.8] = 300.0
+    rgb[(x - 44.5) ** 2 + (y - 20.5) ** 2 < 0.06] = 300.0
     rgb += 6.0 * np.exp(-((x - 37.0) ** 2 + (y - 31.0) ** 2) / 20.0)[..., None] * np.array([1.0, 0.6, 0.2])
     rgb = rgb.reshape(height, 8, width, 8, 3).mean(axis=(1, 3))
     rgb[-8:, :10] = 2.0 ** np.random.default_rng(8).uniform(-3, 4, (8, 10, 1)) * (1.0, 0.7, 0.5)
@@ -161,10 +165,25 @@ def test_highlights_are_antialiased_alike_in_window_files_and_float64(gl, displa
     assert (magnified[1::3, 1::3] == shown[5:12, 6:13]).all()
 
 
+def test_a_glint_smaller_than_a_pixel_is_a_dot() -> None:
+    """A hundred times white within a pixel: one white square before, now a dot that is as bright as it was and fades to
+    its sides, less where it is hardly overexposed. Beside a second one, and below white, nothing happens."""
+    for norms, sides in (((100.0, 0.1), 4), ((100.0, 100.0), 0), ((1.02, 0.1), 4), ((0.9, 0.1), 0)):
+        rgb = np.full((7, 7, 3), 0.1, np.float32)
+        rgb[3, 3:5] = np.array(norms)[:, None]
+        plain, dotted = (tone_map.to_display(rgb, 0.0, antialias=on) for on in (False, True))
+        brighter = (dotted > plain + 1e-4).all(axis=-1)
+        assert brighter.sum() == sides and (dotted[3, 3] == plain[3, 3]).all()
+        if sides:
+            assert brighter[[2, 4, 3, 3], [3, 3, 2, 4]].all()
+            spread = 0.135 * min(norms[0] - 1.0, 1.0)
+            assert dotted[2, 3] == pytest.approx(plain[2, 3] + spread * (plain[3, 3] - plain[2, 3]), rel=1e-3)
+
+
 @pytest.mark.parametrize("size", [(48, 40), (24, 20), (96, 80)])
 def test_highlights_of_pictures_of_other_sizes(gl, display, size: tuple[int, int]) -> None:
     """Shrunk: as the shrunk picture's own, to the pixel. Enlarged: something is smoothed, at edges only, and no pixel
-    becomes brighter."""
+    becomes brighter but round a glint."""
     rgb = overexposed_edges()
     source = texture_of(gl, rgb)
     plain, shown = (
@@ -176,7 +195,7 @@ def test_highlights_of_pictures_of_other_sizes(gl, display, size: tuple[int, int
         k = rgb.shape[1] // size[0]
         small = rgb.reshape(size[1], k, size[0], k, 3).mean(axis=(1, 3))
         assert np.abs(shown - tone_map.tone_map_8bit(small, 0.0, antialias=True)).max() <= 1
-    assert (shown <= plain).all() and 0.02 < (shown < plain - 10).any(axis=-1).mean() < 0.3
+    assert (shown > plain).any(axis=-1).mean() < 0.01 and 0.02 < (shown < plain - 10).any(axis=-1).mean() < 0.3
 
 
 def test_false_colour_and_errors_are_not_antialiased(gl, display) -> None:

@@ -135,4 +135,26 @@ def antialiased(exposed: Array, curve: Callable[[Array], Array]) -> Array:
             straight = share * curve(step.bright) + (1.0 - share) * curve(step.dark)
             bent = curve(share * step.bright + (1.0 - share) * step.dark)
             shown[row, column] *= 1.0 + step.weight * (np.minimum(straight / np.maximum(bent, 1e-6), 1.0) - 1.0)
-    return shown
+    return with_dots(exposed, shown, curve)
+
+
+def glint_share(norm: float, around: float) -> float:
+    """Of what is shown of an overexposed pixel, where the brightest of those beside it has the norm `around`."""
+    return 0.135 * min(max(norm - 1.0, 0.0), 1.0) * min(max(2.0 - 2.0 * around, 0.0), 1.0)
+
+
+def with_dots(exposed: Array, shown: Array, curve: Callable[[Array], Array]) -> Array:
+    """`shown` with some of each single overexposed pixel on the four beside it, the strongest one's."""
+    sides = ((0, 1), (0, -1), (1, 0), (-1, 0))
+    norm = np.pad(exposed_norm(exposed), 2, mode="edge")
+    dotted = shown.copy()
+    for row in range(len(exposed)):
+        for column in range(exposed.shape[1]):
+            found = []
+            for down, right in sides:
+                at = min(max(row + down, 0), len(exposed) - 1), min(max(column + right, 0), exposed.shape[1] - 1)
+                around = max(norm[at[0] + 2 + d, at[1] + 2 + r] for d, r in sides)
+                found.append((glint_share(norm[at[0] + 2, at[1] + 2], around), at))
+            share, at = max(found)
+            dotted[row, column] += share * np.maximum(curve(exposed[at]) - shown[row, column], 0.0)
+    return dotted
