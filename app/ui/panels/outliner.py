@@ -239,7 +239,7 @@ def _switches(
             continue
         corner = imgui.ImVec2(high.x - (2 - position) * theme.em(1.4), low.y)
         imgui.same_line(corner.x - imgui.get_window_pos().x + imgui.get_scroll_x())
-        pressed = imgui.invisible_button(f"##{name}", imgui.ImVec2(theme.em(1.3), side))
+        pressed = imgui.invisible_button(f"##{name}", imgui.ImVec2(theme.em(1.3), imgui.get_text_line_height()))
         item_rects.note(f"{name} {thing.name}")
         widgets.tooltip(tip)
         colours = theme.palette()
