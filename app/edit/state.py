@@ -16,7 +16,7 @@ from .live_inputs import LiveInputs
 from .requests import Pull, Request
 
 Tool = Literal["select", "move", "rotate", "scale", "brush", "pull", "measure"]
-CompareMode = Literal["off", "hold", "wipe", "error"]
+CompareMode = Literal["off", "hold", "wipe", "beside", "error"]
 Theme = Literal["dark", "light"]
 ToneCurve = Literal["spectrasplat", "aces", "reinhard", "linear"]
 

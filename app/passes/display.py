@@ -104,13 +104,14 @@ class Display:
         other: moderngl.Texture | None = None,
         compare: Compare | None = None,
         antialias: bool = False,
+        output: str = "picture",
     ) -> moderngl.Texture:
         """`picture` (RGBA32F, linear Rec.709, row 0 on top) as an RGBA8 texture of `size` (width, height), sRGB codes,
         row 0 on top.
 
         `exposure_ev` is absolute (as `tone_map.to_display` takes it). `other` is what `compare` shows beside it, over
         it or takes the error against; without it the picture alone is shown. `antialias`: see
-        `base.highlights`; of a picture that is shown alone.
+        `base.highlights`; of a picture that is shown alone. `output`: another name, another texture.
         """
         parameters = self._develop(settings, exposure_ev)
         parameters["step_uv"] = 1.0 / size[0], 1.0 / size[1]
@@ -127,7 +128,7 @@ class Display:
         variant = _Variant(_tone(settings), shows, taps, antialias, picture.size == size, enlarged > 1.0)
         # Pixel for pixel nothing is blended, so that one broken pixel stays one.
         nearest = enlarged > NEAREST_FROM or picture.size == size
-        return self._dispatch("picture", variant, parameters, (picture, other or picture), size, nearest)
+        return self._dispatch(output, variant, parameters, (picture, other or picture), size, nearest)
 
     def magnify(
         self,
@@ -235,7 +236,7 @@ def _shown(compare: Compare) -> Shows:
     if compare.holding:
         return "other"
     match compare.mode:
-        case "off" | "hold":
+        case "off" | "hold" | "beside":
             return "picture"
         case mode:
             return mode

@@ -10,6 +10,7 @@ import re
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -64,6 +65,8 @@ class LivePicture:
         """The engine's, as of the last frame."""
         self._developed: tuple[object, ...] | None = None
         """What `shown` was made of."""
+        self.beside: tuple[moderngl.Texture, moderngl.Texture] | None = None
+        """The other picture and the error, while they are shown side by side."""
         self.shown: moderngl.Texture | None = None
         """RGBA8, sRGB codes, row 0 on top."""
         self.magnified: moderngl.Texture | None = None
@@ -173,9 +176,15 @@ class LivePicture:
             return
         self._developed = None if texture is not None else key
         radiance = self._glare.run(radiance, glare)
-        self.shown = self._display.run(
-            radiance, state.display, self.exposure_ev, self._size, texture, state.compare, antialias
-        )
+        look = state.display, self.exposure_ev, self._size
+        self.shown = self._display.run(radiance, *look, texture, state.compare, antialias)
+        self.beside = None
+        if texture is not None and state.compare.mode == "beside":
+            errors = replace(state.compare, mode="error", holding=False)
+            self.beside = (
+                self._display.run(texture, *look, output="other"),
+                self._display.run(radiance, *look, texture, errors, output="error"),
+            )
 
     def _expose(self, state: State, radiance: moderngl.Texture, now_s: float, delta_s: float) -> None:
         if not state.display.auto_exposure:

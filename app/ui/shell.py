@@ -120,7 +120,8 @@ def _draw_windows(state: State, view_model: ViewModel) -> State:
 
 def _draw_picture(state: State, view_model: ViewModel) -> State:
     flags = imgui.WindowFlags_.no_scrollbar | imgui.WindowFlags_.no_scroll_with_mouse | imgui.WindowFlags_.no_collapse
-    if view_model.picture is not None:  # which covers all of it: a software renderer need not fill it twice
+    if view_model.picture is not None and state.compare.mode != "beside":
+        # The picture covers all of it: a software renderer need not fill it twice.
         flags |= imgui.WindowFlags_.no_background
     imgui.push_style_var(imgui.StyleVar_.window_padding, imgui.ImVec2(0, 0))
     shown, _ = imgui.begin(layout.VIEWPORT, None, flags)

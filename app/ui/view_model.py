@@ -93,6 +93,8 @@ class ViewModel:
     """What the picture shows, or is about to; another one while something is being prepared."""
     picture: int | None = None
     """Texture id of the displayed picture, top row first."""
+    beside: tuple[int, int] | None = None
+    """Texture ids of the picture that it is compared with and of the error, for side by side."""
     picture_size: tuple[int, int] = (0, 0)
     frame_ms: tuple[float, ...] = ()
     """Durations of the last frames, newest last."""

@@ -20,8 +20,9 @@ from .overlay import Canvas
 from .ray_labels import draw_ray_labels
 from .view_axes import draw_axes
 from .view_model import ViewModel
+from .viewport_beside import draw_beside, tag
 from .viewport_input import Mouse, ViewportInput
-from .viewport_marks import draw_lights, draw_magnifier, draw_marks, draw_wipe
+from .viewport_marks import draw_lights, draw_magnifier, draw_marks, draw_wipe, own_label
 from .viewport_tools import MARGIN_EM, badges, draw_badges, draw_toolbar
 
 MIN_SIDE = 64
@@ -47,10 +48,19 @@ def reset() -> None:
 def draw_viewport(state: State, view_model: ViewModel) -> State:
     """Draw the picture into the present window and carry out what is done in it."""
     room = imgui.get_content_region_avail()
+    if state.compare.mode == "beside":
+        return draw_beside(state, view_model, room, _draw_own)
+    return _draw_own(state, view_model, room)
+
+
+def _draw_own(state: State, view_model: ViewModel, size: ImVec2) -> State:
     imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(0, 0))
-    imgui.begin_child("picture", ImVec2(max(room.x, 1.0), max(room.y, 1.0)), 0, _FLAGS)
+    imgui.begin_child("picture", ImVec2(max(size.x, 1.0), max(size.y, 1.0)), 0, _FLAGS)
     imgui.pop_style_var()
+    corner = imgui.get_cursor_screen_pos()
     state = _draw_inside(state, view_model)
+    if state.compare.mode == "beside":
+        tag(corner, size, own_label(state))  # in this window, which lies over the one round it
     imgui.end_child()
     return state
 

@@ -222,16 +222,19 @@ def draw_wipe(canvas: Canvas, state: State, view_model: ViewModel) -> None:
         ImVec2(x - 0.5 * size.x, middle - 0.5 * size.y), theme.packed(palette.text), icons.ICON_FA_LEFT_RIGHT
     )
     y = canvas.top + theme.em(0.8)
-    left = METHOD_NAMES.get(state.method, state.method)
-    swapped = glass_object(state.scene, state.selection) if state.compare.method == "glass" else None
-    if swapped is not None:
-        dispersion = state.scene.objects[swapped].material.dispersion
-        left = dispersion.name if dispersion is not None else left
+    left = own_label(state)
     # Without the other picture both sides are this one: it must not carry the other's name.
     right = view_model.compare_label if view_model.compare_ready else "On its way: this is the same picture"
     gap = theme.em(1.0)
     _label(canvas, x - gap - imgui.calc_text_size(left).x, y, left)
     _label(canvas, x + gap, y, right)
+
+
+def own_label(state: State) -> str:
+    """What this picture is, beside another: its method, or its glass."""
+    swapped = glass_object(state.scene, state.selection) if state.compare.method == "glass" else None
+    dispersion = None if swapped is None else state.scene.objects[swapped].material.dispersion
+    return METHOD_NAMES.get(state.method, state.method) if dispersion is None else dispersion.name
 
 
 def draw_magnifier(canvas: Canvas, view_model: ViewModel) -> None:

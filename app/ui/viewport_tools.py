@@ -165,7 +165,7 @@ def badges(state: State, view_model: ViewModel) -> list[Badge]:
                 False,
             )
         )
-    if (state.compare.mode in ("wipe", "error") or state.compare.holding) and not view_model.compare_ready:
+    if (state.compare.mode in ("wipe", "error", "beside") or state.compare.holding) and not view_model.compare_ready:
         badges.append(
             Badge(
                 "Nothing to compare with yet",

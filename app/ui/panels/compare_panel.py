@@ -22,12 +22,14 @@ MODES: dict[CompareMode, str] = {
     "off": "Picture alone",
     "hold": "Hold C to see it",
     "wipe": "Wipe",
+    "beside": "Side by side",
     "error": "Error map",
 }
 MODE_TIPS = {
     "off": "Show the picture alone. Hold C at any time to see what it is compared with.",
     "hold": "Compute the other picture and show it as long as C is held.",
     "wipe": "The picture left of the line, the other right of it. Drag the line in the picture.",
+    "beside": "This picture, the other and the error map beside each other, of the same view at half the size.",
     "error": "Relative error of the picture: blue is too dark, red too bright.",
 }
 REFERENCE = "reference"
@@ -110,7 +112,7 @@ def _controls(state: State, view_model: ViewModel) -> State:
         tip="Measure this method and the other against the reference while both run, and plot relMSE over time.",
     )
     state = replace(state, compare=replace(compare, plot=plot))
-    if mode == "error":
+    if mode in ("error", "beside"):
         _legend()
     return _progress(state, view_model)
 
