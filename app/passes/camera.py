@@ -224,6 +224,12 @@ class CameraPass:
         """Light is seen on its way."""
         return self._haze is not None
 
+    def draw_haze(self, camera: Camera, width: int, height: int) -> None:
+        """What `samples` does before the first one of a view, where there is haze: a clock of samples leaves it out."""
+        if self._haze is not None:
+            self._haze.draw(camera, width, height)
+            self._is_hazy = True
+
     def add_haze(self, picture: moderngl.Texture, camera: Camera, *, coarse: bool) -> None:
         """Add what haze shows to a picture of radiance; `coarse`: by fewer beams."""
         assert self._haze is not None
@@ -317,9 +323,7 @@ class CameraPass:
         if sample_offset == 0 or self._sums.size != (width, height):
             self._clear(width, height)
         maps = maps or self._no_maps()
-        if self._haze is not None:
-            self._haze.draw(camera, width, height)
-            self._is_hazy = True
+        self.draw_haze(camera, width, height)
         parameters = self._parameters(camera, width, height, maps.scale, seed)
         parameters["sample_side"] = 1.0 / np.sqrt(samples + sample_offset)
         if is_in_strips(samples, sample_offset):

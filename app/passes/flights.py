@@ -23,8 +23,11 @@ from ..model.settings import RenderSettings
 from .emission_domain import EmissionDomain, emission_domain
 from .trace import FLIGHT_ROOM, Band, LatticeSlice, TracePass
 
-PHOTONS = 1 << 16
-"""Of all lights together, that meet glass or a mirror first; a quarter as many that do not."""
+PHOTONS = 1 << 15
+"""Of all lights together, that meet glass or a mirror first."""
+DIRECT_SHARE, DIRECT_SHARE_OF_EXTENT = 1 / 8, 1 / 32
+"""Times as many that do not; of a light with extent, whose haze has soft borders anyway. Their beams are broad, and so
+cost the more to draw."""
 BANDS = MAX_BANDS
 """Where something disperses: neighbours in a prism's fan are then told apart by nobody."""
 PLAIN_BANDS = 4
@@ -35,6 +38,9 @@ MOST_EVENTS = 16
 """Of a path: what comes after them is faint."""
 SPLIT_THRESHOLD = 0.002
 """Share of a photon's power below which roulette decides, whose survivors would be seen as needles."""
+FAINT, THINNED = 0.05, 8
+"""Times the brightest of its band is what of a path is faint, and of so many such paths one is drawn; a Fibonacci
+number, which leaves a golden lattice even."""
 REACH = 4.0
 """Of the scene's radius: so far light is followed that meets nothing more."""
 _BATCH = 1 << 14
@@ -85,6 +91,7 @@ def trace_flights(
                 seen = power.values[-1] if at_one else power.band(band.x_lo, band.x_hi)
                 colours[row] = seen / max(band.power_w, 1e-300)
             for records in _traced(trace, part):
+                records = _thinned(records, len(part.bands) * part.light_points)
                 records["light_and_source"] = number * MAX_BANDS + (records["light_and_source"] >> 8 & 255)
                 found.append(records)
         records = np.concatenate(found)
@@ -121,7 +128,8 @@ def _parts(scene: Scene, buffers: SceneBuffers, photons: int, max_depth: int) ->
                 continue
             count = 1 if not depth else BANDS if buffers.features.spectral_groups else PLAIN_BANDS
             bands = _bands(buffers, index, max(count // (4 if points > 1 else 1), 1))
-            parts.append(_Part(index, domain, bands, points, share if depth else share // 4, depth))
+            direct = DIRECT_SHARE if points == 1 else DIRECT_SHARE_OF_EXTENT
+            parts.append(_Part(index, domain, bands, points, share if depth else int(direct * share), depth))
     return parts
 
 
@@ -168,6 +176,20 @@ def _kept(records: np.ndarray, specular: bool) -> np.ndarray:
     depth, meets_specular = records["what"] >> 8, (records["what"] & _SPECULAR_BIT) != 0
     mine = (depth > 0) | meets_specular if specular else (depth == 0) & ~meets_specular
     return records[mine & (records["flux_w"] > 0.0)].copy()
+
+
+def _thinned(records: np.ndarray, lattices: int) -> np.ndarray:
+    """With one for `THINNED` of faint stretches, as much broader: they are many, and each is drawn at the same cost."""
+    band = records["light_and_source"] >> 8 & 255
+    brightest = np.zeros(MAX_BANDS)
+    np.maximum.at(brightest, band, records["flux_w"])
+    faint = records["flux_w"] < FAINT * brightest[band]
+    kept = ~faint | (records["photon_id"] // lattices % THINNED == 0)
+    records, faint = records[kept], faint[kept]
+    records["flux_w"][faint] *= THINNED
+    for name in ("dposition_ds", "dposition_dt", "ddirection_ds", "ddirection_dt"):
+        records[name][faint] *= np.sqrt(THINNED)
+    return records
 
 
 def _bounds(scene: Scene) -> np.ndarray:

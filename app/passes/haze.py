@@ -34,8 +34,8 @@ BAND_BLUR = 0.5
 MIN_PIXELS = 0.6
 """Standard deviation of the narrowest beam, pixels."""
 SUBPIXELS = 2
-"""Distances to what is seen directly are known so many times in a pixel, both ways."""
-COARSE = 8
+"""Distances to what is seen directly are known so many times in a pixel, both ways, as `haze.frag` has it."""
+COARSE = 32
 """In motion, so many times fewer beams are drawn."""
 HAZE_PARAMETERS = Struct(
     "HazeParameters",
@@ -62,7 +62,7 @@ class Haze:
             self._ctx,
             "camera/haze.vert",
             "camera/haze.frag",
-            haze_defines(channels.targets, SUBPIXELS),
+            haze_defines(channels.targets),
             (FLIGHT, CAMERA_PARAMETERS, HAZE_PARAMETERS),
         )
         self._draw = self._ctx.vertex_array(self._program, [])

@@ -370,12 +370,10 @@ def single_defines(beyond: Mapping[str, int | float | str]) -> Defines:
     }
 
 
-def haze_defines(targets: int, subpixels: int) -> Defines:
-    """Of the program that draws beams of light in haze, into so many textures; distances are known `subpixels` times
-    in a pixel, both ways."""
+def haze_defines(targets: int) -> Defines:
+    """Of the program that draws beams of light in haze, into so many textures."""
     return {
         "TARGETS": targets,
-        "SUBPIXELS": subpixels,
         "BIND_PARAMETERS": bindings.PARAMETERS,
         "BIND_FLIGHTS": BIND_FLIGHTS,
         "BIND_HAZE_COLOURS": BIND_HAZE_COLOURS,

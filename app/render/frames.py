@@ -176,6 +176,7 @@ class FrameRenderer:
                 if not self._shows_map:
                     self._add_camera_pass(traced)
                     assert traced.camera_pass is not None
+                    traced.camera_pass.draw_haze(*self._view(stage))
                     yield from budget.measuring(traced.camera_pass, *self._view(stage), first=True)
                 sampling = replace(sampling, seconds=budget.for_light(self._settings.spp))
             self.phase = _TRACING

@@ -97,6 +97,17 @@ def test_all_that_is_scattered_is_seen(gl: Context) -> None:
     power = picture.sum() * (extent / SIZE[1]) ** 2
     expected = LUX * WIDTH**2 * scattering * 4.0 / (4.0 * math.pi)
     assert power == pytest.approx(expected, rel=0.005)
+    # In bins: watts, of all of the spectrum.
+    buffers = scene_buffers(gl, scene_in_bins := beam_scene(camera, scattering), RenderSettings())
+    haze = Haze(gl, buffers, Channels((380.0, 480.0, 550.0, 600.0, 650.0, 700.0, 780.0)))
+    haze.draw(camera, *SIZE)
+    sums = np.concatenate(
+        [np.frombuffer(t.read(), "f4").reshape(-1, 4).sum(axis=0, dtype=float) for t in haze.textures]
+    )
+    watts = scene_in_bins.lights[0].spectral_power.power_w() * WIDTH**2
+    assert sums.sum() * (extent / SIZE[1]) ** 2 == pytest.approx(watts * scattering * 4.0 / (4.0 * math.pi), rel=0.005)
+    haze.release()
+    buffers.release()
     cosines, weights = np.polynomial.legendre.leggauss(64)
     for g in (0.0, 0.7, -0.4):
         assert 2.0 * math.pi * weights @ reference.henyey_greenstein(cosines, g) == pytest.approx(1.0, rel=1e-9)

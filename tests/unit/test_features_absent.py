@@ -184,7 +184,7 @@ def sources(features: Features) -> list[shader.Source]:
         made.append(shader.load_source("light/bounce.comp", soft, structs))
     if features.haze:
         structs = (records.FLIGHT, CAMERA_PARAMETERS, HAZE_PARAMETERS)
-        made += [shader.load_source(f"camera/haze.{s}", haze_defines(1, 2), structs) for s in ("vert", "frag")]
+        made += [shader.load_source(f"camera/haze.{s}", haze_defines(1), structs) for s in ("vert", "frag")]
     return made + camera_sources(features, light)
 
 
