@@ -117,7 +117,7 @@ def parse_bounces(text: str) -> int:
 
 def parse_haze(text: str) -> float:
     """Scattering coefficient of the haze round all objects, 1/scene unit."""
-    value = _number("--haze", text, "what is scattered per scene unit, for example 0.03")
+    value = _number("--haze", text, "per scene unit, for example 0.03")
     if not HAZE.holds(value):
         raise UserError(f"--haze {text} is out of range: give 0 (clear air) to {MAX_HAZE:g} per scene unit")
     return value
@@ -125,7 +125,7 @@ def parse_haze(text: str) -> float:
 
 def parse_haze_anisotropy(text: str) -> float:
     """Mean cosine of the angle by which haze scatters."""
-    value = _number("--haze-anisotropy", text, "a mean cosine, for example 0.3")
+    value = _number("--haze-anisotropy", text, "between -0.99 and 0.99, for example 0.3")
     if not HAZE_ANISOTROPY.holds(value):
         raise UserError(f"--haze-anisotropy {text} is out of range: give -{MAX_ANISOTROPY:g} to {MAX_ANISOTROPY:g}")
     return value
