@@ -50,7 +50,7 @@ def bench_agreement_command(request: AgreementRequest) -> int:
                     with ProgressReporter(f"bench-agreement {name}") as progress:
                         found.append(agreement.measure(context, name, scene, settings, progress))
                 except NothingToMeasure as reason:
-                    if request.scenes:
+                    if len(scenes) == 1:
                         raise
                     print(f"note: {reason}", file=sys.stderr)
                     continue
