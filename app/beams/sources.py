@@ -233,11 +233,16 @@ def _rectangle(at: np.ndarray, half: np.ndarray) -> np.ndarray:
 
 
 def _places(count: int) -> np.ndarray:
-    """Points (count, 2) that share the unit disc evenly [Vogel 1979]; one lies in the middle."""
-    if count == 1:
-        return np.zeros((1, 2))
+    """Points (count, 2) that share the unit disc evenly: Vogel's spiral (1979), moved and stretched so that its mean is
+    the disc's middle and its variance, with that of a disc of 1/count of the area about each point (`soften`), is the
+    disc's own, 1/4 along every axis. Otherwise few points would shift what a lamp lights, and blur it unevenly."""
     k = np.arange(count) + 0.5
-    return np.sqrt(k / count)[:, None] * np.column_stack([np.cos(_GOLDEN * k), np.sin(_GOLDEN * k)])
+    places = np.sqrt(k / count)[:, None] * np.column_stack([np.cos(_GOLDEN * k), np.sin(_GOLDEN * k)])
+    places -= places.mean(axis=0)
+    if count < 3:  # in one line: no variance across
+        return places
+    variance, axes = np.linalg.eigh(places.T @ places / count)
+    return places @ (axes * np.sqrt(0.25 * (1.0 - 1.0 / count) / variance)) @ axes.T
 
 
 def _grid(count: int) -> np.ndarray:

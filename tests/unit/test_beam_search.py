@@ -11,7 +11,7 @@ from spectrasplat.beams.facets import BeamScene, beam_scene
 from spectrasplat.beams.find import Emission, Search, search
 from spectrasplat.beams.leaves import Leaves
 from spectrasplat.beams.search import SUM_ENTERED, SUM_ROULETTE
-from spectrasplat.beams.sources import emissions
+from spectrasplat.beams.sources import _places, emissions
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.optics.spectral_tables import SpectralAxis
 from spectrasplat.stress.cases.beam_cases import kept as books_of
@@ -79,3 +79,14 @@ def test_leaves_keep_their_own_edges_and_corners(stone: tuple[BeamScene, Emissio
     parts = [every.where(keep), every.where(~keep)]
     assert Leaves.joined(parts).flux.sum() == pytest.approx(every.flux.sum())
     assert len(Leaves.joined([]).head) == len(Leaves.joined([]).corner) == 0
+
+
+@pytest.mark.parametrize("count", [4, 16, 64])
+def test_places_on_a_lamp_have_its_middle_and_its_variance(count: int) -> None:
+    """With the variance of the disc that stands for each of them: a quarter of the radius squared along every axis."""
+    places = _places(count)
+    np.testing.assert_allclose(places.mean(axis=0), 0.0, atol=1e-12)
+    np.testing.assert_allclose(places.T @ places / count + np.eye(2) / (4.0 * count), np.eye(2) / 4.0, atol=1e-12)
+    assert np.linalg.norm(places, axis=1).max() < 1.1
+    apart = np.linalg.norm(places[:, None] - places, axis=-1) + 9.0 * np.eye(count)
+    assert apart.min() > 1.0 / np.sqrt(count)
