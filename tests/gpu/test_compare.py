@@ -77,7 +77,10 @@ def test_the_reference_agrees_with_the_picture_and_stops_when_the_scene_changes(
         lambda: (comparison.advance(compared, running, 0.02), time.sleep(0.02)),
     )
     until(
-        lambda: comparison._composed_from == thread().snapshot.number,
+        lambda: (
+            comparison._direct.is_done
+            and comparison._composed_from == (thread().snapshot.number, comparison._direct.version)
+        ),
         lambda: comparison.advance(compared, running, 0.02),
     )
     live, reference = read(running.picture), read(comparison.picture)

@@ -38,8 +38,11 @@ def test_every_glass_applies_and_its_remark_is_true(scene: Scene, preset: preset
     changed = presets.apply_material(edits.set_priority(scene, index, 7), index, preset)
     material = changed.objects[index].material
     assert isinstance(material, Dielectric) and material.priority == 7
+    if preset.tint is not None:  # tells its colourant instead, and absorbs
+        assert preset.tint.colourant in preset.remark and material.absorption is not None
+        return
     told = dict(re.findall(r"(n_d|V_d) ([\d.]+)", preset.remark))
-    assert f"{material.dispersion.n_d:.3f}" == told["n_d"]
+    assert material.absorption is None and f"{material.dispersion.n_d:.3f}" == told["n_d"]
     assert "V_d" not in told or f"{material.dispersion.V_d:.0f}" == told["V_d"]
 
 
