@@ -56,12 +56,19 @@ class PictureWindow:
         """GPU units² of a texel where the weight is 1."""
         return 1.0 / float(np.linalg.det(_on_plane(self.texel_rows(step), frame)))
 
-    def holds(self, points: np.ndarray) -> np.ndarray:
-        """bool (n,): which points (n, 3) of GPU space lie in it."""
-        found = points @ self.rows[:, :3].T + self.rows[:, 3]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            pixels = found[:, :2] / found[:, 2:]
-        return (found[:, 2] > 0.0) & np.all((pixels >= self.low) & (pixels < self.high), axis=1)
+    def holds_grid(self, frame: PlaneFrame, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """bool (m, n): which places of the plane lie in it, `u` (n,) and `v` (m,) along its axes.
+
+        Homogeneous pixels are a sum of what goes with u and what goes with v; a border p ≥ low is p_h − low w ≥ 0, so
+        nothing is divided."""
+        rows = _on_plane(self.rows, frame)
+        along, across = rows[:, 0, None] * u, rows[:, 1, None] * v + rows[:, 2, None]
+        held = np.add.outer(across[2], along[2]) > 0.0
+        for i in (0, 1):
+            for border, sign in ((self.low[i], 1.0), (self.high[i], -1.0)):
+                inside = np.add.outer(sign * (across[i] - border * across[2]), sign * (along[i] - border * along[2]))
+                held &= inside >= 0.0 if sign > 0.0 else inside > 0.0
+        return held
 
 
 def picture_window(

@@ -180,8 +180,7 @@ class LightMaps:
         frame = self.layout.frames[receiver]
         parts = (np.arange(4) + 0.5) / 4.0
         u, v = (np.add.outer(at[:-1], parts * (at[1] - at[0])).ravel() for at in (x, y))
-        places = frame.at(np.stack(np.meshgrid(u, v), axis=-1)).reshape(-1, 3)
-        held = fine.holds(places).reshape(len(y) - 1, 4, len(x) - 1, 4)
+        held = fine.holds_grid(frame, u, v).reshape(len(y) - 1, 4, len(x) - 1, 4)
         return held.mean(axis=(1, 3))
 
     def release(self) -> None:

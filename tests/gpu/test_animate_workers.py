@@ -53,6 +53,7 @@ def test_ranges_are_the_frames_of_the_whole(whole: dict[str, bytes], tmp_path: P
     assert frames_of(tmp_path / "a") == whole
 
 
+@pytest.mark.slow
 def test_workers_that_meet_make_every_frame_once(whole: dict[str, bytes], tmp_path: Path) -> None:
     workers = [worker(tmp_path / "a", str(COUNT)) for _ in range(3)]
     told = [process.communicate(timeout=300) for process in workers]

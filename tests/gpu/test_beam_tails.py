@@ -131,6 +131,7 @@ def test_more_facets_ahead_than_a_flight_keeps(gl) -> None:
         assert held(by_beams) == pytest.approx(1.0, abs=0.04)
 
 
+@pytest.mark.slow
 def test_a_stone_is_less_noisy_than_by_photons(gl, tmp_path: Path) -> None:
     scene, noise = stone(tmp_path), {}
     for method in ("srd", "srd-photons"):
@@ -178,6 +179,7 @@ def test_what_is_kept_to_be_shown_again_holds_no_tail(gl, tmp_path: Path) -> Non
         assert light.map_flux() * light.map_scale == pytest.approx(whole, rel=0.06)
 
 
+@pytest.mark.slow
 def test_rounds_of_photons_have_their_beams_together(gl, tmp_path: Path, monkeypatch) -> None:
     """Beside photons, a few rounds share a search; a pass may only be left where photons have caught up with beams."""
     monkeypatch.setattr(batch_size, "DEFAULT_BATCH", 4096)

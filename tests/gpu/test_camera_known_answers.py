@@ -151,6 +151,7 @@ def test_fringe_of_an_edge_behind_a_thin_prism(gl, name: str, bands: int) -> Non
     assert of_bins == pytest.approx(lines[0] - lines[1], rel=0.02)
 
 
+@pytest.mark.slow
 def test_the_fringe_notices_a_wrong_sign(gl, monkeypatch, tmp_path) -> None:
     """The mutant: on leaving glass the index is differentiated as on entering it."""
     mutate(
@@ -213,6 +214,7 @@ def test_shift_of_an_edge_behind_a_slab_at_45_degrees(gl, name: str, offset_d: f
 RADIUS, LENS_Z, LENS_THICK, OBJECT_GAP, HEIGHT = 1.0, 3.0, 0.15, 0.6, 0.15
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bands", [1, 8])
 def test_image_scale_of_a_plano_convex_lens(gl, bands: int) -> None:
     """Lateral colour: a mark off the axis, seen through a magnifying lens, stands higher in blue light, by the

@@ -106,6 +106,7 @@ def test_methods_agree_with_random_wavelengths(
     assert 3.0 * error + 0.01 < 0.028
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bands", [1, 2])
 def test_a_column_of_the_wrong_sign_is_noticed(gl, drawn, monkeypatch, tmp_path, bands: int) -> None:
     mean, error = drawn
@@ -178,6 +179,7 @@ def test_a_caustic_behind_matched_glass_has_its_colours(behind_panes) -> None:
 EDGES_NM = tuple(np.linspace(380.0, 780.0, 9).tolist())
 
 
+@pytest.mark.slow
 def test_light_and_camera_half_agree_on_a_lamp_behind_a_slab(gl) -> None:
     """Reciprocity to 1.2 %: the irradiance that the light pass throws through a slab onto paper is what a camera on the
     paper finds when it adds up the lamp it sees through the slab, L cos θ dΩ, in every bin.

@@ -86,6 +86,7 @@ def pictures(camera_pass: Shuffled, scene: Scene, orders: int, samples: int) -> 
     return taken
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["default", "wine_glass"])
 def test_a_path_knows_nothing_of_its_neighbours(gl: Context, name: str) -> None:
     scene = load_scene(Path(f"assets/scenes/{name}.toml"))

@@ -64,6 +64,7 @@ def test_pixels_behind_glass_are_known(state: State) -> None:
     assert seen[:4].all() and seen[-30:].all()
 
 
+@pytest.mark.slow
 def test_the_reference_agrees_with_the_picture_and_stops_when_the_scene_changes(
     gl, state: State, running: LiveEngine, comparison: Comparison
 ) -> None:

@@ -43,6 +43,7 @@ def shares(found: Probe) -> dict[str, float]:
     return {name: share for name, share in found.shares.items() if name != "direct"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "material",
     [

@@ -64,6 +64,7 @@ def _canvases(light: LightPass, seconds: float) -> list:
     return [canvas.splatter for canvas in beams._canvases.values()]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "method"), [("ball", "srd"), ("prism", "srd-photons"), ("prism", "srd")])
 def test_slow_devices_get_small_portions_and_the_same_light(queueing, name: str, method: str) -> None:
     passes = [traced(queueing, name, seconds, method) for seconds in (1e3, SLOW)]

@@ -198,6 +198,7 @@ def test_mistakes_would_be_noticed(gl: Context, monkeypatch: pytest.MonkeyPatch,
         )
 
 
+@pytest.mark.slow
 def test_the_viewer_keeps_it_where_only_the_camera_moves(gl: Context) -> None:
     scene = scene_of(place(sphere(0.4, 320), Diffuse((0.5, 0.5, 0.5)), (0.0, 0.0, 0.5)), floor(), environment=SKY)
     engine = LiveEngine(gl)

@@ -94,6 +94,7 @@ def test_a_map_and_its_place(exports: Exports, state: State, shown: Shown, tmp_p
     assert json.loads((tmp_path / "m.json").read_text())["receiver"] == "table"
 
 
+@pytest.mark.slow
 def test_an_animation_looks_as_the_window_and_can_be_cancelled(
     exports: Exports, state: State, shown: Shown, tmp_path: Path
 ) -> None:

@@ -48,6 +48,7 @@ def whole(settings: RenderSettings) -> np.ndarray:
         return render(load_scene(find_scene(SCENE)), settings, context=context).rgb
 
 
+@pytest.mark.slow
 def test_a_killed_worker_loses_nothing(tmp_path: Path) -> None:
     killer = Killer(1, after=1)
     result = farmed(tmp_path / "parts", 1, 3, killer, settings=SMALL)

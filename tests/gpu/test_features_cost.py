@@ -82,6 +82,7 @@ def released(light: LightPass) -> None:
     light.buffers.release()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "absent"),
     [
@@ -148,6 +149,7 @@ def compared(gl: Context, light: LightPass, trial: Trial) -> float:
     return map_difference(*maps)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", QUICK)
 def test_forcing_a_feature_in_leaves_the_map_as_it_is(gl: Context, tmp_path: Path, name: str) -> None:
     light = begun(gl, scene_of(tmp_path, name))
@@ -219,6 +221,7 @@ def test_interval_of_the_median() -> None:
     assert abs(held / 2000 - 0.961) < 0.015
 
 
+@pytest.mark.slow
 def test_the_report_tells_what_was_measured_before_a_stop(
     gl: Context, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -66,6 +66,7 @@ class First:
         pass
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "method", "camera_method"),
     [
@@ -170,6 +171,7 @@ def test_seconds_are_those_of_the_whole_picture(gl: Context, name: str, layer: s
     assert told == sorted(told) and told[-1] > 0.85
 
 
+@pytest.mark.slow
 def test_samples_that_are_asked_for_are_taken_within_the_seconds(gl: Context) -> None:
     scene = load_scene(assets_dir() / "scenes" / "prism.toml")
     result = render(scene, RenderSettings(width=96, height=54, seconds=3.0, spp=3), context=gl)

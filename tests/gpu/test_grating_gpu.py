@@ -399,6 +399,7 @@ def behind_a_prism() -> Scene:
     return replace(scene, objects=(*scene.objects, grating))
 
 
+@pytest.mark.slow
 def test_an_edit_of_glass_before_a_grating_is_followed(gl: Context) -> None:
     """Photons carry a column by n and one by λ; what the edit moves is where a fresh trace puts it."""
     scene = behind_a_prism()
@@ -435,6 +436,7 @@ def test_picking_follows_the_strongest_order(gl: Context) -> None:
     assert np.abs(ends[:, 0] - 0.01 - np.tan(np.arcsin(nm * 6e-4))).max() < 2e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("count", "lines"), [(3, 20.0), (11, 20.0), (51, 10.0)])
 def test_two_gratings_of_many_orders_keep_white(gl: Context, count: int, lines: float) -> None:
     """What a sample cannot follow any more still stands for the light that is left, no more and no less."""

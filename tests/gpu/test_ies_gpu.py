@@ -42,6 +42,7 @@ def picture(gl, light: Light, **settings: object) -> np.ndarray:
     return render(ball_under(light), replace(SETTINGS, **settings), context=gl).rgb.astype(float)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["srd", pytest.param("stochastic", marks=pytest.mark.slow)])
 def test_an_isotropic_table_is_a_point_light(gl, tmp_path: Path, method: str) -> None:
     point = picture(gl, PointLight("lamp", POWER, PLACE), method=method)

@@ -181,6 +181,7 @@ def through_ball(gl) -> tuple[Scene, np.ndarray]:
     return question, picture(gl, question)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", [2.0**10, pytest.param(2.0**-10, marks=SLOW)])
 def test_units_of_length_by_powers_of_two_change_nothing(gl, original: np.ndarray, scale: float) -> None:
     # Of slivers of beams that are left to photons, rounding decides how their lattices lie.
@@ -226,6 +227,7 @@ def test_batches_do_not_show(gl, original: np.ndarray) -> None:
     assert difference(picture(gl, scene(), batch=8192), original) < EXACT
 
 
+@pytest.mark.slow
 def test_batches_do_not_show_in_passes_that_grow(gl) -> None:
     """Borders of bands, shifts and weights of `progressive`'s passes depend on the photons asked for only."""
     whole = picture(gl, scene(), method="progressive", photons=60_000)

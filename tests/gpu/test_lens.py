@@ -53,6 +53,7 @@ def reference(camera: Camera, objects: tuple[SceneObject, ...], samples: int) ->
     return render_camera_reference(scene, *SIZE, samples=samples).rgb()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["pinhole", "orthographic"])
 def test_the_picture_is_the_references(gl, kind: str) -> None:
     """What is left is noise: a tenth of what a pinhole, half the radius or another plane of focus would leave."""
@@ -69,6 +70,7 @@ def test_the_picture_is_the_references(gl, kind: str) -> None:
     assert min(errors) > 3.0 * error, (error, errors)
 
 
+@pytest.mark.slow
 def test_glass_is_seen_through_all_of_the_lens(gl) -> None:
     """A ball of glass out of focus: paths begin where the look that met it did."""
     objects = (*things(), SceneObject("ball", sphere(0.45, 1280), GLASS, at(0.0, -1.2, 0.6)))

@@ -144,6 +144,7 @@ def test_every_frame_of_a_drag_shows_where_things_stand(engine: LiveEngine) -> N
     assert there < 0.5 * here, (there, here)
 
 
+@pytest.mark.slow
 def test_back_where_it_was_all_is_traced_afresh(engine: LiveEngine) -> None:
     """What was accumulated before a drag must not be shown, nor added to, in moved buffers."""
     scene = shipped("prism")

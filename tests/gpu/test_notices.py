@@ -114,6 +114,7 @@ GIVEN_UP = SCENE + "[render]\nmax_depth = 2\n"
 FEW = ("--size", "32x18", "--photons", "4k")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "command",
     [

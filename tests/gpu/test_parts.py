@@ -62,6 +62,7 @@ def test_a_missing_part_is_named(lens: list[Path], tmp_path: Path, capsys: pytes
     assert not (tmp_path / "a.npy").exists()
 
 
+@pytest.mark.slow
 def test_no_part_counts_twice(lens: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     copy = tmp_path / "copy.ssp"
     shutil.copy(lens[0], copy)

@@ -218,6 +218,7 @@ def known_share(polarisation: bool, v_d: float = 20.0) -> float:
 
 
 # Beams of few photons leave up to a per cent of wide bands unaccounted (docs/beams.md).
+@pytest.mark.slow
 @pytest.mark.parametrize(("method", "tolerance"), [("srd", 0.015), ("srd-photons", 5e-3)])
 def test_panes_across_each_other_against_electric_fields(gl, method: str, tolerance: float) -> None:
     """By beams and by photons, reflections in the panes included; by means a seventeenth more would pass."""
@@ -232,6 +233,7 @@ def test_panes_across_each_other_against_electric_fields(gl, method: str, tolera
     assert found[0] / found[1] == pytest.approx(known[0] / known[1], rel=4e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("v_d", [np.inf, pytest.param(20.0, marks=pytest.mark.slow)], ids=["one index", "dispersive"])
 def test_what_a_camera_sees_through_panes_across_each_other(gl, v_d: float) -> None:
     """A lamp as large as the floor: by reciprocity as much of it as would come the other way."""

@@ -58,6 +58,7 @@ def test_maps_hold_what_beams_of_a_lamp_throw(gl) -> None:
     assert abs(balance(gl, "prism_case", "srd").held) < 5e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["stochastic-even", "hero", "srd-lambda"])
 def test_single_wavelengths_are_drawn_with_the_power_that_landed(gl, method: str) -> None:
     found = balance(gl, "prism", method)
@@ -66,6 +67,7 @@ def test_single_wavelengths_are_drawn_with_the_power_that_landed(gl, method: str
     assert abs(found.held) < 2e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("file", "old", "new", "noticed"),
     [

@@ -36,6 +36,7 @@ def told(monkeypatch: pytest.MonkeyPatch, **scripts: str) -> None:
     monkeypatch.setattr(prove_gpu, "command_of", command)
 
 
+@pytest.mark.slow
 def test_the_short_form_on_this_machine(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, proof = proved(tmp_path, "--parts", "answers", "--short")
     out = capsys.readouterr().out

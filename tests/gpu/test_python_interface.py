@@ -121,6 +121,7 @@ def test_a_mistake_leaves_it_usable(live: ss.Session) -> None:
     assert live.render().stats.photons_traced == 0
 
 
+@pytest.mark.slow
 def test_one_pass_is_enough_whatever_it_emits() -> None:
     """The lens's lattice has fewer points than it is asked for."""
     with ss.Session(ss.load("lens"), **SMALL) as session:
@@ -144,6 +145,7 @@ def test_a_closed_one_says_so() -> None:
         session.render()
 
 
+@pytest.mark.slow
 def test_photons_carry_the_light_that_landed(gl: Context) -> None:
     scene = ss.load("prism")
     photons = ss.trace(scene, photons=20_000)

@@ -74,6 +74,7 @@ def scene_of(tmp_path: Path, shape: str = "prism") -> Scene:
     return load_scene(file)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in SCENES]
 )
@@ -93,6 +94,7 @@ def test_flux_closes_in_every_shipped_scene(gl, name: str) -> None:
     assert result.rgb.max() > 0.0
 
 
+@pytest.mark.slow
 def test_a_bubble_in_a_flint_block_neither_breeds_rays_nor_loses_them(gl, tmp_path: Path) -> None:
     """Total reflection to and fro between block and bubble cuts bands again and again: an early version
     filled the queue with halves of halves, and moved the starts of some outside the block."""
@@ -194,6 +196,7 @@ def test_frame_and_scale_do_not_matter(gl, tmp_path: Path, matrix: np.ndarray, t
     assert after.sum() == pytest.approx(before.sum(), rel=0.005)
 
 
+@pytest.mark.slow
 def test_order_of_objects_does_not_matter(gl, tmp_path: Path) -> None:
     scene = scene_of(tmp_path, "sphere")
     before = render(scene, SMALL, context=gl).rgb

@@ -40,6 +40,7 @@ QUICK = (
 """Those that take a second or two; of the others one severity is looked at below, and all of it in the slow run."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in CASES])
 def test_case_keeps_its_promises(gl, name: str) -> None:
     case = CASES[name]
@@ -49,12 +50,14 @@ def test_case_keeps_its_promises(gl, name: str) -> None:
     assert len({m.severity for m in measured}) == case.steps
 
 
+@pytest.mark.slow
 def test_one_glass_agrees_with_the_reference(gl, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(camera_glass_cases, "glasses", lambda chosen=camera_glass_cases.glasses(): chosen[:1])
     (found,) = camera_glass_cases.measure_glasses(gl)
     assert found.broken() == []
 
 
+@pytest.mark.slow
 def test_a_stone_ten_thousand_extents_off_looks_the_same(gl, monkeypatch: pytest.MonkeyPatch) -> None:
     """And where GPU space is not fitted to the glass, the case says so."""
     monkeypatch.setattr(camera_solid_cases, "CHANGES", camera_solid_cases.CHANGES[-1:])
@@ -177,6 +180,7 @@ SLOW_MUTANTS = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "mistake", [pytest.param(m, marks=pytest.mark.slow) if m in SLOW_MUTANTS else m for m in MUTANTS]
 )

@@ -50,6 +50,7 @@ def test_gap_and_contact_hold(gl, monkeypatch) -> None:
     assert [m.broken() for m in found] == [[], []]
 
 
+@pytest.mark.slow
 def test_lines_narrower_than_even_bands_are_absorbed(gl, monkeypatch) -> None:
     """Bands are cut about the lines; sixteen even ones, as there once were, miss one part in fifty or more."""
     monkeypatch.setattr(line_cases, "WIDTHS_NM", (5.0,))

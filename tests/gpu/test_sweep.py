@@ -66,6 +66,7 @@ def test_a_light_sweep_on_workers_is_that_of_one_process(tmp_path: Path) -> None
     assert sorted(path.name for path in (tmp_path / "a").iterdir()) == ["0000.png", "0001.png", "sweep.json"]
 
 
+@pytest.mark.slow
 def test_a_sweep_can_be_left(tmp_path: Path) -> None:
     points = ss.sweep(ss.load("prism"), {"objects.prism.n_d": [1.5, 1.6, 1.7]}, size=(32, 18), photons=10_000, spp=1)
     assert next(points).number == 0

@@ -151,6 +151,7 @@ def orders(gl: Context, shape: Shape, levels: int) -> np.ndarray:
     return -np.polyfit(np.arange(levels), np.log2(np.maximum(found, 1e-12)), 1)[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("levels", [3, pytest.param(5, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", SHAPES)
 def test_order_of_convergence(gl, name: str, levels: int) -> None:

@@ -105,6 +105,7 @@ def live() -> Iterator[tuple[ss.Session, Browser]]:
         view.close()
 
 
+@pytest.mark.slow
 def test_a_slider_stretches_the_spectrum_and_traces_nothing(live: tuple[ss.Session, Browser]) -> None:
     session, browser = live
     before, old = browser.pictures[-1]

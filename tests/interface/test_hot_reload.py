@@ -81,6 +81,7 @@ def test_a_change_on_disk_shows_in_the_picture(hands: Hands, shaders: Path) -> N
     assert np.mean(np.abs(before + after - 255.0).max(axis=-1) <= 16.0) > 0.5
 
 
+@pytest.mark.slow
 def test_f5_compiles_from_disk(hands: Hands, shaders: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(shader_watch, "INTERVAL_S", 1e9)
     hands.session._watch = shader_watch.ShaderWatch()

@@ -110,6 +110,7 @@ def test_what_the_soak_asks_for(gl: Context, own_folder: Path) -> None:
     soak(gl, own_folder, actions, seed)
 
 
+@pytest.mark.slow
 def test_a_closed_viewer_leaves_nothing_on_the_device(gl: Context, own_folder: Path) -> None:
     left = []
     for _ in range(2):  # programs are kept for the next viewer: only the first may leave some

@@ -97,6 +97,7 @@ def chroma_noise(shown: np.ndarray) -> float:
     return float(ratios.var(axis=0, ddof=1).mean())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "scene",
     [mirrored, dispersing]

@@ -269,6 +269,7 @@ def test_maps_are_the_histogram_of_random_photons(
         assert compare(mutant, theirs, allowed).p_value < ALPHA, name
 
 
+@pytest.mark.slow
 def test_a_kernel_that_shrinks_takes_its_bias_along(gl, reference: tuple[np.ndarray, np.ndarray, Window]) -> None:
     """With a first kernel that blurs, bias² over 16 passes is less than half of that of a kernel which stays."""
     theirs = reference[0]

@@ -142,6 +142,7 @@ def known_lobe(roughness: float) -> np.ndarray:
     return np.bincount(ring, share) / np.bincount(ring, middle)
 
 
+@pytest.mark.slow
 def test_the_lobe_of_a_reflection_is_ggx(gl: Context) -> None:
     """In rings from the middle of the lobe to a hundredth of it: the footprints do not blur it, and lose nothing."""
     found, wanted = reflected_lobe(gl, 0.5), known_lobe(0.5)
@@ -161,6 +162,7 @@ def error(picture: np.ndarray, reference: np.ndarray) -> float:
     return float(np.linalg.norm(a - b) / np.linalg.norm(b))
 
 
+@pytest.mark.slow
 def test_the_pattern_behind_a_slab_is_the_references(gl: Context) -> None:
     """Blocks within the errors of both: the reference's own, by its independent parts, and 2 % of the photons'."""
     scene = lit_slab(0.4)
@@ -190,6 +192,7 @@ def prism(roughness: float, polarisation: bool = False, smooth: bool = False) ->
     return Scene("prism", camera, (light,), objects, render=RenderDefaults(polarisation=polarisation))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("method", "polarisation", "smooth"),
     [

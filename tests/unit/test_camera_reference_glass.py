@@ -264,6 +264,7 @@ def busy_scene() -> Scene:
     )
 
 
+@pytest.mark.slow
 def test_nested_and_smooth_glass_throws_the_light_references_light() -> None:
     """Both tracers' loops are written apart. Sums over what is seen directly agree to 2 %, blocks to 8 % of the
     brightest (a focus of few texels)."""

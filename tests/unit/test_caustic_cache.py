@@ -66,6 +66,7 @@ def quiet(fraction: float, text: str) -> None:
     assert 0.0 <= fraction <= 1.0 and "photons" in text
 
 
+@pytest.mark.slow
 def test_a_finished_reference_builds_nothing(scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     first = cached_camera_reference(scene, *SIZE, samples=16, caustic=PLAN, folder=tmp_path)
     assert first.caustic_photons >= PLAN.photons and 0.0 < first.caustic_relmse < 0.1

@@ -80,6 +80,7 @@ def test_what_nohup_ignores_stays_ignored() -> None:
         signal.signal(signal.SIGHUP, before)
 
 
+@pytest.mark.slow
 def test_some_kills_at_any_moment(tmp_path: Path) -> None:
     rng = np.random.default_rng(4)
     for index in range(4):

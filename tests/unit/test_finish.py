@@ -96,6 +96,7 @@ def test_only_scenes_with_a_finish_have_its_features() -> None:
     assert rough.rough_diffuse and replace(rough, rough_diffuse=False) == plain
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("alpha", [0.05, 0.3, 1.0])
 def test_the_albedo_of_a_coat_is_its_lobe_summed_up(alpha: float) -> None:
     """Against a plain sum over the hemisphere, which draws nothing."""

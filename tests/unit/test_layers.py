@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -45,7 +46,7 @@ def modules(root: Path) -> dict[str, Path]:
 
 def imports(name: str, file: Path, known: dict[str, Path]) -> Iterator[tuple[str, int, bool]]:
     """(module, line, at start-up) of every import of this package in a file: types and late imports are arrows too."""
-    tree = ast.parse(file.read_text(encoding="utf-8"))
+    tree = _parsed(file)
     late = {id(inner) for outer in ast.walk(tree) if _is_late(outer) for inner in ast.walk(outer)}
     package = name.split(".") if file.name == "__init__.py" else name.split(".")[:-1]
     for node in ast.walk(tree):
@@ -68,6 +69,12 @@ def _is_late(node: ast.AST) -> bool:
     if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
         return True
     return isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
+
+
+@cache
+def _parsed(file: Path) -> ast.Module:
+    """Once for all tests of the checkout."""
+    return ast.parse(file.read_text(encoding="utf-8"))
 
 
 def upward(root: Path) -> list[str]:
