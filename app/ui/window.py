@@ -29,6 +29,7 @@ from .imgui_host import ImguiHost
 SETTLE_FRAMES = 3
 """Frames drawn after an event before waiting again: imgui's layout and hovering need two."""
 MIN_SIDE = 320
+MODIFIER_KEYS = frozenset(range(glfw.KEY_LEFT_SHIFT, glfw.KEY_RIGHT_SUPER + 1))
 NO_DISPLAY = "there is no display to open a window on: 'spectrasplat render SCENE -o OUT.png' needs none"
 
 
@@ -252,8 +253,13 @@ class Window:
         def wake(*_event: object) -> None:
             self.wake()
 
+        def key(_window: object, key: int, _scancode: int, action: int, _modifiers: int) -> None:
+            self.wake()
+            if action == glfw.RELEASE and key in MODIFIER_KEYS:
+                self._host.keep_for_next_frame()
+
+        glfw.set_key_callback(self._handle, key)
         for listen in (
-            glfw.set_key_callback,
             glfw.set_char_callback,
             glfw.set_mouse_button_callback,
             glfw.set_cursor_pos_callback,
