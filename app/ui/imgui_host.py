@@ -62,9 +62,10 @@ class ImguiHost:
     def keep_for_next_frame(self) -> None:
         """What is put in from here on waits for the frame after the next.
 
-        Called before a modifier is let go: where a frame takes longer than somebody's fingers, Ctrl would else be up
-        again in the very frame in which the letter goes down, and Ctrl+R would be R. imgui handles a key's second
-        change in a frame of its own, so a key that no keyboard has goes down and up.
+        For frames that take longer than somebody's fingers. Before a modifier is let go: Ctrl would else be up again in
+        the very frame in which the letter goes down, and Ctrl+R would be R. Before a mouse button is pressed that has
+        just come: some controls must be hovered first. imgui handles a key's second change in a frame of its own, so
+        a key that no keyboard has goes down and up.
         """
         self.make_current()
         io = imgui.get_io()

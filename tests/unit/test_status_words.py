@@ -1,9 +1,10 @@
-"""What the status bar says of the light: never photons where none will come."""
+"""What the status bar says of the light: never photons where none will come; and numbers as words."""
 
 from __future__ import annotations
 
 import pytest
 from spectrasplat.render.viewer.stats import LiveStats
+from spectrasplat.ui.panels.numbers import kelvin
 from spectrasplat.ui.panels.status_bar import progress_words
 
 
@@ -21,3 +22,10 @@ from spectrasplat.ui.panels.status_bar import progress_words
 )
 def test_what_is_said(stats: LiveStats, is_playing: bool, said: str) -> None:
     assert progress_words(stats, is_playing) == said
+
+
+@pytest.mark.parametrize(
+    ("temperature_k", "said"), [(6394.2, "6,390 K"), (2855.6, "2,856 K"), (25_000.0, "25,000 K"), (999.6, "1,000 K")]
+)
+def test_a_colour_temperature_has_no_power_of_ten(temperature_k: float, said: str) -> None:
+    assert kelvin(temperature_k) == said
