@@ -76,7 +76,7 @@ def test_every_panel_draws(gl: Context, size: tuple[int, int], theme: str) -> No
         rig.open_panel(**everything)
         rig.frame(SETTLED_TABS)
         shown = {label for label in rig.items.items if label.startswith("Window: ")}
-        assert {"Window: Inspector", "Window: Timing", "Window: Compare", "Window: Abbe diagram"} <= shown
+        assert {"Window: Inspector", "Window: Timing", "Window: Compare", "Window: Abbe"} <= shown
         ground = rig.screenshot()[size[1] // 2, 4].mean()
         assert ground < 60 if theme == "dark" else ground > 180
 
