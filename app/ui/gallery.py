@@ -76,6 +76,13 @@ class Gallery:
             if not (self._show(index, _shipped_picture(path)) or self._show(index, target)):
                 self._start(index, target)
 
+    def pause(self) -> None:
+        """Nothing more for now: somebody works on a scene, whose light needs the processor. What is half done is done
+        again."""
+        if self._job is not None:
+            self._waiting.insert(0, self._job.index)
+            self._stop(self._job)
+
     def _start(self, index: int, target: Path) -> None:
         part = target.with_suffix(".part.png")
         try:

@@ -59,6 +59,19 @@ class ImguiHost:
             raise
         imgui.render()
 
+    def keep_for_next_frame(self) -> None:
+        """What is put in from here on waits for the frame after the next.
+
+        For frames that take longer than somebody's fingers. Before a modifier is let go: Ctrl would else be up again in
+        the very frame in which the letter goes down, and Ctrl+R would be R. Before a mouse button is pressed that has
+        just come: some controls must be hovered first. imgui handles a key's second change in a frame of its own, so
+        a key that no keyboard has goes down and up.
+        """
+        self.make_current()
+        io = imgui.get_io()
+        io.add_key_event(imgui.Key.f24, True)
+        io.add_key_event(imgui.Key.f24, False)
+
     def render(self) -> None:
         """Draw the last frame into the framebuffer in use."""
         imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())

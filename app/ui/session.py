@@ -116,6 +116,8 @@ class Session:
             self.reload_shaders()
         if self.may_make_thumbnails():
             self.jobs.gallery.step()
+        else:
+            self.jobs.gallery.pause()
 
     def wait_for_layout(self) -> None:
         """The window's size has changed before anything was made for it: leave the engine alone for some frames

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from imgui_bundle import imgui
 
-from ..edit.state import State
+from ..edit.state import Panels, State
 from . import item_rects, layout, shortcuts, theme
 from .layout import Docked, Place
 from .panels import (
@@ -80,11 +80,14 @@ WINDOWS = (
     PanelWindow("spectrum", "Spectrum", "bottom", spectrum.draw_spectrum),
     PanelWindow("compare", "Compare", "bottom", _draw_compare),
     # Beside the caustic, which it is there to change.
-    PanelWindow("abbe", "Abbe diagram", "right bottom", draw_abbe, (44.0, 34.0)),
+    PanelWindow("abbe", "Abbe", "right bottom", draw_abbe, (44.0, 34.0)),
     PanelWindow("shortcuts", "Shortcuts", "floating", help_list.draw_shortcuts, (62.0, 38.0)),
     PanelWindow("about", "About SpectraSplat", "floating", about.draw_about, (32.0, 20.0)),
 )
 _OVER_START_PAGE = ("shortcuts", "about")
+_CALLED_UP = frozenset(window.field for window in WINDOWS if not getattr(Panels(), window.field))
+"""Panels that somebody opened: Esc closes them, docked or floating, while they have the keyboard and no tool is to be
+left first."""
 _DOCKED = tuple(Docked(window.title, window.place) for window in WINDOWS)
 
 
@@ -145,10 +148,12 @@ def _draw_panel(window: PanelWindow, state: State, view_model: ViewModel) -> Sta
         imgui.set_next_window_focus()
     shown, stays = imgui.begin(window.title, True)
     item_rects.note(f"Window: {window.title}")
-    if not imgui.is_window_docked():
+    is_floating = not imgui.is_window_docked()
+    if is_floating:
         shortcuts.floating_panels.append(window.field)
-        if imgui.is_window_focused(imgui.FocusedFlags_.child_windows):
-            shortcuts.focused_panel["field"] = window.field
+    is_leavable = is_floating or (window.field in _CALLED_UP and state.tool == "select")
+    if is_leavable and imgui.is_window_focused(imgui.FocusedFlags_.child_windows):
+        shortcuts.focused_panel["field"] = window.field
     if shown:
         state = window.draw(state, view_model)
     imgui.end()

@@ -22,7 +22,7 @@ _ALWAYS = ("Shortcuts", "Quit", "Full screen")
 """Even while a text is typed or a menu is open; quitting in dialogues too."""
 
 focused_panel = {"field": ""}
-"""The floating panel that had the keyboard in the last frame, of `Panels`: Esc closes it."""
+"""The panel that floats or was called up and had the keyboard in the last frame, of `Panels`: Esc closes it."""
 floating_panels: list[str] = []
 """All that floated: with nothing else to leave, Esc closes the last of them."""
 

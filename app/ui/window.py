@@ -29,6 +29,7 @@ from .imgui_host import ImguiHost
 SETTLE_FRAMES = 3
 """Frames drawn after an event before waiting again: imgui's layout and hovering need two."""
 MIN_SIDE = 320
+MODIFIER_KEYS = frozenset(range(glfw.KEY_LEFT_SHIFT, glfw.KEY_RIGHT_SUPER + 1))
 NO_DISPLAY = "there is no display to open a window on: 'spectrasplat render SCENE -o OUT.png' needs none"
 
 
@@ -109,6 +110,9 @@ class Window:
         self._settling = SETTLE_FRAMES
         self._dropped: list[Path] = []
         self._close_pressed = False
+        self._has_moved = False
+        """The mouse, since the last frame: controls with others on them (rows with an eye) take no press before they
+        were hovered for a frame."""
         self._listen()
         self._host = ImguiHost()
         imgui.backends.glfw_init_for_opengl(ctypes.cast(self._handle, ctypes.c_void_p).value or 0, True)
@@ -175,6 +179,7 @@ class Window:
     def frame(self, guest: Guest) -> None:
         """Draw one frame and show it."""
         self._host.make_current()
+        self._has_moved = False
         width = max(glfw.get_window_size(self._handle)[0], 1)
         guest.prepare(self.interface_scale, self.framebuffer_size[0] / width)
         theme.apply(guest.preferences, self.interface_scale)
@@ -252,11 +257,25 @@ class Window:
         def wake(*_event: object) -> None:
             self.wake()
 
+        def key(_window: object, key: int, _scancode: int, action: int, _modifiers: int) -> None:
+            self.wake()
+            if action == glfw.RELEASE and key in MODIFIER_KEYS:
+                self._host.keep_for_next_frame()
+
+        def button(_window: object, _button: int, action: int, _modifiers: int) -> None:
+            self.wake()
+            if action == glfw.PRESS and self._has_moved:
+                self._host.keep_for_next_frame()
+
+        def moved(_window: object, _x: float, _y: float) -> None:
+            self.wake()
+            self._has_moved = True
+
+        glfw.set_key_callback(self._handle, key)
+        glfw.set_mouse_button_callback(self._handle, button)
+        glfw.set_cursor_pos_callback(self._handle, moved)
         for listen in (
-            glfw.set_key_callback,
             glfw.set_char_callback,
-            glfw.set_mouse_button_callback,
-            glfw.set_cursor_pos_callback,
             glfw.set_cursor_enter_callback,
             glfw.set_scroll_callback,
             glfw.set_window_focus_callback,

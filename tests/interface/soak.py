@@ -66,7 +66,7 @@ LEAVES_THE_SCENE = (requests.NewScene, requests.Open, requests.Recover)
 TAKES_LONG = (requests.Animate, requests.Bake)
 MAX_OBJECTS = 6
 TABS = ("dispersion", "dispersion", "inspector", "inspector", "view", "brush")
-EDITORS = ("Dispersion", "Inspector", "View", "Brush", "Abbe diagram")
+EDITORS = ("Dispersion", "Inspector", "View", "Brush", "Abbe")
 """Windows that edit the scene: most of what is done is done there."""
 
 

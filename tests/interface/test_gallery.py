@@ -87,6 +87,23 @@ def test_closing_ends_the_process(gl: Context, tmp_path: Path, scenes: dict[str,
     assert process.poll() is not None
 
 
+def test_a_pause_ends_the_process_and_begins_it_again_later(
+    gl: Context, tmp_path: Path, scenes: dict[str, Path]
+) -> None:
+    renderer = Renderer("import time; time.sleep(60)")
+    gallery = Gallery(gl, tmp_path, scenes, renderer)
+    gallery.step()
+    assert gallery._job is not None
+    process = gallery._job.process
+    gallery.pause()
+    assert process.poll() is not None
+    assert gallery.is_busy, "its thumbnail is still to be made"
+    renderer.code = MAKE
+    finish(gallery)
+    assert all(entry.thumbnail is not None for entry in gallery.entries)
+    gallery.release()
+
+
 @pytest.mark.slow
 def test_a_shipped_scene_really_gets_one(gl: Context, tmp_path: Path) -> None:
     from spectrasplat.base.paths import shipped_scenes

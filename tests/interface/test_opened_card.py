@@ -11,7 +11,7 @@ import pytest
 from spectrasplat.edit import requests
 from spectrasplat.edit.document import Document
 from spectrasplat.edit.preferences import MAX_UP, Settings, load_settings
-from spectrasplat.edit.state import State
+from spectrasplat.edit.state import Selection, State
 from spectrasplat.gpu.context import Context
 from spectrasplat.model.io.mesh_io import save_ply
 from spectrasplat.model.scene import Dielectric, Diffuse
@@ -29,7 +29,7 @@ from tests.interface.shell_rig import ShellRig
 
 @pytest.fixture(autouse=True)
 def nothing_closed() -> None:
-    opened_card._memory |= {"closed": "", "part": "0", "glass": "N-BK7"}
+    opened_card._memory |= {"closed": "", "part": "0", "glass": "N-BK7", "selected": ""}
 
 
 @pytest.fixture
@@ -70,6 +70,16 @@ def test_what_is_not_glass_is_made_glass_by_a_click(gl: Context) -> None:
     assert isinstance(made, Dielectric) and made.dispersion.n_d == pytest.approx(2.4175, abs=1e-3)
     assert rig.state.edit_label == f"Make {before.objects[0].name} glass"
     assert "Window: opened" not in rig.items.items
+
+
+def test_the_part_is_what_is_selected_until_another_is_chosen(gl: Context) -> None:
+    rig = ShellRig(gl, opaque())
+    rig.state = replace(rig.state, selection=Selection("object", 1))
+    rig.frame(2)
+    rig.click("Make glass")
+    rig.frame(2)
+    objects = rig.state.scene.objects
+    assert [isinstance(o.material, Dielectric) for o in objects[:2]] == [False, True]
 
 
 def test_the_question_can_be_closed_and_comes_back_with_another_file(gl: Context) -> None:

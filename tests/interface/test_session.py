@@ -114,6 +114,24 @@ def test_shown_texture_stays_valid_in_the_frame_in_which_the_size_changes(rig: R
     assert rig.session.picture.shown is resized and drawn == [resized.glo]
 
 
+def test_the_engine_waits_for_the_layout_behind_the_start_page(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else the first scene's long first frames show tabs that have no widths yet."""
+    calls: list[int] = []
+    advance = rig.session.picture.advance
+    monkeypatch.setattr(rig.session.picture, "advance", lambda *a: (calls.append(1), advance(*a))[1])
+    rig.settle()
+    assert calls
+    rig.frame(lambda state: state.with_panels(start_page=True))
+    calls.clear()
+    rig.frame()
+    rig.frame(lambda state: state.with_panels(start_page=False))
+    for _ in range(2 * LAYOUT_FRAMES - 1):
+        rig.frame()
+    assert not calls
+    rig.frame()
+    assert calls
+
+
 def test_edits_are_undone_one_by_one_and_a_drag_is_one_step(rig: Rig) -> None:
     first = rig.session.state.scene
     rig.rename("a")

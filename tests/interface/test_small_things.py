@@ -33,6 +33,22 @@ def test_escape_closes_the_floating_panel_that_has_the_keyboard_and_no_other(gl:
     assert not panels.shortcuts and panels.abbe and panels.inspector
 
 
+def test_escape_closes_a_docked_panel_that_was_called_up_and_leaves_those_of_the_first_layout(gl: Context) -> None:
+    rig = ShellRig(gl)
+    rig.open_panel(abbe=False, dispersion=True)
+    rig.show_tab("Dispersion")
+    rig.click("Dispersion/Abbe diagram")
+    rig.frame(4)
+    assert rig.state.preferences.panels.abbe
+    rig.key(imgui.Key.escape)
+    rig.frame(2)
+    assert not rig.state.preferences.panels.abbe
+    rig.click(rig.find("Window: Outliner").at(0.5, 0.9))
+    rig.key(imgui.Key.escape)
+    rig.frame(2)
+    assert rig.state.preferences.panels.outliner and rig.state.preferences.panels.dispersion
+
+
 def test_help_and_quit_work_while_a_text_is_typed(gl: Context) -> None:
     rig = ShellRig(gl)
     rig.open_panel(abbe=False, dispersion=True)

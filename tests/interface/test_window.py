@@ -88,3 +88,40 @@ def test_without_a_display_one_sentence_names_the_way_out(tmp_path: Path) -> Non
 def test_wrong_options_are_told_before_a_window_is_opened(tmp_path: Path, arguments: list[str], told: str) -> None:
     done = run(tmp_path, *arguments, display=False)
     assert done.returncode == 2 and told in done.stderr and done.stderr.count("\n") == 1
+
+
+LETTER_OUTLIVES_CTRL = """
+import ctypes, glfw
+from imgui_bundle import imgui
+from spectrasplat.ui.window import Window
+
+window = Window()
+window._host.make_current()
+exchange = ctypes.CFUNCTYPE(*[ctypes.c_void_p] * 3)(("glfwSetKeyCallback", glfw._glfw))
+handle = ctypes.cast(window._handle, ctypes.c_void_p).value
+installed = exchange(handle, None)  # imgui's, which calls the window's own before
+call = ctypes.CFUNCTYPE(None, ctypes.c_void_p, *[ctypes.c_int] * 4)(installed)
+seen = []
+def frame():
+    imgui.backends.glfw_new_frame()
+    with window._host.frame():
+        if imgui.is_key_pressed(imgui.Key.r, False):
+            seen.append(imgui.get_io().key_ctrl)
+io = imgui.get_io()
+io.add_key_event(imgui.Key.mod_ctrl, True)
+frame()
+io.add_key_event(imgui.Key.r, True)
+call(handle, glfw.KEY_LEFT_CONTROL, 37, glfw.RELEASE, 0)
+io.add_key_event(imgui.Key.mod_ctrl, False)
+for _ in range(4):
+    frame()
+print(seen)
+"""
+
+
+@pytest.mark.slow
+def test_the_window_keeps_ctrl_down_for_the_letter_of_a_long_frame(tmp_path: Path) -> None:
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "SPECTRASPLAT_CONFIG": str(tmp_path / "config")}
+    command = ["xvfb-run", "-a", sys.executable, "-P", "-c", LETTER_OUTLIVES_CTRL]
+    done = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.stdout.strip() == "[True]", done.stderr

@@ -32,3 +32,8 @@ def percent(share: float) -> str:
     if 0.0 < share < 1e-4:
         return "< 0.01 %"
     return f"{100 * share:.3g} %"
+
+
+def kelvin(temperature_k: float) -> str:
+    """A colour temperature: "6,390 K", "2,856 K"; to ten kelvin from 3,000 K on, as well as it can be told."""
+    return f"{round(temperature_k, -1 if temperature_k >= 3000.0 else 0):,.0f} K"

@@ -25,7 +25,7 @@ _BORDER_EM = 0.8
 _WIDTH_EM = 26.0
 _MOST_PARTS = 12
 
-_memory = {"closed": "", "part": "0", "glass": DEFAULT_GLASS}
+_memory = {"closed": "", "part": "0", "glass": DEFAULT_GLASS, "selected": ""}
 """The file whose questions were closed, and what was last chosen: memory of the interface."""
 
 
@@ -41,7 +41,8 @@ def draw_opened_card(state: State, view_model: ViewModel, middle_x: float, botto
         return state
     imgui.set_next_window_size((theme.em(_WIDTH_EM), 0.0))
     imgui.set_next_window_pos((middle_x, bottom - theme.em(_BORDER_EM)), imgui.Cond_.always, imgui.ImVec2(0.5, 1.0))
-    imgui.push_style_color(imgui.Col_.window_bg, (*theme.palette().raised[:3], 0.94))
+    # Darker than fields and buttons, which must stand out on it whatever the picture.
+    imgui.push_style_color(imgui.Col_.window_bg, (*theme.palette().window[:3], 0.97))
     imgui.begin("##opened", None, _FLAGS)
     item_rects.note("Window: opened")
     if view_model.up is not None:
@@ -69,9 +70,10 @@ def _up(state: State, view_model: ViewModel) -> State:
 
 def _glass(state: State, parts: list[str]) -> State:
     imgui.text_unformatted("Nothing here is glass, so there is no caustic.")
-    shown = {str(i): name for i, name in enumerate(parts[:_MOST_PARTS])}
-    part = str(min(int(_memory["part"]), len(shown) - 1))
-    _, part = widgets.combo("Part", shown, part, tip="What is to be glass.")
+    part = str(min(_asked_part(state), len(parts) - 1))
+    shown = {str(i): name for i, name in enumerate(parts) if i < _MOST_PARTS or str(i) == part}
+    tip = "What is to be glass; a click on it in the picture chooses it too."
+    _, part = widgets.combo("Part", shown, part, tip=tip)
     _, glass = widgets.combo("Glass", _GLASSES, _memory["glass"], tip="Others are in the dispersion panel.")
     _memory["part"], _memory["glass"] = part, glass
     if widgets.button("Make glass", tip="Make this part glass; it can be undone."):
@@ -79,3 +81,12 @@ def _glass(state: State, parts: list[str]) -> State:
         state = edits.attempt(state, f"Make {parts[index]} glass", edits.make_glass, index, glass)
     imgui.same_line()
     return state
+
+
+def _asked_part(state: State) -> int:
+    """Index of the part that was chosen last: here, or by selecting it."""
+    selected = str(state.selection.index) if state.selection.kind == "object" else ""
+    if selected != _memory["selected"]:
+        _memory["selected"] = selected
+        _memory["part"] = selected or _memory["part"]
+    return int(_memory["part"])

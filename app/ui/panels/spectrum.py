@@ -57,7 +57,7 @@ def _told(state: State, cursor: CursorInfo, colour: ColourInfo | None) -> None:
             ("Purity", numbers.percent(colour.purity), "Excitation purity: 100 % is a spectral colour, 0 % is white."),
             (
                 "Temperature",
-                "–" if colour.temperature_k is None else f"{colour.temperature_k:.3g} K",
+                "–" if colour.temperature_k is None else numbers.kelvin(colour.temperature_k),
                 "Correlated colour temperature: of the black body that looks most alike; none for strong colours.",
             ),
         ]

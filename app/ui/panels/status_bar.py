@@ -9,6 +9,7 @@ from imgui_bundle import imgui
 
 from ...edit.requests import CancelJob
 from ...edit.state import State
+from ...render.viewer.stats import LiveStats
 from .. import item_rects, theme
 from ..view_model import ViewModel
 from . import numbers, rows, widgets
@@ -69,12 +70,20 @@ def _progress(state: State, view_model: ViewModel) -> State:
     said = "beams, as fine as that many photons" if stats.only_beams else "photons"
     rows.explain("Progress", f"{stats.photons:,} of {target:,} {said}.")
     imgui.same_line()
-    word = "Done" if stats.converged else "Accumulating" if state.playing else "Paused"
-    found = (
-        f"{numbers.count(stats.polygons)} polygons" if stats.only_beams else f"{numbers.count(stats.photons)} photons"
-    )
-    imgui.text_unformatted(f"{word}, {found}")
+    imgui.text_unformatted(progress_words(stats, state.playing))
     return state
+
+
+def progress_words(stats: LiveStats, is_playing: bool) -> str:
+    """What goes on, and how far it is: by polygons, by photons, or where nothing throws a caustic by camera samples."""
+    if stats.differs == "scene":
+        return "Preparing …"
+    word = "Done" if stats.converged else "Accumulating" if is_playing else "Paused"
+    if stats.only_beams:
+        return f"{word}, {numbers.count(stats.polygons)} polygons"
+    if stats.photons or not stats.camera_samples:
+        return f"{word}, {numbers.count(stats.photons)} photons"
+    return f"{word}, {numbers.count(round(stats.camera_samples))} samples a pixel, no caustics"
 
 
 def _selection(state: State) -> None:

@@ -185,12 +185,13 @@ def counts_of(state: State, view_model: ViewModel) -> list[tuple[str, str, str]]
         ("Rate", f"{numbers.count(stats.photons_per_second)}/s", "Emitted photons per second of trace and splat time."),
         (
             "Beams",
-            f"{numbers.count(stats.beams)}, {numbers.count(stats.polygons)} polygons",
+            numbers.count(stats.beams),
             (
-                "Light followed from facet to facet as beams, and the polygons that those throw, in the last search. "
-                "Where they carry all light, photons only say how finely they are followed."
+                "Light followed from facet to facet as beams, in the last search. Where they carry all light, photons "
+                "only say how finely they are followed."
             ),
         ),
+        ("Polygons", numbers.count(stats.polygons), "What the beams threw on flat receivers."),
         (
             "Stored",
             numbers.count(stats.photons_stored),

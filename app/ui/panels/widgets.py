@@ -24,6 +24,7 @@ from ...edit.state import State
 from ...model.io.scene_table import MAX_MAGNITUDE
 from ...model.scene import Vec3
 from .. import item_rects, theme
+from . import slider_mark
 from .rows import (
     begin_row,
     beside,
@@ -88,9 +89,12 @@ def slider(
     """
     label_hit = begin_row(label)
     flags = _flags(logarithmic, clamp)
-    changed, moved = imgui.slider_float(f"##{label}", value, low, high, _with_unit(format, unit), flags)
+    with slider_mark.hidden_grab():
+        changed, moved = imgui.slider_float(f"##{label}", value, low, high, _with_unit(format, unit), flags)
+    smallest = slider_mark.smallest_shown(format) if logarithmic else None
+    slider_mark.draw(slider_mark.share_of(value, low, high, smallest))
     if mark is not None and low < mark < high:
-        _notch((mark - low) / (high - low))
+        slider_mark.notch((mark - low) / (high - low))
     explain(label, tip, unit, how_to(None if reset is None else (format % reset).strip()))
     return _settled(changed, value, _tidy(moved), reset, label_hit)
 
@@ -109,7 +113,9 @@ def reciprocal_slider(
         after = _tidy(moved)
     else:
         shown = "none" if math.isinf(value) else _with_unit(format % value, unit)
-        changed, moved = imgui.slider_float(f"##{label}", reverse, 1.0 / low, 0.0, shown)
+        with slider_mark.hidden_grab():
+            changed, moved = imgui.slider_float(f"##{label}", reverse, 1.0 / low, 0.0, shown)
+        slider_mark.draw(slider_mark.share_of(reverse, 1.0 / low, 0.0))
         after = math.inf if abs(moved) < 1e-4 else float(f"{1.0 / moved:.5g}")
     explain(label, tip, unit, how_to(None if reset is None else "none" if math.isinf(reset) else format % reset))
     return _settled(changed, value, after, reset, label_hit, infinite=True)
@@ -377,17 +383,6 @@ def _with_unit(format: str, unit: str) -> str:
 def _tidy(value: float) -> float:
     """A float32 as the decimal number that was meant."""
     return float(f"{value:.7g}")
-
-
-def _notch(share: float) -> None:
-    """Short marks above and below the place where the slider's grab stands for a value."""
-    low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
-    grab = imgui.get_style().grab_min_size
-    x = low.x + 2.0 + grab / 2 + share * (high.x - low.x - grab - 4.0)
-    tint, length = theme.packed(theme.palette().text, 0.6), 0.2 * (high.y - low.y)
-    drawing = imgui.get_window_draw_list()
-    drawing.add_line(ImVec2(x, high.y - length), ImVec2(x, high.y), tint, 1.5)
-    drawing.add_line(ImVec2(x, low.y), ImVec2(x, low.y + length), tint, 1.5)
 
 
 def _fitting(text: str, width: float) -> str:

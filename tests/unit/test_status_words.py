@@ -1,0 +1,31 @@
+"""What the status bar says of the light: never photons where none will come; and numbers as words."""
+
+from __future__ import annotations
+
+import pytest
+from spectrasplat.render.viewer.stats import LiveStats
+from spectrasplat.ui.panels.numbers import kelvin
+from spectrasplat.ui.panels.status_bar import progress_words
+
+
+@pytest.mark.parametrize(
+    ("stats", "is_playing", "said"),
+    [
+        (LiveStats(differs="scene"), True, "Preparing …"),
+        (LiveStats(), True, "Accumulating, 0 photons"),
+        (LiveStats(photons=1_250_000, camera_samples=3.0), True, "Accumulating, 1.25 M photons"),
+        (LiveStats(photons=1_250_000, camera_samples=3.0), False, "Paused, 1.25 M photons"),
+        (LiveStats(only_beams=True, polygons=368, converged=True), True, "Done, 368 polygons"),
+        (LiveStats(camera_samples=2.6), True, "Accumulating, 3 samples a pixel, no caustics"),
+        (LiveStats(camera_samples=64.0, converged=True), True, "Done, 64 samples a pixel, no caustics"),
+    ],
+)
+def test_what_is_said(stats: LiveStats, is_playing: bool, said: str) -> None:
+    assert progress_words(stats, is_playing) == said
+
+
+@pytest.mark.parametrize(
+    ("temperature_k", "said"), [(6394.2, "6,390 K"), (2855.6, "2,856 K"), (25_000.0, "25,000 K"), (999.6, "1,000 K")]
+)
+def test_a_colour_temperature_has_no_power_of_ten(temperature_k: float, said: str) -> None:
+    assert kelvin(temperature_k) == said
