@@ -41,11 +41,11 @@ def spokes(picture: np.ndarray) -> float:
 
 
 def test_few_photons_through_a_ball_fan_out(gl) -> None:
-    """Photons that glass spreads strongly widen as light does. Measured: SPOKES_AFTER, and SPOKES_BEFORE where they
+    """Photons that glass spreads strongly widen as light does. Measured: 0.020, and 0.052 where they
     were straight strips."""
     scene = load_scene(assets_dir() / "scenes" / "ball_plain.toml")
     settings = RenderSettings(240, 135, photons=20_000, layer="caustic", spp=4)
-    assert spokes(render(scene, settings, context=gl).rgb.astype(float)) < 0.0
+    assert spokes(render(scene, settings, context=gl).rgb.astype(float)) < 0.03
 
 
 def test_weak_arcs_of_few_photons_have_no_streaks(gl) -> None:
