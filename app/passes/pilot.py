@@ -54,8 +54,8 @@ photons, 0.067, 0.034 with 20,000; nRMSE 0.034, 0.045 with 80,000 (footprints ha
 KEPT_THRESHOLDS = (0.003, 0.03, 0.1)
 """Shares of a photon's power below which roulette decides, where parts that weak add little work; the first that does.
 
-`ball`, 10,000 and 50,000 photons (480×270): nRMSE 0.063 and 0.039 with `SPLIT_THRESHOLD`, 0.058 and 0.032 with 0.03,
-where the streaks of its second rainbow are gone."""
+`ball`, 50,000 and 200,000 photons (480×270): nRMSE 0.039 and 0.024 with `SPLIT_THRESHOLD`, 0.034 and 0.022 with 0.1,
+which it gets; 0.032 and 0.022 with 0.03, whose splats take a third longer."""
 MOST_MORE_FLIGHTS = 1.4
 """How many times the flights of a pilot that may take."""
 _FULL = 0.8
