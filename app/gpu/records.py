@@ -62,7 +62,7 @@ def photon_record(groups: int, hero: bool = False) -> Struct:
             Field("branch_key", "uint", "hash of the choices of the path"),
             Field("flags", "uint", "FLAG_*; from LATTICE_BIT on, points of its sub-lattice"),
             Field("depth", "uint", "specular events on the path"),
-            Field("cosine", "float", "|cos| of incidence on the receiver"),
+            Field("fan", "uint", "two halves: change of the footprint's W (lib/fan.glsl) per lattice spacing"),
             *spectral,
             *(_COMPANIONS if hero else ()),
         ),

@@ -78,6 +78,12 @@ SPLAT = Struct(
         ),
         Field("ripple", "vec4", "swept: what is taken off by those two waves and, z, by their sum"),
         Field("rect", "vec4", "x0, y0, x1, y1: nothing is drawn outside, atlas texels"),
+        Field(
+            "fan",
+            "vec2",
+            "swept: change of the W, 1 at the centre, by which places in it are divided, per unit of xi and of eta",
+        ),
+        Field("reserved", "vec2", ""),
     ),
 )
 """A splat, ready to be drawn. xi runs over [-1, 1] from end to end of the whole band's smeared sweep."""

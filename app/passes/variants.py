@@ -189,7 +189,7 @@ def draw_variants(features: SplatFeatures) -> dict[int, tuple[str, Defines]]:
     }
     if features.band_cuts and not features.point_spectrum:
         variants[3] = ("light/splat_cut.frag", {"CUT": 1, "CLIPPED": 1})
-    variants[4] = ("light/splat_swept.frag", {"SWEPT": 1, "EDGE": 1, "CLIPPED": 1})
+    variants[4] = ("light/splat_swept.frag", {"SWEPT": 1, "EDGE": 1, "CLIPPED": 1, "FANS": 1})
     if features.contact_lines:
         # The same beside a line of contact; of swept ones those that an edge cuts as well.
         beside: Defines = {"CONTACT_LINES": 1}

@@ -5,6 +5,7 @@
 #include "lib/gaussian.glsl"
 #include "lib/lattice.glsl"
 #include "lib/placement.glsl"
+#include "lib/fan.glsl"
 
 layout(local_size_x = WORKGROUP) in;
 
@@ -64,6 +65,9 @@ const float ACROSS_FLOOR = 0.1;
 const float SAMPLED_VARIANCE = 0.12;
 const float THIN_VARIANCE = 0.15;
 const float CUT = 3.0;
+// A footprint fans out where its width changes by more than the first over a standard deviation of its length; by the second at most.
+const float LEAST_FAN = 0.015;
+const float MOST_FAN = 3.0;
 // Splats of three texels' standard deviation at least go to a map with texels twice as wide.
 const float BROAD_VARIANCE = 9.0;
 const int WIDER_LEVELS = 6;
@@ -78,6 +82,7 @@ struct Footprint {
     vec2 axis_t;
     vec2 chord;
     float per_spacing;  // the axes over the lattice's own steps
+    vec2 fan;  // change of W (lib/fan.glsl) per texel, along the longer axis
 };
 
 float spectral_variable(uint group, float x) {
@@ -128,6 +133,14 @@ float needed_smoothing(PhotonRecord photon, vec2 step_s, vec2 step_t, vec2 chord
     return mix(narrowed, 1.0, clamp(max(parted, fine), 0.0, 1.0));
 }
 
+// A footprint that widens along its longer axis, by the last flight's perspective and by that of the picture's pixels.
+vec2 fan_in(Placement place, PhotonRecord photon, float w, vec2 step_s, vec2 step_t) {
+    vec2 axis = longest_axis(vec3(dot(step_s, step_s), dot(step_s, step_t), dot(step_t, step_t)));
+    vec2 change = unpackHalf2x16(photon.fan) + vec2(dot(place.row_w.xyz, photon.dposition_ds), dot(place.row_w.xyz, photon.dposition_dt)) / w;
+    vec2 longest = axis.x * step_s + axis.y * step_t;
+    return dot(change, axis) / max(dot(longest, longest), 1e-20) * longest;
+}
+
 Footprint footprint_in(Placement place, PhotonRecord photon, vec3 sweep_middle, vec3 sweep) {
     vec3 at = homogeneous_texel(place, photon.position + sweep_middle);
     vec2 step_s = texels_along(place, at, photon.dposition_ds), step_t = texels_along(place, at, photon.dposition_dt);
@@ -137,6 +150,7 @@ Footprint footprint_in(Placement place, PhotonRecord photon, vec3 sweep_middle, 
     f.per_spacing = smoothing * needed_smoothing(photon, step_s, step_t, f.chord);
     f.axis_s = f.per_spacing * step_s;
     f.axis_t = f.per_spacing * step_t;
+    f.fan = fan_in(place, photon, at.z, step_s, step_t);
     return f;
 }
 
@@ -196,14 +210,21 @@ SplatRecord splat_of(PhotonRecord photon, float power_w, float mean, Footprint f
 }
 
 vec2 half_extent(SplatRecord splat) {
-    return splat.kind == 1u ? splat.along : abs(splat.along) + abs(splat.across);
+    if (splat.kind == 1u) return splat.along;
+    vec4 part = part_that_fans(splat.fan);
+    vec2 extent = vec2(0.0);
+    for (int i = 0; i < 4; ++i) {
+        vec2 corner = vec2((i & 1) == 0 ? part.x : part.z, (i & 2) == 0 ? part.y : part.w);
+        extent = max(extent, abs(corner.x * splat.along + corner.y * splat.across) / (1.0 + dot(splat.fan, corner)));
+    }
+    return extent;
 }
 
-// A swept splat that its rectangle cuts is drawn by a program of its own: to ask every fragment costs a tenth of the rate.
+// A swept splat that its rectangle cuts, or that fans out, is drawn by a program of its own: to ask every fragment costs a tenth of the rate.
 void mark_edge(inout SplatRecord splat) {
     vec2 extent = half_extent(splat);
     bool whole = all(greaterThanEqual(splat.centre - extent, splat.rect.xy)) && all(lessThanEqual(splat.centre + extent, splat.rect.zw));
-    if (splat.kind == 2u && !whole) {
+    if (splat.kind == 2u && (!whole || splat.fan != vec2(0.0))) {
         splat.kind = 4u;
     }
 }

@@ -22,9 +22,14 @@ flat out uint side;
 noperspective out vec2 at;
 flat out vec2 half_texel;  // along x, y in units of sqrt(2) sigma
 #else
-noperspective out vec3 at;  // across, along xi, table u
+#ifdef FANS
+#define INTERPOLATED smooth
+#else
+#define INTERPOLATED noperspective
+#endif
+INTERPOLATED out vec3 at;  // across, along xi, table u
 flat out vec3 shape;        // half texel across, table row, layer
-noperspective out vec2 wave;  // cycles
+INTERPOLATED out vec2 wave;  // cycles
 flat out vec3 ripple;
 #ifndef ONE_COLOUR
 flat out vec4 throughput;
@@ -73,6 +78,9 @@ vec4 energy(SplatRecord splat, uint g) {
 }
 #endif
 
+#ifdef FANS
+#include "lib/fan.glsl"
+#endif
 #ifdef CLIPPED
 // The least and largest (xi, eta) in [-1, 1]² that the splat's rectangle holds: what is outside need not be drawn.
 vec4 part_inside(SplatRecord splat) {
@@ -81,9 +89,20 @@ vec4 part_inside(SplatRecord splat) {
     for (int i = 0; i < 4; ++i) {
         vec2 to_corner = vec2((i & 1) == 0 ? splat.rect.x : splat.rect.z, (i & 2) == 0 ? splat.rect.y : splat.rect.w) - splat.centre;
         vec2 place = vec2(to_corner.x * splat.across.y - to_corner.y * splat.across.x, splat.along.x * to_corner.y - splat.along.y * to_corner.x) / area;
+#ifdef FANS
+        // Back through the perspective; where that has no place for it, all is drawn.
+        float w = 1.0 - dot(splat.fan, place);
+        if (w < 1e-3) return part_that_fans(splat.fan);
+        place /= w;
+#endif
         range = vec4(min(range.xy, place), max(range.zw, place));
     }
+#ifdef FANS
+    vec4 part = part_that_fans(splat.fan);
+    return vec4(max(range.xy, part.xy), min(range.zw, part.zw));
+#else
     return vec4(max(range.xy, vec2(-1.0)), min(range.zw, vec2(1.0)));
+#endif
 }
 #endif
 
@@ -140,5 +159,12 @@ void main() {
 #endif
 #endif
     rect = splat.rect;
+#ifdef FANS
+    // What is linear in xi and eta stays so: the rasteriser's own perspective.
+    float w = 1.0 + dot(splat.fan, corner);
+    position = splat.centre * w + (position - splat.centre);
+    gl_Position = vec4(position / atlas_size * 2.0 - w, 0.0, w);
+#else
     gl_Position = vec4(position / atlas_size * 2.0 - 1.0, 0.0, 1.0);
+#endif
 }

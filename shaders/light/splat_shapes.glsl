@@ -114,6 +114,7 @@ SplatRecord small_splat(PhotonRecord photon, float power_w, float mean, Footprin
     splat.inverse_sigma_xi = 0.0;
     splat.waves = vec4(0.0);
     splat.ripple = vec4(0.0);
+    splat.fan = vec2(0.0);
     splat.kind = 1u;
     return splat;
 }
@@ -155,6 +156,21 @@ float throughput_of_windows(PhotonRecord photon, float reach, vec4 throughput, u
     return sums.x > 0.0 ? sums.y / sums.x : 0.0;
 }
 #endif
+
+// Change of W per unit of xi and of eta: what the splat's half extents are divided by at its ends. Along one of both, and so little over the spectrum
+// that none of that is left out.
+vec2 fan_of_splat(Footprint f, vec2 along, vec2 across, float xi_half) {
+    float change = length(f.fan) * sqrt(max(dot(f.axis_s, f.axis_s), dot(f.axis_t, f.axis_t)));
+    if (change < LEAST_FAN) return vec2(0.0);
+    vec2 fan = min(1.0, MOST_FAN / change) * vec2(dot(f.fan, along), dot(f.fan, across));
+    if (abs(fan.x) * xi_half > 0.8) fan *= 0.8 / (abs(fan.x) * xi_half);
+    if (abs(fan.x) > abs(fan.y)) {
+        fan.y = clamp(fan.y, -FAN_ASIDE, FAN_ASIDE);
+    } else {
+        fan.x = clamp(fan.x, -FAN_ASIDE, FAN_ASIDE);
+    }
+    return fan;
+}
 
 SplatRecord swept_splat(PhotonRecord photon, float power_w, float mean, Footprint f, uint light_and_class, vec4 band) {
     SplatRecord splat;
@@ -256,11 +272,20 @@ SplatRecord swept_splat(PhotonRecord photon, float power_w, float mean, Footprin
     splat.x_range = vec2(photon.x_lo, photon.x_hi);
     splat.xi_half = xi_half;
     splat.inverse_sigma_xi = SQRT_HALF * reach / sigma;
+    splat.fan = cut ? vec2(0.0) : fan_of_splat(f, splat.along, splat.across, xi_half);
+    if (splat.fan != vec2(0.0)) {
+        // What is not drawn the rest has.
+        vec4 part = part_that_fans(splat.fan);
+        vec2 end = min(-part.xy, part.zw);
+        float whole = kept_by_cut(reach, max(sweep, 0.1 * sigma), sigma);
+        splat.amplitude *= 2.0 * whole / (whole + kept_by_cut(end.x * reach, max(sweep, 0.1 * sigma), sigma));
+        splat.amplitude *= 2.0 * kept / (kept + kept_by_cut(end.y * y_edge, box, s));
+    }
     splat.kind = cut ? 3u : 2u;
     flatten_lattice(splat, drawn, f, lattice_of(photon));
     return splat;
 }
 
 SplatRecord empty_splat() {
-    return SplatRecord(vec2(0.0), vec2(0.0), vec2(0.0), 0.0, 0.0, 0.0, 0.0, 0u, 0u, vec4(0.0), vec2(0.0), 0.0, 0.0, vec4(0.0), vec4(0.0), vec4(0.0));
+    return SplatRecord(vec2(0.0), vec2(0.0), vec2(0.0), 0.0, 0.0, 0.0, 0.0, 0u, 0u, vec4(0.0), vec2(0.0), 0.0, 0.0, vec4(0.0), vec4(0.0), vec4(0.0), vec2(0.0), vec2(0.0));
 }

@@ -8,9 +8,14 @@ layout(binding = 1) uniform usampler2D contact_words;
 flat in uint side;
 #endif
 flat in vec4 rect;
+#ifdef FANS
+smooth in vec3 at;
+smooth in vec2 wave;
+#else
 noperspective in vec3 at;
-flat in vec3 shape;
 noperspective in vec2 wave;
+#endif
+flat in vec3 shape;
 flat in vec3 ripple;
 #ifdef ONE_COLOUR
 flat in vec4 splat_colour[TARGETS];
@@ -22,7 +27,13 @@ layout(binding = 0) uniform sampler2DArray spectra;
 layout(location = 0) out vec4 deposited[TARGETS];
 
 void main() {
+#ifdef FANS
+    // A texel holds so much more of the splat where that is narrower: W times in either direction, and a plane's perspective once more.
+    float w = 1.0 / gl_FragCoord.w;
+    float share = gaussian_box_fast(at.x, shape.x * w) * w * w * flatness(wave, ripple);
+#else
     float share = gaussian_box_fast(at.x, shape.x) * flatness(wave, ripple);
+#endif
 #ifdef EDGE
     // Clip distances would do, but llvmpipe loses triangles that two of them cut.
     bvec4 within = bvec4(greaterThan(gl_FragCoord.xy, rect.xy), lessThan(gl_FragCoord.xy, rect.zw));

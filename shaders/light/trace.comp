@@ -10,6 +10,9 @@ layout(local_size_x = 64) in;
 #include "lib/medium.glsl"
 #include "lib/band.glsl"
 #include "lib/interface.glsl"
+#ifdef FOOTPRINTS
+#include "lib/fan.glsl"
+#endif
 #include "light/trace_records.glsl"
 #ifdef HAS_GRATING
 #include "lib/grating.glsl"
@@ -19,6 +22,8 @@ layout(local_size_x = 64) in;
 #include "lib/rough_surface.glsl"
 #endif
 
+// Change of W per spacing: more is no footprint.
+#define FAN_LIMIT 1e4
 // Narrower bands are not cut at total internal reflection.
 #define MIN_CUT_BAND 1e-4
 // A grating of up to so many orders sends each on as a whole lattice where it is met first.
@@ -107,8 +112,20 @@ void absorb(inout RayRecord ray, float distance, inout float absorbed_w)
 #include "light/trace_bands.glsl"
 #include "light/trace_rough.glsl"
 
+#ifdef FOOTPRINTS
+// Of the photon's footprint, per spacing of its own lattice.
+uint fan_where_it_landed(RayRecord ray, RayRecord start, Hit hit)
+{
+    vec2 way;
+    for (int c = 0; c < 2; ++c) way[c] = change_of_way(start.dposition[c].xyz, start.ddirection[c].xyz, ray.direction, hit.normal_g, hit.distance);
+    vec2 fan = fan_of_footprint(ray.dposition[0].xyz, ray.dposition[1].xyz, ray.ddirection[0].xyz, ray.ddirection[1].xyz, way, ray.direction, hit.normal_g);
+    fan *= ray.footprint_scale;
+    return is_within2(fan, FAN_LIMIT) ? packHalf2x16(fan) : 0u;
+}
+#endif
+
 // A photon on a receiver. The share that no specular event precedes the camera pass draws.
-void land(inout RayRecord ray, uint receiver, uint triangle, vec3 normal_g, uint slot, inout Outcome outcome)
+void land(inout RayRecord ray, RayRecord start, uint receiver, uint triangle, Hit hit, uint slot, inout Outcome outcome)
 {
     outcome.what |= ray.depth == 0u ? DIRECT : DEPOSITED;
     outcome.flux_w = carried_w(ray);
@@ -118,13 +135,18 @@ void land(inout RayRecord ray, uint receiver, uint triangle, vec3 normal_g, uint
     photon.flux_w = ray.flux_w;
     photon.dposition_ds = vec3(0.0);
     photon.dposition_dt = vec3(0.0);
+    photon.fan = 0u;
 #ifdef FOOTPRINTS
     photon.dposition_ds = ray.dposition[0].xyz * ray.footprint_scale;
     photon.dposition_dt = ray.dposition[1].xyz * ray.footprint_scale;
+    photon.fan = fan_where_it_landed(ray, start, hit);
 #endif
     uint lattice_bits = p.lattice_bits;
 #ifdef LOBE_COLUMNS
-    if (widen_by_lobe(ray, normal_g, photon.dposition_ds, photon.dposition_dt)) lattice_bits = 0u;
+    if (widen_by_lobe(ray, hit.normal_g, photon.dposition_ds, photon.dposition_dt)) {
+        lattice_bits = 0u;
+        photon.fan = 0u;
+    }
 #endif
     photon.x_lo = ray.x_lo;
     photon.x_hi = ray.x_hi;
@@ -140,7 +162,6 @@ void land(inout RayRecord ray, uint receiver, uint triangle, vec3 normal_g, uint
     photon.light_and_source = ray.light_and_source;
     photon.branch_key = ray.branch_key;
     photon.depth = ray.depth;
-    photon.cosine = abs(dot(ray.direction, normal_g));
 #if SPECTRAL_GROUPS > 0
     SPECTRAL_COPY
 #endif
@@ -508,7 +529,7 @@ void main()
     } else
 #endif
     if (kind == KIND_DIFFUSE) {
-        land(ray, thing.receiver, facet.source, hit.normal_g, k, outcome);
+        land(ray, start, thing.receiver, facet.source, hit, k, outcome);
     } else if (kind == KIND_BLACK) {
         outcome.what |= ABSORBED;
         outcome.flux_w = carried_w(ray);

@@ -54,9 +54,9 @@ def test_broad_footprints_leave_the_bands_as_they_are(gl: Context, monkeypatch: 
 def test_weak_branches_keep_their_lattices_where_that_costs_little(gl: Context) -> None:
     """Most photons of `prism_case` end on its slit; every ray of the ball's has weak branches."""
     slit, ball = prepared(gl, "prism_case"), prepared(gl, "ball")
-    for light, threshold in ((slit, pilot.KEPT_THRESHOLD), (ball, SPLIT_THRESHOLD)):
+    for light, threshold in ((slit, pilot.KEPT_THRESHOLDS[0]), (ball, pilot.KEPT_THRESHOLDS[-1])):
         assert light.trace.split_threshold == threshold
-    by_default, kept = next(iter(slit.pilots.values())).flights
+    by_default, kept, *_ = next(iter(slit.pilots.values())).flights
     assert by_default < kept <= pilot.MOST_MORE_FLIGHTS * by_default
     # Six pilots have traced the same rays, each of which flies once at least.
     assert by_default > slit.trace.rays_traced / 6
@@ -67,7 +67,7 @@ def test_weak_branches_that_the_queues_have_no_room_for_play_roulette(gl: Contex
     light = prepared(gl, "spectrometer")
     by_default, kept = (sum(pilot.flights[i] for pilot in light.pilots.values()) for i in range(2))
     assert kept < pilot.MOST_MORE_FLIGHTS * by_default
-    assert max(pilot.fullness for pilot in light.pilots.values()) > 1.0
+    assert max(pilot.fullness[0] for pilot in light.pilots.values()) > 1.0
     assert light.trace.split_threshold == SPLIT_THRESHOLD
 
 

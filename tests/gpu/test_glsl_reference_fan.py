@@ -1,0 +1,67 @@
+"""lib/fan.glsl against float64 and a closed form: light of a point meets a plane where footprints that fan out say."""
+
+from __future__ import annotations
+
+import numpy as np
+from spectrasplat.reference import optics
+from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
+
+COVERS = {
+    "fan.glsl": ("change_of_way", "longest_axis", "growth_of_side", "fan_of_footprint", "part_that_fans"),
+}
+LIBRARY = ["lib/fan.glsl"]
+COUNT = 2000
+
+
+def test_light_of_a_point_lands_where_its_footprint_says(gl) -> None:
+    """A point a way above a plane: directions d + s a + t b meet it exactly at (s side_s + t side_t) / W. Without W
+    places are off by up to their own distance."""
+    rng = np.random.default_rng(5)
+    normal = as_f32(optics.unit(rng.normal(size=(COUNT, 3))))
+    direction = optics.unit(rng.normal(size=(COUNT, 3)))
+    direction = as_f32(direction - optics.times(np.maximum(0.3 + optics.dot(direction, normal), 0.0), normal))
+    way = as_f32(np.exp(rng.uniform(-1.0, 1.0, COUNT)))
+    turns = as_f32(rng.normal(size=(2, COUNT, 3)))
+    body = """
+    vec3 zero = vec3(0.0);
+    vec2 change = vec2(change_of_way(zero, a, d, n, w), change_of_way(zero, b, d, n, w));
+    vec3 s = w * a + change.x * d, t = w * b + change.y * d;
+    vec2 axis = longest_axis(vec3(dot(s, s), dot(s, t), dot(t, t)));
+    fan = fan_of_footprint(s, t, a, b, change, d, n);
+    length_along = length(axis.x * s + axis.y * t);
+    """
+    inputs = {"n": normal, "d": direction, "w": way, "a": turns[0], "b": turns[1]}
+    got = evaluate(gl.ctx, LIBRARY, body, inputs, {"fan": "vec2", "length_along": "float"})
+    n, d, w, a, b = (np.asarray(x, float) for x in (normal, direction, way, *turns))
+    sides = []
+    for turn in (a, b):
+        moved = optics.times(w, turn)
+        sides.append(moved - optics.times(optics.dot(moved, n) / optics.dot(d, n), d))
+    longest = np.linalg.svd(np.stack(sides, axis=-1), compute_uv=False)[:, 0]
+    np.testing.assert_allclose(np.asarray(got["length_along"]).reshape(-1), longest, rtol=1e-4)
+    s, t = 0.1, -0.05
+    turned = d + s * a + t * b
+    landed = optics.times(w * optics.dot(d, n) / optics.dot(turned, n), turned) - optics.times(w, d)
+    divisor = 1.0 + np.asarray(got["fan"]) @ [s, t]
+    usable = divisor > 0.3
+    told = optics.times(1.0 / divisor, s * sides[0] + t * sides[1])
+    size = np.linalg.norm(landed, axis=1)
+    assert usable.mean() > 0.8
+    assert (np.linalg.norm(told - landed, axis=1) / size)[usable].max() < 2e-3
+    straight = s * sides[0] + t * sides[1]
+    assert np.median(np.linalg.norm(straight - landed, axis=1) / size) > 0.03
+
+
+def test_what_is_drawn_ends_before_the_horizon(gl) -> None:
+    rng = np.random.default_rng(6)
+    fan = rng.uniform(-3.0, 3.0, (COUNT, 2))
+    along = np.abs(fan[:, 0]) >= np.abs(fan[:, 1])
+    fan[along, 1] = np.clip(fan[along, 1], -0.05, 0.05)
+    fan[~along, 0] = np.clip(fan[~along, 0], -0.05, 0.05)
+    got = evaluate(gl.ctx, LIBRARY, "part = part_that_fans(fan);", {"fan": as_f32(fan)}, {"part": "vec4"})["part"]
+    part = np.asarray(got, float)
+    least = 1.0 + np.minimum(fan * part[:, :2], fan * part[:, 2:]).sum(axis=1)
+    assert least.min() > 0.15 - 1e-5
+    assert (part[:, 2:] >= 0.0).all() and (part[:, :2] <= 0.0).all()
+    small = np.abs(fan).sum(axis=1) < 0.8
+    np.testing.assert_array_equal(part[small], np.tile([-1.0, -1.0, 1.0, 1.0], (small.sum(), 1)))
