@@ -67,6 +67,8 @@ const float THIN_VARIANCE = 0.15;
 const float CUT = 3.0;
 // A footprint fans out where its width changes by more than the first over a standard deviation of its length; by the second at most.
 const float LEAST_FAN = 0.015;
+// Texels: the texel's own blur knows no perspective, and of shorter footprints it is most of what is drawn.
+const float LEAST_FANNED = 0.75;
 const float MOST_FAN = 3.0;
 // Splats of three texels' standard deviation at least go to a map with texels twice as wide.
 const float BROAD_VARIANCE = 9.0;

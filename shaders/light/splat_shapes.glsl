@@ -160,8 +160,8 @@ float throughput_of_windows(PhotonRecord photon, float reach, vec4 throughput, u
 // Change of W per unit of xi and of eta: what the splat's half extents are divided by at its ends. Along one of both, and so little over the spectrum
 // that none of that is left out.
 vec2 fan_of_splat(Footprint f, vec2 along, vec2 across, float xi_half) {
-    float change = length(f.fan) * sqrt(max(dot(f.axis_s, f.axis_s), dot(f.axis_t, f.axis_t)));
-    if (change < LEAST_FAN) return vec2(0.0);
+    float longer = sqrt(max(dot(f.axis_s, f.axis_s), dot(f.axis_t, f.axis_t))), change = length(f.fan) * longer;
+    if (change < LEAST_FAN || longer < LEAST_FANNED) return vec2(0.0);
     vec2 fan = min(1.0, MOST_FAN / change) * vec2(dot(f.fan, along), dot(f.fan, across));
     if (abs(fan.x) * xi_half > 0.8) fan *= 0.8 / (abs(fan.x) * xi_half);
     if (abs(fan.x) > abs(fan.y)) {

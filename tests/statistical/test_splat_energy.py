@@ -55,3 +55,22 @@ def test_ripple_over_the_grid_is_small(sample: np.ndarray) -> None:
 
 def test_the_mean_would_show_a_cut_that_is_not_given_back(sample: np.ndarray) -> None:
     assert abs((sample * 0.9973).mean() - 1.0) > BIAS_LIMIT
+
+
+def test_footprints_that_fan_out_keep_their_energy(gl) -> None:
+    """W changes by up to 0.3 a spacing, along the longer axis. 1,350 splats know their mean to about 0.05 %; while footprints
+    shorter than a texel fanned too, single ones were off by a fifth and the mean of 675 by 1 %."""
+    side, widest = 1024, (2.0, 4.0, 8.0)
+    rig = Rig(gl.ctx, FEATURES, size=(side, side))
+    rng = np.random.default_rng(12)
+    sums = {False: 0.0, True: 0.0}
+    for width in np.repeat(widest, 2):
+        records = random_splats(rng, float(width))
+        records["position"][:, :2] = rng.uniform(0.3 * side, 0.7 * side, (len(records), 2))
+        fan = np.zeros((len(records), 2), np.float16)
+        fan[:, 0] = rng.uniform(-0.3, 0.3, len(records))
+        for fans in sums:
+            records["fan"] = fan.view(np.uint32).reshape(-1) if fans else 0
+            sums[fans] += rig.draw(records)[..., 3].sum()
+    assert sums[True] != sums[False]
+    assert sums[True] / sums[False] == pytest.approx(1.0, abs=1.5e-3)
