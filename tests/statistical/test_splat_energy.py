@@ -58,8 +58,8 @@ def test_the_mean_would_show_a_cut_that_is_not_given_back(sample: np.ndarray) ->
 
 
 def test_footprints_that_fan_out_keep_their_energy(gl) -> None:
-    """W changes by up to 0.3 a spacing, along the longer axis. 1,350 splats know their mean to about 0.05 %; while footprints
-    shorter than a texel fanned too, single ones were off by a fifth and the mean of 675 by 1 %."""
+    """W changes by up to 0.3 a spacing, along the longer axis. 1,350 splats know their mean to about 0.05 %; while
+    footprints shorter than a texel fanned too, single ones were off by a fifth, the mean of 675 by 1 %."""
     side, widest = 1024, (2.0, 4.0, 8.0)
     rig = Rig(gl.ctx, FEATURES, size=(side, side))
     rng = np.random.default_rng(12)
