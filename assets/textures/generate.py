@@ -1,4 +1,4 @@
-"""Draws the shipped texture: a page of print, which shows what glass does to edges better than any pattern.
+"""Draws the shipped textures: a page of print, which shows what glass does to edges better than any pattern, and tiles.
 
 The words are our own; the letters are those of the font that Pillow brings (Aileron, CC0), so nothing is installed.
 Run from the project's folder: python assets/textures/generate.py
@@ -8,11 +8,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 HERE = Path(__file__).resolve().parent
 SIZE = 1024
 MARGIN = 64
+TILES, JOINT = 8, 1.5
+"""Along a side of the picture; half a joint's width, pixels."""
 HEADING_SIZE, TEXT_SIZE = 62, 37
 HEADING = "White light, bent"
 TEXT = (
@@ -44,6 +47,18 @@ def page() -> Image.Image:
     return image
 
 
+def tiles() -> Image.Image:
+    """TILES × TILES tiles of a pool, each a little another colour, with joints between them."""
+    random = np.random.default_rng(4)
+    colour = np.array([0.80, 0.93, 0.96]) + random.normal(0.0, 0.022, (TILES, TILES, 1)) * [1.0, 0.9, 0.8]
+    side = SIZE // (2 * TILES)
+    picture = np.kron(colour, np.ones((side, side, 1)))
+    place = (np.arange(side * TILES) + 0.5) % side
+    joint = np.minimum(place, side - place) < JOINT
+    picture[joint[:, None] | joint] = [0.55, 0.62, 0.64]
+    return Image.fromarray(np.round(255.0 * np.clip(picture, 0.0, 1.0)).astype(np.uint8))
+
+
 def broken(text: str, font: ImageFont.FreeTypeFont, width: float) -> list[str]:
     """`text` in lines no wider than `width` pixels."""
     lines = [""]
@@ -58,3 +73,4 @@ def broken(text: str, font: ImageFont.FreeTypeFont, width: float) -> list[str]:
 
 if __name__ == "__main__":
     page().save(HERE / "text.png", optimize=True)
+    tiles().save(HERE / "tiles.png", optimize=True)
