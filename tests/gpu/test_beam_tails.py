@@ -104,6 +104,7 @@ def coarse(light: LightPass) -> np.ndarray:
     return texels[:height, :width].reshape(height // 8, 8, width // 8, 8, 3).sum(axis=(1, 3))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("light", [BEAM, LAMP], ids=["parallel", "spot"])
 def test_photons_carry_what_beams_leave_in_a_scene_of_any_size(gl, tmp_path: Path, light: str) -> None:
     scene = stone(tmp_path, light)

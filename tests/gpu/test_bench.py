@@ -63,6 +63,7 @@ def test_a_rig_renders_what_render_does_again_and_again(gl: Any, prism: Scene) -
     assert budgets == sorted(set(budgets)) and 1 <= len(budgets) <= 4 and budgets[-1] >= 64
 
 
+@pytest.mark.slow
 def test_a_baseline_is_rendered_with_any_kernel(gl: Any, prism: Scene) -> None:
     """What a kernel blurs is gone with the next rendering, and only methods with a kernel to choose have any."""
     rig = MethodRig(gl, prism, "stochastic", WIDTH, HEIGHT)

@@ -92,6 +92,7 @@ WAYS = [
 wavelengths."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("method", "bands", "samples", "own"), WAYS, ids=[f"{way[0]}-{way[1]}" for way in WAYS])
 def test_methods_agree_with_random_wavelengths(
     gl, drawn, method: str, bands: int | None, samples: int, own: float

@@ -107,6 +107,7 @@ def test_the_reference_agrees_with_the_picture_and_stops_when_the_scene_changes(
     assert not comparison.is_stale and comparison.picture is None and comparison.is_busy
 
 
+@pytest.mark.slow
 def test_another_method_runs_beside_in_its_own_engine(
     gl, state: State, running: LiveEngine, comparison: Comparison
 ) -> None:

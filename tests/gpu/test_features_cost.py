@@ -159,6 +159,7 @@ def test_forcing_a_feature_in_leaves_the_map_as_it_is(gl: Context, tmp_path: Pat
     released(light)
 
 
+@pytest.mark.slow
 def test_another_map_is_noticed(gl: Context, tmp_path: Path) -> None:
     """The mutant: glass left out of the forced variant's absorption, so that the comparison has something to find."""
     light = begun(gl, scene_of(tmp_path, "nested"))

@@ -71,6 +71,7 @@ def test_below_a_lambertian_lamp(gl, tmp_path: Path) -> None:
     np.testing.assert_allclose(rgb709_to_xyz(shown.rgb.astype(float))[..., 1], expected, rtol=2e-3)
 
 
+@pytest.mark.slow
 def test_a_turn_about_the_axis_is_a_turn_of_the_c0_plane(gl, tmp_path: Path) -> None:
     base = lamp(tmp_path, POWER, lopsided(), position=PLACE)
     c, s = np.cos(np.radians(40.0)), np.sin(np.radians(40.0))

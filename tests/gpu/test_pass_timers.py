@@ -75,6 +75,7 @@ def test_real_queries_are_read(gl, monkeypatch) -> None:
     target.release()
 
 
+@pytest.mark.slow
 def test_every_pass_of_a_frame_is_timed(monkeypatch) -> None:
     """By whatever the queries say: beams, photons' tracing and splats, the environment's light, the camera."""
     monkeypatch.setattr(pass_timers.PassTimers, "_tells_truth", lambda self: True)

@@ -192,6 +192,7 @@ def test_a_pixel_shows_its_own_texels_only(gl, samples: int) -> None:
     assert placement.dtype == PLACEMENT.dtype
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", ["prism", "ball"])
 def test_pictures_are_those_of_fine_maps_along_the_plane(gl, monkeypatch: pytest.MonkeyPatch, scene: str) -> None:
     """Beams, and photons whose footprints are bent by the view; blurred over blocks, since filters differ."""

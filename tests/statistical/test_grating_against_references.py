@@ -88,6 +88,7 @@ def test_the_camera_sees_the_slits_spectra() -> None:
     assert error(other, reference) > 0.08
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("reflects", [False, True])
 def test_light_lands_in_the_same_spectra(reflects: bool) -> None:
     scene = spectra_on_a_wall(reflects=reflects)
