@@ -52,6 +52,7 @@ def draw(gl, animation, sink, stop_after: float = 2.0) -> None:
     work.close()
 
 
+@pytest.mark.slow
 def test_a_turntable_traces_once_and_its_first_frame_is_the_picture(gl, stage: Stage) -> None:
     made = turntable(stage, 4, 24.0)
     renderer = FrameRenderer(gl, SMALL, [made.frame(i) for i in range(4)])

@@ -370,6 +370,7 @@ def test_inside_dispersive_glass_against_the_slow_tracer(gl: Context) -> None:
     assert matched > 60
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lines", [1500.0, 1700.0, 2000.0, 2400.0])
 def test_the_camera_sees_an_order_end_at_its_wavelength(gl: Context, lines: float) -> None:
     """White all round, seen straight through order 1: all up to λ = Λ, nothing beyond."""

@@ -80,6 +80,7 @@ def test_glass_is_seen_through_all_of_the_lens(gl) -> None:
     assert relative(picture, expected) < 0.05
 
 
+@pytest.mark.slow
 def test_more_samples_leave_less(gl) -> None:
     """An edge out of focus, of a picture in a few samples more than in one launch of many."""
     expected = reference(VIEW, things(), 512)

@@ -54,6 +54,7 @@ def picture(backend: str, folder: Path) -> np.ndarray:
     return np.load(output)
 
 
+@pytest.mark.slow
 def test_osmesa_draws_what_egl_draws(tmp_path: Path) -> None:
     try:
         osmesa.load_library()

@@ -190,6 +190,7 @@ def test_case_notices_a_mistake_in_a_shader(gl, monkeypatch: pytest.MonkeyPatch,
     assert said in broken(CASES[name], gl)
 
 
+@pytest.mark.slow
 def test_glass_of_other_dispersion_is_noticed(gl, monkeypatch: pytest.MonkeyPatch) -> None:
     """V_d 20 seen, V_d 8 in the reference."""
     true_reference = camera_glass_cases.render_camera_reference

@@ -76,6 +76,7 @@ def test_a_finished_reference_builds_nothing(scene: Scene, tmp_path: Path, monke
     assert (again.caustic_photons, again.caustic_relmse) == (first.caustic_photons, first.caustic_relmse)
 
 
+@pytest.mark.slow
 def test_more_samples_look_up_the_stored_caustic(scene: Scene, tmp_path: Path, rounds: list[int]) -> None:
     cached_camera_reference(scene, *SIZE, samples=16, caustic=PLAN, folder=tmp_path)
     assert rounds
