@@ -160,7 +160,7 @@ def test_seconds_are_those_of_the_whole_picture(gl: Context, name: str, layer: s
         layer = f"map:{next(o.name for o in scene.objects if o.material.receives)}"
     told: list[float] = []
     settings = RenderSettings(width=96, height=54, seconds=5.0, layer=layer)
-    # Programs are compiled before, as in a second rendering of a scene: also those of splats that few photons do not have.
+    # Programs are compiled before, as in a second rendering of a scene, those of splats that few photons lack too.
     render(scene, replace(settings, seconds=None, photons=100_000, spp=1), context=gl)
     started = time.perf_counter()
     result = render(scene, settings, progress=lambda share, text: told.append(share), context=gl)
