@@ -17,10 +17,12 @@ from .search import (
     SUM_DEPOSITED,
     SUM_HANDED,
     SUM_LEAVES,
+    band_power,
     flux_of,
     halve_space,
     is_curved,
     medium,
+    passes_at,
     power_as,
     recentre,
 )
@@ -31,8 +33,61 @@ _COLOURED = 0.02
 """The same where absorption has a colour."""
 _STEEP = 0.3
 """A relative change of the density over a leaf that is no longer linear."""
+_CROOKED = 0.25
+"""Of a polygon's width: what its edges miss where it cannot be halved and yet keeps its area nearly."""
 _STRAY = 0.1
 """Of the tolerance: how far rays may leave their parabola over the band (what they see is swept over many pixels)."""
+
+
+@part
+def outline_of(beam, corner, place, work):
+    """Area and length of the polygon just laid, at one of its places, and the row of `corner` where that begins."""
+    begin = work.count[2]
+    for a in range(first_place(beam), place):
+        begin += beam.corners[a]
+    area = length = 0.0
+    for c in range(begin + 1, begin + beam.corners[place]):
+        au, av = corner[c, 0] - corner[begin, 0], corner[c, 1] - corner[begin, 1]
+        length = max(length, np.sqrt(au * au + av * av))
+        if c > begin + 1:
+            bu, bv = corner[c - 1, 0] - corner[begin, 0], corner[c - 1, 1] - corner[begin, 1]
+            area += 0.5 * (au * bv - av * bu)
+    return abs(area), length, begin
+
+
+@part
+def even_out(beam, new, corner, work):
+    """Let the leaf just laid have the same density all over at each of its places, with as much flux as the beam."""
+    new.slope[0] = new.slope[1] = 0.0
+    for a in range(first_place(beam), last_place(beam)):
+        area, _, _ = outline_of(beam, corner, a, work)
+        new.density[a] = passes_at(beam, beam, a) * beam.boost * work.density / area if area > 0.0 else 0.0
+    if first_place(beam) > 0:
+        new.density[0] = new.density[2] = new.density[1]
+
+
+@part
+def stand_still(beam, new, edge, corner, tables, work):
+    """Let the leaf just laid lie, with all of its flux, where the strongest of its three places does: what grazes lands
+    at the horizon for some of its wavelengths, and lines mixed from such ends would hold any area."""
+    chosen, most = 1, 0.0
+    for a in range(3):
+        if passes_at(beam, beam, a) > most:
+            chosen, most = a, passes_at(beam, beam, a)
+    if most * band_power(beam, tables, work) <= 0.0:
+        return
+    for ln in range(new.head[6]):
+        line = edge[work.count[1] + ln].line
+        for k in range(3):
+            line[0, k] = line[1, k] = line[2, k] = line[chosen, k]
+    _, _, chosen_first = outline_of(beam, corner, chosen, work)
+    for c in range(beam.corners[chosen]):
+        for k in range(2):
+            corner[work.count[2] + c, k] = corner[chosen_first + c, k]
+    new.head[7] = beam.corners[chosen]
+    density = new.density[chosen] * flux_of(beam, tables, work) / (most * band_power(beam, tables, work))
+    for a in range(3):
+        new.density[a] = density
 
 
 @part
@@ -85,6 +140,13 @@ def end(nodes, facets, solids, tables, sources, leaf, edge, corner, work):
     if work.sources > 1:
         soften(nodes, kind, facets, solids, tables, sources, leaf, edge, corner, work)
     anchor_density(hand, new, work)
+    # What is too faint to be halved and yet neither straight nor even must hold its own flux at least.
+    area, length, _ = outline_of(hand, corner, 1, work)
+    is_crooked = first_place(hand) == 0 and bent > tolerance and bent * length > _CROOKED * area
+    if kind == LEAF_RECEIVER and (steepest > 1.0 or is_crooked):
+        even_out(hand, new, corner, work)
+    if kind == LEAF_RECEIVER and is_crooked:
+        stand_still(hand, new, edge, corner, tables, work)
     flux = flux_of(hand, tables, work)
     new.flux = flux
     work.count[0] += 1

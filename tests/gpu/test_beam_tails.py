@@ -109,7 +109,7 @@ def coarse(light: LightPass) -> np.ndarray:
 def test_photons_carry_what_beams_leave_in_a_scene_of_any_size(gl, tmp_path: Path, light: str) -> None:
     scene = stone(tmp_path, light)
     with passed(gl, scene, "stochastic", photons=4 * PHOTONS) as alone:
-        share = landing(alone)
+        share, in_map = landing(alone), landing(alone) * held(alone)
     with passed(gl, scene) as by_beams:
         assert by_beams.only_beams and by_beams.trace.rays_traced > PHOTONS / 4
         stats, tally = by_beams.beam_stats, by_beams.stats.tally
@@ -118,14 +118,15 @@ def test_photons_carry_what_beams_leave_in_a_scene_of_any_size(gl, tmp_path: Pat
         assert abs(tally.handed) < 0.01 * stats.handed_w * PHOTONS
         assert tally.roulette == pytest.approx(0.0, abs=2e-3 * tally.emitted)
         assert landing(by_beams) == pytest.approx(share, rel=5e-3)
-        assert held(by_beams) == pytest.approx(1.0, abs=0.01)
+        # What grazes the table lands beyond the map of either.
+        assert landing(by_beams) * held(by_beams) == pytest.approx(in_map, rel=6e-3)
 
 
 def test_more_facets_ahead_than_a_flight_keeps(gl) -> None:
     """The light is halved until each part has few enough: else all but 192 of some 500 facets would stay dark."""
     scene = scene_of(convex_stone(1000))
     with passed(gl, scene, "stochastic", photons=4 * PHOTONS) as alone:
-        share = landing(alone)
+        share, in_map = landing(alone), landing(alone) * held(alone)
     with passed(gl, scene) as by_beams:
         assert by_beams.only_beams and landing(by_beams) == pytest.approx(share, rel=5e-3)
         # The map of a layer leaves out a hundredth of the light at each side.

@@ -193,7 +193,10 @@ def test_units_of_length_by_powers_of_two_change_nothing(gl, original: np.ndarra
 @pytest.mark.slow
 def test_the_origin_may_lie_anywhere(gl, original: np.ndarray) -> None:
     far = moved(scene(), placed(offset=(1024.0, -2048.0, 512.0)))
-    assert difference(picture(gl, far), original) < EXACT
+    # As above: which slivers of beams are left to photons is rounding.
+    assert difference(picture(gl, far), original) < 2e-4
+    by_photons = [picture(gl, s, method="srd-photons") for s in (far, scene())]
+    assert difference(*by_photons) < EXACT
 
 
 @pytest.mark.slow
@@ -293,13 +296,24 @@ def test_two_halves_of_a_light_are_the_light(gl, original: np.ndarray) -> None:
     assert after.sum() == pytest.approx(original.sum(), rel=ENERGY)
 
 
+def test_beams_throw_as_much_as_photons_where_light_grazes(gl) -> None:
+    """Some of the spot's light leaves the prism all but along the face, and lands at the floor's horizon: beams of it
+    that are too faint to be halved held a thousand times their flux (the map 40 % more blue)."""
+    by_beams, by_photons = (
+        picture(gl, scene(), layer="map:floor", width=48, height=48, method=method).mean(axis=(0, 1))
+        for method in ("srd", "srd-photons")
+    )
+    np.testing.assert_allclose(by_beams, by_photons, rtol=0.025)
+
+
 @pytest.mark.slow
 def test_resolution_of_a_map_does_not_change_what_it_holds(gl) -> None:
     """The window is the same, so the mean of its irradiance is; what blurs over its rim is all that may differ."""
     coarse, fine = (
         picture(gl, scene(), layer="map:floor", width=side, height=side).mean(axis=(0, 1)) for side in (48, 160)
     )
-    np.testing.assert_allclose(fine, coarse, rtol=3e-3)
+    # Measured: 0.003 (0.009 with 24 texels, 0.002 with 96).
+    np.testing.assert_allclose(fine, coarse, rtol=5e-3)
 
 
 @pytest.mark.slow
