@@ -125,6 +125,8 @@ class Features:
     """The air scatters: the camera sees light on its way (`passes.haze`)."""
     flights: bool = False
     """Where rays fly outside glass is recorded: of photons that are traced for haze alone."""
+    landing_cuts: bool = False
+    """Of one band some wavelengths may meet another surface than its anchor does."""
     rough: bool = False
     """Some glass has a ground surface, whose microfacets turn paths by chance."""
 
@@ -146,6 +148,7 @@ class Features:
             "FOOTPRINTS": self.footprints,
             "POINT_SPECTRUM": self.point_spectrum,
             "BAND_CUTS": self.band_cuts,
+            "LANDING_CUTS": self.landing_cuts,
             "HAS_DIELECTRIC": self.dielectrics,
             "HAS_MIRROR": self.mirrors,
             "HAS_GRATING": self.gratings,
@@ -207,6 +210,10 @@ class Features:
             random_wavelength=random,
             even_wavelengths=settings.method == "stochastic-even",
             band_cuts=groups > 0,
+            landing_cuts=groups > 0
+            and footprints
+            and bool(dielectrics)
+            and sum(not o.material.is_specular for o in scene.objects) > 1,
             dielectrics=bool(dielectrics),
             mirrors=any(o.material.is_mirror for o in scene.objects),
             gratings=any(o.material.is_grating for o in scene.objects),

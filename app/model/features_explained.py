@@ -55,6 +55,11 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
             "total internal reflection may cut a band" if features.band_cuts else "no band to cut",
         ),
         (
+            "landing cuts",
+            features.landing_cuts,
+            "a band may land on several surfaces" if features.landing_cuts else "there is one surface to land on",
+        ),
+        (
             "spatial columns",
             features.footprints,
             "footprints are anisotropic" if features.footprints else "the method splats single texels",

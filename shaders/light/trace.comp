@@ -110,6 +110,7 @@ void absorb(inout RayRecord ray, float distance, inout float absorbed_w)
 #endif
 
 #include "light/trace_bands.glsl"
+#include "light/trace_landing.glsl"
 #include "light/trace_rough.glsl"
 
 #ifdef FOOTPRINTS
@@ -207,8 +208,8 @@ void send_on(inout RayRecord child, Deflection turned, vec3 share, inout Outcome
 #include "light/trace_grating.glsl"
 
 // Each child is stored in one place, whichever event made it: where every branch is executed, every
-// store costs even when no ray takes it.
-void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint kind, uint weight_row, uint slot, inout Outcome outcome)
+// store costs even when no ray takes it. `border`: where the band is cut before it lands; negative: nowhere.
+void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint kind, uint weight_row, float border, uint slot, inout Outcome outcome)
 {
     bool entering = dot(ray.direction, hit.normal_g) < 0.0;
     outcome.what |= frame.refused != 0u ? FELL_NORMAL : 0u;
@@ -315,7 +316,7 @@ void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint k
     refracted_share = stay ? common_share(ray, 1.0 - reflectance.y, 1.0 - companion_reflectance) : 1.0 - reflectance.y;
 #endif
 #ifdef BAND_CUTS
-    float onset = -1.0, at = splits ? cut_of_band(ray, start, frame, hit.distance, boundary, cosine2, onset) : -1.0, below = 0.0;
+    float onset = -1.0, at = splits ? cut_of_band(ray, start, frame, hit.distance, boundary, cosine2, onset) : border, below = 0.0;
     if (at >= 0.0) {
         // Back to the start of the flight.
         splits = false;
@@ -492,7 +493,12 @@ void main()
 
     RayOrigin origin = RayOrigin(ray.last_primitive, ray.last_object, uint((ray.flags & FLAG_INSIDE) != 0u), ray.inside_mask);
     Hit hit;
+    float border = -1.0;
+#ifdef LANDING_CUTS
+    bool met = meet_with_band(ray, origin, hit, border);
+#else
     bool met = intersect_closest(ray.position, ray.direction, FAR_DISTANCE, origin, hit);
+#endif
 #ifdef LOOPS_MAY_END
     // llvmpipe ends every loop of an invocation once they have run 65,535 rounds together, and goes on with what there is.
     uint rounds = 0u;
@@ -528,20 +534,20 @@ void main()
         outcome = Outcome(LEFT_TO_BEAMS, carried_w(ray), 0.0, 0.0);
     } else
 #endif
-    if (kind == KIND_DIFFUSE) {
+    if (kind == KIND_DIFFUSE && border < 0.0) {
         land(ray, start, thing.receiver, facet.source, hit, k, outcome);
-    } else if (kind == KIND_BLACK) {
+    } else if (kind == KIND_BLACK && border < 0.0) {
         outcome.what |= ABSORBED;
         outcome.flux_w = carried_w(ray);
     } else if (kind == NONE) {
         // A ray that leaves the scene from inside a solid slipped through a crack.
         outcome.what |= is_inside(medium_stack(ray)) ? LOST_NUMERIC : ESCAPED;
         outcome.flux_w = carried_w(ray);
-    } else if (ray.depth >= p.max_depth) {
+    } else if (ray.depth >= p.max_depth && border < 0.0) {
         outcome.what |= LOST_DEPTH;
         outcome.flux_w = carried_w(ray);
     } else {
-        scatter(ray, start, hit, shading_frame(hit, facet, ray.direction), kind, thing.weight_row, k, outcome);
+        scatter(ray, start, hit, shading_frame(hit, facet, ray.direction), kind, thing.weight_row, border, k, outcome);
     }
 #ifdef FLIGHTS
 #ifdef BAND_CUTS

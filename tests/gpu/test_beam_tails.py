@@ -126,7 +126,7 @@ def test_more_facets_ahead_than_a_flight_keeps(gl) -> None:
     """The light is halved until each part has few enough: else all but 192 of some 500 facets would stay dark."""
     scene = scene_of(convex_stone(1000))
     with passed(gl, scene, "stochastic", photons=4 * PHOTONS) as alone:
-        share, in_map = landing(alone), landing(alone) * held(alone)
+        share = landing(alone)
     with passed(gl, scene) as by_beams:
         assert by_beams.only_beams and landing(by_beams) == pytest.approx(share, rel=5e-3)
         # The map of a layer leaves out a hundredth of the light at each side.

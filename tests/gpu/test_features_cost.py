@@ -94,6 +94,7 @@ def released(light: LightPass) -> None:
                 "spectral columns",
                 "weights over the band",
                 "band cuts",
+                "landing cuts",
                 "absorption",
                 "medium stack",
                 "spectral bins",

@@ -10,10 +10,14 @@ tolerance stands beside a mutant: the scene with one thing not moved along diffe
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
+from spectrasplat.model.features import Features
 from spectrasplat.model.geometry.mesh import Mesh, make_mesh
+from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.lights import CollimatedLight, SpotLight
 from spectrasplat.model.lights.light import made
 from spectrasplat.model.optics.spectrum import Spectrum, illuminant
@@ -304,6 +308,54 @@ def test_beams_throw_as_much_as_photons_where_light_grazes(gl) -> None:
         for method in ("srd", "srd-photons")
     )
     np.testing.assert_allclose(by_beams, by_photons, rtol=0.025)
+
+
+BALL = """
+[camera]
+position = [0.0, -5.0, 4.0]
+target = [0.6, 0.0, 0.0]
+[[lights]]
+kind = "collimated"
+position = [-3.0, 0.0, 4.0]
+target = [0.0, 0.0, 0.6]
+radius = 0.45
+[[objects]]
+shape = "sphere"
+radius = 0.5
+triangles = 5120
+glass = "N-SF66"
+position = [0.0, 0.0, 0.6]
+"""
+
+
+def ball_over(folder: Path, *borders: float) -> Scene:
+    """A ball over a floor that is one object between any two `borders`."""
+    strips = [
+        f"""
+[[objects]]
+name = "strip {i}"
+shape = "inline"
+vertices = [[{lo}, -6.0, 0.0], [{hi}, -6.0, 0.0], [{hi}, 6.0, 0.0], [{lo}, 6.0, 0.0]]
+triangles = [[0, 1, 2], [0, 2, 3]]
+material = "diffuse"
+"""
+        for i, (lo, hi) in enumerate(pairwise((-6.0, *borders, 6.0)))
+    ]
+    file = folder / f"{len(borders)}.toml"
+    file.write_text(BALL + "".join(strips))
+    return load_scene(file)
+
+
+def test_a_floor_may_be_several_objects(gl, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a band that lands on two of them each gets its own part: else either lacks colours beside the border. What is
+    left to miss are footprints that reach over it."""
+    strips = 0.8, 0.95, 1.1, 1.25
+    whole = picture(gl, ball_over(tmp_path)).sum(axis=(0, 1))
+    np.testing.assert_allclose(picture(gl, ball_over(tmp_path, *strips)).sum(axis=(0, 1)), whole, rtol=0.02)
+    of = Features.of
+    monkeypatch.setattr(Features, "of", staticmethod(lambda *asked: replace(of(*asked), landing_cuts=False)))
+    uncut = picture(gl, ball_over(tmp_path, *strips)).sum(axis=(0, 1))
+    assert np.all(uncut < [0.96, 0.98, 0.985] * whole)
 
 
 @pytest.mark.slow

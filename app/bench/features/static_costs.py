@@ -83,6 +83,7 @@ def static_costs(scene: Scene, features: Features) -> dict[str, str]:
         ),
         "weights over the band": (features.spectral_weights, "Fresnel and indices at 3 wavelengths instead of 1"),
         "band cuts": (features.band_cuts, "one program more; a cut ray becomes two"),
+        "landing cuts": (features.landing_cuts, "two rays more a landing; a cut ray becomes two"),
         "spatial columns": (features.footprints, f"{sizes.ray - unspatial.ray} B a ray"),
         "refraction": (features.dielectrics, f"{size_words(row * len(glasses))} of indices; two children a surface"),
         "polarisation": (features.polarised, f"{sizes.ray - unpolarised.ray} B a ray"),

@@ -41,6 +41,7 @@ FEATURE_SYMBOLS: dict[str, tuple[str, ...]] = {
         "is_cut",
         "energy_below",
     ),
+    "landing cuts": ("meet_with_band", "lands_broadly"),
     "spatial columns": (
         r"ray\.dposition\[c\]\.xyz = transfer_column",
         r"photon\.dposition_ds = ray",

@@ -77,6 +77,9 @@ def trials(scene: Scene, features: Features) -> list[Trial]:
     return found
 
 
+_OF_BANDS = "spectral columns", "weights over the band", "band cuts", "landing cuts"
+
+
 def _dispersion(scene: Scene, base: Features) -> Trial:
     included = base.spectral_groups > 0
     plain = replace(
@@ -84,6 +87,7 @@ def _dispersion(scene: Scene, base: Features) -> Trial:
         spectral_groups=0,
         merged_groups=False,
         band_cuts=False,
+        landing_cuts=False,
         spectral_weights=(base.spectral_weights and not included) or base.absorption,
     )
     forced = base if included else replace(base, spectral_groups=1, band_cuts=True, spectral_weights=True)
@@ -105,7 +109,7 @@ def _pair(name: str, included: bool, scene: Scene, base: Features) -> tuple[Vari
 
 
 def _left_out(name: str, scene: Scene, base: Features, asked: Variant) -> tuple[Variant | None, Variant | None, str]:
-    uncut = replace(base, band_cuts=False)
+    uncut = replace(base, band_cuts=False, landing_cuts=False)
     plain = replace(uncut, spectral_groups=0, merged_groups=False)
     match name:
         case "spectral columns":
@@ -120,6 +124,12 @@ def _left_out(name: str, scene: Scene, base: Features, asked: Variant) -> tuple[
             )
         case "band cuts":
             return asked, Variant(scene, uncut), ""
+        case "landing cuts":
+            return (
+                asked,
+                Variant(scene, replace(base, landing_cuts=False)),
+                "without it borders have colours",
+            )
         case "spatial columns":
             bare = replace(plain, footprints=False, normal_derivatives=False)
             return (
@@ -181,7 +191,7 @@ def _left_out(name: str, scene: Scene, base: Features, asked: Variant) -> tuple[
 def _forced_in(name: str, scene: Scene, base: Features, asked: Variant) -> tuple[Variant | None, Variant | None, str]:
     columns = replace(base, spectral_groups=1, spectral_weights=True)
     match name:
-        case _ if base.point_spectrum and name in ("spectral columns", "weights over the band", "band cuts"):
+        case _ if base.point_spectrum and name in _OF_BANDS:
             return None, None, "cannot be forced in: photons have no band"
         case "spectral columns":
             return (
@@ -196,6 +206,13 @@ def _forced_in(name: str, scene: Scene, base: Features, asked: Variant) -> tuple
                 Variant(scene, replace(columns, band_cuts=True)),
                 Variant(scene, columns),
                 "both with a column, which cuts need",
+            )
+        case "landing cuts":
+            cut = replace(columns, band_cuts=True)
+            return (
+                Variant(scene, replace(cut, landing_cuts=True)),
+                Variant(scene, cut),
+                "both with a column and band cuts, which it needs",
             )
         case "refraction":
             return Variant(scene, replace(base, dielectrics=True)), asked, ""
