@@ -150,7 +150,10 @@ class Gallery:
 def _shipped_picture(scene: Path) -> Path:
     """The picture that comes with a shipped scene; perhaps there is none."""
     assets = assets_dir()
-    return assets / "gallery" / f"{scene.stem}.png" if scene.parent == assets / "scenes" else Path()
+    if scene.parent != assets / "scenes":
+        return Path()
+    photograph = assets / "gallery" / f"{scene.stem}.jpg"
+    return photograph if photograph.exists() else photograph.with_suffix(".png")
 
 
 def _entry(name: str, path: Path) -> SceneEntry:
