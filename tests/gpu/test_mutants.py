@@ -36,6 +36,12 @@ class Mutant:
 
 
 MUTANTS = {
+    "bands that land on several surfaces left whole": Mutant(
+        "light/trace_landing.glsl",
+        "border = end > 3u ? clear_cut(ray, ray, x, hit.distance) : -1.0;",
+        "border = -1.0;",
+        "gpu/test_invariance.py::test_a_floor_may_be_several_objects",
+    ),
     "survivor's boost dropped from throughput": Mutant(
         "light/roulette.glsl", "ray.throughput *= boost;", "", f"{_BALANCE}[prism]"
     ),
@@ -59,7 +65,7 @@ MUTANTS = {
         "gpu/test_emission_lattice.py::test_splats_about_a_lattice_add_up_to_an_even_plane[0]",
     ),
     "what is refracted was reflected as well": Mutant(
-        "light/trace.comp",
+        "light/trace_scatter.glsl",
         "send_on(child, refracted, 1.0 - reflectance, outcome);",
         "send_on(child, refracted, vec3(1.0), outcome);",
         f"{_BALANCE}[prism]",
@@ -89,7 +95,7 @@ MUTANTS = {
         "light/trace.comp", "exp(-alpha * distance)", "vec3(exp(-alpha.y * distance))", f"{_PATHS}[absorption]"
     ),
     "grey mirror": Mutant(
-        "light/trace.comp",
+        "light/trace_scatter.glsl",
         "send_on(child, reflected, kept, outcome)",
         "send_on(child, reflected, kept.yyy, outcome)",
         f"{_PATHS}[coloured mirror]",

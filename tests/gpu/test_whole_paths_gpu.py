@@ -206,7 +206,7 @@ MUTANTS = {
         "nested, the outer decides",
     ),
     "grey mirror": (
-        "light/trace.comp",
+        "light/trace_scatter.glsl",
         "send_on(child, reflected, kept, outcome)",
         "send_on(child, reflected, kept.yyy, outcome)",
         "coloured mirror",
