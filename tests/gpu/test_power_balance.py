@@ -95,4 +95,4 @@ def test_the_balance_notices_a_picture_that_lost_power(
 ) -> None:
     mutate(monkeypatch, tmp_path, file, old, new)
     found = balance(gl, "prism")
-    assert abs(getattr(found, noticed)) > (0.05 if "boost" in old else 1e-3), found
+    assert abs(getattr(found, noticed)) > (0.01 if "boost" in old else 1e-3), found
