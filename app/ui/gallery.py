@@ -33,6 +33,19 @@ SIZE = (320, 180)
 PHOTONS = "400k"
 PATIENCE_S = 120.0
 FOLDER = "thumbnails"
+BEST = (
+    "default",
+    "brilliant",
+    "crystal_ball",
+    "wine_glass",
+    "prism",
+    "brilliant_studio",
+    "spectrum",
+    "lens_text",
+    "water",
+    "ripples",
+)
+"""What the start page begins with: by name it would begin with a grey achromat, and first cards are what is clicked."""
 
 Render = Callable[[Path, Path], "subprocess.Popen[bytes]"]
 
@@ -145,6 +158,12 @@ class Gallery:
             texture.release()
         self._textures.clear()
         self._waiting.clear()
+
+
+def best_first(scenes: Mapping[str, Path]) -> dict[str, Path]:
+    """`scenes`, those of `BEST` first; the rest in the order they come in."""
+    known = [name for name in BEST if name in scenes]
+    return {name: scenes[name] for name in (*known, *(name for name in scenes if name not in BEST))}
 
 
 def _shipped_picture(scene: Path) -> Path:

@@ -9,8 +9,9 @@ from pathlib import Path
 
 import pytest
 from PIL import Image
+from spectrasplat.base.paths import shipped_scenes
 from spectrasplat.gpu.context import Context
-from spectrasplat.ui.gallery import Gallery
+from spectrasplat.ui.gallery import BEST, Gallery, best_first
 
 MAKE = "import sys; from PIL import Image; Image.new('RGB', (32, 18), (255, 0, 0)).save(sys.argv[1])"
 
@@ -49,6 +50,14 @@ def test_titles_and_descriptions_come_from_the_files(gl: Context, tmp_path: Path
         ("two", "", None),
     ]
     gallery.release()
+
+
+def test_the_page_begins_with_the_best_scenes_and_loses_none() -> None:
+    scenes = shipped_scenes()
+    ordered = best_first(scenes)
+    assert tuple(ordered)[: len(BEST)] == BEST
+    assert ordered == scenes
+    assert list(ordered)[len(BEST) :] == sorted(set(scenes) - set(BEST))
 
 
 def test_thumbnails_are_rendered_once_and_again_when_the_scene_changes(
@@ -106,7 +115,6 @@ def test_a_pause_ends_the_process_and_begins_it_again_later(
 
 @pytest.mark.slow
 def test_a_shipped_scene_really_gets_one(gl: Context, tmp_path: Path) -> None:
-    from spectrasplat.base.paths import shipped_scenes
 
     gallery = Gallery(gl, tmp_path, {"prism": shipped_scenes()["prism"]})
     while gallery.is_busy:

@@ -8,7 +8,7 @@ from contextlib import suppress
 from typing import Any
 
 import tomlkit
-from tomlkit.items import AoT, Item, Table
+from tomlkit.items import AoT, InlineTable, Item, Table
 
 
 def toml_text(values: Mapping[str, Any], before: str = "") -> str:
@@ -38,7 +38,8 @@ def _update(table: Any, values: Mapping[str, Any], depth: int = 0) -> None:
         old = table.get(key)
         if old is not None and old.unwrap() == value:
             continue
-        if isinstance(value, Mapping) and isinstance(old, Table):
+        # In place in braces too: written anew they would lose the blanks that somebody put in them.
+        if isinstance(value, Mapping) and isinstance(old, Table | InlineTable):
             _update(old, value, depth + 1)
         elif isinstance(old, AoT) and len(old) == len(value):
             for entry, wanted in zip(old, value, strict=True):
