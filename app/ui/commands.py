@@ -13,6 +13,7 @@ from functools import partial
 from ..edit import requests
 from ..edit.state import State, Tool
 from . import layout, view_commands
+from .open_panels import set_open
 from .panels import dialogs
 from .view_model import ViewModel
 
@@ -83,11 +84,11 @@ def _toggle_physical(state: State, _view_model: ViewModel) -> State:
 
 def _open_panel(name: str, state: State, _view_model: ViewModel) -> State:
     layout.raise_panel(name)
-    return state.with_panels(**{name: True})
+    return set_open(state, name, True)
 
 
 def _toggle_panel(name: str, state: State, _view_model: ViewModel) -> State:
-    return state.with_panels(**{name: not getattr(state.preferences.panels, name)})
+    return set_open(state, name, not getattr(state.preferences.panels, name))
 
 
 def _is_object(state: State, _view_model: ViewModel) -> bool:

@@ -287,4 +287,5 @@ class Session:
 
 def _first_state(scene: Scene, settings: Settings, welcome: bool) -> State:
     state = State(scene=scene, camera=scene.camera, preferences=settings.preferences)
-    return state.with_panels(start_page=welcome)
+    # Opening Compare begins a second picture, which nobody asked for at a start.
+    return state.with_panels(start_page=welcome, compare=False)

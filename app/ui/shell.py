@@ -13,6 +13,7 @@ from imgui_bundle import imgui
 from ..edit.state import Panels, State
 from . import item_rects, layout, shortcuts, theme
 from .layout import Docked, Place
+from .open_panels import set_open
 from .panels import (
     about,
     dialogs,
@@ -157,4 +158,4 @@ def _draw_panel(window: PanelWindow, state: State, view_model: ViewModel) -> Sta
     if shown:
         state = window.draw(state, view_model)
     imgui.end()
-    return state if stays else state.with_panels(**{window.field: False})
+    return state if stays else set_open(state, window.field, False)
