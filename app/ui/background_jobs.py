@@ -101,7 +101,7 @@ class BackgroundJobs:
 
     def cancel_export(self) -> None:
         """Stop the running export; what is finished stays."""
-        note = self.exports.cancel()
+        note = self.exports.stop()
         if note is not None:
             self.notes.append((note, False))
 

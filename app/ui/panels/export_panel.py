@@ -64,11 +64,15 @@ def _running(state: State, view_model: ViewModel) -> State:
     rows.explain("Export progress", "The export works in the time that the window leaves; editing does not change it.")
     if job.text:
         widgets.hint(job.text)
-    if widgets.button(
-        "Cancel export",
-        tip="Stop the export. What is finished stays: a movie plays up to here, a sequence keeps its frames.",
-        width=-1,
-    ):
+    if job.is_stopped:
+        label, tip = "Discard it", "Do not wait for what is done to become a picture: write nothing at all."
+    else:
+        label = "Cancel export"
+        tip = (
+            "Stop the export. What is done is kept: a picture is written with the light that it has by then, a movie "
+            "plays up to here, a sequence keeps its frames."
+        )
+    if widgets.button(label, tip=tip, width=-1):
         state = state.asking(CancelJob())
     imgui.separator()
     return state

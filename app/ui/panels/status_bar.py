@@ -107,7 +107,8 @@ def _job(state: State, view_model: ViewModel) -> State:
     imgui.progress_bar(job.fraction, imgui.ImVec2(theme.em(9), 0.0), f"{job.fraction:.0%}")
     widgets.tooltip(job.text or job.title)
     imgui.same_line()
-    if widgets.button("Cancel##job", tip="Stop the export; what is finished stays."):
+    label, tip = ("Discard", "Write nothing at all.") if job.is_stopped else ("Cancel", "Stop; what is done is kept.")
+    if widgets.button(f"{label}##job", tip=tip):
         state = state.asking(CancelJob())
     return state
 
