@@ -93,6 +93,19 @@ def test_one_edit_changes_one_line_of_what_a_person_wrote(tmp_path: Path, name: 
     assert target.read_text(encoding="utf-8") == MINE.replace("colour = 0.8", "colour = [0.35, 0.8, 0.8]")
 
 
+def test_another_key_in_braces_keeps_their_blanks_and_words(tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text(MINE, encoding="utf-8")
+    document = Document.open(file)
+    card = document.scene.objects[1]
+    glossy = replace(card, material=replace(card.material, roughness=0.25))
+    document.history.push("Coat", replace(document.scene, objects=(document.scene.objects[0], glossy)))
+    text = document.save().read_text(encoding="utf-8")
+    assert text == MINE.replace("colour = 0.8 }", "colour = 0.8, roughness = 0.25 }")
+    document.history.push("No coat", replace(document.scene, objects=(document.scene.objects[0], card)))
+    assert document.save().read_text(encoding="utf-8") == MINE
+
+
 def test_words_that_name_files_stay_in_their_folder(tmp_path: Path) -> None:
     """From another folder they would name nothing."""
     (tmp_path / "beside").mkdir()

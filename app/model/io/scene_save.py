@@ -218,7 +218,10 @@ def _kept_material(
         if wanted.keys() <= {"glass", *_OVER_GLASS}:
             return kept | wanted
     if isinstance(values.get("material"), dict):
-        return kept | {"material": wanted}
+        before, words = old.material.values(path), values["material"]
+        # A grey of one number, say, where something else of the material changed.
+        same = {key: words[key] for key in wanted if key in words and before.get(key) == wanted[key]}
+        return kept | {"material": wanted | same}
     return kept | _material(new, materials, path)
 
 
