@@ -88,7 +88,12 @@ def _open_panel(name: str, state: State, _view_model: ViewModel) -> State:
 
 
 def _toggle_panel(name: str, state: State, _view_model: ViewModel) -> State:
-    return set_open(state, name, not getattr(state.preferences.panels, name))
+    is_open = getattr(state.preferences.panels, name)
+    if is_open and name in layout.behind:
+        # Who asks for it does not see that it is open.
+        layout.raise_panel(name)
+        return state
+    return set_open(state, name, not is_open)
 
 
 def _is_object(state: State, _view_model: ViewModel) -> bool:

@@ -150,6 +150,7 @@ def _draw_panel(window: PanelWindow, state: State, view_model: ViewModel) -> Sta
     shown, stays = imgui.begin(window.title, True)
     item_rects.note(f"Window: {window.title}")
     is_floating = not imgui.is_window_docked()
+    (layout.behind.discard if shown or is_floating else layout.behind.add)(window.field)
     if is_floating:
         shortcuts.floating_panels.append(window.field)
     is_leavable = is_floating or (window.field in _CALLED_UP and state.tool == "select")

@@ -14,6 +14,7 @@ from spectrasplat.base.paths import assets_dir
 from spectrasplat.edit import requests
 from spectrasplat.edit.preferences import load_settings
 from spectrasplat.gpu.context import Context
+from spectrasplat.ui import layout
 from spectrasplat.ui.commands import command
 from spectrasplat.ui.panels import dialogs
 from spectrasplat.ui.session import Session
@@ -136,4 +137,17 @@ def test_the_escape_that_closes_a_list_leaves_the_panel_it_hangs_from(gl: Contex
     rig.frame(2)
     assert not imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
     assert rig.state.preferences.panels.compare
+    rig.release()
+
+
+def test_a_panel_behind_a_tab_is_brought_to_the_front_and_not_closed(gl: Context) -> None:
+    rig = ShellRig(gl)
+    rig.show_tab("Timing")
+    toggle = command("Panel: Spectrum").act
+    rig.state = toggle(rig.state, rig.view_model)
+    rig.frame(3)
+    assert rig.state.preferences.panels.spectrum and "spectrum" not in layout.behind and "timing" in layout.behind
+    rig.state = toggle(rig.state, rig.view_model)
+    rig.frame(2)
+    assert not rig.state.preferences.panels.spectrum
     rig.release()

@@ -156,7 +156,8 @@ def _animation(state: State, view_model: ViewModel, idle: bool) -> State:
             clamp=False,
         )
         _choices.frames = frames = max(1, round(count))
-    widgets.read_out("Length", f"{frames / _choices.fps:.2f} s, {frames} frames", tip="How long the animation plays.")
+    length = f"{frames / _choices.fps:.2f} s, {frames} {'frame' if frames == 1 else 'frames'}"
+    widgets.read_out("Length", length, tip="How long the animation plays.")
     _, _choices.size = widgets.combo("Size", SIZES, _choices.size, tip="Pixels of each picture.")
     _, _choices.photons = widgets.combo(
         "Photons##frame", PHOTONS, _choices.photons, tip="Photons of each traced frame."

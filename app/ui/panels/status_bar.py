@@ -83,7 +83,8 @@ def progress_words(stats: LiveStats, is_playing: bool) -> str:
         return f"{word}, {numbers.count(stats.polygons)} polygons"
     if stats.photons or not stats.camera_samples:
         return f"{word}, {numbers.count(stats.photons)} photons"
-    return f"{word}, {numbers.count(round(stats.camera_samples))} samples a pixel, no caustics"
+    samples = round(stats.camera_samples)
+    return f"{word}, {numbers.count(samples)} {'sample' if samples == 1 else 'samples'} a pixel, no caustics"
 
 
 def _selection(state: State) -> None:
