@@ -122,7 +122,8 @@ class Document:
             save_gltf(scene, target, self._readable_original())
             self._original = target
         else:
-            save_scene(scene, target, over=True)
+            # Of the file it came from, also under another name: what stands at that name is another scene's.
+            save_scene(scene, target, words_from=self.source)
         self.path = self.source = target
         self.history.mark_saved(scene)
         return target

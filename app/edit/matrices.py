@@ -91,4 +91,5 @@ def _angles_deg(rotation: np.ndarray) -> Vec3:
         x, z = 0.0, math.atan2(-rotation[0, 1], rotation[1, 1])
     else:
         x, z = math.atan2(rotation[2, 1], rotation[2, 2]), math.atan2(rotation[1, 0], rotation[0, 0])
-    return vec3(np.degrees([x, y, z]))
+    # What is left of rounding would be shown as "-0.00".
+    return vec3([0.0 if abs(angle) < 1e-10 else angle for angle in np.degrees([x, y, z])])

@@ -74,8 +74,22 @@ class BeamSplatter:
         atlas: MapAtlas,
         weight: float = 1.0,
     ) -> None:
+        """All `steps` at once."""
+        for _ in self.steps(polygons, frames, layout, tables, atlas, weight):
+            pass
+
+    def steps(
+        self,
+        polygons: BeamPolygons,
+        frames: Mapping[int, PlaneFrame],
+        layout: MapLayout,
+        tables: BeamTables,
+        atlas: MapAtlas,
+        weight: float = 1.0,
+    ) -> Iterator[int]:
         """Add the energy of all polygons to `atlas`, times `weight` (what its sums hold per unit of energy:
-        `LightMaps.photon_weight` where photons are added too).
+        `LightMaps.photon_weight` where photons are added too), pausing after every portion with the number of its
+        polygons: on a software renderer all of a fine search take seconds, for which a window would stand still.
 
         `frames`: the plane of every receiver that polygons lie on. What no window holds is left out."""
         if not len(polygons):
@@ -102,6 +116,7 @@ class BeamSplatter:
                 atlas.pending += len(part)
                 if atlas.pending >= FLUSH:
                     atlas.flush()
+                yield len(part)
         error = self._ctx.error
         if error != "GL_NO_ERROR":
             raise RuntimeError(f"{error} while drawing {len(polygons)} beam polygons")

@@ -318,7 +318,12 @@ class BeamLight:
         self.found = found
         self._count(found)
         if found.polygons is not None:
-            self.draw(found.polygons, maps, weight)
+            drawn = 0
+            for more in self._drawing(found.polygons, maps, weight):
+                drawn += more
+                stats.draw_seconds += time.perf_counter() - started
+                yield 0.5 + 0.5 * drawn / max(drawn, len(found.polygons))
+                started = time.perf_counter()
             self._context.finish()
         stats.draw_seconds += time.perf_counter() - started
         yield 1.0
@@ -357,6 +362,11 @@ class BeamLight:
 
     def draw(self, polygons: BeamPolygons, maps: LightMaps, weight: float) -> None:
         """Add polygons to `maps`."""
+        for _ in self._drawing(polygons, maps, weight):
+            pass
+
+    def _drawing(self, polygons: BeamPolygons, maps: LightMaps, weight: float) -> Iterator[int]:
+        """`draw`, pausing with the number that was added."""
         targets, channels = maps.atlas.targets, self._shown.channels
         if targets not in self._canvases:
             self._canvases[targets] = _Canvas(self._context, targets)
@@ -365,7 +375,7 @@ class BeamLight:
             # A preview's: in colour only.
             channels = MapChannels(channels.edges_nm)
         tables = canvas.tables(self._buffers, self._shown, channels)
-        canvas.splatter.run(polygons, self.frames, maps.layout, tables, maps.atlas, weight)
+        yield from canvas.splatter.steps(polygons, self.frames, maps.layout, tables, maps.atlas, weight)
 
     def draw_found(self, maps: LightMaps, threshold: float) -> None:
         """Draw what the survey found, with the weight that photons for such a `threshold` would have."""

@@ -12,7 +12,7 @@ from .compare import Comparison
 from .compared_with import Histogram
 from .cursor_info import Cursor
 from .export import Exports, Shown
-from .gallery import Gallery
+from .gallery import Gallery, best_first
 from .ray_overlay import RayOverlay
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ class BackgroundJobs:
         self.exports = Exports(context)
         self.overlay = RayOverlay(context)
         self.cursor = Cursor()
-        self.gallery = Gallery(context, config, shipped_scenes())
+        self.gallery = Gallery(context, config, best_first(shipped_scenes()))
         self.histogram: Histogram | None = None
         """Of the picture and of what it is compared with."""
         self._histogram_s = -1e9
@@ -101,7 +101,7 @@ class BackgroundJobs:
 
     def cancel_export(self) -> None:
         """Stop the running export; what is finished stays."""
-        note = self.exports.cancel()
+        note = self.exports.stop()
         if note is not None:
             self.notes.append((note, False))
 

@@ -13,6 +13,7 @@ from functools import partial
 from ..edit import requests
 from ..edit.state import State, Tool
 from . import layout, view_commands
+from .open_panels import set_open
 from .panels import dialogs
 from .view_model import ViewModel
 
@@ -83,11 +84,16 @@ def _toggle_physical(state: State, _view_model: ViewModel) -> State:
 
 def _open_panel(name: str, state: State, _view_model: ViewModel) -> State:
     layout.raise_panel(name)
-    return state.with_panels(**{name: True})
+    return set_open(state, name, True)
 
 
 def _toggle_panel(name: str, state: State, _view_model: ViewModel) -> State:
-    return state.with_panels(**{name: not getattr(state.preferences.panels, name)})
+    is_open = getattr(state.preferences.panels, name)
+    if is_open and name in layout.behind:
+        # Who asks for it does not see that it is open.
+        layout.raise_panel(name)
+        return state
+    return set_open(state, name, not is_open)
 
 
 def _is_object(state: State, _view_model: ViewModel) -> bool:

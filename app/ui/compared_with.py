@@ -89,9 +89,8 @@ class FilePicture:
         height, width = rgb.shape[:2]
         self.words = f"{path.name}, {width}×{height}"
         if (width, height) != size:
-            rows, columns = ((np.arange(n) + 0.5) * m / n for n, m in ((size[1], height), (size[0], width)))
-            rgb = rgb[rows.astype(int)][:, columns.astype(int)]
-            self.words += f", shown as {size[0]}×{size[1]} by nearest pixels"
+            rgb = resized(rgb, size)
+            self.words += f", shown as {size[0]}×{size[1]}; one of the same size compares best"
         texels = np.concatenate([rgb, np.ones((*rgb.shape[:2], 1), np.float32)], axis=-1)
         self.texture = self._context.ctx.texture(size, 4, np.ascontiguousarray(texels).tobytes(), dtype="f4")
 
@@ -100,6 +99,16 @@ class FilePicture:
         if self.texture is not None:
             self.texture.release()
         self.texture, self.problem, self.words, self._key = None, None, "", ()
+
+
+def resized(rgb: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """A linear picture (h, w, 3) at another (width, height), by means of what falls on a pixel. Nearest pixels would
+    show a chequer of errors that is in neither picture."""
+    from PIL import Image
+
+    resample = Image.Resampling.BILINEAR
+    channels = [Image.fromarray(np.ascontiguousarray(rgb[..., i], np.float32)) for i in range(3)]
+    return np.stack([np.asarray(channel.resize(size, resample)) for channel in channels], axis=-1)
 
 
 def histogram_of(own: np.ndarray, other: np.ndarray, exposure_ev: float) -> Histogram:

@@ -25,6 +25,7 @@ from ..model.scene import RenderDefaults
 from ..model.settings import RenderSettings
 from ..passes.display import Display
 from ..render.notices import FrameNotices, frame_notices
+from .render_job import Course
 from .view_model import JobInfo
 
 if TYPE_CHECKING:
@@ -97,6 +98,13 @@ class Exports:
         job, self._job = self._job, None
         return job.cancel()
 
+    def stop(self) -> str | None:
+        """End the job as soon as it can keep what is done: a picture is written with the light that it has by then.
+        Asked again, or of what has no such middle, `cancel`."""
+        if self._job is not None and self._job.stop():
+            return None
+        return self.cancel()
+
     def release(self) -> None:
         """End the job."""
         self.cancel()
@@ -123,14 +131,15 @@ class Exports:
                 notices,
             )
         if isinstance(request, requests.RenderPicture):
+            course = Course()
             return _Job(
                 f"Rendering {name}",
-                _render(self._context, request, stage, state, notices),
+                _render(self._context, request, stage, state, notices, course),
                 f"Rendered {name}.",
                 "Nothing was written: a picture is whole or not at all.",
                 notices,
                 seconds=request.seconds,
-                is_picture=True,
+                course=course,
             )
         work, frames = _animate(self._context, request, stage, state, notices)
         title = "Turntable" if request.kind == "turntable" else "Animation"
@@ -156,10 +165,10 @@ class _Job:
         notices: FrameNotices,
         frames: int = 0,
         seconds: float | None = None,
-        is_picture: bool = False,
+        course: Course | None = None,
     ) -> None:
-        """`seconds`: that it takes, where that is known."""
-        self.is_picture = is_picture
+        """`seconds`: that it takes, where that is known; `course`: of a finished picture."""
+        self._course = course
         self._title, self._work, self._notices = title, work, notices
         self._finished, self._cancelled = finished, cancelled
         self._frames = frames
@@ -167,8 +176,24 @@ class _Job:
         self._started_s = time.monotonic()
 
     @property
+    def is_picture(self) -> bool:
+        """A finished picture, in which everything goes into one file."""
+        return self._course is not None
+
+    @property
+    def is_stopped(self) -> bool:
+        return self._course is not None and self._course.is_stopped
+
+    @property
     def view_model(self) -> JobInfo:
-        return JobInfo(self._title, self._fraction, self._text())
+        return JobInfo(self._title, self._fraction, self._text(), self.is_stopped)
+
+    def stop(self) -> bool:
+        """Whether it will end by itself with what is done."""
+        if self._course is None or self._course.is_stopped:
+            return False
+        self._course.is_stopped = True
+        return True
 
     def step(self, budget_s: float) -> str | None:
         started = time.perf_counter()
@@ -176,7 +201,8 @@ class _Job:
             while time.perf_counter() - started < budget_s:
                 self._fraction = max(self._fraction, next(self._work))
         except StopIteration:
-            return self._told(self._finished)
+            early = " It was stopped early, and is what was done until then." if self.is_stopped else ""
+            return self._told(self._finished + early)
         return None
 
     def cancel(self) -> str:
@@ -191,10 +217,13 @@ class _Job:
         return " ".join([sentence, *(f"Note: {notice}." for notice in notices)])
 
     def _text(self) -> str:
+        if self.is_stopped:
+            return "Finishing with what is done so far"
+        phase = "tracing photons and taking camera samples" if self._course is None else self._course.phase
         frame = (
             f"Frame {min(int(self._fraction * self._frames) + 1, self._frames)} of {self._frames}"
             if self._frames
-            else "Tracing photons and taking camera samples"
+            else phase[:1].upper() + phase[1:]
         )
         left = self._left_s()
         return frame if left is None else f"{frame}, {left_words(left, datetime.now().astimezone())}"
@@ -287,7 +316,7 @@ def _spectral(
 
 
 def _render(
-    context: Context, request: requests.RenderPicture, stage: Stage, state: State, notices: FrameNotices
+    context: Context, request: requests.RenderPicture, stage: Stage, state: State, notices: FrameNotices, course: Course
 ) -> Iterator[float]:
     from .render_job import render_picture
 
@@ -299,7 +328,7 @@ def _render(
             develop.release()
 
     settings = _settings(state, request.size, request.photons or MIN_PHOTONS)
-    return render_picture(context, request, stage, settings, write_shown, notices)
+    return render_picture(context, request, stage, settings, write_shown, notices, course)
 
 
 def _bake(

@@ -33,6 +33,19 @@ SIZE = (320, 180)
 PHOTONS = "400k"
 PATIENCE_S = 120.0
 FOLDER = "thumbnails"
+BEST = (
+    "default",
+    "brilliant",
+    "crystal_ball",
+    "wine_glass",
+    "prism",
+    "brilliant_studio",
+    "spectrum",
+    "lens_text",
+    "water",
+    "ripples",
+)
+"""What the start page begins with: by name it would begin with a grey achromat, and first cards are what is clicked."""
 
 Render = Callable[[Path, Path], "subprocess.Popen[bytes]"]
 
@@ -59,11 +72,14 @@ class Gallery:
         self._job: _Job | None = None
         self.entries = tuple(_entry(name, path) for name, path in scenes.items())
         self._waiting = list(range(len(self.entries)))
+        """To be looked for, before any is rendered: one that takes long would hold up pictures that are there."""
+        self._missing: list[int] = []
+        """To be rendered."""
 
     @property
     def is_busy(self) -> bool:
         """A thumbnail is being rendered or read."""
-        return self._job is not None or bool(self._waiting)
+        return self._job is not None or bool(self._waiting or self._missing)
 
     def step(self) -> None:
         """A little of the work, between frames: take what is finished, start the next."""
@@ -73,14 +89,17 @@ class Gallery:
             index = self._waiting.pop(0)
             path = self.entries[index].path
             target = self._thumbnail(path)
-            if not (self._show(index, _shipped_picture(path)) or self._show(index, target)):
-                self._start(index, target)
+            if not any(self._show(index, picture) for picture in (*_shipped_pictures(path), target)):
+                self._missing.append(index)
+        elif self._missing:
+            index = self._missing.pop(0)
+            self._start(index, self._thumbnail(self.entries[index].path))
 
     def pause(self) -> None:
         """Nothing more for now: somebody works on a scene, whose light needs the processor. What is half done is done
         again."""
         if self._job is not None:
-            self._waiting.insert(0, self._job.index)
+            self._missing.insert(0, self._job.index)
             self._stop(self._job)
 
     def _start(self, index: int, target: Path) -> None:
@@ -145,15 +164,21 @@ class Gallery:
             texture.release()
         self._textures.clear()
         self._waiting.clear()
+        self._missing.clear()
 
 
-def _shipped_picture(scene: Path) -> Path:
-    """The picture that comes with a shipped scene; perhaps there is none."""
+def best_first(scenes: Mapping[str, Path]) -> dict[str, Path]:
+    """`scenes`, those of `BEST` first; the rest in the order they come in."""
+    known = [name for name in BEST if name in scenes]
+    return {name: scenes[name] for name in (*known, *(name for name in scenes if name not in BEST))}
+
+
+def _shipped_pictures(scene: Path) -> tuple[Path, ...]:
+    """Where the picture that comes with a shipped scene would be."""
     assets = assets_dir()
     if scene.parent != assets / "scenes":
-        return Path()
-    photograph = assets / "gallery" / f"{scene.stem}.jpg"
-    return photograph if photograph.exists() else photograph.with_suffix(".png")
+        return ()
+    return tuple(assets / "gallery" / f"{scene.stem}{suffix}" for suffix in (".png", ".jpg"))
 
 
 def _entry(name: str, path: Path) -> SceneEntry:

@@ -39,6 +39,9 @@ class Docked:
 _raised: set[str] = set()
 """Fields of the panels that somebody wants to see in front."""
 
+behind: set[str] = set()
+"""Fields of the panels that lay behind another one's tab in the last frame."""
+
 
 def dockspace(windows: tuple[Docked, ...], bottom_margin: float) -> None:
     """Submit the dock space below the menu bar, `bottom_margin` pixels above the lower edge; before every docked

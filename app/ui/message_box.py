@@ -7,9 +7,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from .view_model import Message
+from .window_words import in_window
 
 NOTICE_S = 6.0
-"""A notice is gone after this long."""
+"""A short notice is gone after this long on the screen."""
+CHARACTERS_S = 15.0
+"""Of a longer one that are read in a second."""
 MAX_MESSAGES = 6
 
 
@@ -17,7 +20,12 @@ MAX_MESSAGES = 6
 class _Said:
     text: str
     is_error: bool
-    at_s: float
+    shown_s: float | None = None
+    """When it came on the screen: preparing a scene may hold the frame after that in which it was told."""
+
+    @property
+    def stays_s(self) -> float:
+        return max(NOTICE_S, len(self.text) / CHARACTERS_S)
 
 
 class MessageBox:
@@ -29,9 +37,9 @@ class MessageBox:
 
     def tell(self, text: str, is_error: bool = False) -> None:
         """Show one sentence."""
-        sentence = " ".join(text.split())
+        sentence = in_window(" ".join(text.split()))
         self._said = [said for said in self._said if said.text != sentence]
-        self._said.append(_Said(sentence, is_error, self._clock()))
+        self._said.append(_Said(sentence, is_error))
         del self._said[:-MAX_MESSAGES]
 
     def close(self, text: str) -> None:
@@ -40,9 +48,12 @@ class MessageBox:
 
     def messages(self) -> tuple[Message, ...]:
         """What to show."""
-        now = self._clock()
-        self._said = [said for said in self._said if said.is_error or now - said.at_s < NOTICE_S]
-        return tuple(Message(said.text, said.is_error, now - said.at_s) for said in self._said)
+        now, ages = self._clock(), {}
+        for said in self._said:
+            said.shown_s = now if said.shown_s is None else said.shown_s
+            ages[id(said)] = now - said.shown_s
+        self._said = [said for said in self._said if said.is_error or ages[id(said)] < said.stays_s]
+        return tuple(Message(said.text, said.is_error, ages[id(said)]) for said in self._said)
 
     @property
     def is_fading(self) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,6 +27,20 @@ if TYPE_CHECKING:
     Develop = Callable[[Path, np.ndarray], None]
 
 
+@dataclass
+class Course:
+    """What the rendering tells while it works, and what it is told."""
+
+    phase: str = "preparing"
+    """What it is at."""
+    is_stopped: bool = False
+    """Somebody waited long enough: what is done by then becomes the picture."""
+
+    def stops(self) -> bool:
+        """`is_stopped`, to be asked."""
+        return self.is_stopped
+
+
 def layer_path(path: Path, layer: str) -> Path:
     """Where another layer of the picture at `path` goes: a.png, a_caustic.png."""
     return path.with_name(f"{path.stem}_{layer}{path.suffix}")
@@ -39,6 +53,7 @@ def render_picture(
     settings: RenderSettings,
     write_shown: Develop,
     notices: FrameNotices,
+    course: Course,
 ) -> Iterator[float]:
     """Shares of the work from 0 to 1; files are written whole at its end. `write_shown`: writes a linear picture as the
     window shows it. Raises `UserError` before the first share for what cannot be rendered or written."""
@@ -59,7 +74,7 @@ def render_picture(
         camera_beams=settings.method == "srd",
     )
     check_picture_memory(settings.width, settings.height, settings.bins)
-    return _work(context, request, targets, stage, settings, write_shown, notices)
+    return _work(context, request, targets, stage, settings, write_shown, notices, course)
 
 
 def _work(
@@ -70,6 +85,7 @@ def _work(
     settings: RenderSettings,
     write_shown: Develop,
     notices: FrameNotices,
+    course: Course,
 ) -> Iterator[float]:
     from ..render.frames import FrameRenderer
 
@@ -77,12 +93,13 @@ def _work(
     renderer = FrameRenderer(context, settings, [stage], time.perf_counter())
     try:
         own = 0.98 / len(targets)
-        for share in renderer.steps(stage):
+        for share in renderer.steps(stage, course.stops):
+            course.phase = renderer.phase
             yield own * share
         pictures = [renderer.picture]
         notices.take(frame_notices(renderer.light, stage.camera, settings, pictures[0].rgb))
         if request.caustic:
-            for share in renderer.steps_of_layer("caustic", stage):
+            for share in renderer.steps_of_layer("caustic", stage, course.stops):
                 yield own * (1.0 + share)
             pictures.append(renderer.picture)
     finally:

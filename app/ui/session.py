@@ -166,7 +166,9 @@ class Session:
         things = {"object": scene.objects, "light": scene.lights, "camera": (scene.camera,), None: ()}[selection.kind]
         if selection.index >= len(things):
             selection = Selection()
-        self.state = replace(self.state, scene=scene, selection=selection, pull=None)
+        # Who looked through the scene's camera does so still.
+        camera = scene.camera if self.state.camera == self.state.scene.camera else self.state.camera
+        self.state = replace(self.state, scene=scene, camera=camera, selection=selection, pull=None)
 
     def welcome(self) -> None:
         """Open the start page for somebody who has never seen it."""
@@ -263,7 +265,7 @@ class Session:
         except UserError as error:
             self.messages.tell(sentence(str(error)), is_error=True)
         else:
-            self.messages.tell(f"Saved {path.name}.")
+            self.messages.tell(f"Saved {path.name} in {path.parent}.")
 
     def close(self) -> None:
         """The end in good order: settings are remembered, nothing is left to recover."""
@@ -287,4 +289,5 @@ class Session:
 
 def _first_state(scene: Scene, settings: Settings, welcome: bool) -> State:
     state = State(scene=scene, camera=scene.camera, preferences=settings.preferences)
-    return state.with_panels(start_page=welcome)
+    # Opening Compare begins a second picture, which nobody asked for at a start.
+    return state.with_panels(start_page=welcome, compare=False)

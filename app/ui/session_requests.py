@@ -52,7 +52,7 @@ def _stand_up(session: Session, request: requests.StandUp) -> None:
 def _save(session: Session, request: requests.Save) -> None:
     path = session.document.save(request.path)
     session.settings = session.settings.opened(path)
-    session.messages.tell(f"Saved {path.name}.")
+    session.messages.tell(f"Saved {path.name} in {path.parent}.")
 
 
 def _undo(session: Session, _request: requests.Undo) -> None:

@@ -13,6 +13,7 @@ from imgui_bundle import imgui
 from ..edit.state import Panels, State
 from . import item_rects, layout, shortcuts, theme
 from .layout import Docked, Place
+from .open_panels import set_open
 from .panels import (
     about,
     dialogs,
@@ -149,6 +150,7 @@ def _draw_panel(window: PanelWindow, state: State, view_model: ViewModel) -> Sta
     shown, stays = imgui.begin(window.title, True)
     item_rects.note(f"Window: {window.title}")
     is_floating = not imgui.is_window_docked()
+    (layout.behind.discard if shown or is_floating else layout.behind.add)(window.field)
     if is_floating:
         shortcuts.floating_panels.append(window.field)
     is_leavable = is_floating or (window.field in _CALLED_UP and state.tool == "select")
@@ -157,4 +159,4 @@ def _draw_panel(window: PanelWindow, state: State, view_model: ViewModel) -> Sta
     if shown:
         state = window.draw(state, view_model)
     imgui.end()
-    return state if stays else state.with_panels(**{window.field: False})
+    return state if stays else set_open(state, window.field, False)

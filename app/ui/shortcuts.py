@@ -9,6 +9,7 @@ from imgui_bundle import imgui
 
 from ..edit.state import State
 from .commands import COMMANDS, PANELS, VIEWS, Command
+from .open_panels import set_open
 from .view_model import ViewModel
 
 COMPARE_KEY = imgui.Key.c
@@ -77,19 +78,22 @@ def handle(state: State, view_model: ViewModel) -> State:
     """Carry out the commands whose keys were pressed in this frame; nothing while a text field or a dialogue has
     them."""
     io = imgui.get_io()
-    _close_menus()
+    has_closed_menu = _close_menus()
     is_modal = imgui.internal.get_top_most_popup_modal() is not None
     for command in _all():
         if command.name in _ALWAYS and _is_pressed(command) and (command.name == "Quit" or not is_modal):
             return command.act(state, view_model)
-    is_free = not io.want_text_input and not imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
+    # The Esc that closes a menu closes nothing more: what it hung from would go with it.
+    is_free = (
+        not has_closed_menu and not io.want_text_input and not imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
+    )
     # The right button held means flying: its letters belong to the camera.
     if not is_free or imgui.is_mouse_down(imgui.MouseButton_.right):
         return _hold_compare(state, False)
     on_start_page = state.preferences.panels.start_page
     closing = focused_panel["field"] or (floating_panels[-1] if floating_panels and state.tool == "select" else "")
     if closing and imgui.is_key_pressed(imgui.Key.escape):
-        return state.with_panels(**{closing: False})
+        return set_open(state, closing, False)
     if on_start_page and imgui.is_key_pressed(imgui.Key.escape):
         return state.with_panels(start_page=False)
     for command in _all():
@@ -100,12 +104,14 @@ def handle(state: State, view_model: ViewModel) -> State:
     return _hold_compare(state, imgui.is_key_down(COMPARE_KEY) and not (io.key_ctrl or io.key_shift or io.key_alt))
 
 
-def _close_menus() -> None:
-    """Esc closes menus and pickers; dialogues handle it themselves. (imgui does so only with its keyboard navigation
-    on.)"""
+def _close_menus() -> bool:
+    """Esc closes menus and pickers, and whether it did; dialogues handle it themselves. (imgui does so only with its
+    keyboard navigation on.)"""
     is_menu = imgui.is_popup_open("", imgui.PopupFlags_.any_popup) and imgui.internal.get_top_most_popup_modal() is None
-    if is_menu and imgui.is_key_pressed(imgui.Key.escape):
-        imgui.internal.close_popup_to_level(0, True)
+    if not (is_menu and imgui.is_key_pressed(imgui.Key.escape)):
+        return False
+    imgui.internal.close_popup_to_level(0, True)
+    return True
 
 
 @cache

@@ -82,6 +82,8 @@ class JobInfo:
     title: str
     fraction: float
     text: str
+    is_stopped: bool = False
+    """It ends with what is done, as soon as that is a picture."""
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ all of the same view at half the size, with a cross where the cursor is.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from imgui_bundle import ImVec2, imgui
 
@@ -23,17 +24,26 @@ def draw_beside(state: State, view_model: ViewModel, room: ImVec2, draw_own: Dra
     pane = ImVec2(max(0.5 * (room.x - gap), 1.0), max(0.5 * (room.y - gap), 1.0))
     state = draw_own(state, view_model, pane)
     middle = ImVec2(corner.x + 0.5 * (room.x - pane.x), corner.y + pane.y + gap)
-    titles = (view_model.compare_label or "The other picture", "Error map")
+    # Another glass is no reference: what differs is no error.
+    title = "Difference" if state.compare.method in ("glass", "file") else "Error map"
+    titles = (view_model.compare_label or "The other picture", title)
     for index, at in enumerate((ImVec2(corner.x + pane.x + gap, corner.y), middle)):
         imgui.set_cursor_screen_pos(at)
         if view_model.beside is None:
             imgui.dummy(pane)
-            tag(at, pane, f"{titles[index]}: on its way")
+            has_none = state.compare.method == "file" and state.compare.file is None
+            tag(at, pane, "No picture chosen yet" if has_none else f"{titles[index]}: on its way")
             continue
         imgui.image(imgui.ImTextureRef(view_model.beside[index]), pane)
         item_rects.note(f"Beside: {index + 1}")
         tag(at, pane, titles[index])
-        if state.hover is not None:
+        if state.hover is None and imgui.is_item_hovered():
+            # Whose values are asked for does not matter: all show the same place.
+            mouse = imgui.get_mouse_pos()
+            state = replace(state, hover=((mouse.x - at.x) / pane.x, (mouse.y - at.y) / pane.y))
+    if state.hover is not None:
+        crossed = (ImVec2(corner.x + pane.x + gap, corner.y), middle) if view_model.beside is not None else ()
+        for at in crossed:
             _cross(ImVec2(at.x + state.hover[0] * pane.x, at.y + state.hover[1] * pane.y))
     return state
 

@@ -190,6 +190,22 @@ def test_the_order_of_drawing_is_fixed_and_groups_add_up(rig: BeamRig, monkeypat
     assert rig.draw(many) == pytest.approx(first, rel=1e-4, abs=1e-5 * first.max())
 
 
+def test_drawing_pauses_after_every_portion(rig: BeamRig, monkeypatch: pytest.MonkeyPatch) -> None:
+    """All of a fine search at once made a window stand still for up to 14 s on a busy processor."""
+    rng = np.random.default_rng(4)
+    many = joined([moving(rng, size, 3.0) for size in np.geomspace(0.1, 20.0, 60)])
+    counts: list[int] = []
+    steps = rig.splatter.steps
+
+    def run(*arguments, **named) -> None:
+        counts.extend(steps(*arguments, **named))
+
+    monkeypatch.setattr("spectrasplat.passes.beam_splat.GROUP", 7)
+    monkeypatch.setattr(rig.splatter, "run", run)
+    rig.draw(many)
+    assert len(counts) >= 60 // 7 and max(counts) <= 7 and sum(counts) == 60
+
+
 def test_a_coarse_window_gets_what_is_not_inside_the_fine_one(gl) -> None:
     """The fine window shows 16 of the coarse one's 64 units, four times as fine; nothing leaves a window's tile."""
     rig = BeamRig(gl.ctx)

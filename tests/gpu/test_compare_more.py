@@ -13,7 +13,7 @@ from spectrasplat.base.paths import assets_dir
 from spectrasplat.edit.state import Compare, Selection, State
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.ui.compare import Comparison
-from spectrasplat.ui.compared_with import GlassSwap, histogram_of
+from spectrasplat.ui.compared_with import GlassSwap, histogram_of, resized
 from spectrasplat.ui.reference_thread import Snapshot
 
 from tests.gpu.test_compare import SIZE, read, small_engine, until
@@ -137,3 +137,14 @@ def test_a_picture_of_another_size_is_not_shown_and_begun_anew(state, running, c
     assert comparison.picture is None
     until(lambda: comparison.picture is not None, lambda: comparison.advance(larger, running, 0.05))
     assert begun == [SIZE, (SIZE[0] + 20, SIZE[1])]
+
+
+def test_a_picture_of_another_size_is_no_chequer() -> None:
+    """Nearest pixels shifted a ramp by up to half a pixel, which looked like an error of the picture."""
+    ramp = np.linspace(0.0, 1.0, 41)[None, :, None] * np.ones((31, 1, 3))
+    shown = resized(ramp.astype(np.float32), (53, 40))
+    wanted = (((np.arange(53) + 0.5) * 41 / 53 - 0.5) / 40).clip(0.0, 1.0)
+    assert shown.shape == (40, 53, 3)
+    np.testing.assert_allclose(shown[20, :, 1], wanted, atol=1e-5)
+    halved = resized(np.tile(np.float32([[[0.0] * 3], [[2.0] * 3]]), (10, 20, 1)), (10, 10))
+    np.testing.assert_allclose(halved[2:-2, 2:-2], 1.0, atol=1e-5)

@@ -9,8 +9,9 @@ from pathlib import Path
 
 import pytest
 from PIL import Image
+from spectrasplat.base.paths import shipped_scenes
 from spectrasplat.gpu.context import Context
-from spectrasplat.ui.gallery import Gallery
+from spectrasplat.ui.gallery import BEST, Gallery, best_first
 
 MAKE = "import sys; from PIL import Image; Image.new('RGB', (32, 18), (255, 0, 0)).save(sys.argv[1])"
 
@@ -42,6 +43,12 @@ def finish(gallery: Gallery) -> None:
         time.sleep(0.005)
 
 
+def until_rendering(gallery: Gallery) -> None:
+    """After a look at what is there, one scene a step."""
+    for _ in range(len(gallery.entries) + 1):
+        gallery.step()
+
+
 def test_titles_and_descriptions_come_from_the_files(gl: Context, tmp_path: Path, scenes: dict[str, Path]) -> None:
     gallery = Gallery(gl, tmp_path, scenes, Renderer())
     assert [(e.title, e.description, e.thumbnail) for e in gallery.entries] == [
@@ -49,6 +56,14 @@ def test_titles_and_descriptions_come_from_the_files(gl: Context, tmp_path: Path
         ("two", "", None),
     ]
     gallery.release()
+
+
+def test_the_page_begins_with_the_best_scenes_and_loses_none() -> None:
+    scenes = shipped_scenes()
+    ordered = best_first(scenes)
+    assert tuple(ordered)[: len(BEST)] == BEST
+    assert ordered == scenes
+    assert list(ordered)[len(BEST) :] == sorted(set(scenes) - set(BEST))
 
 
 def test_thumbnails_are_rendered_once_and_again_when_the_scene_changes(
@@ -80,7 +95,7 @@ def test_a_scene_that_fails_has_no_thumbnail_and_leaves_nothing(
 
 def test_closing_ends_the_process(gl: Context, tmp_path: Path, scenes: dict[str, Path]) -> None:
     gallery = Gallery(gl, tmp_path, scenes, Renderer("import time; time.sleep(60)"))
-    gallery.step()
+    until_rendering(gallery)
     assert gallery._job is not None
     process = gallery._job.process
     gallery.release()
@@ -92,7 +107,7 @@ def test_a_pause_ends_the_process_and_begins_it_again_later(
 ) -> None:
     renderer = Renderer("import time; time.sleep(60)")
     gallery = Gallery(gl, tmp_path, scenes, renderer)
-    gallery.step()
+    until_rendering(gallery)
     assert gallery._job is not None
     process = gallery._job.process
     gallery.pause()
@@ -106,7 +121,6 @@ def test_a_pause_ends_the_process_and_begins_it_again_later(
 
 @pytest.mark.slow
 def test_a_shipped_scene_really_gets_one(gl: Context, tmp_path: Path) -> None:
-    from spectrasplat.base.paths import shipped_scenes
 
     gallery = Gallery(gl, tmp_path, {"prism": shipped_scenes()["prism"]})
     while gallery.is_busy:
@@ -115,4 +129,20 @@ def test_a_shipped_scene_really_gets_one(gl: Context, tmp_path: Path) -> None:
     assert gallery.entries[0].thumbnail_size == (320, 180)
     path = next((tmp_path / "thumbnails").iterdir())
     assert Image.open(path).convert("L").getextrema()[1] > 200
+    gallery.release()
+
+
+def test_what_is_there_is_shown_before_anything_is_rendered(gl: Context, tmp_path: Path) -> None:
+    """A picture that takes a minute to render held up those behind it; and one that is a JPEG was not found."""
+    (tmp_path / "slow.toml").write_text('name = "slow"\n')
+    shipped = shipped_scenes()
+    scenes = {"slow": tmp_path / "slow.toml", "prism": shipped["prism"], "crystal_ball": shipped["crystal_ball"]}
+    renderer = Renderer("import time; time.sleep(60)")
+    gallery = Gallery(gl, tmp_path, scenes, renderer)
+    for _ in scenes:
+        gallery.step()
+    assert renderer.calls == 0
+    assert [entry.thumbnail is not None for entry in gallery.entries] == [False, True, True]
+    gallery.step()
+    assert renderer.calls == 1
     gallery.release()

@@ -122,6 +122,16 @@ def test_world_and_camera_stand_in_the_outliner(gl: Context, state: State) -> No
         rig.click("Put it here")
         rig.frame(2)
         assert rig.state.scene.camera.position == (1.0, 2.0, 3.0) and rig.state.edit_label == "Camera"
+        # The view is the camera's now, and shows what is done to it; one from elsewhere stays.
+        for elsewhere in (False, True):
+            if elsewhere:
+                rig.state = replace(rig.state, camera=replace(state.camera, position=(1.0, 2.0, 9.0)))
+            before = rig.state.scene.camera.vertical_fov_deg
+            x, y = rig.find("Field of view").centre
+            rig.drag((x - 20, y), (x + 20, y))
+            rig.frame(2)
+            assert rig.state.scene.camera.vertical_fov_deg != before
+            assert (rig.state.camera == rig.state.scene.camera) != elsewhere
         rig.click("World")
         rig.frame(2)
         assert rig.state.selection == Selection() and "Longest path" in rig.items.items

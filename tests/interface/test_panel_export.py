@@ -125,6 +125,15 @@ def test_comparing(gl) -> None:
         assert "Scale" in rig.items.items and "Line at" not in rig.items.items
 
 
+def test_a_picture_file_has_no_progress(gl) -> None:
+    """It is read at once; there is nothing to start again."""
+    state = replace(scene_state(), compare=Compare(mode="beside", method="file"))
+    with PanelRig(gl, draw_compare, state, (900, 320)) as rig:
+        rig.frame(2)
+        assert "File" in rig.items.items
+        assert not {"Progress", "Start again"} & rig.items.items.keys()
+
+
 def test_curves_are_drawn_even_where_an_error_is_zero(gl) -> None:
     seconds = np.geomspace(0.1, 10.0, 8)
     curves = (ErrorCurve("srd", seconds, 0.1 / seconds), ErrorCurve("stochastic", seconds, np.zeros(8)))
@@ -139,4 +148,5 @@ def test_curves_are_drawn_even_where_an_error_is_zero(gl) -> None:
 def test_values_stand_within_a_wide_panel(gl) -> None:
     with PanelRig(gl, draw_compare, replace(scene_state(), compare=Compare(mode="wipe")), (900, 320)) as rig:
         rig.frame(2)
-        assert 450 < rig.find("Here").left < rig.find("Here").right < 900
+        assert rig.find("Show").right < rig.find("Here").left < rig.find("Here").right < 900
+        assert rig.find("Here").bottom < rig.find("Progress").bottom < 320  # nothing to scroll to

@@ -80,6 +80,25 @@ def test_a_picture_and_its_caustics_are_written_whole(gl: Context, tmp_path: Pat
     assert beauty.mean() > caustic.mean() and caustic.max() > 0
 
 
+def test_cancelling_a_picture_keeps_what_is_done_and_again_drops_it(gl: Context, tmp_path: Path) -> None:
+    exports, state = Exports(gl), scene_state()
+    path = tmp_path / "a.png"
+    request = requests.RenderPicture(path, (96, 54), 64_000_000, None, 256)
+    exports.begin(request, state, shown(gl))
+    exports.step(0.1)
+    assert exports.stop() is None and exports.job is not None and exports.job.is_stopped
+    assert exports.job.text == "Finishing with what is done so far"
+    note = None
+    while note is None:
+        note = exports.step(0.1)
+    assert note.startswith("Rendered a.png. It was stopped early") and np.asarray(Image.open(path)).max() > 0
+    path.unlink()
+    exports.begin(request, state, shown(gl))
+    exports.step(0.0)
+    assert exports.stop() is None
+    assert (exports.stop() or "").startswith("Nothing was written") and exports.job is None and not path.exists()
+
+
 def test_a_written_picture_has_the_glare_of_its_lens_and_a_measured_one_has_not(gl: Context) -> None:
     rgb = np.zeros((32, 32, 3), np.float32)
     rgb[16, 16] = 100.0

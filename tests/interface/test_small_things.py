@@ -14,6 +14,8 @@ from spectrasplat.base.paths import assets_dir
 from spectrasplat.edit import requests
 from spectrasplat.edit.preferences import load_settings
 from spectrasplat.gpu.context import Context
+from spectrasplat.ui import layout
+from spectrasplat.ui.commands import command
 from spectrasplat.ui.panels import dialogs
 from spectrasplat.ui.session import Session
 from spectrasplat.ui.view_model import ViewModel
@@ -103,3 +105,49 @@ def test_smaller_pictures_look_like_the_png(tmp_path: Path, suffix: str) -> None
         write_image(tmp_path / name, rgb)
     png, other = (np.asarray(Image.open(tmp_path / name).convert("RGB"), float) for name in ("a.png", f"a{suffix}"))
     assert np.abs(png - other).mean() < 2.0
+
+
+def test_opening_compare_begins_to_compare_and_closing_it_ends_it(gl: Context) -> None:
+    rig = ShellRig(gl)
+    rig.state = command("Panel: Compare").act(rig.state, rig.view_model)
+    rig.frame(3)
+    assert rig.state.preferences.panels.compare and rig.state.compare.mode == "wipe"
+    rig.state = replace(rig.state, compare=replace(rig.state.compare, mode="beside", plot=True))
+    rig.key(imgui.Key.h)  # panels out of the way: the pictures stay
+    assert rig.state.compare.mode == "beside"
+    rig.key(imgui.Key.h)
+    rig.frame(3)
+    rig.show_tab("Compare")
+    rig.key(imgui.Key.escape)
+    rig.frame(2)
+    assert not rig.state.preferences.panels.compare
+    assert rig.state.compare.mode == "off" and not rig.state.compare.plot
+    rig.release()
+
+
+def test_the_escape_that_closes_a_list_leaves_the_panel_it_hangs_from(gl: Context) -> None:
+    rig = ShellRig(gl)
+    rig.state = command("Panel: Compare").act(rig.state, rig.view_model)
+    rig.frame(3)
+    rig.frame(3)
+    rig.click("Show")
+    rig.frame(2)
+    assert imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
+    rig.key(imgui.Key.escape)
+    rig.frame(2)
+    assert not imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
+    assert rig.state.preferences.panels.compare
+    rig.release()
+
+
+def test_a_panel_behind_a_tab_is_brought_to_the_front_and_not_closed(gl: Context) -> None:
+    rig = ShellRig(gl)
+    rig.show_tab("Timing")
+    toggle = command("Panel: Spectrum").act
+    rig.state = toggle(rig.state, rig.view_model)
+    rig.frame(3)
+    assert rig.state.preferences.panels.spectrum and "spectrum" not in layout.behind and "timing" in layout.behind
+    rig.state = toggle(rig.state, rig.view_model)
+    rig.frame(2)
+    assert not rig.state.preferences.panels.spectrum
+    rig.release()

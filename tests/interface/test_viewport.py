@@ -444,3 +444,7 @@ def test_pictures_of_the_same_view_stand_side_by_side(gl: Context) -> None:
         assert other.right - other.left == pytest.approx(own.right - own.left, abs=1.0)
         wide, high = rig.state.viewport_size
         assert wide / high == pytest.approx(SIZE[0] / SIZE[1], rel=0.03)
+        # The cursor over any of them asks for the values of that place in all of them.
+        rig.move((0.25 * other.left + 0.75 * other.right, 0.5 * (other.top + other.bottom)))
+        rig.frame(2)
+        assert rig.state.hover == pytest.approx((0.75, 0.5), abs=0.02)

@@ -17,6 +17,7 @@ from spectrasplat.ui.panels.status_bar import progress_words
         (LiveStats(photons=1_250_000, camera_samples=3.0), False, "Paused, 1.25 M photons"),
         (LiveStats(only_beams=True, polygons=368, converged=True), True, "Done, 368 polygons"),
         (LiveStats(camera_samples=2.6), True, "Accumulating, 3 samples a pixel, no caustics"),
+        (LiveStats(camera_samples=1.0), True, "Accumulating, 1 sample a pixel, no caustics"),
         (LiveStats(camera_samples=64.0, converged=True), True, "Done, 64 samples a pixel, no caustics"),
     ],
 )

@@ -61,6 +61,62 @@ def test_save_without_a_name_goes_back_and_undoing_it_is_unsaved(file: Path) -> 
     assert document.unsaved
 
 
+MINE = """# My own bench, in mm.
+units  = "mm"
+
+[[objects]]
+name = "block"
+shape = "box"
+glass = "N-SF11"
+rotation_deg = [-90.0, 0, 12.5]   # turned by an eighth
+rests_at_z = 0.01
+
+[[objects]]
+name = "card"
+shape = "plane"
+material = { kind = "diffuse", colour = 0.8 }   # white
+"""
+
+
+@pytest.mark.parametrize("name", ["mine.toml", "other.toml", "beside/other.toml", "taken.toml"])
+def test_one_edit_changes_one_line_of_what_a_person_wrote(tmp_path: Path, name: str) -> None:
+    """Also under another name, and also where another scene stood there."""
+    file = tmp_path / "mine.toml"
+    file.write_text(MINE, encoding="utf-8")
+    (tmp_path / "beside").mkdir()
+    (tmp_path / "taken.toml").write_text("# Of somebody else\n" + SCENE, encoding="utf-8")
+    document = Document.open(file)
+    card = document.scene.objects[1]
+    tinted = replace(card, material=replace(card.material, reflectance_rgb=(0.35, 0.8, 0.8)))
+    document.history.push("Reflectance", replace(document.scene, objects=(document.scene.objects[0], tinted)))
+    target = document.save(tmp_path / name)
+    assert target.read_text(encoding="utf-8") == MINE.replace("colour = 0.8", "colour = [0.35, 0.8, 0.8]")
+
+
+def test_another_key_in_braces_keeps_their_blanks_and_words(tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text(MINE, encoding="utf-8")
+    document = Document.open(file)
+    card = document.scene.objects[1]
+    glossy = replace(card, material=replace(card.material, roughness=0.25))
+    document.history.push("Coat", replace(document.scene, objects=(document.scene.objects[0], glossy)))
+    text = document.save().read_text(encoding="utf-8")
+    assert text == MINE.replace("colour = 0.8 }", "colour = 0.8, roughness = 0.25 }")
+    document.history.push("No coat", replace(document.scene, objects=(document.scene.objects[0], card)))
+    assert document.save().read_text(encoding="utf-8") == MINE
+
+
+def test_words_that_name_files_stay_in_their_folder(tmp_path: Path) -> None:
+    """From another folder they would name nothing."""
+    (tmp_path / "beside").mkdir()
+    save_ply(sphere(0.5, 80), tmp_path / "ball.ply")
+    file = tmp_path / "mine.toml"
+    file.write_text('# Mine\n[[objects]]\nmesh = "ball.ply"\nglass = "N-SF11"\n', encoding="utf-8")
+    document = Document.open(file)
+    target = document.save(tmp_path / "beside" / "mine.toml")
+    assert len(Document.open(target).scene.objects[0].mesh.triangles) == len(document.scene.objects[0].mesh.triangles)
+
+
 @pytest.mark.parametrize("name", ["gone/scene.toml", "scene.png", "scene"])
 def test_a_failed_save_leaves_the_document_unsaved_and_where_it_was(file: Path, name: str) -> None:
     document = Document.open(file)

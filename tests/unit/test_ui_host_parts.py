@@ -63,6 +63,19 @@ def test_notices_fade_and_errors_stay() -> None:
     assert box.messages() == ()
 
 
+def test_a_notice_stays_until_it_can_be_read() -> None:
+    """Of a file that takes long to prepare, notes were gone before the first frame; four long ones had six seconds."""
+    clock = Clock()
+    box = MessageBox(clock)
+    box.tell("word " * 60)
+    clock.now = 100.0  # nothing was drawn meanwhile
+    assert len(box.messages()) == 1
+    clock.now += 300 / 15 - 1
+    assert len(box.messages()) == 1
+    clock.now += 2
+    assert box.messages() == ()
+
+
 def test_a_message_that_is_said_again_is_shown_once_and_too_many_push_out_the_oldest() -> None:
     box = MessageBox(Clock())
     for number in range(MAX_MESSAGES + 3):

@@ -73,3 +73,10 @@ def test_editing_one_part_leaves_the_others_and_the_shear() -> None:
     np.testing.assert_allclose(scaled[:3, :3] / np.linalg.norm(scaled[:3, :3], axis=0), SHEARED[:3, :3] / scale)
     for same in (with_position(SHEARED, position), with_rotation(SHEARED, rotation), with_scale(SHEARED, scale)):
         np.testing.assert_allclose(same, SHEARED, atol=1e-12)
+
+
+def test_what_rounding_leaves_of_an_angle_is_nothing() -> None:
+    """It would be shown as "-0.00°"."""
+    for degrees in range(-170, 180, 7):
+        found = decompose(compose((0, 0, 0), (-90.0, 0.0, float(degrees)), (1, 1, 1)))[1]
+        assert f"{found[1]:.2f}" == "0.00"

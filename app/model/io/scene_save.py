@@ -44,21 +44,26 @@ INLINE_TRIANGLES = 64
 """Flat meshes of no more triangles than this go into the scene file itself."""
 
 
-def save_scene(scene: Scene, path: str | os.PathLike[str], over: bool = False) -> None:
+def save_scene(scene: Scene, path: str | os.PathLike[str], over: bool = False, words_from: Path | None = None) -> None:
     """Write `scene` to the TOML file `path`, whole or not at all.
 
     Meshes without a description go to PLY files in the folder `<stem>_meshes` beside it, pictures without a file to
     `<stem>_pictures`, copies of files that the scene may not read from there to `<stem>_files`. `over`: where `path`
-    holds a scene already, what did not change keeps the words, order and comments it has there.
+    holds a scene already, what did not change keeps the words, order and comments it has there; `words_from`: those of
+    this scene file instead, which it was opened from.
     Raises UserError when something cannot be written.
     """
     path = Path(path)
     check_writable(path)
     values, before = scene_values(scene, path), ""
-    if over and files.is_file(path):
+    written = words_from or (path if over else None)
+    if written is not None and written.suffix.lower() == ".toml" and files.is_file(written):
         with suppress(UserError, OSError, ValueError):
-            before = files.read_text(path, files.SCENE_BYTES)
-            values = _kept(scene, path, tomllib.loads(before))
+            text = files.read_text(written, files.SCENE_BYTES)
+            raw = tomllib.loads(text)
+            # From another folder the names of files would mean others, or none.
+            if written.parent == path.parent or not _names_files(raw, written.parent):
+                values, before = _kept(scene, path, raw, written), text
     text = toml_text(values, before)
     with atomic_output(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
@@ -85,9 +90,17 @@ def scene_values(scene: Scene, path: Path) -> dict[str, Any]:
 # -- over what a person wrote -------------------------------------------------------------
 
 
-def _kept(scene: Scene, path: Path, raw: dict[str, Any]) -> dict[str, Any]:
-    """`raw`, the tables that stand in `path`, with what differs in `scene` replaced."""
-    before = load_scene(path)
+def _names_files(raw: Any, folder: Path) -> bool:
+    """Whether any of its texts is the name of something in `folder`."""
+    if isinstance(raw, dict | list):
+        return any(_names_files(value, folder) for value in (raw.values() if isinstance(raw, dict) else raw))
+    # No file's name is so long, and the system would refuse to look for it.
+    return isinstance(raw, str) and 0 < len(raw) < 256 and (folder / raw).exists()
+
+
+def _kept(scene: Scene, path: Path, raw: dict[str, Any], written: Path) -> dict[str, Any]:
+    """`raw`, the tables that stand in the file `written`, with what differs in `scene` replaced."""
+    before = load_scene(written)
     values = dict(raw)
     if scene.name != before.name:
         values["name"] = scene.name
@@ -205,7 +218,10 @@ def _kept_material(
         if wanted.keys() <= {"glass", *_OVER_GLASS}:
             return kept | wanted
     if isinstance(values.get("material"), dict):
-        return kept | {"material": wanted}
+        before, words = old.material.values(path), values["material"]
+        # A grey of one number, say, where something else of the material changed.
+        same = {key: words[key] for key in wanted if key in words and before.get(key) == wanted[key]}
+        return kept | {"material": wanted | same}
     return kept | _material(new, materials, path)
 
 

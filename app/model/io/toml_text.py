@@ -8,7 +8,7 @@ from contextlib import suppress
 from typing import Any
 
 import tomlkit
-from tomlkit.items import AoT, Item, Table
+from tomlkit.items import AoT, InlineTable, Item, Table
 
 
 def toml_text(values: Mapping[str, Any], before: str = "") -> str:
@@ -38,7 +38,11 @@ def _update(table: Any, values: Mapping[str, Any], depth: int = 0) -> None:
         old = table.get(key)
         if old is not None and old.unwrap() == value:
             continue
-        if isinstance(value, Mapping) and isinstance(old, Table):
+        if isinstance(value, Mapping) and isinstance(old, InlineTable) and old.keys() != value.keys():
+            table[key] = _braces(old, value, depth + 1)
+            continue
+        # In place in braces too: written anew they would lose the blanks that somebody put in them.
+        if isinstance(value, Mapping) and isinstance(old, Table | InlineTable):
             _update(old, value, depth + 1)
         elif isinstance(old, AoT) and len(old) == len(value):
             for entry, wanted in zip(old, value, strict=True):
@@ -49,6 +53,19 @@ def _update(table: Any, values: Mapping[str, Any], depth: int = 0) -> None:
             table[key] = _item(value, depth)
         else:
             table.add(key, _item(value, depth))
+
+
+def _braces(old: InlineTable, values: Mapping[str, Any], depth: int) -> Item:
+    """An inline table with other keys than `old`, with its blanks, and its words for what did not change."""
+    told = []
+    for key in [*(key for key in old if key in values), *(key for key in values if key not in old)]:
+        known = old.get(key)
+        item = known if known is not None and known.unwrap() == values[key] else _item(values[key], depth)
+        told.append(f"{tomlkit.key(key).as_string()} = {item.as_string().strip()}")
+    blank = " " if old.as_string().startswith("{ ") else ""
+    item = tomlkit.parse(f"x = {{{blank}{', '.join(told)}{blank}}}")["x"]
+    assert isinstance(item, InlineTable)
+    return item
 
 
 def _entries(values: list[Mapping[str, Any]], known: list[Any]) -> AoT:

@@ -43,33 +43,49 @@ FILES = (".exr", ".npy", ".png")
 _QUESTION = "compare with"
 ERROR_RANGE = 0.5
 """Relative error at the ends of the map's scale (`passes.display.ERROR_RANGE`)."""
-_WIDE_EM = 40.0
+_WIDE_EM, _WIDEST_EM = 40.0, 50.0
+"""Of the panel, from which on it has two and three columns."""
+_LOWEST_PLOT_EM = 9.0
 _LEGEND_STEPS = 40
 
 
 def draw_compare(state: State, view_model: ViewModel) -> State:
     """Draw the panel's contents."""
-    if imgui.get_content_region_avail().x < theme.em(_WIDE_EM):
+    width = imgui.get_content_region_avail().x
+    if width < theme.em(_WIDE_EM):
         state = _controls(state, view_model)
+        state = _progress(state, view_model)
         _values(state, view_model)
-        state = _plot(state, view_model, theme.em(13))
-        if not state.compare.plot:
-            _histogram(view_model, theme.em(11))
-        return state
-    if imgui.begin_table("##compare", 2, imgui.TableFlags_.sizing_stretch_prop):
-        imgui.table_setup_column("controls", imgui.TableColumnFlags_.width_stretch, 1.0)
-        imgui.table_setup_column("plot", imgui.TableColumnFlags_.width_stretch, 1.3)
+        return _drawn(state, view_model, theme.em(13), theme.em(11))
+    # Below the picture it is low and wide: side by side nothing has to be scrolled to.
+    is_widest = width >= theme.em(_WIDEST_EM) and is_comparing(state.compare)
+    if imgui.begin_table("##compare", 3 if is_widest else 2, imgui.TableFlags_.sizing_stretch_prop):
+        stretch = imgui.TableColumnFlags_.width_stretch
+        for name, share in (("controls", 1.0), *((("progress", 1.0),) if is_widest else ()), ("plot", 1.2)):
+            imgui.table_setup_column(name, stretch, share)
         imgui.table_next_row()
         imgui.table_next_column()
         state = _controls(state, view_model)
+        if is_widest:
+            imgui.table_next_column()
+            _values(state, view_model)
+            state = _progress(state, view_model)
+        else:
+            state = _progress(state, view_model)
         imgui.table_next_column()
-        _values(state, view_model)
-        room = max(imgui.get_content_region_avail().y, theme.em(9))
-        state = _plot(state, view_model, room)
-        if not state.compare.plot:
-            _histogram(view_model, room)
+        if not is_widest:
+            _values(state, view_model)
+        room = max(imgui.get_content_region_avail().y, theme.em(_LOWEST_PLOT_EM))
+        state = _drawn(state, view_model, room, room)
         imgui.end_table()
     return state
+
+
+def _drawn(state: State, view_model: ViewModel, plot_height: float, histogram_height: float) -> State:
+    """Curves or histogram."""
+    if not state.compare.plot:
+        _histogram(view_model, histogram_height)
+    return _plot(state, view_model, plot_height)
 
 
 def _controls(state: State, view_model: ViewModel) -> State:
@@ -114,7 +130,7 @@ def _controls(state: State, view_model: ViewModel) -> State:
     state = replace(state, compare=replace(compare, plot=plot))
     if mode in ("error", "beside"):
         _legend()
-    return _progress(state, view_model)
+    return state
 
 
 def _glass(compare: Compare) -> Compare:
@@ -163,9 +179,9 @@ def _histogram(view_model: ViewModel, height: float) -> None:
         # The root, so that a bright line on a grey table is seen beside the table.
         implot.setup_axis_limits(implot.ImAxis_.y1, 0.0, 1.15 * top**0.5, implot.Cond_.always)
         implot.setup_legend(implot.Location_.north_east)
-        for name, shares, tint in zip(
-            ("This picture", view_model.compare_label or "Other"), (found.own, found.other), _tints(), strict=True
-        ):
+        # Its error stands in the picture; here it would lie over the curves.
+        other = view_model.compare_label.partition(",")[0] or "Other"
+        for name, shares, tint in zip(("This picture", other), (found.own, found.other), _tints(), strict=True):
             spec = implot.Spec(line_color=tint, line_weight=1.8)
             implot.plot_line(name, found.stops, np.ascontiguousarray(np.sqrt(shares), float), spec)
         implot.end_plot()
@@ -176,6 +192,10 @@ def _progress(state: State, view_model: ViewModel) -> State:
     """How far the other picture is, and what it is."""
     if not is_comparing(state.compare):
         widgets.hint("Choose what to show to begin. The other picture is computed in the time that this one leaves.")
+        return state
+    if state.compare.method == "file":  # it is read at once, whole
+        if view_model.compare_text:
+            widgets.hint(view_model.compare_text)
         return state
     done = view_model.reference_progress
     rows.begin_row("Progress")

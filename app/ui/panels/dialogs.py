@@ -73,11 +73,16 @@ def new_scene(state: State, view_model: ViewModel) -> State:
     return unless_unsaved(state, view_model, requests.NewScene())
 
 
+NO_FILE = "'{}' has no file of its own yet: what comes with SpectraSplat, and a mesh, are never written over."
+
+
 def save_as(state: State, view_model: ViewModel) -> State:
     """Ask where to save."""
     folder = view_model.path.parent if view_model.path is not None else _recent_folder(view_model)
     name = view_model.path.name if view_model.path is not None else f"{_file_stem(view_model.title)}.toml"
-    file_browser.ask(file_browser.Question("save", "Save as", SAVEABLE, folder / name, saving=True))
+    # Else Ctrl+S on a scene that comes with the program would ask this without a word why.
+    hint = "" if view_model.path is not None else NO_FILE.format(view_model.title)
+    file_browser.ask(file_browser.Question("save", "Save as", SAVEABLE, folder / name, saving=True, hint=hint))
     return state
 
 

@@ -71,7 +71,7 @@ def draw_dispersion(state: State, view_model: ViewModel) -> State:
 
 
 def _why_empty(state: State) -> str:
-    if state.selection.kind is None:
+    if state.selection.kind in (None, "camera"):
         return "Click an object of glass, or a caustic that it makes, to edit its dispersion."
     if state.selection.kind == "light":
         return "A light is selected. Its spectrum is in the inspector; click an object of glass to edit its dispersion."

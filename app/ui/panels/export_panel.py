@@ -64,11 +64,15 @@ def _running(state: State, view_model: ViewModel) -> State:
     rows.explain("Export progress", "The export works in the time that the window leaves; editing does not change it.")
     if job.text:
         widgets.hint(job.text)
-    if widgets.button(
-        "Cancel export",
-        tip="Stop the export. What is finished stays: a movie plays up to here, a sequence keeps its frames.",
-        width=-1,
-    ):
+    if job.is_stopped:
+        label, tip = "Discard it", "Do not wait for what is done to become a picture: write nothing at all."
+    else:
+        label = "Cancel export"
+        tip = (
+            "Stop the export. What is done is kept: a picture is written with the light that it has by then, a movie "
+            "plays up to here, a sequence keeps its frames."
+        )
+    if widgets.button(label, tip=tip, width=-1):
         state = state.asking(CancelJob())
     imgui.separator()
     return state
@@ -152,7 +156,8 @@ def _animation(state: State, view_model: ViewModel, idle: bool) -> State:
             clamp=False,
         )
         _choices.frames = frames = max(1, round(count))
-    widgets.read_out("Length", f"{frames / _choices.fps:.2f} s, {frames} frames", tip="How long the animation plays.")
+    length = f"{frames / _choices.fps:.2f} s, {frames} {'frame' if frames == 1 else 'frames'}"
+    widgets.read_out("Length", length, tip="How long the animation plays.")
     _, _choices.size = widgets.combo("Size", SIZES, _choices.size, tip="Pixels of each picture.")
     _, _choices.photons = widgets.combo(
         "Photons##frame", PHOTONS, _choices.photons, tip="Photons of each traced frame."

@@ -34,6 +34,8 @@ class Question:
     saving: bool = False
     known: Mapping[str, Path] = field(default_factory=dict)
     """Files that are found by a bare name from any folder."""
+    hint: str = ""
+    """Why it is asked, where that is not plain."""
 
 
 @dataclass(frozen=True)
@@ -108,6 +110,8 @@ def draw() -> None:
 
 
 def _contents(question: Question) -> None:
+    if question.hint:
+        widgets.hint(question.hint)
     _places(question)
     footer = imgui.get_frame_height_with_spacing() * 2 + theme.em(0.6)
     if _browser.error:

@@ -58,7 +58,10 @@ def _scene_camera(state: State) -> State:
     widgets.hint("The view that the scene is saved with.")
     camera, active = draw_camera_rows(state.scene.camera)
     if camera != state.scene.camera:
+        looks_through = state.camera == state.scene.camera
         state = edits.attempt(state, "Camera", edits.set_camera, camera)
+        if looks_through:  # who looks through it sees what is done to it
+            state = replace(state, camera=state.scene.camera)
     if widgets.button("Look through it", tip="Take its view (0).", width=-1):
         state = replace(state, camera=state.scene.camera)
     if widgets.button("Put it here", tip="Save the present view with the scene (Ctrl+0).", width=-1):

@@ -83,7 +83,8 @@ def progress_words(stats: LiveStats, is_playing: bool) -> str:
         return f"{word}, {numbers.count(stats.polygons)} polygons"
     if stats.photons or not stats.camera_samples:
         return f"{word}, {numbers.count(stats.photons)} photons"
-    return f"{word}, {numbers.count(round(stats.camera_samples))} samples a pixel, no caustics"
+    samples = round(stats.camera_samples)
+    return f"{word}, {numbers.count(samples)} {'sample' if samples == 1 else 'samples'} a pixel, no caustics"
 
 
 def _selection(state: State) -> None:
@@ -107,7 +108,8 @@ def _job(state: State, view_model: ViewModel) -> State:
     imgui.progress_bar(job.fraction, imgui.ImVec2(theme.em(9), 0.0), f"{job.fraction:.0%}")
     widgets.tooltip(job.text or job.title)
     imgui.same_line()
-    if widgets.button("Cancel##job", tip="Stop the export; what is finished stays."):
+    label, tip = ("Discard", "Write nothing at all.") if job.is_stopped else ("Cancel", "Stop; what is done is kept.")
+    if widgets.button(f"{label}##job", tip=tip):
         state = state.asking(CancelJob())
     return state
 
