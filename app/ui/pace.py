@@ -6,8 +6,8 @@ SOFTWARE_FRAME_S = 0.04
 """A frame on the software renderer: with the batch that runs over its end, within the 50 ms in which input must
 have its effect."""
 PATIENT_FRAME_S = 0.15
-"""While nobody touches anything, and the first whole picture or a finished one is waited for: what the interface costs
-is then spent less often."""
+"""While nobody touches anything: what the interface costs, on two cores more than half of a frame, is then spent less
+often. Input and a new picture end it, or else half of the interface's frames would show what the last one did."""
 GPU_SHARE = 0.75
 """Of the time between two pictures of the screen; the rest is the driver's and the window system's."""
 MIN_SHARE = 0.25
@@ -30,7 +30,7 @@ class Pace:
 
     @property
     def patient_budget_s(self) -> float:
-        """The same where somebody waits and touches nothing."""
+        """The same while nobody touches anything."""
         return self._left_of(max(self.frame_s, PATIENT_FRAME_S) if self._is_software else self.frame_s)
 
     def _left_of(self, frame_s: float) -> float:

@@ -82,6 +82,8 @@ class Session:
         self.interface_s = 0.0
         self.engine_s = 0.0
         self.clock = clock
+        self.input_waits: Callable[[], bool] = lambda: False
+        """Whether there is input that the next frame will see."""
         self._watch = ShaderWatch(clock=clock)
         self.dropped: list[Path] = []
         """Files to be opened in the next frame."""
