@@ -197,11 +197,12 @@ class LivePicture:
         is_data = texture is not None or state.display.false_colour
         glare = 0.0 if is_data else state.scene.render.glare
         antialias = _antialiases(state, other)
-        key = (id(radiance), version, state.display, glare, antialias, self.exposure_ev, self._size, state.compare)
+        halo = glare, glare > 0.0 and state.interacting
+        key = (id(radiance), version, state.display, halo, antialias, self.exposure_ev, self._size, state.compare)
         if texture is None and self.shown is not None and key == self._developed:
             return
         self._developed = None if texture is not None else key
-        radiance = self._glare.run(radiance, glare)
+        radiance = self._glare.run(radiance, glare, in_motion=state.interacting)
         look = state.display, self.exposure_ev, self._size
         self.shown = self._display.run(radiance, *look, texture, state.compare, antialias)
         self.beside = None

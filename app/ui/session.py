@@ -114,7 +114,7 @@ class Session:
         self.delta_s = min(max(now - self._last_start, 1e-4), 0.25)
         self._frame_started = self._last_start = now
         self.picture.resize(self.state, self.jobs.comparison)
-        if self._watch.changed():
+        if not self.was_interacting and self._watch.changed():  # looking takes some of a frame, and can wait
             self.reload_shaders()
         if self.may_make_thumbnails():
             self.jobs.gallery.step()
