@@ -59,7 +59,9 @@ class Phase:
     glass: float
     """… and for what is seen by way of glass and mirrors."""
     whole_s: float
-    """From the last input until every pixel has its own path again."""
+    """From the last input until every pixel has its own path again …"""
+    whole_processor_s: float
+    """… and what that took on all cores."""
     device_ms: dict[str, float] = field(default_factory=dict)
     """Of a frame, by pass and by the device's own timers; empty where these do not work."""
 
@@ -73,7 +75,8 @@ class Phase:
             f"{self.processor_ms:8.1f} ms "
             f"{self.pictures_per_second:8.1f} /s "
             f"{self.photons_per_second / 1e6:8.3f} M/s "
-            f"{self.rays_traced:>12,} {100 * self.direct:6.0f} % {100 * self.glass:6.0f} % {self.whole_s:7.2f} s"
+            f"{self.rays_traced:>12,} {100 * self.direct:6.0f} % {100 * self.glass:6.0f} % {self.whole_s:7.2f} s "
+            f"{self.whole_processor_s:7.2f} s"
             f"{on_device}"
         )
 
@@ -92,7 +95,8 @@ def run(context: Context, scene: Path, size: tuple[int, int], seconds: float) ->
         age = process_age_s()
         yield whole if age is None else f"{whole}, {age:.2f} s from the start of the process"
         heads = "".join(f" {head:>11}" for head in ("median", "95 %", "frames", "processor", "pictures"))
-        yield f"{'':<24}{heads} {'photons':>12} {'rays traced':>12} {'direct':>8} {'glass':>8} {'whole':>9}"
+        heads += f" {'photons':>12} {'rays traced':>12} {'direct':>8} {'glass':>8} {'whole':>9} {'processor':>9}"
+        yield f"{'':<24}{heads}"
         for name, hold, act in (
             ("accumulating", None, bench.rest),
             ("orbiting", bench.holding_middle_button, bench.orbit),
@@ -198,6 +202,8 @@ class _Bench:
             elapsed, worked = time.perf_counter() - started, time.process_time() - worked
             rays = self.session.picture.stats.rays_traced - before.rays_traced
             spent = self._context.timers.since(on_device)
+        ended = time.process_time()
+        whole_s = self.wait_for_whole()
         return Phase(
             name,
             np.array(times),
@@ -207,7 +213,8 @@ class _Bench:
             pictures / elapsed,
             float(np.mean(direct)),
             float(np.mean(glass)),
-            self.wait_for_whole(),
+            whole_s,
+            time.process_time() - ended,
             {name: 1e3 * seconds / len(times) for name, seconds in spent.items()},
         )
 

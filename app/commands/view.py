@@ -99,6 +99,7 @@ def _run(
     elif scene is None and screenshot is None:
         session.welcome()
     viewer = Viewer(session, refresh_s=window.refresh_s)
+    session.input_waits = window.input_waits
     layout_memory.load()
     try:
         if screenshot is None:

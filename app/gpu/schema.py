@@ -49,6 +49,14 @@ class Struct:
     """Moved as groups of four words: GLSL also gets `NAME_TEXELS`, `to_texels` and `NAME_of`. A software
     renderer pays per access, not per byte, and a texel is one access."""
 
+    def __hash__(self) -> int:
+        return self._hash
+
+    @cached_property
+    def _hash(self) -> int:
+        # Sources are kept by the structs that they hold, and a drag asks for a dozen of them in every frame.
+        return hash((self.name, self.fields, self.texels))
+
     def __post_init__(self) -> None:
         offset, widest = 0, 4
         for field in self.fields:

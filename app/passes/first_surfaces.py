@@ -43,6 +43,8 @@ class FirstSurfaces:
             else None
         )
         self._target: moderngl.Framebuffer | None = None
+        self._beyond = np.zeros(0)
+        """What a picture of the target's size holds beyond all."""
         self.texture: moderngl.Texture | None = None
 
     def _corners_of(self, scene: SceneBuffers) -> np.ndarray:
@@ -69,8 +71,7 @@ class FirstSurfaces:
         target.viewport = (0, 0, width, height)
         assert self.texture is not None
         target.clear(depth=1.0)
-        beyond = np.full((height, width), FAR, "f4") if self._distances else np.full((height, width, 2), NONE, "u4")
-        self.texture.write(beyond)
+        self.texture.write(self._beyond)
         if self._draw is not None:
             self._program["depths"] = self._depths(parameters)
             self._ctx.enable_only(moderngl.DEPTH_TEST)
@@ -100,6 +101,8 @@ class FirstSurfaces:
                 if self._distances
                 else self._ctx.texture((width, height), 2, dtype="u4")
             )
+            pixels = (height, width)
+            self._beyond = np.full(pixels, FAR, "f4") if self._distances else np.full((*pixels, 2), NONE, "u4")
             self._target = self._ctx.framebuffer([self.texture], self._ctx.depth_texture((width, height)))
         return self._target
 

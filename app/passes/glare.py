@@ -28,25 +28,32 @@ class Glare:
         self._sampler.border_color = (0.0, 0.0, 0.0, 0.0)
         self._textures: dict[tuple[str, int], moderngl.Texture] = {}
 
-    def run(self, picture: moderngl.Texture, share: float) -> moderngl.Texture:
+    def run(self, picture: moderngl.Texture, share: float, *, in_motion: bool = False) -> moderngl.Texture:
         """`picture` (RGBA32F, linear) of which the lens scatters `share`; itself where that is 0. The texture stays
-        valid until the next call."""
+        valid until the next call.
+
+        `in_motion`: the light of the finest octave, a halo of two pixels at 540 rows, stays where it is; it alone costs
+        a software renderer as much as all the rest of it."""
         if share <= 0.0:
             return picture
         # Rows of the finest octave, whose texels are as wide as its Gaussian.
         rows = _SPREAD / WIDEST * 2.0 ** (OCTAVES - 1)
-        shrunk = [picture]
-        for octave in range(OCTAVES):
+        octaves, finer = range(1 if in_motion else 0, OCTAVES), picture
+        if in_motion:
+            # Means of whole pixels: many lookups between them for each of the larger texels would take as long.
+            finer = self._step("HALVE", 0, (-(-picture.width // 2), -(-picture.height // 2)), (picture, picture))
+        shrunk: dict[int, moderngl.Texture] = {}
+        for octave in octaves:
             height = max(1, round(rows / 2**octave))
             size = max(1, round(height * picture.width / picture.height)), height
-            shrunk.append(self._step("SHRINK", octave, size, (shrunk[-1], shrunk[-1])))
+            finer = shrunk[octave] = self._step("SHRINK", octave, size, (finer, finer))
         softened = self._texture(("EMPTY", 0), (1, 1))
-        for octave in reversed(range(OCTAVES)):
-            of = shrunk[octave + 1]
+        for octave in reversed(octaves):
+            of = shrunk[octave]
             spread = self._step("SPREAD", octave, of.size, (of, softened), share / OCTAVES)
             ring = spread.width + 2, spread.height + 2
             softened = self._step("SOFTEN", octave, ring, (spread, spread))
-        return self._step("JOIN", 0, picture.size, (picture, softened), share)
+        return self._step("JOIN", 0, picture.size, (picture, softened), share * len(octaves) / OCTAVES)
 
     def release(self) -> None:
         """Free everything."""

@@ -7,6 +7,7 @@ frame already shows the input of that frame. No window is needed; `window` and `
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -25,9 +26,9 @@ Draw = Callable[[State, ViewModel], State]
 DEFAULT_BUDGET_S = 0.03
 
 
-def run_frame(session: Session, draw: Draw, budget_s: float = DEFAULT_BUDGET_S) -> None:
+def run_frame(session: Session, draw: Draw, budget_s: float = DEFAULT_BUDGET_S, slice_s: float = math.inf) -> None:
     """Draw the interface with `draw`, within imgui's frame, and carry out what it asks; the engine works for about
-    `budget_s`."""
+    `budget_s`, but hardly longer than `slice_s` once there is input or another picture."""
     view_model = view_model_of(session)
     before = replace(session.state, interacting=False, hover=None, requests=())
     started = session.clock()
@@ -39,7 +40,7 @@ def run_frame(session: Session, draw: Draw, budget_s: float = DEFAULT_BUDGET_S) 
     session.autosave.update(
         session.document.scene, session.document.title, session.document.source, session.document.unsaved
     )
-    _work(session, budget_s)
+    _work(session, budget_s, slice_s)
     session.was_interacting = session.state.interacting
 
 
@@ -72,7 +73,7 @@ def _carry_out(session: Session, request: requests.Request) -> None:
         )
 
 
-def _work(session: Session, budget_s: float) -> None:
+def _work(session: Session, budget_s: float, slice_s: float) -> None:
     """Let the engine work and show its picture."""
     session.engine_s = 0.0
     if session.state.preferences.panels.start_page:  # which covers the picture, and behind which there is no layout yet
@@ -85,7 +86,7 @@ def _work(session: Session, budget_s: float) -> None:
     started = session.clock()
     drawn = session.drawn.of(session.state)
     try:
-        session.picture.advance(drawn, left)
+        session.picture.advance(drawn, left, slice_s, session.input_waits)
     except EngineError as error:
         session.renderer_stopped(error)
         return

@@ -6,6 +6,7 @@ raised as `EngineError`, and `restart` makes a new one; the last picture stays.
 
 from __future__ import annotations
 
+import math
 import re
 import time
 from collections.abc import Callable
@@ -43,6 +44,13 @@ class Other(Protocol):
     @property
     def picture(self) -> moderngl.Texture | None:
         """Radiance, as the engine's."""
+
+
+Stops = Callable[[], bool]
+
+
+def _never() -> bool:
+    return False
 
 
 _SHADER_FILE = re.compile(r"\.(comp|vert|frag|glsl)\b")
@@ -135,8 +143,11 @@ class LivePicture:
         self._exposure.restart()
         self.awaits_scene = self.radiance is not None
 
-    def advance(self, state: State, budget_s: float) -> None:
-        """Let the engine follow `state`. Raises `EngineError`."""
+    def advance(self, state: State, budget_s: float, slice_s: float = math.inf, stops: Stops = _never) -> None:
+        """Let the engine follow `state`. Raises `EngineError`.
+
+        It works in slices of `slice_s`: not beyond the one in which another picture is made, or after which `stops()`,
+        or which it had little to do in."""
         if self.engine is None:
             return
         with self._guarded():
@@ -144,9 +155,24 @@ class LivePicture:
             self.engine.target_photons = state.preferences.target_photons
             self.engine.refine_when_still = state.preferences.refine_when_still
             self.engine.set(state.live_inputs)
-            self.engine.advance(budget_s, state.interacting)
-            self.stats = self.engine.stats
+            self.stats = self._advance(self.engine, state.interacting, budget_s, slice_s, stops)
             self.awaits_scene &= self.stats.shows_other and self.problem is None
+
+    @staticmethod
+    def _advance(engine: LiveEngine, interacting: bool, budget_s: float, slice_s: float, stops: Stops) -> LiveStats:
+        """The engine's stats, with what all slices together took."""
+        version, started = engine.picture_version, time.perf_counter()
+        trace_s = splat_s = camera_s = 0.0
+        while True:
+            begun = time.perf_counter()
+            given = min(slice_s, max(budget_s - (begun - started), 0.5 * min(slice_s, budget_s)))
+            engine.advance(given, interacting)
+            stats = engine.stats
+            trace_s, splat_s, camera_s = trace_s + stats.trace_s, splat_s + stats.splat_s, camera_s + stats.camera_s
+            now = time.perf_counter()
+            ends = now - started > budget_s - 0.5 * min(slice_s, budget_s) or now - begun < 0.5 * given
+            if ends or engine.picture_version != version or stats.converged or stops():
+                return replace(stats, trace_s=trace_s, splat_s=splat_s, camera_s=camera_s)
 
     def show(self, state: State, now_s: float, delta_s: float, other: Other | None = None) -> None:
         """Develop the engine's picture for the screen."""
@@ -171,11 +197,12 @@ class LivePicture:
         is_data = texture is not None or state.display.false_colour
         glare = 0.0 if is_data else state.scene.render.glare
         antialias = _antialiases(state, other)
-        key = (id(radiance), version, state.display, glare, antialias, self.exposure_ev, self._size, state.compare)
+        halo = glare, glare > 0.0 and state.interacting
+        key = (id(radiance), version, state.display, halo, antialias, self.exposure_ev, self._size, state.compare)
         if texture is None and self.shown is not None and key == self._developed:
             return
         self._developed = None if texture is not None else key
-        radiance = self._glare.run(radiance, glare)
+        radiance = self._glare.run(radiance, glare, in_motion=state.interacting)
         look = state.display, self.exposure_ev, self._size
         self.shown = self._display.run(radiance, *look, texture, state.compare, antialias)
         self.beside = None

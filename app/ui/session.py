@@ -82,6 +82,8 @@ class Session:
         self.interface_s = 0.0
         self.engine_s = 0.0
         self.clock = clock
+        self.input_waits: Callable[[], bool] = lambda: False
+        """Whether there is input that the next frame will see."""
         self._watch = ShaderWatch(clock=clock)
         self.dropped: list[Path] = []
         """Files to be opened in the next frame."""
@@ -112,7 +114,7 @@ class Session:
         self.delta_s = min(max(now - self._last_start, 1e-4), 0.25)
         self._frame_started = self._last_start = now
         self.picture.resize(self.state, self.jobs.comparison)
-        if self._watch.changed():
+        if not self.was_interacting and self._watch.changed():  # looking takes some of a frame, and can wait
             self.reload_shaders()
         if self.may_make_thumbnails():
             self.jobs.gallery.step()

@@ -25,8 +25,6 @@ class Viewer:
         self.pace = Pace(session.context.is_software, refresh_s)
         self._draw = draw
         self._drawn_at = 0.0
-        self._has_shown = False
-        """A whole picture."""
 
     def prepare(self, interface_scale: float = 1.0, framebuffer_scale: float = 1.0) -> None:
         """Before a frame."""
@@ -36,10 +34,10 @@ class Viewer:
 
     def draw(self) -> None:
         """One frame."""
-        stats = self.session.picture.stats
-        self._has_shown |= stats.camera_samples >= 1 and stats.resolution_scale >= 1
-        waits = (not self._has_shown or self.session.jobs.exports.is_rendering) and not _is_touched()
-        run_frame(self.session, self._draw, self.pace.patient_budget_s if waits else self.pace.budget_s)
+        if _is_touched() or self.session.was_interacting:
+            run_frame(self.session, self._draw, self.pace.budget_s)
+        else:
+            run_frame(self.session, self._draw, self.pace.patient_budget_s, self.pace.frame_s)
 
     def rendered(self) -> None:
         """imgui has drawn; the screen has not been waited for."""

@@ -113,6 +113,8 @@ class Window:
         self._has_moved = False
         """The mouse, since the last frame: controls with others on them (rows with an eye) take no press before they
         were hovered for a frame."""
+        self._has_event = False
+        """Since the last frame began."""
         self._listen()
         self._host = ImguiHost()
         imgui.backends.glfw_init_for_opengl(ctypes.cast(self._handle, ctypes.c_void_p).value or 0, True)
@@ -176,10 +178,16 @@ class Window:
                 time.sleep(0.05)
             self.frame(guest)
 
+    def input_waits(self) -> bool:
+        """Whether anything has happened that the frame which is being drawn does not know of: imgui keeps it for the
+        next one."""
+        glfw.poll_events()
+        return self._has_event
+
     def frame(self, guest: Guest) -> None:
         """Draw one frame and show it."""
         self._host.make_current()
-        self._has_moved = False
+        self._has_moved = self._has_event = False
         width = max(glfw.get_window_size(self._handle)[0], 1)
         guest.prepare(self.interface_scale, self.framebuffer_size[0] / width)
         theme.apply(guest.preferences, self.interface_scale)
@@ -255,20 +263,21 @@ class Window:
         """Any event wakes the loop. imgui's own callbacks, installed later, call these first."""
 
         def wake(*_event: object) -> None:
+            self._has_event = True
             self.wake()
 
         def key(_window: object, key: int, _scancode: int, action: int, _modifiers: int) -> None:
-            self.wake()
+            wake()
             if action == glfw.RELEASE and key in MODIFIER_KEYS:
                 self._host.keep_for_next_frame()
 
         def button(_window: object, _button: int, action: int, _modifiers: int) -> None:
-            self.wake()
+            wake()
             if action == glfw.PRESS and self._has_moved:
                 self._host.keep_for_next_frame()
 
         def moved(_window: object, _x: float, _y: float) -> None:
-            self.wake()
+            wake()
             self._has_moved = True
 
         glfw.set_key_callback(self._handle, key)
@@ -286,12 +295,12 @@ class Window:
 
         def dropped(_window: object, paths: list[str]) -> None:
             self._dropped += [Path(path) for path in paths]
-            self.wake()
+            wake()
 
         def closing(_window: object) -> None:
             glfw.set_window_should_close(self._handle, False)
             self._close_pressed = True
-            self.wake()
+            wake()
 
         glfw.set_drop_callback(self._handle, cast(Any, dropped))  # glfw hands a list over, whatever its types say
         glfw.set_window_close_callback(self._handle, closing)

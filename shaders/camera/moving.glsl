@@ -10,6 +10,14 @@ layout(rg32ui, binding = IMAGE_VISIBLE) uniform readonly restrict uimage2D visib
 
 const vec2 PIXEL_MIDDLE = vec2(0.5);
 
+// A pixel by its number. Without a division of integers, which a software renderer does ray by ray.
+uvec2 pixel_of(uint number)
+{
+    int width = int(p.size.x), row = int((float(number) + 0.5) / float(width)), column = int(number) - row * width;
+    row += column < 0 ? -1 : (column >= width ? 1 : 0);
+    return uvec2(int(number) - row * width, row);
+}
+
 // Primitive and object; NONE where nothing is seen.
 uvec2 seen_first(uvec2 pixel)
 {

@@ -11,7 +11,7 @@ void main()
     uint at = gl_GlobalInvocationID.x;
     if (at >= specular_count) return;
     uint number = specular_pixel(at);
-    uvec2 pixel = uvec2(number % p.size.x, number / p.size.x);
+    uvec2 pixel = pixel_of(number);
     uvec2 block = pixel / m.glass_step;
     vec2 off = vec2(pixel - block * m.glass_step) + 0.5 - 0.5 * float(m.glass_step);
     uint rank = min(uint(31.0 * dot(off, off) * 2.0 / float(m.glass_step * m.glass_step)), 31u);

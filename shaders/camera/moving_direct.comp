@@ -117,8 +117,8 @@ void main()
     Corners texels = Corners(imageLoad(places, cell), imageLoad(places, cell + ivec2(1, 0)), imageLoad(places, cell + ivec2(0, 1)), imageLoad(places, cell + 1));
     MapLook look = look_of(map, texels, side);
 #endif
-    for (uint i = 0u; i < m.lattice_step * m.lattice_step; ++i) {
-        uvec2 off = uvec2(i % m.lattice_step, i / m.lattice_step), pixel = from + off;
+    for (uvec2 off = uvec2(0u); off.y < m.lattice_step; off = off.x + 1u < m.lattice_step ? off + uvec2(1u, 0u) : uvec2(0u, off.y + 1u)) {
+        uvec2 pixel = from + off;
         vec2 share = vec2(off) * side;
         bool inside = all(lessThan(pixel, p.size));
         uvec2 first = inside ? seen_first(pixel) : uvec2(NONE);

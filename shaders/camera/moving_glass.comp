@@ -20,8 +20,7 @@ void main()
 {
     uint at = gl_GlobalInvocationID.x;
     if (at >= specular_count) return;
-    uint here = specular_pixel(at);
-    uvec2 pixel = uvec2(here % p.size.x, here / p.size.x), first = seen_first(pixel);
+    uvec2 pixel = pixel_of(specular_pixel(at)), first = seen_first(pixel);
     vec3 normal = normal_of(first.x);
     ivec2 block = ivec2(pixel / m.glass_step);
     vec4 sum = vec4(0.0);
@@ -30,8 +29,7 @@ void main()
         bool inside = all(greaterThanEqual(near, ivec2(0))) && all(lessThan(near, ivec2(m.blocks)));
         uint best = inside ? imageLoad(chosen, near).x : NONE;
         WHEN(best != NONE) {
-            uint number = bitfieldExtract(best, 0, NUMBER_BITS);
-            uvec2 at = uvec2(number % p.size.x, number / p.size.x);
+            uvec2 at = pixel_of(bitfieldExtract(best, 0, NUMBER_BITS));
             uvec2 other = seen_first(at);
             vec2 away = (vec2(at) - vec2(pixel)) / float(m.glass_step);
             float alike = other.y == first.y ? pow(max(dot(normal_of(other.x), normal), 0.0), 16.0) : 0.0;

@@ -14,7 +14,7 @@ void main()
     uint best = imageLoad(chosen, ivec2(block)).x;
     WHEN(best != NONE) {
         uint number = bitfieldExtract(best, 0, NUMBER_BITS);
-        imageStore(found, ivec2(number % p.size.x, number / p.size.x), vec4(0.0));
+        imageStore(found, ivec2(pixel_of(number)), vec4(0.0));
         listed[atomicAdd(listed_count, 1u)] = number | (THE_SAMPLE << NUMBER_BITS);
     }
 }

@@ -10,7 +10,7 @@ void main()
 {
     uint at = gl_GlobalInvocationID.x;
     if (at >= uneven_count) return;
-    uvec2 pixel = uvec2(pixels[at] % p.size.x, pixels[at] / p.size.x), first = seen_first(pixel);
+    uvec2 pixel = pixel_of(pixels[at]), first = seen_first(pixel);
     bool met = first.y != NONE;
     radiance[0] = vec4(0.0);
     lights_seen = look_index = 0u;

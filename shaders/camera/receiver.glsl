@@ -187,6 +187,11 @@ void add_direct(CameraPath path, SurfaceInteraction seen, WavelengthInterval int
         WHEN(!known) {
             LightSample s;
             gain = unshadowed(i, seen, light_point(i, pixel_key), s);
+#ifdef IN_MOTION
+            // A spot that fades over half its cone has no edge there: what tells places apart are its shadows alone.
+            bool fades = lights[i].kind == LIGHT_KIND_POINT && lights[i].has_profile == 0u && 2.0 * lights[i].cone.x <= lights[i].cone.y;
+            if (fades && gain > 0.0) lights_seen ^= hash_pcg(i + 1u);
+#endif
             WHEN(gain > 0.0) gain = hidden_from(s, seen) ? 0.0 : gain;
 #ifdef LISTS_SPECULAR
             WHEN(gain > 0.0) {

@@ -1,5 +1,5 @@
 // Veiling glare on the device (app/base/glare.py): a picture is shrunk by octaves, each octave's halo is spread on the way back, and the
-// share that the lens scatters is put in place of as much of the picture. Which step this is: SHRINK, SPREAD, SOFTEN or JOIN.
+// share that the lens scatters is put in place of as much of the picture. Which step this is: HALVE, SHRINK, SPREAD, SOFTEN or JOIN.
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(binding = 0) uniform sampler2D fine;     // black beyond its border
 layout(binding = 1) uniform sampler2D coarse;   // likewise, softened
@@ -34,7 +34,11 @@ void main()
     ivec2 texel = ivec2(gl_GlobalInvocationID.xy), size = imageSize(made);
     if (any(greaterThanEqual(texel, size))) return;
     vec2 at = (vec2(texel) + 0.5) / vec2(size);
-#ifdef SHRINK
+#ifdef HALVE
+    ivec2 first = 2 * texel, last = min(first + 1, textureSize(fine, 0) - 1);
+    vec3 found = 0.25 * (texelFetch(fine, first, 0).rgb + texelFetch(fine, ivec2(last.x, first.y), 0).rgb
+                         + texelFetch(fine, ivec2(first.x, last.y), 0).rgb + texelFetch(fine, last, 0).rgb);
+#elif defined(SHRINK)
     // Taps that tile what the texel covers.
     ivec2 taps = max((textureSize(fine, 0) + size - 1) / size, ivec2(1));
     vec3 found = vec3(0.0);

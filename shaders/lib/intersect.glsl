@@ -231,7 +231,8 @@ void intersect_solid(uint solid, vec3 origin_p, vec3 direction, RayOrigin origin
     uint enter_plane = NONE, leave_plane = NONE;
     uint first = solids[solid].first_plane, end = first + solids[solid].plane_count;
     COUNT_ROUNDS(end - first + 1u);
-    for (uint i = first; i < end; ++i) {
+    // Most rays miss most solids, and a few planes tell.
+    for (uint i = first; i < end && enter <= leave; ++i) {
         vec4 plane = planes[i];
         float facing = dot(direction, plane.xyz);
         float gap = plane.w - dot(origin_p, plane.xyz);

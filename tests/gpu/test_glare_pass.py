@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from spectrasplat.base.glare import with_glare
+from spectrasplat.base.glare import OCTAVES, with_glare
 from spectrasplat.gpu.context import Context
 from spectrasplat.passes.glare import Glare
 
 SHARE = 0.2
 
 
-def scattered(context: Context, rgb: np.ndarray, share: float) -> np.ndarray:
+def scattered(context: Context, rgb: np.ndarray, share: float, *, in_motion: bool = False) -> np.ndarray:
     """What the pass makes of `rgb` (H, W, 3)."""
     height, width = rgb.shape[:2]
     texels = np.concatenate([rgb, np.ones((height, width, 1), np.float32)], axis=-1)
     texture = context.ctx.texture((width, height), 4, texels.tobytes(), dtype="f4")
     glare = Glare(context)
     try:
-        made = glare.run(texture, share)
+        made = glare.run(texture, share, in_motion=in_motion)
         assert (made is texture) == (share == 0.0)
         return np.frombuffer(made.read(), np.float32).reshape(height, width, 4)[..., :3].copy()
     finally:
@@ -36,6 +36,20 @@ def test_a_halo_is_that_of_written_pictures(gl: Context, height: int, width: int
     for share in (0.02, 0.04, 0.08, 0.16):
         place = height // 3, width // 3 + int(share * height)
         assert ours[place] == pytest.approx(wanted[place], rel=0.2)
+
+
+@pytest.mark.parametrize("height, width", [(180, 320), (541, 963)])
+def test_in_motion_only_the_narrowest_halo_is_missing(gl: Context, height: int, width: int) -> None:
+    rgb = np.zeros((height, width, 3), np.float32)
+    rgb[height // 3, width // 3] = 1e4, 2e4, 5e3
+    moving, wanted = scattered(gl, rgb, SHARE, in_motion=True), with_glare(rgb, SHARE)
+    assert moving.sum() == pytest.approx(wanted.sum(), rel=0.01)
+    # What is not scattered stays where it is.
+    place = height // 3, width // 3
+    assert moving[place] == pytest.approx((1.0 - SHARE * (OCTAVES - 1) / OCTAVES) * rgb[place], rel=0.01)
+    for share in (0.04, 0.08, 0.16):
+        place = height // 3, width // 3 + int(share * height)
+        assert moving[place] == pytest.approx(wanted[place], rel=0.2)
 
 
 def test_nothing_scattered_costs_nothing(gl: Context) -> None:

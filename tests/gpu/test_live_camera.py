@@ -14,7 +14,9 @@ from spectrasplat.edit.live_inputs import LiveInputs
 from spectrasplat.gpu.context import Context
 from spectrasplat.model.environment import gradient, world_to_local
 from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.lights import SpotLight
 from spectrasplat.model.optics.glass import with_gain
+from spectrasplat.model.optics.spectrum import illuminant
 from spectrasplat.model.scene import Camera, Dielectric, Scene
 from spectrasplat.model.texture import Environment
 from spectrasplat.passes.spectrum_choice import Spectrum
@@ -310,6 +312,34 @@ def test_in_motion_what_is_seen_directly_is_as_sharp_as_ever(
     # Nothing of the glass is missing, and no pixel of it is black where the whole sample is not.
     glass = ~on_table
     assert glass.sum() > 100 and (shown[glass].sum(axis=-1) > 0).mean() > 0.95
+
+
+def test_in_motion_only_sharp_edges_of_light_are_looked_at_pixel_by_pixel(
+    engine: LiveEngine, table: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A spot that fades from its middle to its border is smooth there; one with a hard border is not."""
+    monkeypatch.setattr("spectrasplat.render.viewer.live_camera.STEPS", (24,))
+    monkeypatch.setattr("spectrasplat.render.viewer.live_camera.SCALES", (1.0,))
+    x, y, _ = table.camera.target
+    uneven, errors = [], []
+    for inner_deg in (0.0, 34.9):
+        spot = SpotLight(
+            "spot",
+            illuminant("D65").scaled_to_luminous(20.0),
+            position=(x, y, 2.0),
+            direction=(0.0, 0.0, -1.0),
+            inner_half_angle_deg=inner_deg,
+            outer_half_angle_deg=35.0,
+        )
+        lit = replace(table, lights=(*table.lights, spot))
+        settle(engine, inputs(lit))
+        camera = moved(engine, lit)
+        shown, on_table = picture(engine), seen_objects(engine) == 1 - glass_of(lit)
+        uneven.append(int(np.frombuffer(engine._camera_pass._moving._lists.read(4), "u4")[0]))
+        expected = one_sample(engine, camera)
+        errors.append(np.abs(shown - expected)[on_table].mean() / expected[on_table].mean())
+    assert uneven[0] < 0.8 * uneven[1]
+    assert max(errors) < 0.03
 
 
 @pytest.mark.parametrize("size", [(161, 89), (158, 91)])

@@ -268,3 +268,11 @@ def test_a_layout_that_drifts_is_seen(gl) -> None:
     out = run(gl, items, read_words(struct, "items[row]."), (struct,), {0: written.tobytes(), 1: bytes(values.nbytes)})
     read = np.frombuffer(out[1], np.uint32).reshape(values.shape)
     assert np.count_nonzero(read != values) == 2 * ROWS
+
+
+def test_structs_are_told_apart_by_what_they_hold() -> None:
+    """By their hash, too, which is worked out once: sources are kept by the structs in them."""
+    found = structs()
+    again = [Struct(struct.name, struct.fields, struct.texels) for struct in found]
+    assert again == found and [hash(struct) for struct in again] == [hash(struct) for struct in found]
+    assert len(set(found + again)) == len(found) == len({hash(struct) for struct in found})

@@ -125,3 +125,37 @@ def test_the_window_keeps_ctrl_down_for_the_letter_of_a_long_frame(tmp_path: Pat
     command = ["xvfb-run", "-a", sys.executable, "-P", "-c", LETTER_OUTLIVES_CTRL]
     done = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.stdout.strip() == "[True]", done.stderr
+
+
+INPUT_IS_SEEN_WHILE_A_FRAME_IS_DRAWN = """
+import glfw
+from imgui_bundle import imgui
+from spectrasplat.ui.viewer import Viewer
+from spectrasplat.ui.session import Session
+from spectrasplat.ui.window import Window
+
+with Window() as window:
+    session = Session(window.context)
+    session.input_waits = window.input_waits
+    viewer, seen = Viewer(session), []
+    for _ in range(10):
+        window.frame(viewer)
+    while window.input_waits():  # what the window itself has been told
+        window.frame(viewer)
+    def draw(state, _model):
+        before = window.input_waits()
+        glfw.set_window_size(window._handle, 700, 500)
+        glfw.wait_events_timeout(2.0)
+        seen.append((before, window.input_waits()))
+        return state
+    viewer._draw = draw
+    window.frame(viewer)
+    print(seen)
+"""
+
+
+def test_a_long_frame_hears_of_input(tmp_path: Path) -> None:
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "SPECTRASPLAT_CONFIG": str(tmp_path / "config")}
+    command = ["xvfb-run", "-a", sys.executable, "-P", "-c", INPUT_IS_SEEN_WHILE_A_FRAME_IS_DRAWN]
+    done = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.stdout.strip() == "[(False, True)]", done.stderr

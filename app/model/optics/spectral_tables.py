@@ -57,6 +57,13 @@ class SpectralAxis:
         seen = {(d.kind, d.coefficients, d.range_nm, d.gain): d for d in dispersions if d.is_dispersive}
         return _axis_of(tuple(seen.values()))
 
+    @cached_property
+    def cell_edges_x(self) -> np.ndarray:
+        """x of the ends of the cells λ ± ½ nm, (402,), read-only: a scene's every spectrum asks for them."""
+        edges_x = self.x_of_nm(np.concatenate([[_LO_NM], VISIBLE_NM[:-1] + 0.5, [_HI_NM]]))
+        edges_x.flags.writeable = False
+        return edges_x
+
     def x_of_nm(self, wavelength_nm: np.ndarray | float) -> np.ndarray:
         """x of wavelengths (clamped to 380–780 nm), float64, same shape."""
         wavelength = np.clip(np.asarray(wavelength_nm, dtype=np.float64), _LO_NM, _HI_NM)
@@ -190,8 +197,7 @@ def cumulative(axis: SpectralAxis, spectrum: Spectrum, weights: np.ndarray | Non
     `Spectrum.power_w()` to rounding.
     Inside a cell the density is constant in x.
     """
-    edges_nm = np.concatenate([[_LO_NM], VISIBLE_NM[:-1] + 0.5, [_HI_NM]])
-    edges_x = axis.x_of_nm(edges_nm)
+    edges_x = axis.cell_edges_x
     table = np.column_stack([K_M * cmf_xyz(), np.ones(401)]) if weights is None else weights
     running = np.vstack([np.zeros(table.shape[1]), np.cumsum(spectrum.density[:, None] * table, axis=0)])
     if not spectrum.lines:

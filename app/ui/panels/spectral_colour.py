@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 from imgui_bundle import ImVec2, imgui
@@ -29,7 +29,13 @@ def spectral_srgb() -> np.ndarray:
 
 def colour_of_nm(wavelength_nm: float, opacity: float = 1.0) -> int:
     """The colour as a draw list takes it."""
-    red, green, blue = spectral_srgb()[int(np.clip(round(wavelength_nm) - 380, 0, 400))]
+    return _packed(min(max(round(wavelength_nm) - 380, 0), 400), opacity)
+
+
+@lru_cache(maxsize=4096)
+def _packed(row: int, opacity: float) -> int:
+    # Strips ask for more than a hundred in every frame: worked out each time they took a third of all panels' time.
+    red, green, blue = spectral_srgb()[row]
     return imgui.color_convert_float4_to_u32((red, green, blue, opacity))
 
 
