@@ -73,8 +73,8 @@ def test_single_wavelengths_are_drawn_with_the_power_that_landed(gl, method: str
     [
         pytest.param("light/roulette.glsl", "ray.throughput *= boost;", "", "unaccounted", id="a survivor's boost"),
         pytest.param(
-            "light/trace_scatter.glsl", "child.throughput *= share;", "child.throughput *= 0.85 * share;", "unaccounted",
-            id="a share of each event",
+            "light/trace_scatter.glsl", "child.throughput *= share;", "child.throughput *= 0.85 * share;",
+            "unaccounted", id="a share of each event",
         ),
         pytest.param(
             "light/trace.comp", "photon.throughput = ray.throughput;", "photon.throughput = 0.85 * ray.throughput;",
