@@ -21,6 +21,7 @@ from ..gpu.shader import ShaderError
 from ..passes.display import Display
 from ..passes.glare import Glare
 from ..passes.sample_picture import SamplePicture
+from ..render.viewer.dirty_level import DirtyLevel
 from ..render.viewer.stats import LiveStats
 from .auto_exposure import AutoExposure
 from .shown_scene import index_in
@@ -154,7 +155,8 @@ class LivePicture:
             self.engine.playing = state.playing
             self.engine.target_photons = state.preferences.target_photons
             self.engine.refine_when_still = state.preferences.refine_when_still
-            self.engine.set(state.live_inputs)
+            if self.engine.set(state.live_inputs) != DirtyLevel.NOTHING:
+                budget_s = min(budget_s, slice_s)  # what is under way now has to be told
             self.stats = self._advance(self.engine, state.interacting, budget_s, slice_s, stops)
             self.awaits_scene &= self.stats.shows_other and self.problem is None
 

@@ -16,6 +16,7 @@ from spectrasplat.edit.stored_photons import StoredPhotons
 from spectrasplat.gpu.context import Context
 from spectrasplat.model.scene import Camera, Dielectric, Diffuse
 from spectrasplat.passes.pick import PickHit
+from spectrasplat.render.viewer.dirty_level import DirtyLevel
 from spectrasplat.ui.crash_log import FILE_NAME
 from spectrasplat.ui.frame import run_frame
 from spectrasplat.ui.live_picture import LivePicture
@@ -380,3 +381,15 @@ def test_the_timing_panel_tells_the_memory_of_the_whole_program(rig: Rig) -> Non
     rig.frame(lambda state: state.with_panels(timing=False))
     rig.frame()
     assert rig.view_model.process_bytes == 0
+
+
+def test_what_a_new_wish_asks_for_is_told_after_a_slice(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+    given: list[float] = []
+    advance = rig.engine.advance
+    monkeypatch.setattr(
+        rig.engine, "advance", lambda budget_s, interacting: (given.append(budget_s), advance(budget_s, interacting))
+    )
+    rig.session.picture.advance(rig.session.state, 0.15, 0.04)
+    monkeypatch.setattr(rig.engine, "set", lambda inputs: DirtyLevel.NOTHING)
+    rig.session.picture.advance(rig.session.state, 0.15)
+    assert given == pytest.approx([0.04, 0.15], rel=0.05)
