@@ -53,7 +53,7 @@ CASES: dict[str, tuple[Edit, list[str]]] = {
         lambda s: edits.set_diffuse_colour(s, 1, (0.8, 0.5, 0.5)),
         [
             '-material = { kind = "diffuse", colour = 0.8 }',
-            '+material = {kind = "diffuse", colour = [0.8, 0.5, 0.5]}',
+            '+material = { kind = "diffuse", colour = [0.8, 0.5, 0.5] }',
         ],
     ),
 }
