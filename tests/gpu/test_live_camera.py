@@ -55,10 +55,10 @@ def inputs(scene: Scene, **changes) -> LiveInputs:
 
 
 def edged(scene: Scene, turn_deg: float = 0.0) -> Scene:
-    """White and black stripes all round behind it, 4 degrees wide."""
+    """White and black stripes all round behind it, 4 degrees wide; they light no receiver."""
     rgb = np.zeros((90, 360, 3), np.float32)
     rgb[:, np.arange(360) % 8 < 4] = WHITE
-    return replace(scene, environment=Environment(rgb, world_to_local((0.0, 0.0, 1.0), turn_deg)))
+    return replace(scene, environment=Environment(rgb, world_to_local((0.0, 0.0, 1.0), turn_deg), lights=False))
 
 
 def with_dispersion(scene: Scene, gain: float) -> Scene:
@@ -214,7 +214,7 @@ def test_environments_are_only_looked_at_and_a_turned_one_is_not_sent_again(engi
     turned = replace(
         striped, environment=replace(striped.environment, world_to_local=world_to_local((0.0, 0.0, 1.0), 4.0))
     )
-    graded = replace(stage, environment=gradient((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
+    graded = replace(stage, environment=gradient((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), lights=False))
     for scene in (striped, turned, graded):
         assert dirty_level(engine._inputs, engine._inputs, inputs(scene)) == DirtyLevel.CAMERA
     corner = settle(engine, inputs(striped))[:4, :, 0]
