@@ -34,6 +34,8 @@ ALL_SEEN = 0xFFFF
 _SAMPLES_AT_ONCE = 1 << 22
 _NEAREST = 1e-4
 """Of the farthest corner's depth: what is drawn begins there, however near the camera."""
+_TIE = 4e-6
+"""Of the range of depths: what the last object is taken to lie farther off."""
 _CORNER = np.dtype([("position", "f4", 3), ("object", "u4")])
 
 
@@ -89,6 +91,8 @@ class _Drawn:
         corners["object"] = np.repeat(np.arange(len(places)), [len(p) for p in places])
         self._corners = ctx.buffer(corners.tobytes())
         self._array = ctx.vertex_array(self._program, [(self._corners, "3f 1u", "position", "object")])
+        # Above rounding: of two surfaces in one place the first is met.
+        self._tie = _TIE / max(len(places) - 1, 1)
         self._is_pinhole = camera.kind != "orthographic"
         forward = camera_frame(camera)[2]
         position = scene.space.to_gpu(np.asarray(camera.position, float))
@@ -106,6 +110,9 @@ class _Drawn:
         rows = max(1, _SAMPLES_AT_ONCE // (width * PARTS))
         self._program["plane"] = tuple(plane)
         self._program["receiver"] = receiver
+        from_near = self._depth - np.array([0.0, 0.0, 0.0, self._near])
+        self._program["tie"] = self._tie
+        self._program["depth_row"] = tuple(from_near / (self._far - self._near))
         for first, count in _stripes(tile.height, rows):
             seen = ctx.texture((width, count * PARTS), 1, dtype="u1")
             depth = ctx.depth_texture((width, count * PARTS))

@@ -7,10 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import uniform_filter
+from spectrasplat.base.paths import assets_dir
 from spectrasplat.model.camera_rays import camera_frame
 from spectrasplat.model.contacts import standing
 from spectrasplat.model.features import Features
 from spectrasplat.model.geometry.primitives import box
+from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.optics.glass import constant
 from spectrasplat.model.scene import Black, Camera, Scene, SceneObject
 from spectrasplat.model.settings import RenderSettings
@@ -95,6 +98,18 @@ def test_words_are_what_rays_see(gl) -> None:
     # Middles of parts within a rounding of an edge may fall on either side.
     assert np.count_nonzero(seen != want) <= 2e-3 * seen.size
     assert (found > 0xFFFF).any() and (found == 0xFFFF).any()
+
+
+def test_a_face_just_behind_a_wall_does_not_hide_it_from_within_the_glass(gl) -> None:
+    """The pool's far wall stands a hundredth before the water's side, which came through the wall in dashes: depth of a
+    projection that begins at the camera tells such distances no longer."""
+    pool = load_scene(assets_dir() / "scenes" / "underwater.toml")
+    with light_pass(gl, pool, replace(SETTINGS, width=1280, height=720, photons=2_000)) as (light, _):
+        wall = 1  # of the receivers: floor, far wall, …
+        tile = light.layout.tiles[wall][0]
+        words = read_words(light.atlas.contact_words)[tile.y : tile.y + tile.height, tile.x : tile.x + tile.width]
+    wall_round_it = uniform_filter(((words & 0xFFFF) == 0xFFFF).astype(float), 9)
+    assert not ((words > 0xFFFF) & (wall_round_it > 0.8)).any() and (words > 0xFFFF).any()
 
 
 @pytest.mark.parametrize(("method", "left"), [("srd", 0.2), ("srd-photons", 0.35)])
