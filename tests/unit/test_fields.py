@@ -200,11 +200,11 @@ def test_saving_over_a_file_keeps_what_nobody_changed(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     path.write_text(WRITTEN, encoding="utf-8")
     scene = load_scene(path)
-    save_scene(scene, path, over=True)
+    save_scene(scene, path, words_from=path)
     assert path.read_text(encoding="utf-8") == WRITTEN
 
     sun = replace(scene.lights[1], angular_diameter_deg=0.5)
-    save_scene(replace(scene, lights=(scene.lights[0], sun)), path, over=True)
+    save_scene(replace(scene, lights=(scene.lights[0], sun)), path, words_from=path)
     text = path.read_text(encoding="utf-8")
     assert (
         "position = [-3, 0, 4] # in the corner" in text and "# the lamps" in text and "[materials.heavy]   # fl" in text
@@ -216,7 +216,7 @@ def test_saving_over_a_file_keeps_what_nobody_changed(tmp_path: Path) -> None:
     ball = replace(scene.objects[0], material=Dielectric(catalogue.find("N-BK7")))
     more = PointLight("new", illuminant("D65"), (1.0, 1.0, 5.0))
     changed = replace(again, objects=(ball, scene.objects[1]), lights=(*again.lights, more))
-    save_scene(changed, path, over=True)
+    save_scene(changed, path, words_from=path)
     text = path.read_text(encoding="utf-8")
     assert 'glass = "Schott N-BK7"' in text and "in the corner" in text and "width = 9\n" in text
     again = load_scene(path)
@@ -224,7 +224,7 @@ def test_saving_over_a_file_keeps_what_nobody_changed(tmp_path: Path) -> None:
     assert again.objects[0].material == ball.material
     np.testing.assert_array_equal(again.objects[1].object_to_world, scene.objects[1].object_to_world)
 
-    save_scene(replace(again, objects=(again.objects[1],), lights=(again.lights[2],)), path, over=True)
+    save_scene(replace(again, objects=(again.objects[1],), lights=(again.lights[2],)), path, words_from=path)
     again = load_scene(path)
     assert [o.name for o in again.objects] == ["floor"] and [light.name for light in again.lights] == ["new"]
 
@@ -234,7 +234,7 @@ def test_a_file_that_is_no_scene_any_more_is_written_anew(tmp_path: Path) -> Non
     path.write_text(WRITTEN, encoding="utf-8")
     scene = load_scene(path)
     path.write_text("not [ a scene", encoding="utf-8")
-    save_scene(scene, path, over=True)
+    save_scene(scene, path, words_from=path)
     assert load_scene(path).lights[0] == scene.lights[0]
 
 
@@ -246,7 +246,7 @@ def test_shipped_scenes_are_saved_over_word_for_word(name: str, tmp_path: Path) 
     text = source.read_text(encoding="utf-8").replace('"../', f'"{assets_dir().as_posix()}/')
     path.write_text(text, encoding="utf-8")
     scene = load_scene(path)
-    save_scene(scene, path, over=True)
+    save_scene(scene, path, words_from=path)
     assert path.read_text(encoding="utf-8") == text
 
 
@@ -255,7 +255,7 @@ def test_the_default_lamps_are_left_out_again(tmp_path: Path) -> None:
     path.write_text('[[objects]]\nshape = "sphere"\n', encoding="utf-8")
     scene = load_scene(path)
     assert scene.lights[0].name == "lamp"
-    save_scene(scene, path, over=True)
+    save_scene(scene, path, words_from=path)
     # The table that was put below is an object now; the rest is as it was.
     assert "lights" not in path.read_text(encoding="utf-8")
 

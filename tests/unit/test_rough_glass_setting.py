@@ -107,14 +107,14 @@ def test_it_is_saved_as_it_was_written(tmp_path: Path) -> None:
     path = tmp_path / "scene.toml"
     item = before.objects[0]
     edited = replace(item, material=item.material.changed(roughness=0.25))
-    save_scene(replace(before, objects=(edited, *before.objects[1:])), path, over=True)
+    save_scene(replace(before, objects=(edited, *before.objects[1:])), path, words_from=path)
     table = tomllib.loads(path.read_text())["objects"][0]
     assert (table["glass"], table["roughness"]) == ("N-SF11", 0.25) and "material" not in table
     assert "# frosted" in path.read_text()
     save_scene(
         replace(before, objects=(replace(item, material=item.material.changed(roughness=0.0)), *before.objects[1:])),
         path,
-        over=True,
+        words_from=path,
     )
     assert "roughness" not in tomllib.loads(path.read_text())["objects"][0], "polished is what glass is"
 

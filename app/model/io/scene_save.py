@@ -44,26 +44,25 @@ INLINE_TRIANGLES = 64
 """Flat meshes of no more triangles than this go into the scene file itself."""
 
 
-def save_scene(scene: Scene, path: str | os.PathLike[str], over: bool = False, words_from: Path | None = None) -> None:
+def save_scene(scene: Scene, path: str | os.PathLike[str], words_from: Path | None = None) -> None:
     """Write `scene` to the TOML file `path`, whole or not at all.
 
     Meshes without a description go to PLY files in the folder `<stem>_meshes` beside it, pictures without a file to
-    `<stem>_pictures`, copies of files that the scene may not read from there to `<stem>_files`. `over`: where `path`
-    holds a scene already, what did not change keeps the words, order and comments it has there; `words_from`: those of
-    this scene file instead, which it was opened from.
+    `<stem>_pictures`, copies of files that the scene may not read from there to `<stem>_files`. `words_from`: the
+    scene file it was opened from, perhaps `path` itself; what did not change keeps the words, order and comments it has
+    there.
     Raises UserError when something cannot be written.
     """
     path = Path(path)
     check_writable(path)
     values, before = scene_values(scene, path), ""
-    written = words_from or (path if over else None)
-    if written is not None and written.suffix.lower() == ".toml" and files.is_file(written):
+    if words_from is not None and words_from.suffix.lower() == ".toml" and files.is_file(words_from):
         with suppress(UserError, OSError, ValueError):
-            text = files.read_text(written, files.SCENE_BYTES)
+            text = files.read_text(words_from, files.SCENE_BYTES)
             raw = tomllib.loads(text)
             # From another folder the names of files would mean others, or none.
-            if written.parent == path.parent or not _names_files(raw, written.parent):
-                values, before = _kept(scene, path, raw, written), text
+            if words_from.parent == path.parent or not _names_files(raw, words_from.parent):
+                values, before = _kept(scene, path, raw, words_from), text
     text = toml_text(values, before)
     with atomic_output(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
