@@ -65,19 +65,6 @@ class BeamSplatter:
         self._programs: dict[tuple[int, bool, bool], moderngl.Program] = {}
         self._parameters = ctx.buffer(reserve=PARAMETERS.stride)
 
-    def run(
-        self,
-        polygons: BeamPolygons,
-        frames: Mapping[int, PlaneFrame],
-        layout: MapLayout,
-        tables: BeamTables,
-        atlas: MapAtlas,
-        weight: float = 1.0,
-    ) -> None:
-        """All `steps` at once."""
-        for _ in self.steps(polygons, frames, layout, tables, atlas, weight):
-            pass
-
     def steps(
         self,
         polygons: BeamPolygons,

@@ -6,12 +6,13 @@ magnitude, and its tolerance is that of texels in which an edge takes long to pa
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from reference.beam_polygons import area_of, deposited, polygon, regular
-from reference.beam_rig import PLANE, BeamRig
+from reference.beam_rig import PLANE, BeamRig, all_of
 from spectrasplat.beams.polygons import BeamPolygons, joined
 from spectrasplat.gpu.map_channels import MapChannels
 from spectrasplat.gpu.records import NONE, RECEIVER
@@ -197,11 +198,13 @@ def test_drawing_pauses_after_every_portion(rig: BeamRig, monkeypatch: pytest.Mo
     counts: list[int] = []
     steps = rig.splatter.steps
 
-    def run(*arguments, **named) -> None:
-        counts.extend(steps(*arguments, **named))
+    def counted(*arguments, **named) -> Iterator[int]:
+        for count in steps(*arguments, **named):
+            counts.append(count)
+            yield count
 
     monkeypatch.setattr("spectrasplat.passes.beam_splat.GROUP", 7)
-    monkeypatch.setattr(rig.splatter, "run", run)
+    monkeypatch.setattr(rig.splatter, "steps", counted)
     rig.draw(many)
     assert len(counts) >= 60 // 7 and max(counts) <= 7 and sum(counts) == 60
 
@@ -221,7 +224,7 @@ def test_a_coarse_window_gets_what_is_not_inside_the_fine_one(gl) -> None:
 
     def drawn(one: BeamPolygons) -> tuple[np.ndarray, np.ndarray]:
         atlas.clear()
-        rig.splatter.run(one, {0: PLANE}, layout, rig.tables, atlas, weight=3.0)
+        all_of(rig.splatter.steps(one, {0: PLANE}, layout, rig.tables, atlas, weight=3.0))
         total = atlas.read_total()[..., W] / (3.0 * power)
         kept = [total[y0:y1, x0:x1].sum() for x0, y0, x1, y1 in (tile.rect for tile in tiles)]
         assert total.sum() == pytest.approx(sum(kept), rel=1e-6)
@@ -248,7 +251,7 @@ def test_anisotropic_texels_and_an_oblique_frame(gl) -> None:
     one = polygon(start, start + (4.0, 1.0), (0.0, 1.0))
     area = area_of(polygon(start + 20.0).edges[:, :3])
     rig.atlas.clear()
-    rig.splatter.run(one, {0: PLANE}, layout, rig.tables, rig.atlas)
+    all_of(rig.splatter.steps(one, {0: PLANE}, layout, rig.tables, rig.atlas))
     drawn = rig.atlas.read_tile(rig.tile)[..., W].sum()
     assert drawn == pytest.approx(area * rig.light.power_w(), rel=2e-3)
 
@@ -270,7 +273,7 @@ def test_broad_penumbrae_go_to_wider_texels_with_all_their_light(gl) -> None:
         for side in (0.5, 3.0):
             atlas.clear()
             one = soft(polygon(regular(4, (32.3, 31.8), side / np.sqrt(2.0), 0.3)), softness)
-            rig.splatter.run(one, {0: PLANE}, layout, rig.tables, atlas)
+            all_of(rig.splatter.steps(one, {0: PLANE}, layout, rig.tables, atlas))
             total = atlas.read_total()[..., W] / rig.light.power_w()
             held = [total[y0:y1, x0:x1].sum() for x0, y0, x1, y1 in (tile.rect for tile in tiles)]
             expected = np.zeros(3)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from reference.beam_polygons import polygon, regular
-from reference.beam_rig import PLANE, BeamRig
+from reference.beam_rig import PLANE, BeamRig, all_of
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.gpu.records import PLACEMENT, RECEIVER
 from spectrasplat.gpu.scene_buffers import GpuSpace
@@ -120,7 +120,7 @@ def test_swept_polygons_in_perspective(gl, size: float, motion: float) -> None:
     start = regular(5, middle - 0.5 * motion, size, 0.3)
     one = polygon(start, start + motion, (0.25, 0.5), slope=(0.01 / size, -0.02 / size))
     rig.atlas.clear()
-    rig.splatter.run(one, {0: PLANE}, layout, rig.tables, rig.atlas)
+    all_of(rig.splatter.steps(one, {0: PLANE}, layout, rig.tables, rig.atlas))
     drawn = rig.atlas.read_tile(rig.tile)[..., W].astype(float)
 
     parts, steps = (32, 1) if motion == 0.0 else (8, 64)
@@ -221,7 +221,7 @@ def test_a_coarse_window_takes_what_lies_outside(gl) -> None:
     inside = TexelMap.of(fine[0], PLANE).points(np.array([32.0, 32.0]))
     for centre, radius in ((inside, 60.0), (np.array([0.0, -80.0]), 20.0)):
         atlas.clear()
-        rig.splatter.run(polygon(regular(6, centre, radius, 0.2)), {0: PLANE}, layout, rig.tables, atlas)
+        all_of(rig.splatter.steps(polygon(regular(6, centre, radius, 0.2)), {0: PLANE}, layout, rig.tables, atlas))
         x0, y0, x1, y1 = tiles[1].rect
         held = atlas.read_total()[y0:y1, x0:x1, W].sum() / rig.light.power_w()
         assert held == pytest.approx(1.5 * np.sin(np.pi / 3.0) * 2.0 * radius**2, rel=2e-3)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -19,6 +20,12 @@ from spectrasplat.passes.plane_frame import PlaneFrame
 
 PLANE = PlaneFrame(np.zeros(3), np.eye(3)[:2])
 ROWS = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]])
+
+
+def all_of(steps: Iterator[int]) -> None:
+    """Everything that comes in steps, at once."""
+    for _ in steps:
+        pass
 
 
 @dataclass
@@ -43,5 +50,5 @@ class BeamRig:
     def draw(self, polygons: BeamPolygons) -> np.ndarray:
         """The map after these polygons alone, float64 (height, width, channels)."""
         self.atlas.clear()
-        self.splatter.run(polygons, {0: PLANE}, self.layout, self.tables, self.atlas)
+        all_of(self.splatter.steps(polygons, {0: PLANE}, self.layout, self.tables, self.atlas))
         return self.atlas.read_tile(self.tile).astype(np.float64)
