@@ -7,7 +7,7 @@ import numpy as np
 from .compiling import part
 from .hand import HAND, SPARE, faint_share, halve, push_both
 from .leaves import anchor_density, density_slope, lay_leaf, passes, plane_map
-from .nodes import STATIC, copy, first_place, last_place, lay_out
+from .nodes import STATIC, area_of, copy, first_place, last_place, lay_out
 from .rays import PARALLEL, follow
 from .search import (
     LEAF_OPEN,
@@ -41,18 +41,24 @@ _STRAY = 0.1
 
 @part
 def outline_of(beam, corner, place, work):
-    """Area and length of the polygon just laid, at one of its places, and the row of `corner` where that begins."""
+    """Corners of the polygon just laid, at one of its places, and the row of `corner` where they begin."""
     begin = work.count[2]
     for a in range(first_place(beam), place):
         begin += beam.corners[a]
-    area = length = 0.0
-    for c in range(begin + 1, begin + beam.corners[place]):
-        au, av = corner[c, 0] - corner[begin, 0], corner[c, 1] - corner[begin, 1]
-        length = max(length, np.sqrt(au * au + av * av))
-        if c > begin + 1:
-            bu, bv = corner[c - 1, 0] - corner[begin, 0], corner[c - 1, 1] - corner[begin, 1]
-            area += 0.5 * (au * bv - av * bu)
-    return abs(area), length, begin
+    return corner[begin : begin + beam.corners[place]], begin
+
+
+@part
+def is_crooked(beam, bent, corner, work):
+    """Whether edges that miss by `bent` miss much of the width of the polygon just laid, in the middle of its band."""
+    if first_place(beam) > 0:
+        return False
+    outline, _ = outline_of(beam, corner, 1, work)
+    length = 0.0
+    for c in range(1, len(outline)):
+        u, v = outline[c, 0] - outline[0, 0], outline[c, 1] - outline[0, 1]
+        length = max(length, np.sqrt(u * u + v * v))
+    return bent * length > _CROOKED * area_of(outline, len(outline))
 
 
 @part
@@ -60,7 +66,8 @@ def even_out(beam, new, corner, work):
     """Let the leaf just laid have the same density all over at each of its places, with as much flux as the beam."""
     new.slope[0] = new.slope[1] = 0.0
     for a in range(first_place(beam), last_place(beam)):
-        area, _, _ = outline_of(beam, corner, a, work)
+        outline, _ = outline_of(beam, corner, a, work)
+        area = area_of(outline, len(outline))
         new.density[a] = passes_at(beam, beam, a) * beam.boost * work.density / area if area > 0.0 else 0.0
     if first_place(beam) > 0:
         new.density[0] = new.density[2] = new.density[1]
@@ -74,18 +81,19 @@ def stand_still(beam, new, edge, corner, tables, work):
     for a in range(3):
         if passes_at(beam, beam, a) > most:
             chosen, most = a, passes_at(beam, beam, a)
-    if most * band_power(beam, tables, work) <= 0.0:
+    held = most * band_power(beam, tables, work)
+    if held <= 0.0:
         return
     for ln in range(new.head[6]):
         line = edge[work.count[1] + ln].line
         for k in range(3):
             line[0, k] = line[1, k] = line[2, k] = line[chosen, k]
-    _, _, chosen_first = outline_of(beam, corner, chosen, work)
+    _, begin = outline_of(beam, corner, chosen, work)
     for c in range(beam.corners[chosen]):
         for k in range(2):
-            corner[work.count[2] + c, k] = corner[chosen_first + c, k]
+            corner[work.count[2] + c, k] = corner[begin + c, k]
     new.head[7] = beam.corners[chosen]
-    density = new.density[chosen] * flux_of(beam, tables, work) / (most * band_power(beam, tables, work))
+    density = new.density[chosen] * flux_of(beam, tables, work) / held
     for a in range(3):
         new.density[a] = density
 
@@ -141,12 +149,12 @@ def end(nodes, facets, solids, tables, sources, leaf, edge, corner, work):
         soften(nodes, kind, facets, solids, tables, sources, leaf, edge, corner, work)
     anchor_density(hand, new, work)
     # What is too faint to be halved and yet neither straight nor even must hold its own flux at least.
-    area, length, _ = outline_of(hand, corner, 1, work)
-    is_crooked = first_place(hand) == 0 and bent > tolerance and bent * length > _CROOKED * area
-    if kind == LEAF_RECEIVER and (steepest > 1.0 or is_crooked):
-        even_out(hand, new, corner, work)
-    if kind == LEAF_RECEIVER and is_crooked:
-        stand_still(hand, new, edge, corner, tables, work)
+    if kind == LEAF_RECEIVER:
+        crooked = bent > tolerance and is_crooked(hand, bent, corner, work)
+        if crooked or steepest > 1.0:
+            even_out(hand, new, corner, work)
+        if crooked:
+            stand_still(hand, new, edge, corner, tables, work)
     flux = flux_of(hand, tables, work)
     new.flux = flux
     work.count[0] += 1
