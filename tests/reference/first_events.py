@@ -6,8 +6,8 @@ transmitted and reflected at the second surface. All of the light is in them, no
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -15,8 +15,6 @@ from spectrasplat.beams.polygons import BeamPieces, joined
 from spectrasplat.gpu.scene_buffers import SceneBuffers
 from spectrasplat.passes.emission_domain import EmissionDomain, azimuthal_plane
 from spectrasplat.reference.optics import fresnel_reflectance, reflect, refract
-
-_KEYS = itertools.count(1)
 
 
 def half_planes(corners: np.ndarray) -> np.ndarray:
@@ -87,7 +85,7 @@ def first_events(
                 if (back < 1.0).all():
                     out = np.stack([refract(w, -normals[s], i) for w, i in zip(inside, n, strict=True)])
                     found.append(_piece(*common, at, out, carried * (1.0 - back), edges, s, item, 2, False))
-    return joined(found)
+    return _numbered(joined(found))
 
 
 def diverging_first_event(
@@ -134,7 +132,12 @@ def diverging_first_event(
                 common = lo, hi, centre, hull, [start] * 3
                 found.append(_piece(*common, [outside] * 3, reflectance, *rest, False))
                 found.append(_piece(*common, inside, 1.0 - reflectance, *rest, True))
-    return joined(found)
+    return _numbered(joined(found))
+
+
+def _numbered(pieces: BeamPieces) -> BeamPieces:
+    """With keys of their own, the same whatever was made before."""
+    return replace(pieces, key=np.arange(1, len(pieces) + 1))
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:
@@ -172,7 +175,7 @@ def _piece(lo, hi, centre, hull, positions, directions, weight, edges, triangle,
         last_object=item * one,
         is_inside=np.array([inside]),
         inside=np.array([1 << item if inside else 0], np.uint64),
-        key=np.array([next(_KEYS)]),
+        key=np.zeros(1, np.int64),
         is_tail=np.zeros(1, bool),
         flux=np.ones(1),
         state=np.zeros((1, 3, 6)),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -16,9 +15,6 @@ EVEN = CumulativeSpectrum(np.array([0.0, 1.0]), np.outer([0.0, 2.0], [1.0, 1.0, 
 LINE = CumulativeSpectrum(np.array([0.0, 0.4, 0.4, 1.0]), np.outer([0.0, 0.0, 3.0, 3.0], np.ones(4)))
 SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 KEY = 12345
-
-
-_KEYS = itertools.count(1)
 
 
 def edges_of(corners: np.ndarray, move: tuple[float, float] = (0.0, 0.0)) -> np.ndarray:
@@ -59,7 +55,7 @@ def piece(
         last_object=one,
         is_inside=one.astype(bool),
         inside=one.astype(np.uint64),
-        key=np.array([next(_KEYS)]),
+        key=np.zeros(1, np.int64),
         is_tail=np.zeros(1, bool),
         flux=np.ones(1),
         state=np.zeros((1, 3, 6)),
@@ -70,8 +66,12 @@ def piece(
     )
 
 
+def numbered(pieces: BeamPieces) -> BeamPieces:
+    return replace(pieces, key=np.arange(1, len(pieces) + 1))
+
+
 def rays_of(pieces: BeamPieces, count: int, first: int = 0, stride: int = 1, key: int = KEY) -> PieceRays:
-    lattice = PieceLattice(pieces, [EVEN, LINE], [1.0, 1.0])
+    lattice = PieceLattice(numbered(pieces), [EVEN, LINE], [1.0, 1.0])
     return lattice.rays(int(pieces.light[0]), count, (1 << 30, 3 << 29), key, first, stride)
 
 
@@ -167,7 +167,7 @@ def test_no_colour_is_coarser_than_another() -> None:
     """A band of a hundredth of the power has as many points; two halves of a band have as many as the whole."""
     faint = CumulativeSpectrum(np.array([0.0, 0.5, 1.0]), np.outer([0.0, 0.01, 1.0], np.ones(4)))
     halves = joined([piece(band=(0.0, 0.5)), piece(band=(0.5, 0.75)), piece(band=(0.75, 1.0))])
-    rays = PieceLattice(halves, [faint], [1.0]).rays(0, 4000, (0, 0), KEY)
+    rays = PieceLattice(numbered(halves), [faint], [1.0]).rays(0, 4000, (0, 0), KEY)
     assert np.bincount(rays.piece) == pytest.approx(np.array([2000, 1000, 1000]), rel=0.12)
     assert np.bincount(rays.piece, rays.flux_w) == pytest.approx([0.04, 1.98, 1.98], rel=1e-6)
 
@@ -175,7 +175,7 @@ def test_no_colour_is_coarser_than_another() -> None:
 def test_many_small_pieces_are_stood_for_by_some() -> None:
     sizes = np.linspace(0.5, 1.5, 1000)
     pieces = joined([piece(size * SQUARE, weight=(3.0, 3.0, 3.0)) for size in sizes])
-    lattice = PieceLattice(pieces, [EVEN], [0.5])
+    lattice = PieceLattice(numbered(pieces), [EVEN], [0.5])
     assert lattice.flux_w == pytest.approx(4.0 * sizes**2 * 3.0 * 0.5, rel=1e-9)
     mean = np.zeros(1000)
     for key in range(400):
