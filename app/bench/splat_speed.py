@@ -46,6 +46,7 @@ class SplatFeatures:
     local_gain: bool = False
     reindexed: bool = False
     hero: bool = False
+    tint_levels: int = 0
 
 
 def measure(ctx: moderngl.Context, pixels: float, count: int = 1 << 17) -> dict[str, float]:

@@ -22,6 +22,8 @@ FLAG_BAND_FINAL = 2
 """The band was just cut at total internal reflection: do not cut again at this surface."""
 FLAG_INSIDE = 4
 """The ray travels on the inner side of `last_object`."""
+TINT_BIT = 3
+"""From here on, up to the next, a photon's flags are its level (`model.tint_levels`)."""
 LATTICE_BIT = 8
 """From here on a photon's flags are the number of points of the golden-ratio lattice that it lies on; 0: on none."""
 
@@ -60,7 +62,11 @@ def photon_record(groups: int, hero: bool = False) -> Struct:
             Field("photon_id", "uint", "index on the emission lattice of the pass"),
             Field("light_and_source", "uint", "bits 0-7 light, 8-15 spectral band of the pass, 16-31 object first met"),
             Field("branch_key", "uint", "hash of the choices of the path"),
-            Field("flags", "uint", "FLAG_*; from LATTICE_BIT on, points of its sub-lattice"),
+            Field(
+                "flags",
+                "uint",
+                "FLAG_*; from TINT_BIT on, level of its tint; from LATTICE_BIT on, points of its lattice",
+            ),
             Field("depth", "uint", "specular events on the path"),
             Field("fan", "uint", "two halves: change of the footprint's W (lib/fan.glsl) per lattice spacing"),
             *spectral,
@@ -131,9 +137,12 @@ _COMPANIONS_POLARISATION = tuple(
 )
 
 
-def ray_record(columns: int, hero: bool = False, polarised: bool = False, flights: bool = False) -> Struct:
+def ray_record(
+    columns: int, hero: bool = False, polarised: bool = False, flights: bool = False, tinted: bool = False
+) -> Struct:
     """State of one ray between two surfaces; `columns` derivative columns, spatial ones first; `hero` as above;
-    `polarised`: with its state of polarisation; `flights`: with how far it has come through haze."""
+    `polarised`: with its state of polarisation; `flights`: with how far it has come through haze; `tinted`: and through
+    the glass whose tint has levels."""
     fields = [
         Field("position", "vec3", "GPU space"),
         Field("flux_w", "float", "accounted radiant flux of the band, W"),
@@ -165,12 +174,14 @@ def ray_record(columns: int, hero: bool = False, polarised: bool = False, flight
     fields += _POLARISATION if polarised else ()
     fields += _COMPANIONS_POLARISATION if hero and polarised else ()
     fields += (Field("flown", "vec4", "x: way outside glass so far, GPU units"),) if flights else ()
+    fields += (Field("tinted", "vec4", "x: way through that glass so far, times its rate"),) if tinted else ()
     return Struct("RayRecord", tuple(fields), texels=True)
 
 
 def ray_record_of(features: Features) -> Struct:
     """`ray_record` as a scene's programs have it."""
-    return ray_record(features.defines()["COLUMNS"], features.hero, features.polarised, features.flights)
+    columns = features.defines()["COLUMNS"]
+    return ray_record(columns, features.hero, features.polarised, features.flights, features.tint_levels > 0)
 
 
 FLIGHT = Struct(
@@ -315,6 +326,10 @@ TRACE_PARAMETERS = Struct(
         Field("lattice_shift", "uint", "of the first sub-lattice's points across, as emitted"),
         Field("lattices_together", "uint", "so many sub-lattices after each other have one shift"),
         Field("surface_key", "uint", "of the numbers for microfacets of rough surfaces"),
+        Field("tint_rate", "float", "1/GPU unit: a way w through the glass whose tint has levels counts rate · w"),
+        Field("tint_row", "uint", "row of its absorption"),
+        Field("tint_key", "uint", "of the numbers by which levels are rounded"),
+        Field("reserved", "uint"),
         Field(
             "beam_objects", "uvec4", "one bit an object: who meets it first is left to beams", -(-MAX_OBJECTS // 128)
         ),

@@ -34,6 +34,7 @@ from ..model.optics.spectral_tables import (
 )
 from ..model.scene import Grating, Light, Scene
 from ..model.tint_bands import tint_curves
+from ..model.tint_levels import TintLevels, tint_levels
 from . import bindings
 from .records import NONE
 from .scene_texels import SceneTexels, spectra_texture, tree_texels
@@ -175,7 +176,7 @@ class SpectraLayout:
     variable_row: int
     weight_row: int
     power_row: int
-    """First of one row per light: cumulative radiant power over x, W per unit weight."""
+    """First of one row per light and level of its tint: cumulative radiant power over x, W per unit weight."""
     brightness_row: int
     """Likewise, where wavelengths are drawn at random: share of the draws below x (`wavelength_cdf`)."""
     rough_row: int
@@ -282,7 +283,13 @@ class SceneBuffers:
     @cached_property
     def tints(self) -> np.ndarray:
         """`tint_curves` of the scene: every pass asks, and a mean chord takes all of a mesh's triangles."""
-        return tint_curves(self.scene)
+        levels = self.tint_levels
+        return tint_curves(self.scene, None if levels is None else levels.coefficient)
+
+    @cached_property
+    def tint_levels(self) -> TintLevels | None:
+        """The glass whose way photons tell, where they do."""
+        return tint_levels(self.scene) if self.features.tint_levels else None
 
     @cached_property
     def primitives(self) -> np.ndarray:
@@ -396,6 +403,8 @@ class SceneBuffers:
         media: list[Dispersion] = []
         weights: list[np.ndarray] = []
         gratings: list[np.ndarray] = []
+        absorbers: dict[bytes, int] = {}
+        """Row of each curve."""
         widths = rough_glass.distinct(item.material.microfacet_width for item in self.scene.objects)
         x = np.linspace(0.0, 1.0, SAMPLES)
         nm = self.axis.nm_of_samples(SAMPLES)
@@ -435,9 +444,11 @@ class SceneBuffers:
                 if material.dispersion in self.groups.glasses and self.groups.count:
                     record["group"] = self.groups.group[self.groups.glasses.index(material.dispersion)]
             if material.absorption is not None:
-                record["weight_row"] = len(weights)
-                coefficient = np.interp(nm, VISIBLE_NM, material.absorption.coefficient)
-                weights.append(coefficient / self.space.scale)
+                alpha = material.absorption.coefficient
+                row = absorbers.setdefault(alpha.tobytes(), len(weights))
+                record["weight_row"] = row
+                if row == len(weights):
+                    weights.append(np.interp(nm, VISIBLE_NM, alpha) / self.space.scale)
         self._sections["OBJECTS"] = records
         if gratings:
             self._sections["GRATINGS"] = np.concatenate(gratings)
@@ -464,7 +475,13 @@ class SceneBuffers:
         self.light_power: list[CumulativeSpectrum] = [
             cumulative(self.axis, light.spectral_power) for light in self.scene.lights
         ]
-        rows.append(np.array([power.at(x)[:, 3] for power in self.light_power]).reshape(-1, SAMPLES))
+        levels, powers = self.tint_levels, self.light_power
+        self.tint_row = NONE if levels is None else absorbers[levels.coefficient.tobytes()]
+        """Of the spectra: absorption of the glass whose way photons tell."""
+        if levels is not None:
+            behind = [spectrum for light in self.scene.lights for spectrum in levels.all_behind(light.spectral_power)]
+            powers = [cumulative(self.axis, spectrum) for spectrum in behind]
+        rows.append(np.array([power.at(x)[:, 3] for power in powers]).reshape(-1, SAMPLES))
         rows += [self._draws(), rough_glass.tables(widths, SAMPLES)]
         counts = np.cumsum([0] + [len(r) for r in rows])
         self.layout = SpectraLayout(*counts.tolist())
@@ -482,7 +499,8 @@ class SceneBuffers:
             "STACK_SIZE": max(1, len(self.stack_objects)),
             "STACK_OBJECTS": "uint[](" + ", ".join(f"{o}u" for o in (self.stack_objects or [0])) + ")",
         }
-        self.defines |= rough_glass.row_defines(widths, self.layout.rough_row)
+        if self.features.rough:
+            self.defines |= rough_glass.row_defines(self.layout.rough_row)
 
     def _draws(self) -> np.ndarray:
         """Each light's density of random wavelengths as a running integral, (lights, SAMPLES); none where none are

@@ -20,6 +20,7 @@ from .scene import (
     SceneObject,
 )
 from .settings import RANDOM_METHODS, RenderSettings, divides_spectrum, has_beams
+from .tint_levels import LEVELS, tint_levels
 
 MAX_GROUPS = 4
 """Spectral columns a photon may carry; further dispersive materials share the last one."""
@@ -127,6 +128,8 @@ class Features:
     """Where rays fly outside glass is recorded: of photons that are traced for haze alone."""
     landing_cuts: bool = False
     """Of one band some wavelengths may meet another surface than its anchor does."""
+    tint_levels: int = 0
+    """Steps of the way through one tinted glass that photons tell (`model.tint_levels`)."""
     rough: bool = False
     """Some glass has a ground surface, whose microfacets turn paths by chance."""
 
@@ -171,7 +174,8 @@ class Features:
             "LOBE_COLUMNS": self.has_lobe_columns,
             "FLIGHTS": self.flights,
         }
-        return numbers | {name: 1 for name, on in switches.items() if on}
+        levels = {"TINT_LEVELS": self.tint_levels} if self.tint_levels else {}
+        return numbers | levels | {name: 1 for name, on in switches.items() if on}
 
     @staticmethod
     def of(scene: Scene, settings: RenderSettings) -> Features:
@@ -199,6 +203,10 @@ class Features:
             and _has_receivers(scene)
             else 0
         )
+        hazy = settings.layer == "beauty" and why_no_haze(scene) is None
+        beams = _has_beams(scene, settings)
+        # Beams, light on its way and the viewer's guess of a spectrum know weights at three wavelengths alone.
+        told = not (single or beams or hazy or settings.anchor_weights) and absorbing and tint_levels(scene) is not None
         coloured_mirror = any(o.material.is_mirror and o.material.is_coloured for o in scene.objects)
         return Features(
             method=settings.method,
@@ -234,7 +242,7 @@ class Features:
             reindexed=_reindexed(scene, settings, groups, coloured=absorbing or coloured_mirror),
             local_gain=groups > 0 and settings.local_gain and any(o.local_dispersion for o in scene.objects),
             anchor_weights=settings.anchor_weights,
-            beams=_has_beams(scene, settings),
+            beams=beams,
             camera_beams=settings.camera_beams and why_no_camera_beams(scene, settings) is None,
             light_profiles=any(light.profile is not None for light in scene.lights),
             draws_by_power=random and settings.bins is not None,
@@ -246,7 +254,8 @@ class Features:
             contact_lines=bool(standing(scene)),
             coats=settings.layer == "beauty" and any(o.material.has_coat for o in scene.objects),
             rough_diffuse=settings.layer == "beauty" and any(o.material.diffuse_roughness for o in scene.objects),
-            haze=settings.layer == "beauty" and why_no_haze(scene) is None,
+            haze=hazy,
+            tint_levels=LEVELS if told else 0,
             rough=any(o.material.is_rough for o in dielectrics),
         )
 

@@ -9,6 +9,7 @@ from .environment_sun import with_sun
 from .features import Features, beam_objects, dispersive_materials, half_spaces, is_flat, why_no_beams, why_no_haze
 from .scene import Scene
 from .settings import divides_spectrum, has_beams
+from .tint_levels import MAX_LIGHTS
 
 
 def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
@@ -106,6 +107,7 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
             else "all glass is polished",
         ),
         ("absorption", features.absorption, "some glass absorbs" if features.absorption else "all glass is clear"),
+        ("tint levels", features.tint_levels > 0, _tint_words(scene, features)),
         (
             "medium stack",
             features.medium_stack,
@@ -270,6 +272,20 @@ def _beam_words(scene: Scene, features: Features) -> str:
     if any(o.local_dispersion for o in scene.objects):
         return "the dispersion brush was used on a receiver"
     return "no light can be followed as beams"
+
+
+def _tint_words(scene: Scene, features: Features) -> str:
+    if features.tint_levels:
+        return "one band holds a whole tint"
+    if not features.absorption:
+        return "all glass is clear"
+    if features.point_spectrum:
+        return "a photon has one wavelength"
+    if features.beams or features.haze:
+        return "beams and haze know tints at three wavelengths a band"
+    if features.anchor_weights:
+        return "in the viewer photons know tints at three wavelengths a band"
+    return "tints are too faint" if len(scene.lights) <= MAX_LIGHTS else f"there are more than {MAX_LIGHTS} lights"
 
 
 def _polarisation_words(scene: Scene, features: Features) -> str:

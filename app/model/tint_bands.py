@@ -29,13 +29,17 @@ _WIDER = 1.0 + 1e-9
 """Rounding of a band's width."""
 
 
-def tint_curves(scene: Scene) -> np.ndarray:
-    """(N, 401): what gets through each glass that absorbs, or is left by each mirror, on `VISIBLE_NM`; none twice."""
+def tint_curves(scene: Scene, but: np.ndarray | None = None) -> np.ndarray:
+    """(N, 401): what gets through each glass that absorbs, or is left by each mirror, on `VISIBLE_NM`; none twice.
+    `but`: coefficient (401,) of a glass that is left out."""
     curves: dict[bytes, np.ndarray] = {}
     for item in scene.objects:
         found: Sequence[np.ndarray] = ()
-        if item.material.absorption is not None:
-            depth = item.material.absorption.coefficient * _mean_chord(item)
+        absorption = item.material.absorption
+        if absorption is not None and but is not None and np.array_equal(absorption.coefficient, but):
+            continue
+        if absorption is not None:
+            depth = absorption.coefficient * mean_chord(item)
             with np.errstate(under="ignore"):
                 found = [np.exp(-share * depth) for share in _PATHS]
         elif (rgb := getattr(item.material, "reflectance_rgb", None)) is not None and not item.material.receives:
@@ -99,7 +103,7 @@ def _cut(ends: tuple[float, float], least: int, most: int, tolerance: float, *ar
     return tuple(found if ends[0] <= ends[1] else found[::-1])
 
 
-def _mean_chord(item: SceneObject) -> float:
+def mean_chord(item: SceneObject) -> float:
     """Of the solid, scene units: four volumes over the surface (Cauchy), exact where it is convex."""
     turn = item.object_to_world[:3, :3]
     area = np.linalg.norm(item.mesh.area_vectors() @ (np.linalg.inv(turn) * np.linalg.det(turn)), axis=1).sum()

@@ -178,7 +178,9 @@ def _spectra(
     }
     starts = np.cumsum([0] + [len(rows) for rows in sections.values()])
     defines: dict[str, int | str] = dict(zip(sections, starts.tolist(), strict=False))
-    defines |= rough_glass.row_defines(widths, int(defines.pop("ROUGH_ROW")))
+    rough_row = int(defines.pop("ROUGH_ROW"))
+    if any(width > 0.0 for width in widths):
+        defines |= rough_glass.row_defines(rough_row)
     return np.concatenate(list(sections.values())), defines | {"ABSORBERS": len(absorptions)}
 
 

@@ -363,7 +363,7 @@ class TracePass:
         if piece.lattice_count < 1 << (32 - records.LATTICE_BIT):
             self._trace_values["lattice_bits"] = piece.lattice_count << records.LATTICE_BIT
         self._trace_values["lattice_shift"] = piece.shift[1]
-        self._trace_values["surface_key"] = piece.seed
+        self._trace_values["surface_key"] = self._trace_values["tint_key"] = piece.seed
         self._trace_values["lattices_together"] = 1 if self._features.spectral_groups else len(piece.bands)
         self._trace_parameters.write(self._trace_values.tobytes())
 
@@ -373,7 +373,10 @@ class TracePass:
         p = records.TRACE_PARAMETERS.zeros(1)
         p["max_depth"], p["split_threshold"], p["lattices"] = max_depth, self.split_threshold, lattices
         p["lattices_together"] = 1
-        p["power_row"] = self.scene.layout.power_row + light
+        p["power_row"] = self.scene.layout.power_row + light * max(1, self._features.tint_levels)
+        p["tint_row"] = self.scene.tint_row
+        if self.scene.tint_levels is not None:
+            p["tint_rate"] = self.scene.tint_levels.rate / self.scene.space.scale
         bits = np.zeros(p["beam_objects"].size * 32, bool)
         bits[list(beam_objects)] = True
         p["beam_objects"] = np.packbits(bits, bitorder="little").view("<u4").reshape(p["beam_objects"].shape)

@@ -95,6 +95,7 @@ def light_defines(features: Features, traits: DeviceTraits) -> Defines:
         "FLAG_BAND_FINAL": f"{records.FLAG_BAND_FINAL}u",
         "FLAG_INSIDE": f"{records.FLAG_INSIDE}u",
         "LATTICE_BIT": records.LATTICE_BIT,
+        "TINT_BIT": records.TINT_BIT,
         "MASK_SIZE": records.MASK_SIZE,
         "CATEGORY_COUNT": f"{len(records.CATEGORIES)}u",
         "FALLBACK_COUNT": f"{len(records.FALLBACKS)}u",
@@ -143,6 +144,8 @@ class SplatFeatures(Protocol):
     def hero(self) -> bool: ...
     @property
     def contact_lines(self) -> bool: ...
+    @property
+    def tint_levels(self) -> int: ...
 
 
 def splat_defines(features: SplatFeatures) -> Defines:
@@ -177,6 +180,7 @@ def footprint_defines(features: SplatFeatures) -> Defines:
             "FLAG_FOOTPRINT_DROPPED": f"{records.FLAG_FOOTPRINT_DROPPED}u",
             "LATTICE_BIT": records.LATTICE_BIT,
         }
+        | ({"TINT_LEVELS": features.tint_levels, "TINT_BIT": records.TINT_BIT} if features.tint_levels else {})
         | {name: 1 for name, on in switches.items() if on}
     )
 

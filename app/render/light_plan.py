@@ -173,7 +173,7 @@ class Planner:
             ends = float(axis.x_of_nm(lo_nm)), float(axis.x_of_nm(hi_nm))
             edges = np.linspace(*ends, count + 1)
             edges[1:-1] += aside * (edges[1] - edges[0])
-            if self._tinted:
+            if self._tinted and len(self.buffers.tints):
                 spectrum = self.scene.lights[light].spectral_power
                 tolerance = fit.tint_tolerance()
                 edges = cut_by_tints(ends, count, MAX_BANDS, self.buffers.tints, spectrum, axis, tolerance)

@@ -20,10 +20,13 @@ from ..gpu.splat_tables import SplatTables
 from ..model.optics.glass import Dispersion
 from ..model.optics.spectrum import Spectrum
 from ..model.scene import Scene
+from ..model.tint_levels import LEVELS
 from ..passes.footprint import SpectralVariables
 
 PREVIEW_WIDTH = 64
 """Samples of the spectral tables of a preview."""
+LEVELS_WIDTH = 256
+"""Where there are as many as a tint has levels."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +112,7 @@ class ShownSpectra:
         ctx, spectra, channels = self._ctx, self.spectra, channels or self.channels
         if self._reindexing is None:
             return ShownTables(
-                SplatTables.build(ctx, self._buffers.axis, spectra, self.reflectances, spans, channels, width), None
+                traced_tables(ctx, self._buffers, spectra, self.reflectances, spans, channels, width), None
             )
         shown = self._reindexing.spans(spans, self._buffers.axis, spectra)
         tables = SplatTables.build(ctx, self._reindexing.axis, spectra, self.reflectances, shown, channels, width)
@@ -123,6 +126,25 @@ class ShownSpectra:
         """Free what it owns."""
         self.variables.release()
         self.show_gains(None)
+
+
+def traced_tables(
+    ctx: moderngl.Context,
+    buffers: SceneBuffers,
+    spectra: Sequence[Spectrum],
+    reflectances: Sequence[np.ndarray | None],
+    spans: Sequence[Sequence[tuple[float, float]]],
+    channels: MapChannels,
+    width: int | None = None,
+) -> SplatTables:
+    """`SplatTables.build` for the lights' spectra: behind every level of a tint, one after the other, where photons
+    tell them."""
+    levels = buffers.tint_levels
+    if levels is not None:
+        width = width or (None if any(light.lines for light in spectra) else LEVELS_WIDTH)
+        spectra = [behind for light in spectra for behind in levels.all_behind(light)]
+        spans = [bands for bands in spans for _ in range(LEVELS)]
+    return SplatTables.build(ctx, buffers.axis, spectra, reflectances, spans, channels, width)
 
 
 class PassTables:

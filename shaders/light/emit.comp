@@ -164,6 +164,9 @@ void main()
 #ifdef FLIGHTS
         ray.flown = vec4(0.0);
 #endif
+#ifdef TINT_LEVELS
+        ray.tinted = vec4(0.0);
+#endif
 #if COLUMNS > 0
         for (int c = 0; c < COLUMNS; ++c) {
             ray.dposition[c] = vec4(0.0);

@@ -261,6 +261,9 @@ void main() {
     Placement place = placements[at];
 
     uint light = photon.light_and_source & 255u;
+#ifdef TINT_LEVELS
+    light = light * uint(TINT_LEVELS) + (photon.flags >> uint(TINT_BIT) & uint(TINT_LEVELS - 1));
+#endif
     uint band = (photon.light_and_source >> 8u) & 255u;
     uint table = (light * classes + receiver.reflectance_class) * bands + band;
     vec4 table_band = table_bands[table];

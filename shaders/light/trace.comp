@@ -59,6 +59,28 @@ vec3 band_powers(uint row, vec3 band)
     return vec3(anchor - low - upper, upper + high - anchor - uppermost, uppermost);
 }
 
+#ifdef TINT_LEVELS
+// Of the sequence by which levels are rounded, neither of the lattice's own.
+#define TINT_GENERATOR 3774877043u
+
+// How far a ray has come through the glass whose tint has levels: up or down to one of them, the same way all along its path.
+uint tint_level(RayRecord ray)
+{
+    float rounding = kronecker(ray.photon_id / p.lattices, TINT_GENERATOR, p.tint_key + ray.photon_id % p.lattices * 2654435769u);
+    return min(uint(float(TINT_LEVELS) * ray.tinted.x / (1.0 + ray.tinted.x) + rounding), uint(TINT_LEVELS - 1));
+}
+#endif
+
+// Row of what is left of the light's power, over the spectrum, where a ray has come to.
+uint power_row(RayRecord ray)
+{
+#ifdef TINT_LEVELS
+    return uint(p.power_row) + tint_level(ray);
+#else
+    return uint(p.power_row);
+#endif
+}
+
 // What throughput at a band's low end, anchor and high end each add to the power a ray carries, W (`band_powers`), for the rays of this event.
 vec3 band_w;
 
@@ -93,6 +115,18 @@ void absorb(inout RayRecord ray, float distance, inout float absorbed_w)
 {
     uint row = medium_weight_row(medium_stack(ray));
     if (row == NONE) return;
+#ifdef TINT_LEVELS
+    if (row == p.tint_row && ray.x_hi > ray.x_lo) {
+        float before = carried_w(ray);
+        ray.tinted.x += p.tint_rate * distance;
+        ray.flux_w *= exp(-spectral_row(uint(WEIGHT_ROW) + row, ray.x_anchor) * distance);
+        band_w = band_powers(power_row(ray), band_of(ray));
+        float left = carried_w(ray);
+        absorbed_w += before - left;
+        ray.survival *= left / max(before, 1e-30);
+        return;
+    }
+#endif
     vec3 alpha = spectral_row(uint(WEIGHT_ROW) + row, band_of(ray));
     vec3 kept = exp(-alpha * distance);
     absorbed_w += carried_w(ray);
@@ -178,6 +212,9 @@ void land(inout RayRecord ray, RayRecord start, uint receiver, uint triangle, Hi
         outcome.what |= FELL_FOOTPRINT;
     }
     photon.flags = (ray.flags & FLAG_FOOTPRINT_DROPPED) | lattice_bits;
+#ifdef TINT_LEVELS
+    photon.flags |= tint_level(ray) << uint(TINT_BIT);
+#endif
     store_photon(slot, photon);
     outcome.what |= LEFT_PHOTON;
 }
@@ -233,7 +270,7 @@ void main()
     RayRecord ray = load_ray(indices[k]), start = ray;
     Outcome outcome = Outcome(0u, 0.0, 0.0, 0.0);
 #ifndef POINT_SPECTRUM
-    band_w = band_powers(uint(p.power_row), band_of(ray));
+    band_w = band_powers(power_row(ray), band_of(ray));
 #endif
 
     RayOrigin origin = RayOrigin(ray.last_primitive, ray.last_object, uint((ray.flags & FLAG_INSIDE) != 0u), ray.inside_mask);

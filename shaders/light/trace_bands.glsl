@@ -135,7 +135,7 @@ PassingPart passing_part(RayRecord ray, ShadingFrame frame, MediumInterface boun
     float anchors = 1.0 - fresnel_reflectance(theta, eta_it, transmitted_cosine2(theta, eta_it));
 #endif
     part.let_through = refracted.exists ? vec3(low ? 1.0 - reflectance.x : 0.0, anchors, low ? 0.0 : 1.0 - reflectance.z) : vec3(0.0);
-    vec3 density_w = band_powers(uint(p.power_row), part.band);
+    vec3 density_w = band_powers(power_row(ray), part.band);
     part.power_w = dot(density_w, part.throughput * part.let_through);
     // What the ray's end has: more cannot leave it.
     float most_w = max(low ? band_w.x * ray.throughput.x : band_w.z * ray.throughput.z, 0.0);

@@ -200,7 +200,7 @@ void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint k
     float x_anchor = ray.x_anchor;
 #ifdef BAND_CUTS
     if (parts) {
-        vec3 power = spectral_row(uint(p.power_row), part.band), whole = spectral_row(uint(p.power_row), band_of(ray));
+        vec3 power = spectral_row(power_row(ray), part.band), whole = spectral_row(power_row(ray), band_of(ray));
         child.flux_w *= clamp((power.z - power.x) / max(whole.z - whole.x, 1e-30), 0.0, 1.0);
         child.throughput = part.throughput;
         child.x_lo = part.band.x;
@@ -210,7 +210,7 @@ void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint k
         reflectance = 1.0 - part.let_through;
         refracted_share = part.power_w / max(carried_w(ray), 1e-30);
         // From here on it is this part's power that counts.
-        band_w = band_powers(uint(p.power_row), part.band);
+        band_w = band_powers(power_row(ray), part.band);
     }
 #endif
     if (splits && refracted.exists) {

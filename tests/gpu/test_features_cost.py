@@ -164,7 +164,7 @@ def test_forcing_a_feature_in_leaves_the_map_as_it_is(gl: Context, tmp_path: Pat
 def test_another_map_is_noticed(gl: Context, tmp_path: Path) -> None:
     """The mutant: glass left out of the forced variant's absorption, so that the comparison has something to find."""
     light = begun(gl, scene_of(tmp_path, "nested"))
-    other = replace(light.features, absorption=False)
+    other = replace(light.features, absorption=False, tint_levels=0)
     trial = Trial("absorption", False, "", Variant(light.scene, other), Variant(light.scene, light.features), True)
     assert compared(gl, light, trial) > 3 * features_cost.MAP_TOLERANCE
     released(light)

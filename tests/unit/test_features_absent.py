@@ -47,6 +47,7 @@ EVERYTHING = Features(
     smooth_normals=True,
     normal_derivatives=True,
     absorption=True,
+    tint_levels=16,
     medium_stack=True,
     contacts=True,
     tree=True,
@@ -127,6 +128,7 @@ WITHOUT = {
     "interpolated normals": {"smooth_normals": False, "normal_derivatives": False},
     "normal derivatives": {"normal_derivatives": False},
     "absorption": {"absorption": False},
+    "tint levels": {"tint_levels": 0},
     "medium stack": {"medium_stack": False},
     "contacts": {"contacts": False},
     "triangle tree": {"tree": False},
@@ -145,7 +147,12 @@ WITHOUT = {
 
 def sources(features: Features) -> list[shader.Source]:
     """The light pass's and the camera's sources, with stand-ins for the numbers that only a scene's data give."""
-    ray = records.ray_record(features.defines()["COLUMNS"], polarised=features.polarised, flights=features.flights)
+    ray = records.ray_record(
+        features.defines()["COLUMNS"],
+        polarised=features.polarised,
+        flights=features.flights,
+        tinted=features.tint_levels > 0,
+    )
     photon = records.photon_record(features.spectral_groups)
     structs = (*SCENE_STRUCTS, ray, photon, records.OUTCOME, records.TRACE_PARAMETERS, records.EMIT_PARAMETERS)
     structs += (records.FLIGHT,) if features.flights else ()

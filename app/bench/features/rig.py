@@ -13,11 +13,11 @@ import numpy as np
 
 from ...gpu.map_channels import MapChannels, tents
 from ...gpu.scene_buffers import SceneBuffers
-from ...gpu.splat_tables import SplatTables
 from ...passes.footprint import SpectralVariables
 from ...passes.map_atlas import MapAtlas
 from ...passes.splat import Splatter
 from ...passes.trace import LatticeSlice, TracePass
+from ...render.shown_spectra import traced_tables
 from .variants import Variant
 
 if TYPE_CHECKING:
@@ -99,9 +99,9 @@ class Rig:
             else MapChannels(edges)
         )
         spectra = [lamp.spectral_power for lamp in scene.lights]
-        self._tables = SplatTables.build(
+        self._tables = traced_tables(
             ctx,
-            light.buffers.axis,
+            self._buffers,
             spectra,
             light.reflectances,
             [spans.get(i, [(0.0, 1.0)]) for i in range(len(spectra))],

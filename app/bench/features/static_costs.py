@@ -59,6 +59,7 @@ def static_costs(scene: Scene, features: Features) -> dict[str, str]:
     unspatial = RecordSizes.of(replace(features, footprints=False))
     polished = RecordSizes.of(replace(features, rough=False))
     unpolarised = RecordSizes.of(replace(features, polarised=False))
+    untinted = RecordSizes.of(replace(features, tint_levels=0))
     specular = [o for o in scene.objects if o.material.is_specular]
     convex = half_spaces(scene)
     loose = [o for i, o in enumerate(scene.objects) if i not in convex]
@@ -98,6 +99,10 @@ def static_costs(scene: Scene, features: Features) -> dict[str, str]:
         "interpolated normals": (features.smooth_normals, f"{3 * _TEXEL} B a facet, {size_words(3 * _TEXEL * smooth)}"),
         "normal derivatives": (features.normal_derivatives, "one more vector a column and surface"),
         "absorption": (features.absorption, f"3 lookups a flight, {size_words(row * absorbing)}"),
+        "tint levels": (
+            features.tint_levels > 0,
+            f"{sizes.ray - untinted.ray} B a ray; {features.tint_levels} tables a light and band instead of one",
+        ),
         "contacts": (features.contacts, f"{len(contacts(scene))} pair(s) that may touch"),
         "medium stack": (features.medium_stack, f"{len(overlapping_solids(scene))} bit(s) of a ray's mask"),
         "triangle tree": (features.tree, f"about {size_words(triangles * (TRIANGLE.stride + _NODE // 2))}"),

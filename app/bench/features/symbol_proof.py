@@ -68,6 +68,7 @@ FEATURE_SYMBOLS: dict[str, tuple[str, ...]] = {
     ),
     "normal derivatives": (r"normal_columns\[c\] = normal_column\(frame, ray",),
     "absorption": ("medium_weight_row", r"vec3 alpha = "),
+    "tint levels": ("tint_level", "TINT_LEVELS"),
     "contacts": ("accept_sheet", "crossed_in_contact", "comes_first", "left_normal"),
     "medium stack": ("medium_of", "stack_objects", "STACK_OBJECTS", "mask_before"),
     "triangle tree": ("intersect_tree", "box_entry", "LEAF_BIT", "TREE_AT", "TREE_STACK"),

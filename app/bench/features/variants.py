@@ -144,7 +144,13 @@ def _left_out(name: str, scene: Scene, base: Features, asked: Variant) -> tuple[
                 "without them footprints are wrong, but light goes the same ways",
             )
         case "absorption":
-            return asked, Variant(scene, replace(base, absorption=False)), ""
+            return asked, Variant(scene, replace(base, absorption=False, tint_levels=0)), ""
+        case "tint levels":
+            return (
+                asked,
+                Variant(scene, replace(base, tint_levels=0)),
+                "without them a band knows three places of a tint",
+            )
         case "polarisation":
             return asked, Variant(scene, replace(base, polarised=False)), "without it light is weighed another way"
         case "rough surfaces":
@@ -263,7 +269,7 @@ def _forced_in(name: str, scene: Scene, base: Features, asked: Variant) -> tuple
             return None, None, "cannot be forced in: the channels are those of glass that the camera sees"
         case _ if name in _CAMERA:
             return None, None, "part of the picture; here only the map is drawn"
-        case "half-space solids" | "absorption" | "medium stack" | "triangle tree":
+        case "half-space solids" | "absorption" | "tint levels" | "medium stack" | "triangle tree":
             return None, None, "nothing in the scene to put it to"
         case _:
             return None, None, "has no code of its own"

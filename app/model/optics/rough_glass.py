@@ -69,10 +69,8 @@ def tables(widths: Iterable[float], samples: int) -> np.ndarray:
     return np.concatenate([np.zeros((0, samples)), *(_table(width, samples) for width in distinct(widths))])
 
 
-def row_defines(widths: Iterable[float], first_row: int) -> dict[str, int | str]:
-    """Where shaders find them; nothing where no surface is rough."""
-    if not any(width > 0.0 for width in widths):
-        return {}
+def row_defines(first_row: int) -> dict[str, int | str]:
+    """Where shaders find them."""
     return {"ROUGH_ROW": first_row, "ROUGH_STEPS": INDEX_STEPS, "ROUGH_REACH": f"{INDEX_REACH:.8f}"}
 
 
