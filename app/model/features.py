@@ -204,9 +204,8 @@ class Features:
             else 0
         )
         hazy = settings.layer == "beauty" and why_no_haze(scene) is None
-        beams = _has_beams(scene, settings)
-        # Beams, light on its way and the viewer's guess of a spectrum know weights at three wavelengths alone.
-        told = not (single or beams or hazy or settings.anchor_weights) and absorbing and tint_levels(scene) is not None
+        # Light on its way and what the viewer reads from photons know weights at three wavelengths alone.
+        told = not (single or hazy or settings.anchor_weights) and absorbing and tint_levels(scene) is not None
         coloured_mirror = any(o.material.is_mirror and o.material.is_coloured for o in scene.objects)
         return Features(
             method=settings.method,
@@ -242,7 +241,7 @@ class Features:
             reindexed=_reindexed(scene, settings, groups, coloured=absorbing or coloured_mirror),
             local_gain=groups > 0 and settings.local_gain and any(o.local_dispersion for o in scene.objects),
             anchor_weights=settings.anchor_weights,
-            beams=beams,
+            beams=_has_beams(scene, settings),
             camera_beams=settings.camera_beams and why_no_camera_beams(scene, settings) is None,
             light_profiles=any(light.profile is not None for light in scene.lights),
             draws_by_power=random and settings.bins is not None,

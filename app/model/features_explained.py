@@ -281,8 +281,8 @@ def _tint_words(scene: Scene, features: Features) -> str:
         return "all glass is clear"
     if features.point_spectrum:
         return "a photon has one wavelength"
-    if features.beams or features.haze:
-        return "beams and haze know tints at three wavelengths a band"
+    if features.haze:
+        return "haze knows tints at three wavelengths a band"
     if features.anchor_weights:
         return "in the viewer photons know tints at three wavelengths a band"
     return "tints are too faint" if len(scene.lights) <= MAX_LIGHTS else f"there are more than {MAX_LIGHTS} lights"
