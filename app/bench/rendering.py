@@ -22,17 +22,14 @@ from ..model.optics.colorimetry import rgb709_to_xyz
 from ..model.scene import Scene
 from ..model.settings import RenderSettings
 from ..passes.camera import CameraPass
-from ..passes.pixel_lattice import LOOKS
 from ..render.device_scene import scene_buffers
 from ..render.light_pass import LightPass
 from ..render.pass_sizes import pass_sizes
-from ..render.sampling import DEFAULT_SAMPLES
+from ..render.sampling import CAUSTIC_SAMPLES
 from .results import OWN_METHODS
 
 KERNELS = tuple(float(width) for width in np.geomspace(0.45, 32.0, 13))
 """Widths of a kernel that are tried: standard deviations in lattice spacings."""
-_SAMPLES = DEFAULT_SAMPLES * LOOKS
-"""Of the camera: as often as a still looks at a pixel in which an outline lies."""
 WARM_UP_PHOTONS = 2048
 SMALLEST_BUDGET = 128
 FIRST_SECONDS = 0.02
@@ -147,7 +144,7 @@ class MethodRig:
         started = time.perf_counter()
         light, settings = self._light, self._settings
         maps = light.caustic_maps(self._textures)
-        self._camera_pass.run(self._scene.camera, settings.width, settings.height, _SAMPLES, 0, maps, seed)
+        self._camera_pass.run(self._scene.camera, settings.width, settings.height, CAUSTIC_SAMPLES, 0, maps, seed)
         xyz = rgb709_to_xyz(self._camera_pass.read_rgb().astype(np.float64))
         seconds["camera"] = time.perf_counter() - started
         return Rendering(xyz, seconds, light.stats.photons, light.stats.splats)

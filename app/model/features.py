@@ -204,8 +204,11 @@ class Features:
             else 0
         )
         hazy = settings.layer == "beauty" and why_no_haze(scene) is None
-        # Light on its way and what the viewer reads from photons know weights at three wavelengths alone.
-        told = not (single or hazy or settings.anchor_weights) and absorbing and tint_levels(scene) is not None
+        beams = _has_beams(scene, settings)
+        # Light on its way and what the viewer reads from photons know weights at three wavelengths alone; where no band
+        # may be cut, photons carry on what beams leave in bands of the same tables.
+        plain = single or hazy or settings.anchor_weights or (beams and not groups)
+        told = absorbing and not plain and tint_levels(scene) is not None
         coloured_mirror = any(o.material.is_mirror and o.material.is_coloured for o in scene.objects)
         return Features(
             method=settings.method,
@@ -241,7 +244,7 @@ class Features:
             reindexed=_reindexed(scene, settings, groups, coloured=absorbing or coloured_mirror),
             local_gain=groups > 0 and settings.local_gain and any(o.local_dispersion for o in scene.objects),
             anchor_weights=settings.anchor_weights,
-            beams=_has_beams(scene, settings),
+            beams=beams,
             camera_beams=settings.camera_beams and why_no_camera_beams(scene, settings) is None,
             light_profiles=any(light.profile is not None for light in scene.lights),
             draws_by_power=random and settings.bins is not None,

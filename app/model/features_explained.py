@@ -281,6 +281,8 @@ def _tint_words(scene: Scene, features: Features) -> str:
         return "all glass is clear"
     if features.point_spectrum:
         return "a photon has one wavelength"
+    if features.beams and not features.spectral_groups:
+        return "beams need bands that are cut for tints"
     if features.haze:
         return "haze knows tints at three wavelengths a band"
     if features.anchor_weights:

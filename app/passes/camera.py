@@ -73,7 +73,7 @@ TAPS_PER_PIXEL = 1.2
 """Of one sample; between two looks colours are not told apart, so the more samples there are, the closer they lie."""
 PRIMARY_SAMPLES = LOOKS
 """Of one sample at what is seen directly: outlines and textures there cost a tenth of what glass costs …"""
-PRIMARY_SAMPLES_UNTIL = 16
+PRIMARY_SAMPLES_UNTIL = 64
 """… and with more samples than these they are smooth as they are."""
 SURVEY_SAMPLES = 2
 """Samples of so many looks each that tell, before a still's first sample, which pixels are even …"""
@@ -92,8 +92,8 @@ _VARIANTS: dict[str, Callable[[Defines], Defines]] = {
     "single": single_defines,
     "beside": beside_defines,
 }
-"""Programs: for all that a sample sees (where another lists pixels: beyond glass and mirrors), for what is seen
-directly, beyond glass of one wavelength, and directly where beams show the rest."""
+"""Programs: beyond glass and mirrors, for what is seen directly, beyond glass of one wavelength, and directly where
+beams show the rest."""
 FALLBACKS = ("columns_dropped", "depth_reached", "stack_full", "band_uncut", "loops_ended")
 """What the shader counts, in its order."""
 
@@ -155,7 +155,7 @@ class CameraPass:
         """Where bands serve a scene badly, wavelengths may be taken one by one. That takes a program of its own, which
         is compiled when it is needed."""
         self.max_taps = MAX_TAPS
-        self.primary_samples = PRIMARY_SAMPLES if self._may_choose else 1
+        self.primary_samples = PRIMARY_SAMPLES if self._may_choose or not self.disperses else 1
         self.only_directly = False
         """Leave what is seen in glass and mirrors black where a program of its own follows it."""
         """Of a sample, at what is seen directly, while a pixel has few samples."""
@@ -177,12 +177,12 @@ class CameraPass:
             )
             if on
         }
-        self._listed: ListedPixels | None = None
-        if "CAMERA_SPECULAR" in shown:
-            halts = context.traits.loops_may_end
-            # A viewer may open the lens later.
-            self._listed = ListedPixels(self._ctx, halted_bytes(lens_defines(shown)) if halts else None)
-            shown = halting_defines(shown) if halts else shown
+        self.follows = "CAMERA_SPECULAR" in shown
+        """Some paths go on beyond glass or mirrors."""
+        halts = self.follows and context.traits.loops_may_end
+        # A viewer may open the lens later.
+        self._listed = ListedPixels(self._ctx, halted_bytes(lens_defines(shown)) if halts else None)
+        shown = halting_defines(shown) if halts else shown
         if "RECEIVER_LIGHT" in shown:
             self._dark = without_light(self._ctx, len(scene.receivers))
         self._source = (shown, structs)
@@ -198,7 +198,7 @@ class CameraPass:
         self._has_lens = features.lens
         if not features.camera_beams:
             # Else beams may do without them, and they are compiled when paths need them.
-            for variant in ("all",) if self._listed is None else ("all", "direct"):
+            for variant in ("all", "direct") if self.follows else ("direct",):
                 self._compiled(variant)
 
     def _light_records(self) -> np.ndarray:
@@ -255,7 +255,7 @@ class CameraPass:
         """From the next first sample on, show what is seen in these objects (O,) by polygons of the picture, which
         belong to its camera, size and seed; None: by paths, as everything else. `starts`: paths that carry on handed
         polygons, with those, of a picture so wide."""
-        if polygons is None or objects is None or self._listed is None:
+        if polygons is None or objects is None or not self.follows:
             self._beam_objects[:] = False
             return
         shown, structs = self._source
@@ -346,8 +346,7 @@ class CameraPass:
         if parameters["primary_samples"][0] > 1:
             looks = looks_lattice(samples, sample_offset)
             if (
-                self._listed is not None
-                and not self._has_lens  # few looks do not tell what lies before a blurred place
+                not self._has_lens  # few looks do not tell what lies before a blurred place
                 and sample_offset == 0
                 and samples >= SURVEY_FROM
                 and self._sums.is_single
@@ -444,8 +443,7 @@ class CameraPass:
         ):
             buffer.bind_to_storage_buffer(binding)
         self._counters.bind_to_storage_buffer(BIND_COUNTERS)
-        if self._listed is not None:
-            self._listed.bind()
+        self._listed.bind()
         self._parameters_buffer.bind_to_uniform_block(bindings.PARAMETERS)
         for unit, texture in enumerate(maps.textures):
             texture.use(location=unit)
@@ -492,8 +490,7 @@ class CameraPass:
         if self._beam_objects_buffer is not None:
             self._beam_objects_buffer.release()
         shader.release(*self._programs.values())
-        if self._listed is not None:
-            self._listed.release()
+        self._listed.release()
         if self._owns_pictures:
             self.pictures.release()
         if self._dark is not None:
@@ -510,14 +507,9 @@ class CameraPass:
         return self._source
 
     @property
-    def follows(self) -> bool:
-        """Some paths go on beyond glass or mirrors."""
-        return self._listed is not None
-
-    @property
     def listed(self) -> int:
         """Pixels that are listed."""
-        return 0 if self._listed is None else self._listed.count
+        return self._listed.count
 
     def moving_parameters(
         self, camera: Camera, width: int, height: int, maps: CausticMaps, max_taps: int, seed: int
@@ -540,8 +532,7 @@ class CameraPass:
 
     def start_list(self) -> None:
         """Nothing is listed."""
-        if self._listed is not None:
-            self._listed.clear()
+        self._listed.clear()
 
     def follow(self, parameters: np.ndarray, maps: CausticMaps) -> Iterator[float]:
         """Follow what is listed, into the sums; pauses with the share done."""
@@ -562,8 +553,7 @@ class CameraPass:
     def _clear(self, width: int, height: int) -> None:
         if self._sums.clear(width, height):
             self._rows = DispatchBudget(_FIRST_ROWS, _GROUP, -(-height // _GROUP) * _GROUP)
-            if self._listed is not None:
-                self._listed.resize(width * height, width * (-(-height // _GROUP) * _GROUP))
+            self._listed.resize(width * height, width * (-(-height // _GROUP) * _GROUP))
         self._within_rows = False
 
     def _add_sample(self, parameters: np.ndarray, width: int, height: int, maps: CausticMaps) -> Iterator[float]:
@@ -592,8 +582,7 @@ class CameraPass:
             # Groups that overlap the next band would add its rows twice, so bands are whole groups.
             rows = min(self._rows.units, height - row)
             parameters["first_row"] = row
-            if self._listed is not None:
-                self._listed.clear()
+            self._listed.clear()
             took = self._dispatch(self._program_direct(), parameters, maps, -(-width // _GROUP), -(-rows // _GROUP))
             self._rows.learn(rows, took, self.dispatch_seconds)
             yield row, rows
@@ -602,7 +591,6 @@ class CameraPass:
     def _survey(self, parameters: np.ndarray, width: int, height: int, maps: CausticMaps) -> Iterator[float]:
         """Find the pixels in which, and round which, nothing but one surface in the same light is seen directly, and
         what that looks like: the samples then look at the others only. Pauses after every dispatch with 0.0."""
-        assert self._listed is not None
         taken = parameters.copy()
         taken["survey"], taken["survey_gain"] = 1, 1.0 / SURVEY_SAMPLES
         taken["survey_at"] = self._listed.survey_at(width * height)
@@ -621,7 +609,7 @@ class CameraPass:
 
     def _follow_listed(self, parameters: np.ndarray, maps: CausticMaps) -> Iterator[float]:
         """Follow what the listed pixels of a band of rows see, yielding the share done."""
-        if self._listed is None or self.only_directly:
+        if self.only_directly or not self.follows:
             return
 
         def dispatch(count: int) -> float:
@@ -645,7 +633,7 @@ class CameraPass:
     def _program_direct(self) -> moderngl.ComputeShader:
         """What looks at what is seen directly."""
         if not self.shows_beams:
-            return self._compiled("all" if self._listed is None else "direct")
+            return self._compiled("direct")
         assert self._beam_objects_buffer is not None
         self._beam_objects_buffer.bind_to_storage_buffer(BIND_BEAM_OBJECTS)
         return self._compiled("beside")
@@ -665,7 +653,6 @@ class CameraPass:
         for share in self._beams.draw(self._sums.size, places, as_image, bind, self.dispatch_seconds):
             yield drawn * share
         if self._starts is not None:
-            assert self._listed is not None
             found, gather = self._beams.found, self._beams.gather
             parameters["start_share"] = START_SHARE
 

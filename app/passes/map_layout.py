@@ -20,7 +20,7 @@ from ..model.camera_rays import camera_frame, camera_rays
 from ..model.features import is_flat
 from ..model.scene import Camera, Scene
 from .map_atlas import placement_rows
-from .picture_window import PictureWindow, picture_window
+from .picture_window import PLENTY, PictureWindow, picture_window
 from .plane_frame import PlaneFrame, plane_frame
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ class Fineness:
 
 LIVE = Fineness(2.0, 2048, 768)
 """Of a picture that somebody waits for."""
-STILL = Fineness(4.0, 3072, 1024, 2)
+STILL = Fineness(4.0, 3072, 1024, 4)
 """Of one that is kept. `brilliant` at 240×135, beams alone: nRMSE 0.129 with 2 texels a pixel, 0.072 with 3, 0.046 with
 4, 0.036 with 6, at the same time but for the memory."""
 _SHRINK = 0.85
@@ -113,6 +113,13 @@ class MapLayout:
     """(wider texels, finer texels) of the same window, in the order in which they are added up."""
     frames: dict[int, PlaneFrame] = field(default_factory=dict)
     """Of flat receivers."""
+
+    def width_told(self, receiver: int) -> float:
+        """What a receiver's finest map tells apart, scene units: a texel's side, or half a pixel's where texels are
+        smaller than that. These are so only that outlines cut them in smaller parts."""
+        side = float(np.sqrt(self.placements["texel_area"][self.receivers[receiver]["placement"]]))
+        window = next(iter(self.windows[receiver]), None)
+        return side * max(1.0, window.per_pixel / PLENTY) if isinstance(window, PictureWindow) else side
 
 
 def layout_maps(

@@ -17,6 +17,9 @@ _MARGIN, _MARGIN_PIXELS = 0.04, 4.0
 _LEAST_COSINE = 0.02
 """Between the plane's normal and the view in the window's middle: texels of a plane seen edge-on are of no use to what
 is seen in mirrors or through glass."""
+PLENTY, FINER = 2, 1536
+"""Texels along a pixel that windows as large as there is room for may have; more of them, in windows up to this side,
+texels."""
 _LEAST_SHARE = 0.02
 """Of the light that must land where the camera sees the plane, or that could as well be behind it."""
 
@@ -101,7 +104,7 @@ def picture_window(
     low = np.floor(np.maximum(low - margin, 0.0)).astype(int)
     high = np.ceil(np.minimum(high + margin, size)).astype(int)
     for count in range(per_pixel, 0, -1):
-        if count * (high - low).max() <= largest:
+        if count * (high - low).max() <= (largest if count <= PLENTY else min(largest, FINER)):
             middle = np.average(positions[seen], axis=0)
             is_aslant = _cosine(camera, space.to_world(middle), np.cross(*frame.axes)) < _LEAST_COSINE
             return None if is_aslant else PictureWindow(low, high, count, rows, bool(seen.all()))

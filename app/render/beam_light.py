@@ -275,7 +275,7 @@ class BeamLight:
         for r in self.frames:
             record = layout.placements[layout.receivers[r]["placement"]]
             finer = share if record["kind"] == KIND_PICTURE else 1.0
-            texels[r] = finer * float(np.sqrt(record["texel_area"])) * self._buffers.space.scale
+            texels[r] = finer * layout.width_told(r) * self._buffers.space.scale
         return texels
 
     def begin(self) -> None:

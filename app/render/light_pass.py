@@ -589,12 +589,9 @@ class LightPass:
         stats.splat_seconds += self._splatting.seconds - before
 
     def _texel_size(self) -> np.ndarray:
-        """Texel side of each receiver's finest window, GPU units."""
-        sides = []
-        for record in self.layout.receivers:
-            area = self.layout.placements["texel_area"][record["placement"]]
-            sides.append(np.sqrt(area) * self.buffers.space.scale)
-        return np.array(sides)
+        """What each receiver's finest window tells apart, GPU units."""
+        receivers = range(len(self.layout.receivers))
+        return np.array([self.layout.width_told(r) for r in receivers]) * self.buffers.space.scale
 
     @property
     def lit_receivers(self) -> list[int]:

@@ -14,6 +14,9 @@ from ..passes.spectrum_choice import MAX_BANDS, MIN_SAMPLES, SAMPLES_A_BAND, Spe
 
 DEFAULT_SAMPLES = 16
 """Camera samples a pixel."""
+CAUSTIC_SAMPLES = 64
+"""Of a picture of the caustic alone: only outlines are looked at more than twice, and what hides a part of a focus is
+half of the error there is (`ball`, 160×90, 400,000 photons: nRMSE 0.025 with 16, 0.015 with 64, no slower)."""
 LIVE_BANDS_FOR = 16
 """Samples whose error the viewer's number of bands is fitted to: a still picture shall be whole within seconds, so not
 to all that it gets in the end."""
@@ -50,7 +53,7 @@ class CameraSampling:
     @staticmethod
     def of(settings: RenderSettings) -> CameraSampling:
         """For pictures that are waited for."""
-        return CameraSampling(settings.spp or DEFAULT_SAMPLES)
+        return CameraSampling(settings.spp or (CAUSTIC_SAMPLES if settings.layer == "caustic" else DEFAULT_SAMPLES))
 
     @staticmethod
     def live(samples: int) -> CameraSampling:

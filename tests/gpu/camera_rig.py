@@ -62,6 +62,9 @@ def opened_camera_pass(
     camera_pass = CameraPass(
         gl, SceneBuffers(gl.ctx, scene, features, spectral_axis(scene, features)), maps=channels, **options
     )
+    if not camera_pass.disperses:
+        # Whoever asks for one sample knows where it looks.
+        camera_pass.primary_samples = 1
     if split_threshold is not None:
         camera_pass.split_threshold = split_threshold
     return camera_pass

@@ -84,7 +84,7 @@ def test_what_microfacets_throw_at_each_other_is_given_back(gl) -> None:
         {
             **bindings.SCENE_DEFINES,
             **dict.fromkeys(("TRIANGLES_AT", "NORMALS_AT", "OBJECTS_AT"), 0),
-            **rough_glass.row_defines(widths, 3),
+            **rough_glass.row_defines(3),
             "SPECTRAL_SAMPLES": SAMPLES,
         },
         SCENE_STRUCTS,

@@ -54,8 +54,9 @@ def test_all_that_was_emitted_is_drawn_or_accounted_for_where_reflection_is_tota
 
 
 def test_maps_hold_what_beams_of_a_lamp_throw(gl) -> None:
-    """Through a slit and a prism, whose image is two to four texels wide and swept over hundreds."""
-    assert abs(balance(gl, "prism_case", "srd").held) < 5e-4
+    """Through a slit and a prism, whose image is four to eight texels wide and swept over hundreds; chords of bands may
+    miss by a texel, which is half a pixel (0.06 % too much)."""
+    assert abs(balance(gl, "prism_case", "srd").held) < 1e-3
 
 
 @pytest.mark.slow

@@ -92,12 +92,13 @@ def test_features_that_are_in_tell_what_they_add(tmp_path: Path) -> None:
     text = said(scene(tmp_path))
     # Two vec4 a column in a ray, one in a photon; both lists hold two glasses.
     assert "64 B a ray, 32 B a photon" in row(text, "spectral columns") and "64 B a ray" in row(text, "spatial columns")
+    assert "16 B a ray; 16 tables" in row(text, "tint levels")
     assert "73 planes" in row(text, "half-space solids")
     assert " B" not in row(text, "mirrors")
     # Both glasses stand before the camera: the maps hold eight spectral channels beside XYZ.
     assert "32 B a texel" in row(text, "spectral maps") and "a second program" in row(text, "camera refraction")
     assert (
-        "A ray is 224 bytes with 4 derivative column(s), a photon record 128, its splats 288, a map's texel 48."
+        "A ray is 240 bytes with 4 derivative column(s), a photon record 128, its splats 288, a map's texel 48."
         in " ".join(text.split())
     )
     assert "bench --features" in text

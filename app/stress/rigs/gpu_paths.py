@@ -191,7 +191,8 @@ def trace_light(
     """
     camera, render = Camera((0, 0, 9), (0, 0, 0), up=(0, 1, 0)), RenderDefaults(polarisation=polarisation)
     scene = Scene("question", camera, (light,), tuple(objects), render=render)
-    features = Features.of(scene, RenderSettings(method=method))
+    # What a photon's weights hold is looked at: all of a tint.
+    features = replace(Features.of(scene, RenderSettings(method=method)), tint_levels=0)
     buffers = SceneBuffers(gl.ctx, scene, features, spectral_axis(scene, features))
     trace = TracePass(
         gl, features, buffers, batch=max(2 * count * len(bands_nm), 1024), max_depth=max_depth, split_threshold=0.0
