@@ -77,7 +77,9 @@ class LiveEngine:
         self._inputs: LiveInputs | None = None
         """What the picture shows."""
         self._shown: Shown | None = None
-        self._building: Iterator[Shown | None] | None = None
+        self._building: Iterator[Shown | str | None] | None = None
+        self._building_at, self._building_since = "", 0.0
+        """What building is at, and since when anything is built."""
         self._splatting: Iterator[None] = iter(())
         self._tracing: Iterator[None] = iter(())
         self._maps: CausticMaps | None = None
@@ -248,6 +250,7 @@ class LiveEngine:
                 self.problem = None
                 if self._shown is not None and self._shown.light.light_pass.beams is not None:
                     self._shown.light.light_pass.beams.pause()
+                self._building_at, self._building_since = "setting the scene up", time.perf_counter()
                 self._building = build(
                     self.context,
                     self.budget,
@@ -385,9 +388,10 @@ class LiveEngine:
             if self.context.traits.work_is_queued:
                 # What is only queued keeps no deadline.
                 self.context.finish()
-            if built is not None:
+            if isinstance(built, Shown):
                 self._swap(built)
                 return
+            self._building_at = built or self._building_at
 
     def _swap(self, built: Shown) -> None:
         # What does not compile (or fit) leaves everything as it was: the programs of the camera come first.
@@ -484,6 +488,8 @@ class LiveEngine:
             direct_scale=camera_pass.direct_scale,
             shows_other=self._differs == "scene" or self._camera.owes_first,
             differs=self._differs,
+            preparing=self._building_at if self._differs == "scene" else "",
+            preparing_s=time.perf_counter() - self._building_since,
             camera_bands=camera_pass.shown_bands,
             camera_fallbacks=camera_pass.fallbacks,
         )

@@ -340,7 +340,7 @@ class LiveLight:
         assert beams is not None and maps is not None
         beams.draw_found(maps, self.moving.threshold)
 
-    def sample(self, photons: int) -> Iterator[None]:
+    def sample(self, photons: int) -> Iterator[str | None]:
         """Trace photons that answer questions (`stored_records`) about what beams carry; nothing where there are
         some."""
         if self.light_pass.has_beams and not self._samples.photons:

@@ -23,6 +23,9 @@ _FLAGS = (
     | imgui.WindowFlags_.no_bring_to_front_on_focus
 )
 
+SAYS_WHY_S = 3.0
+"""Who waits longer wants to know for what."""
+
 
 def height() -> float:
     """Height of the bar, interface pixels."""
@@ -77,7 +80,7 @@ def _progress(state: State, view_model: ViewModel) -> State:
 def progress_words(stats: LiveStats, is_playing: bool) -> str:
     """What goes on, and how far it is: by polygons, by photons, or where nothing throws a caustic by camera samples."""
     if stats.differs == "scene":
-        return "Preparing …"
+        return preparing_words(stats)
     word = "Done" if stats.converged else "Accumulating" if is_playing else "Paused"
     if stats.only_beams:
         return f"{word}, {numbers.count(stats.polygons)} polygons"
@@ -85,6 +88,13 @@ def progress_words(stats: LiveStats, is_playing: bool) -> str:
         return f"{word}, {numbers.count(stats.photons)} photons"
     samples = round(stats.camera_samples)
     return f"{word}, {numbers.count(samples)} {'sample' if samples == 1 else 'samples'} a pixel, no caustics"
+
+
+def preparing_words(stats: LiveStats) -> str:
+    """That the scene is prepared; after a while also what that is at and how long it has taken so far."""
+    if not stats.preparing or stats.preparing_s < SAYS_WHY_S:
+        return "Preparing …"
+    return f"Preparing: {stats.preparing} ({stats.preparing_s:.0f} s so far)"
 
 
 def _selection(state: State) -> None:
