@@ -7,6 +7,7 @@ One question is open at a time; a new one replaces it.
 
 from __future__ import annotations
 
+import mimetypes
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -61,6 +62,8 @@ class _Browser:
 
 _browser = _Browser()
 _OVERWRITE = "Replace file?"
+_OWN_FORMATS = (".exr", ".npy", ".hdr", ".webp", ".toml", ".json", ".glb", ".gltf", ".ies", ".obj", ".stl", ".ply")
+"""Kinds of files that Python's table lacks, or has on some systems only."""
 
 
 def ask(question: Question) -> None:
@@ -220,8 +223,14 @@ def _choose(question: Question) -> None:
     path = _browser.folder / Path(_browser.name.strip()).expanduser()
     if question.saving:
         if path.suffix.lower() not in question.suffixes:
+            if _is_format(path.suffix):
+                _browser.error = f"{path.name}: no {path.suffix} is written here; end the name in {_either(question)}."
+                return
             path = path.with_name(path.name + question.suffixes[0])
-        if path.is_dir():
+        if not path.parent.is_dir():
+            near = suggestion(path.parent.name, [entry.path.name for entry in _browser.entries if entry.is_folder])
+            _browser.error = f"There is no folder {path.parent}{near.rstrip('?')}{'?' if near else '.'}"
+        elif path.is_dir():
             _browser.error = f"{path.name} is a folder."
         elif path.exists():
             _browser.confirming = path
@@ -237,6 +246,18 @@ def _choose(question: Question) -> None:
         _browser.error = f"There is no file {path.name} {where}{near.rstrip('?')}{'?' if near else '.'}"
     else:
         _answer(question, path)
+
+
+def _either(question: Question) -> str:
+    """ ".png, .jpg or .exr"."""
+    *others, last = question.suffixes
+    return f"{', '.join(others)} or {last}" if others else last
+
+
+def _is_format(suffix: str) -> bool:
+    """Whether `suffix` names a kind of file: shot.tiff asks for a TIFF, but v1.2 is only a name."""
+    kind = mimetypes.types_map.get(suffix.lower(), "")
+    return suffix.lower() in _OWN_FORMATS or kind.partition("/")[0] in ("image", "video", "model")
 
 
 def _answer(question: Question, path: Path) -> None:
