@@ -70,7 +70,7 @@ def save_scene(scene: Scene, path: str | os.PathLike[str], words_from: Path | No
 
 def scene_values(scene: Scene, path: Path) -> dict[str, Any]:
     """The tables of `scene` as they would stand in `path`; writes PLY and picture files where it must."""
-    values: dict[str, Any] = {"name": scene.name}
+    values: dict[str, Any] = {"name": scene.name} | ({"units": scene.units} if scene.units else {})
     if scene.environment is None:
         values["background"] = list(scene.background_rgb)
     if not scene.lights:

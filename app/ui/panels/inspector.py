@@ -264,7 +264,9 @@ def _mesh(thing: SceneObject) -> None:
     widgets.read_out("Shape", mesh.name or "mesh", tip="Shape, or the name in the file it came from.")
     widgets.read_out("Triangles", f"{len(mesh.triangles):,}", tip="Number of triangles.")
     widgets.read_out("Vertices", f"{len(mesh.vertices):,}", tip="Number of vertices, welded.")
-    widgets.read_out("Size", " × ".join(f"{s:.3g}" for s in size), tip="Extent along its own axes, scene units.")
+    widgets.read_out(
+        "Size", " × ".join(f"{s:.3g}" for s in size) + " units", tip="Extent along its own axes, scene units."
+    )
     widgets.read_out("Closed", "yes" if mesh.is_closed else "no", tip="Glass must be closed: light needs an inside.")
 
 

@@ -35,6 +35,7 @@ from .rows import (
     tooltip,
     words,
 )
+from .unit_words import named
 
 __all__ = [
     "FloatResult",
@@ -181,10 +182,10 @@ def combo(
     shown: Mapping[Choice, str] = options if isinstance(options, Mapping) else {option: option for option in options}
     begin_row(label)
     chosen = current
-    opened = imgui.begin_combo(f"##{label}", shown.get(current, current))
+    opened = imgui.begin_combo(f"##{label}", named(shown.get(current, current)))
     if opened:
         for key, text in shown.items():
-            if imgui.selectable(f"{text}##{key}", key == current)[0]:
+            if imgui.selectable(f"{named(text)}##{key}", key == current)[0]:
                 chosen = key
             item_rects.note(text)
             if key == current:
@@ -314,7 +315,7 @@ def read_out(label: str, text: str, *, tip: str) -> None:
     """A value that cannot be edited, in the row layout."""
     begin_row(label)
     imgui.align_text_to_frame_padding()
-    imgui.text_unformatted(text)
+    imgui.text_unformatted(named(text))
     explain(label, tip)
 
 
@@ -377,7 +378,7 @@ def _with_unit(format: str, unit: str) -> str:
     """`format` with the unit behind it, percent signs doubled for printf."""
     if not unit:
         return format
-    return format + ("" if unit == "°" else " ") + unit.replace("%", "%%")
+    return format + ("" if unit == "°" else " ") + named(unit).replace("%", "%%")
 
 
 def _tidy(value: float) -> float:
