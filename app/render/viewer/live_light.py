@@ -340,12 +340,13 @@ class LiveLight:
         assert beams is not None and maps is not None
         beams.draw_found(maps, self.moving.threshold)
 
-    def sample(self, photons: int) -> Iterator[str | None]:
+    def sample(self, photons: int) -> Iterator[None]:
         """Trace photons that answer questions (`stored_records`) about what beams carry; nothing where there are
         some."""
         if self.light_pass.has_beams and not self._samples.photons:
             self._sampled = photons
-            yield from self.light_pass.sample_steps(photons, self._samples.keep)
+            for _ in self.light_pass.sample_steps(photons, self._samples.keep):
+                yield
 
     def stored_records(self, limit: int) -> np.ndarray:
         """About `limit` stored records (`gpu.records.photon_record`) of all light, beams' too."""
