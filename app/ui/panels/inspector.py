@@ -9,7 +9,7 @@ import numpy as np
 from imgui_bundle import imgui
 
 from ...edit import edits, environments
-from ...edit.state import State
+from ...edit.state import Selection, State
 from ...model.materials import MATERIAL_KINDS
 from ...model.materials.finish import USUAL_COAT_INDEX, USUAL_ROUGHNESS
 from ...model.scene import (
@@ -77,7 +77,7 @@ def _object(state: State, view_model: ViewModel, index: int) -> State:
     if changed:
         state = edits.attempt(state, f"Rename {thing.name}", edits.rename, index, name)
     if widgets.section("Placement"):
-        state = _place(state, index)
+        state = widgets.unless_locked(state, Selection("object", index), lambda state: _place(state, index))
     if widgets.section("Material"):
         state = _material(state, view_model, index)
     if widgets.section("Mesh", is_open=False):
