@@ -127,7 +127,7 @@ _MOVING_WORD = 1
 """Roulette's seed in motion: the same beams from frame to frame."""
 
 
-COMPILING = "compiling the search for beams, up to a minute, once"
+COMPILING = "readying the search for beams, up to a minute the first time"
 SEARCHING = "searching for beams"
 _compiled: list[bool] = []
 """Holds something once a search has run in this process."""

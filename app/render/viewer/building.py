@@ -109,4 +109,5 @@ def build(
     except BaseException:  # also when the generator is closed because nobody wants this scene any more
         light.release()
         raise
+    yield "compiling the programs that see it, once for scenes of its kind"
     yield Shown(wanted, light, accumulation, steps)

@@ -54,6 +54,9 @@ CAMERA_SHARE = 0.4
 ENVIRONMENT_SHARE = 0.3
 """Of a frame, at least, for the environment's light until all of it is known."""
 
+PATIENCE_S = 1.0
+"""After which whoever waits for a scene is told every step."""
+
 QUERIED_PHOTONS = 200_000
 """Stored ones that are asked what lies under the cursor."""
 
@@ -391,7 +394,10 @@ class LiveEngine:
             if isinstance(built, Shown):
                 self._swap(built)
                 return
-            self._building_at = built or self._building_at
+            if built is not None:
+                self._building_at = built
+                if time.perf_counter() - self._building_since > PATIENCE_S:
+                    return  # what comes may hold the frame up for long: its name is shown before
 
     def _swap(self, built: Shown) -> None:
         # What does not compile (or fit) leaves everything as it was: the programs of the camera come first.
@@ -488,7 +494,7 @@ class LiveEngine:
             direct_scale=camera_pass.direct_scale,
             shows_other=self._differs == "scene" or self._camera.owes_first,
             differs=self._differs,
-            preparing=self._building_at if self._differs == "scene" else "",
+            preparing=self._building_at if self._differs == "scene" or self._camera.owes_first else "",
             preparing_s=time.perf_counter() - self._building_since,
             camera_bands=camera_pass.shown_bands,
             camera_fallbacks=camera_pass.fallbacks,

@@ -79,7 +79,7 @@ def _progress(state: State, view_model: ViewModel) -> State:
 
 def progress_words(stats: LiveStats, is_playing: bool) -> str:
     """What goes on, and how far it is: by polygons, by photons, or where nothing throws a caustic by camera samples."""
-    if stats.differs == "scene":
+    if stats.differs == "scene" or stats.preparing:
         return preparing_words(stats)
     word = "Done" if stats.converged else "Accumulating" if is_playing else "Paused"
     if stats.only_beams:
