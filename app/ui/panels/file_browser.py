@@ -74,6 +74,12 @@ def ask(question: Question) -> None:
     _enter(start if start.is_dir() else start.parent)
 
 
+def beside(path: Path | None, name: str, suffix: str) -> Path:
+    """A file to propose, in the folder of the scene's file or at home; other signs than letters and digits become _."""
+    stem = "".join(c if c.isalnum() or c in "-_" else "_" for c in name)
+    return (Path.home() if path is None else path.parent) / f"{stem}{suffix}"
+
+
 def take(identity: str) -> Path | None:
     """The file chosen for question `identity`, once; None while nothing is chosen."""
     return _browser.answers.pop(identity, None)
