@@ -320,6 +320,12 @@ class LightPass:
         self._first_photons, self._planned = photons, None
         self.plan(photons, 0)
 
+    def go_on_from(self, photons: int, stats: LightStats) -> None:
+        """Be as after passes of `photons` that counted `stats`; the maps are empty, until the caller brings back what
+        was summed."""
+        self.begin(photons, self.seed)
+        self.stats = stats
+
     def plan(self, photons: int, number: int) -> None:
         """Plan pass `number`, of about `photons`; what was summed before stays, each pass with its own weight
         (`pass_sizes.emphasis`). Where bands are the same in all passes of so many photons, they share one plan."""

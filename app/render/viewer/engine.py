@@ -297,7 +297,8 @@ class LiveEngine:
         self._inputs = wanted
         if appearance_differs(before, wanted):
             self._take_scene(wanted, shown.light)
-        self._show_preview(seconds)
+        if not shown.light.holds_shown:  # else the picture itself is there at once
+            self._show_preview(seconds)
         self._splat_again(shown)
 
     def _follow_camera(self, wanted: LiveInputs, *, view_only: bool) -> None:
