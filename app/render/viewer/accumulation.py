@@ -111,12 +111,16 @@ class Accumulation:
             self.photons = min(self.photons * FINER, self.largest)
             self.number, self.begun = 0, False
 
+    def bring_back(self) -> None:
+        """Stand where the light was that is kept (`LiveLight.holds_shown`)."""
+        self.photons, self.number = self.light.bring_back()
+        self.begun = True
+
     def show_stored(self) -> Iterator[None]:
         """Splat the stored photons and publish them; where there are none, what was kept of the same light, or else all
         beams again from the coarsest."""
         if self.light.only_beams and self.light.holds_shown:
-            self.photons, self.number = self.light.bring_back()
-            self.begun = True
+            self.bring_back()
             yield
         elif self.light.only_beams:
             self.photons, self.number, self.begun = self.first, 0, False

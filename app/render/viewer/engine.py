@@ -297,7 +297,11 @@ class LiveEngine:
         self._inputs = wanted
         if appearance_differs(before, wanted):
             self._take_scene(wanted, shown.light)
-        if not shown.light.holds_shown:  # else the picture itself is there at once
+        if shown.light.holds_shown:
+            shown.accumulation.bring_back()
+            assert shown.light.light_pass.maps is not None
+            self._show_for_now(shown.light.light_pass.maps)
+        else:
             self._show_preview(seconds)
         self._splat_again(shown)
 
@@ -349,12 +353,16 @@ class LiveEngine:
         maps = self._shown.light.splat_preview(self._preview_photons)
         if maps is None:
             return
-        self._set_maps(maps)
-        self._tell(events.PreviewShown())
+        self._show_for_now(maps)
         took = time.perf_counter() - started - self._shown.light.beam_seconds
         self._preview_photons = int(
             np.clip(self._preview_photons * np.clip(seconds / max(took, 1e-4), 0.5, 2.0), 1 << 12, 1 << 24)
         )
+
+    def _show_for_now(self, maps: LightMaps) -> None:
+        """A coarse picture at once: samples of other light do not stay beside those of this one."""
+        self._set_maps(maps)
+        self._tell(events.PreviewShown())
         self._restart_camera(same_view=False)
 
     def _restart_camera(self, *, same_view: bool, finer_maps: bool = False) -> None:
