@@ -23,6 +23,8 @@ _FLAGS = (
     | imgui.WindowFlags_.no_bring_to_front_on_focus
 )
 
+_RATES_EM = 14.0
+"""For rate and frame time at the right end."""
 SAYS_WHY_S = 3.0
 """Who waits longer wants to know for what."""
 
@@ -121,7 +123,16 @@ def _job(state: State, view_model: ViewModel) -> State:
     label, tip = ("Discard", "Write nothing at all.") if job.is_stopped else ("Cancel", "Stop; what is done is kept.")
     if widgets.button(f"{label}##job", tip=tip):
         state = state.asking(CancelJob())
+    # Behind the button: it would wander with the words.
+    if job.text and _room_right() > imgui.calc_text_size(job.text).x + theme.em(_RATES_EM):
+        imgui.same_line()
+        imgui.text_disabled(job.text)
     return state
+
+
+def _room_right() -> float:
+    """From the last item to the window's edge, pixels."""
+    return imgui.get_window_pos().x + imgui.get_window_width() - imgui.get_item_rect_max().x
 
 
 def _right_end(view_model: ViewModel) -> None:
