@@ -128,3 +128,5 @@ class Scene:
     render: RenderDefaults = RenderDefaults()
     notes: tuple[str, ...] = ()
     """What was assumed while loading, one sentence each; shown to the user."""
+    units: str = ""
+    """What people call the unit of length ("mm"); converts nothing. Empty where nobody said."""

@@ -137,6 +137,16 @@ def hull_boxes(hulls: np.ndarray, first: np.ndarray) -> tuple[np.ndarray, np.nda
     return np.minimum.reduceat(hulls, first), np.maximum.reduceat(hulls, first)
 
 
+def hull_areas(hulls: np.ndarray, first: np.ndarray) -> np.ndarray:
+    """Area (n,) of hulls that begin at `first`."""
+    following = np.arange(1, len(hulls) + 1)
+    following[np.append(first[1:], len(hulls)) - 1] = first
+    # About a corner of each: places far beyond the window must not cost digits.
+    about = hulls[first].repeat(np.diff(np.append(first, len(hulls))), axis=0)
+    (x, y), (u, v) = (hulls - about).T, (hulls[following] - about).T
+    return 0.5 * np.abs(np.add.reduceat(x * v - u * y, first))
+
+
 def levels(polygons: BeamPolygons, chosen: np.ndarray, to_texels: TexelMap) -> np.ndarray:
     """int64 (n,): how many times the texels may double for each of the `chosen`, since its penumbrae are broad.
 

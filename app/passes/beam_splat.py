@@ -18,7 +18,7 @@ from ..gpu import shader
 from ..gpu.dispatch_budget import DISPATCH_S, DispatchBudget
 from ..gpu.records import NONE
 from ..gpu.schema import Field, Struct
-from .beam_records import BEAM, PackedBeams, hull_boxes, levels, packed, texel_hulls
+from .beam_records import BEAM, PackedBeams, hull_areas, hull_boxes, levels, packed, texel_hulls
 from .texel_map import TexelMap
 from .variants import beam_defines
 
@@ -34,6 +34,10 @@ if TYPE_CHECKING:
 GROUP = 1 << 11
 """Polygons that are uploaded and drawn at a time: a software renderer sorts all of them into tiles before it draws."""
 _SMALLEST_GROUP = 16
+TEXELS = 1 << 19
+"""That the polygons drawn at a time cover in all: 0.1 s of llvmpipe, for which a window may stand still. Large ones
+swept over half a picture took up to 3 s, 2,048 at a time. Counted, not timed: sums must not depend on the machine's
+load."""
 UNIT_CONTACT = 2
 """Texture unit of the words of `contact_lines`."""
 FLUSH = 1 << 14
@@ -86,9 +90,14 @@ class BeamSplatter:
             to_texels = TexelMap.of(record, frames[receiver])
             reflectance_class = int(layout.receivers[receiver]["reflectance_class"])
             texel_area = float(record["texel_area"])
+            covered = np.cumsum(_covered(polygons, chosen, to_texels, record["rect"]))
             done = 0
             while done < len(chosen):
-                part = chosen[done : done + (self._portion.units if self._portion else GROUP)]
+                if self._portion:
+                    end = done + self._portion.units
+                else:
+                    end = min(portion_end(covered, done), done + GROUP)
+                part = chosen[done:end]
                 done += len(part)
                 curves = tables.parts(polygons.light[part], reflectance_class, polygons.x_lo[part], polygons.x_hi[part])
                 all_beams = list(packed(polygons, part, to_texels, texel_area * weight, curves))
@@ -152,6 +161,21 @@ class BeamSplatter:
     def release(self) -> None:
         """Free program and buffers."""
         shader.release(*self._programs.values(), self._parameters)
+
+
+def portion_end(covered: np.ndarray, done: int) -> int:
+    """Where a portion ends that begins with polygon `done`: one polygon at least, and no more than `TEXELS` texels in
+    all, of which polygons up to each (n,) have `covered` so many."""
+    before = covered[done - 1] if done else 0.0
+    return max(int(np.searchsorted(covered, before + TEXELS, "right")), done + 1)
+
+
+def _covered(polygons: BeamPolygons, chosen: np.ndarray, to_texels: TexelMap, rect: np.ndarray) -> np.ndarray:
+    """Texels (n,) that each of the `chosen` is drawn over, about: of its hull, within the window `rect`."""
+    _, hulls, first = texel_hulls(polygons, chosen, to_texels)
+    low, high = hull_boxes(hulls, first)
+    sides = np.clip(np.minimum(high, rect[2:]) - np.maximum(low, rect[:2]), 0.0, None)
+    return np.minimum(hull_areas(hulls, first), sides.prod(axis=1))
 
 
 def _windows(

@@ -127,6 +127,8 @@ _MOVING_WORD = 1
 """Roulette's seed in motion: the same beams from frame to frame."""
 
 
+COMPILING = "readying the search for beams, up to a minute the first time"
+SEARCHING = "searching for beams"
 _compiled: list[bool] = []
 """Holds something once a search has run in this process."""
 
@@ -210,16 +212,17 @@ class BeamLight:
         self.found: LightBeams | None = None
         """The last that were drawn, or found by the survey."""
 
-    def surveying(self, moving: MovingBeams | None = None) -> Iterator[None]:
-        """Find out which objects' light beams carry, and whether that pays, with pauses; afterwards `found` holds the
-        strongest beams, or those of `moving`."""
+    def surveying(self, moving: MovingBeams | None = None) -> Iterator[str | None]:
+        """Find out which objects' light beams carry, and whether that pays, with pauses that tell what it is at (None:
+        as before); afterwards `found` holds the strongest beams, or those of `moving`."""
         threshold = _SURVEY if moving is None else moving.threshold
         light_parts = SURVEY_PARTS if moving is None else MOVING_PARTS
         if not _compiled:
             # The first search of all may have to be compiled, which says nothing about the scene.
             for _ in self._searched(self.finder, 1.0, _MOVING_WORD, 1, threads=None):
-                yield
+                yield COMPILING
             _compiled.append(True)
+            yield SEARCHING
         each, work = _STEP_FACETS + len(self.finder.scene.facets), 0
 
         def pays(steps: int) -> bool:
@@ -231,12 +234,12 @@ class BeamLight:
         for step in self._searched(self.finder, threshold, _MOVING_WORD, light_parts, pays, None):
             if isinstance(step, LightBeams):
                 found = step
-            yield
+            yield None
         if pays(0):
             for step in self._searched(self.finder, _SURVEY, _MOVING_WORD, light_parts, pays, None, hands=True):
                 if isinstance(step, LightBeams):
                     strongest = step
-                yield
+                yield None
         if not pays(0):
             self.why_not = "the strongest beams alone are so many that photons are cheaper"
             return

@@ -73,6 +73,22 @@ class LightMaps:
         self.atlas.clear()
         self.splatter.reset_counts()
 
+    def copied_sums(self, into: Sequence[moderngl.Texture] | None = None) -> list[moderngl.Texture]:
+        """What was summed, in textures of the caller's; `into`: those of an earlier call."""
+        self.atlas.flush()
+        total = self.atlas.total_textures
+        copies = list(into) if into is not None else [self._ctx.texture(self.atlas.size, 4, dtype="f4") for _ in total]
+        for source, target in zip(total, copies, strict=True):
+            copy_texture(self._ctx, source, target)
+        return copies
+
+    def bring_back(self, sums: Sequence[moderngl.Texture], photon_weight: float) -> None:
+        """Hold again what `copied_sums` gave, with the weight of that time."""
+        self.clear()
+        for source, target in zip(sums, self.atlas.total_textures, strict=True):
+            copy_texture(self._ctx, source, target)
+        self.photon_weight = photon_weight
+
     @property
     def scale(self) -> float:
         """Factor from what the atlas has summed to energy per texel."""

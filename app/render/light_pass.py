@@ -41,7 +41,7 @@ from ..passes.splat import Splatter
 from ..passes.trace import Batch, LatticeSlice, TracePass
 from . import shrinking
 from .batch_size import batch_size
-from .beam_light import BeamLight, BeamStats, MovingBeams, carries_everything
+from .beam_light import SEARCHING, BeamLight, BeamStats, MovingBeams, carries_everything
 from .handed_rays import handed_rays
 from .light_maps import LightMaps
 from .light_plan import Division, LightPlan, Planner
@@ -133,8 +133,9 @@ class LightPass:
         for _ in self.preparing():
             pass
 
-    def preparing(self) -> Iterator[None]:
-        """`prepare`, pausing often: whoever draws meanwhile may bind what it likes."""
+    def preparing(self) -> Iterator[str | None]:
+        """`prepare`, pausing often with what it is at (None: as before): whoever draws meanwhile may bind what it
+        likes."""
         specular = [
             self.buffers.space.to_gpu(m.corners())
             for m, o in zip(self.buffers.world_meshes, self.scene.objects, strict=True)
@@ -147,7 +148,7 @@ class LightPass:
         }
         self.domains: dict[int, EmissionDomain] = {i: d for i, d in domains.items() if d is not None}
         if self.features.beams and self.domains:
-            yield
+            yield SEARCHING
             self._beams = BeamLight(
                 self.context,
                 self.scene,
@@ -156,21 +157,21 @@ class LightPass:
                 self.trace.max_depth,
                 beside=self._pace.searches_beside,
             )
-            yield
+            yield None
             yield from self._beams.surveying(self._moving)
-            yield
+            yield "following the first photons"
         self.pilots: dict[int, Pilot] = {}
         if self._moving is None or not self.only_beams:
             self.pilots = yield from self._pilot_steps()
-        yield
+        yield None
         shows_map = self.settings.layer.startswith("map:")
         self.map_receiver = check_map_receiver(self.scene, self.buffers, self.settings.layer[4:]) if shows_map else None
         self.lay_out(self.fit)
 
-    def _pilot_steps(self) -> Generator[None, None, dict[int, Pilot]]:
+    def _pilot_steps(self) -> Generator[str | None, None, dict[int, Pilot]]:
         pilots: dict[int, Pilot] = {}
         for i, domain in self.domains.items():
-            yield
+            yield None
             pilots[i] = yield from pilot_steps(
                 self.trace, self.scene, i, domain, self._full_power(i), self._needs_spectral_pilot
             )
@@ -319,6 +320,12 @@ class LightPass:
         self._first_photons, self._planned = photons, None
         self.plan(photons, 0)
 
+    def go_on_from(self, photons: int, stats: LightStats) -> None:
+        """Be as after passes of `photons` that counted `stats`; the maps are empty, until the caller brings back what
+        was summed."""
+        self.begin(photons, self.seed)
+        self.stats = stats
+
     def plan(self, photons: int, number: int) -> None:
         """Plan pass `number`, of about `photons`; what was summed before stays, each pass with its own weight
         (`pass_sizes.emphasis`). Where bands are the same in all passes of so many photons, they share one plan."""
@@ -354,12 +361,12 @@ class LightPass:
             self._division,
         )
 
-    def sample_steps(self, photons: int, keep: Keep) -> Iterator[None]:
+    def sample_steps(self, photons: int, keep: Keep) -> Iterator[str | None]:
         """Trace about `photons` as if there were no beams and hand them to `keep`; the maps stay as they are."""
         plans = yield from self.sample_plans(photons)
         yield from thrown(self.trace, self.settings.seed, plans, photons, keep)
 
-    def sample_plans(self, photons: int) -> Generator[None, None, list[LightPlan]]:
+    def sample_plans(self, photons: int) -> Generator[str | None, None, list[LightPlan]]:
         """Of `sample_steps`."""
         self._sample_pilots = self.pilots or self._sample_pilots or (yield from self._pilot_steps())
         return self._planner(self._sample_pilots).plans(photons, self._texel_size())

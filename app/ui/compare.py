@@ -355,8 +355,12 @@ class Comparison:
         return snapshot.known >= 1.0 or (self._thread is not None and self._thread.is_done)
 
     def _noise(self, snapshot: Snapshot) -> str:
-        """The reference's own error in words."""
-        return f"own relMSE {'' if self._is_known(snapshot) else '> '}{snapshot.relmse:.1e}"
+        """The reference's own error in words: that of its caustics, and while it becomes finer what its direct light is
+        made of, which that error does not count."""
+        words = f"relMSE of its caustics {'' if self._is_known(snapshot) else '> '}{snapshot.relmse:.1e}"
+        if self._direct is None or self._direct.is_done:
+            return words
+        return f"{words}, direct light {self._direct.samples} of {DIRECT_SAMPLES[-1]} samples"
 
     def _measure(self, state: State, running: LiveEngine) -> None:
         engines = {state.method: running}
@@ -406,6 +410,11 @@ class _DirectPicture:
     def is_done(self) -> bool:
         """It becomes no better."""
         return self.version == len(DIRECT_SAMPLES)
+
+    @property
+    def samples(self) -> int:
+        """Of a pixel of `rgb`; 0 while there is none."""
+        return DIRECT_SAMPLES[self.version - 1] if self.version else 0
 
     def _sampled(self, camera: Camera, inputs: LiveInputs) -> Iterator[float]:
         """Without maps."""

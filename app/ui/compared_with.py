@@ -89,8 +89,8 @@ class FilePicture:
         height, width = rgb.shape[:2]
         self.words = f"{path.name}, {width}×{height}"
         if (width, height) != size:
-            rgb = resized(rgb, size)
-            self.words += f", shown as {size[0]}×{size[1]}; one of the same size compares best"
+            rgb = of_height(rgb, size)
+            self.words += f", scaled to the height of this view, {size[0]}×{size[1]}; one of that size compares best"
         texels = np.concatenate([rgb, np.ones((*rgb.shape[:2], 1), np.float32)], axis=-1)
         self.texture = self._context.ctx.texture(size, 4, np.ascontiguousarray(texels).tobytes(), dtype="f4")
 
@@ -99,6 +99,17 @@ class FilePicture:
         if self.texture is not None:
             self.texture.release()
         self.texture, self.problem, self.words, self._key = None, None, "", ()
+
+
+def of_height(rgb: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """A linear picture (h, w, 3) in one of another (width, height): as high, and in its middle, cut or with black at
+    both sides. So a camera, whose angle of view is that of the height, sees the same things in the same places."""
+    width, height = size
+    scaled = resized(rgb, (max(round(rgb.shape[1] * height / rgb.shape[0]), 1), height))
+    spare = width - scaled.shape[1]
+    if spare < 0:
+        return scaled[:, -spare // 2 : -spare // 2 + width]
+    return np.pad(scaled, ((0, 0), (spare // 2, spare - spare // 2), (0, 0)))
 
 
 def resized(rgb: np.ndarray, size: tuple[int, int]) -> np.ndarray:

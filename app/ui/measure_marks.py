@@ -12,6 +12,7 @@ from ..edit.state import State
 from ..model.scene import Vec3
 from . import item_rects, theme
 from .overlay import Canvas, draw_outlined
+from .panels.unit_words import named
 from .view_model import ViewModel
 
 SNAP_PX = 9.0
@@ -59,7 +60,7 @@ def draw_measure(canvas: Canvas, state: State, view_model: ViewModel, mouse: tup
         taken = point_at(view_model, canvas, *mouse)
         if taken is not None:
             _dot(canvas, canvas.pixels(np.asarray(taken)), 5.5, filled=False)
-    text = measuring.words(state.measured)
+    text = named(measuring.words(state.measured))
     size = imgui.calc_text_size(text)
     _plate(canvas, canvas.left + 0.5 * (canvas.width - size.x), canvas.top + theme.em(0.8), text)
     item_rects.note("Measured")

@@ -30,6 +30,7 @@ from .panels import (
     start_page,
     status_bar,
     timing,
+    unit_words,
     view_panel,
 )
 from .panels.abbe import draw_abbe
@@ -97,6 +98,7 @@ def draw_interface(state: State, view_model: ViewModel) -> State:
 
     The host applies the theme (`theme.apply`) between frames: sizes must not change within one.
     """
+    unit_words.use(state.scene.units)
     state = shortcuts.handle(state, view_model)
     shortcuts.focused_panel["field"] = ""
     shortcuts.floating_panels.clear()

@@ -17,6 +17,7 @@ from . import item_rects, overlay, theme
 from .gizmo import Gizmo
 from .measure_marks import draw_measure
 from .overlay import Canvas
+from .panels.status_bar import preparing_words
 from .ray_labels import draw_ray_labels
 from .view_axes import draw_axes
 from .view_model import ViewModel
@@ -110,7 +111,7 @@ def _draw_picture(state: State, view_model: ViewModel, corner: ImVec2, size: ImV
         return
     imgui.dummy(size)
     item_rects.note("Picture")
-    text = "Preparing the scene…"
+    text = preparing_words(view_model.stats)
     extent = imgui.calc_text_size(text)
     at = ImVec2(corner.x + 0.5 * (size.x - extent.x), corner.y + 0.5 * (size.y - extent.y))
     imgui.get_window_draw_list().add_text(at, theme.packed(theme.palette().muted), text)

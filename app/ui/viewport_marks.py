@@ -203,8 +203,9 @@ def _draw_light(
 
 
 def draw_wipe(canvas: Canvas, state: State, view_model: ViewModel) -> None:
-    """The handle on the wipe's line, with what is on either side."""
-    if state.compare.mode != "wipe" or view_model.picture is None:
+    """The handle on the wipe's line, with what is on either side; while C is held there is one picture, and a badge
+    names it."""
+    if state.compare.mode != "wipe" or state.compare.holding or view_model.picture is None:
         return
     x = canvas.left + state.compare.wipe * canvas.width
     middle, radius = canvas.top + 0.5 * canvas.height, theme.em(0.8)
@@ -224,7 +225,9 @@ def draw_wipe(canvas: Canvas, state: State, view_model: ViewModel) -> None:
     y = canvas.top + theme.em(0.8)
     left = own_label(state)
     # Without the other picture both sides are this one: it must not carry the other's name.
-    right = view_model.compare_label if view_model.compare_ready else "On its way: this is the same picture"
+    lacks_file = state.compare.method == "file" and state.compare.file is None
+    missing = "No picture chosen: this is the same one" if lacks_file else "On its way: this is the same picture"
+    right = view_model.compare_label if view_model.compare_ready else missing
     gap = theme.em(1.0)
     _label(canvas, x - gap - imgui.calc_text_size(left).x, y, left)
     _label(canvas, x + gap, y, right)

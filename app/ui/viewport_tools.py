@@ -14,6 +14,7 @@ from .commands import command
 from .gizmo import Gizmo
 from .panels.brush_panel import NOT_PHYSICAL
 from .panels.rows import tooltip
+from .panels.status_bar import preparing_words
 from .view_model import ViewModel
 
 MARGIN_EM = 0.6
@@ -137,7 +138,7 @@ def badges(state: State, view_model: ViewModel) -> list[Badge]:
     elif view_model.stats.differs:
         badges.append(
             Badge(
-                "Preparing …" if view_model.stats.differs == "scene" else "Light is being traced …",
+                preparing_words(view_model.stats) if view_model.stats.differs == "scene" else "Light is being traced …",
                 "The picture shows what was there before the last change, until the first light of the new scene has "
                 "been traced.",
             )

@@ -333,9 +333,22 @@ def _create(place: WindowPlace, visible: bool) -> Any:
         )
     if glfw.get_platform() != glfw.PLATFORM_NULL:  # which takes the smallest side for the height
         glfw.set_window_size_limits(handle, MIN_SIDE, MIN_SIDE, glfw.DONT_CARE, glfw.DONT_CARE)
+    _shrink_to_screen(handle)
     if place.position is not None and _is_on_a_screen(place.position, place.size[0]):
         glfw.set_window_pos(handle, *place.position)
     return handle
+
+
+def _shrink_to_screen(handle: Any) -> None:
+    """Make a window that is larger than any screen as large as the largest: where no window manager does it, panels at
+    its right would be out of reach."""
+    areas = [glfw.get_monitor_workarea(monitor)[2:] for monitor in glfw.get_monitors()]
+    if not areas or glfw.get_window_attrib(handle, glfw.MAXIMIZED):
+        return
+    size = glfw.get_window_size(handle)
+    fitting = tuple(min(side, max(sides)) for side, sides in zip(size, zip(*areas, strict=True), strict=True))
+    if fitting != size and min(fitting) >= MIN_SIDE:
+        glfw.set_window_size(handle, *fitting)
 
 
 def _is_on_a_screen(position: tuple[int, int], window_width: int) -> bool:

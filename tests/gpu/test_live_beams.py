@@ -106,3 +106,44 @@ def test_the_engine_answers_questions_about_beams(gl: Context) -> None:
         assert engine.picture is not None and engine.picture.size == SIZE
     finally:
         engine.release()
+
+
+def test_leaving_one_wavelength_finds_the_light_as_it_was(gl: Context) -> None:
+    engine = LiveEngine(gl, replace(Budget.of(gl), first_photons=1 << 12, largest_photons=1 << 15))
+    engine.target_photons, engine.camera_samples = 1 << 17, 1
+    try:
+        wanted = inputs(shipped("prism"))
+        engine.set(wanted)
+        until_idle(engine)
+        photons, maps_before = engine.stats.photons, live_maps(engine)
+        engine.set(replace(wanted, solo_nm=550.0))
+        until_idle(engine)
+        assert nrmse(live_maps(engine), maps_before) > 0.1
+        engine.set(wanted)
+        frames = 0
+        while engine.stats.photons != photons or not engine.stats.converged:
+            engine.advance(0.02)
+            frames += 1
+            assert frames < 400 and engine.stats.photons in (photons, 0)  # never again from few on
+        assert np.array_equal(live_maps(engine), maps_before)
+        # Another glass is other light: nothing of what was kept may be shown.
+        engine.set(replace(wanted, solo_nm=550.0))
+        until_idle(engine)
+        engine.set(inputs(edited(wanted.scene, 2.0)))
+        until_idle(engine)
+        assert not np.array_equal(live_maps(engine), maps_before)
+    finally:
+        engine.release()
+
+
+def live_maps(engine: LiveEngine) -> np.ndarray:
+    assert engine._shown is not None
+    return maps(engine._shown.light)
+
+
+def until_idle(engine: LiveEngine) -> None:
+    deadline = time.monotonic() + 120.0
+    engine.advance(0.05)
+    while not engine.is_idle:
+        engine.advance(0.05)
+        assert engine.problem is None and time.monotonic() < deadline

@@ -49,7 +49,8 @@ def test_a_swatch_opens_a_picker(gl: Context) -> None:
     field = Field(gl)
     field.rig.click("Reflectance: swatch")
     field.rig.frame(3)
-    picker = field.rig.find("Reflectance: picker")
+    picker, swatch = field.rig.find("Reflectance: picker"), field.rig.find("Reflectance: swatch")
+    assert picker.top > swatch.bottom or picker.bottom < swatch.top or picker.right < swatch.left
     field.rig.click(picker.at(0.3, 0.5))
     field.rig.frame(2)
     assert field.rgb != (0.8, 0.4, 0.2) and all(0.0 <= c <= 1.0 for c in field.rgb)

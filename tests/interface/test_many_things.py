@@ -13,10 +13,11 @@ from spectrasplat.edit.selecting import chosen, everything
 from spectrasplat.edit.state import Selection, State
 from spectrasplat.gpu.context import Context
 from spectrasplat.ui import viewport
+from spectrasplat.ui.panels.inspector import draw_inspector
 from spectrasplat.ui.session import Session
 
 from tests.interface.fake_engine import FakeEngine
-from tests.interface.panel_rig import scene_state
+from tests.interface.panel_rig import PanelRig, scene_state
 from tests.interface.shell_rig import ShellRig
 
 
@@ -94,6 +95,19 @@ def test_eye_and_lock_in_the_outliner(gl: Context, state: State) -> None:
         assert rig.state.hidden == rig.state.locked == {("object", "singlet")}
         rig.click("Hide singlet")
         assert not rig.state.hidden
+
+
+def test_what_is_locked_keeps_its_place(gl: Context) -> None:
+    with PanelRig(gl, draw_inspector, scene_state("achromat")) as rig:
+        key = ("object", rig.state.scene.objects[rig.state.selection.index].name)
+        nothing: frozenset[tuple[str, str]] = frozenset()
+        for locked in (frozenset({key}), nothing):
+            rig.state = replace(rig.state, locked=locked)
+            rig.frame(2)
+            before = rig.state.scene
+            row = rig.find("Position")
+            rig.drag(row.at(0.1), row.at(0.25))
+            assert (rig.state.scene is before) == bool(locked)
 
 
 def test_what_is_locked_is_not_taken_in_the_picture(gl: Context, monkeypatch: pytest.MonkeyPatch) -> None:

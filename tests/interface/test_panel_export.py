@@ -71,6 +71,17 @@ def test_a_turntable_as_a_sequence_is_a_folder(rig: PanelRig, tmp_path: Path) ->
     assert rig.state.requests == (wanted,)
 
 
+def test_the_ending_of_a_film_decides_what_it_becomes(rig: PanelRig, tmp_path: Path) -> None:
+    rig.view_model = replace(rig.view_model, title="scene.toml")
+    rig.click("Render animation…")
+    rig.click("Save")
+    rig.click("Render animation…")
+    rig.key(imgui.Key.a, [imgui.Key.mod_ctrl])
+    rig.type("turn.gif")
+    rig.click("Save")
+    assert [asked.path for asked in rig.state.requests] == [tmp_path / "scene_turntable.mp4", tmp_path / "turn.gif"]
+
+
 def test_keys_are_added_changed_and_deleted(rig: PanelRig, tmp_path: Path) -> None:
     choose(rig, "Kind", "Keys")
     rig.click("Render animation…")

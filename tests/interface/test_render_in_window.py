@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from imgui_bundle import imgui
 from panel_rig import PanelRig, scene_state
 from PIL import Image
 from spectrasplat.base.errors import UserError
@@ -57,6 +58,33 @@ def test_the_panel_asks_for_what_was_chosen(rig: PanelRig, tmp_path: Path) -> No
     rig.click("Save")
     wanted = requests.RenderPicture(tmp_path / "scene.png", (960, 540), None, 60.0, 16, False, None)
     assert rig.state.requests == (wanted,)
+
+
+@pytest.mark.parametrize(
+    ("typed", "said"),
+    [
+        ("a.tiff", "a.tiff: no .tiff is written here; end the name in .png, .jpg, .webp, .exr or .npy."),
+        ("gone/a.png", "There is no folder"),
+    ],
+)
+def test_a_bad_name_is_told_before_anything_is_rendered(rig: PanelRig, typed: str, said: str) -> None:
+    rig.click("Render…")
+    rig.frame(2)
+    rig.key(imgui.Key.a, [imgui.Key.mod_ctrl])
+    rig.type(typed)
+    rig.click("Save")
+    rig.frame(2)
+    assert rig.state.requests == () and said in file_browser._browser.error
+    assert file_browser.is_open("export render")
+
+
+def test_a_point_in_a_name_is_no_ending(rig: PanelRig, tmp_path: Path) -> None:
+    rig.click("Render…")
+    rig.frame(2)
+    rig.key(imgui.Key.a, [imgui.Key.mod_ctrl])
+    rig.type("take.2")
+    rig.click("Save")
+    assert rig.state.requests[0].path == tmp_path / "take.2.png"
 
 
 def shown(gl: Context) -> Shown:

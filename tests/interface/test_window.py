@@ -159,3 +159,35 @@ def test_a_long_frame_hears_of_input(tmp_path: Path) -> None:
     command = ["xvfb-run", "-a", sys.executable, "-P", "-c", INPUT_IS_SEEN_WHILE_A_FRAME_IS_DRAWN]
     done = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.stdout.strip() == "[(False, True)]", done.stderr
+
+
+A_PICTURE_IS_DROPPED = """
+import ctypes
+import glfw
+from spectrasplat.ui.session import Session
+from spectrasplat.ui.viewer import Viewer
+from spectrasplat.ui.window import Window
+
+with Window() as window:
+    session = Session(window.context)
+    session.state = session.state.with_panels(compare=True)
+    viewer = Viewer(session, lambda state, _model: state)
+    window.frame(viewer)
+    exchange = ctypes.CFUNCTYPE(*[ctypes.c_void_p] * 3)(("glfwSetDropCallback", glfw._glfw))
+    handle = ctypes.cast(window._handle, ctypes.c_void_p).value
+    kind = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int, ctypes.POINTER(ctypes.c_char_p))
+    drop = kind(exchange(handle, None))
+    drop(handle, 2, (ctypes.c_char_p * 2)("größer.exr".encode(), b"second.exr"))
+    window._take_events(viewer)
+    window.frame(viewer)
+    compare = session.state.compare
+    print([compare.mode, compare.method, str(compare.file)], len(session.state.requests))
+"""
+
+
+def test_a_picture_dropped_while_comparing_is_compared_with(tmp_path: Path) -> None:
+    """What glfw itself calls for a drop, as the window has installed it."""
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "SPECTRASPLAT_CONFIG": str(tmp_path / "config")}
+    command = ["xvfb-run", "-a", sys.executable, "-P", "-c", A_PICTURE_IS_DROPPED]
+    done = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.stdout.strip() == "['wipe', 'file', 'größer.exr'] 0", done.stderr

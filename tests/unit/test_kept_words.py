@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -101,3 +102,42 @@ def _assert_alike(found: Scene, wanted: Scene) -> None:
         assert a.name == b.name and a.spectral_power.power_w() == pytest.approx(b.spectral_power.power_w(), rel=1e-8)
         assert np.allclose(a.position, b.position) and np.allclose(a.direction, b.direction)
     assert found.camera == wanted.camera and found.render == wanted.render
+
+
+def _changed_lines(before: str, after: str) -> list[str]:
+    lines = difflib.unified_diff(before.splitlines(), after.splitlines(), lineterm="", n=0)
+    return [line for line in lines if line[0] in "+-" and not line.startswith(("---", "+++"))]
+
+
+def test_saved_into_another_folder_only_names_of_files_differ(tmp_path: Path) -> None:
+    here, there = tmp_path / "here", tmp_path / "there"
+    there.mkdir()
+    scenes = assets_dir() / "scenes"
+    shutil.copytree(scenes / "prism_case", here / "prism_case")
+    # What is called like a file, and names none.
+    text = (scenes / "prism_case.toml").read_text(encoding="utf-8").replace('name = "slit"', 'name = "prism_case"')
+    (here / "case.toml").write_text(text, encoding="utf-8")
+    document = Document.open(here / "case.toml")
+    document.history.push("Rename", edits.rename(document.scene, 2, "ground"))
+    document.save(there / "case.toml")
+    saved = (there / "case.toml").read_text(encoding="utf-8")
+    differing = _changed_lines(text, saved)
+    assert {line.split(" = ")[0].lstrip("+-") for line in differing} == {"mesh", "name"}
+    assert len(differing) == 2 * 4  # three meshes, which had to be copied, and the name
+    _assert_alike(load_scene(there / "case.toml"), document.scene)
+    shutil.rmtree(here)
+    load_scene(there / "case.toml")
+
+
+def test_saved_into_the_folder_above_files_are_named_where_they_are(tmp_path: Path) -> None:
+    here = tmp_path / "here"
+    scenes = assets_dir() / "scenes"
+    shutil.copytree(scenes / "prism_case", here / "prism_case")
+    text = (scenes / "prism_case.toml").read_text(encoding="utf-8")
+    (here / "case.toml").write_text(text, encoding="utf-8")
+    Document.open(here / "case.toml").save(tmp_path / "above.toml")
+    differing = _changed_lines(text, (tmp_path / "above.toml").read_text(encoding="utf-8"))
+    assert [line for line in differing if line.startswith("+")] == [
+        f'+mesh = "here/prism_case/{name}.ply"' for name in ("prism", "slit", "floor")
+    ]
+    load_scene(tmp_path / "above.toml")

@@ -12,6 +12,12 @@ from spectrasplat.ui.panels.status_bar import progress_words
     ("stats", "is_playing", "said"),
     [
         (LiveStats(differs="scene"), True, "Preparing …"),
+        (LiveStats(differs="scene", preparing="searching for beams", preparing_s=1.0), True, "Preparing …"),
+        (
+            LiveStats(differs="scene", preparing="searching for beams", preparing_s=12.4),
+            True,
+            "Preparing: searching for beams (12 s so far)",
+        ),
         (LiveStats(), True, "Accumulating, 0 photons"),
         (LiveStats(photons=1_250_000, camera_samples=3.0), True, "Accumulating, 1.25 M photons"),
         (LiveStats(photons=1_250_000, camera_samples=3.0), False, "Paused, 1.25 M photons"),

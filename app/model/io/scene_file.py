@@ -129,7 +129,7 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 def _scene_from_table(table: SceneTable, kept: Kept, staging: Staging) -> Scene:
     name = table.string("name", table.file.stem)
-    table.string("units", "units")  # a label for people; every length is in it
+    units = table.string("units", "")
     notes: list[str] = []
     background, environment = _read_environment(table, kept, notes)
     render = read_render(table.table("render"))
@@ -145,14 +145,14 @@ def _scene_from_table(table: SceneTable, kept: Kept, staging: Staging) -> Scene:
     if environment is None and not table.given(("camera", "lights", "background")):
         table.finish("a scene")
         lights, camera, environment = _studio(objects, notes)
-        return Scene(name, camera, lights, tuple(objects), background, environment, render, tuple(notes))
+        return Scene(name, camera, lights, tuple(objects), background, environment, render, tuple(notes), units)
     around = environment_of(objects)
     lights = _read_lights(table, around, notes, dark_without=environment is None or _has_diffuse(objects))
     camera = _read_camera(table, around, notes)
     table.finish("a scene")
     if environment is None and not (table.has("camera") or table.has("lights")):
         _add_table(objects, notes)
-    return Scene(name, camera, lights, tuple(objects), background, environment, render, tuple(notes))
+    return Scene(name, camera, lights, tuple(objects), background, environment, render, tuple(notes), units)
 
 
 def _read_environment(table: SceneTable, kept: Kept, notes: list[str]) -> tuple[Vec3, Environment | None]:

@@ -40,6 +40,8 @@ from .toml_text import toml_text
 
 _OVER_GLASS = ("dispersion_gain", "priority", "roughness")
 """Keys that an object may have beside its `glass`."""
+_FILE_KEYS = ("mesh", "heights", "texture", "file", "csv")
+"""Keys whose texts name files (`SceneTable.existing_file`)."""
 INLINE_TRIANGLES = 64
 """Flat meshes of no more triangles than this go into the scene file itself."""
 
@@ -60,9 +62,9 @@ def save_scene(scene: Scene, path: str | os.PathLike[str], words_from: Path | No
         with suppress(UserError, OSError, ValueError):
             text = files.read_text(words_from, files.SCENE_BYTES)
             raw = tomllib.loads(text)
-            # From another folder the names of files would mean others, or none.
-            if words_from.parent == path.parent or not _names_files(raw, words_from.parent):
-                values, before = _kept(scene, path, raw, words_from), text
+            if words_from.parent.resolve() != path.parent.resolve():
+                raw = _renamed_files(raw, words_from.parent, path)
+            values, before = _kept(scene, path, raw, words_from), text
     text = toml_text(values, before)
     with atomic_output(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
@@ -70,7 +72,7 @@ def save_scene(scene: Scene, path: str | os.PathLike[str], words_from: Path | No
 
 def scene_values(scene: Scene, path: Path) -> dict[str, Any]:
     """The tables of `scene` as they would stand in `path`; writes PLY and picture files where it must."""
-    values: dict[str, Any] = {"name": scene.name}
+    values: dict[str, Any] = {"name": scene.name} | ({"units": scene.units} if scene.units else {})
     if scene.environment is None:
         values["background"] = list(scene.background_rgb)
     if not scene.lights:
@@ -89,12 +91,18 @@ def scene_values(scene: Scene, path: Path) -> dict[str, Any]:
 # -- over what a person wrote -------------------------------------------------------------
 
 
-def _names_files(raw: Any, folder: Path) -> bool:
-    """Whether any of its texts is the name of something in `folder`."""
-    if isinstance(raw, dict | list):
-        return any(_names_files(value, folder) for value in (raw.values() if isinstance(raw, dict) else raw))
-    # No file's name is so long, and the system would refuse to look for it.
-    return isinstance(raw, str) and 0 < len(raw) < 256 and (folder / raw).exists()
+def _renamed_files(raw: Any, folder: Path, path: Path) -> Any:
+    """`raw`, written in `folder`, with files called what the scene file `path` has to call them; else as it was."""
+    if isinstance(raw, list):
+        return [_renamed_files(value, folder, path) for value in raw]
+    if not isinstance(raw, dict):
+        return raw
+    return {
+        key: kept_name(str(folder / value), path)
+        if key in _FILE_KEYS and isinstance(value, str) and files.is_file(folder / value)
+        else _renamed_files(value, folder, path)
+        for key, value in raw.items()
+    }
 
 
 def _kept(scene: Scene, path: Path, raw: dict[str, Any], written: Path) -> dict[str, Any]:

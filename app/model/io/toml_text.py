@@ -36,7 +36,7 @@ def _update(table: Any, values: Mapping[str, Any], depth: int = 0) -> None:
         table.remove(key)
     for key, value in values.items():
         old = table.get(key)
-        if old is not None and old.unwrap() == value:
+        if old is not None and _plain(old) == value:
             continue
         if isinstance(value, Mapping) and isinstance(old, InlineTable) and old.keys() != value.keys():
             table[key] = _braces(old, value, depth + 1)
@@ -55,12 +55,17 @@ def _update(table: Any, values: Mapping[str, Any], depth: int = 0) -> None:
             table.add(key, _item(value, depth))
 
 
+def _plain(known: Any) -> Any:
+    """The value of what stands in a document; tomlkit gives truth values as they are."""
+    return known.unwrap() if isinstance(known, Item) else known
+
+
 def _braces(old: InlineTable, values: Mapping[str, Any], depth: int) -> Item:
     """An inline table with other keys than `old`, with its blanks, and its words for what did not change."""
     told = []
     for key in [*(key for key in old if key in values), *(key for key in values if key not in old)]:
         known = old.get(key)
-        item = known if known is not None and known.unwrap() == values[key] else _item(values[key], depth)
+        item = known if isinstance(known, Item) and _plain(known) == values[key] else _item(values[key], depth)
         told.append(f"{tomlkit.key(key).as_string()} = {item.as_string().strip()}")
     blank = " " if old.as_string().startswith("{ ") else ""
     item = tomlkit.parse(f"x = {{{blank}{', '.join(told)}{blank}}}")["x"]
@@ -72,7 +77,7 @@ def _entries(values: list[Mapping[str, Any]], known: list[Any]) -> AoT:
     """[[…]] tables, those of `known` that say the same used again."""
     entries = tomlkit.aot()
     for value in values:
-        same = next((entry for entry in known if entry.unwrap() == value), None)
+        same = next((entry for entry in known if _plain(entry) == value), None)
         if same is not None:
             known.remove(same)
         entries.append(_item(value, 0) if same is None else same)

@@ -62,6 +62,8 @@ class Accumulation:
                 self.publish()
                 return
             yield from light_pass.settling()
+            if self.photons > self.first:
+                self.light.keep(self.photons, self.number)
             self.publish()
             yield
             yield from self._refine()
@@ -109,9 +111,18 @@ class Accumulation:
             self.photons = min(self.photons * FINER, self.largest)
             self.number, self.begun = 0, False
 
+    def bring_back(self) -> None:
+        """Stand where the light was that is kept (`LiveLight.holds_shown`)."""
+        self.photons, self.number = self.light.bring_back()
+        self.begun = True
+
     def show_stored(self) -> Iterator[None]:
-        """Splat the stored photons and publish them; where there are none, all beams again from the coarsest."""
-        if self.light.only_beams:
+        """Splat the stored photons and publish them; where there are none, what was kept of the same light, or else all
+        beams again from the coarsest."""
+        if self.light.only_beams and self.light.holds_shown:
+            self.bring_back()
+            yield
+        elif self.light.only_beams:
             self.photons, self.number, self.begun = self.first, 0, False
             yield from self._pass()
         elif self.light.photons_stored:

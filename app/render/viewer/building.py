@@ -62,8 +62,9 @@ def build(
     target: int,
     publish: Callable[[], None],
     moving: MovingBeams,
-) -> Iterator[Shown | None]:
-    """Everything for a scene that photons must be traced for, up to its first picture; None while it is not done.
+) -> Iterator[Shown | str | None]:
+    """Everything for a scene that photons must be traced for, up to its first picture; while it is not done, what it is
+    at (None: as before).
 
     `largest`: photons of the finest pass, `target`: after which nothing more is traced. `publish` is called for every
     later picture, `moving`: how fine the first beams are. What was made is freed when the generator is closed
@@ -85,12 +86,12 @@ def build(
     scene = replace(wanted.scene, camera=wanted.camera)
     light = LiveLight(context, scene, settings, budget.store_bytes, moving)
     try:
-        yield None
-        for _ in light.light_pass.preparing():
-            yield None
+        yield "following the first photons"
+        yield from light.light_pass.preparing()
         light.show(wanted)
         if light.environment is not None:
             # The first picture is not a dark one.
+            yield "asking the environment for its light"
             for _ in light.environment.steps(_ENVIRONMENT_S):
                 yield None
                 if light.environment.is_worth_showing:
@@ -100,6 +101,7 @@ def build(
         first = min(budget.first_photons, largest)
         accumulation = Accumulation(light, first, largest, target, wanted.seed, lambda: published.append(True))
         steps = chain(accumulation.survey(), accumulation.steps())
+        yield "tracing its first light"
         while not published:
             next(steps, None)
             yield None
@@ -107,4 +109,5 @@ def build(
     except BaseException:  # also when the generator is closed because nobody wants this scene any more
         light.release()
         raise
+    yield "compiling the programs that see it, once for scenes of its kind"
     yield Shown(wanted, light, accumulation, steps)

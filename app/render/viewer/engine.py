@@ -54,6 +54,9 @@ CAMERA_SHARE = 0.4
 ENVIRONMENT_SHARE = 0.3
 """Of a frame, at least, for the environment's light until all of it is known."""
 
+PATIENCE_S = 1.0
+"""After which whoever waits for a scene is told every step."""
+
 QUERIED_PHOTONS = 200_000
 """Stored ones that are asked what lies under the cursor."""
 
@@ -77,7 +80,9 @@ class LiveEngine:
         self._inputs: LiveInputs | None = None
         """What the picture shows."""
         self._shown: Shown | None = None
-        self._building: Iterator[Shown | None] | None = None
+        self._building: Iterator[Shown | str | None] | None = None
+        self._building_at, self._building_since = "", 0.0
+        """What building is at, and since when anything is built."""
         self._splatting: Iterator[None] = iter(())
         self._tracing: Iterator[None] = iter(())
         self._maps: CausticMaps | None = None
@@ -248,6 +253,7 @@ class LiveEngine:
                 self.problem = None
                 if self._shown is not None and self._shown.light.light_pass.beams is not None:
                     self._shown.light.light_pass.beams.pause()
+                self._building_at, self._building_since = "setting the scene up", time.perf_counter()
                 self._building = build(
                     self.context,
                     self.budget,
@@ -291,7 +297,12 @@ class LiveEngine:
         self._inputs = wanted
         if appearance_differs(before, wanted):
             self._take_scene(wanted, shown.light)
-        self._show_preview(seconds)
+        if shown.light.holds_shown:
+            shown.accumulation.bring_back()
+            assert shown.light.light_pass.maps is not None
+            self._show_for_now(shown.light.light_pass.maps)
+        else:
+            self._show_preview(seconds)
         self._splat_again(shown)
 
     def _follow_camera(self, wanted: LiveInputs, *, view_only: bool) -> None:
@@ -342,12 +353,16 @@ class LiveEngine:
         maps = self._shown.light.splat_preview(self._preview_photons)
         if maps is None:
             return
-        self._set_maps(maps)
-        self._tell(events.PreviewShown())
+        self._show_for_now(maps)
         took = time.perf_counter() - started - self._shown.light.beam_seconds
         self._preview_photons = int(
             np.clip(self._preview_photons * np.clip(seconds / max(took, 1e-4), 0.5, 2.0), 1 << 12, 1 << 24)
         )
+
+    def _show_for_now(self, maps: LightMaps) -> None:
+        """A coarse picture at once: samples of other light do not stay beside those of this one."""
+        self._set_maps(maps)
+        self._tell(events.PreviewShown())
         self._restart_camera(same_view=False)
 
     def _restart_camera(self, *, same_view: bool, finer_maps: bool = False) -> None:
@@ -385,9 +400,13 @@ class LiveEngine:
             if self.context.traits.work_is_queued:
                 # What is only queued keeps no deadline.
                 self.context.finish()
-            if built is not None:
+            if isinstance(built, Shown):
                 self._swap(built)
                 return
+            if built is not None:
+                self._building_at = built
+                if time.perf_counter() - self._building_since > PATIENCE_S:
+                    return  # what comes may hold the frame up for long: its name is shown before
 
     def _swap(self, built: Shown) -> None:
         # What does not compile (or fit) leaves everything as it was: the programs of the camera come first.
@@ -484,6 +503,8 @@ class LiveEngine:
             direct_scale=camera_pass.direct_scale,
             shows_other=self._differs == "scene" or self._camera.owes_first,
             differs=self._differs,
+            preparing=self._building_at if self._differs == "scene" or self._camera.owes_first else "",
+            preparing_s=time.perf_counter() - self._building_since,
             camera_bands=camera_pass.shown_bands,
             camera_fallbacks=camera_pass.fallbacks,
         )

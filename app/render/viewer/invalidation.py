@@ -93,7 +93,7 @@ def _scene(old: Scene, new: Scene) -> DirtyLevel:
     cost = DirtyLevel.NOTHING
     for item in fields(Scene):
         a, b = getattr(old, item.name), getattr(new, item.name)
-        if a is b or item.name in ("name", "camera", "notes"):
+        if a is b or item.name in ("name", "camera", "notes", "units"):
             continue
         if item.name == "objects":
             cost = max(cost, _objects(a, b))

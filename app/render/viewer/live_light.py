@@ -22,6 +22,7 @@ from ..map_fit import PREVIEW_FINENESS, MapFit
 from ..solo import solo, solo_scene
 from ..splatting import Pace
 from .invalidation import shown_glasses
+from .kept_light import KeptLight
 from .moved_light import MovedLight
 from .photon_store import PhotonStore
 from .spectrum_guess import SpectrumGuess
@@ -56,6 +57,8 @@ class LiveLight:
         self.buffers = scene_buffers(context, scene, settings)
         self.stored = StoredPasses(context.ctx, capacity_bytes)
         self._samples = PhotonStore(context.ctx, capacity_bytes)
+        self._kept = KeptLight()
+        self._shown: LiveInputs | None = None
         self._sampled = 0
         """Photons that those were asked for."""
         self.moving = moving or MovingBeams()
@@ -127,6 +130,7 @@ class LiveLight:
         glasses = shown_glasses(self.light_pass.scene, inputs.scene)
         if glasses is None:
             raise ValueError("these photons cannot follow the scene: it must be traced")
+        self._shown = inputs
         shown = self.light_pass.shown
         spectra = [
             light.spectral_power if inputs.solo_nm is None else solo(light.spectral_power, inputs.solo_nm)
@@ -167,6 +171,7 @@ class LiveLight:
             if owned is not None:
                 owned.release()
         self._preview = self._guess = None
+        self._kept.release()
         if self.light_pass.beams is not None and self.only_beams:
             self.light_pass.beams.survey_again()
         self.light_pass.lay_out(self.fit_of(inputs))
@@ -175,6 +180,21 @@ class LiveLight:
     def fit_of(inputs: LiveInputs) -> MapFit:
         """Proper maps for what `inputs` shows."""
         return MapFit(inputs.camera, inputs.width, inputs.height, LIVE, avoids_powers_of_two=True)
+
+    def keep(self, photons: int, number: int) -> None:
+        """Remember the maps, which `number` passes of `photons` have filled, for when one wavelength was looked at."""
+        if self.only_beams and self._shown is not None:
+            self._kept.keep(self.light_pass, self._shown, photons, number)
+
+    @property
+    def holds_shown(self) -> bool:
+        """What was kept is the light of what is shown."""
+        return self._shown is not None and self._kept.holds(self.light_pass, self._shown)
+
+    def bring_back(self) -> tuple[int, int]:
+        """Make the maps what they were, where `holds_shown`; returns photons of the last pass and the number of such
+        passes."""
+        return self._kept.bring_back(self.light_pass)
 
     def move(self, scene: Scene) -> LightMaps | None:
         """A few photons through `scene`, in which the same things stand elsewhere: buffers are moved there, and what is
@@ -345,7 +365,8 @@ class LiveLight:
         some."""
         if self.light_pass.has_beams and not self._samples.photons:
             self._sampled = photons
-            yield from self.light_pass.sample_steps(photons, self._samples.keep)
+            for _ in self.light_pass.sample_steps(photons, self._samples.keep):
+                yield
 
     def stored_records(self, limit: int) -> np.ndarray:
         """About `limit` stored records (`gpu.records.photon_record`) of all light, beams' too."""
@@ -369,12 +390,14 @@ class LiveLight:
         """Device memory of photons, queues, maps and scene."""
         maps = sum(maps.bytes for maps in (self.light_pass.maps, self._preview) if maps is not None)
         maps += sum(light.bytes for light in (self.environment, self.bounces) if light is not None)
-        return self.stored.bytes + self._samples.bytes + self.light_pass.trace.bytes + self.buffers.bytes + maps
+        photons = self.stored.bytes + self._samples.bytes
+        return photons + self.light_pass.trace.bytes + self.buffers.bytes + maps + self._kept.bytes
 
     def release(self) -> None:
         """Free everything, the stored photons and the scene's buffers too."""
         self._samples.clear()
         owners = (
+            self._kept,
             self._moved,
             self._preview,
             self._guess,

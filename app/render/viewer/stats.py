@@ -37,6 +37,10 @@ class LiveStats:
     differs: Literal["", "light", "scene", "moved"] = ""
     """What of the wanted scene the picture does not show yet: nothing is missing, its light is being traced, all of it
     is being prepared, or light is shown by a few photons while something is moved."""
+    preparing: str = ""
+    """What the preparation of a scene is at, up to its first picture; empty where nothing is prepared."""
+    preparing_s: float = 0.0
+    """For how long it has been prepared."""
     first_order: bool = False
     """The stored paths belong to a glass of another dispersion; the picture follows the edit to first order."""
     converged: bool = False

@@ -18,6 +18,8 @@ MAP_SIZES = {"512x512": "512 × 512", "1024x1024": "1024 × 1024", "2048x2048": 
 PHOTONS = render_section.PHOTONS
 _KINDS = {"turntable": "Turntable", "keys": "Keys"}
 _FORMATS = {"mp4": "Movie (MP4)", "gif": "GIF", "png": "Sequence (PNG)"}
+_FILMS = {"mp4": (".mp4", ".gif"), "gif": (".gif", ".mp4"), "png": (".png",)}
+"""Endings by format: that of a film decides what it becomes, as those of pictures do."""
 
 
 @dataclass
@@ -97,7 +99,7 @@ def _screenshot(view_model: ViewModel, idle: bool) -> None:
     )
     tip = "PNG: as displayed. EXR and NPY: linear Rec.709 radiance, lm/(sr unit²), without tone curve."
     if widgets.button("Save screenshot…", tip=tip, enabled=idle, width=-1):
-        _ask("screenshot", "Save screenshot", suffixes, view_model, view_model.title)
+        _ask("screenshot", "Save screenshot", suffixes, view_model)
 
 
 def _bake(state: State, view_model: ViewModel, idle: bool) -> None:
@@ -124,9 +126,7 @@ def _bake(state: State, view_model: ViewModel, idle: bool) -> None:
         "where the texture lies in the world."
     )
     if widgets.button("Bake map…", tip=tip, enabled=idle, width=-1):
-        _ask(
-            "bake", "Bake caustic map", (".exr", ".png", ".npy"), view_model, f"{view_model.title}_{_choices.receiver}"
-        )
+        _ask("bake", "Bake caustic map", (".exr", ".png", ".npy"), view_model, f"_{_choices.receiver}")
 
 
 def _animation(state: State, view_model: ViewModel, idle: bool) -> State:
@@ -174,19 +174,16 @@ def _animation(state: State, view_model: ViewModel, idle: bool) -> State:
         _ask(
             "animate",
             "Render animation",
-            (f".{_choices.format}",),
+            _FILMS[_choices.format],
             view_model,
-            f"{view_model.title}_{_choices.kind}",
+            f"_{_choices.kind}",
         )
     return state
 
 
-def _ask(identity: str, title: str, suffixes: tuple[str, ...], view_model: ViewModel, name: str) -> None:
-    folder = view_model.path.parent if view_model.path is not None else Path.home()
-    stem = "".join(c if c.isalnum() or c in "-_" else "_" for c in name)
-    file_browser.ask(
-        file_browser.Question(f"export {identity}", title, suffixes, folder / f"{stem}{suffixes[0]}", saving=True)
-    )
+def _ask(identity: str, title: str, suffixes: tuple[str, ...], view_model: ViewModel, what: str = "") -> None:
+    proposed = file_browser.beside(view_model.path, f"{Path(view_model.title).stem}{what}", suffixes[0])
+    file_browser.ask(file_browser.Question(f"export {identity}", title, suffixes, proposed, saving=True))
 
 
 def _answers(state: State) -> State:

@@ -7,6 +7,7 @@ One question is open at a time; a new one replaces it.
 
 from __future__ import annotations
 
+import mimetypes
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -61,6 +62,8 @@ class _Browser:
 
 _browser = _Browser()
 _OVERWRITE = "Replace file?"
+_OWN_FORMATS = (".exr", ".npy", ".hdr", ".webp", ".toml", ".json", ".glb", ".gltf", ".ies", ".obj", ".stl", ".ply")
+"""Kinds of files that Python's table lacks, or has on some systems only."""
 
 
 def ask(question: Question) -> None:
@@ -69,6 +72,12 @@ def ask(question: Question) -> None:
     _browser.question, _browser.confirming, _browser.wants_focus = question, None, True
     _browser.name = start.name if question.saving and not start.is_dir() else ""
     _enter(start if start.is_dir() else start.parent)
+
+
+def beside(path: Path | None, name: str, suffix: str) -> Path:
+    """A file to propose, in the folder of the scene's file or at home; other signs than letters and digits become _."""
+    stem = "".join(c if c.isalnum() or c in "-_" else "_" for c in name)
+    return (Path.home() if path is None else path.parent) / f"{stem}{suffix}"
 
 
 def take(identity: str) -> Path | None:
@@ -220,8 +229,14 @@ def _choose(question: Question) -> None:
     path = _browser.folder / Path(_browser.name.strip()).expanduser()
     if question.saving:
         if path.suffix.lower() not in question.suffixes:
+            if _is_format(path.suffix):
+                _browser.error = f"{path.name}: no {path.suffix} is written here; end the name in {_either(question)}."
+                return
             path = path.with_name(path.name + question.suffixes[0])
-        if path.is_dir():
+        if not path.parent.is_dir():
+            near = suggestion(path.parent.name, [entry.path.name for entry in _browser.entries if entry.is_folder])
+            _browser.error = f"There is no folder {path.parent}{near.rstrip('?')}{'?' if near else '.'}"
+        elif path.is_dir():
             _browser.error = f"{path.name} is a folder."
         elif path.exists():
             _browser.confirming = path
@@ -237,6 +252,18 @@ def _choose(question: Question) -> None:
         _browser.error = f"There is no file {path.name} {where}{near.rstrip('?')}{'?' if near else '.'}"
     else:
         _answer(question, path)
+
+
+def _either(question: Question) -> str:
+    """ ".png, .jpg or .exr"."""
+    *others, last = question.suffixes
+    return f"{', '.join(others)} or {last}" if others else last
+
+
+def _is_format(suffix: str) -> bool:
+    """Whether `suffix` names a kind of file: shot.tiff asks for a TIFF, but v1.2 is only a name."""
+    kind = mimetypes.types_map.get(suffix.lower(), "")
+    return suffix.lower() in _OWN_FORMATS or kind.partition("/")[0] in ("image", "video", "model")
 
 
 def _answer(question: Question, path: Path) -> None:

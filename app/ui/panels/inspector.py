@@ -9,7 +9,7 @@ import numpy as np
 from imgui_bundle import imgui
 
 from ...edit import edits, environments
-from ...edit.state import State
+from ...edit.state import Selection, State
 from ...model.materials import MATERIAL_KINDS
 from ...model.materials.finish import USUAL_COAT_INDEX, USUAL_ROUGHNESS
 from ...model.scene import (
@@ -77,7 +77,7 @@ def _object(state: State, view_model: ViewModel, index: int) -> State:
     if changed:
         state = edits.attempt(state, f"Rename {thing.name}", edits.rename, index, name)
     if widgets.section("Placement"):
-        state = _place(state, index)
+        state = widgets.unless_locked(state, Selection("object", index), lambda state: _place(state, index))
     if widgets.section("Material"):
         state = _material(state, view_model, index)
     if widgets.section("Mesh", is_open=False):
@@ -264,7 +264,9 @@ def _mesh(thing: SceneObject) -> None:
     widgets.read_out("Shape", mesh.name or "mesh", tip="Shape, or the name in the file it came from.")
     widgets.read_out("Triangles", f"{len(mesh.triangles):,}", tip="Number of triangles.")
     widgets.read_out("Vertices", f"{len(mesh.vertices):,}", tip="Number of vertices, welded.")
-    widgets.read_out("Size", " × ".join(f"{s:.3g}" for s in size), tip="Extent along its own axes, scene units.")
+    widgets.read_out(
+        "Size", " × ".join(f"{s:.3g}" for s in size) + " units", tip="Extent along its own axes, scene units."
+    )
     widgets.read_out("Closed", "yes" if mesh.is_closed else "no", tip="Glass must be closed: light needs an inside.")
 
 

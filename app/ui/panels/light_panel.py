@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ...edit import edits
-from ...edit.state import State
+from ...edit.state import Selection, State
 from ...model.fields import FileName
 from ...model.lights import LIGHT_KINDS
 from ...model.scene import Light, Vec3
@@ -62,6 +62,10 @@ def _edit(state: State, index: int, light: Light, what: str) -> State:
 
 
 def _draw_place(state: State, index: int) -> State:
+    return widgets.unless_locked(state, Selection("light", index), lambda state: _draw_place_rows(state, index))
+
+
+def _draw_place_rows(state: State, index: int) -> State:
     light = state.scene.lights[index]
     if light.has_place:
         speed = 0.005 * environment_of(state.scene.objects).radius

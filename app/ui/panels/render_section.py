@@ -77,10 +77,8 @@ def draw_render(state: State, view_model: ViewModel, idle: bool) -> State:
     suffixes = (".exr",) if _choices.spectral else (".png", ".jpg", ".webp", ".exr", ".npy")
     tip = "Choose a name, then render with the present view. How long it takes is shown while it works."
     if widgets.button("Render…", tip=tip, enabled=idle, width=-1):
-        folder = view_model.path.parent if view_model.path is not None else Path.home()
-        stem = "".join(c if c.isalnum() or c in "-_" else "_" for c in Path(view_model.title).stem)
-        question = file_browser.Question(_QUESTION, "Render", suffixes, folder / f"{stem}{suffixes[0]}", saving=True)
-        file_browser.ask(question)
+        proposed = file_browser.beside(view_model.path, Path(view_model.title).stem, suffixes[0])
+        file_browser.ask(file_browser.Question(_QUESTION, "Render", suffixes, proposed, saving=True))
     path = file_browser.take(_QUESTION)
     return state if path is None else state.asking(_request(state, path))
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from .. import item_rects, theme
+from .unit_words import named
 
 _LABEL_EM, _LABEL_SHARE = 8.4, 0.42
 _MIN_FIELD_EM = 4.5
@@ -19,7 +20,7 @@ def begin_row(label: str) -> bool:
 
     A label wider than its column pushes the field aside, or onto a line of its own: nothing is cut off.
     """
-    shown = label.split("##")[0]
+    shown = named(label.split("##")[0])
     room = imgui.get_content_region_avail().x
     column = min(theme.em(_LABEL_EM), _LABEL_SHARE * room)
     gap = imgui.get_style().item_inner_spacing.x
@@ -74,6 +75,7 @@ def tooltip(text: str, *extra: str) -> None:
     flags = imgui.HoveredFlags_.for_tooltip.value | imgui.HoveredFlags_.allow_when_disabled.value
     if not text or imgui.is_item_active() or not imgui.is_item_hovered(flags):
         return
+    text, extra = named(text), tuple(map(named, extra))
     imgui.begin_tooltip()
     imgui.push_text_wrap_pos(theme.em(_TIP_EM))
     imgui.text_unformatted(text)
@@ -88,5 +90,5 @@ def words(text: str, colour: theme.Colour) -> None:
     """Text wrapped to the window."""
     imgui.push_text_wrap_pos(0.0)
     with theme.coloured(colour):
-        imgui.text_unformatted(text)
+        imgui.text_unformatted(named(text))
     imgui.pop_text_wrap_pos()

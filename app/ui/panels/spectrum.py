@@ -10,6 +10,7 @@ from ...edit.state import State
 from .. import theme
 from ..view_model import CursorInfo, ViewModel
 from . import numbers, rows, spectral_colour, widgets
+from .unit_words import named
 
 _TOO_FEW = "Too few photons have landed here to tell the caustic's spectrum; wait, or point where it is brighter."
 
@@ -78,7 +79,7 @@ def _told(state: State, cursor: CursorInfo, colour: ColourInfo | None) -> None:
         parts.insert(0, ("On", state.scene.objects[cursor.object_index].name, "The first surface under the cursor."))
     room = imgui.get_content_region_avail().x
     gap, used = theme.em(1.2), 0.0
-    for label, text, tip in parts:
+    for label, text, tip in ((label, named(text), tip) for label, text, tip in parts):
         width = imgui.calc_text_size(f"{label}  {text}").x + gap
         if used and used + width <= room:
             imgui.same_line(0, gap)
@@ -105,7 +106,7 @@ def _plot(wavelengths_nm: np.ndarray, spectrum: np.ndarray) -> None:
     if not implot.begin_plot("##spectrum", imgui.ImVec2(-1, height), flags):
         return
     scaled, unit = _scaled(spectrum)
-    implot.setup_axes("λ (nm)", f"E ({unit}/unit²/nm)", implot.AxisFlags_.none, implot.AxisFlags_.none)
+    implot.setup_axes("λ (nm)", named(f"E ({unit}/unit²/nm)"), implot.AxisFlags_.none, implot.AxisFlags_.none)
     implot.setup_axis_limits(implot.ImAxis_.x1, 380, 780, implot.Cond_.always)
     implot.setup_axis_limits(implot.ImAxis_.y1, 0, 1.1 * float(scaled.max()), implot.Cond_.always)
     implot.push_plot_clip_rect()

@@ -23,6 +23,11 @@ _FLAGS = (
     | imgui.WindowFlags_.no_bring_to_front_on_focus
 )
 
+_RATES_EM = 14.0
+"""For rate and frame time at the right end."""
+SAYS_WHY_S = 3.0
+"""Who waits longer wants to know for what."""
+
 
 def height() -> float:
     """Height of the bar, interface pixels."""
@@ -76,8 +81,8 @@ def _progress(state: State, view_model: ViewModel) -> State:
 
 def progress_words(stats: LiveStats, is_playing: bool) -> str:
     """What goes on, and how far it is: by polygons, by photons, or where nothing throws a caustic by camera samples."""
-    if stats.differs == "scene":
-        return "Preparing …"
+    if stats.differs == "scene" or stats.preparing:
+        return preparing_words(stats)
     word = "Done" if stats.converged else "Accumulating" if is_playing else "Paused"
     if stats.only_beams:
         return f"{word}, {numbers.count(stats.polygons)} polygons"
@@ -85,6 +90,13 @@ def progress_words(stats: LiveStats, is_playing: bool) -> str:
         return f"{word}, {numbers.count(stats.photons)} photons"
     samples = round(stats.camera_samples)
     return f"{word}, {numbers.count(samples)} {'sample' if samples == 1 else 'samples'} a pixel, no caustics"
+
+
+def preparing_words(stats: LiveStats) -> str:
+    """That the scene is prepared; after a while also what that is at and how long it has taken so far."""
+    if not stats.preparing or stats.preparing_s < SAYS_WHY_S:
+        return "Preparing …"
+    return f"Preparing: {stats.preparing} ({stats.preparing_s:.0f} s so far)"
 
 
 def _selection(state: State) -> None:
@@ -111,7 +123,16 @@ def _job(state: State, view_model: ViewModel) -> State:
     label, tip = ("Discard", "Write nothing at all.") if job.is_stopped else ("Cancel", "Stop; what is done is kept.")
     if widgets.button(f"{label}##job", tip=tip):
         state = state.asking(CancelJob())
+    # Behind the button: it would wander with the words.
+    if job.text and _room_right() > imgui.calc_text_size(job.text).x + theme.em(_RATES_EM):
+        imgui.same_line()
+        imgui.text_disabled(job.text)
     return state
+
+
+def _room_right() -> float:
+    """From the last item to the window's edge, pixels."""
+    return imgui.get_window_pos().x + imgui.get_window_width() - imgui.get_item_rect_max().x
 
 
 def _right_end(view_model: ViewModel) -> None:

@@ -12,7 +12,7 @@ something is being dragged. The host lowers that flag before every frame.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
@@ -20,7 +20,8 @@ import numpy as np
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as icons
 
-from ...edit.state import State
+from ...edit import selecting
+from ...edit.state import Selection, State
 from ...model.io.scene_table import MAX_MAGNITUDE
 from ...model.scene import Vec3
 from .. import item_rects, theme
@@ -35,6 +36,7 @@ from .rows import (
     tooltip,
     words,
 )
+from .unit_words import named
 
 __all__ = [
     "FloatResult",
@@ -56,6 +58,7 @@ __all__ = [
     "text_field",
     "toggle",
     "tooltip",
+    "unless_locked",
     "vec3",
 ]
 
@@ -64,6 +67,7 @@ FloatResult = tuple[bool, float, bool]
 
 Choice = TypeVar("Choice", bound=str)
 
+_PICKER_EM = 15.0
 _LARGEST = MAX_MAGNITUDE
 """Numbers beyond could not be saved either."""
 
@@ -181,10 +185,10 @@ def combo(
     shown: Mapping[Choice, str] = options if isinstance(options, Mapping) else {option: option for option in options}
     begin_row(label)
     chosen = current
-    opened = imgui.begin_combo(f"##{label}", shown.get(current, current))
+    opened = imgui.begin_combo(f"##{label}", named(shown.get(current, current)))
     if opened:
         for key, text in shown.items():
-            if imgui.selectable(f"{text}##{key}", key == current)[0]:
+            if imgui.selectable(f"{named(text)}##{key}", key == current)[0]:
                 chosen = key
             item_rects.note(text)
             if key == current:
@@ -228,6 +232,7 @@ def menu_button(label: str, options: Mapping[str, str], *, tip: str) -> str | No
 def colour(label: str, rgb: Vec3, *, tip: str) -> tuple[bool, Vec3, bool]:
     """A linear Rec.709 colour: its numbers, linear as in scene files or with sRGB's encoding, as the button behind them
     says, and a swatch that opens a picker."""
+    row = imgui.get_cursor_screen_pos()
     begin_row(label)
     is_linear = _colour_numbers["linear"]
     style, side = imgui.get_style(), imgui.get_frame_height()
@@ -253,7 +258,10 @@ def colour(label: str, rgb: Vec3, *, tip: str) -> tuple[bool, Vec3, bool]:
     ):
         imgui.open_popup(f"picker of {label}")
     explain(f"{label}: swatch", "Choose the colour by eye.")
+    if imgui.is_popup_open(f"picker of {label}"):
+        _place_beside_row(row)
     if imgui.begin_popup(f"picker of {label}"):
+        imgui.set_next_item_width(theme.em(_PICKER_EM))
         picked, by_eye = imgui.color_picker3(f"##picker {label}", encoded, flags.no_inputs.value)
         active = active or imgui.is_item_active()
         item_rects.note(f"{label}: picker")
@@ -268,6 +276,26 @@ def colour(label: str, rgb: Vec3, *, tip: str) -> tuple[bool, Vec3, bool]:
         return False, rgb, active
     r, g, b = (_tidy(c) for c in found)
     return True, (r, g, b), active
+
+
+def _place_beside_row(row: ImVec2) -> None:
+    """The next window goes where it does not hide the row, whose numbers follow it: to the left of the panel's rows, to
+    their right, or below where neither side has room."""
+    view, gap, side = imgui.get_main_viewport(), theme.em(0.6), theme.em(_PICKER_EM + 2.0)
+    left, top = view.work_pos
+    right, bottom = left + view.work_size.x, top + view.work_size.y
+    beyond = imgui.get_window_pos().x + imgui.get_window_width() + gap
+    y = max(top, min(row.y, bottom - side))
+    if row.x - gap - side >= left:
+        imgui.set_next_window_pos((row.x - gap, y), imgui.Cond_.appearing, (1.0, 0.0))
+    elif beyond + side <= right:
+        imgui.set_next_window_pos((beyond, y), imgui.Cond_.appearing)
+    else:
+        below = row.y + imgui.get_frame_height_with_spacing()
+        if below + side <= bottom:
+            imgui.set_next_window_pos((row.x, below), imgui.Cond_.appearing)
+        else:
+            imgui.set_next_window_pos((row.x, row.y - gap), imgui.Cond_.appearing, (0.0, 1.0))
 
 
 _colour_numbers = {"linear": True}
@@ -314,7 +342,7 @@ def read_out(label: str, text: str, *, tip: str) -> None:
     """A value that cannot be edited, in the row layout."""
     begin_row(label)
     imgui.align_text_to_frame_padding()
-    imgui.text_unformatted(text)
+    imgui.text_unformatted(named(text))
     explain(label, tip)
 
 
@@ -339,6 +367,17 @@ def note(text: str) -> None:
 def error(text: str) -> None:
     """Something that was refused, and why; written as a sentence whatever its ends."""
     words(f"{text[:1].upper()}{text[1:].rstrip('.')}.", theme.palette().error)
+
+
+def unless_locked(state: State, selection: Selection, draw: Callable[[State], State]) -> State:
+    """What `draw` draws and makes of the state; of what is locked its rows are shown and cannot be changed."""
+    locked = selecting.is_locked(state, selection)
+    if locked:
+        hint("Locked: it cannot be moved. The lock in the outliner frees it.")
+    imgui.begin_disabled(locked)
+    state = draw(state)
+    imgui.end_disabled()
+    return state
 
 
 def holding(state: State, active: bool) -> State:
@@ -377,7 +416,7 @@ def _with_unit(format: str, unit: str) -> str:
     """`format` with the unit behind it, percent signs doubled for printf."""
     if not unit:
         return format
-    return format + ("" if unit == "°" else " ") + unit.replace("%", "%%")
+    return format + ("" if unit == "°" else " ") + named(unit).replace("%", "%%")
 
 
 def _tidy(value: float) -> float:
