@@ -15,6 +15,7 @@ from spectrasplat.edit import environments
 from spectrasplat.edit.requests import Notice, Open
 from spectrasplat.edit.state import Selection, State
 from spectrasplat.gpu.context import Context
+from spectrasplat.model.materials import Grating
 from spectrasplat.ui.panels import dialogs, file_browser, picture_choice
 from spectrasplat.ui.panels.inspector import draw_inspector
 from spectrasplat.ui.view_model import ViewModel
@@ -29,7 +30,7 @@ def draw(state: State, view_model: ViewModel) -> State:
 
 @pytest.fixture
 def nothing_selected() -> State:
-    return replace(scene_state(), selection=Selection())
+    return replace(scene_state("spectrometer", Grating), selection=Selection())
 
 
 @pytest.fixture

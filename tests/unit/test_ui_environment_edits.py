@@ -27,7 +27,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 @pytest.fixture(scope="module")
 def scene() -> Scene:
-    return load_scene(assets_dir() / "scenes" / "prism.toml")
+    return replace(load_scene(assets_dir() / "scenes" / "prism.toml"), environment=None)
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,7 @@
 
 Panoramas are passed round in this format more than in any other, and an 8-bit library does not read it.
 G. Ward: Real Pixels, Graphics Gems II (1991), and the file format's description that comes with Radiance.
-The loops are compiled (`radiance_rows`), since runs of bytes cannot be decoded by whole arrays.
+Runs of bytes cannot be decoded by whole arrays, so their loops are compiled (`radiance_rows`).
 """
 
 from __future__ import annotations
@@ -26,14 +26,27 @@ def read_hdr(data: bytes, where: str, max_pixels: int) -> tuple[np.ndarray, tupl
     height, width, body = _resolution(data, body, where)
     if width * height > max_pixels:
         raise UserError(f"{where}: {width} × {height} pixels are more than {max_pixels >> 20} million; make it smaller")
-    from .radiance_rows import DAMAGED, decode
+    coded = np.frombuffer(data, np.uint8, offset=body)
+    rgbe = _flat(coded, height, width)
+    if rgbe is None:
+        from .radiance_rows import DAMAGED, decode
 
-    rgbe = np.empty((height, width, 4), np.uint8)
-    rows, end = decode(np.frombuffer(data, np.uint8, offset=body), rgbe)
-    if rows < height:
-        reason = "holds a run that leaves its row" if end == DAMAGED else "ends"
-        raise UserError(f"{where}: the file {reason} in row {rows + 1} of {height}; copy or export it again")
+        rgbe = np.empty((height, width, 4), np.uint8)
+        rows, end = decode(coded, rgbe)
+        if rows < height:
+            reason = "holds a run that leaves its row" if end == DAMAGED else "ends"
+            raise UserError(f"{where}: the file {reason} in row {rows + 1} of {height}; copy or export it again")
     return _radiance(rgbe) / np.float32(exposure), notes
+
+
+def _flat(coded: np.ndarray, height: int, width: int) -> np.ndarray | None:
+    """Pixels without any runs, uint8 (height, width, 4); None where there may be some."""
+    if len(coded) != 4 * height * width:
+        return None
+    pixels = coded.reshape(height, width, 4)
+    opens_row = (pixels[:, 0, :2] == 2).all(axis=1) & (pixels[:, 0, 2] < 128)
+    repeats = (pixels[..., :3] == 1).all(axis=2)
+    return None if opens_row.any() or repeats.any() else pixels
 
 
 def _header(data: bytes, where: str) -> tuple[list[str], int]:
