@@ -156,9 +156,9 @@ class CameraPass:
         is compiled when it is needed."""
         self.max_taps = MAX_TAPS
         self.primary_samples = PRIMARY_SAMPLES if self._may_choose or not self.disperses else 1
+        """Of a sample, at what is seen directly, while a pixel has few samples."""
         self.only_directly = False
         """Leave what is seen in glass and mirrors black where a program of its own follows it."""
-        """Of a sample, at what is seen directly, while a pixel has few samples."""
         self.split_threshold = SPLIT_THRESHOLD
         structs = (
             *SCENE_STRUCTS,
@@ -503,7 +503,7 @@ class CameraPass:
 
     @property
     def source(self) -> tuple[dict[str, int | float | str], tuple[Struct, ...]]:
-        """Defines and structs of the program that follows listed pixels, or of the only one."""
+        """Defines and structs of the program that follows listed pixels; those of the others are made from them."""
         return self._source
 
     @property

@@ -212,9 +212,9 @@ def beam_defines(targets: int, edges: int, is_still: bool, contact_lines: bool =
 
 
 # -- camera pass --------------------------------------------------------------------------
-# A scene that shows glass or mirrors has two programs: one for what is seen directly, which lists the pixels that meet
-# something specular first, and one for those, which holds all that is expensive. A third is for samples of single
-# wavelengths.
+# Every scene has a program for what is seen directly. In one that shows glass or mirrors it lists the pixels that meet
+# something specular first, and another is for those, which holds all that is expensive. A third is for samples of
+# single wavelengths.
 
 
 def camera_defines(scene: SceneBuffers, channels: Channels, layer: str, maps: MapChannels) -> Defines:
@@ -315,7 +315,9 @@ def halted_bytes(beyond: Mapping[str, int | float | str]) -> int:
 def direct_defines(beyond: Mapping[str, int | float | str]) -> Defines:
     """For what is seen directly, from what the listed pixels are compiled with."""
     left_out = {"CAMERA_SPECULAR", *_BEYOND_ONLY}
+    followed = {"FOLLOWED": 1} if "CAMERA_SPECULAR" in beyond else {}
     return {name: value for name, value in beyond.items() if name not in left_out} | {
+        **followed,
         "SPECTRAL_GROUPS": 0,
         "LISTS_SPECULAR": 1,
         "MAX_EVENTS": 1,

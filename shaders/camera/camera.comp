@@ -3,8 +3,8 @@
 // and looks up along its spectral sweep what is there. Where glass splits it, both parts are followed while they are strong; of the weak rest
 // one is chosen by chance.
 //
-// Where the scene shows glass or mirrors this is two programs: one for what is seen directly, which lists the pixels that meet something
-// specular first (LISTS_SPECULAR), and one for the listed ones (CAMERA_SPECULAR), which holds all that is expensive.
+// This is a program for what is seen directly (LISTS_SPECULAR). Where the scene shows glass or mirrors it lists the pixels that meet something specular
+// first (FOLLOWED), and another is for those (CAMERA_SPECULAR), which holds all that is expensive.
 #ifdef CAMERA_SPECULAR
 layout(local_size_x = 64) in;
 #else
@@ -14,10 +14,8 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "camera/globals.glsl"
 #include "camera/start.glsl"
 
-#if defined(LISTS_SPECULAR) || defined(CAMERA_SPECULAR)
 // How many pixels are listed, how many of their paths have halted, and what is to be known of the listed ones.
 layout(std430, binding = BIND_LISTED) restrict buffer Listed { uint listed_count; uint halted_count; uint listed[]; };
-#endif
 layout(rgba32f, binding = 0) uniform image2D picture[TARGETS];
 #ifdef BEAM_STARTS
 // Paths that carry on what camera beams hand over, and what they find.
@@ -359,11 +357,7 @@ void main()
 #ifdef BEAM_STARTS
     CameraPath path = started_path(starts[entry]);
     pixel_key = hash_combine(pixel_key, starts[entry].key);
-#elif !defined(LISTS_SPECULAR)
-#ifndef CAMERA_SPECULAR
-    uint primary_sample = THE_SAMPLE;
-    float gain = 1.0;
-#endif
+#elif defined(CAMERA_SPECULAR)
     CameraPath path = camera_path(pixel, primary_sample, gain);
 #endif
 #ifdef RGB_CHANNELS
@@ -379,16 +373,20 @@ void main()
     uint number = pixel.y * p.size.x + pixel.x;
     WHEN(p.survey == SURVEY_KEPT) {
         uint key = even_key(pixel), sees = key & KIND_BITS;
-#ifdef COATS
+#if defined(COATS) && defined(FOLLOWED)
         if (sees == SEES_COATED) listed[atomicAdd(listed_count, 1u)] = listed_entry(number, THE_SAMPLE, p.primary_samples);
         if (sees == SEES_COATED) sees = SEES_DIRECTLY;
 #endif
         if (sees == SEES_DIRECTLY) imageStore(picture[0], ivec2(pixel), imageLoad(picture[0], ivec2(pixel)) + vec4(surveyed_mean(pixel), 0.0));
+#ifdef FOLLOWED
         if (sees == SEES_SPECULAR) listed[atomicAdd(listed_count, 1u)] = listed_entry(number, THE_SAMPLE, p.primary_samples);
+#endif
         if (key != 0u) return;
     }
     Survey survey = Survey(0u, vec3(0.0));
+#ifdef FOLLOWED
     uint specular_samples = 0u, chosen = THE_SAMPLE, draw = hash_combine(pixel_key, p.draw_index);
+#endif
     for (uint k = 0u; k < p.primary_samples; ++k) {
         look_index = p.draw_index * p.primary_samples + k;
         lights_seen = 0u;
@@ -406,7 +404,7 @@ void main()
         const bool by_beams = false;
 #endif
         uint sees = by_beams ? SEES_BEAMS : (is_specular(kind) ? SEES_SPECULAR : SEES_DIRECTLY);
-#ifdef COATS
+#if defined(COATS) && defined(FOLLOWED)
         // The base is seen directly; a path goes on from the coat.
         WHEN(kind == KIND_DIFFUSE && is_coated(hit.object)) {
             sees = SEES_COATED;
@@ -418,10 +416,12 @@ void main()
         if (by_beams) {
             // The polygons of the picture show it.
         } else if (is_specular(kind)) {
+#ifdef FOLLOWED
             specular_samples += 1u;
             // Each of them as likely: the newest of c with 1 / c.
             draw = hash_pcg(draw);
             if (unit_float(draw) * float(specular_samples) < 1.0) chosen = k;
+#endif
         } else {
             see_directly(path, met, hit, kind, pixel_key);
         }
@@ -431,6 +431,7 @@ void main()
         keep_survey(pixel, survey.key, p.survey_gain * radiance[0].rgb);
         return;
     }
+#ifdef FOLLOWED
     WHEN(specular_samples > 0u) {
 #ifdef LENS
         // A place in the pixel goes with one on the lens: another pair may meet no glass.
@@ -440,7 +441,8 @@ void main()
 #endif
         listed[atomicAdd(listed_count, 1u)] = listed_entry(number, is_any ? THE_SAMPLE : chosen, specular_samples);
     }
-#elif defined(CAMERA_SPECULAR)
+#endif
+#else
     int events = 0;
     bool goes_on = true, halts = false;
 #ifdef HALTS
@@ -527,10 +529,6 @@ void main()
         return;
     }
 #endif
-#else
-    Hit hit;
-    bool met = intersect_closest(path.position, path.direction, FAR_DISTANCE, path.origin, hit);
-    see_directly(path, met, hit, met ? object_at(hit.object).kind : NONE, pixel_key);
 #endif
 #ifdef BEAM_STARTS
     for (int t = 0; t < TARGETS; ++t) found_light[entry * uint(TARGETS) + uint(t)] = radiance[t];

@@ -262,7 +262,7 @@ void main() {
 
     uint light = photon.light_and_source & 255u;
 #ifdef TINT_LEVELS
-    light = light * uint(TINT_LEVELS) + (photon.flags >> uint(TINT_BIT) & uint(TINT_LEVELS - 1));
+    light = light * uint(TINT_LEVELS) + bitfieldExtract(photon.flags, TINT_BIT, LATTICE_BIT - TINT_BIT);
 #endif
     uint band = (photon.light_and_source >> 8u) & 255u;
     uint table = (light * classes + receiver.reflectance_class) * bands + band;

@@ -268,7 +268,7 @@ def camera_sources(
         records.PLACEMENT,
         *([PICTURE] if images else []),
     )
-    programs = [camera_pass, direct_defines(camera_pass)] if "CAMERA_SPECULAR" in camera_pass else [camera_pass]
+    programs = [direct_defines(camera_pass), *([camera_pass] if "CAMERA_SPECULAR" in camera_pass else [])]
     return [shader.load_source("camera/camera.comp", defines, structs) for defines in programs]
 
 

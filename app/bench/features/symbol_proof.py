@@ -78,7 +78,7 @@ FEATURE_SYMBOLS: dict[str, tuple[str, ...]] = {
     "contact lines": ("contact_words", "takes_side", "side_of_contact"),
     "local gain": ("gain_boxes", "local_gain"),
     "photons by index": ("traced_bands", "v_path"),
-    "camera refraction": ("meet_surface", "reflect_path", "path_stack", "stack_size", "listed"),
+    "camera refraction": ("meet_surface", "reflect_path", "path_stack", "stack_size", "listed_entry"),
     "camera spectral taps": (r"restrict_to_band\(path, pixel_key\)", "taps_of", "onset_of"),
     "spectral maps": ("BIN_ROW", "BIN_SPECTRUM_ROW", "BIN_TARGET"),
     "beams": ("is_beam_object",),
