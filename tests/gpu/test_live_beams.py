@@ -95,10 +95,7 @@ def test_the_engine_answers_questions_about_beams(gl: Context) -> None:
     try:
         wanted = inputs(shipped("prism"))
         engine.set(wanted)
-        deadline = time.monotonic() + 120.0
-        while not engine.is_idle:
-            engine.advance(0.05)
-            assert engine.problem is None and time.monotonic() < deadline
+        until_idle(engine)
         stats = engine.stats
         assert stats.only_beams and stats.polygons > 0 and stats.photons >= 1 << 14 and stats.converged
         photons = engine.stored_photons()

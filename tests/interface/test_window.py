@@ -16,6 +16,13 @@ from PIL import Image
 ROOT = Path(__file__).resolve().parents[2]
 
 
+def in_a_window(program: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    """`program`, run by a process that has a display of its own."""
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "SPECTRASPLAT_CONFIG": str(folder / "config")}
+    command = ["xvfb-run", "-a", sys.executable, "-P", "-c", program]
+    return subprocess.run(command, env=environment, cwd=folder, capture_output=True, text=True, check=False)
+
+
 def run(tmp_path: Path, *arguments: str, display: bool) -> subprocess.CompletedProcess[str]:
     """`spectrasplat ARGUMENTS` with a virtual screen or without any."""
     environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
@@ -121,9 +128,7 @@ print(seen)
 
 @pytest.mark.slow
 def test_the_window_keeps_ctrl_down_for_the_letter_of_a_long_frame(tmp_path: Path) -> None:
-    environment = os.environ | {"PYTHONPATH": str(ROOT), "SPECTRASPLAT_CONFIG": str(tmp_path / "config")}
-    command = ["xvfb-run", "-a", sys.executable, "-P", "-c", LETTER_OUTLIVES_CTRL]
-    done = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, check=False)
+    done = in_a_window(LETTER_OUTLIVES_CTRL, tmp_path)
     assert done.stdout.strip() == "[True]", done.stderr
 
 
@@ -155,9 +160,7 @@ with Window() as window:
 
 
 def test_a_long_frame_hears_of_input(tmp_path: Path) -> None:
-    environment = os.environ | {"PYTHONPATH": str(ROOT), "SPECTRASPLAT_CONFIG": str(tmp_path / "config")}
-    command = ["xvfb-run", "-a", sys.executable, "-P", "-c", INPUT_IS_SEEN_WHILE_A_FRAME_IS_DRAWN]
-    done = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, check=False)
+    done = in_a_window(INPUT_IS_SEEN_WHILE_A_FRAME_IS_DRAWN, tmp_path)
     assert done.stdout.strip() == "[(False, True)]", done.stderr
 
 
@@ -187,7 +190,5 @@ with Window() as window:
 
 def test_a_picture_dropped_while_comparing_is_compared_with(tmp_path: Path) -> None:
     """What glfw itself calls for a drop, as the window has installed it."""
-    environment = os.environ | {"PYTHONPATH": str(ROOT), "SPECTRASPLAT_CONFIG": str(tmp_path / "config")}
-    command = ["xvfb-run", "-a", sys.executable, "-P", "-c", A_PICTURE_IS_DROPPED]
-    done = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, check=False)
+    done = in_a_window(A_PICTURE_IS_DROPPED, tmp_path)
     assert done.stdout.strip() == "['wipe', 'file', 'größer.exr'] 0", done.stderr
