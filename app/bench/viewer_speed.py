@@ -22,6 +22,7 @@ from ..base.process_age import process_age_s
 from ..edit.state import Selection
 from ..gpu.shader import recorded
 from ..passes.sample_picture import SamplePicture
+from ..render.viewer.engine import LiveEngine
 from ..ui.headless import HeadlessInterface
 from ..ui.session import Session
 from ..ui.viewer import Viewer, headless_viewer
@@ -290,7 +291,7 @@ class _Bench:
 
         Pictures are finished after one camera sample from now on: what is timed begins at rest."""
         engine = self.session.picture.engine
-        assert engine is not None
+        assert isinstance(engine, LiveEngine)
         engine.camera_samples = 1
         found = []
         for _ in range(NUDGES):

@@ -90,7 +90,7 @@ def _run(
     from ..ui.session import Session
     from ..ui.viewer import Viewer
 
-    session = Session(window.context, scene, opening=opening)
+    session = Session(window.context, scene, window.engine, opening=opening)
     if theme is not None:
         preferences = replace(session.state.preferences, theme=theme)
         session.state = replace(session.state, preferences=preferences)
@@ -108,6 +108,8 @@ def _run(
             _take_screenshot(window, viewer, session, *screenshot, interrupted)
     except Exception as error:
         raise _rescued(session, error) from error
+    place = _place(window, session.settings.window)
+    window.hide()
     if interrupted():
         # Nobody can be asked: what is unsaved stays and is offered at the next start.
         if session.document.unsaved:
@@ -116,7 +118,7 @@ def _run(
         return
     if screenshot is None:
         layout_memory.save()
-        session.settings = replace(session.settings, window=_place(window, session.settings.window))
+        session.settings = replace(session.settings, window=place)
         session.close()
     else:
         session.autosave.close()

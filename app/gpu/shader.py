@@ -22,6 +22,7 @@ from ..base import paths
 from .glsl_conditionals import Line
 from .schema import Struct
 from .stripped_store import stripped
+from .unlocked import calls_of, unlocked
 
 if TYPE_CHECKING:
     import moderngl
@@ -189,7 +190,9 @@ def release(*resources: Releasable) -> None:
         if owners <= 0:  # given back already
             continue
         _owners[id(owned)] = owners - 1
-        if owners <= 1 and not any(owned is held for programs in _kept.values() for held in programs.values()):
+        if owners <= 1 and not any(
+            owned is held for programs in list(_kept.values()) for held in list(programs.values())
+        ):
             _drop(owned)
 
 
@@ -254,6 +257,9 @@ def _built(ctx: moderngl.Context, stages: tuple[Source, ...], compiled: Callable
     is_new = texts not in _kept.get(id(ctx), ())
     for programs in _recordings:
         programs.append(Built(stages, 0.0))
+    calls = calls_of(ctx)
+    if is_new and calls is not None:
+        calls.compile(texts)
     program = _kept_or(ctx, texts, compiled)
     for programs in _recordings:
         programs[-1] = Built(stages, time.perf_counter() - started if is_new else 0.0)
@@ -269,7 +275,7 @@ def compute(
     """Compile the compute shader `name`; raises `ShaderError` with file and line."""
     source = load_source(name, defines, structs)
     try:
-        return _built(ctx, (source,), lambda: ctx.compute_shader(source.text))
+        return _built(ctx, (source,), lambda: unlocked(ctx.compute_shader(source.text)))
     except Exception as error:  # moderngl raises its own Error type with the driver's log
         raise ShaderError(f"{name} does not compile:\n{source.explain(str(error))}") from error
 

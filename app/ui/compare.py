@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from ..gpu.context import Context
     from ..model.scene import Camera, Scene, Vec3
     from ..render.viewer.engine import LiveEngine
+    from .live_picture import Engine
 
 REFERENCE, GLASS, FILE = "reference", "glass", "file"
 STAND_IN = "stochastic-even"
@@ -210,7 +211,7 @@ class Comparison:
         self._stop()
         self._begun = None
 
-    def advance(self, state: State, running: LiveEngine | None, budget_s: float) -> None:
+    def advance(self, state: State, running: Engine | None, budget_s: float) -> None:
         """Follow `state` and work for about `budget_s`; `running` is the engine whose picture is compared."""
         self._compare = state.compare
         self._count_seconds(running, state.method)
@@ -324,7 +325,7 @@ class Comparison:
         self._engine.advance(budget_s, False)
         self._count_seconds(self._engine, self._method)
 
-    def _compose(self, running: LiveEngine, budget_s: float) -> None:
+    def _compose(self, running: Engine, budget_s: float) -> None:
         """The reference's caustics on the picture without caustics. Behind glass there is no reference: stripes over
         the running picture say so."""
         if self._direct is None:
@@ -362,7 +363,7 @@ class Comparison:
             return words
         return f"{words}, direct light {self._direct.samples} of {DIRECT_SAMPLES[-1]} samples"
 
-    def _measure(self, state: State, running: LiveEngine) -> None:
+    def _measure(self, state: State, running: Engine) -> None:
         engines = {state.method: running}
         if self._engine is not None and self._needs_engine and state.compare.method != GLASS:
             engines[self._method] = self._engine
@@ -373,7 +374,7 @@ class Comparison:
             if stats.resolution_scale == 1.0 and self._curves.wants(method, stats.photons):
                 self._curves.add(method, self._seconds[method][0], stats.photons, _read(picture))
 
-    def _count_seconds(self, engine: LiveEngine | None, method: str) -> None:
+    def _count_seconds(self, engine: Engine | None, method: str) -> None:
         """Seconds that the engine's present picture took to trace and to splat."""
         if engine is None:
             return

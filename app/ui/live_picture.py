@@ -33,6 +33,9 @@ if TYPE_CHECKING:
     from ..model.scene import Scene
     from ..passes.pick import PickHit
     from ..render.viewer.engine import LiveEngine
+    from ..render.viewer.threaded_engine import ThreadedEngine
+
+    Engine = LiveEngine | ThreadedEngine
 
 
 class EngineError(RuntimeError):
@@ -60,10 +63,10 @@ _SHADER_FILE = re.compile(r"\.(comp|vert|frag|glsl)\b")
 class LivePicture:
     """Owns the engine and what shows its picture."""
 
-    def __init__(self, context: Context, make_engine: Callable[[Context], LiveEngine] | None = None) -> None:
+    def __init__(self, context: Context, make_engine: Callable[[Context], Engine] | None = None) -> None:
         self._context = context
         self._make_engine = make_engine or _live_engine
-        self.engine: LiveEngine | None = self._make_engine(context)
+        self.engine: Engine | None = self._make_engine(context)
         self._display = Display(context)
         self._glare = Glare(context)
         self._sampler = SamplePicture(context)
@@ -89,6 +92,11 @@ class LivePicture:
     def radiance(self) -> moderngl.Texture | None:
         """The linear picture."""
         return self.engine.picture if self.engine is not None else None
+
+    @property
+    def is_busy(self) -> bool:
+        """The driver compiles, and there is no news until it is done."""
+        return self.engine is not None and self.engine.is_busy
 
     @property
     def problem(self) -> str | None:
@@ -142,7 +150,7 @@ class LivePicture:
     def new_scene(self) -> None:
         """Another scene: its exposure is found at once."""
         self._exposure.restart()
-        self.awaits_scene = self.radiance is not None
+        self.awaits_scene = self.shown is not None
 
     def advance(self, state: State, budget_s: float, slice_s: float = math.inf, stops: Stops = _never) -> None:
         """Let the engine follow `state`. Raises `EngineError`.
@@ -158,10 +166,11 @@ class LivePicture:
             if self.engine.set(state.live_inputs) != DirtyLevel.NOTHING:
                 budget_s = min(budget_s, slice_s)  # what is under way now has to be told
             self.stats = self._advance(self.engine, state.interacting, budget_s, slice_s, stops)
-            self.awaits_scene &= self.stats.shows_other and self.problem is None
+            if not self.is_busy:
+                self.awaits_scene &= self.stats.shows_other and self.problem is None
 
     @staticmethod
-    def _advance(engine: LiveEngine, interacting: bool, budget_s: float, slice_s: float, stops: Stops) -> LiveStats:
+    def _advance(engine: Engine, interacting: bool, budget_s: float, slice_s: float, stops: Stops) -> LiveStats:
         """The engine's stats, with what all slices together took."""
         version, started = engine.picture_version, time.perf_counter()
         trace_s = splat_s = camera_s = 0.0
@@ -173,7 +182,8 @@ class LivePicture:
             trace_s, splat_s, camera_s = trace_s + stats.trace_s, splat_s + stats.splat_s, camera_s + stats.camera_s
             now = time.perf_counter()
             ends = now - started > budget_s - 0.5 * min(slice_s, budget_s) or now - begun < 0.5 * given
-            if ends or engine.picture_version != version or stats.converged or stops():
+            ends |= engine.is_busy or engine.picture_version != version or stats.converged
+            if ends or stops():
                 return replace(stats, trace_s=trace_s, splat_s=splat_s, camera_s=camera_s)
 
     def show(self, state: State, now_s: float, delta_s: float, other: Other | None = None) -> None:

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from ..edit.lessons import Lesson
     from ..gpu.context import Context
     from ..model.scene import Scene
-    from ..render.viewer.engine import LiveEngine
+    from .live_picture import Engine
 
 FRAMES_REMEMBERED = 120
 IDLE_S = 0.5
@@ -55,7 +55,7 @@ class Session:
         self,
         context: Context,
         path: Path | None = None,
-        make_engine: Callable[[Context], LiveEngine] | None = None,
+        make_engine: Callable[[Context], Engine] | None = None,
         clock: Callable[[], float] = time.monotonic,
         opening: Opening | None = None,
     ) -> None:
@@ -140,6 +140,7 @@ class Session:
             state.interacting
             or self.jobs.is_busy
             or self.messages.is_fading
+            or self.picture.is_busy
             or (state.display.auto_exposure and self.picture.is_settling)
             or (state.playing and self.picture.engine is not None and not self.picture.stats.converged)
         )

@@ -135,7 +135,7 @@ def badges(state: State, view_model: ViewModel) -> list[Badge]:
                 False,
             )
         )
-    elif view_model.stats.differs:
+    elif view_model.stats.differs and view_model.picture is not None:  # its place says so, too
         badges.append(
             Badge(
                 preparing_words(view_model.stats) if view_model.stats.differs == "scene" else "Light is being traced …",

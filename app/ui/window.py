@@ -10,8 +10,9 @@ import ctypes
 import os
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
-from typing import Any, Protocol, Self, cast
+from typing import TYPE_CHECKING, Any, Protocol, Self, cast
 
 import moderngl
 import numpy as np
@@ -22,9 +23,14 @@ import glfw  # isort: skip
 from ..base.errors import UserError
 from ..edit.preferences import WindowPlace
 from ..edit.state import Preferences
+from ..gpu import unlocked
 from ..gpu.context import GL_VERSION, GL_VERSION_CODE, Context
 from . import theme
 from .imgui_host import ImguiHost
+
+if TYPE_CHECKING:
+    from ..render.viewer.engine import LiveEngine
+    from ..render.viewer.threaded_engine import ThreadedEngine
 
 SETTLE_FRAMES = 3
 """Frames drawn after an event before waiting again: imgui's layout and hovering need two."""
@@ -107,6 +113,8 @@ class Window:
         # A GPU waits for the screen; on the processor waiting would be time taken from the photons.
         glfw.swap_interval(0 if self.context.is_software else 1)
         self._screen = self.context.ctx.detect_framebuffer(0)
+        self._hidden = _beside(self._handle)
+        self._engine: ThreadedEngine | None = None
         self._settling = SETTLE_FRAMES
         self._dropped: list[Path] = []
         self._close_pressed = False
@@ -133,8 +141,44 @@ class Window:
         self._host.make_current()
         imgui.backends.glfw_shutdown()
         self._host.release()
+        if self._engine is not None:  # whose thread has the hidden window, also where an error ended the session
+            with suppress(Exception):
+                self._engine.release()
+        if self._hidden is not None:
+            glfw.destroy_window(self._hidden)
         glfw.destroy_window(self._handle)
         glfw.terminate()
+
+    def engine(self, context: Context) -> LiveEngine | ThreadedEngine:
+        """One that works beside the window, which is drawn while the driver compiles; one at a time. Where the driver
+        shares nothing, the window waits for it."""
+        from ..render.viewer.engine import LiveEngine
+        from ..render.viewer.threaded_engine import ThreadedEngine
+
+        if self._hidden is None:
+            return LiveEngine(context)
+        self._engine = ThreadedEngine(context, self._begin_engine, self._end_engine)
+        return self._engine
+
+    def _begin_engine(self) -> Context:
+        """On the engine's thread: its context."""
+        hidden: Any = self._hidden
+        glfw.make_context_current(hidden)
+        loader: Any = GlfwLoader()
+        context = Context(moderngl.create_context(require=GL_VERSION_CODE, context=loader), "window")
+        unlocked.unlock(context.ctx, loader.load)
+        return context
+
+    @staticmethod
+    def _end_engine() -> None:
+        """Likewise, at its end."""
+        no_window: Any = None
+        glfw.make_context_current(no_window)
+
+    def hide(self) -> None:
+        """Out of sight at once: what is freed before the end may have to wait for the driver."""
+        glfw.hide_window(self._handle)
+        glfw.poll_events()
 
     @property
     def place(self) -> WindowPlace:
@@ -337,6 +381,15 @@ def _create(place: WindowPlace, visible: bool) -> Any:
     if place.position is not None and _is_on_a_screen(place.position, place.size[0]):
         glfw.set_window_pos(handle, *place.position)
     return handle
+
+
+def _beside(window: Any) -> Any | None:
+    """A hidden window whose context shares the objects of `window`'s, which stays current; None where it cannot be
+    had. The hints are those of `window`."""
+    glfw.window_hint(glfw.VISIBLE, False)
+    glfw.window_hint(glfw.MAXIMIZED, False)
+    no_monitor: Any = None
+    return glfw.create_window(1, 1, "", no_monitor, window) or None
 
 
 def _shrink_to_screen(handle: Any) -> None:

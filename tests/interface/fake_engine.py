@@ -35,6 +35,7 @@ class FakeEngine:
     playing: bool = True
     target_photons: int = 0
     refine_when_still: bool = True
+    is_busy: bool = False
 
     def set(self, inputs: LiveInputs) -> DirtyLevel:
         self.inputs = inputs

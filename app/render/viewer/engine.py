@@ -491,6 +491,11 @@ class LiveEngine:
         return self._inputs
 
     @property
+    def building_at(self) -> str:
+        """What building is at now; empty where nothing is built."""
+        return self._building_at if self.schedule.building else ""
+
+    @property
     def stats(self) -> LiveStats:
         """This moment's."""
         context, camera_pass = self.context, self._camera_pass
@@ -547,6 +552,11 @@ class LiveEngine:
     @property
     def _knows_environment(self) -> bool:
         return self._shown is None or (self._shown.light.knows_environment and self._shown.light.knows_bounces)
+
+    @property
+    def is_busy(self) -> bool:
+        """Never while anybody can ask: what is asked of it is done when it returns (see `ThreadedEngine`)."""
+        return False
 
     @property
     def is_idle(self) -> bool:

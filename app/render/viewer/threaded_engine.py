@@ -1,0 +1,222 @@
+"""A live engine on a thread of its own, with an OpenGL context of its own that shares its objects with the window's.
+
+Work and drawing take turns as they would on one thread: `advance` waits for the work that it asks for. Only where
+that takes much longer than its budget, because the driver compiles, does it return early. Until that work is done the
+engine `is_busy`: it follows nothing, answers nothing, and tells how long it has been at it.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from dataclasses import replace
+from typing import TYPE_CHECKING, TypeVar
+
+from ...edit.stored_photons import StoredPhotons
+from .dirty_level import DirtyLevel
+from .engine import PATIENCE_S, QUERIED_PHOTONS, LiveEngine
+
+if TYPE_CHECKING:
+    import moderngl
+    import numpy as np
+
+    from ...edit.live_inputs import LiveInputs
+    from ...gpu.context import Context
+    from ...passes.pick import PickHit
+    from .photon_queries import CausticSpectrum
+    from .stats import LiveStats
+
+    T = TypeVar("T")
+
+OVERRUN_S = 0.15
+"""What work may take beyond its budget before the window is drawn without it."""
+BUSY_FRAME_S = 0.08
+"""How long each frame waits for work that has overrun: the processor is the driver's for most of that time."""
+COMPILING = "compiling a program, once for scenes of its kind"
+
+
+class ThreadedEngine:
+    """What a `LiveEngine` offers, for the thread of the window. `context` is the window's."""
+
+    def __init__(
+        self,
+        context: Context,
+        begin: Callable[[], Context],
+        end: Callable[[], None],
+        make: Callable[[Context], LiveEngine] = LiveEngine,
+    ) -> None:
+        """Both are called on the new thread: `begin` makes a context that shares `context`'s objects current there,
+        `end` leaves it."""
+        self.context, self._end = context, end
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="engine")
+        self._engine = self._thread.submit(lambda: make(begin())).result()
+        self._work: Future[None] | None = None
+        """What has overrun its time."""
+        self._work_began = 0.0
+        self._is_released = False
+        self._stats, self._inputs = self._engine.stats, self._engine.inputs
+        self._version = self._engine.picture_version
+        self._original: moderngl.Texture | None = None
+        self._picture: moderngl.Texture | None = None
+        """`_original` as the window's context knows it."""
+
+    # ---- work --------------------------------------------------------------------------------
+
+    @property
+    def is_busy(self) -> bool:
+        """It works on what it was asked for before; this frame, too, will be without news."""
+        return self._work is not None
+
+    def advance(self, budget_s: float, interacting: bool = False) -> None:
+        """As of a `LiveEngine`; returns without news where the driver compiles."""
+        if self._work is None:
+            self._work_began = time.perf_counter()
+            self._work = self._thread.submit(self._advance, budget_s, interacting)
+            patience_s = budget_s + OVERRUN_S
+        else:
+            patience_s = BUSY_FRAME_S
+        wait((self._work,), patience_s)
+        if not self._work.done():
+            return
+        done, self._work = self._work, None
+        done.result()
+        self._stats, self._inputs = self._engine.stats, self._engine.inputs
+        self._version = self._engine.picture_version
+
+    def _advance(self, budget_s: float, interacting: bool) -> None:
+        self._engine.advance(budget_s, interacting)
+        self._engine.context.finish()  # what the window's context shows must be there
+
+    def set(self, inputs: LiveInputs) -> DirtyLevel:
+        """As of a `LiveEngine`; whoever asks while it is busy asks again in the next frame."""
+        return self._asked(lambda: self._engine.set(inputs), DirtyLevel.NOTHING)
+
+    def retrace(self) -> None:
+        """As of a `LiveEngine`."""
+        self._asked(self._engine.retrace, None)
+
+    def rebuild(self) -> None:
+        """As of a `LiveEngine`; waits until all is compiled."""
+        self._finish()
+        self._thread.submit(self._engine.rebuild).result()
+
+    def release(self) -> None:
+        """End the work and free everything (once); waits for the driver."""
+        if self._is_released:
+            return
+        self._is_released = True
+        try:
+            self._finish()
+        finally:
+            self._forget_picture()
+            self._thread.submit(self._release).result()
+            self._thread.shutdown()
+
+    def _release(self) -> None:
+        try:
+            self._engine.release()
+        finally:
+            self._end()
+
+    def _finish(self) -> None:
+        if self._work is not None:
+            work, self._work = self._work, None
+            work.result()
+
+    def _asked(self, question: Callable[[], T], answer: T) -> T:
+        """What the engine answers on its thread; `answer` while it is busy."""
+        return answer if self.is_busy else self._thread.submit(question).result()
+
+    # ---- wishes ------------------------------------------------------------------------------
+
+    @property
+    def playing(self) -> bool:
+        """As of a `LiveEngine`."""
+        return self._engine.playing
+
+    @playing.setter
+    def playing(self, playing: bool) -> None:
+        if not self.is_busy:
+            self._engine.playing = playing
+
+    @property
+    def refine_when_still(self) -> bool:
+        """As of a `LiveEngine`."""
+        return self._engine.refine_when_still
+
+    @refine_when_still.setter
+    def refine_when_still(self, refines: bool) -> None:
+        if not self.is_busy:
+            self._engine.refine_when_still = refines
+
+    @property
+    def target_photons(self) -> int:
+        """As of a `LiveEngine`."""
+        return self._engine.target_photons
+
+    @target_photons.setter
+    def target_photons(self, photons: int) -> None:
+        if not self.is_busy and photons != self._engine.target_photons:
+            self._engine.target_photons = photons
+
+    # ---- what there is -----------------------------------------------------------------------
+
+    @property
+    def picture(self) -> moderngl.Texture | None:
+        """As of a `LiveEngine`, in the window's context; None also while it is busy and may be drawing it."""
+        if self.is_busy:
+            return None
+        original = self._engine.picture
+        if original is not self._original:
+            self._forget_picture()
+            self._original = original
+            if original is not None:
+                self._picture = self.context.ctx.external_texture(
+                    original.glo, original.size, original.components, 0, original.dtype
+                )
+        return self._picture
+
+    def _forget_picture(self) -> None:
+        if self._picture is not None:
+            self._picture.release()  # the texture itself is the engine's
+        self._picture = self._original = None
+
+    @property
+    def picture_version(self) -> int:
+        """As of a `LiveEngine`."""
+        return self._version
+
+    @property
+    def problem(self) -> str | None:
+        """As of a `LiveEngine`."""
+        return self._engine.problem
+
+    @property
+    def inputs(self) -> LiveInputs | None:
+        """As of a `LiveEngine`."""
+        return self._inputs
+
+    @property
+    def stats(self) -> LiveStats:
+        """As of a `LiveEngine`; while it is busy those of before, with what is compiled now."""
+        if not self.is_busy:
+            return self._stats
+        waited_s = time.perf_counter() - self._work_began
+        if waited_s < PATIENCE_S and not self._stats.preparing:
+            return self._stats
+        preparing = self._engine.building_at or self._stats.preparing or COMPILING
+        before_s = self._stats.preparing_s if self._stats.preparing else 0.0
+        return replace(self._stats, preparing=preparing, preparing_s=before_s + waited_s, converged=False)
+
+    def pick(self, x: float, y: float) -> PickHit | None:
+        """As of a `LiveEngine`."""
+        return self._asked(lambda: self._engine.pick(x, y), None)
+
+    def stored_photons(self, limit: int = QUERIED_PHOTONS) -> StoredPhotons:
+        """As of a `LiveEngine`."""
+        return self._asked(lambda: self._engine.stored_photons(limit), StoredPhotons.none())
+
+    def caustic_spectrum(self, receiver: int, position: np.ndarray) -> CausticSpectrum | None:
+        """As of a `LiveEngine`."""
+        return self._asked(lambda: self._engine.caustic_spectrum(receiver, position), None)
