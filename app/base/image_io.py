@@ -3,7 +3,8 @@
 | suffix | content |
 |---|---|
 | .png | 8-bit sRGB through `tone_map`: for looking at |
-| .jpg, .jpeg, .webp | the same, smaller, by a little that is lost |
+| .webp | the same, without loss, smaller |
+| .jpg, .jpeg | the same, smaller still, by a little that is lost |
 | .exr | float32 scene-referred linear Rec.709, negatives kept, and spectral channels where given: for working on |
 | .npy | float32 (H, W, 3) scene-referred linear Rec.709: for comparing |
 
@@ -27,6 +28,7 @@ from .atomic import atomic_output
 from .errors import BrokenPictureError, UserError
 from .glare import with_glare
 from .tone_map import auto_exposure, srgb_eotf, tone_map_8bit
+from .webp_film import check_size
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".exr", ".npy")
 SHOWN_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp")
@@ -175,7 +177,10 @@ def save_codes(path: Path, codes: np.ndarray) -> None:
         texts.add(b"sRGB", b"\x00")  # rendering intent: perceptual
         Image.fromarray(codes).save(path, format="PNG", pnginfo=texts, compress_level=6)
     elif suffix == ".webp":
-        Image.fromarray(codes).save(path, format="WEBP", quality=95, method=4)
+        check_size(path, (codes.shape[1], codes.shape[0]))
+        # Without loss: its other way halves the resolution of colours, and those of a caustic change from pixel to
+        # pixel. `quality` is how hard it tries.
+        Image.fromarray(codes).save(path, format="WEBP", lossless=True, quality=50, method=3)
     else:
         # Colours at full resolution: those of a caustic change from pixel to pixel.
         Image.fromarray(codes).save(path, format="JPEG", quality=95, subsampling=0)

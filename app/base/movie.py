@@ -1,4 +1,4 @@
-"""Where finished frames go: an MP4, or a folder of numbered PNGs that can be resumed."""
+"""Where finished frames go: an MP4, a GIF, an animated WebP, or a folder of numbered PNGs that can be resumed."""
 
 from __future__ import annotations
 
@@ -19,8 +19,11 @@ from .atomic import atomic_output, check_writable
 from .errors import UserError
 from .gif import Gif
 from .locks import locked
+from .webp_film import WebpFilm, check_size
 
 MANIFEST = "animation.json"
+FILM_SUFFIXES = (".mp4", ".gif", ".webp")
+"""Of animations that are one file."""
 _CLAIM = ".claim"
 _DIGITS = 4
 _PNG_BEGIN, _PNG_END = b"\x89PNG\r\n\x1a\n", b"IEND\xaeB`\x82"
@@ -312,12 +315,15 @@ def _last_line(told: bytes) -> str:
 
 def open_sink(
     path: Path, size: tuple[int, int], fps: float, description: Mapping[str, object], overwrite: bool = False
-) -> Movie | Gif | Frames:
-    """The sink that `path` asks for: a `.mp4`, a `.gif`, or a folder (a name without a suffix). Raises `UserError`."""
+) -> Movie | Gif | WebpFilm | Frames:
+    """The sink that `path` asks for: one of `FILM_SUFFIXES`, or a folder (a name without a suffix). Raises
+    `UserError`."""
     if path.suffix.lower() == ".mp4":
         return Movie(path, size, fps)
     if path.suffix.lower() == ".gif":
         return Gif(path, size, fps)
+    if path.suffix.lower() == ".webp":
+        return WebpFilm(path, size, fps)
     check_folder(path)
     return Frames(path, description, overwrite)
 
@@ -326,5 +332,13 @@ def check_folder(path: Path) -> None:
     """Raise `UserError` where `path` looks like a file's name."""
     if path.suffix and not os.path.isdir(path):
         raise UserError(
-            f"cannot write {path}: the suffix '{path.suffix}' is not an animation; use .mp4, .gif, or a folder for PNGs"
+            f"cannot write {path}: the suffix '{path.suffix}' is not an animation; use {', '.join(FILM_SUFFIXES)}, or "
+            "a folder for PNGs"
         )
+
+
+def check_film(path: Path, size: tuple[int, int]) -> None:
+    """Raise `UserError` where the film `path` of pictures of `size` could not be written at the end."""
+    if path.suffix.lower() == ".webp":
+        check_size(path, size)
+    check_writable(path)

@@ -63,6 +63,7 @@ class Plan:
 
 def plan_of(request: AnimateRequest) -> Plan:
     """Everything checked; what was assumed is told. Raises `UserError`."""
+    from ..base.movie import FILM_SUFFIXES
     from ..edit.parameters import Stage
     from ..render.animate import description
 
@@ -71,8 +72,10 @@ def plan_of(request: AnimateRequest) -> Plan:
         raise UserError(
             "--skip-existing and --overwrite exclude each other: keep the frames there are, or replace them"
         )
-    if request.skip_existing and request.output.suffix.lower() in (".mp4", ".gif"):
-        raise UserError("--skip-existing is for a folder of frames: a movie (.mp4) is written in one go")
+    if request.skip_existing and request.output.suffix.lower() in FILM_SUFFIXES:
+        raise UserError(
+            f"--skip-existing is for a folder of frames: a film ({request.output.suffix}) is written in one go"
+        )
     fps = DEFAULT_FPS if request.fps is None else _parse_fps(request.fps)
     scene = options.open_scene(request.scene, request.opening)
     settings = _settings(request, scene)

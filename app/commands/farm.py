@@ -138,8 +138,7 @@ def farm_render_command(request: RenderRequest, farm: FarmRequest) -> int:
 
 def farm_animate_command(request: AnimateRequest, farm: FarmRequest) -> int:
     """Render an animation; returns the exit code. Raises `UserError`."""
-    from ..base.atomic import check_writable
-    from ..base.movie import Frames, Movie, check_folder
+    from ..base.movie import FILM_SUFFIXES, Frames, check_film, check_folder, open_sink
     from ..base.progress import ProgressReporter
 
     workers_of(farm)
@@ -150,10 +149,10 @@ def farm_animate_command(request: AnimateRequest, farm: FarmRequest) -> int:
     from ..farm.animate import FarmFrames
     from ..farm.part_folder import held
 
-    is_movie, started = request.output.suffix.lower() == ".mp4", time.perf_counter()
+    is_movie, started = request.output.suffix.lower() in FILM_SUFFIXES, time.perf_counter()
     folder = request.output.with_name(request.output.name + ".frames") if is_movie else request.output
     if is_movie:
-        check_writable(request.output)
+        check_film(request.output, size)
     else:
         check_folder(folder)
     with held(folder, request.output), interrupt_flag() as interrupted, crew(farm) as workers:
@@ -177,7 +176,7 @@ def farm_animate_command(request: AnimateRequest, farm: FarmRequest) -> int:
         )
         return interrupted.exit_code
     if is_movie:
-        movie = Movie(request.output, size, plan.fps)
+        movie = open_sink(request.output, size, plan.fps, {})
         try:
             for index in plan.only:
                 movie.write(index, sink.read(index))

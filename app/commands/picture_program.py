@@ -221,7 +221,7 @@ def animate(
             "-o",
             "--output",
             metavar="OUT",
-            help="A movie (.mp4), a .gif, or a folder for numbered PNGs, which can be resumed.",
+            help="A movie (.mp4, .gif or .webp), or a folder for numbered PNGs, which can be resumed.",
         ),
     ],
     turntable: Annotated[

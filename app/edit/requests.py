@@ -167,7 +167,7 @@ class Bake:
 
 @dataclass(frozen=True)
 class Animate:
-    """Render an animation to `path` (.mp4, .gif, or a folder for PNGs): a turntable, or the keys of
+    """Render an animation to `path` (.mp4, .gif, .webp, or a folder for PNGs): a turntable, or the keys of
     `State.animation`."""
 
     path: Path

@@ -10,9 +10,13 @@ import numpy as np
 import pytest
 from imgui_bundle import imgui
 from PIL import Image
+from spectrasplat.base import webp_film
+from spectrasplat.base.errors import UserError
 from spectrasplat.base.gif import Gif, durations_ms
+from spectrasplat.base.image_io import save_codes
 from spectrasplat.base.movie import open_sink
 from spectrasplat.base.paths import assets_dir
+from spectrasplat.base.webp_film import WebpFilm
 from spectrasplat.commands.glass import glass_command
 from spectrasplat.edit import requests
 from spectrasplat.edit.importing import import_objects
@@ -177,6 +181,47 @@ def test_a_gif_plays_at_its_pace_and_in_its_colours(tmp_path: Path) -> None:
         shown = np.asarray(image.convert("RGB")).astype(int)
     assert abs(shown[:, :16] - [200, 160, 160]).max() <= 4 and abs(shown[:, 16:] - 160).max() <= 4
     assert sum(durations_ms(24, 24.0)) == 1000 and set(durations_ms(9, 100.0)) == {20}
+
+
+def test_an_animated_webp_plays_at_its_pace_and_in_all_its_colours(tmp_path: Path) -> None:
+    sink = open_sink(tmp_path / "a.WebP", (33, 15), 24.0, {})
+    assert isinstance(sink, WebpFilm)
+    for level in (0, 80, 160):
+        codes = np.full((15, 33, 3), level, np.uint8)
+        codes[:, :16, 0] = 200
+        sink.write(level, codes)
+    assert not (tmp_path / "a.WebP").exists() and not sink.has(0)
+    sink.close()
+    data = (tmp_path / "a.WebP").read_bytes()
+    assert int.from_bytes(data[4:8], "little") == len(data) - 8
+    with Image.open(tmp_path / "a.WebP") as image:
+        assert image.n_frames == 3 and image.size == (33, 15) and image.info["loop"] == 0
+        shown = []
+        for index in range(3):
+            image.seek(index)
+            shown.append(np.asarray(image.convert("RGB")).astype(int))
+            assert image.info["duration"] in (41, 42)
+    for level, frame in zip((0, 80, 160), shown, strict=True):
+        assert abs(frame[:, :14] - [200, level, level]).max() <= 6 and abs(frame[:, 20:] - level).max() <= 6
+    assert sum(webp_film.durations_ms(24, 24.0)) == 1000 and set(webp_film.durations_ms(9, 200.0)) == {11}
+    WebpFilm(tmp_path / "none.webp", (8, 8), 24.0).close()
+    assert not (tmp_path / "none.webp").exists()  # without a frame nothing appears
+
+
+def test_a_webp_larger_than_the_format_allows_is_refused_before_anything_is_drawn(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="at most 16383 pixels a side, not 20000×10; choose a smaller size or another"):
+        open_sink(tmp_path / "a.webp", (20000, 10), 24.0, {})
+    with pytest.raises(UserError, match="at most 16383 pixels"):
+        save_codes(tmp_path / "still.webp", np.zeros((1, 20000, 3), np.uint8))
+    with pytest.raises(UserError, match=r"'.avi' is not an animation; use .mp4, .gif, .webp, or a folder for PNGs"):
+        open_sink(tmp_path / "a.avi", (8, 8), 24.0, {})
+
+
+def test_a_still_webp_keeps_colours_that_change_from_pixel_to_pixel(tmp_path: Path) -> None:
+    codes = np.random.default_rng(5).integers(0, 256, (40, 60, 3), np.uint8)
+    save_codes(tmp_path / "a.webp", codes)
+    with Image.open(tmp_path / "a.webp") as image:
+        np.testing.assert_array_equal(np.asarray(image.convert("RGB")), codes)
 
 
 def test_a_guessed_glass_is_said_to_be_a_guess() -> None:

@@ -79,7 +79,11 @@ def test_the_ending_of_a_film_decides_what_it_becomes(rig: PanelRig, tmp_path: P
     rig.key(imgui.Key.a, [imgui.Key.mod_ctrl])
     rig.type("turn.gif")
     rig.click("Save")
-    assert [asked.path for asked in rig.state.requests] == [tmp_path / "scene_turntable.mp4", tmp_path / "turn.gif"]
+    choose(rig, "File", "Animated WebP")
+    rig.click("Render animation…")
+    rig.click("Save")
+    names = ["scene_turntable.mp4", "turn.gif", "scene_turntable.webp"]
+    assert [asked.path for asked in rig.state.requests] == [tmp_path / name for name in names]
 
 
 def test_keys_are_added_changed_and_deleted(rig: PanelRig, tmp_path: Path) -> None:

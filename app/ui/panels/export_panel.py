@@ -17,8 +17,13 @@ SIZES = {size: words for size, words in render_section.SIZES.items() if size != 
 MAP_SIZES = {"512x512": "512 × 512", "1024x1024": "1024 × 1024", "2048x2048": "2048 × 2048", "4096x4096": "4096 × 4096"}
 PHOTONS = render_section.PHOTONS
 _KINDS = {"turntable": "Turntable", "keys": "Keys"}
-_FORMATS = {"mp4": "Movie (MP4)", "gif": "GIF", "png": "Sequence (PNG)"}
-_FILMS = {"mp4": (".mp4", ".gif"), "gif": (".gif", ".mp4"), "png": (".png",)}
+_FORMATS = {"mp4": "Movie (MP4)", "gif": "GIF", "webp": "Animated WebP", "png": "Sequence (PNG)"}
+_FILMS = {
+    "mp4": (".mp4", ".gif", ".webp"),
+    "gif": (".gif", ".mp4", ".webp"),
+    "webp": (".webp", ".mp4", ".gif"),
+    "png": (".png",),
+}
 """Endings by format: that of a film decides what it becomes, as those of pictures do."""
 
 
@@ -166,7 +171,8 @@ def _animation(state: State, view_model: ViewModel, idle: bool) -> State:
         "File",
         _FORMATS,
         _choices.format,
-        tip="An H.264 movie, a GIF of 256 colours, or a folder of numbered PNGs that can be resumed.",
+        tip="An H.264 movie, a GIF of 256 colours, an animated WebP of all colours, or a folder of numbered PNGs that "
+        "can be resumed.",
     )
     can = idle and (_choices.kind == "turntable" or bool(state.animation))
     tip = "Render all pictures with the present tone curve and exposure. The viewer stays usable meanwhile."
