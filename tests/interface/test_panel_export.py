@@ -122,6 +122,20 @@ def test_while_an_export_runs_it_can_only_be_cancelled(rig: PanelRig) -> None:
     assert rig.state.requests == (requests.CancelJob(),)
 
 
+def test_a_starting_export_moves_no_control_under_the_mouse(rig: PanelRig) -> None:
+    labels = ("Render…", "Samples", "Save screenshot…", "Render animation…")
+    before = {label: rig.find(label) for label in labels}
+    job = JobInfo("Turntable: a.mp4", 0.4, "Frame 3 of 8, and words that are so long that they need a second line")
+    rig.view_model = replace(rig.view_model, job=job)
+    rig.frame(3)
+    assert {label: rig.find(label) for label in labels} == before
+    assert before["Render animation…"].bottom < rig.find("Cancel export").top
+    assert rig.find("Cancel export").bottom < rig.size[1]
+    rig.view_model = replace(rig.view_model, job=None)
+    rig.frame(3)
+    assert {label: rig.find(label) for label in labels} == before
+
+
 def test_comparing(gl) -> None:
     with PanelRig(gl, draw_compare, scene_state(), (420, 640)) as rig:
         assert "Start again" not in rig.items.items

@@ -44,14 +44,32 @@ class _Choices:
     photons: str = "1000000"
 
 
-_choices = _Choices()
+@dataclass
+class _Footer:
+    """Of the running export, as it was drawn last."""
+
+    height: float = 96.0
+    """Pixels, with the gap above it."""
+
+
+_choices, _footer = _Choices(), _Footer()
 
 
 def draw_export(state: State, view_model: ViewModel) -> State:
-    """Draw the panel's contents."""
-    if view_model.job is not None:
-        state = _running(state, view_model)
+    """Draw the panel's contents. The running export is shown below what scrolls: nothing moves under the mouse that
+    started it."""
     idle = view_model.job is None
+    imgui.begin_child("##choices", imgui.ImVec2(0, 0 if idle else -_footer.height))
+    state = _sections(state, view_model, idle)
+    imgui.end_child()
+    if not idle:
+        top = imgui.get_cursor_pos_y()
+        state = _running(state, view_model)
+        _footer.height = imgui.get_cursor_pos_y() - top + imgui.get_style().item_spacing.y
+    return _answers(state)
+
+
+def _sections(state: State, view_model: ViewModel, idle: bool) -> State:
     if widgets.section("Render"):
         state = render_section.draw_render(state, view_model, idle)
     if widgets.section("Screenshot"):
@@ -60,12 +78,13 @@ def draw_export(state: State, view_model: ViewModel) -> State:
         _bake(state, view_model, idle)
     if widgets.section("Animation"):
         state = _animation(state, view_model, idle)
-    return _answers(state)
+    return state
 
 
 def _running(state: State, view_model: ViewModel) -> State:
     job = view_model.job
     assert job is not None
+    imgui.separator()
     imgui.text_unformatted(job.title)
     imgui.progress_bar(job.fraction, imgui.ImVec2(-1, 0), f"{100 * job.fraction:.0f} %")
     rows.explain("Export progress", "The export works in the time that the window leaves; editing does not change it.")
@@ -81,7 +100,6 @@ def _running(state: State, view_model: ViewModel) -> State:
         )
     if widgets.button(label, tip=tip, width=-1):
         state = state.asking(CancelJob())
-    imgui.separator()
     return state
 
 
