@@ -48,7 +48,7 @@ class _Choices:
 class _Footer:
     """Of the running export, as it was drawn last."""
 
-    height: float = 96.0
+    height: float = 0.0
     """Pixels, with the gap above it."""
 
 
@@ -59,7 +59,7 @@ def draw_export(state: State, view_model: ViewModel) -> State:
     """Draw the panel's contents. The running export is shown below what scrolls: nothing moves under the mouse that
     started it."""
     idle = view_model.job is None
-    imgui.begin_child("##choices", imgui.ImVec2(0, 0 if idle else -_footer.height))
+    imgui.begin_child("##choices", imgui.ImVec2(0, 0 if idle else -max(_footer.height, _least_footer())))
     state = _sections(state, view_model, idle)
     imgui.end_child()
     if not idle:
@@ -88,8 +88,7 @@ def _running(state: State, view_model: ViewModel) -> State:
     imgui.text_unformatted(job.title)
     imgui.progress_bar(job.fraction, imgui.ImVec2(-1, 0), f"{100 * job.fraction:.0f} %")
     rows.explain("Export progress", "The export works in the time that the window leaves; editing does not change it.")
-    if job.text:
-        widgets.hint(job.text)
+    widgets.hint(job.text or " ")  # a line that comes and goes would move the button
     if job.is_stopped:
         label, tip = "Discard it", "Do not wait for what is done to become a picture: write nothing at all."
     else:
@@ -101,6 +100,13 @@ def _running(state: State, view_model: ViewModel) -> State:
     if widgets.button(label, tip=tip, width=-1):
         state = state.asking(CancelJob())
     return state
+
+
+def _least_footer() -> float:
+    """Height of a running export whose words need one line: it is known before it was drawn."""
+    style = imgui.get_style()
+    lines = 2.0 * imgui.get_text_line_height_with_spacing() + 2.0 * imgui.get_frame_height_with_spacing()
+    return lines + 2.0 * style.item_spacing.y + 1.0
 
 
 def _screenshot(view_model: ViewModel, idle: bool) -> None:

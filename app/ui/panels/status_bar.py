@@ -73,7 +73,7 @@ def _progress(state: State, view_model: ViewModel) -> State:
     imgui.progress_bar(share, imgui.ImVec2(theme.em(7), theme.em(0.4)), "")
     imgui.pop_style_color()
     said = "beams, as fine as that many photons" if stats.only_beams else "photons"
-    rows.explain("Progress", f"{stats.photons:,} of {target:,} {said}.")
+    rows.explain("Progress", f"{stats.photons:,} of {target:,} {said}." if stats.photons else "No light yet.")
     imgui.same_line()
     imgui.text_unformatted(progress_words(stats, state.playing))
     return state
@@ -83,11 +83,15 @@ def progress_words(stats: LiveStats, is_playing: bool) -> str:
     """What goes on, and how far it is: by polygons, by photons, or where nothing throws a caustic by camera samples."""
     if stats.differs == "scene" or stats.preparing:
         return preparing_words(stats)
+    if not (stats.photons or stats.polygons or stats.camera_samples or stats.converged):
+        return "Preparing …" if is_playing else "Paused"  # nothing is there to be counted
     word = "Done" if stats.converged else "Accumulating" if is_playing else "Paused"
     if stats.only_beams:
         return f"{word}, {numbers.count(stats.polygons)} polygons"
-    if stats.photons or not stats.camera_samples:
+    if stats.photons:
         return f"{word}, {numbers.count(stats.photons)} photons"
+    if not stats.camera_samples:
+        return word
     samples = round(stats.camera_samples)
     return f"{word}, {numbers.count(samples)} {'sample' if samples == 1 else 'samples'} a pixel, no caustics"
 

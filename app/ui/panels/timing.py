@@ -179,7 +179,7 @@ def counts_of(state: State, view_model: ViewModel) -> list[tuple[str, str, str]]
     lines = [
         (
             "Photons",
-            f"{numbers.count(stats.photons)} of {numbers.count(target)}",
+            f"{numbers.count(stats.photons)} of {numbers.count(target)}" if stats.photons else "none yet",
             "Emitted photons that the shown map holds, and where it stops.",
         ),
         ("Rate", f"{numbers.count(stats.photons_per_second)}/s", "Emitted photons per second of trace and splat time."),
