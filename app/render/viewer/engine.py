@@ -506,9 +506,9 @@ class LiveEngine:
             camera_samples=float(camera_pass.shown_samples),
             resolution_scale=camera_pass.scale,
             direct_scale=camera_pass.direct_scale,
-            shows_other=self._differs == "scene" or self._camera.owes_first,
-            differs=self._differs,
-            preparing=self._building_at if self._differs == "scene" or self._camera.owes_first else "",
+            shows_other=self.differs == "scene" or self._camera.owes_first,
+            differs=self.differs,
+            preparing=self._building_at if self.differs == "scene" or self._camera.owes_first else "",
             preparing_s=time.perf_counter() - self._building_since,
             camera_bands=camera_pass.shown_bands,
             camera_fallbacks=camera_pass.fallbacks,
@@ -542,7 +542,8 @@ class LiveEngine:
         )
 
     @property
-    def _differs(self) -> Literal["", "light", "scene", "moved"]:
+    def differs(self) -> Literal["", "light", "scene", "moved"]:
+        """What of the wanted scene the picture does not show yet, as in `LiveStats`."""
         if self.schedule.moved and not self.schedule.building:
             return "moved"
         if self._wanted is None or not self.schedule.building:

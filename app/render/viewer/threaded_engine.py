@@ -203,11 +203,12 @@ class ThreadedEngine:
         if not self.is_busy:
             return self._stats
         waited_s = time.perf_counter() - self._work_began
-        if waited_s < PATIENCE_S and not self._stats.preparing:
-            return self._stats
-        preparing = self._engine.building_at or self._stats.preparing or COMPILING
-        before_s = self._stats.preparing_s if self._stats.preparing else 0.0
-        return replace(self._stats, preparing=preparing, preparing_s=before_s + waited_s, converged=False)
+        stats = replace(self._stats, differs=self._engine.differs, converged=False)
+        if waited_s < PATIENCE_S and not stats.preparing:
+            return stats
+        preparing = self._engine.building_at or stats.preparing or COMPILING
+        before_s = stats.preparing_s if stats.preparing else 0.0
+        return replace(stats, preparing=preparing, preparing_s=before_s + waited_s)
 
     def pick(self, x: float, y: float) -> PickHit | None:
         """As of a `LiveEngine`."""
