@@ -14,6 +14,8 @@ from spectrasplat.gpu.context import Context
 from spectrasplat.render.viewer.dirty_level import DirtyLevel
 from spectrasplat.render.viewer.stats import LiveStats
 from spectrasplat.render.viewer.threaded_engine import COMPILING, ThreadedEngine
+from spectrasplat.ui.session import IDLE_S, LAYOUT_FRAMES, Session
+from spectrasplat.ui.viewer import Viewer, headless_viewer
 
 from tests.interface.fake_engine import FakeEngine
 from tests.interface.test_window import in_a_window
@@ -135,3 +137,26 @@ def test_the_window_is_drawn_while_the_driver_compiles(tmp_path: Path, monkeypat
     monkeypatch.setenv("MESA_SHADER_CACHE_DIR", str(tmp_path / "cache"))
     done = in_a_window(DRAWN_WHILE_THE_DRIVER_COMPILES, tmp_path)
     assert done.stdout.strip() == "True True True {0.25}", done.stdout + done.stderr
+
+
+def test_while_the_engine_is_busy_the_window_stays_awake_and_waits_for_the_scene(
+    gl: Context, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SPECTRASPLAT_CONFIG", str(tmp_path / "config"))
+    session = Session(gl, make_engine=FakeEngine)
+    session.jobs.gallery.release()
+    session.state = replace(session.state, playing=False).with_panels(start_page=False)
+    with headless_viewer(Viewer(session)) as interface:
+        interface.frame(LAYOUT_FRAMES + 3)
+        engine = session.picture.engine
+        assert isinstance(engine, FakeEngine) and session.wait_s() == IDLE_S and session.picture.shown is not None
+        picture, engine.picture, engine.is_busy = engine.picture, None, True
+        session.show_document(Document.new())
+        interface.frame(3)
+        assert session.wait_s() == 0.0
+        assert session.picture.awaits_scene  # nothing of it is drawn, whatever the stats of before say
+        engine.picture, engine.is_busy = picture, False
+        interface.frame()
+        assert not session.picture.awaits_scene
+    session.autosave.close()
+    session.release()
