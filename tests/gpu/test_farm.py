@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from farm_rig import SCENE, SETTINGS, farmed, kill
+from PIL import Image
 from spectrasplat.__main__ import main
 from spectrasplat.base import atomic
 from spectrasplat.base.errors import UserError
@@ -165,7 +166,10 @@ def test_frames_of_a_farm_are_those_of_one_process(tmp_path: Path) -> None:
     one, many = ({path.name: path.read_bytes() for path in (tmp_path / name).iterdir()} for name in ("one", "many"))
     assert one == many and len(one) == 6
     assert main(["farm", "animate", *asked, "--workers", "1", "-o", str(tmp_path / "a.mp4")]) == 0
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.mp4", "many", "one"]
+    assert main(["farm", "animate", *asked, "--workers", "1", "-o", str(tmp_path / "a.webp")]) == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.mp4", "a.webp", "many", "one"]
+    with Image.open(tmp_path / "a.webp") as image:
+        assert image.n_frames == 5 and image.size == (48, 27)
 
 
 @pytest.mark.slow

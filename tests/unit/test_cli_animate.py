@@ -59,14 +59,20 @@ def test_options(name: str, here: Path, capsys: pytest.CaptureFixture[str]) -> N
 @pytest.mark.parametrize(
     ("output", "told"),
     [
-        ("out.avi", ("'.avi'", "use .mp4")),
+        ("out.avi", ("'.avi'", "use .mp4, .gif, .webp, or a folder")),
         ("gone/out.mp4", ("does not exist",)),
+        ("gone/out.webp", ("does not exist",)),
         ("file", ("it is a file",)),
         ("pictures", ("pictures of something else", "--overwrite")),
     ],
 )
 def test_outputs(output: str, told: tuple[str, ...], here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     refused(["animate", "prism", "-o", output, "--size", "16x16"], told, here, capsys)
+
+
+def test_a_webp_is_told_its_largest_side(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    asked = ["animate", "prism", "-o", "out.webp", "--size", "16384x16"]
+    refused(asked, ("at most 16383 pixels a side, not 16384×16", "another format"), here, capsys)
 
 
 @pytest.mark.parametrize(
