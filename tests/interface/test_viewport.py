@@ -425,8 +425,10 @@ def test_a_comparison_that_is_not_there_yet_is_told() -> None:
 def test_a_badge_says_that_picture_and_scene_differ() -> None:
     state = scene_state()
     for differs, text in (("scene", "Preparing …"), ("light", "Light is being traced …")):
-        told = [badge.text for badge in viewport_tools.badges(state, ViewModel(stats=LiveStats(differs=differs)))]
-        assert text in told
+        shown = ViewModel(stats=LiveStats(differs=differs), picture=1)
+        assert text in [badge.text for badge in viewport_tools.badges(state, shown)]
+        # Where no picture is, its place says so.
+        assert not viewport_tools.badges(state, replace(shown, picture=None))
     assert not {"Preparing …", "Light is being traced …"} & {
         badge.text for badge in viewport_tools.badges(state, ViewModel(stats=LiveStats()))
     }
