@@ -19,6 +19,7 @@ from ..gpu.schema import Field, Struct
 
 if TYPE_CHECKING:
     from ..gpu.context import Context
+    from .glare import Halo
 
 DISPLAY_PARAMETERS = Struct(
     "DisplayParameters",
@@ -42,8 +43,11 @@ wrong."""
 NEAREST_FROM = 4.0
 """Enlarged more than this, pixels are shown as squares."""
 _MAX_TAPS = 4
-_GROUP = 8
+_GROUP = 32, 8
+"""Wide: a software renderer hands every group out by itself."""
 _ROWS = 16
+_HALO = 2
+"""Texture unit."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +65,8 @@ class _Variant:
     """Output pixels are the picture's."""
     enlarged: bool = True
     """Output pixels are smaller than the picture's."""
+    has_halo: bool = False
+    """Glare is added on the way."""
 
     @property
     def rows(self) -> int:
@@ -72,6 +78,7 @@ class _Variant:
         return {
             **({"ANTIALIAS": 1, "ROWS": self.rows} if self.rows > 1 else {}),
             **({"SAME_SIZE": 1} if self.same_size else {}),
+            **({"HALO": 1} if self.has_halo else {}),
             **({} if self.enlarged else {"BESIDE_IS_NEXT": 1}),
             "COLOUR_TABLE": glsl_table(table),
             "TAPS": self.taps,
@@ -105,6 +112,7 @@ class Display:
         compare: Compare | None = None,
         antialias: bool = False,
         output: str = "picture",
+        halo: Halo | None = None,
     ) -> moderngl.Texture:
         """`picture` (RGBA32F, linear Rec.709, row 0 on top) as an RGBA8 texture of `size` (width, height), sRGB codes,
         row 0 on top.
@@ -112,6 +120,7 @@ class Display:
         `exposure_ev` is absolute (as `tone_map.to_display` takes it). `other` is what `compare` shows beside it, over
         it or takes the error against; without it the picture alone is shown. `antialias`: see
         `base.highlights`; of a picture that is shown alone. `output`: another name, another texture.
+        `halo`: glare, of a picture that is shown alone, pixel for pixel and not antialiased.
         """
         parameters = self._develop(settings, exposure_ev)
         parameters["step_uv"] = 1.0 / size[0], 1.0 / size[1]
@@ -125,10 +134,13 @@ class Display:
         shrunk = max(picture.width / size[0], picture.height / size[1])
         taps = int(np.clip(np.ceil(shrunk - 0.01), 1, _MAX_TAPS))
         enlarged = max(size[0] / picture.width, size[1] / picture.height)
-        variant = _Variant(_tone(settings), shows, taps, antialias, picture.size == size, enlarged > 1.0)
+        same_size = picture.size == size
+        if halo is not None and not (same_size and shows == "picture" and not antialias):
+            raise ValueError("glare is added on the way to a picture alone, pixel for pixel and not antialiased")
+        variant = _Variant(_tone(settings), shows, taps, antialias, same_size, enlarged > 1.0, halo is not None)
         # Pixel for pixel nothing is blended, so that one broken pixel stays one.
-        nearest = enlarged > NEAREST_FROM or picture.size == size
-        return self._dispatch(output, variant, parameters, (picture, other or picture), size, nearest)
+        nearest = enlarged > NEAREST_FROM or same_size
+        return self._dispatch(output, variant, parameters, (picture, other or picture), size, nearest, halo)
 
     def magnify(
         self,
@@ -193,6 +205,7 @@ class Display:
         pictures: tuple[moderngl.Texture, moderngl.Texture],
         size: tuple[int, int],
         nearest: bool,
+        halo: Halo | None = None,
     ) -> moderngl.Texture:
         output = self._output(name, size)
         self._parameters.write(parameters.tobytes())
@@ -203,8 +216,13 @@ class Display:
             texture.use(unit)
             sampler.use(unit)
         output.bind_to_image(0, read=False, write=True)
-        self._program(variant).run(-(-size[0] // _GROUP), -(-size[1] // (_GROUP * variant.rows)))
-        for unit in (0, 1):
+        program = self._program(variant)
+        if halo is not None:
+            halo.light.use(_HALO)
+            self._samplers[moderngl.LINEAR].use(_HALO)
+            program["kept"].value = halo.kept
+        program.run(-(-size[0] // _GROUP[0]), -(-size[1] // (_GROUP[1] * variant.rows)))
+        for unit in (0, 1, _HALO):
             sampler.clear(unit)
         self._ctx.memory_barrier()
         self._context.check("the display pass")

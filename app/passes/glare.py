@@ -6,6 +6,8 @@ as its texels are wide. What a step reads is black beyond its border, as there.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import moderngl
 
 from ..base.glare import OCTAVES, WIDEST
@@ -15,7 +17,15 @@ from ..gpu.context import Context
 _SPREAD = 1.3
 """Standard deviation of an octave on its way back, texels of it: its own tent, its wider neighbours' and the shrinking
 (measured, `tests/gpu/test_glare_pass.py`)."""
-_GROUP = 8
+_GROUP = 32, 8
+
+
+@dataclass(frozen=True)
+class Halo:
+    """What a lens makes of a picture: `kept` of it, and `light`, softened (shaders/display/softened.glsl)."""
+
+    kept: float
+    light: moderngl.Texture
 
 
 class Glare:
@@ -36,6 +46,12 @@ class Glare:
         a software renderer as much as all the rest of it."""
         if share <= 0.0:
             return picture
+        halo = self.halo(picture, share, in_motion=in_motion)
+        return self._step("JOIN", 0, picture.size, (picture, halo.light), 1.0 - halo.kept)
+
+    def halo(self, picture: moderngl.Texture, share: float, *, in_motion: bool = False) -> Halo:
+        """What `run` adds to the picture, where whoever shows that adds it (`Display.run`): joining takes a software
+        renderer longer than finding it. Valid until the next call."""
         # Rows of the finest octave, whose texels are as wide as its Gaussian.
         rows = _SPREAD / WIDEST * 2.0 ** (OCTAVES - 1)
         octaves, finer = range(1 if in_motion else 0, OCTAVES), picture
@@ -53,7 +69,7 @@ class Glare:
             spread = self._step("SPREAD", octave, of.size, (of, softened), share / OCTAVES)
             ring = spread.width + 2, spread.height + 2
             softened = self._step("SOFTEN", octave, ring, (spread, spread))
-        return self._step("JOIN", 0, picture.size, (picture, softened), share * len(octaves) / OCTAVES)
+        return Halo(1.0 - share * len(octaves) / OCTAVES, softened)
 
     def release(self) -> None:
         """Free everything."""
@@ -79,7 +95,7 @@ class Glare:
             texture.use(unit)
             self._sampler.use(unit)
         made.bind_to_image(0, read=False, write=True)
-        program.run(-(-size[0] // _GROUP), -(-size[1] // _GROUP))
+        program.run(-(-size[0] // _GROUP[0]), -(-size[1] // _GROUP[1]))
         for unit in (0, 1):
             self._sampler.clear(unit)
         self._ctx.memory_barrier()

@@ -32,6 +32,8 @@ MOVING_PARAMETERS = Struct(
         Field("blocks", "uvec2", "of pixels of which one is followed through glass"),
         Field("lattice_step", "uint", "pixels"),
         Field("glass_step", "uint", "side of a block, pixels"),
+        Field("lists_cells", "uint", "the lattice's program looks at listed cells, not at points"),
+        Field("pad", "uint", "unused"),
     ),
 )
 LATTICE_STEP = 4
@@ -40,7 +42,7 @@ BIND_MOVING = 10
 """Of uniform blocks."""
 BIND_MOVING_LISTS = 22
 """Of storage buffers, one that no other program of the camera has."""
-IMAGE_PICTURE, IMAGE_VISIBLE, IMAGE_PLACES, IMAGE_LIGHT, IMAGE_CHOSEN, IMAGE_FOUND = range(6)
+IMAGE_PICTURE, IMAGE_VISIBLE, IMAGE_PLACES, IMAGE_LIGHT, IMAGE_CHOSEN, IMAGE_FOUND, IMAGE_CELLS, IMAGE_MARKS = range(8)
 _GROUP = 8, 8
 _CELLS_GROUP = 32, 8
 """Many: a software renderer hands every group out by itself, which takes as long as thirty of its cells."""
@@ -64,8 +66,10 @@ class MovingPicture:
             "IMAGE_LIGHT": IMAGE_LIGHT,
             "IMAGE_CHOSEN": IMAGE_CHOSEN,
             "IMAGE_FOUND": IMAGE_FOUND,
+            "IMAGE_CELLS": IMAGE_CELLS,
+            "IMAGE_MARKS": IMAGE_MARKS,
         }
-        names = "lattice", "direct", "uneven", *(("blocks", "list", "glass") if view.follows else ())
+        names = "lattice", "cells", "direct", "uneven", *(("blocks", "list", "glass") if view.follows else ())
         self._programs = {
             name: shader.compute(self._ctx, f"camera/moving_{name}.comp", defines, (*structs, MOVING_PARAMETERS))
             for name in names
@@ -93,6 +97,7 @@ class MovingPicture:
         if not self._lattice or self._lattice[0].size != lattice:
             shader.release(*self._lattice)
             self._lattice = [self._ctx.texture(lattice, 4, dtype="f4") for _ in range(2)]
+            self._lattice += [self._ctx.texture(size, 1, dtype="u4") for size in (cells, lattice)]
         # A pixel that sees a coat may be on both lists.
         room = 8 + 4 * width * height * (2 if "COATS" in self._view.source[0] else 1)
         if self._lists is None or self._lists.size != room:
@@ -100,11 +105,15 @@ class MovingPicture:
                 self._lists.release()
             self._lists = self._ctx.buffer(reserve=room)
         self._tell(1)
-        self._run("lattice", lattice, maps)
-        assert self._lists is not None
+        self._run("lattice", lattice, maps, None, _CELLS_GROUP)
+        self._lists.write(bytes(8))
+        self._run("cells", cells, maps, None, _CELLS_GROUP)
+        if count := self._listed()[0]:
+            self._tell(1, lists_cells=True)
+            self._run("lattice", (count, 1), maps, None, (_CELLS_GROUP[0] * _CELLS_GROUP[1], 1))
         self._lists.write(bytes(8))
         self._run("direct", cells, maps, picture, _CELLS_GROUP)
-        uneven, self.specular = np.frombuffer(self._lists.read(8), "u4").tolist()
+        uneven, self.specular = self._listed()
         self._run_listed("uneven", uneven, maps, picture)
 
     def glass(self, picture: moderngl.Texture, maps: CausticMaps, step: int) -> Iterator[float]:
@@ -128,11 +137,17 @@ class MovingPicture:
         yield from self._view.follow(self._camera, maps)
         self._run_listed("glass", self.specular, maps, picture)
 
-    def _tell(self, step: int) -> tuple[int, int]:
+    def _listed(self) -> list[int]:
+        """What the last programs have listed from either end."""
+        assert self._lists is not None
+        return list(np.frombuffer(self._lists.read(8), "u4").tolist())
+
+    def _tell(self, step: int, *, lists_cells: bool = False) -> tuple[int, int]:
         """Write the parameters for blocks of this side; how many there are."""
         width, height = (int(side) for side in self._camera["size"][0])
         values = MOVING_PARAMETERS.zeros(1)
         values["lattice"], values["lattice_step"], values["glass_step"] = self._lattice[0].size, LATTICE_STEP, step
+        values["lists_cells"] = lists_cells
         blocks = -(-width // step), -(-height // step)
         values["blocks"] = blocks
         self._parameters.write(values.tobytes())
@@ -154,12 +169,14 @@ class MovingPicture:
         self._parameters.bind_to_uniform_block(BIND_MOVING)
         assert self._lists is not None
         self._lists.bind_to_storage_buffer(BIND_MOVING_LISTS)
-        places, light = self._lattice
+        places, light, cells, marks = self._lattice
         for unit, texture in (
             (IMAGE_PICTURE, picture),
             (IMAGE_VISIBLE, self._visible),
             (IMAGE_PLACES, places),
             (IMAGE_LIGHT, light),
+            (IMAGE_CELLS, cells),
+            (IMAGE_MARKS, marks),
             (IMAGE_CHOSEN, self._chosen if name in ("blocks", "list", "glass") else None),
             (IMAGE_FOUND, self._view.sums[0]),
         ):

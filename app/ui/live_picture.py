@@ -214,9 +214,11 @@ class LivePicture:
         if texture is None and self.shown is not None and key == self._developed:
             return
         self._developed = None if texture is not None else key
-        radiance = self._glare.run(radiance, glare, in_motion=state.interacting)
+        joins = glare > 0.0 and state.interacting and not antialias and radiance.size == self._size
+        scattered = self._glare.halo(radiance, glare, in_motion=True) if joins else None
+        radiance = radiance if joins else self._glare.run(radiance, glare, in_motion=state.interacting)
         look = state.display, self.exposure_ev, self._size
-        self.shown = self._display.run(radiance, *look, texture, state.compare, antialias)
+        self.shown = self._display.run(radiance, *look, texture, state.compare, antialias, halo=scattered)
         self.beside = None
         if texture is not None and state.compare.mode == "beside":
             errors = replace(state.compare, mode="error", holding=False)

@@ -1,7 +1,6 @@
 // A picture in motion, what is seen directly: every pixel looks the caustic maps up. One invocation is for one cell between four points of the
 // lattice and reads once what all its pixels share: on a software renderer reading that for every pixel takes five times as long as the lookups do.
-// Where the points all round a cell agree, on direct light and on which map of which object is shown, both lie between its corners; of shadows and
-// outlines as thin as a cell some point next to it tells. Other pixels are listed for moving_uneven.comp: a program that holds all that these need
+// Where the points of a cell agree, on direct light and on which map of which object is shown (moving_cells.comp), both lie between its corners. Other pixels are listed for moving_uneven.comp: a program that holds all that these need
 // would take twice as long, even where none is.
 layout(local_size_x = 32, local_size_y = 8) in;
 
@@ -10,24 +9,11 @@ layout(local_size_x = 32, local_size_y = 8) in;
 layout(rgba32f, binding = IMAGE_PICTURE) uniform writeonly restrict image2D picture;
 layout(rgba32f, binding = IMAGE_PLACES) uniform readonly restrict image2D places;
 layout(rgba32f, binding = IMAGE_LIGHT) uniform readonly restrict image2D light;
+layout(r32ui, binding = IMAGE_CELLS) uniform readonly restrict uimage2D cells;
 #include "camera/moving_lists.glsl"
 
 // Texels that a pixel is long from which on two lookups stand for it, and up to which these do.
 const float TWO_LOOKUPS = 1.25, MOST_TEXELS = 2.0;
-
-// Which map of which object all of the cell shows; NONE where its pixels look themselves.
-uint map_of(ivec2 cell)
-{
-    ivec2 last = ivec2(m.lattice) - 1;
-    uint key = floatBitsToUint(imageLoad(light, cell).w), map = floatBitsToUint(imageLoad(places, cell).w);
-    bool even = key != 0u;
-    for (int i = 0; i < 16; ++i) {
-        ivec2 off = ivec2(i % 4, i / 4) - 1, point = clamp(cell + off, ivec2(0), last);
-        bool corner = all(greaterThanEqual(off, ivec2(0))) && all(lessThan(off, ivec2(2)));
-        even = even && floatBitsToUint(imageLoad(light, point).w) == key && (!corner || floatBitsToUint(imageLoad(places, point).w) == map);
-    }
-    return even ? map : NONE;
-}
 
 // What lies between a cell's corners.
 struct Corners { vec4 here; vec4 right; vec4 down; vec4 across; };
@@ -109,7 +95,7 @@ void main()
     ivec2 cell = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(cell, ivec2(m.lattice) - 1))) return;
     uvec2 from = uvec2(cell) * m.lattice_step;
-    uint map = map_of(cell);
+    uint map = imageLoad(cells, cell).x;
     Corners lights = Corners(imageLoad(light, cell), imageLoad(light, cell + ivec2(1, 0)), imageLoad(light, cell + ivec2(0, 1)), imageLoad(light, cell + 1));
     // The last points of the lattice lie on the picture's border.
     vec2 side = 1.0 / vec2(max(min(from + m.lattice_step, p.size - 1u) - from, uvec2(1u)));

@@ -1,19 +1,26 @@
 // Direct light, and places in the caustic maps, of every few pixels of a picture in motion: both vary slowly but at outlines and at the edges of
-// shadows, and are the expensive part of what is seen directly. moving_direct.comp looks up the rest.
-layout(local_size_x = 8, local_size_y = 8) in;
+// shadows, and are the expensive part of what is seen directly. First the points of a lattice, then the middles of those cells between them that
+// moving_cells.comp lists.
+layout(local_size_x = 32, local_size_y = 8) in;
 
 #include "camera/moving.glsl"
 
 // Place in the atlas (of a map along a plane's own axes) over depth, one over depth (both are linear over the picture), and which map of which object (`LATTICE_…`).
 layout(rgba32f, binding = IMAGE_PLACES) uniform writeonly restrict image2D places;
-// Radiance by direct light, and a key that two points share where it varies slowly between them; 0: with none.
+// Radiance by direct light.
 layout(rgba32f, binding = IMAGE_LIGHT) uniform writeonly restrict image2D light;
+// What two points share where both vary slowly between them; 0: with none.
+layout(r32ui, binding = IMAGE_MARKS) uniform writeonly restrict uimage2D marks;
+// Which map of which object all of a cell shows; NONE where its pixels look themselves.
+layout(r32ui, binding = IMAGE_CELLS) uniform restrict uimage2D cells;
+#include "camera/moving_lists.glsl"
 
-void main()
+// What one pixel sees directly.
+struct Look { vec4 place; vec4 light; uint mark; };
+
+Look look_at(uvec2 pixel)
 {
-    uvec2 point = gl_GlobalInvocationID.xy;
-    if (any(greaterThanEqual(point, m.lattice))) return;
-    uvec2 pixel = min(point * m.lattice_step, p.size - 1u), first = seen_first(pixel);
+    uvec2 first = seen_first(pixel);
     CameraPath path = path_from(pixel, PIXEL_MIDDLE, 1.0);
     Hit hit = hit_on(first, path);
     bool met = first.y != NONE;
@@ -50,6 +57,25 @@ void main()
     }
 #endif
     uint map = min(placement, LATTICE_MAPS) * LATTICE_OBJECTS + min(hit.object, LATTICE_OBJECTS - 1u);
-    imageStore(places, ivec2(point), vec4(texel.xy / depth, 1.0 / depth, uintBitsToFloat(map)));
-    imageStore(light, ivec2(point), vec4(radiance[0].rgb, uintBitsToFloat(key)));
+    return Look(vec4(texel.xy / depth, 1.0 / depth, uintBitsToFloat(map)), vec4(radiance[0].rgb, 0.0), key == 0u ? 0u : hash_combine(key, map) | 1u);
+}
+
+void main()
+{
+    ivec2 at = ivec2(gl_GlobalInvocationID.xy);
+    bool is_cell = m.lists_cells != 0u;
+    if (is_cell) {
+        uint number = gl_WorkGroupID.x * gl_WorkGroupSize.x * gl_WorkGroupSize.y + gl_LocalInvocationIndex;
+        if (number >= uneven_count) return;
+        at = ivec2(pixels[number] & 0xffffu, pixels[number] >> 16);
+    } else if (any(greaterThanEqual(at, ivec2(m.lattice)))) return;
+    Look look = look_at(min(uvec2(at) * m.lattice_step + (is_cell ? m.lattice_step / 2u : 0u), p.size - 1u));
+    if (is_cell) {
+        // Where its corners have this mark, `cells` holds it.
+        imageStore(cells, at, uvec4(look.mark == imageLoad(cells, at).x ? floatBitsToUint(look.place.w) : NONE));
+    } else {
+        imageStore(places, at, look.place);
+        imageStore(light, at, look.light);
+        imageStore(marks, at, uvec4(look.mark));
+    }
 }

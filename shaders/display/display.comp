@@ -6,10 +6,17 @@
 #ifdef ANTIALIAS
 #include "lib/highlights.glsl"
 #endif
+#ifdef HALO
+#include "display/softened.glsl"
+#endif
 
-layout(local_size_x = 8, local_size_y = 8) in;
+layout(local_size_x = 32, local_size_y = 8) in;
 layout(binding = 0) uniform sampler2D shown;
 layout(binding = 1) uniform sampler2D other;
+#ifdef HALO
+layout(binding = 2) uniform sampler2D halo;
+uniform float kept;
+#endif
 layout(rgba8, binding = 0) uniform writeonly restrict image2D display;
 // A software renderer reads a storage buffer ray by ray, and took as long for that as for all the rest.
 layout(std140, binding = 0) uniform Parameters { DisplayParameters parameters; };
@@ -194,7 +201,11 @@ void main()
 #elif defined(SHOW_WIPE)
     vec3 colour = wiped(vec2(pixel));
 #else
-    vec3 colour = developed(look(shown, vec2(pixel)));
+    vec3 scene = look(shown, vec2(pixel));
+#ifdef HALO
+    scene = kept * scene + between_softened(halo, (vec2(pixel) + 0.5) * parameters.step_uv);
+#endif
+    vec3 colour = developed(scene);
 #endif
     imageStore(display, pixel, vec4(colour, 1.0));
 }

@@ -1,32 +1,21 @@
 // Veiling glare on the device (app/base/glare.py): a picture is shrunk by octaves, each octave's halo is spread on the way back, and the
 // share that the lens scatters is put in place of as much of the picture. Which step this is: HALVE, SHRINK, SPREAD, SOFTEN or JOIN.
-layout(local_size_x = 8, local_size_y = 8) in;
+#include "display/softened.glsl"
+
+// Wide: a software renderer hands every group out by itself.
+layout(local_size_x = 32, local_size_y = 8) in;
 layout(binding = 0) uniform sampler2D fine;     // black beyond its border
 layout(binding = 1) uniform sampler2D coarse;   // likewise, softened
 layout(rgba32f, binding = 0) uniform writeonly restrict image2D made;
 uniform float share;
 
-const float TENT[3] = float[3](0.25, 0.5, 0.25);
-
-// Mean over a tent as wide as two texels to each side, about a texel; black beyond the border.
+// Mean over a tent as wide as two texels to each side, about a texel: of four lookups between texels, beyond whose border the sampler is black.
 vec3 spread(sampler2D of, ivec2 texel)
 {
-    ivec2 size = textureSize(of, 0);
-    vec3 sum = vec3(0.0);
-    for (int j = 0; j < 3; ++j)
-        for (int i = 0; i < 3; ++i) {
-            ivec2 at = texel + ivec2(i, j) - 1;
-            bool inside = all(greaterThanEqual(at, ivec2(0))) && all(lessThan(at, size));
-            sum += inside ? TENT[i] * TENT[j] * texelFetch(of, clamp(at, ivec2(0), size - 1), 0).rgb : vec3(0.0);
-        }
-    return sum;
-}
-
-// One lookup between texels that were softened first (SOFTEN) is the same as one for every part of the tent.
-vec3 between_softened(sampler2D of, vec2 at)
-{
-    vec2 within = vec2(textureSize(of, 0) - 2);
-    return textureLod(of, (at * within + 1.0) / (within + 2.0), 0.0).rgb;
+    vec2 to_uv = 1.0 / vec2(textureSize(of, 0));
+    vec2 low = vec2(texel) * to_uv, high = vec2(texel + 1) * to_uv;
+    return 0.25 * (textureLod(of, low, 0.0).rgb + textureLod(of, vec2(high.x, low.y), 0.0).rgb
+                   + textureLod(of, vec2(low.x, high.y), 0.0).rgb + textureLod(of, high, 0.0).rgb);
 }
 
 void main()

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from spectrasplat.base.glare import OCTAVES, with_glare
+from spectrasplat.edit.state import Display as Settings
 from spectrasplat.gpu.context import Context
+from spectrasplat.passes.display import Display
 from spectrasplat.passes.glare import Glare
 
 SHARE = 0.2
@@ -55,3 +57,25 @@ def test_in_motion_only_the_narrowest_halo_is_missing(gl: Context, height: int, 
 def test_nothing_scattered_costs_nothing(gl: Context) -> None:
     rgb = np.random.default_rng(1).random((8, 12, 3), np.float32)
     assert np.array_equal(scattered(gl, rgb, 0.0), rgb)
+
+
+def test_a_halo_added_on_the_way_to_the_screen_is_the_same(gl: Context) -> None:
+    size = 97, 61
+    rgb = np.random.default_rng(2).random((size[1], size[0], 4), np.float32) ** 8 * 20.0
+    texture = gl.ctx.texture(size, 4, rgb.tobytes(), dtype="f4")
+    glare, display = Glare(gl), Display(gl)
+    try:
+        shown = []
+        for joined in (True, False):
+            picture = glare.run(texture, SHARE, in_motion=True) if joined else texture
+            halo = None if joined else glare.halo(texture, SHARE, in_motion=True)
+            made = display.run(picture, Settings(), 0.0, size, halo=halo)
+            shown.append(np.frombuffer(made.read(), np.uint8).astype(int))
+        plain = np.frombuffer(display.run(texture, Settings(), 0.0, size).read(), np.uint8).astype(int)
+        assert np.abs(shown[0] - shown[1]).max() <= 1 and np.abs(shown[0] - plain).max() > 20
+        with pytest.raises(ValueError, match="pixel for pixel"):
+            display.run(texture, Settings(), 0.0, (50, 30), halo=glare.halo(texture, SHARE))
+    finally:
+        glare.release()
+        display.release()
+        texture.release()

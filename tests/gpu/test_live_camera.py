@@ -342,6 +342,39 @@ def test_in_motion_only_sharp_edges_of_light_are_looked_at_pixel_by_pixel(
     assert max(errors) < 0.03
 
 
+def test_in_motion_cells_beside_a_broad_shadow_are_even_and_those_beside_a_thin_one_are_not(
+    engine: LiveEngine, table: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By the lattice's marks, in numpy: only of cells next to something broad does the device ask more."""
+    monkeypatch.setattr("spectrasplat.render.viewer.live_camera.SCALES", (1.0,))
+    large = replace(inputs(table), width=480, height=270)
+    settle(engine, large)
+    engine.set(
+        replace(large, camera=replace(table.camera, position=tuple(np.add(table.camera.position, (0.3, 0.1, 0.0)))))
+    )
+    engine.advance(5.0, interacting=True)
+    textures = engine._camera_pass._moving._lattice[2:]
+    cells, marks = (np.frombuffer(t.read(), np.uint32).reshape(t.height, t.width) for t in textures)
+    around = np.pad(marks, 1, mode="edge")
+    sides = [around[1:-1, :-2], around[1:-1, 2:], around[:-2, 1:-1], around[2:, 1:-1]]
+    left, right, above, below = (side != marks for side in sides)
+    thin = np.pad((left & right) | (above & below), 1, mode="edge")
+    height, width = cells.shape
+    corners = [around[1 + j : 1 + j + height, 1 + i : 1 + i + width] for j in (0, 1) for i in (0, 1)]
+    even = (corners[0] != 0) & np.all([corner == corners[0] for corner in corners], axis=0)
+    alone, by_thin = np.zeros_like(even), np.zeros_like(even)
+    for j in range(4):
+        for i in range(4):
+            differs = around[j : j + height, i : i + width] != corners[0]
+            alone |= differs
+            by_thin |= differs & thin[j : j + height, i : i + width]
+    looks = cells == 0xFFFFFFFF
+    assert looks[~even].all() and not looks[even & ~alone].any()
+    assert looks[even & by_thin].all() and (even & by_thin).any()
+    broad = even & alone & ~by_thin
+    assert broad.sum() > 20 and looks[broad].mean() < 0.4
+
+
 @pytest.mark.parametrize("size", [(161, 89), (158, 91)])
 def test_in_motion_the_last_rows_and_columns_are_as_sharp_as_the_others(
     engine: LiveEngine, table: Scene, size: tuple[int, int], monkeypatch: pytest.MonkeyPatch
