@@ -312,7 +312,8 @@ EMIT_PARAMETERS = Struct(
         ),
         Field("thinned", "uint", "one bit a cell: are only some of its points emitted?", MASK_SIZE * MASK_SIZE // 32),
         Field("thinned_chance", "float", "of a point in such a cell to be emitted"),
-        Field("reserved", "uint", "", 3),
+        Field("lamp_step", "float", "footprint sides per extent of what a point stands for on the light; 0: a point"),
+        Field("reserved", "uint", "", 2),
     ),
 )
 TRACE_PARAMETERS = Struct(

@@ -132,6 +132,8 @@ class Features:
     """Steps of the way through one tinted glass that photons tell (`model.tint_levels`)."""
     rough: bool = False
     """Some glass has a ground surface, whose microfacets turn paths by chance."""
+    lamp_columns: bool = False
+    """Some light is extended: photons carry how far the light of its other points lands beside theirs."""
 
     @property
     def has_lobe_columns(self) -> bool:
@@ -143,7 +145,7 @@ class Features:
         numbers = {
             "SPECTRAL_GROUPS": self.spectral_groups,
             "TARGETS": self.targets,
-            "COLUMNS": (2 if self.footprints else 0) + self.spectral_groups + (2 if self.has_lobe_columns else 0),
+            "COLUMNS": 2 * (self.footprints + self.has_lobe_columns + self.lamp_columns) + self.spectral_groups,
         }
         switches = {
             "MERGED_GROUPS": self.merged_groups,
@@ -172,6 +174,7 @@ class Features:
             "POLARISED": self.polarised,
             "ROUGH_SURFACES": self.rough,
             "LOBE_COLUMNS": self.has_lobe_columns,
+            "LAMP_COLUMNS": self.lamp_columns,
             "FLIGHTS": self.flights,
         }
         levels = {"TINT_LEVELS": self.tint_levels} if self.tint_levels else {}
@@ -209,6 +212,8 @@ class Features:
         # may be cut, photons carry on what beams leave in bands of the same tables.
         plain = single or hazy or settings.anchor_weights or (beams and not groups)
         told = absorbing and not plain and tint_levels(scene) is not None
+        by_beams = set(beam_objects(scene)) if beams else set()
+        by_photons = any(o.material.is_specular for i, o in enumerate(scene.objects) if i not in by_beams)
         coloured_mirror = any(o.material.is_mirror and o.material.is_coloured for o in scene.objects)
         return Features(
             method=settings.method,
@@ -259,6 +264,7 @@ class Features:
             haze=hazy,
             tint_levels=LEVELS if told else 0,
             rough=any(o.material.is_rough for o in dielectrics),
+            lamp_columns=footprints and not random and by_photons and any(light.has_extent for light in scene.lights),
         )
 
 

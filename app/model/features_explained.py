@@ -106,6 +106,13 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
             if features.rough
             else "all glass is polished",
         ),
+        (
+            "lamp columns",
+            features.lamp_columns,
+            f"photons know how broad {names([light.name for light in scene.lights if light.has_extent])} is"
+            if features.lamp_columns
+            else _no_lamp_words(scene, features),
+        ),
         ("absorption", features.absorption, "some glass absorbs" if features.absorption else "all glass is clear"),
         ("tint levels", features.tint_levels > 0, _tint_words(scene, features)),
         (
@@ -272,6 +279,14 @@ def _beam_words(scene: Scene, features: Features) -> str:
     if any(o.local_dispersion for o in scene.objects):
         return "the dispersion brush was used on a receiver"
     return "no light can be followed as beams"
+
+
+def _no_lamp_words(scene: Scene, features: Features) -> str:
+    if not any(light.has_extent for light in scene.lights):
+        return "every light is a point or parallel"
+    if features.random_wavelength or not features.footprints:
+        return "the method draws places on lights by chance"
+    return "beams carry all light"
 
 
 def _tint_words(scene: Scene, features: Features) -> str:

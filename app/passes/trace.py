@@ -135,6 +135,9 @@ class LatticeSlice:
     """Factor on every weight; a pass uses its photon count, so that passes add up by size."""
     beam_objects: tuple[int, ...] = ()
     """Objects whose light beams carry: photons that meet one of them first end there (`Features.beams`)."""
+    lamp_step: float = 0.0
+    """Sides of a footprint over the extent of what each point stands for on a lamp (`Features.lamp_columns`);
+    0: footprints know of none."""
 
     @property
     def count(self) -> int:
@@ -356,6 +359,7 @@ class TracePass:
         if domain.thinned is not None:
             p["thinned"] = np.packbits(domain.thinned.ravel(), bitorder="little").view("<u4")
         p["thinned_chance"] = domain.thinned_chance
+        p["lamp_step"] = piece.lamp_step
         self._emit_parameters.write(p.tobytes())
         lattices = len(piece.bands) * piece.light_points
         self._trace_values = self._trace_parameters_of(piece.light, lattices, max_depth, piece.beam_objects)

@@ -36,6 +36,8 @@ class LightPlan:
     """Share of the photons."""
     beam_objects: tuple[int, ...] = ()
     """Objects whose light beams carry, not photons."""
+    lamp_step: float = 0.0
+    """`LatticeSlice.lamp_step` if the light had a single point."""
 
     @property
     def lattices(self) -> int:
@@ -66,6 +68,7 @@ class LightPlan:
             self.light_points,
             weight=weight,
             beam_objects=self.beam_objects,
+            lamp_step=self.lamp_step / self.light_points**0.5,
         )
 
 
@@ -134,6 +137,7 @@ class Planner:
                 self.settings.smoothing,
                 budget,
                 self.domains[i].active_share,
+                self.features.lamp_columns,
             )
             aside = 0.0 if anchors is None else shift(anchors[0], i, anchors[1], Dimension.SPECTRAL) / 2.0**32 - 0.5
             bands = self._bands(i, fit, aside)
@@ -143,7 +147,10 @@ class Planner:
                 else self._scattered_points(i, len(bands), budget)
             )
             points = max(1, min(points, self.batch // len(bands)))
-            plan = LightPlan(i, self.domains[i], bands, points, share)
+            # A footprint's standard deviation is its side times the smoothing.
+            has_columns = self.features.lamp_columns and self.scene.lights[i].has_extent
+            lamp_step = 1.0 / self.settings.smoothing if has_columns else 0.0
+            plan = LightPlan(i, self.domains[i], bands, points, share, lamp_step=lamp_step)
             power_of = self.buffers.light_power[i] if self.features.spectral_groups else None
             plans.append(self.division.of(plan, power_of))
         return plans

@@ -179,6 +179,20 @@ void main()
         ray.ddirection[0].xyz = ddirection_ds;
         ray.ddirection[1].xyz = ddirection_dt;
 #endif
+#ifdef LAMP_COLUMNS
+        // Two axes of a normal distribution with the variance of the places that this point stands for on the light.
+#ifdef LIGHT_AREA
+        float reach = p.lamp_step * (p.is_disc != 0u ? 0.5 : inversesqrt(3.0));
+        ray.dposition[COLUMNS - 2].xyz = reach * p.light_u;
+        ray.dposition[COLUMNS - 1].xyz = reach * p.light_v;
+#endif
+#ifdef LIGHT_PLANE
+        float reach = 0.5 * p.lamp_step * p.cone.x;
+        ray.ddirection[COLUMNS - 2].xyz = reach * (p.tangent - dot(p.tangent, direction) * direction);
+        ray.ddirection[COLUMNS - 1].xyz = reach * (p.bitangent - dot(p.bitangent, direction) * direction);
+        for (int c = COLUMNS - 2; c < COLUMNS; ++c) ray.dposition[c].xyz = -p.back * ray.ddirection[c].xyz;
+#endif
+#endif
         uvec4 texels[RayRecord_TEXELS];
         to_texels(ray, texels);
         for (uint i = 0u; i < uint(RayRecord_TEXELS); ++i) rays[2u * k * uint(RayRecord_TEXELS) + i] = texels[i];

@@ -17,8 +17,10 @@ layout(local_size_x = 64) in;
 #ifdef HAS_GRATING
 #include "lib/grating.glsl"
 #endif
-#ifdef ROUGH_SURFACES
+#if defined(ROUGH_SURFACES) || defined(LAMP_COLUMNS)
 #include "lib/footprint.glsl"
+#endif
+#ifdef ROUGH_SURFACES
 #include "lib/rough_surface.glsl"
 #endif
 
@@ -177,6 +179,14 @@ void land(inout RayRecord ray, RayRecord start, uint receiver, uint triangle, Hi
     photon.fan = fan_where_it_landed(ray, start, hit);
 #endif
     uint lattice_bits = p.lattice_bits;
+#ifdef LAMP_COLUMNS
+    // A footprint blurs what light from a point would draw, and an extended light has that coming: the broader of the two is drawn.
+    vec2 fan = unpackHalf2x16(photon.fan);
+    if (cover_sides(hit.normal_g, photon.dposition_ds, photon.dposition_dt, fan, ray.dposition[LAMP].xyz, ray.dposition[LAMP + 1].xyz)) {
+        lattice_bits = 0u;
+        photon.fan = is_within2(fan, FAN_LIMIT) ? packHalf2x16(fan) : 0u;
+    }
+#endif
 #ifdef LOBE_COLUMNS
     if (widen_by_lobe(ray, hit.normal_g, photon.dposition_ds, photon.dposition_dt)) {
         lattice_bits = 0u;

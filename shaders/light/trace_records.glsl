@@ -34,6 +34,8 @@ layout(std430, binding = BIND_STATE) readonly restrict buffer StateBlock { Queue
 #endif
 // Columns after the spectral ones: how far microfacets of rough surfaces spread light.
 #define LOBE (SPATIAL + SPECTRAL_GROUPS)
+// The last ones: how far an extended light spreads what it throws.
+#define LAMP (COLUMNS - 2)
 
 RayRecord load_ray(uint slot)
 {

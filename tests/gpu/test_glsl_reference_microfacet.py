@@ -23,7 +23,7 @@ COVERS = {
         "lobe_part",
     ),
     "rough_energy.glsl": ("regained",),
-    "footprint.glsl": ("join_sides",),
+    "footprint.glsl": ("frame_across", "join_sides", "cover_sides"),
 }
 LIBRARY = ["lib/rough_surface.glsl"]
 COUNT = 4000
@@ -157,3 +157,44 @@ def test_joined_sides_have_both_covariances(gl) -> None:
     made = sum(np.einsum("ni,nj->nij", got[name], got[name]) for name in "uv")
     assert np.abs(made - wanted).max(axis=(1, 2)).max() < 1e-5 * np.trace(wanted, axis1=1, axis2=2).max()
     assert np.abs(optics.dot(got["u"], normal)).max() < 1e-4
+
+
+def test_covered_sides_are_as_broad_as_either_footprint(gl) -> None:
+    rng = np.random.default_rng(8)
+    normal = as_f32(optics.unit(rng.normal(size=(COUNT, 3))))
+    sides = rng.normal(size=(4, COUNT, 3)) * 10.0 ** rng.uniform(-1.0, 0.0, (4, COUNT, 1))
+    sides = as_f32(sides - optics.times(np.einsum("knc,nc->kn", sides, normal), normal))
+    fan = as_f32(rng.normal(size=(COUNT, 2)))
+    body = "u = a; v = b; f = fan; grew = cover_sides(n, u, v, f, c, d) ? 1.0 : 0.0;"
+    inputs = {"n": normal, "fan": fan} | dict(zip("abcd", sides, strict=True))
+    outputs = {"u": "vec3", "v": "vec3", "f": "vec2", "grew": "float"}
+    got = evaluate(gl.ctx, ["lib/footprint.glsl"], body, inputs, outputs, {"LAMP_COLUMNS": 1})
+    s = optics.unit(np.cross(normal, np.where(np.abs(normal[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])))
+    frame = np.stack([s, np.cross(normal, s)], axis=1)
+    flat = np.einsum("nfc,knc->nfk", frame, sides.astype(float))
+    own, other = flat[..., :2], flat[..., 2:]
+    area = np.abs(np.linalg.det(own)) / np.square(own).sum(axis=(1, 2))
+    # Where the other, told by the own sides, is longer than one along an axis, it is kept along that axis.
+    told = np.linalg.solve(own, other)
+    values, vectors = np.linalg.eigh(told @ told.transpose(0, 2, 1))
+    grown = own @ vectors * np.sqrt(np.maximum(values, 1.0))[:, None, :]
+    wanted = grown @ grown.transpose(0, 2, 1)
+    made = np.einsum("nfc,knc->nfk", frame, np.stack([got["u"], got["v"]]).astype(float))
+    covered = made @ made.transpose(0, 2, 1)
+    broad = area > 0.02
+    size = np.trace(wanted, axis1=1, axis2=2)
+    assert broad.sum() > COUNT // 2
+    assert np.abs(covered - wanted)[broad].max(axis=(1, 2)).max() / size[broad].max() < 1e-4
+    grew = got["grew"] > 0.0
+    assert np.array_equal(grew[broad], values[broad, 1] > 1.0)
+    assert np.array_equal(got["u"][~grew], sides[0][~grew])
+    assert (values[broad, 1] < 1.0).any()
+    # The change per unit of length in the plane is what it was.
+    gradient = np.linalg.solve(own.transpose(0, 2, 1), fan[..., None].astype(float))
+    kept = (made.transpose(0, 2, 1) @ gradient)[..., 0]
+    np.testing.assert_allclose(got["f"][broad], kept[broad], atol=2e-3 * np.abs(kept[broad]).max())
+    thin = area < 5e-5
+    assert thin.any()
+    both = own @ own.transpose(0, 2, 1) + other @ other.transpose(0, 2, 1)
+    assert np.abs(covered - both)[thin].max() < 1e-4 * both.max()
+    assert not got["f"][thin].any()

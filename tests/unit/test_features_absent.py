@@ -70,6 +70,7 @@ EVERYTHING = Features(
     coats=True,
     rough_diffuse=True,
     rough=True,
+    lamp_columns=True,
     haze=True,
     flights=True,
 )
@@ -104,6 +105,7 @@ WITHOUT = {
     "landing cuts": {"landing_cuts": False},
     "spatial columns": {
         "footprints": False,
+        "lamp_columns": False,
         "spectral_groups": 0,
         "merged_groups": False,
         "band_cuts": False,
@@ -123,6 +125,7 @@ WITHOUT = {
     "polarisation": {"polarised": False},
     "haze": {"haze": False, "flights": False},
     "rough surfaces": {"rough": False},
+    "lamp columns": {"lamp_columns": False},
     "mirrors": {"mirrors": False},
     "gratings": {"gratings": False},
     "interpolated normals": {"smooth_normals": False, "normal_derivatives": False},
@@ -333,7 +336,7 @@ def test_a_scene_without_dispersion_has_no_spectral_code_nor_columns() -> None:
     forced = replace(features, spectral_groups=1, spectral_weights=True, band_cuts=True)
     plain, carrying = RecordSizes.of(features), RecordSizes.of(forced)
     assert (carrying.ray - plain.ray, carrying.photon - plain.photon) == (32, 16)
-    assert (plain.columns, carrying.columns) == (2, 3)
+    assert (plain.columns, carrying.columns) == (4, 5), "two of the lattice, two of the lamp"
 
 
 def _reasons(scene: Scene) -> dict[str, str]:
@@ -432,7 +435,8 @@ def test_without_beams_photons_need_what_they_always_did(scene: str, anchored: b
     alone, found = (
         Features.of(loaded, RenderSettings(method=method, anchor_weights=anchored)) for method in ("srd", "srd-photons")
     )
-    assert replace(alone, beams=False) == replace(found, method="srd")
+    # Nothing is left to photons that would have to know how broad a lamp is.
+    assert replace(alone, beams=False, lamp_columns=found.lamp_columns) == replace(found, method="srd")
     assert scene != "prism" or alone.reindexed == anchored
 
 

@@ -56,8 +56,9 @@ def static_costs(scene: Scene, features: Features) -> dict[str, str]:
     """By `explain`'s names: what the features that are in add. Those that are out, or add nothing, are not listed."""
     sizes = RecordSizes.of(features)
     unspectral = RecordSizes.of(replace(features, spectral_groups=0))
-    unspatial = RecordSizes.of(replace(features, footprints=False))
+    unspatial = RecordSizes.of(replace(features, footprints=False, lamp_columns=False))
     polished = RecordSizes.of(replace(features, rough=False))
+    from_points = RecordSizes.of(replace(features, lamp_columns=False))
     unpolarised = RecordSizes.of(replace(features, polarised=False))
     untinted = RecordSizes.of(replace(features, tint_levels=0))
     specular = [o for o in scene.objects if o.material.is_specular]
@@ -94,6 +95,7 @@ def static_costs(scene: Scene, features: Features) -> dict[str, str]:
         ),
         "rough diffuse": (features.rough_diffuse, "one more function a light and surface"),
         "rough surfaces": (features.rough, f"{sizes.ray - polished.ray} B a ray"),
+        "lamp columns": (features.lamp_columns, f"{sizes.ray - from_points.ray} B a ray"),
         "mirrors": (features.mirrors, f"{size_words(row * mirrors)} of reflectances"),
         "gratings": (features.gratings, f"{_TEXEL} B an order; a step of the queue for each"),
         "interpolated normals": (features.smooth_normals, f"{3 * _TEXEL} B a facet, {size_words(3 * _TEXEL * smooth)}"),

@@ -131,7 +131,7 @@ def _left_out(name: str, scene: Scene, base: Features, asked: Variant) -> tuple[
                 "without it borders have colours",
             )
         case "spatial columns":
-            bare = replace(plain, footprints=False, normal_derivatives=False)
+            bare = replace(plain, footprints=False, normal_derivatives=False, lamp_columns=False)
             return (
                 Variant(scene, plain),
                 Variant(scene, bare),
@@ -155,6 +155,8 @@ def _left_out(name: str, scene: Scene, base: Features, asked: Variant) -> tuple[
             return asked, Variant(scene, replace(base, polarised=False)), "without it light is weighed another way"
         case "rough surfaces":
             return asked, Variant(scene, replace(base, rough=False)), "without it all glass is polished"
+        case "lamp columns":
+            return asked, Variant(scene, replace(base, lamp_columns=False)), "without it each lamp is drawn as a point"
         case "contacts":
             return asked, Variant(scene, replace(base, contacts=False)), "without it light is lost between surfaces"
         case "medium stack":
@@ -224,6 +226,8 @@ def _forced_in(name: str, scene: Scene, base: Features, asked: Variant) -> tuple
             return Variant(scene, replace(base, dielectrics=True)), asked, ""
         case "rough surfaces":
             return Variant(scene, replace(base, rough=True)), asked, "every surface of width zero"
+        case "lamp columns":
+            return Variant(scene, replace(base, lamp_columns=True)), asked, "every light of no breadth"
         case "mirrors":
             return Variant(scene, replace(base, mirrors=True)), asked, ""
         case "gratings":

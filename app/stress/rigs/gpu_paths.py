@@ -183,11 +183,13 @@ def trace_light(
     method: str = "srd",
     place: tuple[float, float] = (0.5, 0.5),
     polarisation: bool = False,
+    lamp_step: float = 0.0,
 ) -> Photons:
     """All landings of `count` lattice points for each spectral band.
 
     Every interface splits and nothing plays roulette, so each path is there once and with its true flux (1 W
-    per unit of the light's quantity and band). `place` is where on an extended light the rays start.
+    per unit of the light's quantity and band). `place` is where on an extended light the rays start, `lamp_step`
+    how much of it their footprints cover (`LatticeSlice.lamp_step`).
     """
     camera, render = Camera((0, 0, 9), (0, 0, 0), up=(0, 1, 0)), RenderDefaults(polarisation=polarisation)
     scene = Scene("question", camera, (light,), tuple(objects), render=render)
@@ -209,7 +211,10 @@ def trace_light(
             Band(float(lo), float(hi), float(0.5 * (lo + hi)), watts)
             for (lo, hi), watts in zip(ends, powers, strict=True)
         )
-        batch = trace.run(LatticeSlice(0, bands, count, 0, 1, count, SHIFT, (0, 0), 0, SEED, light_place=place), domain)
+        piece = LatticeSlice(
+            0, bands, count, 0, 1, count, SHIFT, (0, 0), 0, SEED, light_place=place, lamp_step=lamp_step
+        )
+        batch = trace.run(piece, domain)
         assert batch.tally.fallbacks["queue_overflow"] == 0
         assert batch.tally.imbalance < FLUX_CLOSURE, f"flux does not close: {batch.tally.imbalance:.3g}"
         records = np.frombuffer(trace.photons.read(), trace.photon.dtype, batch.photons).copy()
