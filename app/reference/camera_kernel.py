@@ -20,7 +20,7 @@ import numpy as np
 from .camera_coat import base_reflectance, coat_albedo, coat_lobe, reflected_by_coat, under_coat
 from .camera_lights import light_seen, sample_light
 from .camera_rays import lens_ray
-from .camera_scene import beyond, picture_at
+from .camera_scene import beyond
 from .compiling import compiled, inlined
 from .environment_draw import draw_by_cosine, draw_direction
 from .photon_emit import search
@@ -29,6 +29,7 @@ from .photon_scene import BLACK, DIFFUSE
 from .polarised import begin_unpolarised
 from .sampling import DIMENSIONS, FIRST_CHOICE, choice, mixed, sobol_next, sobol_start, unit
 from .scattering import AIR, scatter, side_met, transmitted
+from .worn_textures import worn_at
 
 _LENS = np.uint64(0xD1B54A32D192ED03)
 """Sets the numbers for the place on the lens apart from those of Fresnel choices."""
@@ -104,14 +105,9 @@ def _caustic_texel(tables, side, px, py, pz):
 def _surface(scene, pictures, triangle, u, v):
     """A diffuse surface's reflectance at a point: (class, r, g, b); the colour counts in class 0 only."""
     thing = scene.owner[triangle]
-    r, g, b = pictures.colour[thing, 0], pictures.colour[thing, 1], pictures.colour[thing, 2]
-    if pictures.texture[thing] >= 0 and pictures.uv_row[triangle] >= 0:
-        uv, w = pictures.uv[pictures.uv_row[triangle]], 1.0 - u - v
-        tr, tg, tb = picture_at(
-            pictures, pictures.texture[thing], w * uv[0] + u * uv[2] + v * uv[4], w * uv[1] + u * uv[3] + v * uv[5]
-        )
-        r, g, b = r * tr, g * tg, b * tb
-    return scene.reflectance_class[thing], r, g, b
+    r, g, b = worn_at(pictures, thing, triangle, u, v)
+    colour = pictures.colour[thing]
+    return scene.reflectance_class[thing], colour[0] * r, colour[1] * g, colour[2] * b
 
 
 @inlined

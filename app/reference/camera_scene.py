@@ -16,11 +16,11 @@ import numpy as np
 from ..model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz, daylight_per_lumen, rgb_basis
 from ..model.optics.spectrum import cmf_at
 from ..model.scene import Scene
-from ..model.texture import Texture
 from .camera_coat import Finishes, finishes
 from .compiling import inlined
 from .environment_draw import EnvironmentDraw, environment_draw
 from .photon_scene import TABLE_NM, PhotonScene, reflectance_classes
+from .worn_textures import blend, worn_textures
 
 _EVEN_SHARE = 0.2
 """Of the wavelengths: drawn by power, the rest by what the eye sees."""
@@ -166,89 +166,23 @@ def pictures(scene: Scene, photons: PhotonScene, centre: np.ndarray) -> Pictures
     far = np.asarray(scene.background_rgb if beyond is None else beyond.rgb, np.float32).reshape(
         *(beyond.rgb.shape if beyond else (1, 1, 3))
     )
-    textures: list[Texture] = []
-    texture = np.full(len(scene.objects), -1, np.int32)
     colour = np.ones((len(scene.objects), 3))
     for index, item in enumerate(scene.objects):
-        if not item.material.receives or item.material.reflectance is not None:
-            continue
-        colour[index] = item.material.reflectance_rgb
-        if item.material.texture is not None:
-            if not any(t is item.material.texture for t in textures):
-                textures.append(item.material.texture)
-            texture[index] = next(i for i, t in enumerate(textures) if t is item.material.texture)
-    arrays = [*(np.asarray(t.rgb, np.float32) for t in textures), far]
-    first = np.concatenate([[0], np.cumsum([a.shape[0] * a.shape[1] for a in arrays])])
-    repeats = [*(t.wrap == "repeat" for t in textures), False]
-    size = np.array([[f, a.shape[1], a.shape[0], r] for f, a, r in zip(first, arrays, repeats, strict=False)], np.int64)
-    uv_row, uv = _coordinates(scene, photons, centre, texture)
+        if item.material.receives and item.material.reflectance is None:
+            colour[index] = item.material.reflectance_rgb
+    worn = worn_textures(scene, photons, centre)
+    last = (len(worn.rgb), far.shape[1], far.shape[0], 0)
     return Pictures(
-        np.concatenate([a.reshape(-1, 3) for a in arrays]),
-        size,
-        texture,
+        np.concatenate([worn.rgb, far.reshape(-1, 3)]),
+        np.concatenate([worn.size, np.array([last], np.int64)]),
+        worn.texture,
         colour,
-        uv_row,
-        uv,
+        worn.uv_row,
+        worn.uv,
         np.array(beyond.world_to_local, float) if beyond else np.eye(3),
         finishes(scene),
         environment_draw(scene),
     )
-
-
-def _coordinates(
-    scene: Scene, photons: PhotonScene, centre: np.ndarray, texture: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Each triangle's row of texture coordinates (−1: none), in the order of the tree, and the rows (U, 6)."""
-    row = np.full(len(photons.owner), -1, np.int32)
-    if not (texture >= 0).any():
-        return row, np.zeros((1, 6))
-    uv = np.zeros((len(photons.owner), 6))
-    for index, item in enumerate(scene.objects):
-        coordinates = item.mesh.transformed(item.object_to_world).uv
-        if texture[index] >= 0 and coordinates is not None:
-            own = photons.owner == index
-            uv[own] = coordinates.reshape(-1, 6)[photons.facet[own]]
-    worn = np.flatnonzero(texture[photons.owner] >= 0)
-    row[worn] = np.arange(len(worn))
-    return row, np.ascontiguousarray(uv[worn])
-
-
-@inlined
-def _texel(first, width, height, repeats, x, y):
-    """Number of the texel in column x and row y, wherever these lie."""
-    if repeats:
-        return first + (y % height) * width + x % width
-    return first + min(max(y, 0), height - 1) * width + min(max(x, 0), width - 1)
-
-
-@inlined
-def _blend(rgb, a, b, c, d, fx, fy):
-    """Between four texels: a and b above, c and d below."""
-    wa, wb, wc, wd = (1.0 - fx) * (1.0 - fy), fx * (1.0 - fy), (1.0 - fx) * fy, fx * fy
-    return (
-        wa * rgb[a, 0] + wb * rgb[b, 0] + wc * rgb[c, 0] + wd * rgb[d, 0],
-        wa * rgb[a, 1] + wb * rgb[b, 1] + wc * rgb[c, 1] + wd * rgb[d, 1],
-        wa * rgb[a, 2] + wb * rgb[b, 2] + wc * rgb[c, 2] + wd * rgb[d, 2],
-    )
-
-
-@inlined
-def picture_at(pictures, which, u, v):
-    """Linear Rec.709 of a texture at (u, v), v upwards, between the four nearest texels."""
-    first, width, height, repeats = (
-        pictures.size[which, 0],
-        pictures.size[which, 1],
-        pictures.size[which, 2],
-        pictures.size[which, 3] != 0,
-    )
-    x, y = u * width - 0.5, (1.0 - v) * height - 0.5
-    x0, y0 = math.floor(x), math.floor(y)
-    column, row = int(x0), int(y0)
-    a = _texel(first, width, height, repeats, column, row)
-    b = _texel(first, width, height, repeats, column + 1, row)
-    c = _texel(first, width, height, repeats, column, row + 1)
-    d = _texel(first, width, height, repeats, column + 1, row + 1)
-    return _blend(pictures.rgb, a, b, c, d, x - x0, y - y0)
 
 
 @inlined
@@ -270,4 +204,4 @@ def beyond(pictures, dx, dy, dz):
     left, right = int(x0) % width, (int(x0) + 1) % width
     top, bottom = max(int(y0), 0), min(int(y0) + 1, height - 1)
     above, below = first + top * width, first + bottom * width
-    return _blend(pictures.rgb, above + left, above + right, below + left, below + right, x - x0, y - y0)
+    return blend(pictures.rgb, above + left, above + right, below + left, below + right, x - x0, y - y0)

@@ -20,6 +20,7 @@ from .photon_scene import BLACK, DIFFUSE
 from .polarised import begin_unpolarised
 from .sampling import DIMENSIONS, FIRST_CHOICE, choice, mixed, sobol_next, sobol_start
 from .scattering import AIR, scatter, side_met, transmitted
+from .worn_textures import worn_at
 
 EMITTED, DEPOSITED, DIRECT, ABSORBED, ESCAPED, LOST_DEPTH, LOST_NUMERIC = range(7)
 COUNTED = 7
@@ -27,7 +28,7 @@ COUNTED = 7
 
 
 @compiled
-def _deposit(scene, camera, colour, atom, triangle, place, from_front, watt, picture, stack):
+def _deposit(scene, camera, worn, colour, atom, triangle, u, v, place, from_front, watt, picture, stack):
     """Add a landed photon to its pixel; returns (row, column, luminance added), row −1 where the camera does not see
     it."""
     px, py, pz = place
@@ -45,9 +46,10 @@ def _deposit(scene, camera, colour, atom, triangle, place, from_front, watt, pic
     radiance = watt * abs(cosine) * factor / (math.pi * pixel_area)
     thing = scene.owner[triangle]
     rgb = colour.rgb[scene.reflectance_class[thing], atom]
-    r = radiance * rgb[0] * scene.reflectance[thing, 0]
-    g = radiance * rgb[1] * scene.reflectance[thing, 1]
-    b = radiance * rgb[2] * scene.reflectance[thing, 2]
+    red, green, blue = worn_at(worn, thing, triangle, u, v)
+    r = radiance * rgb[0] * scene.reflectance[thing, 0] * red
+    g = radiance * rgb[1] * scene.reflectance[thing, 1] * green
+    b = radiance * rgb[2] * scene.reflectance[thing, 2] * blue
     picture[row, column, 0] += r
     picture[row, column, 1] += g
     picture[row, column, 2] += b
@@ -58,6 +60,7 @@ def _deposit(scene, camera, colour, atom, triangle, place, from_front, watt, pic
 def trace(
     scene,
     camera,
+    worn,
     domain,
     colour,
     sequence,
@@ -114,7 +117,9 @@ def trace(
                     break
                 tally[DEPOSITED] += watt
                 is_front = side_met(scene, triangle, place, dx, dy, dz) == 0
-                y, x, added = _deposit(scene, camera, colour, atom, triangle, place, is_front, watt, picture, stack)
+                y, x, added = _deposit(
+                    scene, camera, worn, colour, atom, triangle, u, v, place, is_front, watt, picture, stack
+                )
                 if y >= 0:
                     tally[COUNTED + 1] += 1.0
                     if pilot:

@@ -102,7 +102,7 @@ class ReferenceRun(PartsRun[ReferencePicture]):
                 "the beauty layer"
             )
         try:
-            from . import photon_emission, photon_kernel, photon_scene, sampling
+            from . import photon_emission, photon_kernel, photon_scene, sampling, worn_textures
         except ImportError as error:
             raise UserError(
                 f"the reference renderer needs numba ({error}); install it with: pip install numba"
@@ -110,6 +110,7 @@ class ReferenceRun(PartsRun[ReferencePicture]):
         self._kernel, self._sampling = photon_kernel, sampling
         self._scene, centre = photon_scene.photon_scene(scene)
         self._camera_pass = photon_scene.viewpoint(scene.camera, width, height, centre)
+        self._worn = worn_textures.worn_textures(scene, self._scene, centre)
         self._max_depth, self._seed = max_depth, seed
         classes, _ = photon_scene.reflectance_classes(scene)
         corners = specular_corners(scene, centre)
@@ -170,6 +171,7 @@ class ReferenceRun(PartsRun[ReferencePicture]):
             self._kernel.trace(
                 self._scene,
                 self._camera_pass,
+                self._worn,
                 domain,
                 colour,
                 sequence,
@@ -216,6 +218,7 @@ class ReferenceRun(PartsRun[ReferencePicture]):
             self._kernel.trace(
                 self._scene,
                 self._camera_pass,
+                self._worn,
                 domain,
                 colour,
                 sequence,

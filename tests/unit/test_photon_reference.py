@@ -35,6 +35,7 @@ from spectrasplat.model.scene import (
     Scene,
     SceneObject,
 )
+from spectrasplat.model.texture import Texture
 from spectrasplat.reference import photon_emission, photon_emit, photon_run, sampling
 from spectrasplat.reference.photon_reference import cached_reference, reference_key, render_reference
 
@@ -112,6 +113,23 @@ def test_absorption_is_beers_law_over_the_way_in_the_glass() -> None:
     tinted, _, _ = through_slab(Absorption(np.full(401, 0.7)))
     # The same photons in both, so the ratio has no noise.
     assert tinted[5, 5, 1] / clear[5, 5, 1] == pytest.approx(math.exp(-0.7 * way), rel=1e-9)
+
+
+def test_a_texture_counts_where_the_photon_lands() -> None:
+    plain, _, _ = slab_scene()
+    red = np.array([0.5, 0.25, 0.125], np.float32)
+    # The pencil lands on a strip of that colour.
+    rgb = np.ones((1, 40, 3), np.float32)
+    tile = math.floor(plain.camera.target[0] + 20.0)
+    rgb[0, tile - 1 : tile + 2] = red
+    floor = plain.objects[1]
+    worn = replace(floor, material=Diffuse((0.8, 0.8, 0.8), texture=Texture(rgb)))
+    without, with_it = (
+        render_reference(scene, 11, 11, photons=1 << 15).rgb[5, 5]
+        for scene in (plain, replace(plain, objects=(plain.objects[0], worn)))
+    )
+    np.testing.assert_allclose(with_it, red * without, rtol=1e-6)
+    assert without.max() > 0.0
 
 
 # ---- every light's power -----------------------------------------------------------------
