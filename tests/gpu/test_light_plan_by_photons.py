@@ -31,24 +31,35 @@ def bands(light: LightPass, photons: int) -> int:
     return max(light.stats.bands.values())
 
 
-def test_bands_grow_with_the_cube_root_of_the_photons_once_footprints_are_narrow(
+def test_bands_grow_with_the_fifth_root_of_the_photons_once_footprints_are_narrow(
     gl: Context, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     light = prepared(gl, "prism_case")
-    few, *many = (bands(light, n) for n in (2_000, 80_000, 160_000, 320_000, 640_000))
-    slope = np.polyfit(np.log([0.5, 1.0, 2.0, 4.0]), np.log(many), 1)[0]
-    assert many[0] > few and abs(slope - 1.0 / 3.0) < 0.05
-    # With a whole texel's tolerance they stay.
-    monkeypatch.setattr(pilot, "NARROW_TEXELS", 1e-9)
-    assert bands(light, 2_000) == bands(light, 640_000) == few
+    photons = [1_000 * 4**i for i in range(5)]
+    rough = bands(light, photons[2])
+    monkeypatch.setattr(pilot, "FEW_OF_A_BAND", 0.0)
+    # Of bands of a few dozen photons the edges are rough: half as many are taken.
+    assert bands(light, photons[2]) > 2 * rough
+    slope = np.polyfit(np.log(photons), np.log([bands(light, n) for n in photons]), 1)[0]
+    assert abs(slope - 0.2) < 0.04
+
+
+def test_bands_grow_with_the_cube_root_of_the_photons_while_footprints_are_broad(
+    gl: Context, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pilot, "LEAST_BROAD", 0.0)
+    light = prepared(gl, "spectrometer")
+    photons = [10_000 * 4**i for i in range(4)]
+    slope = np.polyfit(np.log(photons), np.log([bands(light, n) for n in photons]), 1)[0]
+    assert abs(slope - 1.0 / 3.0) < 0.05
 
 
 def test_broad_footprints_leave_the_bands_as_they_are(gl: Context, monkeypatch: pytest.MonkeyPatch) -> None:
     """With few photons one band is enough: every other one would widen what blurs the picture already."""
     light = prepared(gl, "ball")
-    assert (bands(light, 30_000), bands(light, 200_000), bands(light, 1_000_000)) == (1, 2, 2)
-    monkeypatch.setattr(pilot, "BLURRED", 0.0)
-    assert bands(light, 30_000) == 2
+    assert (bands(light, 30_000), bands(light, 200_000), bands(light, 1_000_000)) == (1, 2, 3)
+    monkeypatch.setattr(pilot.PilotFit, "_broad_texels", lambda fit, lattices: 0.0)
+    assert bands(light, 30_000) > 1
 
 
 def test_weak_branches_keep_their_lattices_where_that_costs_little(gl: Context) -> None:
