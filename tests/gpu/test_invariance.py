@@ -351,11 +351,11 @@ def test_a_floor_may_be_several_objects(gl, tmp_path: Path, monkeypatch: pytest.
     left to miss are footprints that reach over it."""
     strips = 0.8, 0.95, 1.1, 1.25
     whole = picture(gl, ball_over(tmp_path)).sum(axis=(0, 1))
-    np.testing.assert_allclose(picture(gl, ball_over(tmp_path, *strips)).sum(axis=(0, 1)), whole, rtol=0.02)
+    np.testing.assert_allclose(picture(gl, ball_over(tmp_path, *strips)).sum(axis=(0, 1)), whole, rtol=0.012)
     of = Features.of
     monkeypatch.setattr(Features, "of", staticmethod(lambda *asked: replace(of(*asked), landing_cuts=False)))
     uncut = picture(gl, ball_over(tmp_path, *strips)).sum(axis=(0, 1))
-    assert np.all(uncut < [0.96, 0.98, 0.985] * whole)
+    assert np.all(uncut < [0.987, 0.987, 0.985] * whole)
 
 
 @pytest.mark.slow

@@ -26,6 +26,7 @@ class Worker:
         """After each slice."""
         self.share = 1.0
         """Of the time that is given."""
+        self.is_busy = False
 
     def perf_counter(self) -> float:
         return self.now
