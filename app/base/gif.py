@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .atomic import atomic_output, check_writable
+from .film import Film
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -18,32 +17,22 @@ SHORTEST_CS = 2
 """Frames that are shown for less are slowed down by browsers."""
 
 
-class Gif:
+class Gif(Film):
     """A sink of frames (`movie.Sink`); the file appears when it is closed. Its frames are kept until then, a byte a
     pixel."""
 
     def __init__(self, path: Path, size: tuple[int, int], fps: float) -> None:
         """Raises `UserError` where the place cannot be written."""
         check_writable(path)
-        self._path, self._size, self._fps = path, size, fps
+        super().__init__(size)
+        self._path, self._fps = path, fps
         self._frames: list[Image.Image] = []
-
-    def has(self, index: int) -> bool:
-        """It cannot be resumed."""
-        return False
-
-    @contextmanager
-    def claimed(self, index: int) -> Iterator[bool]:
-        """Nobody else writes it."""
-        yield True
 
     def write(self, index: int, codes: np.ndarray) -> None:
         """Append a frame, in the 256 colours that suit it, dithered."""
         from PIL import Image
 
-        width, height = self._size
-        if codes.shape != (height, width, 3) or codes.dtype != np.uint8:
-            raise ValueError(f"a frame is uint8 {(height, width, 3)}, got {codes.dtype} {codes.shape}")
+        self._check(codes)
         self._frames.append(Image.fromarray(codes).quantize(256, dither=Image.Dither.FLOYDSTEINBERG))
 
     def close(self) -> None:

@@ -17,6 +17,7 @@ import numpy as np
 from . import files
 from .atomic import atomic_output, check_writable
 from .errors import UserError
+from .film import Film
 from .gif import Gif
 from .locks import locked
 from .webp_film import WebpFilm, check_size
@@ -45,13 +46,14 @@ class Sink(Protocol):
         """Make what was written usable."""
 
 
-class Movie:
+class Movie(Film):
     """An H.264 MP4 by ffmpeg, which `imageio-ffmpeg` brings along; appears when it is closed."""
 
     def __init__(self, path: Path, size: tuple[int, int], fps: float) -> None:
         """Raises `UserError` where the place cannot be written or there is no ffmpeg."""
         check_writable(path)
-        self._path, self._size = path, size
+        super().__init__(size)
+        self._path = path
         self._output = atomic_output(path)
         temporary = self._output.__enter__()
         # A group of its own: Ctrl-C is for us, and the movie is finished then.
@@ -61,20 +63,9 @@ class Movie:
         )
         self.frames = 0
 
-    def has(self, index: int) -> bool:
-        """A movie cannot be resumed."""
-        return False
-
-    @contextmanager
-    def claimed(self, index: int) -> Iterator[bool]:
-        """Nobody else writes it."""
-        yield True
-
     def write(self, index: int, codes: np.ndarray) -> None:
         """Append a frame; raises `UserError` when ffmpeg has given up."""
-        width, height = self._size
-        if codes.shape != (height, width, 3) or codes.dtype != np.uint8:
-            raise ValueError(f"a frame is uint8 {(height, width, 3)}, got {codes.dtype} {codes.shape}")
+        self._check(codes)
         assert self._process.stdin is not None
         try:
             self._process.stdin.write(np.ascontiguousarray(codes).data)

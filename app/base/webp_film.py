@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import io
 import struct
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 
 from .atomic import atomic_output, check_writable
 from .errors import UserError
+from .film import Film
 
 LARGEST_SIDE = 16383
 """What the format can say."""
@@ -26,7 +25,7 @@ _ANIMATED, _NO_BLENDING = 0x02, 0x02
 _FRAME_CHUNKS = (b"VP8 ", b"VP8L")
 
 
-class WebpFilm:
+class WebpFilm(Film):
     """A sink of frames (`movie.Sink`); the file appears when it is closed. Until then its frames are kept as they are
     compressed."""
 
@@ -34,25 +33,15 @@ class WebpFilm:
         """Raises `UserError` where the place cannot be written, or the pictures are too large for WebP."""
         check_size(path, size)
         check_writable(path)
-        self._path, self._size, self._fps = path, size, fps
+        super().__init__(size)
+        self._path, self._fps = path, fps
         self._frames: list[bytes] = []
-
-    def has(self, index: int) -> bool:
-        """It cannot be resumed."""
-        return False
-
-    @contextmanager
-    def claimed(self, index: int) -> Iterator[bool]:
-        """Nobody else writes it."""
-        yield True
 
     def write(self, index: int, codes: np.ndarray) -> None:
         """Append a frame."""
         from PIL import Image
 
-        width, height = self._size
-        if codes.shape != (height, width, 3) or codes.dtype != np.uint8:
-            raise ValueError(f"a frame is uint8 {(height, width, 3)}, got {codes.dtype} {codes.shape}")
+        self._check(codes)
         into = io.BytesIO()
         Image.fromarray(codes).save(into, format="WEBP", quality=QUALITY, method=4)
         self._frames.append(_bitstream(into.getvalue()))
