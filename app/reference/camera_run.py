@@ -105,7 +105,7 @@ class CameraRun(PartsRun[CameraPicture]):
         self._camera = photon_scene.viewpoint(scene.camera, width, height, centre)
         self._start = camera_start.camera_start(scene, photons)
         self._lights = camera_lights.camera_lights(scene.lights, centre)
-        self._pictures = camera_scene.pictures(scene, photons, centre)
+        self._pictures = camera_scene.pictures(scene, photons)
         self._tables = (
             [caustic.half(number).tables for number in range(2)] if caustic else [spectral_caustic.no_caustic(scene)]
         )

@@ -160,8 +160,8 @@ def with_upsampled_mirrors(photons: PhotonScene, scene: Scene) -> PhotonScene:
     return photons._replace(weights=np.concatenate(rows), weight=weight)
 
 
-def pictures(scene: Scene, photons: PhotonScene, centre: np.ndarray) -> Pictures:
-    """Texels and texture coordinates; `photons`, `centre`: what `photon_scene` made of the scene."""
+def pictures(scene: Scene, photons: PhotonScene) -> Pictures:
+    """Texels and texture coordinates; `photons`: what `photon_scene` made of the scene."""
     beyond = scene.environment
     far = np.asarray(scene.background_rgb if beyond is None else beyond.rgb, np.float32).reshape(
         *(beyond.rgb.shape if beyond else (1, 1, 3))
@@ -170,7 +170,7 @@ def pictures(scene: Scene, photons: PhotonScene, centre: np.ndarray) -> Pictures
     for index, item in enumerate(scene.objects):
         if item.material.receives and item.material.reflectance is None:
             colour[index] = item.material.reflectance_rgb
-    worn = worn_textures(scene, photons, centre)
+    worn = worn_textures(scene, photons)
     last = (len(worn.rgb), far.shape[1], far.shape[0], 0)
     return Pictures(
         np.concatenate([worn.rgb, far.reshape(-1, 3)]),

@@ -110,7 +110,7 @@ class ReferenceRun(PartsRun[ReferencePicture]):
         self._kernel, self._sampling = photon_kernel, sampling
         self._scene, centre = photon_scene.photon_scene(scene)
         self._camera_pass = photon_scene.viewpoint(scene.camera, width, height, centre)
-        self._worn = worn_textures.worn_textures(scene, self._scene, centre)
+        self._worn = worn_textures.worn_textures(scene, self._scene)
         self._max_depth, self._seed = max_depth, seed
         classes, _ = photon_scene.reflectance_classes(scene)
         corners = specular_corners(scene, centre)

@@ -29,8 +29,8 @@ class WornTextures(NamedTuple):
     """float64 (U, 6): u, v at each corner."""
 
 
-def worn_textures(scene: Scene, photons: PhotonScene, centre: np.ndarray) -> WornTextures:
-    """Texels and texture coordinates; `photons`, `centre`: what `photon_scene` made of the scene. What has a spectral
+def worn_textures(scene: Scene, photons: PhotonScene) -> WornTextures:
+    """Texels and texture coordinates; `photons`: what `photon_scene` made of the scene. What has a spectral
     reflectance wears none."""
     textures: list[Texture] = []
     texture = np.full(len(scene.objects), -1, np.int32)
@@ -47,13 +47,11 @@ def worn_textures(scene: Scene, photons: PhotonScene, centre: np.ndarray) -> Wor
         np.concatenate([np.zeros((0, 3), np.float32), *(a.reshape(-1, 3) for a in arrays)]),
         np.array(size, np.int64).reshape(-1, 4),
         texture,
-        *_coordinates(scene, photons, centre, texture),
+        *_coordinates(scene, photons, texture),
     )
 
 
-def _coordinates(
-    scene: Scene, photons: PhotonScene, centre: np.ndarray, texture: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def _coordinates(scene: Scene, photons: PhotonScene, texture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Each triangle's row of texture coordinates (−1: none), in the order of the tree, and the rows (U, 6)."""
     row = np.full(len(photons.owner), -1, np.int32)
     if not (texture >= 0).any():
