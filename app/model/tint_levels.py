@@ -16,11 +16,15 @@ import numpy as np
 from .optics.colorimetry import VISIBLE_NM, cmf_xyz
 from .optics.spectrum import Spectrum
 from .scene import Scene
+from .scene_defaults import surroundings_of
 from .tint_bands import TOLERANCE, mean_chord
 
-LEVELS = 16
-"""Steps. Rounding at random between neighbours is right to (αΔ)²/8: below 1 % of the light that came in wherever a
-glass takes at most twice what it takes on the mean."""
+LEVELS = 32
+"""Steps, as many as a photon's flags hold. Rounding by turns between neighbours is right to (αΔ)²/8: below 0.3 % of
+the light that came in wherever a glass takes at most twice what it takes on the mean. What is left of a step between
+neighbours is grain."""
+DIAGONALS = 8
+"""A way that is usual is at least the body's diagonal by this: the last level is then four diagonals away."""
 MAX_LIGHTS = 4
 """Every level of every light has tables of its own: more lights would take more memory than fewer photons save."""
 
@@ -31,13 +35,16 @@ class TintLevels:
 
     coefficient: np.ndarray
     """float64 (401,), absorption on `VISIBLE_NM`, 1/scene unit."""
+    usual: float
+    """A way that is usual in the body, scene units."""
 
     @cached_property
     def rate(self) -> float:
-        """Root mean square of the absorption by brightness, 1/scene unit: a way w lies at level
-        LEVELS · rw / (1 + rw), so that levels are closest where most light is left."""
+        """1/scene unit: a way w lies at level LEVELS · rw / (1 + rw), so that levels are closest where most light is
+        left. The absorption's root mean square by brightness; in glass so thin or clear that all ways would share
+        the first levels, the reciprocal of the usual way."""
         luminous = cmf_xyz()[:, 1]
-        return float(np.sqrt(self.coefficient**2 @ luminous / luminous.sum()))
+        return max(float(np.sqrt(self.coefficient**2 @ luminous / luminous.sum())), 1.0 / self.usual)
 
     def behind(self, spectrum: Spectrum, level: int) -> Spectrum:
         """What is left of a light at a level."""
@@ -59,9 +66,10 @@ def tint_levels(scene: Scene) -> TintLevels | None:
     most, found = TOLERANCE, None
     for item in scene.objects:
         if item.material.absorption is not None:
-            coefficient = item.material.absorption.coefficient
+            coefficient, chord = item.material.absorption.coefficient, mean_chord(item)
             with np.errstate(under="ignore"):
-                colours = float(np.ptp(np.exp(-coefficient * mean_chord(item))))
+                colours = float(np.ptp(np.exp(-coefficient * chord)))
             if colours > most:
-                most, found = colours, TintLevels(coefficient)
+                usual = max(chord, 2.0 * surroundings_of([item]).radius / DIAGONALS)
+                most, found = colours, TintLevels(coefficient, usual)
     return found
