@@ -32,6 +32,7 @@ from ..passes.map_layout import MapLayout
 from .camera_beams import CameraBeams
 from .device_scene import scene_buffers, spectral_axis
 from .frame_fit import FrameFit, Survey, inputs_of, share_light, stages_to_survey
+from .frame_progress import FrameProgress
 from .light_pass import LightPass
 from .map_picture import map_picture
 from .memory_estimate import MemoryEstimate, check_room, estimate
@@ -44,10 +45,6 @@ _ENVIRONMENT_SHARE = 0.25
 """Of a timed rendering, at most, for the light of the environment."""
 _BOUNCES_SHARE = 0.15
 """Likewise for what receivers give to each other."""
-_ENVIRONMENT_PROGRESS = 0.1
-"""Of the progress where light is traced, where it is not timed."""
-_PHOTON_S, _SAMPLE_S = 10e-6, 3e-6
-"""What a photon and a camera sample of a pixel take, one to the other: progress is weighted by them."""
 _PREPARING, _TRACING, _SEEING = "preparing", "tracing photons", "taking camera samples"
 _ASKING = "asking for the environment's light"
 _BOUNCING = "asking what surfaces give to each other"
@@ -140,8 +137,8 @@ class FrameRenderer:
         """What `steps` is at."""
         self.seconds = FrameSeconds()
         """Of the last frame."""
-        self._light_share = 0.0
-        """Of the last frame's progress, where its light was traced."""
+        self._progress = FrameProgress()
+        """Of the last frame."""
         self.memory: MemoryEstimate | None = None
         """Expected of the last frame that was traced."""
         self.traces = 0
@@ -151,7 +148,7 @@ class FrameRenderer:
 
     def steps(self, stage: Stage, stop: Stop = lambda: False) -> Iterator[float]:
         """Render a frame, pausing with the share done. What was done when `stop()` turned true is a picture too."""
-        self.seconds, self.phase = FrameSeconds(), _PREPARING
+        self.seconds, self.phase, self._progress = FrameSeconds(), _PREPARING, self._progress_of_camera()
         yield from self._survey()
         stage = _with_sun(stage)
         inputs = inputs_of(stage, self._settings)
@@ -170,7 +167,8 @@ class FrameRenderer:
                 yield 0.0
             self.seconds.prepare = time.perf_counter() - self.seconds.started
             sampling, budget = LightSampling.of(stage.scene, self._settings), self._budget
-            self._light_share = self._share_of_light(light, sampling)
+            if light.domains:
+                self._progress.expect_photons(sampling.photons)
             yield from self._ask_environment(traced, stop)
             if budget is not None:
                 if not self._shows_map:
@@ -181,9 +179,7 @@ class FrameRenderer:
                 sampling = replace(sampling, seconds=budget.for_light(self._settings.spp))
             self.phase = _TRACING
             for share in self._fill(light, sampling, stop):
-                begun = 0.0 if traced.environment is None else _ENVIRONMENT_PROGRESS
-                done = self._light_share * (begun + (1.0 - begun) * share)
-                yield done if budget is None else budget.spent
+                yield self._share(self._progress.light(share))
             light.finish()
             light.settle()
             yield from self._ask_bounces(traced, stop)
@@ -233,16 +229,16 @@ class FrameRenderer:
             # An animation may open the lens, through which polygons are not seen.
             if self._traced.camera_beams is not None and stage.camera.lens_radius == 0.0:
                 for _ in self._traced.camera_beams.choosing(*view, sampling.budget, settings.seed):
-                    yield self._share(self._light_share)
+                    yield self._share(self._progress.camera(0.0))
             for _ in sampling.choosing(camera_pass, *view, maps):
-                yield self._share(self._light_share)
+                yield self._share(self._progress.camera(0.0))
             samples = sampling.samples(camera_pass)
         if budget is not None:
             yield from self._see_until(budget, stage, maps, stop)
             self.seconds.camera += time.perf_counter() - started
             return
         for share in camera_pass.samples(*view, samples, 0, maps, settings.seed):
-            yield self._share(self._light_share + (1.0 - self._light_share) * share)
+            yield self._share(self._progress.camera(share))
             # A survey and beams come before the first sample: without it all is black, and without a turn of bands
             # colours are missing.
             turn = min(camera_pass.spectrum.bands, samples)
@@ -268,13 +264,12 @@ class FrameRenderer:
             taken += count
             budget.sample_s = (time.perf_counter() - started) / taken
 
-    def _share_of_light(self, light: LightPass, sampling: LightSampling) -> float:
-        """Of the frame's time, about."""
-        settings = self._settings
-        if self._shows_map or not light.domains:
-            return float(self._shows_map)
-        camera_s = settings.width * settings.height * CameraSampling.of(settings).budget * _SAMPLE_S
-        return sampling.photons * _PHOTON_S / (sampling.photons * _PHOTON_S + camera_s)
+    def _progress_of_camera(self) -> FrameProgress:
+        """Of a frame whose light is there."""
+        settings, progress = self._settings, FrameProgress()
+        if not self._shows_map:
+            progress.expect_samples(settings.width * settings.height * CameraSampling.of(settings).budget)
+        return progress
 
     def _share(self, of_work: float) -> float:
         """Progress: of the time where that is given, else of the work."""
@@ -385,8 +380,7 @@ class FrameRenderer:
         traced.environment = light = EnvironmentLightPass(self._context, traced.buffers, self._settings.seed)
         longest = float("inf") if self._settings.seconds is None else _ENVIRONMENT_SHARE * self._settings.seconds
         for share in light.steps():
-            done = _ENVIRONMENT_PROGRESS * self._light_share * share
-            yield done if self._budget is None else self._budget.spent
+            yield self._share(self._progress.environment(share, light.seconds))
             if light.asked >= LEAST_DIRECTIONS and (light.seconds >= longest or stop()):
                 break
         light.show()
@@ -403,7 +397,7 @@ class FrameRenderer:
         bounces.take(light.scene, light.caustic_maps(), light.map_channels)
         longest = float("inf") if self._settings.seconds is None else _BOUNCES_SHARE * self._settings.seconds
         for _ in bounces.steps():
-            yield self._share(self._light_share)
+            yield self._share(self._progress.light(1.0))
             if bounces.asked >= LEAST_OF_BOUNCES and (bounces.seconds >= longest or stop()):
                 break
         bounces.show()
