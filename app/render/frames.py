@@ -271,7 +271,7 @@ class FrameRenderer:
     def _share_of_light(self, light: LightPass, sampling: LightSampling) -> float:
         """Of the frame's time, about."""
         settings = self._settings
-        if self._shows_map or not light.domains:
+        if self._shows_map or not light.survey.domains:
             return float(self._shows_map)
         camera_s = settings.width * settings.height * CameraSampling.of(settings).budget * _SAMPLE_S
         return sampling.photons * _PHOTON_S / (sampling.photons * _PHOTON_S + camera_s)

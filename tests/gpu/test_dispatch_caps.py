@@ -37,7 +37,7 @@ def traced(context, name: str, seconds: float, method: str = "srd") -> LightPass
     settings = RenderSettings(width=96, height=54, photons=PHOTONS, method=method)
     buffers = scene_buffers(context, scene, settings)
     light = LightPass(context, scene, settings, buffers.features, buffers)
-    light.dispatch_seconds = light._splatting.dispatch_seconds = seconds
+    light.batches.dispatch_seconds = light.batches.splatting.dispatch_seconds = seconds
     light.prepare()
     for canvas in _canvases(light, seconds):
         canvas.dispatch_seconds = seconds
@@ -91,8 +91,8 @@ def test_the_processor_has_no_caps(gl) -> None:
     """Sums in another order would be rounded otherwise from run to run."""
     light = traced(gl, "prism", SLOW, "srd-photons")
     try:
-        assert light._splatting._part is None
-        assert light._portion.units == light.trace.batch
+        assert light.batches.splatting._part is None
+        assert light.batches.budget.units == light.trace.batch
     finally:
         light.release()
         light.buffers.release()
