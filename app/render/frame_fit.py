@@ -11,7 +11,7 @@ import numpy as np
 
 from ..edit.live_inputs import LiveInputs
 from ..edit.parameters import Stage
-from ..gpu.scene_buffers import GpuSpace
+from ..gpu.gpu_space import GpuSpace
 from ..model.optics.glass import Dispersion
 from ..model.scene import Camera
 from ..model.settings import RenderSettings

@@ -150,13 +150,13 @@ def test_records_say_where_a_piece_is(gl, tmp_path: Path) -> None:
             item = int(np.searchsorted(buffers.first_triangle, triangle, side="right")) - 1
             corners = all_corners[item][triangle - buffers.first_triangle[item]]
             if item == 0:
-                normal, offset = np.split(buffers._planes[number & 0x7FFFFFFF].astype(float), [3])
+                normal, offset = np.split(buffers.geometry.solids.planes[number & 0x7FFFFFFF].astype(float), [3])
                 assert number >> 31 and corners @ normal == pytest.approx(float(offset[0]), abs=1e-6)
             else:
-                assert buffers._triangle_order[number] == triangle
+                assert buffers.geometry.triangles.order[number] == triangle
         emission = emission_of(light, False)
         (rays,) = emission.batches(0, 500, 1.0, (0, 0), 5, 10_000)
-        planes = buffers._planes[rays["last_primitive"] & 0x7FFFFFFF]
+        planes = buffers.geometry.solids.planes[rays["last_primitive"] & 0x7FFFFFFF]
         off = np.einsum("ij,ij->i", rays["position"], planes[:, :3]) - planes[:, 3]
         assert np.abs(off).max() < 1e-6 and np.all(rays["last_object"] == 0) and np.all(rays["depth"] == 1)
         inward = np.einsum("ij,ij->i", rays["direction"], planes[:, :3]) < 0.0
