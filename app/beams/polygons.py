@@ -5,7 +5,7 @@ half-planes that move with the wavelength; on a flat receiver each is a line, gi
 spectral coordinate x (`model.optics.spectral_tables`) and linear in x between them. So the light at a place is that of
 an interval of x, cut out by the lines, times a density: no wavelength has to be sampled.
 
-All arrays are float64 and lengths are in GPU space (`gpu.scene_buffers.GpuSpace`) unless they say otherwise.
+All arrays are float64 and lengths are in GPU space (`gpu.gpu_space.GpuSpace`) unless they say otherwise.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from ..model.optics.spectral_tables import SpectralAxis
     from ..model.scene import Scene, SceneObject
-    from .scene_buffers import GpuSpace
+    from .gpu_space import GpuSpace
 
 _BIND_BOXES, _BIND_GAINS = 9, 10
 

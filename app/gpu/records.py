@@ -1,7 +1,7 @@
 """Every record that crosses between Python and GLSL, with units.
 
 "GPU space" is the scene moved and scaled by a power of two so that its refracting and
-reflecting objects lie within about one unit of the origin (`scene_buffers.GpuSpace`): float32
+reflecting objects lie within about one unit of the origin (`gpu_space.GpuSpace`): float32
 then resolves 1e-7 of the glass whatever the scene's own units and origin are.
 Flux stays in watts of the scene; only lengths are scaled.
 """

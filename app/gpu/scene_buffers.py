@@ -1,7 +1,6 @@
-"""The scene as the GPU sees it: triangles with their tree, half-space solids, objects, spectra.
+"""The scene as the GPU sees it: what stands in it (`SceneGeometry`), objects' records, spectra.
 
-Everything is moved and scaled into "GPU space" first (`GpuSpace`), so that float32 resolves the
-glass equally well in a scene of micrometres and in one that stands ten kilometres off the origin.
+Everything is moved and scaled into GPU space first (`GpuSpace`).
 """
 
 from __future__ import annotations
@@ -13,14 +12,10 @@ import moderngl
 import numpy as np
 
 from ..base.errors import UserError
-from ..model.contacts import overlapping_solids, world_bounds
+from ..model.contacts import overlapping_solids
 from ..model.features import (
-    MAX_GROUPS,
     Features,
-    dispersive_materials,
-    half_spaces,
 )
-from ..model.geometry.bvh import Bvh, build_bvh
 from ..model.geometry.mesh import Mesh
 from ..model.optics import rough_glass
 from ..model.optics.colorimetry import VISIBLE_NM, mirror_reflectance
@@ -36,135 +31,13 @@ from ..model.scene import Grating, Light, Scene
 from ..model.tint_bands import tint_curves
 from ..model.tint_levels import TintLevels, tint_levels
 from . import bindings
+from .gpu_space import GpuSpace
 from .records import NONE
-from .scene_texels import SceneTexels, spectra_texture, tree_texels
-from .schema import Field, Struct
+from .scene_geometry import SceneGeometry
+from .scene_records import GRATING, GRATING_ORDER, OBJECT
+from .scene_texels import SceneTexels, spectra_texture
+from .spectral_groups import SAMPLES, Groups, index_slope
 from .texture_store import textured_objects
-
-SAMPLES = 1025
-"""Equally spaced samples of every spectral table over x in [0, 1]; linear interpolation errs below 2e-7 in n."""
-_PLANE_BIT = 0x80000000
-"""Of a primitive's number: a plane of a half-space solid, not a triangle (shaders/lib/intersect.glsl)."""
-
-
-TRIANGLE = Struct(
-    "Triangle",
-    (
-        Field("vertex", "vec3", "first corner, GPU space"),
-        Field("object", "uint", "scene object index"),
-        Field("edge1", "vec3", "second corner minus first"),
-        Field("normals", "uint", "first of three corner normals, or NONE for a flat facet"),
-        Field("edge2", "vec3", "third corner minus first"),
-        Field("source", "uint", "global index before the tree reordered them: objects in scene order"),
-    ),
-    texels=True,
-)
-SOLID = Struct(
-    "Solid",
-    (Field("first_plane", "uint"), Field("plane_count", "uint"), Field("object", "uint"), Field("reserved", "uint")),
-)
-OBJECT = Struct(
-    "Object",
-    (
-        Field("kind", "uint", "0 black, 1 diffuse, 2 mirror, 3 dielectric, 4 grating"),
-        Field("medium", "uint", "row of the index table (dielectric, grating: its wavelength)"),
-        Field(
-            "weight_row", "uint", "row of absorption (1/GPU unit) or reflectance over x, texel of a grating, or NONE"
-        ),
-        Field(
-            "stack_bit", "uint", "bit of this solid in a ray's inside mask, by priority; NONE where it overlaps nothing"
-        ),
-        Field("receiver", "uint", "receiver index, or NONE"),
-        Field("group", "uint", "spectral group of the glass, or NONE"),
-        Field("first_triangle", "uint", "global source index of its first triangle"),
-        Field("texture", "uint", "its picture in the texture store, or NONE"),
-        Field(
-            "colour",
-            "vec4",
-            "linear Rec.709 reflectance (diffuse, mirror); dielectric: GGX's width, its table's row, 0, n_d",
-        ),
-    ),
-    texels=True,
-)
-GRATING = Struct(
-    "Grating",
-    (
-        Field("lines", "vec3", "unit, along the lines"),
-        Field("orders", "uint", "how many follow it in the same section, one GratingOrder each"),
-    ),
-    texels=True,
-)
-GRATING_ORDER = Struct(
-    "GratingOrder",
-    (
-        Field("shift_per_um", "float", "added to a direction's tangential part, per micrometre of wavelength: m / Λ"),
-        Field("efficiency", "float", "share of the light"),
-        Field("left", "float", "share that the orders before have left"),
-        Field("reflects", "uint"),
-    ),
-    texels=True,
-)
-SCENE_STRUCTS = (TRIANGLE, SOLID, OBJECT, GRATING, GRATING_ORDER)
-
-
-@dataclass(frozen=True)
-class GpuSpace:
-    """p_gpu = (p_world - centre) * scale, scale a power of two."""
-
-    centre: np.ndarray
-    scale: float
-
-    @staticmethod
-    def of(scene: Scene) -> GpuSpace:
-        """The space in which the specular objects (else everything) have about unit radius."""
-        chosen = [o for o in scene.objects if o.material.is_specular] or list(scene.objects)
-        bounds = np.stack([world_bounds(o) for o in chosen])
-        low, high = bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
-        radius = 0.5 * float(np.linalg.norm(high - low))
-        return GpuSpace(0.5 * (low + high), 2.0 ** -float(np.round(np.log2(radius))) if radius > 0 else 1.0)
-
-    def to_gpu(self, points: np.ndarray) -> np.ndarray:
-        """World positions (..., 3) → GPU space, float64."""
-        return (np.asarray(points, float) - self.centre) * self.scale
-
-    def to_world(self, points: np.ndarray) -> np.ndarray:
-        """GPU space positions (..., 3) → world, float64."""
-        return np.asarray(points, float) / self.scale + self.centre
-
-
-@dataclass(frozen=True)
-class Groups:
-    """How dispersive glasses share the spectral columns of a photon."""
-
-    glasses: tuple[Dispersion, ...]
-    """Distinct dispersive glasses."""
-    group: tuple[int, ...]
-    """Group of each glass."""
-    count: int
-    by_wavelength: bool
-    """The single group's variable is the wavelength (the paper's λ-column)."""
-
-    @staticmethod
-    def of(scene: Scene, features: Features) -> Groups:
-        glasses = tuple(scene.objects[i].material.dispersion for i in dispersive_materials(scene))
-        count = features.spectral_groups
-        group = tuple(min(i, count - 1) for i in range(len(glasses))) if count else ()
-        return Groups(glasses, group, count, features.merged_groups and len(glasses) <= MAX_GROUPS)
-
-    def variables(self, axis: SpectralAxis) -> np.ndarray:
-        """var_g over x, float64 (count, SAMPLES): n of the glass, or a shared variable."""
-        x = np.linspace(0.0, 1.0, SAMPLES)
-        nm = axis.nm_of_samples(SAMPLES)
-        rows = []
-        for g in range(self.count):
-            members = [glass for glass, owner in zip(self.glasses, self.group, strict=True) if owner == g]
-            if self.by_wavelength:
-                rows.append(nm / 1000.0)
-            elif len(members) == 1:
-                rows.append(members[0].index(nm))
-            else:
-                rows.append(x)
-        return np.array(rows).reshape(self.count, SAMPLES)
 
 
 @dataclass(frozen=True)
@@ -206,23 +79,20 @@ class SceneBuffers:
         self.receivers = [i for i, o in enumerate(scene.objects) if o.material.receives]
         self.traced_glasses = [o.material.dispersion for o in scene.objects]
         """Each object's glass as the records number it, whatever `scene` is replaced by to be shown."""
-        self.first_triangle = np.cumsum([0] + [len(o.mesh.triangles) for o in scene.objects])
         self.world_meshes: list[Mesh] = [
             like.world_meshes[i]
             if like is not None and like.scene.objects[i].object_to_world is o.object_to_world
             else o.mesh.transformed(o.object_to_world)
             for i, o in enumerate(scene.objects)
         ]
-        self.corner_turn: np.ndarray = (
-            np.tile(np.arange(3), (self.first_triangle[-1], 1)) if like is None else like.corner_turn
-        )
-        """int (T, 3): which of its own corners each triangle's first, second and third are on the GPU; T counts all
-        objects' triangles."""
-        self._tree: Bvh | None = None
+        before = None if like is None else like.geometry
+        self.geometry: SceneGeometry
+        self.geometry, self._sections = SceneGeometry.of(scene, self.world_meshes, self.space, features.tree, before)
+        self.triangle_count = len(self._sections.get("TRIANGLES", ()))
+        """Those that are looked for one by one: none of half-space solids."""
         self._buffers: dict[int, moderngl.Buffer] = {}
-        self._sections: dict[str, np.ndarray] = {}
         self.defines: dict[str, int | str] = {**bindings.SCENE_DEFINES, "SPECTRAL_SAMPLES": SAMPLES}
-        self._pack_geometry(like)
+        self._pack_geometry()
         self._pack_objects(like)
         self._pack_profiles()
         self.texels = SceneTexels(ctx, self._sections)
@@ -294,15 +164,18 @@ class SceneBuffers:
     @cached_property
     def primitives(self) -> np.ndarray:
         """uint32 (T,): what a ray that left each triangle has as `last_primitive`; T counts all objects' triangles."""
-        numbers = np.full(self.first_triangle[-1], NONE, np.uint32)
-        numbers[self._triangle_order] = np.arange(len(self._triangle_order))
-        for first, count, index, _ in self._solids:
-            planes = self._planes[first : first + count].astype(float)
-            corners = self.space.to_gpu(self.world_meshes[index].corners())
-            off = np.abs(corners @ planes[:, :3].T - planes[:, 3]).max(axis=1)
-            start = self.first_triangle[index]
-            numbers[start : start + len(corners)] = _PLANE_BIT | (first + off.argmin(axis=1))
-        return numbers
+        return self.geometry.primitives(self.world_meshes, self.space)
+
+    @property
+    def corner_turn(self) -> np.ndarray:
+        """int (T, 3): which of its own corners each triangle's first, second and third are on the GPU; T counts all
+        objects' triangles."""
+        return self.geometry.triangles.corner_turn
+
+    @property
+    def first_triangle(self) -> np.ndarray:
+        """int (objects + 1,): each object's first one among the triangles of all."""
+        return self.geometry.first_triangle
 
     def profile_start(self, light: Light) -> int:
         """Where the light's intensity table begins among the profiles; 0 without one."""
@@ -321,83 +194,21 @@ class SceneBuffers:
         self.__dict__.update(moved.__dict__)
         return True
 
-    def _pack_geometry(self, like: SceneBuffers | None) -> None:
-        corners, owner, source = [], [], []
-        normals: list[np.ndarray] = []
-        solids: list[tuple[int, int, int, int]] = []
-        planes: list[np.ndarray] = []
-        plane_count, known_meshes, convex = 0, set(), half_spaces(self.scene)
-        for index, item in enumerate(self.scene.objects):
-            mesh = self.world_meshes[index]
-            untransformed = convex.get(index)
-            if untransformed is not None:
-                # Of a mesh that stands in many places, they are found once.
-                own = mesh.convex_planes if like is None and id(item.mesh) not in known_meshes else None
-                known_meshes.add(id(item.mesh))
-                if own is None:  # a transform may push a borderline solid over the tolerance
-                    own = _transformed_planes(untransformed, item.object_to_world)
-                solids.append((plane_count, len(own), index, 0))
-                plane_count += len(own)
-                offset = own[:, 3] - own[:, :3] @ self.space.centre
-                planes.append(np.column_stack([own[:, :3], offset * self.space.scale]))
-                continue
-            corners.append(self.space.to_gpu(mesh.corners()))
-            owner.append(np.full(len(mesh.triangles), index))
-            source.append(self.first_triangle[index] + np.arange(len(mesh.triangles)))
-            known = mesh.corner_normals if item.material.is_specular or item.material.has_coat else None
-            normals.append(np.full((len(mesh.triangles), 3, 3), np.nan) if known is None else known)
-
-        solid_records = SOLID.zeros(len(solids))
-        for record, values in zip(solid_records, solids, strict=True):
-            record["first_plane"], record["plane_count"], record["object"], _ = values
-        self.solid_count = len(solids)
-        self._solids, self._triangle_order = solids, np.zeros(0, int)
-        all_planes = np.ascontiguousarray(np.concatenate(planes), "f4") if planes else np.zeros((0, 4), "f4")
-        self.defines["PLANE_COUNT"] = len(all_planes)
-        self._in_storage = max(all_planes.nbytes, solid_records.nbytes) > self.ctx.info["GL_MAX_UNIFORM_BLOCK_SIZE"]
+    def _pack_geometry(self) -> None:
+        solids, tree = self.geometry.solids, self.geometry.triangles.tree
+        self.defines["PLANE_COUNT"] = len(solids.planes)
+        largest = max(solids.planes.nbytes, solids.records.nbytes)
+        self._in_storage = largest > self.ctx.info["GL_MAX_UNIFORM_BLOCK_SIZE"]
         if self._in_storage:
             self.defines["SOLIDS_IN_STORAGE"] = 1
-        self._planes = all_planes
-        if planes:
+        if len(solids.records):
             self._buffers = {
-                bindings.SOLIDS: self.ctx.buffer(solid_records),
-                bindings.PLANES: self.ctx.buffer(all_planes),
+                bindings.SOLIDS: self.ctx.buffer(solids.records),
+                bindings.PLANES: self.ctx.buffer(solids.planes),
             }
-
-        self.triangle_count = sum(len(c) for c in corners)
-        if not corners:
-            self.defines |= {"TRIANGLE_COUNT": 0, "SOLID_COUNT": self.solid_count}
-            return
-        all_corners = np.concatenate(corners).astype("f4")
-        if like is None:
-            turned = _best_corner_first(all_corners)
-            self.corner_turn[np.concatenate(source)] = turned[..., 0]
-        else:
-            turned = self.corner_turn[np.concatenate(source)][..., None]
-        all_corners = np.take_along_axis(all_corners, turned, axis=1)
-        order = np.arange(len(all_corners))
-        if self.features.tree:
-            before = None if like is None else like._tree
-            bvh = self._tree = build_bvh(all_corners) if before is None else before.refitted(all_corners)
-            order = bvh.order
-            self._sections["TREE"] = tree_texels(bvh.nodes)
-            self.defines |= {"TREE_STACK": max(bvh.depth, 1)}
-        all_corners = all_corners[order]
-        records = TRIANGLE.zeros(len(order))
-        records["vertex"] = all_corners[:, 0]
-        records["edge1"] = all_corners[:, 1] - all_corners[:, 0]
-        records["edge2"] = all_corners[:, 2] - all_corners[:, 0]
-        records["object"] = np.concatenate(owner)[order]
-        records["source"] = self._triangle_order = np.concatenate(source)[order]
-        all_normals = np.take_along_axis(np.concatenate(normals), turned, axis=1)[order]
-        smooth = np.isfinite(all_normals).all(axis=(1, 2)) & (np.abs(all_normals).sum(axis=2) > 0).all(axis=1)
-        # A facet whose three corner normals agree is flat: its normal has no derivative to compute.
-        records["normals"] = NONE
-        records["normals"][smooth] = 3 * np.arange(np.count_nonzero(smooth))
-        packed = np.zeros((3 * np.count_nonzero(smooth), 4), "f4")
-        packed[:, :3] = all_normals[smooth].reshape(-1, 3)
-        self._sections |= {"TRIANGLES": records, "NORMALS": packed}
-        self.defines |= {"TRIANGLE_COUNT": self.triangle_count, "SOLID_COUNT": self.solid_count}
+        if tree is not None:
+            self.defines["TREE_STACK"] = max(tree.depth, 1)
+        self.defines |= {"TRIANGLE_COUNT": self.triangle_count, "SOLID_COUNT": len(solids.records)}
 
     def _pack_objects(self, like: SceneBuffers | None) -> None:
         media: list[Dispersion] = []
@@ -523,39 +334,6 @@ def _grating_texels(grating: Grating, object_to_world: np.ndarray) -> np.ndarray
     orders["shift_per_um"], orders["efficiency"] = grating.shift_per_um, grating.efficiency
     orders["left"], orders["reflects"] = grating.left, grating.reflects
     return np.concatenate([record.view("<u4").reshape(-1, 4) for record in (head, orders)])
-
-
-def index_slope(groups: Groups, glass: int | None, axis: SpectralAxis, variables: np.ndarray) -> np.ndarray:
-    """dn/dvar over x of a glass (its number in `groups`) with respect to its group's variable: 1 where n is the
-    variable, 0 without a group."""
-    if glass is None or not groups.count:
-        return np.zeros(SAMPLES)
-    variable = variables[groups.group[glass]]
-    n = groups.glasses[glass].index(axis.nm_of_samples(SAMPLES))
-    if np.array_equal(n, variable):
-        return np.ones(SAMPLES)
-    return np.gradient(n, variable, edge_order=2)
-
-
-def _best_corner_first(corners: np.ndarray) -> np.ndarray:
-    """Order (T, 3, 1) of each triangle's corners, turned so that the edges at the first are nearest to a right angle.
-
-    A needle then has its short edge there. Between its two long ones the normal and the place on the facet would
-    lose as many digits as the needle is thin.
-    """
-    to_next = (np.roll(corners, -1, axis=1) - corners).astype(np.float64)
-    from_last = np.roll(to_next, 1, axis=1)
-    along = np.einsum("tcj,tcj->tc", to_next, from_last)
-    size = np.linalg.norm(to_next, axis=2) * np.linalg.norm(from_last, axis=2)
-    cosine = np.abs(np.divide(along, size, out=np.ones_like(along), where=size > 0.0))
-    return ((cosine.argmin(axis=1)[:, None] + np.arange(3)) % 3)[..., None]
-
-
-def _transformed_planes(planes: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    """Half-spaces n·x <= d under an affine map."""
-    covectors = np.linalg.inv(matrix).T @ np.column_stack([planes[:, :3], -planes[:, 3]]).T
-    covectors = covectors.T / np.linalg.norm(covectors[:3], axis=0)[:, None]
-    return np.column_stack([covectors[:, :3], -covectors[:, 3]])
 
 
 def _stack_bits(scene: Scene) -> dict[int, int]:

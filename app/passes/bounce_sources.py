@@ -17,7 +17,8 @@ from ..gpu import bindings, shader
 from ..gpu.context import Context
 from ..gpu.map_channels import MapChannels
 from ..gpu.records import PLACEMENT, RECEIVER
-from ..gpu.scene_buffers import SCENE_STRUCTS, SceneBuffers
+from ..gpu.scene_buffers import SceneBuffers
+from ..gpu.scene_records import SCENE_STRUCTS
 from ..gpu.schema import Field, Struct
 from ..gpu.texture_store import TextureStore, place_defines
 from ..model.contacts import world_bounds

@@ -21,7 +21,8 @@ from ..gpu.context import Context
 from ..gpu.dispatch_budget import DispatchBudget
 from ..gpu.map_channels import MapChannels
 from ..gpu.records import PLACEMENT, RECEIVER
-from ..gpu.scene_buffers import SCENE_STRUCTS, SceneBuffers
+from ..gpu.scene_buffers import SceneBuffers
+from ..gpu.scene_records import SCENE_STRUCTS
 from ..gpu.schema import Struct
 from ..gpu.texture_store import PICTURE, TextureStore
 from ..model.scene import Camera

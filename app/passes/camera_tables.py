@@ -15,8 +15,9 @@ import moderngl
 import numpy as np
 
 from ..gpu.map_channels import MapChannels
-from ..gpu.scene_buffers import SAMPLES, SceneBuffers, index_slope
+from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.scene_texels import spectra_texture
+from ..gpu.spectral_groups import SAMPLES, index_slope
 from ..model.materials.finish import SMOOTH_ROUGHNESS
 from ..model.optics import rough_glass
 from ..model.optics.coat import coat_tables

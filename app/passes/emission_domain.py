@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..gpu.gpu_space import GpuSpace
 from ..gpu.records import MASK_SIZE
-from ..gpu.scene_buffers import GpuSpace
 from ..model.scene import Light, Scene
 
 _COARSE_ANGLE = 0.15

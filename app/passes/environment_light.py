@@ -24,7 +24,8 @@ from ..base.random_words import random_word
 from ..gpu import bindings, shader
 from ..gpu.context import Context
 from ..gpu.dispatch_budget import DispatchBudget
-from ..gpu.scene_buffers import SCENE_STRUCTS, SceneBuffers
+from ..gpu.scene_buffers import SceneBuffers
+from ..gpu.scene_records import SCENE_STRUCTS
 from ..gpu.schema import Field, Struct
 from ..model.environment_light import EnvironmentLight, even_points, lighting_environment
 from ..model.materials import Grating

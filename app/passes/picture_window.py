@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..gpu.scene_buffers import GpuSpace
+from ..gpu.gpu_space import GpuSpace
 from ..model.camera_rays import camera_frame
 from ..model.scene import Camera
 from .plane_frame import PlaneFrame

@@ -13,7 +13,8 @@ import numpy as np
 from ..gpu import bindings, shader
 from ..gpu.context import Context
 from ..gpu.records import NONE
-from ..gpu.scene_buffers import SCENE_STRUCTS, SceneBuffers
+from ..gpu.scene_buffers import SceneBuffers
+from ..gpu.scene_records import SCENE_STRUCTS
 from ..gpu.schema import Field, Struct
 from ..model.scene_checks import contains
 

@@ -15,7 +15,8 @@ import numpy as np
 
 from ..gpu import bindings, records, shader
 from ..gpu.context import Context
-from ..gpu.scene_buffers import SCENE_STRUCTS, SceneBuffers
+from ..gpu.scene_buffers import SceneBuffers
+from ..gpu.scene_records import SCENE_STRUCTS
 from ..model.features import Features
 from .emission_domain import EmissionDomain
 from .lattice_order import morton_order

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..gpu.scene_buffers import GpuSpace
+from ..gpu.gpu_space import GpuSpace
 from ..model.optics.colorimetry import VISIBLE_NM, cmf_xyz
 from ..model.optics.spectral_tables import SpectralAxis
 from ..model.optics.spectrum import Spectrum, cmf_at

@@ -7,16 +7,13 @@ photons asks and with roulette's numbers of its own, so that a pass is even when
 
 from __future__ import annotations
 
-import threading
 import time
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..beams.find import GoOn
-from ..beams.light_beams import LIGHT_PARTS, BeamFinder, LightBeams
+from ..beams.light_beams import BeamFinder, LightBeams
 from ..beams.polygons import BeamPolygons
 from ..beams.search import (
     SUM_ABSORBED,
@@ -28,17 +25,16 @@ from ..beams.search import (
     SUM_NUMERIC,
     SUM_ROULETTE,
 )
-from ..gpu.beam_tables import BeamTables
 from ..gpu.context import Context
-from ..gpu.map_channels import MapChannels
 from ..gpu.scene_buffers import SceneBuffers
 from ..model.features import is_flat
 from ..model.scene import Scene
-from ..passes.beam_splat import BeamSplatter
 from ..passes.map_atlas import KIND_PICTURE
 from ..passes.map_layout import Landings, MapLayout
 from ..passes.plane_frame import plane_frame
 from ..passes.trace import FluxTally
+from .beam_drawing import BeamDrawing
+from .beam_worker import BeamWorker
 from .light_maps import LightMaps
 from .shown_spectra import ShownSpectra
 
@@ -75,8 +71,6 @@ _SHARE_PHOTONS = 1e5
 240×135: nRMSE 0.0046 with a share of 0.5, 0.0020 with 0.1 for a twentieth more of the processor's time, 0.0016 with
 0.03 for a fifth more."""
 _LEAST_SHARE = 1.0 / 64.0
-_PAUSE_S = 0.003
-"""How long a pause lasts while a search runs beside whoever draws."""
 _ENDS = {
     "deposited": SUM_DEPOSITED,
     "absorbed": SUM_ABSORBED,
@@ -133,39 +127,6 @@ _compiled: list[bool] = []
 """Holds something once a search has run in this process."""
 
 
-class _Canvas:
-    """What draws polygons into maps of so many targets."""
-
-    def __init__(self, context: Context, targets: int) -> None:
-        self._context = context
-        self._splatter = BeamSplatter(context.ctx, targets, context.traits.work_is_queued, context.timers)
-        self._tables: BeamTables | None = None
-
-    def tables(self, buffers: SceneBuffers, shown: ShownSpectra, channels: MapChannels) -> BeamTables:
-        """Made when they are needed."""
-        if self._tables is None:
-            self._tables = BeamTables.build(
-                self._context.ctx, buffers.axis, shown.spectra, shown.reflectances, channels
-            )
-        return self._tables
-
-    @property
-    def splatter(self) -> BeamSplatter:
-        """Its programs."""
-        return self._splatter
-
-    def forget_tables(self) -> None:
-        """Other spectra are shown."""
-        if self._tables is not None:
-            self._tables.release()
-        self._tables = None
-
-    def release(self) -> None:
-        """Free everything."""
-        self.forget_tables()
-        self._splatter.release()
-
-
 class BeamLight:
     """Finds and draws the beams of one scene's lights."""
 
@@ -180,10 +141,9 @@ class BeamLight:
         beside: bool = False,
     ) -> None:
         """`beside`: search in a thread of its own, with pauses in which somebody draws."""
-        self._context, self._scene, self._buffers, self._shown = context, scene, buffers, shown
+        self._context, self._buffers = context, buffers
         self._depth = depth
-        self._worker = ThreadPoolExecutor(1, "beams") if beside else None
-        self._stop = threading.Event()
+        self._worker = BeamWorker(depth, beside=beside)
         self.frames = {
             r: plane_frame(buffers.space.to_gpu(buffers.world_meshes[i].vertices))
             for r, i in enumerate(buffers.receivers)
@@ -199,7 +159,7 @@ class BeamLight:
             buffers.space.scale,
         )
         self._coarse: tuple[MapLayout, BeamFinder] | None = None
-        self._canvases: dict[int, _Canvas] = {}
+        self.drawing = BeamDrawing(context, buffers, shown, self.frames)
         self.carried: dict[int, tuple[int, ...]] = {}
         """By light: the objects whose light beams carry."""
         self.why_not = ""
@@ -219,7 +179,7 @@ class BeamLight:
         light_parts = SURVEY_PARTS if moving is None else MOVING_PARTS
         if not _compiled:
             # The first search of all may have to be compiled, which says nothing about the scene.
-            for _ in self._searched(self.finder, 1.0, _MOVING_WORD, 1, threads=None):
+            for _ in self._worker.searched(self.finder, 1.0, _MOVING_WORD, 1, threads=None):
                 yield COMPILING
             _compiled.append(True)
             yield SEARCHING
@@ -231,12 +191,12 @@ class BeamLight:
             return work < _DEAREST
 
         found = strongest = LightBeams({})
-        for step in self._searched(self.finder, threshold, _MOVING_WORD, light_parts, pays, None):
+        for step in self._worker.searched(self.finder, threshold, _MOVING_WORD, light_parts, pays, None):
             if isinstance(step, LightBeams):
                 found = step
             yield None
         if pays(0):
-            for step in self._searched(self.finder, _SURVEY, _MOVING_WORD, light_parts, pays, None, hands=True):
+            for step in self._worker.searched(self.finder, _SURVEY, _MOVING_WORD, light_parts, pays, None, hands=True):
                 if isinstance(step, LightBeams):
                     strongest = step
                 yield None
@@ -262,7 +222,7 @@ class BeamLight:
         )
         self.finder = self._traced if same else self._traced.shown_as(scene)
         self._coarse = None
-        self._forget_tables()
+        self.drawing.forget_tables()
 
     def lay_out(self, layout: MapLayout) -> None:
         """Polygons will be drawn into maps that lie so."""
@@ -283,12 +243,8 @@ class BeamLight:
 
     def begin(self) -> None:
         """Spectra and glass are now what is shown."""
-        self._forget_tables()
+        self.drawing.forget_tables()
         self.stats = BeamStats()
-
-    def _forget_tables(self) -> None:
-        for canvas in self._canvases.values():
-            canvas.forget_tables()
 
     def steps(
         self, photons: float, weight: float, word: int, maps: LightMaps, *, hands: bool = True
@@ -304,7 +260,7 @@ class BeamLight:
         finest = _finest(_SURVEY, surveyed)
         while True:
             threshold = max(self._threshold(photons, surveyed, growth), finest)
-            for step in self._searched(self.finder, threshold, word, hands=hands):
+            for step in self._worker.searched(self.finder, threshold, word, hands=hands):
                 stats.find_seconds += time.perf_counter() - started
                 if isinstance(step, LightBeams):
                     found = step
@@ -322,7 +278,7 @@ class BeamLight:
         self._count(found)
         if found.polygons is not None:
             drawn = 0
-            for more in self._drawing(found.polygons, maps, weight):
+            for more in self.drawing.steps(found.polygons, maps, weight):
                 drawn += more
                 stats.draw_seconds += time.perf_counter() - started
                 yield 0.5 + 0.5 * drawn / max(drawn, len(found.polygons))
@@ -365,20 +321,8 @@ class BeamLight:
 
     def draw(self, polygons: BeamPolygons, maps: LightMaps, weight: float) -> None:
         """Add polygons to `maps`."""
-        for _ in self._drawing(polygons, maps, weight):
+        for _ in self.drawing.steps(polygons, maps, weight):
             pass
-
-    def _drawing(self, polygons: BeamPolygons, maps: LightMaps, weight: float) -> Iterator[int]:
-        """`draw`, pausing with the number that was added."""
-        targets, channels = maps.atlas.targets, self._shown.channels
-        if targets not in self._canvases:
-            self._canvases[targets] = _Canvas(self._context, targets)
-        canvas = self._canvases[targets]
-        if targets != channels.targets:
-            # A preview's: in colour only.
-            channels = MapChannels(channels.edges_nm)
-        tables = canvas.tables(self._buffers, self._shown, channels)
-        yield from canvas.splatter.steps(polygons, self.frames, maps.layout, tables, maps.atlas, weight)
 
     def draw_found(self, maps: LightMaps, threshold: float) -> None:
         """Draw what the survey found, with the weight that photons for such a `threshold` would have."""
@@ -413,73 +357,9 @@ class BeamLight:
             if isinstance(step, LightBeams):
                 self._survey_polygons = step.polygons
 
-    def _searched(
-        self,
-        finder: BeamFinder,
-        threshold: float,
-        word: int,
-        light_parts: int = LIGHT_PARTS,
-        go_on: GoOn = lambda steps: True,
-        threads: int | None = 1,
-        *,
-        hands: bool = False,
-    ) -> Iterator[float | LightBeams]:
-        """`BeamFinder.find`, beside whoever draws if so asked (by `threads`); stopped where nobody waits for it any
-        more."""
-        if self._worker is None:
-            yield from finder.find(threshold, self._depth, word, light_parts, None, go_on, hands=hands)
-            return
-        while True:
-            self.pause()  # nobody waits for the one before
-            stop, done = threading.Event(), [0.0]
-            self._stop = stop
-            future = self._worker.submit(
-                self._search, finder, threshold, word, light_parts, threads, go_on, stop, done, hands
-            )
-            try:
-                while not future.done():
-                    wait([future], _PAUSE_S)
-                    yield done[0]
-                if not stop.is_set():
-                    yield future.result()
-                    return
-            finally:
-                stop.set()
-
-    def _search(
-        self,
-        finder: BeamFinder,
-        threshold: float,
-        word: int,
-        light_parts: int,
-        threads: int | None,
-        go_on: GoOn,
-        stop: threading.Event,
-        done: list[float],
-        hands: bool,
-    ) -> LightBeams:
-        """In the worker; what is stopped returns nothing of use."""
-        found = LightBeams({})
-        for step in finder.find(
-            threshold,
-            self._depth,
-            word,
-            light_parts,
-            threads,
-            lambda steps: go_on(steps) and not stop.is_set(),
-            hands=hands,
-        ):
-            if stop.is_set():
-                break
-            if isinstance(step, LightBeams):
-                found = step
-            else:
-                done[0] = step
-        return found
-
     def pause(self) -> None:
         """Stop the search that runs beside, for something more urgent; whoever goes on waiting for it begins again."""
-        self._stop.set()
+        self._worker.pause()
 
     def _count(self, found: LightBeams) -> None:
         stats = self.stats
@@ -505,11 +385,8 @@ class BeamLight:
 
     def release(self) -> None:
         """Free everything; a search that runs ends soon."""
-        self.pause()
-        if self._worker is not None:
-            self._worker.shutdown(wait=False, cancel_futures=True)
-        for canvas in self._canvases.values():
-            canvas.release()
+        self._worker.release()
+        self.drawing.release()
 
 
 def _finest(threshold: float, followed: float) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..edit.live_inputs import LiveInputs
 from ..edit.parameters import Stage
-from ..gpu.scene_buffers import GpuSpace
+from ..gpu.gpu_space import GpuSpace
 from ..model.optics.glass import Dispersion
 from ..model.scene import Camera
 from ..model.settings import RenderSettings
@@ -41,7 +41,7 @@ class Survey:
     def of(light: LightPass) -> Survey:
         """Of a light pass that has begun."""
         counts = {plan.index: (len(plan.bands), plan.light_points) for plan in light.plans}
-        return Survey(light.buffers.space, tuple(light.pilots.values()), light.buffers.axis.glasses, counts)
+        return Survey(light.buffers.space, tuple(light.survey.pilots.values()), light.buffers.axis.glasses, counts)
 
 
 @dataclass(frozen=True)

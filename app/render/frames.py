@@ -167,7 +167,7 @@ class FrameRenderer:
                 yield 0.0
             self.seconds.prepare = time.perf_counter() - self.seconds.started
             sampling, budget = LightSampling.of(stage.scene, self._settings), self._budget
-            if light.domains:
+            if light.survey.domains:
                 self._progress.expect_photons(sampling.photons)
             yield from self._ask_environment(traced, stop)
             if budget is not None:

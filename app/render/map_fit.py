@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..gpu.scene_buffers import GpuSpace
+from ..gpu.gpu_space import GpuSpace
 from ..model.scene import Camera
 from ..passes.map_layout import STILL, Fineness
 from ..passes.pilot import Pilot

@@ -9,7 +9,8 @@ from ..base.errors import UserError
 from ..base.memory import available_bytes, picture_bytes, resident_bytes
 from ..model.settings import RenderSettings
 from ..passes.map_layout import MapLayout
-from .light_pass import BEAM_ROUND, LightPass
+from .light_pass import LightPass
+from .pass_rounds import BEAM_ROUND
 
 _MIB = 1 << 20
 _SPLAT_PROGRAMS = 130 * _MIB

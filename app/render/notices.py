@@ -15,7 +15,8 @@ from ..model.scene import Camera
 from ..model.settings import RenderSettings
 from ..passes.bounce_light import BounceLightPass
 from ..passes.environment_light import MAX_EVENTS, EnvironmentLightPass
-from ..passes.map_layout import project
+from ..passes.map_layout import Window, pixel_side, project
+from ..passes.picture_window import PictureWindow
 from ..passes.plane_frame import plane_frame
 from ..passes.texel_map import TexelMap
 from .light_pass import LightPass
@@ -94,9 +95,9 @@ def shares(stats: LightStats) -> dict[str, float]:
 def light_notices(light: LightPass) -> list[str]:
     """Of a light pass that has finished."""
     found = loss_notices(shares(light.stats), light.settings.max_depth)
-    for index in light.domains:
+    for index in light.survey.domains:
         name = light.scene.lights[index].name
-        if light.buffers.light_power[index].band(0.0, 1.0)[3] > 0.0 and not len(light.pilots[index].whole):
+        if light.buffers.light_power[index].band(0.0, 1.0)[3] > 0.0 and not len(light.survey.pilots[index].whole):
             found.append(f"light '{name}': nothing that meets glass or mirrors reaches a receiver; it makes no caustic")
     outside = light.stats.outside_map_w
     drawn = light.stats.drawn_w
@@ -105,13 +106,23 @@ def light_notices(light: LightPass) -> list[str]:
     if light.map_receiver is not None:  # its texels are the picture's
         return found
     for receiver, windows in light.layout.windows.items():
-        pixels = [light.window_pixels(receiver, window) for window in windows]
-        if receiver in light.lit_receivers and pixels and max(pixels) < 1.0:
+        pixels = [_window_pixels(light, receiver, window) for window in windows]
+        if receiver in light.survey.lit_receivers and pixels and max(pixels) < 1.0:
             item = light.scene.objects[light.buffers.receivers[receiver]]
             found.append(
                 f"the caustic map of '{item.name}' is smaller than a pixel; choose a larger --size or come nearer"
             )
     return found
+
+
+def _window_pixels(light: LightPass, receiver: int, window: Window | PictureWindow) -> float:
+    """Longest side of a flat receiver's window, pixels of the picture that maps are fitted to."""
+    if isinstance(window, PictureWindow):
+        return float(window.pixels.max())
+    points = light.buffers.space.to_gpu(light.buffers.world_meshes[light.buffers.receivers[receiver]].vertices)
+    size = light.fit.width, light.fit.height
+    pixel = pixel_side(light.fit.view, light.buffers, plane_frame(points), window, size)
+    return float(window.size.max()) / pixel
 
 
 def picture_notices(light: LightPass, camera: Camera, settings: RenderSettings, rgb: np.ndarray) -> list[str]:
@@ -120,7 +131,7 @@ def picture_notices(light: LightPass, camera: Camera, settings: RenderSettings, 
     if settings.bins or settings.layer not in ("beauty", "caustic") or not np.isfinite(rgb).all():
         return []
     expected, held = 0.0, 0.0
-    for receiver in light.lit_receivers:
+    for receiver in light.survey.lit_receivers:
         if light.layout.windows[receiver]:
             found = _pixels_of(light, receiver, camera, settings)
             about = np.zeros(rgb.shape[:2], bool)

@@ -209,8 +209,9 @@ def _rounds_and_groups(light: LightPass, sampling: LightSampling) -> tuple[int, 
     rounds, groups = 0, []
     for number, photons in enumerate(sizes):
         light.plan(photons, number)
-        rounds += light.rounds(photons)
-        groups.append(-(-light.rounds(photons) // light.rounds_together(photons)))
+        planned = light.pass_of(number, photons)
+        rounds += planned.count
+        groups.append(-(-planned.count // planned.together))
     return rounds, groups
 
 

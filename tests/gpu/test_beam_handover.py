@@ -99,14 +99,14 @@ def emission_of(light: LightPass, two_events: bool) -> BeamEmission:
     """First events of the prism, in the bands of the light's plan."""
     spans = [(band.x_lo, band.x_hi) for band in light.plans[0].bands]
     edges = np.array([spans[0][0], *(hi for _, hi in spans)])
-    pieces = first_events(light.buffers, light.domains[0], 0, edges, two_events)
+    pieces = first_events(light.buffers, light.survey.domains[0], 0, edges, two_events)
     return BeamEmission(light.buffers, light.trace.ray, pieces, [spans])
 
 
 def hand_over(light: LightPass, emission: BeamEmission, count: int, first: int = 0, stride: int = 1) -> None:
     arguments = (0, count, float(PHOTONS), (123456789, 987654321), 77, light.trace.batch, first, stride)
     for rays in emission.batches(*arguments):
-        for _ in light.batch_steps(light.trace.carry_on(rays, 0), RoundOf(0, first, stride, True)):
+        for _ in light.batches.steps(light.trace.carry_on(rays, 0), RoundOf(0, first, stride, True), light.deposit(0)):
             pass
 
 
@@ -119,7 +119,7 @@ def test_what_meets_a_beams_object_first_is_left_to_it(gl, tmp_path: Path) -> No
     found: dict[bool, tuple] = {}
     for beams in (False, True):
         with light_of(gl, scene_of(tmp_path, BESIDE), beams) as light:
-            light._beams = None  # what beams throw themselves is not looked at here
+            light.survey.beam_light = None  # what beams throw themselves is not looked at here
             run(light)
             tally = light.stats.tally
             assert tally.imbalance < 1e-4
@@ -129,7 +129,7 @@ def test_what_meets_a_beams_object_first_is_left_to_it(gl, tmp_path: Path) -> No
             shares = {name: flux / emitted for name, flux in tally.ended.items()}
             shares["beams"] = tally.left_to_beams / emitted
             # Pilots say where light lands, whoever carries it.
-            found[beams] = light.pilots[0].whole, sources, shares
+            found[beams] = light.survey.pilots[0].whole, sources, shares
     assert np.array_equal(found[False][0], found[True][0]) and len(found[True][0])
     assert found[False][1] == {0, 2} and found[True][1] == {2}
     before, after = found[False][2], found[True][2]
@@ -150,13 +150,13 @@ def test_records_say_where_a_piece_is(gl, tmp_path: Path) -> None:
             item = int(np.searchsorted(buffers.first_triangle, triangle, side="right")) - 1
             corners = all_corners[item][triangle - buffers.first_triangle[item]]
             if item == 0:
-                normal, offset = np.split(buffers._planes[number & 0x7FFFFFFF].astype(float), [3])
+                normal, offset = np.split(buffers.geometry.solids.planes[number & 0x7FFFFFFF].astype(float), [3])
                 assert number >> 31 and corners @ normal == pytest.approx(float(offset[0]), abs=1e-6)
             else:
-                assert buffers._triangle_order[number] == triangle
+                assert buffers.geometry.triangles.order[number] == triangle
         emission = emission_of(light, False)
         (rays,) = emission.batches(0, 500, 1.0, (0, 0), 5, 10_000)
-        planes = buffers._planes[rays["last_primitive"] & 0x7FFFFFFF]
+        planes = buffers.geometry.solids.planes[rays["last_primitive"] & 0x7FFFFFFF]
         off = np.einsum("ij,ij->i", rays["position"], planes[:, :3]) - planes[:, 3]
         assert np.abs(off).max() < 1e-6 and np.all(rays["last_object"] == 0) and np.all(rays["depth"] == 1)
         inward = np.einsum("ij,ij->i", rays["direction"], planes[:, :3]) < 0.0
@@ -226,7 +226,7 @@ def test_pieces_of_light_that_diverges(gl, tmp_path: Path) -> None:
         run(light)
         spans = [(band.x_lo, band.x_hi) for band in light.plans[0].bands]
         edges = np.array([spans[0][0], *(hi for _, hi in spans)])
-        pieces = diverging_first_event(light.buffers, light.domains[0], 0, edges, 10)
+        pieces = diverging_first_event(light.buffers, light.survey.domains[0], 0, edges, 10)
         emission = BeamEmission(light.buffers, light.trace.ray, pieces, [spans])
         assert emission.flux_w(0) * PHOTONS == pytest.approx(light.stats.tally.left_to_beams, rel=5e-3)
         hand_over(light, emission, PHOTONS)
@@ -270,7 +270,7 @@ def test_a_laser_has_one_index(gl, tmp_path: Path) -> None:
 
 def test_what_no_table_has_is_refused(gl, tmp_path: Path) -> None:
     with light_of(gl, scene_of(tmp_path), True) as light:
-        pieces = first_events(light.buffers, light.domains[0], 0, np.array([0.25, 0.75]), False)
+        pieces = first_events(light.buffers, light.survey.domains[0], 0, np.array([0.25, 0.75]), False)
         line = replace(pieces, x_lo=pieces.x_hi)
         # A light's only line stands for all of its spectrum, where bands may be cut.
         alone = BeamEmission(light.buffers, light.trace.ray, line, [[(0.0, 1.0)]])

@@ -16,8 +16,7 @@ from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes.trace import Batch
-from spectrasplat.render import batch_size
-from spectrasplat.render import light_pass as light_passes
+from spectrasplat.render import batch_size, pass_rounds
 from spectrasplat.render.device_scene import scene_buffers
 from spectrasplat.render.light_pass import LightPass
 from spectrasplat.render.photon_records import NoRecords, RoundOf
@@ -165,13 +164,13 @@ def test_lines_over_a_continuum_go_by_photons(gl, tmp_path: Path) -> None:
     (lamp,) = scene.lights
     mixed = replace(lamp.spectral_power, lines=((546.1, 2.0),))
     with passed(gl, replace(scene, lights=(replace(lamp, spectral_power=mixed),))) as light:
-        assert light.beams is None and "continuum" in light._beams.why_not
+        assert light.beams is None and "continuum" in light.survey.beam_light.why_not
 
 
 def test_what_is_kept_to_be_shown_again_holds_no_tail(gl, tmp_path: Path) -> None:
     """Weak beams play roulette when they are drawn again: kept tails, 8 % of the light, would count twice."""
     with passed(gl, stone(tmp_path)) as light:
-        assert light.stats.splats > 1000 and light._records.kept == 0
+        assert light.stats.splats > 1000 and light.batches.records.kept == 0
         whole = light.map_flux() * light.map_scale
         light.maps.clear()
         for _ in light.beam_steps_again(float(PHOTONS)):
@@ -185,7 +184,7 @@ def test_what_is_kept_to_be_shown_again_holds_no_tail(gl, tmp_path: Path) -> Non
 def test_rounds_of_photons_have_their_beams_together(gl, tmp_path: Path, monkeypatch) -> None:
     """Beside photons, a few rounds share a search; a pass may only be left where photons have caught up with beams."""
     monkeypatch.setattr(batch_size, "DEFAULT_BATCH", 4096)
-    monkeypatch.setattr(light_passes, "BEAM_LEAST", PHOTONS // 3)
+    monkeypatch.setattr(pass_rounds, "MIN_BEAM_PHOTONS", PHOTONS // 3)
     scene = stone(tmp_path, more=BALL + '\n[[lights]]\nkind = "point"\nposition = [25.0, 0.0, 20.0]')
     with passed(gl, scene) as light:
         assert light.has_beams and not light.only_beams

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from spectrasplat.gpu import bindings
 from spectrasplat.gpu.records import NONE
-from spectrasplat.gpu.scene_buffers import OBJECT, SCENE_STRUCTS, TRIANGLE
+from spectrasplat.gpu.scene_records import OBJECT, SCENE_STRUCTS, TRIANGLE
 from spectrasplat.gpu.scene_texels import SceneTexels
 from spectrasplat.model.contacts import contacts, overlapping_solids
 from spectrasplat.model.geometry.primitives import box, plane

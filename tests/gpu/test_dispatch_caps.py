@@ -13,6 +13,7 @@ from spectrasplat.gpu.device_traits import DeviceTraits
 from spectrasplat.gpu.dispatch_budget import DispatchBudget
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.settings import RenderSettings
+from spectrasplat.passes.beam_splat import BeamSplatter
 from spectrasplat.render.device_scene import scene_buffers
 from spectrasplat.render.light_pass import LightPass
 
@@ -37,10 +38,10 @@ def traced(context, name: str, seconds: float, method: str = "srd") -> LightPass
     settings = RenderSettings(width=96, height=54, photons=PHOTONS, method=method)
     buffers = scene_buffers(context, scene, settings)
     light = LightPass(context, scene, settings, buffers.features, buffers)
-    light.dispatch_seconds = light._splatting.dispatch_seconds = seconds
+    light.batches.dispatch_seconds = light.batches.splatting.dispatch_seconds = seconds
     light.prepare()
-    for canvas in _canvases(light, seconds):
-        canvas.dispatch_seconds = seconds
+    for splatter in _splatters(light):
+        splatter.dispatch_seconds = seconds
     light.begin(PHOTONS, 1)
     sizes: list[int] = []
     steps, splat = light.trace.steps, light.splatter.run
@@ -54,14 +55,14 @@ def traced(context, name: str, seconds: float, method: str = "srd") -> LightPass
     return light
 
 
-def _canvases(light: LightPass, seconds: float) -> list:
+def _splatters(light: LightPass) -> list[BeamSplatter]:
     beams = light.beams
     if beams is None:
         return []
     maps = light._maps
     beams.draw_found(maps, 1.0)
     maps.clear()
-    return [canvas.splatter for canvas in beams._canvases.values()]
+    return list(beams.drawing.splatters.values())
 
 
 @pytest.mark.slow
@@ -74,8 +75,8 @@ def test_slow_devices_get_small_portions_and_the_same_light(queueing, name: str,
         if slowly.beams is None:
             assert min(slowly.sizes) <= 1024 and max(slowly.sizes[-8:]) <= 1024
         if slowly.beams is not None:
-            (canvas,) = slowly.beams._canvases.values()
-            assert canvas.splatter._portion.units == 16
+            (splatter,) = slowly.beams.drawing.splatters.values()
+            assert splatter._portion is not None and splatter._portion.units == 16
         assert slowly.stats.photons == freely.stats.photons
         for texture, other in zip(freely.atlas.total_textures, slowly.atlas.total_textures, strict=True):
             sums, found = (np.frombuffer(t.read(), "f4").astype(float) for t in (texture, other))
@@ -91,8 +92,8 @@ def test_the_processor_has_no_caps(gl) -> None:
     """Sums in another order would be rounded otherwise from run to run."""
     light = traced(gl, "prism", SLOW, "srd-photons")
     try:
-        assert light._splatting._part is None
-        assert light._portion.units == light.trace.batch
+        assert light.batches.splatting._part is None
+        assert light.batches.budget.units == light.trace.batch
     finally:
         light.release()
         light.buffers.release()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from spectrasplat.gpu import bindings
 from spectrasplat.gpu.records import NONE
-from spectrasplat.gpu.scene_buffers import OBJECT, SCENE_STRUCTS, SOLID, TRIANGLE
+from spectrasplat.gpu.scene_records import OBJECT, SCENE_STRUCTS, SOLID, TRIANGLE
 from spectrasplat.gpu.scene_texels import SceneTexels, tree_texels
 from spectrasplat.model.geometry import bvh
 from spectrasplat.reference import optics

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from reference.lamps import cosine, isotropic, lamp, lopsided
 from spectrasplat.gpu import bindings
-from spectrasplat.gpu.scene_buffers import SAMPLES, SCENE_STRUCTS
+from spectrasplat.gpu.scene_records import SCENE_STRUCTS
 from spectrasplat.gpu.scene_texels import spectra_texture
+from spectrasplat.gpu.spectral_groups import SAMPLES
 from spectrasplat.model.optics.catalogue import find
 from spectrasplat.model.optics.spectral_tables import SpectralAxis, cumulative, wavelength_cdf
 from spectrasplat.model.optics.spectrum import Spectrum, constant, illuminant

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from reference import microfacet
 from spectrasplat.gpu import bindings
-from spectrasplat.gpu.scene_buffers import SAMPLES, SCENE_STRUCTS
+from spectrasplat.gpu.scene_records import SCENE_STRUCTS
 from spectrasplat.gpu.scene_texels import spectra_texture
+from spectrasplat.gpu.spectral_groups import SAMPLES
 from spectrasplat.model.optics import rough_glass
 from spectrasplat.reference import optics, random_numbers, rough_albedo
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from reference import queue
 from spectrasplat.gpu import bindings, records, shader
-from spectrasplat.gpu.scene_buffers import SCENE_STRUCTS
+from spectrasplat.gpu.scene_records import SCENE_STRUCTS
 
 CATEGORIES, FALLBACKS = len(records.CATEGORIES), len(records.FALLBACKS)
 PHOTON = records.photon_record(1)

@@ -10,7 +10,7 @@ import pytest
 from reference import gaussians, medium
 from spectrasplat.gpu import bindings
 from spectrasplat.gpu.records import NONE
-from spectrasplat.gpu.scene_buffers import OBJECT, SCENE_STRUCTS, TRIANGLE
+from spectrasplat.gpu.scene_records import OBJECT, SCENE_STRUCTS, TRIANGLE
 from spectrasplat.gpu.scene_texels import SceneTexels, spectra_texture
 from spectrasplat.gpu.schema import Struct
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate

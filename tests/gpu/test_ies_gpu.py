@@ -84,7 +84,7 @@ def test_a_turn_about_the_axis_is_a_turn_of_the_c0_plane(gl, tmp_path: Path) -> 
 
 def test_dark_directions_get_no_photons(gl, tmp_path: Path) -> None:
     """The cone that holds the light bounds the domain; a lamp that shines away from the glass has none."""
-    from spectrasplat.gpu.scene_buffers import GpuSpace
+    from spectrasplat.gpu.gpu_space import GpuSpace
 
     narrow = ies_text(lambda v, h: np.where(v <= 5.0, 100.0, 0.0), [0.0, 5.0, 10.0, 90.0])
     down = lamp(tmp_path, POWER, narrow, position=(0.0, 0.0, 3.0))

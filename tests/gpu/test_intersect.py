@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from spectrasplat.gpu import bindings
 from spectrasplat.gpu.records import NONE
-from spectrasplat.gpu.scene_buffers import OBJECT, SCENE_STRUCTS, TRIANGLE
+from spectrasplat.gpu.scene_records import OBJECT, SCENE_STRUCTS, TRIANGLE
 from spectrasplat.gpu.scene_texels import SceneTexels, tree_texels
 from spectrasplat.model.geometry.bvh import build_bvh
 from spectrasplat.model.geometry.primitives_round import sphere

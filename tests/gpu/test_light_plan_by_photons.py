@@ -67,7 +67,7 @@ def test_weak_branches_keep_their_lattices_where_that_costs_little(gl: Context) 
     slit, ball = prepared(gl, "prism_case"), prepared(gl, "ball")
     for light, threshold in ((slit, pilot.KEPT_THRESHOLDS[0]), (ball, pilot.KEPT_THRESHOLDS[-1])):
         assert light.trace.split_threshold == threshold
-    by_default, kept, *_ = next(iter(slit.pilots.values())).flights
+    by_default, kept, *_ = next(iter(slit.survey.pilots.values())).flights
     assert by_default < kept <= pilot.MOST_MORE_FLIGHTS * by_default
     # Six pilots have traced the same rays, each of which flies once at least.
     assert by_default > slit.trace.rays_traced / 6
@@ -76,9 +76,9 @@ def test_weak_branches_keep_their_lattices_where_that_costs_little(gl: Context) 
 def test_weak_branches_that_the_queues_have_no_room_for_play_roulette(gl: Context) -> None:
     """Little work besides, but each of a grating's orders is a lattice of its own, all in flight at once."""
     light = prepared(gl, "spectrometer")
-    by_default, kept = (sum(pilot.flights[i] for pilot in light.pilots.values()) for i in range(2))
+    by_default, kept = (sum(pilot.flights[i] for pilot in light.survey.pilots.values()) for i in range(2))
     assert kept < pilot.MOST_MORE_FLIGHTS * by_default
-    assert max(pilot.fullness[0] for pilot in light.pilots.values()) > 1.0
+    assert max(pilot.fullness[0] for pilot in light.survey.pilots.values()) > 1.0
     assert light.trace.split_threshold == SPLIT_THRESHOLD
 
 

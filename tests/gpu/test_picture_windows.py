@@ -10,8 +10,8 @@ import pytest
 from reference.beam_polygons import polygon, regular
 from reference.beam_rig import PLANE, BeamRig, all_of
 from spectrasplat.base.paths import assets_dir
+from spectrasplat.gpu.gpu_space import GpuSpace
 from spectrasplat.gpu.records import PLACEMENT, RECEIVER
-from spectrasplat.gpu.scene_buffers import GpuSpace
 from spectrasplat.gpu.tiles import pack
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.scene import Camera

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from spectrasplat.gpu import scene_buffers
+from spectrasplat.gpu.gpu_space import GpuSpace
 from spectrasplat.model.optics.glass import from_abbe
 from spectrasplat.model.scene import Scene
 from spectrasplat.stress.case import Case
@@ -63,9 +63,7 @@ def test_a_stone_ten_thousand_extents_off_looks_the_same(gl, monkeypatch: pytest
     monkeypatch.setattr(camera_solid_cases, "CHANGES", camera_solid_cases.CHANGES[-1:])
     (found,) = camera_solid_cases.measure_scale(gl)
     assert found.broken() == []
-    monkeypatch.setattr(
-        scene_buffers.GpuSpace, "of", staticmethod(lambda scene: scene_buffers.GpuSpace(np.zeros(3), 1.0))
-    )
+    monkeypatch.setattr(GpuSpace, "of", staticmethod(lambda scene: GpuSpace(np.zeros(3), 1.0)))
     (found,) = camera_solid_cases.measure_scale(gl)
     assert "error of picture" in "; ".join(found.broken())
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from spectrasplat.gpu import scene_buffers
+from spectrasplat.gpu import scene_geometry
 from spectrasplat.gpu.records import FLAG_FOOTPRINT_DROPPED
 from spectrasplat.model.geometry.primitives_round import ellipsoid
 from spectrasplat.model.scene import Diffuse
@@ -157,7 +157,7 @@ def test_case_notices_a_mistake_in_a_shader(gl, monkeypatch: pytest.MonkeyPatch,
 
 def test_needles_notice_triangles_begun_at_any_corner(gl, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
-        scene_buffers,
+        scene_geometry,
         "_best_corner_first",
         lambda corners: np.broadcast_to(np.arange(3)[None, :, None], (len(corners), 3, 1)),
     )
@@ -172,7 +172,7 @@ def test_triangles_begin_at_the_corner_nearest_to_a_right_angle() -> None:
         np.array([np.roll(needle, k, axis=0) for k in range(3)] + [[[0, 1, 0], [0, 0, 0], [1, 0, 0]]])
         @ np.linalg.qr(rng.normal(size=(3, 3)))[0]
     )
-    order = scene_buffers._best_corner_first(triangles)
+    order = scene_geometry._best_corner_first(triangles)
     turned = np.take_along_axis(triangles, order, axis=1)
     edges = turned[:, 1:] - turned[:, :1]
     cosine = np.abs(np.sum(edges[:, 0] * edges[:, 1], axis=1)) / np.prod(np.linalg.norm(edges, axis=2), axis=1)
@@ -183,7 +183,7 @@ def test_triangles_begin_at_the_corner_nearest_to_a_right_angle() -> None:
         np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]),
         atol=1e-12,
     )
-    assert scene_buffers._best_corner_first(np.zeros((1, 3, 3))).shape == (1, 3, 1)
+    assert scene_geometry._best_corner_first(np.zeros((1, 3, 3))).shape == (1, 3, 1)
 
 
 def test_a_wrong_reference_does_not_agree(gl, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -87,7 +87,7 @@ def prepared(gl: Context, hole: Opening) -> LightPass:
 def between_points(light: LightPass) -> Opening:
     """A hole in the sheet through which no point of the pilot passes: as far from all as there is, and from the
     slit."""
-    domain, count = light.domains[0], light.pilots[0].lattice_count
+    domain, count = light.survey.domains[0], light.survey.pilots[0].lattice_count
     unit = lattice_point(np.arange(count), count, (0, 0))
     places = domain.origin + (domain.rect[:2] + unit * domain.rect[2:]) @ np.stack([domain.tangent, domain.bitangent])
     points = light.buffers.space.to_world(places)[:, :2]
@@ -111,14 +111,14 @@ def light(gl: Context) -> Iterator[LightPass]:
 
 def renderings(light: LightPass, domain: EmissionDomain) -> tuple[np.ndarray, np.ndarray]:
     """What lands and what is emitted in each of SEEDS renderings, W."""
-    guided, sums = light.domains, []
-    light.domains = {0: domain}
+    guided, sums = light.survey.domains, []
+    light.survey.domains = {0: domain}
     for seed in range(SEEDS):
         light.begin(PHOTONS, 1 + seed)
         light.run_pass(0, PHOTONS, lambda _: True)
         tally = light.stats.tally
         sums.append(np.array([tally.ended["deposited"], tally.emitted]) * light.map_scale)
-    light.domains = guided
+    light.survey.domains = guided
     return tuple(np.array(sums).T)
 
 
@@ -134,7 +134,7 @@ def transmitted_w() -> float:
 
 
 def test_a_blocked_beam_lands_whole(light: LightPass) -> None:
-    domain = light.domains[0]
+    domain = light.survey.domains[0]
     assert domain.thinned is not None and domain.active_share < 0.4 * domain.mask.mean()
     found, emitted = renderings(light, domain)
     assert p_value(found, transmitted_w()) > ALPHA
@@ -149,7 +149,7 @@ def test_a_blocked_beam_lands_whole(light: LightPass) -> None:
 
 
 def test_more_of_the_photons_land(light: LightPass) -> None:
-    guided = light.domains[0]
+    guided = light.survey.domains[0]
     landed = []
     for domain in (guided, replace(guided, thinned=None, thinned_chance=1.0)):
         found, _ = renderings(light, domain)

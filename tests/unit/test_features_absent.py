@@ -16,7 +16,7 @@ from spectrasplat.bench.features.symbol_proof import FEATURE_SYMBOLS, occurring,
 from spectrasplat.gpu import records, shader
 from spectrasplat.gpu.limits import BRUSH_STORAGE_BLOCKS, NEEDED
 from spectrasplat.gpu.program_use import use_of
-from spectrasplat.gpu.scene_buffers import SCENE_STRUCTS
+from spectrasplat.gpu.scene_records import SCENE_STRUCTS
 from spectrasplat.gpu.texture_store import PICTURE
 from spectrasplat.model.features import Features
 from spectrasplat.model.features_explained import explain

@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 
 from ...gpu.mip_chain import level_count
 from ...gpu.records import photon_record, ray_record_of
-from ...gpu.scene_buffers import SAMPLES, TRIANGLE
+from ...gpu.scene_records import TRIANGLE
+from ...gpu.spectral_groups import SAMPLES
 from ...model.contacts import contacts, overlapping_solids
 from ...model.features import Features, beam_objects, half_spaces
 from ...model.scene import Scene

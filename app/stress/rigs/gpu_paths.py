@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...gpu.context import Context
-from ...gpu.scene_buffers import Groups, SceneBuffers
+from ...gpu.scene_buffers import SceneBuffers
+from ...gpu.spectral_groups import Groups
 from ...model.features import Features
 from ...model.geometry.mesh import Mesh, make_mesh
 from ...model.lights import CollimatedLight

@@ -1,0 +1,172 @@
+"""Shapes of a scene packed for the GPU: triangles with their tree, and solids that are intersections of half-spaces."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..model.features import half_spaces
+from ..model.geometry.bvh import Bvh, build_bvh
+from ..model.geometry.mesh import Mesh
+from ..model.scene import Scene, SceneObject
+from .gpu_space import GpuSpace
+from .records import NONE
+from .scene_records import SOLID, TRIANGLE
+from .scene_texels import tree_texels
+
+_PLANE_BIT = 0x80000000
+"""Of a primitive's number: a plane of a half-space solid, not a triangle (shaders/lib/intersect.glsl)."""
+
+
+@dataclass(frozen=True)
+class Solids:
+    """Objects that are intersections of half-spaces."""
+
+    records: np.ndarray
+    """SOLID (S,)."""
+    planes: np.ndarray
+    """float32 (P, 4): n·x <= d, GPU space."""
+
+    @staticmethod
+    def of(scene: Scene, meshes: Sequence[Mesh], space: GpuSpace, *, moved: bool) -> Solids:
+        """`meshes`: in the world; `moved`: of a scene that was packed before, in which objects stand elsewhere."""
+        found: list[tuple[int, np.ndarray]] = []
+        known_meshes = set()
+        for index, untransformed in half_spaces(scene).items():
+            item, mesh = scene.objects[index], meshes[index]
+            # Of a mesh that stands in many places, they are found once.
+            own = mesh.convex_planes if not moved and id(item.mesh) not in known_meshes else None
+            known_meshes.add(id(item.mesh))
+            if own is None:  # a transform may push a borderline solid over the tolerance
+                own = _transformed_planes(untransformed, item.object_to_world)
+            offset = own[:, 3] - own[:, :3] @ space.centre
+            found.append((index, np.column_stack([own[:, :3], offset * space.scale])))
+        records = SOLID.zeros(len(found))
+        counts = [len(planes) for _, planes in found]
+        records["object"] = [index for index, _ in found]
+        records["plane_count"], records["first_plane"] = counts, np.cumsum([0, *counts])[:-1]
+        planes = np.concatenate([planes for _, planes in found]) if found else np.zeros((0, 4))
+        return Solids(records, np.ascontiguousarray(planes, "f4"))
+
+
+@dataclass(frozen=True)
+class Triangles:
+    """All other objects, as the tree orders their triangles."""
+
+    order: np.ndarray
+    """int (N,): each one's number among the triangles of all objects, in their order."""
+    corner_turn: np.ndarray
+    """`SceneBuffers.corner_turn`."""
+    tree: Bvh | None
+
+    @staticmethod
+    def of(
+        scene: Scene,
+        meshes: Sequence[Mesh],
+        space: GpuSpace,
+        first: np.ndarray,
+        loose: Sequence[int],
+        has_tree: bool,
+        before: Triangles | None,
+    ) -> tuple[Triangles, dict[str, np.ndarray]]:
+        """With the sections of `SceneTexels`, which nobody needs once they are uploaded. `first`:
+        `SceneGeometry.first_triangle`; `loose`: objects that are no `Solids`; `before`: of a scene in which they only
+        stood elsewhere."""
+        corner_turn = np.tile(np.arange(3), (first[-1], 1)) if before is None else before.corner_turn
+        if not loose:
+            return Triangles(np.zeros(0, int), corner_turn, None), {}
+        source = np.concatenate([np.arange(first[i], first[i + 1]) for i in loose])
+        corners = np.concatenate([space.to_gpu(meshes[i].corners()) for i in loose]).astype("f4")
+        if before is None:
+            corner_turn[source] = _best_corner_first(corners)[..., 0]
+        turned = corner_turn[source][..., None]
+        corners = np.take_along_axis(corners, turned, axis=1)
+        order, tree = np.arange(len(corners)), None
+        if has_tree:
+            known = None if before is None else before.tree
+            tree = build_bvh(corners) if known is None else known.refitted(corners)
+            order = tree.order
+        found = Triangles(source[order], corner_turn, tree)
+        sections = {} if tree is None else {"TREE": tree_texels(tree.nodes)}
+        corners = corners[order]
+        records = TRIANGLE.zeros(len(order))
+        records["vertex"] = corners[:, 0]
+        records["edge1"] = corners[:, 1] - corners[:, 0]
+        records["edge2"] = corners[:, 2] - corners[:, 0]
+        records["object"] = np.repeat(loose, [len(meshes[i].triangles) for i in loose])[order]
+        records["source"] = found.order
+        normals = np.concatenate([_corner_normals(scene.objects[i], meshes[i]) for i in loose])
+        normals = np.take_along_axis(normals, turned, axis=1)[order]
+        smooth = np.isfinite(normals).all(axis=(1, 2)) & (np.abs(normals).sum(axis=2) > 0).all(axis=1)
+        # A facet whose three corner normals agree is flat: its normal has no derivative to compute.
+        records["normals"] = NONE
+        records["normals"][smooth] = 3 * np.arange(np.count_nonzero(smooth))
+        packed = np.zeros((3 * np.count_nonzero(smooth), 4), "f4")
+        packed[:, :3] = normals[smooth].reshape(-1, 3)
+        return found, sections | {"TRIANGLES": records, "NORMALS": packed}
+
+
+@dataclass(frozen=True)
+class SceneGeometry:
+    """Every object's shape, as one or the other."""
+
+    solids: Solids
+    triangles: Triangles
+    first_triangle: np.ndarray
+    """int (objects + 1,): each object's first one among the triangles of all."""
+
+    @staticmethod
+    def of(
+        scene: Scene, meshes: Sequence[Mesh], space: GpuSpace, has_tree: bool, before: SceneGeometry | None = None
+    ) -> tuple[SceneGeometry, dict[str, np.ndarray]]:
+        """With sections of `SceneTexels`. `meshes`: in the world; `before`: of a scene whose objects only stood
+        elsewhere: corners' turns and the tree's shape are taken from there."""
+        solids = Solids.of(scene, meshes, space, moved=before is not None)
+        packed = set(solids.records["object"].tolist())
+        loose = [i for i in range(len(meshes)) if i not in packed]
+        first = np.cumsum([0] + [len(mesh.triangles) for mesh in meshes])
+        known = None if before is None else before.triangles
+        triangles, sections = Triangles.of(scene, meshes, space, first, loose, has_tree, known)
+        return SceneGeometry(solids, triangles, first), sections
+
+    def primitives(self, meshes: Sequence[Mesh], space: GpuSpace) -> np.ndarray:
+        """uint32 (T,): what a ray that left each triangle has as `last_primitive`; T counts all objects' triangles."""
+        numbers = np.full(self.first_triangle[-1], NONE, np.uint32)
+        numbers[self.triangles.order] = np.arange(len(self.triangles.order))
+        for solid in self.solids.records:
+            first, count, index = (int(solid[name]) for name in ("first_plane", "plane_count", "object"))
+            planes = self.solids.planes[first : first + count].astype(float)
+            corners = space.to_gpu(meshes[index].corners())
+            off = np.abs(corners @ planes[:, :3].T - planes[:, 3]).max(axis=1)
+            start = self.first_triangle[index]
+            numbers[start : start + len(corners)] = _PLANE_BIT | (first + off.argmin(axis=1))
+        return numbers
+
+
+def _corner_normals(item: SceneObject, mesh: Mesh) -> np.ndarray:
+    """float (T, 3, 3); not a number where the surface is as its facets are."""
+    known = mesh.corner_normals if item.material.is_specular or item.material.has_coat else None
+    return np.full((len(mesh.triangles), 3, 3), np.nan) if known is None else known
+
+
+def _best_corner_first(corners: np.ndarray) -> np.ndarray:
+    """Order (T, 3, 1) of each triangle's corners, turned so that the edges at the first are nearest to a right angle.
+
+    A needle then has its short edge there. Between its two long ones the normal and the place on the facet would
+    lose as many digits as the needle is thin.
+    """
+    to_next = (np.roll(corners, -1, axis=1) - corners).astype(np.float64)
+    from_last = np.roll(to_next, 1, axis=1)
+    along = np.einsum("tcj,tcj->tc", to_next, from_last)
+    size = np.linalg.norm(to_next, axis=2) * np.linalg.norm(from_last, axis=2)
+    cosine = np.abs(np.divide(along, size, out=np.ones_like(along), where=size > 0.0))
+    return ((cosine.argmin(axis=1)[:, None] + np.arange(3)) % 3)[..., None]
+
+
+def _transformed_planes(planes: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+    """Half-spaces n·x <= d under an affine map."""
+    covectors = np.linalg.inv(matrix).T @ np.column_stack([planes[:, :3], -planes[:, 3]]).T
+    covectors = covectors.T / np.linalg.norm(covectors[:3], axis=0)[:, None]
+    return np.column_stack([covectors[:, :3], -covectors[:, 3]])

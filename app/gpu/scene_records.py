@@ -1,0 +1,64 @@
+"""Records of what stands in a scene, as shaders read them."""
+
+from __future__ import annotations
+
+from .schema import Field, Struct
+
+TRIANGLE = Struct(
+    "Triangle",
+    (
+        Field("vertex", "vec3", "first corner, GPU space"),
+        Field("object", "uint", "scene object index"),
+        Field("edge1", "vec3", "second corner minus first"),
+        Field("normals", "uint", "first of three corner normals, or NONE for a flat facet"),
+        Field("edge2", "vec3", "third corner minus first"),
+        Field("source", "uint", "global index before the tree reordered them: objects in scene order"),
+    ),
+    texels=True,
+)
+SOLID = Struct(
+    "Solid",
+    (Field("first_plane", "uint"), Field("plane_count", "uint"), Field("object", "uint"), Field("reserved", "uint")),
+)
+OBJECT = Struct(
+    "Object",
+    (
+        Field("kind", "uint", "0 black, 1 diffuse, 2 mirror, 3 dielectric, 4 grating"),
+        Field("medium", "uint", "row of the index table (dielectric, grating: its wavelength)"),
+        Field(
+            "weight_row", "uint", "row of absorption (1/GPU unit) or reflectance over x, texel of a grating, or NONE"
+        ),
+        Field(
+            "stack_bit", "uint", "bit of this solid in a ray's inside mask, by priority; NONE where it overlaps nothing"
+        ),
+        Field("receiver", "uint", "receiver index, or NONE"),
+        Field("group", "uint", "spectral group of the glass, or NONE"),
+        Field("first_triangle", "uint", "global source index of its first triangle"),
+        Field("texture", "uint", "its picture in the texture store, or NONE"),
+        Field(
+            "colour",
+            "vec4",
+            "linear Rec.709 reflectance (diffuse, mirror); dielectric: GGX's width, its table's row, 0, n_d",
+        ),
+    ),
+    texels=True,
+)
+GRATING = Struct(
+    "Grating",
+    (
+        Field("lines", "vec3", "unit, along the lines"),
+        Field("orders", "uint", "how many follow it in the same section, one GratingOrder each"),
+    ),
+    texels=True,
+)
+GRATING_ORDER = Struct(
+    "GratingOrder",
+    (
+        Field("shift_per_um", "float", "added to a direction's tangential part, per micrometre of wavelength: m / Λ"),
+        Field("efficiency", "float", "share of the light"),
+        Field("left", "float", "share that the orders before have left"),
+        Field("reflects", "uint"),
+    ),
+    texels=True,
+)
+SCENE_STRUCTS = (TRIANGLE, SOLID, OBJECT, GRATING, GRATING_ORDER)

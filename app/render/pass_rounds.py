@@ -1,0 +1,143 @@
+"""One pass of the light pass, in rounds: each is an even sub-lattice of the whole, traced as beams and as photons.
+
+A pass that is stopped between rounds is complete everywhere, only coarser.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from ..base.random_words import Dimension, random_word
+from ..passes.beam_emission import BeamEmission
+from .handed_rays import handed_rays
+from .light_plan import LightPlan
+from .light_stats import PassStep
+from .light_survey import LightSurvey
+from .photon_batches import Deposit, PhotonBatches
+from .photon_records import RoundOf
+
+BEAM_ROUND = 1 << 19
+"""Photons' worth of beams, where they carry everything, after which a pass may be left."""
+MIN_BEAM_PHOTONS = 1 << 17
+"""Photons, at least, whose beams are found at once, where photons are traced besides."""
+
+
+def roulette_word(seed: int, number: int) -> int:
+    """Seed of beams' roulette in round `number` of all passes."""
+    return random_word(seed, 0, number, Dimension.BRANCH)
+
+
+@dataclass(frozen=True)
+class PassRounds:
+    """Pass `number` of about `photons` over all lights, as it is planned."""
+
+    survey: LightSurvey
+    plans: Sequence[LightPlan]
+    batches: PhotonBatches
+    into: Deposit
+    number: int
+    photons: int
+    weight: float
+    """What it adds to the weight of the maps' sums."""
+    seed: int
+
+    @property
+    def count(self) -> int:
+        """Into how many rounds the pass is divided."""
+        if not self.plans:
+            return -(-self.photons // BEAM_ROUND) if self.survey.has_beams else 0
+        batch = self.batches.trace.batch
+        return max(-(-plan.lattice_count(self.photons) // (batch // plan.lattices)) for plan in self.plans)
+
+    @property
+    def together(self) -> int:
+        """How many rounds have their beams together: few photons' worth of beams are coarse ones."""
+        if not (self.plans and self.survey.has_beams):
+            return 1
+        return max(1, -(-MIN_BEAM_PHOTONS * self.count // self.photons))
+
+    def steps(self, first_round: int = 0, first_group: int = 0, stride: int = 1) -> Iterator[PassStep]:
+        """The whole pass, pausing after every event of the rays and after every splatting.
+
+        `first_round`: where a pass goes on that was left before. `first_group`, `stride`: of the groups of rounds that
+        have their beams together, this one and every so manieth after it, where others trace the rest."""
+        if not self.plans:
+            yield from self._only_beams(range(first_round + first_group, self.count, stride))
+            return
+        rounds, together = self.count, self.together
+        for j in range(first_round, rounds):
+            if (j // together - first_group) % stride:
+                continue
+            if j == first_round or j % together == 0:
+                end = min((j // together + 1) * together, rounds)
+                yield from self._beams(RoundOf(self.number, j, rounds, False), j / rounds, end - j)
+            yield from self._photons(j, rounds)
+            self.into.maps.photon_weight += self.weight / rounds
+            yield PassStep((j + 1) / rounds, (j + 1) % together == 0 or j + 1 == rounds)
+
+    def _only_beams(self, numbers: Sequence[int]) -> Iterator[PassStep]:
+        rounds, photons = self.count, self.photons
+        for j in numbers:
+            for step in self._beams(RoundOf(self.number, j, rounds, True)):
+                yield PassStep((j + step.fraction) / rounds, False)
+            self.into.maps.photon_weight += self.weight / rounds
+            self.into.stats.photons += photons * (j + 1) // rounds - photons * j // rounds
+            yield PassStep((j + 1) / rounds, True)
+
+    def _photons(self, j: int, rounds: int) -> Iterator[PassStep]:
+        """Photons of round `j`, light by light."""
+        lights = len(self.plans)
+        for i, plan in enumerate(self.plans):
+            done, lattice = j * lights + i, plan.lattice_count(self.photons)
+            points = len(range(j, lattice, rounds))
+            if points:
+                part = plan.slice(self.seed, self.number, lattice, j, rounds, points, self.weight)
+                for piece, is_last in self.batches.divided(part):
+                    of = RoundOf(self.number, j, rounds, is_last and i + 1 == lights)
+                    tracing = self.batches.trace.steps(piece, plan.domain)
+                    for _ in self.batches.steps(tracing, of, self.into, rays=piece.count):
+                        yield PassStep(done / (rounds * lights), False)
+            if i + 1 < lights:
+                yield PassStep((done + 1) / (rounds * lights), False)
+
+    def _beams(self, of: RoundOf, done: float = 0.0, rounds: int = 1) -> Iterator[PassStep]:
+        """The beams of so many `rounds` from one on, and what they hand to photons."""
+        beams, stats = self.survey.beams, self.into.stats
+        if beams is None:
+            return
+        share, weight = self.photons * rounds / of.count, self.weight * rounds / of.count
+        before = beams.stats.find_seconds, beams.stats.draw_seconds
+        for part in beams.steps(share, weight, roulette_word(self.seed, self._nth(of)), self.into.maps):
+            yield PassStep(done if self.plans else part, False)
+        after = beams.stats.find_seconds, beams.stats.draw_seconds
+        stats.trace_seconds += after[0] - before[0]
+        stats.splat_seconds += after[1] - before[1]
+        thrown = beams.tally(weight)
+        stats.tally.merge(thrown)
+        stats.polygons_w += thrown.ended["deposited"]
+        for tails in (False, True):
+            for _ in self._handed(of, share, weight, tails):
+                yield PassStep(done, False)
+
+    def _handed(self, of: RoundOf, share: float, weight: float, tails: bool) -> Iterator[None]:
+        """Photons that carry on what beams of `share` photons left: weak beams (`tails`), or all else."""
+        beams, batches = self.survey.beams, self.batches
+        if beams is None or beams.found is None or beams.found.pieces is None:
+            return
+        pieces, started = beams.found.pieces, time.perf_counter()
+        pieces = pieces.where(pieces.is_tail == tails)
+        if not len(pieces):
+            return
+        emission = BeamEmission(self.survey.buffers, batches.trace.ray, pieces, batches.records.tables.spans)
+        most, entered_w = batches.budget.units, beams.stats.entered_w
+        for light, rays in handed_rays(emission, entered_w, share, weight, most, self.seed, self._nth(of)):
+            self.into.stats.trace_seconds += time.perf_counter() - started
+            yield from batches.steps(batches.trace.carry_on(rays, light), of, self.into, of_tails=tails)
+            started = time.perf_counter()
+
+    @staticmethod
+    def _nth(of: RoundOf) -> int:
+        """A round's number among those of all passes."""
+        return of.number * of.count + of.index

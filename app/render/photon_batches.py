@@ -1,0 +1,144 @@
+"""Rays of a batch through the scene, and what landed into maps: traced, kept, splatted and counted, with pauses."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Generator, Iterator
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from ..gpu.dispatch_budget import DISPATCH_S, DispatchBudget
+from ..passes.trace import Batch, LatticeSlice, TracePass
+from .photon_records import PhotonRecords, RoundOf
+from .splatting import Pace, Splatting
+
+if TYPE_CHECKING:
+    import moderngl
+
+    from ..gpu.context import Context
+    from ..passes.map_atlas import MapAtlas
+    from .light_maps import LightMaps
+    from .light_stats import LightStats
+    from .shown_spectra import ShownSpectra, ShownTables
+
+MIN_RAYS = 1 << 10
+"""Rays of a batch that are not divided further, however slow the device is."""
+
+
+@dataclass(frozen=True)
+class Deposit:
+    """Where photons go, and how they are drawn there."""
+
+    maps: LightMaps
+    stats: LightStats
+    smoothing: float
+    """Standard deviation of a footprint in lattice spacings."""
+
+
+class PhotonBatches:
+    """Owns what traces, keeps and splats photons; `trace` and `records` become its own."""
+
+    def __init__(
+        self, context: Context, trace: TracePass, shown: ShownSpectra, records: PhotonRecords, pace: Pace
+    ) -> None:
+        self.trace = trace
+        self.records = records
+        self.splatting = Splatting(context, shown, pace)
+        self.budget = DispatchBudget(trace.batch, MIN_RAYS, trace.batch)
+        """Rays of the next batch."""
+        self.dispatch_seconds = DISPATCH_S
+        """What the first event of a batch may take where the device queues work: smaller batches follow one that took
+        longer."""
+        self._context = context
+        self._pace = pace
+        self._traced_once = False
+        """A first event of all tells of compiling."""
+
+    @property
+    def tables(self) -> ShownTables:
+        """The spectral tables of the plan that was begun."""
+        return self.records.tables.full
+
+    def divided(self, part: LatticeSlice) -> Iterator[tuple[LatticeSlice, bool]]:
+        """`part`, in slices that the device has shown to manage in time, and whether each is the last."""
+        lattices, first, left = part.count // part.points, part.first, part.points
+        while left:
+            points = min(left, max(self.budget.units // lattices, 1))
+            yield replace(part, first=first, points=points), points == left
+            first, left = first + points * part.stride, left - points
+
+    def steps(
+        self,
+        tracing: Generator[None, None, Batch],
+        of: RoundOf,
+        into: Deposit,
+        *,
+        of_tails: bool = False,
+        rays: int = 0,
+    ) -> Iterator[None]:
+        """Trace a batch (`TracePass.steps`, `carry_on`), keep and splat what landed, and count it. `of_tails`: photons
+        that carry on weak beams, for which a pass has photons besides. `rays`: of the lattice, in this batch."""
+        batch = yield from self._traced(tracing, into.stats, rays)
+        if self.records.takes_tails or not of_tails:
+            self.records.keep(self.trace.photons, batch, self.trace.photon.stride, of)
+        yield
+        yield from self.splat(self.trace.photons, batch.photons, into)
+        into.stats.photons += 0 if of_tails else batch.emitted_photons
+        into.stats.splats += batch.photons
+        into.stats.tally.merge(batch.tally.without_beams)
+
+    def _traced(
+        self, tracing: Generator[None, None, Batch], stats: LightStats, rays: int
+    ) -> Generator[None, None, Batch]:
+        queued, is_first = self._context.traits.work_is_queued, True
+        started = time.perf_counter()
+        while True:
+            try:
+                if self._pace.waits:
+                    with self._context.timers.timing("trace"):
+                        next(tracing)
+                else:
+                    next(tracing)
+            except StopIteration as finished:
+                batch: Batch = finished.value
+                break
+            if queued and (self._pace.waits or is_first):
+                self._context.finish()
+            took, is_compiled = time.perf_counter() - started, self._traced_once
+            stats.trace_seconds += took
+            if queued and is_first and rays and is_compiled:
+                self.budget.learn(rays, took, self.dispatch_seconds)
+            is_first, self._traced_once = False, True
+            yield
+            started = time.perf_counter()
+        stats.trace_seconds += time.perf_counter() - started
+        return batch
+
+    def splat(
+        self,
+        photons: moderngl.Buffer,
+        count: int,
+        into: Deposit,
+        tables: ShownTables | None = None,
+        stride: int = 1,
+    ) -> Iterator[None]:
+        """Add every `stride`-th photon record to maps, see `Splatting.steps`. `tables` of another plan than the one
+        begun."""
+        before, stats = self.splatting.seconds, into.stats
+        for _ in self.splatting.steps(photons, count, into.maps, tables or self.tables, into.smoothing, stride):
+            stats.splat_seconds += self.splatting.seconds - before
+            yield
+            before = self.splatting.seconds
+        stats.splat_seconds += self.splatting.seconds - before
+
+    def settling(self, atlas: MapAtlas, stats: LightStats) -> Iterator[None]:
+        """Sum up what is pending, so that maps can be shown at once."""
+        before = self.splatting.seconds
+        yield from self.splatting.summing(atlas)
+        stats.splat_seconds += self.splatting.seconds - before
+
+    def release(self) -> None:
+        """Free everything."""
+        self.trace.release()
+        self.records.release()
+        self.splatting.release()
