@@ -43,6 +43,8 @@ BIND_MOVING = 10
 BIND_MOVING_LISTS = 22
 """Of storage buffers, one that no other program of the camera has."""
 IMAGE_PICTURE, IMAGE_VISIBLE, IMAGE_PLACES, IMAGE_LIGHT, IMAGE_CHOSEN, IMAGE_FOUND, IMAGE_CELLS, IMAGE_MARKS = range(8)
+IMAGE_FACING = IMAGE_PLACES
+"""Devices promise eight: glass asks no lattice."""
 _GROUP = 8, 8
 _CELLS_GROUP = 32, 8
 """Many: a software renderer hands every group out by itself, which takes as long as thirty of its cells."""
@@ -68,6 +70,7 @@ class MovingPicture:
             "IMAGE_FOUND": IMAGE_FOUND,
             "IMAGE_CELLS": IMAGE_CELLS,
             "IMAGE_MARKS": IMAGE_MARKS,
+            "IMAGE_FACING": IMAGE_FACING,
         }
         names = "lattice", "cells", "direct", "uneven", *(("blocks", "list", "glass") if view.follows else ())
         self._programs = {
@@ -77,6 +80,7 @@ class MovingPicture:
         self._parameters = self._ctx.buffer(reserve=MOVING_PARAMETERS.stride)
         self._lattice: list[moderngl.Texture] = []
         self._chosen: moderngl.Texture | None = None
+        self._facing: moderngl.Texture | None = None
         self._lists: moderngl.Buffer | None = None
         self.specular = 0
         """Pixels that see glass, mirrors or coats first."""
@@ -123,10 +127,11 @@ class MovingPicture:
         if not self.specular:
             return
         blocks = self._tell(step)
-        if self._chosen is None or self._chosen.size != blocks:
-            if self._chosen is not None:
-                self._chosen.release()
+        if self._chosen is None or self._facing is None or self._chosen.size != blocks:
+            if self._chosen is not None and self._facing is not None:
+                shader.release(self._chosen, self._facing)
             self._chosen = self._ctx.texture(blocks, 1, dtype="u4")
+            self._facing = self._ctx.texture(blocks, 4, dtype="f4")
         self._chosen.write(np.full(blocks[::-1], NONE, "u4"))
         self._camera["pixel_width"] = self._camera["pixel_height"] = step
         self._run_listed("blocks", self.specular, maps)
@@ -173,7 +178,7 @@ class MovingPicture:
         for unit, texture in (
             (IMAGE_PICTURE, picture),
             (IMAGE_VISIBLE, self._visible),
-            (IMAGE_PLACES, places),
+            (IMAGE_PLACES, self._facing if name in ("list", "glass") else places),
             (IMAGE_LIGHT, light),
             (IMAGE_CELLS, cells),
             (IMAGE_MARKS, marks),
@@ -188,6 +193,6 @@ class MovingPicture:
     def release(self) -> None:
         """Free programs, buffers and textures."""
         shader.release(*self._programs.values(), self._parameters, *self._lattice)
-        for owned in (self._chosen, self._lists):
+        for owned in (self._chosen, self._facing, self._lists):
             if owned is not None:
                 owned.release()
