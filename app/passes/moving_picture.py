@@ -43,6 +43,8 @@ BIND_MOVING = 10
 BIND_MOVING_LISTS = 22
 """Of storage buffers, one that no other program of the camera has."""
 IMAGE_PICTURE, IMAGE_VISIBLE, IMAGE_PLACES, IMAGE_LIGHT, IMAGE_CHOSEN, IMAGE_FOUND, IMAGE_CELLS, IMAGE_MARKS = range(8)
+IMAGE_FACING = IMAGE_PLACES
+"""Devices promise eight: glass asks no lattice."""
 _GROUP = 8, 8
 _CELLS_GROUP = 32, 8
 """Many: a software renderer hands every group out by itself, which takes as long as thirty of its cells."""
@@ -68,6 +70,7 @@ class MovingPicture:
             "IMAGE_FOUND": IMAGE_FOUND,
             "IMAGE_CELLS": IMAGE_CELLS,
             "IMAGE_MARKS": IMAGE_MARKS,
+            "IMAGE_FACING": IMAGE_FACING,
         }
         names = "lattice", "cells", "direct", "uneven", *(("blocks", "list", "glass") if view.follows else ())
         self._programs = {
@@ -77,6 +80,7 @@ class MovingPicture:
         self._parameters = self._ctx.buffer(reserve=MOVING_PARAMETERS.stride)
         self._lattice: list[moderngl.Texture] = []
         self._chosen: moderngl.Texture | None = None
+        self._facing: moderngl.Texture | None = None
         self._lists: moderngl.Buffer | None = None
         self.specular = 0
         """Pixels that see glass, mirrors or coats first."""
@@ -105,16 +109,17 @@ class MovingPicture:
                 self._lists.release()
             self._lists = self._ctx.buffer(reserve=room)
         self._tell(1)
-        self._run("lattice", lattice, maps, None, _CELLS_GROUP)
+        self._bind(maps, picture)
+        self._run("lattice", lattice, _CELLS_GROUP)
         self._lists.write(bytes(8))
-        self._run("cells", cells, maps, None, _CELLS_GROUP)
+        self._run("cells", cells, _CELLS_GROUP)
         if count := self._listed()[0]:
             self._tell(1, lists_cells=True)
-            self._run("lattice", (count, 1), maps, None, (_CELLS_GROUP[0] * _CELLS_GROUP[1], 1))
+            self._run("lattice", (count, 1), (_CELLS_GROUP[0] * _CELLS_GROUP[1], 1))
         self._lists.write(bytes(8))
-        self._run("direct", cells, maps, picture, _CELLS_GROUP)
+        self._run("direct", cells, _CELLS_GROUP)
         uneven, self.specular = self._listed()
-        self._run_listed("uneven", uneven, maps, picture)
+        self._run_listed("uneven", uneven)
 
     def glass(self, picture: moderngl.Texture, maps: CausticMaps, step: int) -> Iterator[float]:
         """What is seen by way of glass and mirrors, one path for each block of `step`² pixels, added to what `direct`
@@ -123,19 +128,22 @@ class MovingPicture:
         if not self.specular:
             return
         blocks = self._tell(step)
-        if self._chosen is None or self._chosen.size != blocks:
-            if self._chosen is not None:
-                self._chosen.release()
+        if self._chosen is None or self._facing is None or self._chosen.size != blocks:
+            if self._chosen is not None and self._facing is not None:
+                shader.release(self._chosen, self._facing)
             self._chosen = self._ctx.texture(blocks, 1, dtype="u4")
+            self._facing = self._ctx.texture(blocks, 4, dtype="f4")
         self._chosen.write(np.full(blocks[::-1], NONE, "u4"))
         self._camera["pixel_width"] = self._camera["pixel_height"] = step
-        self._run_listed("blocks", self.specular, maps)
+        self._bind(maps, self._view.sums[0], glass=True)
+        self._run_listed("blocks", self.specular)
         self._view.start_list()
-        self._run("list", blocks, maps, self._view.sums[0])
+        self._run("list", blocks)
         self.followed = self._view.listed
         yield 0.0
         yield from self._view.follow(self._camera, maps)
-        self._run_listed("glass", self.specular, maps, picture)
+        self._bind(maps, picture, glass=True)
+        self._run_listed("glass", self.specular)
 
     def _listed(self) -> list[int]:
         """What the last programs have listed from either end."""
@@ -153,18 +161,8 @@ class MovingPicture:
         self._parameters.write(values.tobytes())
         return blocks
 
-    def _run_listed(self, name: str, count: int, maps: CausticMaps, picture: moderngl.Texture | None = None) -> None:
-        if count:
-            self._run(name, (count, 1), maps, picture, (_LISTED_GROUP, 1))
-
-    def _run(
-        self,
-        name: str,
-        size: tuple[int, ...],
-        maps: CausticMaps,
-        picture: moderngl.Texture | None = None,
-        group: tuple[int, int] = _GROUP,
-    ) -> None:
+    def _bind(self, maps: CausticMaps, picture: moderngl.Texture, *, glass: bool = False) -> None:
+        """What the programs read and write, for those that run one after the other; `glass`: of glass and mirrors."""
         self._view.bind_for(self._camera, maps)
         self._parameters.bind_to_uniform_block(BIND_MOVING)
         assert self._lists is not None
@@ -173,21 +171,29 @@ class MovingPicture:
         for unit, texture in (
             (IMAGE_PICTURE, picture),
             (IMAGE_VISIBLE, self._visible),
-            (IMAGE_PLACES, places),
             (IMAGE_LIGHT, light),
             (IMAGE_CELLS, cells),
             (IMAGE_MARKS, marks),
-            (IMAGE_CHOSEN, self._chosen if name in ("blocks", "list", "glass") else None),
-            (IMAGE_FOUND, self._view.sums[0]),
+            *(
+                ((IMAGE_FACING, self._facing), (IMAGE_CHOSEN, self._chosen), (IMAGE_FOUND, self._view.sums[0]))
+                if glass
+                else ((IMAGE_PLACES, places),)
+            ),
         ):
-            if texture is not None:
-                texture.bind_to_image(unit, read=True, write=True)
+            assert texture is not None
+            texture.bind_to_image(unit, read=True, write=True)
+
+    def _run_listed(self, name: str, count: int) -> None:
+        if count:
+            self._run(name, (count, 1), (_LISTED_GROUP, 1))
+
+    def _run(self, name: str, size: tuple[int, ...], group: tuple[int, int] = _GROUP) -> None:
         self._programs[name].run(-(-size[0] // group[0]), -(-size[1] // group[1]))
         self._ctx.memory_barrier()
 
     def release(self) -> None:
         """Free programs, buffers and textures."""
         shader.release(*self._programs.values(), self._parameters, *self._lattice)
-        for owned in (self._chosen, self._lists):
+        for owned in (self._chosen, self._facing, self._lists):
             if owned is not None:
                 owned.release()

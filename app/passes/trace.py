@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import moderngl
 import numpy as np
@@ -90,6 +91,7 @@ class FluxTally:
         return abs(started - sum(self.ended.values()) - self.roulette) / started if started else 0.0
 
 
+@lru_cache(maxsize=64)
 def queue_bytes(features: Features, batch: int) -> int:
     """Device memory that tracing `batch` lattice points at once takes."""
     ray = records.ray_record_of(features).stride

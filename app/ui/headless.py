@@ -93,7 +93,7 @@ class HeadlessInterface:
         with recording(self.items), self._host.frame():
             self._draw()
         self._framebuffer.use()
-        self._framebuffer.clear(0.0, 0.0, 0.0, 1.0)
+        self._framebuffer.clear(*theme.ground())
         self._host.render()
         self._no_framebuffer.use()
         self._context.finish()

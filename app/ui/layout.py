@@ -109,6 +109,13 @@ def _build(dock: int, size: imgui.ImVec2, windows: tuple[Docked, ...]) -> None:
     builder.dock_builder_finish(dock)
 
 
+def lies_on_ground(title: str) -> bool:
+    """Whether this window lay in the dock space in the last frame: its ground is what the frame was cleared to."""
+    window = imgui.internal.find_window_by_name(title)
+    node = None if window is None else window.dock_node
+    return node is not None and imgui.internal.dock_node_get_root_node(node).is_dock_space()
+
+
 def raise_panel(field: str) -> None:
     """Show this panel before the tabs beside it in the next frame."""
     _raised.add(field)

@@ -149,7 +149,9 @@ def _draw_panel(window: PanelWindow, state: State, view_model: ViewModel) -> Sta
     imgui.set_next_window_pos(viewport.get_center(), imgui.Cond_.first_use_ever, imgui.ImVec2(0.5, 0.5))
     if layout.is_raised(window.field):
         imgui.set_next_window_focus()
-    shown, stays = imgui.begin(window.title, True)
+    # A software renderer takes as long to fill panels as to draw the picture.
+    flags = imgui.WindowFlags_.no_background if layout.lies_on_ground(window.title) else imgui.WindowFlags_.none
+    shown, stays = imgui.begin(window.title, True, flags)
     item_rects.note(f"Window: {window.title}")
     is_floating = not imgui.is_window_docked()
     (layout.behind.discard if shown or is_floating else layout.behind.add)(window.field)

@@ -31,6 +31,11 @@ def palette(preferences: Preferences | None = None) -> Palette:
     return LIGHT if ground.x > 0.5 else DARK
 
 
+def ground() -> Colour:
+    """What a frame is cleared to: docked windows have no ground of their own."""
+    return palette().window
+
+
 def set_up() -> None:
     """Give the imgui context its fonts, once; later calls cost nothing. Best before the first frame."""
     if bold() is None:

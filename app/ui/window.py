@@ -244,7 +244,7 @@ class Window:
             guest.draw()
         self._screen.use()
         self._screen.viewport = (0, 0, *self.framebuffer_size)
-        self._screen.clear(0.0, 0.0, 0.0, 1.0)
+        self._screen.clear(*theme.ground())
         self._host.render()
         if self.context.is_software:
             self.context.finish()
@@ -277,7 +277,7 @@ class Window:
         texture = self.context.ctx.texture((width, height), 4)
         target = self.context.ctx.framebuffer([texture])
         target.use()
-        target.clear(0.0, 0.0, 0.0, 1.0)
+        target.clear(*theme.ground())
         self._host.render()
         data = target.read(components=3, alignment=1)
         self._screen.use()

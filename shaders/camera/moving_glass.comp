@@ -6,6 +6,8 @@ layout(local_size_x = 64) in;
 #include "camera/moving_lists.glsl"
 
 layout(r32ui, binding = IMAGE_CHOSEN) uniform readonly restrict uimage2D chosen;
+// Which way the chosen ones' surfaces face, and the objects that these are of.
+layout(rgba32f, binding = IMAGE_FACING) uniform readonly restrict image2D facing;
 layout(rgba32f, binding = IMAGE_FOUND) uniform readonly restrict image2D found;
 #ifdef COATS
 layout(rgba32f, binding = IMAGE_PICTURE) uniform restrict image2D picture;
@@ -30,9 +32,11 @@ void main()
         uint best = inside ? imageLoad(chosen, near).x : NONE;
         WHEN(best != NONE) {
             uvec2 at = pixel_of(bitfieldExtract(best, 0, NUMBER_BITS));
-            uvec2 other = seen_first(at);
+            vec4 other = imageLoad(facing, near);
             vec2 away = (vec2(at) - vec2(pixel)) / float(m.glass_step);
-            float alike = other.y == first.y ? pow(max(dot(normal_of(other.x), normal), 0.0), 16.0) : 0.0;
+            float alike = max(dot(other.xyz, normal), 0.0);
+            for (int power = 2; power <= 16; power *= 2) alike *= alike;
+            if (floatBitsToUint(other.w) != first.y) alike = 0.0;
             float weight = exp(-2.0 * dot(away, away)) * max(alike, OTHER_FACET);
             if (m.glass_step == 1u) weight = at == pixel ? 1.0 : 0.0;
             sum += weight * vec4(imageLoad(found, ivec2(at)).rgb, 1.0);

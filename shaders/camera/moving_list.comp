@@ -1,10 +1,11 @@
-// Lists the chosen pixels, with nothing found yet.
+// Lists the chosen pixels, with nothing found yet; and what those round them will ask of each, once for all of these.
 layout(local_size_x = 8, local_size_y = 8) in;
 
 #include "camera/moving.glsl"
 
 layout(r32ui, binding = IMAGE_CHOSEN) uniform readonly restrict uimage2D chosen;
 layout(rgba32f, binding = IMAGE_PICTURE) uniform writeonly restrict image2D found;
+layout(rgba32f, binding = IMAGE_FACING) uniform writeonly restrict image2D facing;
 layout(std430, binding = BIND_LISTED) restrict buffer Listed { uint listed_count; uint halted_count; uint listed[]; };
 
 void main()
@@ -14,7 +15,9 @@ void main()
     uint best = imageLoad(chosen, ivec2(block)).x;
     WHEN(best != NONE) {
         uint number = bitfieldExtract(best, 0, NUMBER_BITS);
-        imageStore(found, ivec2(pixel_of(number)), vec4(0.0));
+        uvec2 pixel = pixel_of(number), first = seen_first(pixel);
+        imageStore(found, ivec2(pixel), vec4(0.0));
+        imageStore(facing, ivec2(block), vec4(normal_of(first.x), uintBitsToFloat(first.y)));
         listed[atomicAdd(listed_count, 1u)] = number | (THE_SAMPLE << NUMBER_BITS);
     }
 }
