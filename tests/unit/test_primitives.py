@@ -232,3 +232,13 @@ def _dented(triangles: np.ndarray) -> np.ndarray:
     top = {4, 5, 6, 7}
     sides = [t for t in triangles.tolist() if not set(t) <= top]
     return np.array(sides + [(4, 5, 8), (5, 6, 8), (6, 7, 8), (7, 4, 8)])
+
+
+@pytest.mark.parametrize(("points", "segments"), [(5, 512), (100, 400), (2_000, 128)])
+def test_a_solid_of_revolution_is_as_fine_as_its_profile_allows(points: int, segments: int) -> None:
+    """Few large facets would stripe the light that grazes them."""
+    angle = np.linspace(0.0, np.pi, points)
+    profile = np.column_stack([np.sin(angle), -np.cos(angle)])
+    profile[[0, -1], 0] = 0.0
+    solid = primitives.solid_of_revolution(profile)
+    assert len(solid.vertices) == 2 + (points - 2) * segments
