@@ -174,12 +174,15 @@ _HIDDEN = {"name", "names", "gradient"}
 
 @cache
 def _parameters(shape: str) -> dict[str, tuple[str, bool]]:
-    """Key -> (annotation, required) of a shape, in the order of its function."""
+    """Key -> (annotation, required) of a shape, in the order of its function.
+
+    A parameter that may be None is left out of a file to mean that: the key, where it stands, is of the other type.
+    """
     if shape == INLINE:
         return {"vertices": ("rows3", True), "triangles": ("rows3", True), "uv": ("rows2", False)}
     signature = inspect.signature(_function(shape))
     keys = {
-        key: (str(parameter.annotation), parameter.default is inspect.Parameter.empty)
+        key: (str(parameter.annotation).removesuffix(" | None"), parameter.default is inspect.Parameter.empty)
         for key, parameter in signature.parameters.items()
         if key not in _HIDDEN
     }

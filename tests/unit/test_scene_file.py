@@ -34,6 +34,14 @@ def test_three_lines_make_a_scene_whose_caustic_is_in_view(tmp_path: Path) -> No
     assert math.degrees(angle) < 0.4 * scene.camera.vertical_fov_deg
 
 
+@pytest.mark.parametrize(("line", "segments"), [("", 512), ("segments = 48", 48)])
+def test_a_parameter_that_may_be_none_is_left_out_or_of_its_type(tmp_path: Path, line: str, segments: int) -> None:
+    cone = '[[objects]]\nshape = "revolution"\nprofile = [[0, 0], [1, 0], [0, 1]]\nglass = "N-BK7"\n'
+    mesh = load(tmp_path, cone + line).objects[0].mesh
+    # A fan below and a fan above.
+    assert len(mesh.triangles) == 2 * segments
+
+
 @pytest.mark.parametrize(("kind", "most"), [("lights", 256), ("objects", 65_535)])
 def test_more_than_a_photon_can_tell_apart_is_refused(tmp_path: Path, kind: str, most: int) -> None:
     from dataclasses import replace
