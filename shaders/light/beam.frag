@@ -176,15 +176,13 @@ void main() {
     while (left != 0u) {
         at = is_cut ? middle + part_place(uint(findLSB(left))) : middle;
         left &= left - 1u;
-        crossings = 0;
-#if EDGES > 0
-        crossing = 0u;
-#endif
+        begin_place();
         deposit();
         for (int g = 0; g < TARGETS; ++g) sum[g] += weight * deposited[g];
     }
     for (int g = 0; g < TARGETS; ++g) deposited[g] = sum[g];
 #else
+    begin_place();
     deposit();
 #endif
 }

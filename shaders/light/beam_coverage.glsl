@@ -82,10 +82,18 @@ vec3 line_at(int e, float t) {
 }
 
 // The edges that cross the texel at some time, four bits each; where a program takes any number of edges it looks at all again.
-uint crossing = 0u;
-int crossings = 0;
-// One of them: normal, distance inside, window; and their change over the band.
-vec4 only_start = vec4(1.0, 0.0, 1.0, 1.0), only_change = vec4(0.0);
+uint crossing;
+int crossings;
+// One of them: normal, distance inside, window; and their change over the band. Where none crosses, one that all of the texel lies within.
+vec4 only_start, only_change;
+
+// Before each place that is looked at: of the last one nothing is kept, neither the list nor the one edge.
+void begin_place() {
+    crossing = 0u;
+    crossings = 0;
+    only_start = vec4(1.0, 0.0, 1.0, 1.0);
+    only_change = vec4(0.0);
+}
 
 // Covered part of the texel at t: the lengths of what bounds it, times their distance from the texel's centre. Loops have short bodies, since a software renderer
 // runs a loop that no texel is in once.

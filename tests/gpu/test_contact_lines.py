@@ -12,13 +12,14 @@ from spectrasplat.base.paths import assets_dir
 from spectrasplat.model.camera_rays import camera_frame
 from spectrasplat.model.contacts import standing
 from spectrasplat.model.features import Features
-from spectrasplat.model.geometry.primitives import box
+from spectrasplat.model.geometry.primitives import box, polygon_prism
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.optics.glass import constant
 from spectrasplat.model.scene import Black, Camera, Scene, SceneObject
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.passes.contact_lines import PARTS, read_words
+from spectrasplat.passes.contact_lines import PARTS, contact_words, read_words
 from spectrasplat.passes.picture_window import PictureWindow
+from spectrasplat.render import light_pass as light_pass_module
 from spectrasplat.render.light_pass import LightPass
 from spectrasplat.render.still import render
 from spectrasplat.stress.rigs.glsl_function import evaluate
@@ -141,6 +142,24 @@ def test_light_beside_a_box_reaches_up_to_it(gl, method: str, most: float, witho
         even = np.median(picture[share == 1.0])
         errors.append(picture[at_line].sum() / (even * share[at_line].sum()) - 1.0)
     assert abs(errors[0]) < most and abs(errors[0]) < 0.5 * abs(errors[1]), errors
+
+
+def test_a_beam_cut_into_parts_of_texels_keeps_its_light(gl, monkeypatch: pytest.MonkeyPatch, without) -> None:
+    """Where all parts of every texel are seen, they add up to what texels get without a line. Each part is looked at by
+    itself: of the one before, the edge that crossed it does not count."""
+    post = solid("post", polygon_prism(24, 0.5, 0.5), constant(1.5, "n 1.5"), (0.0, 0.0, 0.25))
+    scene = stage(post, lights=[SUN], camera=OBLIQUE)
+    settings = replace(SETTINGS, method="srd", width=32, height=18)
+
+    def all_seen(*arguments):
+        words = contact_words(*arguments)
+        words.write(np.full((words.height, words.width), 0xFFFFFFFF, "u4").tobytes())
+        return words
+
+    whole = without(lambda: render(scene, settings, context=gl).rgb[..., 1])
+    monkeypatch.setattr(light_pass_module, "contact_words", all_seen)
+    in_parts = render(scene, settings, context=gl).rgb[..., 1]
+    assert abs(in_parts.sum() / whole.sum() - 1.0) < 2e-3, in_parts.sum() / whole.sum()
 
 
 def test_only_scenes_in_which_something_stands_on_a_receiver_ask() -> None:
