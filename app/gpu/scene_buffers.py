@@ -87,7 +87,7 @@ class SceneBuffers:
         ]
         before = None if like is None else like.geometry
         self.geometry: SceneGeometry
-        self.geometry, self._sections = SceneGeometry.of(scene, self.world_meshes, self.space, features.tree, before)
+        self.geometry, self._sections = SceneGeometry.of(scene, self.world_meshes, self.space, features, before)
         self.triangle_count = len(self._sections.get("TRIANGLES", ()))
         """Those that are looked for one by one: none of half-space solids."""
         self._buffers: dict[int, moderngl.Buffer] = {}
@@ -208,7 +208,11 @@ class SceneBuffers:
             }
         if tree is not None:
             self.defines["TREE_STACK"] = max(tree.depth, 1)
-        self.defines |= {"TRIANGLE_COUNT": self.triangle_count, "SOLID_COUNT": len(solids.records)}
+        self.defines |= {
+            "TRIANGLE_COUNT": self.triangle_count,
+            "SOLID_COUNT": len(solids.records),
+            "PIECE_COUNT": len(self.geometry.curved.faces),
+        }
 
     def _pack_objects(self, like: SceneBuffers | None) -> None:
         media: list[Dispersion] = []

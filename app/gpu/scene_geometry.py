@@ -7,17 +7,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model.features import half_spaces
+from ..model.curved_solids import Face, curved_solids
+from ..model.features import Features, half_spaces
 from ..model.geometry.bvh import Bvh, build_bvh
 from ..model.geometry.mesh import Mesh
 from ..model.scene import Scene, SceneObject
 from .gpu_space import GpuSpace
 from .records import NONE
-from .scene_records import SOLID, TRIANGLE
+from .scene_records import PIECE, SOLID, TRIANGLE
 from .scene_texels import tree_texels
 
 _PLANE_BIT = 0x80000000
 """Of a primitive's number: a plane of a half-space solid, not a triangle (shaders/lib/intersect.glsl)."""
+_CURVED_BIT = 0x40000000
+"""Likewise, a face of a curved solid."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +55,42 @@ class Solids:
 
 
 @dataclass(frozen=True)
+class Curved:
+    """Objects that are intersections of quadrics' insides and half-spaces (`curved_solids`)."""
+
+    own: dict[int, tuple[Face, ...]]
+    """By object, in their own frames."""
+    faces: tuple[Face, ...]
+    """Of all objects, GPU space."""
+    objects: tuple[int, ...]
+    """Each face's object."""
+
+    @staticmethod
+    def of(scene: Scene, space: GpuSpace, own: dict[int, tuple[Face, ...]]) -> tuple[Curved, dict[str, np.ndarray]]:
+        """With the sections of `SceneTexels`."""
+        faces: list[Face] = []
+        for index, found in own.items():
+            matrix = scene.objects[index].object_to_world
+            offset = (matrix[:3, 3] - space.centre) * space.scale
+            faces += [face.moved(space.scale * matrix[:3, :3], offset) for face in found]
+        objects = [index for index, found in own.items() for _ in found]
+        records = PIECE.zeros(len(faces))
+        for record, face in zip(records, faces, strict=True):
+            record["row_x"], record["row_y"], record["row_z"] = face.rows
+            record["origin"], record["linear"], record["constant"] = face.origin, face.linear, face.constant
+            record["is_plane"] = face.is_plane
+        records["object"] = objects
+        records["is_last"] = np.diff([*objects, -1]) != 0
+        return Curved(own, tuple(faces), tuple(objects)), {"PIECES": records} if faces else {}
+
+    def primitives(self, index: int, corners: np.ndarray) -> np.ndarray:
+        """uint32 (T,): the face that each triangle of an object's mesh stands for. `corners` (T, 3, 3): GPU space."""
+        first = self.objects.index(index)
+        off = [np.abs(face.distance(corners)).max(axis=1) for face in self.faces[first : first + len(self.own[index])]]
+        return (_CURVED_BIT | (first + np.argmin(off, axis=0))).astype(np.uint32)
+
+
+@dataclass(frozen=True)
 class Triangles:
     """All other objects, as the tree orders their triangles."""
 
@@ -72,8 +111,8 @@ class Triangles:
         before: Triangles | None,
     ) -> tuple[Triangles, dict[str, np.ndarray]]:
         """With the sections of `SceneTexels`, which nobody needs once they are uploaded. `first`:
-        `SceneGeometry.first_triangle`; `loose`: objects that are no `Solids`; `before`: of a scene in which they only
-        stood elsewhere."""
+        `SceneGeometry.first_triangle`; `loose`: objects that are neither `Solids` nor `Curved`; `before`: of a scene in
+        which they only stood elsewhere."""
         corner_turn = np.tile(np.arange(3), (first[-1], 1)) if before is None else before.corner_turn
         if not loose:
             return Triangles(np.zeros(0, int), corner_turn, None), {}
@@ -110,26 +149,31 @@ class Triangles:
 
 @dataclass(frozen=True)
 class SceneGeometry:
-    """Every object's shape, as one or the other."""
+    """Every object's shape, as one of three."""
 
     solids: Solids
+    curved: Curved
     triangles: Triangles
     first_triangle: np.ndarray
     """int (objects + 1,): each object's first one among the triangles of all."""
 
     @staticmethod
     def of(
-        scene: Scene, meshes: Sequence[Mesh], space: GpuSpace, has_tree: bool, before: SceneGeometry | None = None
+        scene: Scene, meshes: Sequence[Mesh], space: GpuSpace, features: Features, before: SceneGeometry | None = None
     ) -> tuple[SceneGeometry, dict[str, np.ndarray]]:
         """With sections of `SceneTexels`. `meshes`: in the world; `before`: of a scene whose objects only stood
-        elsewhere: corners' turns and the tree's shape are taken from there."""
+        elsewhere: what is curved, corners' turns and the tree's shape are taken from there."""
         solids = Solids.of(scene, meshes, space, moved=before is not None)
-        packed = set(solids.records["object"].tolist())
+        own: dict[int, tuple[Face, ...]] = {}
+        if features.curved_solids:
+            own = curved_solids(scene) if before is None else before.curved.own
+        curved, pieces = Curved.of(scene, space, own)
+        packed = set(solids.records["object"].tolist()) | set(own)
         loose = [i for i in range(len(meshes)) if i not in packed]
         first = np.cumsum([0] + [len(mesh.triangles) for mesh in meshes])
         known = None if before is None else before.triangles
-        triangles, sections = Triangles.of(scene, meshes, space, first, loose, has_tree, known)
-        return SceneGeometry(solids, triangles, first), sections
+        triangles, sections = Triangles.of(scene, meshes, space, first, loose, features.tree, known)
+        return SceneGeometry(solids, curved, triangles, first), sections | pieces
 
     def primitives(self, meshes: Sequence[Mesh], space: GpuSpace) -> np.ndarray:
         """uint32 (T,): what a ray that left each triangle has as `last_primitive`; T counts all objects' triangles."""
@@ -142,6 +186,9 @@ class SceneGeometry:
             off = np.abs(corners @ planes[:, :3].T - planes[:, 3]).max(axis=1)
             start = self.first_triangle[index]
             numbers[start : start + len(corners)] = _PLANE_BIT | (first + off.argmin(axis=1))
+        for index in self.curved.own:
+            start, end = self.first_triangle[index], self.first_triangle[index + 1]
+            numbers[start:end] = self.curved.primitives(index, space.to_gpu(meshes[index].corners()))
         return numbers
 
 

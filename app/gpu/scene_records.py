@@ -20,6 +20,22 @@ SOLID = Struct(
     "Solid",
     (Field("first_plane", "uint"), Field("plane_count", "uint"), Field("object", "uint"), Field("reserved", "uint")),
 )
+PIECE = Struct(
+    "Piece",
+    (
+        Field("row_x", "vec3", "where |rows · q|² - 2 linear · q - constant <= 0, q from `origin`, GPU space"),
+        Field("object", "uint", "scene object index"),
+        Field("row_y", "vec3"),
+        Field("is_last", "uint", "1: the next one is another solid's"),
+        Field("row_z", "vec3"),
+        Field("constant", "float"),
+        Field("origin", "vec3"),
+        Field("is_plane", "uint", "1: the rows are zero"),
+        Field("linear", "vec3"),
+        Field("reserved", "uint"),
+    ),
+    texels=True,
+)
 OBJECT = Struct(
     "Object",
     (
@@ -61,4 +77,4 @@ GRATING_ORDER = Struct(
     ),
     texels=True,
 )
-SCENE_STRUCTS = (TRIANGLE, SOLID, OBJECT, GRATING, GRATING_ORDER)
+SCENE_STRUCTS = (TRIANGLE, SOLID, PIECE, OBJECT, GRATING, GRATING_ORDER)

@@ -23,7 +23,7 @@ ROW_TEXELS = 4096
 _LEAF_BIT = 0x80000000
 _LEAF_COUNT_SHIFT = 28
 _EMPTY_BOX = np.array([np.inf] * 3 + [-np.inf] * 3, np.float32)
-SECTIONS = ("TREE", "TRIANGLES", "NORMALS", "OBJECTS", "GRATINGS")
+SECTIONS = ("TREE", "TRIANGLES", "NORMALS", "PIECES", "OBJECTS", "GRATINGS")
 
 
 class SceneTexels:

@@ -72,16 +72,27 @@ def standing(scene: Scene) -> list[tuple[int, int]]:
     ]
 
 
+def nested_pairs(scene: Scene) -> list[tuple[int, int]]:
+    """Pairs of dielectric objects whose bounds overlap or touch."""
+    indices = [i for i, o in enumerate(scene.objects) if o.material.transmits]
+    return [(indices[i], indices[j]) for pairs in _meeting_solids(scene, indices) for i, j in pairs.tolist()]
+
+
 def _nested(scene: Scene) -> list[int]:
     indices = [i for i, o in enumerate(scene.objects) if o.material.transmits]
-    if len(indices) < 2:
-        return []
-    bounds = np.stack([world_bounds(scene.objects[i]) for i in indices])
-    slack = _SOLID_SLACK * np.ptp(bounds, axis=(0, 1)).max()
     found = np.zeros(len(indices), bool)
-    for pairs in _meeting(bounds, 2.0 * slack):
+    for pairs in _meeting_solids(scene, indices):
         found[pairs] = True
     return [indices[i] for i in np.flatnonzero(found)]
+
+
+def _meeting_solids(scene: Scene, indices: list[int]) -> Iterator[np.ndarray]:
+    """Pairs (P, 2) among `indices`."""
+    if len(indices) < 2:
+        return
+    bounds = np.stack([world_bounds(scene.objects[i]) for i in indices])
+    slack = _SOLID_SLACK * np.ptp(bounds, axis=(0, 1)).max()
+    yield from _meeting(bounds, 2.0 * slack)
 
 
 def _meeting(bounds: np.ndarray, slack: float) -> Iterator[np.ndarray]:

@@ -13,6 +13,7 @@ import numpy as np
 from .bounces import why_no_bounces
 from .camera_rays import camera_frame
 from .contacts import contacts, overlapping_solids, standing, world_bounds
+from .curved_solids import curved_solids
 from .environment_light import why_no_environment_light
 from .scene import (
     Camera,
@@ -66,7 +67,7 @@ class Features:
     smooth_normals: bool
     """Some specular surface has interpolated normals."""
     normal_derivatives: bool
-    """They bend columns too."""
+    """They, or those of curved solids, bend columns too."""
     absorption: bool
     medium_stack: bool
     """Transparent solids nest or touch, so priorities decide the medium."""
@@ -78,6 +79,8 @@ class Features:
     """There are triangles besides the convex solids."""
     convex_solids: bool
     """Convex faceted solids are intersected as half-spaces."""
+    curved_solids: bool
+    """Balls, ellipsoids, lenses and cylinders are met as the quadrics they are, not as triangles."""
     charts: bool
     """A receiver is curved and carries charts."""
     nested_windows: bool
@@ -165,6 +168,7 @@ class Features:
             "HAS_TREE": self.tree,
             "LOOSE_TRIANGLES": self.loose_triangles,
             "CONVEX_SOLIDS": self.convex_solids,
+            "CURVED_SOLIDS": self.curved_solids,
             "CHARTS": self.charts,
             "NESTED_WINDOWS": self.nested_windows,
             "ANCHOR_WEIGHTS": self.anchor_weights,
@@ -189,11 +193,12 @@ class Features:
         single = random or settings.method.startswith("regular")
         groups = 0 if single else min(len(dispersive), 1 if settings.method == "srd-lambda" else MAX_GROUPS)
         convex = half_spaces(scene)
-        loose = [o for i, o in enumerate(scene.objects) if i not in convex]
+        curved = curved_solids(scene)
+        loose = [o for i, o in enumerate(scene.objects) if i not in convex and i not in curved]
         loose_triangles = sum(len(o.mesh.triangles) for o in loose)
         absorbing = any(o.material.absorption is not None for o in dielectrics)
         smooth = any(
-            o.mesh.corner_normals is not None for o in scene.objects if o.material.is_specular or o.material.has_coat
+            o.mesh.corner_normals is not None and (o.material.is_specular or o.material.has_coat) for o in loose
         )
         footprints = settings.method != "stochastic-point"
         camera_specular, camera_disperses = camera_needs(scene, settings)
@@ -233,13 +238,14 @@ class Features:
             mirrors=any(o.material.is_mirror for o in scene.objects),
             gratings=any(o.material.is_grating for o in scene.objects),
             smooth_normals=smooth,
-            normal_derivatives=smooth and (footprints or groups > 0),
+            normal_derivatives=bool(smooth or curved) and (footprints or groups > 0),
             absorption=absorbing,
             medium_stack=bool(overlapping_solids(scene)),
             contacts=bool(contacts(scene)),
             tree=loose_triangles > MAX_LOOSE_TRIANGLES,
             loose_triangles=loose_triangles > 0,
-            convex_solids=len(loose) < len(scene.objects),
+            convex_solids=bool(convex),
+            curved_solids=bool(curved),
             charts=any(o.material.receives and not is_flat(o) for o in scene.objects),
             nested_windows=any(o.material.receives and is_flat(o) for o in scene.objects),
             targets=-(-settings.bins // 4) if settings.bins else 1 + -(-tents // 4),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from .bounces import why_no_bounces
 from .contacts import contacts, overlapping_solids, standing
+from .curved_solids import curved_solids
 from .environment_light import why_no_environment_light
 from .environment_sun import with_sun
 from .features import Features, beam_objects, dispersive_materials, half_spaces, is_flat, why_no_beams, why_no_haze
@@ -16,7 +17,8 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
     """(feature, compiled in, reason) for every choice, for people."""
     glasses = [o.material.dispersion.name for i, o in enumerate(scene.objects) if i in dispersive_materials(scene)]
     convex = half_spaces(scene)
-    loose = sum(len(o.mesh.triangles) for i, o in enumerate(scene.objects) if i not in convex)
+    curved = curved_solids(scene)
+    loose = sum(len(o.mesh.triangles) for i, o in enumerate(scene.objects) if i not in convex and i not in curved)
     solids = [scene.objects[i].name for i in convex]
     touching = [scene.objects[i].name for i in overlapping_solids(scene)]
     on_receivers = list(dict.fromkeys(scene.objects[j].name for _, j in standing(scene)))
@@ -75,14 +77,16 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
         (
             "interpolated normals",
             features.smooth_normals,
-            "some specular surface is smooth" if features.smooth_normals else "all specular facets are flat",
+            "some specular surface is a smooth mesh"
+            if features.smooth_normals
+            else "no specular surface is a smooth mesh",
         ),
         (
             "normal derivatives",
             features.normal_derivatives,
             "columns bend with the normals"
             if features.normal_derivatives
-            else ("no columns" if features.smooth_normals else "all specular facets are flat"),
+            else ("no columns" if features.smooth_normals or curved else "all specular facets are flat"),
         ),
         ("polarisation", features.polarised, _polarisation_words(scene, features)),
         (
@@ -136,6 +140,13 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
             "half-space solids",
             features.convex_solids,
             names(solids) if features.convex_solids else "no convex faceted solid",
+        ),
+        (
+            "curved solids",
+            features.curved_solids,
+            f"met without triangles: {names([scene.objects[i].name for i in curved])}"
+            if features.curved_solids
+            else "no ball, ellipsoid, lens or cylinder stands by itself",
         ),
         (
             "charts",

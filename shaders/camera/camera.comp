@@ -275,7 +275,7 @@ void meet_surface(inout CameraPath path, Hit hit, uint kind, uint pixel_key)
     path.position = surface_point(hit, facet, whole.position, whole.direction);
 #ifdef SPECTRAL_SWEEP
 #ifdef NORMAL_DERIVATIVES
-    path.planar_so_far = uint(path.planar_so_far != 0u && ((hit.primitive & PLANE_BIT) != 0u || facet.normals == NONE));
+    path.planar_so_far = uint(path.planar_so_far != 0u && is_planar(hit, facet));
 #endif
     WHEN(path.restricted != 0u) transfer_ends(path, hit.normal_g);
 #endif

@@ -16,7 +16,7 @@ struct PathFrame {
 PathFrame path_frame(CameraPath path, Hit hit, Triangle facet)
 {
     PathFrame frame;
-    frame.shading = shading_frame(hit, facet, path.direction);
+    frame.shading = shading_frame(hit, facet, path.position, path.direction);
 #ifdef SPECTRAL_SWEEP
     for (int end = 0; end < 2; ++end)
         frame.end_normal[end] = normal_beside(frame.shading, path.restricted != 0u ? path.end_position[end] - path.position : vec3(0.0));

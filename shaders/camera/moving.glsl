@@ -24,7 +24,7 @@ uvec2 seen_first(uvec2 pixel)
     return imageLoad(visible, ivec2(pixel)).xy;
 }
 
-// Unit, outward.
+// Unit, outward; of what is no curved solid.
 vec3 normal_of(uint primitive)
 {
     Hit hit;
@@ -32,12 +32,12 @@ vec3 normal_of(uint primitive)
     Triangle facet = hit_triangle(hit);
     vec3 normal = normalize(cross(facet.edge1, facet.edge2));
 #ifdef CONVEX_SOLIDS
-    if (primitive != NONE && (primitive & PLANE_BIT) != 0u) normal = planes[primitive & ~PLANE_BIT].xyz;
+    if (is_plane(primitive)) normal = planes[primitive & ~PLANE_BIT].xyz;
 #endif
     return normal;
 }
 
-// Where the path's ray meets the plane of what it sees first.
+// Where the path's ray meets the plane, or the curved face, of what it sees first.
 Hit hit_on(uvec2 first, CameraPath path)
 {
     Hit hit;
@@ -51,10 +51,29 @@ Hit hit_on(uvec2 first, CameraPath path)
     hit.bary = vec2(-dot(facet.edge2, q), dot(facet.edge1, q)) * inverse;
     hit.distance = -dot(away, hit.normal_g) / dot(path.direction, hit.normal_g);
 #ifdef CONVEX_SOLIDS
-    if (first.x != NONE && (first.x & PLANE_BIT) != 0u)
+    if (is_plane(first.x))
         hit.distance = (planes[first.x & ~PLANE_BIT].w - dot(hit.normal_g, path.position)) / dot(path.direction, hit.normal_g);
 #endif
+#ifdef CURVED_SOLIDS
+    // Its triangles lie within it, so that a ray which meets them meets it, but for rounding and beyond a face's rim.
+    if (is_curved(first.x)) {
+        Piece piece = piece_at(first.x & ~CURVED_BIT);
+        vec2 interval = piece_interval(piece, path.position, path.direction);
+        bool meets = interval.x <= interval.y;
+        hit.distance = meets ? (interval.x > 0.0 ? interval.x : interval.y) : dot(piece.origin - path.position, path.direction);
+        hit.normal_g = normalize(piece_gradient(piece, path.position + hit.distance * path.direction));
+    }
+#endif
     return hit;
+}
+
+// Unit, outward: how what a pixel sees first faces.
+vec3 facing_of(uvec2 first, uvec2 pixel)
+{
+#ifdef CURVED_SOLIDS
+    if (is_curved(first.x)) return hit_on(first, path_from(pixel, PIXEL_MIDDLE, 1.0)).normal_g;
+#endif
+    return normal_of(first.x);
 }
 
 uint kind_of(uvec2 first)

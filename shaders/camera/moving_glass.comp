@@ -23,7 +23,7 @@ void main()
     uint at = gl_GlobalInvocationID.x;
     if (at >= specular_count) return;
     uvec2 pixel = pixel_of(specular_pixel(at)), first = seen_first(pixel);
-    vec3 normal = normal_of(first.x);
+    vec3 normal = facing_of(first, pixel);
     ivec2 block = ivec2(pixel / m.glass_step);
     vec4 sum = vec4(0.0);
     for (int i = 0; i < 9; ++i) {

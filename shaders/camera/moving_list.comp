@@ -17,7 +17,7 @@ void main()
         uint number = bitfieldExtract(best, 0, NUMBER_BITS);
         uvec2 pixel = pixel_of(number), first = seen_first(pixel);
         imageStore(found, ivec2(pixel), vec4(0.0));
-        imageStore(facing, ivec2(block), vec4(normal_of(first.x), uintBitsToFloat(first.y)));
+        imageStore(facing, ivec2(block), vec4(facing_of(first, pixel), uintBitsToFloat(first.y)));
         listed[atomicAdd(listed_count, 1u)] = number | (THE_SAMPLE << NUMBER_BITS);
     }
 }

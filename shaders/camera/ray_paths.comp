@@ -33,8 +33,8 @@ void main()
         Hit hit;
         bool met = intersect_closest(position, direction, FAR_DISTANCE, origin, hit);
         Triangle facet = hit_triangle(hit);
-        ShadingFrame frame = shading_frame(hit, facet, direction);
         vec3 there = met ? surface_point(hit, facet, position, direction) : position + p.escape * direction;
+        ShadingFrame frame = shading_frame(hit, facet, there, direction);
         path.points = event + 2u;
         points[at + event + 1u] = vec4(there, 0.0);
         path.last_object = met ? hit.object : NONE;

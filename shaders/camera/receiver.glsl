@@ -41,7 +41,7 @@ SurfaceInteraction seen_on(CameraPath path, Hit hit, Triangle facet, vec3 positi
     seen.dposition[2] = vec3(0.0);
     seen.reflectance = object_colours[hit.object].rgb;
 #ifdef COATS
-    seen.coat_normal = shading_frame(hit, facet, direction).normal;
+    seen.coat_normal = shading_frame(hit, facet, seen.position, direction).normal;
 #endif
     return seen;
 }

@@ -3,6 +3,8 @@
 #ifndef FOOTPRINT_GLSL
 #define FOOTPRINT_GLSL
 
+#include "lib/optics.glsl"
+
 // The two axes of a box of about this covariance, times 12.
 void box_of_covariance(float xx, float yy, float xy, out vec2 major, out vec2 minor)
 {
@@ -20,13 +22,6 @@ void box_of_covariance(float xx, float yy, float xy, out vec2 major, out vec2 mi
 void box_of_three(vec2 a, vec2 b, vec2 c, out vec2 major, out vec2 minor)
 {
     box_of_covariance(a.x * a.x + b.x * b.x + c.x * c.x, a.y * a.y + b.y * b.y + c.y * c.y, a.x * a.y + b.x * b.y + c.x * c.y, major, minor);
-}
-
-// Two unit vectors across a third.
-void frame_across(vec3 normal, out vec3 s, out vec3 t)
-{
-    s = normalize(cross(normal, abs(normal.z) < 0.9 ? vec3(0.0, 0.0, 1.0) : vec3(1.0, 0.0, 0.0)));
-    t = cross(normal, s);
 }
 
 // A footprint of sides `a` and `b` in the plane across `normal`, joined with another one's, `c` and `d`.

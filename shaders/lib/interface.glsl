@@ -35,15 +35,32 @@ struct Deflection {
     bool exists;        // false: nothing is transmitted
 };
 
-ShadingFrame shading_frame(Hit hit, Triangle facet, vec3 direction)
+#ifdef CURVED_SOLIDS
+// A curved solid's face: its own normal, which turns from place to place.
+void curve_as_piece(Hit hit, bool entering, vec3 position, inout ShadingFrame frame)
+{
+    Piece piece = piece_at(hit.primitive & ~CURVED_BIT);
+    frame.interpolated = 1u - piece.is_plane;
+#ifdef NORMAL_DERIVATIVES
+    curve_of_piece(piece, position, entering ? 1.0 : -1.0, frame.summed, frame.gradient_u, frame.gradient_v, frame.along_u, frame.along_v);
+#endif
+}
+#endif
+
+// `position`: the place of the hit.
+ShadingFrame shading_frame(Hit hit, Triangle facet, vec3 position, vec3 direction)
 {
     ShadingFrame frame;
     bool entering = dot(direction, hit.normal_g) < 0.0;
     frame.normal = frame.normal_g = entering ? hit.normal_g : -hit.normal_g;
     frame.interpolated = frame.refused = 0u;
+#ifdef NORMAL_DERIVATIVES
+    frame.summed = frame.normal;
+    frame.gradient_u = frame.gradient_v = frame.along_u = frame.along_v = vec3(0.0);
+#endif
 #ifdef SMOOTH_NORMALS
     // Without a branch: some corners' normals where the facet has none. Software renderers execute both sides anyway.
-    bool has_normals = (hit.primitive & PLANE_BIT) == 0u && facet.normals != NONE;
+    bool has_normals = (hit.primitive & (PLANE_BIT | CURVED_BIT)) == 0u && facet.normals != NONE;
     uint first = has_normals ? facet.normals : 0u;
     float side = entering ? 1.0 : -1.0;
     vec3 n0 = side * corner_normal(first), n1 = side * corner_normal(first + 1u), n2 = side * corner_normal(first + 2u);
@@ -60,7 +77,19 @@ ShadingFrame shading_frame(Hit hit, Triangle facet, vec3 direction)
     frame.along_v = n2 - n0;
 #endif
 #endif
+#ifdef CURVED_SOLIDS
+    if (is_curved(hit.primitive)) curve_as_piece(hit, entering, position, frame);
+#endif
     return frame;
+}
+
+// Whether the surface keeps its normal round the place that was hit.
+bool is_planar(Hit hit, Triangle facet)
+{
+#ifdef CURVED_SOLIDS
+    if (is_curved(hit.primitive)) return piece_at(hit.primitive & ~CURVED_BIT).is_plane != 0u;
+#endif
+    return is_plane(hit.primitive) || facet.normals == NONE;
 }
 
 #ifdef NORMAL_DERIVATIVES
@@ -130,12 +159,15 @@ vec3 refracted_column(Deflection turned, vec3 direction, vec3 ddirection, vec3 d
 vec3 surface_point(Hit hit, Triangle facet, vec3 origin, vec3 direction)
 {
     vec3 position = origin + hit.distance * direction;
-    if ((hit.primitive & PLANE_BIT) == 0u) position = facet.vertex + hit.bary.x * facet.edge1 + hit.bary.y * facet.edge2;
+    if ((hit.primitive & (PLANE_BIT | CURVED_BIT)) == 0u) position = facet.vertex + hit.bary.x * facet.edge1 + hit.bary.y * facet.edge2;
 #ifdef CONVEX_SOLIDS
-    else if (hit.primitive != NONE) {
+    if (is_plane(hit.primitive)) {
         vec4 plane = planes[hit.primitive & ~PLANE_BIT];
         position -= plane.xyz * (dot(position, plane.xyz) - plane.w);
     }
+#endif
+#ifdef CURVED_SOLIDS
+    if (is_curved(hit.primitive)) position = on_piece(piece_at(hit.primitive & ~CURVED_BIT), position);
 #endif
     return position;
 }

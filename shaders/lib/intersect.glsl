@@ -1,6 +1,6 @@
-// Nearest hit of a ray with the scene. Three ways to hold geometry, each compiled in only where
-// the scene has it: convex faceted solids as half-spaces, few loose triangles in a loop, many in
-// a tree. Nothing is offset: a ray starts exactly on the surface it left, that facet is excluded
+// Nearest hit of a ray with the scene. Four ways to hold geometry, each compiled in only where
+// the scene has it: convex faceted solids as half-spaces, curved ones as quadrics, few loose triangles
+// in a loop, many in a tree. Nothing is offset: a ray starts exactly on the surface it left, that facet is excluded
 // by its number, and the neighbours of a curved surface by the side the ray is on.
 #ifndef INTERSECT_GLSL
 #define INTERSECT_GLSL
@@ -12,9 +12,15 @@
 
 #include "lib/finite.glsl"
 #include "lib/scene.glsl"
+#include "lib/optics.glsl"
+#ifdef CURVED_SOLIDS
+#include "lib/curved.glsl"
+#endif
 
 // Set on `Hit.primitive` where it numbers a plane of a half-space solid, not a triangle.
 #define PLANE_BIT 0x80000000u
+// … a face of a curved solid.
+#define CURVED_BIT 0x40000000u
 // Distances below this (GPU units) are suspect: the same surface met again, or two that touch.
 #define NEAR_DISTANCE 3e-5
 #ifdef CONTACTS
@@ -39,7 +45,7 @@ vec3 left_normal = vec3(0.0);
 
 struct Hit {
     float distance;
-    uint primitive;   // slot in `triangles`, or PLANE_BIT | plane; NONE: nothing was hit
+    uint primitive;   // slot in `triangles`, PLANE_BIT | plane or CURVED_BIT | face; NONE: nothing was hit
     uint object;
     vec3 normal_g;    // unit, outward
     vec2 bary;        // weights of edge1 and edge2 (triangles only)
@@ -52,6 +58,16 @@ struct RayOrigin {
     uint inside;      // 1: it travels on that object's inner side (no bool: see shaders/README.md)
     uint inside_mask; // solids of the medium stack it is inside of (see medium.glsl)
 };
+
+bool is_plane(uint primitive)
+{
+    return (primitive & PLANE_BIT) != 0u && primitive != NONE;
+}
+
+bool is_curved(uint primitive)
+{
+    return (primitive & (PLANE_BIT | CURVED_BIT)) == CURVED_BIT;
+}
 
 bool accept_hit(float distance, float facing, uint object, RayOrigin origin)
 {
@@ -273,6 +289,50 @@ void intersect_solid(uint solid, vec3 origin_p, vec3 direction, RayOrigin origin
 }
 #endif
 
+#ifdef CURVED_SOLIDS
+// Curved solids are where all their faces overlap. A ray that has left one has left it for good; one that goes on within starts inside.
+void intersect_curved(vec3 origin_p, vec3 direction, RayOrigin origin, inout float best_key, inout Hit hit)
+{
+    COUNT_ROUNDS(PIECE_COUNT);
+    float enter = -FAR_DISTANCE, leave = FAR_DISTANCE;
+    uint enter_face = NONE, leave_face = NONE;
+    for (uint i = 0u; i < uint(PIECE_COUNT); ++i) {
+        Piece piece = piece_at(i);
+        vec2 interval = piece_interval(piece, origin_p, direction);
+        if ((CURVED_BIT | i) == origin.primitive) {
+            // At its own place a ray is at distance 0, whatever rounding says.
+            float chord = max(piece_chord(piece, origin_p, direction), START_DISTANCE);
+            interval = origin.inside != 0u ? vec2(-FAR_DISTANCE, chord) : vec2(FAR_DISTANCE, -FAR_DISTANCE);
+        }
+        enter_face = interval.x > enter ? CURVED_BIT | i : enter_face;
+        leave_face = interval.y < leave ? CURVED_BIT | i : leave_face;
+        enter = max(enter, interval.x);
+        leave = min(leave, interval.y);
+        if (piece.is_last != 0u) {
+            // Of a solid that is behind, or that the ray passes by, nothing is met.
+            bool enters = enter <= leave && enter_face != NONE, leaves = enter <= leave && leave_face != NONE;
+            float key = crossing_key(enter, -1.0);
+            if (enters && key < best_key && accept_hit(enter, -1.0, piece.object, origin)) {
+                best_key = key;
+                hit.distance = enter;
+                hit.primitive = enter_face;
+                hit.object = piece.object;
+            }
+            key = crossing_key(leave, 1.0);
+            if (leaves && key < best_key && accept_hit(leave, 1.0, piece.object, origin)) {
+                best_key = key;
+                hit.distance = leave;
+                hit.primitive = leave_face;
+                hit.object = piece.object;
+            }
+            enter = -FAR_DISTANCE;
+            leave = FAR_DISTANCE;
+            enter_face = leave_face = NONE;
+        }
+    }
+}
+#endif
+
 bool intersect(vec3 origin_p, vec3 direction, float far, RayOrigin origin, bool any_hit, out Hit hit)
 {
     hit.distance = far;
@@ -287,13 +347,20 @@ bool intersect(vec3 origin_p, vec3 direction, float far, RayOrigin origin, bool 
         Triangle left = triangle_at(min(origin.primitive, uint(max(TRIANGLE_COUNT, 1)) - 1u));
         left_normal = normalize(cross(left.edge1, left.edge2));
 #ifdef CONVEX_SOLIDS
-        if ((origin.primitive & PLANE_BIT) != 0u) left_normal = planes[origin.primitive & ~PLANE_BIT].xyz;
+        if (is_plane(origin.primitive)) left_normal = planes[origin.primitive & ~PLANE_BIT].xyz;
+#endif
+#ifdef CURVED_SOLIDS
+        // Nothing is in contact with it.
+        if (is_curved(origin.primitive)) left_normal = vec3(0.0);
 #endif
     }
 #endif
 #ifdef CONVEX_SOLIDS
     for (uint i = 0u; i < uint(SOLID_COUNT); ++i)
         intersect_solid(i, origin_p, direction, origin, best_key, hit);
+#endif
+#ifdef CURVED_SOLIDS
+    intersect_curved(origin_p, direction, origin, best_key, hit);
 #endif
     float ahead = -dot(origin_p, direction);
     ahead = ahead > FAR_START ? ahead : 0.0;
@@ -319,7 +386,7 @@ bool intersect_closest(vec3 origin_p, vec3 direction, float far, RayOrigin origi
 {
     bool met = intersect(origin_p, direction, far, origin, false, hit);
 #ifdef LOOSE_TRIANGLES
-    if (met && (hit.primitive & PLANE_BIT) == 0u) {
+    if (met && (hit.primitive & (PLANE_BIT | CURVED_BIT)) == 0u) {
         Triangle facet = hit_triangle(hit);
         hit.object = facet.object;
         hit.normal_g = normalize(cross(facet.edge1, facet.edge2));
@@ -328,6 +395,10 @@ bool intersect_closest(vec3 origin_p, vec3 direction, float far, RayOrigin origi
 #ifdef CONVEX_SOLIDS
     if (met && (hit.primitive & PLANE_BIT) != 0u)
         hit.normal_g = planes[hit.primitive & ~PLANE_BIT].xyz;
+#endif
+#ifdef CURVED_SOLIDS
+    if (is_curved(hit.primitive))
+        hit.normal_g = normalize(piece_gradient(piece_at(hit.primitive & ~CURVED_BIT), origin_p + hit.distance * direction));
 #endif
     return met;
 }

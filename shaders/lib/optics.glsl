@@ -6,6 +6,13 @@
 #ifndef OPTICS_GLSL
 #define OPTICS_GLSL
 
+// Two unit vectors across a third.
+void frame_across(vec3 normal, out vec3 s, out vec3 t)
+{
+    s = normalize(cross(normal, abs(normal.z) < 0.9 ? vec3(0.0, 0.0, 1.0) : vec3(1.0, 0.0, 0.0)));
+    t = cross(normal, s);
+}
+
 // Squared cosine of the transmitted angle; <= 0 is total internal reflection. The factored form
 // keeps its digits where eta_it is close to 1.
 float transmitted_cosine2(float theta, float eta_it)

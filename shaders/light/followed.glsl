@@ -58,8 +58,8 @@ FollowedRay follow_specular(vec3 position, vec3 direction, RayOrigin origin, uin
         }
         if (follows) {
             Triangle facet = hit_triangle(hit);
-            ShadingFrame frame = shading_frame(hit, facet, direction);
             position = surface_point(hit, facet, position, direction);
+            ShadingFrame frame = shading_frame(hit, facet, position, direction);
             ray.events = event + 1u;
 #ifdef ROUGH_SURFACES
             // One microfacet, which the path loses by as a camera's does.

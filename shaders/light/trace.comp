@@ -339,7 +339,7 @@ void main()
         outcome.what |= LOST_DEPTH;
         outcome.flux_w = carried_w(ray);
     } else {
-        scatter(ray, start, hit, shading_frame(hit, facet, ray.direction), kind, thing.weight_row, border, k, outcome);
+        scatter(ray, start, hit, shading_frame(hit, facet, ray.position, ray.direction), kind, thing.weight_row, border, k, outcome);
     }
 #ifdef FLIGHTS
 #ifdef BAND_CUTS

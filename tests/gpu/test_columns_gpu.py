@@ -257,7 +257,10 @@ MUTANTS = {
     "position follows the shading normal": (
         "light/trace.comp",
         "ray.ddirection[c].xyz, ray.direction, hit.normal_g, hit.distance)",
-        "ray.ddirection[c].xyz, ray.direction, shading_frame(hit, facet, ray.direction).normal, hit.distance)",
+        (
+            "ray.ddirection[c].xyz, ray.direction, "
+            "shading_frame(hit, facet, ray.position, ray.direction).normal, hit.distance)"
+        ),
         "sun",
     ),
     "axes swapped": (

@@ -65,7 +65,7 @@ class Facets:
         defines = {**bindings.SCENE_DEFINES, **texels.defines, "TRIANGLE_COUNT": COUNT, "SPECTRAL_SAMPLES": 2}
         defines |= dict.fromkeys(("LOOSE_TRIANGLES", "SMOOTH_NORMALS", "NORMAL_DERIVATIVES"), 1)
         start = "Hit hit = Hit(1.0, slot, 0u, n_g, bary); Triangle facet = hit_triangle(hit);"
-        start += "ShadingFrame frame = shading_frame(hit, facet, d);"
+        start += "ShadingFrame frame = shading_frame(hit, facet, vec3(0.0), d);"
         try:
             return evaluate(
                 gl.ctx,

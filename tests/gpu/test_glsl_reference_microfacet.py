@@ -24,7 +24,8 @@ COVERS = {
         "lobe_part",
     ),
     "rough_energy.glsl": ("regained",),
-    "footprint.glsl": ("frame_across", "join_sides", "cover_sides"),
+    "footprint.glsl": ("join_sides", "cover_sides"),
+    "optics.glsl": ("frame_across",),
 }
 LIBRARY = ["lib/rough_surface.glsl"]
 COUNT = 4000

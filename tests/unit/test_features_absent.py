@@ -53,6 +53,7 @@ EVERYTHING = Features(
     tree=True,
     loose_triangles=True,
     convex_solids=True,
+    curved_solids=True,
     charts=True,
     nested_windows=True,
     targets=3,
@@ -136,6 +137,7 @@ WITHOUT = {
     "contacts": {"contacts": False},
     "triangle tree": {"tree": False},
     "half-space solids": {"convex_solids": False},
+    "curved solids": {"curved_solids": False},
     "charts": {"charts": False},
     "nested windows": {"nested_windows": False},
     "contact lines": {"contact_lines": False},
@@ -167,12 +169,20 @@ def sources(features: Features) -> list[shader.Source]:
         "TREE_AT": 0,
         "TREE_STACK": 9,
         "NORMALS_AT": 0,
+        "PIECES_AT": 0,
         "INDEX_ROW": 0,
         "SLOPE_ROW": 1,
         "VARIABLE_ROW": 2,
         "BIND_FLIGHTS": 16,
     }
-    numbers |= {"STACK_SIZE": 1, "STACK_OBJECTS": "uint[](0u)", "SOLID_COUNT": 1, "PLANE_COUNT": 6, "TRIANGLE_COUNT": 9}
+    numbers |= {
+        "STACK_SIZE": 1,
+        "STACK_OBJECTS": "uint[](0u)",
+        "SOLID_COUNT": 1,
+        "PLANE_COUNT": 6,
+        "PIECE_COUNT": 2,
+        "TRIANGLE_COUNT": 9,
+    }
     light = features.defines() | numbers
     splat = splat_defines(features) | {"GROUPS": features.spectral_groups}
     made = [

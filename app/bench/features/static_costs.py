@@ -9,9 +9,10 @@ from dataclasses import dataclass, replace
 
 from ...gpu.mip_chain import level_count
 from ...gpu.records import photon_record, ray_record_of
-from ...gpu.scene_records import TRIANGLE
+from ...gpu.scene_records import PIECE, TRIANGLE
 from ...gpu.spectral_groups import SAMPLES
 from ...model.contacts import contacts, overlapping_solids
+from ...model.curved_solids import curved_solids
 from ...model.features import Features, beam_objects, half_spaces
 from ...model.scene import Scene
 from ...model.texture import Environment, Texture
@@ -62,11 +63,12 @@ def static_costs(scene: Scene, features: Features) -> dict[str, str]:
     from_points = RecordSizes.of(replace(features, lamp_columns=False))
     unpolarised = RecordSizes.of(replace(features, polarised=False))
     untinted = RecordSizes.of(replace(features, tint_levels=0))
-    specular = [o for o in scene.objects if o.material.is_specular]
     convex = half_spaces(scene)
-    loose = [o for i, o in enumerate(scene.objects) if i not in convex]
+    round_ones = curved_solids(scene)
+    pieces = sum(len(faces) for faces in round_ones.values())
+    loose = [o for i, o in enumerate(scene.objects) if i not in convex and i not in round_ones]
     triangles = sum(len(o.mesh.triangles) for o in loose)
-    smooth = sum(len(o.mesh.triangles) for o in specular if o.mesh.corner_normals is not None)
+    smooth = sum(len(o.mesh.triangles) for o in loose if o.material.is_specular and o.mesh.corner_normals is not None)
     planes = sum(len(own) for own in convex.values())
     row = SAMPLES * 8
     glasses = {o.material.dispersion for o in scene.objects if o.material.transmits}
@@ -112,6 +114,10 @@ def static_costs(scene: Scene, features: Features) -> dict[str, str]:
         "half-space solids": (
             features.convex_solids,
             f"{planes} planes, {size_words(planes * _TEXEL)}: each ray walks through all",
+        ),
+        "curved solids": (
+            features.curved_solids,
+            f"{pieces} faces, {size_words(pieces * PIECE.stride)}: each ray walks through all",
         ),
         "charts": (features.charts, f"{len(curved)} receiver(s) with a placement a facet"),
         "local gain": (features.local_gain, "eight voxels a photon"),

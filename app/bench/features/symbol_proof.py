@@ -62,9 +62,7 @@ FEATURE_SYMBOLS: dict[str, tuple[str, ...]] = {
     "interpolated normals": (
         "corner_normal",
         "has_normals",
-        "summed",
         "NORMALS_AT",
-        "normalised_derivative",
         "MIN_SHADING_COSINE",
     ),
     "normal derivatives": (r"normal_columns\[c\] = normal_column\(frame, ray",),
@@ -74,6 +72,7 @@ FEATURE_SYMBOLS: dict[str, tuple[str, ...]] = {
     "medium stack": ("medium_of", "stack_objects", "STACK_OBJECTS", "mask_before"),
     "triangle tree": ("intersect_tree", "box_entry", "LEAF_BIT", "TREE_AT", "TREE_STACK"),
     "half-space solids": ("intersect_solid", "planes", "solids", "SOLID_COUNT"),
+    "curved solids": ("intersect_curved", "piece_at", "PIECES_AT", "PIECE_COUNT"),
     "charts": ("RECEIVER_CHARTS", "PLACED_CHART"),
     "nested windows": ("only_fine", "outer"),
     "contact lines": ("contact_words", "takes_side", "side_of_contact"),

@@ -12,10 +12,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...model.curved_solids import curved_solids
 from ...model.features import Features, half_spaces
 from ...model.features_explained import explain
 from ...model.geometry.mesh import Mesh
 from ...model.scene import Absorption, Scene, SceneObject
+from ...reference.exact_shapes import as_triangles
 
 FORCED_BINS = 16
 """Spectral bins that a scene without any is made to pay for."""
@@ -162,20 +164,24 @@ def _left_out(name: str, scene: Scene, base: Features, asked: Variant) -> tuple[
         case "medium stack":
             return asked, Variant(scene, replace(base, medium_stack=False)), "without it nested solids refract wrongly"
         case "triangle tree":
-            convex = half_spaces(scene)
-            loose = sum(len(o.mesh.triangles) for i, o in enumerate(scene.objects) if i not in convex)
+            exact = {*half_spaces(scene), *curved_solids(scene)}
+            loose = sum(len(o.mesh.triangles) for i, o in enumerate(scene.objects) if i not in exact)
             if loose > MAX_LOOPED_TRIANGLES:
                 return None, None, f"cannot be left out here: a loop would test {loose:,} triangles for every ray"
             return asked, Variant(scene, replace(base, tree=False)), "against a loop"
         case "half-space solids":
-            meshed = _as_triangles(scene)
-            loose = sum(len(o.mesh.triangles) for o in meshed.objects)
+            meshed = _without_half_spaces(scene)
+            round_ones = curved_solids(scene)
+            loose = sum(len(o.mesh.triangles) for i, o in enumerate(meshed.objects) if i not in round_ones)
             features = replace(base, convex_solids=False, loose_triangles=True, tree=loose > 24)
             return (
                 asked,
                 Variant(meshed, features),
                 f"against {'a tree' if features.tree else 'a loop'} over the same facets",
             )
+        case "curved solids":
+            features = replace(base, curved_solids=False, smooth_normals=True, loose_triangles=True, tree=True)
+            return asked, Variant(as_triangles(scene), features), "against a tree over triangles that stand for them"
         case "nested windows":
             return asked, Variant(scene, replace(base, nested_windows=False)), "against the finest window alone"
         case "contact lines":
@@ -233,9 +239,9 @@ def _forced_in(name: str, scene: Scene, base: Features, asked: Variant) -> tuple
         case "gratings":
             return Variant(scene, replace(base, gratings=True)), asked, ""
         case "interpolated normals" | "normal derivatives":
-            every = len(half_spaces(scene)) == len(_specular(scene))
+            every = len(half_spaces(scene)) + len(curved_solids(scene)) == len(_specular(scene))
             note = (
-                "half-spaces have no corners to interpolate: the code is there and waits"
+                "what has no triangles has no corners to interpolate: the code is there and waits"
                 if every
                 else "every facet with three equal normals"
             )
@@ -273,7 +279,7 @@ def _forced_in(name: str, scene: Scene, base: Features, asked: Variant) -> tuple
             return None, None, "cannot be forced in: the channels are those of glass that the camera sees"
         case _ if name in _CAMERA:
             return None, None, "part of the picture; here only the map is drawn"
-        case "half-space solids" | "absorption" | "tint levels" | "medium stack" | "triangle tree":
+        case "half-space solids" | "curved solids" | "absorption" | "tint levels" | "medium stack" | "triangle tree":
             return None, None, "nothing in the scene to put it to"
         case _:
             return None, None, "has no code of its own"
@@ -311,7 +317,7 @@ def _with_absorption(scene: Scene) -> Scene:
     return replace(scene, objects=tuple(filled(o) for o in scene.objects))
 
 
-def _as_triangles(scene: Scene) -> Scene:
+def _without_half_spaces(scene: Scene) -> Scene:
     """Convex solids as the triangles they came from."""
 
     convex = half_spaces(scene)
