@@ -152,6 +152,9 @@ def test_records_say_where_a_piece_is(gl, tmp_path: Path) -> None:
             if item == 0:
                 normal, offset = np.split(buffers.geometry.solids.planes[number & 0x7FFFFFFF].astype(float), [3])
                 assert number >> 31 and corners @ normal == pytest.approx(float(offset[0]), abs=1e-6)
+            elif item in buffers.geometry.curved.own:
+                face = buffers.geometry.curved.faces[number & 0x3FFFFFFF]
+                assert number >> 30 == 1 and np.abs(face.distance(corners)).max() < 1e-6
             else:
                 assert buffers.geometry.triangles.order[number] == triangle
         emission = emission_of(light, False)
