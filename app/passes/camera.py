@@ -29,7 +29,7 @@ from .camera_programs import CameraPrograms
 from .camera_records import camera_parameters
 from .caustic_maps import CausticMaps
 from .haze import Haze
-from .listed_pixels import GROUP, ListedPixels
+from .listed_pixels import ListedPixels
 from .picture_channels import Channels
 from .picture_sums import PictureSums
 from .pixel_lattice import LOOKS, cells_of, is_in_strips, looks_lattice, pixel_lattice, shared_places
@@ -119,7 +119,7 @@ class CameraPass:
         self._inputs = CameraInputs(
             self._ctx, scene, self.channels, reflectances, maps, pictures, "RECEIVER_LIGHT" in shown
         )
-        shown |= self._inputs.defines
+        shown |= self._inputs.defines | {"PATHS_GROUP": context.traits.paths_group}
         self.follows = "CAMERA_SPECULAR" in shown
         """Some paths go on beyond glass or mirrors."""
         halts = self.follows and context.traits.loops_may_end
@@ -455,11 +455,15 @@ class CameraPass:
         """Follow what the listed pixels of a band of rows see, yielding the share done."""
         if self.only_directly or not self.follows:
             return
+        run = self._paths(parameters, maps)
+        yield from self._listed.follow(
+            parameters, lambda count: run(self._program_beyond(), count), self.dispatch_seconds
+        )
 
-        def dispatch(count: int) -> float:
-            return self._dispatch(self._program_beyond(), parameters, maps, -(-count // GROUP), 1)
-
-        yield from self._listed.follow(parameters, dispatch, self.dispatch_seconds)
+    def _paths(self, parameters: np.ndarray, maps: CausticMaps) -> Callable[[moderngl.ComputeShader, int], float]:
+        """What runs a program for so many paths; seconds it took."""
+        group = self.context.traits.paths_group
+        return lambda program, count: self._dispatch(program, parameters, maps, -(-count // group), 1)
 
     def _dispatch(
         self, program: moderngl.ComputeShader, parameters: np.ndarray, maps: CausticMaps, groups_x: int, groups_y: int
@@ -482,16 +486,10 @@ class CameraPass:
 
     def _draw_beams(self, parameters: np.ndarray, samples: int, maps: CausticMaps) -> Iterator[float]:
         """Draw what is seen by beams, yielding the share done after every portion."""
-
-        def bind() -> None:
-            self._bind(maps, parameters)
-
-        def dispatch(program: moderngl.ComputeShader, groups: int) -> float:
-            return self._dispatch(program, parameters, maps, groups, 1)
-
+        bind, paths = lambda: self._bind(maps, parameters), self._paths(parameters, maps)
         size, as_image = self._sums.size, self.scene.texels.as_image
         places, target_s = shared_places(samples, int(parameters["primary_samples"][0])), self.dispatch_seconds
-        yield from self._beams.draw(size, places, as_image, parameters, self._listed, bind, dispatch, target_s)
+        yield from self._beams.draw(size, places, as_image, parameters, self._listed, bind, paths, target_s)
 
     def _program_beyond(self) -> moderngl.ComputeShader:
         """What follows rays beyond glass and mirrors."""

@@ -12,7 +12,7 @@ import numpy as np
 from ..beams.screen_polygons import ScreenPolygons
 from ..beams.screen_starts import ScreenStarts
 from .beam_starts import BeamStarts
-from .listed_pixels import GROUP, ListedPixels
+from .listed_pixels import ListedPixels
 from .screen_beams import MOST_ENTRIES, ScreenBeams
 from .variants import BIND_BEAM_OBJECTS, screen_beam_defines, start_defines
 
@@ -24,7 +24,7 @@ START_SHARE = 0.25
 """Of a sample's power, that a path which carries on a beam stands for."""
 
 Dispatch = Callable[[moderngl.ComputeShader, int], float]
-"""Runs a program in so many groups; seconds it took."""
+"""Runs a program for so many paths; seconds it took."""
 
 
 class ShownBeams:
@@ -101,10 +101,7 @@ class ShownBeams:
             found, gather = self._beams.found, self._beams.gather
             parameters["start_share"] = START_SHARE
 
-            def follow(program: moderngl.ComputeShader, count: int) -> float:
-                return dispatch(program, -(-count // GROUP))
-
-            for share in self._starts.follow(listed, parameters, follow, found, gather, target_s):
+            for share in self._starts.follow(listed, parameters, dispatch, found, gather, target_s):
                 yield drawn + (1.0 - drawn) * share
 
     def add(self, sums: Sequence[moderngl.Texture], row: int, rows: int) -> None:
