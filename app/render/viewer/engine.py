@@ -178,7 +178,7 @@ class LiveEngine(EngineAnswers):
         self._tell(events.Examined(self._camera, level, moves, things), budget_s)
 
     def _work(self, deadline: float, budget_s: float) -> None:
-        sees, camera = self._maps is not None and self._inputs is not None, self._camera
+        sees, camera = not self._camera_pass.is_paused and self._inputs is not None, self._camera
         reserved = CAMERA_SHARE * budget_s
         if self.schedule.building:
             self._build(deadline - (reserved if sees and camera.owes_picture else 0.0))
@@ -189,7 +189,7 @@ class LiveEngine(EngineAnswers):
         ):
             self._work_on_photons(deadline - (0.0 if camera.is_done else reserved))
         self._work_on_environment(deadline, budget_s)
-        if self._maps is None or self._inputs is None:
+        if self._camera_pass.is_paused or self._inputs is None:
             return
         # A coarse picture that is owed is finished in this frame: what was moved must be seen to move.
         camera = self._camera
@@ -287,8 +287,8 @@ class LiveEngine(EngineAnswers):
 
     def _refit(self, wanted: LiveInputs) -> None:
         assert self._shown is not None
+        # Whoever walks round meanwhile sees the maps of before; nobody else waits for a picture by these.
         self._camera_pass.pause()
-        self._maps = None
         self._shown.light.fit_to(wanted)
         self._splat_again(self._shown, refitted=True)
 
@@ -334,6 +334,7 @@ class LiveEngine(EngineAnswers):
     def _set_maps(self, maps: LightMaps) -> None:
         assert self._shown is not None
         self._maps = self._shown.light.caustic_maps(maps)
+        self._shown.light.drop_outdated()
         if not self.schedule.moved:  # places on what is moved stay where it was
             self._shown.light.bounce_caustics(self._maps)
         self._published_photons = maps.photon_weight
@@ -392,12 +393,16 @@ class LiveEngine(EngineAnswers):
         then for what surfaces give each other."""
         if self._shown is None or self.schedule.building or self._camera.owes_picture:
             return
+        # The rest of it would begin the picture anew each time that more is known, and share frames with it.
+        hurries = self._camera_pass.is_becoming_whole or self._camera_pass.is_paused
+        if hurries and self._shown.light.shows_environment:
+            return
         end = max(deadline - CAMERA_SHARE * budget_s, time.perf_counter() + ENVIRONMENT_SHARE * budget_s)
         seconds, interacting = 0.5 * ENVIRONMENT_SHARE * budget_s, self.schedule.interacting
         found = self._shown.light.ask_environment(end, seconds, interacting)
         if not self.schedule.moved:
             found = self._shown.light.ask_bounces(end, seconds, interacting) or found
-        if found:
+        if found and not self._camera_pass.is_paused:
             self._restart_camera(same_view=not interacting)
 
     def release(self) -> None:
