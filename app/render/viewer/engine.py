@@ -47,6 +47,9 @@ PREVIEW_GPU_S = 0.004
 CAMERA_SHARE = 0.4
 """Of a frame, where photons are traced as well."""
 
+REFIT_SHARE = 0.5
+"""Of a frame, at least, for maps that are filled while those of before are walked round."""
+
 ENVIRONMENT_SHARE = 0.3
 """Of a frame, at least, for the environment's light until all of it is known."""
 
@@ -197,6 +200,9 @@ class LiveEngine(EngineAnswers):
         end = max(deadline, time.perf_counter() + owed) if camera.owes_picture else deadline
         self._tally.seconds["camera"] += self._camera_pass.advance(end, one_sample=self.schedule.interacting)
         self._tell(events.CameraWorked(self._camera))
+        if self.schedule.interacting and self.schedule.splatting and self._shown and self._shown.light.shows_outdated:
+            # A hand that walks round for long shall not see the maps of before all the while.
+            self._work_on_photons(max(deadline, time.perf_counter() + REFIT_SHARE * budget_s))
 
     # ---- schedule ----------------------------------------------------------------------------
 

@@ -180,6 +180,11 @@ class LiveLight:
             self.light_pass.beams.survey_again()
         self.light_pass.lay_out(self.fit_of(inputs))
 
+    @property
+    def shows_outdated(self) -> bool:
+        """The maps that are shown are of before `fit_to`."""
+        return bool(self._outdated)
+
     def drop_outdated(self) -> None:
         """Nobody looks at the maps of before `fit_to` any more."""
         shader.release(*self._outdated)
