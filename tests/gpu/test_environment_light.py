@@ -25,6 +25,7 @@ from spectrasplat.render.device_scene import scene_buffers
 from spectrasplat.render.frames import FrameRenderer
 from spectrasplat.render.viewer.engine import LiveEngine
 from spectrasplat.render.viewer.live_camera import LiveCamera
+from spectrasplat.render.viewer.schedule import Schedule
 
 from tests.gpu.mutants import mutate
 
@@ -246,6 +247,9 @@ def test_the_rest_of_it_waits_for_a_picture_that_becomes_whole(
     does = {"hurry": True}
     try:
         monkeypatch.setattr(LiveCamera, hurries, property(lambda _: does["hurry"]))
+        if hurries == "is_paused":
+            # Maps are awaited as long as photons for them are.
+            monkeypatch.setattr(Schedule, "has_photon_work", property(lambda _: does["hurry"]))
         engine.set(LiveInputs(scene, CAMERA, 48, 32))
         until = time.monotonic() + 60.0
         while engine._shown is None and time.monotonic() < until:

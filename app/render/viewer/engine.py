@@ -400,8 +400,8 @@ class LiveEngine(EngineAnswers):
         if self._shown is None or self.schedule.building or self._camera.owes_picture:
             return
         # The rest of it would begin the picture anew each time that more is known, and share frames with it.
-        hurries = self._camera_pass.is_becoming_whole or self._camera_pass.is_paused
-        if hurries and self._shown.light.shows_environment:
+        awaits_maps = self._camera_pass.is_paused and self.schedule.has_photon_work
+        if (self._camera_pass.is_becoming_whole or awaits_maps) and self._shown.light.shows_environment:
             return
         end = max(deadline - CAMERA_SHARE * budget_s, time.perf_counter() + ENVIRONMENT_SHARE * budget_s)
         seconds, interacting = 0.5 * ENVIRONMENT_SHARE * budget_s, self.schedule.interacting
