@@ -27,7 +27,7 @@ def test_walking_round_and_dragging_the_dispersion_trace_nothing(gl: Context, mo
     camera = bench.session.state.camera
     orbiting = bench.phase("orbiting", 0.3, bench.orbit, bench.holding_middle_button)
     assert bench.session.state.camera != camera
-    dragging = bench.phase("dragging dispersion", 0.4, bench.drag_gain, bench.holding_gain)
+    dragging = bench.phase("dragging dispersion", 0.9, bench.drag_gain, bench.holding_gain)
     # What is seen directly has every pixel in motion too, and all of the picture has once it rests.
     assert orbiting.glass < orbiting.direct and orbiting.whole_s > 0.0 < orbiting.whole_processor_s
     gain = bench.session.state.scene.objects[bench._glass].material.dispersion.gain

@@ -202,7 +202,7 @@ class LiveEngine(EngineAnswers):
         self._tell(events.CameraWorked(self._camera))
         if self.schedule.interacting and self.schedule.splatting and self._shown and self._shown.light.shows_outdated:
             # A hand that walks round for long shall not see the maps of before all the while.
-            self._work_on_photons(max(deadline, time.perf_counter() + REFIT_SHARE * budget_s))
+            self._work_on_photons(max(deadline, time.perf_counter() + REFIT_SHARE * budget_s), only_stored=True)
 
     # ---- schedule ----------------------------------------------------------------------------
 
@@ -383,12 +383,14 @@ class LiveEngine(EngineAnswers):
 
     # ---- light -------------------------------------------------------------------------------
 
-    def _work_on_photons(self, deadline: float) -> None:
-        """Splat what is due, then trace."""
+    def _work_on_photons(self, deadline: float, *, only_stored: bool = False) -> None:
+        """Splat what is due, then trace, but for `only_stored`."""
         assert self._shown is not None
         light_pass = self._shown.light.light_pass
         before = light_counts(light_pass.stats)
         while time.perf_counter() < deadline and self.schedule.has_photon_work:
+            if only_stored and not self.schedule.splatting:
+                break
             work = self._splatting if self.schedule.splatting else self._tracing
             if next(work, self) is self:
                 self._tell(events.SplattingEnded() if self.schedule.splatting else events.TracingEnded())
