@@ -16,7 +16,6 @@ import numpy as np
 
 from ..beams.screen_polygons import ScreenPolygons
 from ..beams.screen_starts import ScreenStarts
-from ..gpu import shader
 from ..gpu.context import Context
 from ..gpu.dispatch_budget import DispatchBudget
 from ..gpu.map_channels import MapChannels
@@ -352,9 +351,9 @@ class CameraPass:
 
     def release(self) -> None:
         """Free every buffer, texture and program."""
-        shader.release(self._inputs, self._programs, self._sums, self._beams, self._listed)
-        if self._haze is not None:
-            self._haze.release()
+        for owned in (self._inputs, self._programs, self._sums, self._beams, self._listed, self._haze):
+            if owned is not None:
+                owned.release()
 
     # ---- for pictures in motion ------------------------------------------------------------
 
