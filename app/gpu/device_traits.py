@@ -35,6 +35,9 @@ class DeviceTraits:
     """A command only queues work: whoever keeps a deadline must wait for the device."""
     dispatch_s: float = DISPATCH_S
     """What a dispatch should take where nobody waits for frames."""
+    paths_group: int = 64
+    """Camera paths of a work group. A software renderer hands groups out to its threads one by one and runs eight paths
+    of one side by side: with more in a group, few paths are shared out unevenly."""
     viewer_batch: int = 1 << 18
     """Rays of a batch while somebody watches …"""
     viewer_first_photons: int = 1 << 20
@@ -69,6 +72,7 @@ class DeviceTraits:
             batch_scale=1,
             work_is_queued=False,
             dispatch_s=0.15,
+            paths_group=8,
             viewer_batch=1 << 14,
             viewer_first_photons=1 << 14,
             viewer_largest_photons=1 << 22,

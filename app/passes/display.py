@@ -48,6 +48,8 @@ _GROUP = 32, 8
 _ROWS = 16
 _HALO = 2
 """Texture unit."""
+_SHOWN_IMAGE = 1
+"""Image unit."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,8 @@ class _Variant:
     """Output pixels are smaller than the picture's."""
     has_halo: bool = False
     """Glare is added on the way."""
+    as_image: bool = False
+    """Pixels are read by `imageLoad` (`DeviceTraits.texels_as_images`); only of a picture alone, pixel for pixel."""
 
     @property
     def rows(self) -> int:
@@ -77,6 +81,7 @@ class _Variant:
         table = ERROR if self.shows == "error" else FALSE_COLOUR
         return {
             **({"ANTIALIAS": 1, "ROWS": self.rows} if self.rows > 1 else {}),
+            **({"AS_IMAGE": 1} if self.as_image else {}),
             **({"SAME_SIZE": 1} if self.same_size else {}),
             **({"HALO": 1} if self.has_halo else {}),
             **({} if self.enlarged else {"BESIDE_IS_NEXT": 1}),
@@ -137,7 +142,9 @@ class Display:
         same_size = picture.size == size
         if halo is not None and not (same_size and shows == "picture" and not antialias):
             raise ValueError("glare is added on the way to a picture alone, pixel for pixel and not antialiased")
-        variant = _Variant(_tone(settings), shows, taps, antialias, same_size, enlarged > 1.0, halo is not None)
+        as_image = same_size and shows == "picture" and self._context.traits.texels_as_images
+        sizes = same_size, enlarged > 1.0
+        variant = _Variant(_tone(settings), shows, taps, antialias, *sizes, halo is not None, as_image)
         # Pixel for pixel nothing is blended, so that one broken pixel stays one.
         nearest = enlarged > NEAREST_FROM or same_size
         return self._dispatch(output, variant, parameters, (picture, other or picture), size, nearest, halo)
@@ -216,6 +223,8 @@ class Display:
             texture.use(unit)
             sampler.use(unit)
         output.bind_to_image(0, read=False, write=True)
+        if variant.as_image:
+            pictures[0].bind_to_image(_SHOWN_IMAGE, read=True, write=False)
         program = self._program(variant)
         if halo is not None:
             halo.light.use(_HALO)

@@ -15,8 +15,8 @@ from ..gpu.dispatch_budget import DispatchBudget
 from ..gpu.records import NONE
 from .variants import BIND_HALTED, BIND_LISTED
 
-GROUP = 64
-"""Pixels of a work group."""
+_WHOLE = 64
+"""Pixels that a dispatch is given more or less by."""
 _FIRST = 1024
 _PLACES = 8192
 """Samples that may be under way, where they halt."""
@@ -47,8 +47,8 @@ class ListedPixels:
         """For pictures of so many pixels, up to `room` of them on the list at a time."""
         self.room, self._surveyed = room, 0
         self._reserve()
-        self.budget = DispatchBudget(_FIRST, GROUP, max(pixels, GROUP))
-        self.resumed = DispatchBudget(_FIRST, GROUP, _PLACES)
+        self.budget = DispatchBudget(_FIRST, _WHOLE, max(pixels, _WHOLE))
+        self.resumed = DispatchBudget(_FIRST, _WHOLE, _PLACES)
 
     def survey_at(self, pixels: int) -> int:
         """Make room for a survey of so many pixels behind the list; where it begins, in words behind the counts."""

@@ -20,8 +20,9 @@ from ..beams.screen_pairs import count_pixel_parts
 from ..beams.screen_polygons import ScreenPolygons
 from ..beams.screen_starts import ScreenStarts, screen_starts
 from ..model.scene import Camera
-from ..passes.camera import PRIMARY_SAMPLES, PRIMARY_SAMPLES_UNTIL, CameraPass
+from ..passes.camera import CameraPass
 from ..passes.pixel_lattice import shared_places
+from ..passes.sample_spread import PRIMARY_SAMPLES, PRIMARY_SAMPLES_UNTIL
 from ..passes.screen_beams import parts_of, sees_edges, strength_of
 from ..passes.spectrum_choice import Spectrum
 

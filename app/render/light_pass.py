@@ -121,9 +121,9 @@ class LightPass:
 
     def lay_out(self, fit: MapFit) -> None:
         """Maps fitted to where light lands and to `fit`; empty."""
-        if self.maps is not None:
-            self.maps.release()
-        self.maps, self.fit = None, fit
+        if (before := self.give_maps()) is not None:
+            before.release()
+        self.fit = fit
         layout = self.layout_for(fit)
         self.before_maps(layout)
         words = None
@@ -133,6 +133,11 @@ class LightPass:
         self.features = self.maps.features
         if self.survey.beam_light is not None:
             self.survey.beam_light.lay_out(self.maps.layout)
+
+    def give_maps(self) -> LightMaps | None:
+        """The maps that there are become the caller's, to show them until others are filled."""
+        given, self.maps = self.maps, None
+        return given
 
     def layout_for(self, fit: MapFit) -> MapLayout:
         """Where maps fitted to `fit` lie."""

@@ -6,7 +6,7 @@
 // This is a program for what is seen directly (LISTS_SPECULAR). Where the scene shows glass or mirrors it lists the pixels that meet something specular
 // first (FOLLOWED), and another is for those (CAMERA_SPECULAR), which holds all that is expensive.
 #ifdef CAMERA_SPECULAR
-layout(local_size_x = 64) in;
+layout(local_size_x = PATHS_GROUP) in;
 #else
 layout(local_size_x = 8, local_size_y = 8) in;
 #endif

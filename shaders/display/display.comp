@@ -17,6 +17,10 @@ layout(binding = 1) uniform sampler2D other;
 layout(binding = 2) uniform sampler2D halo;
 uniform float kept;
 #endif
+#ifdef AS_IMAGE
+// `shown`, for a software renderer, whose `texelFetch` works out a mip level for every pixel.
+layout(rgba32f, binding = 1) uniform readonly restrict image2D shown_image;
+#endif
 layout(rgba8, binding = 0) uniform writeonly restrict image2D display;
 // A software renderer reads a storage buffer ray by ray, and took as long for that as for all the rest.
 layout(std140, binding = 0) uniform Parameters { DisplayParameters parameters; };
@@ -29,7 +33,9 @@ const vec3 NOT_FINITE = vec3(1.0, 0.0, 1.0);
 // Mean of the picture over an output pixel: one lookup where the picture is enlarged, TAPS² where it is shrunk.
 vec3 look(sampler2D picture, vec2 pixel)
 {
-#ifdef SAME_SIZE
+#ifdef AS_IMAGE
+    return imageLoad(shown_image, ivec2(pixel)).rgb;
+#elif defined(SAME_SIZE)
     return texelFetch(picture, ivec2(pixel), 0).rgb;
 #elif TAPS == 1
     return textureLod(picture, parameters.origin + (pixel + 0.5) * parameters.step_uv, 0.0).rgb;
@@ -85,7 +91,9 @@ vec3 toned(vec3 colour)
 // What the picture has beside a pixel, so many of the larger of its pixels and the output's away; the border's go on beyond it.
 vec3 scene_beside(sampler2D picture, vec2 pixel, ivec2 pixels)
 {
-#ifdef SAME_SIZE
+#ifdef AS_IMAGE
+    return imageLoad(shown_image, clamp(ivec2(pixel) + pixels, ivec2(0), imageSize(shown_image) - 1)).rgb;
+#elif defined(SAME_SIZE)
     return texelFetch(picture, clamp(ivec2(pixel) + pixels, ivec2(0), textureSize(picture, 0) - 1), 0).rgb;
 #else
     vec2 half_uv = 0.5 * parameters.beside_px * parameters.step_uv;

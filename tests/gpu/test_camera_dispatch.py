@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -40,6 +41,15 @@ def test_the_size_of_dispatches_changes_nothing(camera_pass: CameraPass) -> None
     assert np.array_equal(camera_pass.read_rgb(), whole)
     assert shares == sorted(shares) and shares[-1] == 1.0
     assert len(shares) > 3 * 7 + 10, "no pixels were listed, or all were followed at once"
+
+
+def test_how_many_paths_a_group_has_changes_nothing(gl, camera_pass: CameraPass, monkeypatch) -> None:
+    camera_pass.run(CAMERA, *SIZE, 3)
+    monkeypatch.setattr(gl, "traits", replace(gl.traits, paths_group=72 - gl.traits.paths_group))
+    other = opened_camera_pass(gl, [floor(), *solids("prism")], background=(0.9, 0.5, 0.2), camera=CAMERA)
+    other.run(CAMERA, *SIZE, 3)
+    assert np.array_equal(other.read_rgb(), camera_pass.read_rgb())
+    released(other)
 
 
 @pytest.mark.parametrize("after", [2, 9, 30])

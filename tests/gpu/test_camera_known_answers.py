@@ -21,7 +21,7 @@ from spectrasplat.model.geometry.primitives_lens import lens
 from spectrasplat.model.lights import DirectionalLight
 from spectrasplat.model.optics.spectrum import illuminant
 from spectrasplat.model.scene import Camera, Diffuse, Light, SceneObject
-from spectrasplat.passes.camera import TAPS_PER_PIXEL
+from spectrasplat.passes.sample_spread import TAPS_PER_PIXEL
 from spectrasplat.passes.spectrum_choice import Spectrum
 from spectrasplat.reference import glasses
 from spectrasplat.reference.glasses import C_NM, D_NM, F_NM

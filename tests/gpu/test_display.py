@@ -360,3 +360,21 @@ def test_a_broken_shader_keeps_the_last_good_programs(gl, display, monkeypatch, 
     display.reload()
     assert codes(display.run(picture, Settings(), 0.0, (40, 10)))[..., 0].max() == 0
     picture.release()
+
+
+@pytest.mark.parametrize("antialias", [False, True])
+def test_pixels_are_the_same_read_as_images_and_as_texels(gl, monkeypatch, antialias: bool) -> None:
+    """A software renderer reads images, which costs it less, other devices texels."""
+    rng = np.random.default_rng(5)
+    rgb = 2.0 ** rng.uniform(-6, 6, (41, 53, 3))
+    rgb[7, 9] = np.nan
+    shown = []
+    for as_images in (False, True):
+        monkeypatch.setattr(gl, "traits", replace(gl.traits, texels_as_images=as_images))
+        one = Display(gl)
+        picture = gl.ctx.texture((53, 41), 4, np.dstack([rgb, np.ones((41, 53))]).astype("f4").tobytes(), dtype="f4")
+        shown.append(one.run(picture, Settings(), 0.0, (53, 41), antialias=antialias).read())
+        assert any(variant.as_image for variant in one._programs) == as_images
+        picture.release()
+        one.release()
+    assert shown[0] == shown[1]

@@ -24,6 +24,8 @@ from spectrasplat.passes.environment_light import EnvironmentLightPass
 from spectrasplat.render.device_scene import scene_buffers
 from spectrasplat.render.frames import FrameRenderer
 from spectrasplat.render.viewer.engine import LiveEngine
+from spectrasplat.render.viewer.live_camera import LiveCamera
+from spectrasplat.render.viewer.schedule import Schedule
 
 from tests.gpu.mutants import mutate
 
@@ -230,5 +232,44 @@ def test_the_viewer_keeps_it_where_only_the_camera_moves(gl: Context) -> None:
         aside = replace(scene, objects=(replace(scene.objects[0], object_to_world=matrix), scene.objects[1]))
         assert shown(aside, CAMERA)[0] is not first
         assert shown(replace(scene, environment=replace(SKY, lights=False)), CAMERA)[0] is None
+    finally:
+        engine.release()
+
+
+@pytest.mark.parametrize("hurries", ["is_becoming_whole", "is_paused"])
+def test_the_rest_of_it_waits_for_a_picture_that_becomes_whole(
+    gl: Context, monkeypatch: pytest.MonkeyPatch, hurries: str
+) -> None:
+    """Each time that more was known the picture began anew, and had two thirds of the frames in between."""
+    scene = scene_of(place(sphere(0.4, 320), Diffuse((0.5, 0.5, 0.5)), (0.0, 0.0, 0.5)), floor(), environment=SKY)
+    engine = LiveEngine(gl)
+    engine.target_photons, engine.camera_samples = 1000, 2
+    does = {"hurry": True}
+    try:
+        monkeypatch.setattr(LiveCamera, hurries, property(lambda _: does["hurry"]))
+        if hurries == "is_paused":
+            # Maps are awaited as long as photons for them are.
+            monkeypatch.setattr(Schedule, "has_photon_work", property(lambda _: does["hurry"]))
+        engine.set(LiveInputs(scene, CAMERA, 48, 32))
+        until = time.monotonic() + 60.0
+        while engine._shown is None and time.monotonic() < until:
+            engine.advance(0.05)
+        assert engine._shown is not None
+        light = engine._shown.light.environment
+        known = light.asked
+        assert 0 < light.shown <= known < light.total
+        for _ in range(5):
+            engine.advance(0.05)
+        assert light.asked == known and not engine.is_idle
+        # Another one is asked for its first light all the same, and all of it once nothing hurries any more.
+        engine.set(LiveInputs(replace(scene, environment=gradient(*[(1.0, 0.0, 0.0)] * 3)), CAMERA, 48, 32))
+        for _ in range(5):
+            engine.advance(0.05)
+        if hurries == "is_becoming_whole":
+            assert 0 < light.shown <= light.asked < light.total
+        does["hurry"] = False
+        while not engine.is_idle and time.monotonic() < until:
+            engine.advance(0.05)
+        assert light.is_done and light.shown == light.total
     finally:
         engine.release()

@@ -23,8 +23,9 @@ from spectrasplat.passes.spectrum_choice import Spectrum
 from spectrasplat.render.solo import solo_scene
 from spectrasplat.render.viewer.dirty_level import DirtyLevel
 from spectrasplat.render.viewer.engine import PREVIEW_S, Budget, LiveEngine
+from spectrasplat.render.viewer.glass_steps import STEPS, GlassSteps
 from spectrasplat.render.viewer.invalidation import appearance_differs, dirty_level
-from spectrasplat.render.viewer.live_camera import MOVING_TAPS, STEPS, _side
+from spectrasplat.render.viewer.live_camera import MOVING_TAPS, _side
 from spectrasplat.render.viewer.spectrum_guess import guess_weights
 
 SIZE = (120, 68)
@@ -81,13 +82,17 @@ def engine(gl: Context) -> Iterator[LiveEngine]:
 
 
 def until(
-    done: Callable[[], bool], engine: LiveEngine, each: Callable[[], None] = lambda: None, patience_s: float = 120.0
+    done: Callable[[], bool],
+    engine: LiveEngine,
+    each: Callable[[], None] = lambda: None,
+    patience_s: float = 120.0,
+    budget_s: float = 0.05,
 ) -> None:
     end = time.monotonic() + patience_s
     while not done():
         assert engine.problem is None, engine.problem
         assert time.monotonic() < end, "it took too long"
-        engine.advance(0.05)
+        engine.advance(budget_s)
         each()
 
 
@@ -123,7 +128,7 @@ def test_a_moving_camera_sees_no_colour_grain_in_glass(
     engine: LiveEngine, stage: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        "spectrasplat.render.viewer.live_camera.STEPS", (1,)
+        "spectrasplat.render.viewer.glass_steps.STEPS", (1,)
     )  # a slow machine must not leave too few pixels to see grain in
     settle(engine, inputs(stage))
     moved = replace(stage.camera, position=tuple(np.add(stage.camera.position, (0.02, 0.0, 0.0))))
@@ -249,9 +254,9 @@ def test_a_picture_in_motion_follows_as_much_glass_as_its_time_asks_for(engine: 
     # However slow the machine is, what is moved is seen to move: every few frames at least.
     assert all(later > before for before, later in zip(pictures[:-4], pictures[4:], strict=True)), pictures
     view = engine._camera_pass
-    assert view.shown_samples == 1 and view._glass_rate is not None and view._glass_pixels > 1000
-    step = view._step_in(PREVIEW_S)
-    assert view._glass_pixels <= step * step * view._glass_rate * PREVIEW_S or step == STEPS[-1]
+    assert view.shown_samples == 1 and view._glass.rate is not None and view._glass.pixels > 1000
+    step = view._glass.within(PREVIEW_S)
+    assert view._glass.pixels <= step * step * view._glass.rate * PREVIEW_S or step == STEPS[-1]
 
 
 @pytest.fixture(scope="module")
@@ -292,7 +297,7 @@ def test_in_motion_what_is_seen_directly_is_as_sharp_as_ever(
     engine: LiveEngine, table: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Smallest error that would be seen: a picture of half the side misses by three times the bound."""
-    monkeypatch.setattr("spectrasplat.render.viewer.live_camera.STEPS", (24,))
+    monkeypatch.setattr("spectrasplat.render.viewer.glass_steps.STEPS", (24,))
     monkeypatch.setattr("spectrasplat.render.viewer.live_camera.SCALES", (1.0,))
     settle(engine, inputs(table))
     camera = moved(engine, table)
@@ -318,7 +323,7 @@ def test_in_motion_only_sharp_edges_of_light_are_looked_at_pixel_by_pixel(
     engine: LiveEngine, table: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A spot that fades from its middle to its border is smooth there; one with a hard border is not."""
-    monkeypatch.setattr("spectrasplat.render.viewer.live_camera.STEPS", (24,))
+    monkeypatch.setattr("spectrasplat.render.viewer.glass_steps.STEPS", (24,))
     monkeypatch.setattr("spectrasplat.render.viewer.live_camera.SCALES", (1.0,))
     x, y, _ = table.camera.target
     uneven, errors = [], []
@@ -380,7 +385,7 @@ def test_in_motion_the_last_rows_and_columns_are_as_sharp_as_the_others(
     engine: LiveEngine, table: Scene, size: tuple[int, int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Pictures whose sides are no multiples of the lattice's cells."""
-    monkeypatch.setattr("spectrasplat.render.viewer.live_camera.STEPS", (24,))
+    monkeypatch.setattr("spectrasplat.render.viewer.glass_steps.STEPS", (24,))
     monkeypatch.setattr("spectrasplat.render.viewer.live_camera.SCALES", (1.0,))
     wanted = replace(inputs(table), width=size[0], height=size[1])
     settle(engine, wanted)
@@ -402,7 +407,7 @@ def test_in_motion_the_last_rows_and_columns_are_as_sharp_as_the_others(
 def test_once_still_glass_becomes_finer_until_every_pixel_has_its_own_path(
     engine: LiveEngine, table: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("spectrasplat.render.viewer.live_camera.STEPS", (24,))
+    monkeypatch.setattr("spectrasplat.render.viewer.glass_steps.STEPS", (24,))
     settle(engine, inputs(table))
     camera = moved(engine, table)
     engine.playing = False
@@ -422,6 +427,41 @@ def test_once_still_glass_becomes_finer_until_every_pixel_has_its_own_path(
     glass = seen_objects(engine) == next(i for i, o in enumerate(table.objects) if o.material.is_specular)
     expected = one_sample(engine, camera)
     assert np.abs(whole[0] - expected)[glass].max() <= 1e-4 * expected[glass].max()
+
+
+def test_whoever_walks_round_while_maps_are_laid_out_anew_sees_those_of_before(
+    engine: LiveEngine, table: Scene
+) -> None:
+    """Nothing new was shown for as long as the stored photons took to fill them: seconds in large scenes."""
+    engine.set(inputs(table))
+    until(lambda: engine.schedule.splatting and not engine._shown.light.is_coarse, engine, budget_s=1e-3)
+    assert engine._shown.light.shows_outdated and engine._camera_pass.is_paused
+    version, seen = engine.picture_version, []
+    for step in range(60):
+        position = tuple(np.add(table.camera.position, (0.1 * (step + 1), 0.05, 0.0)))
+        camera = replace(table.camera, position=position)
+        engine.set(replace(inputs(table), camera=camera))
+        engine.advance(1e-3, interacting=True)
+        assert engine.inputs.camera == camera
+        assert engine.picture_version > version, "the picture stood still"
+        version = engine.picture_version
+        seen.append(picture(engine))
+        if not engine._shown.light.shows_outdated:
+            break
+    # While the hand still moves there are the new ones.
+    assert 1 < step < 59
+    assert all(p.max() > 0.0 for p in seen) and not np.array_equal(seen[0], seen[-1])
+    until(lambda: engine.is_idle, engine)
+    assert engine.stats.resolution_scale == 1.0
+
+
+@pytest.mark.parametrize(
+    ("rate", "later"), [(None, [6, 1]), (50.0, [6, 1]), (1.0, [6, 3, 1])], ids=["unknown", "soon", "slow"]
+)
+def test_blocks_before_the_last_are_left_out_where_that_is_soon_there(rate: float | None, later: list[int]) -> None:
+    steps = GlassSteps()
+    steps.rate, steps.pixels = rate, 900
+    assert steps.after(12) == later and steps.after(6) == later[1:] and steps.after(1) == []
 
 
 def test_it_is_said_while_picture_and_scene_differ(engine: LiveEngine, stage: Scene) -> None:

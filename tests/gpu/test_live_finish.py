@@ -71,7 +71,7 @@ def blocks(rgb: np.ndarray, rows: int = 6, columns: int = 8) -> np.ndarray:
 @pytest.mark.slow
 def test_a_coat_is_seen_in_motion_as_at_rest(engine: LiveEngine, monkeypatch: pytest.MonkeyPatch) -> None:
     """Parts of the picture of a movement against the same view at rest; without the coat they would be another."""
-    monkeypatch.setattr("spectrasplat.render.viewer.live_camera.STEPS", (3,))  # however slow the machine is
+    monkeypatch.setattr("spectrasplat.render.viewer.glass_steps.STEPS", (3,))  # however slow the machine is
     monkeypatch.setattr("spectrasplat.render.viewer.live_camera.SCALES", (1.0,))
     moved = replace(CAMERA, position=(0.05, -4.0, 1.22))
     wanted = LiveInputs(scene_of(COATED), CAMERA, *SIZE)

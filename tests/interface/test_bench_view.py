@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+import time
+from types import SimpleNamespace
+
+import numpy as np
 import pytest
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.bench import viewer_speed
+from spectrasplat.edit.state import State
 from spectrasplat.gpu.context import Context
+from spectrasplat.model.scene import Camera, Scene
+from spectrasplat.render.viewer.engine import LiveEngine
+from spectrasplat.render.viewer.stats import LiveStats
 
 
 @pytest.mark.slow
@@ -19,7 +27,7 @@ def test_walking_round_and_dragging_the_dispersion_trace_nothing(gl: Context, mo
     camera = bench.session.state.camera
     orbiting = bench.phase("orbiting", 0.3, bench.orbit, bench.holding_middle_button)
     assert bench.session.state.camera != camera
-    dragging = bench.phase("dragging dispersion", 0.4, bench.drag_gain, bench.holding_gain)
+    dragging = bench.phase("dragging dispersion", 0.9, bench.drag_gain, bench.holding_gain)
     # What is seen directly has every pixel in motion too, and all of the picture has once it rests.
     assert orbiting.glass < orbiting.direct and orbiting.whole_s > 0.0 < orbiting.whole_processor_s
     gain = bench.session.state.scene.objects[bench._glass].material.dispersion.gain
@@ -28,5 +36,43 @@ def test_walking_round_and_dragging_the_dispersion_trace_nothing(gl: Context, mo
     assert orbiting.rays_traced == dragging.rays_traced == 0
     assert 0.0 < orbiting.processor_ms < 60_000.0
     assert len(dragging.frame_ms) > 2 and "ms" in dragging.line
-    assert 0 < bench.latency(bench.nudge_camera) < 5000
+    seen = bench.latency(bench.nudge_camera)
+    assert seen.missed == 0 and 0 < seen.answered_ms[0] < 1e3 * viewer_speed.ANSWER_S
+    monkeypatch.setattr(viewer_speed, "ANSWER_S", 0.0)
+    assert bench.latency(bench.nudge_camera).missed == 1
     bench.release()
+
+
+def test_an_input_that_is_never_answered_is_missed_in_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It used to be waited for through sixty frames, each as long as the machine took, and as long for rest before."""
+
+    class Deaf(LiveEngine):
+        inputs = None
+        picture_version = camera_samples = 0
+
+        def __init__(self) -> None:
+            pass
+
+    frames = []
+
+    def frame() -> None:
+        frames.append(time.perf_counter())
+        time.sleep(0.005)
+
+    empty = Scene("none", Camera((0, -1, 0), (0, 0, 0)), (), ())
+    bench = object.__new__(viewer_speed._Bench)
+    picture = SimpleNamespace(engine=Deaf(), stats=LiveStats(converged=False), radiance=object())
+    bench.session = SimpleNamespace(state=State(empty, empty.camera), picture=picture, frame_ms=[5.0])
+    bench.interface = SimpleNamespace(frame=frame)
+    bench._sampler = SimpleNamespace(run=lambda _radiance: np.zeros(3))
+    monkeypatch.setattr(viewer_speed, "REST_S", 0.02)
+    monkeypatch.setattr(viewer_speed, "ANSWER_S", 0.03)
+    found = bench.latency(lambda: None)
+    assert found.missed == viewer_speed.NUDGES and not len(found.answered_ms)
+    assert frames[-1] - frames[0] < 1.0
+
+
+def test_inputs_that_were_missed_are_later_than_all_others() -> None:
+    assert viewer_speed.Latency(np.array([10.0, 30.0]), 0).line == "20 ms"
+    assert viewer_speed.Latency(np.array([10.0, 30.0]), 1).line == "30 ms, 1 later than 2 s"
+    assert viewer_speed.Latency(np.array([10.0]), 3).line == "over 2 s, 3 later than 2 s"

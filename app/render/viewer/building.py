@@ -3,6 +3,7 @@ pauses."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from itertools import chain
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 
 _ENVIRONMENT_S = 0.006
 """What one dispatch that asks for the environment's light should take."""
+PATIENCE_S = 1.0
+"""After which whoever waits for a scene is told every step."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +55,46 @@ class Shown:
     accumulation: Accumulation
     steps: Iterator[None] = field(default_factory=lambda: iter(()))
     """What is left of the accumulation."""
+
+
+class Building:
+    """What is being built, if anything is, and how it comes on."""
+
+    def __init__(self, context: Context) -> None:
+        self._context = context
+        self._steps: Iterator[Shown | str | None] | None = None
+        self._since = 0.0
+        self.at = ""
+        """What it is at, or was last."""
+
+    @property
+    def seconds(self) -> float:
+        """Since anything was begun."""
+        return time.perf_counter() - self._since
+
+    def begin(self, steps: Iterator[Shown | str | None]) -> None:
+        """Build this (`build`), and nothing else any more."""
+        self.at, self._since, self._steps = "setting the scene up", time.perf_counter(), steps
+
+    def drop(self) -> None:
+        """Build no further."""
+        self._steps = None
+
+    def advance(self, deadline: float) -> Shown | None:
+        """Go on until about `deadline` (`time.perf_counter`); what was built, once it is."""
+        assert self._steps is not None
+        while time.perf_counter() < deadline:
+            built = next(self._steps, None)
+            if self._context.traits.work_is_queued:
+                # What is only queued keeps no deadline.
+                self._context.finish()
+            if isinstance(built, Shown):
+                return built
+            if built is not None:
+                self.at = built
+                if self.seconds > PATIENCE_S:
+                    break  # what comes may hold the frame up for long: its name is shown before
+        return None
 
 
 def build(

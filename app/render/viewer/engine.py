@@ -11,36 +11,32 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...base.errors import UserError
 from ...edit.live_inputs import LiveInputs
-from ...edit.stored_photons import StoredPhotons
 from ...gpu import shader
 from ...model.environment_sun import with_sun
 from ...passes.caustic_maps import CausticMaps
-from ...passes.pick import Picker, PickHit
+from ...passes.pick import Picker
 from ..beam_light import MovingBeams
 from ..light_maps import LightMaps
 from ..solo import scene_seen
 from . import schedule as events
 from .building import Budget, Shown, build
 from .dirty_level import DirtyLevel
-from .invalidation import appearance_differs, dirty_level, only_moves
-from .live_camera import DIRECT_S, MOVED_S, LiveCamera
+from .engine_answers import EngineAnswers
+from .invalidation import appearance_differs, dirty_level, moves_view, only_moves
+from .live_camera import DIRECT_S, MOVED_S
 from .live_light import LiveLight
-from .photon_queries import CausticSpectrum, caustic_spectrum, reach_of, world_photons
-from .refit import is_judged, wants_new_maps
-from .schedule import Action, CameraState, Schedule, ShowMaps
-from .stats import LiveStats
+from .refit import wants_new_maps
+from .schedule import Action, ShowMaps
+from .work_tally import light_counts
 
 if TYPE_CHECKING:
-    import moderngl
-
     from ...gpu.context import Context
-    from ...gpu.scene_buffers import SceneBuffers
 
 PREVIEW_OVERRUN_S = 0.25
 """What a coarse picture may take beyond a frame's budget."""
@@ -51,48 +47,28 @@ PREVIEW_GPU_S = 0.004
 CAMERA_SHARE = 0.4
 """Of a frame, where photons are traced as well."""
 
+REFIT_SHARE = 0.5
+"""Of a frame, at least, for maps that are filled while those of before are walked round."""
+
 ENVIRONMENT_SHARE = 0.3
 """Of a frame, at least, for the environment's light until all of it is known."""
 
-PATIENCE_S = 1.0
-"""After which whoever waits for a scene is told every step."""
 
-QUERIED_PHOTONS = 200_000
-"""Stored ones that are asked what lies under the cursor."""
-
-
-class LiveEngine:
+class LiveEngine(EngineAnswers):
     """Owns everything of one live rendering; `context` stays the caller's and must be current in every call."""
 
     def __init__(self, context: Context, budget: Budget | None = None) -> None:
-        self.context = context
+        shader.keep_programs(context.ctx)
+        super().__init__(context)
         self.budget = budget or Budget.of(context)
-        self.schedule = Schedule()
-        """What is under way and what is due; only `_tell` changes it."""
-        self.problem: str | None = None
-        """Why the last change could not be shown (bad shader, maps too large); the picture before it stays."""
         self.preview_seconds = PREVIEW_S if context.is_software else PREVIEW_GPU_S
         """What a coarse picture should take."""
         self._target_photons = 32_000_000
-        shader.keep_programs(context.ctx)
-        self._camera_pass = LiveCamera(context)
-        self._wanted: LiveInputs | None = None
-        self._inputs: LiveInputs | None = None
-        """What the picture shows."""
-        self._shown: Shown | None = None
-        self._building: Iterator[Shown | str | None] | None = None
-        self._building_at, self._building_since = "", 0.0
-        """What building is at, and since when anything is built."""
         self._splatting: Iterator[None] = iter(())
         self._tracing: Iterator[None] = iter(())
         self._maps: CausticMaps | None = None
-        self._picker: Picker | None = None
-        self._rays_before = 0
         self._preview_photons = 1 << 13
         self._moving = MovingBeams()
-        self._times = {"trace": 0.0, "splat": 0.0, "camera": 0.0}
-        self._history: list[tuple[float, int, float]] = []
-        self._published_photons = 0.0
 
     # ---- what is wanted ----------------------------------------------------------------------
 
@@ -146,15 +122,6 @@ class LiveEngine:
         return self._level
 
     @property
-    def _level(self) -> DirtyLevel:
-        """What is wanted asks for."""
-        assert self._wanted is not None
-        if self._shown is None or self._inputs is None:
-            return DirtyLevel.BUILD
-        level = dirty_level(self._shown.traced, self._inputs, self._wanted, self._shown.light.may_have_beams)
-        return max(level, DirtyLevel.TRACE) if self.schedule.moved else level
-
-    @property
     def _only_moves(self) -> bool:
         """What is wanted differs from what was traced in where things stand alone."""
         return self._shown is not None and self._wanted is not None and only_moves(self._shown.traced, self._wanted)
@@ -175,7 +142,7 @@ class LiveEngine:
             try:
                 self._build(float("inf"))
             except (shader.ShaderError, UserError):
-                self._building = None
+                self._building.drop()
                 self._tell(events.Failed())
                 raise
 
@@ -186,7 +153,7 @@ class LiveEngine:
         coarsely."""
         started = time.perf_counter()
         deadline = started + budget_s
-        self._times = dict.fromkeys(self._times, 0.0)
+        self._tally.begin_frame()
         if self._wanted is None:
             return
         on_device = dict(self.context.timers.seconds)
@@ -200,21 +167,21 @@ class LiveEngine:
                 self._follow(budget_s)
                 self._work(deadline, budget_s)
         except (shader.ShaderError, UserError) as error:
-            self._building = None
+            self._building.drop()
             self.problem = str(error)
             self._tell(events.Failed())
-        self._times |= self.context.timers.since(on_device)
+        self._tally.seconds |= self.context.timers.since(on_device)
 
     def _follow(self, budget_s: float) -> None:
         """Bring what is shown nearer to what is wanted."""
         due = self.schedule.wish_is_due
         level = self._level if due else DirtyLevel.NOTHING
-        moves = due and _moves_view(self._inputs, self._wanted)
+        moves = due and moves_view(self._inputs, self._wanted)
         things = due and self.schedule.interacting and level >= DirtyLevel.TRACE and self._only_moves
         self._tell(events.Examined(self._camera, level, moves, things), budget_s)
 
     def _work(self, deadline: float, budget_s: float) -> None:
-        sees, camera = self._maps is not None and self._inputs is not None, self._camera
+        sees, camera = not self._camera_pass.is_paused and self._inputs is not None, self._camera
         reserved = CAMERA_SHARE * budget_s
         if self.schedule.building:
             self._build(deadline - (reserved if sees and camera.owes_picture else 0.0))
@@ -225,18 +192,17 @@ class LiveEngine:
         ):
             self._work_on_photons(deadline - (0.0 if camera.is_done else reserved))
         self._work_on_environment(deadline, budget_s)
-        if self._maps is None or self._inputs is None:
+        if self._camera_pass.is_paused or self._inputs is None:
             return
         # A coarse picture that is owed is finished in this frame: what was moved must be seen to move.
         camera = self._camera
         owed = PREVIEW_OVERRUN_S if camera.is_coarse else 0.25 * budget_s
         end = max(deadline, time.perf_counter() + owed) if camera.owes_picture else deadline
-        self._times["camera"] += self._camera_pass.advance(end, one_sample=self.schedule.interacting)
+        self._tally.seconds["camera"] += self._camera_pass.advance(end, one_sample=self.schedule.interacting)
         self._tell(events.CameraWorked(self._camera))
-
-    @property
-    def _camera(self) -> CameraState:
-        return self._camera_pass.state
+        if self.schedule.interacting and self.schedule.splatting and self._shown and self._shown.light.shows_outdated:
+            # A hand that walks round for long shall not see the maps of before all the while.
+            self._work_on_photons(max(deadline, time.perf_counter() + REFIT_SHARE * budget_s), only_stored=True)
 
     # ---- schedule ----------------------------------------------------------------------------
 
@@ -253,16 +219,8 @@ class LiveEngine:
                 self.problem = None
                 if self._shown is not None and self._shown.light.light_pass.beams is not None:
                     self._shown.light.light_pass.beams.pause()
-                self._building_at, self._building_since = "setting the scene up", time.perf_counter()
-                self._building = build(
-                    self.context,
-                    self.budget,
-                    self._wanted,
-                    self._largest,
-                    self._target_photons,
-                    self._maps_ready,
-                    self._moving,
-                )
+                sizes = self.budget, self._wanted, self._largest, self._target_photons
+                self._building.begin(build(self.context, *sizes, self._maps_ready, self._moving))
             case Action.FOLLOW_PHOTONS:
                 self._follow_photons(self._wanted, 0.4 * budget_s)
             case Action.FOLLOW_CAMERA | Action.MOVE_CAMERA:
@@ -319,7 +277,8 @@ class LiveEngine:
     def _follow_move(self, wanted: LiveInputs) -> None:
         shown = self._shown
         assert shown is not None
-        self._building, self._splatting, self._tracing = None, iter(()), iter(())
+        self._building.drop()
+        self._splatting, self._tracing = iter(()), iter(())
         self._camera_pass.pause()
         if shown.light.light_pass.beams is not None:
             shown.light.light_pass.beams.pause()
@@ -334,8 +293,8 @@ class LiveEngine:
 
     def _refit(self, wanted: LiveInputs) -> None:
         assert self._shown is not None
+        # Whoever walks round meanwhile sees the maps of before; nobody else waits for a picture by these.
         self._camera_pass.pause()
-        self._maps = None
         self._shown.light.fit_to(wanted)
         self._splat_again(self._shown, refitted=True)
 
@@ -381,6 +340,7 @@ class LiveEngine:
     def _set_maps(self, maps: LightMaps) -> None:
         assert self._shown is not None
         self._maps = self._shown.light.caustic_maps(maps)
+        self._shown.light.drop_outdated()
         if not self.schedule.moved:  # places on what is moved stay where it was
             self._shown.light.bounce_caustics(self._maps)
         self._published_photons = maps.photon_weight
@@ -394,19 +354,8 @@ class LiveEngine:
     # ---- building ----------------------------------------------------------------------------
 
     def _build(self, deadline: float) -> None:
-        assert self._building is not None
-        while time.perf_counter() < deadline:
-            built = next(self._building, None)
-            if self.context.traits.work_is_queued:
-                # What is only queued keeps no deadline.
-                self.context.finish()
-            if isinstance(built, Shown):
-                self._swap(built)
-                return
-            if built is not None:
-                self._building_at = built
-                if time.perf_counter() - self._building_since > PATIENCE_S:
-                    return  # what comes may hold the frame up for long: its name is shown before
+        if (built := self._building.advance(deadline)) is not None:
+            self._swap(built)
 
     def _swap(self, built: Shown) -> None:
         # What does not compile (or fit) leaves everything as it was: the programs of the camera come first.
@@ -420,7 +369,8 @@ class LiveEngine:
             built.light.release()
             raise
         before, self._shown = self._shown, built
-        self._building, self._splatting, self._tracing = None, iter(()), built.steps
+        self._building.drop()
+        self._splatting, self._tracing = iter(()), built.steps
         self._inputs = built.traced
         if before is not None:
             self._rays_before += before.light.light_pass.trace.rays_traced
@@ -433,173 +383,39 @@ class LiveEngine:
 
     # ---- light -------------------------------------------------------------------------------
 
-    def _work_on_photons(self, deadline: float) -> None:
-        """Splat what is due, then trace."""
+    def _work_on_photons(self, deadline: float, *, only_stored: bool = False) -> None:
+        """Splat what is due, then trace, but for `only_stored`."""
         assert self._shown is not None
         light_pass = self._shown.light.light_pass
-        stats = light_pass.stats
-        before = stats.trace_seconds, stats.splat_seconds, stats.photons
+        before = light_counts(light_pass.stats)
         while time.perf_counter() < deadline and self.schedule.has_photon_work:
+            if only_stored and not self.schedule.splatting:
+                break
             work = self._splatting if self.schedule.splatting else self._tracing
             if next(work, self) is self:
                 self._tell(events.SplattingEnded() if self.schedule.splatting else events.TracingEnded())
-        stats = light_pass.stats
-        traced = max(stats.trace_seconds - before[0], 0.0)
-        splatted = max(stats.splat_seconds - before[1], 0.0)
-        self._times["trace"] += traced
-        self._times["splat"] += splatted
-        self._history = [h for h in self._history if h[0] > time.perf_counter() - 1.0]
-        self._history.append((time.perf_counter(), max(stats.photons - before[2], 0), traced + splatted))
+        self._tally.note_light(before, light_pass.stats)
 
     def _work_on_environment(self, deadline: float, budget_s: float) -> None:
         """A part of a frame or what is left of it, while the camera has a picture to show: for the environment's light,
         then for what surfaces give each other."""
         if self._shown is None or self.schedule.building or self._camera.owes_picture:
             return
+        # The rest of it would begin the picture anew each time that more is known, and share frames with it.
+        awaits_maps = self._camera_pass.is_paused and self.schedule.has_photon_work
+        if (self._camera_pass.is_becoming_whole or awaits_maps) and self._shown.light.shows_environment:
+            return
         end = max(deadline - CAMERA_SHARE * budget_s, time.perf_counter() + ENVIRONMENT_SHARE * budget_s)
         seconds, interacting = 0.5 * ENVIRONMENT_SHARE * budget_s, self.schedule.interacting
         found = self._shown.light.ask_environment(end, seconds, interacting)
         if not self.schedule.moved:
             found = self._shown.light.ask_bounces(end, seconds, interacting) or found
-        if found:
+        if found and not self._camera_pass.is_paused:
             self._restart_camera(same_view=not interacting)
-
-    # ---- what there is -----------------------------------------------------------------------
-
-    @property
-    def picture(self) -> moderngl.Texture | None:
-        """RGBA32F, linear Rec.709 radiance (lm/(sr unit²) for white), top row first; None before the first."""
-        return self._camera_pass.picture
-
-    @property
-    def picture_version(self) -> int:
-        """Changes whenever the picture does."""
-        return self._camera_pass.version
-
-    @property
-    def camera_samples(self) -> int:
-        """A still picture is finished after so many a pixel."""
-        return self._camera_pass.target_samples
-
-    @camera_samples.setter
-    def camera_samples(self, samples: int) -> None:
-        self._camera_pass.target_samples = samples
-
-    @property
-    def inputs(self) -> LiveInputs | None:
-        """What the picture shows, or is about to."""
-        return self._inputs
-
-    @property
-    def building_at(self) -> str:
-        """What building is at now; empty where nothing is built."""
-        return self._building_at if self.schedule.building else ""
-
-    @property
-    def stats(self) -> LiveStats:
-        """This moment's."""
-        context, camera_pass = self.context, self._camera_pass
-        common = LiveStats(
-            renderer=context.renderer,
-            is_software=context.is_software,
-            device_advice=context.advice,
-            camera_samples=float(camera_pass.shown_samples),
-            resolution_scale=camera_pass.scale,
-            direct_scale=camera_pass.direct_scale,
-            shows_other=self.differs == "scene" or self._camera.owes_first,
-            differs=self.differs,
-            preparing=self._building_at if self.differs == "scene" or self._camera.owes_first else "",
-            preparing_s=time.perf_counter() - self._building_since,
-            camera_bands=camera_pass.shown_bands,
-            camera_fallbacks=camera_pass.fallbacks,
-        )
-        if self._shown is None:
-            return common
-        light = self._shown.light
-        light_pass = light.light_pass
-        tally = light_pass.stats.tally
-        beams, polygons = (0, 0) if light_pass.beams is None else light_pass.beams.counts
-        seconds = sum(h[2] for h in self._history)
-        return replace(
-            common,
-            rays_traced=self._rays_before + light_pass.trace.rays_traced,
-            photons=int(self._published_photons),
-            photons_stored=light.photons_stored,
-            passes=self._shown.accumulation.number,
-            trace_s=self._times["trace"],
-            splat_s=self._times["splat"] + self._times.get("beams", 0.0),  # apart only by the device's own timers
-            camera_s=self._times["camera"],
-            photons_per_second=sum(h[1] for h in self._history) / seconds if seconds > 0.0 else 0.0,
-            first_order=light.first_order,
-            converged=self.is_idle,
-            bytes=light.bytes,
-            fallbacks=dict(tally.fallbacks),
-            lost={name: flux / tally.emitted for name, flux in tally.ended.items()} if tally.emitted else {},
-            bands=dict(light_pass.stats.bands),
-            beams=beams,
-            polygons=polygons,
-            only_beams=light.only_beams,
-        )
-
-    @property
-    def differs(self) -> Literal["", "light", "scene", "moved"]:
-        """What of the wanted scene the picture does not show yet, as in `LiveStats`."""
-        if self.schedule.moved and not self.schedule.building:
-            return "moved"
-        if self._wanted is None or not self.schedule.building:
-            return ""
-        return "scene" if self._level == DirtyLevel.BUILD else "light"
-
-    @property
-    def _knows_environment(self) -> bool:
-        return self._shown is None or (self._shown.light.knows_environment and self._shown.light.knows_bounces)
-
-    @property
-    def is_busy(self) -> bool:
-        """Never while anybody can ask: what is asked of it is done when it returns (see `ThreadedEngine`)."""
-        return False
-
-    @property
-    def is_idle(self) -> bool:
-        """Nothing is left to do until an input changes."""
-        if self._wanted is None:
-            return True
-        judged = self._shown is None or is_judged(self._shown.light, self._wanted)
-        return judged and self._knows_environment and self.schedule.is_idle(self._camera)
-
-    def pick(self, x: float, y: float) -> PickHit | None:
-        """First surface at (x, y) of the picture, 0 to 1 from its top left corner; None beyond everything."""
-        if self._picker is None or self._inputs is None:
-            return None
-        return self._picker.pick(self._inputs.camera, self._inputs.width, self._inputs.height, x, y)
-
-    def stored_photons(self, limit: int = QUERIED_PHOTONS) -> StoredPhotons:
-        """About `limit` stored photons in world space, as they are shown."""
-        if self._shown is None or self._inputs is None or self.schedule.moved:
-            return StoredPhotons.none()
-        return world_photons(self._shown.light, self._inputs, limit)
-
-    def caustic_spectrum(self, receiver: int, position: np.ndarray) -> CausticSpectrum | None:
-        """The caustic's spectral irradiance at a world position on object `receiver`."""
-        if self._shown is None or self._inputs is None or self.schedule.moved:
-            return None
-        if receiver not in self._shown.light.buffers.receivers:
-            return None
-        light = self._shown.light
-        traced, shown = (
-            [each.spectral_power for each in s.lights] for s in (light.light_pass.scene, self._inputs.scene)
-        )
-        photons, weight = self.stored_photons(), light.stored_weight(QUERIED_PHOTONS)
-        return caustic_spectrum(photons, weight, receiver, position, reach_of(light, receiver), traced, shown)
-
-    @property
-    def buffers(self) -> SceneBuffers | None:
-        """The traced scene on the device, for overlays that ask it more (ray fans)."""
-        return self._shown.light.buffers if self._shown else None
 
     def release(self) -> None:
         """Free everything."""
-        self._building = None
+        self._building.drop()
         if self._shown is not None:
             self._shown.light.release()
         if self._picker is not None:
@@ -608,9 +424,3 @@ class LiveEngine:
         shader.forget_programs(self.context.ctx)
         self._splatting = self._tracing = iter(())
         self._shown = self._maps = self._picker = None
-
-
-def _moves_view(before: LiveInputs | None, after: LiveInputs | None) -> bool:
-    if before is None or after is None:
-        return False
-    return (before.camera, before.width, before.height) != (after.camera, after.width, after.height)

@@ -65,6 +65,13 @@ def only_moves(traced: LiveInputs, new: LiveInputs) -> bool:
     )
 
 
+def moves_view(before: LiveInputs | None, after: LiveInputs | None) -> bool:
+    """Camera or picture size are others."""
+    if before is None or after is None:
+        return False
+    return (before.camera, before.width, before.height) != (after.camera, after.width, after.height)
+
+
 def _inputs(old: LiveInputs, new: LiveInputs) -> DirtyLevel:
     cost = DirtyLevel.NOTHING
     for item in fields(LiveInputs):

@@ -27,6 +27,7 @@ from ...passes.first_surfaces import FirstSurfaces
 from ...passes.moving_picture import MovingPicture
 from ...passes.spectrum_choice import Spectrum
 from ..sampling import CameraSampling, whole_cycles
+from .glass_steps import GlassSteps, blended
 from .schedule import CameraState
 
 if TYPE_CHECKING:
@@ -42,16 +43,9 @@ longer than DIRECT_S."""
 DIRECT_S = 0.5
 MOVED_S = 0.1
 """The same while things are moved, whose light and tree take their time as well."""
-STEPS = (1, 2, 3, 6, 12, 24)
-"""Sides of the blocks of pixels that share one path through glass, in motion."""
-REFINED = (6, 3, 1)
-"""The same once nothing moves, one after the other."""
 DISPATCH_SECONDS = 0.008
 FIRST_S = 0.06
 """What glass may take in the first picture of a view that nothing moves in."""
-SOON_S = 20.0
-"""Of glass, by the rate of the few paths of a picture in motion, which is a fifth of that of many: photons wait so long
-for a whole picture."""
 SETTLED = 8
 """Samples at most that a better map waits for before its picture replaces the one shown."""
 MOVING_TAPS = 8
@@ -59,9 +53,6 @@ MOVING_TAPS = 8
 SMOOTH_SHARE = 1 / 4
 """Samples of the whole spectrum that come before bands, over the number of these: edges are smooth while the bands are
 awaited."""
-_FIRST_STEP = 12
-"""Before anything was measured: coarse, so that the first picture comes at once."""
-_RATE_BLEND = 0.5
 
 
 class LiveCamera:
@@ -109,10 +100,7 @@ class LiveCamera:
         """What is shown is no preview and no mere first sample."""
         self._direct_rate: float | None = None
         """Pixels per second, of what is seen directly in motion."""
-        self._glass_rate: float | None = None
-        """Paths through glass per second."""
-        self._glass_pixels = 0
-        """Pixels of the last picture in motion that see glass or mirrors."""
+        self._glass = GlassSteps()
         self.picture: moderngl.Texture | None = None
         """RGBA32F, linear Rec.709, top row first; None before the first sample."""
         self.shown_samples = 0
@@ -226,26 +214,25 @@ class LiveCamera:
         self._begin(smooth=smooth)
         self._drawn = self._drawn if is_drawn else None
         if seconds is not None:
-            self._ladder = [self._step_in(seconds)]
+            self._ladder = [self._glass.within(seconds)]
         elif keeps:
             self._ladder = []
         elif is_drawn:
-            self._ladder = [step for step in REFINED if step * self.scale < 1.0]
+            self._ladder = self._glass.after(1.0 / self.scale)
         else:
-            first = self._step_in(FIRST_S)
+            first = self._glass.within(FIRST_S)
             if same_view and not self._shows_other:
                 first = min(first, round(1.0 / self.scale))
-            self._ladder = [first, *(step for step in REFINED if step < first)]
+            self._ladder = [first, *self._glass.after(first)]
 
     def _direct_scale(self, width: int, height: int, seconds: float) -> float:
         most = float("inf") if self._direct_rate is None else self._direct_rate * seconds
         return next((s for s in SCALES if s * s * width * height <= most), SCALES[-1])
 
-    def _step_in(self, seconds: float) -> int:
-        """Side of the blocks of which one path each can be followed in that time."""
-        if self._glass_rate is None:
-            return _FIRST_STEP
-        return next((s for s in STEPS if self._glass_pixels <= s * s * self._glass_rate * seconds), STEPS[-1])
+    @property
+    def is_paused(self) -> bool:
+        """It has no maps to look at."""
+        return self._maps is None
 
     def pause(self) -> None:
         """Leave the maps alone, which are about to go; what is shown stays until `restart`."""
@@ -298,7 +285,7 @@ class LiveCamera:
         """Glass of a view that nothing moves in is becoming finer, and will soon be as fine as it gets."""
         if self._maps is None or not self._ladder or self._is_preview:
             return False
-        return self._glass_rate is None or self._glass_pixels <= SOON_S * self._glass_rate
+        return self._glass.are_soon_done
 
     @property
     def is_done(self) -> bool:
@@ -408,10 +395,12 @@ class LiveCamera:
             self._moving.direct(self._drawn, self._camera, self._maps, MOVING_TAPS)
             self._context.finish()
             if not self._is_first:  # drivers compile at the first use
-                self._direct_rate = _blend(self._direct_rate, self._size[0] * self._size[1], started)
+                self._direct_rate = blended(
+                    self._direct_rate, self._size[0] * self._size[1], time.perf_counter() - started
+                )
             self._is_first = False
-            self._glass_pixels = self._moving.specular
-            if not self._glass_pixels:
+            self._glass.pixels = self._moving.specular
+            if not self._glass.pixels:
                 self._ladder = [1]
             return False
         step = self._ladder[0]
@@ -424,7 +413,7 @@ class LiveCamera:
             return False
         self._steps = None
         if self._moving.followed:
-            self._glass_rate = _blend(self._glass_rate, self._moving.followed, time.perf_counter() - self._spent_s)
+            self._glass.learn(self._moving.followed, self._spent_s)
         self._ladder.pop(0)
         assert self._pass is not None
         if self._pass.has_haze:
@@ -482,12 +471,6 @@ class LiveCamera:
             if owned is not None:
                 owned.release()
         self._pass = self._pictures = self.picture = self._spare = self._moving = self._surfaces = None
-
-
-def _blend(rate: float | None, units: int, started: float) -> float:
-    """A rate, units per second, with those that were done since `started` (`time.perf_counter`)."""
-    measured = units / max(time.perf_counter() - started, 1e-4)
-    return measured if rate is None else rate + _RATE_BLEND * (measured - rate)
 
 
 def _side(pixels: float) -> int:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...gpu import shader
 from ...model.features import Features
 from ...passes.bounce_light import BounceLightPass
 from ...passes.environment_light import EnvironmentLightPass
@@ -96,6 +97,8 @@ class LiveLight:
         self._preview: LightMaps | None = None
         self._moved: MovedLight | None = None
         self._guess: SpectrumGuess | None = None
+        self._outdated: list[LightMaps | SpectrumGuess] = []
+        """Maps of another layout that are shown until the present ones are filled."""
         self.is_coarse = True
         """The maps are those of a first preview: `fit_to` makes proper ones."""
 
@@ -165,16 +168,27 @@ class LiveLight:
         return replace(features, map_tents=0, targets=1) if features.map_tents else features
 
     def fit_to(self, inputs: LiveInputs) -> None:
-        """Maps laid out for the camera and picture size of `inputs`; empty, to be filled from the stored photons."""
+        """Maps laid out for the camera and picture size of `inputs`; empty, to be filled from the stored photons.
+        Those that there were stay to be looked at until `drop_outdated`."""
         self.is_coarse = False
-        for owned in (self._preview, self._guess):
-            if owned is not None:
-                owned.release()
+        self.drop_outdated()
+        before = self.light_pass.give_maps(), self._preview, self._guess
+        self._outdated = [owned for owned in before if owned is not None]
         self._preview = self._guess = None
         self._kept.release()
         if self.light_pass.beams is not None and self.only_beams:
             self.light_pass.beams.survey_again()
         self.light_pass.lay_out(self.fit_of(inputs))
+
+    @property
+    def shows_outdated(self) -> bool:
+        """The maps that are shown are of before `fit_to`."""
+        return bool(self._outdated)
+
+    def drop_outdated(self) -> None:
+        """Nobody looks at the maps of before `fit_to` any more."""
+        shader.release(*self._outdated)
+        self._outdated = []
 
     @staticmethod
     def fit_of(inputs: LiveInputs) -> MapFit:
@@ -338,6 +352,14 @@ class LiveLight:
         return True
 
     @property
+    def shows_environment(self) -> bool:
+        """Something of the environment's light is shown, and of what receivers give each other as soon as that may be
+        asked for."""
+        environment, bounces = self.environment, self.bounces
+        bounced = bounces is None or bounces.shown > 0 or not self.knows_environment
+        return bounced and (environment is None or environment.shown > 0 or environment.is_done)
+
+    @property
     def knows_environment(self) -> bool:
         """All of it was asked for."""
         return self.environment is None or self.environment.is_done
@@ -388,7 +410,8 @@ class LiveLight:
     @property
     def bytes(self) -> int:
         """Device memory of photons, queues, maps and scene."""
-        maps = sum(maps.bytes for maps in (self.light_pass.maps, self._preview) if maps is not None)
+        there = self.light_pass.maps, self._preview, *self._outdated
+        maps = sum(maps.bytes for maps in there if isinstance(maps, LightMaps))
         maps += sum(light.bytes for light in (self.environment, self.bounces) if light is not None)
         photons = self.stored.bytes + self._samples.bytes
         return photons + self.light_pass.trace.bytes + self.buffers.bytes + maps + self._kept.bytes
@@ -396,6 +419,7 @@ class LiveLight:
     def release(self) -> None:
         """Free everything, the stored photons and the scene's buffers too."""
         self._samples.clear()
+        self.drop_outdated()
         owners = (
             self._kept,
             self._moved,

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from .live_light import LiveLight
 
 NO_OBJECT = 0xFFFF
+QUERIED_PHOTONS = 200_000
+"""Stored ones that are asked what lies under the cursor."""
 FINEST_BINS = 40
 """Of 10 nm."""
 MOST_ERROR = 0.2
@@ -84,6 +86,16 @@ class CausticSpectrum:
     def resolution_nm(self) -> float:
         """Width of a bin."""
         return float(self.wavelength_nm[1] - self.wavelength_nm[0])
+
+
+def spectrum_at(light: LiveLight, shown: LiveInputs, receiver: int, position: np.ndarray) -> CausticSpectrum | None:
+    """The caustic's spectral irradiance at a world `position` on object `receiver`, as `shown` shows the photons of
+    `light`; None where nothing is received."""
+    if receiver not in light.buffers.receivers:
+        return None
+    then, now = ([each.spectral_power for each in s.lights] for s in (light.light_pass.scene, shown.scene))
+    photons, weight = world_photons(light, shown, QUERIED_PHOTONS), light.stored_weight(QUERIED_PHOTONS)
+    return caustic_spectrum(photons, weight, receiver, position, reach_of(light, receiver), then, now)
 
 
 def caustic_spectrum(

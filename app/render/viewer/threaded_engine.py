@@ -14,8 +14,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, TypeVar
 
 from ...edit.stored_photons import StoredPhotons
+from .building import PATIENCE_S
 from .dirty_level import DirtyLevel
-from .engine import PATIENCE_S, QUERIED_PHOTONS, LiveEngine
+from .engine import LiveEngine
+from .photon_queries import QUERIED_PHOTONS
 
 if TYPE_CHECKING:
     import moderngl
