@@ -21,9 +21,11 @@ float gaussian_box(float y, float half_width) {
     return 0.5 * (erf_approx(y + half_width) - erf_approx(y - half_width));
 }
 
-// The same to 5e-4 with one division (7.1.27). Over boxes side by side the errors cancel, so no energy is lost by it.
+// The same to 5e-4 with one division (7.1.27). Over boxes side by side the errors cancel, so no energy is lost by it. Beyond ALL_OF_IT nothing is left; of a box
+// some hundred times as wide as the Gaussian the powers would overflow.
+const float ALL_OF_IT = 6.0;
 float gaussian_box_fast(float y, float half_width) {
-    vec2 x = vec2(y + half_width, y - half_width);
+    vec2 x = clamp(vec2(y + half_width, y - half_width), -ALL_OF_IT, ALL_OF_IT);
     vec2 a = abs(x);
     vec2 p = 1.0 + a * (0.278393 + a * (0.230389 + a * (0.000972 + a * 0.078108)));
     p *= p;

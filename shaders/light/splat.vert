@@ -82,9 +82,18 @@ vec4 energy(SplatRecord splat, uint g) {
 #include "lib/fan.glsl"
 #endif
 #ifdef CLIPPED
+// Sine between a splat's sides.
+#define THINNEST_SPLAT 1e-6
 // The least and largest (xi, eta) in [-1, 1]² that the splat's rectangle holds: what is outside need not be drawn.
 vec4 part_inside(SplatRecord splat) {
+#ifdef FANS
+    vec4 all_of_it = part_that_fans(splat.fan);
+#else
+    vec4 all_of_it = vec4(-1.0, -1.0, 1.0, 1.0);
+#endif
     float area = splat.along.x * splat.across.y - splat.along.y * splat.across.x;
+    // At a focus a splat may be too thin to say where in it a place lies.
+    if (abs(area) <= THINNEST_SPLAT * length(splat.along) * length(splat.across)) return all_of_it;
     vec4 range = vec4(vec2(1e30), vec2(-1e30));
     for (int i = 0; i < 4; ++i) {
         vec2 to_corner = vec2((i & 1) == 0 ? splat.rect.x : splat.rect.z, (i & 2) == 0 ? splat.rect.y : splat.rect.w) - splat.centre;
@@ -92,17 +101,12 @@ vec4 part_inside(SplatRecord splat) {
 #ifdef FANS
         // Back through the perspective; where that has no place for it, all is drawn.
         float w = 1.0 - dot(splat.fan, place);
-        if (w < 1e-3) return part_that_fans(splat.fan);
+        if (w < 1e-3) return all_of_it;
         place /= w;
 #endif
         range = vec4(min(range.xy, place), max(range.zw, place));
     }
-#ifdef FANS
-    vec4 part = part_that_fans(splat.fan);
-    return vec4(max(range.xy, part.xy), min(range.zw, part.zw));
-#else
-    return vec4(max(range.xy, vec2(-1.0)), min(range.zw, vec2(1.0)));
-#endif
+    return vec4(max(range.xy, all_of_it.xy), min(range.zw, all_of_it.zw));
 }
 #endif
 
