@@ -178,6 +178,8 @@ def _left_out(name: str, scene: Scene, base: Features, asked: Variant) -> tuple[
             )
         case "nested windows":
             return asked, Variant(scene, replace(base, nested_windows=False)), "against the finest window alone"
+        case "border images":
+            return asked, Variant(scene, replace(base, border_images=False)), "without them borders are too dark"
         case "contact lines":
             return None, None, "asks the picture's own pixels, which the map that is drawn here does not have"
         case "refraction" | "mirrors" | "gratings":
@@ -259,6 +261,8 @@ def _forced_in(name: str, scene: Scene, base: Features, asked: Variant) -> tuple
             return Variant(scene, replace(base, charts=True)), asked, ""
         case "nested windows":
             return Variant(scene, replace(base, nested_windows=True)), asked, ""
+        case "border images":
+            return None, None, "no border near which light lands"
         case "spectral bins":
             return (
                 Variant(scene, replace(base, targets=FORCED_BINS // 4), FORCED_BINS),
