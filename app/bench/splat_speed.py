@@ -40,6 +40,7 @@ class SplatFeatures:
     band_cuts: bool = False
     nested_windows: bool = False
     contact_lines: bool = False
+    border_images: bool = False
     charts: bool = False
     targets: int = 1
     point_spectrum: bool = False

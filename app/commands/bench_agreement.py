@@ -8,11 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from ..base.atomic import atomic_output, make_output_folder
+from ..base.errors import UserError
 from ..base.interrupts import exit_code_of
 from ..base.memory import check_picture_memory
 from ..bench.results import AgreementSettings as Settings
 from . import options
 from .bench import MAX_SEEDS, load_scenes, met_by
+
+MAX_RANDOM = 1000
 
 
 @dataclass(frozen=True)
@@ -27,6 +30,8 @@ class AgreementRequest:
     reference_seconds: str | None = None
     method: str | None = None
     reference: str | None = None
+    random: str | None = None
+    random_seed: str | None = None
 
 
 def bench_agreement_command(request: AgreementRequest) -> int:
@@ -35,12 +40,15 @@ def bench_agreement_command(request: AgreementRequest) -> int:
 
     from ..base.progress import ProgressReporter
     from ..bench import agreement
+    from ..bench.random_scenes import random_scenes
     from ..bench.rendering import NothingToMeasure
     from ..gpu.context import create_context
 
     settings = _settings(request)
-    scenes = met_by(settings.reference, load_scenes(request.scenes))
+    count, seed = _chance(request)
+    named = load_scenes(request.scenes) if count is None else {}
     make_output_folder(request.output, "agreement.json")
+    scenes = met_by(settings.reference, named if count is None else random_scenes(count, seed, request.output))
     found: list[agreement.SceneAgreement] = []
     print(agreement.HEAD, flush=True)
     try:
@@ -62,6 +70,22 @@ def bench_agreement_command(request: AgreementRequest) -> int:
         return exit_code_of(interrupt)
     print(f"wrote {request.output / 'agreement.json'}")
     return 0
+
+
+def _chance(request: AgreementRequest) -> tuple[int | None, int]:
+    """How many scenes are drawn by chance, None where scenes are named, and their seed."""
+    if request.random is None:
+        if request.random_seed is not None:
+            raise UserError("--random-seed says which random scenes are compared: say with --random N how many")
+        return None, 1
+    if request.scenes:
+        raise UserError(
+            f"--random draws its own scenes: leave out {', '.join(request.scenes)}, or compare these apart without it"
+        )
+    count = options.parse_integer("--random", request.random, 1, MAX_RANDOM)
+    if request.random_seed is None:
+        return count, 1
+    return count, options.parse_integer("--random-seed", request.random_seed, 0, options.MAX_SEED)
 
 
 def _settings(request: AgreementRequest) -> Settings:

@@ -140,9 +140,10 @@ def bench_agreement(
             autocompletion=completion.scenes,
         ),
     ] = None,
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder for agreement.json.")] = Path(
-        "bench_agreement"
-    ),
+    output: Annotated[
+        Path,
+        typer.Option("-o", "--output", metavar="DIR", help="Folder for agreement.json and scenes drawn by chance."),
+    ] = Path("bench_agreement"),
     photons: Annotated[Text, typer.Option(metavar="N", help="Of each picture; default: 250k.")] = None,
     seeds: Annotated[Text, typer.Option(metavar="N", help="Pictures, at least 2; default: 6.")] = None,
     size: Annotated[Text, typer.Option(metavar="WxH", help="Pixels; default: 240x135.")] = None,
@@ -151,12 +152,35 @@ def bench_agreement(
     method: Annotated[
         Text, typer.Option(metavar="NAME", autocompletion=completion.methods, help="Default: srd.")
     ] = None,
+    random: Annotated[
+        Text,
+        typer.Option(
+            "--random",
+            metavar="N",
+            help="Compare N scenes drawn by chance instead: glass solids on and over a table; their files are written "
+            "to DIR.",
+        ),
+    ] = None,
+    random_seed: Annotated[
+        Text, typer.Option(metavar="S", help="Which scenes these are; the same S, the same scenes; default: 1.")
+    ] = None,
     allow_outside: AllowOutside = False,
 ) -> None:
     """Compare a method's caustics with the float64 reference by standard scores, by pixels and in 8x8 blocks."""
     from .bench_agreement import AgreementRequest, bench_agreement_command
 
-    request = AgreementRequest(tuple(scenes or ()), output, photons, seeds, size, reference_seconds, method, reference)
+    request = AgreementRequest(
+        tuple(scenes or ()),
+        output,
+        photons,
+        seeds,
+        size,
+        reference_seconds,
+        method,
+        reference,
+        random,
+        random_seed,
+    )
     raise typer.Exit(bench_agreement_command(request))
 
 

@@ -15,6 +15,7 @@ from .camera_rays import camera_frame
 from .contacts import contacts, overlapping_solids, standing, world_bounds
 from .curved_solids import curved_solids
 from .environment_light import why_no_environment_light
+from .geometry.outline import convex_outline
 from .scene import (
     Camera,
     Scene,
@@ -121,6 +122,8 @@ class Features:
     """How often light goes on from one diffuse surface to another: camera rays look up what arrived."""
     contact_lines: bool = False
     """Something stands on a flat receiver: in a still, what lands beneath it is kept from what lands beside it."""
+    border_images: bool = False
+    """A flat receiver is convex: what footprints would spread beyond its borders comes back as their mirror image."""
     coats: bool = False
     """Some receiver has a glossy coat: camera rays go on from it."""
     rough_diffuse: bool = False
@@ -265,6 +268,7 @@ class Features:
             polarised=scene.render.polarisation and bool(dielectrics),
             bounces=scene.render.bounces if settings.layer == "beauty" and why_no_bounces(scene) is None else 0,
             contact_lines=bool(standing(scene)),
+            border_images=footprints and any(has_borders(o) for o in scene.objects),
             coats=settings.layer == "beauty" and any(o.material.has_coat for o in scene.objects),
             rough_diffuse=settings.layer == "beauty" and any(o.material.diffuse_roughness for o in scene.objects),
             haze=hazy,
@@ -421,6 +425,15 @@ def half_spaces(scene: Scene) -> dict[int, np.ndarray]:
             if planes > MOST_PLANES:
                 return {}
     return found
+
+
+def has_borders(item: SceneObject) -> bool:
+    """Whether an object is a flat receiver of a convex outline, at whose straight borders footprints have images."""
+    if not item.material.receives or not is_flat(item):
+        return False
+    points = item.mesh.vertices - item.mesh.vertices.mean(axis=0)
+    in_plane = points @ np.linalg.svd(points, full_matrices=False)[2][:2].T
+    return convex_outline(in_plane, item.mesh.triangles) is not None
 
 
 def is_flat(item: SceneObject) -> bool:

@@ -7,7 +7,16 @@ from .contacts import contacts, overlapping_solids, standing
 from .curved_solids import curved_solids
 from .environment_light import why_no_environment_light
 from .environment_sun import with_sun
-from .features import Features, beam_objects, dispersive_materials, half_spaces, is_flat, why_no_beams, why_no_haze
+from .features import (
+    Features,
+    beam_objects,
+    dispersive_materials,
+    half_spaces,
+    has_borders,
+    is_flat,
+    why_no_beams,
+    why_no_haze,
+)
 from .scene import Scene
 from .settings import divides_spectrum, has_beams
 from .tint_levels import MAX_LIGHTS
@@ -22,6 +31,7 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
     solids = [scene.objects[i].name for i in convex]
     touching = [scene.objects[i].name for i in overlapping_solids(scene)]
     on_receivers = list(dict.fromkeys(scene.objects[j].name for _, j in standing(scene)))
+    bordered = [item.name for item in scene.objects if has_borders(item)]
     in_contact = [f"{scene.objects[i].name} and {scene.objects[j].name}" for i, j in contacts(scene)]
     diffuse = [o for o in scene.objects if o.material.receives]
     worn = [o.name for o in diffuse if o.material.texture is not None]
@@ -166,6 +176,13 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
             "contact lines",
             features.contact_lines,
             f"on a receiver: {names(on_receivers)}" if features.contact_lines else "nothing stands on a receiver",
+        ),
+        (
+            "border images",
+            features.border_images,
+            f"footprints near a border of {names(bordered)} come back from it"
+            if features.border_images
+            else "no flat receiver is convex, or no light lands near a border",
         ),
         (
             "local gain",

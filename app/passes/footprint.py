@@ -20,7 +20,7 @@ from ..gpu.records import (
     photon_record,
 )
 from ..gpu.schema import Field, Struct
-from .variants import SplatFeatures, footprint_defines
+from .variants import Defines, SplatFeatures, footprint_defines
 
 if TYPE_CHECKING:
     import moderngl
@@ -41,6 +41,8 @@ VERTICES = (3, 6, 6, 6, 3, 6, 6)
 """Per splat of kinds 1 to 7."""
 UNIT_CONTACT = 1
 """Texture unit of the words of `contact_lines`, in all programs that splat."""
+UNIT_BORDERS = 2
+"""Of receivers' borders (`borders`), in the program that makes footprints."""
 
 SPLAT = Struct(
     "SplatRecord",
@@ -83,7 +85,8 @@ SPLAT = Struct(
             "vec2",
             "swept: change of the W, 1 at the centre, by which places in it are divided, per unit of xi and of eta",
         ),
-        Field("reserved", "vec2", ""),
+        Field("images", "uint", "a photon's first: of so many splats behind its own, its images beyond borders"),
+        Field("reserved", "uint", ""),
     ),
 )
 """A splat, ready to be drawn. xi runs over [-1, 1] from end to end of the whole band's smeared sweep."""
@@ -153,13 +156,14 @@ class Footprints:
         self._vertices = VERTICES[:kinds]
         self.commands = ctx.buffer(np.zeros(5 * kinds, np.uint32))
         """Indirect draws of all kinds, five words each."""
-        self.slots_per_photon = int(defines["SLOTS"])
+        self.slots_per_photon = int(defines["SLOTS"]) + int(defines["IMAGE_SLOTS"])
         self.capacity = group * self.slots_per_photon
         """Splats of a kind that the lists have room for."""
         self.splats = ctx.buffer(reserve=self.capacity * SPLAT.stride)
         self.lists = ctx.buffer(reserve=kinds * self.capacity * 4)
         """Slots of each kind, `capacity` each."""
-        counts: dict[str, int | float | str] = {"WORKGROUP": LIST_WORKGROUP, "KINDS": f"{kinds}u"}
+        counts: Defines = {"WORKGROUP": LIST_WORKGROUP, "KINDS": f"{kinds}u"}
+        counts |= {name: defines[name] for name in ("SLOTS", "IMAGE_SLOTS", "BORDER_IMAGES") if name in defines}
         self._list = shader.compute(ctx, "light/splat_list.comp", counts, (SPLAT,))
 
     def run(
@@ -221,14 +225,15 @@ class Footprints:
             gains.bind()
         if atlas.contact_words is not None:
             atlas.contact_words.use(UNIT_CONTACT)
-        slots = count * self.slots_per_photon
+        if atlas.borders is not None:
+            atlas.borders.use(UNIT_BORDERS)
         self.commands.write(np.array([[vertices, 1, 0, 0, 0] for vertices in self._vertices], np.uint32))
         self._program.run(group_x=-(-count // WORKGROUP))
         self._ctx.memory_barrier()
         self.commands.bind_to_storage_buffer(7)
         self.lists.bind_to_storage_buffer(8)
         self._list["capacity"].value = self.capacity
-        self._list["slots"].value = slots
+        self._list["photons"].value = count
         self._list.run(1)
 
     def counts(self) -> dict[str, float]:

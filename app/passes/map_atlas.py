@@ -77,6 +77,8 @@ class MapAtlas:
         """Photons in the scratch textures."""
         self.contact_words: moderngl.Texture | None = None
         """Of `contact_lines`, where such lines lie in the maps; the atlas's own."""
+        self.borders: moderngl.Texture | None = None
+        """Of `borders`, where light lands near receivers' borders; the atlas's own."""
         self.clear()
 
     def _texture(self) -> moderngl.Texture:
@@ -145,8 +147,9 @@ class MapAtlas:
         shader.release(
             self.framebuffer, self._accumulate, *self.scratch_textures, *self.total_textures, self.placements
         )
-        if self.contact_words is not None:
-            self.contact_words.release()
+        for texture in (self.contact_words, self.borders):
+            if texture is not None:
+                texture.release()
 
 
 def park(ctx: moderngl.Context) -> None:

@@ -19,6 +19,8 @@ from ..gpu.tiles import Tile, pack
 from ..model.camera_rays import camera_frame, camera_rays
 from ..model.features import is_flat
 from ..model.scene import Camera, Scene
+from .borders import lit_borders
+from .landings import Landings
 from .map_atlas import placement_rows
 from .picture_window import PLENTY, PictureWindow, picture_window
 from .plane_frame import PlaneFrame, plane_frame
@@ -77,16 +79,6 @@ _LEAST_TEXELS_PER_PIXEL = 0.5
 
 
 @dataclass(frozen=True)
-class Landings:
-    """Pilot photons on one receiver: every place where some wavelength of theirs arrives."""
-
-    positions: np.ndarray
-    """float64 (n, 3), GPU space."""
-    flux_w: np.ndarray
-    """float64 (n,)."""
-
-
-@dataclass(frozen=True)
 class Window:
     """A rectangle on a flat receiver, coordinates along `axes` in GPU space."""
 
@@ -113,6 +105,8 @@ class MapLayout:
     """(wider texels, finer texels) of the same window, in the order in which they are added up."""
     frames: dict[int, PlaneFrame] = field(default_factory=dict)
     """Of flat receivers."""
+    borders: dict[int, np.ndarray] = field(default_factory=dict)
+    """Of convex flat receivers, (n, 4): those near which light lands (`borders.borders_near`)."""
 
     def width_told(self, receiver: int) -> float:
         """What a receiver's finest map tells apart, scene units: a texel's side, or half a pixel's where texels are
@@ -192,7 +186,8 @@ def _layout_maps(
             sizes.append((atlas.width, atlas.height))
             plans.append((receiver, None, [], atlas))
     tiles, size = pack(sizes, max_side)
-    return _place(scene, buffers, plans, tiles, size, reflectance_class)
+    layout = _place(scene, buffers, plans, tiles, size, reflectance_class)
+    return replace(layout, borders=lit_borders(scene, buffers, layout.frames, landings))
 
 
 def _place(

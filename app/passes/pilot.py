@@ -17,7 +17,7 @@ from ..gpu.records import MAX_BANDS
 from ..model.scene import Scene
 from ..model.tint_bands import TOLERANCE as TINT_TOLERANCE
 from .emission_domain import EmissionDomain
-from .map_layout import Landings
+from .landings import Landings
 from .trace import SPLIT_THRESHOLD, Band, FluxTally, LatticeSlice, TracePass
 
 PHOTONS = 4096

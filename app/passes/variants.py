@@ -38,6 +38,8 @@ have nothing in common then take 24,000 of the driver's 65,535, and what is left
 ends of paths they hold."""
 SPARE_ROUNDS = 0
 """Rounds that must be left when it halts or ends; where they are not, it is counted."""
+MOST_IMAGES = 4
+"""Of a footprint beyond its receiver's borders: across the two nearest ones, and across both."""
 TINT_STEPS = 48
 """Stretches that the whole spectrum is cut into behind coloured glass."""
 
@@ -145,6 +147,8 @@ class SplatFeatures(Protocol):
     @property
     def contact_lines(self) -> bool: ...
     @property
+    def border_images(self) -> bool: ...
+    @property
     def tint_levels(self) -> int: ...
 
 
@@ -170,11 +174,15 @@ def footprint_defines(features: SplatFeatures) -> Defines:
         "LOCAL_GAIN": features.local_gain,
         "REINDEXED": features.reindexed,
         "CONTACT_LINES": features.contact_lines,
+        "BORDER_IMAGES": features.border_images,
     }
+    windows = 2 if features.nested_windows else 1
     return (
         splat_defines(features)
         | {
             "GROUPS": features.spectral_groups,
+            "MOST_IMAGES": MOST_IMAGES,
+            "IMAGE_SLOTS": MOST_IMAGES * windows if features.border_images else 0,
             "POWER_SAMPLES": CUMULATIVE_SAMPLES,
             "NONE": f"{records.NONE}u",
             "FLAG_FOOTPRINT_DROPPED": f"{records.FLAG_FOOTPRINT_DROPPED}u",

@@ -29,8 +29,9 @@ from ..gpu.context import Context
 from ..gpu.scene_buffers import SceneBuffers
 from ..model.features import is_flat
 from ..model.scene import Scene
+from ..passes.landings import Landings
 from ..passes.map_atlas import KIND_PICTURE
-from ..passes.map_layout import Landings, MapLayout
+from ..passes.map_layout import MapLayout
 from ..passes.plane_frame import plane_frame
 from ..passes.trace import FluxTally
 from .beam_drawing import BeamDrawing

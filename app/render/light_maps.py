@@ -14,6 +14,7 @@ from ..gpu.shader import Releasable
 from ..gpu.tiles import Tile
 from ..model.features import Features
 from ..passes.accumulate import LevelsFold, SeamFold, copy_texture
+from ..passes.border_maps import border_texture, inside_share
 from ..passes.caustic_maps import CausticMaps
 from ..passes.contact_lines import read_words, seen_shares
 from ..passes.map_atlas import MapAtlas
@@ -43,12 +44,15 @@ class LightMaps:
             features,
             nested_windows=any(len(windows) > 1 for windows in layout.windows.values()),
             contact_lines=contact_words is not None,
+            border_images=features.border_images and bool(layout.borders),
         )
         self.splatter = Splatter(ctx, self.features)
         # Tents only say how XYZ are shared out over the spectrum.
         scratched = 1 if features.map_tents else None
         self.atlas = MapAtlas(ctx, layout.size, layout.placements, features.targets, scratched)
         self.atlas.contact_words = contact_words
+        if self.features.border_images:
+            self.atlas.borders = border_texture(ctx, layout)
         self.receivers = ctx.buffer(
             np.ascontiguousarray(layout.receivers if len(layout.receivers) else RECEIVER.zeros(1)).tobytes()
         )
@@ -63,7 +67,10 @@ class LightMaps:
         """Splat from now on with other features of the same layout (the brush came or went)."""
         self.splatter.release()
         self.features = replace(
-            features, nested_windows=self.features.nested_windows, contact_lines=self.features.contact_lines
+            features,
+            nested_windows=self.features.nested_windows,
+            contact_lines=self.features.contact_lines,
+            border_images=self.features.border_images,
         )
         self.splatter = Splatter(self._ctx, self.features)
 
@@ -161,10 +168,12 @@ class LightMaps:
         flux = 0.0
         words = None if self.atlas.contact_words is None else read_words(self.atlas.contact_words)
         targets = 1 if is_xyz else len(self.resolved_textures())
+        bordered = self.layout.borders if self.features.border_images else {}
         for receiver, tiles in self.layout.tiles.items():
             charts = self.layout.charts.get(receiver)
             for level, tile in enumerate(tiles):
                 finer = self._finer_share(receiver, level, tile) if level and charts is None else None
+                within = inside_share(self.layout, receiver, level) if receiver in bordered else None
                 for target in range(targets):
                     for first, rows in self.portions(tile, target):
                         energy = (rows[..., 3] if is_xyz else rows.sum(axis=-1)).astype(float)
@@ -172,6 +181,8 @@ class LightMaps:
                             energy = energy[charts.owner[first : first + len(rows)] >= 0]
                         elif finer is not None:
                             energy *= 1.0 - finer(first, first + len(rows))
+                        if within is not None:
+                            energy *= within(first, first + len(rows))
                         if words is not None:
                             row = tile.y + first
                             energy *= seen_shares(words[row : row + len(rows), tile.x : tile.x + tile.width])

@@ -25,8 +25,9 @@ from ..model.scene import Scene
 from ..model.settings import RenderSettings
 from ..passes.caustic_maps import CausticMaps
 from ..passes.contact_lines import contact_words
+from ..passes.landings import Landings
 from ..passes.map_atlas import MapAtlas
-from ..passes.map_layout import Landings, MapLayout, check_map_receiver, layout_maps
+from ..passes.map_layout import MapLayout, check_map_receiver, layout_maps
 from ..passes.pilot import Pilot
 from ..passes.splat import Splatter
 from ..passes.trace import TracePass

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ..gpu.scene_buffers import SceneBuffers
     from ..model.features import Features
     from ..model.scene import Scene
-    from ..passes.map_layout import Landings
+    from ..passes.landings import Landings
     from ..passes.trace import TracePass
     from .light_plan import Division
     from .map_fit import MapFit

@@ -54,6 +54,11 @@ layout(std430, binding = 11) readonly buffer TracedBands { TracedBand traced_ban
 layout(binding = 1) uniform usampler2D contact_words;
 #endif
 
+#ifdef BORDER_IMAGES
+#include "lib/border.glsl"
+layout(binding = 2) uniform sampler2D borders;
+#endif
+
 #define RECEIVER_CHARTS 1u
 
 const float TEXEL_VARIANCE = 1.0 / 12.0;
@@ -247,6 +252,20 @@ bool holds(Placement place, PhotonRecord photon, Footprint f) {
     return bounded(f.axis_s) && bounded(f.axis_t) && bounded(f.chord) && bounded(f.centre - anchor.xy / anchor.z);
 }
 
+#if SLOTS == 2
+// Whether a splat lies so deep inside a fine window that nobody reads it in the coarse one `outer`: that is read up to the fine one's border, plus what a
+// bilinear lookup there reaches.
+bool is_only_fine(SplatRecord splat, Placement place, Placement outer, vec3 position) {
+    vec3 in_outer = homogeneous_texel(outer, position), in_fine = homogeneous_texel(place, position);
+    vec2 extent = half_extent(splat) + 3.0 * texels_per_length(place, in_fine) / texels_per_length(outer, in_outer);
+    return all(greaterThan(splat.centre - extent, place.rect.xy)) && all(lessThan(splat.centre + extent, place.rect.zw));
+}
+#endif
+
+#ifdef BORDER_IMAGES
+#include "light/footprint_images.glsl"
+#endif
+
 void main() {
     uint i = gl_GlobalInvocationID.x;
     if (i >= photon_count) {
@@ -360,6 +379,7 @@ void main() {
     Placement drawn_in = place;
 #ifdef CONTACT_LINES
     float held = 1.0, lost = 0.0;
+    float thin = thin_variance(f);
     uint side = shown ? side_of_contact(place, f, photon.photon_id, held, lost) : 0u;
     sums[i].x += lost * power_w;
     if (side == 0u)
@@ -378,22 +398,29 @@ void main() {
 #ifdef CONTACT_LINES
     keep_to_side(fine, side, held);
 #endif
-    uint slot = i * uint(SLOTS);
+    uint slot = i * uint(SLOTS + IMAGE_SLOTS);
+#ifdef BORDER_IMAGES
+    // Behind the photon's own splats, so many of them.
+    Depicted depicted = Depicted(photon, middle, sweep, power_w, mean, table, table_band, 0u, 0.0);
+#ifdef CONTACT_LINES
+    depicted.side = side;
+    depicted.thin = thin;
+#endif
+    fine.images = put_images(depicted, place, slot + uint(SLOTS));
+#ifdef REINDEXED
+    fine.images = carries ? fine.images : 0u;
+#endif
+#endif
     splats[slot] = fine;
 
 #if SLOTS == 2
     SplatRecord coarse = empty_splat();
     if (place.next != NONE) {
-        // The coarse map is read outside the fine window: up to its border, plus what a bilinear lookup there reaches.
         Placement outer = placements[place.next];
         Footprint g = footprint_in(outer, photon, middle, sweep);
         inside = inside || contains(outer.rect, g.centre, 0.0);
         choose_level(outer, g, photon, middle, sweep);
-        vec3 in_outer = homogeneous_texel(outer, photon.position), in_fine = homogeneous_texel(drawn_in, photon.position);
-        float margin = 3.0 * texels_per_length(drawn_in, in_fine) / texels_per_length(outer, in_outer);
-        vec2 extent = half_extent(fine) + margin;
-        bool only_fine = shown && all(greaterThan(fine.centre - extent, drawn_in.rect.xy)) && all(lessThan(fine.centre + extent, drawn_in.rect.zw));
-        if (!only_fine) {
+        if (!shown || !is_only_fine(fine, drawn_in, outer, photon.position)) {
             coarse = splat_of(photon, power_w, mean, g, table, table_band);
             coarse.rect = outer.rect;
             if (!touches(outer.rect, coarse.centre, half_extent(coarse))) {

@@ -1,27 +1,41 @@
 // Lists the splats of each kind in photon order, and how many vertices each kind's draw has: draws then pull only what is theirs.
-// One work group, each thread a run of slots: counted, summed over the threads before it, listed. No atomics: the order in
+// One work group, each thread a run of photons: counted, summed over the threads before it, listed. No atomics: the order in
 // which splats are added is a function of the photons alone.
 layout(local_size_x = WORKGROUP) in;
-
 
 layout(std430, binding = 1) readonly buffer Splats { SplatRecord splats[]; };
 layout(std430, binding = 7) buffer Commands { uint draw_words[5 * KINDS]; };
 layout(std430, binding = 8) writeonly buffer Lists { uint lists[]; };  // `capacity` a kind
 
-uniform uint slots;
+uniform uint photons;  // with SLOTS splats each, and images behind them
 uniform uint capacity;
 
 shared uint counts[WORKGROUP * int(KINDS)];
 
+const uint PHOTON_SLOTS = uint(SLOTS + IMAGE_SLOTS);
+
+// Behind the last slot of a photon that holds anything.
+uint end_of(uint photon) {
+    uint slot = photon * PHOTON_SLOTS;
+#ifdef BORDER_IMAGES
+    return slot + uint(SLOTS) + splats[slot].images;
+#else
+    return slot + uint(SLOTS);
+#endif
+}
+
 void main() {
     uint me = gl_LocalInvocationID.x;
-    uint run = (slots + uint(WORKGROUP) - 1u) / uint(WORKGROUP);
-    uint first = min(me * run, slots), last = min(first + run, slots);
+    uint run = (photons + uint(WORKGROUP) - 1u) / uint(WORKGROUP);
+    uint first = min(me * run, photons), last = min(first + run, photons);
     uint mine[KINDS];
     for (uint k = 0u; k < KINDS; ++k) mine[k] = 0u;
-    for (uint slot = first; slot < last; ++slot) {
-        uint kind = splats[slot].kind;
-        for (uint k = 0u; k < KINDS; ++k) mine[k] += kind == k + 1u ? 1u : 0u;
+    for (uint photon = first; photon < last; ++photon) {
+        uint end = end_of(photon);
+        for (uint slot = photon * PHOTON_SLOTS; slot < end; ++slot) {
+            uint kind = splats[slot].kind;
+            for (uint k = 0u; k < KINDS; ++k) mine[k] += kind == k + 1u ? 1u : 0u;
+        }
     }
     for (uint k = 0u; k < KINDS; ++k) counts[k * uint(WORKGROUP) + me] = mine[k];
     barrier();
@@ -36,12 +50,15 @@ void main() {
     }
     barrier();
     for (uint k = 0u; k < KINDS; ++k) mine[k] = k * capacity + counts[k * uint(WORKGROUP) + me];
-    for (uint slot = first; slot < last; ++slot) {
-        uint kind = splats[slot].kind;
-        for (uint k = 0u; k < KINDS; ++k) {
-            if (kind == k + 1u) {
-                lists[mine[k]] = slot;
-                ++mine[k];
+    for (uint photon = first; photon < last; ++photon) {
+        uint end = end_of(photon);
+        for (uint slot = photon * PHOTON_SLOTS; slot < end; ++slot) {
+            uint kind = splats[slot].kind;
+            for (uint k = 0u; k < KINDS; ++k) {
+                if (kind == k + 1u) {
+                    lists[mine[k]] = slot;
+                    ++mine[k];
+                }
             }
         }
     }

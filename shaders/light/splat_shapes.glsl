@@ -287,5 +287,5 @@ SplatRecord swept_splat(PhotonRecord photon, float power_w, float mean, Footprin
 }
 
 SplatRecord empty_splat() {
-    return SplatRecord(vec2(0.0), vec2(0.0), vec2(0.0), 0.0, 0.0, 0.0, 0.0, 0u, 0u, vec4(0.0), vec2(0.0), 0.0, 0.0, vec4(0.0), vec4(0.0), vec4(0.0), vec2(0.0), vec2(0.0));
+    return SplatRecord(vec2(0.0), vec2(0.0), vec2(0.0), 0.0, 0.0, 0.0, 0.0, 0u, 0u, vec4(0.0), vec2(0.0), 0.0, 0.0, vec4(0.0), vec4(0.0), vec4(0.0), vec2(0.0), 0u, 0u);
 }

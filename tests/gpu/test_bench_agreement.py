@@ -37,3 +37,19 @@ def test_what_cannot_be_compared_is_a_sentence(capsys: pytest.CaptureFixture[str
     assert main(["bench-agreement", "prism", "--method", "srdd"]) == 2
     said = capsys.readouterr().err
     assert "--seeds 1 is out of range" in said and "--method 'srdd'" in said
+
+
+def test_scenes_drawn_by_chance_have_their_rows_and_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    options = ["--size", "48x27", "--photons", "10k", "--seeds", "2", "--reference-seconds", "2", "-o", str(tmp_path)]
+    assert main(["bench-agreement", "--random", "2", "--random-seed", "4", *options]) == 0
+    scenes = msgspec.json.decode((tmp_path / "agreement.json").read_bytes(), type=list[SceneAgreement])
+    printed = capsys.readouterr()
+    for number in range(2):
+        name = f"random_4_{number}"
+        assert (tmp_path / f"{name}.toml").is_file()
+        # A scene whose caustic nobody sees is a note.
+        assert (name in printed.out) != (name in printed.err and "note" in printed.err)
+    assert {scene.scene for scene in scenes} <= {"random_4_0", "random_4_1"}

@@ -13,6 +13,7 @@ import numpy as np
 
 from ...gpu.map_channels import MapChannels, tents
 from ...gpu.scene_buffers import SceneBuffers
+from ...passes.border_maps import border_texture
 from ...passes.footprint import SpectralVariables
 from ...passes.map_atlas import MapAtlas
 from ...passes.splat import Splatter
@@ -90,6 +91,8 @@ class Rig:
         # Its maps have no pixels for lines of contact to lie in.
         self._splatter = Splatter(ctx, replace(variant.features, contact_lines=False))
         self._atlas = MapAtlas(ctx, light.layout.size, light.layout.placements, variant.features.targets)
+        if variant.features.border_images:
+            self._atlas.borders = border_texture(ctx, light.layout)
         self._variables = SpectralVariables.build(ctx, self._buffers.variables)
         spans = {plan.index: [(band.x_lo, band.x_hi) for band in plan.bands] for plan in light.plans}
         edges = None if variant.bins is None else tuple(np.linspace(380.0, 780.0, variant.bins + 1).tolist())

@@ -17,6 +17,7 @@ from ...model.features import Features, beam_objects, half_spaces
 from ...model.scene import Scene
 from ...model.texture import Environment, Texture
 from ...passes.footprint import SPLAT
+from ...passes.variants import MOST_IMAGES
 
 _TEXEL = 16
 """Bytes of an RGBA32F or RGBA32UI texel."""
@@ -123,6 +124,10 @@ def static_costs(scene: Scene, features: Features) -> dict[str, str]:
         "local gain": (features.local_gain, "eight voxels a photon"),
         "photons by index": (features.reindexed, "32 B a band"),
         "contact lines": (features.contact_lines, "4 B a texel; splats beside them have a program each"),
+        "border images": (
+            features.border_images,
+            f"room for {MOST_IMAGES} more splats a photon and window, {SPLAT.stride} B each",
+        ),
         "nested windows": (features.nested_windows, f"{SPLAT.stride} B a photon: a splat for each window"),
         "camera refraction": (features.camera_specular, "a second program; 4 B a pixel list what it has to do"),
         "camera spectral taps": (

@@ -184,6 +184,8 @@ def _left_out(name: str, scene: Scene, base: Features, asked: Variant) -> tuple[
             return asked, Variant(as_triangles(scene), features), "against a tree over triangles that stand for them"
         case "nested windows":
             return asked, Variant(scene, replace(base, nested_windows=False)), "against the finest window alone"
+        case "border images":
+            return asked, Variant(scene, replace(base, border_images=False)), "without them borders are too dark"
         case "contact lines":
             return None, None, "asks the picture's own pixels, which the map that is drawn here does not have"
         case "refraction" | "mirrors" | "gratings":
@@ -265,6 +267,8 @@ def _forced_in(name: str, scene: Scene, base: Features, asked: Variant) -> tuple
             return Variant(scene, replace(base, charts=True)), asked, ""
         case "nested windows":
             return Variant(scene, replace(base, nested_windows=True)), asked, ""
+        case "border images":
+            return None, None, "no border near which light lands"
         case "spectral bins":
             return (
                 Variant(scene, replace(base, targets=FORCED_BINS // 4), FORCED_BINS),

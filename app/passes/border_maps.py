@@ -1,0 +1,51 @@
+"""Receivers' borders (`borders`) as the splat pass reads them, and which part of a map's texels lies inside of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import moderngl
+
+    from .map_layout import MapLayout
+    from .plane_frame import PlaneFrame
+
+
+def border_texture(ctx: moderngl.Context, layout: MapLayout) -> moderngl.Texture:
+    """RGBA32F: a row a receiver, its borders from the left, zeros behind them."""
+    rows = np.zeros((len(layout.receivers), 1 + max(map(len, layout.borders.values()))), (np.float32, 4))
+    for receiver, borders in layout.borders.items():
+        rows[receiver, : len(borders)] = borders
+    return ctx.texture(rows.shape[1::-1], 4, rows, dtype="f4")
+
+
+def _on_plane(rows: np.ndarray, frame: PlaneFrame) -> np.ndarray:
+    """Rows (n, 4) that act on places, for plane coordinates (s, t, 1): (n, 3)."""
+    return np.concatenate([rows[:, :3] @ frame.axes.T, (rows[:, :3] @ frame.origin + rows[:, 3])[:, None]], axis=1)
+
+
+def inside_share(layout: MapLayout, receiver: int, level: int) -> Callable[[int, int], np.ndarray]:
+    """How much of each texel of a window lies inside of the receiver's borders: of rows `first` to `end`, (rows,
+    width). Of a texel that a border crosses aslant about as much."""
+    tile, frame = layout.tiles[receiver][level], layout.frames[receiver]
+    index = int(layout.receivers["placement"][receiver])
+    for _ in range(level):
+        index = int(layout.placements["next"][index])
+    place = layout.placements[index]
+    rows = np.stack([place["row_u"], place["row_v"], place["row_w"]]).astype(float)
+    rows -= np.outer([tile.x, tile.y, 0.0], rows[2])
+    lines = _on_plane(layout.borders[receiver], frame) @ np.linalg.inv(_on_plane(rows, frame))
+    lines /= np.abs(lines[:, :2]).sum(axis=1)[:, None]
+    x = np.arange(tile.width) + 0.5
+
+    def share(first: int, end: int) -> np.ndarray:
+        y = np.arange(first, end) + 0.5
+        inside = np.ones((end - first, tile.width))
+        for a, b, c in lines:
+            inside *= np.clip(0.5 + np.add.outer(b * y + c, a * x), 0.0, 1.0)
+        return inside
+
+    return share

@@ -1,0 +1,84 @@
+"""Scenes drawn by chance: the same seed, the same scenes; all load; all kinds come up; nothing stands in another."""
+
+from __future__ import annotations
+
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+import pytest
+from spectrasplat.__main__ import main
+from spectrasplat.bench.random_scenes import GLASSES, SOLIDS, random_scene, random_scenes, scene_name
+from spectrasplat.model.contacts import world_bounds
+from spectrasplat.model.io.scene_file import load_scene
+
+MANY = 60
+
+
+@pytest.fixture(scope="module")
+def drawn() -> list[dict]:
+    return [random_scene(7, number) for number in range(MANY)]
+
+
+def test_a_seed_and_a_number_say_the_scene(tmp_path: Path) -> None:
+    first, again, other = (random_scene(seed, 3) for seed in (5, 5, 6))
+    assert first == again and first != other and first["name"] == scene_name(5, 3)
+    random_scenes(2, 5, tmp_path)
+    (tmp_path / "more").mkdir()
+    random_scenes(3, 5, tmp_path / "more")
+    for number in range(2):
+        name = f"{scene_name(5, number)}.toml"
+        assert (tmp_path / name).read_bytes() == (tmp_path / "more" / name).read_bytes()
+
+
+def test_every_scene_loads_from_its_file(tmp_path: Path) -> None:
+    scenes = random_scenes(12, 7, tmp_path)
+    for name, scene in scenes.items():
+        again = load_scene(tmp_path / f"{name}.toml")
+        assert again.camera == scene.camera and again.lights == scene.lights and again.name == name
+        assert any(o.material.transmits for o in scene.objects) and any(o.material.receives for o in scene.objects)
+        # Data of glass that end within the spectrum are all that there is to note.
+        assert all("nearest value" in note for note in scene.notes), scene.notes
+        low = {o.name: world_bounds(o)[0, 2] for o in scene.objects if not o.material.receives}
+        assert min(low.values()) > 0.0, "nothing reaches into the table"
+
+
+def test_nothing_stands_in_another(tmp_path: Path) -> None:
+    for scene in random_scenes(12, 9, tmp_path).values():
+        bounds = [(o.name, world_bounds(o)) for o in scene.objects if not o.material.receives]
+        for (a, one), (b, other) in combinations(bounds, 2):
+            middle = 0.5 * (one.sum(axis=0) - other.sum(axis=0))
+            # Boxes of turned solids may meet where these do not.
+            assert np.linalg.norm(middle[:2]) > 1.2, (a, b)
+
+
+def test_everything_comes_up(drawn: list[dict]) -> None:
+    objects = [item for values in drawn for item in values["objects"]]
+    names = {item["name"].split()[0] for item in objects}
+    assert names == {*SOLIDS, "table", "wall", "mirror", "blocker"}
+    assert {item["glass"] for item in objects if "glass" in item} == set(GLASSES)
+    lights = [light for values in drawn for light in values["lights"]]
+    assert {light["kind"] for light in lights} == {"directional", "point", "area"}
+    assert {light.get("shape") for light in lights} == {None, "disc", "rectangle"}
+    assert {len(values["lights"]) for values in drawn} == {1, 2}
+    assert {values["camera"].get("kind", "pinhole") for values in drawn} == {"pinhole", "orthographic"}
+    assert {item["rests_at_z"] > 0.05 for item in objects if "glass" in item} == {True, False}
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (("--random", "0"), "--random 0 is out of range"),
+        (("--random", "few"), "--random 'few' is not a whole number"),
+        (("--random", "2", "--random-seed", "-1"), "--random-seed -1 is out of range"),
+        (("--random-seed", "3"), "--random N how many"),
+        (("prism", "--random", "2"), "leave out prism"),
+    ],
+)
+def test_bad_values_are_one_sentence(
+    options: tuple[str, ...], sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["bench-agreement", *options, "-o", str(tmp_path / "found")]) == 2
+    said = capsys.readouterr().err
+    assert sentence in said and said.count("\n") <= 2
+    assert not (tmp_path / "found").exists()
