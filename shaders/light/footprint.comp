@@ -244,12 +244,24 @@ bool contains(vec4 rect, vec2 centre, float margin) {
     return all(greaterThanEqual(centre, rect.xy + margin)) && all(lessThan(centre, rect.zw - margin));
 }
 
-bool bounded(vec2 v) { return is_within2(v, extent_limit); }
-
-// Whether a footprint is not a numerical accident.
-bool holds(Placement place, PhotonRecord photon, Footprint f) {
+// Texels, or lengths: not a number for what is done with it here.
+const float FAR_TOO_LARGE = 1e15;
+// What of a footprint's size can be drawn: beyond `extent_limit` texels no digits are left to tell how thin it is. 0: it is a numerical accident.
+float held_size(Placement place, PhotonRecord photon, vec3 middle, vec3 sweep) {
+    Footprint f = footprint_in(place, photon, middle, sweep);
     vec3 anchor = homogeneous_texel(place, photon.position);
-    return bounded(f.axis_s) && bounded(f.axis_t) && bounded(f.chord) && bounded(f.centre - anchor.xy / anchor.z);
+    vec2 away = f.centre - anchor.xy / anchor.z;
+    vec2 largest = max(max(abs(f.axis_s), abs(f.axis_t)), max(abs(f.chord), abs(away)));
+    bool is_number = is_within2(f.axis_s, FAR_TOO_LARGE) && is_within2(f.axis_t, FAR_TOO_LARGE) && is_within2(f.chord, FAR_TOO_LARGE) && is_within2(away, FAR_TOO_LARGE);
+    return is_number ? min(1.0, extent_limit / max(max(largest.x, largest.y), 1e-20)) : 0.0;
+}
+
+void shrink(inout PhotonRecord photon, inout vec3 middle, inout vec3 sweep, float share) {
+    bool is_left = share > 0.0;
+    photon.dposition_ds = is_left ? share * photon.dposition_ds : vec3(0.0);
+    photon.dposition_dt = is_left ? share * photon.dposition_dt : vec3(0.0);
+    middle = is_left ? share * middle : vec3(0.0);
+    sweep = is_left ? share * sweep : vec3(0.0);
 }
 
 #if SLOTS == 2
@@ -360,17 +372,15 @@ void main() {
     vec3 sweep = to_hi - to_lo;
     Footprint f = footprint_in(place, photon, middle, sweep);
     bool shown = in_front(place, photon, middle, sweep);
-    bool accident = shown && !holds(place, photon, f);
-    if (accident && place.next != NONE) {
+    float held = shown ? held_size(place, photon, middle, sweep) : 1.0;
+    if ((held < 1.0 || !shown) && place.next != NONE) {
         // Close to the camera, texels of its pixels are as small as one likes: the coarse window tells.
         shown = false;
-        accident = !holds(placements[place.next], photon, footprint_in(placements[place.next], photon, middle, sweep));
+        held = held_size(placements[place.next], photon, middle, sweep);
     }
-    if (accident || (photon.flags & FLAG_FOOTPRINT_DROPPED) != 0u) {
-        photon.dposition_ds = vec3(0.0);
-        photon.dposition_dt = vec3(0.0);
-        middle = vec3(0.0);
-        sweep = vec3(0.0);
+    held = (photon.flags & FLAG_FOOTPRINT_DROPPED) != 0u ? 0.0 : held;
+    if (held < 1.0) {
+        shrink(photon, middle, sweep, held);
         f = footprint_in(place, photon, middle, sweep);
         sums[i].yz += vec2(power_w, 1.0);
     }
@@ -378,9 +388,9 @@ void main() {
     bool inside = shown && contains(place.rect, f.centre, 0.0);
     Placement drawn_in = place;
 #ifdef CONTACT_LINES
-    float held = 1.0, lost = 0.0;
+    float kept = 1.0, lost = 0.0;
     float thin = thin_variance(f);
-    uint side = shown ? side_of_contact(place, f, photon.photon_id, held, lost) : 0u;
+    uint side = shown ? side_of_contact(place, f, photon.photon_id, kept, lost) : 0u;
     sums[i].x += lost * power_w;
     if (side == 0u)
 #endif
@@ -396,7 +406,7 @@ void main() {
     }
     mark_edge(fine);
 #ifdef CONTACT_LINES
-    keep_to_side(fine, side, held);
+    keep_to_side(fine, side, kept);
 #endif
     uint slot = i * uint(SLOTS + IMAGE_SLOTS);
 #ifdef BORDER_IMAGES
@@ -417,6 +427,8 @@ void main() {
     SplatRecord coarse = empty_splat();
     if (place.next != NONE) {
         Placement outer = placements[place.next];
+        // Far from the camera, texels of its pixels are the larger ones.
+        shrink(photon, middle, sweep, held_size(outer, photon, middle, sweep));
         Footprint g = footprint_in(outer, photon, middle, sweep);
         inside = inside || contains(outer.rect, g.centre, 0.0);
         choose_level(outer, g, photon, middle, sweep);

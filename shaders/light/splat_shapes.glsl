@@ -195,19 +195,23 @@ SplatRecord swept_splat(PhotonRecord photon, float power_w, float mean, Footprin
         e = f.chord / sweep;
     }
     vec2 m = vec2(-e.y, e.x);
-    float a = cov.x * e.x * e.x + 2.0 * cov.y * e.x * e.y + cov.z * e.y * e.y;
-    float b = cov.x * e.x * m.x + cov.y * (e.x * m.y + e.y * m.x) + cov.z * e.y * m.y;
-    float c = cov.x * m.x * m.x + 2.0 * cov.y * m.x * m.y + cov.z * m.y * m.y + blur;
+    // From the axes, not from the covariance: of what is long and thin that has no digits left for the thin side.
+    vec2 s_along = vec2(dot(f.axis_s, e), dot(f.axis_s, m)), t_along = vec2(dot(f.axis_t, e), dot(f.axis_t, m));
+    float a = s_along.x * s_along.x + t_along.x * t_along.x;
+    float b = s_along.x * s_along.y + t_along.x * t_along.y;
+    float c = s_along.y * s_along.y + t_along.y * t_along.y;
+    float area = s_along.x * t_along.y - s_along.y * t_along.x;
 
     // A texel seen along its m direction is a trapezoid: a box as wide as its longer side and, for the shorter, a
     // Gaussian of the same variance. The box is kept exactly (no ripple over the grid), the rest is Gaussian.
     vec2 side = abs(m);
     float box = max(side.x, side.y);
     float narrow = min(side.x, side.y);
-    float s2 = max(c, ACROSS_FLOOR * ACROSS_FLOOR) + narrow * narrow * TEXEL_VARIANCE;
+    float s2 = max(c + blur, ACROSS_FLOOR * ACROSS_FLOOR) + narrow * narrow * TEXEL_VARIANCE;
     float c_total = s2 + box * box * TEXEL_VARIANCE;
     float shear = b / c_total;
-    float along2 = a + TEXEL_VARIANCE - b * shear, sampled = SAMPLED_VARIANCE * (1.0 + shear * shear);
+    // a - b²/c_total, without a difference of what may be alike.
+    float along2 = TEXEL_VARIANCE + (a * (c_total - c) + area * area) / c_total, sampled = SAMPLED_VARIANCE * (1.0 + shear * shear);
     bool cut = false;
 #ifdef BAND_CUTS
     // Of what is thinner along the sweep than sampling allows, the texel's average is taken as of a cut band: no light reaches beyond its texels.

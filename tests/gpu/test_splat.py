@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -216,6 +217,37 @@ def test_broken_footprints_become_single_texels_and_are_counted(rig: Rig, broken
     for at in (20, 40, 50):
         assert image[at, at, 3] == pytest.approx(rig.light.power_w(), rel=1e-5)
     assert rig.splatter.counts()["footprints_dropped"] == 3
+
+
+@pytest.mark.parametrize("angle_deg", [0.0, 31.0, 45.0])
+@pytest.mark.parametrize("long_axis", [400.0, 7000.0])
+def test_far_larger_than_the_map_and_thin(rig: Rig, long_axis: float, angle_deg: float) -> None:
+    """Its covariance has no digits left in float32 for the thin side."""
+    axes = frame(np.radians(angle_deg), long_axis, 0.8)
+    skew = np.array([[1.0, 1.0], [-1.0, 1.0]]) @ np.array(axes) / np.sqrt(2.0)  # the same Gaussian by other axes
+    centre = np.array([32.2, 31.7])
+    covariance = np.outer(axes[0], axes[0]) + np.outer(axes[1], axes[1])
+    reference = splat_image((64, 64), centre, covariance, np.zeros(2), np.zeros(1), xyzw(rig.light)[None])
+    assert relative_error(rig.draw(photons(PLAIN, centre, *skew)), reference) < 0.05
+
+
+@pytest.mark.parametrize("window", ["one", "coarse"])
+@pytest.mark.parametrize("far", [1e4, 1e6, 1e9, 1e12])
+def test_too_large_ones_are_drawn_as_large_as_can_be_and_counted(gl, far: float, window: str) -> None:
+    """Light that leaves glass at a grazing angle: no firefly, nothing that is not a number, whichever window it is in,
+    and whether or not the picture's window has it in front."""
+    along, across = frame(0.7, far, 1.0)
+    rows = np.array([[0.25, 0.0, 0.0, 24.0], [0.0, 0.25, 0.0, 24.0]])
+    for features, chord in ((PLAIN, [0.0, 0.0]), (CUTS, [0.3 * far, 0.2 * far])):
+        coarse = None if window == "one" else ((64, 64), rows, 16.0)
+        own = replace(features, nested_windows=window == "coarse")
+        rig = Rig(gl.ctx, own, coarse=coarse)
+        records = photons(own, [[20.5, 20.5], [40.5, 41.5]], along + 1e-3 * across, along - 1e-3 * across, chord)
+        records["x_hi"][1] = 0.8
+        for tile in range(1 if coarse is None else 2):
+            image = rig.draw(records, tile=tile)
+            assert np.isfinite(image).all() and image.max() < 0.05 * rig.light.power_w()
+        assert image.sum() > 0.0 and (rig.splatter.counts()["footprints_dropped"] > 0) == (far > 1e5)
 
 
 def test_nested_windows_are_complete_where_they_are_read(gl) -> None:
