@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .contacts import contacts, nested_pairs
+from .flat_shapes import is_flat
 from .geometry.mesh_recipes import recipe_of
 from .scene import Scene, SceneObject
 
@@ -56,8 +57,8 @@ class Face(NamedTuple):
 def curved_solids(scene: Scene) -> dict[int, tuple[Face, ...]]:
     """Faces, in their own frames, of the objects that are met as curved solids, by index.
 
-    They are of glass or mirrors made by description (`mesh_recipes`), wear no picture, and touch nothing that is not
-    glass. Glass that they lie in or against is met exactly too, else a surface that both share would be in two places.
+    They are of glass or mirrors made by description (`mesh_recipes`) and wear no picture. What they lie in or against
+    is flat, or glass that is met exactly too, else a surface that both share would be in two places.
     None is where they have more than `MOST_FACES` together.
     """
     found: dict[int, tuple[Face, ...]] = {}
@@ -68,8 +69,9 @@ def curved_solids(scene: Scene) -> dict[int, tuple[Face, ...]]:
     if not found:
         return {}
     for pair in contacts(scene):
-        for index in pair:
-            found.pop(index, None)
+        for index, other in (pair, pair[::-1]):
+            if index in found and not is_flat(scene.objects[other]):
+                del found[index]
     exact = {i for i, item in enumerate(scene.objects) if item.mesh.convex_planes is not None}
     pairs = nested_pairs(scene)
     refused = True

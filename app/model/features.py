@@ -15,6 +15,7 @@ from .camera_rays import camera_frame
 from .contacts import contacts, overlapping_solids, standing, world_bounds
 from .curved_solids import curved_solids
 from .environment_light import why_no_environment_light
+from .flat_shapes import is_faceted, is_flat
 from .geometry.outline import convex_outline
 from .scene import (
     Camera,
@@ -305,16 +306,6 @@ MAX_BEAM_TRIANGLES = 8192
 """A mesh of more is never tried as facets of beams; whether fewer pay is measured (`render.beam_light`)."""
 
 
-def is_faceted(item: SceneObject) -> bool:
-    """Whether all the object's facets are flat: no interpolated normals."""
-    mesh = item.mesh
-    if mesh.corner_normals is None:
-        return True
-    known = np.abs(mesh.corner_normals).sum(axis=2) > 0.0
-    cosine = np.einsum("tcj,tj->tc", mesh.corner_normals, mesh.face_normals())
-    return bool((~known | (cosine >= 1.0 - 1e-9)).all())
-
-
 def why_no_beams(item: SceneObject) -> str | None:
     """Why beams cannot carry what an object of glass or a mirror throws; None: they can."""
     if item.material.is_grating:
@@ -434,11 +425,3 @@ def has_borders(item: SceneObject) -> bool:
     points = item.mesh.vertices - item.mesh.vertices.mean(axis=0)
     in_plane = points @ np.linalg.svd(points, full_matrices=False)[2][:2].T
     return convex_outline(in_plane, item.mesh.triangles) is not None
-
-
-def is_flat(item: SceneObject) -> bool:
-    """Whether all the object's triangles lie in one plane (relative tolerance 1e-5)."""
-    points = item.mesh.vertices
-    centred = points - points.mean(axis=0)
-    singular = np.linalg.svd(centred, compute_uv=False)
-    return bool(singular[-1] <= 1e-5 * max(singular[0], np.finfo(float).tiny))

@@ -13,10 +13,10 @@ from .features import (
     dispersive_materials,
     half_spaces,
     has_borders,
-    is_flat,
     why_no_beams,
     why_no_haze,
 )
+from .flat_shapes import is_flat
 from .scene import Scene
 from .settings import divides_spectrum, has_beams
 from .tint_levels import MAX_LIGHTS

@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .features import is_flat
+from .flat_shapes import is_flat
 from .scene import Dab, SceneObject
 
 MIN_LOG2_GAIN = -6.0

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..model.features import is_flat
+from ..model.flat_shapes import is_flat
 from ..model.geometry.outline import convex_outline
 from .landings import Landings
 from .plane_frame import PlaneFrame

@@ -22,7 +22,7 @@ from ..gpu.scene_records import SCENE_STRUCTS
 from ..gpu.schema import Field, Struct
 from ..gpu.texture_store import TextureStore, place_defines
 from ..model.contacts import world_bounds
-from ..model.features import is_flat
+from ..model.flat_shapes import is_flat
 from ..model.optics.colorimetry import VISIBLE_NM, rgb_basis, xyz_to_rgb709, xyz_to_rgb709_matrix
 from ..model.optics.spectrum import Spectrum
 from ..model.scene import Light, Scene

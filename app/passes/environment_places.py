@@ -17,7 +17,7 @@ from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.schema import Field, Struct
 from ..gpu.tiles import pack
 from ..model.contacts import world_bounds
-from ..model.features import is_flat
+from ..model.flat_shapes import is_flat
 from ..model.geometry.charts import DEFAULT_GUTTER, ChartAtlas, build_charts
 from ..model.scene_checks import contains
 from .map_layout import Window

@@ -17,7 +17,7 @@ from ..gpu.records import NONE, PLACEMENT, RECEIVER
 from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.tiles import Tile, pack
 from ..model.camera_rays import camera_frame, camera_rays
-from ..model.features import is_flat
+from ..model.flat_shapes import is_flat
 from ..model.scene import Camera, Scene
 from .borders import lit_borders
 from .landings import Landings

@@ -27,7 +27,7 @@ from ..beams.search import (
 )
 from ..gpu.context import Context
 from ..gpu.scene_buffers import SceneBuffers
-from ..model.features import is_flat
+from ..model.flat_shapes import is_flat
 from ..model.scene import Scene
 from ..passes.landings import Landings
 from ..passes.map_atlas import KIND_PICTURE

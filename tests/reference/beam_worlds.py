@@ -11,7 +11,7 @@ from spectrasplat.beams.convert import pieces_of, polygons_of
 from spectrasplat.beams.facets import BeamScene, beam_scene
 from spectrasplat.beams.find import Emission, Search, search
 from spectrasplat.beams.sources import emissions, mask_at
-from spectrasplat.model.features import is_flat
+from spectrasplat.model.flat_shapes import is_flat
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.optics.colorimetry import VISIBLE_NM, rgb_partition
 from spectrasplat.model.optics.spectral_tables import SpectralAxis

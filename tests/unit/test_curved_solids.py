@@ -91,12 +91,15 @@ def test_other_shapes_stay_triangles(shape: str, sizes: dict) -> None:
     assert not faces_of(placed(described(shape, **sizes)))
 
 
-def test_what_stands_on_something_or_is_painted_or_has_no_description_stays_triangles() -> None:
+def test_what_touches_something_round_or_receives_or_has_no_description_stays_triangles() -> None:
     ball = described("sphere", radius=0.5)
     assert curved_solids(scene_of(placed(ball)))
     assert curved_solids(scene_of(placed(ball, material=Mirror())))
     assert not curved_solids(scene_of(placed(ball, material=Diffuse())))
-    assert not curved_solids(scene_of(placed(ball, at=(0.0, 0.0, 0.5))))
+    on_the_table = placed(ball, at=(0.0, 0.0, 0.5))
+    assert curved_solids(scene_of(on_the_table))
+    beside_it = placed(described("sphere", radius=0.3), at=(0.0, 0.79, 0.5), material=Diffuse())
+    assert not curved_solids(scene_of(on_the_table, beside_it))
     assert not curved_solids(as_triangles(scene_of(placed(ball))))
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...edit.stored_photons import StoredPhotons
-from ...model.features import is_flat
+from ...model.flat_shapes import is_flat
 from .invalidation import shown_glasses
 
 if TYPE_CHECKING:
