@@ -43,6 +43,9 @@ MOST_IMAGES = 4
 TINT_STEPS = 48
 """Stretches that the whole spectrum is cut into behind coloured glass."""
 
+FAR_TOO_LARGE = 1e15
+"""Texels: what float32 can still be asked of a footprint's columns; beyond, they are a numerical accident."""
+
 (
     BIND_LIGHTS,
     BIND_OBJECT_COLOURS,
@@ -187,6 +190,7 @@ def footprint_defines(features: SplatFeatures) -> Defines:
             "NONE": f"{records.NONE}u",
             "FLAG_FOOTPRINT_DROPPED": f"{records.FLAG_FOOTPRINT_DROPPED}u",
             "LATTICE_BIT": records.LATTICE_BIT,
+            "FAR_TOO_LARGE": FAR_TOO_LARGE,
         }
         | ({"TINT_LEVELS": features.tint_levels, "TINT_BIT": records.TINT_BIT} if features.tint_levels else {})
         | {name: 1 for name, on in switches.items() if on}

@@ -244,8 +244,6 @@ bool contains(vec4 rect, vec2 centre, float margin) {
     return all(greaterThanEqual(centre, rect.xy + margin)) && all(lessThan(centre, rect.zw - margin));
 }
 
-// Texels, or lengths: not a number for what is done with it here.
-const float FAR_TOO_LARGE = 1e15;
 // What of a footprint's size can be drawn: beyond `extent_limit` texels no digits are left to tell how thin it is. 0: it is a numerical accident.
 float held_size(Placement place, PhotonRecord photon, vec3 middle, vec3 sweep) {
     Footprint f = footprint_in(place, photon, middle, sweep);

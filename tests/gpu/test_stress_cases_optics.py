@@ -101,8 +101,8 @@ MUTANTS = {
     "overflow not seen": (
         "overflow",
         "light/footprint.comp",
-        "bool accident = shown && ",
-        "bool accident = false && ",
+        "    if (held < 1.0) {",
+        "    if (held < -1.0) {",
         "",
     ),
     "lost footprints not counted": (

@@ -9,6 +9,7 @@ import numpy as np
 from ...gpu.context import Context
 from ...gpu.records import FLAG_FOOTPRINT_DROPPED
 from ...passes.splat import CHUNK, EXTENT_LIMIT
+from ...passes.variants import FAR_TOO_LARGE
 from ..case import Case, Measurement
 from ..judging import EPSILON, judged, not_finite
 from ..rigs.splat_rig import Rig, SplatFeatures, photons
@@ -138,22 +139,30 @@ def measure_overflow(context: Context) -> Iterator[Measurement]:
     }
     for value, severity in severe.items():
         records = broken_records(value)
-        image = rig.draw(records)
         sound = np.isfinite(value) and abs(value) < EXTENT_LIMIT
-        # A dropped footprint is one texel's splat: nothing of it leaves its own square of eight texels.
-        squares = image[..., 3].reshape(2, 8, 4, 8).sum(axis=(1, 3)).ravel() / rig.light.power_w()
+        # What is merely too large keeps its shape at the limit: it is drawn by itself, and makes no firefly.
+        large = np.isfinite(value) and not sound and abs(value) < FAR_TOO_LARGE
+        images = [rig.draw(records[6:] if large else records)]
         counted, broken = int(rig.splatter.counts()["footprints_dropped"]), 1 if sound else 7
+        if large:
+            images.append(rig.draw(records[:6]))
+            counted += int(rig.splatter.counts()["footprints_dropped"])
+        # A dropped footprint is one texel's splat: nothing of it leaves its own square of eight texels.
+        squares = images[0][..., 3].reshape(2, 8, 4, 8).sum(axis=(1, 3)).ravel() / rig.light.power_w()
+        dropped = [7] if sound or large else [0, 1, 2, 3, 4, 5, 7]
+        fireflies = [image[..., 3].max() / rig.light.power_w() for image in images[1:]] or [0.0]
         errors, bounds = judged(
             {
-                "energy of each": (np.abs(squares - 1.0), ONE_SPLAT),
-                "energy of dropped ones": (np.abs(squares[[7] if sound else [0, 1, 2, 3, 4, 5, 7]] - 1.0), 1e-5),
+                "energy of each": (np.abs(squares[6 if large else 0 :] - 1.0), ONE_SPLAT),
+                "energy of dropped ones": (np.abs(squares[dropped] - 1.0), 1e-5),
+                "brightest texel of large ones": (np.array(fireflies), 0.01),
                 "miscounted": (np.array([abs(counted - broken)]), 0.0),
             }
         )
         yield Measurement(
             severity,
             f"{value:g}",
-            not_finite([image]),
+            not_finite(images),
             errors,
             bounds,
             fallbacks={"footprint dropped": counted},
@@ -186,7 +195,8 @@ CASES = (
     Case(
         "overflow",
         "Columns of 1e10, 1e38, infinity and NaN",
-        "A photon whose columns overflowed has lost its shape, not its light: it is drawn as one texel, and counted.",
+        "A photon whose columns overflowed has lost its shape, not its light: it is drawn as one texel, and counted. "
+        "What is finite but larger than any map is drawn as large as can be, and counted too.",
         "value put into a column (infinite from 1e39, NaN 1e41)",
         measure_overflow,
         steps=9,
