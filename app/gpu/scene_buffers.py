@@ -240,7 +240,9 @@ class SceneBuffers:
             record["colour"][:3] = material.reflectance_rgb
             if material.receives:
                 record["receiver"] = self.receivers.index(index)
+            size = self.space.scale * 0.5 * float(np.linalg.norm(np.ptp(self.world_meshes[index].vertices, axis=0)))
             if material.is_mirror:
+                record["colour"][3] = size
                 record["weight_row"] = len(weights)
                 weights.append(mirror_reflectance(material.reflectance_rgb, nm))
             if isinstance(material, Grating):
@@ -250,7 +252,7 @@ class SceneBuffers:
                 if material.dispersion not in media:
                     media.append(material.dispersion)
                 record["medium"] = media.index(material.dispersion)
-                record["colour"][3] = material.dispersion.n_d
+                record["colour"][2:] = size, material.dispersion.n_d
                 if material.is_rough:
                     width = material.microfacet_width
                     record["colour"][:2] = width, rough_glass.ROWS * widths.index(width)

@@ -54,7 +54,8 @@ OBJECT = Struct(
         Field(
             "colour",
             "vec4",
-            "linear Rec.709 reflectance (diffuse, mirror); dielectric: GGX's width, its table's row, 0, n_d",
+            "linear Rec.709 reflectance (diffuse; mirror, w: its size); dielectric: GGX's width, its table's row, size "
+            "(half of its bounds' diagonal, GPU units), n_d",
         ),
     ),
     texels=True,

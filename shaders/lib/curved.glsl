@@ -70,6 +70,12 @@ float piece_chord(Piece piece, vec3 position, vec3 direction)
     return -2.0 * dot(piece_gradient(piece, position), direction) / a;
 }
 
+// Way along the face's outward normal to where a ray meets it after `distance`.
+float height_over(Piece piece, vec3 position, vec3 direction, float distance)
+{
+    return distance * dot(direction, normalize(piece_gradient(piece, position + distance * direction)));
+}
+
 // Normal, turned to `side`, and its change over a way in the plane across it as `ShadingFrame` has them (lib/interface.glsl): along two
 // directions across.
 void curve_of_piece(Piece piece, vec3 position, float side, out vec3 summed, out vec3 across_s, out vec3 across_t, out vec3 along_s, out vec3 along_t)

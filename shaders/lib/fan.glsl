@@ -17,6 +17,25 @@ vec2 longest_axis(vec3 products)
     return dot(axis, axis) > 0.0 ? normalize(axis) : vec2(1.0, 0.0);
 }
 
+// Sides `s` and `t` of a footprint, with the directions' change along them, no longer than `widest`: along its longest axis, and aside of it.
+void keep_within(float widest, inout vec3 s, inout vec3 t, inout vec3 turn_s, inout vec3 turn_t)
+{
+    vec2 axis = longest_axis(vec3(dot(s, s), dot(s, t), dot(t, t)));
+    vec3 wide = axis.x * s + axis.y * t, narrow = axis.x * t - axis.y * s;
+    float share = min(1.0, widest / max(length(wide), 1e-30)), aside = min(1.0, widest / max(length(narrow), 1e-30));
+    // What is well within stays as it is, to the last digit.
+    if (share >= 1.0) return;
+    vec3 turn_wide = axis.x * turn_s + axis.y * turn_t, turn_narrow = axis.x * turn_t - axis.y * turn_s;
+    wide *= share;
+    turn_wide *= share;
+    narrow *= aside;
+    turn_narrow *= aside;
+    s = axis.x * wide - axis.y * narrow;
+    t = axis.y * wide + axis.x * narrow;
+    turn_s = axis.x * turn_wide - axis.y * turn_narrow;
+    turn_t = axis.y * turn_wide + axis.x * turn_narrow;
+}
+
 // By how much a side of a footprint grows, as a share of itself, for every unit of way that the last flight grows: one over its distance from where it is a point.
 float growth_of_side(vec3 side, vec3 turn, vec3 direction, vec3 normal_g)
 {

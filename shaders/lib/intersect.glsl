@@ -289,15 +289,6 @@ void intersect_solid(uint solid, vec3 origin_p, vec3 direction, RayOrigin origin
 }
 #endif
 
-#if defined(CURVED_SOLIDS) && defined(CONTACTS) && defined(MEDIUM_STACK)
-// Way along a face's normal to the place where a ray meets it after `distance`.
-float height_over(uint face, vec3 origin_p, vec3 direction, float distance)
-{
-    vec3 outward = normalize(piece_gradient(piece_at(face & ~CURVED_BIT), origin_p + distance * direction));
-    return distance * dot(direction, outward);
-}
-#endif
-
 #ifdef CURVED_SOLIDS
 // Curved solids are where all their faces overlap. A ray that has left one has left it for good; one that goes on within starts inside.
 void intersect_curved(vec3 origin_p, vec3 direction, RayOrigin origin, inout float best_key, inout Hit hit)
@@ -322,8 +313,8 @@ void intersect_curved(vec3 origin_p, vec3 direction, RayOrigin origin, inout flo
             bool enters = enter <= leave && enter_face != NONE, leaves = enter <= leave && leave_face != NONE;
 #if defined(CONTACTS) && defined(MEDIUM_STACK)
             uint bit = object_at(piece.object).stack_bit;
-            enters = enters && !crossed_in_contact(-height_over(enter_face, origin_p, direction, enter), -1.0, bit, origin);
-            leaves = leaves && !crossed_in_contact(height_over(leave_face, origin_p, direction, leave), 1.0, bit, origin);
+            enters = enters && !crossed_in_contact(-height_over(piece_at(enter_face & ~CURVED_BIT), origin_p, direction, enter), -1.0, bit, origin);
+            leaves = leaves && !crossed_in_contact(height_over(piece_at(leave_face & ~CURVED_BIT), origin_p, direction, leave), 1.0, bit, origin);
 #endif
             float key = crossing_key(enter, -1.0);
             if (enters && key < best_key && accept_hit(enter, -1.0, piece.object, origin)) {

@@ -145,6 +145,9 @@ void absorb(inout RayRecord ray, float distance, inout float absorbed_w)
 }
 #endif
 
+#ifdef FOOTPRINTS
+#include "light/trace_widths.glsl"
+#endif
 #include "light/trace_bands.glsl"
 #include "light/trace_landing.glsl"
 #include "light/trace_rough.glsl"
@@ -319,6 +322,10 @@ void main()
 #if COLUMNS > 0
     for (int c = 0; c < COLUMNS; ++c)
         ray.dposition[c].xyz = transfer_column(ray.dposition[c].xyz, ray.ddirection[c].xyz, ray.direction, hit.normal_g, hit.distance);
+#endif
+
+#ifdef FOOTPRINTS
+    if (kind == KIND_DIELECTRIC || kind == KIND_MIRROR) keep_columns_within(ray, thing.kind == KIND_MIRROR ? thing.colour.w : thing.colour.z);
 #endif
 
 #ifdef BEAMS

@@ -21,6 +21,7 @@ COVERS = {
         "on_piece",
         "piece_interval",
         "piece_chord",
+        "height_over",
         "curve_of_piece",
     ),
     "intersect.glsl": ("intersect_curved", "is_curved", "is_plane"),
@@ -108,8 +109,12 @@ def on_face(face: Face, seed: int = 4) -> tuple[np.ndarray, np.ndarray]:
 def test_where_rays_come_in_and_go_out(pieces: Pieces, number: int, distance: float) -> None:
     face = FACES[number]
     start, way = rays(distance)
-    body = f"found = piece_interval(piece_at({number}u), o, d);"
-    got = pieces.run(body, {"o": start, "d": way}, {"found": "vec2"}, ("lib/curved.glsl",))["found"]
+    body = f"found = piece_interval(piece_at({number}u), o, d); high = height_over(piece_at({number}u), o, d, 0.5);"
+    outputs = {"found": "vec2", "high": "float"}
+    told = pieces.run(body, {"o": start, "d": way}, outputs, ("lib/curved.glsl",))
+    got = told["found"]
+    normal = optics.unit(gradient(face, start + 0.5 * way))
+    np.testing.assert_allclose(told["high"], 0.5 * optics.dot(way, normal), atol=2e-5)
     want = interval(face, start, way)
     # What only touches may be met or missed, and a plane seen edge-on is far away.
     middle = start + np.nan_to_num(want.mean(axis=1), posinf=0.0, neginf=0.0)[:, None] * way

@@ -7,7 +7,14 @@ from spectrasplat.reference import optics
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
 COVERS = {
-    "fan.glsl": ("change_of_way", "longest_axis", "growth_of_side", "fan_of_footprint", "part_that_fans"),
+    "fan.glsl": (
+        "change_of_way",
+        "longest_axis",
+        "growth_of_side",
+        "fan_of_footprint",
+        "part_that_fans",
+        "keep_within",
+    ),
 }
 LIBRARY = ["lib/fan.glsl"]
 COUNT = 2000
@@ -65,3 +72,29 @@ def test_what_is_drawn_ends_before_the_horizon(gl) -> None:
     assert (part[:, 2:] >= 0.0).all() and (part[:, :2] <= 0.0).all()
     small = np.abs(fan).sum(axis=1) < 0.8
     np.testing.assert_array_equal(part[small], np.tile([-1.0, -1.0, 1.0, 1.0], (small.sum(), 1)))
+
+
+def test_sides_are_kept_within_what_is_believed(gl) -> None:
+    """The footprint is compressed along its own axes, and the directions' change with it: the same points of the
+    lattice, nearer together. What is within stays bit for bit."""
+    rng = np.random.default_rng(8)
+    sides = as_f32(rng.normal(size=(2, COUNT, 3)) * 10.0 ** rng.uniform(-3.0, 3.0, (2, COUNT, 1)))
+    turns = as_f32(rng.normal(size=(2, COUNT, 3)))
+    body = "vec3 a = s, b = t, c = u, d = v; keep_within(0.5, a, b, c, d); ka = a; kb = b; kc = c; kd = d;"
+    inputs = {"s": sides[0], "t": sides[1], "u": turns[0], "v": turns[1]}
+    got = evaluate(gl.ctx, LIBRARY, body, inputs, dict.fromkeys(("ka", "kb", "kc", "kd"), "vec3"))
+    before = np.stack(sides, axis=-1).astype(float)
+    left, sizes, right = np.linalg.svd(before, full_matrices=False)
+    shares = np.minimum(1.0, 0.5 / sizes)
+    held = np.einsum("nij,nj,njk->nik", left, sizes * shares, right)
+    # The same combinations of the columns' changes: by the right singular vectors.
+    to_axes = np.einsum("nki,nk,nkj->nij", right, shares, right)
+    turned = np.stack(turns, axis=-1).astype(float) @ to_axes
+    apart = sizes[:, 0] > 1.001 * sizes[:, 1]  # else the axes are any
+    size = np.linalg.norm(before, axis=(1, 2))[:, None]
+    for names, want, scale in ((("ka", "kb"), held, np.minimum(size, 0.5)), (("kc", "kd"), turned, 1.0)):
+        for name, column in zip(names, (want[..., 0], want[..., 1]), strict=True):
+            assert (np.abs(got[name] - column) / scale)[apart].max() < 2e-3
+    within = sizes[:, 0] <= 0.499
+    assert within.any() and np.array_equal(got["ka"][within], sides[0][within])
+    assert np.array_equal(got["kd"][within], turns[1][within])
