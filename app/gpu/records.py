@@ -330,7 +330,7 @@ TRACE_PARAMETERS = Struct(
         Field("tint_rate", "float", "1/GPU unit: a way w through the glass whose tint has levels counts rate · w"),
         Field("tint_row", "uint", "row of its absorption"),
         Field("tint_key", "uint", "of the numbers by which levels are rounded"),
-        Field("reserved", "uint"),
+        Field("widest_on_surface", "float", "side of a footprint, of the size of the glass or mirror that it is on"),
         Field(
             "beam_objects", "uvec4", "one bit an object: who meets it first is left to beams", -(-MAX_OBJECTS // 128)
         ),

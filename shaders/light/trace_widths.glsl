@@ -4,13 +4,24 @@
 #ifndef TRACE_WIDTHS_GLSL
 #define TRACE_WIDTHS_GLSL
 
-// Of an object's size (half of its bounds' diagonal): the longest side of a footprint on it, and of what a lamp's other points add. Of 0.03, 0.06, 0.12 and no bound it is
-// the best one in scenes of chance (docs/agreement.md), in shipped ones all are alike.
-const float WIDEST_ON_SURFACE = 0.06;
-
-void keep_columns_within(inout RayRecord ray, float size)
+float longest_side(vec3 s, vec3 t)
 {
-    float widest = WIDEST_ON_SURFACE * size / max(ray.footprint_scale, 1e-30);
+    vec2 axis = longest_axis(vec3(dot(s, s), dot(s, t), dot(t, t)));
+    return length(axis.x * s + axis.y * t);
+}
+
+// Of a ray that has met a surface of an object of this size; `start`: as it set out. A lattice as wide as that stays as it is: nothing else is between its points.
+void keep_columns_within(inout RayRecord ray, RayRecord start, float size, float distance)
+{
+    vec3 own_s = start.dposition[0].xyz, own_t = start.dposition[1].xyz;
+    if (ray.depth == 0u) {
+        // From a lamp: as wide as it is across the ray.
+        own_s += distance * start.ddirection[0].xyz;
+        own_t += distance * start.ddirection[1].xyz;
+        own_s -= dot(own_s, ray.direction) * ray.direction;
+        own_t -= dot(own_t, ray.direction) * ray.direction;
+    }
+    float widest = max(p.widest_on_surface * size / max(ray.footprint_scale, 1e-30), longest_side(own_s, own_t));
     vec3 s = ray.dposition[0].xyz, t = ray.dposition[1].xyz, turn_s = ray.ddirection[0].xyz, turn_t = ray.ddirection[1].xyz;
     keep_within(widest, s, t, turn_s, turn_t);
     ray.dposition[0].xyz = s;
@@ -22,7 +33,7 @@ void keep_columns_within(inout RayRecord ray, float size)
     t = ray.dposition[LAMP + 1].xyz;
     turn_s = ray.ddirection[LAMP].xyz;
     turn_t = ray.ddirection[LAMP + 1].xyz;
-    keep_within(WIDEST_ON_SURFACE * size, s, t, turn_s, turn_t);
+    keep_within(p.widest_on_surface * size, s, t, turn_s, turn_t);
     ray.dposition[LAMP].xyz = s;
     ray.dposition[LAMP + 1].xyz = t;
     ray.ddirection[LAMP].xyz = turn_s;

@@ -89,5 +89,5 @@ def test_light_stays_where_it_lands(gl: Context, scene: Scene, truth: np.ndarray
 def test_without_a_bound_it_is_spread(
     gl: Context, scene: Scene, truth: np.ndarray, monkeypatch, tmp_path: Path
 ) -> None:
-    mutate(monkeypatch, tmp_path, "light/trace_widths.glsl", "WIDEST_ON_SURFACE = 0.06", "WIDEST_ON_SURFACE = 1e9")
+    mutate(monkeypatch, tmp_path, "light/trace_widths.glsl", "p.widest_on_surface * size", "1e9 * size")
     assert deviation(gl, scene, truth) > 1.25 * BOUND
