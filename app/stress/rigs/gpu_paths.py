@@ -197,9 +197,9 @@ def trace_light(
     # What a photon's weights hold is looked at: all of a tint.
     features = replace(Features.of(scene, RenderSettings(method=method)), tint_levels=0)
     buffers = SceneBuffers(gl.ctx, scene, features, spectral_axis(scene, features))
-    batch = max(2 * count * len(bands_nm), 1024)
+    room = max(2 * count * len(bands_nm), 1024)
     # Few rays, whose footprints are as wide as the light: columns are asked for as derivatives.
-    trace = TracePass(gl, features, buffers, batch, max_depth, split_threshold=0.0, widest_on_surface=1e30)
+    trace = TracePass(gl, features, buffers, room, max_depth, split_threshold=0.0, widest_on_surface=1e30)
     try:
         space = buffers.space
         specular = [o.mesh.corners() for o in objects if not o.material.receives]
