@@ -16,6 +16,7 @@ from ..model.contacts import overlapping_solids
 from ..model.features import (
     Features,
 )
+from ..model.flat_shapes import is_faceted
 from ..model.geometry.mesh import Mesh
 from ..model.optics import rough_glass
 from ..model.optics.colorimetry import VISIBLE_NM, mirror_reflectance
@@ -38,6 +39,9 @@ from .scene_records import GRATING, GRATING_ORDER, OBJECT
 from .scene_texels import SceneTexels, spectra_texture
 from .spectral_groups import SAMPLES, Groups, index_slope
 from .texture_store import textured_objects
+
+UNBOUNDED = 1e30
+"""Size of an object whose facets are all flat, for footprints on it: they grow no faster than the way is long."""
 
 
 @dataclass(frozen=True)
@@ -240,7 +244,9 @@ class SceneBuffers:
             record["colour"][:3] = material.reflectance_rgb
             if material.receives:
                 record["receiver"] = self.receivers.index(index)
-            size = self.space.scale * 0.5 * float(np.linalg.norm(np.ptp(self.world_meshes[index].vertices, axis=0)))
+            size = UNBOUNDED
+            if material.is_specular and not is_faceted(item):
+                size = self.space.scale * 0.5 * float(np.linalg.norm(np.ptp(self.world_meshes[index].vertices, axis=0)))
             if material.is_mirror:
                 record["colour"][3] = size
                 record["weight_row"] = len(weights)

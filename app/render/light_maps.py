@@ -177,15 +177,15 @@ class LightMaps:
                 for target in range(targets):
                     for first, rows in self.portions(tile, target):
                         energy = (rows[..., 3] if is_xyz else rows.sum(axis=-1)).astype(float)
-                        if charts is not None:
-                            energy = energy[charts.owner[first : first + len(rows)] >= 0]
-                        elif finer is not None:
+                        if finer is not None:
                             energy *= 1.0 - finer(first, first + len(rows))
                         if within is not None:
                             energy *= within(first, first + len(rows))
                         if words is not None:
                             row = tile.y + first
                             energy *= seen_shares(words[row : row + len(rows), tile.x : tile.x + tile.width])
+                        if charts is not None:
+                            energy = energy[charts.owner[first : first + len(rows)] >= 0]
                         flux += energy.sum()
         return flux
 

@@ -325,7 +325,7 @@ void main()
 #endif
 
 #ifdef FOOTPRINTS
-    if (kind == KIND_DIELECTRIC || kind == KIND_MIRROR) keep_columns_within(ray, start, thing.kind == KIND_MIRROR ? thing.colour.w : thing.colour.z, hit.distance);
+    if ((kind == KIND_DIELECTRIC || kind == KIND_MIRROR)) keep_columns_within(ray, start, thing.kind == KIND_MIRROR ? thing.colour.w : thing.colour.z, hit.distance);
 #endif
 
 #ifdef BEAMS

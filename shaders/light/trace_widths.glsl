@@ -1,5 +1,5 @@
 // How far a footprint is believed while its light goes through glass. Columns are derivatives: what they say of a place farther away than the surface is
-// large is nothing, for no light of the footprint has met that surface there. Where paths are long (inside a diamond, a drop) columns grow by a factor with every
+// large is nothing, for no light of the footprint has met that surface there. Of flat facets they say enough. Where paths are long (inside a diamond, a drop) columns grow by a factor with every
 // surface, and footprints without bound would spread light over all of a picture, whatever the number of photons.
 #ifndef TRACE_WIDTHS_GLSL
 #define TRACE_WIDTHS_GLSL
