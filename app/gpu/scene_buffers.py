@@ -89,6 +89,10 @@ class SceneBuffers:
             else o.mesh.transformed(o.object_to_world)
             for i, o in enumerate(scene.objects)
         ]
+        # Of a mesh's normals, and asked again with every move of a hand.
+        self._faceted: list[bool] = (
+            [o.material.is_specular and is_faceted(o) for o in scene.objects] if like is None else like._faceted
+        )
         before = None if like is None else like.geometry
         self.geometry: SceneGeometry
         self.geometry, self._sections = SceneGeometry.of(scene, self.world_meshes, self.space, features, before)
@@ -245,7 +249,7 @@ class SceneBuffers:
             if material.receives:
                 record["receiver"] = self.receivers.index(index)
             size = UNBOUNDED
-            if material.is_specular and not is_faceted(item):
+            if material.is_specular and not self._faceted[index]:
                 size = self.space.scale * 0.5 * float(np.linalg.norm(np.ptp(self.world_meshes[index].vertices, axis=0)))
             if material.is_mirror:
                 record["colour"][3] = size

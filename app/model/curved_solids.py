@@ -72,13 +72,12 @@ def curved_solids(scene: Scene) -> dict[int, tuple[Face, ...]]:
         for index, other in (pair, pair[::-1]):
             if index in found and not is_flat(scene.objects[other]):
                 del found[index]
-    exact = {i for i, item in enumerate(scene.objects) if item.mesh.convex_planes is not None}
     pairs = nested_pairs(scene)
     refused = True
     while refused:
         refused = False
         for a, b in (*pairs, *((b, a) for a, b in pairs)):
-            if a in found and b not in found and b not in exact:
+            if a in found and b not in found and scene.objects[b].mesh.convex_planes is None:
                 del found[a]
                 refused = True
     return found if sum(map(len, found.values())) <= MOST_FACES else {}

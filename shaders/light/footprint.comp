@@ -245,8 +245,7 @@ bool contains(vec4 rect, vec2 centre, float margin) {
 }
 
 // What of a footprint's size can be drawn: beyond `extent_limit` texels no digits are left to tell how thin it is. 0: it is a numerical accident.
-float held_size(Placement place, PhotonRecord photon, vec3 middle, vec3 sweep) {
-    Footprint f = footprint_in(place, photon, middle, sweep);
+float held_size(Placement place, PhotonRecord photon, Footprint f) {
     vec3 anchor = homogeneous_texel(place, photon.position);
     vec2 away = f.centre - anchor.xy / anchor.z;
     vec2 largest = max(max(abs(f.axis_s), abs(f.axis_t)), max(abs(f.chord), abs(away)));
@@ -370,11 +369,11 @@ void main() {
     vec3 sweep = to_hi - to_lo;
     Footprint f = footprint_in(place, photon, middle, sweep);
     bool shown = in_front(place, photon, middle, sweep);
-    float held = shown ? held_size(place, photon, middle, sweep) : 1.0;
+    float held = shown ? held_size(place, photon, f) : 1.0;
     if ((held < 1.0 || !shown) && place.next != NONE) {
         // Close to the camera, texels of its pixels are as small as one likes: the coarse window tells.
         shown = false;
-        held = held_size(placements[place.next], photon, middle, sweep);
+        held = held_size(placements[place.next], photon, footprint_in(placements[place.next], photon, middle, sweep));
     }
     held = (photon.flags & FLAG_FOOTPRINT_DROPPED) != 0u ? 0.0 : held;
     if (held < 1.0) {
@@ -426,8 +425,12 @@ void main() {
     if (place.next != NONE) {
         Placement outer = placements[place.next];
         // Far from the camera, texels of its pixels are the larger ones.
-        shrink(photon, middle, sweep, held_size(outer, photon, middle, sweep));
         Footprint g = footprint_in(outer, photon, middle, sweep);
+        float held_there = held_size(outer, photon, g);
+        if (held_there < 1.0) {
+            shrink(photon, middle, sweep, held_there);
+            g = footprint_in(outer, photon, middle, sweep);
+        }
         inside = inside || contains(outer.rect, g.centre, 0.0);
         choose_level(outer, g, photon, middle, sweep);
         if (!shown || !is_only_fine(fine, drawn_in, outer, photon.position)) {

@@ -137,7 +137,7 @@ uint put_images(Depicted of, Placement place, uint slot) {
         for (uint next = 0u; next != NONE;) {
             Placement drawn_in = window;
             Footprint f = footprint_in(window, image.photon, image.middle, image.sweep);
-            bool shown = in_front(window, image.photon, image.middle, image.sweep) && held_size(window, image.photon, image.middle, image.sweep) >= 1.0;
+            bool shown = in_front(window, image.photon, image.middle, image.sweep) && held_size(window, image.photon, f) >= 1.0;
             if (!keeps_side) choose_level(drawn_in, f, image.photon, image.middle, image.sweep);
             SplatRecord splat = splat_of(image.photon, image.power_w, image.mean, f, image.table, image.band);
             splat.rect = drawn_in.rect;
