@@ -151,19 +151,17 @@ def _traced(trace: TracePass, part: _Part) -> list[np.ndarray]:
     lattices = len(part.bands) * part.light_points
     lattice = max(16, round(part.photons / lattices / part.domain.active_share))
     stride = -(-lattice * lattices // trace.batch)
-    found, first = [], 0
-    pending = [(first, stride) for first in range(stride)]
+    found = []
+    pending = [
+        LatticeSlice(part.light, part.bands, lattice, first, stride, points, (0, 0), (0, 0), 0, 1, part.light_points)
+        for first in range(stride)
+        if (points := len(range(first, lattice, stride)))
+    ]
     while pending:
-        first, stride = pending.pop(0)
-        points = len(range(first, lattice, stride))
-        if not points:
-            continue
-        piece = LatticeSlice(
-            part.light, part.bands, lattice, first, stride, points, (0, 0), (0, 0), 0, 1, part.light_points
-        )
+        piece = pending.pop(0)
         batch = trace.run(piece, part.domain, part.max_depth)
-        if batch.flights > FLIGHT_ROOM * trace.batch and points > 1:
-            pending += [(first, 2 * stride), (first + stride, 2 * stride)]
+        if (batch.overflow or batch.flights > FLIGHT_ROOM * trace.batch) and piece.points > 1:
+            pending += piece.halves
             continue
         assert trace.flights is not None
         count = min(batch.flights, FLIGHT_ROOM * trace.batch)

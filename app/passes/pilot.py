@@ -120,12 +120,19 @@ def pilot_steps(
         every: int = 1,
     ) -> Generator[None, None, tuple[np.ndarray, FluxTally, int, float]]:
         raw, tally, flights, fullness = b"", FluxTally(), 0, 0.0
+        waiting = []
         for first in range(0, slices * every, every):
             points = len(range(first, count, slices * every))
             piece = LatticeSlice(
                 light, (band,), count, first, slices * every, points, (0, 0), (0, 0), 0, 1, light_place=place
             )
+            waiting.append(piece)
+        while waiting:
+            piece = waiting.pop(0)
             batch = yield from trace.steps(piece, domain, depth, split_threshold)
+            if batch.overflow and piece.points > 1:
+                waiting[:0] = piece.halves
+                continue
             raw += trace.photons.read(size=batch.photons * trace.photon.stride) if batch.photons else b""
             tally.merge(batch.tally)
             flights += batch.flights

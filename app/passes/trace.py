@@ -110,6 +110,9 @@ class Batch:
     steps: int
     flights: int
     """Of all rays, up to what they meet."""
+    overflow: int
+    """Rays and photons that found no room. What carries their light is gone: only fewer points at once bring it back
+    (`LatticeSlice.halves`)."""
     fullness: float
     """Of the fuller queue, of rays or of photons, for lattice points that fill a batch."""
 
@@ -146,6 +149,12 @@ class LatticeSlice:
     def count(self) -> int:
         """Rays emitted at most."""
         return self.points * len(self.bands) * self.light_points
+
+    @property
+    def halves(self) -> tuple[LatticeSlice, LatticeSlice]:
+        """Every other point, and the rest; of more than one."""
+        later = replace(self, first=self.first + self.stride, stride=2 * self.stride, points=self.points // 2)
+        return replace(self, stride=2 * self.stride, points=(self.points + 1) // 2), later
 
 
 WIDEST_ON_SURFACE = 0.06
@@ -331,7 +340,8 @@ class TracePass:
         ctx.memory_barrier()
         photons = int(state["photon_first"]) + int(state["photons_new"])
         fullness = max(int(state["most_alive"]) / RAY_ROOM, photons / PHOTON_ROOM) / max(emitted, 1)
-        return Batch(photons, emitted, self._tally(int(state["overflow"])), step, int(state["flights"]), fullness)
+        overflow = int(state["overflow"])
+        return Batch(photons, emitted, self._tally(overflow), step, int(state["flights"]), overflow, fullness)
 
     def _start(self, piece: LatticeSlice, domain: EmissionDomain, max_depth: int, split_threshold: float) -> None:
         state = self._state_zero.copy()
@@ -393,6 +403,7 @@ class TracePass:
         p["tint_row"] = self.scene.tint_row
         if self.scene.tint_levels is not None:
             p["tint_rate"] = self.scene.tint_levels.rate / self.scene.space.scale
+            p["tint_halfway"] = self.scene.tint_halfway[light]
         bits = np.zeros(p["beam_objects"].size * 32, bool)
         bits[list(beam_objects)] = True
         p["beam_objects"] = np.packbits(bits, bitorder="little").view("<u4").reshape(p["beam_objects"].shape)

@@ -247,6 +247,7 @@ class LightPass:
         self.seed = seed
         self.stats, self._elsewhere = LightStats(), LightStats()
         self._maps.clear()
+        self.batches.begin()
         if self.survey.beam_light is not None:
             self.survey.beam_light.begin()
         self._first_photons, self._planned = photons, None

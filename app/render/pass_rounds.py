@@ -94,11 +94,9 @@ class PassRounds:
             points = len(range(j, lattice, rounds))
             if points:
                 part = plan.slice(self.seed, self.number, lattice, j, rounds, points, self.weight)
-                for piece, is_last in self.batches.divided(part):
-                    of = RoundOf(self.number, j, rounds, is_last and i + 1 == lights)
-                    tracing = self.batches.trace.steps(piece, plan.domain)
-                    for _ in self.batches.steps(tracing, of, self.into, rays=piece.count):
-                        yield PassStep(done / (rounds * lights), False)
+                of = RoundOf(self.number, j, rounds, i + 1 == lights)
+                for _ in self.batches.lattice(part, plan.domain, of, self.into):
+                    yield PassStep(done / (rounds * lights), False)
             if i + 1 < lights:
                 yield PassStep((done + 1) / (rounds * lights), False)
 
@@ -134,7 +132,7 @@ class PassRounds:
         most, entered_w = batches.budget.units, beams.stats.entered_w
         for light, rays in handed_rays(emission, entered_w, share, weight, most, self.seed, self._nth(of)):
             self.into.stats.trace_seconds += time.perf_counter() - started
-            yield from batches.steps(batches.trace.carry_on(rays, light), of, self.into, of_tails=tails)
+            yield from batches.handed(rays, light, of, self.into, of_tails=tails)
             started = time.perf_counter()
 
     @staticmethod

@@ -14,8 +14,10 @@ from .splatting import Pace, Splatting
 
 if TYPE_CHECKING:
     import moderngl
+    import numpy as np
 
     from ..gpu.context import Context
+    from ..passes.emission_domain import EmissionDomain
     from ..passes.map_atlas import MapAtlas
     from .light_maps import LightMaps
     from .light_stats import LightStats
@@ -53,32 +55,48 @@ class PhotonBatches:
         self._pace = pace
         self._traced_once = False
         """A first event of all tells of compiling."""
+        self._held: dict[int, int] = {}
+        """Rays of a batch, by light, whose paths branch so often that the queues hold no more."""
 
     @property
     def tables(self) -> ShownTables:
         """The spectral tables of the plan that was begun."""
         return self.records.tables.full
 
-    def divided(self, part: LatticeSlice) -> Iterator[tuple[LatticeSlice, bool]]:
-        """`part`, in slices that the device has shown to manage in time, and whether each is the last."""
+    def begin(self) -> None:
+        """Forget what another rendering's photons needed: the same passes are divided in the same way again."""
+        self._held.clear()
+
+    def lattice(self, part: LatticeSlice, domain: EmissionDomain, of: RoundOf, into: Deposit) -> Iterator[None]:
+        """Trace `part`, keep, splat and count what landed, in slices that the device has shown to manage in time and
+        whose paths the queues hold."""
         lattices, first, left = part.count // part.points, part.first, part.points
         while left:
-            points = min(left, max(self.budget.units // lattices, 1))
-            yield replace(part, first=first, points=points), points == left
+            most = min(self.budget.units, self._held.get(part.light, self.budget.units))
+            points = min(left, max(most // lattices, 1))
+            piece = replace(part, first=first, points=points)
+            batch = yield from self._traced(self.trace.steps(piece, domain), into.stats, piece.count)
+            if batch.overflow and points > 1:
+                self._held[part.light] = piece.count // 2
+                continue
             first, left = first + points * part.stride, left - points
+            yield from self._landed(batch, replace(of, is_last_light=of.is_last_light and not left), into)
 
-    def steps(
-        self,
-        tracing: Generator[None, None, Batch],
-        of: RoundOf,
-        into: Deposit,
-        *,
-        of_tails: bool = False,
-        rays: int = 0,
+    def handed(
+        self, rays: np.ndarray, light: int, of: RoundOf, into: Deposit, *, of_tails: bool = False
     ) -> Iterator[None]:
-        """Trace a batch (`TracePass.steps`, `carry_on`), keep and splat what landed, and count it. `of_tails`: photons
-        that carry on weak beams, for which a pass has photons besides. `rays`: of the lattice, in this batch."""
-        batch = yield from self._traced(tracing, into.stats, rays)
+        """The same for `rays` that are on their way already (`TracePass.carry_on`). `of_tails`: photons that carry on
+        weak beams, for which a pass has photons besides."""
+        waiting = [rays]
+        while waiting:
+            some = waiting.pop()
+            batch = yield from self._traced(self.trace.carry_on(some, light), into.stats, 0)
+            if batch.overflow and len(some) > 1:
+                waiting += [some[1::2], some[::2]]
+                continue
+            yield from self._landed(batch, of, into, of_tails=of_tails)
+
+    def _landed(self, batch: Batch, of: RoundOf, into: Deposit, *, of_tails: bool = False) -> Iterator[None]:
         if self.records.takes_tails or not of_tails:
             self.records.keep(self.trace.photons, batch, self.trace.photon.stride, of)
         yield

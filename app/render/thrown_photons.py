@@ -25,8 +25,13 @@ def thrown(
         for i, (plan, lattice) in enumerate(zip(plans, counts, strict=True)):
             points = len(range(j, lattice, rounds))
             if points:
-                part = plan.slice(seed, 0, lattice, j, rounds, points, float(photons))
-                batch = yield from trace.steps(part, plan.domain, max_depth)
-                of = RoundOf(0, j, rounds, i + 1 == len(plans))
-                keep(trace.photons, batch.photons, trace.photon.stride, of)
+                waiting = [plan.slice(seed, 0, lattice, j, rounds, points, float(photons))]
+                while waiting:
+                    part = waiting.pop()
+                    batch = yield from trace.steps(part, plan.domain, max_depth)
+                    if batch.overflow and part.points > 1:
+                        waiting += part.halves
+                        continue
+                    of = RoundOf(0, j, rounds, i + 1 == len(plans) and not waiting)
+                    keep(trace.photons, batch.photons, trace.photon.stride, of)
             yield

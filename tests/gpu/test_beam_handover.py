@@ -106,7 +106,7 @@ def emission_of(light: LightPass, two_events: bool) -> BeamEmission:
 def hand_over(light: LightPass, emission: BeamEmission, count: int, first: int = 0, stride: int = 1) -> None:
     arguments = (0, count, float(PHOTONS), (123456789, 987654321), 77, light.trace.batch, first, stride)
     for rays in emission.batches(*arguments):
-        for _ in light.batches.steps(light.trace.carry_on(rays, 0), RoundOf(0, first, stride, True), light.deposit(0)):
+        for _ in light.batches.handed(rays, 0, RoundOf(0, first, stride, True), light.deposit(0)):
             pass
 
 

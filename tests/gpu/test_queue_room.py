@@ -1,0 +1,69 @@
+"""Paths that branch so often that the queues cannot hold them: fewer are traced at once, and no light is lost."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from spectrasplat.base.paths import assets_dir
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.materials.grating import Grating
+from spectrasplat.model.scene import Scene
+from spectrasplat.passes.trace import Band, LatticeSlice
+from spectrasplat.stress.rigs.probe import SMALL, light_pass, probe
+
+ORDERS = 101
+
+
+@pytest.fixture(scope="module")
+def crowded() -> Scene:
+    """A spectrometer whose grating sends out so many orders that a beam's bands end between them."""
+    scene = load_scene(assets_dir() / "scenes" / "spectrometer.toml")
+    orders = tuple(range(-(ORDERS // 2), ORDERS // 2 + 1))
+    grating = Grating(30.0, orders, (0.9 / ORDERS,) * ORDERS)
+    return replace(scene, objects=(replace(scene.objects[0], material=grating), *scene.objects[1:]))
+
+
+def test_a_slice_is_both_of_its_halves() -> None:
+    whole = LatticeSlice(0, (Band(0.0, 1.0, 0.5, 1.0),), 100, 3, 4, 17, (0, 0), (0, 0), 0, 1)
+    halves = whole.halves
+
+    def points(part: LatticeSlice) -> list[int]:
+        return list(range(part.first, part.first + part.stride * part.points, part.stride))
+
+    assert sorted(points(halves[0]) + points(halves[1])) == points(whole)
+    assert [half.points for half in halves] == [9, 8]
+
+
+def test_full_queues_lose_nothing(gl, crowded: Scene) -> None:
+    """The picture is the same, however few paths are followed at once."""
+    settings = replace(SMALL, width=64, height=36, photons=8192)
+    found = [probe(gl, crowded, replace(settings, batch=batch)) for batch in (16_384, 2048)]
+    for one in found:
+        assert one.stats.tally.fallbacks["queue_overflow"] == 0
+        assert one.stats.tally.imbalance < 1e-5
+    assert found[0].picture == pytest.approx(found[1].picture, rel=1e-3, abs=1e-4 * float(found[0].picture.max()))
+
+
+def test_a_slice_that_overflows_is_traced_again_in_parts(gl, crowded: Scene) -> None:
+    """Before: 7 % of the flux was gone."""
+    with light_pass(gl, crowded, replace(SMALL, photons=8192, batch=16_384)) as (light, _):
+        light.begin(8192, 1)
+        plan = light.plans[0]
+        part = plan.slice(1, 0, plan.lattice_count(8192), 0, 1, plan.lattice_count(8192), 8192.0)
+        whole = light.trace.run(part, plan.domain)
+        assert whole.overflow > 0 and whole.tally.imbalance > 0.01
+        for _ in light.pass_steps(0, 8192):
+            pass
+        tally = light.stats.tally
+        assert tally.imbalance < 1e-5 and np.isclose(tally.emitted, whole.tally.emitted + _others(light, 8192))
+
+
+def _others(light, photons: int) -> float:
+    """W of the lights after the first."""
+    emitted = 0.0
+    for plan in light.plans[1:]:
+        lattice = plan.lattice_count(photons)
+        emitted += light.trace.run(plan.slice(1, 0, lattice, 0, 1, lattice, float(photons)), plan.domain).tally.emitted
+    return emitted
