@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from ..model.features import Features
 from ..model.scene_checks import MAX_OBJECTS
+from ..model.tint_levels import LEVELS
 from .schema import Field, Struct
 
 NONE = 0xFFFFFFFF
@@ -331,6 +332,7 @@ TRACE_PARAMETERS = Struct(
         Field("tint_row", "uint", "row of its absorption"),
         Field("tint_key", "uint", "of the numbers by which levels are rounded"),
         Field("widest_on_surface", "float", "side of a footprint, of the size of the glass or mirror that it is on"),
+        Field("tint_halfway", "vec4", "odds for the next level, of a way in the middle between both", LEVELS // 4),
         Field(
             "beam_objects", "uvec4", "one bit an object: who meets it first is left to beams", -(-MAX_OBJECTS // 128)
         ),

@@ -308,6 +308,7 @@ class SceneBuffers:
         if levels is not None:
             behind = [spectrum for light in self.scene.lights for spectrum in levels.all_behind(light.spectral_power)]
             powers = [cumulative(self.axis, spectrum) for spectrum in behind]
+            self.tint_halfway = [levels.halfway(light.spectral_power).reshape(-1, 4) for light in self.scene.lights]
         rows.append(np.array([power.at(x)[:, 3] for power in powers]).reshape(-1, SAMPLES))
         rows += [self._draws(), rough_glass.tables(widths, SAMPLES)]
         counts = np.cumsum([0] + [len(r) for r in rows])

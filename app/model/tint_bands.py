@@ -18,7 +18,8 @@ from .optics.spectrum import Spectrum
 from .scene import Scene, SceneObject
 
 TOLERANCE = 0.01
-"""Share of the light that straight weights may miss or put elsewhere, root mean square over the spectrum."""
+"""Share of the light that straight weights may miss or put elsewhere, root mean square over the spectrum; and what they
+may make of all of it too much or too little, whatever is asked for: wide footprints blur, but they lose no light."""
 _LEAST_SHARE = 1e-3
 """A curve that leaves less of the light says nothing: what it gets wrong is dim."""
 _PATHS = (0.5, 1.0, 2.0)
@@ -82,25 +83,35 @@ def _cut(ends: tuple[float, float], least: int, most: int, tolerance: float, *ar
     # Even bands are among those that may be.
     places = np.unique(np.concatenate([x[(x > low) & (x < high)], np.linspace(low, high, least + 1)]))
     share = np.diff(places, prepend=low) / np.interp(places, x, np.gradient(x))
-    missed = np.zeros(1)
+    missed, lost = np.zeros(1), []
     for curve, weight in zip(curves, weights, strict=True):
         density = np.interp(places, x, weight) * share
-        missed = np.maximum(missed, _missed(places, np.interp(places, x, curve), density) * weight.sum())
+        squares, sums = _missed(places, np.interp(places, x, curve), density)
+        missed = np.maximum(missed, squares * weight.sum())
+        lost.append(sums)
     missed[places[None, :] - places[:, None] > _WIDER * (high - low) / least] = np.inf
     missed[np.tril_indices(len(places))] = np.inf
     # `best[j]`: the least that bands from the low end to place j miss; `before`: where the last of them begins.
     best, before = missed[0], []
+    edges = [0, len(places) - 1]
     for count in range(2, most + 1):
-        if count > least and best[-1] <= tolerance**2:
+        all_lost = max(abs(float(sums[edges[:-1], edges[1:]].sum())) for sums in lost)
+        if count > least and best[-1] <= tolerance**2 and all_lost <= TOLERANCE:
             break
         sums = best[:, None] + missed
         before.append(np.argmin(sums, axis=0))
         best = np.min(sums, axis=0)
-    edges = [len(places) - 1]
+        edges = _path(before)
+    found = [low, *(float(places[edge]) for edge in edges[1:-1]), high]
+    return tuple(found if ends[0] <= ends[1] else found[::-1])
+
+
+def _path(before: list[np.ndarray]) -> list[int]:
+    """Edges of the bands to the last place, the first at place 0."""
+    edges = [len(before[0]) - 1]
     for step in reversed(before):
         edges.append(int(step[edges[-1]]))
-    found = [low, *(float(places[edge]) for edge in reversed(edges[1:])), high] if before else [low, high]
-    return tuple(found if ends[0] <= ends[1] else found[::-1])
+    return [0, *reversed(edges)]
 
 
 def mean_chord(item: SceneObject) -> float:
@@ -110,9 +121,10 @@ def mean_chord(item: SceneObject) -> float:
     return 4.0 * abs(item.mesh.volume() * float(np.linalg.det(turn))) / float(area)
 
 
-def _missed(x: np.ndarray, curve: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """(P, P): the sum of weight · (curve - straight)² over all places x (P,) of the band from place i to place j > i,
-    where "straight" leads through the curve at both and in the middle between them."""
+def _missed(x: np.ndarray, curve: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Two of (P, P): the sums of weight · (curve - straight)² and of weight · (curve - straight) over all places x (P,)
+    of the band from place i to place j > i, where "straight" leads through the curve at both and in the middle between
+    them."""
     middle = 0.5 * (x[:, None] + x[None, :])
     at_middle = np.interp(middle, x, curve)
     turn = np.searchsorted(x, middle, side="right")
@@ -121,13 +133,16 @@ def _missed(x: np.ndarray, curve: np.ndarray, weight: np.ndarray) -> np.ndarray:
     )
     first, last = np.arange(len(x))[:, None], np.arange(len(x))[None, :] + 1
 
-    def of(begin: np.ndarray, end: np.ndarray, x0: np.ndarray, y0: np.ndarray, y1: np.ndarray) -> np.ndarray:
+    def of(
+        begin: np.ndarray, end: np.ndarray, x0: np.ndarray, y0: np.ndarray, y1: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         one, to_x, to_x2, to_y, to_xy, to_y2 = sums[:, end] - sums[:, begin]
         half = np.where(middle > x[:, None], middle - x[:, None], 1.0)
         slope = (y1 - y0) / half
         y = y0 - slope * x0
-        return to_y2 - 2.0 * (y * to_y + slope * to_xy) + y * y * one + 2.0 * y * slope * to_x + slope**2 * to_x2
+        squares = to_y2 - 2.0 * (y * to_y + slope * to_xy) + y * y * one + 2.0 * y * slope * to_x + slope**2 * to_x2
+        return squares, to_y - y * one - slope * to_x
 
     low = of(np.broadcast_to(first, turn.shape), turn, x[:, None], curve[:, None], at_middle)
     high = of(turn, np.broadcast_to(last, turn.shape), middle, at_middle, curve[None, :])
-    return np.maximum(low + high, 0.0)
+    return np.maximum(low[0] + high[0], 0.0), low[1] + high[1]

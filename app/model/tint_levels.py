@@ -4,6 +4,8 @@ Between three wavelengths of a band a photon's weight is straight, and a tint is
 bands for that (`tint_bands`), every band has photons of its own, and all footprints are wider. So photons remember how
 far they have come through that glass, rounded to one of a few levels, up or down by a sequence over the lattice that
 makes neighbours right in the mean; the light's tables hold its spectrum behind every level, exact over all wavelengths.
+What is left halves over equal ways, so that light halfway between two levels is less than their mean: how much less,
+each level tells.
 """
 
 from __future__ import annotations
@@ -20,11 +22,13 @@ from .scene_defaults import surroundings_of
 from .tint_bands import TOLERANCE, mean_chord
 
 LEVELS = 32
-"""Steps, as many as a photon's flags hold. Rounding by turns between neighbours is right to (αΔ)²/8: below 0.3 % of
-the light that came in wherever a glass takes at most twice what it takes on the mean. What is left of a step between
-neighbours is grain."""
+"""Steps, as many as a photon's flags hold. Rounding by turns between neighbours is right for all of the light, by power
+and brightness (`halfway`); a wavelength whose α is another by δ is wrong by δ(δ + α)Δ²/8. What is left of a step
+between neighbours is grain."""
 DIAGONALS = 8
 """A way that is usual is at least the body's diagonal by this: the last level is then four diagonals away."""
+_NOTHING = 1e-12
+"""Share of the light that is none: what of it is brightness has no digits left."""
 MAX_LIGHTS = 4
 """Every level of every light has tables of its own: more lights would take more memory than fewer photons save."""
 
@@ -53,6 +57,26 @@ class TintLevels:
             kept = np.exp(-self.coefficient * way)
         lines = tuple((nm, power * float(np.interp(nm, VISIBLE_NM, kept))) for nm, power in spectrum.lines)
         return Spectrum(spectrum.density * kept, lines)
+
+    def halfway(self, spectrum: Spectrum) -> np.ndarray:
+        """(LEVELS,): the odds for the next level of a photon in the middle between both, so that what is left of the
+        light is, in the mean of both, what is left in the middle: of its power and its brightness, each as a share. A
+        half where that is the same at both, and of the last level."""
+        level = np.arange(2 * LEVELS - 1) / 2.0
+        way = level / ((LEVELS - level) * self.rate)
+        power = np.array(spectrum.density)
+        for nm, line in spectrum.lines:
+            power[round(nm - VISIBLE_NM[0])] += line
+        with np.errstate(under="ignore"):
+            kept = np.exp(-self.coefficient * way[:, None])
+            left = np.stack([kept @ power, kept @ (power * cmf_xyz()[:, 1])])
+        odds = np.full(LEVELS, 0.5)
+        here, middle, there = left[:, :-1:2], left[:, 1::2], left[:, 2::2]
+        seen = (middle > _NOTHING * left[:, :1]).all(axis=0)
+        shares = [np.where(seen, part / np.where(seen, middle, 1.0), 1.0).sum(axis=0) for part in (here, middle, there)]
+        falls = shares[0] - shares[2] > 1e-9
+        odds[:-1][falls] = ((shares[0] - shares[1]) / np.where(falls, shares[0] - shares[2], 1.0))[falls]
+        return np.clip(odds, 0.02, 0.98)
 
     def all_behind(self, spectrum: Spectrum) -> list[Spectrum]:
         """What is left at each level."""

@@ -69,7 +69,11 @@ vec3 band_powers(uint row, vec3 band)
 uint tint_level(RayRecord ray)
 {
     float rounding = kronecker(ray.photon_id / p.lattices, TINT_GENERATOR, p.tint_key + ray.photon_id % p.lattices * 2654435769u);
-    return min(uint(float(TINT_LEVELS) * ray.tinted.x / (1.0 + ray.tinted.x) + rounding), uint(TINT_LEVELS - 1));
+    float place = min(float(TINT_LEVELS) * ray.tinted.x / (1.0 + ray.tinted.x), float(TINT_LEVELS - 1)), level = floor(place);
+    // What is left falls the less the less of it there is: odds of a half lie before or behind the middle.
+    float halfway = p.tint_halfway[uint(level) >> 2][uint(level) & 3u], beyond = (place - level) * halfway;
+    float further = beyond / (beyond + (1.0 - (place - level)) * (1.0 - halfway));
+    return uint(level) + (rounding >= 1.0 - further && level < float(TINT_LEVELS - 1) ? 1u : 0u);
 }
 #endif
 

@@ -38,7 +38,7 @@ width = 2.0
 height = 2.0
 material = "diffuse"
 """
-WINE, GREEN = [0.85, 0.16, 0.20], [0.2, 0.7, 0.3]
+WINE, GREEN, DARK = [0.85, 0.16, 0.20], [0.2, 0.7, 0.3], [0.02, 0.05, 0.01]
 
 
 def scene_of(tmp_path: Path, colour: list[float], thickness: float, side: float = 2.2) -> Scene:
@@ -90,6 +90,17 @@ def test_one_band_has_the_colour_of_a_plate(gl, tmp_path: Path, colour: list[flo
     assert np.all(np.abs(found.mean(axis=(0, 1)) - truth) < 0.005 * truth + 0.003 * shone)
     # By turns: no place is a level off, which would be a tenth.
     assert np.all(found.std(axis=(0, 1)) < 0.02 * truth + 0.01 * shone)
+    light.release()
+
+
+@pytest.mark.parametrize("thickness", [0.7, 1.0, 1.3])
+def test_what_deep_glass_lets_through_is_right_as_a_share(gl, tmp_path: Path, thickness: float) -> None:
+    """A few per cent of the light: halfway between two levels less of it is left than their mean, by 4 %."""
+    scene = scene_of(tmp_path, DARK, thickness)
+    truth = let_through(scene, thickness)
+    found, light = traced(gl, scene, 20_000)
+    assert truth[1] < 0.12 * let_through(scene, 0.0)[1]
+    assert found.mean(axis=(0, 1))[[1, 3]] == pytest.approx(truth[[1, 3]], rel=0.01)
     light.release()
 
 

@@ -30,8 +30,8 @@ def lines(width_nm: float, depth: float = 3.0) -> np.ndarray:
     return np.exp(-depth * depths)[None]
 
 
-def misplaced(edges: np.ndarray, curve: np.ndarray, axis: SpectralAxis) -> float:
-    """Share of the light that straight weights misplace, told one band after the other."""
+def misplaced(edges: np.ndarray, curve: np.ndarray, axis: SpectralAxis, *, signed: bool = False) -> float:
+    """Share of the light that straight weights misplace, told one band after the other; `signed`: what they add."""
     x, power = axis.x_of_nm(VISIBLE_NM), WHITE.density
     drawn = np.zeros(401)
     for lo, hi in pairwise(edges):
@@ -39,7 +39,8 @@ def misplaced(edges: np.ndarray, curve: np.ndarray, axis: SpectralAxis) -> float
         places = np.array([lo, 0.5 * (lo + hi), hi])
         order = np.argsort(x)
         drawn[inside] = np.interp(x[inside], places, np.interp(places, x[order], curve[order]))
-    return float((power * np.abs(drawn - curve)).sum() / (power * curve).sum())
+    more = drawn - curve if signed else np.abs(drawn - curve)
+    return float((power * more).sum() / (power * curve).sum())
 
 
 @pytest.mark.parametrize("axis", AXES.values(), ids=AXES)
@@ -50,6 +51,16 @@ def test_bands_follow_lines(axis: SpectralAxis, width_nm: float) -> None:
     assert 2 < len(edges) <= 33 and (np.diff(edges) > 0.0).all() and (edges[0], edges[-1]) == WHOLE
     # Even bands are what there was before.
     assert misplaced(edges, curve[0], axis) < min(0.02, 0.4 * misplaced(np.linspace(0.0, 1.0, 17), curve[0], axis))
+
+
+@pytest.mark.parametrize("axis", AXES.values(), ids=AXES)
+@pytest.mark.parametrize("width_nm", [80.0, 20.0, 5.0])
+def test_few_photons_lose_no_light(axis: SpectralAxis, width_nm: float) -> None:
+    """However coarsely a tint may be told, what all of it lets through is told well."""
+    curve = lines(width_nm)
+    edges = cut_by_tints(WHOLE, 1, 32, curve, WHITE, axis, 0.1)
+    assert len(edges) < len(cut_by_tints(WHOLE, 1, 32, curve, WHITE, axis))
+    assert abs(misplaced(edges, curve[0], axis, signed=True)) < 1.5 * TOLERANCE
 
 
 def test_what_does_not_change_needs_no_band() -> None:
