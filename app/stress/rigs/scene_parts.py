@@ -104,7 +104,11 @@ def moved(
     objects = tuple(
         replace(_thinner(item, scale), object_to_world=matrix @ item.object_to_world) for item in scene.objects
     )
-    return replace(scene, camera=camera, lights=lights, objects=objects)
+    seen = scene.environment
+    if seen is not None:
+        # The whole world turns: what glass mirrors of it too.
+        seen = replace(seen, world_to_local=seen.world_to_local @ turn.T)
+    return replace(scene, camera=camera, lights=lights, objects=objects, environment=seen)
 
 
 def turn(axis: Sequence[float], degrees: float) -> np.ndarray:
