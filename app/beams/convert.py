@@ -71,7 +71,7 @@ def polygons_of(leaves: list[Leaves], scene: BeamScene, light: int, unit: float)
     exists = lives.bands[:, 1] > lives.bands[:, 0]
     t = lives.bands[exists]
     own = np.repeat(np.cumsum(exists) - 1, np.diff(starts))
-    bounds = lives.bounds & np.repeat(exists, np.diff(starts))
+    bounds = (lives.bounds | (chosen.soft < 0.0)) & np.repeat(exists, np.diff(starts))
     kept, own = edges[bounds], own[bounds]
     counts = np.bincount(own, minlength=len(t))
     change = kept[:, 4:] - kept[:, :4]

@@ -7,8 +7,8 @@ import numpy as np
 from .compiling import part
 from .hand import HAND, SPARE, faint_share, halve, push_both
 from .leaves import anchor_density, density_slope, lay_leaf, passes, plane_map
-from .nodes import STATIC, area_of, copy, first_place, last_place, lay_out
-from .rays import PARALLEL, follow
+from .nodes import LINES, STATIC, area_of, copy, first_place, last_place, lay_out
+from .rays import PARALLEL, REFLECT, follow
 from .search import (
     LEAF_OPEN,
     LEAF_RECEIVER,
@@ -35,6 +35,10 @@ _STEEP = 0.3
 """A relative change of the density over a leaf that is no longer linear."""
 _CROOKED = 0.25
 """Of a polygon's width: what its edges miss where it cannot be halved and yet keeps its area nearly."""
+SHARP = 0.05
+"""Of the widest penumbra of a polygon: an edge of the facet left last that is sharper masks what is drawn."""
+_BESIDE = 1e-7
+"""GPU units."""
 _STRAY = 0.1
 """Of the tolerance: how far rays may leave their parabola over the band (what they see is swept over many pixels)."""
 
@@ -146,7 +150,12 @@ def end(nodes, facets, solids, tables, sources, leaf, edge, corner, work):
         push_both(nodes, low, high, work)
         return
     if work.sources > 1:
+        own_lines = hand.lines
+        if kind == LEAF_RECEIVER:
+            hold_in(hand, facets, solids, tables, source, work)
         soften(nodes, kind, facets, solids, tables, sources, leaf, edge, corner, work)
+        if kind == LEAF_RECEIVER:
+            mask_edges(hand, own_lines, new, edge, corner, work)
     anchor_density(hand, new, work)
     # What is too faint to be halved and yet neither straight nor even must hold its own flux at least.
     if kind == LEAF_RECEIVER:
@@ -195,6 +204,101 @@ def absorb(beam, facets, solids, tables, work):
 
 
 @part
+def hold_in(hand, facets, solids, tables, source, work):
+    """Give a beam the half-planes of all edges of the facet that it left last. Its outline may lie within them, but
+    penumbrae are as wide as others ask for, and none reaches out from under a facet that stands on the receiver."""
+    last = hand.flight - 1
+    if last < 0:
+        return
+    number = np.int64(hand.path[last, 0])
+    facet, normal, towards = facets[number], facets[number].plane, hand.direction[1]
+    along = normal[0] * towards[0, 0] + normal[1] * towards[0, 1] + normal[2] * towards[0, 2]
+    way = 1 if (along > 0.0) == (hand.path[last, 1] != REFLECT) else 2
+    before = hand.lines
+    for e in range(facet.corners):
+        is_known = hand.lines >= LINES - 1
+        for ln in range(before):
+            made = hand.made[ln]
+            is_known = is_known or (made[0] == last and made[1] == number and made[2] == e and made[3] > 0)
+        if not is_known:
+            made = hand.made[hand.lines]
+            made[0], made[1], made[2], made[3] = last, number, e, way
+            hand.lines += 1
+    if hand.lines > before:
+        lay_out(hand, facets, solids, tables, source, work)
+
+
+@part
+def mask_edges(hand, own_lines, new, edge, corner, work):
+    """Turn those half-planes of the facet left last that penumbrae reach, and that are sharper than these, into masks
+    (negative softness): behind the first `own_lines`, which stay what they are. The others of `hold_in` are dropped."""
+    first, last, lines = work.count[1], hand.flight - 1, hand.lines
+    widest = 0.0
+    for ln in range(own_lines):
+        widest = max(widest, edge[first + ln].soft)
+    kept = lines
+    for ln in range(lines):
+        if hand.made[ln, 0] != last or hand.made[ln, 2] < 0 or not edge[first + ln].soft < SHARP * widest:
+            continue
+        line, nearest, begin = edge[first + ln].line, 1e300, work.count[2]
+        for a in range(first_place(hand), last_place(hand)):
+            for c in range(begin, begin + hand.corners[a]):
+                nearest = min(nearest, line[a, 0] * corner[c, 0] + line[a, 1] * corner[c, 1] + line[a, 2])
+            begin += hand.corners[a]
+        if nearest < widest:
+            mask = edge[first + kept]
+            for a in range(3):
+                for c in range(3):
+                    mask.line[a, c] = line[a, c]
+                # Of two lines in one place the edge bounds the outline.
+                mask.line[a, 2] += _BESIDE
+            mask.soft = -max(edge[first + ln].soft, _BESIDE)
+            kept += 1
+    for ln in range(lines, kept):
+        edge[first + own_lines + ln - lines] = edge[first + ln]
+    new.head[6] = own_lines + kept - lines
+
+
+@part
+def moves(hand, spare, ln, facets):
+    """How far an edge of the facet that a beam left last moves on the receiver where another point of the lamp throws
+    it: as high as it is there, times the change of direction. Not at all where it stands on the receiver, and to be
+    told so from the edge itself: half-planes in q are straight about one ray only."""
+    facet, ground = facets[hand.made[ln, 1]], facets[hand.facet]
+    e, number = hand.made[ln, 2], facet.corners
+    begin, end_of = facet.corner[e], facet.corner[e + 1 if e + 1 < number else 0]
+    along = size = height = 0.0
+    for k in range(3):
+        side = end_of[k] - begin[k]
+        along += (hand.position[1, 0, k] - begin[k]) * side
+        size += side * side
+    along = min(max(along / size, 0.0), 1.0)
+    here = there = 0.0
+    for k in range(3):
+        height += ground.plane[k] * (begin[k] + along * (end_of[k] - begin[k]))
+        here += ground.plane[k] * hand.direction[1, 0, k]
+        there += ground.plane[k] * spare.direction[1, 0, k]
+    height = abs(height - ground.plane[3])
+    if abs(here) < 1e-9 or abs(there) < 1e-9:
+        return 0.0
+    # Across the edge's image, which lies along the edge seen in the old direction.
+    tu = tv = mu = mv = 0.0
+    for k in range(3):
+        side = end_of[k] - begin[k]
+        slant = 0.0
+        for j in range(3):
+            slant += ground.plane[j] * (end_of[j] - begin[j])
+        side -= slant / here * hand.direction[1, 0, k]
+        turned = spare.direction[1, 0, k] / abs(there) - hand.direction[1, 0, k] / abs(here)
+        tu += ground.frame[1, k] * side
+        tv += ground.frame[2, k] * side
+        mu += ground.frame[1, k] * turned
+        mv += ground.frame[2, k] * turned
+    length = np.sqrt(tu * tu + tv * tv)
+    return height * abs(mu * tv - mv * tu) / length if length > 0.0 else 0.0
+
+
+@part
 def soften(nodes, kind, facets, solids, tables, sources, leaf, edge, corner, work):
     """Set the penumbra of the leaf just laid from where its edges lie for two other points of an extended light.
 
@@ -215,6 +319,9 @@ def soften(nodes, kind, facets, solids, tables, sources, leaf, edge, corner, wor
             at = e[1, 0] * cu + e[1, 1] * cv + e[1, 2]
             if turn == 0:
                 own[ln], soft[ln] = at, 0.0
+            elif kind == LEAF_RECEIVER and hand.made[ln, 0] == hand.flight - 1 and hand.made[ln, 2] >= 0:
+                moved = moves(hand, spare, ln, facets)
+                soft[ln] += moved * moved
             elif hand.made[ln, 2] != STATIC or kind == LEAF_RECEIVER:
                 soft[ln] += (at - own[ln]) * (at - own[ln])
     lay_leaf(hand, facets, kind, leaf, edge, corner, work)

@@ -50,7 +50,7 @@ def irradiance_at(polygons: BeamPolygons, receiver: int, point: np.ndarray) -> L
 
     ends = polygons.edges[rows].reshape(-1, 2, 4)
     ends[:, 1] = np.where(np.repeat(is_line, counts)[:, None], ends[:, 0], ends[:, 1])
-    distance, softness = ends[..., :2] @ place + ends[..., 2], ends[..., 3]
+    distance, softness = ends[..., :2] @ place + ends[..., 2], np.abs(ends[..., 3])
     begins, stops = _inside(distance + softness)
     begin, stop = np.maximum.reduceat(begins, first), np.minimum.reduceat(stops, first)
     lit = stop > begin

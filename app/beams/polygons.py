@@ -77,7 +77,8 @@ class BeamPolygons(Outlines):
     """int32 (N + 1,), polygon i has edges edge_start[i] … edge_start[i + 1]."""
     edges: np.ndarray
     """(E, 8): a_u, a_v, c, softness at x_lo, the same at x_hi. |a| = 1; a . p + c is the distance inside, GPU units;
-    softness: half width of the penumbra of an extended light there, GPU units, 0: sharp."""
+    softness: half width of the penumbra of an extended light there, GPU units, 0: sharp. Where it is negative the line
+    is a mask, of that width: it bounds no light, but what other edges' penumbrae throw beyond it stays inside."""
     hull_start: np.ndarray
     """int32 (N + 1,), likewise into `hulls`."""
     hulls: np.ndarray
