@@ -36,8 +36,8 @@ GREY = 0.03
 
 @pytest.fixture(scope="module")
 def stage() -> Scene:
-    """The prism from close by, near minimum deviation, before white: the table lies far below. The studio that it mirrors
-    is left out, whose lamps have coloured edges behind a prism."""
+    """The prism from close by, near minimum deviation, before white: the table lies far below. The studio that it
+    mirrors is left out, whose lamps have coloured edges behind a prism."""
     scene = replace(load_scene(assets_dir() / "scenes" / "prism.toml"), environment=None)
     below = np.eye(4)
     below[2, 3] = -30.0

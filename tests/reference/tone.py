@@ -48,8 +48,8 @@ def tone_spectrasplat(rgb: Array) -> Array:
 
 
 def bending(rgb: Array) -> Array:
-    """By how much (…,) a colour lies beyond where the curve begins to bend, by the gamut's knee or by the shoulder; negative:
-    it stays as it is."""
+    """By how much (…,) a colour lies beyond where the curve begins to bend, by the gamut's knee or by the shoulder;
+    negative: it stays as it is."""
     grey = np.maximum(luminance_709(rgb), 1e-30)[..., None]
     return np.maximum(p_norm(np.maximum(1.0 - rgb / grey, 0.0)) - 0.8, p_norm(np.maximum(rgb, 0.0)) / 3.0**0.2 - 0.5)
 
