@@ -332,11 +332,16 @@ void see_directly(CameraPath path, bool met, Hit hit, uint kind, uint pixel_key)
 void main()
 {
 #ifdef CAMERA_SPECULAR
-    uint at_listed = p.first_listed + gl_GlobalInvocationID.x;
+#ifdef HALTS
+    uint at = shared_out(gl_WorkGroupID.x, gl_NumWorkGroups.x) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
+#else
+    uint at = gl_GlobalInvocationID.x;
+#endif
+    uint at_listed = p.first_listed + at;
     if (at_listed >= p.end_listed) return;
 #ifdef HALTS
     bool resumes = p.first_place == NONE;
-    place = resumes ? halted[at_listed].queued[1u - p.queue] : p.first_place + gl_GlobalInvocationID.x;
+    place = resumes ? halted[at_listed].queued[1u - p.queue] : p.first_place + at;
     uint entry = resumes ? halted[place].entry : listed[at_listed];
 #else
     uint entry = listed[at_listed];

@@ -67,9 +67,8 @@ MapLook look_of(uint map, Corners places, vec2 side)
 vec4 caustic(MapLook look, vec2 texel)
 {
     vec2 to_uv = 1.0 / vec2(textureSize(caustic_map[0], 0));
-    vec4 sum = vec4(0.0);
-    for (float i = 0.0; i < look.lookups; i += 1.0)
-        sum += textureLod(caustic_map[0], clamp(texel + (2.0 * i - 1.0) * look.apart, look.low, look.high) * to_uv, 0.0);
+    vec4 sum = textureLod(caustic_map[0], clamp(texel - look.apart, look.low, look.high) * to_uv, 0.0);
+    if (look.lookups > 1.0) sum += textureLod(caustic_map[0], clamp(texel + look.apart, look.low, look.high) * to_uv, 0.0);
     return look.factor * map_to_channels(sum);
 }
 #endif
