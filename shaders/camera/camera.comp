@@ -459,7 +459,7 @@ void main()
     while ((goes_on || stack_size > 0) && !halts) {
         int found = 0;
         for (; (goes_on || stack_size > 0) && found < ENDS_HELD && !halts; ++events) {
-            COUNT_ROUNDS(32);
+            COUNT_ROUNDS(12);
             if (!goes_on) path = STACKED(--stack_size);
             goes_on = true;
             Hit hit;
