@@ -75,12 +75,14 @@ class _Variant:
     @property
     def rows(self) -> int:
         """Pixels of a column that an invocation develops."""
-        return _ROWS if self.antialias and self.tone != "false_colour" and self.shows == "picture" else 1
+        return _ROWS if self.shows in ("picture", "other") else 1
 
     def defines(self) -> dict[str, int | str]:
         table = ERROR if self.shows == "error" else FALSE_COLOUR
+        antialias = self.antialias and self.tone != "false_colour" and self.shows == "picture"
         return {
-            **({"ANTIALIAS": 1, "ROWS": self.rows} if self.rows > 1 else {}),
+            **({"ROWS": self.rows} if self.rows > 1 else {}),
+            **({"ANTIALIAS": 1} if antialias else {}),
             **({"AS_IMAGE": 1} if self.as_image else {}),
             **({"SAME_SIZE": 1} if self.same_size else {}),
             **({"HALO": 1} if self.has_halo else {}),

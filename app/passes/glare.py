@@ -33,7 +33,7 @@ class Glare:
 
     def __init__(self, context: Context) -> None:
         self._context, self._ctx = context, context.ctx
-        self._programs: dict[str, moderngl.ComputeShader] = {}
+        self._programs: dict[tuple[str | int, ...], moderngl.ComputeShader] = {}
         self._sampler = self._ctx.sampler(filter=(moderngl.LINEAR, moderngl.LINEAR))
         self._sampler.border_color = (0.0, 0.0, 0.0, 0.0)
         self._textures: dict[tuple[str, int], moderngl.Texture] = {}
@@ -85,9 +85,12 @@ class Glare:
         read: tuple[moderngl.Texture, moderngl.Texture],
         share: float = 0.0,
     ) -> moderngl.Texture:
-        if step not in self._programs:
-            self._programs[step] = shader.compute(self._ctx, "display/glare.comp", {step: 1})
-        program, made = self._programs[step], self._texture((step, octave), size)
+        finer = zip(read[0].size, size, strict=True)
+        taps = tuple(-(-fine // side) for fine, side in finer) if step == "SHRINK" else ()
+        if (step, *taps) not in self._programs:
+            defines = {step: 1} | dict(zip(("TAPS_ACROSS", "TAPS_DOWN"), taps, strict=False))
+            self._programs[step, *taps] = shader.compute(self._ctx, "display/glare.comp", defines)
+        program, made = self._programs[step, *taps], self._texture((step, octave), size)
         if "share" in program:
             program["share"].value = share
         self._ctx.memory_barrier()
@@ -95,6 +98,7 @@ class Glare:
             texture.use(unit)
             self._sampler.use(unit)
         made.bind_to_image(0, read=False, write=True)
+        read[0].bind_to_image(1, read=True, write=False)
         program.run(-(-size[0] // _GROUP[0]), -(-size[1] // _GROUP[1]))
         for unit in (0, 1):
             self._sampler.clear(unit)

@@ -32,9 +32,9 @@ ENDS_HELD = 8
 """Paths' ends of a sample that are looked at together."""
 CUT_THRESHOLD = 0.004
 """Share of a sample's power above which both parts of a cut band are followed."""
-HALT_ROUNDS = 3000
+HALT_ROUNDS = 5000
 """Rounds of its loops after which a sample halts on a software renderer; see camera/halts.glsl. Eight side by side that
-have nothing in common then take 24,000 of the driver's 65,535, and what is left is for the surface they are at and the
+have nothing in common then take 40,000 of the driver's 65,535, and what is left is for the surface they are at and the
 ends of paths they hold."""
 SPARE_ROUNDS = 0
 """Rounds that must be left when it halts or ends; where they are not, it is counted."""

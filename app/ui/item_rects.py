@@ -8,11 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from typing import NamedTuple
 
 
-@dataclass(frozen=True)
-class ItemRect:
+class ItemRect(NamedTuple):
     """An item on the screen, pixels from the top left of the interface."""
 
     label: str

@@ -137,7 +137,7 @@ void look_behind(CameraPath path, uint pixel_key)
 #if defined(LAYER_BEAUTY) && defined(VISIBLE_LIGHTS)
     add_lights(path, met ? hit.distance : FAR_DISTANCE);
 #endif
-    WHEN(!met || kind == KIND_DIFFUSE) add_end(path, met, hit, same_hit, pixel_key);
+    if (!met || kind == KIND_DIFFUSE) add_end(path, met, hit, same_hit, pixel_key);
 }
 
 void main()
@@ -196,7 +196,7 @@ void main()
             sum += hi - lo;
         }
     }
-    WHEN(sum > 0.0) {
+    if (sum > 0.0) {
         float per_point = 1.0 / float(view.points);
         cover.low *= per_point;
         cover.high *= per_point;

@@ -183,13 +183,13 @@ void cross_glass(inout CameraPath path, CameraPath whole, Hit hit, Triangle face
     bvec3 passes = greaterThan(cosine2, vec3(0.0));
     bool may_cut = path.restricted != 0u && any(passes) && !all(passes) && path.recut == 0u;
     bool cut = false;
-    WHEN(may_cut) {
+    if (may_cut) {
         float at = cell_border(onset_of(path, theta3, boundary, passes));
         cut = may_cut_at(path, at);
         bool near = cut && (whole.planar_so_far != 0u || cut_is_near(whole, at, hit.distance));
         if (cut && !near) atomicAdd(fallbacks[FELL_CUT], 1u);
         cut = near;
-        WHEN(cut) {
+        if (cut) {
             // Both parts meet this surface again, each from its own start.
             path = whole;
             path.recut = 1u;
@@ -214,7 +214,7 @@ void cross_glass(inout CameraPath path, CameraPath whole, Hit hit, Triangle face
     bool strong = !total && (begins || path.depth <= 1 || min(path.branch_weight * likely, path.branch_weight * (1.0 - likely)) > p.split_threshold);
     bool splits = strong && stack_size < STACK;
     if (strong && !splits) atomicAdd(fallbacks[FELL_STACK], 1u);
-    WHEN(splits && mirror_weight.y > 0.0) {
+    if (splits && mirror_weight.y > 0.0) {
         mirrored.weight *= mirror_weight;
         mirrored.branch_weight *= likely;
         mirrored.origin = origin_back;
@@ -241,7 +241,7 @@ void cross_glass(inout CameraPath path, CameraPath whole, Hit hit, Triangle face
         path.weight *= total ? vec3(1.0) : 1.0 - reflectance;
         path.branch_weight *= total ? 1.0 : 1.0 - likely;
     }
-    WHEN(!reflects) {
+    if (!reflects) {
         refract_path(path, refracted, frame, boundary, n_i, n_t);
         path.medium = boundary.behind;
     }
@@ -249,7 +249,7 @@ void cross_glass(inout CameraPath path, CameraPath whole, Hit hit, Triangle face
 #ifdef ROUGH_SURFACES
     bool wrong_side = reflects ? reflect_at(frame.shading, path.direction).geometric : refracted.geometric;
 #endif
-    WHEN(reflects) reflect_path(path, frame);
+    if (reflects) reflect_path(path, frame);
 #ifdef POLARISED
     polarise_path(path, event, reflects);
 #endif
@@ -277,15 +277,15 @@ void meet_surface(inout CameraPath path, Hit hit, uint kind, uint pixel_key)
 #ifdef NORMAL_DERIVATIVES
     path.planar_so_far = uint(path.planar_so_far != 0u && is_planar(hit, facet));
 #endif
-    WHEN(path.restricted != 0u) transfer_ends(path, hit.normal_g);
+    if (path.restricted != 0u) transfer_ends(path, hit.normal_g);
 #endif
     path.depth += 1;
 #ifdef COATS
     path.coat_pdf = 0.0;
-    WHEN(kind == KIND_DIFFUSE) meet_coat(path, hit, facet, pixel_key);
+    if (kind == KIND_DIFFUSE) meet_coat(path, hit, facet, pixel_key);
 #endif
 #ifdef HAS_MIRROR
-    WHEN(kind == KIND_MIRROR) {
+    if (kind == KIND_MIRROR) {
         PathFrame frame = path_frame(path, hit, facet);
 #ifdef POLARISED
         PolarisedEvent event = polarised_event(path, frame, mirror_reflection());
@@ -310,10 +310,10 @@ void meet_surface(inout CameraPath path, Hit hit, uint kind, uint pixel_key)
     }
 #endif
 #ifdef HAS_DIELECTRIC
-    WHEN(kind == KIND_DIELECTRIC) cross_glass(path, whole, hit, facet, pixel_key);
+    if (kind == KIND_DIELECTRIC) cross_glass(path, whole, hit, facet, pixel_key);
 #endif
 #ifdef HAS_GRATING
-    WHEN(kind == KIND_GRATING) meet_grating(path, whole, hit, facet, pixel_key);
+    if (kind == KIND_GRATING) meet_grating(path, whole, hit, facet, pixel_key);
 #endif
 }
 #endif
@@ -325,18 +325,23 @@ void see_directly(CameraPath path, bool met, Hit hit, uint kind, uint pixel_key)
 #if defined(LAYER_BEAUTY) && defined(VISIBLE_LIGHTS)
     add_lights(path, met ? hit.distance : FAR_DISTANCE);
 #endif
-    WHEN(!met || kind == KIND_DIFFUSE) add_end(path, met, hit, true, pixel_key);
+    if (!met || kind == KIND_DIFFUSE) add_end(path, met, hit, true, pixel_key);
 }
 #endif
 
 void main()
 {
 #ifdef CAMERA_SPECULAR
-    uint at_listed = p.first_listed + gl_GlobalInvocationID.x;
+#ifdef HALTS
+    uint at = shared_out(gl_WorkGroupID.x, gl_NumWorkGroups.x) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
+#else
+    uint at = gl_GlobalInvocationID.x;
+#endif
+    uint at_listed = p.first_listed + at;
     if (at_listed >= p.end_listed) return;
 #ifdef HALTS
     bool resumes = p.first_place == NONE;
-    place = resumes ? halted[at_listed].queued[1u - p.queue] : p.first_place + gl_GlobalInvocationID.x;
+    place = resumes ? halted[at_listed].queued[1u - p.queue] : p.first_place + at;
     uint entry = resumes ? halted[place].entry : listed[at_listed];
 #else
     uint entry = listed[at_listed];
@@ -371,7 +376,7 @@ void main()
 #endif
 #ifdef LISTS_SPECULAR
     uint number = pixel.y * p.size.x + pixel.x;
-    WHEN(p.survey == SURVEY_KEPT) {
+    if (p.survey == SURVEY_KEPT) {
         uint key = even_key(pixel), sees = key & KIND_BITS;
 #if defined(COATS) && defined(FOLLOWED)
         if (sees == SEES_COATED) listed[atomicAdd(listed_count, 1u)] = listed_entry(number, THE_SAMPLE, p.primary_samples);
@@ -398,7 +403,7 @@ void main()
 #ifdef BEAM_OBJECTS
         bool by_beams = is_specular(kind) && beam_objects[hit.object] != 0u;
 #ifdef VISIBLE_LIGHTS
-        WHEN(by_beams) add_lights(path, hit.distance);
+        if (by_beams) add_lights(path, hit.distance);
 #endif
 #else
         const bool by_beams = false;
@@ -406,7 +411,7 @@ void main()
         uint sees = by_beams ? SEES_BEAMS : (is_specular(kind) ? SEES_SPECULAR : SEES_DIRECTLY);
 #if defined(COATS) && defined(FOLLOWED)
         // The base is seen directly; a path goes on from the coat.
-        WHEN(kind == KIND_DIFFUSE && is_coated(hit.object)) {
+        if (kind == KIND_DIFFUSE && is_coated(hit.object)) {
             sees = SEES_COATED;
             specular_samples += 1u;
             draw = hash_pcg(draw);
@@ -425,14 +430,14 @@ void main()
         } else {
             see_directly(path, met, hit, kind, pixel_key);
         }
-        WHEN(p.survey == SURVEY_TAKES) survey_look(survey, k, sees, met, hit, lights_seen);
+        if (p.survey == SURVEY_TAKES) survey_look(survey, k, sees, met, hit, lights_seen);
     }
     if (p.survey == SURVEY_TAKES) {
         keep_survey(pixel, survey.key, p.survey_gain * radiance[0].rgb);
         return;
     }
 #ifdef FOLLOWED
-    WHEN(specular_samples > 0u) {
+    if (specular_samples > 0u) {
 #ifdef LENS
         // A place in the pixel goes with one on the lens: another pair may meet no glass.
         bool is_any = p.primary_samples == 1u;
@@ -446,7 +451,7 @@ void main()
     int events = 0;
     bool goes_on = true, halts = false;
 #ifdef HALTS
-    WHEN(resumes) {
+    if (resumes) {
         resume(events);
         goes_on = false;
     }
@@ -454,8 +459,8 @@ void main()
     while ((goes_on || stack_size > 0) && !halts) {
         int found = 0;
         for (; (goes_on || stack_size > 0) && found < ENDS_HELD && !halts; ++events) {
-            COUNT_ROUNDS(32);
-            WHEN(!goes_on) path = STACKED(--stack_size);
+            COUNT_ROUNDS(12);
+            if (!goes_on) path = STACKED(--stack_size);
             goes_on = true;
             Hit hit;
             bool met = intersect_closest(path.position, path.direction, FAR_DISTANCE, path.origin, hit);
@@ -469,10 +474,10 @@ void main()
             cut_at = -1.0;
             bool asks = path.restricted != 0u && !event_limit_reached && (ends || (path.planar_so_far != 0u && kind != KIND_BLACK && asked < MAX_ASKED));
             if (asks) asks = sweep_pixels(path, met ? hit.distance : FAR_DISTANCE) > (ends ? MIN_SWEEP : MIN_CUT_SWEEP * sample_side(path));
-            WHEN(asks) cut_at = where_paths_diverge(path, met, ends, hit, same_hit);
+            if (asks) cut_at = where_paths_diverge(path, met, ends, hit, same_hit);
             parts = cut_at >= 0.0;
 #endif
-            WHEN(!parts) {
+            if (!parts) {
 #if defined(LAYER_BEAUTY) && defined(VISIBLE_LIGHTS)
 #ifdef HAS_GRATING
                 bool met_before = path.recut != 0u || path.order != 0u;
@@ -483,26 +488,26 @@ void main()
                 // Before a coat that is seen first, the program for what is seen directly has added them.
                 met_before = met_before || (coated && path.depth == 0);
 #endif
-                WHEN(!met_before) add_lights(path, met ? hit.distance : FAR_DISTANCE);
+                if (!met_before) add_lights(path, met ? hit.distance : FAR_DISTANCE);
 #endif
                 // Light that would still be caught inside is as if it left here.
                 bool specular = !ends && kind != KIND_BLACK, leaves = specular && (event_limit_reached || path.depth >= MAX_DEPTH);
                 if (leaves) atomicAdd(fallbacks[FELL_DEPTH], 1u);
 #ifdef HAS_GRATING
-                WHEN(leaves && kind == KIND_GRATING) path.weight *= efficiency_left(path, hit.object);
+                if (leaves && kind == KIND_GRATING) path.weight *= efficiency_left(path, hit.object);
 #endif
-                WHEN(ends || leaves) ended[found++] = PathEnd(path, hit, uint(met && ends), uint(same_hit || leaves));
+                if (ends || leaves) ended[found++] = PathEnd(path, hit, uint(met && ends), uint(same_hit || leaves));
                 goes_on = specular && !leaves;
 #ifdef COATS
                 goes_on = goes_on || (coated && !event_limit_reached && path.depth < MAX_DEPTH);
 #endif
-                WHEN(goes_on) meet_surface(path, hit, kind, pixel_key);
+                if (goes_on) meet_surface(path, hit, kind, pixel_key);
 #if defined(HAS_GRATING) || defined(COATS) || defined(ROUGH_SURFACES)
                 goes_on = goes_on && path.inverse_pdf > 0.0;
 #endif
             }
 #ifdef SPECTRAL_SWEEP
-            WHEN(cut_at >= 0.0) cut_band(path, cut_at, pixel_key);
+            if (cut_at >= 0.0) cut_band(path, cut_at, pixel_key);
 #endif
 #ifdef HALTS
             halts = rounds >= uint(HALT_ROUNDS);
@@ -517,7 +522,7 @@ void main()
             }
             goes_on = goes_on && !halts;
 #else
-            WHEN(pushes_path) STACKED(stack_size++) = pending_path;
+            if (pushes_path) STACKED(stack_size++) = pending_path;
 #endif
         }
         for (int e = 0; e < found; ++e) add_end(ended[e].path, ended[e].met != 0u, ended[e].hit, ended[e].same_hit != 0u, pixel_key);

@@ -41,7 +41,7 @@ void cut_band(inout CameraPath path, float at, uint pixel_key)
     float below = share_below(path, at);
     bool both = path.branch_weight * min(below, 1.0 - below) > CUT_THRESHOLD && stack_size < STACK;
     bool takes_low = true;
-    WHEN(!both) takes_low = unit_float(hash_combine(hash_combine(pixel_key, path.key + uint(path.depth + path.cuts) * 2654435769u), p.draw_index)) < below;
+    if (!both) takes_low = unit_float(hash_combine(hash_combine(pixel_key, path.key + uint(path.depth + path.cuts) * 2654435769u), p.draw_index)) < below;
     path.cuts += 1;
     CameraPath whole = path;
     // What stack_size first, then what goes on.
@@ -53,7 +53,7 @@ void cut_band(inout CameraPath path, float at, uint pixel_key)
         if (both) path.branch_weight *= share;
         else path.inverse_pdf /= share;
         restrict_to_part(path, low ? whole.band.x : at, low ? at : whole.band.z);
-        WHEN(part == 0) pending_path = path;
+        if (part == 0) pending_path = path;
     }
     pushes_path = both;
 }
@@ -112,7 +112,7 @@ float where_paths_diverge(CameraPath path, bool met, bool ends, Hit hit, out boo
         }
         if (i == 1) {
             bisects = parts && path.planar_so_far != 0u && path.cuts < MAX_CUTS;
-            WHEN(bisects && met && other.object == hit.object) {
+            if (bisects && met && other.object == hit.object) {
                 // Two facets of one solid part in the edge where they meet: where both are as far.
                 vec3 position, direction;
                 ray_at(path, parted, position, direction);

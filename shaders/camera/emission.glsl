@@ -71,7 +71,7 @@ WavelengthInterval wavelength_interval(CameraPath path, float lo, float hi)
 // Adds a light whose spectrum is that of `row`, `factor` times.
 void add_spectrum(CameraPath path, WavelengthInterval interval, uint row, float factor)
 {
-    WHEN(interval.steps == 1)
+    if (interval.steps == 1)
         for (int t = 0; t < TARGETS; ++t)
             radiance[t] += factor * interval.through * (emission_until(row, t, interval.cell_hi) - emission_until(row, t, interval.cell_lo));
     COUNT_ROUNDS(interval.steps);
@@ -89,7 +89,7 @@ void add_spectrum(CameraPath path, WavelengthInterval interval, uint row, float 
 void add_colour(CameraPath path, WavelengthInterval interval, uint row, vec3 colour)
 {
     bool grey = colour.r == colour.g && colour.g == colour.b;
-    WHEN(grey) add_spectrum(path, interval, row, colour.r);
+    if (grey) add_spectrum(path, interval, row, colour.r);
     for (uint c = grey ? 3u : 0u; c < 3u; ++c) add_spectrum(path, interval, row + 1u + c, c == 0u ? colour.r : (c == 1u ? colour.g : colour.b));
 }
 
@@ -98,7 +98,7 @@ void channel_factors(CameraPath path, WavelengthInterval interval, out vec4 fact
 {
     bool whole = interval.steps == 1 && path.restricted == 0u;
     for (int t = 0; t < TARGETS; ++t) factors[t] = vec4(interval.through);
-    WHEN(!whole) {
+    if (!whole) {
         COUNT_ROUNDS(interval.steps * TARGETS);
         float step_x = (interval.hi - interval.lo) / float(interval.steps);
         for (int t = 0; t < TARGETS; ++t) {

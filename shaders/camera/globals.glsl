@@ -34,10 +34,6 @@ layout(std430, binding = BIND_COUNTERS) restrict buffer Counters { uint fallback
 #include "lib/textures.glsl"
 #endif
 
-// An `if` whose body is left out where no ray takes it: a software renderer runs both sides of an `if` for all rays, but ends a loop
-// that none is in.
-#define WHEN(condition) for (bool wanted = (condition); wanted; wanted = false)
-
 #define FELL_COLUMNS 0
 #define FELL_DEPTH 1
 #define FELL_STACK 2

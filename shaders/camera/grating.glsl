@@ -81,7 +81,7 @@ void meet_grating(inout CameraPath path, CameraPath whole, Hit hit, Triangle fac
     // What is thrown to the side is one band; what goes straight on or back stays whole.
     CameraPath banded = path;
 #ifdef HAS_DISPERSION
-    WHEN(banded.restricted == 0u) restrict_to_band(banded, pixel_key);
+    if (banded.restricted == 0u) restrict_to_band(banded, pixel_key);
 #endif
     uint end = alone ? number + 1u : grating.orders;
     GratingOrder order;
@@ -105,7 +105,7 @@ void meet_grating(inout CameraPath path, CameraPath whole, Hit hit, Triangle fac
     bool more = !alone && number + 1u < end, here = passes.y;
 #ifdef SPECTRAL_SWEEP
     bool cut = false;
-    WHEN(!all(passes) && path.recut == 0u) {
+    if (!all(passes) && path.recut == 0u) {
         vec3 columns[SPECTRAL_GROUPS], bends[2], unused;
         for (int e = 0; e < 2; ++e) {
             linear_end(banded, e, unused, bends[e]);
@@ -114,24 +114,24 @@ void meet_grating(inout CameraPath path, CameraPath whole, Hit hit, Triangle fac
         for (int g = 0; g < SPECTRAL_GROUPS; ++g) columns[g] = banded.ddirection[SPATIAL + g];
         float at = cell_border(evanescence_onset(banded.band, banded.direction, columns, bends, normal, grating.lines, side, order, hit.object, medium, passes));
         CameraPath start = whole;
-        WHEN(start.restricted == 0u) restrict_to_band(start, pixel_key);
+        if (start.restricted == 0u) restrict_to_band(start, pixel_key);
         cut = may_cut_at(start, at);
         bool near = cut && (whole.planar_so_far != 0u || cut_is_near(start, at, hit.distance));
         if (cut && !near) atomicAdd(fallbacks[FELL_CUT], 1u);
         cut = near;
-        WHEN(cut) {
+        if (cut) {
             // Both parts meet this surface again, each from its own start; where other orders are pending, these first.
             path = start;
             path.recut = uint(!more);
             cut_at = more ? -1.0 : at;
         }
     }
-    WHEN(cut && more) path = whole;
+    if (cut && more) path = whole;
     here = here || cut;
 #else
     bool cut = false;
 #endif
-    WHEN(more) {
+    if (more) {
         pending_path = whole;
         pending_path.order = number + 1u;
         pending_path.recut = 0u;
@@ -142,7 +142,7 @@ void meet_grating(inout CameraPath path, CameraPath whole, Hit hit, Triangle fac
         if (!here) path.inverse_pdf = 0.0;
         return;
     }
-    WHEN(order.shift_per_um != 0.0) path = banded;
+    if (order.shift_per_um != 0.0) path = banded;
     path.weight *= order.efficiency;
     path.branch_weight *= order.efficiency;
     path.key = hash_combine(path.key, 16u + number);

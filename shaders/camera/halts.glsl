@@ -19,6 +19,14 @@ struct Halted {
 layout(std430, binding = BIND_HALTED) restrict buffer HaltedSamples { Halted halted[]; };
 uint place;
 
+// Which of `count` groups the one of this number is: one after the other from each quarter. A software renderer gives each of its threads a run of
+// neighbours, and what is listed at the picture's top may take three times as long as what is at its bottom.
+uint shared_out(uint group, uint count)
+{
+    uint run = count / 4u;
+    return group < 4u * run ? group % 4u * run + group / 4u : group;
+}
+
 // The path that it was following waits with the others, last.
 void halt(uint entry, int events)
 {

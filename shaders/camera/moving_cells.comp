@@ -27,20 +27,20 @@ void main()
     if (any(greaterThanEqual(cell, ivec2(m.lattice) - 1))) return;
     uint mark = mark_at(cell), found = NONE;
     bool even = mark != 0u && mark_at(cell + ivec2(1, 0)) == mark && mark_at(cell + ivec2(0, 1)) == mark && mark_at(cell + 1) == mark;
-    WHEN(even) {
+    if (even) {
         found = floatBitsToUint(imageLoad(places, cell).w);
         bool alone = false, thin = false;
         // Next to something else, which may reach in between the corners, the cell's middle tells as well …
         for (int i = 0; i < 12; ++i) {
             ivec2 off = (i < 4 ? ivec2(i, 0) : i < 8 ? ivec2(i - 4, 3) : ivec2((i & 1) * 3, 1 + (i - 8) / 2)) - 1;
             uint other = mark_at(cell + off);
-            WHEN(other != mark) {
+            if (other != mark) {
                 alone = true;
                 thin = thin || is_thin(cell + off, other);
             }
         }
         // … but of something thin it does not tell enough.
-        WHEN(alone && !thin) pixels[atomicAdd(uneven_count, 1u)] = uint(cell.x) | uint(cell.y) << 16;
+        if (alone && !thin) pixels[atomicAdd(uneven_count, 1u)] = uint(cell.x) | uint(cell.y) << 16;
         if (alone) found = thin ? NONE : mark;
     }
     imageStore(cells, cell, uvec4(found));

@@ -37,7 +37,7 @@ struct MapLook {
 MapLook look_of(uint map, Corners places, vec2 side)
 {
     MapLook look = MapLook(map != NONE && map / LATTICE_OBJECTS != LATTICE_MAPS, vec4(0.0), vec2(0.0), vec2(0.0), vec2(0.0), 1.0);
-    WHEN(look.covered) {
+    if (look.covered) {
         uint placement = map / LATTICE_OBJECTS, object = map % LATTICE_OBJECTS;
         vec4 rect = placements[placement].rect;
         look.low = floor(rect.xy) + 0.5;
@@ -67,9 +67,8 @@ MapLook look_of(uint map, Corners places, vec2 side)
 vec4 caustic(MapLook look, vec2 texel)
 {
     vec2 to_uv = 1.0 / vec2(textureSize(caustic_map[0], 0));
-    vec4 sum = vec4(0.0);
-    for (float i = 0.0; i < look.lookups; i += 1.0)
-        sum += textureLod(caustic_map[0], clamp(texel + (2.0 * i - 1.0) * look.apart, look.low, look.high) * to_uv, 0.0);
+    vec4 sum = textureLod(caustic_map[0], clamp(texel - look.apart, look.low, look.high) * to_uv, 0.0);
+    if (look.lookups > 1.0) sum += textureLod(caustic_map[0], clamp(texel + look.apart, look.low, look.high) * to_uv, 0.0);
     return look.factor * map_to_channels(sum);
 }
 #endif
@@ -111,28 +110,28 @@ void main()
         bool even = map != NONE && first.y == map % LATTICE_OBJECTS;
         vec4 found = even ? between(lights, share) : vec4(0.0);
 #ifdef HAS_RECEIVERS
-        // Without a loop round it, which would take longer than the lookups that it may save.
+        // By all of them: a software renderer runs what an `if` leaves out, too.
         vec4 texel = between(texels, share), by_caustic = caustic(look, texel.xy / texel.z);
 #if defined(COATS) || defined(ROUGH_DIFFUSE)
-        WHEN(even && look.covered) found += by_caustic * vec4(albedo_of(pixel, first), 1.0);
+        if (even && look.covered) found += by_caustic * vec4(albedo_of(pixel, first), 1.0);
 #else
         if (even && look.covered) found += by_caustic;
 #endif
 #endif
-        WHEN(!even && inside) {
+        if (!even && inside) {
             bool specular = is_specular(kind_of(first));
             uint number = pixel.y * p.size.x + pixel.x;
-            WHEN(!specular) pixels[atomicAdd(uneven_count, 1u)] = number;
+            if (!specular) pixels[atomicAdd(uneven_count, 1u)] = number;
 #ifndef COATS
-            WHEN(specular) pixels[p.size.x * p.size.y - 1u - atomicAdd(specular_count, 1u)] = number;
+            if (specular) pixels[p.size.x * p.size.y - 1u - atomicAdd(specular_count, 1u)] = number;
 #endif
         }
 #ifdef COATS
         // What a coat reflects is followed besides.
         uint kind = inside ? kind_of(first) : NONE;
-        WHEN(is_specular(kind) || (kind == KIND_DIFFUSE && is_coated(first.y)))
+        if (is_specular(kind) || (kind == KIND_DIFFUSE && is_coated(first.y)))
             pixels[2u * p.size.x * p.size.y - 1u - atomicAdd(specular_count, 1u)] = pixel.y * p.size.x + pixel.x;
 #endif
-        WHEN(inside) imageStore(picture, ivec2(pixel), vec4(found.rgb, 1.0));
+        if (inside) imageStore(picture, ivec2(pixel), vec4(found.rgb, 1.0));
     }
 }

@@ -38,7 +38,7 @@ void main()
         ivec2 near = block + ivec2(i % 3, i / 3) - 1;
         bool inside = all(greaterThanEqual(near, ivec2(0))) && all(lessThan(near, ivec2(m.blocks)));
         uint best = inside ? imageLoad(chosen, near).x : NONE;
-        WHEN(best != NONE) {
+        if (best != NONE) {
             uvec2 at = pixel_of(bitfieldExtract(best, 0, NUMBER_BITS));
             vec4 other = imageLoad(facing, near);
             // From the block's middle, wherever in it the chosen pixel lies: so weights have no borders but the spline's.

@@ -35,7 +35,7 @@ Look look_at(uvec2 pixel)
     bool lamp = any(greaterThan(radiance[0].rgb, vec3(0.0)));
     radiance[0] = vec4(0.0);
 #ifdef HAS_RECEIVERS
-    WHEN(met && !lamp && kind_of(first) == KIND_DIFFUSE) {
+    if (met && !lamp && kind_of(first) == KIND_DIFFUSE) {
         Triangle facet = hit_triangle(hit);
         Object thing = object_at(hit.object);
         SurfaceInteraction seen = seen_on(path, hit, facet, surface_point(hit, facet, path.position, path.direction), path.direction);

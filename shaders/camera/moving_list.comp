@@ -13,7 +13,7 @@ void main()
     uvec2 block = gl_GlobalInvocationID.xy;
     if (any(greaterThanEqual(block, m.blocks))) return;
     uint best = imageLoad(chosen, ivec2(block)).x;
-    WHEN(best != NONE) {
+    if (best != NONE) {
         uint number = bitfieldExtract(best, 0, NUMBER_BITS);
         uvec2 pixel = pixel_of(number), first = seen_first(pixel);
         imageStore(found, ivec2(pixel), vec4(0.0));

@@ -19,6 +19,6 @@ void main()
 #if defined(LAYER_BEAUTY) && defined(VISIBLE_LIGHTS)
     add_lights(path, met ? hit.distance : FAR_DISTANCE);
 #endif
-    WHEN(!met || kind_of(first) == KIND_DIFFUSE) add_end(path, met, hit, true, 0u);
+    if (!met || kind_of(first) == KIND_DIFFUSE) add_end(path, met, hit, true, 0u);
     imageStore(picture, ivec2(pixel), vec4(radiance[0].rgb, 1.0));
 }

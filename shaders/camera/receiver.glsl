@@ -184,7 +184,7 @@ void add_direct(CameraPath path, SurfaceInteraction seen, WavelengthInterval int
         vec3 toward = vec3(0.0);
 #endif
         if (known) gain = mix(steady.gains[2u * i], steady.gains[2u * i + 1u], share);
-        WHEN(!known) {
+        if (!known) {
             LightSample s;
             gain = unshadowed(i, seen, light_point(i, pixel_key), s);
 #ifdef IN_MOTION
@@ -192,9 +192,9 @@ void add_direct(CameraPath path, SurfaceInteraction seen, WavelengthInterval int
             bool fades = lights[i].kind == LIGHT_KIND_POINT && lights[i].has_profile == 0u && 2.0 * lights[i].cone.x <= lights[i].cone.y;
             if (fades && gain > 0.0) lights_seen ^= hash_pcg(i + 1u);
 #endif
-            WHEN(gain > 0.0) gain = hidden_from(s, seen) ? 0.0 : gain;
+            if (gain > 0.0) gain = hidden_from(s, seen) ? 0.0 : gain;
 #ifdef LISTS_SPECULAR
-            WHEN(gain > 0.0) {
+            if (gain > 0.0) {
                 lights_seen ^= hash_pcg(i + 1u);
                 if (p.survey == 1u) gain = unshadowed(i, seen, even_light_point(), s);
             }
@@ -206,10 +206,10 @@ void add_direct(CameraPath path, SurfaceInteraction seen, WavelengthInterval int
         uint row = uint(LIGHT_ROW) + i * uint(ROWS_PER_LIGHT);
         // Other classes than 0 have their reflectance in the light's own row.
 #if defined(COATS) || defined(ROUGH_DIFFUSE)
-        WHEN(gain > 0.0)
+        if (gain > 0.0)
             add_colour(path, interval, reflectance_class == 0u ? row : row + 3u + reflectance_class, base_response(seen, toward, reflectance_class == 0u) * (INVERSE_PI * gain));
 #else
-        WHEN(gain > 0.0)
+        if (gain > 0.0)
             add_colour(path, interval, reflectance_class == 0u ? row : row + 3u + reflectance_class, (reflectance_class == 0u ? seen.reflectance : vec3(1.0)) * (INVERSE_PI * gain));
 #endif
     }
@@ -236,8 +236,8 @@ void add_coat_lights(CameraPath path, SurfaceInteraction seen, WavelengthInterva
         if (lights[i].measure > 0.0)
             gain *= share_of_points(coat_direction_density(finish.alpha, toward, normalize(toward + from)),
                                     lights[i].kind == LIGHT_KIND_AREA ? s.gain : 1.0 / lights[i].measure);
-        WHEN(gain > 0.0) gain = hidden_from(s, seen) ? 0.0 : gain;
-        WHEN(gain > 0.0) add_spectrum(path, interval, uint(LIGHT_ROW) + i * uint(ROWS_PER_LIGHT), gain);
+        if (gain > 0.0) gain = hidden_from(s, seen) ? 0.0 : gain;
+        if (gain > 0.0) add_spectrum(path, interval, uint(LIGHT_ROW) + i * uint(ROWS_PER_LIGHT), gain);
     }
 }
 #endif
@@ -268,7 +268,7 @@ Steady steady_lights(SurfaceInteraction seen, vec3 lo, vec3 hi, uint pixel_key)
             seen.position = end == 0 ? lo : hi;
             gains[end] = unshadowed(i, seen, light_point(i, pixel_key), s);
             hidden[end] = 0u;
-            WHEN(gains[end] > 0.0) hidden[end] = uint(hidden_from(s, seen));
+            if (gains[end] > 0.0) hidden[end] = uint(hidden_from(s, seen));
         }
         seen.position = middle;
         bool straight = abs(gains[2] - mix(gains[0], gains[1], share)) <= STEADY_TOLERANCE * max(gains[0], gains[1]);
@@ -392,7 +392,7 @@ void add_caustic_at(CameraPath path, SurfaceInteraction seen, WavelengthInterval
 #endif
 #ifdef MAP_BINS
     // The caustic's own dispersion meets the camera's: every spectral channel that the interval touches is read by itself.
-    WHEN(path.restricted != 0u) {
+    if (path.restricted != 0u) {
         float x = 0.5 * (interval.lo + interval.hi);
         float first = spectral_row(uint(BIN_ROW), interval.lo), last = spectral_row(uint(BIN_ROW), interval.hi);
         int from = int(floor(first)), to = max(from, int(ceil(last)) - BIN_OVERLAP);
@@ -402,7 +402,7 @@ void add_caustic_at(CameraPath path, SurfaceInteraction seen, WavelengthInterval
         bool lit = BIN_TARGET == 0 || any(notEqual(watts[0], vec4(0.0)));
         // Where XYZ are dark, so is every channel.
 #if BIN_TARGET > 0
-        WHEN(lit) {
+        if (lit) {
             vec4 rest[MAP_TARGETS];
             caustic_values(placement, texel, box, rest, 1, MAP_TARGETS - 1);
             for (int t = 1; t < MAP_TARGETS; ++t) watts[t] = rest[t];
@@ -429,16 +429,16 @@ void add_caustic_at(CameraPath path, SurfaceInteraction seen, WavelengthInterval
                 part_sum += watt * dot(part.rgb, vec3(0.2126, 0.7152, 0.0722));
 #endif
             }
-            WHEN(within && watt != 0.0) add_spectrum(path, interval, row, factor * watt);
+            if (within && watt != 0.0) add_spectrum(path, interval, row, factor * watt);
         }
 #ifdef RGB_CHANNELS
-        WHEN(lit) {
+        if (lit) {
             vec4 lacking = map_to_channels(watts[0]) - whole[0];
             radiance[0] += factor * interval.through * spectrum_share(interval, positive, part_sum, whole_sum) * lacking;
         }
 #endif
     }
-    WHEN(path.restricted == 0u)
+    if (path.restricted == 0u)
 #endif
     {
         vec4 factors[TARGETS], values[MAP_TARGETS];
@@ -463,7 +463,7 @@ void add_caustic(CameraPath path, SurfaceInteraction seen, WavelengthInterval in
     vec3 texel;
     uint receiver = object_at(seen.object).receiver;
     bool covered = find_texel(receiver, seen.source, seen.position, placement, texel);
-    WHEN(covered) add_caustic_at(path, seen, interval, receiver, placement, texel);
+    if (covered) add_caustic_at(path, seen, interval, receiver, placement, texel);
 }
 
 #endif

@@ -125,7 +125,7 @@ void add_lights(CameraPath path, float far)
 #ifdef COATS
             seen *= share_of_lobe(path, lights[i], position, direction);
 #endif
-            WHEN(seen > 0.0) add_spectrum(path, interval, uint(LIGHT_ROW) + i * uint(ROWS_PER_LIGHT), seen);
+            if (seen > 0.0) add_spectrum(path, interval, uint(LIGHT_ROW) + i * uint(ROWS_PER_LIGHT), seen);
         }
     }
 }
@@ -200,7 +200,7 @@ void add_end(CameraPath path, bool met, Hit hit, bool same_hit, uint pixel_key)
     uint texture = NONE;
     Paint paint;
 #endif
-    WHEN(met) {
+    if (met) {
         facet = triangle_at(hit.primitive);
 #ifdef LAYER_BEAUTY
         vec3 at = surface_point(hit, facet, path.position, path.direction);
@@ -210,14 +210,14 @@ void add_end(CameraPath path, bool met, Hit hit, bool same_hit, uint pixel_key)
         seen = seen_on(path, hit, facet, at, path.direction);
 #ifdef HAS_TEXTURES
         texture = object_at(hit.object).texture;
-        WHEN(texture != NONE) paint = paint_of(texture, facet.source, facet);
+        if (texture != NONE) paint = paint_of(texture, facet.source, facet);
 #endif
     }
     Steady steady = no_steady_lights();
 #ifdef SPECTRAL_SWEEP
     ArrivalCurve curve;
     bool traced = taps > 1 && same_hit && met;
-    WHEN(traced) {
+    if (traced) {
         curve = arrival_curve(path, hit);
 #ifdef LAYER_BEAUTY
         steady = steady_lights(seen, curve.lo, curve.hi, pixel_key);
@@ -240,15 +240,15 @@ void add_end(CameraPath path, bool met, Hit hit, bool same_hit, uint pixel_key)
             part = (hi - lo) * per_x;
         }
 #ifdef HAS_RECEIVERS
-        WHEN(traced) {
+        if (traced) {
             seen.position = arrival_at(path, curve, x);
             seen.dposition[2] = part * (curve.hi - curve.lo);
         }
 #endif
-        WHEN(taps > 1 && !(same_hit && met)) {
+        if (taps > 1 && !(same_hit && met)) {
             ray_at(path, x, position, direction);
 #ifdef HAS_RECEIVERS
-            WHEN(!same_hit) {
+            if (!same_hit) {
                 Hit found;
                 ends = intersect_closest(position, direction, FAR_DISTANCE, path.origin, found);
                 uint kind = ends ? object_at(found.object).kind : NONE;
@@ -258,14 +258,14 @@ void add_end(CameraPath path, bool met, Hit hit, bool same_hit, uint pixel_key)
                     found = hit;
                     if (met) found.distance = dot(hit.normal_g, path.position + hit.distance * path.direction - position) / dot(hit.normal_g, direction);
                 }
-                WHEN(ends) {
+                if (ends) {
                     facet = triangle_at(found.primitive);
                     seen = seen_on(path, found, facet, position + found.distance * direction, direction);
                     vec3 sweep = part * (p_hi - p_lo + found.distance * (d_hi - d_lo));
                     seen.dposition[2] = sweep - (dot(sweep, found.normal_g) / dot(direction, found.normal_g)) * direction;
 #ifdef HAS_TEXTURES
                     texture = object_at(found.object).texture;
-                    WHEN(texture != NONE) paint = paint_of(texture, facet.source, facet);
+                    if (texture != NONE) paint = paint_of(texture, facet.source, facet);
 #endif
                 }
             }
@@ -274,15 +274,15 @@ void add_end(CameraPath path, bool met, Hit hit, bool same_hit, uint pixel_key)
 #endif
         WavelengthInterval interval = wavelength_interval(path, lo, hi);
 #ifdef HAS_RECEIVERS
-        WHEN(ends && object_at(seen.object).kind == KIND_DIFFUSE) {
+        if (ends && object_at(seen.object).kind == KIND_DIFFUSE) {
 #ifdef HAS_TEXTURES
-            WHEN(texture != NONE) seen.reflectance = object_colours[seen.object].rgb * painted(paint, seen);
+            if (texture != NONE) seen.reflectance = object_colours[seen.object].rgb * painted(paint, seen);
 #endif
 #if defined(COATS) && defined(CAMERA_SPECULAR)
             bool coated = is_coated(seen.object);
-            WHEN(coated) add_coat_lights(path, seen, interval, pixel_key);
+            if (coated) add_coat_lights(path, seen, interval, pixel_key);
             // The base of what is seen first is left to the program for what is seen directly.
-            WHEN(!coated || path.depth > 0) {
+            if (!coated || path.depth > 0) {
 #endif
             add_caustic(path, seen, interval);
 #ifdef LAYER_BEAUTY
@@ -302,7 +302,7 @@ void add_end(CameraPath path, bool met, Hit hit, bool same_hit, uint pixel_key)
 #else
         vec3 direction_change = vec3(0.0);
 #endif
-        WHEN(!ends) add_sky(path, interval, direction, direction_change);
+        if (!ends) add_sky(path, interval, direction, direction_change);
 #endif
     }
 }

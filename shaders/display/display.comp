@@ -25,6 +25,8 @@ layout(rgba8, binding = 0) uniform writeonly restrict image2D display;
 // A software renderer reads a storage buffer ray by ray, and took as long for that as for all the rest.
 layout(std140, binding = 0) uniform Parameters { DisplayParameters parameters; };
 
+void show(ivec2 pixel, vec3 colour) { imageStore(display, pixel, vec4(colour, 1.0)); }
+
 const vec3 COLOURS[] = COLOUR_TABLE;
 const float BRIGHTEST = 1e30;
 const float LINE_HALF_PX = 1.0;
@@ -168,7 +170,29 @@ vec3 wiped(vec2 pixel)
     return abs(from_line) <= LINE_HALF_PX + 1.0 ? 0.4 * colour : colour;
 }
 
-#ifdef ANTIALIAS
+#ifdef ROWS
+vec3 scene_at(ivec2 pixel)
+{
+    vec3 scene = look(shown, vec2(pixel));
+#ifdef HALO
+    scene = kept * scene + between_softened(halo, (vec2(pixel) + 0.5) * parameters.step_uv);
+#endif
+    return scene;
+}
+
+// Develops a pixel, or tells that the tone curve bends it: that takes as long as all the rest.
+bool is_bent(ivec2 pixel, vec3 scene)
+{
+#ifdef TONE_SPECTRASPLAT
+    vec3 colour = exposed(scene);
+    show(pixel, srgb_encode(clamp(colour, 0.0, 1.0)));
+    return !(is_finite3(scene) && tone_keeps(colour));
+#else
+    show(pixel, developed(scene));
+    return false;
+#endif
+}
+
 // A column of pixels. A software renderer runs both sides of an `if`, and a loop once at least: so those that need more than the others come in a
 // loop of their own after all of them.
 void main()
@@ -176,12 +200,14 @@ void main()
     ivec2 first = ivec2(gl_GlobalInvocationID.xy) * ivec2(1, ROWS);
     int rows = min(ROWS, imageSize(display).y - first.y);
     if (first.x >= imageSize(display).x || rows <= 0) return;
+    uint bent = 0u;
+#ifdef ANTIALIAS
     uint beside_hot = 0u;
     vec3 scene = look(shown, vec2(first));
     bool is_hot_above = is_hot(scene_beside(shown, vec2(first), ivec2(0, -1)));
     for (int row = 0; row < rows; ++row) {
         ivec2 pixel = first + ivec2(0, row);
-        imageStore(display, pixel, vec4(developed(scene), 1.0));
+        if (is_bent(pixel, scene)) bent |= 1u << uint(row);
         vec3 below = scene_beside(shown, vec2(pixel), ivec2(0, 1));
         bool hot = is_hot_above || is_hot(below) || is_hot(scene_beside(shown, vec2(pixel), ivec2(-1, 0))) || is_hot(scene_beside(shown, vec2(pixel), ivec2(1, 0)));
         if (hot && is_finite3(scene)) beside_hot |= 1u << uint(row);
@@ -194,10 +220,23 @@ void main()
         scene = look(shown, next);
 #endif
     }
+    bent &= ~beside_hot;
+#else
+    for (int row = 0; row < rows; ++row) {
+        ivec2 pixel = first + ivec2(0, row);
+        if (is_bent(pixel, scene_at(pixel))) bent |= 1u << uint(row);
+    }
+#endif
+    for (; bent != 0u; bent &= bent - 1u) {
+        ivec2 pixel = first + ivec2(0, findLSB(bent));
+        show(pixel, developed(scene_at(pixel)));
+    }
+#ifdef ANTIALIAS
     for (; beside_hot != 0u; beside_hot &= beside_hot - 1u) {
         ivec2 pixel = first + ivec2(0, findLSB(beside_hot));
-        imageStore(display, pixel, vec4(antialiased(shown, vec2(pixel)), 1.0));
+        show(pixel, antialiased(shown, vec2(pixel)));
     }
+#endif
 }
 #else
 void main()
@@ -206,15 +245,9 @@ void main()
     if (any(greaterThanEqual(pixel, imageSize(display)))) return;
 #ifdef SHOW_ERROR
     vec3 colour = error_colour(look(shown, vec2(pixel)), look(other, vec2(pixel)));
-#elif defined(SHOW_WIPE)
-    vec3 colour = wiped(vec2(pixel));
 #else
-    vec3 scene = look(shown, vec2(pixel));
-#ifdef HALO
-    scene = kept * scene + between_softened(halo, (vec2(pixel) + 0.5) * parameters.step_uv);
+    vec3 colour = wiped(vec2(pixel));
 #endif
-    vec3 colour = developed(scene);
-#endif
-    imageStore(display, pixel, vec4(colour, 1.0));
+    show(pixel, colour);
 }
 #endif

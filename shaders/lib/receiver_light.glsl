@@ -5,8 +5,10 @@
 
 vec4 receiver_record(sampler2D map, uint i)
 {
-    int width = textureSize(map, 0).x;
-    return texelFetch(map, ivec2(int(i) % width, int(i) / width), 0);
+    // Without a division of integers, which a software renderer does ray by ray.
+    int width = textureSize(map, 0).x, row = int((float(i) + 0.5) / float(width)), column = int(i) - row * width;
+    row += column < 0 ? -1 : (column >= width ? 1 : 0);
+    return texelFetch(map, ivec2(int(i) - row * width, row), 0);
 }
 
 // One side of a receiver at a place on its triangle `source`: three channels between texels, the fourth of the texel itself.

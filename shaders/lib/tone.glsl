@@ -8,12 +8,18 @@ const float GAMUT_KNEE = 0.8;
 
 float luminance_709(vec3 rgb) { return dot(rgb, vec3(0.2126390, 0.7151687, 0.0721923)); }
 
+// Σ c⁵
+float fifth_powers(vec3 c)
+{
+    vec3 square = c * c;
+    return dot(square * square, c);
+}
+
 // (Σ c⁵)^(1/5) of non-negative channels.
 float p_norm(vec3 c)
 {
     float largest = max(max(max(c.r, c.g), c.b), 1e-30);
-    vec3 share = c / largest, square = share * share;
-    return largest * pow(dot(square * square, share), 0.2);
+    return largest * pow(fifth_powers(c / largest), 0.2);
 }
 
 // Towards the grey of the same luminance until no channel is negative; the border is rounded.
@@ -39,6 +45,14 @@ vec3 roll_off(vec3 rgb)
 }
 
 vec3 tone_spectrasplat(vec3 rgb) { return roll_off(into_gamut(rgb)); }
+
+// Whether that leaves a finite colour as it is: well inside the gamut and below the shoulder, as most of most pictures is. Told without a root.
+bool tone_keeps(vec3 rgb)
+{
+    float start = fifth_powers(vec3(SHOULDER_START)), knee = fifth_powers(vec3(GAMUT_KNEE, 0.0, 0.0));
+    vec3 depths = max(1.0 - rgb / max(luminance_709(rgb), 1e-30), 0.0);
+    return fifth_powers(depths) <= knee && fifth_powers(rgb) <= start;
+}
 
 // Fit of the ACES reference and sRGB output transforms [Hill 2017], exposed so that middle grey stays.
 vec3 tone_aces(vec3 rgb)

@@ -11,8 +11,8 @@ void main() {
         return;
     }
     vec4 added = imageLoad(scratch, at);
-    // Most of a map is dark. A loop, as a software renderer runs the body of an `if` for all.
-    for (bool lit = any(notEqual(added, vec4(0.0))); lit; lit = false) {
+    // Most of a map is dark.
+    if (any(notEqual(added, vec4(0.0)))) {
         vec4 before = imageLoad(total, at);
         precise vec4 after = before + added;
         precise vec4 taken = after - before;

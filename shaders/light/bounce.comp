@@ -44,8 +44,8 @@ void main()
         bool faces = cosine > 0.0 && (!aims || dot(toward, asked[i].normal) < 0.0);
         Hit hit;
         bool met = false;
-        for (bool wanted = faces; wanted; wanted = false) met = intersect_closest(position, toward, FAR_DISTANCE, origin, hit);
-        for (bool wanted = met; wanted; wanted = false) {
+        if (faces) met = intersect_closest(position, toward, FAR_DISTANCE, origin, hit);
+        if (met) {
             vec4 radiance = radiance_from(hit, position, toward);
             // The very place that was drawn, and not one of the finer texels that lie over a part of it.
             bool counts = !aims || (hit.object == asked[i].object && abs(hit.distance * hit.distance - distance2) < 1e-3 * distance2
@@ -61,7 +61,7 @@ void main()
         uint own = hash_combine(asked[i].object, id);
         vec2 shift = vec2(unit_float(hash_pcg(id)), unit_float(hash_pcg(id ^ 0x9e3779b9u)));
         vec3 toward = toward_specular(p.specular, position, place.normal, fract(asked[i].place.xy + shift), weight, narrow);
-        for (bool wanted = weight > 0.0; wanted; wanted = false) {
+        if (weight > 0.0) {
             FollowedRay ray = follow_specular(position, toward, origin, own, p.x_of_rgb, lost);
             if (ray.events > 0u && ray.met != 0u) sum.specular += weight * ray.weight * radiance_from(ray.hit, ray.position, ray.direction).rgb;
         }

@@ -49,7 +49,7 @@ void main()
         uint placement;
         vec3 at;
         bool covered = find_texel(thing.receiver, source, place.position + within.x * place.span_u + within.y * place.span_v, placement, at);
-        for (bool wanted = covered; wanted; wanted = false) {
+        if (covered) {
             vec2 box = (abs(texels_along(placements[placement], at, place.span_u)) + abs(texels_along(placements[placement], at, place.span_v))) / float(PARTS);
             ivec2 lookups = clamp(ivec2(ceil(box)), ivec2(1), ivec2(MAX_TEXELS));
             vec2 step = box / vec2(lookups), corner = at.xy / at.z - 0.5 * (box - step);

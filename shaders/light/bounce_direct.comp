@@ -28,8 +28,7 @@ void main()
         LightSample s = sample_light(light, position, unit);
         float gain = s.gain * max(dot(s.toward, place.normal), 0.0);
         // Up to the light, less a hair so that a surface the light lies on does not hide it.
-        for (bool wanted = gain > 0.0; wanted; wanted = false)
-            if (!intersect_any(position, s.toward, s.distance * 0.99999, origin)) sum += gain;
+        if (gain > 0.0 && !intersect_any(position, s.toward, s.distance * 0.99999, origin)) sum += gain;
     }
     gains[p.light * p.count + id] += sum * p.share;
 }

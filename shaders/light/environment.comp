@@ -47,7 +47,7 @@ void main()
         vec3 position = place.position + (asked[i].within.x - 0.5) * place.step_u + (asked[i].within.y - 0.5) * place.step_v;
         sum.all += amount;
         bool reaches = false;
-        for (bool wanted = amount != vec3(0.0); wanted; wanted = false) reaches = !intersect_any(position, toward, FAR_DISTANCE, origin);
+        if (amount != vec3(0.0)) reaches = !intersect_any(position, toward, FAR_DISTANCE, origin);
         if (reaches) sum.straight += amount;
     }
 #ifdef FOLLOWS_SPECULAR
@@ -59,7 +59,7 @@ void main()
         uint own = hash_combine(asked[i].key, id);
         vec2 shift = vec2(unit_float(hash_pcg(id)), unit_float(hash_pcg(id ^ 0x9e3779b9u)));
         vec3 toward = toward_specular(p.specular, position, place.normal, fract(asked[i].toward.xy + shift), weight, narrow);
-        for (bool wanted = weight > 0.0; wanted; wanted = false) {
+        if (weight > 0.0) {
             FollowedRay ray = follow_specular(position, toward, origin, own, p.x_of_rgb, lost);
             if (ray.events > 0u && ray.met == 0u) sum.specular += weight * ray.weight * environment_at(ray.direction, narrow ? p.level_narrow : p.level_wide);
         }

@@ -17,10 +17,12 @@ from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 COVERS = {
     "tone.glsl": (
         "luminance_709",
+        "fifth_powers",
         "p_norm",
         "into_gamut",
         "roll_off",
         "tone_spectrasplat",
+        "tone_keeps",
         "tone_aces",
         "tone_reinhard",
         "srgb_encode",
@@ -55,21 +57,27 @@ def test_each_tone_function_has_its_twin(gl) -> None:
     body = """
     y = luminance_709(rgb); norm = p_norm(abs(rgb)); inside = into_gamut(rgb); rolled = roll_off(abs(rgb));
     own = tone_spectrasplat(rgb); aces = tone_aces(rgb); reinhard = tone_reinhard(rgb);
+    fifth = fifth_powers(abs(rgb)); keeps = tone_keeps(rgb) ? 1.0 : 0.0;
     code = srgb_encode(clamp(rgb, 0.0, 1.0)); error = signed_error(rgb, other, floor_value);
     """
-    outputs = {"y": "float", "norm": "float", "error": "float"} | dict.fromkeys(
+    outputs = dict.fromkeys(("y", "norm", "fifth", "keeps", "error"), "float") | dict.fromkeys(
         ("inside", "rolled", "own", "aces", "reinhard", "code"), "vec3"
     )
     got = evaluate(gl.ctx, ["lib/tone.glsl"], body, {"rgb": rgb, "other": other, "floor_value": floor_value}, outputs)
     size = np.abs(rgb).max(axis=1)
     assert (np.abs(got["y"] - tone.luminance_709(rgb)) <= 1e-6 * size + 1e-9).all()
     assert (np.abs(got["norm"] - tone.p_norm(np.abs(rgb))) <= 2e-6 * size + 1e-9).all()
+    assert (np.abs(got["fifth"] / np.sum(np.abs(rgb) ** 5, axis=1).clip(1e-30) - 1)[1:] < 1e-5).all()
     # Near black luminance cancels: what is compared is the colour, in units of the largest channel that went in.
     clear = tone.luminance_709(rgb) > 0.02 * size
     assert clear.mean() > 0.8
     assert (np.abs(got["inside"] - tone.into_gamut(rgb))[clear] <= 2e-4 * size[clear, None]).all()
     assert np.abs(got["rolled"] - tone.roll_off(np.abs(rgb))).max() < 3e-6
     assert np.abs(got["own"] - tone.tone_spectrasplat(rgb))[clear].max() < 3e-4
+    keeps, bending = got["keeps"] > 0.5, tone.bending(rgb)
+    assert 0.1 < keeps.mean() < 0.5
+    assert (keeps == (bending < 0.0))[clear & (np.abs(bending) > 1e-4)].all()
+    assert np.abs(tone.tone_spectrasplat(rgb) - rgb)[keeps].max() < 1e-7
     assert np.abs(got["aces"] - tone.tone_aces(rgb)).max() < 1e-5
     assert np.abs(got["reinhard"] - tone.tone_reinhard(rgb))[clear].max() < 1e-5
     assert np.abs(got["code"] - tone.srgb_encode(np.clip(rgb, 0, 1))).max() < 3e-6

@@ -36,8 +36,9 @@ GREY = 0.03
 
 @pytest.fixture(scope="module")
 def stage() -> Scene:
-    """The prism from close by, near minimum deviation, before white: the table lies far below."""
-    scene = load_scene(assets_dir() / "scenes" / "prism.toml")
+    """The prism from close by, near minimum deviation, before white: the table lies far below. The studio that it
+    mirrors is left out, whose lamps have coloured edges behind a prism."""
+    scene = replace(load_scene(assets_dir() / "scenes" / "prism.toml"), environment=None)
     below = np.eye(4)
     below[2, 3] = -30.0
     objects = tuple(
@@ -123,14 +124,14 @@ def colour_grain(rgb: np.ndarray, mask: np.ndarray) -> float:
     return float(np.sqrt((step**2).mean()))
 
 
-@pytest.mark.slow
 def test_a_moving_camera_sees_no_colour_grain_in_glass(
     engine: LiveEngine, stage: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
         "spectrasplat.render.viewer.glass_steps.STEPS", (1,)
     )  # a slow machine must not leave too few pixels to see grain in
-    settle(engine, inputs(stage))
+    engine.set(inputs(stage))
+    until(lambda: engine.picture is not None, engine)
     moved = replace(stage.camera, position=tuple(np.add(stage.camera.position, (0.02, 0.0, 0.0))))
     engine.set(replace(inputs(stage), camera=moved))
     engine.advance(5.0, interacting=True)

@@ -11,7 +11,7 @@ from spectrasplat.gpu.context import Context
 from spectrasplat.model.geometry import primitives
 from spectrasplat.model.scene import Dielectric
 from spectrasplat.passes.first_surfaces import FirstSurfaces
-from spectrasplat.passes.moving_picture import MovingPicture
+from spectrasplat.passes.moving_picture import COARSE, COARSE_SPLIT, MovingPicture
 
 from tests.gpu.camera_rig import ABOVE, opened_camera_pass
 from tests.unit.camera_scenes import FLINT, place
@@ -75,6 +75,28 @@ def test_blocks_of_glass_beside_a_bright_lamp_have_no_edges(gl: Context, columns
     y, x = (np.indices(shown.shape) * weights).reshape(2, -1).sum(axis=1)
     assert abs(x - (STEP * (LAMP[0] + 0.5) - 0.5)) < 1.0 and abs(y - (STEP * (LAMP[1] + 0.5) - 0.5)) < 1.0
     assert abs(shown.sum() / STEP**2 - 1.0) < 0.1
+
+
+def test_only_coarse_blocks_leave_weak_parts_of_paths_to_chance(gl: Context) -> None:
+    glass = place(primitives.box((4.0, 3.0, 1.0)), Dielectric(FLINT), (0.0, 0.0, 0.0))
+    view = opened_camera_pass(gl, [glass])
+    surfaces = FirstSurfaces(gl.ctx, view.scene)
+    moving = MovingPicture(view, surfaces)
+    picture = gl.ctx.texture(SIZE, 4, dtype="f4")
+    followed: list[float] = []
+
+    def follow(parameters: np.ndarray, *_of: object) -> Iterator[float]:
+        followed.append(float(parameters["split_threshold"][0]))
+        yield 1.0
+
+    moving.direct(picture, ABOVE, view._inputs.no_maps, 8)
+    with patch.object(view, "follow", follow):
+        for step in (12, COARSE, 3, 1):
+            list(moving.glass(picture, view._inputs.no_maps, step))
+    least = pytest.approx(view.split_threshold)
+    assert followed == [pytest.approx(COARSE_SPLIT), pytest.approx(COARSE_SPLIT), least, least]
+    for owned in (picture, moving, surfaces, view):
+        owned.release()
 
 
 def test_blocks_of_one_brightness_show_it_everywhere(gl: Context) -> None:

@@ -47,6 +47,13 @@ def tone_spectrasplat(rgb: Array) -> Array:
     return roll_off(into_gamut(rgb))
 
 
+def bending(rgb: Array) -> Array:
+    """By how much (…,) a colour lies beyond where the curve begins to bend, by the gamut's knee or by the shoulder;
+    negative: it stays as it is."""
+    grey = np.maximum(luminance_709(rgb), 1e-30)[..., None]
+    return np.maximum(p_norm(np.maximum(1.0 - rgb / grey, 0.0)) - 0.8, p_norm(np.maximum(rgb, 0.0)) / 3.0**0.2 - 0.5)
+
+
 def tone_aces(rgb: Array) -> Array:
     """Hill's fit of ACES, middle grey kept."""
     to_fit = np.array([[0.59719, 0.35458, 0.04823], [0.07600, 0.90834, 0.01566], [0.02840, 0.13383, 0.83777]])

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 PREVIEW_OVERRUN_S = 0.25
 """What a coarse picture may take beyond a frame's budget."""
-PREVIEW_S = 0.02
+PREVIEW_S = 0.016
 """What a coarse picture should take on a software renderer."""
 PREVIEW_GPU_S = 0.004
 """And elsewhere."""

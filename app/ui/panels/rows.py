@@ -13,6 +13,8 @@ from .unit_words import named
 _LABEL_EM, _LABEL_SHARE = 8.4, 0.42
 _MIN_FIELD_EM = 4.5
 _TIP_EM = 26.0
+_TIP_HOVERS = imgui.HoveredFlags_.for_tooltip.value | imgui.HoveredFlags_.allow_when_disabled.value
+"""Put together once: a hundred items ask in every frame."""
 
 
 def begin_row(label: str) -> bool:
@@ -72,8 +74,7 @@ def is_typed_in(label: str) -> bool:
 
 def tooltip(text: str, *extra: str) -> None:
     """Explain the last item when it is hovered, switched-off ones too; not while it is being dragged or typed in."""
-    flags = imgui.HoveredFlags_.for_tooltip.value | imgui.HoveredFlags_.allow_when_disabled.value
-    if not text or imgui.is_item_active() or not imgui.is_item_hovered(flags):
+    if not text or imgui.is_item_active() or not imgui.is_item_hovered(_TIP_HOVERS):
         return
     text, extra = named(text), tuple(map(named, extra))
     imgui.begin_tooltip()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache, lru_cache
+from itertools import pairwise
 
 import numpy as np
 from imgui_bundle import ImVec2, imgui
@@ -39,11 +40,14 @@ def _packed(row: int, opacity: float) -> int:
     return imgui.color_convert_float4_to_u32((red, green, blue, opacity))
 
 
+@lru_cache(maxsize=16)
+def _strip(steps: int, opacity: float) -> list[int]:
+    return [colour_of_nm(380.0 + 400.0 * i / steps, opacity) for i in range(steps + 1)]
+
+
 def draw_strip(drawing: imgui.ImDrawList, low: ImVec2, high: ImVec2, opacity: float = 1.0, steps: int = 64) -> None:
     """A band of 380 to 780 nm, from left to right, between two corners in pixels."""
     width = (high.x - low.x) / steps
-    for i in range(steps):
-        left = colour_of_nm(380.0 + 400.0 * i / steps, opacity)
-        right = colour_of_nm(380.0 + 400.0 * (i + 1) / steps, opacity)
+    for i, (left, right) in enumerate(pairwise(_strip(steps, opacity))):
         x = low.x + i * width
         drawing.add_rect_filled_multi_color(ImVec2(x, low.y), ImVec2(x + width, high.y), left, right, right, left)
