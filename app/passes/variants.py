@@ -296,7 +296,7 @@ def camera_defines(scene: SceneBuffers, channels: Channels, layer: str, maps: Ma
         "HAS_RECEIVERS": any(not m.is_specular for m in materials),
         "VISIBLE_LIGHTS": beauty and any(light.has_extent for light in lights),
         "ABSORPTION": specular and (coloured or absorbs),
-        "NORMAL_DERIVATIVES": features.smooth_normals or features.curved_solids,
+        "NORMAL_DERIVATIVES": features.smooth_normals or features.curved_solids or features.rough,
         "POLARISED": specular and features.polarised,
         "COATS": features.coats,
         "ROUGH_DIFFUSE": features.rough_diffuse,
