@@ -179,12 +179,10 @@ const float WIDEST_CUT = 0.5;
 
 // Where the light's emission ends the splat is cut off, as bright as if all of it were lit; the photon carries its lit share. At a fragment are the
 // wavelengths that land about `share` of its way along the sweep (as in `flatten_lattice`).
-void cut_at_edge(inout SplatRecord splat, Blur blur, Footprint f, PhotonRecord photon) {
-    splat.x_range = vec2(0.0);
-    splat.lit = 1.0;
-    vec3 edge = unpacked_edge(photon.depth >> EDGE_BIT);
+void cut_at_edge(inout SplatRecord splat, Blur blur, Footprint f, uint word) {
+    vec3 edge = unpacked_edge(word);
     float area = f.axis_s.x * f.axis_t.y - f.axis_s.y * f.axis_t.x;
-    if (edge.xy == vec2(0.0) || abs(area) < 1e-6 || smoothing >= WIDEST_CUT || stride != 1u) return;
+    if (abs(area) < 1e-6 || smoothing >= WIDEST_CUT || stride != 1u) return;
     vec2 per_texel = f.per_spacing / area * (edge.x * vec2(f.axis_t.y, -f.axis_t.x) + edge.y * vec2(-f.axis_s.y, f.axis_s.x));
     float own = blur.along2, swept = blur.sweep * blur.sweep * TEXEL_VARIANCE, share = swept / (own + swept);
     float along = dot(per_texel, blur.e), variance = dot(per_texel, per_texel) * TEXEL_VARIANCE + along * along * share * own;
@@ -311,7 +309,10 @@ SplatRecord swept_splat(PhotonRecord photon, float power_w, float mean, Footprin
     }
     splat.kind = cut ? 3u : 2u;
 #ifdef LIGHT_EDGES
-    if (!cut) cut_at_edge(splat, drawn, f, photon);
+    splat.x_range = cut ? splat.x_range : vec2(0.0);
+    splat.lit = 1.0;
+    // A software renderer runs the body of an `if` for all photons, but that of a loop only where one of them goes in.
+    for (uint edge = cut ? 0u : photon.depth >> EDGE_BIT; edge != 0u; edge = 0u) cut_at_edge(splat, drawn, f, edge);
 #endif
     flatten_lattice(splat, drawn, f, lattice_of(photon));
     return splat;
