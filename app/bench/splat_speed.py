@@ -48,6 +48,7 @@ class SplatFeatures:
     reindexed: bool = False
     hero: bool = False
     tint_levels: int = 0
+    light_edges: bool = False
 
 
 def measure(ctx: moderngl.Context, pixels: float, count: int = 1 << 17) -> dict[str, float]:

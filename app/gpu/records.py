@@ -8,6 +8,8 @@ Flux stays in watts of the scene; only lengths are scaled.
 
 from __future__ import annotations
 
+import numpy as np
+
 from ..model.features import Features
 from ..model.scene_checks import MAX_OBJECTS
 from ..model.tint_levels import LEVELS
@@ -27,6 +29,8 @@ TINT_BIT = 3
 """From here on, up to the next, a photon's flags are its level (`model.tint_levels`)."""
 LATTICE_BIT = 8
 """From here on a photon's flags are the number of points of the golden-ratio lattice that it lies on; 0: on none."""
+EDGE_BIT = 8
+"""From here on a photon's depth is where its light's emission ends (`Features.light_edges`); 0: not near it."""
 
 
 _COMPANIONS = (
@@ -68,13 +72,18 @@ def photon_record(groups: int, hero: bool = False) -> Struct:
                 "uint",
                 "FLAG_*; from TINT_BIT on, level of its tint; from LATTICE_BIT on, points of its lattice",
             ),
-            Field("depth", "uint", "specular events on the path"),
+            Field("depth", "uint", "specular events; from EDGE_BIT on where its light ends (`packed_edge`)"),
             Field("fan", "uint", "two halves: change of the footprint's W (lib/fan.glsl) per lattice spacing"),
             *spectral,
             *(_COMPANIONS if hero else ()),
         ),
         texels=True,
     )
+
+
+def specular_events(photons: np.ndarray) -> np.ndarray:
+    """Of photon records (n,): events on each one's path."""
+    return photons["depth"] & ((1 << EDGE_BIT) - 1)
 
 
 PLACEMENT = Struct(
@@ -167,7 +176,11 @@ def ray_record(
     if columns:
         fields += [
             Field(
-                "dposition", "vec4", "xyz: GPU space per lattice spacing, or per unit of a group's variable", columns
+                "dposition",
+                "vec4",
+                "xyz: GPU space per lattice spacing, or per unit of a group's variable; w of the first: where its light"
+                " ends (`packed_edge`), as a number",
+                columns,
             ),
             Field("ddirection", "vec4", "xyz: per the same", columns),
         ]
@@ -279,7 +292,7 @@ EMIT_PARAMETERS = Struct(
         Field("origin", "vec3", "point, spot, area: light centre; plane: centre of the domain; GPU space"),
         Field("weight", "float", "domain measure per lattice point: sr, unit², or sr·unit²"),
         Field("axis", "vec3", "axis of the azimuthal plane, or the beam's direction"),
-        Field("mean_spacing", "float", "geometric mean of `spacing`"),
+        Field("lamp_step", "float", "footprint sides per extent of what a point stands for on the light; 0: a point"),
         Field("tangent", "vec3", "domain's first axis"),
         Field("back", "float", "plane: how far before the plane rays start, GPU space"),
         Field("bitangent", "vec3", "domain's second axis"),
@@ -313,8 +326,7 @@ EMIT_PARAMETERS = Struct(
         ),
         Field("thinned", "uint", "one bit a cell: are only some of its points emitted?", MASK_SIZE * MASK_SIZE // 32),
         Field("thinned_chance", "float", "of a point in such a cell to be emitted"),
-        Field("lamp_step", "float", "footprint sides per extent of what a point stands for on the light; 0: a point"),
-        Field("reserved", "uint", "", 2),
+        Field("reserved", "uint", "", 3),
     ),
 )
 TRACE_PARAMETERS = Struct(

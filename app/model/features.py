@@ -139,6 +139,9 @@ class Features:
     """Steps of the way through one tinted glass that photons tell (`model.tint_levels`)."""
     rough: bool = False
     """Some glass has a ground surface, whose microfacets turn paths by chance."""
+    light_edges: bool = False
+    """Some light's emission ends at a hard edge: photons beside it carry where, and their footprints are cut off
+    there."""
     lamp_columns: bool = False
     """Some light is extended: photons carry how far the light of its other points lands beside theirs."""
 
@@ -183,6 +186,7 @@ class Features:
             "ROUGH_SURFACES": self.rough,
             "LOBE_COLUMNS": self.has_lobe_columns,
             "LAMP_COLUMNS": self.lamp_columns,
+            "LIGHT_EDGES": self.light_edges,
             "FLIGHTS": self.flights,
         }
         levels = {"TINT_LEVELS": self.tint_levels} if self.tint_levels else {}
@@ -275,6 +279,7 @@ class Features:
             haze=hazy,
             tint_levels=LEVELS if told else 0,
             rough=any(o.material.is_rough for o in dielectrics),
+            light_edges=footprints and not single and by_photons and any(light.has_hard_edge for light in scene.lights),
             lamp_columns=footprints and not random and by_photons and any(light.has_extent for light in scene.lights),
         )
 

@@ -127,6 +127,13 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
             if features.lamp_columns
             else _no_lamp_words(scene, features),
         ),
+        (
+            "light edges",
+            features.light_edges,
+            f"footprints end where {names([light.name for light in scene.lights if light.has_hard_edge])} ends"
+            if features.light_edges
+            else "no light of photons with columns ends at a hard edge",
+        ),
         ("absorption", features.absorption, "some glass absorbs" if features.absorption else "all glass is clear"),
         ("tint levels", features.tint_levels > 0, _tint_words(scene, features)),
         (

@@ -70,7 +70,11 @@ SPLAT = Struct(
             "vec4",
             "anchor, value there, slope below and above it; by xi (cut, point spectrum, small: by x)",
         ),
-        Field("x_range", "vec2", "the photon's band, spectral coordinate"),
+        Field(
+            "x_range",
+            "vec2",
+            "the photon's band, spectral coordinate; kinds 4 and 6 with `LIGHT_EDGES`: change of `lit` per xi and eta",
+        ),
         Field("xi_half", "float", "half of the band in xi (small: 1 where the band was cut, else 0)"),
         Field("inverse_sigma_xi", "float", "1 / (sqrt(2) standard deviations along, in xi)"),
         Field(
@@ -86,7 +90,7 @@ SPLAT = Struct(
             "swept: change of the W, 1 at the centre, by which places in it are divided, per unit of xi and of eta",
         ),
         Field("images", "uint", "a photon's first: of so many splats behind its own, its images beyond borders"),
-        Field("reserved", "uint", ""),
+        Field("lit", "float", "kinds 4 and 6 with `LIGHT_EDGES`: lit share of a texel at the centre, not clamped"),
     ),
 )
 """A splat, ready to be drawn. xi runs over [-1, 1] from end to end of the whole band's smeared sweep."""

@@ -357,8 +357,7 @@ class TracePass:
             domain.bitangent,
         )
         p["weight"] = domain.measure * piece.weight / (piece.lattice_count * piece.light_points)
-        p["spacing"] = spacing = domain.spacing(piece.lattice_count)
-        p["mean_spacing"] = np.sqrt(np.prod(spacing))
+        p["spacing"] = domain.spacing(piece.lattice_count)
         p["back"] = domain.back
         p["light_axis"] = np.asarray(self.scene.scene.lights[piece.light].direction, float)
         p["profile"] = self.scene.profile_start(self.scene.scene.lights[piece.light])

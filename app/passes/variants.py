@@ -101,6 +101,7 @@ def light_defines(features: Features, traits: DeviceTraits) -> Defines:
         "FLAG_INSIDE": f"{records.FLAG_INSIDE}u",
         "LATTICE_BIT": records.LATTICE_BIT,
         "TINT_BIT": records.TINT_BIT,
+        "EDGE_BIT": records.EDGE_BIT,
         "MASK_SIZE": records.MASK_SIZE,
         "CATEGORY_COUNT": f"{len(records.CATEGORIES)}u",
         "FALLBACK_COUNT": f"{len(records.FALLBACKS)}u",
@@ -153,6 +154,8 @@ class SplatFeatures(Protocol):
     def border_images(self) -> bool: ...
     @property
     def tint_levels(self) -> int: ...
+    @property
+    def light_edges(self) -> bool: ...
 
 
 def splat_defines(features: SplatFeatures) -> Defines:
@@ -164,6 +167,7 @@ def splat_defines(features: SplatFeatures) -> Defines:
         "ONE_COLOUR": features.point_spectrum or features.spectral_groups == 0,
         "CHARTS": features.charts,
         "HERO": features.hero,
+        "LIGHT_EDGES": features.light_edges,
     }
     counts: Defines = {"TARGETS": features.targets, "SLOTS": 2 if features.nested_windows else 1}
     if features.point_spectrum:
@@ -190,6 +194,7 @@ def footprint_defines(features: SplatFeatures) -> Defines:
             "NONE": f"{records.NONE}u",
             "FLAG_FOOTPRINT_DROPPED": f"{records.FLAG_FOOTPRINT_DROPPED}u",
             "LATTICE_BIT": records.LATTICE_BIT,
+            "EDGE_BIT": records.EDGE_BIT,
             "FAR_TOO_LARGE": FAR_TOO_LARGE,
         }
         | ({"TINT_LEVELS": features.tint_levels, "TINT_BIT": records.TINT_BIT} if features.tint_levels else {})
@@ -291,7 +296,7 @@ def camera_defines(scene: SceneBuffers, channels: Channels, layer: str, maps: Ma
         "HAS_RECEIVERS": any(not m.is_specular for m in materials),
         "VISIBLE_LIGHTS": beauty and any(light.has_extent for light in lights),
         "ABSORPTION": specular and (coloured or absorbs),
-        "NORMAL_DERIVATIVES": features.smooth_normals or features.curved_solids,
+        "NORMAL_DERIVATIVES": features.smooth_normals or features.curved_solids or features.rough,
         "POLARISED": specular and features.polarised,
         "COATS": features.coats,
         "ROUGH_DIFFUSE": features.rough_diffuse,

@@ -7,6 +7,7 @@ start depends on, are drawn by `drawn_wavelengths`.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import erf
 
 import numpy as np
 
@@ -25,6 +26,9 @@ from .emission_maps import (
     spot_falloff,
 )
 from .optics import unit
+
+EDGE_SPREAD = 0.42
+"""Standard deviation, lattice spacings."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +69,7 @@ class Emitter:
     def weight(self, q: np.ndarray, count: int) -> np.ndarray:
         """What one of `count` lattice points at `q` (..., 2) carries per unit of the light's own quantity.
 
-        At a hard edge that is the covered share of a lattice cell.
+        At a hard edge that is the lit share of a normal distribution about the point.
         """
         light = self.light
         share: np.ndarray | float = self.domain.measure / count
@@ -73,30 +77,31 @@ class Emitter:
         axis = unit(np.asarray(light.direction, float))
         spacing = self.domain.spacing(count) * self.unit_length
 
-        def covered(inside: np.ndarray, spacing: float) -> np.ndarray:
-            return np.clip(inside / spacing + 0.5, 0.0, 1.0)
-
-        radial = float(np.sqrt(np.prod(spacing)))
-
         if light.profile is not None:
             u, v = light.across
             horizontal = np.arctan2(direction @ v, direction @ u)
             share = share * light.profile.at(angle_between(direction, axis), horizontal)
         inner, outer = light.cone
         if outer < np.pi:
-            return share * (
-                covered(outer - angle_between(direction, axis), radial)
-                if inner == outer
-                else spot_falloff(direction, axis, inner, outer)
-            )
+            if inner != outer:
+                return share * spot_falloff(direction, axis, inner, outer)
+
+            def angle_at(q: np.ndarray) -> np.ndarray:
+                return angle_between(self.start(q)[1], axis)
+
+            steps = 1e-3 * np.diag(spacing)
+            change = np.stack([angle_at(q + step) - angle_at(q - step) for step in steps], axis=-1) / 2e-3
+            return share * _lit_share((outer - angle_at(q)) / np.linalg.norm(change, axis=-1))
         if self.domain.kind == "area":
             return share * np.maximum(direction @ axis, 0.0)
         if light.has_outline:
             offset = (start - np.array(light.position)) @ np.stack([self.domain.tangent, self.domain.bitangent]).T
             if light.is_disc:
-                return share * covered(light.half_extent[0] - np.linalg.norm(offset, axis=-1), radial)
-            inside = np.array(light.half_extent) - np.abs(offset)
-            return share * covered(inside[..., 0], spacing[0]) * covered(inside[..., 1], spacing[1])
+                across = np.linalg.norm(offset * spacing, axis=-1)
+                away = np.linalg.norm(offset, axis=-1)
+                return share * _lit_share((light.half_extent[0] - away) * away / np.maximum(across, 1e-30))
+            inside = (np.array(light.half_extent) - np.abs(offset)) / spacing
+            return share * _lit_share(inside[..., 0]) * _lit_share(inside[..., 1])
         return np.full(direction.shape[:-1], share)
 
     def lattice(self, count: int, shift: tuple[int, int], sub_lattice: int = 0) -> np.ndarray:
@@ -104,6 +109,12 @@ class Emitter:
         first, second = ((s + sub_lattice * g) % 2**32 for s, g in zip(shift, PLASTIC, strict=True))
         square = lattice_point(np.arange(count), count, (first, second))
         return self.unit_length * (self.domain.rect[:2] + square * self.domain.rect[2:])
+
+
+def _lit_share(spacings: np.ndarray) -> np.ndarray:
+    """Of what a lattice point stands for, so many spacings inside of a hard edge; all or nothing beyond one."""
+    share = 0.5 * (1.0 + np.vectorize(erf)(spacings / (np.sqrt(2.0) * EDGE_SPREAD)))
+    return np.where(np.abs(spacings) < 1.0, share, spacings > 0.0)
 
 
 def drawn_wavelengths(

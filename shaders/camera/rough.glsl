@@ -12,8 +12,8 @@ struct RoughPlace {
     vec3 regained;        // factor for what its microfacets send on after all
 };
 
-// The microfacet takes the place of the frame's normals, and turns with them. Samples of a pixel share out the microfacets between them, and
-// none is averaged over the lobe: lookups along the sweep would be fewer than the band's wavelengths part.
+// The microfacet takes the place of the frame's normals, and turns with them. Samples of a pixel share out the microfacets between them as they do the
+// pixel, and each looks up the light of its share of the lobe [Krivanek, Colbert 2008]: lamps and windows seen through ground glass would be specks.
 RoughPlace meet_microfacet(CameraPath path, inout PathFrame frame, uint object, uint pixel_key)
 {
     vec4 told = object_at(object).colour;
@@ -23,9 +23,14 @@ RoughPlace meet_microfacet(CameraPath path, inout PathFrame frame, uint object, 
     uint key = hash_combine(pixel_key, 80u), depth = uint(path.depth);
     vec3 normal = frame.shading.normal;
     vec3 microfacet = visible_microfacet(-path.direction, normal, place.width, microfacet_numbers(p.draw_index, depth, key));
-#ifdef NORMAL_DERIVATIVES
     for (int c = 0; c < COLUMNS_HELD; ++c) frame.columns[c] = turned_with(microfacet, normal, frame.columns[c]);
-#endif
+    // A box of these sides is as broad as the lobe. A second surface adds its axes a quarter turn aside, to the left or to the right, which adds
+    // variances in the mean.
+    vec3 first, second;
+    lobe_axes(microfacet, normal, sqrt(12.0) * place.width, first, second);
+    float turn = depth == 0u ? 0.0 : (hash_combine(p.draw_index, key) & 1u) != 0u ? 1.0 : -1.0;
+    frame.columns[0] += turn == 0.0 ? first : turn * second;
+    frame.columns[1] += turn == 0.0 ? second : -turn * first;
 #ifdef SPECTRAL_SWEEP
     for (int end = 0; end < 2; ++end) frame.end_normal[end] = normalize(microfacet + turned_with(microfacet, normal, frame.end_normal[end] - normal));
 #endif

@@ -5,6 +5,7 @@ layout(local_size_x = 64) in;
 
 #include "lib/emission.glsl"
 #include "lib/spot.glsl"
+#include "lib/edge.glsl"
 #ifdef RANDOM_WAVELENGTH
 #include "lib/wavelength.glsl"
 #endif
@@ -19,10 +20,6 @@ layout(std430, binding = BIND_PARAMETERS) readonly restrict buffer Parameters { 
 layout(std430, binding = BIND_RAYS_OUT) writeonly restrict buffer RaysOut { uvec4 rays[]; };
 layout(std430, binding = BIND_INDICES) readonly restrict buffer Order { uint order[]; };
 layout(std430, binding = BIND_OUTCOMES) writeonly restrict buffer Outcomes { uvec4 outcomes[]; };
-
-// Share of a lattice cell on the lit side of a hard edge `inside` domain units away: a lattice that is
-// cut off sharply would leave a saw-toothed edge.
-float coverage(float inside, float spacing) { return clamp(inside / spacing + 0.5, 0.0, 1.0); }
 
 vec3 to_world(vec3 local) { return local.x * p.tangent + local.y * p.bitangent + local.z * p.axis; }
 
@@ -58,6 +55,9 @@ void main()
 
     vec3 position, direction, dposition_ds = vec3(0.0), dposition_dt = vec3(0.0), ddirection_ds = vec3(0.0), ddirection_dt = vec3(0.0);
     float weight = p.weight;
+    // A lattice that is cut off sharply would leave a saw-toothed edge.
+    float spacings = EDGE_REACH;
+    vec2 to_lit = vec2(0.0);
 #ifdef THINNED_CELLS
     // Few points of a cell from which a pilot's light landed nowhere stand for all of them. Roulette on the way has the generators from 1 on.
     bool is_thinned = (p.thinned[bit >> 5u] & (1u << (bit & 31u))) != 0u;
@@ -73,8 +73,13 @@ void main()
     ddirection_dt = p.spacing.y * to_world(dy);
     position = p.origin;
 #ifndef LIGHT_AREA
-    weight *= p.cone.y - p.cone.x > 1e-7 ? spot_falloff(direction, p.light_axis, p.cone)
-                                         : coverage(p.cone.y - angle_between(direction, p.light_axis), p.mean_spacing);
+    if (p.cone.y - p.cone.x > 1e-7) {
+        weight *= spot_falloff(direction, p.light_axis, p.cone);
+    } else if (p.cone.y < 3.1415926) {
+        float angle = angle_between(direction, p.light_axis);
+        to_lit = vec2(dot(ddirection_ds, p.light_axis), dot(ddirection_dt, p.light_axis)) / max(sin(angle), 1e-6);
+        spacings = spacings_inside(p.cone.y - angle, to_lit);
+    }
 #ifdef LIGHT_PROFILE
     weight *= profile_intensity(p.profile, direction, p.light_axis, p.light_u, p.light_v);
 #endif
@@ -93,11 +98,24 @@ void main()
     // A collimated beam ends at its aperture.
     vec3 off_axis = p.origin - p.aperture_centre + across;
     vec2 at = vec2(dot(off_axis, p.light_u), dot(off_axis, p.light_v));
-    vec2 half_size = 1.0 / max(vec2(length(p.light_u), length(p.light_v)), vec2(1e-20));
-    vec2 inside = half_size * (1.0 - abs(at));
-    weight *= p.light_u == vec3(0.0) ? 1.0 : p.is_disc != 0u ? coverage(half_size.x * (1.0 - length(at)), p.mean_spacing)
-                                                        : coverage(inside.x, p.spacing.x) * coverage(inside.y, p.spacing.y);
+    mat2 at_by_step = mat2(p.spacing.x * vec2(dot(p.tangent, p.light_u), dot(p.tangent, p.light_v)),
+                           p.spacing.y * vec2(dot(p.bitangent, p.light_u), dot(p.bitangent, p.light_v)));
+    if (p.light_u != vec3(0.0)) {
+        float from_middle = max(length(at), 1e-20);
+        vec2 outwards[2] = vec2[](p.is_disc != 0u ? at / from_middle : vec2(sign(at.x), 0.0), vec2(0.0, sign(at.y)));
+        vec2 change = -outwards[0] * at_by_step, across_change = -outwards[1] * at_by_step;
+        spacings = spacings_inside(1.0 - dot(outwards[0], at), change);
+        to_lit = change;
+        if (p.is_disc == 0u) {
+            // Beside a corner a footprint is cut by the nearer edge; the other one takes its share of all of it.
+            float other = spacings_inside(1.0 - abs(at.y), across_change), first = spacings;
+            spacings = min(first, other);
+            to_lit = first < other ? change : across_change;
+            weight *= lit_share(max(first, other));
+        }
+    }
 #endif
+    weight *= lit_share(spacings);
     alive = alive && weight > 0.0;
     if (alive) {
         RayRecord ray;
@@ -174,7 +192,10 @@ void main()
         }
 #endif
 #ifdef FOOTPRINTS
-        ray.dposition[0].xyz = dposition_ds;
+        ray.dposition[0] = vec4(dposition_ds, 0.0);
+#ifdef LIGHT_EDGES
+        ray.dposition[0].w = float(packed_edge(spacings, to_lit));
+#endif
         ray.dposition[1].xyz = dposition_dt;
         ray.ddirection[0].xyz = ddirection_ds;
         ray.ddirection[1].xyz = ddirection_dt;

@@ -6,6 +6,9 @@
 #include "lib/lattice.glsl"
 #include "lib/placement.glsl"
 #include "lib/fan.glsl"
+#ifdef LIGHT_EDGES
+#include "lib/edge.glsl"
+#endif
 
 layout(local_size_x = WORKGROUP) in;
 
@@ -227,10 +230,13 @@ vec2 half_extent(SplatRecord splat) {
     return extent;
 }
 
-// A swept splat that its rectangle cuts, or that fans out, is drawn by a program of its own: to ask every fragment costs a tenth of the rate.
+// A swept splat that its rectangle or its light's edge cuts, or that fans out, is drawn by a program of its own: to ask every fragment costs a tenth of the rate.
 void mark_edge(inout SplatRecord splat) {
     vec2 extent = half_extent(splat);
     bool whole = all(greaterThanEqual(splat.centre - extent, splat.rect.xy)) && all(lessThanEqual(splat.centre + extent, splat.rect.zw));
+#ifdef LIGHT_EDGES
+    whole = whole && splat.x_range == vec2(0.0);
+#endif
     if (splat.kind == 2u && (!whole || splat.fan != vec2(0.0))) {
         splat.kind = 4u;
     }

@@ -31,6 +31,9 @@ INTERPOLATED out vec3 at;  // across, along xi, table u
 flat out vec3 shape;        // half texel across, table row, layer
 INTERPOLATED out vec2 wave;  // cycles
 flat out vec3 ripple;
+#if defined(EDGE) && defined(LIGHT_EDGES)
+INTERPOLATED out float lit;
+#endif
 #ifndef ONE_COLOUR
 flat out vec4 throughput;
 flat out vec4 band;
@@ -144,6 +147,9 @@ void main() {
     shape = vec3(splat.y_box, splat.table_row, float(splat.layer));
     wave = xi * splat.waves.xz + corner.y * splat.waves.yw;
     ripple = splat.ripple.xyz;
+#if defined(EDGE) && defined(LIGHT_EDGES)
+    lit = splat.lit + xi * splat.x_range.x + corner.y * splat.x_range.y;
+#endif
 #ifdef ONE_COLOUR
     for (int g = 0; g < TARGETS; ++g) {
 #ifdef HERO

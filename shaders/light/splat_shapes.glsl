@@ -172,6 +172,28 @@ vec2 fan_of_splat(Footprint f, vec2 along, vec2 across, float xi_half) {
     return fan;
 }
 
+#ifdef LIGHT_EDGES
+// Spacings by which wavelengths and texels blur the edge at most for the splat to be cut off there, and of footprints' widths.
+const float BLURRED_EDGE = 0.4;
+const float WIDEST_CUT = 0.5;
+
+// Where the light's emission ends the splat is cut off, as bright as if all of it were lit; the photon carries its lit share. At a fragment are the
+// wavelengths that land about `share` of its way along the sweep (as in `flatten_lattice`).
+void cut_at_edge(inout SplatRecord splat, Blur blur, Footprint f, uint word) {
+    vec3 edge = unpacked_edge(word);
+    float area = f.axis_s.x * f.axis_t.y - f.axis_s.y * f.axis_t.x;
+    if (abs(area) < 1e-6 || smoothing >= WIDEST_CUT || stride != 1u) return;
+    vec2 per_texel = f.per_spacing / area * (edge.x * vec2(f.axis_t.y, -f.axis_t.x) + edge.y * vec2(-f.axis_s.y, f.axis_s.x));
+    float own = blur.along2, swept = blur.sweep * blur.sweep * TEXEL_VARIANCE, share = swept / (own + swept);
+    float along = dot(per_texel, blur.e), variance = dot(per_texel, per_texel) * TEXEL_VARIANCE + along * along * share * own;
+    if (variance > BLURRED_EDGE * BLURRED_EDGE) return;
+    float sharpness = sqrt(TEXEL_VARIANCE / max(variance, 1e-12));
+    splat.lit = 0.5 + sharpness * edge.z;
+    splat.x_range = sharpness * vec2((1.0 - share) * dot(per_texel, splat.along), dot(per_texel, splat.across));
+    splat.amplitude /= lit_share(edge.z);
+}
+#endif
+
 SplatRecord swept_splat(PhotonRecord photon, float power_w, float mean, Footprint f, uint light_and_class, vec4 band) {
     SplatRecord splat;
     vec3 cov = vec3(f.axis_s.x * f.axis_s.x + f.axis_t.x * f.axis_t.x, f.axis_s.x * f.axis_s.y + f.axis_t.x * f.axis_t.y,
@@ -286,10 +308,16 @@ SplatRecord swept_splat(PhotonRecord photon, float power_w, float mean, Footprin
         splat.amplitude *= 2.0 * kept / (kept + kept_by_cut(end.y * y_edge, box, s));
     }
     splat.kind = cut ? 3u : 2u;
+#ifdef LIGHT_EDGES
+    splat.x_range = cut ? splat.x_range : vec2(0.0);
+    splat.lit = 1.0;
+    // A software renderer runs the body of an `if` for all photons, but that of a loop only where one of them goes in.
+    for (uint edge = cut ? 0u : photon.depth >> EDGE_BIT; edge != 0u; edge = 0u) cut_at_edge(splat, drawn, f, edge);
+#endif
     flatten_lattice(splat, drawn, f, lattice_of(photon));
     return splat;
 }
 
 SplatRecord empty_splat() {
-    return SplatRecord(vec2(0.0), vec2(0.0), vec2(0.0), 0.0, 0.0, 0.0, 0.0, 0u, 0u, vec4(0.0), vec2(0.0), 0.0, 0.0, vec4(0.0), vec4(0.0), vec4(0.0), vec2(0.0), 0u, 0u);
+    return SplatRecord(vec2(0.0), vec2(0.0), vec2(0.0), 0.0, 0.0, 0.0, 0.0, 0u, 0u, vec4(0.0), vec2(0.0), 0.0, 0.0, vec4(0.0), vec4(0.0), vec4(0.0), vec2(0.0), 0u, 0.0);
 }

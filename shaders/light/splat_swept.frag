@@ -9,11 +9,14 @@ flat in uint side;
 #endif
 flat in vec4 rect;
 #ifdef FANS
-smooth in vec3 at;
-smooth in vec2 wave;
+#define INTERPOLATED smooth
 #else
-noperspective in vec3 at;
-noperspective in vec2 wave;
+#define INTERPOLATED noperspective
+#endif
+INTERPOLATED in vec3 at;
+INTERPOLATED in vec2 wave;
+#if defined(EDGE) && defined(LIGHT_EDGES)
+INTERPOLATED in float lit;
 #endif
 flat in vec3 shape;
 flat in vec3 ripple;
@@ -38,6 +41,9 @@ void main() {
     // Clip distances would do, but llvmpipe loses triangles that two of them cut.
     bvec4 within = bvec4(greaterThan(gl_FragCoord.xy, rect.xy), lessThan(gl_FragCoord.xy, rect.zw));
     share = all(within) ? share : 0.0;
+#ifdef LIGHT_EDGES
+    share *= clamp(lit, 0.0, 1.0);
+#endif
 #endif
 #ifdef CONTACT_LINES
     share *= takes_side(texelFetch(contact_words, ivec2(gl_FragCoord.xy), 0).x, side);

@@ -213,7 +213,11 @@ void land(inout RayRecord ray, RayRecord start, uint receiver, uint triangle, Hi
     photon.photon_id = ray.photon_id;
     photon.light_and_source = ray.light_and_source;
     photon.branch_key = ray.branch_key;
-    photon.depth = ray.depth;
+    photon.depth = min(ray.depth, (1u << EDGE_BIT) - 1u);
+#ifdef LIGHT_EDGES
+    // The edge is told in steps of the lattice as emitted: footprints of a coarser one, or broader ones, reach over it from farther away.
+    if (lattice_bits == p.lattice_bits && ray.footprint_scale == 1.0) photon.depth |= uint(ray.dposition[0].w) << EDGE_BIT;
+#endif
 #if SPECTRAL_GROUPS > 0
     SPECTRAL_COPY
 #endif

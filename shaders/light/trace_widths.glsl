@@ -24,6 +24,10 @@ void keep_columns_within(inout RayRecord ray, RayRecord start, float size, float
     float widest = max(p.widest_on_surface * size / max(ray.footprint_scale, 1e-30), longest_side(own_s, own_t));
     vec3 s = ray.dposition[0].xyz, t = ray.dposition[1].xyz, turn_s = ray.ddirection[0].xyz, turn_t = ray.ddirection[1].xyz;
     keep_within(widest, s, t, turn_s, turn_t);
+#ifdef LIGHT_EDGES
+    // Made smaller, it no longer says where its neighbours and the edge are.
+    if (s != ray.dposition[0].xyz) ray.dposition[0].w = 0.0;
+#endif
     ray.dposition[0].xyz = s;
     ray.dposition[1].xyz = t;
     ray.ddirection[0].xyz = turn_s;

@@ -75,7 +75,7 @@ def test_footprints_in_the_focal_plane_are_as_broad_as_the_image_of_the_sun(gl) 
     objects = (placed("lens", made, material), placed("floor", box((4.0, 4.0, 1.0)).transformed(floor), Diffuse()))
     smoothing = 0.45
     photons = trace_light(gl, objects, sun, NM, max_depth=2, lamp_step=1.0 / smoothing)
-    photons = photons.where(photons.records["depth"] == 2)
+    photons = photons.of_depth(2)
     bright = photons.records["flux_w"] > 0.5 * photons.records["flux_w"].max()
     assert bright.sum() > 100
     records = photons.records[bright]

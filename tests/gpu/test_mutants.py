@@ -120,8 +120,8 @@ MUTANTS = {
     ),
     "soft edges of a rectangular beam swapped": Mutant(
         "light/emit.comp",
-        "coverage(inside.x, p.spacing.x) * coverage(inside.y, p.spacing.y)",
-        "coverage(inside.x, p.spacing.y) * coverage(inside.y, p.spacing.x)",
+        "mat2(p.spacing.x * vec2(",
+        "mat2(p.spacing.y * vec2(",
         "statistical/test_samplers_emission.py::"
         "test_a_rectangular_beam_s_edges_are_as_soft_as_its_lattice_is_wide_across_them",
     ),

@@ -70,10 +70,11 @@ def landed(gl) -> tuple[np.ndarray, float]:
         records = np.frombuffer(trace.photons.read(), trace.photon.dtype, batch.photons)
         # The beam's softened rim is left out: there a ray starts with less, and less is a smaller chance.
         whole = records["flux_w"] > 0.5 * domain.measure / BATCH
-        first = records["depth"] == 1
+        events = records_of_the_device.specular_events(records)
+        first = events == 1
         full = np.median(records["flux_w"][first])
         started += np.count_nonzero(first)
-        depths.append(records["depth"][~first])
+        depths.append(events[~first])
         assert np.median(records["flux_w"][~first]) == pytest.approx(full / float(reflectance()), rel=1e-3)
         assert whole[~first].mean() > 0.9
     trace.release()

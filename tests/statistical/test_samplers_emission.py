@@ -173,8 +173,8 @@ def test_a_hard_spot_fills_its_cone(gl) -> None:
     rays = emit(gl, light, box(1.0), passes=4)
     assert rays.weight.sum() == pytest.approx(2.0 * np.pi * (1.0 - np.cos(np.radians(35.0))), rel=MEASURE_ERROR)
     cosine, turn = polar(rays.direction, AXIS)
-    # The edge is softened over one lattice spacing.
-    assert (rays.weight < 0.999 * rays.weight.max()).mean() < 0.02
+    # The edge is softened as footprints are broad, a lattice spacing to either side.
+    assert (rays.weight < 0.999 * rays.weight.max()).mean() < 0.06
     within = np.cos(np.radians(34.0))
     chosen = cosine > within
     accept(cells((1.0 - cosine[chosen]) / (1.0 - within), turn[chosen], bins=(8, 8)), uniform_expected((8, 8)))

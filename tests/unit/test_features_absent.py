@@ -72,6 +72,7 @@ EVERYTHING = Features(
     coats=True,
     rough_diffuse=True,
     rough=True,
+    light_edges=True,
     lamp_columns=True,
     haze=True,
     flights=True,
@@ -108,6 +109,7 @@ WITHOUT = {
     "spatial columns": {
         "footprints": False,
         "lamp_columns": False,
+        "light_edges": False,
         "spectral_groups": 0,
         "merged_groups": False,
         "band_cuts": False,
@@ -127,6 +129,7 @@ WITHOUT = {
     "polarisation": {"polarised": False},
     "haze": {"haze": False, "flights": False},
     "rough surfaces": {"rough": False},
+    "light edges": {"light_edges": False},
     "lamp columns": {"lamp_columns": False},
     "mirrors": {"mirrors": False},
     "gratings": {"gratings": False},
@@ -447,8 +450,9 @@ def test_without_beams_photons_need_what_they_always_did(scene: str, anchored: b
     alone, found = (
         Features.of(loaded, RenderSettings(method=method, anchor_weights=anchored)) for method in ("srd", "srd-photons")
     )
-    # Nothing is left to photons that would have to know how broad a lamp is.
-    assert replace(alone, beams=False, lamp_columns=found.lamp_columns) == replace(found, method="srd")
+    # Nothing is left to photons that would have to know how broad a lamp is, or where a beam ends.
+    known = {"lamp_columns": found.lamp_columns, "light_edges": found.light_edges}
+    assert replace(alone, beams=False, **known) == replace(found, method="srd")
     assert scene != "prism" or alone.reindexed == anchored
 
 

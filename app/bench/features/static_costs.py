@@ -100,6 +100,7 @@ def static_costs(scene: Scene, features: Features) -> dict[str, str]:
         "rough diffuse": (features.rough_diffuse, "one more function a light and surface"),
         "rough surfaces": (features.rough, f"{sizes.ray - polished.ray} B a ray"),
         "lamp columns": (features.lamp_columns, f"{sizes.ray - from_points.ray} B a ray"),
+        "light edges": (features.light_edges, "splats beside an edge have another program; one more number a fragment"),
         "mirrors": (features.mirrors, f"{size_words(row * mirrors)} of reflectances"),
         "gratings": (features.gratings, f"{_TEXEL} B an order; a step of the queue for each"),
         "interpolated normals": (features.smooth_normals, f"{3 * _TEXEL} B a facet, {size_words(3 * _TEXEL * smooth)}"),

@@ -56,6 +56,7 @@ FEATURE_SYMBOLS: dict[str, tuple[str, ...]] = {
     "coats": ("coat_pdf", "coat_weight", "coat_response"),
     "rough diffuse": ("rough_response", "rough_albedo"),
     "rough surfaces": ("lobe_axes", "smith_share", "microfacet_numbers", "regained"),
+    "light edges": ("packed_edge", "unpacked_edge", "cut_at_edge"),
     "lamp columns": ("cover_sides", "LAMP"),
     "mirrors": (r"\(kind == KIND_MIRROR\) ",),
     "gratings": ("grating_at", "diffract_direction", "GRATINGS_AT"),

@@ -133,7 +133,7 @@ def _left_out(name: str, scene: Scene, base: Features, asked: Variant) -> tuple[
                 "without it borders have colours",
             )
         case "spatial columns":
-            bare = replace(plain, footprints=False, normal_derivatives=False, lamp_columns=False)
+            bare = replace(plain, footprints=False, normal_derivatives=False, lamp_columns=False, light_edges=False)
             return (
                 Variant(scene, plain),
                 Variant(scene, bare),
@@ -157,6 +157,8 @@ def _left_out(name: str, scene: Scene, base: Features, asked: Variant) -> tuple[
             return asked, Variant(scene, replace(base, polarised=False)), "without it light is weighed another way"
         case "rough surfaces":
             return asked, Variant(scene, replace(base, rough=False)), "without it all glass is polished"
+        case "light edges":
+            return asked, Variant(scene, replace(base, light_edges=False)), "without it beams end in a comb"
         case "lamp columns":
             return asked, Variant(scene, replace(base, lamp_columns=False)), "without it each lamp is drawn as a point"
         case "contacts":
@@ -234,6 +236,8 @@ def _forced_in(name: str, scene: Scene, base: Features, asked: Variant) -> tuple
             return Variant(scene, replace(base, dielectrics=True)), asked, ""
         case "rough surfaces":
             return Variant(scene, replace(base, rough=True)), asked, "every surface of width zero"
+        case "light edges":
+            return Variant(scene, replace(base, light_edges=True)), asked, "no light with an edge"
         case "lamp columns":
             return Variant(scene, replace(base, lamp_columns=True)), asked, "every light of no breadth"
         case "mirrors":

@@ -154,6 +154,12 @@ class Light:
         return 4.0, 4.0
 
     @property
+    def has_hard_edge(self) -> bool:
+        """Whether what it throws ends all at once, at its aperture or the border of its cone."""
+        inner, outer = self.cone
+        return (self.is_parallel and self.has_place) or (inner == outer < math.pi)
+
+    @property
     def has_extent(self) -> bool:
         """Whether it is more than a point or a strictly parallel beam, so that a camera ray can run into it."""
         return False

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...base.errors import UserError
 from ...gpu.context import Context
+from ...gpu.records import specular_events
 from ...model.geometry.primitives import slab
 from ...model.geometry.primitives_gem import brilliant
 from ...model.optics import glass as model_glass
@@ -199,7 +200,7 @@ def measure_gem_cut(context: Context) -> Iterator[Measurement]:
         band = max(390.0, critical_nm - 0.5 * width), min(770.0, critical_nm + 0.5 * width)
         photons = wedge_photons(context, band)
         # In through the one face; what the other lets out begins where reflection stops being total.
-        let_out = photons.where((photons.records["depth"] == 2) & (photons.nm[:, 2] > band[1] - 1e-2))
+        let_out = photons.where((specular_events(photons.records) == 2) & (photons.nm[:, 2] > band[1] - 1e-2))
         cut_n = GEM.index(let_out.nm[:, 0])
         # c² = 1 − n² s² vanishes there: dn = dc²/(2 n s²), to which bisection in 22 steps, x's 24 bits and the table
         # add theirs.
@@ -208,7 +209,7 @@ def measure_gem_cut(context: Context) -> Iterator[Measurement]:
         whole = trace_light(
             context, (gem, above), beam_light(tuple(-1.2 * direction), tuple(direction), 0.6), [band], 60, 30
         )
-        below = photons.where((photons.records["depth"] == 2) & (photons.nm[:, 2] < critical_nm - 0.5))
+        below = photons.where((specular_events(photons.records) == 2) & (photons.nm[:, 2] < critical_nm - 0.5))
         errors, bounds = judged(
             {
                 "index at the cut": (np.abs(cut_n - CRITICAL_N), allowed),

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...gpu.context import Context
+from ...gpu.records import specular_events
 from ...gpu.scene_buffers import SceneBuffers
 from ...gpu.spectral_groups import Groups
 from ...model.features import Features
@@ -91,7 +92,7 @@ class Photons:
 
     def of_depth(self, depth: int) -> Photons:
         """Those after `depth` specular events."""
-        return self.where(self.records["depth"] == depth)
+        return self.where(specular_events(self.records) == depth)
 
     def of_choices(self, *choices: int) -> Photons:
         """Those whose path took these choices, one an event (`REFLECTED`, …)."""
