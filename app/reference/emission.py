@@ -113,7 +113,7 @@ class Emitter:
 
 def _lit_share(spacings: np.ndarray) -> np.ndarray:
     """Of what a lattice point stands for, so many spacings inside of a hard edge; all or nothing beyond one."""
-    share = 0.5 * (1.0 + np.vectorize(erf)(spacings / (np.sqrt(2.0) * EDGE_SPREAD)))
+    share = 0.5 * (1.0 + np.vectorize(erf, otypes=[float])(spacings / (np.sqrt(2.0) * EDGE_SPREAD)))
     return np.where(np.abs(spacings) < 1.0, share, spacings > 0.0)
 
 

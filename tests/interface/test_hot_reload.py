@@ -73,7 +73,7 @@ def test_a_change_on_disk_shows_in_the_picture(hands: Hands, shaders: Path) -> N
     (left, top), (right, bottom) = box.at(0.02, 0.02), box.at(0.98, 0.98)
     shown = slice(round(top), round(bottom)), slice(round(left), round(right))
     before = hands.interface.screenshot()[shown].astype(float)
-    edit(shaders / "display/display.comp", "vec4(developed(scene), 1.0)", "vec4(1.0 - developed(scene), 1.0)")
+    edit(shaders / "display/display.comp", "pixel, vec4(colour, 1.0)", "pixel, vec4(1.0 - colour, 1.0)")
     hands.interface.frame(4)
     assert view_model_of(hands.session).shader_error is None
     after = hands.interface.screenshot()[shown].astype(float)

@@ -112,6 +112,8 @@ def follow_chain(
             ]
         )
         direction = optics.refract(direction, normal, safe)
+        # Near total reflection columns are divided by the cosine at which the ray leaves.
+        steepest = np.where(passes, np.minimum(steepest, np.abs(dot(direction, normal))), steepest)
     upward = np.array([0.0, 0.0, 1.0])
     # What leaves downwards is not among the photons that are asked about.
     distance = (screen_z - position[:, 2]) / np.where(np.abs(direction[:, 2]) > 1e-9, direction[:, 2], 1e-9)
