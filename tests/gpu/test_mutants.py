@@ -150,13 +150,13 @@ MUTANTS = {
         "gpu/test_picture_windows.py::test_a_pixel_shows_its_own_texels_only",
     ),
     "camera absorption by the last chord only": Mutant(
-        "camera/camera.comp",
+        "camera/meet.glsl",
         "path.lengths[i] += hit.distance",
         "path.lengths[i] = hit.distance",
         "gpu/test_camera_glass.py::test_absorption_follows_beers_law",
     ),
     "camera band ends with the anchor's index": Mutant(
-        "camera/camera.comp",
+        "camera/meet.glsl",
         "interface_indices(boundary, path.band, n_i, n_t);",
         "interface_indices(boundary, path.band.yyy, n_i, n_t);",
         "gpu/test_camera_cuts.py::test_parted_colours_go_their_own_ways",

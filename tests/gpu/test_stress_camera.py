@@ -81,7 +81,7 @@ def broken(case: Case, gl) -> str:
 MUTANTS = {
     "total reflection before its time": (
         "eye-tir-margin",
-        "camera/camera.comp",
+        "camera/meet.glsl",
         "bool total = !refracted.exists",
         "bool total = cosine2.y <= 0.01",
         "inside the edge",
@@ -109,21 +109,21 @@ MUTANTS = {
     ),
     "branches that could not wait and are not counted": (
         "eye-shells",
-        "camera/camera.comp",
+        "camera/meet.glsl",
         "if (strong && !splits) atomicAdd(fallbacks[FELL_STACK], 1u);",
         "",
         "full stack not counted",
     ),
     "branches put away and forgotten": (
         "eye-shells",
-        "camera/camera.comp",
+        "camera/meet.glsl",
         "        pending_path = mirrored;\n",
         "        pushes_path = false;\n",
         "energy",
     ),
     "leaving taken for entering": (
         "eye-inside",
-        "camera/camera.comp",
+        "camera/meet.glsl",
         "bool entering = dot(whole.direction, hit.normal_g) < 0.0;",
         "bool entering = true;",
         "wards",
@@ -144,14 +144,14 @@ MUTANTS = {
     ),
     "a per cent of the way through glass lost": (
         "eye-absorption",
-        "camera/camera.comp",
+        "camera/meet.glsl",
         "path.lengths[i] += hit.distance;",
         "path.lengths[i] += 0.99 * hit.distance;",
         "radiance",
     ),
     "bands that are not cut": (
         "eye-cut",
-        "camera/camera.comp",
+        "camera/meet.glsl",
         "bool may_cut = path.restricted != 0u",
         "bool may_cut = false && path.restricted != 0u",
         "colour",
