@@ -260,36 +260,61 @@ def mask_edges(hand, own_lines, new, edge, corner, work):
 
 
 @part
-def moves(hand, spare, ln, facets):
+def direction_through(beam, point, facet, out):
+    """Direction of a beam's ray, in the middle of its band, that leaves through `point` of the facet left last."""
+    x, d, across = beam.position[1], beam.direction[1], facet.frame
+    a = b = uu = uv = vu = vv = 0.0
+    for k in range(3):
+        off = point[k] - x[0, k]
+        a += off * across[1, k]
+        b += off * across[2, k]
+        uu += x[1, k] * across[1, k]
+        uv += x[1, k] * across[2, k]
+        vu += x[2, k] * across[1, k]
+        vv += x[2, k] * across[2, k]
+    det = uu * vv - uv * vu
+    du = dv = 0.0
+    if abs(det) > 1e-30:
+        du, dv = (a * vv - b * vu) / det, (b * uu - a * uv) / det
+    for k in range(3):
+        out[k] = d[0, k] + du * d[1, k] + dv * d[2, k]
+
+
+@part
+def moves(hand, spare, ln, facets, work):
     """How far an edge of the facet that a beam left last moves on the receiver where another point of the lamp throws
-    it: as high as it is there, times the change of direction. Not at all where it stands on the receiver, and to be
-    told so from the edge itself: half-planes in q are straight about one ray only."""
+    it: as high as it is there, times the change of direction through it. Not at all where it stands on the receiver,
+    and to be told so from the edge itself: half-planes in q are straight about one ray only."""
     facet, ground = facets[hand.made[ln, 1]], facets[hand.facet]
     e, number = hand.made[ln, 2], facet.corners
     begin, end_of = facet.corner[e], facet.corner[e + 1 if e + 1 < number else 0]
+    foot, old, new = work.rays[0, 0], work.rays[0, 1], work.rays[0, 2]
     along = size = height = 0.0
     for k in range(3):
         side = end_of[k] - begin[k]
         along += (hand.position[1, 0, k] - begin[k]) * side
         size += side * side
     along = min(max(along / size, 0.0), 1.0)
+    for k in range(3):
+        foot[k] = begin[k] + along * (end_of[k] - begin[k])
+    direction_through(hand, foot, facet, old)
+    direction_through(spare, foot, facet, new)
     here = there = 0.0
     for k in range(3):
-        height += ground.plane[k] * (begin[k] + along * (end_of[k] - begin[k]))
-        here += ground.plane[k] * hand.direction[1, 0, k]
-        there += ground.plane[k] * spare.direction[1, 0, k]
+        height += ground.plane[k] * foot[k]
+        here += ground.plane[k] * old[k]
+        there += ground.plane[k] * new[k]
     height = abs(height - ground.plane[3])
     if abs(here) < 1e-9 or abs(there) < 1e-9:
         return 0.0
     # Across the edge's image, which lies along the edge seen in the old direction.
     tu = tv = mu = mv = 0.0
+    slant = 0.0
     for k in range(3):
-        side = end_of[k] - begin[k]
-        slant = 0.0
-        for j in range(3):
-            slant += ground.plane[j] * (end_of[j] - begin[j])
-        side -= slant / here * hand.direction[1, 0, k]
-        turned = spare.direction[1, 0, k] / abs(there) - hand.direction[1, 0, k] / abs(here)
+        slant += ground.plane[k] * (end_of[k] - begin[k])
+    for k in range(3):
+        side = end_of[k] - begin[k] - slant / here * old[k]
+        turned = new[k] / there - old[k] / here
         tu += ground.frame[1, k] * side
         tv += ground.frame[2, k] * side
         mu += ground.frame[1, k] * turned
@@ -320,7 +345,7 @@ def soften(nodes, kind, facets, solids, tables, sources, leaf, edge, corner, wor
             if turn == 0:
                 own[ln], soft[ln] = at, 0.0
             elif kind == LEAF_RECEIVER and hand.made[ln, 0] == hand.flight - 1 and hand.made[ln, 2] >= 0:
-                moved = moves(hand, spare, ln, facets)
+                moved = moves(hand, spare, ln, facets, work)
                 soft[ln] += moved * moved
             elif hand.made[ln, 2] != STATIC or kind == LEAF_RECEIVER:
                 soft[ln] += (at - own[ln]) * (at - own[ln])

@@ -90,7 +90,8 @@ def test_maps_hold_what_lands_of_a_lamp_near_a_face(gl, height: float, radius: f
         for method in ("srd", "srd-photons")
     )
     assert (found.stats.polygons_w > 0.0) == by_beams
-    assert found.map_error < 3e-3
+    # Penumbrae of edges that stand on the table, told from rays that leave other places of a face, made it 1.6e-3.
+    assert found.map_error < 6e-4
     assert found.picture.sum() == pytest.approx(photons.picture.sum(), rel=0.01)
 
 
