@@ -35,7 +35,7 @@ _STEEP = 0.3
 """A relative change of the density over a leaf that is no longer linear."""
 _CROOKED = 0.25
 """Of a polygon's width: what its edges miss where it cannot be halved and yet keeps its area nearly."""
-SHARP = 0.05
+_SHARP = 0.05
 """Of the widest penumbra of a polygon: an edge of the facet left last that is sharper masks what is drawn."""
 _BESIDE = 1e-7
 """GPU units."""
@@ -238,7 +238,7 @@ def mask_edges(hand, own_lines, new, edge, corner, work):
         widest = max(widest, edge[first + ln].soft)
     kept = lines
     for ln in range(lines):
-        if hand.made[ln, 0] != last or hand.made[ln, 2] < 0 or not edge[first + ln].soft < SHARP * widest:
+        if hand.made[ln, 0] != last or hand.made[ln, 2] < 0 or not edge[first + ln].soft < _SHARP * widest:
             continue
         line, nearest, begin = edge[first + ln].line, 1e300, work.count[2]
         for a in range(first_place(hand), last_place(hand)):

@@ -62,9 +62,7 @@ def cut_by_tints(
     """Edges (B + 1,), in x, of `least` to `most` bands between `ends`, none wider than `least` even ones: as many as
     straight weights need to follow `curves` (N, 401) under `light` within `tolerance`, and where these err least. By
     dynamic programming over the nanometres, as curves are fitted by segments (Bellman 1961)."""
-    power = np.array(light.density)
-    for nm, line in light.lines:
-        power[round(nm - VISIBLE_NM[0])] += line
+    power = power_by_nm(light)
     left = (curves * power).sum(axis=1, keepdims=True)
     told = left[:, 0] > _LEAST_SHARE * power.sum()
     curves, weights = curves[told], power / left[told]
@@ -72,6 +70,14 @@ def cut_by_tints(
         return np.linspace(*ends, least + 1)
     x = np.asarray(axis.x_of_nm(VISIBLE_NM), np.float64)
     return np.array(_cut(tuple(ends), least, most, tolerance, x.tobytes(), curves.tobytes(), weights.tobytes()))
+
+
+def power_by_nm(light: Spectrum) -> np.ndarray:
+    """float64 (401,), W/nm on `VISIBLE_NM`, lines spread over the nanometre that they are in."""
+    power = np.array(light.density)
+    for nm, line in light.lines:
+        power[round(nm - VISIBLE_NM[0])] += line
+    return power
 
 
 @lru_cache(maxsize=64)

@@ -19,7 +19,7 @@ from .optics.colorimetry import VISIBLE_NM, cmf_xyz
 from .optics.spectrum import Spectrum
 from .scene import Scene
 from .scene_defaults import surroundings_of
-from .tint_bands import TOLERANCE, mean_chord
+from .tint_bands import TOLERANCE, mean_chord, power_by_nm
 
 LEVELS = 32
 """Steps, as many as a photon's flags hold. Rounding by turns between neighbours is right for all of the light, by power
@@ -64,9 +64,7 @@ class TintLevels:
         half where that is the same at both, and of the last level."""
         level = np.arange(2 * LEVELS - 1) / 2.0
         way = level / ((LEVELS - level) * self.rate)
-        power = np.array(spectrum.density)
-        for nm, line in spectrum.lines:
-            power[round(nm - VISIBLE_NM[0])] += line
+        power = power_by_nm(spectrum)
         with np.errstate(under="ignore"):
             kept = np.exp(-self.coefficient * way[:, None])
             left = np.stack([kept @ power, kept @ (power * cmf_xyz()[:, 1])])

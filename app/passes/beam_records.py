@@ -159,8 +159,7 @@ def levels(polygons: BeamPolygons, chosen: np.ndarray, to_texels: TexelMap) -> n
     first = np.cumsum(counts) - counts
     density = to_texels.density(polygons.centre[chosen])
     softness = polygons.edges[rows][:, [3, 7]] * np.repeat(np.sqrt(density), counts)[:, None]
-    windows, is_mask = np.sqrt(1.0 + 4.0 * softness**2), softness[:, 0] < 0.0
-    mean, widest = _mean_and_widest(windows, is_mask, first)
+    windows, is_mask, mean, widest = _windows_as_they_are(softness, first)
     area = polygons.area[chosen] * density
     sharpest = np.minimum.reduceat(windows.min(axis=1), first)
     is_masked = np.logical_or.reduceat(is_mask, first)
@@ -196,16 +195,13 @@ def packed(
     start, middle, end = polygons.density[chosen].T
     middle, end = np.where(is_line, start, middle), np.where(is_line, start, end)
     weight = to_texels.drawn_weights(polygons.centre[chosen])
-    lines, moves = _lines(
-        polygons.edges[edge_rows], inverse, anchor[owner], weight[owner], is_line[owner], 0.5 * diagonal[owner]
-    )
+    ends = polygons.edges[edge_rows]
+    lines, moves = _lines(ends, inverse, anchor[owner], weight[owner], is_line[owner], 0.5 * diagonal[owner])
     motion = np.maximum.reduceat(moves, first)
     area = polygons.area[chosen] * to_texels.density(polygons.centre[chosen])
     width = area / np.maximum(diagonal - motion, np.sqrt(area) + 1e-9)
     windows, widest = _windows(lines, first, owner, width)
-    beside = hulls - np.repeat(anchor, _sizes(hulls, hull_first), axis=0)
-    grown = np.abs(polygons.edges[edge_rows, :2]).sum(axis=1)
-    kept = _kept_by_masks(lines, grown, first, owner, widest, beside, hull_first)
+    kept = _kept_by_masks(lines, ends, first, owner, widest, hulls, hull_first, anchor)
     is_wide = width > MOSTLY_INSIDE * widest
     edges = _edges(lines[..., :3], windows)
 
@@ -283,11 +279,15 @@ def _lines(
     return lines, np.abs(change[:, 2]) + np.linalg.norm(change[:, :2], axis=1) * radius
 
 
-def _mean_and_widest(windows: np.ndarray, is_mask: np.ndarray, first: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Of each polygon's windows (E, 2 ends), without masks'."""
+def _windows_as_they_are(
+    softness: np.ndarray, first: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """The window of each edge (E, 2 ends), texels, and whether it is a mask; the mean and the widest of each polygon's
+    without masks'."""
+    windows, is_mask = np.sqrt(1.0 + 4.0 * softness**2), softness[:, 0] < 0.0
     counted = np.where(is_mask[:, None], 0.0, windows)
     mean = np.add.reduceat(counted.mean(axis=1), first) / np.add.reduceat(~is_mask, first)
-    return mean, np.maximum.reduceat(counted.max(axis=1), first)
+    return windows, is_mask, mean, np.maximum.reduceat(counted.max(axis=1), first)
 
 
 def _half_plane_share(normal: np.ndarray, inside: np.ndarray) -> np.ndarray:
@@ -309,9 +309,7 @@ def _windows(
     ones, are moved out of the way.
 
     At the edges of a narrow polygon they are all the same and whole texels, or it would lose or gain light."""
-    softness = lines[..., 3]
-    windows, is_mask = np.sqrt(1.0 + 4.0 * softness**2), softness[:, 0] < 0.0
-    mean, widest = _mean_and_widest(windows, is_mask, first)
+    windows, is_mask, mean, widest = _windows_as_they_are(lines[..., 3], first)
     is_narrow = width <= WIDE * widest
     widest = np.where(is_narrow, np.round(mean), widest)
     # Of a wide polygon little is beyond, and nothing tells how much.
@@ -319,36 +317,35 @@ def _windows(
     return np.where((is_narrow[owner] & ~is_mask)[:, None], widest[owner, None], windows), widest
 
 
-def _sizes(hulls: np.ndarray, first: np.ndarray) -> np.ndarray:
-    return np.diff(np.append(first, len(hulls)))
-
-
 def _kept_by_masks(
     lines: np.ndarray,
-    grown: np.ndarray,
+    ends: np.ndarray,
     first: np.ndarray,
     owner: np.ndarray,
     widest: np.ndarray,
     hulls: np.ndarray,
     hull_first: np.ndarray,
+    anchor: np.ndarray,
 ) -> np.ndarray:
     """Share (n,) of a narrow polygon's light that its masks keep, about: what they hold back is spread over what is
-    inside of them. The polygon is as wide across a mask as its hull, less `grown` (E,) of the widest penumbra."""
+    inside of them. The polygon is as wide across a mask as its hull, less what the widest penumbra grew that by along
+    both axes of the plane (`ends` (E, 8): of `BeamPolygons`)."""
     masks = np.flatnonzero((lines[:, 0, 3] < 0.0) & (lines[:, 0, 2] < NO_EDGE[2]))
     kept = np.ones(len(first))
     if not len(masks):
         return kept
-    sizes, line, window = _sizes(hulls, hull_first)[owner[masks]], lines[masks].mean(axis=1), widest[owner[masks]]
+    of, line = owner[masks], lines[masks].mean(axis=1)
+    rows, sizes = ragged(np.append(hull_first, len(hulls)), of)
     begins = np.cumsum(sizes) - sizes
-    rows = np.repeat(hull_first[owner[masks]] - begins, sizes) + np.arange(sizes.sum())
-    inside = np.sum(np.repeat(line[:, :2], sizes, axis=0) * hulls[rows], axis=1) + np.repeat(line[:, 2], sizes)
+    beside = hulls[rows] - np.repeat(anchor[of], sizes, axis=0)
+    inside = np.sum(np.repeat(line[:, :2], sizes, axis=0) * beside, axis=1) + np.repeat(line[:, 2], sizes)
     low, high = np.minimum.reduceat(inside, begins), np.maximum.reduceat(inside, begins)
-    penumbra = np.maximum.reduceat(lines[..., 3].max(axis=1), first)[owner[masks]]
-    half = np.maximum(0.5 * (high - low) - grown[masks] * penumbra, 0.0)
+    penumbra = np.maximum.reduceat(lines[..., 3].max(axis=1), first)[of]
+    half = np.maximum(0.5 * (high - low) - np.abs(ends[masks, :2]).sum(axis=1) * penumbra, 0.0)
     low, high = np.maximum(0.5 * (low + high)[None] + half * [[-1.0], [1.0]], 0.0)
     along = (np.arange(LOOKS) + 0.5)[:, None] / LOOKS
-    shares = [_half_plane_share(line[:, :2], place / window) for place in low + along * (high - low)]
-    np.multiply.at(kept, owner[masks], np.maximum(np.mean(shares, axis=0), LEAST_KEPT))
+    shares = [_half_plane_share(line[:, :2], place / widest[of]) for place in low + along * (high - low)]
+    np.multiply.at(kept, of, np.maximum(np.mean(shares, axis=0), LEAST_KEPT))
     return kept
 
 
