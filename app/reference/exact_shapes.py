@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..model.geometry import primitives
+from ..model.geometry.cone_rows import in_rows
 from ..model.geometry.mesh import Mesh
 from ..model.geometry.mesh_recipes import recipe_of
 from ..model.geometry.primitives_round import profile_with_normals
@@ -173,6 +174,8 @@ def _between(first: tuple[float, float, float], second: tuple[float, float, floa
 
 def _revolution(shape: dict[str, Any]) -> Iterator[Piece]:
     points, start, end, loop = profile_with_normals(shape["profile"], float(shape["crease_deg"]))
+    # Where normals turn along the profile, they do from row to row, as the mesh's corners have them.
+    points, start, end = in_rows(points, start, end, loop)
     following = np.roll(points, -1, axis=0)[: None if loop else -1]
     for a, b, normal_a, normal_b in zip(points, following, start, end, strict=False):
         yield _band(a, b, normal_a, normal_b)

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...base.errors import UserError
+from .cone_rows import in_rows
 from .mesh import Mesh, make_mesh, normalised
 from .primitives_check import MAX_TRIANGLES, count, in_range, positive
 from .primitives_uv import globe_uv
@@ -75,6 +76,7 @@ def solid_of_revolution(
     the axis open, repeated points, or one that crosses itself.
     """
     points, start, end, loop = profile_with_normals(profile, crease_deg)
+    points, start, end = in_rows(points, start, end, loop)
     if segments is None:
         segments = min(max(TRIANGLES // (2 * len(points)), SEGMENTS[0]), SEGMENTS[1])
     segments = count("solid of revolution", "segments", segments, 3, 1 << 16)
