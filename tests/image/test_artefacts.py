@@ -77,3 +77,44 @@ def test_ground_glass_has_no_specks(gl) -> None:
     settings = RenderSettings(64, 48, photons=20_000, spp=16)
     picture = render(replace(scene, camera=camera), settings, context=gl).rgb.astype(float)
     assert grain(picture) < 0.18
+
+
+TUMBLER = """
+[camera]
+position = [2.6, -6.4, 6.0]
+target = [1.08, -0.3, 0.2]
+vertical_fov_deg = 28
+
+[[lights]]
+kind = "directional"
+direction = [0.766, -0.306, -0.565]
+angular_diameter_deg = 0.53
+illuminance_lx = 10_000
+
+[[objects]]
+shape = "revolution"
+segments = 96
+profile = [[0, 0], [0.62, 0], [0.8, 1.56], [0, 1.56]]
+material = { kind = "mirror" }
+rests_at_z = 0.001
+
+[[objects]]
+shape = "plane"
+width = 20.0
+height = 20.0
+material = "diffuse"
+"""
+
+
+def test_what_a_cone_throws_has_no_stripes(gl, tmp_path) -> None:
+    """A silvered tumbler of 96 segments, beside one of 1,024: half of what it lights is within 1.6 % of it, and within
+    4 % where a cone was one row of facets, over which normals turn unevenly."""
+    pictures = []
+    for segments in (96, 1024):
+        path = tmp_path / f"tumbler_{segments}.toml"
+        path.write_text(TUMBLER.replace("= 96", f"= {segments}"))
+        settings = RenderSettings(160, 90, photons=40_000, layer="caustic")
+        pictures.append(render(load_scene(path), settings, context=gl).rgb.astype(float) @ [0.2126, 0.7152, 0.0722])
+    coarse, fine = pictures
+    lit = fine > 0.2 * np.median(fine[fine > 0.0])
+    assert np.median(np.abs(coarse[lit] / fine[lit] - 1.0)) < 0.025

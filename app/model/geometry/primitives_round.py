@@ -57,8 +57,8 @@ def torus(major_radius: float = 0.5, minor_radius: float = 0.15, triangles: int 
 SEGMENTS = (128, 512)
 """Of a solid of revolution whose file does not say: as many of these as `TRIANGLES` allow …"""
 TRIANGLES = 80_000
-"""… since light that grazes a few large facets is striped: what 128 of them miss of a cone's light is 3 % of it, and
-what 512 miss cannot be told from noise."""
+"""… since light that grazes a few large facets is striped (`cone_rows`): 128 of them leave a tumbler an nRMSE of 0.024,
+512 of 0.016."""
 
 
 def solid_of_revolution(
