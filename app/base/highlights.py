@@ -8,9 +8,9 @@ is flat there is a step within it (subcell resolution: Harten 1989, *ENO Schemes
 Computational Physics 83), its place is known from the three values, and so is how much of the pixel either side covers.
 A tone curve is straight between two such sides, by what they cover, instead of bent between them.
 
-What is smaller than a pixel, such as the sun's image in a curved glass, is one pixel, all white and square: nothing in
-the picture tells how much of it is covered. It is shown as a lens would, as a dot: a little of what is shown of it lies
-on the four pixels round it.
+What is smaller than a pixel, such as the sun's image in a curved glass, is one pixel, or two by two, all white and
+square: nothing in the picture tells how much of them is covered. It is shown as a lens would, as a dot: a little of
+what is shown of it lies on the pixels at its sides. That much is done for what is no wider than three pixels.
 
 Where nothing near is brighter than white nothing changes, nor where brightness has a slope and not a step: spectra,
 penumbrae, caustics. Only pictures to look at have it, never linear data. `shaders/lib/highlights.glsl` is the same on
@@ -35,7 +35,7 @@ GLINT_SPREAD = 0.135
 
 @dataclass(frozen=True)
 class Glints:
-    """Of n pixels, each beside one that is overexposed alone."""
+    """Of n sides of pixels within small groups that are overexposed."""
 
     rows: np.ndarray
     columns: np.ndarray
@@ -46,26 +46,43 @@ class Glints:
 
 
 def find_glints(norm: np.ndarray) -> Glints:
-    """What lies beside single overexposed pixels of a picture whose colours have these norms (H, W); beside two of
-    them the stronger counts. A pixel is single where all four round it are below white, surely where below half."""
-    height, width = norm.shape
+    """What lies beside small groups of overexposed pixels of a picture whose colours have these norms (H, W).
+
+    Of a pixel beside two of theirs what becomes brighter counts. A group is small where on each line through its pixel,
+    diagonals too, no more than three in a row are above white, surely where those at the ends are below half of it.
+    """
     rows, columns = np.nonzero(norm > WHITE)
-    beside = [(np.clip(rows + d, 0, height - 1), np.clip(columns + r, 0, width - 1)) for d, r in _BESIDE]
-    around = np.max([norm[place] for place in beside], axis=0)
-    over = np.clip(norm[rows, columns] / np.float32(WHITE) - 1, 0, 1)
-    share = np.float32(GLINT_SPREAD) * over * np.clip(2 - 2 * around / np.float32(WHITE), 0, 1)
-    single = share > 0
-    # At the border there is nothing beyond, and `around` is the pixel itself.
-    places = np.concatenate([np.stack(place)[:, single] for place in beside], axis=1)
-    bright = np.tile(np.stack([rows, columns])[:, single], len(_BESIDE))
-    shares = np.tile(share[single], len(_BESIDE))
-    order = np.argsort(-shares, kind="stable")
-    _, first = np.unique(places[0, order] * width + places[1, order], return_index=True)
-    chosen = order[first]
-    return Glints(places[0, chosen], places[1, chosen], bright[:, chosen], shares[chosen, None])
+    over = np.float32(GLINT_SPREAD) * np.clip(norm[rows, columns] / np.float32(WHITE) - 1, 0, 1)
+    found: list[tuple[np.ndarray, ...]] = []
+    for side in _BESIDE:
+        beside = _places(norm, rows, columns, side, 1)
+        behind = _darkest(norm, rows, columns, (-side[0], -side[1]))[-1]
+        around = [norm[beside], behind]
+        for turn in (-1, 0, 1):
+            way = (side[1] + turn * side[0], side[0] + turn * side[1])
+            ahead, back = _darkest(norm, rows, columns, way), _darkest(norm, rows, columns, (-way[0], -way[1]))
+            around.append(np.min([np.maximum(a, b) for a, b in zip(ahead, back[::-1], strict=True)], axis=0))
+        share = over * np.clip(2 - 2 * np.max(around, axis=0) / np.float32(WHITE), 0, 1)
+        chosen = share > 0
+        found.append((*(part[chosen] for part in (*beside, rows, columns)), share[chosen]))
+    row, column, bright_row, bright_column, share = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return Glints(row, column, np.stack([bright_row, bright_column]), share[:, None])
 
 
-_BESIDE = ((0, -1), (0, 1), (-1, 0), (1, 0))
+_BESIDE = ((0, -1), (-1, 0), (0, 1), (1, 0))
+
+
+def _places(
+    norm: np.ndarray, rows: np.ndarray, columns: np.ndarray, way: tuple[int, int], pixels: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Pixels so many along a way from these; at the border there is nothing beyond, but the border's own again."""
+    height, width = norm.shape
+    return np.clip(rows + pixels * way[0], 0, height - 1), np.clip(columns + pixels * way[1], 0, width - 1)
+
+
+def _darkest(norm: np.ndarray, rows: np.ndarray, columns: np.ndarray, way: tuple[int, int]) -> np.ndarray:
+    """(3, n): the least norm among the next one, two and three pixels along a way."""
+    return np.minimum.accumulate([norm[_places(norm, rows, columns, way, k)] for k in (1, 2, 3)], axis=0)
 
 
 @dataclass(frozen=True)

@@ -117,7 +117,7 @@ def _antialias(display: np.ndarray, exposed: np.ndarray) -> None:
     display[steps.rows, steps.columns] *= 1 + steps.weight * (fall - 1)
     glints = find_glints(norm)
     own, bright = display[glints.rows, glints.columns], display[tuple(glints.bright)]
-    display[glints.rows, glints.columns] = own + glints.share * np.maximum(bright - own, 0)
+    np.maximum.at(display, (glints.rows, glints.columns), own + glints.share * np.maximum(bright - own, 0))
 
 
 def _p_norm(channels: np.ndarray) -> np.ndarray:

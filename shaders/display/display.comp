@@ -115,31 +115,52 @@ bool is_hot(vec3 scene)
     return max(max(scene.r, scene.g), scene.b) * parameters.gain > STEP_WHITE;
 }
 
-// A pixel beside something overexposed.
-vec3 antialiased(sampler2D picture, vec2 pixel)
+// The least among the next one, two and three pixels along a way from the one at `from`, of their norms' fifth powers: what is less has the lesser
+// norm too, and none needs a root.
+vec3 darkest_beyond(sampler2D picture, vec2 pixel, ivec2 from, ivec2 way)
 {
-    vec3 colour = exposed(look(picture, pixel)), factor = vec3(1.0);
+    float one = exposed_fifths(exposed_beside(picture, pixel, from + way));
+    float two = min(one, exposed_fifths(exposed_beside(picture, pixel, from + 2 * way)));
+    return vec3(one, two, min(two, exposed_fifths(exposed_beside(picture, pixel, from + 3 * way))));
+}
+
+// What is shown, linear, of the pixel so many beside this one: where a step runs through it, straight between both sides.
+vec3 stepped(sampler2D picture, vec2 pixel, ivec2 at)
+{
+    vec3 colour = exposed_beside(picture, pixel, at);
     PixelStep found = PixelStep(colour, colour, 0.0, 0.0, 0.0);
     for (int line = 0; line < 2; ++line) {
         ivec2 next = line == 0 ? ivec2(1, 0) : ivec2(0, 1);
-        find_step(found, colour, exposed_beside(picture, pixel, -2 * next), exposed_beside(picture, pixel, -next),
-            exposed_beside(picture, pixel, next), exposed_beside(picture, pixel, 2 * next));
+        find_step(found, colour, exposed_beside(picture, pixel, at - 2 * next), exposed_beside(picture, pixel, at - next),
+            exposed_beside(picture, pixel, at + next), exposed_beside(picture, pixel, at + 2 * next));
     }
     float share = step_share(found, exposed_norm(colour));
     vec3 mixture = toned(mix(found.dark, found.bright, share));
-    vec3 result = toned(colour) * step_factor(toned(found.bright), toned(found.dark), mixture, share, step_weight(found)), glint = vec3(0.0);
-    float most = 0.0;
+    return toned(colour) * step_factor(toned(found.bright), toned(found.dark), mixture, share, step_weight(found));
+}
+
+const ivec2 SIDES[4] = ivec2[](ivec2(1, 0), ivec2(0, 1), ivec2(-1, 0), ivec2(0, -1));
+
+// Whether a pixel may be beside something small that is overexposed.
+bool is_near_glint(sampler2D picture, vec2 pixel)
+{
+    bool near = false;
     for (int side = 0; side < 4; ++side) {
-        ivec2 next = (side & 1) == 0 ? ivec2(1 - (side & 2), 0) : ivec2(0, 1 - (side & 2)), aside = ivec2(next.y, next.x);
-        vec3 bright = exposed_beside(picture, pixel, next);
-        float around = max(exposed_norm(colour), exposed_norm(exposed_beside(picture, pixel, 2 * next)));
-        around = max(around, exposed_norm(exposed_beside(picture, pixel, next + aside)));
-        around = max(around, exposed_norm(exposed_beside(picture, pixel, next - aside)));
-        float shows = glint_share(exposed_norm(bright), around);
-        if (shows > most) glint = bright;
-        most = max(most, shows);
+        float bright = exposed_fifths(exposed_beside(picture, pixel, SIDES[side]));
+        near = near || (bright > STEP_WHITE && darkest_beyond(picture, pixel, SIDES[side], SIDES[side]).z < STEP_WHITE);
     }
-    return srgb_encode(result + most * max(toned(glint) - result, 0.0));
+    return near && exposed_fifths(exposed_beside(picture, pixel, ivec2(0))) < STEP_WHITE;
+}
+
+// What such a pixel shows of the one beside it.
+float share_of_side(sampler2D picture, vec2 pixel, ivec2 next)
+{
+    float around = max(exposed_fifths(exposed_beside(picture, pixel, ivec2(0))), darkest_beyond(picture, pixel, next, next).z);
+    for (int turn = -1; turn < 2; ++turn) {
+        ivec2 way = next.yx + turn * next;
+        around = max(around, end_of_run(darkest_beyond(picture, pixel, next, way), darkest_beyond(picture, pixel, next, -way)));
+    }
+    return glint_share(exposed_norm(exposed_beside(picture, pixel, next)), pow(around, 0.2));
 }
 #endif
 
@@ -232,9 +253,22 @@ void main()
         show(pixel, developed(scene_at(pixel)));
     }
 #ifdef ANTIALIAS
+    uint glints = 0u;
     for (; beside_hot != 0u; beside_hot &= beside_hot - 1u) {
         ivec2 pixel = first + ivec2(0, findLSB(beside_hot));
-        show(pixel, antialiased(shown, vec2(pixel)));
+        show(pixel, srgb_encode(stepped(shown, vec2(pixel), ivec2(0))));
+        if (is_near_glint(shown, vec2(pixel))) glints |= beside_hot & ~(beside_hot - 1u);
+    }
+    // One look a round, so that nothing but one is paid where there is no glint.
+    vec3 own = vec3(0.0), result = vec3(0.0);
+    for (int side = -1; glints != 0u;) {
+        ivec2 pixel = first + ivec2(0, findLSB(glints)), next = side < 0 ? ivec2(0) : SIDES[side];
+        vec3 there = stepped(shown, vec2(pixel), next);
+        own = side < 0 ? there : own;
+        result = side < 0 ? there : max(result, own + share_of_side(shown, vec2(pixel), next) * max(there - own, 0.0));
+        if (side == 3) show(pixel, srgb_encode(result));
+        glints = side == 3 ? glints & (glints - 1u) : glints;
+        side = side == 3 ? -1 : side + 1;
     }
 #endif
 }

@@ -22,6 +22,12 @@ float exposed_norm(vec3 exposed)
     return p_norm(max(exposed, 0.0)) * pow(3.0, -0.2);
 }
 
+// Its fifth power, which is 1 where that is.
+float exposed_fifths(vec3 exposed)
+{
+    return fifth_powers(max(exposed, 0.0)) / 3.0;
+}
+
 // A norm about as a display shows it, 0 to 1.
 float seen_norm(float norm)
 {
@@ -70,7 +76,16 @@ vec3 step_factor(vec3 bright, vec3 dark, vec3 mixture, float share, float weight
     return 1.0 + weight * (min(straight / max(mixture, 1e-6), 1.0) - 1.0);
 }
 
-// What a pixel shows of one beside it that is overexposed alone: `around` is the greatest norm beside that one. A Gaussian of half a pixel.
+// The greater norm, or power of one, at the ends of a run of no more than three overexposed pixels in a line. `ahead`, `back`: the least norms among one, two and three
+// pixels to either side of one of them.
+float end_of_run(vec3 ahead, vec3 back)
+{
+    vec3 ends = max(ahead, back.zyx);
+    return min(ends.x, min(ends.y, ends.z));
+}
+
+// What a pixel shows of one beside it in a small group that is overexposed: `around` is the greatest norm at the ends of its runs, along
+// rows, columns and diagonals, and the pixel's own. A Gaussian of half a pixel.
 float glint_share(float norm, float around)
 {
     return 0.135 * clamp(norm / STEP_WHITE - 1.0, 0.0, 1.0) * clamp(2.0 - 2.0 * around / STEP_WHITE, 0.0, 1.0);

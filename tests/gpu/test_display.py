@@ -36,6 +36,8 @@ COVERS = {
         "step_share",
         "step_weight",
         "step_factor",
+        "exposed_fifths",
+        "end_of_run",
         "glint_share",
     ),
 }
@@ -98,10 +100,13 @@ def test_each_function_of_highlights_has_its_twin(gl) -> None:
     bright = s.bright; dark = s.dark; contrast = s.contrast; norm = exposed_norm(pixel);
     seen = seen_norm(norm); flatness = step_flatness(after.r - before.r, pixel.r);
     share = step_share(s, norm); weight = step_weight(s); glint = glint_share(norm, before.r);
+    around = end_of_run(before2, after2); fifths = exposed_fifths(pixel);
     vec3 mixture = tone_spectrasplat(mix(dark, bright, share));
     factor = step_factor(tone_spectrasplat(bright), tone_spectrasplat(dark), mixture, share, weight);
     """
-    outputs = dict.fromkeys(("contrast", "norm", "seen", "flatness", "share", "weight", "glint"), "float")
+    outputs = dict.fromkeys(
+        ("contrast", "norm", "seen", "flatness", "share", "weight", "glint", "around", "fifths"), "float"
+    )
     outputs |= dict.fromkeys(("bright", "dark", "factor"), "vec3")
     got = evaluate(gl.ctx, ["lib/tone.glsl", "lib/highlights.glsl"], body, inputs, outputs)
     before2, before, pixel, after, after2 = line.astype(float)
@@ -111,6 +116,9 @@ def test_each_function_of_highlights_has_its_twin(gl) -> None:
     assert np.abs(got["flatness"] - want).max() < 1e-5
     glints = [tone.glint_share(float(tone.exposed_norm(p)), b) for p, b in zip(pixel, before[:, 0], strict=True)]
     assert got["glint"] == pytest.approx(np.array(glints), abs=1e-5) and (got["glint"] > 0.0).mean() > 0.02
+    assert np.abs(got["fifths"] / tone.exposed_norm(pixel) ** 5 - 1.0).max() < 1e-4
+    ends = np.maximum(before2, after2[:, ::-1]).min(axis=1)
+    assert got["around"] == pytest.approx(ends, rel=1e-6)
     steps = 0
     for i in range(COUNT):
         step = tone.step_between(pixel[i], (before[i], before2[i]), (after[i], after2[i]))
@@ -146,6 +154,7 @@ def overexposed_edges(size: tuple[int, int] = (48, 40)) -> np.ndarray:
     rgb[np.abs(y + 0.6 * x - 33.0) < 1.2] = (0.1, 9.0, 2.0)
     rgb[(x - 40.3) ** 2 + (y - 5.4) ** 2 < 0.8] = 300.0
     rgb[(x - 44.5) ** 2 + (y - 20.5) ** 2 < 0.06] = 300.0
+    rgb[(x - 44.0) ** 2 + (y - 15.0) ** 2 < 0.3] = 300.0
     rgb += 6.0 * np.exp(-((x - 37.0) ** 2 + (y - 31.0) ** 2) / 20.0)[..., None] * np.array([1.0, 0.6, 0.2])
     rgb = rgb.reshape(height, 8, width, 8, 3).mean(axis=(1, 3))
     rgb[-8:, :10] = 2.0 ** np.random.default_rng(8).uniform(-3, 4, (8, 10, 1)) * (1.0, 0.7, 0.5)
@@ -175,17 +184,33 @@ def test_highlights_are_antialiased_alike_in_window_files_and_float64(gl, displa
 
 def test_a_glint_smaller_than_a_pixel_is_a_dot() -> None:
     """A hundred times white within a pixel: one white square before, now a dot that is as bright as it was and fades to
-    its sides, less where it is hardly overexposed. Beside a second one, and below white, nothing happens."""
-    for norms, sides in (((100.0, 0.1), 4), ((100.0, 100.0), 0), ((1.02, 0.1), 4), ((0.9, 0.1), 0)):
+    its sides, less where it is hardly overexposed. Below white nothing happens."""
+    for norm, sides in ((100.0, 4), (1.02, 4), (0.9, 0)):
         rgb = np.full((7, 7, 3), 0.1, np.float32)
-        rgb[3, 3:5] = np.array(norms)[:, None]
+        rgb[3, 3] = norm
         plain, dotted = (tone_map.to_display(rgb, 0.0, antialias=on) for on in (False, True))
         brighter = (dotted > plain + 1e-4).all(axis=-1)
         assert brighter.sum() == sides and (dotted[3, 3] == plain[3, 3]).all()
         if sides:
             assert brighter[[2, 4, 3, 3], [3, 3, 2, 4]].all()
-            spread = 0.135 * min(norms[0] - 1.0, 1.0)
+            spread = 0.135 * min(norm - 1.0, 1.0)
             assert dotted[2, 3] == pytest.approx(plain[2, 3] + spread * (plain[3, 3] - plain[2, 3]), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("height", "width", "sides"), [(2, 2, 8), (1, 3, 8), (3, 3, 12), (4, 1, 0), (4, 4, 0), (1, 9, 0)]
+)
+def test_a_glint_of_a_few_pixels_is_a_dot(height: int, width: int, sides: int) -> None:
+    """Two by two pixels of the sun were a hard square; its sides have what those of a single pixel have, its corners
+    nothing. Larger or longer ones are no glints, and stay."""
+    rgb = np.full((11, 15, 3), 0.1, np.float32)
+    rgb[3 : 3 + height, 3 : 3 + width] = 80.0
+    plain, dotted = (tone_map.to_display(rgb, 0.0, antialias=on) for on in (False, True))
+    brighter = (dotted > plain + 1e-4).all(axis=-1)
+    assert brighter.sum() == sides and not brighter[[2, 2], [2, 3 + width]].any()
+    assert (dotted[3 : 3 + height, 3 : 3 + width] == plain[3 : 3 + height, 3 : 3 + width]).all()
+    if sides:
+        assert dotted[2, 3] == pytest.approx(plain[2, 3] + 0.135 * (plain[3, 3] - plain[2, 3]), rel=1e-3)
 
 
 @pytest.mark.parametrize("size", [(48, 40), (24, 20), (96, 80)])
@@ -203,7 +228,7 @@ def test_highlights_of_pictures_of_other_sizes(gl, display, size: tuple[int, int
         k = rgb.shape[1] // size[0]
         small = rgb.reshape(size[1], k, size[0], k, 3).mean(axis=(1, 3))
         assert np.abs(shown - tone_map.tone_map_8bit(small, 0.0, antialias=True)).max() <= 1
-    assert (shown > plain).any(axis=-1).mean() < 0.01 and 0.02 < (shown < plain - 10).any(axis=-1).mean() < 0.3
+    assert (shown > plain).any(axis=-1).mean() < 0.02 and 0.02 < (shown < plain - 10).any(axis=-1).mean() < 0.3
 
 
 def test_false_colour_and_errors_are_not_antialiased(gl, display) -> None:

@@ -142,7 +142,7 @@ def antialiased(exposed: Array, curve: Callable[[Array], Array]) -> Array:
             straight = share * curve(step.bright) + (1.0 - share) * curve(step.dark)
             bent = curve(share * step.bright + (1.0 - share) * step.dark)
             shown[row, column] *= 1.0 + step.weight * (np.minimum(straight / np.maximum(bent, 1e-6), 1.0) - 1.0)
-    return with_dots(exposed, shown, curve)
+    return with_dots(exposed, shown)
 
 
 def glint_share(norm: float, around: float) -> float:
@@ -150,18 +150,33 @@ def glint_share(norm: float, around: float) -> float:
     return 0.135 * min(max(norm - 1.0, 0.0), 1.0) * min(max(2.0 - 2.0 * around, 0.0), 1.0)
 
 
-def with_dots(exposed: Array, shown: Array, curve: Callable[[Array], Array]) -> Array:
-    """`shown` with some of each single overexposed pixel on the four beside it, the strongest one's."""
-    sides = ((0, 1), (0, -1), (1, 0), (-1, 0))
-    norm = np.pad(exposed_norm(exposed), 2, mode="edge")
+def with_dots(exposed: Array, shown: Array) -> Array:
+    """`shown` with some of each overexposed pixel on the one at its side, the brightest one's, where no more than three
+    in a row are overexposed on each line through it."""
+    sides = ((0, 1), (1, 0), (0, -1), (-1, 0))
+    norm = np.pad(exposed_norm(exposed), 4, mode="edge")
+
+    def at_way(at: tuple[int, int], down: int, right: int) -> float:
+        return norm[at[0] + 4 + down, at[1] + 4 + right]
+
     dotted = shown.copy()
     for row in range(len(exposed)):
         for column in range(exposed.shape[1]):
-            found = []
+            own = shown[row, column]
             for down, right in sides:
                 at = min(max(row + down, 0), len(exposed) - 1), min(max(column + right, 0), exposed.shape[1] - 1)
-                around = max(norm[at[0] + 2 + d, at[1] + 2 + r] for d, r in sides)
-                found.append((glint_share(norm[at[0] + 2, at[1] + 2], around), at))
-            share, at = max(found)
-            dotted[row, column] += share * np.maximum(curve(exposed[at]) - shown[row, column], 0.0)
+                behind = min(at_way(at, k * down, k * right) for k in (1, 2, 3))
+                lines = ((right, down), (down + right, right + down), (down - right, right - down))
+                ends = max(
+                    min(
+                        max(at_way(at, i * one, i * other), at_way(at, -j * one, -j * other))
+                        for i in (1, 2, 3)
+                        for j in range(1, 5 - i)
+                    )
+                    for one, other in lines
+                )
+                around = max(at_way((row, column), 0, 0), behind, ends)
+                share = glint_share(at_way(at, 0, 0), around)
+                brighter = own + share * np.maximum(shown[at] - own, 0.0)
+                dotted[row, column] = np.maximum(dotted[row, column], brighter)
     return dotted
