@@ -7,7 +7,7 @@ import numpy as np
 from .compiling import part
 from .hand import HAND, SPARE, faint_share, halve, push_both
 from .leaves import anchor_density, density_slope, lay_leaf, passes, plane_map
-from .nodes import LINES, STATIC, area_of, copy, first_place, last_place, lay_out
+from .nodes import HALF, LINES, STATIC, area_of, copy, first_place, last_place, lay_out
 from .rays import PARALLEL, REFLECT, follow
 from .search import (
     LEAF_OPEN,
@@ -328,7 +328,8 @@ def soften(nodes, kind, facets, solids, tables, sources, leaf, edge, corner, wor
     """Set the penumbra of the leaf just laid from where its edges lie for two other points of an extended light.
 
     The light's part is a disc whose radius is the way to those points. An edge's cover over it rises as the disc's
-    cumulative profile; a ramp of the same variance is sqrt(3)/2 of the disc's projected radius wide to each side."""
+    cumulative profile; a ramp of the same variance is sqrt(3)/2 of the disc's projected radius wide to each side.
+    Where a beam was cut in halves nothing ends: of every point's light either half has what lands on its side."""
     hand, spare = nodes[HAND], nodes[SPARE]
     first, n = work.count[1], nodes[HAND].lines
     soft, own = work.soft, work.own
@@ -347,7 +348,7 @@ def soften(nodes, kind, facets, solids, tables, sources, leaf, edge, corner, wor
             elif kind == LEAF_RECEIVER and hand.made[ln, 0] == hand.flight - 1 and hand.made[ln, 2] >= 0:
                 moved = moves(hand, spare, ln, facets, work)
                 soft[ln] += moved * moved
-            elif hand.made[ln, 2] != STATIC or kind == LEAF_RECEIVER:
+            elif hand.made[ln, 2] != HALF and (hand.made[ln, 2] != STATIC or kind == LEAF_RECEIVER):
                 soft[ln] += (at - own[ln]) * (at - own[ln])
     lay_leaf(hand, facets, kind, leaf, edge, corner, work)
     new.slope[0], new.slope[1] = slope_u, slope_v

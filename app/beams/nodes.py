@@ -19,9 +19,9 @@ SPARE_LINES = LINES // 2
 """Half-planes of a beam up to which those are kept that may bound its outline only at other places than its three."""
 THIN = 1e-10
 """Width in q below which a polygon is rounding's."""
-STATIC, TOTAL = -1, -2
-"""Kinds of half-planes besides a facet's edge: one that does not move (an aperture, a cell), and the onset of total
-reflection."""
+STATIC, TOTAL, HALF = -1, -2, -3
+"""Kinds of half-planes besides a facet's edge: one that does not move (an aperture, a cell), the onset of total
+reflection, and where a beam was cut in halves."""
 
 
 NODE = np.dtype(
@@ -33,8 +33,8 @@ NODE = np.dtype(
         ("corners", "i8", 3),
         ("held", "i8", 3),
         # Half-planes: line[0] + line[1] q_u + line[2] q_v >= 0 at each place, and how to make them again: flight,
-        # facet, edge (or STATIC, TOTAL), sign: 1 for the inside of what is met from its inner side, 2 from outside, -1
-        # and -2 for what is beyond the edge.
+        # facet, edge (or STATIC, TOTAL, HALF), sign: 1 for the inside of what is met from its inner side, 2 from
+        # outside, -1 and -2 for what is beyond the edge.
         ("line", "f8", (LINES, 3, 3)),
         ("made", "i4", (LINES, 4)),
         ("lines", "i8"),
@@ -223,7 +223,7 @@ def heights(corner, count, line, sign, height):
 @part
 def cut(beam, line, sign, flight, facet, edge, way, work):
     """Cut a beam by one more half-plane, sign * `line` (3, 3) by place, made by a flight's meeting a facet's edge (or
-    STATIC, TOTAL) its `way` (1 from inside, 2 from outside); returns whether anything is left."""
+    STATIC, TOTAL, HALF) its `way` (1 from inside, 2 from outside); returns whether anything is left."""
     if beam.lines >= LINES - 1:
         forget_idle_lines(beam, work)
         if beam.lines >= LINES - 1:
@@ -276,7 +276,7 @@ def lay_lines(beam, a, flight, plain, facets, tables, work, position, direction)
     ready = False
     for ln in range(beam.lines):
         edge = np.int64(beam.made[ln, 2])
-        if edge == STATIC or beam.made[ln, 0] != flight or (plain & (1 if edge >= 0 else 2)) == 0:
+        if edge in (STATIC, HALF) or beam.made[ln, 0] != flight or (plain & (1 if edge >= 0 else 2)) == 0:
             continue
         if not ready:
             moments(position, direction, work.moment[3])

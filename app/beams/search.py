@@ -14,8 +14,8 @@ from .compiling import jit, part
 from .facets import MAX_CORNERS
 from .nodes import (
     CORNERS,
+    HALF,
     LINES,
-    STATIC,
     area_of,
     copy,
     cut,
@@ -313,9 +313,9 @@ def halve_space(beam, other, work):
         line[a, 0] = -at
         line[a, 1 + along], line[a, 2 - along] = 1.0, 0.0
     copy(beam, other)
-    zero, static, way = np.int64(0), np.int64(STATIC), np.int64(1)
-    low = cut(beam, line, 1.0, zero, zero, static, way, work)
-    high = cut(other, line, -1.0, zero, zero, static, way, work)
+    zero, half, way = np.int64(0), np.int64(HALF), np.int64(1)
+    low = cut(beam, line, 1.0, zero, zero, half, way, work)
+    high = cut(other, line, -1.0, zero, zero, half, way, work)
     beam.key, other.key = mixed(beam.key, np.int64(13)), mixed(other.key, np.int64(14))
     forget_idle_lines(beam, work)
     recentre(beam)
