@@ -49,6 +49,9 @@ def draw_status_bar(state: State, view_model: ViewModel) -> State:
     _selection(state)
     if view_model.job is not None:
         state = _job(state, view_model)
+    elif view_model.writing:
+        imgui.same_line(0, theme.em(1.6))
+        imgui.text_disabled(view_model.writing)
     _right_end(view_model)
     imgui.end()
     imgui.pop_style_color()
@@ -124,7 +127,7 @@ def _job(state: State, view_model: ViewModel) -> State:
     imgui.progress_bar(job.fraction, imgui.ImVec2(theme.em(9), 0.0), f"{job.fraction:.0%}")
     widgets.tooltip(job.text or job.title)
     imgui.same_line()
-    label, tip = ("Discard", "Write nothing at all.") if job.is_stopped else ("Cancel", "Stop; what is done is kept.")
+    label, tip = ("Discard", "Write nothing at all.") if job.is_stopped else ("Cancel", f"Stop; {job.when_stopped}.")
     if widgets.button(f"{label}##job", tip=tip):
         state = state.asking(CancelJob())
     # Behind the button: it would wander with the words.
