@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 from ..base.errors import UserError
 from ..base.paths import shipped_scenes
 from .compare import Comparison, engine_beside
-from .compared_with import Histogram
 from .cursor_info import Cursor
 from .export import Exports, Shown
 from .gallery import Gallery, best_first
@@ -62,9 +61,9 @@ class BackgroundJobs:
         self.overlay = RayOverlay(context)
         self.cursor = Cursor()
         self.gallery = Gallery(context, config, best_first(shipped_scenes()))
-        self.histogram: Histogram | None = None
-        """Of the picture and of what it is compared with."""
         self._histogram_s = -1e9
+        self.engine_rests = False
+        """In the last frame it left all time to a finished picture."""
         self.notes: list[tuple[str, bool]] = []
         """Sentence, whether it is an error."""
 
@@ -91,7 +90,8 @@ class BackgroundJobs:
         self.comparison.advance(state, picture.engine, share * max(left, 0.0))
         if self.comparison.is_waiting and not state.interacting:
             time.sleep(REFERENCE_WAIT_S)
-        if self.exports.is_rendering and not state.interacting and picture.is_presentable:
+        self.engine_rests = self.exports.is_rendering and not state.interacting and picture.is_presentable
+        if self.engine_rests:
             return 0.0
         return max(budget_s - (time.perf_counter() - started), 0.2 * budget_s)
 
@@ -111,11 +111,9 @@ class BackgroundJobs:
         """After the picture is made: what lies under the cursor, where rays go. `drawn`: the state as
         the picture shows it. Raises `UserError`."""
         self.cursor.update(state, picture, now_s)
-        if not state.preferences.panels.compare:
-            self.histogram = None
-        elif now_s - self._histogram_s > HISTOGRAM_S:
+        if state.preferences.panels.compare and now_s - self._histogram_s > HISTOGRAM_S:
             self._histogram_s = now_s
-            self.histogram = self.comparison.histogram(picture.radiance, picture.exposure_ev)
+            self.comparison.count(picture.radiance, picture.exposure_ev)
         self.overlay.update(drawn)
 
     def export(self, request: requests.Export, state: State, picture: LivePicture) -> None:

@@ -19,7 +19,7 @@ from ..edit.state import Selection
 from ..render.solo import scene_seen
 from ..render.viewer.dirty_level import DirtyLevel
 from ..render.viewer.invalidation import dirty_level
-from .compared_with import FilePicture, GlassSwap, Histogram, histogram_of
+from .compared_with import FilePicture, GlassSwap, Histogram, Histograms
 from .direct_picture import SAMPLES, DirectPicture
 from .error_curves import ErrorCurves
 from .panels.methods import METHOD_NAMES
@@ -74,6 +74,7 @@ class Comparison:
         self.is_stale = False
         self._swap = GlassSwap()
         self._file = FilePicture(context)
+        self._histograms = Histograms()
         self._glass_problem: str | None = None
         self._wish: tuple[str, str] | None = None
         """Method and glass that are wanted of the engine …"""
@@ -206,10 +207,16 @@ class Comparison:
         red, green, blue = (float(v) for v in np.frombuffer(data, np.float32))
         return red, green, blue
 
-    def histogram(self, own: moderngl.Texture | None, exposure_ev: float) -> Histogram | None:
-        """Of the picture and of what it is compared with; both are read from the device."""
+    @property
+    def histogram(self) -> Histogram | None:
+        """Of the picture and of what it is compared with, as last counted."""
+        return self._histograms.last if self.picture is not None else None
+
+    def count(self, own: moderngl.Texture | None, exposure_ev: float) -> None:
+        """Have the histogram counted anew, beside the window; both pictures are read from the device now."""
         other = self.picture
-        return None if own is None or other is None else histogram_of(_read(own), _read(other), exposure_ev)
+        if own is not None and other is not None and not self._histograms.is_counting:
+            self._histograms.ask(_read(own), _read(other), exposure_ev)
 
     # ---- work --------------------------------------------------------------------------------
 
@@ -261,6 +268,7 @@ class Comparison:
             self._engine.release()
             self._engine = None
         self._file.release()
+        self._histograms.release()
 
     @property
     def _file_text(self) -> str:

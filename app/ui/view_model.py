@@ -148,6 +148,8 @@ class ViewModel:
     readings: tuple[RayReading, ...] = ()
     """What those rays say in numbers."""
     job: JobInfo | None = None
+    engine_rests: bool = False
+    """All time is the job's: somebody waits for it."""
     writing: str = ""
     """Which screenshot takes long to be written."""
     exposure_ev: float = 0.0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from spectrasplat.render.viewer.stats import LiveStats
 from spectrasplat.ui.panels.numbers import kelvin
@@ -31,6 +33,12 @@ from spectrasplat.ui.panels.status_bar import progress_words
 )
 def test_what_is_said(stats: LiveStats, is_playing: bool, said: str) -> None:
     assert progress_words(stats, is_playing) == said
+
+
+def test_nothing_accumulates_while_all_time_is_an_export_s() -> None:
+    stats = LiveStats(photons=1_250_000, camera_samples=3.0)
+    assert progress_words(stats, True, rests=True) == "Waiting, 1.25 M photons"
+    assert progress_words(replace(stats, converged=True), True, rests=True) == "Done, 1.25 M photons"
 
 
 @pytest.mark.parametrize(
