@@ -16,6 +16,7 @@ import numpy as np
 from ..base.errors import UserError
 from ..edit.live_inputs import LiveInputs
 from ..edit.state import Selection
+from ..model.environment_sun import with_sun
 from ..render.solo import scene_seen
 from ..render.viewer.dirty_level import DirtyLevel
 from ..render.viewer.invalidation import dirty_level
@@ -177,6 +178,8 @@ class Comparison:
             )
         if not snapshot.directly.all():
             note += " Striped: what is seen behind glass or in mirrors, which is not compared."
+        if self._begun.scene.render.bounces:
+            note += " What surfaces give to each other is not in it."
         if self._begun.local_gain and any(item.local_dispersion for item in self._begun.scene.objects):
             note += " The brush's local gain is not in it: it is not physical."
         return note
@@ -302,7 +305,7 @@ class Comparison:
         return not self._shows_reference and self._compare is not None and self._compare.method != FILE
 
     def _start_reference(self, begun: LiveInputs) -> None:
-        scene = scene_seen(begun.scene, begun.camera, begun.solo_nm)
+        scene = scene_seen(with_sun(begun.scene), begun.camera, begun.solo_nm)
         self._thread = ReferenceThread(scene, begun.width, begun.height)
         self._direct = DirectPicture(self._context, self._find_thread(), scene, begun)
 

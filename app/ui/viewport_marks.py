@@ -3,6 +3,8 @@ magnifier."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as icons
@@ -18,6 +20,7 @@ from .overlay import Canvas, box_corners, draw_box, draw_outlined, lines
 from .panels.methods import METHOD_NAMES
 from .panels.rows import tooltip
 from .panels.spectral_colour import colour_of_nm
+from .view_axes import RADIUS_EM
 from .view_model import CursorInfo, ViewModel
 
 _RING_COLOURS = {"widen": (1.0, 0.84, 0.45, 0.95), "narrow": (0.55, 0.80, 1.0, 0.95), "erase": (1.0, 0.55, 0.50, 0.95)}
@@ -228,9 +231,23 @@ def draw_wipe(canvas: Canvas, state: State, view_model: ViewModel) -> None:
     lacks_file = state.compare.method == "file" and state.compare.file is None
     missing = "No picture chosen: this is the same one" if lacks_file else "On its way: this is the same picture"
     right = view_model.compare_label if view_model.compare_ready else missing
-    gap = theme.em(1.0)
+    gap, end = theme.em(1.0), canvas.left + canvas.width - theme.em(2.0 * RADIUS_EM + 2.0)
     _label(canvas, x - gap - imgui.calc_text_size(left).x, y, left)
-    _label(canvas, x + gap, y, right)
+    # Not under the axes in the corner: its parts stand below each other where they have no room beside each other.
+    right = stacked(right, end - x - gap, lambda text: imgui.calc_text_size(text).x)
+    _label(canvas, min(x + gap, end - imgui.calc_text_size(right).x), y, right)
+
+
+def stacked(text: str, width: float, measure: Callable[[str], float]) -> str:
+    """`text` with its parts, which commas divide, in as few lines of `width` as they fit."""
+    lines_: list[str] = []
+    for part in text.split(", "):
+        longer = f"{lines_[-1]}, {part}" if lines_ else part
+        if lines_ and measure(longer) <= width:
+            lines_[-1] = longer
+        else:
+            lines_.append(part)
+    return "\n".join(lines_)
 
 
 def own_label(state: State) -> str:

@@ -8,6 +8,7 @@ import pytest
 from spectrasplat.render.viewer.stats import LiveStats
 from spectrasplat.ui.panels.numbers import kelvin
 from spectrasplat.ui.panels.status_bar import progress_words
+from spectrasplat.ui.viewport_marks import stacked
 
 
 @pytest.mark.parametrize(
@@ -46,3 +47,11 @@ def test_nothing_accumulates_while_all_time_is_an_export_s() -> None:
 )
 def test_a_colour_temperature_has_no_power_of_ten(temperature_k: float, said: str) -> None:
     assert kelvin(temperature_k) == said
+
+
+def test_a_label_s_parts_stand_below_each_other_where_they_have_no_room() -> None:
+    said = "Reference, relMSE of its caustics > 1.0e-01, direct light 1 of 32 samples"
+    assert stacked(said, 100.0, len) == said
+    assert stacked(said, 50.0, len) == said.replace(", direct", "\ndirect")
+    assert stacked(said, 10.0, len) == said.replace(", ", "\n")
+    assert stacked("Even random wavelengths", 3.0, len) == "Even random wavelengths"
