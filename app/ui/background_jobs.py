@@ -87,6 +87,8 @@ class BackgroundJobs:
         share = COMPARE_SHARE if picture.engine is not None and not picture.stats.converged else 1.0
         if self.comparison.picture is None:
             share = max(share, FIRST_COMPARE_SHARE)
+        elif not picture.is_presentable:
+            share = 0.0  # a picture in blocks is compared with nothing
         self.comparison.advance(state, picture.engine, share * max(left, 0.0))
         if self.comparison.is_waiting and not state.interacting:
             time.sleep(REFERENCE_WAIT_S)

@@ -229,7 +229,8 @@ class Comparison:
         self._begun = None
 
     def advance(self, state: State, running: Engine | None, budget_s: float) -> None:
-        """Follow `state` and work for about `budget_s`; `running` is the engine whose picture is compared."""
+        """Follow `state` and work for about `budget_s`; `running` is the engine whose picture is compared. Without a
+        budget there is only the processor left to leave alone, once there is something to compare with."""
         self._compare = state.compare
         self._count_seconds(running, state.method)
         if not is_active(state.compare) or running is None:
@@ -254,8 +255,10 @@ class Comparison:
         if self._needs_reference:
             if self._thread is None:
                 self._start_reference(self._begun)
-            else:
+            elif budget_s > 0.0 or self._thread.snapshot is None:
                 self._thread.resume()
+            else:
+                self._thread.pause()
             self._compose(running, budget_s)
         else:
             self._pause()
@@ -342,6 +345,8 @@ class Comparison:
         if self._wish != self._given and not self._engine.is_busy:
             self._given, self._version_before = self._wish, self._engine.picture_version
         self._engine.set(replace(self._begun, method=self._method, scene=scene))
+        if budget_s <= 0.0:
+            return
         self._engine.advance(budget_s, False)
         self._count_seconds(self._engine, self._method)
 
@@ -350,7 +355,8 @@ class Comparison:
         the running picture say so."""
         if self._direct is None:
             return
-        self._direct.advance(budget_s)
+        if budget_s > 0.0:
+            self._direct.advance(budget_s)
         snapshot = self._thread.snapshot if self._thread is not None else None
         made_from = (0 if snapshot is None else snapshot.number, self._direct.version)
         if snapshot is None or self._direct.version == 0 or made_from == self._composed_from:
