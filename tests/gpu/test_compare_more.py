@@ -187,3 +187,29 @@ def test_the_reference_has_the_light_of_the_environment(gl, tmp_path: Path) -> N
     assert direct.rgb.sum() == pytest.approx(live.sum(), rel=0.02)
     direct.release()
     engine.release()
+
+
+def test_without_time_the_processor_is_left_to_the_picture(state, running, comparison) -> None:
+    """Once there is something to compare with: until then it goes on."""
+    compared = replace(state, compare=Compare(mode="wipe"))
+    comparison.advance(compared, running, 0.05)
+    comparison._thread.stop(wait=True)
+    asked: list[str] = []
+    comparison._thread = SimpleNamespace(
+        snapshot=None,
+        problem=None,
+        is_done=False,
+        fraction=0.0,
+        stop=lambda *_more: None,
+        pause=lambda: asked.append("pause"),
+        resume=lambda: asked.append("resume"),
+    )
+    version = comparison._direct.version
+    for _ in range(50):
+        comparison.advance(compared, running, 0.0)
+    assert set(asked) == {"resume"} and comparison._direct.version == version
+    height, width = SIZE[::-1]
+    dark = np.zeros((height, width, 3), np.float32)
+    comparison._thread.snapshot = Snapshot(1, dark, dark, np.ones((height, width), bool), 10, 0.5)
+    comparison.advance(compared, running, 0.0)
+    assert asked[-1] == "pause"
