@@ -3,8 +3,6 @@ magnifier."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as icons
@@ -16,6 +14,7 @@ from ..edit.state import Brush, Selection, State
 from ..model.scene import Camera, Scene, SceneObject
 from . import item_rects, theme
 from .compared_with import glass_object
+from .line_breaks import broken
 from .overlay import Canvas, box_corners, draw_box, draw_outlined, lines
 from .panels.methods import METHOD_NAMES
 from .panels.rows import tooltip
@@ -234,20 +233,8 @@ def draw_wipe(canvas: Canvas, state: State, view_model: ViewModel) -> None:
     gap, end = theme.em(1.0), canvas.left + canvas.width - theme.em(2.0 * RADIUS_EM + 2.0)
     _label(canvas, x - gap - imgui.calc_text_size(left).x, y, left)
     # Not under the axes in the corner: its parts stand below each other where they have no room beside each other.
-    right = stacked(right, end - x - gap, lambda text: imgui.calc_text_size(text).x)
+    right = broken(right, end - x - gap, lambda text: imgui.calc_text_size(text).x, at=", ")
     _label(canvas, min(x + gap, end - imgui.calc_text_size(right).x), y, right)
-
-
-def stacked(text: str, width: float, measure: Callable[[str], float]) -> str:
-    """`text` with its parts, which commas divide, in as few lines of `width` as they fit."""
-    lines_: list[str] = []
-    for part in text.split(", "):
-        longer = f"{lines_[-1]}, {part}" if lines_ else part
-        if lines_ and measure(longer) <= width:
-            lines_[-1] = longer
-        else:
-            lines_.append(part)
-    return "\n".join(lines_)
 
 
 def own_label(state: State) -> str:

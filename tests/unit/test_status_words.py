@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 from spectrasplat.render.viewer.stats import LiveStats
+from spectrasplat.ui.line_breaks import broken
 from spectrasplat.ui.panels.numbers import kelvin
 from spectrasplat.ui.panels.status_bar import progress_words
-from spectrasplat.ui.viewport_marks import stacked
 
 
 @pytest.mark.parametrize(
@@ -51,7 +51,13 @@ def test_a_colour_temperature_has_no_power_of_ten(temperature_k: float, said: st
 
 def test_a_label_s_parts_stand_below_each_other_where_they_have_no_room() -> None:
     said = "Reference, relMSE of its caustics > 1.0e-01, direct light 1 of 32 samples"
-    assert stacked(said, 100.0, len) == said
-    assert stacked(said, 50.0, len) == said.replace(", direct", "\ndirect")
-    assert stacked(said, 10.0, len) == said.replace(", ", "\n")
-    assert stacked("Even random wavelengths", 3.0, len) == "Even random wavelengths"
+    assert broken(said, 100.0, len, at=", ") == said
+    assert broken(said, 50.0, len, at=", ") == said.replace(", direct", "\ndirect")
+    assert broken(said, 10.0, len, at=", ") == said.replace(", ", "\n")
+
+
+def test_a_message_breaks_between_words_and_not_within_endings_of_files() -> None:
+    said = "notes.txt: '.txt' is not a kind of scene; use .toml, .glb, .gltf, .ply, .obj, .stl."
+    lines = broken(said, 66.0, len).splitlines()
+    assert " ".join(lines) == said and max(map(len, lines)) <= 66 and lines[1].startswith(".ply,")
+    assert broken("a_name_that_is_wider.png is saved", 10.0, len) == "a_name_that_is_wider.png\nis saved"
