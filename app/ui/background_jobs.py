@@ -63,7 +63,7 @@ class BackgroundJobs:
         self.gallery = Gallery(context, config, best_first(shipped_scenes()))
         self._histogram_s = -1e9
         self.engine_rests = False
-        """In the last frame it left all time to a finished picture."""
+        """In the last frame it left all time to an export."""
         self.notes: list[tuple[str, bool]] = []
         """Sentence, whether it is an error."""
 
@@ -79,8 +79,8 @@ class BackgroundJobs:
         return self._threads[name]
 
     def work(self, state: State, picture: LivePicture, budget_s: float) -> float:
-        """Let exports and comparison work; returns what is left of `budget_s` for the engine: nothing while somebody
-        waits for a finished picture and the one on the screen lacks nothing but photons."""
+        """Let exports and comparison work; returns what is left of `budget_s` for the engine: nothing while an
+        export runs, nobody touches anything, and the picture on the screen lacks nothing but photons."""
         started = time.perf_counter()
         self.export_on(budget_s)
         left = budget_s - (time.perf_counter() - started)
@@ -92,7 +92,8 @@ class BackgroundJobs:
         self.comparison.advance(state, picture.engine, share * max(left, 0.0))
         if self.comparison.is_waiting and not state.interacting:
             time.sleep(REFERENCE_WAIT_S)
-        self.engine_rests = self.exports.is_rendering and not state.interacting and picture.is_presentable
+        is_exporting = self.exports.job is not None
+        self.engine_rests = is_exporting and not state.interacting and picture.is_presentable
         if self.engine_rests:
             return 0.0
         return max(budget_s - (time.perf_counter() - started), 0.2 * budget_s)

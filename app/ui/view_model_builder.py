@@ -49,7 +49,7 @@ def view_model_of(session: Session) -> ViewModel:
         rays=session.jobs.overlay.rays,
         readings=session.jobs.overlay.readings,
         job=session.jobs.exports.job,
-        engine_rests=session.jobs.engine_rests and session.jobs.exports.is_rendering,
+        engine_rests=session.jobs.engine_rests and session.jobs.exports.job is not None,
         writing=session.jobs.exports.writing,
         exposure_ev=picture.exposure_ev,
         delta_s=session.delta_s,
