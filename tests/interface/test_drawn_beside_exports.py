@@ -174,7 +174,7 @@ def test_closing_waits_for_what_is_written_and_tells_what_could_not_be(tmp_path:
 def test_who_quits_while_something_is_exported_is_asked(session: Session, thread: ContextThread) -> None:
     with headless_viewer(Viewer(session)) as interface:
         interface.frame(LAYOUT_FRAMES + 3)
-        session.jobs.exports._job = slow_job(thread)
+        session.jobs.exports._job = slow_job(thread, steps=5)
         session.ask_to_close()
         interface.frame(3)
         assert not session.wants_to_close and session.asks_about_export
