@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -90,7 +91,7 @@ def _run(
     from ..ui.session import Session
     from ..ui.viewer import Viewer
 
-    session = Session(window.context, scene, window.engine, opening=opening)
+    session = Session(window.context, scene, window.engine, opening=opening, open_thread=window.open_thread)
     if theme is not None:
         preferences = replace(session.state.preferences, theme=theme)
         session.state = replace(session.state, preferences=preferences)
@@ -114,15 +115,26 @@ def _run(
         # Nobody can be asked: what is unsaved stays and is offered at the next start.
         if session.document.unsaved:
             session.autosave.write_now(session.document.scene, session.document.title, session.document.source)
-        session.release()
+        session.jobs.finish_export()
+        _tell(session.jobs.notes, session.release())
         return
     if screenshot is None:
         layout_memory.save()
         session.settings = replace(session.settings, window=place)
-        session.close()
+        _tell((), session.close())
     else:
         session.autosave.close()
         session.release()
+
+
+def _tell(notes: Iterable[tuple[str, bool]], unwritten: list[str]) -> None:
+    """What became of exports after the window was closed. Raises `UserError` for what could not be written."""
+    problems = [text for text, is_error in notes if is_error] + unwritten
+    for text, is_error in notes:
+        if not is_error:
+            print(text)
+    if problems:
+        raise UserError("; ".join(problems))
 
 
 def _take_screenshot(

@@ -79,7 +79,16 @@ class FullScreen:
 
 @dataclass(frozen=True)
 class CancelQuit:
-    """The answer "Cancel" to that question, and "Save" before it saves: stay open, ask no more."""
+    """The answer "Cancel" to that question, and "Save" before it saves: stay open, ask no more. Likewise to the
+    question about an export that is not finished."""
+
+
+@dataclass(frozen=True)
+class QuitAfterExport:
+    """Close once the running export is finished."""
+
+    stop: bool = False
+    """As soon as possible: with what is done."""
 
 
 @dataclass(frozen=True)
@@ -227,6 +236,7 @@ Request = (
     | GoTo
     | Quit
     | CancelQuit
+    | QuitAfterExport
     | FullScreen
     | Recover
     | SelectAt

@@ -4,12 +4,12 @@ the time."""
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from ..base.errors import UserError
 from ..base.paths import shipped_scenes
-from .compare import Comparison
-from .compared_with import Histogram
+from .compare import Comparison, engine_beside
 from .cursor_info import Cursor
 from .export import Exports, Shown
 from .gallery import Gallery, best_first
@@ -21,12 +21,20 @@ if TYPE_CHECKING:
     from ..edit import requests
     from ..edit.state import State
     from ..gpu.context import Context
+    from ..gpu.context_thread import ContextThread
     from .live_picture import LivePicture
 
 JOB_SHARE = 0.6
 """Of a frame's budget that a running export gets."""
 RENDER_SHARE = 0.95
 """Likewise a finished picture that somebody waits for."""
+OpenThread = Callable[[str], "ContextThread | None"]
+
+
+def _no_thread(_name: str) -> None:
+    return None
+
+
 HISTOGRAM_S = 1.0
 """Shortest time between two histograms: each reads two pictures."""
 FIRST_COMPARE_SHARE = 0.8
@@ -40,64 +48,90 @@ COMPARE_SHARE = 0.4
 class BackgroundJobs:
     """Owns them. `notes` collects sentences about what was finished, for the host to show."""
 
-    def __init__(self, context: Context, config: Path) -> None:
-        self.comparison = Comparison(context)
-        self.exports = Exports(context)
+    def __init__(self, context: Context, config: Path, open_thread: OpenThread = _no_thread) -> None:
+        """`open_thread`: opens a thread of that name, which has a context that shares `context`'s objects."""
+        self._open_thread = open_thread
+        self._threads: dict[str, ContextThread | None] = {}
+        self.comparison = Comparison(
+            context,
+            lambda context: engine_beside(context, open_thread("comparison")),
+            lambda: self._thread("reference"),
+        )
+        self.exports = Exports(context, lambda: self._thread("export"))
         self.overlay = RayOverlay(context)
         self.cursor = Cursor()
         self.gallery = Gallery(context, config, best_first(shipped_scenes()))
-        self.histogram: Histogram | None = None
-        """Of the picture and of what it is compared with."""
         self._histogram_s = -1e9
+        self.engine_rests = False
+        """In the last frame it left all time to an export."""
         self.notes: list[tuple[str, bool]] = []
         """Sentence, whether it is an error."""
 
     @property
     def is_busy(self) -> bool:
         """The window must not sleep."""
-        return self.exports.job is not None or self.comparison.is_busy
+        return self.exports.is_busy or self.comparison.is_busy
+
+    def _thread(self, name: str) -> ContextThread | None:
+        """The thread of that name, opened when it is first wanted."""
+        if name not in self._threads:
+            self._threads[name] = self._open_thread(name)
+        return self._threads[name]
 
     def work(self, state: State, picture: LivePicture, budget_s: float) -> float:
-        """Let exports and comparison work; returns what is left of `budget_s` for the engine."""
+        """Let exports and comparison work; returns what is left of `budget_s` for the engine: nothing while an
+        export runs, nobody touches anything, and the picture on the screen lacks nothing but photons."""
         started = time.perf_counter()
-        left = budget_s
-        if self.exports.job is not None:
-            try:
-                note = self.exports.step((RENDER_SHARE if self.exports.is_rendering else JOB_SHARE) * budget_s)
-            except UserError as error:
-                self.notes.append((str(error), True))
-            else:
-                if note is not None:
-                    self.notes.append((note, False))
-            left = budget_s - (time.perf_counter() - started)
+        self.export_on(budget_s)
+        left = budget_s - (time.perf_counter() - started)
         share = COMPARE_SHARE if picture.engine is not None and not picture.stats.converged else 1.0
         if self.comparison.picture is None:
             share = max(share, FIRST_COMPARE_SHARE)
+        elif not picture.is_presentable:
+            share = 0.0  # a picture in blocks is compared with nothing
         self.comparison.advance(state, picture.engine, share * max(left, 0.0))
         if self.comparison.is_waiting and not state.interacting:
             time.sleep(REFERENCE_WAIT_S)
+        is_exporting = self.exports.job is not None
+        self.engine_rests = is_exporting and not state.interacting and picture.is_presentable
+        if self.engine_rests:
+            return 0.0
         return max(budget_s - (time.perf_counter() - started), 0.2 * budget_s)
+
+    def export_on(self, budget_s: float) -> None:
+        """Let exports work, and hear what became of them."""
+        if not self.exports.is_busy:
+            return
+        try:
+            note = self.exports.step((RENDER_SHARE if self.exports.is_rendering else JOB_SHARE) * budget_s)
+        except UserError as error:
+            self.notes.append((str(error), True))
+        else:
+            if note is not None:
+                self.notes.append((note, False))
 
     def follow(self, state: State, drawn: State, picture: LivePicture, now_s: float) -> None:
         """After the picture is made: what lies under the cursor, where rays go. `drawn`: the state as
         the picture shows it. Raises `UserError`."""
         self.cursor.update(state, picture, now_s)
-        if not state.preferences.panels.compare:
-            self.histogram = None
-        elif now_s - self._histogram_s > HISTOGRAM_S:
+        if state.preferences.panels.compare and now_s - self._histogram_s > HISTOGRAM_S:
             self._histogram_s = now_s
-            self.histogram = self.comparison.histogram(picture.radiance, picture.exposure_ev)
+            self.comparison.count(picture.radiance, picture.exposure_ev)
         self.overlay.update(drawn)
 
     def export(self, request: requests.Export, state: State, picture: LivePicture) -> None:
         """Begin what `request` asks for. Raises `UserError`."""
-        if picture.shown is None or picture.radiance is None:
+        if picture.shown is None:
             raise UserError("there is no picture yet; wait a moment")
-        note = self.exports.begin(
-            request, state, Shown(picture.shown, picture.radiance, picture.exposure_ev, picture.stats.photons)
-        )
-        if note is not None:
-            self.notes.append((note, False))
+        shown = Shown(picture.shown, picture.radiance, picture.exposure_ev, picture.stats.photons)
+        self.exports.begin(request, state, shown)
+
+    def finish_export(self) -> None:
+        """End the running export with what is done by now, and wait for that; `notes` tell."""
+        if not self.exports.is_stopped:
+            self.cancel_export()
+        while self.exports.job is not None:
+            self.export_on(0.1)
 
     def cancel_export(self) -> None:
         """Stop the running export; what is finished stays."""
@@ -105,10 +139,15 @@ class BackgroundJobs:
         if note is not None:
             self.notes.append((note, False))
 
-    def release(self) -> None:
-        """End and free everything; before the engine is released."""
+    def release(self) -> list[str]:
+        """End and free everything, before the engine is released; sentences about what could not be written."""
         self.cursor.release()
-        self.exports.release()
+        problems = self.exports.release()
         self.comparison.release()
         self.overlay.release()
         self.gallery.release()
+        for thread in self._threads.values():
+            if thread is not None:
+                thread.close()
+        self._threads.clear()
+        return problems

@@ -7,7 +7,6 @@ picture without caustics; what is seen behind glass is not compared.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -17,53 +16,57 @@ import numpy as np
 from ..base.errors import UserError
 from ..edit.live_inputs import LiveInputs
 from ..edit.state import Selection
-from ..model.settings import RenderSettings
-from ..passes.camera import CameraPass
-from ..passes.spectrum_choice import Spectrum
-from ..render.device_scene import scene_buffers
-from ..render.shown_spectra import reflectance_classes
+from ..model.environment_sun import with_sun
 from ..render.solo import scene_seen
 from ..render.viewer.dirty_level import DirtyLevel
 from ..render.viewer.invalidation import dirty_level
-from .compared_with import FilePicture, GlassSwap, Histogram, histogram_of
+from .compared_with import FilePicture, GlassSwap, Histogram, Histograms
+from .direct_picture import SAMPLES, DirectPicture
 from .error_curves import ErrorCurves
 from .panels.methods import METHOD_NAMES
 from .reference_thread import MEASURED_FROM, ReferenceThread, Snapshot
 from .view_model import ErrorCurve
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     import moderngl
 
     from ..edit.state import Compare, State
     from ..gpu.context import Context
-    from ..model.scene import Camera, Scene, Vec3
+    from ..gpu.context_thread import ContextThread
+    from ..model.scene import Vec3
     from ..render.viewer.engine import LiveEngine
     from .live_picture import Engine
 
 REFERENCE, GLASS, FILE = "reference", "glass", "file"
 STAND_IN = "stochastic-even"
 """Takes the reference's place where that cannot be computed."""
-DIRECT_SAMPLES = (1, 4, 16, 32)
-"""Of the picture without caustics, at which it is shown anew: something at once, and it becomes finer."""
-DISPATCH_SECONDS = 0.012
 _NOTHING = (0, 0)
 STRIPE_PX, STRIPE_SHADE = 6, 0.25
 """Width of the stripes over what the reference does not hold, and the share of the picture's light that they leave."""
 
 
+def _no_thread() -> None:
+    return None
+
+
 class Comparison:
     """Owns the other picture. `advance` every frame; everything else may be read at any time."""
 
-    def __init__(self, context: Context, make_engine: Callable[[Context], LiveEngine] | None = None) -> None:
-        self._context = context
+    def __init__(
+        self,
+        context: Context,
+        make_engine: Callable[[Context], Engine] | None = None,
+        thread: Callable[[], ContextThread | None] = _no_thread,
+    ) -> None:
+        """`thread`: where the reference's direct light is computed, asked when it is first wanted; None for the
+        caller's own, with `context`."""
+        self._context, self._find_thread = context, thread
         self._make_engine = make_engine or _engine
         self._begun: LiveInputs | None = None
         """What it was begun for; the method is the running one's."""
         self._thread: ReferenceThread | None = None
-        self._engine: LiveEngine | None = None
-        self._direct: _DirectPicture | None = None
+        self._engine: Engine | None = None
+        self._direct: DirectPicture | None = None
         self._composed: moderngl.Texture | None = None
         self._composed_from = _NOTHING
         self._curves = ErrorCurves()
@@ -72,9 +75,12 @@ class Comparison:
         self.is_stale = False
         self._swap = GlassSwap()
         self._file = FilePicture(context)
+        self._histograms = Histograms()
         self._glass_problem: str | None = None
         self._wish: tuple[str, str] | None = None
-        """Method and glass that the engine was last given."""
+        """Method and glass that are wanted of the engine …"""
+        self._given: tuple[str, str] | None = None
+        """… and those that it was last given."""
         self._version_before: int | None = None
         """Of the engine's picture when it was given them."""
         self._size = (0, 0)
@@ -105,7 +111,9 @@ class Comparison:
     @property
     def _shows_another_wish(self) -> bool:
         """The engine's picture is still that of the glass or the method before: it must not carry this one's name."""
-        return self._engine is not None and self._engine.picture_version == self._version_before
+        if self._engine is None:
+            return False
+        return self._wish != self._given or self._engine.picture_version == self._version_before
 
     @property
     def label(self) -> str:
@@ -170,6 +178,8 @@ class Comparison:
             )
         if not snapshot.directly.all():
             note += " Striped: what is seen behind glass or in mirrors, which is not compared."
+        if self._begun.scene.render.bounces:
+            note += " What surfaces give to each other is not in it."
         if self._begun.local_gain and any(item.local_dispersion for item in self._begun.scene.objects):
             note += " The brush's local gain is not in it: it is not physical."
         return note
@@ -179,7 +189,8 @@ class Comparison:
         """It would use more time (the window must not sleep)."""
         if self._compare is None or not is_active(self._compare) or self.is_stale:
             return False
-        refers = self._thread is not None and not self._thread.is_done and self._thread.problem is None
+        thread = self._thread if self._needs_reference else None
+        refers = thread is not None and not thread.is_done and thread.problem is None
         return refers or (self._engine is not None and self._needs_engine and not self._engine.is_idle)
 
     @property
@@ -199,10 +210,16 @@ class Comparison:
         red, green, blue = (float(v) for v in np.frombuffer(data, np.float32))
         return red, green, blue
 
-    def histogram(self, own: moderngl.Texture | None, exposure_ev: float) -> Histogram | None:
-        """Of the picture and of what it is compared with; both are read from the device."""
+    @property
+    def histogram(self) -> Histogram | None:
+        """Of the picture and of what it is compared with, as last counted."""
+        return self._histograms.last if self.picture is not None else None
+
+    def count(self, own: moderngl.Texture | None, exposure_ev: float) -> None:
+        """Have the histogram counted anew, beside the window; both pictures are read from the device now."""
         other = self.picture
-        return None if own is None or other is None else histogram_of(_read(own), _read(other), exposure_ev)
+        if own is not None and other is not None and not self._histograms.is_counting:
+            self._histograms.ask(_read(own), _read(other), exposure_ev)
 
     # ---- work --------------------------------------------------------------------------------
 
@@ -212,7 +229,8 @@ class Comparison:
         self._begun = None
 
     def advance(self, state: State, running: Engine | None, budget_s: float) -> None:
-        """Follow `state` and work for about `budget_s`; `running` is the engine whose picture is compared."""
+        """Follow `state` and work for about `budget_s`; `running` is the engine whose picture is compared. Without a
+        budget there is only the processor left to leave alone, once there is something to compare with."""
         self._compare = state.compare
         self._count_seconds(running, state.method)
         if not is_active(state.compare) or running is None:
@@ -237,11 +255,15 @@ class Comparison:
         if self._needs_reference:
             if self._thread is None:
                 self._start_reference(self._begun)
-            else:
+            elif budget_s > 0.0 or self._thread.snapshot is None:
                 self._thread.resume()
+            else:
+                self._thread.pause()
+            self._compose(running, budget_s)
+        else:
+            self._pause()
         if self._needs_engine:
             self._advance_engine(running.target_photons, budget_s)
-        self._compose(running, budget_s)
         if state.compare.plot:
             self._measure(state, running)
 
@@ -252,6 +274,7 @@ class Comparison:
             self._engine.release()
             self._engine = None
         self._file.release()
+        self._histograms.release()
 
     @property
     def _file_text(self) -> str:
@@ -285,9 +308,9 @@ class Comparison:
         return not self._shows_reference and self._compare is not None and self._compare.method != FILE
 
     def _start_reference(self, begun: LiveInputs) -> None:
-        scene = scene_seen(begun.scene, begun.camera, begun.solo_nm)
+        scene = scene_seen(with_sun(begun.scene), begun.camera, begun.solo_nm)
         self._thread = ReferenceThread(scene, begun.width, begun.height)
-        self._direct = _DirectPicture(self._context, scene, begun)
+        self._direct = DirectPicture(self._context, self._find_thread(), scene, begun)
 
     def _pause(self) -> None:
         """Give the processor back; what there is stays."""
@@ -318,10 +341,12 @@ class Comparison:
             except UserError as error:
                 self._glass_problem = str(error)
                 return
-        wish = self._method, self._compare.glass if self._compare.method == GLASS else ""
-        if wish != self._wish:
-            self._wish, self._version_before = wish, self._engine.picture_version
+        self._wish = self._method, self._compare.glass if self._compare.method == GLASS else ""
+        if self._wish != self._given and not self._engine.is_busy:
+            self._given, self._version_before = self._wish, self._engine.picture_version
         self._engine.set(replace(self._begun, method=self._method, scene=scene))
+        if budget_s <= 0.0:
+            return
         self._engine.advance(budget_s, False)
         self._count_seconds(self._engine, self._method)
 
@@ -330,7 +355,8 @@ class Comparison:
         the running picture say so."""
         if self._direct is None:
             return
-        self._direct.advance(budget_s)
+        if budget_s > 0.0:
+            self._direct.advance(budget_s)
         snapshot = self._thread.snapshot if self._thread is not None else None
         made_from = (0 if snapshot is None else snapshot.number, self._direct.version)
         if snapshot is None or self._direct.version == 0 or made_from == self._composed_from:
@@ -361,7 +387,7 @@ class Comparison:
         words = f"relMSE of its caustics {'' if self._is_known(snapshot) else '> '}{snapshot.relmse:.1e}"
         if self._direct is None or self._direct.is_done:
             return words
-        return f"{words}, direct light {self._direct.samples} of {DIRECT_SAMPLES[-1]} samples"
+        return f"{words}, direct light {self._direct.samples} of {SAMPLES[-1]} samples"
 
     def _measure(self, state: State, running: Engine) -> None:
         engines = {state.method: running}
@@ -390,60 +416,6 @@ def is_active(compare: Compare) -> bool:
     return compare.mode != "off" or compare.plot
 
 
-class _DirectPicture:
-    """What is seen directly in direct light, without any caustic."""
-
-    def __init__(self, context: Context, scene: Scene, inputs: LiveInputs) -> None:
-        settings = RenderSettings(width=inputs.width, height=inputs.height, method=inputs.method)
-        self._buffers = scene_buffers(context, scene, settings)
-        reflectances, _ = reflectance_classes(scene, self._buffers)
-        self._camera_pass = CameraPass(context, self._buffers, "beauty", reflectances)
-        self._camera_pass.dispatch_seconds = DISPATCH_SECONDS
-        self._camera_pass.spectrum = Spectrum()  # what is seen directly alone needs no bands
-        self._camera_pass.primary_samples = 1
-        self._camera_pass.only_directly = True
-        self._steps = self._sampled(scene.camera, inputs)
-        self._rgb: np.ndarray | None = None
-        self.version = 0
-        """0 while there is nothing; another number for another `rgb`."""
-
-    @property
-    def is_done(self) -> bool:
-        """It becomes no better."""
-        return self.version == len(DIRECT_SAMPLES)
-
-    @property
-    def samples(self) -> int:
-        """Of a pixel of `rgb`; 0 while there is none."""
-        return DIRECT_SAMPLES[self.version - 1] if self.version else 0
-
-    def _sampled(self, camera: Camera, inputs: LiveInputs) -> Iterator[float]:
-        """Without maps."""
-        view, taken = (camera, inputs.width, inputs.height), 0
-        for samples in DIRECT_SAMPLES:
-            yield from self._camera_pass.samples(*view, samples - taken, taken, None, inputs.seed)
-            taken = samples
-            self._rgb = self._camera_pass.read_rgb()
-            self.version += 1
-
-    def advance(self, budget_s: float) -> None:
-        """Work for about `budget_s`, one dispatch at least."""
-        started = time.perf_counter()
-        while next(self._steps, None) is not None and time.perf_counter() - started < budget_s:
-            pass
-
-    @property
-    def rgb(self) -> np.ndarray:
-        """float32 (H, W, 3), from the first version on."""
-        assert self._rgb is not None
-        return self._rgb
-
-    def release(self) -> None:
-        """Free everything."""
-        self._camera_pass.release()
-        self._buffers.release()
-
-
 def _counted(photons: int) -> str:
     return f"{photons / 1e6:.1f} million photons" if photons >= 100_000 else f"{photons:,} photons"
 
@@ -453,6 +425,13 @@ def _read(picture: moderngl.Texture) -> np.ndarray:
     texels = np.empty((picture.height, picture.width, 4), np.float32)
     picture.read_into(texels)
     return texels[..., :3]
+
+
+def engine_beside(context: Context, thread: ContextThread | None) -> Engine:
+    """An engine for what is compared with; on `thread`, where there is one."""
+    from ..render.viewer.threaded_engine import ThreadedEngine
+
+    return _engine(context) if thread is None else ThreadedEngine(context, thread, _engine)
 
 
 def _engine(context: Context) -> LiveEngine:

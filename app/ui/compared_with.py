@@ -3,6 +3,7 @@ file; and what two pictures say of each other, pixel by pixel and as histograms.
 
 from __future__ import annotations
 
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -122,12 +123,45 @@ def resized(rgb: np.ndarray, size: tuple[int, int]) -> np.ndarray:
     return np.stack([np.asarray(channel.resize(size, resample)) for channel in channels], axis=-1)
 
 
+class Histograms:
+    """Of the picture and of what it is compared with, counted beside the window."""
+
+    def __init__(self) -> None:
+        self._pool: ThreadPoolExecutor | None = None
+        self._asked: Future[Histogram] | None = None
+        self._last: Histogram | None = None
+
+    @property
+    def is_counting(self) -> bool:
+        """The last question has no answer yet."""
+        return self._asked is not None and not self._asked.done()
+
+    @property
+    def last(self) -> Histogram | None:
+        """The answer to the last question that has one."""
+        if self._asked is not None and self._asked.done():
+            self._last, self._asked = self._asked.result(), None
+        return self._last
+
+    def ask(self, own: np.ndarray, other: np.ndarray, exposure_ev: float) -> None:
+        """As of `histogram_of`."""
+        self._pool = self._pool or ThreadPoolExecutor(1, thread_name_prefix="histogram")
+        self._asked = self._pool.submit(histogram_of, own, other, exposure_ev)
+
+    def release(self) -> None:
+        """End the thread and forget what it counted."""
+        if self._pool is not None:
+            self._pool.shutdown()
+        self._pool = self._asked = self._last = None
+
+
 def histogram_of(own: np.ndarray, other: np.ndarray, exposure_ev: float) -> Histogram:
     """Of two linear pictures (h, w, 3) as exposed; black pixels are in no bin."""
     edges = np.linspace(*HISTOGRAM_STOPS, HISTOGRAM_BINS + 1)
     shares = []
     for rgb in (own, other):
-        luminance = rgb.reshape(-1, 3) @ LUMINANCE
+        # Not a product of matrices: those of several threads wait for each other, and the reference has long ones.
+        luminance = sum(weight * rgb[..., i].ravel() for i, weight in enumerate(LUMINANCE))
         lit = luminance[luminance > 0.0]
         stops = np.log2(np.maximum(lit, 1e-30)) + exposure_ev
         shares.append(np.histogram(np.clip(stops, *HISTOGRAM_STOPS), edges)[0] / max(len(luminance), 1))

@@ -1,21 +1,18 @@
-"""Screenshots at once; spectral pictures, baked maps and animations as one background job that works a little in every
-frame."""
+"""Screenshots, which are only written; finished pictures, spectral ones, baked maps and animations as one job that
+works beside the window."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterator
-from dataclasses import dataclass
-from datetime import datetime, timedelta
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..base.atomic import atomic_output, check_writable
+from ..base.atomic import check_writable
 from ..base.errors import UserError
 from ..base.glare import with_glare
-from ..base.image_io import SHOWN_SUFFIXES, check_finite, check_suffix, save_codes, write_image
+from ..base.image_io import check_suffix, write_image
 from ..base.memory import MAX_SIDE_PX, check_picture_memory
 from ..edit import requests
 from ..edit.parameters import Stage
@@ -25,39 +22,34 @@ from ..model.scene import RenderDefaults
 from ..model.settings import RenderSettings
 from ..passes.display import Display
 from ..render.notices import FrameNotices, frame_notices
+from .export_job import ExportJob, Words
+from .file_writer import FileWriter
 from .render_job import Course
+from .screenshot import Shown, screenshot, texture_codes, write_codes
 from .view_model import JobInfo
 
 if TYPE_CHECKING:
-    import moderngl
-
     from ..gpu.context import Context
+    from ..gpu.context_thread import ContextThread
 
 SPECTRAL_BINS = 20
 MIN_PHOTONS = 1_000_000
 MAX_PHOTONS = 64_000_000
 
 
-@dataclass(frozen=True)
-class Shown:
-    """What is on the screen."""
-
-    codes: moderngl.Texture
-    """RGBA8, sRGB, row 0 on top."""
-    radiance: moderngl.Texture
-    """RGBA32F, linear Rec.709, row 0 on top."""
-    exposure_ev: float
-    """Absolute, the one in use."""
-    photons: int = 0
-    """In the picture."""
+def _no_thread() -> None:
+    return None
 
 
 class Exports:
-    """Runs one job at a time. `begin` and `step` return a sentence when something is finished."""
+    """Writes screenshots, as many as are asked for, and runs one longer job at a time. Both work beside the window;
+    what became of them `step` returns."""
 
-    def __init__(self, context: Context) -> None:
-        self._context = context
-        self._job: _Job | None = None
+    def __init__(self, context: Context, thread: Callable[[], ContextThread | None] = _no_thread) -> None:
+        """`thread`: where jobs work, asked when the first begins; None for the caller's own, with `context`."""
+        self._context, self._find_thread = context, thread
+        self._writer = FileWriter()
+        self._job: ExportJob | None = None
 
     @property
     def is_rendering(self) -> bool:
@@ -65,23 +57,46 @@ class Exports:
         return self._job is not None and self._job.is_picture
 
     @property
+    def is_stopped(self) -> bool:
+        """The running job ends with what is done."""
+        return self._job is not None and self._job.is_stopped
+
+    @property
+    def is_busy(self) -> bool:
+        """Something has yet to be written."""
+        return self._job is not None or self._writer.is_busy
+
+    @property
     def job(self) -> JobInfo | None:
         """The running job, for panels."""
         return None if self._job is None else self._job.view_model
 
-    def begin(self, request: requests.Export, state: State, shown: Shown) -> str | None:
-        """Carry out `request`, or start it. Raises `UserError`; a running job is not disturbed."""
+    @property
+    def writing(self) -> str:
+        """Which screenshot takes long to be written, in words; empty without one."""
+        return self._writer.words
+
+    def begin(self, request: requests.Export, state: State, shown: Shown) -> None:
+        """Begin what `request` asks for. Raises `UserError`; a running job is not disturbed."""
         if isinstance(request, requests.Screenshot) and not request.spectral:
-            return save_screenshot(request.path, shown)
+            check_suffix(request.path)
+            check_writable(request.path)
+            self.write(request.path, screenshot(request.path, shown))
+            return
         if self._job is not None:
             raise UserError("an export is running already: wait for it, or cancel it first")
         self._job = self._made(request, state, shown)
-        return None
+
+    def write(self, path: Path, work: Callable[[], None]) -> None:
+        """Let `work`, which needs no OpenGL, write `path` beside the window."""
+        self._writer.write(path, work, f"Saved {path.name} in {path.parent}.")
 
     def step(self, budget_s: float) -> str | None:
-        """Work on the job for about `budget_s`. Raises `UserError` when it fails; it is over then."""
-        if self._job is None:
-            return None
+        """Work on the job for about `budget_s`; a sentence when something is finished. Raises `UserError` when it
+        fails; it is over then."""
+        written = self._writer.finished()
+        if written is not None or self._job is None:
+            return written
         try:
             note = self._job.step(budget_s)
         except BaseException:
@@ -92,11 +107,11 @@ class Exports:
         return note
 
     def cancel(self) -> str | None:
-        """End the job; what is finished stays."""
-        if self._job is None:
-            return None
-        job, self._job = self._job, None
-        return job.cancel()
+        """End the job; what is finished stays. None where that takes a moment: `step` tells then."""
+        note = None if self._job is None else self._job.cancel()
+        if note is not None:
+            self._job = None
+        return note
 
     def stop(self) -> str | None:
         """End the job as soon as it can keep what is done: a picture is written with the light that it has by then.
@@ -105,170 +120,47 @@ class Exports:
             return None
         return self.cancel()
 
-    def release(self) -> None:
-        """End the job."""
-        self.cancel()
+    def release(self) -> list[str]:
+        """End the job, and wait for what is being written; sentences about what could not be."""
+        if self._job is not None:
+            self._job.release()
+            self._job = None
+        return self._writer.release()
 
-    def _made(self, request: requests.Export, state: State, shown: Shown) -> _Job:
+    def _made(self, request: requests.Export, state: State, shown: Shown) -> ExportJob:
         stage = Stage(state.scene, state.camera, shown.exposure_ev, state.solo_nm)
         name, notices = request.path.name, FrameNotices()
+        thread = self._find_thread()
+        context = self._context if thread is None else thread.context
+        nothing = "Nothing was written: {} is whole or not at all.".format
         if isinstance(request, requests.Screenshot):
-            work = _spectral(self._context, request.path, stage, state, shown.photons, notices)
-            return _Job(
-                f"Spectral picture: {name}",
-                work,
-                f"Saved {name}.",
-                "Nothing was written: a picture is whole or not at all.",
-                notices,
-            )
+            work = _spectral(context, request.path, stage, state, shown.photons, notices)
+            words = Words(f"Spectral picture: {name}", f"Saved {name}.", nothing("a picture"))
+            return ExportJob(words, work, notices, thread)
         if isinstance(request, requests.Bake):
-            work = _bake(self._context, request, stage, state, notices)
-            return _Job(
-                f"Caustic map: {name}",
-                work,
-                f"Baked {name}; its place is in {request.path.with_suffix('.json').name}.",
-                "Nothing was written: a map is whole or not at all.",
-                notices,
-            )
+            work = _bake(context, request, stage, state, notices)
+            place = request.path.with_suffix(".json").name
+            words = Words(f"Caustic map: {name}", f"Baked {name}; its place is in {place}.", nothing("a map"))
+            return ExportJob(words, work, notices, thread)
         if isinstance(request, requests.RenderPicture):
             course = Course()
-            return _Job(
+            work = _render(context, request, stage, state, notices, course)
+            words = Words(
                 f"Rendering {name}",
-                _render(self._context, request, stage, state, notices, course),
                 f"Rendered {name}.",
-                "Nothing was written: a picture is whole or not at all.",
-                notices,
-                seconds=request.seconds,
-                course=course,
+                nothing("a picture"),
+                "it is written with the light that it has by then",
             )
-        work, frames = _animate(self._context, request, stage, state, notices)
+            return ExportJob(words, work, notices, thread, seconds=request.seconds, course=course)
+        work, frames = _animate(context, request, stage, state, notices)
         title = "Turntable" if request.kind == "turntable" else "Animation"
-        return _Job(
+        words = Words(
             f"{title}: {name}",
-            work,
             f"Saved {name}, {frames} frames.",
             f"Stopped {name}; the frames that are done stay.",
-            notices,
-            frames,
+            "the frames that are done stay",
         )
-
-
-class _Job:
-    """A generator of shares, with a note about it."""
-
-    def __init__(
-        self,
-        title: str,
-        work: Iterator[float],
-        finished: str,
-        cancelled: str,
-        notices: FrameNotices,
-        frames: int = 0,
-        seconds: float | None = None,
-        course: Course | None = None,
-    ) -> None:
-        """`seconds`: that it takes, where that is known; `course`: of a finished picture."""
-        self._course = course
-        self._title, self._work, self._notices = title, work, notices
-        self._finished, self._cancelled = finished, cancelled
-        self._frames = frames
-        self._fraction, self._seconds = 0.0, seconds
-        self._started_s = time.monotonic()
-
-    @property
-    def is_picture(self) -> bool:
-        """A finished picture, in which everything goes into one file."""
-        return self._course is not None
-
-    @property
-    def is_stopped(self) -> bool:
-        return self._course is not None and self._course.is_stopped
-
-    @property
-    def view_model(self) -> JobInfo:
-        return JobInfo(self._title, self._fraction, self._text(), self.is_stopped)
-
-    def stop(self) -> bool:
-        """Whether it will end by itself with what is done."""
-        if self._course is None or self._course.is_stopped:
-            return False
-        self._course.is_stopped = True
-        return True
-
-    def step(self, budget_s: float) -> str | None:
-        started = time.perf_counter()
-        try:
-            while time.perf_counter() - started < budget_s:
-                self._fraction = max(self._fraction, next(self._work))
-        except StopIteration:
-            early = " It was stopped early, and is what was done until then." if self.is_stopped else ""
-            return self._told(self._finished + early)
-        return None
-
-    def cancel(self) -> str:
-        close = getattr(self._work, "close", None)
-        if close is not None:
-            close()
-        return self._told(self._cancelled)
-
-    def _told(self, sentence: str) -> str:
-        """With what the pictures say of themselves."""
-        notices = self._notices.lines(of_frames=self._frames > 1)
-        return " ".join([sentence, *(f"Note: {notice}." for notice in notices)])
-
-    def _text(self) -> str:
-        if self.is_stopped:
-            return "Finishing with what is done so far"
-        phase = "tracing photons and taking camera samples" if self._course is None else self._course.phase
-        frame = (
-            f"Frame {min(int(self._fraction * self._frames) + 1, self._frames)} of {self._frames}"
-            if self._frames
-            else phase[:1].upper() + phase[1:]
-        )
-        left = self._left_s()
-        return frame if left is None else f"{frame}, {left_words(left, datetime.now().astimezone())}"
-
-    def _left_s(self) -> float | None:
-        """Seconds until it ends at the pace so far; None where that is not known yet."""
-        worked = time.monotonic() - self._started_s
-        if self._seconds is not None:
-            return max(self._seconds - worked, 0.0)
-        return None if self._fraction < 0.02 else worked * (1.0 - self._fraction) / self._fraction
-
-
-def left_words(left_s: float, now: datetime) -> str:
-    """ "about 40 s left, until 14:05"."""
-    about = f"{left_s:.0f} s" if left_s < 90 else f"{left_s / 60:.0f} min"
-    return f"about {about} left, until {now + timedelta(seconds=left_s):%H:%M}"
-
-
-def save_screenshot(path: Path, shown: Shown) -> str:
-    """Write what is shown: .png, .jpg and .webp as on the screen, .exr and .npy linear without tone curve. Returns the
-    sentence to tell."""
-    if check_suffix(path) in SHOWN_SUFFIXES:
-        check_finite(path.name, _texels(shown.radiance))
-        write_codes(path, texture_codes(shown.codes))
-    else:
-        write_image(path, _texels(shown.radiance))
-    return f"Saved {path.name}."
-
-
-def write_codes(path: Path, codes: np.ndarray) -> None:
-    """Write uint8 (H, W, 3) sRGB codes, row 0 on top; for pictures of the whole window too."""
-    with atomic_output(path) as temporary:
-        save_codes(temporary, codes)
-
-
-def texture_codes(texture: moderngl.Texture) -> np.ndarray:
-    """uint8 (H, W, 3) of an RGBA8 texture whose row 0 is the top."""
-    raw = np.frombuffer(texture.read(alignment=1), np.uint8)
-    return np.ascontiguousarray(raw.reshape(texture.height, texture.width, 4)[..., :3])
-
-
-def _texels(texture: moderngl.Texture) -> np.ndarray:
-    texels = np.empty((texture.height, texture.width, 4), np.float32)
-    texture.read_into(texels)
-    return np.ascontiguousarray(texels[..., :3])
+        return ExportJob(words, work, notices, thread, frames)
 
 
 def _settings(state: State, size: tuple[int, int], photons: int, **changes: Any) -> RenderSettings:

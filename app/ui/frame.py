@@ -75,9 +75,10 @@ def _carry_out(session: Session, request: requests.Request) -> None:
 
 def _work(session: Session, budget_s: float, slice_s: float) -> None:
     """Let the engine work and show its picture."""
-    session.engine_s = 0.0
+    session.engine_s = session.jobs_s = 0.0
     if session.state.preferences.panels.start_page:  # which covers the picture, and behind which there is no layout yet
         session.frames = -LAYOUT_FRAMES  # it is made from nothing: its tabs take twice as long to find their widths
+        _work_beside(session, budget_s, only_exports=True)
         return
     session.frames += 1
     if session.frames <= LAYOUT_FRAMES:
@@ -108,9 +109,13 @@ def _work(session: Session, budget_s: float, slice_s: float) -> None:
         session.renderer_stopped(error)
 
 
-def _work_beside(session: Session, budget_s: float) -> float:
+def _work_beside(session: Session, budget_s: float, only_exports: bool = False) -> float:
     """Exports and comparison; returns the time that is left."""
+    started = session.clock()
     try:
+        if only_exports:
+            session.jobs.export_on(budget_s)
+            return budget_s
         return session.jobs.work(session.drawn.of(session.state), session.picture, budget_s)
     except Exception as error:  # noqa: BLE001 - a bug in a side line must not stop the picture
         session.jobs.exports.cancel()
@@ -121,7 +126,9 @@ def _work_beside(session: Session, budget_s: float) -> float:
         session.state = replace(session.state, compare=replace(session.state.compare, mode="off", plot=False))
         return budget_s
     finally:
+        session.jobs_s = session.clock() - started
         for text, is_error in session.jobs.notes:
+            session.quits_after_export &= not is_error
             session.messages.tell(sentence(text), is_error)
         session.jobs.notes.clear()
 

@@ -99,6 +99,13 @@ class LivePicture:
         return self.engine is not None and self.engine.is_busy
 
     @property
+    def is_presentable(self) -> bool:
+        """It shows what is wanted, whole, if with few photons."""
+        stats = self.stats
+        lacks = self.shown is None or self.radiance is None or stats.differs or stats.preparing
+        return not lacks and stats.resolution_scale == 1.0
+
+    @property
     def problem(self) -> str | None:
         """Why the engine could not follow the last change; it shows what was before."""
         return self.engine.problem if self.engine is not None else None
@@ -156,7 +163,7 @@ class LivePicture:
         """Let the engine follow `state`. Raises `EngineError`.
 
         It works in slices of `slice_s`: not beyond the one in which another picture is made, or after which `stops()`,
-        or which it had little to do in."""
+        or which it had little to do in. Without a budget it works only on what has changed."""
         if self.engine is None:
             return
         with self._guarded():
@@ -164,7 +171,9 @@ class LivePicture:
             self.engine.target_photons = state.preferences.target_photons
             self.engine.refine_when_still = state.preferences.refine_when_still
             if self.engine.set(state.live_inputs) != DirtyLevel.NOTHING:
-                budget_s = min(budget_s, slice_s)  # what is under way now has to be told
+                budget_s = min(budget_s or slice_s, slice_s)  # what is under way now has to be told
+            elif budget_s <= 0.0:
+                return
             self.stats = self._advance(self.engine, state.interacting, budget_s, slice_s, stops)
             if not self.is_busy:
                 self.awaits_scene &= self.stats.shows_other and self.problem is None

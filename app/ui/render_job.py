@@ -107,6 +107,8 @@ def _work(
             pictures.append(renderer.picture)
     finally:
         renderer.release()
+    course.phase = "writing the picture"
+    yield 0.98
     for target, picture in zip(targets, pictures, strict=True):
         if target.suffix.lower() in SHOWN_SUFFIXES:
             check_finite(target.name, picture.rgb)

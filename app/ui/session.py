@@ -24,12 +24,12 @@ from ..gpu.shader_watch import ShaderWatch
 from ..model.staging import Staging
 from ..render.notices import loss_notices
 from . import layout
-from .background_jobs import BackgroundJobs
+from .background_jobs import BackgroundJobs, OpenThread
 from .crash_log import write_crash
-from .export import write_codes
 from .live_picture import EngineError, LivePicture
 from .message_box import MessageBox
-from .sentences import brief, sentence
+from .screenshot import write_codes
+from .sentences import brief
 
 if TYPE_CHECKING:
     import numpy as np
@@ -58,7 +58,9 @@ class Session:
         make_engine: Callable[[Context], Engine] | None = None,
         clock: Callable[[], float] = time.monotonic,
         opening: Opening | None = None,
+        open_thread: OpenThread | None = None,
     ) -> None:
+        """`open_thread`: as of `BackgroundJobs`."""
         self.context = context
         self.settings, notice = load_settings()
         self._kept_settings = self.settings
@@ -70,17 +72,21 @@ class Session:
         self.recovery: Recovery | None = next(iter(recoveries(config_dir())), None)
         self.picture = LivePicture(context, make_engine)
         self.drawn = Drawn()
-        self.jobs = BackgroundJobs(context, config_dir())
+        self.jobs = BackgroundJobs(context, config_dir(), *(() if open_thread is None else (open_thread,)))
         self.window_picture: Path | None = None
         """Where a picture of the whole window is to be written once this frame is drawn."""
         self.interface_scale = self.framebuffer_scale = 1.0
-        self.asks_to_quit = False
+        self.asks_to_quit = self.asks_about_export = False
+        self.quits_after_export = False
+        """Somebody wants to quit, and waits for what is being exported."""
+        self._discarded: Scene | None = None
+        """What may be lost, as somebody has said."""
         self.is_full_screen = False
         """Wanted of the window."""
         self.wants_to_close = False
         self.frame_ms: deque[float] = deque(maxlen=FRAMES_REMEMBERED)
         self.interface_s = 0.0
-        self.engine_s = 0.0
+        self.engine_s = self.jobs_s = 0.0
         self.clock = clock
         self.input_waits: Callable[[], bool] = lambda: False
         """Whether there is input that the next frame will see."""
@@ -129,6 +135,9 @@ class Session:
     def finished(self) -> None:
         """After the frame is on the screen."""
         self._keep_settings()
+        if self.quits_after_export and self.jobs.exports.job is None:
+            self.quits_after_export = False
+            self.quit()
         self.frame_ms.append(1000.0 * (self.clock() - self._frame_started))
 
     def wait_s(self) -> float:
@@ -248,33 +257,37 @@ class Session:
 
     def ask_to_close(self) -> None:
         """The window's close button was pressed."""
-        self.quit(discard=False)
+        self.quit()
 
-    def quit(self, discard: bool) -> None:
-        """Close, or ask first where work is unsaved and not to be discarded."""
-        if self.document.unsaved and not discard:
+    def quit(self, discard: bool = False) -> None:
+        """Close, or ask first where work is unsaved and not to be discarded, or an export is not finished."""
+        if discard:
+            self._discarded, self.asks_to_quit = self.document.scene, False
+        if self.document.unsaved and self.document.scene is not self._discarded:
             self.asks_to_quit = True
+        elif self.jobs.exports.job is not None:
+            self.asks_about_export = True
         else:
             self.wants_to_close = True
+
+    def stay(self) -> None:
+        """Do not close after all; ask again next time."""
+        self.asks_to_quit = self.asks_about_export = self.quits_after_export = False
+        self._discarded = None
 
     def _remember_file(self, path: Path | None) -> None:
         if path is not None:
             self.settings = self.settings.opened(path)
 
     def write_window_picture(self, path: Path, codes: np.ndarray) -> None:
-        """Write the whole window, uint8 (h, w, 3), as a PNG."""
-        try:
-            write_codes(path, codes)
-        except UserError as error:
-            self.messages.tell(sentence(str(error)), is_error=True)
-        else:
-            self.messages.tell(f"Saved {path.name} in {path.parent}.")
+        """Write the whole window, uint8 (h, w, 3), as a PNG, beside it."""
+        self.jobs.exports.write(path, lambda: write_codes(path, codes))
 
-    def close(self) -> None:
-        """The end in good order: settings are remembered, nothing is left to recover."""
+    def close(self) -> list[str]:
+        """The end in good order: settings are remembered, nothing is left to recover. As `release`."""
         self.autosave.close()
         self._keep_settings()
-        self.release()
+        return self.release()
 
     def _keep_settings(self) -> None:
         """Write what is remembered as soon as it changes, but not while something is dragged: a crash costs none of
@@ -284,10 +297,11 @@ class Session:
             with suppress(UserError):
                 save_settings(self.settings)
 
-    def release(self) -> None:
-        """Free what the device holds."""
-        self.jobs.release()
+    def release(self) -> list[str]:
+        """Free what the device holds, once what was asked for is written; sentences about what could not be."""
+        problems = self.jobs.release()
         self.picture.release()
+        return problems
 
 
 def _first_state(scene: Scene, settings: Settings, welcome: bool) -> State:

@@ -76,7 +76,13 @@ def _full_screen(session: Session, _request: requests.FullScreen) -> None:
 
 
 def _cancel_quit(session: Session, _request: requests.CancelQuit) -> None:
-    session.asks_to_quit = False
+    session.stay()
+
+
+def _quit_after_export(session: Session, request: requests.QuitAfterExport) -> None:
+    session.asks_about_export, session.quits_after_export = False, True
+    if request.stop and not session.jobs.exports.is_stopped:
+        session.jobs.cancel_export()
 
 
 def _recover(session: Session, request: requests.Recover) -> None:
@@ -210,6 +216,7 @@ _HANDLERS: dict[type, Callable] = {
     requests.GoTo: _go_to,
     requests.Quit: _quit,
     requests.CancelQuit: _cancel_quit,
+    requests.QuitAfterExport: _quit_after_export,
     requests.FullScreen: _full_screen,
     requests.Recover: _recover,
     requests.SelectAt: _select_at,

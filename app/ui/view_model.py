@@ -84,6 +84,8 @@ class JobInfo:
     text: str
     is_stopped: bool = False
     """It ends with what is done, as soon as that is a picture."""
+    when_stopped: str = "what is done is kept"
+    """What becomes of it where it is stopped now."""
 
 
 @dataclass(frozen=True)
@@ -125,6 +127,8 @@ class ViewModel:
     """Whose it is, and when it was written."""
     asks_to_quit: bool = False
     """Unsaved changes: the dialogue with Save, Discard and Cancel is open."""
+    asks_about_export: bool = False
+    """Somebody wants to quit while an export runs: the dialogue with Finish, Stop and Cancel is open."""
     curves: tuple[ErrorCurve, ...] = ()
     reference_progress: float | None = None
     """How far the picture that compare modes show is, 0 to 1; None where none was begun."""
@@ -144,6 +148,10 @@ class ViewModel:
     readings: tuple[RayReading, ...] = ()
     """What those rays say in numbers."""
     job: JobInfo | None = None
+    engine_rests: bool = False
+    """All time is the job's: somebody waits for it."""
+    writing: str = ""
+    """Which screenshot takes long to be written."""
     exposure_ev: float = 0.0
     """The exposure in use, automatic or not."""
     delta_s: float = 1 / 60

@@ -41,7 +41,7 @@ class Viewer:
 
     def rendered(self) -> None:
         """imgui has drawn; the screen has not been waited for."""
-        self.pace.note(time.perf_counter() - self._drawn_at - self.session.engine_s)
+        self.pace.note(time.perf_counter() - self._drawn_at - self.session.engine_s - self.session.jobs_s)
 
     def finished(self, take_picture: Callable[[], np.ndarray]) -> None:
         """The frame is on the screen; `take_picture` gives it as uint8 (h, w, 3), top row first."""

@@ -14,10 +14,12 @@ from ..edit.state import Brush, Selection, State
 from ..model.scene import Camera, Scene, SceneObject
 from . import item_rects, theme
 from .compared_with import glass_object
+from .line_breaks import broken
 from .overlay import Canvas, box_corners, draw_box, draw_outlined, lines
 from .panels.methods import METHOD_NAMES
 from .panels.rows import tooltip
 from .panels.spectral_colour import colour_of_nm
+from .view_axes import RADIUS_EM
 from .view_model import CursorInfo, ViewModel
 
 _RING_COLOURS = {"widen": (1.0, 0.84, 0.45, 0.95), "narrow": (0.55, 0.80, 1.0, 0.95), "erase": (1.0, 0.55, 0.50, 0.95)}
@@ -228,9 +230,11 @@ def draw_wipe(canvas: Canvas, state: State, view_model: ViewModel) -> None:
     lacks_file = state.compare.method == "file" and state.compare.file is None
     missing = "No picture chosen: this is the same one" if lacks_file else "On its way: this is the same picture"
     right = view_model.compare_label if view_model.compare_ready else missing
-    gap = theme.em(1.0)
+    gap, end = theme.em(1.0), canvas.left + canvas.width - theme.em(2.0 * RADIUS_EM + 2.0)
     _label(canvas, x - gap - imgui.calc_text_size(left).x, y, left)
-    _label(canvas, x + gap, y, right)
+    # Not under the axes in the corner: its parts stand below each other where they have no room beside each other.
+    right = broken(right, end - x - gap, lambda text: imgui.calc_text_size(text).x, at=", ")
+    _label(canvas, min(x + gap, end - imgui.calc_text_size(right).x), y, right)
 
 
 def own_label(state: State) -> str:

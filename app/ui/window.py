@@ -25,6 +25,7 @@ from ..edit.preferences import WindowPlace
 from ..edit.state import Preferences
 from ..gpu import unlocked
 from ..gpu.context import GL_VERSION, GL_VERSION_CODE, Context
+from ..gpu.context_thread import ContextThread
 from . import theme
 from .imgui_host import ImguiHost
 
@@ -113,7 +114,11 @@ class Window:
         # A GPU waits for the screen; on the processor waiting would be time taken from the photons.
         glfw.swap_interval(0 if self.context.is_software else 1)
         self._screen = self.context.ctx.detect_framebuffer(0)
-        self._hidden = _beside(self._handle)
+        self._threads: list[ContextThread] = []
+        self._hidden: list[Any] = []
+        """Windows of these threads."""
+        self._free: list[Any] = []
+        """Those whose thread has ended."""
         self._engine: ThreadedEngine | None = None
         self._settling = SETTLE_FRAMES
         self._dropped: list[Path] = []
@@ -141,11 +146,14 @@ class Window:
         self._host.make_current()
         imgui.backends.glfw_shutdown()
         self._host.release()
-        if self._engine is not None:  # whose thread has the hidden window, also where an error ended the session
+        if self._engine is not None:  # also where an error ended the session
             with suppress(Exception):
                 self._engine.release()
-        if self._hidden is not None:
-            glfw.destroy_window(self._hidden)
+        for thread in self._threads:
+            with suppress(Exception):
+                thread.close()
+        for hidden in self._hidden:
+            glfw.destroy_window(hidden)
         glfw.destroy_window(self._handle)
         glfw.terminate()
 
@@ -155,25 +163,28 @@ class Window:
         from ..render.viewer.engine import LiveEngine
         from ..render.viewer.threaded_engine import ThreadedEngine
 
-        if self._hidden is None:
+        thread = self.open_thread("engine")
+        if thread is None:
             return LiveEngine(context)
-        self._engine = ThreadedEngine(context, self._begin_engine, self._end_engine)
+        self._engine = ThreadedEngine(context, thread)
         return self._engine
 
-    def _begin_engine(self) -> Context:
-        """On the engine's thread: its context."""
-        hidden: Any = self._hidden
-        glfw.make_context_current(hidden)
-        loader: Any = GlfwLoader()
-        context = Context(moderngl.create_context(require=GL_VERSION_CODE, context=loader), "window")
-        unlocked.unlock(context.ctx, loader.load)
-        return context
+    def open_thread(self, name: str) -> ContextThread | None:
+        """A thread with a context that shares the window's objects; None where the driver shares nothing."""
+        hidden = self._free.pop() if self._free else _beside(self._handle)
+        if hidden is None:
+            return None
+        if hidden not in self._hidden:
+            self._hidden.append(hidden)
+        thread = ContextThread(lambda: _entered(hidden), lambda: self._left(hidden), name)
+        self._threads.append(thread)
+        return thread
 
-    @staticmethod
-    def _end_engine() -> None:
-        """Likewise, at its end."""
+    def _left(self, hidden: Any) -> None:
+        """On a thread, at its end."""
         no_window: Any = None
         glfw.make_context_current(no_window)
+        self._free.append(hidden)
 
     def hide(self) -> None:
         """Out of sight at once: what is freed before the end may have to wait for the driver."""
@@ -390,6 +401,15 @@ def _beside(window: Any) -> Any | None:
     glfw.window_hint(glfw.MAXIMIZED, False)
     no_monitor: Any = None
     return glfw.create_window(1, 1, "", no_monitor, window) or None
+
+
+def _entered(hidden: Any) -> Context:
+    """The context of a hidden window, made current on the thread that asks."""
+    glfw.make_context_current(hidden)
+    loader: Any = GlfwLoader()
+    context = Context(moderngl.create_context(require=GL_VERSION_CODE, context=loader), "window")
+    unlocked.unlock(context.ctx, loader.load)
+    return context
 
 
 def _shrink_to_screen(handle: Any) -> None:

@@ -11,9 +11,11 @@ import pytest
 from spectrasplat.base.image_io import write_image
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.edit.state import Compare, Selection, State
+from spectrasplat.model.environment_sun import with_sun
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.ui.compare import Comparison
 from spectrasplat.ui.compared_with import GlassSwap, histogram_of, of_height, resized
+from spectrasplat.ui.direct_picture import DirectPicture
 from spectrasplat.ui.reference_thread import Snapshot
 
 from tests.gpu.test_compare import SIZE, read, small_engine, until
@@ -163,3 +165,51 @@ def test_a_picture_of_another_shape_keeps_its_proportions() -> None:
     assert np.array_equal(padded[5, 12:108, 0], column) and not padded[:, :12].any() and not padded[:, 108:].any()
     half = of_height(wide, (48, 27))
     assert half[10, 24, 0] == pytest.approx(1.0, abs=0.05)  # the middle stays the middle
+
+
+def test_the_reference_has_the_light_of_the_environment(gl, tmp_path: Path) -> None:
+    """A ball of clay under a sky: all light that there is, and a shadow, come from it."""
+    path = tmp_path / "clay.toml"
+    path.write_text(
+        '[environment]\nkind = "gradient"\nzenith = [0.8, 0.85, 1.0]\nhorizon = [1.2, 0.95, 0.75]\nnadir = 0.3\n'
+        '[[objects]]\nname = "ball"\nshape = "sphere"\nmaterial = { kind = "diffuse" }\n'
+    )
+    scene = load_scene(path)
+    state = State(scene, scene.camera, viewport_size=SIZE)
+    engine = small_engine(gl)
+    engine.target_photons = 20_000
+    engine.set(state.live_inputs)
+    until(lambda: engine.picture is not None and engine.is_idle, lambda: engine.advance(0.1))
+    direct = DirectPicture(gl, None, with_sun(scene), state.live_inputs)
+    until(lambda: direct.is_done, lambda: direct.advance(0.1))
+    live = read(engine.picture)
+    assert np.median(np.abs(direct.rgb - live)) < 0.01 * live.mean()
+    assert direct.rgb.sum() == pytest.approx(live.sum(), rel=0.02)
+    direct.release()
+    engine.release()
+
+
+def test_without_time_the_processor_is_left_to_the_picture(state, running, comparison) -> None:
+    """Once there is something to compare with: until then it goes on."""
+    compared = replace(state, compare=Compare(mode="wipe"))
+    comparison.advance(compared, running, 0.05)
+    comparison._thread.stop(wait=True)
+    asked: list[str] = []
+    comparison._thread = SimpleNamespace(
+        snapshot=None,
+        problem=None,
+        is_done=False,
+        fraction=0.0,
+        stop=lambda *_more: None,
+        pause=lambda: asked.append("pause"),
+        resume=lambda: asked.append("resume"),
+    )
+    version = comparison._direct.version
+    for _ in range(50):
+        comparison.advance(compared, running, 0.0)
+    assert set(asked) == {"resume"} and comparison._direct.version == version
+    height, width = SIZE[::-1]
+    dark = np.zeros((height, width, 3), np.float32)
+    comparison._thread.snapshot = Snapshot(1, dark, dark, np.ones((height, width), bool), 10, 0.5)
+    comparison.advance(compared, running, 0.0)
+    assert asked[-1] == "pause"

@@ -16,9 +16,11 @@ from spectrasplat.edit import requests
 from spectrasplat.edit.drawn import Drawn, scrubbed
 from spectrasplat.edit.state import Key, State
 from spectrasplat.gpu.context import Context
-from spectrasplat.ui.export import Exports, Shown, _Developer, left_words
+from spectrasplat.ui.export import Exports, _Developer
+from spectrasplat.ui.export_job import left_words
 from spectrasplat.ui.panels import export_panel, file_browser, keys_editor
 from spectrasplat.ui.panels.export_panel import draw_export
+from spectrasplat.ui.screenshot import Shown
 from spectrasplat.ui.view_model import ViewModel
 
 GAIN = "objects.prism.dispersion_gain"

@@ -11,6 +11,7 @@ from spectrasplat.edit.document import Document
 from spectrasplat.edit.live_inputs import LiveInputs
 from spectrasplat.edit.state import State
 from spectrasplat.gpu.context import Context
+from spectrasplat.gpu.context_thread import ContextThread
 from spectrasplat.render.viewer.dirty_level import DirtyLevel
 from spectrasplat.render.viewer.stats import LiveStats
 from spectrasplat.render.viewer.threaded_engine import COMPILING, ThreadedEngine
@@ -40,7 +41,7 @@ class SlowEngine(FakeEngine):
 
 @pytest.fixture
 def engine(gl: Context) -> ThreadedEngine:
-    return ThreadedEngine(gl, lambda: gl, lambda: None, SlowEngine)  # type: ignore[arg-type, return-value]
+    return ThreadedEngine(gl, ContextThread(lambda: gl, lambda: None), SlowEngine)  # type: ignore[arg-type, return-value]
 
 
 def wanted() -> LiveInputs:
@@ -117,7 +118,7 @@ class Compiling:
 
 FOLDER = Path.cwd()
 with Window(visible=False) as window:
-    engine = ThreadedEngine(window.context, window._begin_engine, window._end_engine, Compiling)
+    engine = ThreadedEngine(window.context, window.open_thread("engine"), Compiling)
     began, gaps = time.perf_counter(), []
     before = began
     engine.advance(0.04)

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor, wait
+from concurrent.futures import Future, wait
 from dataclasses import replace
 from typing import TYPE_CHECKING, TypeVar
 
 from ...edit.stored_photons import StoredPhotons
+from ...gpu.context_thread import BUSY_FRAME_S, ContextThread
 from .building import PATIENCE_S
 from .dirty_level import DirtyLevel
 from .engine import LiveEngine
@@ -33,8 +34,6 @@ if TYPE_CHECKING:
 
 OVERRUN_S = 0.15
 """What work may take beyond its budget before the window is drawn without it."""
-BUSY_FRAME_S = 0.08
-"""How long each frame waits for work that has overrun: the processor is the driver's for most of that time."""
 COMPILING = "compiling a program, once for scenes of its kind"
 
 
@@ -44,15 +43,12 @@ class ThreadedEngine:
     def __init__(
         self,
         context: Context,
-        begin: Callable[[], Context],
-        end: Callable[[], None],
+        thread: ContextThread,
         make: Callable[[Context], LiveEngine] = LiveEngine,
     ) -> None:
-        """Both are called on the new thread: `begin` makes a context that shares `context`'s objects current there,
-        `end` leaves it."""
-        self.context, self._end = context, end
-        self._thread = ThreadPoolExecutor(1, thread_name_prefix="engine")
-        self._engine = self._thread.submit(lambda: make(begin())).result()
+        """`thread`, which is closed with the engine, has a context that shares `context`'s objects."""
+        self.context, self._thread = context, thread
+        self._engine = thread.run(lambda: make(thread.context))
         self._work: Future[None] | None = None
         """What has overrun its time."""
         self._work_began = 0.0
@@ -74,7 +70,7 @@ class ThreadedEngine:
         """As of a `LiveEngine`; returns without news where the driver compiles."""
         if self._work is None:
             self._work_began = time.perf_counter()
-            self._work = self._thread.submit(self._advance, budget_s, interacting)
+            self._work = self._thread.submit(lambda: self._advance(budget_s, interacting))
             patience_s = budget_s + OVERRUN_S
         else:
             patience_s = BUSY_FRAME_S
@@ -101,7 +97,7 @@ class ThreadedEngine:
     def rebuild(self) -> None:
         """As of a `LiveEngine`; waits until all is compiled."""
         self._finish()
-        self._thread.submit(self._engine.rebuild).result()
+        self._thread.run(self._engine.rebuild)
 
     def release(self) -> None:
         """End the work and free everything (once); waits for the driver."""
@@ -112,14 +108,10 @@ class ThreadedEngine:
             self._finish()
         finally:
             self._forget_picture()
-            self._thread.submit(self._release).result()
-            self._thread.shutdown()
-
-    def _release(self) -> None:
-        try:
-            self._engine.release()
-        finally:
-            self._end()
+            try:
+                self._thread.run(self._engine.release)
+            finally:
+                self._thread.close()
 
     def _finish(self) -> None:
         if self._work is not None:
@@ -128,7 +120,7 @@ class ThreadedEngine:
 
     def _asked(self, question: Callable[[], T], answer: T) -> T:
         """What the engine answers on its thread; `answer` while it is busy."""
-        return answer if self.is_busy else self._thread.submit(question).result()
+        return answer if self.is_busy else self._thread.run(question)
 
     # ---- wishes ------------------------------------------------------------------------------
 
@@ -183,6 +175,11 @@ class ThreadedEngine:
         if self._picture is not None:
             self._picture.release()  # the texture itself is the engine's
         self._picture = self._original = None
+
+    @property
+    def is_idle(self) -> bool:
+        """As of a `LiveEngine` after its last work."""
+        return self._stats.converged and not self.is_busy
 
     @property
     def picture_version(self) -> int:

@@ -16,7 +16,7 @@ from ...edit import edits, requests
 from ...edit.importing import import_objects
 from ...edit.state import Selection, State
 from .. import theme
-from ..view_model import ViewModel
+from ..view_model import JobInfo, ViewModel
 from . import file_browser, picture_choice, widgets
 
 OPENABLE = (".toml", ".glb", ".gltf", ".obj", ".ply", ".stl")
@@ -24,6 +24,7 @@ COMPARABLE = (".exr", ".npy")
 """Dropped while the compare panel is open, these are compared with."""
 SAVEABLE = (".toml", ".glb")
 _UNSAVED = "Unsaved changes"
+_UNFINISHED = "Unfinished export"
 
 
 @dataclass
@@ -103,6 +104,10 @@ def draw_dialogs(state: State, view_model: ViewModel) -> State:
         state = _after_saving(state, view_model)
     if (_memory.pending and not _memory.is_saving) or view_model.asks_to_quit:
         state = _unsaved_question(state, view_model)
+    elif view_model.asks_about_export and view_model.job is not None:
+        state = _export_question(state, view_model.job)
+    elif view_model.asks_about_export:  # it has ended by itself meanwhile
+        state = state.asking(requests.QuitAfterExport())
     return state
 
 
@@ -130,13 +135,42 @@ def _after_saving(state: State, view_model: ViewModel) -> State:
     return state.asking(*pending).with_panels(start_page=False)
 
 
-def _unsaved_question(state: State, view_model: ViewModel) -> State:
-    if not imgui.is_popup_open(_UNSAVED):
-        imgui.open_popup(_UNSAVED)
+def _begin_question(title: str) -> bool:
+    if not imgui.is_popup_open(title):
+        imgui.open_popup(title)
     centre = imgui.get_main_viewport().get_center()
     # Always: its height is known only once its words are wrapped.
     imgui.set_next_window_pos(centre, imgui.Cond_.always, imgui.ImVec2(0.5, 0.5))
-    if not imgui.begin_popup_modal(_UNSAVED, None, imgui.WindowFlags_.always_auto_resize)[0]:
+    return imgui.begin_popup_modal(title, None, imgui.WindowFlags_.always_auto_resize)[0]
+
+
+def _export_question(state: State, job: JobInfo) -> State:
+    if not _begin_question(_UNFINISHED):
+        return state
+    imgui.text_unformatted(f"{job.title} is not finished ({job.fraction:.0%}).")
+    widgets.hint(f"Wait for it before quitting? Stopped now, {job.when_stopped}.")
+    imgui.dummy(imgui.ImVec2(theme.em(26), theme.em(0.4)))
+    width = theme.em(7)
+    asked: requests.Request | None = None
+    if widgets.button("Finish, then quit", tip="Quit once it is there.", width=width + theme.em(2)):
+        asked = requests.QuitAfterExport()
+    imgui.same_line()
+    if widgets.button("Stop, then quit", tip=f"{job.when_stopped[:1].upper()}{job.when_stopped[1:]}.", width=width):
+        asked = requests.QuitAfterExport(stop=True)
+    imgui.same_line()
+    if widgets.button("Cancel##export", tip="Stay, and let it go on.", width=width) or imgui.is_key_pressed(
+        imgui.Key.escape
+    ):
+        asked = requests.CancelQuit()
+    if asked is not None:
+        imgui.close_current_popup()
+        state = state.asking(asked)
+    imgui.end_popup()
+    return state
+
+
+def _unsaved_question(state: State, view_model: ViewModel) -> State:
+    if not _begin_question(_UNSAVED):
         return state
     is_quitting = view_model.asks_to_quit
     imgui.text_unformatted(f"{view_model.title} has changes that are not saved.")

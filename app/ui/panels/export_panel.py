@@ -127,7 +127,7 @@ def _screenshot(view_model: ViewModel, idle: bool) -> None:
         else (".png", ".jpg", ".webp", ".exr", ".npy")
     )
     tip = "PNG: as displayed. EXR and NPY: linear Rec.709 radiance, lm/(sr unit²), without tone curve."
-    if widgets.button("Save screenshot…", tip=tip, enabled=idle, width=-1):
+    if widgets.button("Save screenshot…", tip=tip, enabled=idle or not _choices.spectral, width=-1):
         _ask("screenshot", "Save screenshot", suffixes, view_model)
 
 

@@ -127,7 +127,7 @@ def _render(state: State, view_model: ViewModel) -> State:
             widgets.tooltip(METHOD_TIPS[method])
         imgui.end_menu()
     imgui.separator()
-    return _items(("Reload shaders",), state, view_model)
+    return _items(("Render…", "Panel: Compare", "", "Reload shaders"), state, view_model)
 
 
 def _tools(state: State, view_model: ViewModel) -> State:

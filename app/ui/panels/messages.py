@@ -8,6 +8,7 @@ from imgui_bundle import imgui
 from ...edit.requests import DismissMessage, ReloadShaders
 from ...edit.state import State
 from .. import item_rects, theme
+from ..line_breaks import broken
 from ..view_model import Message, ViewModel
 from . import status_bar, widgets
 
@@ -53,8 +54,9 @@ def _toast(state: State, message: Message, index: int) -> tuple[State, float]:
     with theme.coloured(accent):
         imgui.text_unformatted(icons.ICON_FA_TRIANGLE_EXCLAMATION if message.is_error else icons.ICON_FA_CIRCLE_INFO)
     imgui.same_line()
-    imgui.push_text_wrap_pos(imgui.get_cursor_pos_x() + theme.em(28))
-    imgui.text_unformatted(message.text)
+    width = theme.em(28)
+    imgui.push_text_wrap_pos(imgui.get_cursor_pos_x() + width)  # for names that are wider than that
+    imgui.text_unformatted(broken(message.text, width, lambda text: imgui.calc_text_size(text).x))
     imgui.pop_text_wrap_pos()
     if message.is_error:
         imgui.same_line(0, theme.em(0.8))

@@ -106,7 +106,8 @@ def _plot(wavelengths_nm: np.ndarray, spectrum: np.ndarray) -> None:
     if not implot.begin_plot("##spectrum", imgui.ImVec2(-1, height), flags):
         return
     scaled, unit = _scaled(spectrum)
-    implot.setup_axes("λ (nm)", named(f"E ({unit}/unit²/nm)"), implot.AxisFlags_.none, implot.AxisFlags_.none)
+    across, upward = axis_labels(named(f"{unit}/unit²/nm"), height)
+    implot.setup_axes(across, upward, implot.AxisFlags_.none, implot.AxisFlags_.none)
     implot.setup_axis_limits(implot.ImAxis_.x1, 380, 780, implot.Cond_.always)
     implot.setup_axis_limits(implot.ImAxis_.y1, 0, 1.1 * float(scaled.max()), implot.Cond_.always)
     implot.push_plot_clip_rect()
@@ -124,6 +125,15 @@ def _plot(wavelengths_nm: np.ndarray, spectrum: np.ndarray) -> None:
     )
     implot.end_plot()
     rows.explain("Spectrum plot", "")
+
+
+def axis_labels(unit: str, height: float) -> tuple[str, str]:
+    """Of wavelength and irradiance, in a plot of `height` pixels: where the upright one is too long to stand beside the
+    axis, it would lie over what is above the plot, and the other one has the unit."""
+    upward = f"E ({unit})"
+    if imgui.calc_text_size(upward).x > height - theme.em(3.5):
+        return f"λ (nm), upward E ({unit})", ""
+    return "λ (nm)", upward
 
 
 def _scaled(spectrum: np.ndarray) -> tuple[np.ndarray, str]:

@@ -49,6 +49,9 @@ def draw_status_bar(state: State, view_model: ViewModel) -> State:
     _selection(state)
     if view_model.job is not None:
         state = _job(state, view_model)
+    elif view_model.writing:
+        imgui.same_line(0, theme.em(1.6))
+        imgui.text_disabled(view_model.writing)
     _right_end(view_model)
     imgui.end()
     imgui.pop_style_color()
@@ -75,17 +78,18 @@ def _progress(state: State, view_model: ViewModel) -> State:
     said = "beams, as fine as that many photons" if stats.only_beams else "photons"
     rows.explain("Progress", f"{stats.photons:,} of {target:,} {said}." if stats.photons else "No light yet.")
     imgui.same_line()
-    imgui.text_unformatted(progress_words(stats, state.playing))
+    imgui.text_unformatted(progress_words(stats, state.playing, view_model.engine_rests))
     return state
 
 
-def progress_words(stats: LiveStats, is_playing: bool) -> str:
-    """What goes on, and how far it is: by polygons, by photons, or where nothing throws a caustic by camera samples."""
+def progress_words(stats: LiveStats, is_playing: bool, rests: bool = False) -> str:
+    """What goes on, and how far it is: by polygons, by photons, or where nothing throws a caustic by camera samples.
+    `rests`: an export has all the time."""
     if stats.differs == "scene" or stats.preparing:
         return preparing_words(stats)
     if not (stats.photons or stats.polygons or stats.camera_samples or stats.converged):
         return "Preparing …" if is_playing else "Paused"  # nothing is there to be counted
-    word = "Done" if stats.converged else "Accumulating" if is_playing else "Paused"
+    word = "Done" if stats.converged else ("Waiting" if rests else "Accumulating") if is_playing else "Paused"
     if stats.only_beams:
         return f"{word}, {numbers.count(stats.polygons)} polygons"
     if stats.photons:
@@ -124,7 +128,7 @@ def _job(state: State, view_model: ViewModel) -> State:
     imgui.progress_bar(job.fraction, imgui.ImVec2(theme.em(9), 0.0), f"{job.fraction:.0%}")
     widgets.tooltip(job.text or job.title)
     imgui.same_line()
-    label, tip = ("Discard", "Write nothing at all.") if job.is_stopped else ("Cancel", "Stop; what is done is kept.")
+    label, tip = ("Discard", "Write nothing at all.") if job.is_stopped else ("Cancel", f"Stop; {job.when_stopped}.")
     if widgets.button(f"{label}##job", tip=tip):
         state = state.asking(CancelJob())
     # Behind the button: it would wander with the words.

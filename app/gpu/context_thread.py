@@ -1,0 +1,87 @@
+"""A thread with an OpenGL context of its own, for work that would hold the window up; and work done there in steps.
+
+Whoever draws waits for a step as long as a frame may take, and draws on without it where it takes longer: the driver
+compiles for seconds, a large picture is encoded at its end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from typing import TYPE_CHECKING, Generic, TypeVar
+
+if TYPE_CHECKING:
+    from .context import Context
+
+T = TypeVar("T")
+
+BUSY_FRAME_S = 0.08
+"""How long each frame waits for a step that has overrun: the processor is that step's for most of the time."""
+
+
+class ContextThread:
+    """One thread; what it is given is done in turn."""
+
+    def __init__(self, begin: Callable[[], Context], end: Callable[[], None], name: str = "context") -> None:
+        """Both are called on the new thread: `begin` makes a context current there, which shares objects with the
+        window's, `end` leaves it."""
+        self._end, self._is_closed = end, False
+        self._pool = ThreadPoolExecutor(1, thread_name_prefix=name)
+        self.context = self._pool.submit(begin).result()
+        """The thread's own: only what is submitted may use it."""
+
+    def submit(self, work: Callable[[], T]) -> Future[T]:
+        """Do `work` on the thread, after all that was submitted before."""
+        return self._pool.submit(work)
+
+    def run(self, work: Callable[[], T]) -> T:
+        """The same, and wait for it."""
+        return self._pool.submit(work).result()
+
+    def close(self) -> None:
+        """Finish what was submitted, and leave the context (once)."""
+        if not self._is_closed:
+            self._is_closed = True
+            self._pool.submit(self._end).result()
+            self._pool.shutdown()
+
+
+class SteppedWork(Generic[T]):
+    """Steps of one work, done on a thread where there is one, else at once."""
+
+    def __init__(self, thread: ContextThread | None) -> None:
+        self._thread = thread
+        self._under_way: Future[T] | None = None
+
+    @property
+    def is_under_way(self) -> bool:
+        """A step has overrun its time and is not done."""
+        return self._under_way is not None
+
+    def step(self, work: Callable[[], T], patience_s: float) -> T | None:
+        """What `work` returns; None where it is not done after `patience_s`. Asked again, the first answer comes, and
+        no second step is begun before. Raises what it raises."""
+        if self._thread is None:
+            return work()
+        if self._under_way is None:
+            self._under_way = self._thread.submit(work)
+        else:
+            patience_s = BUSY_FRAME_S
+        wait((self._under_way,), patience_s)
+        return self._taken() if self._under_way.done() else None
+
+    def end(self, work: Callable[[], object], waits: bool = False) -> None:
+        """Do `work` after the step that is under way, whatever becomes of that; there are no more steps. `waits`: until
+        it is done."""
+        self._under_way = None
+        if self._thread is None:
+            work()
+            return
+        done = self._thread.submit(work)
+        if waits:
+            done.result()
+
+    def _taken(self) -> T:
+        assert self._under_way is not None
+        done, self._under_way = self._under_way, None
+        return done.result()
