@@ -32,15 +32,15 @@ class BeamEmission:
         """`ray`: the trace pass's records; `spans`: bands of the spectral tables that photons are splatted by.
 
         A photon's interval may be any part of the spectrum where bands may be cut, else it is that of a table's band. A
-        line's is then all that lies nearer to it than to another. An emission line within a band that photons carry too
-        is in their share, so that its own pieces are not taken. Raises ValueError for a piece whose interval no table
-        has.
+        line's is then all that lies nearer to it than to another; where no band is cut a lamp's strongest line in a
+        band stands for all of it. An emission line within a band that photons carry too is in their share, so that its
+        own pieces are not taken. Raises ValueError for a piece whose interval no table has.
         """
         self._scene = scene
         self._ray = ray
         self._features = scene.features
         if not self._features.band_cuts:
-            pieces = _by_bands(pieces, spans)
+            pieces = _by_bands(_lines_as_bands(pieces, spans, scene), spans)
         band = _bands(pieces, spans, any_interval=self._features.band_cuts)
         within = _is_line_within(pieces)
         self.pieces = pieces.where(~within)
@@ -159,6 +159,28 @@ def _bands(pieces: BeamPieces, spans: Spans, *, any_interval: bool) -> np.ndarra
         # What is cut out of a band is drawn by the light's running integral, whichever the band.
         found[mine] = np.where(same | any_interval, nearest, -1)
     return found
+
+
+def _lines_as_bands(pieces: BeamPieces, spans: Spans, scene: SceneBuffers) -> BeamPieces:
+    """Pieces of emission lines of lamps that have nothing else, as pieces of the tables' bands that hold them.
+
+    What nothing disperses takes all lines the same way: those of a band's strongest stand for the others there."""
+    lo, hi, taken = pieces.x_lo.copy(), pieces.x_hi.copy(), np.ones(len(pieces), bool)
+    for light, lamp in enumerate(scene.scene.lights):
+        mine = pieces.light == light
+        if not mine.any() or (pieces.x_lo != pieces.x_hi)[mine].any():
+            continue
+        lines = np.array([scene.axis.x_of_nm(nm) for nm, _ in lamp.spectral_power.lines])
+        watts = np.array([power for _, power in lamp.spectral_power.lines])
+        for first, last in spans[light]:
+            held = np.flatnonzero((lines >= first) & (lines <= last))
+            if last <= first or not len(held):
+                continue
+            within = mine & (pieces.x_lo >= first) & (pieces.x_lo <= last)
+            strongest = within & (np.abs(pieces.x_lo - lines[held[watts[held].argmax()]]) < _SAME_X)
+            taken &= ~within | strongest
+            lo[strongest], hi[strongest] = first, last
+    return replace(pieces, x_lo=lo, x_hi=hi).where(taken)
 
 
 def _by_bands(pieces: BeamPieces, spans: Spans) -> BeamPieces:

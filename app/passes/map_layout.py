@@ -38,6 +38,9 @@ _GRID, _SEEN_QUANTILE = 17, 0.9
 that they should."""
 _QUANTILE = 0.01
 _MARGIN = 0.06
+_BEYOND, _BEYOND_TEXELS = 1.0, 256
+"""What lands where no pilot photon did: how far round these, as a share of their extent, and in how many texels along
+the longer side. In view it is kept wherever it lands."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +87,8 @@ class Window:
 
     low: np.ndarray
     high: np.ndarray
+    largest: int | None = None
+    """Longest side, texels, where that is not `Fineness`'s."""
 
     @property
     def size(self) -> np.ndarray:
@@ -171,6 +176,8 @@ def _layout_maps(
                 largest = fineness.coarse if level else fineness.fine
                 if isinstance(window, PictureWindow):
                     size = window.texels
+                elif window.largest is not None:
+                    size = _tile_size(scene.camera, buffers, frame, window, picture, window.largest, 1.0)
                 elif receiver == map_receiver:
                     size = picture
                 else:
@@ -316,10 +323,11 @@ def _flat_windows(
     picture: tuple[int, int] | None,
     fineness: Fineness,
 ) -> list[Window | PictureWindow]:
-    """Fine (where it pays) and coarse window, finest first."""
+    """Fine (where it pays) and coarse window, and one of what may land beyond them, finest first."""
     if landed is None or len(landed.positions) == 0:
         return [extent]
     flat = frame.project(landed.positions)
+    seen = _visible(camera, buffers, frame, picture) if picture is not None else None
 
     def widened(window: Window) -> Window:
         """Where a caustic is thinner than a pixel."""
@@ -339,16 +347,27 @@ def _flat_windows(
             fineness.fine,
         )
         if on_pixels is not None:
-            return [on_pixels] if on_pixels.is_all else [on_pixels, everything]
+            known: list[Window | PictureWindow] = [on_pixels] if on_pixels.is_all else [on_pixels, everything]
+            return [*known, *_beyond(everything, seen, extent)]
     light = _meet(_grown(_quantile_box(flat, landed.flux_w, _QUANTILE), _MARGIN), extent) or everything
-    seen = _visible(camera, buffers, frame, picture) if picture is not None else None
     fine = light if seen is None else _meet(light, _grown(seen, 0.02))
-    if fine is None:
-        return [everything]
-    fine = widened(fine)
-    if np.prod(fine.size) > 0.6 * np.prod(everything.size):
-        return [everything]
-    return [fine, everything]
+    known = [everything]
+    if fine is not None:
+        fine = widened(fine)
+        known = [everything] if np.prod(fine.size) > 0.6 * np.prod(everything.size) else [fine, everything]
+    return [*known, *_beyond(everything, seen, extent)]
+
+
+def _beyond(known: Window, seen: Window | None, extent: Window) -> list[Window]:
+    """A window, of few texels, round the known one for what pilot photons did not find: a rare path, or one that begins
+    in a part of a lamp only. None where the receiver ends there."""
+    wide = _grown(known, _BEYOND)
+    if seen is not None:
+        wide = Window(np.minimum(wide.low, seen.low), np.maximum(wide.high, seen.high))
+    found = _meet(wide, extent)
+    if found is None or not (np.any(found.low < known.low) or np.any(found.high > known.high)):
+        return []
+    return [replace(found, largest=_BEYOND_TEXELS)]
 
 
 def _visible(camera: Camera, buffers: SceneBuffers, frame: PlaneFrame, picture: tuple[int, int]) -> Window | None:
