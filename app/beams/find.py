@@ -14,7 +14,7 @@ import numpy as np
 from .facets import DIELECTRIC, MIRROR, BeamScene
 from .hand import FIRST, START
 from .leaves import Leaves, Store
-from .nodes import NODE, STATIC
+from .nodes import HALF, NODE, STATIC
 from .rays import PARALLEL, intensities
 from .search import SUM_ENTERED, SUMS, WORK, flux_in, may_touch, power_of
 from .steps import run
@@ -207,7 +207,8 @@ def _roots(
     limits = np.concatenate([square, emission.limits.reshape(-1, 3)])
     root["lines"] = len(limits)
     root["line"][: len(limits)] = limits[:, None, :]
-    root["made"][: len(limits)] = 0, 0, STATIC, 1
+    root["made"][: len(square)] = 0, 0, HALF, 1
+    root["made"][len(square) : len(limits)] = 0, 0, STATIC, 1
     # What is kept where nothing is met (`sees`) is no root.
     work["room"], work["sees"] = emission.room * (1.0, 1.0, 1.5), False
     store, whole = Store(), [stack[FIRST : FIRST + 1].copy()]

@@ -174,6 +174,10 @@ def test_edited_dispersion_is_what_a_rendering_of_the_edited_glass_shows(gl: Con
         followed = splat_again(light, inputs(edited(scene, gain)))
         trace(fresh, 100_000)
         expected = into(light, fresh)
+        # A texel of the window beyond the others is a hundred times as large, and holds as much more.
+        ((tile, *_),) = light.light_pass.layout.tiles.values()
+        own = np.s_[tile.y : tile.y + tile.height, tile.x : tile.x + tile.width]
+        followed, expected = followed[own], expected[own]
         blocks = [
             m[: m.shape[0] // 4 * 4, : m.shape[1] // 4 * 4, :3]
             .reshape(m.shape[0] // 4, 4, m.shape[1] // 4, 4, 3)
