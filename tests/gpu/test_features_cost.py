@@ -32,7 +32,7 @@ FLOOR = (
 )
 BALL = '[[objects]]\nname = "ball"\nshape = "sphere"\ntriangles = 1280\n'
 GEM = '[[objects]]\nname = "gem"\nshape = "box"\nsize = [1, 1, 1]\nrotation_deg = [20, 30, 0]\n'
-NEST = '[[objects]]\nname = "core"\nshape = "sphere"\ntriangles = 320\nradius = 0.5\n'
+NEST = '[[objects]]\nname = "core"\nshape = "sphere"\ntriangles = 320\nradius = 0.4\n'
 SCENES = {
     "plain ball": BALL + "material = { n_d = 1.6 }\n",
     "coloured ball": BALL + 'glass = "N-SF11"\n',

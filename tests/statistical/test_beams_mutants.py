@@ -36,13 +36,6 @@ MUTANTS = {
         RAYS,
         "lost_or_doubled and prism",
     ),
-    "a band is not cut at the onset of total reflection": (
-        "at_facet.py",
-        "        if (last > _GRAZING and k < -_GRAZING) or (last < -_GRAZING and k > _GRAZING):",
-        "        if k > 1e9:",
-        SPECTRUM,
-        "onset",
-    ),
     "what survives roulette is not boosted": (
         "at_facet.py",
         "        new.boost /= chance\n",
