@@ -50,7 +50,7 @@ def luminance(gl: Context, path: Path, method: str) -> np.ndarray:
     return render(load_scene(path), settings, context=gl).rgb @ np.array([0.2126, 0.7152, 0.0722])
 
 
-@pytest.mark.parametrize("index", [2.4, 1.5])
+@pytest.mark.parametrize("index", [2.4, pytest.param(1.5, marks=pytest.mark.slow)])
 def test_light_under_glass_stays_there(gl, tmp_path: Path, index: float) -> None:
     """Under the prism lies up to twenty times the light that is before it. With 2.4, before: 8 % too much in the whole
     picture, and a line twice as bright as the light along the prism's foot."""

@@ -38,8 +38,13 @@ material = "diffuse"
 WIDE = 'target = [0.0, 0.0, 0.3]\nshape = "rectangle"\nsize = [0.57, 0.71]\nflux_lm = 53000.0'
 
 
-@pytest.mark.parametrize("tint", ["", ", absorption = { colour = [0.9, 0.3, 0.4], distance = 0.3 }"])
-@pytest.mark.parametrize(("kind", "lamp"), [("point", "intensity_cd = 9000.0"), ("area", WIDE)])
+@pytest.mark.parametrize(
+    ("kind", "lamp", "tint"),
+    [
+        ("point", "intensity_cd = 9000.0", ""),
+        ("area", WIDE, ", absorption = { colour = [0.9, 0.3, 0.4], distance = 0.3 }"),
+    ],
+)
 def test_all_lines_of_a_lamp_are_drawn(gl, tmp_path: Path, tint: str, kind: str, lamp: str) -> None:
     """What beams left to photons had no band of the spectral tables, and ended in a traceback; now the strongest line's
     stand for all. Each channel of the light in all is within 1 %."""
