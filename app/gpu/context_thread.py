@@ -19,6 +19,10 @@ BUSY_FRAME_S = 0.08
 """How long each frame waits for a step that has overrun: the processor is that step's for most of the time."""
 
 
+def no_thread(*_name: str) -> None:
+    """In place of what opens one: all work is done where it is asked for."""
+
+
 class ContextThread:
     """One thread; what it is given is done in turn."""
 
@@ -69,6 +73,11 @@ class SteppedWork(Generic[T]):
             patience_s = BUSY_FRAME_S
         wait((self._under_way,), patience_s)
         return self._taken() if self._under_way.done() else None
+
+    def finish(self) -> None:
+        """Wait for the step that is under way. Raises what it raises."""
+        if self._under_way is not None:
+            self._taken()
 
     def end(self, work: Callable[[], object], waits: bool = False) -> None:
         """Do `work` after the step that is under way, whatever becomes of that; there are no more steps. `waits`: until

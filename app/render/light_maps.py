@@ -190,9 +190,17 @@ class LightMaps:
         return flux
 
     def _finer_share(self, receiver: int, level: int, tile: Tile) -> Callable[[int, int], np.ndarray]:
-        """How much of each texel of a coarse window's rows the finer window is read for: rows `first` to `end`."""
-        fine, coarse = self.layout.windows[receiver][level - 1 : level + 1]
+        """How much of each texel of a coarse window's rows finer windows are read for: rows `first` to `end`."""
+        coarse = self.layout.windows[receiver][level]
         assert isinstance(coarse, Window)
+        # Nearly all of a finer window lies in the next one.
+        shares = [self._share_in(fine, receiver, coarse, tile) for fine in self.layout.windows[receiver][:level]]
+        return lambda first, end: np.maximum.reduce([share(first, end) for share in shares])
+
+    def _share_in(
+        self, fine: Window | PictureWindow, receiver: int, coarse: Window, tile: Tile
+    ) -> Callable[[int, int], np.ndarray]:
+        """Likewise, how much of it lies in one of them."""
         x, y = (np.linspace(coarse.low[i], coarse.high[i], n + 1) for i, n in enumerate((tile.width, tile.height)))
         if isinstance(fine, Window):
             columns, rows = (

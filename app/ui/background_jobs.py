@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from ..base.errors import UserError
 from ..base.paths import shipped_scenes
+from ..gpu.context_thread import no_thread
 from .compare import Comparison, engine_beside
 from .cursor_info import Cursor
 from .export import Exports, Shown
@@ -30,11 +31,6 @@ RENDER_SHARE = 0.95
 """Likewise a finished picture that somebody waits for."""
 OpenThread = Callable[[str], "ContextThread | None"]
 
-
-def _no_thread(_name: str) -> None:
-    return None
-
-
 HISTOGRAM_S = 1.0
 """Shortest time between two histograms: each reads two pictures."""
 FIRST_COMPARE_SHARE = 0.8
@@ -48,7 +44,7 @@ COMPARE_SHARE = 0.4
 class BackgroundJobs:
     """Owns them. `notes` collects sentences about what was finished, for the host to show."""
 
-    def __init__(self, context: Context, config: Path, open_thread: OpenThread = _no_thread) -> None:
+    def __init__(self, context: Context, config: Path, open_thread: OpenThread = no_thread) -> None:
         """`open_thread`: opens a thread of that name, which has a context that shares `context`'s objects."""
         self._open_thread = open_thread
         self._threads: dict[str, ContextThread | None] = {}

@@ -16,6 +16,7 @@ import numpy as np
 from ..base.errors import UserError
 from ..edit.live_inputs import LiveInputs
 from ..edit.state import Selection
+from ..gpu.context_thread import no_thread
 from ..model.environment_sun import with_sun
 from ..render.solo import scene_seen
 from ..render.viewer.dirty_level import DirtyLevel
@@ -45,10 +46,6 @@ STRIPE_PX, STRIPE_SHADE = 6, 0.25
 """Width of the stripes over what the reference does not hold, and the share of the picture's light that they leave."""
 
 
-def _no_thread() -> None:
-    return None
-
-
 class Comparison:
     """Owns the other picture. `advance` every frame; everything else may be read at any time."""
 
@@ -56,7 +53,7 @@ class Comparison:
         self,
         context: Context,
         make_engine: Callable[[Context], Engine] | None = None,
-        thread: Callable[[], ContextThread | None] = _no_thread,
+        thread: Callable[[], ContextThread | None] = no_thread,
     ) -> None:
         """`thread`: where the reference's direct light is computed, asked when it is first wanted; None for the
         caller's own, with `context`."""

@@ -18,6 +18,7 @@ from ..edit import requests
 from ..edit.parameters import Stage
 from ..edit.state import Display as DisplaySettings
 from ..edit.state import State
+from ..gpu.context_thread import no_thread
 from ..model.scene import RenderDefaults
 from ..model.settings import RenderSettings
 from ..passes.display import Display
@@ -37,15 +38,11 @@ MIN_PHOTONS = 1_000_000
 MAX_PHOTONS = 64_000_000
 
 
-def _no_thread() -> None:
-    return None
-
-
 class Exports:
     """Writes screenshots, as many as are asked for, and runs one longer job at a time. Both work beside the window;
     what became of them `step` returns."""
 
-    def __init__(self, context: Context, thread: Callable[[], ContextThread | None] = _no_thread) -> None:
+    def __init__(self, context: Context, thread: Callable[[], ContextThread | None] = no_thread) -> None:
         """`thread`: where jobs work, asked when the first begins; None for the caller's own, with `context`."""
         self._context, self._find_thread = context, thread
         self._writer = FileWriter()

@@ -20,6 +20,7 @@ from ..edit.drawn import Drawn
 from ..edit.opening import Opening
 from ..edit.preferences import Settings, config_dir, load_settings, save_settings
 from ..edit.state import Selection, State
+from ..gpu.context_thread import no_thread
 from ..gpu.shader_watch import ShaderWatch
 from ..model.staging import Staging
 from ..render.notices import loss_notices
@@ -58,7 +59,7 @@ class Session:
         make_engine: Callable[[Context], Engine] | None = None,
         clock: Callable[[], float] = time.monotonic,
         opening: Opening | None = None,
-        open_thread: OpenThread | None = None,
+        open_thread: OpenThread = no_thread,
     ) -> None:
         """`open_thread`: as of `BackgroundJobs`."""
         self.context = context
@@ -72,7 +73,7 @@ class Session:
         self.recovery: Recovery | None = next(iter(recoveries(config_dir())), None)
         self.picture = LivePicture(context, make_engine)
         self.drawn = Drawn()
-        self.jobs = BackgroundJobs(context, config_dir(), *(() if open_thread is None else (open_thread,)))
+        self.jobs = BackgroundJobs(context, config_dir(), open_thread)
         self.window_picture: Path | None = None
         """Where a picture of the whole window is to be written once this frame is drawn."""
         self.interface_scale = self.framebuffer_scale = 1.0

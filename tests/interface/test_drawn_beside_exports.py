@@ -235,10 +235,10 @@ def test_what_is_exported_beside_the_window_is_the_same_to_the_bit(tmp_path: Pat
     assert done.stdout.strip() == "8 True", done.stdout + done.stderr
 
 
-DRAWN_WHILE_A_PICTURE_IS_RENDERED = """
+ON_PRISM = """
 import time
+from dataclasses import replace
 from pathlib import Path
-import numpy as np
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.edit import requests
 from spectrasplat.edit.preferences import WindowPlace
@@ -275,11 +275,16 @@ with Window(WindowPlace(None, (760, 500), False)) as window:
             before = now
         return gaps
     until(lambda: session.picture.is_presentable)
+"""
+DRAWN_WHILE_A_PICTURE_IS_RENDERED = (
+    ON_PRISM
+    + """
     carry_out(session, requests.RenderPicture(Path("a.exr"), (1920, 1080), 200_000, None, 1, True, 16))
     gaps = until(lambda: session.jobs.exports.job is None)
     print(max(steps), max(gaps), len(gaps) / sum(gaps), Path("a.exr").exists(), Path("a_caustic.exr").exists())
     session.close()
 """
+)
 
 
 @pytest.mark.slow
@@ -293,32 +298,9 @@ def test_the_window_is_drawn_while_a_picture_is_rendered(tmp_path: Path) -> None
     assert float(rate) > 3.0, done.stdout
 
 
-DRAWN_WHILE_COMPARING = """
-import time
-from dataclasses import replace
-from spectrasplat.base.paths import assets_dir
-from spectrasplat.edit.preferences import WindowPlace
-from spectrasplat.ui.session import Session
-from spectrasplat.ui.viewer import Viewer
-from spectrasplat.ui.window import Window
-
-with Window(WindowPlace(None, (760, 500), False)) as window:
-    session = Session(
-        window.context, assets_dir() / "scenes" / "prism.toml", window.engine, open_thread=window.open_thread
-    )
-    session.jobs.gallery.release()
-    viewer = Viewer(session, refresh_s=window.refresh_s)
-    session.state = session.state.with_panels(start_page=False)
-    def until(done):
-        gaps, before = [], time.perf_counter()
-        while not done():
-            window._take_events(viewer)
-            window.frame(viewer)
-            now = time.perf_counter()
-            gaps.append(now - before)
-            before = now
-        return gaps
-    until(lambda: session.picture.is_presentable)
+DRAWN_WHILE_COMPARING = (
+    ON_PRISM
+    + """
     longest = []
     for method in ("reference", "stochastic-even"):
         session.state = replace(session.state, compare=replace(session.state.compare, mode="wipe", method=method))
@@ -328,6 +310,7 @@ with Window(WindowPlace(None, (760, 500), False)) as window:
     print(*longest)
     session.close()
 """
+)
 
 
 @pytest.mark.slow

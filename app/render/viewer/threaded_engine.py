@@ -9,12 +9,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from concurrent.futures import Future, wait
 from dataclasses import replace
 from typing import TYPE_CHECKING, TypeVar
 
 from ...edit.stored_photons import StoredPhotons
-from ...gpu.context_thread import BUSY_FRAME_S, ContextThread
+from ...gpu.context_thread import ContextThread, SteppedWork
 from .building import PATIENCE_S
 from .dirty_level import DirtyLevel
 from .engine import LiveEngine
@@ -49,8 +48,7 @@ class ThreadedEngine:
         """`thread`, which is closed with the engine, has a context that shares `context`'s objects."""
         self.context, self._thread = context, thread
         self._engine = thread.run(lambda: make(thread.context))
-        self._work: Future[None] | None = None
-        """What has overrun its time."""
+        self._stepped: SteppedWork[None] = SteppedWork(thread)
         self._work_began = 0.0
         self._is_released = False
         self._stats, self._inputs = self._engine.stats, self._engine.inputs
@@ -64,21 +62,15 @@ class ThreadedEngine:
     @property
     def is_busy(self) -> bool:
         """It works on what it was asked for before; this frame, too, will be without news."""
-        return self._work is not None
+        return self._stepped.is_under_way
 
     def advance(self, budget_s: float, interacting: bool = False) -> None:
         """As of a `LiveEngine`; returns without news where the driver compiles."""
-        if self._work is None:
+        if not self.is_busy:
             self._work_began = time.perf_counter()
-            self._work = self._thread.submit(lambda: self._advance(budget_s, interacting))
-            patience_s = budget_s + OVERRUN_S
-        else:
-            patience_s = BUSY_FRAME_S
-        wait((self._work,), patience_s)
-        if not self._work.done():
+        self._stepped.step(lambda: self._advance(budget_s, interacting), budget_s + OVERRUN_S)
+        if self.is_busy:
             return
-        done, self._work = self._work, None
-        done.result()
         self._stats, self._inputs = self._engine.stats, self._engine.inputs
         self._version = self._engine.picture_version
 
@@ -96,7 +88,7 @@ class ThreadedEngine:
 
     def rebuild(self) -> None:
         """As of a `LiveEngine`; waits until all is compiled."""
-        self._finish()
+        self._stepped.finish()
         self._thread.run(self._engine.rebuild)
 
     def release(self) -> None:
@@ -105,18 +97,13 @@ class ThreadedEngine:
             return
         self._is_released = True
         try:
-            self._finish()
+            self._stepped.finish()
         finally:
             self._forget_picture()
             try:
                 self._thread.run(self._engine.release)
             finally:
                 self._thread.close()
-
-    def _finish(self) -> None:
-        if self._work is not None:
-            work, self._work = self._work, None
-            work.result()
 
     def _asked(self, question: Callable[[], T], answer: T) -> T:
         """What the engine answers on its thread; `answer` while it is busy."""
