@@ -31,6 +31,8 @@ OTHER_MEASURES = ("relmse_whole", "relmse_trimmed", "nrmse", "smape", "chroma")
 """Measures beside relMSE by which times to equal error are given, so that no conclusion hangs on one."""
 
 
+RANDOM_KINDS = ("plain", "all")
+"""What scenes drawn by chance hold (`random_scenes`)."""
 REFERENCES = ("exact", "mesh")
 """What a reference meets where a shape has an equation: that surface, or the triangles that the renderer has."""
 

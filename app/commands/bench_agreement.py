@@ -11,6 +11,7 @@ from ..base.atomic import atomic_output, make_output_folder
 from ..base.errors import UserError
 from ..base.interrupts import exit_code_of
 from ..base.memory import check_picture_memory
+from ..bench.results import RANDOM_KINDS
 from ..bench.results import AgreementSettings as Settings
 from . import options
 from .bench import MAX_SEEDS, load_scenes, met_by
@@ -32,6 +33,7 @@ class AgreementRequest:
     reference: str | None = None
     random: str | None = None
     random_seed: str | None = None
+    random_kinds: str | None = None
 
 
 def bench_agreement_command(request: AgreementRequest) -> int:
@@ -45,10 +47,10 @@ def bench_agreement_command(request: AgreementRequest) -> int:
     from ..gpu.context import create_context
 
     settings = _settings(request)
-    count, seed = _chance(request)
+    count, seed, kinds = _chance(request)
     named = load_scenes(request.scenes) if count is None else {}
     make_output_folder(request.output, "agreement.json")
-    scenes = met_by(settings.reference, named if count is None else random_scenes(count, seed, request.output))
+    scenes = met_by(settings.reference, named if count is None else random_scenes(count, seed, request.output, kinds))
     found: list[agreement.SceneAgreement] = []
     print(agreement.HEAD, flush=True)
     try:
@@ -72,20 +74,27 @@ def bench_agreement_command(request: AgreementRequest) -> int:
     return 0
 
 
-def _chance(request: AgreementRequest) -> tuple[int | None, int]:
-    """How many scenes are drawn by chance, None where scenes are named, and their seed."""
+def _chance(request: AgreementRequest) -> tuple[int | None, int, str]:
+    """How many scenes are drawn by chance, None where scenes are named, their seed, and of what they are."""
     if request.random is None:
-        if request.random_seed is not None:
-            raise UserError("--random-seed says which random scenes are compared: say with --random N how many")
-        return None, 1
+        for option, value in (("--random-seed", request.random_seed), ("--random-kinds", request.random_kinds)):
+            if value is not None:
+                raise UserError(f"{option} says which random scenes are compared: say with --random N how many")
+        return None, 1, RANDOM_KINDS[0]
     if request.scenes:
         raise UserError(
             f"--random draws its own scenes: leave out {', '.join(request.scenes)}, or compare these apart without it"
         )
     count = options.parse_integer("--random", request.random, 1, MAX_RANDOM)
-    if request.random_seed is None:
-        return count, 1
-    return count, options.parse_integer("--random-seed", request.random_seed, 0, options.MAX_SEED)
+    seed = (
+        1
+        if request.random_seed is None
+        else options.parse_integer("--random-seed", request.random_seed, 0, options.MAX_SEED)
+    )
+    kinds = request.random_kinds or RANDOM_KINDS[0]
+    if kinds not in RANDOM_KINDS:
+        raise UserError(f"--random-kinds '{kinds}' is neither {' nor '.join(RANDOM_KINDS)}")
+    return count, seed, kinds
 
 
 def _settings(request: AgreementRequest) -> Settings:

@@ -164,6 +164,14 @@ def bench_agreement(
     random_seed: Annotated[
         Text, typer.Option(metavar="S", help="Which scenes these are; the same S, the same scenes; default: 1.")
     ] = None,
+    random_kinds: Annotated[
+        Text,
+        typer.Option(
+            metavar="plain|all",
+            help="What they hold: simple solids of clear glass, or cut stones, vessels, bubbles, tints, ground glass, "
+            "gratings, spots and beams as well; default: plain.",
+        ),
+    ] = None,
     allow_outside: AllowOutside = False,
 ) -> None:
     """Compare a method's caustics with the float64 reference by standard scores, by pixels and in 8x8 blocks."""
@@ -180,6 +188,7 @@ def bench_agreement(
         reference,
         random,
         random_seed,
+        random_kinds,
     )
     raise typer.Exit(bench_agreement_command(request))
 
