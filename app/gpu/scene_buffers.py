@@ -249,7 +249,7 @@ class SceneBuffers:
             if material.receives:
                 record["receiver"] = self.receivers.index(index)
             size = UNBOUNDED
-            if material.is_specular and not self._faceted[index]:
+            if material.is_specular and (material.is_rough or not self._faceted[index]):
                 size = self.space.scale * 0.5 * float(np.linalg.norm(np.ptp(self.world_meshes[index].vertices, axis=0)))
             if material.is_mirror:
                 record["colour"][3] = size

@@ -327,6 +327,9 @@ void main()
     surface_table = thing.colour.y;
 #endif
     if (met) ray.position = surface_point(hit, facet, ray.position, ray.direction);
+#ifdef LOBE_COLUMNS
+    if (met) keep_lobe_of_directions(ray, hit.normal_g);
+#endif
 #if COLUMNS > 0
     for (int c = 0; c < COLUMNS; ++c)
         ray.dposition[c].xyz = transfer_column(ray.dposition[c].xyz, ray.ddirection[c].xyz, ray.direction, hit.normal_g, hit.distance);

@@ -4,6 +4,8 @@
 #ifndef TRACE_WIDTHS_GLSL
 #define TRACE_WIDTHS_GLSL
 
+#define ELEVATIONS 0.5
+
 float longest_side(vec3 s, vec3 t)
 {
     vec2 axis = longest_axis(vec3(dot(s, s), dot(s, t), dot(t, t)));
@@ -43,6 +45,34 @@ void keep_columns_within(inout RayRecord ray, RayRecord start, float size, float
     ray.ddirection[LAMP].xyz = turn_s;
     ray.ddirection[LAMP + 1].xyz = turn_t;
 #endif
+#ifdef LOBE_COLUMNS
+    // Light that comes from anywhere in a disc has half of its radius as standard deviation.
+    vec3 first = ray.dposition[LOBE].xyz, second = ray.dposition[LOBE + 1].xyz, turn_first = ray.ddirection[LOBE].xyz, turn_second = ray.ddirection[LOBE + 1].xyz;
+    keep_within(0.5 * size, first, second, turn_first, turn_second);
+    ray.dposition[LOBE].xyz = first;
+    ray.dposition[LOBE + 1].xyz = second;
+    ray.ddirection[LOBE].xyz = turn_first;
+    ray.ddirection[LOBE + 1].xyz = turn_second;
+#endif
 }
+
+#ifdef LOBE_COLUMNS
+// Of a ray that rough surfaces have turned and that meets a surface with this normal. Directions that have forgotten all, those of Lambert's law, have half of a unit vector's length as standard
+// deviation along either axis; columns by which microfacets turn light grow with every surface, and at grazing exits without bound. And towards the surface and away from it no more than
+// the ray's own elevation: how far light lands goes as one over that.
+void keep_lobe_of_directions(inout RayRecord ray, vec3 normal)
+{
+    vec3 first = ray.dposition[LOBE].xyz, second = ray.dposition[LOBE + 1].xyz, turn_first = ray.ddirection[LOBE].xyz, turn_second = ray.ddirection[LOBE + 1].xyz;
+    keep_within(0.5, turn_first, turn_second, first, second);
+    float elevation = dot(ray.direction, normal);
+    vec3 up = normal - elevation * ray.direction;
+    float slope = length(up);
+    up /= max(slope, 1e-6);
+    vec2 rise = vec2(dot(turn_first, up), dot(turn_second, up));
+    float kept = min(1.0, ELEVATIONS * abs(elevation) / max(slope * length(rise), 1e-30));
+    ray.ddirection[LOBE].xyz = turn_first - (1.0 - kept) * rise.x * up;
+    ray.ddirection[LOBE + 1].xyz = turn_second - (1.0 - kept) * rise.y * up;
+}
+#endif
 
 #endif
