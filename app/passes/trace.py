@@ -16,7 +16,7 @@ import numpy as np
 
 from ..gpu import bindings, records, shader
 from ..gpu.context import Context
-from ..gpu.scene_buffers import SceneBuffers
+from ..gpu.scene_buffers import UNBOUNDED, SceneBuffers
 from ..gpu.scene_records import SCENE_STRUCTS
 from ..model.features import Features
 from .emission_domain import EmissionDomain
@@ -157,6 +157,13 @@ class LatticeSlice:
         return replace(self, stride=2 * self.stride, points=(self.points + 1) // 2), later
 
 
+WIDEST_TURN = 1.4
+"""Radians times the sixth root of the photons, the bandwidth of a density in the plane [Silverman 1986]: how far the
+directions of a footprint may differ behind a surface. Diamond ellipsoids under wide lamps (`random_3_3`, `random_1_1`,
+`random_1_8` of `bench-agreement --random`, 96×54, a million photons), nRMSE without and with it: 0.074, 0.056; 0.082,
+0.078; 0.0168, 0.0144. With 100,000: 0.099, 0.092; 0.110, 0.106; 0.028 both. Shipped scenes are as they were."""
+HANDED_POINTS = 2e4
+"""What rays that beams handed on, whose number is not known where they are traced, count as."""
 WIDEST_ON_SURFACE = 0.06
 """Of an object's size (half of its bounds' diagonal): the longest side of a footprint on it, and of what a lamp's other
 points add, where the lattice's own spacing is not longer. Of 0.03, 0.06, 0.12 and no bound the best one in scenes of
@@ -176,7 +183,7 @@ class TracePass:
         split_threshold: float = SPLIT_THRESHOLD,
         widest_on_surface: float = WIDEST_ON_SURFACE,
     ) -> None:
-        """`widest_on_surface`: infinite where columns are wanted as derivatives, whatever is believed of them."""
+        """`widest_on_surface`: `UNBOUNDED` where columns are wanted as derivatives, whatever is believed of them."""
         self.context = context
         self.scene = scene
         self.batch = batch
@@ -192,7 +199,7 @@ class TracePass:
             *(*SCENE_STRUCTS, self.ray, self.photon, records.OUTCOME, records.CHUNK_COUNT, records.QUEUE_STATE),
             *([records.FLIGHT] if features.flights else []),
         )
-        defines = light_defines(features, context.traits) | scene.defines
+        defines = light_defines(features, context.traits) | scene.defines | {"HANDED_POINTS": HANDED_POINTS}
         self._features = features
         self._defines = defines
         self._structs = structs
@@ -387,10 +394,15 @@ class TracePass:
         self._trace_values["split_threshold"] = split_threshold
         if piece.lattice_count < 1 << (32 - records.LATTICE_BIT):
             self._trace_values["lattice_bits"] = piece.lattice_count << records.LATTICE_BIT
+        self._trace_values["widest_turn"] = self._widest_turn(piece.lattice_count * lattices * domain.active_share)
         self._trace_values["lattice_shift"] = piece.shift[1]
         self._trace_values["surface_key"] = self._trace_values["tint_key"] = piece.seed
         self._trace_values["lattices_together"] = 1 if self._features.spectral_groups else len(piece.bands)
         self._trace_parameters.write(self._trace_values.tobytes())
+
+    def _widest_turn(self, photons: float) -> float:
+        """Radians a side, in a pass of so many photons of a light."""
+        return WIDEST_TURN * max(photons, 1.0) ** (-1.0 / 6.0) if self.widest_on_surface < UNBOUNDED else UNBOUNDED
 
     def _trace_parameters_of(
         self, light: int, lattices: int, max_depth: int, beam_objects: tuple[int, ...] = ()
@@ -398,6 +410,7 @@ class TracePass:
         p = records.TRACE_PARAMETERS.zeros(1)
         p["max_depth"], p["split_threshold"], p["lattices"] = max_depth, self.split_threshold, lattices
         p["lattices_together"], p["widest_on_surface"] = 1, self.widest_on_surface
+        p["widest_turn"] = self._widest_turn(HANDED_POINTS)
         p["power_row"] = self.scene.layout.power_row + light * max(1, self._features.tint_levels)
         p["tint_row"] = self.scene.tint_row
         if self.scene.tint_levels is not None:

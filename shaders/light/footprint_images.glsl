@@ -4,7 +4,7 @@
 //
 // Photons of a lattice go on beyond the border as the lattice does: the last one inside stands for the next ones outside, a step of its lattice further
 // each. Mirrored, their even lattice would have a seam at the border, with gaps from none to two spacings wide. Photons of no lattice are mirrored,
-// those of lattices much finer than texels, and those whose band sweeps towards the border, which blurs the seam.
+// those of lattices much finer than texels, those whose footprints fan out, and those whose band sweeps towards the border, which blurs the seam.
 
 // A photon as it is drawn.
 struct Depicted {
@@ -36,6 +36,8 @@ const uint STEPS_BEYOND = 3u;
 const float LEAST_STEP = 0.375;  // texels
 // Of such a step: which photon of a lattice is the last one inside depends on the wavelength where a band sweeps further towards the border. It is mirrored.
 const float MOST_SWEPT = 0.1;
+// Change of a footprint's size over such a step: light that thins out so fast (glows at low angles) has no even lattice beyond the border, and what those within spread beyond it would be lost.
+const float MOST_FANNED = 0.5;
 // Bit of the image across both borders, behind the steps over the one and over the other.
 const uint ACROSS_BOTH = 2u * STEPS_BEYOND;
 
@@ -70,7 +72,8 @@ Beside footprint_beside(Depicted of, Placement place, vec4 border, int index) {
     vec3 outwards = step.x * of.photon.dposition_ds + step.y * of.photon.dposition_dt;
     found.outwards_by = -dot(border.xyz, outwards);
     float least = max(LEAST_STEP * texel, abs(dot(border.xyz, of.sweep)) / MOST_SWEPT);
-    found.outwards = found.outwards_by < least ? vec3(0.0) : outwards;
+    bool fans = abs(dot(unpackHalf2x16(of.photon.fan), step)) > MOST_FANNED;
+    found.outwards = found.outwards_by < least || fans ? vec3(0.0) : outwards;
     return found;
 }
 

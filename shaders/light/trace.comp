@@ -327,8 +327,11 @@ void main()
     surface_table = thing.colour.y;
 #endif
     if (met) ray.position = surface_point(hit, facet, ray.position, ray.direction);
+#ifdef FOOTPRINTS
+    if (ray.depth > 0u) keep_directions_within(ray);
+#endif
 #ifdef LOBE_COLUMNS
-    if (met) keep_lobe_of_directions(ray, hit.normal_g);
+    if (met) keep_lobe_within(ray, hit.normal_g);
 #endif
 #if COLUMNS > 0
     for (int c = 0; c < COLUMNS; ++c)

@@ -61,9 +61,6 @@ void shadow(RoughPlace place, inout RayRecord child, Deflection turned, float si
 }
 
 #ifdef LOBE_COLUMNS
-// What rays that beams handed on, whose number is not known here, count as.
-#define HANDED_POINTS 2e4
-
 // The footprint of a photon that rough surfaces have turned: its own, and of the lobe as much as one of so many photons stands for. Where the lobe
 // is small beside the lattice's spacing, neighbours still land side by side, and the lattice covers all. Whether it was widened.
 bool widen_by_lobe(RayRecord ray, vec3 normal_g, inout vec3 dposition_ds, inout vec3 dposition_dt)

@@ -4,8 +4,6 @@
 #ifndef TRACE_WIDTHS_GLSL
 #define TRACE_WIDTHS_GLSL
 
-#define ELEVATIONS 0.5
-
 float longest_side(vec3 s, vec3 t)
 {
     vec2 axis = longest_axis(vec3(dot(s, s), dot(s, t), dot(t, t)));
@@ -56,20 +54,37 @@ void keep_columns_within(inout RayRecord ray, RayRecord start, float size, float
 #endif
 }
 
+// Of a ray that a surface has turned: where curved surfaces turn it again and again (inside a diamond), directions grow by a factor each time too, and what leaves at last would be drawn as if it
+// went everywhere at once. Such light is as good as scattered; `widest_turn` is what one photon of so many stands for then.
+void keep_directions_within(inout RayRecord ray)
+{
+    vec3 s = ray.dposition[0].xyz, t = ray.dposition[1].xyz, turn_s = ray.ddirection[0].xyz, turn_t = ray.ddirection[1].xyz;
+    keep_within(p.widest_turn / max(ray.footprint_scale, 1e-30), turn_s, turn_t, s, t);
+#ifdef LIGHT_EDGES
+    if (turn_s != ray.ddirection[0].xyz) ray.dposition[0].w = 0.0;
+#endif
+    ray.ddirection[0].xyz = turn_s;
+    ray.ddirection[1].xyz = turn_t;
+}
+
 #ifdef LOBE_COLUMNS
-// Of a ray that rough surfaces have turned and that meets a surface with this normal. Directions that have forgotten all, those of Lambert's law, have half of a unit vector's length as standard
-// deviation along either axis; columns by which microfacets turn light grow with every surface, and at grazing exits without bound. And towards the surface and away from it no more than
-// the ray's own elevation: how far light lands goes as one over that.
-void keep_lobe_of_directions(inout RayRecord ray, vec3 normal)
+// Directions that have forgotten all, those of Lambert's law, have this as standard deviation along either axis (sines).
+#define FORGOTTEN 0.5
+// Of a ray's elevation over what it meets.
+#define HIGHEST_RISE 0.5
+
+// Of a ray that rough surfaces have turned and that meets a surface with this normal: columns by which microfacets turn light grow with every surface, and at grazing exits without bound. And
+// up and down they say no more than half of the ray's own elevation, for how far light lands goes as one over that.
+void keep_lobe_within(inout RayRecord ray, vec3 normal)
 {
     vec3 first = ray.dposition[LOBE].xyz, second = ray.dposition[LOBE + 1].xyz, turn_first = ray.ddirection[LOBE].xyz, turn_second = ray.ddirection[LOBE + 1].xyz;
-    keep_within(0.5, turn_first, turn_second, first, second);
+    keep_within(FORGOTTEN, turn_first, turn_second, first, second);
     float elevation = dot(ray.direction, normal);
     vec3 up = normal - elevation * ray.direction;
     float slope = length(up);
     up /= max(slope, 1e-6);
     vec2 rise = vec2(dot(turn_first, up), dot(turn_second, up));
-    float kept = min(1.0, ELEVATIONS * abs(elevation) / max(slope * length(rise), 1e-30));
+    float kept = min(1.0, HIGHEST_RISE * abs(elevation) / max(slope * length(rise), 1e-30));
     ray.ddirection[LOBE].xyz = turn_first - (1.0 - kept) * rise.x * up;
     ray.ddirection[LOBE + 1].xyz = turn_second - (1.0 - kept) * rise.y * up;
 }

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from ...gpu.context import Context
 from ...gpu.records import specular_events
-from ...gpu.scene_buffers import SceneBuffers
+from ...gpu.scene_buffers import UNBOUNDED, SceneBuffers
 from ...gpu.spectral_groups import Groups
 from ...model.features import Features
 from ...model.geometry.mesh import Mesh, make_mesh
@@ -200,7 +200,7 @@ def trace_light(
     buffers = SceneBuffers(gl.ctx, scene, features, spectral_axis(scene, features))
     room = max(2 * count * len(bands_nm), 1024)
     # Few rays, whose footprints are as wide as the light: columns are asked for as derivatives.
-    trace = TracePass(gl, features, buffers, room, max_depth, split_threshold=0.0, widest_on_surface=1e30)
+    trace = TracePass(gl, features, buffers, room, max_depth, split_threshold=0.0, widest_on_surface=UNBOUNDED)
     try:
         space = buffers.space
         specular = [o.mesh.corners() for o in objects if not o.material.receives]
