@@ -174,7 +174,7 @@ def wider_material(rng: np.random.Generator) -> Values:
     if kind == "ground":
         return {"glass": glass, "roughness": between(rng, 0.1, 0.6)}
     if kind == "widened":
-        return {"glass": glass, "dispersion_gain": between(rng, -1.0, 4.0)}
+        return {"glass": glass, "dispersion_gain": between(rng, 0.0, 4.0)}
     return {"glass": glass}
 
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 import pytest
 from spectrasplat.__main__ import main
-from spectrasplat.bench.random_scenes import GLASSES, SOLIDS, random_scene, random_scenes, scene_name
+from spectrasplat.bench.random_scenes import random_scene, random_scenes, scene_name
+from spectrasplat.bench.random_solids import GLASSES, PLAIN, WIDER
 from spectrasplat.model.contacts import world_bounds
 from spectrasplat.model.io.scene_file import load_scene
 
@@ -55,7 +57,7 @@ def test_nothing_stands_in_another(tmp_path: Path) -> None:
 def test_everything_comes_up(drawn: list[dict]) -> None:
     objects = [item for values in drawn for item in values["objects"]]
     names = {item["name"].split()[0] for item in objects}
-    assert names == {*SOLIDS, "table", "wall", "mirror", "blocker"}
+    assert names == {*PLAIN, "table", "wall", "mirror", "blocker"}
     assert {item["glass"] for item in objects if "glass" in item} == set(GLASSES)
     lights = [light for values in drawn for light in values["lights"]]
     assert {light["kind"] for light in lights} == {"directional", "point", "area"}
@@ -65,6 +67,28 @@ def test_everything_comes_up(drawn: list[dict]) -> None:
     assert {item["rests_at_z"] > 0.05 for item in objects if "glass" in item} == {True, False}
 
 
+def test_scenes_of_all_kinds_load_and_stand(tmp_path: Path) -> None:
+    for name, scene in random_scenes(40, 3, tmp_path, "all").items():
+        assert load_scene(tmp_path / f"{name}.toml").lights == scene.lights
+        assert any(o.material.is_specular for o in scene.objects) and any(o.material.receives for o in scene.objects)
+        # Data that end within the spectrum, and dispersion wider than any glass has: asked for.
+        assert all("nearest value" in note or "nature does not" in note for note in scene.notes), scene.notes
+        low = {o.name: world_bounds(o)[0, 2] for o in scene.objects if o.name not in ("table", "wall")}
+        assert min(low.values()) > 0.0, (name, low)
+
+
+def test_all_kinds_come_up() -> None:
+    drawn = [random_scene(5, number, "all") for number in range(150)]
+    objects = [item for values in drawn for item in values["objects"]]
+    names = {re.sub(r" \d+( inside)?$", "", item["name"]) for item in objects}
+    assert {*PLAIN, *WIDER, "grating", "white ball", "board"} <= names
+    assert {light["kind"] for values in drawn for light in values["lights"]} >= {"spot", "collimated", "area", "point"}
+    materials = [item["material"] for item in objects if isinstance(item.get("material"), dict)]
+    assert {material["kind"] for material in materials} == {"glass", "mirror", "grating", "diffuse"}
+    assert any("absorption" in material for material in materials) and any("V_d" in material for material in materials)
+    assert any("roughness" in item for item in objects) and any("dispersion_gain" in item for item in objects)
+
+
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
@@ -72,6 +96,8 @@ def test_everything_comes_up(drawn: list[dict]) -> None:
         (("--random", "few"), "--random 'few' is not a whole number"),
         (("--random", "2", "--random-seed", "-1"), "--random-seed -1 is out of range"),
         (("--random-seed", "3"), "--random N how many"),
+        (("--random-kinds", "all"), "--random N how many"),
+        (("--random", "2", "--random-kinds", "some"), "--random-kinds 'some' is neither plain nor all"),
         (("prism", "--random", "2"), "leave out prism"),
     ],
 )
