@@ -10,6 +10,19 @@ float longest_side(vec3 s, vec3 t)
     return length(axis.x * s + axis.y * t);
 }
 
+#if defined(LAMP_COLUMNS) || defined(LOBE_COLUMNS)
+// The places of columns `c` and `c + 1`, and their directions with them.
+void keep_pair_within(inout RayRecord ray, int c, float widest)
+{
+    vec3 first = ray.dposition[c].xyz, second = ray.dposition[c + 1].xyz, turn_first = ray.ddirection[c].xyz, turn_second = ray.ddirection[c + 1].xyz;
+    keep_within(widest, first, second, turn_first, turn_second);
+    ray.dposition[c].xyz = first;
+    ray.dposition[c + 1].xyz = second;
+    ray.ddirection[c].xyz = turn_first;
+    ray.ddirection[c + 1].xyz = turn_second;
+}
+#endif
+
 // Of a ray that has met a surface of an object of this size; `start`: as it set out. A lattice as wide as that stays as it is: nothing else is between its points.
 void keep_columns_within(inout RayRecord ray, RayRecord start, float size, float distance)
 {
@@ -33,24 +46,11 @@ void keep_columns_within(inout RayRecord ray, RayRecord start, float size, float
     ray.ddirection[0].xyz = turn_s;
     ray.ddirection[1].xyz = turn_t;
 #ifdef LAMP_COLUMNS
-    s = ray.dposition[LAMP].xyz;
-    t = ray.dposition[LAMP + 1].xyz;
-    turn_s = ray.ddirection[LAMP].xyz;
-    turn_t = ray.ddirection[LAMP + 1].xyz;
-    keep_within(p.widest_on_surface * size, s, t, turn_s, turn_t);
-    ray.dposition[LAMP].xyz = s;
-    ray.dposition[LAMP + 1].xyz = t;
-    ray.ddirection[LAMP].xyz = turn_s;
-    ray.ddirection[LAMP + 1].xyz = turn_t;
+    keep_pair_within(ray, LAMP, p.widest_on_surface * size);
 #endif
 #ifdef LOBE_COLUMNS
     // Light that comes from anywhere in a disc has half of its radius as standard deviation.
-    vec3 first = ray.dposition[LOBE].xyz, second = ray.dposition[LOBE + 1].xyz, turn_first = ray.ddirection[LOBE].xyz, turn_second = ray.ddirection[LOBE + 1].xyz;
-    keep_within(0.5 * size, first, second, turn_first, turn_second);
-    ray.dposition[LOBE].xyz = first;
-    ray.dposition[LOBE + 1].xyz = second;
-    ray.ddirection[LOBE].xyz = turn_first;
-    ray.ddirection[LOBE + 1].xyz = turn_second;
+    keep_pair_within(ray, LOBE, 0.5 * size);
 #endif
 }
 
