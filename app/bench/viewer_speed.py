@@ -196,6 +196,9 @@ class _Bench:
         started = time.perf_counter()
         while not done():
             self.interface.frame()
+            engine = self.session.picture.engine
+            if engine is None or engine.problem:
+                raise UserError(f"the viewer stopped: {engine.problem if engine is not None else 'see its messages'}")
             if time.perf_counter() - started > PATIENCE_S:
                 raise UserError(f"no picture after {PATIENCE_S:.0f} s")
         return time.perf_counter() - started

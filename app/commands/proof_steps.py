@@ -102,7 +102,13 @@ def _programs(short: bool, _folder: Path) -> Iterator[Finding]:
         for at, (name, path) in enumerate(scenes.items()):
             scene = load_scene(path)
             started = time.perf_counter()
-            programs = compiled_programs(context, scene, RenderSettings(max_depth=scene.render.max_depth))
+            try:
+                programs = compiled_programs(context, scene, RenderSettings(max_depth=scene.render.max_depth))
+            except (shader.ShaderError, UserError) as error:
+                # The other scenes' programs may be wrong for reasons of their own: one run should tell all.
+                yield Finding(name, " ".join(str(error).split()), True, time.perf_counter() - started)
+                yield Finding("", "", done=(at + 1) / len(scenes))
+                continue
             took = time.perf_counter() - started
             new = [built for built in programs if built.texts not in seen]
             seen |= {built.texts: built for built in new}

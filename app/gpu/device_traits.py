@@ -29,8 +29,9 @@ class DeviceTraits:
     queue_read_steps: int = 8
     """Events of all rays between two looks at how many are left. Looking waits for the device, and empty steps cost a
     GPU less."""
-    batch_scale: int = 4
-    """Rays in flight, in units of the default batch."""
+    batch_scale: int = 16
+    """Rays in flight, and the memory for them, in units of the default batch. An event of a few rays takes a GPU as
+    long as one of many: a batch has some forty, of five dispatches each."""
     work_is_queued: bool = True
     """A command only queues work: whoever keeps a deadline must wait for the device."""
     dispatch_s: float = DISPATCH_S

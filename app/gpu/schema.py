@@ -46,7 +46,7 @@ class Struct:
     name: str
     fields: tuple[Field, ...]
     texels: bool = False
-    """Moved as groups of four words: GLSL also gets `NAME_TEXELS`, `to_texels` and `NAME_of`. A software
+    """Moved as groups of four words: GLSL also gets `NAME_TEXELS`, `to_texels`, `NAME_of` and `NAME_FROM`. A software
     renderer pays per access, not per byte, and a texel is one access."""
 
     def __hash__(self) -> int:
@@ -118,6 +118,9 @@ class Struct:
                     unpack.append(f"    {part} = {from_bits}({texel});")
                     word += 1
         count = f"{self.name}_TEXELS"
+        # Without a loop: a compiler that is told not to unroll (camera.comp) would load every texel, into memory, where
+        # most callers want one member.
+        loads = ", ".join(f"load((at) + {i}u)" for i in range(word // 4))
         return "\n".join(
             [
                 f"#define {count} {word // 4}",
@@ -128,7 +131,8 @@ class Struct:
                 f"    {self.name} value;",
                 *unpack,
                 "    return value;",
-                "}\n",
+                "}",
+                f"#define {self.name}_FROM(load, at) {self.name}_of(uvec4[{count}]({loads}))\n",
             ]
         )
 

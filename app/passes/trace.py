@@ -188,6 +188,8 @@ class TracePass:
         self.scene = scene
         self.batch = batch
         self.max_depth = max_depth
+        self.events_at_once = 1
+        """Events of all rays between two pauses of `steps`: more where a pause would take longer than they do."""
         self.rays_traced = 0
         """Rays emitted since this pass was made, pilots and all."""
         self.split_threshold = split_threshold
@@ -208,9 +210,9 @@ class TracePass:
         self._trace = shader.compute(ctx, "light/trace.comp", defines, (*structs, records.TRACE_PARAMETERS))
         queue = {
             name: shader.compute(ctx, f"light/queue_{name}.comp", defines, structs)
-            for name in ("count", "scan", "scatter", "gather", "advance")
+            for name in ("count", "scan", "scatter", "gather")
         }
-        self._count, self._scan, self._scatter, self._gather, self._advance = queue.values()
+        self._count, self._scan, self._scatter, self._gather = queue.values()
 
         ray_capacity = RAY_ROOM * batch
         chunks = -(-ray_capacity // _CHUNK)
@@ -251,7 +253,6 @@ class TracePass:
             self._scan,
             self._scatter,
             self._gather,
-            self._advance,
             *self._emit.values(),
             *self._orders.values(),
             *([] if self.flights is None else [self.flights]),
@@ -291,7 +292,7 @@ class TracePass:
         self.scene.bind()
         self._bind_queue(0)
         self._emit_parameters.bind_to_storage_buffer(bindings.PARAMETERS)
-        self._order(piece).bind_to_storage_buffer(bindings.INDICES)
+        self.order(piece).bind_to_storage_buffer(bindings.INDICES)
         self._emit_program(domain).run(-(-piece.count // _GROUP))
         self._indices.bind_to_storage_buffer(bindings.INDICES)
         self._list_children(first=True, chunks=-(-piece.count // _CHUNK))
@@ -329,18 +330,22 @@ class TracePass:
         limit = (2 + self.scene.most_orders) * max_depth + 32
         step = 0
         while alive and step < limit:
-            if step == limit - 1:
-                self._trace_values["max_depth"] = 0
-                self._trace_parameters.write(self._trace_values.tobytes())
             self.scene.bind()
             self._trace_parameters.bind_to_uniform_block(bindings.PARAMETERS)
             self._bind_queue(step + 1)
-            self._trace.run_indirect(self._state, records.QUEUE_STATE.offset("trace_groups"))
-            self._list_children(first=False)
-            step += 1
-            # Reading the count waits for the device: rarely on a GPU, where empty steps cost less.
-            if step % self.context.traits.queue_read_steps == 0:
-                alive = int(self._read_state()["alive"])
+            for _ in range(min(self.events_at_once, limit - step)):
+                if step == limit - 1:
+                    self._trace_values["max_depth"] = 0
+                    self._trace_parameters.write(self._trace_values.tobytes())
+                self._bind_rays(step + 1)
+                self._trace.run_indirect(self._state, records.QUEUE_STATE.offset("trace_groups"))
+                self._list_children(first=False)
+                step += 1
+                # Reading the count waits for the device: rarely on a GPU, where empty steps cost less.
+                if step % self.context.traits.queue_read_steps == 0:
+                    alive = int(self._read_state()["alive"])
+                    if not alive:
+                        break
             yield
         self.context.check("tracing photons")
         state = self._read_state()
@@ -422,9 +427,7 @@ class TracePass:
         return p
 
     def _bind_queue(self, step: int) -> None:
-        # Step 0 (emission) writes rays[0]; step k reads rays[(k-1) % 2].
-        self._rays[step % 2].bind_to_storage_buffer(bindings.RAYS_OUT)
-        self._rays[(step + 1) % 2].bind_to_storage_buffer(bindings.RAYS_IN)
+        self._bind_rays(step)
         self._outcomes.bind_to_storage_buffer(bindings.OUTCOMES)
         self._slots.bind_to_storage_buffer(bindings.PHOTON_SLOTS)
         self._indices.bind_to_storage_buffer(bindings.INDICES)
@@ -433,6 +436,11 @@ class TracePass:
         self.photons.bind_to_storage_buffer(bindings.PHOTONS)
         if self.flights is not None:
             self.flights.bind_to_storage_buffer(bindings.FLIGHTS)
+
+    def _bind_rays(self, step: int) -> None:
+        # Step 0 (emission) writes rays[0]; step k reads rays[(k-1) % 2].
+        self._rays[step % 2].bind_to_storage_buffer(bindings.RAYS_OUT)
+        self._rays[(step + 1) % 2].bind_to_storage_buffer(bindings.RAYS_IN)
 
     def _list_children(self, *, first: bool, chunks: int = 0) -> None:
         ctx = self.context.ctx
@@ -452,10 +460,9 @@ class TracePass:
         if not first:
             self._gather.run_indirect(self._state, offsets["gather_groups"])
             ctx.memory_barrier()
-        self._advance.run(1)
-        ctx.memory_barrier()
 
-    def _order(self, piece: LatticeSlice) -> moderngl.Buffer:
+    def order(self, piece: LatticeSlice) -> moderngl.Buffer:
+        """The order in which `piece` is emitted, uint32 (points,); made by the processor where it is a new one."""
         key = (piece.points, piece.stride, piece.lattice_count)
         if key not in self._orders:
             if len(self._orders) >= _MAX_ORDERS:

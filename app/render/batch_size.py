@@ -24,7 +24,7 @@ def batch_size(context: Context, features: Features, asked: int | None) -> int:
 
 def _batch_that_fits(features: Features, most_bytes: int) -> int:
     """The largest power of two whose queue takes no more than that, nor more than an eighth of the memory there is."""
-    batch = DEFAULT_BATCH << 2
+    batch = DEFAULT_BATCH << 4
     while batch > SMALLEST_BATCH and queue_bytes(features, batch) > min(most_bytes, available_bytes() // 8):
         batch >>= 1
     return batch

@@ -7,6 +7,8 @@ from collections.abc import Generator, Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ..gpu.dispatch_budget import DISPATCH_S, DispatchBudget
 from ..passes.trace import Batch, LatticeSlice, TracePass
 from .photon_records import PhotonRecords, RoundOf
@@ -14,7 +16,6 @@ from .splatting import Pace, Splatting
 
 if TYPE_CHECKING:
     import moderngl
-    import numpy as np
 
     from ..gpu.context import Context
     from ..passes.emission_domain import EmissionDomain
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
 
 MIN_RAYS = 1 << 10
 """Rays of a batch that are not divided further, however slow the device is."""
+
+MOST_EVENTS = 8
+"""Events of a batch that a device is given at once, however fast it is: as many as it looks for living rays after."""
 
 
 @dataclass(frozen=True)
@@ -75,6 +79,7 @@ class PhotonBatches:
             most = min(self.budget.units, self._held.get(part.light, self.budget.units))
             points = min(left, max(most // lattices, 1))
             piece = replace(part, first=first, points=points)
+            self.trace.order(piece)  # the processor's work, which would pass for the device's below
             batch = yield from self._traced(self.trace.steps(piece, domain), into.stats, piece.count)
             if batch.overflow and points > 1:
                 self._held[part.light] = piece.count // 2
@@ -126,6 +131,7 @@ class PhotonBatches:
             stats.trace_seconds += took
             if queued and is_first and rays and is_compiled:
                 self.budget.learn(rays, took, self.dispatch_seconds)
+                self.trace.events_at_once = int(np.clip(self.dispatch_seconds / max(took, 1e-6), 1, MOST_EVENTS))
             is_first, self._traced_once = False, True
             yield
             started = time.perf_counter()

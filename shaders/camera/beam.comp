@@ -37,9 +37,8 @@ uvec4 polygon_texel(uint i)
 
 ScreenPolygon polygon_at(uint index)
 {
-    uvec4 texels[ScreenPolygon_TEXELS];
-    for (uint i = 0u; i < uint(ScreenPolygon_TEXELS); ++i) texels[i] = polygon_texel(index * uint(ScreenPolygon_TEXELS) + i);
-    return ScreenPolygon_of(texels);
+    uint at = index * uint(ScreenPolygon_TEXELS);
+    return ScreenPolygon_FROM(polygon_texel, at);
 }
 
 // An edge's line at either end of the band: inside where dot(line.xy, place) + line.z >= 0.

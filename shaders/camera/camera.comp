@@ -162,8 +162,9 @@ void main()
 #endif
     uint pixel_key = hash_combine(hash_combine(p.seed, pixel.x), pixel.y);
 #ifdef BEAM_STARTS
-    CameraPath path = started_path(starts[entry]);
-    pixel_key = hash_combine(pixel_key, starts[entry].key);
+    BeamStart start = starts[entry];
+    CameraPath path = started_path(start);
+    pixel_key = hash_combine(pixel_key, start.key);
 #elif defined(CAMERA_SPECULAR)
     CameraPath path = camera_path(pixel, primary_sample, gain);
 #endif

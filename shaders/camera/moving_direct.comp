@@ -39,7 +39,8 @@ MapLook look_of(uint map, Corners places, vec2 side)
     MapLook look = MapLook(map != NONE && map / LATTICE_OBJECTS != LATTICE_MAPS, vec4(0.0), vec2(0.0), vec2(0.0), vec2(0.0), 1.0);
     if (look.covered) {
         uint placement = map / LATTICE_OBJECTS, object = map % LATTICE_OBJECTS;
-        vec4 rect = placements[placement].rect;
+        Placement window = placements[placement];
+        vec4 rect = window.rect;
         look.low = floor(rect.xy) + 0.5;
         look.high = ceil(rect.zw) - 0.5;
         // The pixel's longer side, in texels. Two bilinear lookups along it have the second moment of a box of its length, taken of texels that
@@ -53,7 +54,7 @@ MapLook look_of(uint map, Corners places, vec2 side)
             look.apart = sqrt((told_apart * told_apart - 1.0) / 12.0) / texels * longer;
         }
         bool plain = receivers[object_at(object).receiver].reflectance_class == 0u;
-        look.factor = p.map_scale * INVERSE_PI / (look.lookups * texel_area_at(placements[placement], vec3(0.0, 0.0, 1.0)))
+        look.factor = p.map_scale * INVERSE_PI / (look.lookups * texel_area_at(window, vec3(0.0, 0.0, 1.0)))
 #if defined(COATS) || defined(ROUGH_DIFFUSE)
                     * vec4(1.0);  // `albedo_of` has the rest
 #else

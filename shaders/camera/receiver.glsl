@@ -61,8 +61,9 @@ Paint paint_of(uint picture, uint source, Triangle facet)
     Paint paint;
     paint.picture = picture;
     paint.origin = facet.vertex;
-    hit_uv(pictures[picture], source, vec2(0.0), paint.uv);
-    uv_gradients(pictures[picture], source, facet.edge1, facet.edge2, paint.gradient_u, paint.gradient_v);
+    Picture worn = pictures[picture];
+    hit_uv(worn, source, vec2(0.0), paint.uv);
+    uv_gradients(worn, source, facet.edge1, facet.edge2, paint.gradient_u, paint.gradient_v);
     return paint;
 }
 
@@ -74,7 +75,8 @@ vec3 painted(Paint paint, SurfaceInteraction seen)
     for (int c = 0; c < 3; ++c) columns[c] = vec2(dot(paint.gradient_u, seen.dposition[c]), dot(paint.gradient_v, seen.dposition[c]));
     vec2 ds, dt;
     box_of_three(columns[0], columns[1], columns[2], ds, dt);
-    return texture_filtered(pictures[paint.picture], paint.uv + vec2(dot(paint.gradient_u, along), dot(paint.gradient_v, along)), ds, dt);
+    Picture worn = pictures[paint.picture];
+    return texture_filtered(worn, paint.uv + vec2(dot(paint.gradient_u, along), dot(paint.gradient_v, along)), ds, dt);
 }
 #endif
 
@@ -102,7 +104,8 @@ vec2 even_light_point()
 // Irradiance from one point of a light, as a factor on its own quantity, before anything is in the way.
 float unshadowed(uint light, SurfaceInteraction seen, vec2 unit, out LightSample s)
 {
-    s = sample_light(lights[light], seen.position, unit);
+    CameraLight from = lights[light];
+    s = sample_light(from, seen.position, unit);
     vec3 normal = dot(seen.direction, seen.normal_g) < 0.0 ? seen.normal_g : -seen.normal_g;
     return s.gain * max(dot(s.toward, normal), 0.0);
 }
@@ -307,7 +310,8 @@ void caustic_values(uint placement, vec3 place, vec2 box, out vec4 values[MAP_TA
     skipped_texels = skipped_texels || any(greaterThan(part, vec2(1.001)));
 #endif
     COUNT_ROUNDS(lookups.x * lookups.y);
-    float share = 1.0 / (float(lookups.x * lookups.y) * texel_area_at(placements[placement], place));
+    Placement window = placements[placement];
+    float share = 1.0 / (float(lookups.x * lookups.y) * texel_area_at(window, place));
     for (int t = 0; t < MAP_TARGETS; ++t) values[t] = vec4(0.0);
     for (int i = 0; i < lookups.x * lookups.y; ++i) {
         vec2 at = corner + part * vec2(i % lookups.x, i / lookups.x);
@@ -367,18 +371,19 @@ float spectrum_share(WavelengthInterval interval, bool positive, float part, flo
 void add_caustic_at(CameraPath path, SurfaceInteraction seen, WavelengthInterval interval, uint receiver, uint placement, vec3 texel)
 {
     // Texels larger than pixels are interpolated, smaller ones, and pixels themselves, weighed by their share of the sample.
+    Placement window = placements[placement];
     vec2 box = vec2(0.0);
     for (int c = 0; c < 3; ++c) {
-        vec2 side = texels_along(placements[placement], texel, seen.dposition[c]);
+        vec2 side = texels_along(window, texel, seen.dposition[c]);
         box += side * side;
     }
     box = sqrt(box);
     float side = sample_side(path);
 #if !defined(CAMERA_SPECULAR) && !defined(CAMERA_BEAMS)
-    if (p.cells.x > 1.0 || (p.cells.x > 0.0 && placements[placement].kind == PLACED_PICTURE)) {
+    if (p.cells.x > 1.0 || (p.cells.x > 0.0 && window.kind == PLACED_PICTURE)) {
         // Each look stands for its cell of the pixel. Cells fill it, so texels that fill it too are read once.
         vec2 share = side * vec2(p.pixel_width, p.pixel_height), aside = (floor(look_place * p.cells) + 0.5) / p.cells - look_place;
-        texel.xy += texel.z * texels_along(placements[placement], texel, (aside.x / share.x) * seen.dposition[0] - (aside.y / share.y) * seen.dposition[1]);
+        texel.xy += texel.z * texels_along(window, texel, (aside.x / share.x) * seen.dposition[0] - (aside.y / share.y) * seen.dposition[1]);
         box /= share * p.cells;
     }
 #endif

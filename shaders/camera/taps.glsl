@@ -103,8 +103,10 @@ void add_lights(CameraPath path, float far)
 #endif
     // Few rays come near a light: only they look along their sweep.
     bool near = false;
-    for (uint i = 0u; i < uint(LIGHT_COUNT); ++i)
-        near = near || (lights[i].measure > 0.0 && light_seen(lights[i], path.position, path.direction, far, 2.0 * (WIDTH_OF(lights[i]) + sweep)) > 0.0);
+    for (uint i = 0u; i < uint(LIGHT_COUNT); ++i) {
+        CameraLight light = lights[i];
+        near = near || (light.measure > 0.0 && light_seen(light, path.position, path.direction, far, 2.0 * (WIDTH_OF(light) + sweep)) > 0.0);
+    }
 #ifdef LISTS_SPECULAR
     saw_light = saw_light || near;
 #endif
@@ -121,9 +123,10 @@ void add_lights(CameraPath path, float far)
 #endif
         WavelengthInterval interval = wavelength_interval(path, lo, hi);
         for (uint i = 0u; i < uint(LIGHT_COUNT); ++i) {
-            float seen = lights[i].measure > 0.0 ? light_seen(lights[i], position, direction, far, WIDTH_OF(lights[i]) + sweep * part) : 0.0;
+            CameraLight light = lights[i];
+            float seen = light.measure > 0.0 ? light_seen(light, position, direction, far, WIDTH_OF(light) + sweep * part) : 0.0;
 #ifdef COATS
-            seen *= share_of_lobe(path, lights[i], position, direction);
+            seen *= share_of_lobe(path, light, position, direction);
 #endif
             if (seen > 0.0) add_spectrum(path, interval, uint(LIGHT_ROW) + i * uint(ROWS_PER_LIGHT), seen);
         }

@@ -13,10 +13,8 @@
 
 Piece piece_at(uint number)
 {
-    uvec4 texels[Piece_TEXELS];
-    for (uint i = 0u; i < uint(Piece_TEXELS); ++i)
-        texels[i] = scene_texel(uint(PIECES_AT) + number * uint(Piece_TEXELS) + i);
-    return Piece_of(texels);
+    uint at = uint(PIECES_AT) + number * uint(Piece_TEXELS);
+    return Piece_FROM(scene_texel, at);
 }
 
 vec3 stretched(Piece piece, vec3 way)

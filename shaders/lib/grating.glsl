@@ -11,16 +11,14 @@
 
 Grating grating_at(uint row)
 {
-    uvec4 texels[Grating_TEXELS];
-    texels[0] = scene_texel(uint(GRATINGS_AT) + row);
-    return Grating_of(texels);
+    uint at = uint(GRATINGS_AT) + row;
+    return Grating_FROM(scene_texel, at);
 }
 
 GratingOrder order_at(uint row, uint number)
 {
-    uvec4 texels[GratingOrder_TEXELS];
-    texels[0] = scene_texel(uint(GRATINGS_AT) + row + 1u + number);
-    return GratingOrder_of(texels);
+    uint at = uint(GRATINGS_AT) + row + 1u + number;
+    return GratingOrder_FROM(scene_texel, at);
 }
 
 // The steps m λ / (Λ n) of an order at three places of a band, in the medium that the ray is in.

@@ -25,16 +25,17 @@ bool find_texel(uint receiver, uint source, vec3 position, out uint placement, o
 #endif
     // At most two windows are nested; a chain of four is more than enough.
     for (int level = 0; level < 4 && placement != NONE; ++level) {
-        vec4 rect = placements[placement].rect;
-        at = homogeneous_texel(placements[placement], position);
+        Placement window = placements[placement];
+        vec4 rect = window.rect;
+        at = homogeneous_texel(window, position);
         vec2 texel = at.xy / at.z;
         float slack = 0.0;
 #ifdef CHARTS
         // A chart's rectangle has a gutter, so rounding at its edge must not lose the place.
-        slack = placements[placement].kind == PLACED_CHART ? 1.0 : 0.0;
+        slack = window.kind == PLACED_CHART ? 1.0 : 0.0;
 #endif
         if (at.z > 0.0 && all(greaterThanEqual(texel, rect.xy - slack)) && all(lessThan(texel, rect.zw + slack))) return true;
-        placement = placements[placement].next;
+        placement = window.next;
     }
     return false;
 }

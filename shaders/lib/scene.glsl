@@ -53,18 +53,14 @@ uvec4 scene_texel(uint i)
 
 Triangle triangle_at(uint slot)
 {
-    uvec4 texels[Triangle_TEXELS];
-    for (uint i = 0u; i < uint(Triangle_TEXELS); ++i)
-        texels[i] = scene_texel(uint(TRIANGLES_AT) + slot * uint(Triangle_TEXELS) + i);
-    return Triangle_of(texels);
+    uint at = uint(TRIANGLES_AT) + slot * uint(Triangle_TEXELS);
+    return Triangle_FROM(scene_texel, at);
 }
 
 Object object_at(uint object)
 {
-    uvec4 texels[Object_TEXELS];
-    for (uint i = 0u; i < uint(Object_TEXELS); ++i)
-        texels[i] = scene_texel(uint(OBJECTS_AT) + object * uint(Object_TEXELS) + i);
-    return Object_of(texels);
+    uint at = uint(OBJECTS_AT) + object * uint(Object_TEXELS);
+    return Object_FROM(scene_texel, at);
 }
 
 // Unit normal of a smooth facet's corner; `Triangle.normals` is the first of three.

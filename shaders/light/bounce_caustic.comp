@@ -26,13 +26,14 @@ vec3 colour_worn(EnvironmentPlace place, uint worn)
     Triangle facet = triangle_at(met && hit.object == place.object ? hit.primitive : place.primitive);
     vec3 gradient_u, gradient_v;
     vec2 uv;
-    hit_uv(pictures[worn], facet.source, vec2(0.0), uv);
-    uv_gradients(pictures[worn], facet.source, facet.edge1, facet.edge2, gradient_u, gradient_v);
+    Picture picture = pictures[worn];
+    hit_uv(picture, facet.source, vec2(0.0), uv);
+    uv_gradients(picture, facet.source, facet.edge1, facet.edge2, gradient_u, gradient_v);
     vec3 along = place.position - facet.vertex;
     uv += vec2(dot(gradient_u, along), dot(gradient_v, along));
     vec2 ds = vec2(dot(gradient_u, place.span_u), dot(gradient_v, place.span_u));
     vec2 dt = vec2(dot(gradient_u, place.span_v), dot(gradient_v, place.span_v));
-    return texture_filtered(pictures[worn], uv, ds, dt);
+    return texture_filtered(picture, uv, ds, dt);
 }
 #endif
 
@@ -50,10 +51,11 @@ void main()
         vec3 at;
         bool covered = find_texel(thing.receiver, source, place.position + within.x * place.span_u + within.y * place.span_v, placement, at);
         if (covered) {
-            vec2 box = (abs(texels_along(placements[placement], at, place.span_u)) + abs(texels_along(placements[placement], at, place.span_v))) / float(PARTS);
+            Placement window = placements[placement];
+            vec2 box = (abs(texels_along(window, at, place.span_u)) + abs(texels_along(window, at, place.span_v))) / float(PARTS);
             ivec2 lookups = clamp(ivec2(ceil(box)), ivec2(1), ivec2(MAX_TEXELS));
             vec2 step = box / vec2(lookups), corner = at.xy / at.z - 0.5 * (box - step);
-            float share = 1.0 / (float(PARTS * PARTS * lookups.x * lookups.y) * texel_area_at(placements[placement], at));
+            float share = 1.0 / (float(PARTS * PARTS * lookups.x * lookups.y) * texel_area_at(window, at));
             for (int i = 0; i < lookups.x * lookups.y; ++i) {
                 vec4 energy = caustic_energy(caustic_map[0], placement, corner + step * vec2(i % lookups.x, i / lookups.x), step);
                 sum += share * (energy.x * p.colours[0].rgb + energy.y * p.colours[1].rgb + energy.z * p.colours[2].rgb + energy.w * p.colours[3].rgb);

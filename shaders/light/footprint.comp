@@ -379,7 +379,8 @@ void main() {
     if ((held < 1.0 || !shown) && place.next != NONE) {
         // Close to the camera, texels of its pixels are as small as one likes: the coarse window tells.
         shown = false;
-        held = held_size(placements[place.next], photon, footprint_in(placements[place.next], photon, middle, sweep));
+        Placement coarse = placements[place.next];
+        held = held_size(coarse, photon, footprint_in(coarse, photon, middle, sweep));
     }
     held = (photon.flags & FLAG_FOOTPRINT_DROPPED) != 0u ? 0.0 : held;
     if (held < 1.0) {

@@ -1,4 +1,5 @@
-// Exclusive prefix sums of the chunk counts by one work group, and the next step's dispatch sizes.
+// Exclusive prefix sums of the chunk counts by one work group, and the next step's dispatch sizes. The children become the rays of
+// the next step: what lists them goes by `dispatched` and `next_alive`.
 layout(local_size_x = 256) in;
 
 #include "lib/queue.glsl"
@@ -47,6 +48,10 @@ void main()
         state.trace_groups = uvec4((state.next_alive + 63u) / 64u, 1u, 1u, 0u);
         state.chunk_groups = uvec4((chunks + 63u) / 64u, 1u, 1u, 0u);
         state.next_chunk_groups = uvec4(((state.next_alive + CHUNK - 1u) / CHUNK + 63u) / 64u, 1u, 1u, 0u);
+        state.alive = state.next_alive;
+        state.flights += state.alive;
+        state.most_alive = max(state.most_alive, state.alive);
+        state.iterations += state.alive > 0u ? 1u : 0u;
         state.gather_groups = uvec4((state.photons_new + 63u) / 64u, 1u, 1u, 0u);
     }
 }

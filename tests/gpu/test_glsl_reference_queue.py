@@ -1,4 +1,4 @@
-"""The queue between two trace steps (lib/queue.glsl and the five kernels over it) against its CPU reference in
+"""The queue between two trace steps (lib/queue.glsl and the four kernels over it) against its CPU reference in
 app/reference."""
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Queue:
         structs = (*SCENE_STRUCTS, PHOTON, records.OUTCOME, records.CHUNK_COUNT, records.QUEUE_STATE)
         self.programs = {
             name: shader.compute(self.ctx, f"light/queue_{name}.comp", DEFINES, structs)
-            for name in ("count", "scan", "scatter", "gather", "advance")
+            for name in ("count", "scan", "scatter", "gather")
         }
         state = records.QUEUE_STATE.zeros(1)
         state["alive"] = state["dispatched"] = len(outcomes)
@@ -59,7 +59,6 @@ class Queue:
             ("scan", 1),
             ("scatter", groups),
             ("gather", self.chunks),
-            ("advance", 1),
         ):
             self.programs[name].run(size)
             self.ctx.memory_barrier()
