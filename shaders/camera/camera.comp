@@ -5,6 +5,8 @@
 //
 // This is a program for what is seen directly (LISTS_SPECULAR). Where the scene shows glass or mirrors it lists the pixels that meet something specular
 // first (FOLLOWED), and another is for those (CAMERA_SPECULAR), which holds all that is expensive.
+// NVIDIA unrolls whatever it can count, with all that it has inlined: two minutes for a scene's programs.
+#pragma optionNV(unroll none)
 #ifdef CAMERA_SPECULAR
 layout(local_size_x = PATHS_GROUP) in;
 #else

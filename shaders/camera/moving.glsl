@@ -30,7 +30,7 @@ vec3 normal_of(uint primitive)
     Hit hit;
     hit.primitive = primitive;
     Triangle facet = hit_triangle(hit);
-    vec3 normal = normalize(cross(facet.edge1, facet.edge2));
+    vec3 normal = normalize(facet_normal(facet.edge1, facet.edge2));
 #ifdef CONVEX_SOLIDS
     if (is_plane(primitive)) normal = planes[primitive & ~PLANE_BIT].xyz;
 #endif
@@ -46,7 +46,7 @@ Hit hit_on(uvec2 first, CameraPath path)
     hit.normal_g = normal_of(first.x);
     Triangle facet = hit_triangle(hit);
     vec3 away = path.position - facet.vertex;
-    float inverse = 1.0 / dot(path.direction, cross(facet.edge1, facet.edge2));
+    float inverse = 1.0 / dot(path.direction, facet_normal(facet.edge1, facet.edge2));
     vec3 q = cross(away, path.direction);
     hit.bary = vec2(-dot(facet.edge2, q), dot(facet.edge1, q)) * inverse;
     hit.distance = -dot(away, hit.normal_g) / dot(path.direction, hit.normal_g);

@@ -141,7 +141,7 @@ void try_triangle(uint slot, vec3 near_p, float ahead, vec3 direction, RayOrigin
 {
     Triangle facet = triangle_at(slot);
     vec3 to_origin = near_p - facet.vertex;
-    vec3 normal = cross(facet.edge1, facet.edge2);
+    vec3 normal = facet_normal(facet.edge1, facet.edge2);
     float facing = dot(direction, normal);
     vec3 q = cross(to_origin, direction);
     float inverse = 1.0 / facing;
@@ -350,7 +350,7 @@ bool intersect(vec3 origin_p, vec3 direction, float far, RayOrigin origin, bool 
     left_normal = vec3(0.0);
     if (origin.primitive != NONE) {
         Triangle left = triangle_at(min(origin.primitive, uint(max(TRIANGLE_COUNT, 1)) - 1u));
-        left_normal = normalize(cross(left.edge1, left.edge2));
+        left_normal = normalize(facet_normal(left.edge1, left.edge2));
 #ifdef CONVEX_SOLIDS
         if (is_plane(origin.primitive)) left_normal = planes[origin.primitive & ~PLANE_BIT].xyz;
 #endif
@@ -393,7 +393,7 @@ bool intersect_closest(vec3 origin_p, vec3 direction, float far, RayOrigin origi
     if (met && (hit.primitive & (PLANE_BIT | CURVED_BIT)) == 0u) {
         Triangle facet = hit_triangle(hit);
         hit.object = facet.object;
-        hit.normal_g = normalize(cross(facet.edge1, facet.edge2));
+        hit.normal_g = normalize(facet_normal(facet.edge1, facet.edge2));
     }
 #endif
 #ifdef CONVEX_SOLIDS

@@ -80,10 +80,20 @@ vec3 normalised_derivative(vec3 summed, vec3 dsummed)
     return (dsummed - unit * dot(unit, dsummed)) * inverse_length;
 }
 
+// edge1 × edge2. Both products are rounded before one is taken from the other, as in a processor: with a GPU's multiply-add only one of them is,
+// and a sliver, whose products are alike, gets the normal of that rounding.
+vec3 facet_normal(vec3 edge1, vec3 edge2)
+{
+    precise vec3 ahead = edge1.yzx * edge2.zxy;
+    precise vec3 back = edge1.zxy * edge2.yzx;
+    precise vec3 normal = ahead - back;
+    return normal;
+}
+
 // Gradients of the barycentric weights of edge1 and edge2 in the triangle's plane.
 void barycentric_gradients(vec3 edge1, vec3 edge2, out vec3 gradient_u, out vec3 gradient_v)
 {
-    vec3 normal = cross(edge1, edge2);
+    vec3 normal = facet_normal(edge1, edge2);
     float inverse_area2 = 1.0 / dot(normal, normal);
     gradient_u = cross(edge2, normal) * inverse_area2;
     gradient_v = cross(normal, edge1) * inverse_area2;

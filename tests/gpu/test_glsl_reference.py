@@ -19,6 +19,7 @@ COVERS = {
         "refract_column",
         "transfer_column",
         "normalised_derivative",
+        "facet_normal",
         "barycentric_gradients",
         "fresnel_reflectance",
     ),
@@ -209,6 +210,19 @@ def test_transfer(gl) -> None:
     assert relative_error(got, want, scale=size).max() < 3e-6
     # The result lies in the surface.
     assert np.abs(dot(got, e["n"]) / size).max() < 1e-6
+
+
+def test_facet_normals_of_slivers_round_like_both_products(gl) -> None:
+    """Bit for bit that of float32 products, rounded before their difference: of parallel edges nothing is left."""
+    rng = np.random.default_rng(11)
+    edge1 = as_f32(rng.normal(size=(COUNT, 3)))
+    edge2 = edge1 * as_f32(rng.choice([0.25, 0.5, 2.0], (COUNT, 1)))  # exact multiples
+    edge2[::2] += as_f32(1e-6 * rng.normal(size=(COUNT // 2, 3)))
+    got = evaluate(gl.ctx, OPTICS, "n = facet_normal(e1, e2);", {"e1": edge1, "e2": edge2}, {"n": "vec3"})["n"]
+    a, b = edge1.astype(np.float32), edge2.astype(np.float32)
+    want = a[:, [1, 2, 0]] * b[:, [2, 0, 1]] - a[:, [2, 0, 1]] * b[:, [1, 2, 0]]
+    assert not got[1::2].any() and want[::2].any()
+    np.testing.assert_array_equal(got, want)
 
 
 @pytest.mark.parametrize("scale", [1e-4, 1.0, 1e4])
