@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import base64
 import io
+import os
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -23,7 +24,11 @@ from ..base.errors import UserError
 if TYPE_CHECKING:
     import numpy as np
 
+    from ..gpu.shader import Built
     from ..stress.runner import CaseResult
+
+_MOST_COMPILERS = 8
+"""Processes that compile at a time; each holds some 400 MiB."""
 
 
 class Finding(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -85,11 +90,7 @@ def _clocks() -> Iterator[Finding]:
 
 def _programs(short: bool, _folder: Path) -> Iterator[Finding]:
     from ..base.paths import shipped_scenes
-    from ..bench.programs import compiled_programs
     from ..gpu import shader, strict_compilers
-    from ..gpu.context import create_context
-    from ..model.io.scene_file import load_scene
-    from ..model.settings import RenderSettings
     from .inspect_programs import HEADINGS, beyond_promises, program_rows
 
     absent = strict_compilers.missing()
@@ -97,32 +98,67 @@ def _programs(short: bool, _folder: Path) -> Iterator[Finding]:
         yield Finding("strict compilers", f"not asked: {absent}")
     scenes = {name: path for name, path in shipped_scenes().items() if not short or name in ("prism", "ball_plain")}
     seen: dict[tuple[str, ...], shader.Built] = {}
-    with create_context() as context:
-        shader.keep_programs(context.ctx)
-        for at, (name, path) in enumerate(scenes.items()):
-            scene = load_scene(path)
-            started = time.perf_counter()
-            try:
-                programs = compiled_programs(context, scene, RenderSettings(max_depth=scene.render.max_depth))
-            except (shader.ShaderError, UserError) as error:
-                # The other scenes' programs may be wrong for reasons of their own: one run should tell all.
-                yield Finding(name, " ".join(str(error).split()), True, time.perf_counter() - started)
-                yield Finding("", "", done=(at + 1) / len(scenes))
-                continue
-            took = time.perf_counter() - started
-            new = [built for built in programs if built.texts not in seen]
-            seen |= {built.texts: built for built in new}
+    for at, (name, compiled) in enumerate(_each_compiled(scenes)):
+        new = [built for built in compiled.programs if built.texts not in seen]
+        seen |= {built.texts: built for built in new}
+        if compiled.problem:
+            yield Finding(name, compiled.problem, True, compiled.seconds)
+        else:
             said = beyond_promises(new)
             said += [] if absent else [words for built in new for words in strict_compilers.complaints(built)]
-            driver_s = sum(built.seconds for built in new)
-            longest = max(programs, key=lambda built: built.seconds)
-            words = f"{len(programs)} programs, {len(new)} of them new: {driver_s:.2f} s in the driver"
-            words += f", the longest {longest.name} {longest.seconds:.2f} s; first picture after {took:.1f} s"
-            yield Finding(name, "; ".join([words, *said]), bool(said), took)
-            yield Finding("", "", done=(at + 1) / len(scenes))
-        shader.forget_programs(context.ctx)
+            driver_s = sum(built.seconds for built in compiled.programs)
+            longest = max(compiled.programs, key=lambda built: built.seconds)
+            words = f"{len(compiled.programs)} programs, {len(new)} of them new: {driver_s:.2f} s in the driver"
+            words += f", the longest {longest.name} {longest.seconds:.2f} s; picture after {compiled.seconds:.1f} s"
+            yield Finding(name, "; ".join([words, *said]), bool(said), compiled.seconds)
+        yield Finding("", "", done=(at + 1) / len(scenes))
     rows = [[*row.cells()] for row in program_rows(list(seen.values()))]
     yield Finding("all programs", f"{len(seen)} different ones", rows=[list(HEADINGS), *rows])
+
+
+@dataclass(frozen=True)
+class _Compiled:
+    """A scene's programs, as far as they compile."""
+
+    programs: list[Built]
+    problem: str
+    seconds: float
+
+
+def _compiled(path: Path) -> _Compiled:
+    """In a process of its own."""
+    from ..bench.programs import compiled_programs
+    from ..gpu import shader
+    from ..gpu.context import create_context
+    from ..model.io.scene_file import load_scene
+    from ..model.settings import RenderSettings
+
+    scene = load_scene(path)
+    with create_context() as context:
+        started = time.perf_counter()
+        programs, problem = [], ""
+        try:
+            programs = compiled_programs(context, scene, RenderSettings(max_depth=scene.render.max_depth))
+        except (shader.ShaderError, UserError) as error:
+            # The other scenes' programs may be wrong for reasons of their own: one run should tell all.
+            problem = " ".join(str(error).split())
+        return _Compiled(programs, problem, time.perf_counter() - started)
+
+
+def _each_compiled(scenes: dict[str, Path]) -> Iterator[tuple[str, _Compiled]]:
+    """By scene, several at a time: a driver compiles a program on one core, for up to half a minute."""
+    from concurrent.futures import ProcessPoolExecutor
+    from concurrent.futures.process import BrokenProcessPool
+    from multiprocessing import get_context
+
+    workers = max(1, min(len(scenes), (os.cpu_count() or 1) // 2, _MOST_COMPILERS))
+    with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
+        started = {name: pool.submit(_compiled, path) for name, path in scenes.items()}
+        for name, future in started.items():
+            try:
+                yield name, future.result()
+            except BrokenProcessPool:
+                yield name, _Compiled([], "the driver ended the process that compiled it, or one beside it", 0.0)
 
 
 # -- known answers, stress ----------------------------------------------------------------
