@@ -49,6 +49,9 @@ class DeviceTraits:
     """Photons kept so that edits need no new tracing."""
     viewer_splat_photons: int = 1 << 18
     """Photons splatted between two pauses."""
+    splats_by_compute: bool | None = None
+    """Compute shaders add splats, the rasteriser does not draw them; None where that has to be measured
+    (`splat_way`)."""
 
     @property
     def clock(self) -> Callable[[], float]:
@@ -79,6 +82,7 @@ class DeviceTraits:
             viewer_largest_photons=1 << 22,
             viewer_store_bytes=256 << 20,
             viewer_splat_photons=1 << 12,
+            splats_by_compute=False,
         )
 
 
