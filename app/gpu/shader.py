@@ -93,7 +93,8 @@ def load_source(
 ) -> Source:
     """Flatten the shader `name` (path under the shaders folder) and leave out what cannot run.
 
-    `extensions`: of GLSL that it asks for; they have to stand before everything else. Raises `ShaderError` naming the including file and line when an include is missing.
+    `extensions`: of GLSL that it asks for; they have to stand before everything else. Raises `ShaderError` naming the
+    including file and line when an include is missing.
     """
     root = root or paths.shaders_dir()
     asked = (name, tuple((defines or {}).items()), tuple(structs), root, tuple(extensions))

@@ -39,8 +39,8 @@ if TYPE_CHECKING:
 GROUP = 1 << 15
 """Photons turned to splats and drawn at a time …"""
 MOST_ADDED, ADDED_SPLATS = 1 << 17, 1 << 18
-"""… or added by compute shaders: so many, and no more than may become so many splats. Each group costs a GPU the time of
-its dispatches."""
+"""… or added by compute shaders: so many, and no more than may become so many splats. Each group costs a GPU the time
+of its dispatches."""
 CHUNK, SMALLEST_CHUNK = 1 << 18, 1 << 11
 """Photons between two flushes of the scratch textures, at most and at least. The fewer, the less a sum's rounding
 depends on the order in which batches bring the photons."""

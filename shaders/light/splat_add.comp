@@ -120,7 +120,6 @@ void main() {
                 texel = columns ? texel.yx : texel;
                 t += LANES;
                 vec2 place = vec2(texel) + 0.5;
-                if (!inside_rect(place, splat.rect)) continue;
                 vec2 away = place - splat.centre;
 #ifdef SMALL
                 float share = small_share(away * splat.across, half_texel_of(splat));

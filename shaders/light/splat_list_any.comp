@@ -9,24 +9,24 @@ layout(std430, binding = 8) writeonly buffer Lists { uint lists[]; };  // `capac
 uniform uint photons;  // with SLOTS splats each, and images behind them
 uniform uint capacity;
 
-shared uint counts[KINDS];
+shared uint listed[KINDS];
 shared uint begins[KINDS];
 
 #include "light/splat_slots.glsl"
 
 void main() {
     uint me = gl_LocalInvocationID.x, photon = gl_GlobalInvocationID.x;
-    if (me < KINDS) counts[me] = 0u;
+    if (me < KINDS) listed[me] = 0u;
     barrier();
     uint slot = photon * PHOTON_SLOTS, end = photon < photons ? end_of(photon) : slot;
     for (uint s = slot; s < end; ++s) {
         uint kind = splats[s].kind;
-        if (kind > 0u) atomicAdd(counts[kind - 1u], 1u);
+        if (kind > 0u) atomicAdd(listed[kind - 1u], 1u);
     }
     barrier();
-    if (me < KINDS && counts[me] > 0u) {
-        begins[me] = atomicAdd(dispatch_words[5u * me + 4u], counts[me]);
-        atomicMax(dispatch_words[5u * me], min(begins[me] + counts[me], MOST_GROUPS));
+    if (me < KINDS && listed[me] > 0u) {
+        begins[me] = atomicAdd(dispatch_words[5u * me + 4u], listed[me]);
+        atomicMax(dispatch_words[5u * me], min(begins[me] + listed[me], MOST_GROUPS));
     }
     barrier();
     for (uint s = slot; s < end; ++s) {

@@ -20,7 +20,7 @@ void main() {
             imageStore(drawn_into, texel, imageLoad(drawn_into, texel) + added);
         }
         for (uint channel = 0u; channel < 4u; ++channel) {
-            sums[place + channel * CHANNEL_STEP] = NOTHING;
+            splat_sums[place + channel * CHANNEL_STEP] = NOTHING;
         }
     }
 }

@@ -1,13 +1,13 @@
 // What splats are added to (splat_add.comp), and taken from into the textures of the maps (splat_sums.comp): in each target blocks of 4 by 2 texels, in
 // which each channel's eight values lie side by side, as many as a device's memory is given at once.
 #ifdef FLOAT_ATOMICS
-layout(std430, binding = 2) buffer Sums { float sums[]; };
+layout(std430, binding = 2) buffer Sums { float splat_sums[]; };
 #define NOTHING 0.0
-float sum_at(uint place) { return sums[place]; }
+float sum_at(uint place) { return splat_sums[place]; }
 #else
-layout(std430, binding = 2) buffer Sums { uint sums[]; };
+layout(std430, binding = 2) buffer Sums { uint splat_sums[]; };
 #define NOTHING 0u
-float sum_at(uint place) { return uintBitsToFloat(sums[place]); }
+float sum_at(uint place) { return uintBitsToFloat(splat_sums[place]); }
 #endif
 
 #define CHANNEL_STEP 8u
@@ -23,12 +23,12 @@ void add_to_sum(uint place, float value) {
     // Most channels far from a splat's middle round to nothing.
     if (value == 0.0) return;
 #ifdef FLOAT_ATOMICS
-    atomicAdd(sums[place], value);
+    atomicAdd(splat_sums[place], value);
 #else
-    uint expected, found = sums[place];
+    uint expected, found = splat_sums[place];
     do {
         expected = found;
-        found = atomicCompSwap(sums[place], expected, floatBitsToUint(uintBitsToFloat(expected) + value));
+        found = atomicCompSwap(splat_sums[place], expected, floatBitsToUint(uintBitsToFloat(expected) + value));
     } while (found != expected);
 #endif
 }
