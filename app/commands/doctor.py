@@ -146,6 +146,7 @@ def _opengl() -> Iterator[Check]:
     yield Check("OpenGL", f"{context.version} through {context.backend.upper()}", "ok")
     yield Check("renderer", f"{context.renderer} ({kind})", "ok")
     yield Check("vendor", context.vendor, "ok")
+    yield Check("splats", context.splats.sentence, "ok")
     if context.advice:
         found, _, remedy = context.advice.partition(": ")
         yield Check("better GPU", found, "optional", remedy)

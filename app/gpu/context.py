@@ -9,6 +9,7 @@ from __future__ import annotations
 import ctypes
 import os
 import sys
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, Self
 
@@ -16,6 +17,7 @@ from ..base.errors import DeviceError, UserError, suggestion
 from .better_device import advice
 from .device_traits import DeviceTraits
 from .limits import Limits
+from .splat_way import SplatWay, way_of
 
 if TYPE_CHECKING:
     import moderngl
@@ -55,7 +57,9 @@ class Context:
         self.vendor: str = info["GL_VENDOR"]
         self.version: str = info["GL_VERSION"]
         self.limits = Limits.read(info)
-        self.traits = DeviceTraits.of(self.renderer)
+        self.splats: SplatWay = way_of(ctx)
+        """How splats are drawn here."""
+        self.traits = replace(DeviceTraits.of(self.renderer), splats_by_compute=self.splats.by_compute)
         self.check("reading the OpenGL limits")
 
     @property

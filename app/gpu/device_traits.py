@@ -49,6 +49,8 @@ class DeviceTraits:
     """Photons kept so that edits need no new tracing."""
     viewer_splat_photons: int = 1 << 18
     """Photons splatted between two pauses."""
+    splats_by_compute: bool = False
+    """Compute shaders add splats, the rasteriser does not draw them. Of a GPU that is measured (`splat_way`)."""
 
     @property
     def clock(self) -> Callable[[], float]:
@@ -61,10 +63,9 @@ class DeviceTraits:
         """From OpenGL's GL_RENDERER."""
         if _assumed:
             return _assumed[-1]
-        name = renderer.casefold()
-        if not any(known in name for known in _SOFTWARE_RENDERERS):
+        if not is_software_renderer(renderer):
             return DeviceTraits()
-        llvmpipe = "llvmpipe" in name
+        llvmpipe = "llvmpipe" in renderer.casefold()
         return DeviceTraits(
             is_software=True,
             texels_as_images=llvmpipe,
@@ -80,6 +81,11 @@ class DeviceTraits:
             viewer_store_bytes=256 << 20,
             viewer_splat_photons=1 << 12,
         )
+
+
+def is_software_renderer(renderer: str) -> bool:
+    """From OpenGL's GL_RENDERER, whatever is assumed."""
+    return any(known in renderer.casefold() for known in _SOFTWARE_RENDERERS)
 
 
 _assumed: list[DeviceTraits] = []

@@ -89,13 +89,15 @@ def load_source(
     defines: Mapping[str, int | float | str] | None = None,
     structs: Sequence[Struct] = (),
     root: Path | None = None,
+    extensions: Sequence[str] = (),
 ) -> Source:
     """Flatten the shader `name` (path under the shaders folder) and leave out what cannot run.
 
-    Raises `ShaderError` naming the including file and line when an include is missing.
+    `extensions`: of GLSL that it asks for; they have to stand before everything else. Raises `ShaderError` naming the
+    including file and line when an include is missing.
     """
     root = root or paths.shaders_dir()
-    asked = (name, tuple((defines or {}).items()), tuple(structs), root)
+    asked = (name, tuple((defines or {}).items()), tuple(structs), root, tuple(extensions))
     if _kept and asked in _sources:
         return _sources[asked]
     lines: list[Line] = []
@@ -104,6 +106,8 @@ def load_source(
         lines.append(Line(text, file, line))
 
     emit("#version 430 core", "<generated>", 1)
+    for extension in extensions:
+        emit(f"#extension {extension} : require", "<generated>", 1)
     for key, value in (defines or {}).items():
         emit(f"#define {key} {value}", "<features>", 1)
     for struct in structs:
@@ -271,9 +275,10 @@ def compute(
     name: str,
     defines: Mapping[str, int | float | str] | None = None,
     structs: Sequence[Struct] = (),
+    extensions: Sequence[str] = (),
 ) -> moderngl.ComputeShader:
     """Compile the compute shader `name`; raises `ShaderError` with file and line."""
-    source = load_source(name, defines, structs)
+    source = load_source(name, defines, structs, extensions=extensions)
     try:
         return _built(ctx, (source,), lambda: unlocked(ctx.compute_shader(source.text)))
     except Exception as error:  # moderngl raises its own Error type with the driver's log

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import moderngl
 
 from ..gpu import shader
-from .map_atlas import park
+from ..gpu.parking import park
 
 
 class AddedPicture:

@@ -39,6 +39,8 @@ _WIDEST_NARROWED = 0.5
 """Smoothing, lattice spacings: wider Gaussians leave no ripple, and whoever asks for them means them."""
 VERTICES = (3, 6, 6, 6, 3, 6, 6)
 """Per splat of kinds 1 to 7."""
+MOST_GROUPS = 65535
+"""Work groups that add splats of a kind: what OpenGL promises in one dimension. Each then adds several."""
 UNIT_CONTACT = 1
 """Texture unit of the words of `contact_lines`, in all programs that splat."""
 UNIT_BORDERS = 2
@@ -144,11 +146,17 @@ class SpectralVariables:
         self.buffer.release()
 
 
+def slots_per_photon(features: SplatFeatures) -> int:
+    """Splats that a photon may become."""
+    defines = footprint_defines(features)
+    return int(defines["SLOTS"]) + int(defines["IMAGE_SLOTS"])
+
+
 class Footprints:
     """Owns the splat record buffer, the sum of what is drawn and the counts of what could not be drawn as asked."""
 
-    def __init__(self, ctx: moderngl.Context, features: SplatFeatures, group: int) -> None:
-        """`group`: the most photons one dispatch covers."""
+    def __init__(self, ctx: moderngl.Context, features: SplatFeatures, group: int, by_compute: bool = False) -> None:
+        """`group`: the most photons one dispatch covers. `by_compute`: compute shaders add the splats, in any order."""
         self._ctx = ctx
         groups = features.spectral_groups
         defines = footprint_defines(features) | {"WORKGROUP": WORKGROUP}
@@ -157,10 +165,15 @@ class Footprints:
         self._parameters = ctx.buffer(reserve=PARAMETERS.stride)
         self._sums = ctx.buffer(np.zeros((group, 4), np.float32))
         kinds = 7 if features.contact_lines else 4
-        self._vertices = VERTICES[:kinds]
-        self.commands = ctx.buffer(np.zeros(5 * kinds, np.uint32))
-        """Indirect draws of all kinds, five words each."""
-        self.slots_per_photon = int(defines["SLOTS"]) + int(defines["IMAGE_SLOTS"])
+        self._by_compute = by_compute
+        if by_compute:
+            self._no_commands = np.array([[0, 1, 1, 0, 0]] * kinds, np.uint32)
+        else:
+            self._no_commands = np.array([[vertices, 1, 0, 0, 0] for vertices in VERTICES[:kinds]], np.uint32)
+        self.commands = ctx.buffer(self._no_commands)
+        """Indirect draws of all kinds, five words each; or indirect dispatches, with the number of splats in the last
+        word."""
+        self.slots_per_photon = slots_per_photon(features)
         self.capacity = group * self.slots_per_photon
         """Splats of a kind that the lists have room for."""
         self.splats = ctx.buffer(reserve=self.capacity * SPLAT.stride)
@@ -168,7 +181,10 @@ class Footprints:
         """Slots of each kind, `capacity` each."""
         counts: Defines = {"WORKGROUP": LIST_WORKGROUP, "KINDS": f"{kinds}u"}
         counts |= {name: defines[name] for name in ("SLOTS", "IMAGE_SLOTS", "BORDER_IMAGES") if name in defines}
-        self._list = shader.compute(ctx, "light/splat_list.comp", counts, (SPLAT,))
+        if by_compute:
+            counts |= {"MOST_GROUPS": f"{MOST_GROUPS}u"}
+        list_shader = "light/splat_list_any.comp" if by_compute else "light/splat_list.comp"
+        self._list = shader.compute(ctx, list_shader, counts, (SPLAT,))
 
     def run(
         self,
@@ -231,14 +247,14 @@ class Footprints:
             atlas.contact_words.use(UNIT_CONTACT)
         if atlas.borders is not None:
             atlas.borders.use(UNIT_BORDERS)
-        self.commands.write(np.array([[vertices, 1, 0, 0, 0] for vertices in self._vertices], np.uint32))
+        self.commands.write(self._no_commands)
         self._program.run(group_x=-(-count // WORKGROUP))
         self._ctx.memory_barrier()
         self.commands.bind_to_storage_buffer(7)
         self.lists.bind_to_storage_buffer(8)
         self._list["capacity"].value = self.capacity
         self._list["photons"].value = count
-        self._list.run(1)
+        self._list.run(-(-count // LIST_WORKGROUP) if self._by_compute else 1)
 
     def counts(self) -> dict[str, float]:
         """Since the last reset: `splats_w` (power of all splats over their bands, W), `outside_map_w` (that of photons

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..gpu import bindings, shader
 from ..gpu.context import Context
+from ..gpu.parking import park
 from ..gpu.records import FLIGHT
 from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.schema import Field, Struct
@@ -23,7 +24,6 @@ from .added_picture import AddedPicture, blend_by_adding
 from .camera_records import CAMERA_PARAMETERS, camera_parameters
 from .first_surfaces import FirstSurfaces
 from .flights import MOST_EVENTS, PHOTONS, Flights, trace_flights
-from .map_atlas import park
 from .picture_channels import Channels
 from .variants import BIND_FLIGHTS, BIND_HAZE, BIND_HAZE_COLOURS, UNIT_DISTANCES, haze_defines
 

@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..gpu import shader
+from ..gpu.parking import park
 from ..gpu.records import NONE, PLACEMENT
+from .splat_sums import SplatSums
 
 if TYPE_CHECKING:
     import moderngl
@@ -71,8 +73,9 @@ class MapAtlas:
         )
         self.total_textures = [self._texture() for _ in range(targets)]
         self.scratch_textures = [self._texture() for _ in range(targets if scratched is None else scratched)]
-        self.framebuffer = ctx.framebuffer(self.scratch_textures + self.total_textures[len(self.scratch_textures) :])
+        self.framebuffer = ctx.framebuffer(self.drawn_into)
         self._accumulate = Accumulate(ctx)
+        self._sums: SplatSums | None = None
         self.pending = 0
         """Photons in the scratch textures."""
         self.contact_words: moderngl.Texture | None = None
@@ -95,9 +98,28 @@ class MapAtlas:
         self.placements.orphan(data.nbytes)
         self.placements.write(data)
 
+    @property
+    def drawn_into(self) -> list[moderngl.Texture]:
+        """What splats are added to: a texture for each target, in their order."""
+        return self.scratch_textures + self.total_textures[len(self.scratch_textures) :]
+
+    @property
+    def sums(self) -> SplatSums:
+        """What compute shaders add splats to; made when it is first asked for."""
+        if self._sums is None:
+            self._sums = SplatSums(self.ctx, self.size, self.targets)
+            self._sums.forget(self.drawn_into)
+        return self._sums
+
+    def collect(self) -> None:
+        """What compute shaders added goes to the textures, as if it had been drawn there."""
+        if self._sums is not None:
+            self._sums.move(self.drawn_into)
+
     def flush(self) -> None:
         """Add the scratch textures to the total and clear them."""
         if self.pending:
+            self.collect()
             for scratch, total in zip(self.scratch_textures, self.total_textures, strict=False):
                 self._accumulate.run(scratch, total)
             self.pending = 0
@@ -108,12 +130,24 @@ class MapAtlas:
         park(self.ctx)
         shader.release(self.framebuffer, *self.scratch_textures)
         self.scratch_textures = []
+        self._release_sums()
+
+    def _release_sums(self) -> None:
+        if self._sums is not None:
+            self._sums.release()
+            self._sums = None
 
     @property
     def bytes(self) -> int:
-        """Device memory of the textures."""
+        """Device memory of the textures, and of the sums that go to them."""
         width, height = self.size
-        return 16 * width * height * (len(self.scratch_textures) + len(self.total_textures))
+        return 16 * width * height * len(self.total_textures) + self.scratch_bytes
+
+    @property
+    def scratch_bytes(self) -> int:
+        """Of these what only adding takes."""
+        width, height = self.size
+        return 16 * width * height * len(self.scratch_textures) + (self._sums.bytes if self._sums is not None else 0)
 
     def clear(self) -> None:
         """Forget everything deposited."""
@@ -123,6 +157,8 @@ class MapAtlas:
             park(self.ctx)
             frame.release()
         self.framebuffer.clear()
+        if self._sums is not None:
+            self._sums.forget(self.drawn_into)
         self.pending = 0
 
     def read_total(self) -> np.ndarray:
@@ -143,6 +179,7 @@ class MapAtlas:
         return self.read_total()[y0:y1, x0:x1]
 
     def release(self) -> None:
+        self._release_sums()
         park(self.ctx)
         shader.release(
             self.framebuffer, self._accumulate, *self.scratch_textures, *self.total_textures, self.placements
@@ -150,14 +187,3 @@ class MapAtlas:
         for texture in (self.contact_words, self.borders):
             if texture is not None:
                 texture.release()
-
-
-def park(ctx: moderngl.Context) -> None:
-    """Bind a framebuffer that lives as long as the context.
-
-    moderngl binds the last used framebuffer again after every clear; were it released meanwhile,
-    that is GL_INVALID_OPERATION, and a context without a window has no screen to fall back on.
-    """
-    if ctx.extra is None:
-        ctx.extra = ctx.simple_framebuffer((1, 1))
-    ctx.extra.use()

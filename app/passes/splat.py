@@ -1,4 +1,5 @@
-"""Draws splat records into the caustic maps: additive blending, a program a class, fixed order.
+"""Draws splat records into the caustic maps: additive blending, a program a class, fixed order. On devices whose
+rasteriser blends slowly (`gpu/splat_way.py`) compute shaders add them instead, with atomics and so in any order.
 
 Small splats, swept ones and those of a cut band have a program each because a software renderer runs both sides of a
 branch. A group of photons is made into splats and drawn before the next, so the splat records of a few ten thousand
@@ -15,14 +16,17 @@ from ..base.errors import DeviceError
 from ..gpu import shader
 from ..gpu.context import device_sentence
 from ..gpu.schema import Field, Struct
+from ..gpu.splat_way import way_of
 from .footprint import (
     SPLAT,
     UNIT_CONTACT,
     VERTICES,
     Footprints,
     SpectralVariables,
+    slots_per_photon,
 )
-from .variants import SplatFeatures, draw_variants, splat_defines
+from .splat_sums import BIND_SUMS
+from .variants import Defines, SplatFeatures, add_variants, draw_variants, splat_defines, sum_defines
 
 if TYPE_CHECKING:
     import moderngl
@@ -33,12 +37,18 @@ if TYPE_CHECKING:
     from .map_atlas import MapAtlas
 
 GROUP = 1 << 15
-"""Photons turned to splats and drawn at a time."""
+"""Photons turned to splats and drawn at a time …"""
+MOST_ADDED, ADDED_SPLATS = 1 << 17, 1 << 18
+"""… or added by compute shaders: so many, and no more than may become so many splats. Each group costs a GPU the time
+of its dispatches."""
 CHUNK, SMALLEST_CHUNK = 1 << 18, 1 << 11
 """Photons between two flushes of the scratch textures, at most and at least. The fewer, the less a sum's rounding
 depends on the order in which batches bring the photons."""
 FLUSH_SHARE = 16
 """Texels of the atlas per photon of a chunk: what flushing may cost, in texels a photon."""
+LANES = 32
+"""Invocations that add a splat together: as many as an NVIDIA GPU runs in step."""
+BIND_COMMANDS = 3
 EXTENT_LIMIT = 8192.0
 """Texels. A footprint axis or a sweep beyond twice the largest map is a numerical accident."""
 
@@ -58,27 +68,45 @@ PARAMETERS = Struct(
 class Splatter:
     """The splat pass of one scene's features."""
 
-    def __init__(self, ctx: moderngl.Context, features: SplatFeatures) -> None:
+    def __init__(self, ctx: moderngl.Context, features: SplatFeatures, by_compute: bool | None = None) -> None:
+        """`by_compute`: whether compute shaders add the splats; None as the context's device likes it."""
         self._ctx = ctx
         self._features = features
+        self.by_compute = way_of(ctx).by_compute if by_compute is None else by_compute
         self.group = GROUP
-        self._footprints = Footprints(ctx, features, GROUP)
-        defines = splat_defines(features)
-        slots = GROUP * self._footprints.slots_per_photon
-        corners = np.array([0, 1, 2, 2, 1, 3], np.uint32) + 4 * np.arange(slots, dtype=np.uint32)[:, None]
-        self._indices = ctx.buffer(corners)
+        while (
+            self.by_compute and self.group < MOST_ADDED and 2 * self.group * slots_per_photon(features) <= ADDED_SPLATS
+        ):
+            self.group *= 2
+        self._footprints = Footprints(ctx, features, self.group, self.by_compute)
+        self._indices: moderngl.Buffer | None = None
         self._draws: dict[int, moderngl.VertexArray] = {}
-        for kind, (fragment, chosen) in draw_variants(features).items():
-            program = shader.program(
-                ctx,
-                "light/splat.vert",
-                fragment,
-                defines | chosen | {"FIRST_OF_KIND": f"{(kind - 1) * self._footprints.capacity}u"},
-                (SPLAT,),
-            )
-            corners_shared = VERTICES[kind - 1] == 6
-            self._draws[kind] = ctx.vertex_array(program, [], index_buffer=self._indices if corners_shared else None)
+        self._adds: dict[int, moderngl.ComputeShader] = {}
+        if self.by_compute:
+            self._build_adds()
+        else:
+            self._build_draws()
         self._parameters = ctx.buffer(reserve=PARAMETERS.stride)
+
+    def _of_kind(self, kind: int) -> Defines:
+        return splat_defines(self._features) | {"FIRST_OF_KIND": f"{(kind - 1) * self._footprints.capacity}u"}
+
+    def _build_draws(self) -> None:
+        slots = self.group * self._footprints.slots_per_photon
+        corners = np.array([0, 1, 2, 2, 1, 3], np.uint32) + 4 * np.arange(slots, dtype=np.uint32)[:, None]
+        self._indices = self._ctx.buffer(corners)
+        for kind, (fragment, chosen) in draw_variants(self._features).items():
+            defines = self._of_kind(kind) | chosen
+            program = shader.program(self._ctx, "light/splat.vert", fragment, defines, (SPLAT,))
+            corners_shared = VERTICES[kind - 1] == 6
+            indices = self._indices if corners_shared else None
+            self._draws[kind] = self._ctx.vertex_array(program, [], index_buffer=indices)
+
+    def _build_adds(self) -> None:
+        way = way_of(self._ctx)
+        for kind, chosen in add_variants(self._features).items():
+            defines = self._of_kind(kind) | chosen | sum_defines(way) | {"LANES": LANES}
+            self._adds[kind] = shader.compute(self._ctx, "light/splat_add.comp", defines, (SPLAT,), way.extensions)
 
     def run(
         self,
@@ -101,7 +129,7 @@ class Splatter:
         carry, where the features have them.
         """
         chunk = int(np.clip(atlas.size[0] * atlas.size[1] // FLUSH_SHARE, SMALLEST_CHUNK, CHUNK))
-        group = min(GROUP, chunk)
+        group = min(self.group, chunk)
         for done in range(0, count, group):
             part = min(group, count - done)
             first = start + done * stride
@@ -131,12 +159,9 @@ class Splatter:
             raise DeviceError(device_sentence(error, where))
 
     def draw(self, tables: SplatTables, atlas: MapAtlas) -> None:
-        """Add the splats of the last group of photons to the atlas's scratch textures."""
-        import moderngl
-
+        """Add the splats of the last group of photons to the atlas: to its scratch textures, or to its sums."""
         from ..gpu.splat_tables import CUMULATIVE_SAMPLES, DENSITY_CELLS
 
-        ctx = self._ctx
         values = PARAMETERS.zeros(1)
         values[0] = (atlas.size, (0.5, 0.5), tables.bands, DENSITY_CELLS, CUMULATIVE_SAMPLES, 0)
         self._parameters.write(values.tobytes())
@@ -153,6 +178,24 @@ class Splatter:
         tables.texture.use(0)
         if atlas.contact_words is not None:
             atlas.contact_words.use(UNIT_CONTACT)
+        if self.by_compute:
+            self._add(atlas)
+        else:
+            self._draw(atlas)
+
+    def _add(self, atlas: MapAtlas) -> None:
+        # Made, where it is the first time, before what it needs is bound.
+        sums = atlas.sums
+        sums.buffer.bind_to_storage_buffer(BIND_SUMS)
+        commands = self._footprints.commands
+        commands.bind_to_storage_buffer(BIND_COMMANDS)
+        for kind, program in self._adds.items():
+            program.run_indirect(commands, 20 * (kind - 1))
+
+    def _draw(self, atlas: MapAtlas) -> None:
+        import moderngl
+
+        ctx = self._ctx
         atlas.framebuffer.use()
         ctx.enable_only(moderngl.BLEND)
         ctx.blend_equation = moderngl.FUNC_ADD, moderngl.FUNC_ADD
@@ -172,12 +215,14 @@ class Splatter:
     @property
     def bytes(self) -> int:
         """Device memory of splat records and their lists."""
-        return self._indices.size + self._footprints.bytes
+        return (self._indices.size if self._indices is not None else 0) + self._footprints.bytes
 
     def release(self) -> None:
         for vertex_array in self._draws.values():
             shader.release(vertex_array.program)
             vertex_array.release()
-        self._indices.release()
+        shader.release(*self._adds.values())
+        if self._indices is not None:
+            self._indices.release()
         self._parameters.release()
         self._footprints.release()

@@ -14,6 +14,7 @@ from ..gpu.device_traits import DeviceTraits
 from ..gpu.map_channels import MapChannels
 from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.splat_tables import CUMULATIVE_SAMPLES, DENSITY_CELLS
+from ..gpu.splat_way import SplatWay
 from ..gpu.texture_store import place_defines
 from ..model.environment_light import lighting_environment
 from ..model.features import Features
@@ -218,6 +219,16 @@ def draw_variants(features: SplatFeatures) -> dict[int, tuple[str, Defines]]:
             if of in variants:
                 variants[kind] = (variants[of][0], variants[of][1] | beside)
     return variants
+
+
+def add_variants(features: SplatFeatures) -> dict[int, Defines]:
+    """Kind of splat → what sets its program apart where compute shaders add splats."""
+    return {kind: chosen | {"KIND": kind} for kind, (_, chosen) in draw_variants(features).items()}
+
+
+def sum_defines(way: SplatWay) -> Defines:
+    """Of programs that add to sums in a buffer: how."""
+    return {"FLOAT_ATOMICS": 1} if way.extensions else {}
 
 
 def beam_defines(targets: int, edges: int, is_still: bool, contact_lines: bool = False) -> Defines:

@@ -11,6 +11,7 @@ import numpy as np
 from ..gpu import shader
 from ..gpu.records import RECEIVER
 from ..gpu.shader import Releasable
+from ..gpu.splat_way import way_of
 from ..gpu.tiles import Tile
 from ..model.features import Features
 from ..passes.accumulate import LevelsFold, SeamFold, copy_texture
@@ -46,7 +47,7 @@ class LightMaps:
             contact_lines=contact_words is not None,
             border_images=features.border_images and bool(layout.borders),
         )
-        self.splatter = Splatter(ctx, self.features)
+        self.splatter = self._new_splatter()
         # Tents only say how XYZ are shared out over the spectrum.
         scratched = 1 if features.map_tents else None
         self.atlas = MapAtlas(ctx, layout.size, layout.placements, features.targets, scratched)
@@ -72,7 +73,11 @@ class LightMaps:
             contact_lines=self.features.contact_lines,
             border_images=self.features.border_images,
         )
-        self.splatter = Splatter(self._ctx, self.features)
+        self.splatter = self._new_splatter()
+
+    def _new_splatter(self) -> Splatter:
+        by_compute = way_of(self._ctx).for_maps(self.layout.size, self.features.targets)
+        return Splatter(self._ctx, self.features, by_compute)
 
     def clear(self) -> None:
         """Forget what was deposited and counted."""

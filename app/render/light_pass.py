@@ -421,7 +421,7 @@ class LightPass:
             "photon queue": self.trace.bytes,
             "splats": self.splatter.bytes,
             "map sums": 16 * len(self.atlas.total_textures) * self.atlas.size[0] * self.atlas.size[1],
-            "map scratch": 16 * len(self.atlas.scratch_textures) * self.atlas.size[0] * self.atlas.size[1],
+            "map scratch": self.atlas.scratch_bytes,
         }
         counts = self.splatter.counts()
         elsewhere = self._elsewhere

@@ -122,6 +122,7 @@ class Splatting:
         parts."""
         if self._accumulate is None or not atlas.pending:
             return
+        atlas.collect()
         height = atlas.size[1]
         dispatch_budget = DispatchBudget(FIRST_SUMMED, ROWS, -(-height // ROWS) * ROWS)
         for scratch, total in zip(atlas.scratch_textures, atlas.total_textures, strict=False):

@@ -1,18 +1,6 @@
 // Vertex pulling, nothing instanced. SMALL, SWEPT or CUT chooses the class: a swept splat is a parallelogram (four corners through an index buffer), a small one a triangle about
 // its square, which costs a software rasteriser one set-up instead of two (it wins below about 40 texels).
-layout(std140, binding = 0) uniform DrawParameters {
-    vec2 atlas_size;
-    vec2 table_u;  // texture u = table_u.x * xi + table_u.y
-    uint bands;
-    uint density_cells;
-    uint cumulative_samples;
-    uint reserved;
-};
-layout(std430, binding = 1) readonly buffer Splats { SplatRecord splats[]; };
-layout(std430, binding = 8) readonly buffer Lists { uint lists[]; };  // slots of each kind (splat_list.comp)
-layout(std430, binding = 5) readonly buffer Bands { vec4 table_bands[]; };
-layout(std430, binding = 6) readonly buffer Integrals { vec4 band_integral[]; };  // by layer
-layout(std430, binding = 7) readonly buffer Curves { vec4 curve[]; };  // by light and class: density over x, or its running integral
+#include "light/splat_setup.glsl"
 
 flat out vec4 rect;
 #ifdef CONTACT_LINES
@@ -27,8 +15,8 @@ flat out vec2 half_texel;  // along x, y in units of sqrt(2) sigma
 #else
 #define INTERPOLATED noperspective
 #endif
-INTERPOLATED out vec3 at;  // across, along xi, table u
-flat out vec3 shape;        // half texel across, table row, layer
+INTERPOLATED out vec3 at;
+flat out vec3 shape;
 INTERPOLATED out vec2 wave;  // cycles
 flat out vec3 ripple;
 #if defined(EDGE) && defined(LIGHT_EDGES)
@@ -46,54 +34,12 @@ flat out float curve_row;
 flat out vec4 splat_colour[TARGETS];
 #endif
 
-#if defined(SMALL) || defined(ONE_COLOUR)
-// Energy of the splat in each channel of target g, per unit throughput.
-vec4 energy(SplatRecord splat, uint g) {
-    uint row = splat.layer / (bands * uint(TARGETS)) * uint(TARGETS) + g;
-#ifdef POINT_SPECTRUM
-    // One wavelength: its density over x, unless the photon stands for a band (or a line).
-    vec4 span = table_bands[splat.layer / uint(TARGETS)];
-#ifdef HERO
-    // Four wavelengths, their cells two a number.
-    if (span.y > span.x) {
-        uvec2 cells = uvec2(splat.x_range);
-        uint base = row * density_cells;
-        return splat.throughput.x * curve[base + cells.x / DENSITY_CELLS] + splat.throughput.y * curve[base + cells.x % DENSITY_CELLS]
-             + splat.throughput.z * curve[base + cells.y / DENSITY_CELLS] + splat.throughput.w * curve[base + cells.y % DENSITY_CELLS];
-    }
-    return splat.throughput.x * band_integral[splat.layer + g];
-#endif
-    bool single = splat.x_range.y <= splat.x_range.x && span.y > span.x;
-    if (single) {
-        uint cell = min(uint(splat.throughput.x * float(density_cells)), density_cells - 1u);
-        return curve[row * density_cells + cell];
-    }
-#elif defined(BAND_CUTS)
-    if (splat.xi_half > 0.0) {
-        vec2 place = clamp(splat.x_range, 0.0, 1.0) * float(cumulative_samples - 1u);
-        uvec2 i = min(uvec2(place), cumulative_samples - 2u);
-        vec2 part = place - vec2(i);
-        uint base = row * cumulative_samples;
-        return mix(curve[base + i.y], curve[base + i.y + 1u], part.y) - mix(curve[base + i.x], curve[base + i.x + 1u], part.x);
-    }
-#endif
-    return band_integral[splat.layer + g];
-}
-#endif
-
-#ifdef FANS
-#include "lib/fan.glsl"
-#endif
 #ifdef CLIPPED
 // Sine between a splat's sides.
 #define THINNEST_SPLAT 1e-6
 // The least and largest (xi, eta) in [-1, 1]² that the splat's rectangle holds: what is outside need not be drawn.
 vec4 part_inside(SplatRecord splat) {
-#ifdef FANS
-    vec4 all_of_it = part_that_fans(splat.fan);
-#else
-    vec4 all_of_it = vec4(-1.0, -1.0, 1.0, 1.0);
-#endif
+    vec4 all_of_it = all_of_splat(splat);
     float area = splat.along.x * splat.across.y - splat.along.y * splat.across.x;
     // At a focus a splat may be too thin to say where in it a place lies.
     if (abs(area) <= THINNEST_SPLAT * length(splat.along) * length(splat.across)) return all_of_it;
@@ -117,23 +63,18 @@ void main() {
 #ifdef SMALL
     SplatRecord splat = splats[lists[FIRST_OF_KIND + uint(gl_VertexID / 3)]];
 #ifdef CONTACT_LINES
-    side = splat.layer >> 30u;
-    splat.layer &= 0x3fffffffu;
+    side = side_taken_off(splat);
 #endif
     int third = gl_VertexID % 3;
     vec2 corner = vec2(third == 1 ? 3.0 : -1.0, third == 2 ? 3.0 : -1.0);
     vec2 reach = corner * splat.along;
     vec2 position = splat.centre + reach;
     at = reach * splat.across;
-    half_texel = 0.5 * splat.across;
-    for (int g = 0; g < TARGETS; ++g) {
-        splat_colour[g] = splat.amplitude * energy(splat, uint(g));
-    }
+    half_texel = half_texel_of(splat);
 #else
     SplatRecord splat = splats[lists[FIRST_OF_KIND + uint(gl_VertexID >> 2)]];
 #ifdef CONTACT_LINES
-    side = splat.layer >> 30u;
-    splat.layer &= 0x3fffffffu;
+    side = side_taken_off(splat);
 #endif
     vec2 corner = vec2(float(gl_VertexID & 1), float((gl_VertexID >> 1) & 1)) * 2.0 - 1.0;
 #ifdef CLIPPED
@@ -141,32 +82,26 @@ void main() {
     inside.zw = max(inside.xy, inside.zw);
     corner = mix(inside.xy, inside.zw, 0.5 * corner + 0.5);
 #endif
-    float xi = corner.x;
-    vec2 position = splat.centre + xi * splat.along + corner.y * splat.across;
-    at = vec3(corner.y * splat.y_edge, xi, table_u.x * xi + table_u.y);
-    shape = vec3(splat.y_box, splat.table_row, float(splat.layer));
-    wave = xi * splat.waves.xz + corner.y * splat.waves.yw;
+    vec2 position = splat.centre + corner.x * splat.along + corner.y * splat.across;
+    at = place_at(splat, corner);
+    shape = shape_of(splat);
+    wave = cycles_at(splat, corner);
     ripple = splat.ripple.xyz;
 #if defined(EDGE) && defined(LIGHT_EDGES)
-    lit = splat.lit + xi * splat.x_range.x + corner.y * splat.x_range.y;
+    lit = lit_at(splat, corner);
 #endif
-#ifdef ONE_COLOUR
-    for (int g = 0; g < TARGETS; ++g) {
-#ifdef HERO
-        splat_colour[g] = splat.amplitude * energy(splat, uint(g));
-#else
-        splat_colour[g] = splat.throughput.y * splat.amplitude * energy(splat, uint(g));
-#endif
-    }
-#else
-    throughput = vec4(splat.throughput.x, splat.amplitude * splat.throughput.yzw);
+#ifndef ONE_COLOUR
+    throughput = throughput_of(splat);
+    band = band_of(splat);
 #ifdef CUT
-    band = vec4(splat.x_range, splat.xi_half, splat.inverse_sigma_xi);
-    curve_row = float(splat.layer / (bands * uint(TARGETS)) * uint(TARGETS));
-#else
-    band = vec4(splat.xi_half);
+    curve_row = curve_row_of(splat);
 #endif
 #endif
+#endif
+#if defined(SMALL) || defined(ONE_COLOUR)
+    for (int g = 0; g < TARGETS; ++g) {
+        splat_colour[g] = colour_of(splat, uint(g));
+    }
 #endif
     rect = splat.rect;
 #ifdef FANS

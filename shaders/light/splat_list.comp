@@ -12,17 +12,7 @@ uniform uint capacity;
 
 shared uint counts[WORKGROUP * int(KINDS)];
 
-const uint PHOTON_SLOTS = uint(SLOTS + IMAGE_SLOTS);
-
-// Behind the last slot of a photon that holds anything.
-uint end_of(uint photon) {
-    uint slot = photon * PHOTON_SLOTS;
-#ifdef BORDER_IMAGES
-    return slot + uint(SLOTS) + splats[slot].images;
-#else
-    return slot + uint(SLOTS);
-#endif
-}
+#include "light/splat_slots.glsl"
 
 void main() {
     uint me = gl_LocalInvocationID.x;

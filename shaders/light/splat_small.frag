@@ -1,9 +1,7 @@
 // A splat smaller than a texel can show: an axis-aligned Gaussian, integrated exactly over each texel, of one colour.
-#include "lib/gaussian.glsl"
+#include "light/splat_texel.glsl"
 
 #ifdef CONTACT_LINES
-#include "lib/contact.glsl"
-layout(binding = 1) uniform usampler2D contact_words;
 flat in uint side;
 #endif
 flat in vec4 rect;
@@ -14,10 +12,9 @@ layout(location = 0) out vec4 deposited[TARGETS];
 
 void main() {
     // Clip distances would do, but llvmpipe loses triangles that two of them cut.
-    bvec4 within = bvec4(greaterThan(gl_FragCoord.xy, rect.xy), lessThan(gl_FragCoord.xy, rect.zw));
-    float share = !all(within) ? 0.0 : gaussian_box(at.x, half_texel.x) * gaussian_box(at.y, half_texel.y);
+    float share = !inside_rect(gl_FragCoord.xy, rect) ? 0.0 : small_share(at, half_texel);
 #ifdef CONTACT_LINES
-    share *= takes_side(texelFetch(contact_words, ivec2(gl_FragCoord.xy), 0).x, side);
+    share *= taken_at(gl_FragCoord.xy, side);
 #endif
     for (int g = 0; g < TARGETS; ++g) {
         deposited[g] = share * splat_colour[g];

@@ -107,15 +107,15 @@ MUTANTS = {
         "gpu/test_splat.py::test_a_sweep_lies_between_its_band_s_ends_whichever_wavelength_is_traced",
     ),
     "cut spectrum reversed": Mutant(
-        "light/splat_cut.frag",
-        "vec2 x = mix(band.xx, band.yy, 0.5 + 0.5 * ends / band.z);",
-        "vec2 x = mix(band.xx, band.yy, 0.5 - 0.5 * ends.yx / band.z);",
+        "light/splat_texel.glsl",
+        "return mix(band.xx, band.yy, 0.5 + 0.5 * ends / band.z);",
+        "return mix(band.xx, band.yy, 0.5 - 0.5 * ends.yx / band.z);",
         "gpu/test_splat.py::test_cut_bands_add_up_to_the_whole",
     ),
     "slopes of throughput swapped": Mutant(
-        "light/splat_swept.frag",
-        "min(xi, 0.0) * throughput.z + max(xi, 0.0) * throughput.w",
-        "min(xi, 0.0) * throughput.w + max(xi, 0.0) * throughput.z",
+        "light/splat_texel.glsl",
+        "min(aside, 0.0) * throughput.z + max(aside, 0.0) * throughput.w",
+        "min(aside, 0.0) * throughput.w + max(aside, 0.0) * throughput.z",
         "gpu/test_splat.py::test_throughput_over_the_band",
     ),
     "soft edges of a rectangular beam swapped": Mutant(
@@ -205,15 +205,15 @@ MUTANTS = {
         "gpu/test_grating_gpu.py::test_water_shortens_waves",
     ),
     "a small splat without its height": Mutant(
-        "light/splat_small.frag",
+        "light/splat_texel.glsl",
         "gaussian_box(at.x, half_texel.x) * gaussian_box(at.y, half_texel.y)",
         "gaussian_box(at.x, half_texel.x)",
         "gpu/test_splat.py::test_no_footprint_and_no_sweep_still_deposits_everything",
     ),
     "violet at the chord's high end": Mutant(
-        "light/splat.vert",
-        "table_u.x * xi + table_u.y",
-        "table_u.y - table_u.x * xi",
+        "light/splat_setup.glsl",
+        "table_u.x * at.x + table_u.y",
+        "table_u.y - table_u.x * at.x",
         "gpu/test_splat.py::test_violet_lies_at_the_low_end_of_the_chord",
     ),
     "light of the environment without its cosine": Mutant(

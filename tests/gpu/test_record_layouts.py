@@ -183,10 +183,7 @@ def test_records_packed_as_texels_lie_as_in_a_buffer(gl, struct: Struct) -> None
 _BLOCK = re.compile(r"layout\(std140,[^)]*\)\s*uniform\s+(\w+)\s*\{([^}]*)\}")
 HAND_WRITTEN = {
     "light/footprint.comp": footprint.PARAMETERS,
-    "light/splat.vert": splat.PARAMETERS,
-    "light/splat_swept.frag": splat.PARAMETERS,
-    "light/splat_cut.frag": splat.PARAMETERS,
-    "light/splat_small.frag": splat.PARAMETERS,
+    "light/splat_parameters.glsl": splat.PARAMETERS,
     "light/beam.vert": beam_splat.PARAMETERS,
 }
 """Shaders whose parameter block lists its members itself: it must be this struct."""

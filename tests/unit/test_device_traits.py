@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 
-from spectrasplat.gpu.device_traits import DeviceTraits
+from spectrasplat.gpu.device_traits import DeviceTraits, assumed, is_software_renderer
 
 
 def test_llvmpipe_has_all_of_them() -> None:
@@ -23,3 +23,11 @@ def test_other_software_reads_textures() -> None:
 def test_a_card_has_none() -> None:
     assert DeviceTraits.of("NVIDIA H100/PCIe/SSE2") == DeviceTraits()
     assert DeviceTraits().clock is time.perf_counter
+
+
+def test_what_is_assumed_does_not_hide_a_software_renderer() -> None:
+    with assumed(DeviceTraits(splats_by_compute=True)):
+        assert (
+            is_software_renderer("llvmpipe (LLVM 15.0.6, 256 bits)") and DeviceTraits.of("llvmpipe").splats_by_compute
+        )
+    assert not is_software_renderer("NVIDIA H200/PCIe/SSE2") and not DeviceTraits().splats_by_compute

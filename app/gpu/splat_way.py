@@ -1,0 +1,132 @@
+"""Whether splats are drawn by the rasteriser or added by compute shaders: a device is fast at one of the two.
+
+Data-centre GPUs have next to no raster hardware: an NVIDIA H200 blends 0.7 G fragments a second into RGBA32F, where
+its compute shaders make a million footprints in 14 ms. Elsewhere the rasteriser is kept: software renderers and most
+GPUs then add in a fixed order, and the same picture comes out every time.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+import weakref
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from ..base.errors import UserError, suggestion
+from .device_traits import DeviceTraits, is_software_renderer
+from .limits import Limits
+from .parking import park
+
+if TYPE_CHECKING:
+    import moderngl
+
+ENVIRONMENT_VARIABLE = "SPECTRASPLAT_SPLATS"
+FLOAT_ATOMICS = "GL_NV_shader_atomic_float"
+"""Extension of OpenGL and of GLSL: `atomicAdd` of a float in a storage block."""
+SLOW_BLENDING = 8e9
+"""Fragments a second, of RGBA32F: below it compute shaders add faster."""
+_WAYS = ("raster", "compute")
+_SIDE, _QUADS, _ROUNDS = 1024, 8, 2
+_VERTEX = """#version 430 core
+void main() {
+    gl_Position = vec4(vec2(gl_VertexID % 3 == 1 ? 3.0 : -1.0, gl_VertexID % 3 == 2 ? 3.0 : -1.0), 0.0, 1.0);
+}
+"""
+_FRAGMENT = """#version 430 core
+layout(location = 0) out vec4 colour;
+void main() { colour = vec4(gl_FragCoord.xy, 1.0, 1.0); }
+"""
+
+
+@dataclass(frozen=True)
+class SplatWay:
+    """How a context's splats are drawn."""
+
+    by_compute: bool
+    reason: str
+    """What decided, for people."""
+    largest_sums: int
+    """Bytes that the sums of compute shaders may take: of one storage block."""
+    extensions: tuple[str, ...] = ()
+    """Of GLSL that adding asks for; without them it compares and swaps."""
+
+    def for_maps(self, size: tuple[int, int], targets: int) -> bool:
+        """Whether splats go by compute shaders into maps of so many texels and textures."""
+        return self.by_compute and sums_bytes(size, targets) <= self.largest_sums
+
+    @property
+    def sentence(self) -> str:
+        """For `doctor`."""
+        return f"{'added by compute shaders' if self.by_compute else 'drawn by the rasteriser'} ({self.reason})"
+
+
+def sums_bytes(size: tuple[int, int], targets: int) -> int:
+    """Of the sums that compute shaders add splats to: whole blocks of 4 by 2 texels (`light/splat_sums.glsl`)."""
+    width, height = size
+    return -(-width // 4) * -(-height // 2) * 8 * 16 * targets
+
+
+_ways: weakref.WeakKeyDictionary[moderngl.Context, SplatWay] = weakref.WeakKeyDictionary()
+
+
+def way_of(ctx: moderngl.Context) -> SplatWay:
+    """The way of a context, found out once: on a GPU that has float atomics by drawing for a few milliseconds.
+
+    Raises `UserError` where the environment names a way that there is not."""
+    if ctx not in _ways:
+        _ways[ctx] = _found(ctx)
+    return _ways[ctx]
+
+
+def _found(ctx: moderngl.Context) -> SplatWay:
+    renderer = ctx.info["GL_RENDERER"]
+    extensions = (FLOAT_ATOMICS,) if FLOAT_ATOMICS in ctx.extensions else ()
+    largest = Limits.read(ctx.info).storage_block_bytes
+    forced = _from_environment()
+    if forced:
+        return SplatWay(forced == "compute", f"{ENVIRONMENT_VARIABLE} is set", largest, extensions)
+    if is_software_renderer(renderer):
+        # Where a GPU is assumed its programs are for strict compilers too: without extensions.
+        is_assumed = DeviceTraits.of(renderer).splats_by_compute
+        return SplatWay(is_assumed, "as on all software renderers", largest)
+    if not extensions:
+        return SplatWay(False, f"it has no {FLOAT_ATOMICS}", largest)
+    rate = blending_rate(ctx)
+    return SplatWay(rate < SLOW_BLENDING, f"it blends {rate / 1e9:.1f} G fragments/s", largest, extensions)
+
+
+def _from_environment() -> str:
+    name = os.environ.get(ENVIRONMENT_VARIABLE, "").strip().casefold()
+    if not name or name in _WAYS:
+        return name
+    hint = suggestion(name, _WAYS) or ", use 'raster' or 'compute'"
+    raise UserError(f"{ENVIRONMENT_VARIABLE} is '{name}', which is no way to draw splats{hint}")
+
+
+def blending_rate(ctx: moderngl.Context) -> float:
+    """Fragments that the device adds to an RGBA32F texture a second, by the wall clock, the best of a few rounds."""
+    import moderngl
+
+    texture = ctx.texture((_SIDE, _SIDE), 4, dtype="f4")
+    framebuffer = ctx.framebuffer([texture])
+    program = ctx.program(vertex_shader=_VERTEX, fragment_shader=_FRAGMENT)
+    array = ctx.vertex_array(program, [])
+    framebuffer.use()
+    framebuffer.clear()
+    ctx.enable_only(moderngl.BLEND)
+    ctx.blend_equation = moderngl.FUNC_ADD, moderngl.FUNC_ADD
+    ctx.blend_func = moderngl.ONE, moderngl.ONE
+    shortest = float("inf")
+    array.render(moderngl.TRIANGLES, vertices=3)
+    for _ in range(_ROUNDS):
+        ctx.finish()
+        started = time.perf_counter()
+        array.render(moderngl.TRIANGLES, vertices=3 * _QUADS)
+        ctx.finish()
+        shortest = min(shortest, time.perf_counter() - started)
+    ctx.enable_only(moderngl.NOTHING)
+    park(ctx)
+    for owned in (array, program, framebuffer, texture):
+        owned.release()
+    return _SIDE * _SIDE * _QUADS / shortest

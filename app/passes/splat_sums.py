@@ -1,0 +1,58 @@
+"""Sums in a buffer that compute shaders add splats to, where a device's rasteriser blends slowly."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from ..gpu import shader
+from ..gpu.splat_way import sums_bytes, way_of
+from .variants import sum_defines
+
+if TYPE_CHECKING:
+    import moderngl
+
+BIND_SUMS = 2
+_SIDE = 16
+"""Of a work group."""
+
+
+class SplatSums:
+    """Owns the sums of an atlas: blocks of texels for each of its targets, as `light/splat_sums.glsl` lays them out."""
+
+    def __init__(self, ctx: moderngl.Context, size: tuple[int, int], targets: int) -> None:
+        """What the sums hold at first is anything: `forget` it."""
+        self._ctx = ctx
+        self._size = size
+        way = way_of(ctx)
+        self.buffer = ctx.buffer(reserve=sums_bytes(size, targets))
+        defines = sum_defines(way) | {"SIDE": _SIDE}
+        self._program = shader.compute(ctx, "light/splat_sums.comp", defines, extensions=way.extensions)
+
+    def move(self, textures: Sequence[moderngl.Texture]) -> None:
+        """Add the sums to `textures`, RGBA32F of the atlas's size, one a target; they are zero then."""
+        self._run(textures, 1)
+
+    def forget(self, textures: Sequence[moderngl.Texture]) -> None:
+        """Make them zero; `textures`, as for `move`, stay as they are."""
+        self._run(textures, 0)
+
+    def _run(self, textures: Sequence[moderngl.Texture], counts: int) -> None:
+        self._ctx.memory_barrier()
+        self.buffer.bind_to_storage_buffer(BIND_SUMS)
+        width, height = self._size
+        self._program["counts"].value = counts
+        for target, texture in enumerate(textures):
+            texture.bind_to_image(0, read=True, write=True)
+            self._program["target"].value = target
+            self._program.run(-(-width // _SIDE), -(-height // _SIDE))
+        self._ctx.memory_barrier()
+
+    @property
+    def bytes(self) -> int:
+        """Device memory of the sums."""
+        return self.buffer.size
+
+    def release(self) -> None:
+        """Free sums and program."""
+        shader.release(self.buffer, self._program)

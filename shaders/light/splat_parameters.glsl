@@ -1,0 +1,10 @@
+// What all shaders that draw splats are told.
+layout(std140, binding = 0) uniform DrawParameters {
+    vec2 atlas_size;
+    vec2 table_u;  // texture u = table_u.x * xi + table_u.y
+    uint bands;
+    uint density_cells;
+    uint cumulative_samples;
+    uint reserved;
+};
+layout(std430, binding = 7) readonly buffer Curves { vec4 curve[]; };  // by light and class: density over x, or its running integral

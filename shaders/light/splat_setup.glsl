@@ -1,0 +1,107 @@
+// From a splat's record to what its texels are worked out from (splat_texel.glsl): for splat.vert, whose rasteriser interpolates
+// what is linear in xi and eta, and for splat_add.comp, which works it out at every texel.
+#include "light/splat_parameters.glsl"
+
+layout(std430, binding = 1) readonly buffer Splats { SplatRecord splats[]; };
+layout(std430, binding = 8) readonly buffer Lists { uint lists[]; };  // slots of each kind (splat_list.comp)
+layout(std430, binding = 5) readonly buffer Bands { vec4 table_bands[]; };
+layout(std430, binding = 6) readonly buffer Integrals { vec4 band_integral[]; };  // by layer
+
+#ifdef CONTACT_LINES
+// On which side of a line of contact the splat's light landed; its record then holds the layer alone.
+uint side_taken_off(inout SplatRecord splat) {
+    uint side = splat.layer >> 30u;
+    splat.layer &= 0x3fffffffu;
+    return side;
+}
+#endif
+
+#if defined(SMALL) || defined(ONE_COLOUR)
+// Energy of the splat in each channel of target g, per unit throughput.
+vec4 energy(SplatRecord splat, uint g) {
+    uint row = splat.layer / (bands * uint(TARGETS)) * uint(TARGETS) + g;
+#ifdef POINT_SPECTRUM
+    // One wavelength: its density over x, unless the photon stands for a band (or a line).
+    vec4 span = table_bands[splat.layer / uint(TARGETS)];
+#ifdef HERO
+    // Four wavelengths, their cells two a number.
+    if (span.y > span.x) {
+        uvec2 cells = uvec2(splat.x_range);
+        uint base = row * density_cells;
+        return splat.throughput.x * curve[base + cells.x / DENSITY_CELLS] + splat.throughput.y * curve[base + cells.x % DENSITY_CELLS]
+             + splat.throughput.z * curve[base + cells.y / DENSITY_CELLS] + splat.throughput.w * curve[base + cells.y % DENSITY_CELLS];
+    }
+    return splat.throughput.x * band_integral[splat.layer + g];
+#endif
+    bool single = splat.x_range.y <= splat.x_range.x && span.y > span.x;
+    if (single) {
+        uint cell = min(uint(splat.throughput.x * float(density_cells)), density_cells - 1u);
+        return curve[row * density_cells + cell];
+    }
+#elif defined(BAND_CUTS)
+    if (splat.xi_half > 0.0) {
+        vec2 place = clamp(splat.x_range, 0.0, 1.0) * float(cumulative_samples - 1u);
+        uvec2 i = min(uvec2(place), cumulative_samples - 2u);
+        vec2 part = place - vec2(i);
+        uint base = row * cumulative_samples;
+        return mix(curve[base + i.y], curve[base + i.y + 1u], part.y) - mix(curve[base + i.x], curve[base + i.x + 1u], part.x);
+    }
+#endif
+    return band_integral[splat.layer + g];
+}
+
+// What a texel that held all of the splat would have in target g.
+vec4 colour_of(SplatRecord splat, uint g) {
+#if defined(SMALL) || defined(HERO)
+    return splat.amplitude * energy(splat, g);
+#else
+    return splat.throughput.y * splat.amplitude * energy(splat, g);
+#endif
+}
+#endif
+
+#ifdef SMALL
+vec2 half_texel_of(SplatRecord splat) { return 0.5 * splat.across; }
+#else
+// Across, along xi, table u: at (xi, eta), as the next two.
+vec3 place_at(SplatRecord splat, vec2 at) { return vec3(at.y * splat.y_edge, at.x, table_u.x * at.x + table_u.y); }
+
+vec2 cycles_at(SplatRecord splat, vec2 at) { return at.x * splat.waves.xz + at.y * splat.waves.yw; }
+
+#ifdef LIGHT_EDGES
+float lit_at(SplatRecord splat, vec2 at) { return splat.lit + at.x * splat.x_range.x + at.y * splat.x_range.y; }
+#endif
+
+// Half texel across, table row, layer.
+vec3 shape_of(SplatRecord splat) { return vec3(splat.y_box, splat.table_row, float(splat.layer)); }
+
+#ifndef ONE_COLOUR
+vec4 throughput_of(SplatRecord splat) { return vec4(splat.throughput.x, splat.amplitude * splat.throughput.yzw); }
+
+// Cut: x_lo, x_hi, half of the sweep in xi, 1 / (sqrt(2) sigma) in xi; else half of the band in xi.
+vec4 band_of(SplatRecord splat) {
+#ifdef CUT
+    return vec4(splat.x_range, splat.xi_half, splat.inverse_sigma_xi);
+#else
+    return vec4(splat.xi_half);
+#endif
+}
+
+#ifdef CUT
+// First row of the splat's light and class among the curves.
+float curve_row_of(SplatRecord splat) { return float(splat.layer / (bands * uint(TARGETS)) * uint(TARGETS)); }
+#endif
+#endif
+#endif
+
+#ifdef FANS
+#include "lib/fan.glsl"
+#endif
+// Least xi and eta, largest xi and eta of what is drawn of a swept splat.
+vec4 all_of_splat(SplatRecord splat) {
+#ifdef FANS
+    return part_that_fans(splat.fan);
+#else
+    return vec4(-1.0, -1.0, 1.0, 1.0);
+#endif
+}

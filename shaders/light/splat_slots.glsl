@@ -1,0 +1,12 @@
+// Which slots of a photon hold splats: SLOTS of its own, and behind them its images beyond borders.
+const uint PHOTON_SLOTS = uint(SLOTS + IMAGE_SLOTS);
+
+// Behind the last slot of a photon that holds anything.
+uint end_of(uint photon) {
+    uint slot = photon * PHOTON_SLOTS;
+#ifdef BORDER_IMAGES
+    return slot + uint(SLOTS) + splats[slot].images;
+#else
+    return slot + uint(SLOTS);
+#endif
+}
