@@ -75,6 +75,7 @@ def test_check_reports_a_dispatch_past_the_limit_once(gl: Context) -> None:
 def test_software_renderers_are_recognised(renderer: str, software: bool) -> None:
     class Fake:
         info = {"GL_RENDERER": renderer, "GL_VENDOR": "v", "GL_VERSION": "4.5"}
+        extensions: frozenset[str] = frozenset()
         error = "GL_NO_ERROR"
 
     assert Context(Fake(), "egl").is_software is software  # type: ignore[arg-type]

@@ -279,7 +279,9 @@ def test_picture_does_not_depend_on_batches(rig: Rig) -> None:
     axis = np.stack([np.cos(angles), np.sin(angles)], axis=1) * sizes[:, None]
     records = photons(PLAIN, rng.uniform(5.0, 59.0, (count, 2)), axis, 0.5 * axis[:, ::-1] * [1, -1], axis[::-1])
     whole = rig.draw(records)
-    np.testing.assert_array_equal(rig.draw(records, batch=32768), whole)
+    # Atomics add in any order.
+    rounding = 2e-6 if rig.splatter.by_compute else 0.0
+    np.testing.assert_allclose(rig.draw(records, batch=32768), whole, rtol=rounding)
     np.testing.assert_allclose(rig.draw(records, batch=10007), whole, rtol=2e-6)
 
 
