@@ -76,8 +76,9 @@ def run(is_short: bool = False) -> Iterator[str]:
         yield f"                      {figures['draw_ratio']:.2f} of them once footprints are known   (promised 0.70)"
         fragments = 64e6 * figures["draw_m_per_s"]
         blended, copied = fragments * BLENDED_BYTES, copied_bytes_per_second(context)
+        word = "adding" if context.splats.by_compute else "blending"
         yield (
-            f"blending              {fragments / 1e9:.3f} G fragments/s, {blended / 1e9:.1f} GB/s read and written, "
+            f"{word:<22}{fragments / 1e9:.3f} G fragments/s, {blended / 1e9:.1f} GB/s read and written, "
             f"{100 * blended / copied:.0f} % of the {copied / 1e9:.1f} GB/s that copying memory reaches"
         )
     yield f"tree                  {_tree_seconds():.3f} s for {TRIANGLES} triangles   (promised 0.5)"
