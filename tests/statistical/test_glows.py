@@ -164,6 +164,7 @@ def test_directions_are_believed_no_further_than_one_photon_stands_for(
     assert deviation(drawn(gl, ellipsoid, 200_000), truth) < SPREAD
 
 
+@pytest.mark.slow
 def test_believed_without_bound_they_spread_light(
     gl: Context, ellipsoid: Scene, truth: np.ndarray, monkeypatch
 ) -> None:

@@ -86,6 +86,7 @@ def test_light_stays_where_it_lands(gl: Context, scene: Scene, truth: np.ndarray
     assert deviation(gl, scene, truth) < BOUND
 
 
+@pytest.mark.slow
 def test_without_a_bound_it_is_spread(
     gl: Context, scene: Scene, truth: np.ndarray, monkeypatch, tmp_path: Path
 ) -> None:
