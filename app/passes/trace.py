@@ -290,7 +290,8 @@ class TracePass:
             raise ValueError("objects are left to beams, and the programs were made without them")
         self._start(piece, domain, max_depth, split_threshold or self.split_threshold)
         self.scene.bind()
-        self._bind_queue(0)
+        self._bind_queue()
+        self._bind_rays(0)
         self._emit_parameters.bind_to_storage_buffer(bindings.PARAMETERS)
         self.order(piece).bind_to_storage_buffer(bindings.INDICES)
         self._emit_program(domain).run(-(-piece.count // _GROUP))
@@ -332,7 +333,7 @@ class TracePass:
         while alive and step < limit:
             self.scene.bind()
             self._trace_parameters.bind_to_uniform_block(bindings.PARAMETERS)
-            self._bind_queue(step + 1)
+            self._bind_queue()
             for _ in range(min(self.events_at_once, limit - step)):
                 if step == limit - 1:
                     self._trace_values["max_depth"] = 0
@@ -426,8 +427,7 @@ class TracePass:
         p["beam_objects"] = np.packbits(bits, bitorder="little").view("<u4").reshape(p["beam_objects"].shape)
         return p
 
-    def _bind_queue(self, step: int) -> None:
-        self._bind_rays(step)
+    def _bind_queue(self) -> None:
         self._outcomes.bind_to_storage_buffer(bindings.OUTCOMES)
         self._slots.bind_to_storage_buffer(bindings.PHOTON_SLOTS)
         self._indices.bind_to_storage_buffer(bindings.INDICES)

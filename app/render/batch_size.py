@@ -18,13 +18,12 @@ def batch_size(context: Context, features: Features, asked: int | None) -> int:
     """Lattice points in flight at once: `asked`, or what the device and its memory have room for."""
     batch = asked or DEFAULT_BATCH * context.traits.batch_scale
     if asked is None:
-        batch = min(batch, _batch_that_fits(features, QUEUE_BYTES * context.traits.batch_scale))
+        batch = _batch_that_fits(features, batch, QUEUE_BYTES * context.traits.batch_scale)
     return min(batch, _largest_batch(context, features))
 
 
-def _batch_that_fits(features: Features, most_bytes: int) -> int:
-    """The largest power of two whose queue takes no more than that, nor more than an eighth of the memory there is."""
-    batch = DEFAULT_BATCH << 4
+def _batch_that_fits(features: Features, batch: int, most_bytes: int) -> int:
+    """`batch`, halved until its queue takes no more than that, nor more than an eighth of the memory there is."""
     while batch > SMALLEST_BATCH and queue_bytes(features, batch) > min(most_bytes, available_bytes() // 8):
         batch >>= 1
     return batch

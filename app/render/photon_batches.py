@@ -27,9 +27,6 @@ if TYPE_CHECKING:
 MIN_RAYS = 1 << 10
 """Rays of a batch that are not divided further, however slow the device is."""
 
-MOST_EVENTS = 8
-"""Events of a batch that a device is given at once, however fast it is: as many as it looks for living rays after."""
-
 
 @dataclass(frozen=True)
 class Deposit:
@@ -131,7 +128,8 @@ class PhotonBatches:
             stats.trace_seconds += took
             if queued and is_first and rays and is_compiled:
                 self.budget.learn(rays, took, self.dispatch_seconds)
-                self.trace.events_at_once = int(np.clip(self.dispatch_seconds / max(took, 1e-6), 1, MOST_EVENTS))
+                most = self._context.traits.queue_read_steps  # then it is asked whether any rays are left
+                self.trace.events_at_once = int(np.clip(self.dispatch_seconds / max(took, 1e-6), 1, most))
             is_first, self._traced_once = False, True
             yield
             started = time.perf_counter()
