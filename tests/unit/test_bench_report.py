@@ -20,6 +20,7 @@ from spectrasplat.bench.report import (
 )
 from spectrasplat.bench.report import (
     fair_field,
+    markdown,
     report,
 )
 from spectrasplat.bench.report import (
@@ -291,7 +292,7 @@ def test_errors_that_have_no_logarithm(tmp_path: Path, abscissa: str) -> None:
 
 def test_overview_and_readme_plot(tmp_path: Path) -> None:
     """A method that never gets there stands at the left edge, and a shortest rendering that is already as good is
-    marked ≥."""
+    marked ≥. The README's panels tell the speed-up over the best baseline."""
     near, far, none = (synthetic_scene(tmp_path, name) for name in ("near", "far", "none"))
     near.time_to_equal_error["srd"], far.time_to_equal_error = 120.0, {"stochastic": 1.0}
     near.curves[-1].points = [Point(1000, 0.025, 1e-6, 1e-6, 1e-6, 0.0, 1e-6)]
@@ -304,18 +305,45 @@ def test_overview_and_readme_plot(tmp_path: Path) -> None:
     with report_style.plot_style():
         svg = svg_of(overview(synthetic_result([near, far, none])))
     assert ">≥ 120×<" in svg and ">never<" in svg
-    report.readme_plot(synthetic_result([near, far, none]), tmp_path / "readme")
+    near.speed_ups = [
+        SpeedUp(0.01, "photon", 0.05, False, "hero", 0.6, False),
+        SpeedUp(0.003, "photon", 0.1, False, "hero", 1.4, False),
+        SpeedUp(0.001, "photon", 0.2, True, "hero", 0.2, True),
+        SpeedUp(0.001, "whole", 0.2, False, "hero", 19.0, False),
+    ]
+    far.speed_ups = [SpeedUp(0.01, "photon", None, False, "hero", 0.6, False)]
+    report.readme_plot(synthetic_result([far, near, none]), tmp_path / "readme")
     assert (tmp_path / "readme.png").stat().st_size > 10_000
     svg = (tmp_path / "readme.svg").read_text(encoding="utf-8")
     assert_numbers_are_finite(svg)
-    assert (
-        ">near<" in svg
-        and ">far<" in svg
-        and ">none<" not in svg
-        and ">never as good<" in svg
-        and ">regular-7<" not in svg
-    )
+    assert ">14× at 0.3 %<" in svg and ">not reached at 1 %<" in svg, "the least error at which one is known"
+    assert 0 < svg.index(">far<") < svg.index(">near<"), "in the order they were named, not the best first"
+    assert ">none<" not in svg and ">regular-7<" not in svg and ">srd-lambda<" in svg
     report.readme_plot(synthetic_result([]), tmp_path / "empty")
+
+
+def test_tables_as_markdown(tmp_path: Path) -> None:
+    """What documents are made of: every table has each scene once, in the order they were named, and says what the
+    page says."""
+    scene, bare = synthetic_scene(tmp_path, "a|b"), synthetic_scene(tmp_path, "bare")
+    scene.speed_ups = [
+        SpeedUp(0.1, "photon", 0.05, False, "stochastic", 0.6, False),
+        SpeedUp(0.1, "whole", 2.0, False, "stochastic", 2.2, False),
+        SpeedUp(0.01, "photon", 0.1, False, "", 1.0, False),
+    ]
+    bare.speed_ups, bare.curves, bare.reference = [], [], None
+    text = markdown.tables(synthetic_result([scene, bare]))
+    lines = text.splitlines()
+    for block in text.split("\n\n"):
+        if block.startswith("|"):
+            assert len({len(re.findall(r"(?<!\\)\|", line)) for line in block.splitlines()}) == 1, block
+    ends = [line for line in lines if line.startswith("| `a\\|b` |")]
+    assert "12× s (1.1×)" in ends[0] and "≥ 10× (–)" in ends[0] and "s: `stochastic`" in text
+    last = next(curve for curve in scene.curves if curve.method == "srd").points[-1]
+    assert f"{report_text.number(last.relmse)}, {last.seconds:.2g} s" in text
+    assert "## relMSE after 0.1 s of photon time" in text and "## nRMSE at the end" in text
+    rows_of_bare = [line for line in lines if line.startswith("| `bare` |")]
+    assert len(rows_of_bare) == len(ends) - 1 and all(set(line[9:]) <= set("|– ") for line in rows_of_bare)
 
 
 def test_reference_warning_begins_at_a_tenth(tmp_path: Path) -> None:

@@ -2,7 +2,7 @@
 
     DIR/plots/SCENE_error_time.png .svg    DIR/plots/SCENE_error_photons.png .svg (the camera pass: _samples)
     DIR/plots/overview.png .svg            DIR/plots/scenes.png .svg (the README's figure)
-    DIR/plots/speed_up.png .svg            DIR/report.html
+    DIR/plots/speed_up.png .svg            DIR/report.html, DIR/tables.md
 
 A run that was stopped can be reported as well: what is missing is named where it would stand.
 """
@@ -19,7 +19,7 @@ from ...base.errors import UserError
 from ...base.progress import ProgressReporter
 from ..measured_passes import MEASURED_PASSES
 from ..results import BenchResult, SceneResult
-from . import fair_field
+from . import fair_field, markdown
 from . import scene as report_scene
 from . import style as report_style
 from .curve_plots import error_against
@@ -58,11 +58,13 @@ def write_report(result: BenchResult, directory: Path) -> None:
         progress(1.0, "page")
     with atomic_output(directory / "report.html") as temporary:
         temporary.write_text(document(result, scenes, glance, curve), encoding="utf-8")
+    with atomic_output(directory / "tables.md") as temporary:
+        temporary.write_text(markdown.tables(result), encoding="utf-8")
 
 
 def readme_plot(result: BenchResult, stem: Path) -> None:
-    """Write the README's figure, error against time of `stochastic`, `srd-lambda` and `srd` in each scene, to
-    `stem`.png and `stem`.svg."""
+    """Write the README's figure, error against time of `srd` and two baselines in each scene, to `stem`.png and
+    `stem`.svg."""
     with report_style.plot_style():
         report_style.save(small_multiples(result), stem)
 

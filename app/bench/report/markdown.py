@@ -1,0 +1,125 @@
+"""The findings of a bench run as Markdown tables, to be pasted into a document: `tables.md` beside the page.
+
+Every table has a row a scene, in the order they were named, so that two runs can be laid side by side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+
+import numpy as np
+
+from ..curves import error_at_time
+from ..measured_passes import MEASURED_PASSES
+from ..results import TARGETS, BenchResult, Curve, SpeedUp
+from .fair_field import cell, percent
+from .style import by_rank
+from .text import number, signed
+
+_NONE = "–"
+_ESCAPED_BAR = r"\|"
+_BASELINE_LETTERS = {
+    "stochastic": "s",
+    "stochastic-even": "e",
+    "stochastic-point": "p",
+    "progressive-stochastic": "ps",
+    "hero": "h",
+    "regular-7": "r7",
+    "regular-16": "r16",
+    "srd-lambda": "λ",
+}
+"""What names the best baseline in a cell, where its whole name would make the table too wide to read."""
+
+
+def tables(result: BenchResult) -> str:
+    """The run's tables with their headings; ends with a line break."""
+    measured = MEASURED_PASSES[result.settings.measured_pass]
+    methods = by_rank(sorted({curve.method for scene in result.scenes for curve in scene.curves if curve.points}))
+    machine = ", ".join(value for key, value in result.machine.items() if key != "program")
+    parts = [f"`{result.command}`, {result.date[:10]}; {machine}."]
+    if speed_ups := _speed_ups(result):
+        parts += [f"## How many times sooner `srd` is there, by {measured.time} (and whole processes)", speed_ups]
+    for seconds in measured.compared_seconds:
+        if seconds < max((scene.seconds for scene in result.scenes), default=0.0):
+            heading = f"## relMSE after {seconds:g} s of {measured.time}"
+            parts += [heading, _by_method(result, methods, partial(_after, seconds))]
+    parts += [f"## relMSE at the end, after so many seconds of {measured.time}", _ends(result, methods)]
+    parts += ["## nRMSE at the end", _by_method(result, methods, _last_nrmse)]
+    parts += ["## Exponent of relMSE over the second half of the curve", _by_method(result, methods, _slope)]
+    return "\n\n".join(parts) + "\n"
+
+
+def table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A Markdown table; what would end a cell is escaped."""
+    lines = [headings, ["---"] * len(headings), *rows]
+    return "\n".join(f"| {' | '.join(one.replace('|', _ESCAPED_BAR) for one in line)} |" for line in lines)
+
+
+def _speed_ups(result: BenchResult) -> str:
+    """A row a scene; the cells name the best baseline by letters that a line below explains. "" where nothing was
+    compared."""
+    rows, named = [], set()
+    for scene in result.scenes:
+        found = {(one.clock, one.target): one for one in scene.speed_ups}
+        if found:
+            named |= {one.baseline for one in scene.speed_ups if one.clock == "photon" and one.baseline}
+            cells = [_pair(found.get(("photon", target)), found.get(("whole", target))) for target in TARGETS]
+            rows.append([f"`{scene.scene}`", *cells])
+    if not rows:
+        return ""
+    letters = ", ".join(f"{_letters(name)}: `{name}`" for name in by_rank(sorted(named)))
+    return "\n\n".join(
+        part for part in (table(["scene", *(percent(target) for target in TARGETS)], rows), letters) if part
+    )
+
+
+def _pair(photon: SpeedUp | None, whole: SpeedUp | None) -> str:
+    if photon is None:
+        return _NONE
+    baseline = f" {_letters(photon.baseline)}" if photon.baseline else ""
+    return f"{cell(photon)}{baseline} ({cell(whole)})"
+
+
+def _letters(baseline: str) -> str:
+    return _BASELINE_LETTERS.get(baseline, baseline)
+
+
+def _by_method(result: BenchResult, methods: Sequence[str], value: Callable[[Curve], str]) -> str:
+    """A column a method, with what `value` says of its curve."""
+    rows = []
+    for scene in result.scenes:
+        curves = {curve.method: curve for curve in scene.curves if curve.points}
+        cells = [value(curves[name]) if name in curves else _NONE for name in methods]
+        rows.append([f"`{scene.scene}`", *cells])
+    return table(["scene", *(f"`{name}`" for name in methods)], rows)
+
+
+def _after(seconds: float, curve: Curve) -> str:
+    return number(error_at_time(curve.points, seconds))
+
+
+def _ends(result: BenchResult, methods: Sequence[str]) -> str:
+    """The last relMSE and when; last the reference's own, which is taken off."""
+    rows = []
+    for scene in result.scenes:
+        curves = {curve.method: curve.points[-1] for curve in scene.curves if curve.points}
+        ends = [
+            f"{number(curves[name].relmse)}, {curves[name].seconds:.2g} s" if name in curves else _NONE
+            for name in methods
+        ]
+        own = _NONE if scene.reference is None else number(scene.reference.relmse)
+        rows.append([f"`{scene.scene}`", *ends, own])
+    return table(["scene", *(f"`{name}`" for name in methods), "reference's own"], rows)
+
+
+def _last_nrmse(curve: Curve) -> str:
+    last = curve.points[-1].photons
+    values = [s.metrics["nrmse"] for s in curve.samples if s.photons == last and "nrmse" in s.metrics]
+    return number(float(np.mean(values)) if values else None)
+
+
+def _slope(curve: Curve) -> str:
+    if not curve.slope_half_width > 0.0:
+        return _NONE
+    return f"{signed(curve.slope)} ± {curve.slope_half_width:.2f}"
