@@ -91,7 +91,7 @@ def _chance(request: AgreementRequest) -> tuple[int | None, int, str]:
         if request.random_seed is None
         else options.parse_integer("--random-seed", request.random_seed, 0, options.MAX_SEED)
     )
-    kinds = request.random_kinds or RANDOM_KINDS[0]
+    kinds = RANDOM_KINDS[0] if request.random_kinds is None else request.random_kinds
     if kinds not in RANDOM_KINDS:
         raise UserError(f"--random-kinds '{kinds}' is neither {' nor '.join(RANDOM_KINDS)}")
     return count, seed, kinds

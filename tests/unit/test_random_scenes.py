@@ -98,6 +98,7 @@ def test_all_kinds_come_up() -> None:
         (("--random-seed", "3"), "--random N how many"),
         (("--random-kinds", "all"), "--random N how many"),
         (("--random", "2", "--random-kinds", "some"), "--random-kinds 'some' is neither plain nor all"),
+        (("--random", "2", "--random-kinds", ""), "--random-kinds '' is neither plain nor all"),
         (("prism", "--random", "2"), "leave out prism"),
     ],
 )
