@@ -85,23 +85,23 @@ def bench_command(request: BenchRequest, show: Callable[[object], None]) -> int:
             settings,
         )
         store = Store(request.output, empty, request.fresh)
-        stopped = 0
+        stopped, left_out = 0, []
+
+        def leave_out(reason: str) -> None:
+            print(f"note: {reason}", file=sys.stderr)
+            left_out.append(reason)
+
         try:
             with ProgressReporter("bench") as progress:
-                # Who names scenes wants them measured; of all that there are, those that cannot be are noted.
-                run_bench(
-                    context,
-                    scenes,
-                    store,
-                    progress,
-                    None if request.scenes else lambda reason: print(f"note: {reason}", file=sys.stderr),
-                    start_seconds=start_s,
-                )
+                # What others took hours for is not lost to one scene that cannot be measured.
+                skipped = None if len(scenes) == 1 else leave_out
+                run_bench(context, scenes, store, progress, skipped, start_seconds=start_s)
         except KeyboardInterrupt as interrupt:
             stopped = exit_code_of(interrupt)
             print(f"spectrasplat: stopped; {kept_text(store.result)}", file=sys.stderr)
     write_and_show(store.result, request.output, show)
-    return stopped
+    # Who names scenes wants them measured.
+    return stopped or int(bool(request.scenes and left_out))
 
 
 def parse_settings(request: BenchRequest) -> BenchSettings:

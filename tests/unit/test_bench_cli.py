@@ -36,6 +36,8 @@ class Seen:
         self.settings: BenchSettings | None = None
         self.command = ""
         self.interrupt = False
+        self.dark = ""
+        """A scene in which there is nothing to measure."""
         self.reported: Path | None = None
 
 
@@ -45,13 +47,18 @@ def seen(monkeypatch: pytest.MonkeyPatch) -> Seen:
     found = Seen()
 
     def run(
-        _context: object, scenes: dict[str, Any], store: Any, _progress: object, *_skipped: object, start_seconds: float
+        _context: object, scenes: dict[str, Any], store: Any, _progress: object, skipped: Any, start_seconds: float
     ) -> None:
         assert 0.0 < start_seconds
         found.scenes, found.settings, found.command = [*scenes], store.result.settings, store.result.command
         points = [Point(n, n / 1000, 1 / n, 1 / n, 1 / n, 0.2 / n, 0.8 / n) for n in (100, 1000)]
         samples = [Sample(n, 1, n, n, {"trace": n / 1000}, {"relmse": 1 / n}) for n in (100, 1000)]
         for name in scenes:
+            if name == found.dark:
+                if skipped is None:
+                    raise UserError(f"'{name}': nothing to measure")
+                skipped(f"'{name}': nothing to measure")
+                continue
             curve = Curve("srd", {}, samples, [100, 1000], points, -1.0, 0.1)
             store.put_scene(
                 SceneResult(
@@ -231,6 +238,18 @@ def test_ctrl_c_says_what_is_kept_and_reports_it(
         "there" in told.err
     )
     assert seen.reported == tmp_path and "1/40" in told.out
+
+
+def test_a_scene_without_light_costs_the_others_nothing(
+    seen: Seen, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The others are measured and reported; who named it is told by the exit code as well, and alone it is an error."""
+    seen.dark = "water"
+    assert main(["bench", "water", "prism", "-o", str(tmp_path)]) == 1
+    assert "note: 'water': nothing to measure" in capsys.readouterr().err and seen.reported == tmp_path
+    assert main(["bench", "-o", str(tmp_path / "all")]) == 0
+    assert main(["bench", "water", "-o", str(tmp_path / "alone")]) != 0
+    assert "spectrasplat: 'water': nothing to measure" in capsys.readouterr().err
 
 
 def test_two_scenes_of_one_name(tmp_path: Path) -> None:
