@@ -5,11 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .compiling import jit
-from .screen_polygons import ScreenPolygons
-
-PIXEL_BITS = 27
-"""Of an entry's second word; the others hold the part of the pixel."""
-
+from .screen_polygons import PIXEL_BITS, ScreenPolygons
 
 _NOTHING = np.empty((0, 2), np.uint32)
 

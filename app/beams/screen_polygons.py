@@ -13,6 +13,9 @@ import numpy as np
 
 from .polygons import Outlines
 
+PIXEL_BITS = 27
+"""Of the second word of an entry of `screen_pairs.pixel_parts`: the pixel; the others hold the part of it."""
+
 
 @dataclass(frozen=True)
 class ScreenPolygons(Outlines):

@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING
 import moderngl
 import numpy as np
 
-from ..beams.screen_pairs import PIXEL_BITS, pixel_parts, portions
-from ..beams.screen_polygons import ScreenPolygons
+from ..beams.screen_polygons import PIXEL_BITS, ScreenPolygons
 from ..gpu import shader
 from ..gpu.dispatch_budget import DispatchBudget
 from ..gpu.scene_texels import ROW_TEXELS
@@ -116,6 +115,9 @@ class ScreenBeams:
 
         `places`: (points, 2) of a pixel, 0 to 1, at which its edges are told; `bind`: binds what the camera's programs
         read; `seconds`: what a portion should take."""
+        # Machine code, whose import costs a picture without beams 0.7 s.
+        from ..beams.screen_pairs import pixel_parts, portions
+
         assert self._polygons is not None
         self._picture.clear(size)
         places = ordered(places)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Protocol
 
-from ..beams.screen_pairs import PIXEL_BITS
+from ..beams.screen_polygons import PIXEL_BITS
 from ..gpu import bindings, records
 from ..gpu.device_traits import DeviceTraits
 from ..gpu.map_channels import MapChannels

@@ -37,6 +37,7 @@ from ..passes.trace import FluxTally
 from .beam_drawing import BeamDrawing
 from .beam_worker import BeamWorker
 from .light_maps import LightMaps
+from .moving_beams import SURVEY, MovingBeams
 from .shown_spectra import ShownSpectra
 
 PHOTONS_A_BEAM = 2.0
@@ -54,8 +55,6 @@ _GROWTH, _GROWTH_HANDED = 0.8, 1.0
 weak beams play roulette, and where they are handed over."""
 _ENOUGH = 4.0
 """A search that followed this many times fewer beams than there is time for is done again."""
-_SURVEY = 1e-3
-"""Threshold of the search that tells which objects beams carry, and what they cost."""
 _DEAREST = 1e8
 """Steps of a survey, each times `_STEP_FACETS` and the scene's facets, after which photons are thought cheaper: about
 four seconds of a core. Counted, not timed: the same scene must go the same way on every machine."""
@@ -98,26 +97,9 @@ class BeamStats:
     draw_seconds: float = 0.0
 
 
-@dataclass
-class MovingBeams:
-    """How fine beams are while something is dragged: as fine as their time allows. One value for all light passes of a
-    live rendering."""
-
-    threshold: float = _SURVEY
-
-    def learn(self, took: float, seconds: float) -> None:
-        """A search and its drawing `took` so long. Small changes are left out: other beams would play roulette."""
-        if not 0.5 * seconds <= took <= 1.2 * seconds:
-            self.threshold = float(
-                np.clip(self.threshold * np.clip(took / seconds, 0.5, 2.0), MOVING_FINEST, MOVING_COARSEST)
-            )
-
-
 SURVEY_PARTS = 4
 MOVING_PARTS = 1
 """Points that stand for an extended light in motion."""
-MOVING_COARSEST, MOVING_FINEST = 2e-3, 1e-5
-"""A coarser search takes hardly less time (a brilliant: 50 ms of the processor at 1e-2, 70 ms at 1e-3)."""
 _MOVING_WORD = 1
 """Roulette's seed in motion: the same beams from frame to frame."""
 
@@ -167,7 +149,7 @@ class BeamLight:
         """Why there are none after all."""
         self.stats = BeamStats()
         self._surveyed = self._handing = 1.0
-        """Beams that are followed at `_SURVEY`: where weak ones play roulette, and where they are handed over."""
+        """Beams that are followed at `SURVEY`: where weak ones play roulette, and where they are handed over."""
         self._survey_polygons: BeamPolygons | None = None
         """What maps are fitted to."""
         self.found: LightBeams | None = None
@@ -176,7 +158,7 @@ class BeamLight:
     def surveying(self, moving: MovingBeams | None = None) -> Iterator[str | None]:
         """Find out which objects' light beams carry, and whether that pays, with pauses that tell what it is at (None:
         as before); afterwards `found` holds the strongest beams, or those of `moving`."""
-        threshold = _SURVEY if moving is None else moving.threshold
+        threshold = SURVEY if moving is None else moving.threshold
         light_parts = SURVEY_PARTS if moving is None else MOVING_PARTS
         if not _compiled:
             # The first search of all may have to be compiled, which says nothing about the scene.
@@ -197,7 +179,7 @@ class BeamLight:
                 found = step
             yield None
         if pays(0):
-            for step in self._worker.searched(self.finder, _SURVEY, _MOVING_WORD, light_parts, pays, None, hands=True):
+            for step in self._worker.searched(self.finder, SURVEY, _MOVING_WORD, light_parts, pays, None, hands=True):
                 if isinstance(step, LightBeams):
                     strongest = step
                 yield None
@@ -205,7 +187,7 @@ class BeamLight:
             self.why_not = "the strongest beams alone are so many that photons are cheaper"
             return
         # As many as there would be at the survey's own threshold.
-        to_survey = (threshold / _SURVEY) ** _GROWTH
+        to_survey = (threshold / SURVEY) ** _GROWTH
         if sum(found.followed(light) for light in strongest.plays) * to_survey > MANY:
             self.why_not = (
                 "weak beams of lights with emission lines over a continuum are so many that photons leave less noise"
@@ -258,7 +240,7 @@ class BeamLight:
         self.finder.set_texels(self._texels(maps.layout, photons))
         found, surveyed = LightBeams({}), self._handing if hands else self._surveyed
         growth = _GROWTH_HANDED if hands else _GROWTH
-        finest = _finest(_SURVEY, surveyed)
+        finest = _finest(SURVEY, surveyed)
         while True:
             threshold = max(self._threshold(photons, surveyed, growth), finest)
             for step in self._worker.searched(self.finder, threshold, word, hands=hands):
@@ -271,7 +253,7 @@ class BeamLight:
             # Where light leaves for good, fewer weak beams follow than thought: such are searched for again, finer.
             # What is learnt here is forgotten: a pass must not depend on those before it.
             followed = found.followed()
-            surveyed, finest = max(followed, 1.0) * (threshold / _SURVEY) ** growth, _finest(threshold, followed)
+            surveyed, finest = max(followed, 1.0) * (threshold / SURVEY) ** growth, _finest(threshold, followed)
             enough = _ENOUGH * followed * self._photons_a_beam >= photons
             if enough or self._threshold(photons, surveyed, growth) >= threshold:
                 break
@@ -293,9 +275,9 @@ class BeamLight:
         return PHOTONS_A_BEAM * (1.0 + len(self.finder.scene.facets) / _FACETS_A_BEAM)
 
     def _threshold(self, photons: float, surveyed: float, growth: float) -> float:
-        """Threshold at which beams take about as long as so many photons; `surveyed` are followed at `_SURVEY`."""
+        """Threshold at which beams take about as long as so many photons; `surveyed` are followed at `SURVEY`."""
         beams = max(photons, 1.0) / self._photons_a_beam
-        return float(np.clip(_SURVEY * (surveyed / beams) ** (1.0 / growth), FINEST, COARSEST))
+        return float(np.clip(SURVEY * (surveyed / beams) ** (1.0 / growth), FINEST, COARSEST))
 
     def draw_moving(self, maps: LightMaps, weight: float, moving: MovingBeams, seconds: float) -> None:
         """Find beams at once, as fine as `seconds` allow, and add them to `maps` of any layout times `weight`."""
@@ -327,7 +309,7 @@ class BeamLight:
 
     def draw_found(self, maps: LightMaps, threshold: float) -> None:
         """Draw what the survey found, with the weight that photons for such a `threshold` would have."""
-        beams = self._surveyed * (_SURVEY / threshold) ** _GROWTH
+        beams = self._surveyed * (SURVEY / threshold) ** _GROWTH
         maps.photon_weight = self._photons_a_beam * beams
         if self.found is not None:
             self._count(self.found)
@@ -354,7 +336,7 @@ class BeamLight:
 
     def survey_again(self) -> None:
         """Know better where light lands: with the glass that is shown, and as finely as for a still."""
-        for step in self.finder.find(_SURVEY, self._depth, _MOVING_WORD, MOVING_PARTS):
+        for step in self.finder.find(SURVEY, self._depth, _MOVING_WORD, MOVING_PARTS):
             if isinstance(step, LightBeams):
                 self._survey_polygons = step.polygons
 
@@ -392,8 +374,3 @@ class BeamLight:
 
 def _finest(threshold: float, followed: float) -> float:
     return threshold / (_FINER * max(followed, 1.0) ** 0.5)
-
-
-def carries_everything(scene: Scene, carried: tuple[int, ...]) -> bool:
-    """Whether no photon of a light is needed at its first surface: all glass and mirrors are carried by beams."""
-    return all(i in carried for i, item in enumerate(scene.objects) if item.material.is_specular)

@@ -1,7 +1,7 @@
 """Whether a frame's camera sees flat-faceted glass and mirrors by beams or by paths.
 
 Strong beams are followed and looked up as polygons; weak ones are handed to paths of single wavelengths, each of which
-stands for a small share of a sample (`beams.screen_starts`). A coarse search tells first what that takes; where it is
+stands for a small share of a sample (`beams.drawn_starts`). A coarse search tells first what that takes; where it is
 not surely cheaper than following paths from the pixels on, or would be of no use, they are followed. Counts decide, not
 clocks, so that the same frame is always seen in the same way. Costs are those of a software renderer: elsewhere paths
 are kept.
@@ -16,9 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..beams.camera_view import CameraView
+from ..beams.drawn_starts import drawn_starts
 from ..beams.screen_pairs import count_pixel_parts
 from ..beams.screen_polygons import ScreenPolygons
-from ..beams.screen_starts import ScreenStarts, screen_starts
+from ..beams.screen_starts import ScreenStarts
 from ..model.scene import Camera
 from ..passes.camera import CameraPass
 from ..passes.pixel_lattice import shared_places
@@ -140,7 +141,7 @@ class CameraBeams:
         polygons = polygons.where(~polygons.is_handed)
         brightness = self._pass.brightness
         assert brightness is not None
-        starts = screen_starts(handed, size, brightness, share, seed)
+        starts = drawn_starts(handed, size, brightness, share, seed)
         places = shared_places(samples, PRIMARY_SAMPLES if samples <= PRIMARY_SAMPLES_UNTIL else 1)
         parts = parts_of(strength_of(polygons, brightness), len(places), sees_edges(self._pass.scene.scene))
         self.stats.beams, self.stats.polygons, self.stats.starts = self._view.beams, len(polygons), len(starts)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -29,7 +30,6 @@ from ..passes.camera import CameraPass
 from ..passes.caustic_maps import CausticMaps
 from ..passes.environment_light import LEAST_DIRECTIONS, EnvironmentLightPass
 from ..passes.map_layout import MapLayout
-from .camera_beams import CameraBeams
 from .device_scene import scene_buffers, spectral_axis
 from .frame_fit import FrameFit, Survey, inputs_of, share_light, stages_to_survey
 from .frame_progress import FrameProgress
@@ -40,6 +40,9 @@ from .sampling import CameraSampling, LightSampling, camera_settings, has_own_me
 from .solo import scene_seen
 from .time_budget import TimeBudget
 from .traced_light import traced_light
+
+if TYPE_CHECKING:
+    from .camera_beams import CameraBeams
 
 _ENVIRONMENT_SHARE = 0.25
 """Of a timed rendering, at most, for the light of the environment."""
@@ -204,6 +207,8 @@ class FrameRenderer:
             light.map_channels,
         )
         if traced.camera_pass.scene.features.camera_beams:
+            from .camera_beams import CameraBeams  # machine code, as beams of light are
+
             traced.camera_beams = CameraBeams(traced.camera_pass, self._context.is_software)
         self.seconds.camera = time.perf_counter() - started
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import moderngl
 import numpy as np
@@ -33,12 +34,12 @@ from ..passes.splat import Splatter
 from ..passes.trace import TracePass
 from . import shrinking
 from .batch_size import batch_size
-from .beam_light import BeamLight, BeamStats, MovingBeams
 from .light_maps import LightMaps
 from .light_plan import Division, LightPlan, Planner
 from .light_stats import LightStats, PassStep
 from .light_survey import LightSurvey
 from .map_fit import MapFit
+from .moving_beams import MovingBeams
 from .pass_rounds import PassRounds, roulette_word
 from .pass_sizes import PROGRESSIVE, emphasis
 from .photon_batches import Deposit, PhotonBatches
@@ -46,6 +47,9 @@ from .photon_records import NoRecords, PhotonRecords
 from .shown_spectra import ShownSpectra, ShownTables
 from .splatting import Pace
 from .thrown_photons import Keep, thrown
+
+if TYPE_CHECKING:
+    from .beam_light import BeamLight, BeamStats
 
 
 class LightPass:

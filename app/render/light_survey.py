@@ -16,7 +16,6 @@ import numpy as np
 from ..passes.emission_domain import EmissionDomain, emission_domain
 from ..passes.guided_emission import guided
 from ..passes.pilot import Pilot, landings_of, pilot_steps, split_threshold
-from .beam_light import SEARCHING, BeamLight, MovingBeams, carries_everything
 
 if TYPE_CHECKING:
     from ..gpu.context import Context
@@ -25,8 +24,10 @@ if TYPE_CHECKING:
     from ..model.scene import Scene
     from ..passes.landings import Landings
     from ..passes.trace import TracePass
+    from .beam_light import BeamLight
     from .light_plan import Division
     from .map_fit import MapFit
+    from .moving_beams import MovingBeams
     from .shown_spectra import ShownSpectra
     from .splatting import Pace
 
@@ -71,6 +72,8 @@ class LightSurvey:
         """Find out everything, pausing often with what it is at (None: as before)."""
         self.domains = self._domains()
         if self._features.beams and self.domains:
+            from .beam_light import SEARCHING, BeamLight  # machine code, whose import takes 0.7 s
+
             yield SEARCHING
             self.beam_light = BeamLight(
                 self._context,
@@ -145,9 +148,11 @@ class LightSurvey:
         return self.has_beams and all(self.is_carried(i) for i in self.domains)
 
     def is_carried(self, light: int) -> bool:
-        """Beams carry all of a light, in a scene that was searched for them."""
+        """Beams carry all of a light, in a scene that was searched for them: no photon is needed at its first
+        surface."""
         assert self.beam_light is not None
-        return carries_everything(self._scene, self.beam_light.carried.get(light, ()))
+        carried = self.beam_light.carried.get(light, ())
+        return all(i in carried for i, item in enumerate(self._scene.objects) if item.material.is_specular)
 
     def release(self) -> None:
         """Free everything."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 from ..base.memory import peak_bytes
 from ..edit.parameters import Stage
@@ -12,11 +13,13 @@ from ..gpu.context import Context, create_context
 from ..model.scene import Scene
 from ..model.settings import RenderSettings
 from ..passes.spectrum_choice import Spectrum
-from .beam_light import BeamStats
-from .camera_beams import CameraBeamStats
 from .frames import Fill, FrameRenderer, Picture
 from .light_stats import LightStats
 from .notices import environment_notices, frame_notices
+
+if TYPE_CHECKING:
+    from .beam_light import BeamStats
+    from .camera_beams import CameraBeamStats
 
 Progress = Callable[[float, str], None]
 Cancelled = Callable[[], bool]

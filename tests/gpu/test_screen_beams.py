@@ -10,8 +10,8 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from spectrasplat.beams.screen_pairs import PIXEL_BITS, pixel_parts
-from spectrasplat.beams.screen_polygons import ScreenPolygons
+from spectrasplat.beams.screen_pairs import pixel_parts
+from spectrasplat.beams.screen_polygons import PIXEL_BITS, ScreenPolygons
 from spectrasplat.model.environment import gradient
 from spectrasplat.model.geometry import primitives
 from spectrasplat.model.lights import DirectionalLight

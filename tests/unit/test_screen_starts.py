@@ -6,8 +6,8 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
+from spectrasplat.beams.drawn_starts import drawn_starts
 from spectrasplat.beams.screen_polygons import ScreenPolygons
-from spectrasplat.beams.screen_starts import screen_starts
 
 SIZE = (12, 9)
 GRID = np.linspace(0.0, 1.0, 65)
@@ -67,7 +67,7 @@ def expected(polygons: ScreenPolygons, fine: int = 24, steps: int = 64) -> np.nd
 
 
 def drawn(polygons: ScreenPolygons, share: float) -> tuple[np.ndarray, int, float]:
-    starts = screen_starts(polygons, SIZE, BRIGHTNESS, share, seed=1)
+    starts = drawn_starts(polygons, SIZE, BRIGHTNESS, share, seed=1)
     pixel = np.floor(starts.place).astype(int)
     picture = np.zeros(SIZE[::-1])
     np.add.at(picture, (pixel[:, 1], pixel[:, 0]), starts.weight)
@@ -101,4 +101,4 @@ def test_few_paths_stand_for_many_weak_polygons():
 
 
 def test_nothing_handed_is_nothing():
-    assert len(screen_starts(triangles(3).take(np.zeros(0, int)), SIZE, BRIGHTNESS, 0.1, 1)) == 0
+    assert len(drawn_starts(triangles(3).take(np.zeros(0, int)), SIZE, BRIGHTNESS, 0.1, 1)) == 0

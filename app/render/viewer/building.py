@@ -10,8 +10,8 @@ from itertools import chain
 from typing import TYPE_CHECKING
 
 from ...model.settings import RenderSettings
-from ..beam_light import MovingBeams
 from ..map_fit import preview_size
+from ..moving_beams import MovingBeams
 from .accumulation import Accumulation
 from .live_light import LiveLight
 

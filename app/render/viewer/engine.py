@@ -21,8 +21,8 @@ from ...gpu import shader
 from ...model.environment_sun import with_sun
 from ...passes.caustic_maps import CausticMaps
 from ...passes.pick import Picker
-from ..beam_light import MovingBeams
 from ..light_maps import LightMaps
+from ..moving_beams import MovingBeams
 from ..solo import scene_seen
 from . import schedule as events
 from .building import Budget, Shown, build

@@ -15,11 +15,11 @@ from ...model.features import Features
 from ...passes.bounce_light import BounceLightPass
 from ...passes.environment_light import EnvironmentLightPass
 from ...passes.map_layout import LIVE
-from ..beam_light import MovingBeams
 from ..device_scene import scene_buffers
 from ..light_maps import LightMaps
 from ..light_pass import LightPass
 from ..map_fit import PREVIEW_FINENESS, MapFit
+from ..moving_beams import MovingBeams
 from ..solo import solo, solo_scene
 from ..splatting import Pace
 from .invalidation import shown_glasses
