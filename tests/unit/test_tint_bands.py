@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from spectrasplat.model.geometry.primitives import box, slab
 from spectrasplat.model.materials.absorption import Absorption
-from spectrasplat.model.optics.colorimetry import VISIBLE_NM
+from spectrasplat.model.optics.colorimetry import VISIBLE_NM, cmf_xyz
 from spectrasplat.model.optics.glass import from_abbe
 from spectrasplat.model.optics.spectral_tables import SpectralAxis
 from spectrasplat.model.optics.spectrum import Spectrum, illuminant
@@ -63,10 +63,40 @@ def test_few_photons_lose_no_light(axis: SpectralAxis, width_nm: float) -> None:
     assert abs(misplaced(edges, curve[0], axis, signed=True)) < 1.5 * TOLERANCE
 
 
+def brightness_of_means(edges: np.ndarray, curve: np.ndarray, light: Spectrum, axis: SpectralAxis) -> float:
+    """Of what footprints draw that are so broad that all wavelengths of a band have one weight, its mean by power, as
+    a share of what there is."""
+    nm = np.concatenate([VISIBLE_NM, [line for line, _ in light.lines]])
+    power = np.concatenate([light.density, [watts for _, watts in light.lines]])
+    kept, x = np.interp(nm, VISIBLE_NM, curve), axis.x_of_nm(nm)
+    luminous = power * np.interp(nm, VISIBLE_NM, cmf_xyz()[:, 1])
+    drawn = 0.0
+    for lo, hi in pairwise(edges):
+        inside = (x >= lo) & (x < hi)
+        if power[inside].sum() > 0.0:
+            drawn += luminous[inside].sum() * (power * kept)[inside].sum() / power[inside].sum()
+    return drawn / (luminous * kept).sum()
+
+
+@pytest.mark.parametrize("axis", AXES.values(), ids=AXES)
+@pytest.mark.parametrize("tolerance", [0.01, 0.1])
+def test_wide_footprints_are_as_bright_as_narrow_ones(axis: SpectralAxis, tolerance: float) -> None:
+    """Green and red line of a lamp behind glass that takes the one and leaves the other: both had the mean of both
+    where the footprints of a diamond are broad, and a scene was 4 % too bright; and the same in white light."""
+    lamp = Spectrum(np.zeros(401), ((450.0, 1.0), (546.1, 2.0), (611.0, 1.5)))
+    takes_green = np.exp(-1.0 / (1.0 + np.exp((VISIBLE_NM - 590.0) / 5.0)))
+    for light in (lamp, WHITE):
+        edges = cut_by_tints(WHOLE, 1, 32, takes_green[None], light, axis, tolerance)
+        assert brightness_of_means(edges, takes_green, light, axis) == pytest.approx(
+            1.0, abs=max(0.022, 0.55 * tolerance)
+        )
+    assert abs(brightness_of_means(np.array(WHOLE), takes_green, lamp, axis) - 1.0) > 0.03, "one band would do"
+
+
 def test_what_does_not_change_needs_no_band() -> None:
     axis = AXES["flint"]
     assert cut_by_tints(WHOLE, 1, 32, np.zeros((0, 401)), WHITE, axis).tolist() == [0.0, 1.0]
-    straight = (0.3 + 0.5 * axis.x_of_nm(VISIBLE_NM))[None]
+    straight = (0.3 + 0.05 * axis.x_of_nm(VISIBLE_NM))[None]
     assert cut_by_tints(WHOLE, 1, 32, straight, WHITE, axis).tolist() == [0.0, 1.0]
     # Dispersion asks for five; a curve that lets nothing through says nothing.
     for curve in (straight, np.full((1, 401), 1e-9)):
