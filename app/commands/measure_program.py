@@ -23,7 +23,9 @@ def bench(
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", metavar="DIR", help="Folder for results.json, plots and report.html."),
+        typer.Option(
+            "-o", "--output", metavar="DIR", help="Folder for results.json, tables.md, plots and report.html."
+        ),
     ] = None,
     seconds: Annotated[
         Text,

@@ -21,7 +21,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_SCENE_COLOURS = ("srd", "srd-lambda", "regular-7", "progressive", "other-1", "other-2", "other-3", "stochastic")
+_SCENE_COLOURS = (
+    *("srd", "srd-lambda", "regular-7", "progressive", "other-1", "other-2", "other-3", "stochastic"),
+    *("hero", "progressive-stochastic", "regular-16", "stochastic-point"),
+)
 _CLOCKS = {"photon": "time of the measured pass", "whole": "whole process"}
 _PANELS_A_ROW = 4
 

@@ -10,9 +10,9 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from ..curves import best_baseline, speed_up, time_to_error
 from ..measured_passes import MEASURED_PASSES
-from ..results import BenchResult, SceneResult, SpeedUp
-from ..screen import speed_up_text
+from ..results import BenchResult, Point, SceneResult
 from . import style as style
 from .curve_plots import (
     BASELINE,
@@ -25,7 +25,6 @@ from .curve_plots import (
     scene_series,
     set_limits,
 )
-from .fair_field import percent
 from .text import ratio_text
 
 if TYPE_CHECKING:
@@ -177,18 +176,19 @@ def _method_key(axes: Axes, scenes: Sequence[SceneResult], height_in: float) -> 
 
 
 def small_multiples(result: BenchResult) -> Figure:
-    """Panels that share both axes, one for each scene that has points, in the order that the scenes were named in."""
+    """Panels that share both axes, one for each scene that has points, in the order that the scenes were named in;
+    each tells how much sooner `srd` has the error that the best of all baselines ends with."""
     measured = {curve.method for scene in result.scenes for curve in scene.curves if curve.points}
     shown = {BASELINE, "srd", *[name for name in _RIVALS if name in measured][:1]}
     panels = [(s, [one for one in scene_series(s, "seconds") if one.method in shown]) for s in result.scenes]
     panels = [(scene, drawn) for scene, drawn in panels if drawn]
     columns = 2 if len(panels) == 4 else min(3, max(len(panels), 1))
     rows = max(math.ceil(len(panels) / columns), 1)
-    width, height = 2.75 * columns + 1.75, 2.3 * rows + 0.75
+    width, height = 2.75 * columns + 2.05, 2.3 * rows + 0.75
     figure = style.new_figure(width, height)
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     figure.subplots_adjust(
-        left=0.68 / width, right=1 - 1.02 / width, bottom=0.5 / height, top=1 - 0.35 / height, wspace=0.08, hspace=0.28
+        left=0.68 / width, right=1 - 1.32 / width, bottom=0.5 / height, top=1 - 0.35 / height, wspace=0.08, hspace=0.28
     )
     for axes in grid.flat[len(panels) :]:
         axes.set_visible(False)
@@ -209,19 +209,19 @@ def _draw_panel(axes: Axes, scene: SceneResult, drawn: Sequence[Series], named: 
     if named:
         label_ends(axes, drawn)
     axes.set_title(scene.scene, loc="left", fontsize=10, fontweight="bold", pad=5)
-    told = _least_error_compared(scene)
-    if told is None:
+    best = best_baseline(scene.curves)
+    reached = speed_up(_points_of(scene, "srd"), best.points) if best is not None else None
+    if best is None or not _points_of(scene, "srd"):
         return
-    ahead = told.ratio is not None and told.ratio > 1.0
+    ahead = reached is not None and reached.seconds > 1.0
+    text = f"{ratio_text(reached.seconds, reached.at_once)} less time" if reached is not None else "never as good"
     colour = style.method_style("srd").colour if ahead else style.MUTED
-    axes.set_title(f"{speed_up_text(told)} at {percent(told.target)}", loc="right", fontsize=9, color=colour, pad=5)
-    if told.seconds is not None and told.bound != "~":
-        left = axes.get_xlim()[0]
-        draw_time_arrow(axes, max(told.baseline_seconds, left), max(told.seconds, left), told.target)
+    axes.set_title(text, loc="right", fontsize=9, color=colour, pad=5)
+    own = time_to_error(best.points, best.points[-1].relmse)
+    if reached is not None and own is not None and best.points[-1].relmse > 0.0:
+        to_s = max(own.seconds / reached.seconds, axes.get_xlim()[0])
+        draw_time_arrow(axes, own.seconds, to_s, best.points[-1].relmse)
 
 
-def _least_error_compared(scene: SceneResult) -> SpeedUp | None:
-    """The comparison by the pass's own time at the least error that tells anything: not where both are there with
-    their smallest renderings."""
-    found = [one for one in scene.speed_ups if one.clock == "photon"]
-    return min((one for one in found if one.bound != "~"), key=lambda one: one.target, default=None)
+def _points_of(scene: SceneResult, method: str) -> list[Point]:
+    return next((curve.points for curve in scene.curves if curve.method == method), [])
