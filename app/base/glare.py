@@ -22,7 +22,7 @@ def with_glare(rgb: np.ndarray, share: float) -> np.ndarray:
     """
     if share <= 0.0:
         return rgb
-    # numpy's, for the import of scipy's takes longer (0.3 s) than a picture of this size.
+    # numpy's transforms: to import scipy's takes 0.3 s, longer than to use them on most pictures.
     height, width = rgb.shape[:2]
     margin = int(np.ceil(3.0 * WIDEST * height))
     rows, columns = (_fast_length(side + margin) for side in (height, width))
@@ -38,7 +38,7 @@ def with_glare(rgb: np.ndarray, share: float) -> np.ndarray:
 
 
 def _fast_length(least: int) -> int:
-    """The least product of twos, odd and fives that is not below `least`: transforms of other lengths are slow."""
+    """The least product of twos, threes and fives that is not below `least`: transforms of other lengths are slow."""
     lengths = (
         odd * 2 ** max(0, (-(-least // odd) - 1).bit_length())
         for odd in (3**a * 5**b for a in range(12) for b in range(8))

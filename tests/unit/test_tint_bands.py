@@ -96,6 +96,9 @@ def test_wide_footprints_are_as_bright_as_narrow_ones(axis: SpectralAxis, tolera
 def test_what_does_not_change_needs_no_band() -> None:
     axis = AXES["flint"]
     assert cut_by_tints(WHOLE, 1, 32, np.zeros((0, 401)), WHITE, axis).tolist() == [0.0, 1.0]
+    # A steep one only for the brightness of wide footprints: straight weights follow it whole.
+    steep = (0.3 + 0.5 * axis.x_of_nm(VISIBLE_NM))[None]
+    assert len(cut_by_tints(WHOLE, 1, 32, steep, WHITE, axis)) <= 4
     straight = (0.3 + 0.05 * axis.x_of_nm(VISIBLE_NM))[None]
     assert cut_by_tints(WHOLE, 1, 32, straight, WHITE, axis).tolist() == [0.0, 1.0]
     # Dispersion asks for five; a curve that lets nothing through says nothing.

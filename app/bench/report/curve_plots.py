@@ -16,7 +16,7 @@ import numpy as np
 
 from ..curves import speed_up, time_to_error
 from ..measured_passes import MEASURED_PASSES
-from ..results import Curve, SceneResult
+from ..results import Curve, Point, SceneResult
 from . import style as style
 from .text import number, ratio_text, superscript
 
@@ -80,7 +80,7 @@ def error_against(scene: SceneResult, abscissa: str) -> Figure:
         draw_series(axes, one)
     _draw_reference_error(axes, own)
     if abscissa == "seconds":
-        draw_ratio_arrow(axes, scene, named=True)
+        draw_ratio_arrow(axes, scene)
     label_ends(axes, drawn)
     return figure
 
@@ -216,29 +216,28 @@ def _draw_reference_error(axes: Axes, own: float) -> None:
     )
 
 
-def draw_ratio_arrow(axes: Axes, scene: SceneResult, named: bool) -> None:
+def draw_ratio_arrow(axes: Axes, scene: SceneResult) -> None:
     """From the end of `stochastic` to where `srd` reaches that error: the ratio that counts, to be seen as a length."""
     ratio = scene.time_to_equal_error.get("srd", 0.0)
-    points = next((curve.points for curve in scene.curves if curve.method == BASELINE), [])
+    points = points_of(scene, BASELINE)
     own = time_to_error(points, points[-1].relmse) if points else None
     if own is None or not 1.2 < ratio < math.inf or not 0 < points[-1].relmse < math.inf:
         return
     end_s, error = own.seconds, points[-1].relmse
     reached_s = max(end_s / ratio, axes.get_xlim()[0])
     draw_time_arrow(axes, end_s, reached_s, error)
-    if named:
-        axes.annotate(
-            f"{ratio_text(ratio, is_lower_bound(scene, 'srd'))} less time",
-            (math.sqrt(end_s * reached_s), error),
-            xytext=(0, -3.5),
-            textcoords="offset points",
-            ha="center",
-            va="top",
-            color=style.method_style("srd").colour,
-            fontweight="bold",
-            fontsize=9,
-            zorder=13,
-        )
+    axes.annotate(
+        f"{ratio_text(ratio, is_lower_bound(scene, 'srd'))} less time",
+        (math.sqrt(end_s * reached_s), error),
+        xytext=(0, -3.5),
+        textcoords="offset points",
+        ha="center",
+        va="top",
+        color=style.method_style("srd").colour,
+        fontweight="bold",
+        fontsize=9,
+        zorder=13,
+    )
 
 
 def draw_time_arrow(axes: Axes, from_s: float, to_s: float, error: float) -> None:
@@ -259,11 +258,15 @@ def draw_time_arrow(axes: Axes, from_s: float, to_s: float, error: float) -> Non
     )
 
 
+def points_of(scene: SceneResult, method: str) -> list[Point]:
+    """A method's points; none where it has none yet."""
+    return next((curve.points for curve in scene.curves if curve.method == method), [])
+
+
 def is_lower_bound(scene: SceneResult, method: str) -> bool:
     """Whether the method's shortest rendering is already as good as the baseline's longest, so that the true ratio is
     larger still."""
-    points = {curve.method: curve.points for curve in scene.curves if curve.points}
-    reached = speed_up(points.get(method, []), points.get(BASELINE, []))
+    reached = speed_up(points_of(scene, method), points_of(scene, BASELINE))
     return reached is not None and reached.at_once and method != BASELINE
 
 

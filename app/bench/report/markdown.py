@@ -5,14 +5,12 @@ Every table has a row a scene, in the order they were named, so that two runs ca
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
-import numpy as np
-
-from ..curves import error_at_time
+from ..curves import error_at_time, points_by
 from ..measured_passes import MEASURED_PASSES
-from ..results import TARGETS, BenchResult, Curve, SpeedUp
+from ..results import TARGETS, BenchResult, Curve, SceneResult, SpeedUp
 from .fair_field import cell, percent
 from .style import by_rank
 from .text import number, signed
@@ -44,7 +42,8 @@ def tables(result: BenchResult) -> str:
         if seconds < max((scene.seconds for scene in result.scenes), default=0.0):
             heading = f"## relMSE after {seconds:g} s of {measured.time}"
             parts += [heading, _by_method(result, methods, partial(_after, seconds))]
-    parts += [f"## relMSE at the end, after so many seconds of {measured.time}", _ends(result, methods)]
+    ends = _by_method(result, methods, _end, {"reference's own": _own_error})
+    parts += [f"## relMSE at the end, after so many seconds of {measured.time}", ends]
     parts += ["## nRMSE at the end", _by_method(result, methods, _last_nrmse)]
     parts += ["## Exponent of relMSE over the second half of the curve", _by_method(result, methods, _slope)]
     return "\n\n".join(parts) + "\n"
@@ -85,38 +84,35 @@ def _letters(baseline: str) -> str:
     return _BASELINE_LETTERS.get(baseline, baseline)
 
 
-def _by_method(result: BenchResult, methods: Sequence[str], value: Callable[[Curve], str]) -> str:
-    """A column a method, with what `value` says of its curve."""
+def _by_method(
+    result: BenchResult,
+    methods: Sequence[str],
+    value: Callable[[Curve], str],
+    more: Mapping[str, Callable[[SceneResult], str]] | None = None,
+) -> str:
+    """A column a method, with what `value` says of its curve; behind them `more` by heading."""
     rows = []
     for scene in result.scenes:
         curves = {curve.method: curve for curve in scene.curves if curve.points}
         cells = [value(curves[name]) if name in curves else _NONE for name in methods]
-        rows.append([f"`{scene.scene}`", *cells])
-    return table(["scene", *(f"`{name}`" for name in methods)], rows)
+        rows.append([f"`{scene.scene}`", *cells, *(told(scene) for told in (more or {}).values())])
+    return table(["scene", *(f"`{name}`" for name in methods), *(more or {})], rows)
 
 
 def _after(seconds: float, curve: Curve) -> str:
     return number(error_at_time(curve.points, seconds))
 
 
-def _ends(result: BenchResult, methods: Sequence[str]) -> str:
-    """The last relMSE and when; last the reference's own, which is taken off."""
-    rows = []
-    for scene in result.scenes:
-        curves = {curve.method: curve.points[-1] for curve in scene.curves if curve.points}
-        ends = [
-            f"{number(curves[name].relmse)}, {curves[name].seconds:.2g} s" if name in curves else _NONE
-            for name in methods
-        ]
-        own = _NONE if scene.reference is None else number(scene.reference.relmse)
-        rows.append([f"`{scene.scene}`", *ends, own])
-    return table(["scene", *(f"`{name}`" for name in methods), "reference's own"], rows)
+def _end(curve: Curve) -> str:
+    return f"{number(curve.points[-1].relmse)}, {curve.points[-1].seconds:.2g} s"
 
 
 def _last_nrmse(curve: Curve) -> str:
-    last = curve.points[-1].photons
-    values = [s.metrics["nrmse"] for s in curve.samples if s.photons == last and "nrmse" in s.metrics]
-    return number(float(np.mean(values)) if values else None)
+    return number(points_by(curve, "nrmse")[-1].relmse)
+
+
+def _own_error(scene: SceneResult) -> str:
+    return _NONE if scene.reference is None else number(scene.reference.relmse)
 
 
 def _slope(curve: Curve) -> str:

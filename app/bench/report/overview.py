@@ -10,9 +10,9 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from ..curves import best_baseline, speed_up, time_to_error
+from ..curves import best_baseline, time_to_error
 from ..measured_passes import MEASURED_PASSES
-from ..results import BenchResult, Point, SceneResult
+from ..results import BenchResult, SceneResult
 from . import style as style
 from .curve_plots import (
     BASELINE,
@@ -22,6 +22,7 @@ from .curve_plots import (
     draw_time_arrow,
     is_lower_bound,
     label_ends,
+    points_of,
     scene_series,
     set_limits,
 )
@@ -209,19 +210,15 @@ def _draw_panel(axes: Axes, scene: SceneResult, drawn: Sequence[Series], named: 
     if named:
         label_ends(axes, drawn)
     axes.set_title(scene.scene, loc="left", fontsize=10, fontweight="bold", pad=5)
-    best = best_baseline(scene.curves)
-    reached = speed_up(_points_of(scene, "srd"), best.points) if best is not None else None
-    if best is None or not _points_of(scene, "srd"):
+    best, points = best_baseline(scene.curves), points_of(scene, "srd")
+    if best is None or not points:
         return
-    ahead = reached is not None and reached.seconds > 1.0
-    text = f"{ratio_text(reached.seconds, reached.at_once)} less time" if reached is not None else "never as good"
-    colour = style.method_style("srd").colour if ahead else style.MUTED
+    end = best.points[-1].relmse
+    theirs, reached = time_to_error(best.points, end), time_to_error(points, end)
+    assert theirs is not None, "a curve reaches its own end"
+    ratio = None if reached is None else theirs.seconds / reached.seconds
+    text = "never as good" if ratio is None or reached is None else f"{ratio_text(ratio, reached.at_once)} less time"
+    colour = style.method_style("srd").colour if ratio is not None and ratio > 1.0 else style.MUTED
     axes.set_title(text, loc="right", fontsize=9, color=colour, pad=5)
-    own = time_to_error(best.points, best.points[-1].relmse)
-    if reached is not None and own is not None and best.points[-1].relmse > 0.0:
-        to_s = max(own.seconds / reached.seconds, axes.get_xlim()[0])
-        draw_time_arrow(axes, own.seconds, to_s, best.points[-1].relmse)
-
-
-def _points_of(scene: SceneResult, method: str) -> list[Point]:
-    return next((curve.points for curve in scene.curves if curve.method == method), [])
+    if reached is not None and end > 0.0:
+        draw_time_arrow(axes, theirs.seconds, max(reached.seconds, axes.get_xlim()[0]), end)
