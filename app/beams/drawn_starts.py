@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .clipping import clip
 from .compiling import jit
 from .screen_polygons import ScreenPolygons
 from .screen_starts import ScreenStarts
@@ -60,7 +61,7 @@ def drawn_starts(
 
 @jit
 def _outline(edge_start, edges, hull_start, hulls, i, t, scratch):
-    """Corners of polygon i at t, in the first of `scratch`; returns how many [Sutherland, Hodgman 1974]."""
+    """Corners of polygon i at t, in the first of `scratch`; returns how many."""
     points, spare = scratch[0], scratch[1]
     n = 0
     for k in range(hull_start[i], hull_start[i + 1]):
@@ -70,22 +71,7 @@ def _outline(edge_start, edges, hull_start, hulls, i, t, scratch):
         a = edges[e, 0] + t * (edges[e, 3] - edges[e, 0])
         b = edges[e, 1] + t * (edges[e, 4] - edges[e, 1])
         c = edges[e, 2] + t * (edges[e, 5] - edges[e, 2])
-        kept = 0
-        for k in range(n):
-            j = k + 1 if k + 1 < n else 0
-            here = a * points[k, 0] + b * points[k, 1] + c
-            there = a * points[j, 0] + b * points[j, 1] + c
-            if here >= 0.0:
-                spare[kept, 0], spare[kept, 1] = points[k, 0], points[k, 1]
-                kept += 1
-            if (here >= 0.0) != (there >= 0.0):
-                at = here / (here - there)
-                spare[kept, 0] = points[k, 0] + at * (points[j, 0] - points[k, 0])
-                spare[kept, 1] = points[k, 1] + at * (points[j, 1] - points[k, 1])
-                kept += 1
-        n = kept
-        for k in range(n):
-            points[k, 0], points[k, 1] = spare[k, 0], spare[k, 1]
+        n = clip(points, n, spare, a, b, c)
         if n < 3:
             return 0
     return n

@@ -9,9 +9,10 @@ import math
 
 import numpy as np
 
+from .clipping import clip
 from .compiling import allocating
 from .piece_cells import BODY, COLUMNS, cell_body, ray_of
-from .piece_measure import STEPS, clip, keep_lit, moments_of, power_between, weight_at
+from .piece_measure import STEPS, keep_lit, moments_of, power_between, weight_at
 
 MOMENTS_OF_BAND, TANGENTS = 5, 16
 """Times at which what is lit is measured for its lattice, and sides of what is laid about it."""
