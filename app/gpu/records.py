@@ -345,10 +345,13 @@ TRACE_PARAMETERS = Struct(
         Field("tint_key", "uint", "of the numbers by which levels are rounded"),
         Field("widest_on_surface", "float", "side of a footprint, of the size of the glass or mirror that it is on"),
         Field("widest_turn", "float", "of a footprint's directions behind a surface, rad a side"),
-        # Not an array: Mesa 22.3 reads what follows one of three words from the wrong place.
-        Field("reserved_a", "uint"),
-        Field("reserved_b", "uint"),
-        Field("reserved_c", "uint"),
+        Field("paths", "float", "of the pass, over all of its sub-lattices: each has microfacets of its own"),
+        Field("widest_sweep", "float", "of a ray's directions over its band, rad"),
+        Field(
+            "bounded",
+            "uint",
+            "0: a lamp's and a lobe's columns are wanted as derivatives, whatever is believed of them",
+        ),
         Field("tint_halfway", "vec4", "odds for the next level, of a way in the middle between both", LEVELS // 4),
         Field(
             "beam_objects", "uvec4", "one bit an object: who meets it first is left to beams", -(-MAX_OBJECTS // 128)

@@ -26,6 +26,13 @@ vec3 smith_share(vec3 cosine, float width)
     return mix(vec3(0.0), 1.0 / (1.0 + hidden), greaterThan(cosine, vec3(0.0)));
 }
 
+// Change of that share per cosine, of itself; the cosine is not 0.
+float smith_slope(float cosine, float width)
+{
+    float tangent2 = max((1.0 - cosine) * (1.0 + cosine), 0.0) / (cosine * cosine), root = sqrt(1.0 + width * width * tangent2);
+    return width * width / ((1.0 + root) * root * cosine * cosine * cosine);
+}
+
 // How far a microfacet's normal turns with the surface's own, whose derivative is `dnormal`: as a rigid body would.
 vec3 turned_with(vec3 microfacet, vec3 normal, vec3 dnormal)
 {

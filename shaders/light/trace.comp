@@ -189,6 +189,9 @@ void land(inout RayRecord ray, RayRecord start, uint receiver, uint triangle, Hi
 #ifdef LAMP_COLUMNS
     // A footprint blurs what light from a point would draw, and an extended light has that coming: the broader of the two is drawn.
     vec2 fan = unpackHalf2x16(photon.fan);
+#ifdef LOBE_COLUMNS
+    narrow_lamp_by_lobe(ray);
+#endif
     if (cover_sides(hit.normal_g, photon.dposition_ds, photon.dposition_dt, fan, ray.dposition[LAMP].xyz, ray.dposition[LAMP + 1].xyz)) {
         lattice_bits = 0u;
         photon.fan = is_within2(fan, FAN_LIMIT) ? packHalf2x16(fan) : 0u;
@@ -288,7 +291,11 @@ void main()
 {
     uint k = gl_GlobalInvocationID.x;
     if (k >= state.alive) return;
-    RayRecord ray = load_ray(indices[k]), start = ray;
+    RayRecord ray = load_ray(indices[k]);
+#if SPECTRAL_GROUPS > 0
+    keep_sweeps_within(ray);
+#endif
+    RayRecord start = ray;
     Outcome outcome = Outcome(0u, 0.0, 0.0, 0.0);
 #ifndef POINT_SPECTRUM
     band_w = band_powers(power_row(ray), band_of(ray));
@@ -330,8 +337,11 @@ void main()
 #ifdef FOOTPRINTS
     if (ray.depth > 0u) keep_directions_within(ray);
 #endif
+#ifdef LAMP_COLUMNS
+    if (met && ray.depth > 0u && p.bounded != 0u) keep_pair_above(ray, LAMP, hit.normal_g);
+#endif
 #ifdef LOBE_COLUMNS
-    if (met) keep_lobe_within(ray, hit.normal_g);
+    if (met && p.bounded != 0u) keep_pair_above(ray, LOBE, hit.normal_g);
 #endif
 #if COLUMNS > 0
     for (int c = 0; c < COLUMNS; ++c)

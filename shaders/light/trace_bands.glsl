@@ -1,4 +1,18 @@
 // Bands of the spectrum in flight, for `trace.comp`: cut where total internal reflection sets in, or parted where they may not be.
+#if SPECTRAL_GROUPS > 0
+// Spectral columns are derivatives too. Grazing exits and curved surfaces, again and again inside a solid, make some of them so steep that they would
+// throw the ends of a band all over the scene, and out of it, where no light of the band goes.
+void keep_sweeps_within(inout RayRecord ray)
+{
+    for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
+        float sweep = length(ray.ddirection[SPATIAL + g].xyz) * abs(variable_step(uint(g), ray.x_hi, ray.x_lo));
+        float kept = min(1.0, p.widest_sweep / max(sweep, 1e-30));
+        ray.dposition[SPATIAL + g].xyz *= kept;
+        ray.ddirection[SPATIAL + g].xyz *= kept;
+    }
+}
+#endif
+
 #ifdef BAND_CUTS
 // Whether `at` leaves a band too little on one side of it to be worth a path of its own.
 bool leaves_sliver(RayRecord ray, float at)

@@ -36,21 +36,27 @@ RoughPlace meet_microfacet(RayRecord ray, inout ShadingFrame frame)
     return place;
 }
 
+// Change of a share over half a band, of itself: where derivatives tell more they are steep (deep paths, grazing exits), and know nothing of a band's ends.
+#define MOST_CHANGE 0.3
+
 // Leaves a ray that a microfacet has turned what other microfacets do not hide of it or send on, at three places of its band, and nothing where it does not
 // leave the surface. `side`: 1 where it is reflected, -1 where it is refracted; `share`: of the power, by which roulette asks.
 void shadow(RoughPlace place, inout RayRecord child, Deflection turned, float side, inout float share, inout Outcome outcome)
 {
     if (place.width <= 0.0) return;
-    vec3 cosine = vec3(dot(turned.direction, place.normal));
+    float cosine = dot(turned.direction, place.normal);
+    bool leaves = side * cosine > 0.0 && !turned.geometric;
+    vec3 kept = leaves ? place.regained * smith_share(vec3(side * cosine), place.width) : vec3(0.0);
 #if SPECTRAL_GROUPS > 0
+    vec2 turn = vec2(0.0);
     for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
-        float change = dot(child.ddirection[SPATIAL + g].xyz, place.normal);
-        cosine.x += change * variable_step(uint(g), child.x_lo, child.x_anchor);
-        cosine.z += change * variable_step(uint(g), child.x_hi, child.x_anchor);
+        float along = dot(child.ddirection[SPATIAL + g].xyz, place.normal);
+        turn += along * vec2(variable_step(uint(g), child.x_lo, child.x_anchor), variable_step(uint(g), child.x_hi, child.x_anchor));
     }
+    vec2 change = leaves ? side * smith_slope(side * cosine, place.width) * turn : vec2(0.0);
+    float steepness = max(abs(change.x), abs(change.y)) / MOST_CHANGE;
+    kept.xz *= 1.0 + change / max(steepness * steepness, 1.0);
 #endif
-    bool leaves = side * cosine.y > 0.0 && !turned.geometric;
-    vec3 kept = leaves ? place.regained * smith_share(side * cosine, place.width) : vec3(0.0);
     child.flux_w *= kept.y;
     child.throughput *= kept;
 #ifdef HERO
@@ -61,6 +67,22 @@ void shadow(RoughPlace place, inout RayRecord child, Deflection turned, float si
 }
 
 #ifdef LOBE_COLUMNS
+#ifdef LAMP_COLUMNS
+// Of the lobe's width and a lamp's own: light of places on a lamp that lie as far from each other as this lies evenly behind a rough surface.
+#define EVENED_BY_LOBE 16.0
+
+// The columns of a lamp's places are drawn as broad as rough surfaces leave gaps between the light of one and the next: photons of all of them meet
+// microfacets of their own.
+void narrow_lamp_by_lobe(inout RayRecord ray)
+{
+    vec3 first = ray.dposition[LAMP].xyz, second = ray.dposition[LAMP + 1].xyz, along = ray.dposition[LOBE].xyz, aside = ray.dposition[LOBE + 1].xyz;
+    float lamp = dot(first, first) + dot(second, second), lobe = dot(along, along) + dot(aside, aside);
+    float left = inversesqrt(1.0 + EVENED_BY_LOBE * lobe / max(lamp, 1e-30));
+    ray.dposition[LAMP].xyz *= left;
+    ray.dposition[LAMP + 1].xyz *= left;
+}
+#endif
+
 // The footprint of a photon that rough surfaces have turned: its own, and of the lobe as much as one of so many photons stands for. Where the lobe
 // is small beside the lattice's spacing, neighbours still land side by side, and the lattice covers all. Whether it was widened.
 bool widen_by_lobe(RayRecord ray, vec3 normal_g, inout vec3 dposition_ds, inout vec3 dposition_dt)
@@ -68,8 +90,7 @@ bool widen_by_lobe(RayRecord ray, vec3 normal_g, inout vec3 dposition_ds, inout 
     vec3 first = ray.dposition[LOBE].xyz, second = ray.dposition[LOBE + 1].xyz;
     float own = dot(dposition_ds, dposition_ds) + dot(dposition_dt, dposition_dt), lobe = dot(first, first) + dot(second, second);
     if (lobe <= 0.01 * own) return false;
-    float points = p.lattice_bits != 0u ? float(p.lattice_bits >> LATTICE_BIT) : HANDED_POINTS;
-    float part = lobe_part(points / (ray.footprint_scale * ray.footprint_scale));
+    float part = lobe_part(p.paths / (ray.footprint_scale * ray.footprint_scale));
     join_sides(normal_g, dposition_ds, dposition_dt, part * first, part * second);
     return true;
 }

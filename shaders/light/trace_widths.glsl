@@ -67,17 +67,17 @@ void keep_directions_within(inout RayRecord ray)
     ray.ddirection[1].xyz = turn_t;
 }
 
-#ifdef LOBE_COLUMNS
+#if defined(LAMP_COLUMNS) || defined(LOBE_COLUMNS)
 // Directions that have forgotten all, those of Lambert's law, have this as standard deviation along either axis (sines).
 #define FORGOTTEN 0.5
 // Of a ray's elevation over what it meets.
 #define HIGHEST_RISE 0.5
 
-// Of a ray that rough surfaces have turned and that meets a surface with this normal: columns by which microfacets turn light grow with every surface, and at grazing exits without bound. And
-// up and down they say no more than half of the ray's own elevation, for how far light lands goes as one over that.
-void keep_lobe_within(inout RayRecord ray, vec3 normal)
+// Of columns `c` and `c + 1` of a ray that meets a surface with this normal: how a lamp's places and microfacets turn light grows with every surface, and
+// at grazing exits without bound. And up and down they say no more than half of the ray's own elevation, for how far light lands goes as one over that.
+void keep_pair_above(inout RayRecord ray, int c, vec3 normal)
 {
-    vec3 first = ray.dposition[LOBE].xyz, second = ray.dposition[LOBE + 1].xyz, turn_first = ray.ddirection[LOBE].xyz, turn_second = ray.ddirection[LOBE + 1].xyz;
+    vec3 first = ray.dposition[c].xyz, second = ray.dposition[c + 1].xyz, turn_first = ray.ddirection[c].xyz, turn_second = ray.ddirection[c + 1].xyz;
     keep_within(FORGOTTEN, turn_first, turn_second, first, second);
     float elevation = dot(ray.direction, normal);
     vec3 up = normal - elevation * ray.direction;
@@ -85,8 +85,8 @@ void keep_lobe_within(inout RayRecord ray, vec3 normal)
     up /= max(slope, 1e-6);
     vec2 rise = vec2(dot(turn_first, up), dot(turn_second, up));
     float kept = min(1.0, HIGHEST_RISE * abs(elevation) / max(slope * length(rise), 1e-30));
-    ray.ddirection[LOBE].xyz = turn_first - (1.0 - kept) * rise.x * up;
-    ray.ddirection[LOBE + 1].xyz = turn_second - (1.0 - kept) * rise.y * up;
+    ray.ddirection[c].xyz = turn_first - (1.0 - kept) * rise.x * up;
+    ray.ddirection[c + 1].xyz = turn_second - (1.0 - kept) * rise.y * up;
 }
 #endif
 

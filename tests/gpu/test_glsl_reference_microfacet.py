@@ -19,6 +19,7 @@ COVERS = {
     "rough_surface.glsl": (
         "microfacet_numbers",
         "smith_share",
+        "smith_slope",
         "turned_with",
         "lobe_axes",
         "lobe_part",
@@ -50,6 +51,19 @@ def test_what_is_not_hidden_covers_the_surface_as_it_is_seen(gl, width: float) -
     wanted = [microfacet.unhidden(a, width) for a in angle[:-1]]
     np.testing.assert_allclose(got[:-1], np.repeat(np.array(wanted)[:, None], 3, axis=1), rtol=2e-4)
     assert not got[-1].any()
+
+
+@pytest.mark.parametrize("width", [0.01, 0.09, 0.36, 1.0])
+def test_slope_of_what_is_not_hidden(gl, width: float) -> None:
+    cosine = np.array([1e-3, 0.02, 0.1, 0.5, 0.9, 0.999])
+    inputs = {"cosine": as_f32(cosine), "width": as_f32(np.full(len(cosine), width))}
+    got = evaluate(gl.ctx, LIBRARY, "slope = smith_slope(cosine, width);", inputs, {"slope": "float"})["slope"]
+    step = 1e-6 * cosine
+    ends = [
+        np.log([microfacet.unhidden(np.arccos(c + s), width) for c, s in zip(cosine, side * step, strict=True)])
+        for side in (-1, 1)
+    ]
+    np.testing.assert_allclose(got, (ends[1] - ends[0]) / (2.0 * step), rtol=2e-3, atol=1e-5)
 
 
 def test_visible_microfacets_are_those_of_the_listing(gl) -> None:

@@ -25,11 +25,13 @@ from spectrasplat.model.optics.spectrum import constant, laser
 from spectrasplat.model.placement import rotation_about
 from spectrasplat.model.scene import Camera, Dielectric, Diffuse, RenderDefaults, Scene, SceneObject
 from spectrasplat.model.settings import RenderSettings
+from spectrasplat.passes import trace
 from spectrasplat.reference.camera_reference import render_camera_reference
 from spectrasplat.reference.photon_reference import render_reference
 from spectrasplat.render.still import RenderResult, render
 
 from tests.gpu.mutants import mutate
+from tests.gpu.test_beam_tails import held, passed
 
 INDEX = 1.5
 GLASS = from_abbe(INDEX, np.inf)
@@ -79,7 +81,7 @@ def test_one_surface_reflects_what_its_microfacets_do(gl: Context, angle_deg: fl
 
 def test_without_shadowing_a_surface_reflects_too_much(gl: Context, monkeypatch, tmp_path: Path) -> None:
     """The mutant: at 70° the microfacets hide a tenth of what is reflected."""
-    old, new = "smith_share(side * cosine, place.width)", "vec3(1.0)"
+    old, new = "smith_share(vec3(side * cosine), place.width)", "vec3(1.0)"
     mutate(monkeypatch, tmp_path, "light/trace_rough.glsl", old, new)
     found = shares_of(caustic(gl, black_block(np.radians(70.0), 0.6), 40_000, (8, 8)))
     reflected, transmitted = microfacet.shares(np.radians(70.0), 0.36, 1.0 / INDEX)
@@ -97,6 +99,39 @@ def test_a_slab_lets_through_what_the_reference_does(gl: Context, roughness: flo
     assert found["absorbed"] == pytest.approx(balance["absorbed"] / emitted, abs=4e-3)
     assert abs(found["unaccounted"]) < 1e-5
     assert abs(found["absorbed"]) < 6e-3 and abs(balance["absorbed"] / emitted) < 6e-3
+
+
+def ring_of_sapphire() -> Scene:
+    """Light is thrown about in it many times, and leaves it at grazing angles."""
+    light = AreaLight("lamp", constant(1.0), position=(0.0, 0.0, 4.0), direction=(0.0, 0.0, -1.0), radius=0.2)
+    glass = Dielectric(find("sapphire"), roughness=0.26)
+    ring = thing("ring", primitives.torus(0.58, 0.27, 20_000), glass, (0.0, 0.0, 0.9), 60.0, (1.0, 0.0, 0.0))
+    table = thing("table", primitives.plane(8.0, 8.0), Diffuse())
+    return Scene("ring", ABOVE, (light,), (ring, table), render=RenderDefaults(max_depth=16))
+
+
+def kept_by_ring(gl: Context) -> tuple[float, float]:
+    """Of the light that went through the ring: what its microfacets kept. And of what landed: what the map holds, with
+    that of photons which landed where it does not reach."""
+    with passed(gl, ring_of_sapphire(), photons=60_000) as light:
+        ended = light.stats.tally.ended
+        sent_on = ended["deposited"] + ended["escaped"]
+        return ended["absorbed"] / sent_on, held(light) + light.stats.outside_map_w / ended["deposited"]
+
+
+def test_steep_derivatives_by_wavelength_take_no_light(gl: Context) -> None:
+    kept, drawn = kept_by_ring(gl)
+    assert abs(kept) < 1.5e-3
+    assert drawn == pytest.approx(1.0, abs=3e-3)
+
+
+def test_believed_they_would(gl: Context, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """The mutants: ends of bands thrown out of the scene, and their shares as far off as derivatives tell."""
+    monkeypatch.setattr(trace, "WIDEST_SWEEP", 1e6)
+    assert kept_by_ring(gl)[1] < 0.993
+    monkeypatch.undo()
+    mutate(monkeypatch, tmp_path, "light/trace_rough.glsl", "#define MOST_CHANGE 0.3", "#define MOST_CHANGE 1e6")
+    assert abs(kept_by_ring(gl)[0]) > 3e-3
 
 
 def lit_slab(roughness: float, radius: float = 0.05, dispersion: Dispersion = GLASS, tilt_deg: float = 0.0) -> Scene:
