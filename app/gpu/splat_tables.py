@@ -47,7 +47,7 @@ class SplatTables:
     """vec4 per (light, class, band): x_lo, x_hi, mean place of the energy in the band (0–1), its power (W). Behind
     them, from `first_power` on and four to a vec4, a float per (light, class) and sample of x: power below x, W."""
     integral_buffer: moderngl.Buffer
-    """vec4 per layer: energy of the band."""
+    """Three vec4 per layer: energy of the band, its mean place in the band (0–1) and its standard deviation there."""
     density_buffer: moderngl.Buffer
     """vec4 per (light, class, target) and cell of x: mean energy density over x."""
     cumulative_buffer: moderngl.Buffer
@@ -83,7 +83,7 @@ class SplatTables:
         width = width or (WIDTH_WITH_LINES if any(light.lines for light in lights) else WIDTH)
         shape = (len(lights), len(reflectances), band_count)
         texels = np.zeros((*shape, targets, len(SIGMAS), width, 4), np.float32)
-        integrals = np.zeros((*shape, targets, 4), np.float32)
+        integrals = np.zeros((*shape, targets, 3, 4), np.float32)
         spans = np.zeros((*shape, 4), np.float32)
         density = np.zeros((*shape[:2], targets, DENSITY_CELLS, 4), np.float32)
         running = np.zeros((*shape[:2], targets, CUMULATIVE_SAMPLES, 4), np.float32)
@@ -96,9 +96,10 @@ class SplatTables:
                 running[i, j], power[i, j] = _by_target(below, targets), below[:, channels.power].sum(axis=-1)
                 edges = np.array(bands[i], np.float64)
                 count = len(edges)
-                table, energy, place = source.blurred(edges, width)
+                table, summary, place = source.blurred(edges, width)
+                energy = summary[:, 0]
                 texels[i, j, :count] = table.reshape(len(SIGMAS), width, count, targets, 4).transpose(2, 3, 0, 1, 4)
-                integrals[i, j, :count] = energy.reshape(count, targets, 4)
+                integrals[i, j, :count] = summary.reshape(count, 3, targets, 4).swapaxes(1, 2)
                 spans[i, j, :count] = np.column_stack([edges, place, energy[:, channels.power].sum(axis=-1)])
         texture = ctx.texture_array((width, len(SIGMAS), texels[..., 0, 0, 0].size), 4, texels, dtype="f4")
         texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
@@ -119,7 +120,7 @@ class SplatTables:
     @property
     def first_power(self) -> int:
         """Of `band_buffer`, where powers begin, vec4."""
-        return self.integral_buffer.size // (16 * self.targets)
+        return self.integral_buffer.size // (48 * self.targets)
 
     def release(self) -> None:
         for resource in (
@@ -189,14 +190,15 @@ class FoldedSpectrum:
         return energy * DENSITY_CELLS
 
     def blurred(self, edges: np.ndarray, width: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """T for each row: (rows, width, bands · columns); energies (bands, columns); mean places (bands,).
+        """T for each row: (rows, width, bands · columns); energies, their mean places and standard deviations (bands,
+        3, columns); mean places of what is bright (bands,).
 
         The last few are kept: in a viewer the same light is cut into the same bands again and again."""
         parts = (self.smooth.at(np.linspace(0.0, 1.0, FINEST + 1)), self.line_x, self.line_energy, edges)
         key = (width, *(part.tobytes() for part in parts))
         if key not in _blurred:
             _blurred[key] = self._blur(edges, width)
-            while len(_blurred) > 1 and sum(table.nbytes for table, _, _ in _blurred.values()) > _KEPT_BYTES:
+            while len(_blurred) > 1 and sum(table.nbytes for table, *_ in _blurred.values()) > _KEPT_BYTES:
                 _blurred.pop(next(iter(_blurred)))
         return _blurred[key]
 
@@ -220,15 +222,15 @@ class FoldedSpectrum:
                 )
         energies = finest.sum(axis=0)
         places = (np.arange(len(finest)) + 0.5) / len(finest)
-        weights = finest[..., self.brightness].reshape(len(finest), len(edges), -1).sum(axis=-1)
-        moments, totals = places @ weights, weights.sum(axis=0)
+        first, second = np.tensordot(places, finest, axes=1), np.tensordot(places**2, finest, axes=1)
         for band, place, energy in lines:
             energies[band] += energy
-            moments[band] += place * np.sum(energy[self.brightness])
-            totals[band] += np.sum(energy[self.brightness])
-        lit = totals > 0.0
-        mean = np.where(lit, moments / np.where(lit, totals, 1.0), 0.5)
-        return rows, energies, mean
+            first[band] += place * energy
+            second[band] += place**2 * energy
+        middles = _mean(first, energies, 0.5)
+        spreads = np.sqrt(np.maximum(_mean(second, energies, 0.25) - middles**2, 0.0))
+        bright = _mean(first[:, self.brightness].sum(axis=1), energies[:, self.brightness].sum(axis=1), 0.5)
+        return rows, np.stack([energies, middles, spreads], axis=1), bright
 
     def _lines_of_bands(self, edges: np.ndarray) -> list[tuple[int, float, np.ndarray]]:
         """(band, place in it, energy) of each line in each band, ends (lo, hi] so that none counts twice."""
@@ -241,6 +243,12 @@ class FoldedSpectrum:
                 elif lo < x <= hi or (x == 0.0 and lo == 0.0):
                     found.append((band, (x - lo) / (hi - lo), energy))
         return found
+
+
+def _mean(moments: np.ndarray, energies: np.ndarray, dark: float) -> np.ndarray:
+    """`dark` where there is no energy."""
+    lit = energies > 0.0
+    return np.where(lit, moments / np.where(lit, energies, 1.0), dark)
 
 
 def _cells(sigma: float) -> int:

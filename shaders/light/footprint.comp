@@ -6,6 +6,7 @@
 #include "lib/lattice.glsl"
 #include "lib/placement.glsl"
 #include "lib/fan.glsl"
+#include "lib/swept.glsl"
 #ifdef LIGHT_EDGES
 #include "lib/edge.glsl"
 #endif

@@ -27,6 +27,9 @@ flat out vec4 throughput;
 flat out vec4 band;
 #ifdef CUT
 flat out float curve_row;
+#else
+flat out vec4 middles[TARGETS];
+flat out vec4 bends[TARGETS];
 #endif
 #endif
 #endif
@@ -95,6 +98,11 @@ void main() {
     band = band_of(splat);
 #ifdef CUT
     curve_row = curve_row_of(splat);
+#else
+    for (int g = 0; g < TARGETS; ++g) {
+        middles[g] = channel_middles(splat, uint(g));
+        bends[g] = channel_bends(splat, uint(g));
+    }
 #endif
 #endif
 #endif

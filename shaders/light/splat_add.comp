@@ -16,6 +16,9 @@ shared int first_texel[LANES];
 shared int texel_count[LANES];
 #if defined(SMALL) || defined(ONE_COLOUR)
 shared vec4 splat_colour[TARGETS];
+#elif defined(SWEPT)
+shared vec4 middles[TARGETS];
+shared vec4 bends[TARGETS];
 #endif
 
 // Nearest to a place that texels can have: what is not a number ends somewhere.
@@ -34,6 +37,11 @@ void main() {
 #endif
 #if defined(SMALL) || defined(ONE_COLOUR)
         for (int g = lane; g < TARGETS; g += LANES) splat_colour[g] = colour_of(splat, uint(g));
+#elif defined(SWEPT)
+        for (int g = lane; g < TARGETS; g += LANES) {
+            middles[g] = channel_middles(splat, uint(g));
+            bends[g] = channel_bends(splat, uint(g));
+        }
 #endif
         // Sides in texels about the centre: normals, and how far.
         vec2 normals[SIDES];
@@ -146,8 +154,6 @@ void main() {
                 float curve_row = curve_row_of(splat);
 #elif defined(SWEPT) && defined(ONE_COLOUR)
                 share *= share_along(at.x);
-#elif defined(SWEPT)
-                share *= throughput_swept(at.x, throughput_of(splat), band_of(splat));
 #endif
                 if (share == 0.0) continue;
                 for (int g = 0; g < TARGETS; ++g) {
@@ -156,7 +162,8 @@ void main() {
 #elif defined(CUT)
                     add_to_sums(texel, size, g, share * window_energy(curve_row, x, g));
 #else
-                    add_to_sums(texel, size, g, share * spectrum_at(drawn_at, shape, g));
+                    vec4 throughput = throughput_swept(at.x, throughput_of(splat), band_of(splat), middles[g], bends[g]);
+                    add_to_sums(texel, size, g, share * throughput * spectrum_at(drawn_at, shape, g));
 #endif
                 }
             }

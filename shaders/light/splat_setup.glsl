@@ -1,11 +1,12 @@
 // From a splat's record to what its texels are worked out from (splat_texel.glsl): for splat.vert, whose rasteriser interpolates
 // what is linear in xi and eta, and for splat_add.comp, which works it out at every texel.
 #include "light/splat_parameters.glsl"
+#include "lib/swept.glsl"
 
 layout(std430, binding = 1) readonly buffer Splats { SplatRecord splats[]; };
 layout(std430, binding = 8) readonly buffer Lists { uint lists[]; };  // slots of each kind (splat_list.comp)
 layout(std430, binding = 5) readonly buffer Bands { vec4 table_bands[]; };
-layout(std430, binding = 6) readonly buffer Integrals { vec4 band_integral[]; };  // by layer
+layout(std430, binding = 6) readonly buffer Integrals { vec4 band_integral[]; };  // by layer: energy, its mean place in the band (0–1), its standard deviation there
 
 #ifdef CONTACT_LINES
 // On which side of a line of contact the splat's light landed; its record then holds the layer alone.
@@ -15,6 +16,11 @@ uint side_taken_off(inout SplatRecord splat) {
     return side;
 }
 #endif
+
+// Of each channel of target g, where the band lies in [-1, 1].
+vec4 middles_of(SplatRecord splat, uint g) { return 2.0 * band_integral[3u * (splat.layer + g) + 1u] - 1.0; }
+
+vec4 spreads_of(SplatRecord splat, uint g) { return 2.0 * band_integral[3u * (splat.layer + g) + 2u]; }
 
 #if defined(SMALL) || defined(ONE_COLOUR)
 // Energy of the splat in each channel of target g, per unit throughput.
@@ -31,7 +37,7 @@ vec4 energy(SplatRecord splat, uint g) {
         return splat.throughput.x * curve[base + cells.x / DENSITY_CELLS] + splat.throughput.y * curve[base + cells.x % DENSITY_CELLS]
              + splat.throughput.z * curve[base + cells.y / DENSITY_CELLS] + splat.throughput.w * curve[base + cells.y % DENSITY_CELLS];
     }
-    return splat.throughput.x * band_integral[splat.layer + g];
+    return splat.throughput.x * band_integral[3u * (splat.layer + g)];
 #endif
     bool single = splat.x_range.y <= splat.x_range.x && span.y > span.x;
     if (single) {
@@ -47,15 +53,19 @@ vec4 energy(SplatRecord splat, uint g) {
         return mix(curve[base + i.y], curve[base + i.y + 1u], part.y) - mix(curve[base + i.x], curve[base + i.x + 1u], part.x);
     }
 #endif
-    return band_integral[splat.layer + g];
+    return band_integral[3u * (splat.layer + g)];
 }
 
 // What a texel that held all of the splat would have in target g.
 vec4 colour_of(SplatRecord splat, uint g) {
-#if defined(SMALL) || defined(HERO)
+#if defined(POINT_SPECTRUM) && (defined(SMALL) || defined(HERO))
     return splat.amplitude * energy(splat, g);
-#else
+#elif defined(POINT_SPECTRUM)
     return splat.throughput.y * splat.amplitude * energy(splat, g);
+#else
+    vec4 middles = middles_of(splat, g);
+    vec4 throughput = throughput_over(middles, splat.throughput) + mean_bend(middles, spreads_of(splat, g), splat.throughput);
+    return splat.amplitude * throughput * energy(splat, g);
 #endif
 }
 #endif
@@ -78,14 +88,23 @@ vec3 shape_of(SplatRecord splat) { return vec3(splat.y_box, splat.table_row, flo
 #ifndef ONE_COLOUR
 vec4 throughput_of(SplatRecord splat) { return vec4(splat.throughput.x, splat.amplitude * splat.throughput.yzw); }
 
-// Cut: x_lo, x_hi, half of the sweep in xi, 1 / (sqrt(2) sigma) in xi; else half of the band in xi.
+// Cut: x_lo, x_hi, half of the sweep in xi, 1 / (sqrt(2) sigma) in xi; else half of the band in xi, the sweep's part of the variance along it.
 vec4 band_of(SplatRecord splat) {
 #ifdef CUT
     return vec4(splat.x_range, splat.xi_half, splat.inverse_sigma_xi);
 #else
-    return vec4(splat.xi_half);
+    return vec4(splat.xi_half, sweeps_part(splat.xi_half, splat.inverse_sigma_xi), 0.0, 0.0);
 #endif
 }
+
+#ifndef CUT
+// What its texels need of each channel of target g (`throughput_swept`): where its light is, and what the bend adds as far as that is blurred.
+vec4 channel_middles(SplatRecord splat, uint g) { return splat.xi_half * middles_of(splat, g); }
+
+vec4 channel_bends(SplatRecord splat, uint g) {
+    return (1.0 - band_of(splat).y) * mean_bend(channel_middles(splat, g), splat.xi_half * spreads_of(splat, g), throughput_of(splat));
+}
+#endif
 
 #ifdef CUT
 // First row of the splat's light and class among the curves.

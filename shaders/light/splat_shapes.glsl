@@ -93,6 +93,44 @@ void carry_companions(inout SplatRecord splat, PhotonRecord photon) {
 }
 #endif
 
+#ifndef POINT_SPECTRUM
+// Middle of step k of those whose power `step_w` holds, where the band ends at -half and half and its anchor is at `anchor`.
+float step_place(uint k, float half_band, float anchor) {
+    float place = (float(k % POWER_STEPS) + 0.5) / float(POWER_STEPS);
+    return k < POWER_STEPS ? mix(-half_band, anchor, place) : mix(anchor, half_band, place);
+}
+
+// Mean place of the light's power, and its standard deviation.
+vec2 spread_of_power(float half_band, float anchor) {
+    vec3 moments = vec3(0.0);
+    for (uint k = 0u; k < 2u * POWER_STEPS; ++k) {
+        float place = step_place(k, half_band, anchor), width = (k < POWER_STEPS ? half_band + anchor : half_band - anchor) / float(POWER_STEPS);
+        moments += step_w[k] * vec3(1.0, place, place * place + width * width / 12.0);
+    }
+    vec2 means = moments.yz / max(moments.x, 1e-30);
+    return vec2(means.x, sqrt(max(means.y - means.x * means.x, 0.0)));
+}
+
+// Throughput over a band that ends at `ends`, as `throughput_over` takes it.
+vec4 straight_throughput(PhotonRecord photon, vec2 ends) {
+    float width = photon.x_hi - photon.x_lo;
+    float anchor = width > 0.0 ? clamp((photon.x_anchor - photon.x_lo) / width, 0.0, 1.0) : 0.5;
+    float at = mix(ends.x, ends.y, anchor);
+    return vec4(at, photon.throughput.y,
+                anchor > 1e-3 && width > 0.0 ? (photon.throughput.y - photon.throughput.x) / (at - ends.x) : 0.0,
+                anchor < 0.999 && width > 0.0 ? (photon.throughput.z - photon.throughput.y) / (ends.y - at) : 0.0);
+}
+
+// Of what has one colour: over [-1, 1], such that all of its power counts `mean`.
+vec4 throughput_of_colour(PhotonRecord photon, float mean) {
+    vec4 throughput = straight_throughput(photon, vec2(-1.0, 1.0));
+    vec2 power = spread_of_power(1.0, throughput.x);
+    float as_drawn = throughput_over(vec4(power.x), throughput).x + mean_bend(vec4(power.x), vec4(power.y), throughput).x;
+    bool even = photon.x_hi <= photon.x_lo || as_drawn <= 0.0;
+    return even ? vec4(throughput.x, mean, 0.0, 0.0) : vec4(throughput.x, mean / as_drawn * throughput.yzw);
+}
+#endif
+
 SplatRecord small_splat(PhotonRecord photon, float power_w, float mean, Footprint f, vec4 band) {
     SplatRecord splat;
     float cut = 0.0;
@@ -108,7 +146,11 @@ SplatRecord small_splat(PhotonRecord photon, float power_w, float mean, Footprin
     splat.table_row = 0.0;
     splat.y_edge = 0.0;
     splat.y_box = 0.0;
+#ifdef POINT_SPECTRUM
     splat.throughput = vec4(photon.x_anchor, photon.throughput.y, 0.0, 0.0);
+#else
+    splat.throughput = cut > 0.0 ? vec4(0.0, 1.0, 0.0, 0.0) : throughput_of_colour(photon, 1.0);
+#endif
     splat.x_range = vec2(photon.x_lo, photon.x_hi);
     splat.xi_half = cut;
     splat.inverse_sigma_xi = 0.0;
@@ -127,13 +169,15 @@ float kept_by_cut(float edge, float box, float s) {
 #ifndef ONE_COLOUR
 // Power that fragments (splat_swept.frag) add up to: each wavelength is blurred over places of other throughput, which is straight between the
 // low end of the band, the anchor and the high end, and even beyond. Blurred, a kink is its size times a normal variable's mean excess.
-float power_of_fragments(float xi_half, float sigma_xi, vec4 throughput) {
+float power_of_fragments(float xi_half, float inverse_sigma_xi, vec4 throughput) {
     float lowest = throughput.y - throughput.z * (xi_half + throughput.x), power = 0.0;
     vec3 kinks = vec3(-xi_half, throughput.x, xi_half), bends = vec3(throughput.z, throughput.w - throughput.z, -throughput.w);
+    float part = sweeps_part(xi_half, inverse_sigma_xi), sigma = max(part * SQRT_HALF / inverse_sigma_xi, 1e-6);
+    vec2 spread = spread_of_power(xi_half, throughput.x);
+    float bend = (1.0 - part) * mean_bend(vec4(spread.x), vec4(spread.y), throughput).x;
     for (uint k = 0u; k < 2u * POWER_STEPS; ++k) {
-        float place = (float(k % POWER_STEPS) + 0.5) / float(POWER_STEPS);
-        vec3 z = (kinks - (k < POWER_STEPS ? mix(-xi_half, throughput.x, place) : mix(throughput.x, xi_half, place))) / sigma_xi;
-        power += step_w[k] * (lowest + sigma_xi * dot(bends, vec3(normal_excess(z.x), normal_excess(z.y), normal_excess(z.z))));
+        vec3 z = (kinks - mix(spread.x, step_place(k, xi_half, throughput.x), part)) / sigma;
+        power += step_w[k] * (lowest + bend + sigma * dot(bends, vec3(normal_excess(z.x), normal_excess(z.y), normal_excess(z.z))));
     }
     return power;
 }
@@ -273,19 +317,15 @@ SplatRecord swept_splat(PhotonRecord photon, float power_w, float mean, Footprin
     splat.table_row = (row + 0.5) / float(table_rows);
     splat.y_edge = y_edge * SQRT_HALF / s;
     splat.y_box = 0.5 * box * SQRT_HALF / s;
-#ifdef ONE_COLOUR
+#if defined(POINT_SPECTRUM)
     splat.throughput = vec4(photon.x_anchor, mean, 0.0, 0.0);
+#elif defined(ONE_COLOUR)
+    splat.throughput = throughput_of_colour(photon, mean);
 #else
-    float width = photon.x_hi - photon.x_lo;
-    float anchor = width > 0.0 ? clamp((photon.x_anchor - photon.x_lo) / width, 0.0, 1.0) : 0.5;
     // Slopes by xi, or by x for a cut band.
-    vec2 ends = cut ? vec2(photon.x_lo, photon.x_hi) : vec2(-xi_half, xi_half);
-    float at = mix(ends.x, ends.y, anchor);
-    splat.throughput = vec4(at, photon.throughput.y,
-                            anchor > 1e-3 && width > 0.0 ? (photon.throughput.y - photon.throughput.x) / (at - ends.x) : 0.0,
-                            anchor < 0.999 && width > 0.0 ? (photon.throughput.z - photon.throughput.y) / (ends.y - at) : 0.0);
-    if (!cut && width > 0.0 && any(notEqual(photon.throughput.xz, photon.throughput.yy))) {
-        float as_drawn = power_of_fragments(xi_half, sigma / reach, splat.throughput);
+    splat.throughput = straight_throughput(photon, cut ? vec2(photon.x_lo, photon.x_hi) : vec2(-xi_half, xi_half));
+    if (!cut && photon.x_hi > photon.x_lo && any(notEqual(photon.throughput.xz, photon.throughput.yy))) {
+        float as_drawn = power_of_fragments(xi_half, SQRT_HALF * reach / sigma, splat.throughput);
         splat.amplitude *= as_drawn > 0.0 ? clamp(power_w / as_drawn, 0.5, 2.0) : 1.0;
     }
 #ifdef BAND_CUTS

@@ -22,7 +22,9 @@ flat in vec3 ripple;
 flat in vec4 splat_colour[TARGETS];
 #else
 flat in vec4 throughput;
-flat in vec4 band;  // half of the band in xi
+flat in vec4 band;  // half of the band in xi, the sweep's part of the variance along it
+flat in vec4 middles[TARGETS];
+flat in vec4 bends[TARGETS];
 #endif
 layout(location = 0) out vec4 deposited[TARGETS];
 
@@ -48,9 +50,8 @@ void main() {
         deposited[g] = share * splat_colour[g];
     }
 #else
-    share *= throughput_swept(at.y, throughput, band);
     for (int g = 0; g < TARGETS; ++g) {
-        deposited[g] = share * spectrum_at(at, shape, g);
+        deposited[g] = share * throughput_swept(at.y, throughput, band, middles[g], bends[g]) * spectrum_at(at, shape, g);
     }
 #endif
 }

@@ -1,5 +1,6 @@
 // What a texel gets of a splat: for the fragment shaders and for splat_add.comp alike.
 #include "lib/gaussian.glsl"
+#include "lib/swept.glsl"
 
 #ifdef CONTACT_LINES
 #include "lib/contact.glsl"
@@ -33,7 +34,7 @@ float swept_share(vec3 at, vec3 shape, vec2 wave, vec3 ripple, float w) {
 // No sweep: a Gaussian cut at three standard deviations, which holds 0.9973 of it.
 float share_along(float xi) { return 1.20011 * exp(-4.5 * xi * xi); }
 #else
-// Straight on both sides of the anchor; `place`: xi, or x for a cut band.
+// Straight on both sides of the anchor; `place`: x, for a cut band.
 float throughput_at(float place, vec4 throughput) {
     float aside = place - throughput.x;
     return throughput.y + min(aside, 0.0) * throughput.z + max(aside, 0.0) * throughput.w;
@@ -47,7 +48,11 @@ layout(binding = 0) uniform sampler2DArray spectra;
 // Along, one lookup of the band's spectrum blurred as this texel sees it.
 vec4 spectrum_at(vec3 at, vec3 shape, int g) { return textureLod(spectra, vec3(at.z, shape.y, shape.z + float(g)), 0.0); }
 
-float throughput_swept(float xi, vec4 throughput, vec4 band) { return throughput_at(clamp(xi, -band.x, band.x), throughput); }
+// Of each channel of a target. The wavelengths that a texel at xi has of a channel lie about xi in a splat that is narrow beside its sweep, and in one that is
+// broader wherever the channel has its light: their mean place is so far on the way between both as the sweep's variance is part of all.
+vec4 throughput_swept(float xi, vec4 throughput, vec4 band, vec4 middles, vec4 bends) {
+    return throughput_over(clamp(mix(middles, vec4(xi), band.y), -band.x, band.x), throughput) + bends;
+}
 #endif
 
 #ifdef CUT
