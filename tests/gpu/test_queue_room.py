@@ -38,6 +38,7 @@ def test_a_slice_is_both_of_its_halves() -> None:
     assert [half.points for half in halves] == [9, 8]
 
 
+@pytest.mark.slow
 def test_full_queues_lose_nothing(gl, crowded: Scene) -> None:
     """The picture is the same, however few paths are followed at once."""
     settings = replace(SMALL, width=64, height=36, photons=8192, max_depth=FEW, spp=2)

@@ -68,6 +68,7 @@ def test_a_stone_ten_thousand_extents_off_looks_the_same(gl, monkeypatch: pytest
     assert "error of picture" in "; ".join(found.broken())
 
 
+@pytest.mark.slow
 def test_a_sun_in_a_panorama_is_linear(gl, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(camera_light_cases, "SUNS", (1e2, 1e8))
     assert [m.broken() for m in camera_light_cases.measure_sun(gl)] == [[], []]
