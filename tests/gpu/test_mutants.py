@@ -83,7 +83,10 @@ MUTANTS = {
         f"{_BALANCE}[prism]",
     ),
     "throughput blurred with the spectrum": Mutant(
-        "light/splat_shapes.glsl", "splat.amplitude *= as_drawn", "float unused = as_drawn", f"{_BALANCE}[prism]"
+        "light/splat_shapes.glsl",
+        "splat.amplitude *= as_drawn",
+        "float unused = as_drawn",
+        "gpu/test_splat_throughput.py::test_power_is_what_the_photon_carries[broad]",
     ),
     "band ends without direction dispersion": Mutant(
         "light/trace_bands.glsl",
@@ -113,7 +116,7 @@ MUTANTS = {
         "gpu/test_splat.py::test_cut_bands_add_up_to_the_whole",
     ),
     "slopes of throughput swapped": Mutant(
-        "light/splat_texel.glsl",
+        "lib/swept.glsl",
         "min(aside, 0.0) * throughput.z + max(aside, 0.0) * throughput.w",
         "min(aside, 0.0) * throughput.w + max(aside, 0.0) * throughput.z",
         "gpu/test_splat.py::test_throughput_over_the_band",

@@ -47,6 +47,11 @@ def test_channels_have_what_their_wavelengths_have(gl, name: str, throughput: tu
     np.testing.assert_allclose(drawn(gl, name, throughput), wanted, rtol=0.012 if throughput == STRAIGHT else 0.025)
 
 
+@pytest.mark.parametrize("name", SPLATS)
+def test_power_is_what_the_photon_carries(gl, name: str) -> None:
+    assert drawn(gl, name, BENT)[3] == pytest.approx(by_wavelength(BENT)[3], rel=3e-3)
+
+
 @pytest.mark.parametrize("name", ["a focus", "broad"])
 def test_before_all_channels_had_one_weight(gl, name: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     old, new = "return 2.0 * band_integral[3u * (splat.layer + g) + 1u] - 1.0;", "return vec4(0.0);"
