@@ -150,7 +150,7 @@ void main() {
 #if defined(CUT)
                 vec4 band = band_of(splat);
                 vec2 x = window_at(at.x, band);
-                share *= throughput_at(0.5 * (x.x + x.y), throughput_of(splat)) / (2.0 * half_box_of(band));
+                share *= throughput_over(vec4(0.5 * (x.x + x.y)), throughput_of(splat)).x / (2.0 * half_box_of(band));
                 float curve_row = curve_row_of(splat);
 #elif defined(SWEPT) && defined(ONE_COLOUR)
                 share *= share_along(at.x);

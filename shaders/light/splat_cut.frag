@@ -21,7 +21,7 @@ void main() {
     share *= taken_at(gl_FragCoord.xy, side);
 #endif
     vec2 x = window_at(at.y, band);
-    share *= throughput_at(0.5 * (x.x + x.y), throughput);
+    share *= throughput_over(vec4(0.5 * (x.x + x.y)), throughput).x;
     for (int g = 0; g < TARGETS; ++g) {
         deposited[g] = share * window_energy(curve_row, x, g);
     }

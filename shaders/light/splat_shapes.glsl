@@ -193,9 +193,8 @@ float throughput_of_windows(PhotonRecord photon, float reach, vec4 throughput, u
     for (int i = 0; i < WINDOWS; ++i) {
         float middle = (0.5 + reach) * (2.0 * (float(i) + 0.5) / float(WINDOWS) - 1.0);
         vec2 x = mix(vec2(photon.x_lo), vec2(photon.x_hi), 0.5 + clamp(middle + vec2(-reach, reach), -0.5, 0.5));
-        float aside = 0.5 * (x.x + x.y) - throughput.x;
         float power = power_until(light_and_class, x.y) - power_until(light_and_class, x.x);
-        sums += power * vec2(1.0, throughput.y + min(aside, 0.0) * throughput.z + max(aside, 0.0) * throughput.w);
+        sums += power * vec2(1.0, throughput_over(vec4(0.5 * (x.x + x.y)), throughput).x);
     }
     return sums.x > 0.0 ? sums.y / sums.x : 0.0;
 }

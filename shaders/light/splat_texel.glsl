@@ -33,12 +33,6 @@ float swept_share(vec3 at, vec3 shape, vec2 wave, vec3 ripple, float w) {
 #ifdef ONE_COLOUR
 // No sweep: a Gaussian cut at three standard deviations, which holds 0.9973 of it.
 float share_along(float xi) { return 1.20011 * exp(-4.5 * xi * xi); }
-#else
-// Straight on both sides of the anchor; `place`: x, for a cut band.
-float throughput_at(float place, vec4 throughput) {
-    float aside = place - throughput.x;
-    return throughput.y + min(aside, 0.0) * throughput.z + max(aside, 0.0) * throughput.w;
-}
 #endif
 #endif
 

@@ -21,8 +21,7 @@ from spectrasplat.render.still import render
 from tests.gpu.mutants import mutate
 
 WIDTH, HEIGHT, BLOCK = 96, 54, 6
-BOUND = 0.0255
-"""0.0241 with this seed, 0.0237 with another; without a bound of footprints 0.0297."""
+BOUND = 0.024
 SCENE = """
 [camera]
 position = [4.686, -5.1511, 4.5279]
@@ -68,7 +67,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 
 @pytest.fixture(scope="module")
 def truth(scene: Scene) -> np.ndarray:
-    return blocks(render_reference(scene, WIDTH, HEIGHT, photons=1_500_000).xyz()[..., 1])
+    return blocks(render_reference(scene, WIDTH, HEIGHT, photons=4_000_000).xyz()[..., 1])
 
 
 def blocks(picture: np.ndarray) -> np.ndarray:
@@ -92,4 +91,4 @@ def test_without_a_bound_it_is_spread(
     gl: Context, scene: Scene, truth: np.ndarray, monkeypatch, tmp_path: Path
 ) -> None:
     mutate(monkeypatch, tmp_path, "light/trace_widths.glsl", "p.widest_on_surface * size", "1e9 * size")
-    assert deviation(gl, scene, truth) > 1.1 * BOUND
+    assert deviation(gl, scene, truth) > 1.15 * BOUND
