@@ -278,7 +278,8 @@ void main()
 #ifdef SPECTRAL_SWEEP
             cut_at = -1.0;
             bool asks = path.restricted != 0u && !event_limit_reached && (ends || (path.planar_so_far != 0u && kind != KIND_BLACK && asked < MAX_ASKED));
-            if (asks) asks = sweep_pixels(path, met ? hit.distance : FAR_DISTANCE) > (ends ? MIN_SWEEP : MIN_CUT_SWEEP * sample_side(path));
+            float ahead = met ? hit.distance : FAR_DISTANCE;
+            if (asks) asks = ends ? shown_sweep(path, ahead) > MIN_SWEEP : sweep_pixels(path, ahead) > MIN_CUT_SWEEP * sample_side(path);
             if (asks) cut_at = where_paths_diverge(path, met, ends, hit, same_hit);
             parts = cut_at >= 0.0;
 #endif

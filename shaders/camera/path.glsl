@@ -37,6 +37,9 @@ struct CameraPath {
 #ifdef POLARISED
     Polarisation polarisation;      // of light that would come along the path backwards: by reciprocity it loses as much
 #endif
+#ifdef ROUGH_SURFACES
+    uint ground;                    // 1: a rough surface has turned it, and its pixel's columns are as broad as the lobe, which samples share out
+#endif
 #ifdef COATS
     float coat_pdf;                 // of its direction, where it comes from a coat: density by steradian; else 0
 #endif

@@ -14,11 +14,12 @@ struct RoughPlace {
 
 // The microfacet takes the place of the frame's normals, and turns with them. Samples of a pixel share out the microfacets between them as they do the
 // pixel, and each looks up the light of its share of the lobe [Krivanek, Colbert 2008]: lamps and windows seen through ground glass would be specks.
-RoughPlace meet_microfacet(CameraPath path, inout PathFrame frame, uint object, uint pixel_key)
+RoughPlace meet_microfacet(inout CameraPath path, inout PathFrame frame, uint object, uint pixel_key)
 {
     vec4 told = object_at(object).colour;
     RoughPlace place = RoughPlace(told.x, frame, told.y, vec3(1.0));
     if (place.width <= 0.0) return place;
+    path.ground = 1u;
     // Parts of a band that was cut here meet it again, and find the same microfacet.
     uint key = hash_combine(pixel_key, 80u), depth = uint(path.depth);
     vec3 normal = frame.shading.normal;

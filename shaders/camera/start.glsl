@@ -69,6 +69,9 @@ CameraPath path_from(uvec2 pixel, vec2 within_pixel, float gain)
 #ifdef POLARISED
     path.polarisation = unpolarised(path.direction);
 #endif
+#ifdef ROUGH_SURFACES
+    path.ground = 0u;
+#endif
 #ifdef COATS
     path.coat_pdf = 0.0;
 #endif

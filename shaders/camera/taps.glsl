@@ -25,10 +25,20 @@ float sweep_pixels(CameraPath path, float distance)
     return length(sweep) / pixel;
 }
 
+// The same in widths of what has to tell colours apart: a pixel, or of the lobe of a rough surface, which is many pixels wide, a sample's share.
+float shown_sweep(CameraPath path, float distance)
+{
+#ifdef ROUGH_SURFACES
+    return sweep_pixels(path, distance) / (path.ground != 0u ? sample_side(path) : 1.0);
+#else
+    return sweep_pixels(path, distance);
+#endif
+}
+
 // Looks that this sweep needs: where it shows at all, one for either half; the fewer, the less of the sample the path is.
 int taps_of(CameraPath path, float distance)
 {
-    float pixels = sweep_pixels(path, distance);
+    float pixels = shown_sweep(path, distance);
     return clamp(int(min(ceil(pixels * p.taps_per_pixel), float(p.max_taps)) * sqrt(min(path.branch_weight, 1.0)) + 0.99), pixels > MIN_SWEEP ? 2 : 1, int(p.max_taps));
 }
 #endif
