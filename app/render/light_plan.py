@@ -138,6 +138,7 @@ class Planner:
                 budget,
                 self.domains[i].active_share,
                 self.features.lamp_columns,
+                self.features.has_lobe_columns,
             )
             aside = 0.0 if anchors is None else shift(anchors[0], i, anchors[1], Dimension.SPECTRAL) / 2.0**32 - 0.5
             bands = self._bands(i, fit, aside)

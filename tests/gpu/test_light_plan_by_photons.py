@@ -3,11 +3,14 @@ branches that are as narrow as strong ones where that costs little."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from spectrasplat.base.paths import shipped_scenes
 from spectrasplat.gpu.context import Context
 from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.scene import Dielectric
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes import pilot
 from spectrasplat.passes.trace import SPLIT_THRESHOLD
@@ -18,8 +21,16 @@ from spectrasplat.render.light_plan import Division
 SETTINGS = RenderSettings(120, 68, method="srd-photons", layer="caustic")
 
 
-def prepared(gl: Context, name: str, division: Division | None = None) -> LightPass:
+def prepared(gl: Context, name: str, division: Division | None = None, roughness: float = 0.0) -> LightPass:
+    """`roughness`: of all glass in the scene."""
     scene = load_scene(shipped_scenes()[name])
+    if roughness > 0.0:
+        glass = [isinstance(thing.material, Dielectric) for thing in scene.objects]
+        ground = [
+            replace(thing, material=replace(thing.material, roughness=roughness)) if is_glass else thing
+            for thing, is_glass in zip(scene.objects, glass, strict=True)
+        ]
+        scene = replace(scene, objects=tuple(ground))
     buffers = scene_buffers(gl, scene, SETTINGS)
     light = LightPass(gl, scene, SETTINGS, buffers.features, buffers, division=division)
     light.prepare()
@@ -60,6 +71,19 @@ def test_broad_footprints_leave_the_bands_as_they_are(gl: Context, monkeypatch: 
     assert (bands(light, 30_000), bands(light, 200_000), bands(light, 1_000_000)) == (1, 2, 3)
     monkeypatch.setattr(pilot.PilotFit, "_broad_texels", lambda fit, lattices: 0.0)
     assert bands(light, 30_000) > 1
+
+
+def test_ground_glass_gets_the_bands_that_its_lobes_can_tell_apart(
+    gl: Context, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No band widens a lobe's footprints: rougher glass needs fewer, more photons a few more."""
+    fine, coarse = prepared(gl, "spectrum", roughness=0.05), prepared(gl, "spectrum", roughness=0.3)
+    assert bands(fine, 60_000) > 2 * bands(coarse, 60_000)
+    assert bands(fine, 60_000) < bands(fine, 1_000_000) < 2 * bands(fine, 60_000)
+    told = bands(coarse, 60_000)
+    # As one more polished photon's, footprints would seem to widen with every band.
+    monkeypatch.setattr(pilot.PilotFit, "_ground", lambda fit, photons: np.zeros(len(photons), bool))
+    assert bands(coarse, 60_000) < told
 
 
 def test_weak_branches_keep_their_lattices_where_that_costs_little(gl: Context) -> None:
