@@ -172,11 +172,11 @@ def test_believed_without_bound_they_spread_light(
     assert deviation(drawn(gl, ellipsoid, 200_000), truth) > 1.1 * SPREAD
 
 
-GROUND_BOUND = 0.09
+GROUND_BOUND, GROUND_PHOTONS = 0.09, 40_000
 
 
 def test_light_of_a_ground_diamond_stays_where_it_lands(gl: Context, stone: Scene, glow: np.ndarray) -> None:
-    found = drawn(gl, stone, 20_000)
+    found = drawn(gl, stone, GROUND_PHOTONS)
     assert deviation(found, glow) < GROUND_BOUND
     assert found.sum() == pytest.approx(glow.sum(), rel=0.03)
 
@@ -186,4 +186,4 @@ def test_lobes_without_bound_spread_it(
     gl: Context, stone: Scene, glow: np.ndarray, monkeypatch, tmp_path: Path, believed: str
 ) -> None:
     mutate(monkeypatch, tmp_path, "light/trace_widths.glsl", believed, believed.replace("0.5", "1e9"))
-    assert deviation(drawn(gl, stone, 20_000), glow) > 1.1 * GROUND_BOUND
+    assert deviation(drawn(gl, stone, GROUND_PHOTONS), glow) > 1.1 * GROUND_BOUND
