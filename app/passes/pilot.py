@@ -242,14 +242,17 @@ class PilotFit:
         if not sum(map(len, errors)):
             return 1
         error, axis, weight, ground = map(np.concatenate, (errors, axes, weights, grounds))
-        return max(self._lattice_bands(error, axis, weight, ground), self._ground_bands(error, axis, weight, ground))
+        behind, whole_flux, count = weight[ground].sum(), weight.sum(), 1
+        if behind <= FOLLOWED * whole_flux and not ground.all():
+            count = self._lattice_bands(error[~ground], axis[~ground], weight[~ground])
+        # Elsewhere they blur the rest.
+        if behind >= MOSTLY_GROUND * whole_flux and ground.any():
+            count = max(count, self._ground_bands(error[ground], axis[ground], weight[ground]))
+        return count
 
-    def _lattice_bands(self, error: np.ndarray, axis: np.ndarray, weight: np.ndarray, ground: np.ndarray) -> int:
+    def _lattice_bands(self, error: np.ndarray, axis: np.ndarray, weight: np.ndarray) -> int:
         """Bands for photons whose footprints widen with every band: `error` of the chord of one band and longer `axis`
-        of footprints, texels, and `weight`, of those that are not `ground`, all (n,)."""
-        if not _holds(weight, ~ground, 1.0 - FOLLOWED):
-            return 1
-        error, axis, weight = error[~ground], axis[~ground], weight[~ground]
+        of footprints, texels, and `weight`, all (n,)."""
         relative = _weighted_quantile(error / axis, weight, FOLLOWED)
         typical = _weighted_quantile(error, weight, 0.9)
         for count in range(1, MAX_BANDS):
@@ -265,14 +268,12 @@ class PilotFit:
                 return count
         return MAX_BANDS
 
-    def _ground_bands(self, error: np.ndarray, axis: np.ndarray, weight: np.ndarray, ground: np.ndarray) -> int:
-        """Bands for the `ground` of them, where they are nearly all of the light: their footprints are as broad as all
-        bands' photons together leave gaps, so that a band more blurs nothing of them."""
-        if not _holds(weight, ground, MOSTLY_GROUND):
-            return 1
-        relative = _weighted_quantile(error[ground] / axis[ground], weight[ground], FOLLOWED)
-        narrower = _lobe_part(self.budget) / _lobe_part(self.pilot.lattice_count * self.active_share)
-        broad = self.smoothing * narrower * _weighted_quantile(axis[ground], weight[ground], 0.9)
+    def _ground_bands(self, error: np.ndarray, axis: np.ndarray, weight: np.ndarray) -> int:
+        """The same for photons behind ground glass, whose footprints are as broad as all bands' photons together leave
+        gaps: a band more blurs nothing of them."""
+        relative = _weighted_quantile(error / axis, weight, FOLLOWED)
+        narrower = lobe_part(self.budget) / lobe_part(self.pilot.lattice_count * self.active_share)
+        broad = self.smoothing * narrower * _weighted_quantile(axis, weight, 0.9)
         tolerance = GROUND_TOLERANCE * np.clip(broad, LEAST_BROAD, 1.0)
         return int(np.clip(np.ceil(np.sqrt(relative / (self.smoothing * narrower * tolerance))), 1, MAX_BANDS))
 
@@ -347,14 +348,9 @@ def same_paths(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return a[in_a[same]], b[in_b[same]]
 
 
-def _lobe_part(paths: float) -> float:
+def lobe_part(paths: float) -> float:
     """Of a lobe's width: what one of so many photons is drawn as broad as (`lobe_part`, lib/rough_surface.glsl)."""
     return min(4.4 * max(paths, 1.0) ** (-1.0 / 6.0), 1.1)
-
-
-def _holds(weight: np.ndarray, of: np.ndarray, share: float) -> bool:
-    """Whether `of` them carry at least that share of the whole `weight`."""
-    return bool(of.any()) and float(weight[of].sum()) >= share * float(weight.sum())
 
 
 def _weighted_quantile(values: np.ndarray, weights: np.ndarray, share: float) -> float:

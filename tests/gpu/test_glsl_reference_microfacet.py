@@ -11,6 +11,7 @@ from spectrasplat.gpu.scene_records import SCENE_STRUCTS
 from spectrasplat.gpu.scene_texels import spectra_texture
 from spectrasplat.gpu.spectral_groups import SAMPLES
 from spectrasplat.model.optics import rough_glass
+from spectrasplat.passes import pilot
 from spectrasplat.reference import optics, random_numbers, rough_albedo
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
@@ -145,6 +146,7 @@ def test_microfacets_turn_with_their_surface(gl) -> None:
         spread = 0.5 * np.hypot(width * np.cos(tilt), np.sin(tilt))
         np.testing.assert_allclose(np.linalg.norm(got[one], axis=1), spread, rtol=2e-3, atol=2e-4)
     np.testing.assert_allclose(got["part"], np.minimum(4.4 * count ** (-1.0 / 6.0), 1.1), rtol=1e-4)
+    np.testing.assert_allclose(got["part"], [pilot.lobe_part(paths) for paths in count], rtol=1e-4)
 
 
 def test_numbers_are_kronecker_sequences(gl) -> None:
