@@ -16,8 +16,9 @@ from .facets import BLACK, SAMPLES, BeamScene
 from .find import Emission
 from .rays import PARALLEL, POINT, SOURCE
 
-_RIM = 64
-"""Corners of the polygon that stands for a round aperture or a cone, of the same area."""
+RIM = 64
+"""Corners of the polygon that stands for a round aperture or a cone, of the same area: its sides lie at most 0.04 % of
+the radius inside of the circle, its corners 0.08 % outside."""
 _WIDEST = math.tan(math.radians(75.0))
 """Half side of a gnomonic plane up to which one is enough; else the six sides of a cube are taken."""
 _NEAREST = 1.65
@@ -210,9 +211,9 @@ def _cone(light, direction, forward, right, up) -> np.ndarray | None:
     # Planes through the tip that touch the polygon of the cone's own area at its sides.
     first = _unit(np.cross(direction, np.eye(3)[np.argmin(np.abs(direction))]))
     second = np.cross(direction, first)
-    step = 2.0 * math.pi / _RIM
+    step = 2.0 * math.pi / RIM
     rim = math.tan(outer) * math.sqrt(step / math.sin(step))
-    turn = step * np.arange(_RIM)
+    turn = step * np.arange(RIM)
     corners = direction + rim * (np.cos(turn)[:, None] * first + np.sin(turn)[:, None] * second)
     normals = np.cross(corners, np.roll(corners, -1, axis=0))
     normals *= np.sign(normals @ direction)[:, None]
@@ -220,9 +221,9 @@ def _cone(light, direction, forward, right, up) -> np.ndarray | None:
 
 
 def _disc(at: np.ndarray, radius: float) -> np.ndarray:
-    step = 2.0 * math.pi / _RIM
+    step = 2.0 * math.pi / RIM
     inner = radius * math.sqrt(step / math.sin(step)) * math.cos(0.5 * step)
-    turn = step * np.arange(_RIM)
+    turn = step * np.arange(RIM)
     normals = -np.column_stack([np.cos(turn), np.sin(turn)])
     return np.column_stack([inner - normals @ at, normals])
 

@@ -10,7 +10,7 @@ import numpy as np
 from spectrasplat.beams.convert import pieces_of, polygons_of
 from spectrasplat.beams.facets import BeamScene, beam_scene
 from spectrasplat.beams.find import Emission, Search, search
-from spectrasplat.beams.sources import emissions, mask_at
+from spectrasplat.beams.sources import RIM, emissions, mask_at
 from spectrasplat.model.flat_shapes import is_flat
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.optics.colorimetry import VISIBLE_NM, rgb_partition
@@ -114,13 +114,15 @@ class Rig:
         return World(corners, owner.astype(np.int64), kind, rank, index, absorption, rho)
 
     def lamp(self, light: int = 0) -> Lamp:
-        """A light as rays: all that may meet glass or a mirror."""
+        """A light as rays: all that may meet glass or a mirror. A round parallel light has the aperture that beams
+        have: what else is between the circle and that polygon, tests/unit/test_beam_sources.py bounds."""
         it = self.scene.lights[light]
         right, up, forward = it.axes().T
         special = [i for i, o in enumerate(self.scene.objects) if o.material.is_specular]
         corners = np.concatenate([self.meshes[i].vertices for i in special])
         if it.is_parallel and it.has_place:
-            return Lamp(np.array(it.position), forward, right, up, it.half_extent, it.is_disc)
+            corners = RIM if it.is_disc else 0
+            return Lamp(np.array(it.position), forward, right, up, it.half_extent, it.is_disc, corners=corners)
         if it.is_parallel:
             middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
             tangent = np.tan(it.angular_radius)

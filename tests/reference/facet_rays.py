@@ -74,6 +74,9 @@ class Lamp:
     axis: np.ndarray = field(default_factory=lambda: np.zeros(3))
     cone: tuple[float, float] = (4.0, 4.0)
     lambert: bool = False
+    corners: int = 0
+    """Of the regular polygon of the disc's area, with the middle of a side on the way to `right`, on which rays start
+    instead of the disc; 0: on the disc."""
 
 
 @dataclass(frozen=True)
@@ -133,6 +136,16 @@ def _nearest(o, d, edges, normal, owner, ball, nearest, found):
 
 
 @numba.njit(cache=True, nogil=True)
+def _is_off(a, b, corners):
+    """Whether a place is outside of the unit disc, or of the regular polygon of its area."""
+    if corners == 0:
+        return a * a + b * b > 1.0
+    step = 2.0 * np.pi / corners
+    from_middle = (np.arctan2(b, a) + 0.5 * step) % step - 0.5 * step
+    return np.hypot(a, b) * np.cos(from_middle) > np.sqrt(step / np.sin(step)) * np.cos(0.5 * step)
+
+
+@numba.njit(cache=True, nogil=True)
 def _medium(mask, of_rank):
     best = -1
     for bit in range(62):
@@ -153,6 +166,7 @@ def _trace(
     axis,
     cone,
     lambert,
+    corners,
     edges,
     normal,
     owner,
@@ -181,8 +195,11 @@ def _trace(
     for _ in range(rays):
         a, b = 2.0 * np.random.random() - 1.0, 2.0 * np.random.random() - 1.0
         if lamp_kind & 1:
-            while a * a + b * b > 1.0:
-                a, b = 2.0 * np.random.random() - 1.0, 2.0 * np.random.random() - 1.0
+            reach = 1.0 if corners == 0 else np.sqrt(2.0 * np.pi / corners / np.sin(2.0 * np.pi / corners))
+            a, b = reach * a, reach * b
+            while _is_off(a, b, corners):
+                a = reach * (2.0 * np.random.random() - 1.0)
+                b = reach * (2.0 * np.random.random() - 1.0)
         weight = 1.0
         if lamp_kind < 2:
             x = y = 0.0
@@ -343,6 +360,7 @@ def landed(
             np.asarray(lamp.axis, float),
             np.array(lamp.cone, float),
             lamp.lambert,
+            lamp.corners,
             edges,
             normal,
             owner,
