@@ -54,12 +54,13 @@ class BeamFinder:
         axis: SpectralAxis,
         to_gpu: Callable[[np.ndarray], np.ndarray],
         unit: float,
+        bins: int | None = None,
     ) -> None:
         """`frames`: origin and axes of every flat receiver's map by number, `texels`: side of its finest texel, GPU
-        units; `to_gpu`, `unit`: scene to GPU space, GPU units a scene unit."""
+        units; `to_gpu`, `unit`: scene to GPU space, GPU units a scene unit; `bins`: spectral bins that are kept."""
         self.meshes = in_gpu_space(world_meshes, to_gpu, unit)
         self.scene = beam_scene(scene, self.meshes, frames, axis, unit)
-        self._scene, self._axis, self._to_gpu, self._unit = scene, axis, to_gpu, unit
+        self._scene, self._axis, self._to_gpu, self._unit, self._bins = scene, axis, to_gpu, unit, bins
         lights = enumerate(scene.lights)
         self._beside = frozenset(i for i, light in lights if is_beside_facets(light, self.scene, to_gpu, unit))
         """Lamps too near to facets."""
@@ -125,9 +126,8 @@ class BeamFinder:
             place = 0
             if light.has_place and not light.is_parallel:
                 place = mask_at(self._to_gpu(np.array(light.position)), beams, self.meshes)
-            parts = emissions(
-                light, beams, self._to_gpu, self._unit, self._axis, light_parts if light.has_extent else 1, place
-            )
+            count = light_parts if light.has_extent else 1
+            parts = emissions(light, beams, self._to_gpu, self._unit, self._axis, count, place, self._bins)
             if parts:
                 todo.append((i, parts))
         watts = {i: _power(scene.lights[i]) for i, _ in todo}

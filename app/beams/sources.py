@@ -71,9 +71,10 @@ def emissions(
     axis: SpectralAxis,
     parts: int,
     inside: int = 0,
+    bins: int | None = None,
 ) -> list[Emission]:
     """`light` as sources; an extended one as about `parts` of equal power. `to_gpu`: scene to GPU space, `unit`: GPU
-    units a scene unit; `inside`: mask of the solids that the light stands in."""
+    units a scene unit; `inside`: mask of the solids that the light stands in; `bins`: spectral bins that are kept."""
     corners = _specular_corners(scene)
     if not len(corners):
         return []
@@ -89,16 +90,16 @@ def emissions(
         "lines": tuple(lines),
         "line_shares": tuple(s / total for s in shares),
         "is_continuous": bool(np.any(light.spectral_power.density > 0.0)),
-        "edges": colour_edges(scene, Spectrum(light.spectral_power.density), axis),
+        "edges": colour_edges(scene, Spectrum(light.spectral_power.density), axis, bins),
         "mask": inside,
     }
     make = _parallel if light.is_parallel else _diverging
     return make(light, corners, to_gpu, unit, parts, common)
 
 
-def colour_edges(scene: BeamScene, light: Spectrum, axis: SpectralAxis) -> tuple[float, ...]:
-    """x between which three weights a beam follow what absorbs and what is coloured."""
-    return tuple(cut_by_tints((0.0, 1.0), 1, _MOST_BANDS, scene.tints, light, axis).tolist())
+def colour_edges(scene: BeamScene, light: Spectrum, axis: SpectralAxis, bins: int | None = None) -> tuple[float, ...]:
+    """x between which three weights a beam follow what absorbs and what is coloured, also within each of `bins`."""
+    return tuple(cut_by_tints((0.0, 1.0), 1, _MOST_BANDS, scene.tints, light, axis, bins=bins).tolist())
 
 
 def _specular_corners(scene: BeamScene) -> np.ndarray:

@@ -34,6 +34,11 @@ class MapChannels:
         return len(self.edges_nm) - 1 if self.edges_nm is not None else len(self.tents_nm)
 
     @property
+    def bins(self) -> int | None:
+        """Bins of a spectral picture."""
+        return self.count if self.edges_nm is not None else None
+
+    @property
     def first_target(self) -> int:
         """Target of the first spectral channel."""
         return 0 if self.edges_nm is not None else 1

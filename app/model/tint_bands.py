@@ -67,10 +67,13 @@ def cut_by_tints(
     light: Spectrum,
     axis: SpectralAxis,
     tolerance: float = TOLERANCE,
+    bins: int | None = None,
 ) -> np.ndarray:
     """Edges (B + 1,), in x, of `least` to `most` bands between `ends`, none wider than `least` even ones: as many as
     straight weights need to follow `curves` (N, 401) under `light` within `tolerance`, and where these err least. By
-    dynamic programming over the nanometres, as curves are fitted by segments (Bellman 1961)."""
+    dynamic programming over the nanometres, as curves are fitted by segments (Bellman 1961). `bins`: spectral bins that
+    are kept (`bin_of_nm`), each of which must hold its own light as the picture must hold all; the dim count as much as
+    the bright."""
     power = power_by_nm(light)
     left = (curves * power).sum(axis=1, keepdims=True)
     told = left[:, 0] > _LEAST_SHARE * power.sum()
@@ -78,7 +81,13 @@ def cut_by_tints(
     if not len(curves):
         return np.linspace(*ends, least + 1)
     x = np.asarray(axis.x_of_nm(VISIBLE_NM), np.float64)
-    return np.array(_cut(tuple(ends), least, most, tolerance, x.tobytes(), curves.tobytes(), power.tobytes()))
+    arrays = x.tobytes(), curves.tobytes(), power.tobytes()
+    return np.array(_cut(tuple(ends), least, most, tolerance, bins or 1, *arrays))
+
+
+def bin_of_nm(bins: int) -> np.ndarray:
+    """int (401,): which of `bins` even bins between the ends of `VISIBLE_NM` holds each of its nanometres."""
+    return np.minimum((np.arange(len(VISIBLE_NM)) * bins) // (len(VISIBLE_NM) - 1), bins - 1)
 
 
 def power_by_nm(light: Spectrum) -> np.ndarray:
@@ -90,7 +99,9 @@ def power_by_nm(light: Spectrum) -> np.ndarray:
 
 
 @lru_cache(maxsize=64)
-def _cut(ends: tuple[float, float], least: int, most: int, tolerance: float, *arrays: bytes) -> tuple[float, ...]:
+def _cut(
+    ends: tuple[float, float], least: int, most: int, tolerance: float, bins: int, *arrays: bytes
+) -> tuple[float, ...]:
     """Every pass of a light asks again; the arrays as in `cut_by_tints`."""
     x, curves, power = (np.frombuffer(array, np.float64) for array in arrays)
     curves, luminous = curves.reshape(-1, len(x)), power * cmf_xyz()[:, 1]
@@ -101,10 +112,14 @@ def _cut(ends: tuple[float, float], least: int, most: int, tolerance: float, *ar
     places = np.unique(np.concatenate([between, np.linspace(low, high, least + 1)]))
     missed, flat, lost, brightened = np.zeros(1), np.zeros(1), [], []
     for curve in curves:
-        left, left_luminous = float(curve @ power), float(curve @ luminous)
-        squares, sums = _missed(places, x, curve, power / left)
-        missed = np.maximum(missed, squares * power.sum() / left)
-        lost.append(sums)
+        left_luminous = float(curve @ luminous)
+        squared, kept = np.zeros(1), _kept_apart(bins, curve, power)
+        for some in kept:
+            of_bin, watts = float(curve @ some), float(some.sum())
+            squares, sums = _missed(places, x, curve, some / of_bin)
+            squared = squared + squares * watts / of_bin
+            lost.append(sums)
+        missed = np.maximum(missed, squared / len(kept))
         if left_luminous > _LEAST_SHARE * luminous.sum():
             squares, sums = _missed_by_means(places, x, curve, power, luminous)
             flat = np.maximum(flat, squares * luminous.sum() / left_luminous**2)
@@ -130,6 +145,12 @@ def _cut(ends: tuple[float, float], least: int, most: int, tolerance: float, *ar
         edges = _path(before)
     found = [low, *(float(places[edge]) for edge in edges[1:-1]), high]
     return tuple(found if ends[0] <= ends[1] else found[::-1])
+
+
+def _kept_apart(bins: int, curve: np.ndarray, power: np.ndarray) -> list[np.ndarray]:
+    """`power` (401,) bin by bin, zero outside of each; those without light left out."""
+    parts = [np.where(bin_of_nm(bins) == number, power, 0.0) for number in range(bins)]
+    return [part for part in parts if float(curve @ part) > _LEAST_SHARE * float(curve @ power)]
 
 
 def _most_in_all(of_curves: Sequence[np.ndarray], bands: tuple[Sequence[int], Sequence[int]]) -> float:

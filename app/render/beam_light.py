@@ -140,6 +140,7 @@ class BeamLight:
             buffers.axis,
             buffers.space.to_gpu,
             buffers.space.scale,
+            shown.channels.bins,
         )
         self._coarse: tuple[MapLayout, BeamFinder] | None = None
         self.drawing = BeamDrawing(context, buffers, shown, self.frames)

@@ -15,7 +15,7 @@ from ..model.features import Features
 from ..model.optics.spectral_tables import CumulativeSpectrum
 from ..model.scene import Scene
 from ..model.settings import RenderSettings, divides_spectrum
-from ..model.tint_bands import cut_by_tints
+from ..model.tint_bands import TOLERANCE, cut_by_tints
 from ..passes.emission_domain import EmissionDomain
 from ..passes.pilot import MAX_LIGHT_POINTS, Pilot, PilotFit
 from ..passes.trace import Band, LatticeSlice
@@ -183,8 +183,11 @@ class Planner:
             edges[1:-1] += aside * (edges[1] - edges[0])
             if self._tinted and len(self.buffers.tints):
                 spectrum = self.scene.lights[light].spectral_power
-                tolerance = fit.tint_tolerance()
-                edges = cut_by_tints(ends, count, MAX_BANDS, self.buffers.tints, spectrum, axis, tolerance)
+                tolerance, bins = fit.tint_tolerance(), self.settings.bins
+                if self.features.beams and not self.features.spectral_groups:
+                    # What beams leave to photons has their bands (`beams.sources.colour_edges`), of the whole axis.
+                    ends, tolerance = (0.0, 1.0), TOLERANCE
+                edges = cut_by_tints(ends, count, MAX_BANDS, self.buffers.tints, spectrum, axis, tolerance, bins)
             middles = 0.5 * (edges[:-1] + edges[1:])
         return tuple(
             Band(float(lo), float(hi), float(mid), float(power.band(lo, hi)[3]))

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from spectrasplat.model.geometry.primitives import box, slab
 from spectrasplat.model.materials.absorption import Absorption
-from spectrasplat.model.optics.colorimetry import VISIBLE_NM, cmf_xyz
+from spectrasplat.model.optics.colorimetry import VISIBLE_NM, cmf_xyz, mirror_reflectance
 from spectrasplat.model.optics.glass import from_abbe
 from spectrasplat.model.optics.spectral_tables import SpectralAxis
-from spectrasplat.model.optics.spectrum import Spectrum, illuminant
+from spectrasplat.model.optics.spectrum import Spectrum, blackbody, illuminant
 from spectrasplat.model.scene import Mirror, Scene, SceneObject
-from spectrasplat.model.tint_bands import TOLERANCE, cut_by_tints, tint_curves
+from spectrasplat.model.tint_bands import TOLERANCE, bin_of_nm, cut_by_tints, tint_curves
 from spectrasplat.stress.cases.line_cases import LINES_NM, behind_the_slab
 from spectrasplat.stress.rigs.scene_parts import solid, stage
 
@@ -159,3 +159,24 @@ def test_curves_of_a_scene() -> None:
     assert len(tint_curves(mirror(0.9, 0.9, 0.9))) == 0
     once, four_times = tint_curves(mirror(0.9, 0.6, 0.2))
     np.testing.assert_allclose(four_times, once**4)
+
+
+@pytest.mark.parametrize("axis", AXES.values(), ids=AXES)
+def test_each_bin_that_is_kept_holds_its_own_light(axis: SpectralAxis) -> None:
+    """Copper under a warm lamp: what is missed where the light is dim is nothing to all of it."""
+    curve, light = mirror_reflectance((0.95, 0.6, 0.3), VISIBLE_NM), blackbody(3200.0)
+    x, off = axis.x_of_nm(VISIBLE_NM), {}
+    for bins in (None, 8):
+        edges, drawn = cut_by_tints(WHOLE, 1, 32, curve[None], light, axis, 0.03, bins=bins), np.zeros(401)
+        for lo, hi in pairwise(edges):
+            inside, places = (x >= lo) & (x <= hi), np.array([lo, 0.5 * (lo + hi), hi])
+            drawn[inside] = np.interp(x[inside], places, np.interp(places, x, curve))
+        of_bin = bin_of_nm(8)
+        more, held = (np.bincount(of_bin, some * light.density) for some in (drawn - curve, curve))
+        off[bins] = np.abs(more / held)[held > 2e-3 * held.sum()].max()
+    assert off[8] < TOLERANCE < 2.0 * TOLERANCE < off[None], off
+
+
+def test_bins_are_even_and_the_last_holds_both_its_ends() -> None:
+    assert np.bincount(bin_of_nm(8)).tolist() == [50] * 7 + [51]
+    assert np.bincount(bin_of_nm(1)).tolist() == [401]
