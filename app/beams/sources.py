@@ -11,7 +11,7 @@ from ..model.geometry.mesh import Mesh
 from ..model.lights.light import Light
 from ..model.optics.spectral_tables import SpectralAxis, cumulative
 from ..model.optics.spectrum import Spectrum
-from ..model.tint_bands import cut_by_tints
+from ..model.tint_bands import cut_by_tints, ends_of
 from .facets import BLACK, SAMPLES, BeamScene
 from .find import Emission
 from .rays import PARALLEL, POINT, SOURCE
@@ -99,7 +99,8 @@ def emissions(
 
 def colour_edges(scene: BeamScene, light: Spectrum, axis: SpectralAxis, bins: int | None = None) -> tuple[float, ...]:
     """x between which three weights a beam follow what absorbs and what is coloured, also within each of `bins`."""
-    return tuple(cut_by_tints((0.0, 1.0), 1, _MOST_BANDS, scene.tints, light, axis, bins=bins).tolist())
+    ends = ends_of(light, axis) if np.any(light.density > 0.0) else (0.0, 1.0)
+    return tuple(cut_by_tints(ends, 1, _MOST_BANDS, scene.tints, light, axis, bins=bins).tolist())
 
 
 def _specular_corners(scene: BeamScene) -> np.ndarray:

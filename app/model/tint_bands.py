@@ -85,6 +85,13 @@ def cut_by_tints(
     return np.array(_cut(tuple(ends), least, most, tolerance, bins or 1, *arrays))
 
 
+def ends_of(light: Spectrum, axis: SpectralAxis) -> tuple[float, float]:
+    """x between which a light has power, half a nanometre beyond."""
+    low, high = light.support_nm()
+    first, last = VISIBLE_NM[0], VISIBLE_NM[-1]
+    return float(axis.x_of_nm(max(low - 0.5, first))), float(axis.x_of_nm(min(high + 0.5, last)))
+
+
 def bin_of_nm(bins: int) -> np.ndarray:
     """int (401,): which of `bins` even bins between the ends of `VISIBLE_NM` holds each of its nanometres."""
     return np.minimum((np.arange(len(VISIBLE_NM)) * bins) // (len(VISIBLE_NM) - 1), bins - 1)

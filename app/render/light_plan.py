@@ -15,7 +15,7 @@ from ..model.features import Features
 from ..model.optics.spectral_tables import CumulativeSpectrum
 from ..model.scene import Scene
 from ..model.settings import RenderSettings, divides_spectrum
-from ..model.tint_bands import TOLERANCE, cut_by_tints
+from ..model.tint_bands import TOLERANCE, cut_by_tints, ends_of
 from ..passes.emission_domain import EmissionDomain
 from ..passes.pilot import MAX_LIGHT_POINTS, Pilot, PilotFit
 from ..passes.trace import Band, LatticeSlice
@@ -177,16 +177,14 @@ class Planner:
             middles = axis.x_of_nm(0.5 * (edges_nm[:-1] + edges_nm[1:]))
         else:
             count = fit.band_count() if divides_spectrum(method) and self.features.spectral_groups else 1
-            lo_nm, hi_nm = max(lo_nm - 0.5, 380.0), min(hi_nm + 0.5, 780.0)
-            ends = float(axis.x_of_nm(lo_nm)), float(axis.x_of_nm(hi_nm))
+            ends = ends_of(self.scene.lights[light].spectral_power, axis)
             edges = np.linspace(*ends, count + 1)
             edges[1:-1] += aside * (edges[1] - edges[0])
             if self._tinted and len(self.buffers.tints):
                 spectrum = self.scene.lights[light].spectral_power
                 tolerance, bins = fit.tint_tolerance(), self.settings.bins
                 if self.features.beams and not self.features.spectral_groups:
-                    # What beams leave to photons has their bands (`beams.sources.colour_edges`), of the whole axis.
-                    ends, tolerance = (0.0, 1.0), TOLERANCE
+                    tolerance = TOLERANCE  # what beams leave to photons has their bands: `beams.sources.colour_edges`
                 edges = cut_by_tints(ends, count, MAX_BANDS, self.buffers.tints, spectrum, axis, tolerance, bins)
             middles = 0.5 * (edges[:-1] + edges[1:])
         return tuple(

@@ -112,7 +112,7 @@ def stack_transmittance(*indices: float) -> float:
 # -- spectral bins and layers ---------------------------------------------------------------
 
 
-@pytest.mark.parametrize("bins", [4, 8, 32])
+@pytest.mark.parametrize("bins", [8, *(pytest.param(bins, marks=pytest.mark.slow) for bins in (4, 32))])
 def test_bins_are_named_and_add_up_to_the_picture(render: Render, bins: int) -> None:
     scene = beam(PRISM, x=0.25, spectrum="E")  # flat inside a bin, so that its mean colour is exact
     spectral = render(scene, f"--layer caustic --photons 20k --bins {bins}", ".exr")
