@@ -99,8 +99,7 @@ def emissions(
 
 def colour_edges(scene: BeamScene, light: Spectrum, axis: SpectralAxis, bins: int | None = None) -> tuple[float, ...]:
     """x between which three weights a beam follow what absorbs and what is coloured, also within each of `bins`."""
-    ends = ends_of(light, axis) if np.any(light.density > 0.0) else (0.0, 1.0)
-    return tuple(cut_by_tints(ends, 1, _MOST_BANDS, scene.tints, light, axis, bins=bins).tolist())
+    return tuple(cut_by_tints(ends_of(light, axis), 1, _MOST_BANDS, scene.tints, light, axis, bins=bins).tolist())
 
 
 def _specular_corners(scene: BeamScene) -> np.ndarray:

@@ -86,7 +86,7 @@ def cut_by_tints(
 
 
 def ends_of(light: Spectrum, axis: SpectralAxis) -> tuple[float, float]:
-    """x between which a light has power, half a nanometre beyond."""
+    """x between which a light has power, half a nanometre beyond; of one that has none, all."""
     low, high = light.support_nm()
     first, last = VISIBLE_NM[0], VISIBLE_NM[-1]
     return float(axis.x_of_nm(max(low - 0.5, first))), float(axis.x_of_nm(min(high + 0.5, last)))
@@ -156,7 +156,8 @@ def _cut(
 
 def _kept_apart(bins: int, curve: np.ndarray, power: np.ndarray) -> list[np.ndarray]:
     """`power` (401,) bin by bin, zero outside of each; those without light left out."""
-    parts = [np.where(bin_of_nm(bins) == number, power, 0.0) for number in range(bins)]
+    of_nm = bin_of_nm(bins)
+    parts = [np.where(of_nm == number, power, 0.0) for number in range(bins)]
     return [part for part in parts if float(curve @ part) > _LEAST_SHARE * float(curve @ power)]
 
 

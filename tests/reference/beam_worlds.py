@@ -121,8 +121,8 @@ class Rig:
         special = [i for i, o in enumerate(self.scene.objects) if o.material.is_specular]
         corners = np.concatenate([self.meshes[i].vertices for i in special])
         if it.is_parallel and it.has_place:
-            corners = RIM if it.is_disc else 0
-            return Lamp(np.array(it.position), forward, right, up, it.half_extent, it.is_disc, corners=corners)
+            rim = RIM if it.is_disc else 0
+            return Lamp(np.array(it.position), forward, right, up, it.half_extent, it.is_disc, corners=rim)
         if it.is_parallel:
             middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
             tangent = np.tan(it.angular_radius)

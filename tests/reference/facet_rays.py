@@ -136,13 +136,22 @@ def _nearest(o, d, edges, normal, owner, ball, nearest, found):
 
 
 @numba.njit(cache=True, nogil=True)
+def _circumradius(corners):
+    """Of the regular polygon of the unit disc's area, or of the disc."""
+    if corners == 0:
+        return 1.0
+    step = 2.0 * np.pi / corners
+    return np.sqrt(step / np.sin(step))
+
+
+@numba.njit(cache=True, nogil=True)
 def _is_off(a, b, corners):
     """Whether a place is outside of the unit disc, or of the regular polygon of its area."""
     if corners == 0:
         return a * a + b * b > 1.0
     step = 2.0 * np.pi / corners
     from_middle = (np.arctan2(b, a) + 0.5 * step) % step - 0.5 * step
-    return np.hypot(a, b) * np.cos(from_middle) > np.sqrt(step / np.sin(step)) * np.cos(0.5 * step)
+    return np.hypot(a, b) * np.cos(from_middle) > _circumradius(corners) * np.cos(0.5 * step)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -192,10 +201,10 @@ def _trace(
     np.random.seed(seed)
     o, d, n = np.empty(3), np.empty(3), np.empty(3)
     nearest, found = np.empty(1), np.empty(16, np.int64)
+    reach = _circumradius(corners)
     for _ in range(rays):
         a, b = 2.0 * np.random.random() - 1.0, 2.0 * np.random.random() - 1.0
         if lamp_kind & 1:
-            reach = 1.0 if corners == 0 else np.sqrt(2.0 * np.pi / corners / np.sin(2.0 * np.pi / corners))
             a, b = reach * a, reach * b
             while _is_off(a, b, corners):
                 a = reach * (2.0 * np.random.random() - 1.0)

@@ -30,17 +30,21 @@ def lines(width_nm: float, depth: float = 3.0) -> np.ndarray:
     return np.exp(-depth * depths)[None]
 
 
-def misplaced(edges: np.ndarray, curve: np.ndarray, axis: SpectralAxis, *, signed: bool = False) -> float:
-    """Share of the light that straight weights misplace, told one band after the other; `signed`: what they add."""
-    x, power = axis.x_of_nm(VISIBLE_NM), WHITE.density
-    drawn = np.zeros(401)
+def added(edges: np.ndarray, curve: np.ndarray, axis: SpectralAxis) -> np.ndarray:
+    """What straight weights, told one band after the other, add to a curve (401,)."""
+    x, drawn = axis.x_of_nm(VISIBLE_NM), np.zeros(401)
     for lo, hi in pairwise(edges):
         inside = (x >= lo) & (x <= hi)
         places = np.array([lo, 0.5 * (lo + hi), hi])
         order = np.argsort(x)
         drawn[inside] = np.interp(x[inside], places, np.interp(places, x[order], curve[order]))
-    more = drawn - curve if signed else np.abs(drawn - curve)
-    return float((power * more).sum() / (power * curve).sum())
+    return drawn - curve
+
+
+def misplaced(edges: np.ndarray, curve: np.ndarray, axis: SpectralAxis, *, signed: bool = False) -> float:
+    """Share of the light that straight weights misplace; `signed`: what they add."""
+    more, power = added(edges, curve, axis), WHITE.density
+    return float((power * (more if signed else np.abs(more))).sum() / (power * curve).sum())
 
 
 @pytest.mark.parametrize("axis", AXES.values(), ids=AXES)
@@ -165,14 +169,10 @@ def test_curves_of_a_scene() -> None:
 def test_each_bin_that_is_kept_holds_its_own_light(axis: SpectralAxis) -> None:
     """Copper under a warm lamp: what is missed where the light is dim is nothing to all of it."""
     curve, light = mirror_reflectance((0.95, 0.6, 0.3), VISIBLE_NM), blackbody(3200.0)
-    x, off = axis.x_of_nm(VISIBLE_NM), {}
+    off = {}
     for bins in (None, 8):
-        edges, drawn = cut_by_tints(WHOLE, 1, 32, curve[None], light, axis, 0.03, bins=bins), np.zeros(401)
-        for lo, hi in pairwise(edges):
-            inside, places = (x >= lo) & (x <= hi), np.array([lo, 0.5 * (lo + hi), hi])
-            drawn[inside] = np.interp(x[inside], places, np.interp(places, x, curve))
-        of_bin = bin_of_nm(8)
-        more, held = (np.bincount(of_bin, some * light.density) for some in (drawn - curve, curve))
+        edges = cut_by_tints(WHOLE, 1, 32, curve[None], light, axis, 0.03, bins=bins)
+        more, held = (np.bincount(bin_of_nm(8), some * light.density) for some in (added(edges, curve, axis), curve))
         off[bins] = np.abs(more / held)[held > 2e-3 * held.sum()].max()
     assert off[8] < TOLERANCE < 2.0 * TOLERANCE < off[None], off
 
