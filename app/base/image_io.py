@@ -28,11 +28,12 @@ from .atomic import atomic_output
 from .errors import BrokenPictureError, UserError
 from .glare import with_glare
 from .tone_map import auto_exposure, srgb_eotf, tone_map_8bit
-from .webp_film import check_size
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".exr", ".npy")
 SHOWN_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp")
-"""Of pictures for looking at: tone mapped, 8 bits."""
+"""Suffixes of pictures for looking at: tone mapped, 8 bits."""
+LARGEST_WEBP_SIDE = 16383
+"""Pixels a side that the format can say."""
 _READ_SUFFIXES = (".png", ".exr", ".npy")
 MAX_PIXELS = 1 << 26
 """Of a picture that is read; 805 MB as float32: a mistake rather than a wish."""
@@ -177,7 +178,7 @@ def save_codes(path: Path, codes: np.ndarray) -> None:
         texts.add(b"sRGB", b"\x00")  # rendering intent: perceptual
         Image.fromarray(codes).save(path, format="PNG", pnginfo=texts, compress_level=6)
     elif suffix == ".webp":
-        check_size(path, (codes.shape[1], codes.shape[0]))
+        check_webp_size(path, (codes.shape[1], codes.shape[0]))
         # Without loss: its other way halves the resolution of colours, and those of a caustic change from pixel to
         # pixel. `quality` is how hard it tries.
         Image.fromarray(codes).save(path, format="WEBP", lossless=True, quality=50, method=3)
@@ -303,3 +304,12 @@ def _check_pixels(width: int, height: int) -> None:
     """Before memory is taken for them."""
     if width * height > MAX_PIXELS:
         raise ValueError(f"{width} × {height} pixels are more than {MAX_PIXELS >> 20} million")
+
+
+def check_webp_size(path: Path, size: tuple[int, int]) -> None:
+    """Raise `UserError` where `path` is a WebP, still or animated, that cannot be as large."""
+    if path.suffix.lower() == ".webp" and max(size) > LARGEST_WEBP_SIDE:
+        raise UserError(
+            f"cannot write {path}: a WebP has at most {LARGEST_WEBP_SIDE} pixels a side, not {size[0]}×{size[1]}; "
+            "choose a smaller size or another format"
+        )

@@ -1,4 +1,5 @@
-"""Where finished frames go: an MP4, a GIF, an animated WebP, or a folder of numbered PNGs that can be resumed."""
+"""Where finished frames go: a film (MP4, GIF or animated WebP), which ffmpeg encodes as frames come, or a folder of
+numbered PNGs that can be resumed."""
 
 from __future__ import annotations
 
@@ -17,14 +18,25 @@ import numpy as np
 from . import files
 from .atomic import atomic_output, check_writable
 from .errors import UserError
-from .film import Film
-from .gif import Gif
+from .image_io import check_webp_size
 from .locks import locked
-from .webp_film import WebpFilm, check_size
 
 MANIFEST = "animation.json"
 FILM_SUFFIXES = (".mp4", ".gif", ".webp")
-"""Of animations that are one file."""
+"""Suffixes of animations that are one file."""
+_HIGHEST_RATE = {".gif": 50.0, ".webp": 90.0}
+"""Frames a second; browsers slow down films whose frames are shown more briefly."""
+_ENCODERS = {
+    # Players want even sides; an odd one gets a black line. The colour space is named, so that colours come out as they
+    # went in.
+    ".mp4": "-vf pad=ceil(iw/2)*2:ceil(ih/2)*2,scale=out_color_matrix=bt709:out_range=tv -c:v libx264 -preset medium "
+    "-crf 16 -pix_fmt yuv420p -colorspace bt709 -color_primaries bt709 -color_trc iec61966-2-1 "
+    "-movflags +faststart -f mp4",
+    # 256 colours chosen for each frame, dithered.
+    ".gif": "-lavfi split[a][b];[a]palettegen=stats_mode=single[p];[b][p]paletteuse=new=1:dither=floyd_steinberg "
+    "-loop 0 -f gif",
+    ".webp": "-c:v libwebp_anim -quality 90 -compression_level 4 -pix_fmt yuv420p -loop 0 -f webp",
+}
 _CLAIM = ".claim"
 _DIGITS = 4
 _PNG_BEGIN, _PNG_END = b"\x89PNG\r\n\x1a\n", b"IEND\xaeB`\x82"
@@ -46,26 +58,41 @@ class Sink(Protocol):
         """Make what was written usable."""
 
 
-class Movie(Film):
-    """An H.264 MP4 by ffmpeg, which `imageio-ffmpeg` brings along; appears when it is closed."""
+class Film:
+    """A movie, GIF or animated WebP, encoded by the ffmpeg that `imageio-ffmpeg` brings; appears when it is closed, and
+    cannot be resumed."""
 
     def __init__(self, path: Path, size: tuple[int, int], fps: float) -> None:
-        """Raises `UserError` where the place cannot be written or there is no ffmpeg."""
-        check_writable(path)
-        super().__init__(size)
-        self._path = path
+        """Raises `UserError` where the place cannot be written, the format holds no such size, or there is no
+        ffmpeg."""
+        check_film(path, size)
+        self._path, self._size = path, size
         self._output = atomic_output(path)
         temporary = self._output.__enter__()
-        # A group of its own: Ctrl-C is for us, and the movie is finished then.
-        command = [_ffmpeg(), *_arguments(size, fps), "-y", str(temporary)]
+        # A process group of its own: Ctrl-C is meant for this program, which then finishes the film.
         self._process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True
+            [_ffmpeg(), *_arguments(path.suffix.lower(), size, fps), "-y", str(temporary)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            start_new_session=True,
         )
         self.frames = 0
 
+    def has(self, index: int) -> bool:
+        """False: a film cannot be resumed."""
+        return False
+
+    @contextmanager
+    def claimed(self, index: int) -> Iterator[bool]:
+        """True within the block: nobody else writes this film."""
+        yield True
+
     def write(self, index: int, codes: np.ndarray) -> None:
-        """Append a frame; raises `UserError` when ffmpeg has given up."""
-        self._check(codes)
+        """Append a frame. Raises `UserError` when ffmpeg has stopped, ValueError where `codes` is no frame."""
+        width, height = self._size
+        if codes.shape != (height, width, 3) or codes.dtype != np.uint8:
+            raise ValueError(f"a frame is uint8 {(height, width, 3)}, got {codes.dtype} {codes.shape}")
         assert self._process.stdin is not None
         try:
             self._process.stdin.write(np.ascontiguousarray(codes).data)
@@ -249,43 +276,10 @@ def _is_whole_png(path: Path) -> bool:
         return False
 
 
-def _arguments(size: tuple[int, int], fps: float) -> list[str]:
-    width, height = size
-    return [
-        "-loglevel",
-        "error",
-        "-f",
-        "rawvideo",
-        "-pix_fmt",
-        "rgb24",
-        "-s",
-        f"{width}x{height}",
-        "-r",
-        f"{fps:g}",
-        "-i",
-        "-",
-        # Players want even sides; an odd one gets a black line. Colours are told, so that they come out as they are.
-        "-vf",
-        "pad=ceil(iw/2)*2:ceil(ih/2)*2,scale=out_color_matrix=bt709:out_range=tv",
-        "-c:v",
-        "libx264",
-        "-preset",
-        "medium",
-        "-crf",
-        "16",
-        "-pix_fmt",
-        "yuv420p",
-        "-colorspace",
-        "bt709",
-        "-color_primaries",
-        "bt709",
-        "-color_trc",
-        "iec61966-2-1",
-        "-movflags",
-        "+faststart",
-        "-f",
-        "mp4",
-    ]
+def _arguments(suffix: str, size: tuple[int, int], fps: float) -> list[str]:
+    rate = min(fps, _HIGHEST_RATE.get(suffix, fps))
+    source = f"-loglevel error -f rawvideo -pix_fmt rgb24 -s {size[0]}x{size[1]} -r {rate:g} -i -"
+    return [*source.split(), *_ENCODERS[suffix].split()]
 
 
 def _ffmpeg() -> str:
@@ -295,7 +289,7 @@ def _ffmpeg() -> str:
         return imageio_ffmpeg.get_ffmpeg_exe()
     except RuntimeError as error:
         raise UserError(
-            "no ffmpeg was found to write an MP4: install one, or give a folder for a sequence of PNGs"
+            "no ffmpeg was found to write a film: install one, or give a folder for a sequence of PNGs"
         ) from error
 
 
@@ -306,15 +300,11 @@ def _last_line(told: bytes) -> str:
 
 def open_sink(
     path: Path, size: tuple[int, int], fps: float, description: Mapping[str, object], overwrite: bool = False
-) -> Movie | Gif | WebpFilm | Frames:
+) -> Film | Frames:
     """The sink that `path` asks for: one of `FILM_SUFFIXES`, or a folder (a name without a suffix). Raises
     `UserError`."""
-    if path.suffix.lower() == ".mp4":
-        return Movie(path, size, fps)
-    if path.suffix.lower() == ".gif":
-        return Gif(path, size, fps)
-    if path.suffix.lower() == ".webp":
-        return WebpFilm(path, size, fps)
+    if path.suffix.lower() in FILM_SUFFIXES:
+        return Film(path, size, fps)
     check_folder(path)
     return Frames(path, description, overwrite)
 
@@ -330,6 +320,5 @@ def check_folder(path: Path) -> None:
 
 def check_film(path: Path, size: tuple[int, int]) -> None:
     """Raise `UserError` where the film `path` of pictures of `size` could not be written at the end."""
-    if path.suffix.lower() == ".webp":
-        check_size(path, size)
+    check_webp_size(path, size)
     check_writable(path)

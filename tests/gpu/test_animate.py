@@ -11,7 +11,7 @@ import imageio_ffmpeg
 import numpy as np
 import pytest
 from spectrasplat.base.errors import UserError
-from spectrasplat.base.movie import Frames, Movie
+from spectrasplat.base.movie import Film, Frames
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.edit.animation import Track, keyed, turntable
 from spectrasplat.edit.parameters import Stage, apply
@@ -171,16 +171,16 @@ def read_movie(path: Path, width: int, height: int) -> np.ndarray:
 def test_a_movie_stopped_early_plays(gl, stage: Stage, tmp_path: Path) -> None:
     made = turntable(stage, 6, 24.0)
     path = tmp_path / "out.mp4"
-    draw(gl, made, Movie(path, (96, 54), 24.0), stop_after=0.5)
+    draw(gl, made, Film(path, (96, 54), 24.0), stop_after=0.5)
     assert len(read_movie(path, 96, 54)) == 3
-    draw(gl, made, Movie(tmp_path / "none.mp4", (96, 54), 24.0), stop_after=0.0)
+    draw(gl, made, Film(tmp_path / "none.mp4", (96, 54), 24.0), stop_after=0.0)
     assert [p.name for p in tmp_path.iterdir()] == ["out.mp4"]
 
 
 def test_colours_survive_the_movie(tmp_path: Path) -> None:
     colours = np.array([(255, 0, 0), (0, 200, 0), (30, 30, 220), (128, 128, 128), (240, 240, 240)], np.uint8)
     frame = np.repeat(np.repeat(colours[None], 32, axis=0), 32, axis=1)
-    movie = Movie(tmp_path / "c.mp4", (160, 32), 10.0)
+    movie = Film(tmp_path / "c.mp4", (160, 32), 10.0)
     for index in range(3):
         movie.write(index, frame)
     movie.close()
@@ -190,9 +190,9 @@ def test_colours_survive_the_movie(tmp_path: Path) -> None:
 
 
 def test_odd_sides_and_refusals(tmp_path: Path) -> None:
-    movie = Movie(tmp_path / "odd.mp4", (33, 17), 10.0)
+    movie = Film(tmp_path / "odd.mp4", (33, 17), 10.0)
     movie.write(0, np.full((17, 33, 3), 128, np.uint8))
     movie.close()
     assert read_movie(tmp_path / "odd.mp4", 34, 18).shape == (1, 18, 34, 3)
     with pytest.raises(UserError, match="does not exist"):
-        Movie(tmp_path / "gone" / "x.mp4", (32, 32), 10.0)
+        Film(tmp_path / "gone" / "x.mp4", (32, 32), 10.0)
