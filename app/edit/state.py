@@ -74,10 +74,13 @@ class Compare:
     """With the method "file": the picture."""
     wipe: float = 0.5
     """Place of the wipe's line, share of the width."""
-    plot: bool = False
-    """Error against time of the running method and the chosen other."""
     holding: bool = False
     """The compare key is down."""
+
+    @property
+    def is_active(self) -> bool:
+        """Whether the other picture is wanted."""
+        return self.mode != "off"
 
 
 @dataclass(frozen=True)

@@ -357,7 +357,7 @@ PANELS: tuple[Command, ...] = (
     panel("View", "view", "Exposure, tone, false colour, single wavelength, camera, sampling."),
     panel("Timing", "timing", "Frame time by pass, photons, memory, fall-backs."),
     panel("Spectrum", "spectrum", "The spectrum under the cursor."),
-    panel("Compare", "compare", "Reference, wipe, error map, error against time."),
+    panel("Compare", "compare", "Reference, wipe, error map, histograms."),
     panel("Rays", "rays", "Deviation and focal length of the ray overlay, by wavelength."),
     panel("Lesson", "lesson", "Six lessons: a scene each, a few sentences, what to try."),
     panel("History", "history", "All steps that can be undone."),

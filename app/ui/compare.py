@@ -23,10 +23,8 @@ from ..render.viewer.dirty_level import DirtyLevel
 from ..render.viewer.invalidation import dirty_level
 from .compared_with import FilePicture, GlassSwap, Histogram, Histograms
 from .direct_picture import SAMPLES, DirectPicture
-from .error_curves import ErrorCurves
 from .panels.methods import METHOD_NAMES
-from .reference_thread import MEASURED_FROM, ReferenceThread, Snapshot
-from .view_model import ErrorCurve
+from .reference_thread import ReferenceThread, Snapshot
 
 if TYPE_CHECKING:
     import moderngl
@@ -66,8 +64,6 @@ class Comparison:
         self._direct: DirectPicture | None = None
         self._composed: moderngl.Texture | None = None
         self._composed_from = _NOTHING
-        self._curves = ErrorCurves()
-        self._seconds: dict[str, tuple[float, int]] = {}
         self._compare: Compare | None = None
         self.is_stale = False
         self._swap = GlassSwap()
@@ -95,7 +91,7 @@ class Comparison:
 
     @property
     def _picture(self) -> moderngl.Texture | None:
-        if self._compare is None or not is_active(self._compare):
+        if self._compare is None or not self._compare.is_active:
             return None
         if self._shows_reference:
             return self._composed
@@ -128,14 +124,9 @@ class Comparison:
         return "Reference" if snapshot is None else f"Reference, {self._noise(snapshot)}"
 
     @property
-    def curves(self) -> tuple[ErrorCurve, ...]:
-        """Error against time of the running method and of the other."""
-        return self._curves.curves
-
-    @property
     def progress(self) -> float | None:
         """How far the other picture is, 0 to 1."""
-        if self._compare is None or not is_active(self._compare) or self._begun is None:
+        if self._compare is None or not self._compare.is_active or self._begun is None:
             return None
         if self._shows_reference:
             return None if self._thread is None else self._thread.fraction
@@ -146,7 +137,7 @@ class Comparison:
     @property
     def text(self) -> str:
         """What the other picture is."""
-        if self._compare is None or not is_active(self._compare) or self._begun is None:
+        if self._compare is None or not self._compare.is_active or self._begun is None:
             return ""
         if self._compare.method == FILE:
             return self._file_text
@@ -168,11 +159,6 @@ class Comparison:
             f"Reference: light tracing in float64 without shared code, {_counted(snapshot.photons)}, "
             f"{self._noise(snapshot)}."
         )
-        if self._compare.plot and not self._is_known(snapshot):
-            note += (
-                f" Errors are measured from {MEASURED_FROM * self._begun.width * self._begun.height / 1e6:.1f} "
-                "million on."
-            )
         if not snapshot.directly.all():
             note += " Striped: what is seen behind glass or in mirrors, which is not compared."
         if self._begun.scene.render.bounces:
@@ -184,7 +170,7 @@ class Comparison:
     @property
     def is_busy(self) -> bool:
         """It would use more time (the window must not sleep)."""
-        if self._compare is None or not is_active(self._compare) or self.is_stale:
+        if self._compare is None or not self._compare.is_active or self.is_stale:
             return False
         thread = self._thread if self._needs_reference else None
         refers = thread is not None and not thread.is_done and thread.problem is None
@@ -229,8 +215,7 @@ class Comparison:
         """Follow `state` and work for about `budget_s`; `running` is the engine whose picture is compared. Without a
         budget there is only the processor left to leave alone, once there is something to compare with."""
         self._compare = state.compare
-        self._count_seconds(running, state.method)
-        if not is_active(state.compare) or running is None:
+        if not state.compare.is_active or running is None:
             self._pause()
             return
         wanted = state.live_inputs
@@ -261,8 +246,6 @@ class Comparison:
             self._pause()
         if self._needs_engine:
             self._advance_engine(running.target_photons, budget_s)
-        if state.compare.plot:
-            self._measure(state, running)
 
     def release(self) -> None:
         """Stop and free everything. Before the running engine is released."""
@@ -298,7 +281,7 @@ class Comparison:
     @property
     def _needs_reference(self) -> bool:
         assert self._compare is not None
-        return self._compare.method == REFERENCE or self._compare.plot
+        return self._compare.method == REFERENCE
 
     @property
     def _needs_engine(self) -> bool:
@@ -322,7 +305,6 @@ class Comparison:
                 owned.release()
         self._thread = self._direct = self._composed = None
         self._composed_from = _NOTHING
-        self._curves = ErrorCurves()
 
     def _advance_engine(self, target_photons: int, budget_s: float) -> None:
         assert self._begun is not None
@@ -345,7 +327,6 @@ class Comparison:
         if budget_s <= 0.0:
             return
         self._engine.advance(budget_s, False)
-        self._count_seconds(self._engine, self._method)
 
     def _compose(self, running: Engine, budget_s: float) -> None:
         """The reference's caustics on the picture without caustics. Behind glass there is no reference: stripes over
@@ -370,9 +351,6 @@ class Comparison:
         if self._composed is None:
             self._composed = self._context.ctx.texture((width, height), 4, dtype="f4")
         self._composed.write(np.ascontiguousarray(texels))
-        if not self._is_known(snapshot) or not self._direct.is_done:
-            return
-        self._curves.set_reference(self._direct.rgb + snapshot.caustic_rgb, snapshot.variance_xyz, snapshot.directly)
 
     def _is_known(self, snapshot: Snapshot) -> bool:
         """Whether the reference's own error is known, or will not be known better."""
@@ -385,32 +363,6 @@ class Comparison:
         if self._direct is None or self._direct.is_done:
             return words
         return f"{words}, direct light {self._direct.samples} of {SAMPLES[-1]} samples"
-
-    def _measure(self, state: State, running: Engine) -> None:
-        engines = {state.method: running}
-        if self._engine is not None and self._needs_engine and state.compare.method != GLASS:
-            engines[self._method] = self._engine
-        for method, engine in engines.items():
-            stats, picture = engine.stats, engine.picture
-            if picture is None or picture.size != (state.viewport_size[0], state.viewport_size[1]):
-                continue
-            if stats.resolution_scale == 1.0 and self._curves.wants(method, stats.photons):
-                self._curves.add(method, self._seconds[method][0], stats.photons, _read(picture))
-
-    def _count_seconds(self, engine: Engine | None, method: str) -> None:
-        """Seconds that the engine's present picture took to trace and to splat."""
-        if engine is None:
-            return
-        stats = engine.stats
-        seconds, photons = self._seconds.get(method, (0.0, 0))
-        if stats.photons < photons:
-            seconds = 0.0
-        self._seconds[method] = (seconds + stats.trace_s + stats.splat_s, stats.photons)
-
-
-def is_active(compare: Compare) -> bool:
-    """Whether anything asks for the other picture."""
-    return compare.mode != "off" or compare.plot
 
 
 def _counted(photons: int) -> str:

@@ -123,7 +123,7 @@ def _work_beside(session: Session, budget_s: float, only_exports: bool = False) 
         session.messages.tell(
             f"Comparing or exporting failed by a fault of the program ({brief(error)}).", is_error=True
         )
-        session.state = replace(session.state, compare=replace(session.state.compare, mode="off", plot=False))
+        session.state = replace(session.state, compare=replace(session.state.compare, mode="off"))
         return budget_s
     finally:
         session.jobs_s = session.clock() - started

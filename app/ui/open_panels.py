@@ -18,4 +18,4 @@ def set_open(state: State, field: str, is_open: bool) -> State:
         return state
     compare = state.compare
     mode: CompareMode = "off" if not is_open else "wipe" if compare.mode == "off" else compare.mode
-    return replace(state, compare=replace(compare, mode=mode, plot=compare.plot and is_open))
+    return replace(state, compare=replace(compare, mode=mode))

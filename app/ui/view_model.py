@@ -57,16 +57,6 @@ class SceneEntry:
 
 
 @dataclass(frozen=True)
-class ErrorCurve:
-    """Error of a running method against the reference."""
-
-    method: str
-    seconds: np.ndarray
-    error: np.ndarray
-    """relMSE."""
-
-
-@dataclass(frozen=True)
 class Message:
     """A sentence to the user that fades after a while; `is_error` stays until it is closed."""
 
@@ -129,7 +119,6 @@ class ViewModel:
     """Unsaved changes: the dialogue with Save, Discard and Cancel is open."""
     asks_about_export: bool = False
     """Somebody wants to quit while an export runs: the dialogue with Finish, Stop and Cancel is open."""
-    curves: tuple[ErrorCurve, ...] = ()
     reference_progress: float | None = None
     """How far the picture that compare modes show is, 0 to 1; None where none was begun."""
     compare_text: str = ""

@@ -38,7 +38,6 @@ def view_model_of(session: Session) -> ViewModel:
         recovery_time="" if session.recovery is None else session.recovery.written,
         asks_to_quit=session.asks_to_quit,
         asks_about_export=session.asks_about_export,
-        curves=comparison.curves,
         reference_progress=comparison.progress,
         compare_text=comparison.text,
         compare_label=comparison.label,

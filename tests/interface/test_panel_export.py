@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 from imgui_bundle import imgui
 from panel_rig import PanelRig, scene_state
@@ -14,7 +13,7 @@ from spectrasplat.edit.state import Compare, Key, State
 from spectrasplat.ui.panels import export_panel, file_browser
 from spectrasplat.ui.panels.compare_panel import draw_compare
 from spectrasplat.ui.panels.export_panel import draw_export
-from spectrasplat.ui.view_model import ErrorCurve, JobInfo, ViewModel
+from spectrasplat.ui.view_model import JobInfo, ViewModel
 
 
 def with_browser(state: State, view_model: ViewModel) -> State:
@@ -163,17 +162,6 @@ def test_a_picture_file_has_no_progress(gl) -> None:
         rig.frame(2)
         assert "File" in rig.items.items
         assert not {"Progress", "Start again"} & rig.items.items.keys()
-
-
-def test_curves_are_drawn_even_where_an_error_is_zero(gl) -> None:
-    seconds = np.geomspace(0.1, 10.0, 8)
-    curves = (ErrorCurve("srd", seconds, 0.1 / seconds), ErrorCurve("stochastic", seconds, np.zeros(8)))
-    state = replace(scene_state(), compare=Compare(plot=True))
-    with PanelRig(gl, draw_compare, state, (900, 320)) as rig:
-        before = rig.screenshot()
-        rig.view_model = ViewModel(curves=curves)
-        rig.frame(3)
-        assert np.any(rig.screenshot() != before)
 
 
 def test_values_stand_within_a_wide_panel(gl) -> None:

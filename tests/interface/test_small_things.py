@@ -112,7 +112,7 @@ def test_opening_compare_begins_to_compare_and_closing_it_ends_it(gl: Context) -
     rig.state = command("Panel: Compare").act(rig.state, rig.view_model)
     rig.frame(3)
     assert rig.state.preferences.panels.compare and rig.state.compare.mode == "wipe"
-    rig.state = replace(rig.state, compare=replace(rig.state.compare, mode="beside", plot=True))
+    rig.state = replace(rig.state, compare=replace(rig.state.compare, mode="beside"))
     rig.key(imgui.Key.h)  # panels out of the way: the pictures stay
     assert rig.state.compare.mode == "beside"
     rig.key(imgui.Key.h)
@@ -121,7 +121,7 @@ def test_opening_compare_begins_to_compare_and_closing_it_ends_it(gl: Context) -
     rig.key(imgui.Key.escape)
     rig.frame(2)
     assert not rig.state.preferences.panels.compare
-    assert rig.state.compare.mode == "off" and not rig.state.compare.plot
+    assert rig.state.compare.mode == "off"
     rig.release()
 
 

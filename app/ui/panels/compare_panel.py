@@ -1,4 +1,4 @@
-"""Against a reference or another method: what is shown, what it is, and how fast each gets there."""
+"""The picture compared with a reference or another method: what is shown, and what it is."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ...edit.state import Compare, CompareMode, State
 from ...model.settings import METHODS
 from .. import item_rects, theme
 from ..compared_with import LUMINANCE
-from ..view_model import ErrorCurve, ViewModel
+from ..view_model import ViewModel
 from . import file_browser, rows, widgets
 from .methods import METHOD_NAMES, METHOD_TIPS
 
@@ -56,9 +56,10 @@ def draw_compare(state: State, view_model: ViewModel) -> State:
         state = _controls(state, view_model)
         state = _progress(state, view_model)
         _values(state, view_model)
-        return _drawn(state, view_model, theme.em(13), theme.em(11))
+        _histogram(view_model, theme.em(11))
+        return state
     # Below the picture it is low and wide: side by side nothing has to be scrolled to.
-    is_widest = width >= theme.em(_WIDEST_EM) and is_comparing(state.compare)
+    is_widest = width >= theme.em(_WIDEST_EM) and state.compare.is_active
     if imgui.begin_table("##compare", 3 if is_widest else 2, imgui.TableFlags_.sizing_stretch_prop):
         stretch = imgui.TableColumnFlags_.width_stretch
         for name, share in (("controls", 1.0), *((("progress", 1.0),) if is_widest else ()), ("plot", 1.2)):
@@ -76,16 +77,9 @@ def draw_compare(state: State, view_model: ViewModel) -> State:
         if not is_widest:
             _values(state, view_model)
         room = max(imgui.get_content_region_avail().y, theme.em(_LOWEST_PLOT_EM))
-        state = _drawn(state, view_model, room, room)
+        _histogram(view_model, room)
         imgui.end_table()
     return state
-
-
-def _drawn(state: State, view_model: ViewModel, plot_height: float, histogram_height: float) -> State:
-    """Curves or histogram."""
-    if not state.compare.plot:
-        _histogram(view_model, histogram_height)
-    return _plot(state, view_model, plot_height)
 
 
 def _controls(state: State, view_model: ViewModel) -> State:
@@ -122,12 +116,7 @@ def _controls(state: State, view_model: ViewModel) -> State:
         )
         compare = replace(compare, wipe=wipe / 100.0)
         state = widgets.holding(state, active)
-    _, plot = widgets.toggle(
-        "Error over time",
-        compare.plot,
-        tip="Measure this method and the other against the reference while both run, and plot relMSE over time.",
-    )
-    state = replace(state, compare=replace(compare, plot=plot))
+    state = replace(state, compare=compare)
     if mode in ("error", "beside"):
         _legend()
     return state
@@ -153,7 +142,7 @@ def _file(compare: Compare, view_model: ViewModel) -> Compare:
 
 def _values(state: State, view_model: ViewModel) -> None:
     """Both pictures under the cursor, in numbers."""
-    if not is_comparing(state.compare):
+    if not state.compare.is_active:
         return
     own = None if view_model.cursor is None else view_model.cursor.rgb
     for label, rgb in (("Here", own), ("There", view_model.compared_rgb)):
@@ -190,7 +179,7 @@ def _histogram(view_model: ViewModel, height: float) -> None:
 
 def _progress(state: State, view_model: ViewModel) -> State:
     """How far the other picture is, and what it is."""
-    if not is_comparing(state.compare):
+    if not state.compare.is_active:
         widgets.hint("Choose what to show to begin. The other picture is computed in the time that this one leaves.")
         return state
     if state.compare.method == "file":  # it is read at once, whole
@@ -210,11 +199,6 @@ def _progress(state: State, view_model: ViewModel) -> State:
     ):
         state = state.asking(ComputeReference())
     return state
-
-
-def is_comparing(compare: Compare) -> bool:
-    """Whether anything asks for the other picture."""
-    return compare.mode != "off" or compare.plot
 
 
 def _legend() -> None:
@@ -246,55 +230,6 @@ def _legend() -> None:
         size = imgui.calc_text_size(text)
         at = start.x + pad + place * (width - size.x - 2 * pad)
         drawing.add_text(imgui.ImVec2(at, start.y + 0.5 * (height - size.y)), theme.packed(tint), text)
-
-
-def _plot(state: State, view_model: ViewModel, height: float) -> State:
-    if not state.compare.plot:
-        return state
-    flags = implot.Flags_.no_menus | implot.Flags_.no_mouse_text
-    if not implot.begin_plot("##error over time", imgui.ImVec2(-theme.em(0.6), height), flags):
-        return state
-    implot.setup_axes("time traced and splatted (s)", "relMSE")
-    for axis in (implot.ImAxis_.x1, implot.ImAxis_.y1):
-        implot.setup_axis_scale(axis, implot.Scale_.log10)
-    curves = [shown for shown in map(_drawable, view_model.curves) if shown is not None]
-    x_range, y_range = _limits(curves)
-    implot.setup_axis_limits(implot.ImAxis_.x1, *x_range, implot.Cond_.always)
-    implot.setup_axis_limits(implot.ImAxis_.y1, *y_range, implot.Cond_.always)
-    implot.setup_legend(implot.Location_.north_east)
-    for curve, tint in zip(curves, _tints(), strict=False):
-        seconds, error = np.ascontiguousarray(curve.seconds, float), np.ascontiguousarray(curve.error, float)
-        name = METHOD_NAMES.get(curve.method, curve.method)
-        spec = implot.Spec(
-            line_color=tint, line_weight=1.8, marker=implot.Marker_.circle, marker_size=2.5, marker_fill_color=tint
-        )
-        implot.plot_line(name, seconds, error, spec)
-    implot.end_plot()
-    rows.explain("Error over time", "")
-    if not curves:
-        widgets.hint("Curves appear as soon as the reference is good enough to measure against.")
-    return state
-
-
-def _drawable(curve: ErrorCurve) -> ErrorCurve | None:
-    """The points that a logarithmic plot can show."""
-    keep = (curve.seconds > 0.0) & (curve.error > 0.0) & np.isfinite(curve.error)
-    return replace(curve, seconds=curve.seconds[keep], error=curve.error[keep]) if keep.any() else None
-
-
-def _limits(curves: list[ErrorCurve]) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Whole decades round all points."""
-    if not curves:
-        return (0.1, 100.0), (1e-4, 1.0)
-    seconds = np.concatenate([curve.seconds for curve in curves])
-    error = np.concatenate([curve.error for curve in curves])
-    low, high = _decades(error)
-    return _decades(seconds), (low, 10.0 * high)  # room for the legend
-
-
-def _decades(values: np.ndarray) -> tuple[float, float]:
-    low, high = np.floor(np.log10(values.min()) - 0.05), np.ceil(np.log10(values.max()) + 0.05)
-    return float(10.0**low), float(10.0 ** max(high, low + 1))
 
 
 def _tints() -> tuple[imgui.ImVec4, ...]:
