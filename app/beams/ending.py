@@ -8,9 +8,8 @@ from .compiling import part
 from .hand import HAND, SPARE, faint_share, halve, push_both
 from .leaves import anchor_density, density_slope, lay_leaf, passes, plane_map
 from .nodes import HALF, LINES, STATIC, area_of, copy, first_place, last_place, lay_out
-from .rays import PARALLEL, REFLECT, follow
+from .rays import PARALLEL, REFLECT
 from .search import (
-    LEAF_OPEN,
     LEAF_RECEIVER,
     LEAF_TAIL,
     NARROWEST,
@@ -39,8 +38,6 @@ _SHARP = 0.05
 """Of the widest penumbra of a polygon: an edge of the facet left last that is sharper masks what is drawn."""
 _BESIDE = 1e-7
 """GPU units."""
-_STRAY = 0.1
-"""Of the tolerance: how far rays may leave their parabola over the band (what they see is swept over many pixels)."""
 
 
 @part
@@ -106,7 +103,7 @@ def stand_still(beam, new, edge, corner, tables, work):
 def end(nodes, facets, solids, tables, sources, leaf, edge, corner, work):
     """Write the beam in hand as a leaf, or halve it where it is not straight enough."""
     hand, source, kind = nodes[HAND], sources[0], nodes[HAND].ends
-    if hand.depth == 0 and kind != LEAF_OPEN:
+    if hand.depth == 0:
         return
     is_parallel = source.kind == PARALLEL
     recentre(hand)
@@ -127,9 +124,6 @@ def end(nodes, facets, solids, tables, sources, leaf, edge, corner, work):
         absorb(hand, facets, solids, tables, work)
     bent, uneven = lay_leaf(hand, facets, kind, leaf, edge, corner, work)
     if bent < 0.0:
-        return
-    if work.sees and room and hand.x[2] - hand.x[0] > NARROWEST and strays(hand, facets, solids, tables, source, work):
-        halve(nodes, 0.5 * (hand.x[0] + hand.x[2]), facets, solids, tables, sources, work)
         return
     most = _COLOURED if work.coloured else _UNEVEN
     # What photons carry on where nothing disperses, they carry over their own bands (`passes.beam_emission`).
@@ -171,27 +165,6 @@ def end(nodes, facets, solids, tables, sources, leaf, edge, corner, work):
     work.count[2] += new.head[7]
     work.sums[SUM_LEAVES] += 1.0
     work.sums[SUM_DEPOSITED if kind == LEAF_RECEIVER else SUM_HANDED] += flux
-
-
-@part
-def strays(hand, facets, solids, tables, source, work):
-    """Whether rays over the band leave the parabola through those at its three places by more than the tolerance."""
-    position, direction = work.rays[0], work.rays[1]
-    u, v = hand.centre[0], hand.centre[1]
-    for turn in range(2):
-        x = hand.x[2 * turn] + (0.25 - 0.5 * turn) * (hand.x[2] - hand.x[0])
-        follow(source, facets, solids, tables, hand.path, hand.flight, x, u, v, position, direction, work.state)
-        off = across = along = 0.0
-        near, middle, far = hand.direction[2 * turn], hand.direction[1], hand.direction[2 - 2 * turn]
-        for k in range(3):
-            change = direction[0, k] - (0.375 * near[0, k] + 0.75 * middle[0, k] - 0.125 * far[0, k])
-            off += change * change
-            across += middle[1, k] * middle[1, k]
-            along += middle[2, k] * middle[2, k]
-        per = min(across, along)
-        if off > _STRAY * _STRAY * work.tolerance * work.tolerance * per and per > 0.0:
-            return True
-    return False
 
 
 @part

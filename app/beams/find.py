@@ -70,7 +70,6 @@ class Search:
     drift: float = 1.0
     power: float | None = None
     """Power of all lights, per unit of this one's spectral power: a dim light is followed less far."""
-    sees: bool = False
     faint: float = 0.0
     """Above 0: beams below the threshold end as `search.LEAF_TAIL`, and roulette is played below this share only."""
     most: int = 1 << 40
@@ -168,7 +167,7 @@ def _work(scene: BeamScene, emission: Emission, how: Search, share: float, sourc
     work = np.zeros(1, WORK)
     work["power"], work["seed"], work["depth"] = len(scene.tables), how.seed, how.depth
     work["density"], work["tolerance"], work["drift"] = emission.density, how.tolerance, how.drift
-    work["line_share"], work["room"], work["sees"], work["absorbing"] = share, emission.room, how.sees, scene.absorbs
+    work["line_share"], work["room"], work["absorbing"] = share, emission.room, scene.absorbs
     work["disperses"], work["coloured"] = scene.disperses, scene.absorbs or scene.coloured
     work["objects"], work["sources"] = len(scene.solids), sources
     return work
@@ -209,8 +208,7 @@ def _roots(
     root["line"][: len(limits)] = limits[:, None, :]
     root["made"][: len(square)] = 0, 0, HALF, 1
     root["made"][len(square) : len(limits)] = 0, 0, STATIC, 1
-    # What is kept where nothing is met (`sees`) is no root.
-    work["room"], work["sees"] = emission.room * (1.0, 1.0, 1.5), False
+    work["room"] = emission.room * (1.0, 1.0, 1.5)
     store, whole = Store(), [stack[FIRST : FIRST + 1].copy()]
     found: list[np.ndarray] = []
     while whole:

@@ -10,7 +10,6 @@ from .nodes import copy, cut, exists_throughout, first_place, forget_idle_lines,
 from .rays import PARALLEL, moments
 from .search import (
     FRAGMENTS,
-    LEAF_OPEN,
     LEAF_PIECE,
     SUM_ESCAPED,
     SUM_NUMERIC,
@@ -180,7 +179,7 @@ def fly(nodes, facets, solids, tables, source, obstacles, work):
             if near_boxes(hand, distance + spread[0], obstacles, spread):
                 nodes[j].facet, nodes[j].ends = -1, LEAF_PIECE
     is_lost = count == FRAGMENTS or (hand.mask != 0 and not boxed)
-    if is_lost or not (boxed or work.sees):
+    if is_lost or not boxed:
         # There is no way out of a solid but through its facets.
         work.sums[SUM_NUMERIC if is_lost else SUM_ESCAPED] += missing
         work.top = top
@@ -195,10 +194,8 @@ def fly(nodes, facets, solids, tables, source, obstacles, work):
     for j in range(rest, top):
         # Of the part alone: its rays are still about the whole beam's centre.
         spread_of(nodes[j], spread)
-        if boxed and near_boxes(nodes[j], 1e9, obstacles, spread):
+        if near_boxes(nodes[j], 1e9, obstacles, spread):
             nodes[j].ends = LEAF_PIECE
-        elif work.sees:
-            nodes[j].ends = LEAF_OPEN
         else:
             work.sums[SUM_ESCAPED] += flux_of(nodes[j], tables, work)
             nodes[j].facet = DEAD

@@ -31,7 +31,7 @@ class Leaves:
     flux: np.ndarray
     """(L,)."""
     ray: np.ndarray
-    """(L, 2, 3, 3, 3): position and direction about q = the beam's centre; of pieces and open leaves."""
+    """(L, 2, 3, 3, 3): position and direction about q = the beam's centre; of pieces."""
     state: np.ndarray
     """(L, 3, 6): of polarisation, at the three places (`polarised`)."""
     edge: np.ndarray

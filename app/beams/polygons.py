@@ -145,28 +145,6 @@ class BeamPieces(Outlines):
         return len(self.light)
 
 
-@dataclass(frozen=True)
-class BeamTally:
-    """Where the light that met flat facets first went, W per light (L,), at the wavelengths followed.
-
-    Sums to `entered` but for `roulette`, whose mean over seeds is 0."""
-
-    entered: np.ndarray
-    deposited: np.ndarray
-    """On flat receivers, as polygons."""
-    handed: np.ndarray
-    """To photons."""
-    absorbed: np.ndarray
-    """In glass, by mirrors and on black."""
-    escaped: np.ndarray
-    lost_depth: np.ndarray
-    lost_numeric: np.ndarray
-    roulette: np.ndarray
-    """What roulette took (> 0) or gave (< 0)."""
-    beams: np.ndarray
-    """int64 (L,), beams followed."""
-
-
 def parabola_at(values: np.ndarray, t: np.ndarray) -> np.ndarray:
     """(N, …) at t (N,) in [0, 1], of parabolas through `values` (N, 3, …) at the start, the middle and the end."""
     t = t.reshape(-1, *(1,) * (values.ndim - 2))

@@ -12,8 +12,8 @@ import numpy as np
 from .compiling import jit, part
 from .polarised import begin, behind_glass, behind_mirror, count_from_s, is_followed
 
-PARALLEL, POINT, PINHOLE = 0, 1, 2
-"""Kinds of sources. Rays of the last two diverge; a pinhole's weigh the same all over the picture."""
+PARALLEL, POINT = 0, 1
+"""Kinds of sources. Rays of the second diverge."""
 REFLECT, REFRACT, PASS = 0, 1, 2
 """What a beam does at a facet; PASS: the medium does not change there."""
 

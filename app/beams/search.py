@@ -28,9 +28,8 @@ from .nodes import (
 from .polarised import STATE
 from .rays import advance, at_x, edge_line, follow
 
-LEAF_RECEIVER, LEAF_PIECE, LEAF_OPEN, LEAF_TAIL = 0, 1, 2, 3
-"""What lies on a receiver; what photons carry on; what leaves all facets towards what the camera sees (`sees`); what is
-too weak to be followed as a beam, and is handed to photons, or to the camera's paths."""
+LEAF_RECEIVER, LEAF_PIECE, LEAF_TAIL = 0, 1, 2
+"""What reaches a receiver; what photons carry on; what is too weak to be followed as a beam, and goes on as photons."""
 NARROWEST = 1.0 / 256.0
 """Bands are not halved below this."""
 _STEADY = 3.0
@@ -67,7 +66,7 @@ WORK = np.dtype(
         ("depth", "i8"),
         # Flux per unit of q and of spectral power.
         ("density", "f8"),
-        # Error of places on what goes on, GPU units (from the camera: q).
+        # Error of places on what goes on, GPU units.
         ("tolerance", "f8"),
         # How far outlines may move over a band (`drifts`).
         ("drift", "f8"),
@@ -75,8 +74,6 @@ WORK = np.dtype(
         ("line_share", "f8"),
         # Centre and half side of a square in q that holds everything.
         ("room", "f8", 3),
-        # Beams from the camera: what leaves the facets is kept.
-        ("sees", "?"),
         # Some glass bends one wavelength more than another: else no outline moves over a band.
         ("disperses", "?"),
         # Some medium absorbs.

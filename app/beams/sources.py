@@ -27,7 +27,7 @@ above a block draws 1.9 % more than lands, one 1.5 radii above it 0.8 %, 1.7 rad
 _MOST_BANDS = 32
 """Into which a light's spectrum is cut where something is coloured."""
 _ON_FACET = 2e-7
-"""GPU units: so near to a facet a light or a camera lies on it (START_DISTANCE of shaders/lib/intersect.glsl)."""
+"""GPU units: a light as near to a facet is on it (START_DISTANCE of shaders/lib/intersect.glsl)."""
 _GOLDEN = math.pi * (3.0 - math.sqrt(5.0))
 
 

@@ -10,7 +10,7 @@ from .hand import FIRST, HAND, START, UNKNOWN
 from .leaves import has_room
 from .nodes import copy, lay_out
 from .rays import PARALLEL, emit_straight
-from .search import FRAGMENTS, LEAF_OPEN, LEAF_RECEIVER, SUM_NUMERIC, flux_of
+from .search import FRAGMENTS, LEAF_RECEIVER, SUM_NUMERIC, flux_of
 
 
 @part
@@ -35,13 +35,8 @@ def run(nodes, facets, solids, tables, sources, obstacles, works, leaf, edge, co
         work.steps -= 1
         work.top -= 1
         copy(nodes[work.top], hand)
-        if hand.facet >= 0 and hand.ends < 0:
-            kind = facets[hand.facet].kind
-            if kind == 3 or (kind == 2 and work.sees and hand.depth > 0):
-                hand.ends = LEAF_OPEN if work.sees else LEAF_RECEIVER
-            elif work.sees and hand.depth >= work.depth:
-                # Light that would still be caught inside is seen as if it left here, as camera paths do.
-                hand.ends = LEAF_OPEN
+        if hand.facet >= 0 and hand.ends < 0 and facets[hand.facet].kind == 3:
+            hand.ends = LEAF_RECEIVER
         if hand.ends >= 0:
             if hand.depth > 0 or hand.facet < 0:
                 end(nodes, facets, solids, tables, sources, leaf, edge, corner, work)

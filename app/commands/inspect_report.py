@@ -165,7 +165,7 @@ def _compiled(scene: Scene) -> list[RenderableType]:
     from ..model.settings import RenderSettings
 
     wishes = scene.render
-    settings = RenderSettings(width=wishes.width, height=wishes.height, max_depth=wishes.max_depth, camera_beams=True)
+    settings = RenderSettings(width=wishes.width, height=wishes.height, max_depth=wishes.max_depth)
     features = Features.of(scene, settings)
     costs = static_costs(scene, features)
     table = _table("Compiled into the programs", ("part", False), ("", False), ("why", False), ("costs", False))

@@ -183,13 +183,6 @@ def parse_camera_method(text: str) -> str:
     return text
 
 
-def parse_camera(text: str) -> bool:
-    """Whether the camera may see by beams: "beams" or "paths"."""
-    if text not in ("beams", "paths"):
-        raise UserError(f"--camera '{text}' is unknown, known are beams, paths")
-    return text == "beams"
-
-
 def check_layer(text: str, scene: Scene) -> str:
     """ "beauty", "caustic" or "map:RECEIVER" with a diffuse object of `scene`."""
     if text in ("beauty", "caustic"):

@@ -88,13 +88,6 @@ def render(
         Text, typer.Option("--max-depth", metavar="N", help="Specular events on a light path, at most; default: 64.")
     ] = None,
     spp: Annotated[Text, typer.Option(metavar="N", help="Camera samples a pixel.")] = None,
-    camera: Annotated[
-        Text,
-        typer.Option(
-            metavar="HOW",
-            help="How stills show flat-faceted glass: beams where these should cost less (default with srd), or paths.",
-        ),
-    ] = None,
     batch: Annotated[
         Text, typer.Option(metavar="N", help="Photons in flight at once (never changes the picture).")
     ] = None,
@@ -164,7 +157,6 @@ def render(
         exposure,
         max_depth,
         spp,
-        camera,
         batch,
         stats,
         options.parse_opening(up, glass, environment),

@@ -48,7 +48,6 @@ class RenderRequest:
     exposure: str | None = None
     max_depth: str | None = None
     spp: str | None = None
-    camera: str | None = None
     batch: str | None = None
     stats: bool = False
     opening: Opening | None = None
@@ -202,7 +201,6 @@ def parse_settings(request: RenderRequest) -> dict[str, Any]:
         "glare": (request.glare, options.parse_glare),
         "max_depth": (request.max_depth, _integer("--max-depth", 1, options.MAX_DEPTH)),
         "spp": (request.spp, _integer("--spp", 1, options.MAX_SPP)),
-        "camera_beams": (request.camera, options.parse_camera),
         "batch": (request.batch, options.parse_batch),
     }
     asked = {field: parse(text) for field, (text, parse) in parsers.items() if text is not None}
@@ -223,8 +221,6 @@ def complete_settings(asked: dict[str, Any], scene: Scene, stats: bool) -> Rende
             "glare": wishes.glare,
             "photons": None if "seconds" in asked else wishes.photons,
             "tally": stats,
-            # Who asks for photons alone compares them with what else there is.
-            "camera_beams": asked.get("method", "srd") == "srd",
             **asked,
         }
     )

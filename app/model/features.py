@@ -105,8 +105,6 @@ class Features:
     """Some light shines by a table of intensities over directions."""
     beams: bool = False
     """What meets certain flat-faceted objects first is left to beams (`spectrasplat.beams`): photons end there."""
-    camera_beams: bool = False
-    """The camera may see flat-faceted glass and mirrors by beams, where that is cheaper (`render.camera_beams`)."""
     anchor_weights: bool = False
     """Fresnel weights are those at the band's anchor, so that an edited dispersion leaves the photons as they are."""
     draws_by_power: bool = False
@@ -264,7 +262,6 @@ class Features:
             local_gain=groups > 0 and settings.local_gain and any(o.local_dispersion for o in scene.objects),
             anchor_weights=settings.anchor_weights,
             beams=beams,
-            camera_beams=settings.camera_beams and why_no_camera_beams(scene, settings) is None,
             light_profiles=any(light.profile is not None for light in scene.lights),
             draws_by_power=random and settings.bins is not None,
             environment_lights=why_no_environment_light(scene) is None and settings.layer == "beauty",
@@ -339,24 +336,6 @@ def _has_beams(scene: Scene, settings: RenderSettings) -> bool:
     receives = any(o.material.receives and is_flat(o) for o in scene.objects)
     shines = any(light.profile is None for light in scene.lights)
     return has_beams(settings.method) and receives and shines and not painted and bool(beam_objects(scene))
-
-
-def why_no_camera_beams(scene: Scene, settings: RenderSettings) -> str | None:
-    """Why the camera sees glass and mirrors by paths alone; None: beams may serve it (where they were asked for)."""
-    if not divides_spectrum(settings.method):
-        return f"method {settings.method} follows paths"
-    if not camera_needs(scene, settings)[0]:
-        return "no glass and no mirror is in view"
-    if settings.bins:
-        return "the picture is in bins"
-    if scene.camera.lens_radius > 0.0:
-        return "the camera has a lens"
-    if any(o.material.has_coat for o in scene.objects):
-        return "a receiver is glossy"
-    aspect = settings.width / settings.height
-    if not any(settings.any_view or in_view(scene.objects[i], scene.camera, aspect) for i in beam_objects(scene)):
-        return "no flat-faceted glass or mirror is in view"
-    return None
 
 
 def camera_needs(scene: Scene, settings: RenderSettings) -> tuple[bool, bool]:

@@ -18,7 +18,7 @@ from .features import (
 )
 from .flat_shapes import is_flat
 from .scene import Scene
-from .settings import divides_spectrum, has_beams
+from .settings import has_beams
 from .tint_levels import MAX_LIGHTS
 
 
@@ -274,25 +274,8 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
             features.beams,
             _beam_words(scene, features),
         ),
-        (
-            "camera beams",
-            features.camera_beams,
-            "flat facets in view may be seen by beams, where that is cheaper"
-            if features.camera_beams
-            else _no_camera_beams_words(scene, features),
-        ),
         ("blockers", black > 0, f"{black} black object(s)" if black else "no black object"),
     ]
-
-
-def _no_camera_beams_words(scene: Scene, features: Features) -> str:
-    if not divides_spectrum(features.method):
-        return f"method {features.method} follows paths"
-    if not features.camera_specular:
-        return "no glass and no mirror is in view"
-    if any(o.material.has_coat for o in scene.objects):
-        return "a receiver is glossy"
-    return "--camera beams would try them" if beam_objects(scene) else "no glass and no mirror has flat facets only"
 
 
 def _beam_words(scene: Scene, features: Features) -> str:

@@ -78,8 +78,5 @@ class RenderSettings:
     every photon's weight). The weights of a band's ends differ from it by less than a thousandth."""
     any_view: bool = False
     """The camera may go anywhere (viewer, animation): what a scene needs is not judged by what its camera sees."""
-    camera_beams: bool = False
-    """Let the camera of `srd` see flat-faceted glass and mirrors by beams where that is predicted to be cheaper, as
-    stills do."""
     tally: bool = False
     """Also sum up what the maps hold, for `--stats`."""

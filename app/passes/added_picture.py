@@ -17,7 +17,9 @@ class AddedPicture:
         """`targets`: textures, made when a size is known."""
         self._ctx = ctx
         self._targets = targets
-        self._program = shader.program(ctx, "camera/beam_sum.vert", "camera/beam_sum.frag", {"TARGETS": targets}, ())
+        self._program = shader.program(
+            ctx, "camera/add_picture.vert", "camera/add_picture.frag", {"TARGETS": targets}, ()
+        )
         self._triangle = ctx.vertex_array(self._program, [])
         self.textures: list[moderngl.Texture] = []
 

@@ -14,8 +14,6 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 import moderngl
 import numpy as np
 
-from ..beams.screen_polygons import ScreenPolygons
-from ..beams.screen_starts import ScreenStarts
 from ..gpu.context import Context
 from ..gpu.dispatch_budget import DispatchBudget
 from ..gpu.map_channels import MapChannels
@@ -31,7 +29,7 @@ from .haze import Haze
 from .listed_pixels import ListedPixels
 from .picture_channels import Channels
 from .picture_sums import PictureSums
-from .pixel_lattice import LOOKS, cells_of, is_in_strips, looks_lattice, pixel_lattice, shared_places
+from .pixel_lattice import LOOKS, cells_of, is_in_strips, looks_lattice, pixel_lattice
 from .sample_spread import (
     PRIMARY_SAMPLES,
     looks_of,
@@ -40,7 +38,6 @@ from .sample_spread import (
     spread_samples,
     spread_survey,
 )
-from .shown_beams import ShownBeams
 from .spectrum_choice import PilotRender, Spectrum, choosing_spectrum, grid_of
 from .variants import (
     camera_defines,
@@ -58,8 +55,6 @@ MAX_TAPS = 24
 SURVEY_FROM = 4
 """A still of as many samples or more surveys its pixels first: fewer would cost no more than the survey itself."""
 
-_BEAMS_PROGRESS = 0.7
-"""Of a frame's time, about, that drawing its beams takes."""
 _GROUP = 8
 _FIRST_ROWS = 16
 
@@ -109,7 +104,7 @@ class CameraPass:
         """Where bands serve a scene badly, wavelengths may be taken one by one. That takes a program of its own, which
         is compiled when it is needed."""
         self.max_taps = MAX_TAPS
-        self.primary_samples = PRIMARY_SAMPLES if self._may_choose or not self.disperses else 1
+        self.primary_samples = PRIMARY_SAMPLES if self.chooses or not self.disperses else 1
         """Of a sample, at what is seen directly, while a pixel has few samples."""
         self.only_directly = False
         """Leave what is seen in glass and mirrors black where a program of its own follows it."""
@@ -126,14 +121,11 @@ class CameraPass:
         self._listed = ListedPixels(self._ctx, halted_bytes(lens_defines(shown)) if halts else None)
         shown = halting_defines(shown) if halts else shown
         self._programs = CameraPrograms(self._ctx, shown, self._inputs.structs, features.lens)
-        self._beams = ShownBeams(self._ctx, len(scene.scene.objects), self.channels.targets)
         self._haze = Haze(context, scene, self.channels) if features.haze and layer == "beauty" else None
         self._is_hazy = False
         """The samples that are being taken are of the picture that haze was drawn for."""
-        if not features.camera_beams:
-            # Else beams may do without them, and they are compiled when paths need them.
-            for variant in ("all", "direct") if self.follows else ("direct",):
-                self._programs.of(variant)
+        for variant in ("all", "direct") if self.follows else ("direct",):
+            self._programs.of(variant)
 
     def move(self, scene: SceneBuffers) -> None:
         """The same objects and lights stand elsewhere (`SceneBuffers.move`)."""
@@ -164,30 +156,10 @@ class CameraPass:
         self._haze.draw(camera, *picture.size, coarse=coarse)
         self._haze.add([picture], 0, picture.height)
 
-    def take_beams(
-        self,
-        polygons: ScreenPolygons | None,
-        objects: np.ndarray | None = None,
-        starts: tuple[ScreenStarts, ScreenPolygons] | None = None,
-        width: int = 0,
-    ) -> None:
-        """From the next first sample on, show what is seen in these objects (O,) by polygons of the picture, which
-        belong to its camera, size and seed; None: by paths, as everything else. `starts`: paths that carry on handed
-        polygons, with those, of a picture so wide."""
-        if polygons is None or objects is None or not self.follows:
-            self._beams.drop()
-            return
-        self._beams.take(self._programs, self.scene, self.brightness, polygons, objects, starts, width)
-
     @property
     def brightness(self) -> np.ndarray | None:
         """How much of what looks bright lies below each of equally spaced x; None where nothing disperses."""
         return self._inputs.brightness if self.disperses else None
-
-    @property
-    def shows_beams(self) -> bool:
-        """Some objects are seen by polygons of the picture."""
-        return self._beams.are_there
 
     def run(
         self,
@@ -232,12 +204,8 @@ class CameraPass:
         self.draw_haze(camera, width, height)
         parameters = self._parameters(camera, width, height, maps.scale, seed)
         spread_samples(parameters, samples, sample_offset, self.spectrum.bands)
-        directly = looks_of(samples + sample_offset, self.primary_samples, self.shows_beams, self.spectrum.single)
+        directly = looks_of(samples + sample_offset, self.primary_samples, self.spectrum.single)
         parameters["primary_samples"] = directly
-        before = _BEAMS_PROGRESS if self.shows_beams and sample_offset == 0 else 0.0
-        if before:
-            for share in self._draw_beams(parameters, samples, maps):
-                yield before * share
         if not is_in_strips(samples, sample_offset) and not self._programs.has_lens:
             parameters["cells"] = cells_of(samples * directly)
         looks = np.zeros((samples, LOOKS, 2))
@@ -250,23 +218,18 @@ class CameraPass:
                 and self._sums.is_single
             ):
                 for _ in self._survey(parameters, width, height, maps):
-                    yield before
+                    yield 0.0
         for index, place in enumerate(pixel_lattice(samples, sample_offset)):
-            parameters["sample_index"] = parameters["draw_index"] = sample_offset + index
+            parameters["sample_index"] = sample_offset + index
             parameters["within_pixel"] = place
             parameters["looks"] = looks[index].reshape(-1, 4)
             for share in self._add_sample(parameters, width, height, maps):
-                yield before + (1.0 - before) * (index + share) / samples
+                yield (index + share) / samples
         self.context.check("the camera pass")
 
     @property
     def chooses(self) -> bool:
         """`choose_spectrum` has something to choose: the method leaves it open, and some paths are followed."""
-        specular = [item.material.is_specular for item in self.scene.scene.objects]
-        return self._may_choose and not np.all(self._beams.objects[specular])
-
-    @property
-    def _may_choose(self) -> bool:
         return self.disperses and self.fixed_bands is None and not self.scene.features.random_wavelength
 
     def choose_spectrum(
@@ -308,7 +271,7 @@ class CameraPass:
         parameters = self._parameters(camera, columns, rows, maps.scale, look.seed)
         spread_pilot(parameters, look, samples, columns / width)
         for number in range(look.spectrum.bands):
-            parameters["sample_index"] = parameters["draw_index"] = number
+            parameters["sample_index"] = number
             yield from self._add_sample(parameters, columns, rows, maps)
         picture = self._sums.mean().astype(np.float64)
         # Beside a picture in colour, turns are counted.
@@ -351,7 +314,7 @@ class CameraPass:
 
     def release(self) -> None:
         """Free every buffer, texture and program."""
-        for owned in (self._inputs, self._programs, self._sums, self._beams, self._listed, self._haze):
+        for owned in (self._inputs, self._programs, self._sums, self._listed, self._haze):
             if owned is not None:
                 owned.release()
 
@@ -416,8 +379,6 @@ class CameraPass:
             for share in self._follow_listed(parameters, maps):
                 self._within_rows = True
                 yield (row + share * rows) / height
-            if self.shows_beams:
-                self._beams.add(self._sums.textures, row, rows)
             if self._haze is not None and self._is_hazy:
                 self._haze.add(self._sums.textures, row, rows)
             self._within_rows = False
@@ -435,7 +396,9 @@ class CameraPass:
             rows = min(self._rows.units, height - row)
             parameters["first_row"] = row
             self._listed.clear()
-            took = self._dispatch(self._program_direct(), parameters, maps, -(-width // _GROUP), -(-rows // _GROUP))
+            took = self._dispatch(
+                self._programs.of("direct"), parameters, maps, -(-width // _GROUP), -(-rows // _GROUP)
+            )
             self._rows.learn(rows, took, self.dispatch_seconds)
             yield row, rows
             row += rows
@@ -475,20 +438,6 @@ class CameraPass:
             self._ctx.memory_barrier()
         self._ctx.finish()
         return time.perf_counter() - start
-
-    def _program_direct(self) -> moderngl.ComputeShader:
-        """What looks at what is seen directly."""
-        if not self.shows_beams:
-            return self._programs.of("direct")
-        self._beams.bind_objects()
-        return self._programs.of("beside")
-
-    def _draw_beams(self, parameters: np.ndarray, samples: int, maps: CausticMaps) -> Iterator[float]:
-        """Draw what is seen by beams, yielding the share done after every portion."""
-        bind, paths = lambda: self._bind(maps, parameters), self._paths(parameters, maps)
-        size, as_image = self._sums.size, self.scene.texels.as_image
-        places, target_s = shared_places(samples, int(parameters["primary_samples"][0])), self.dispatch_seconds
-        yield from self._beams.draw(size, places, as_image, parameters, self._listed, bind, paths, target_s)
 
     def _program_beyond(self) -> moderngl.ComputeShader:
         """What follows rays beyond glass and mirrors."""

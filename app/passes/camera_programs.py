@@ -9,16 +9,14 @@ import moderngl
 
 from ..gpu import shader
 from ..gpu.schema import Struct
-from .variants import Defines, beside_defines, direct_defines, lens_defines, single_defines
+from .variants import Defines, direct_defines, lens_defines, single_defines
 
 _VARIANTS: dict[str, Callable[[Defines], Defines]] = {
     "all": lambda shown: shown,
     "direct": direct_defines,
     "single": single_defines,
-    "beside": beside_defines,
 }
-"""Programs: beyond glass and mirrors, for what is seen directly, beyond glass of one wavelength, and directly where
-beams show the rest."""
+"""Programs: beyond glass and mirrors, for what is seen directly, and beyond glass of one wavelength."""
 
 
 class CameraPrograms:

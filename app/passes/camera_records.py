@@ -58,7 +58,6 @@ CAMERA_PARAMETERS = Struct(
         Field("dithered", "uint", "whether pixels begin with different bands"),
         Field("max_taps", "uint", "looks along one sweep at most"),
         Field("split_threshold", "float", "share of a path's power above which both of its parts are followed"),
-        Field("draw_index", "uint", "counts them too: which numbers it draws"),
         Field("counts_turns", "uint", "whether pixels count their own dispersed samples instead"),
         Field("taps_per_pixel", "float", "looks along a sweep, for every pixel it is long"),
         Field("band_side", "float", "side of the share of its pixel that a sample of one band has, pixels"),
@@ -68,13 +67,13 @@ CAMERA_PARAMETERS = Struct(
         Field("end_listed", "uint", "… and the one after its last"),
         Field("first_place", "uint", "where the first of them waits; NONE where this dispatch takes up halted ones"),
         Field("queue", "uint", "of the two, the one that samples which halt are put on"),
-        Field("start_share", "float", "of a sample, that a path which carries a beam on stands for"),
         Field("survey", "uint", "0: none; 1: this sample is one of a survey; 2: even pixels keep what a survey found"),
         Field("survey_at", "uint", "where the survey's pixels begin, words of the list"),
         Field("survey_gain", "float", "share of a survey that one of its samples is"),
         Field("cells", "vec2", "columns and rows of a pixel's cells, one for each of a launch's looks; 0: none"),
         Field("lens_radius", "float", "GPU units"),
         Field("focus_distance", "float", "of the plane of focus, along `forward`, GPU units"),
+        Field("unused", "vec2", ""),
     ),
 )
 

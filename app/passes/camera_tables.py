@@ -170,7 +170,6 @@ def _spectra(
         "INDEX_ROW": np.asarray(index_table(axis, list(glasses.values()), SAMPLES), float),
         "SLOPE_ROW": np.array(slopes).reshape(-1, SAMPLES),
         "VARIABLE_ROW": variables,
-        "X_ROW": x[None],
         "ABSORPTION_ROW": np.array([np.interp(nm, VISIBLE_NM, a) for a in absorptions]).reshape(-1, SAMPLES),
         "BASIS_ROW": np.array([np.interp(nm, VISIBLE_NM, column) for column in rgb_basis().T]),
         "BIN_ROW": maps.coordinate(axis, x)[None],

@@ -69,19 +69,3 @@ def looks_lattice(samples: int, offset: int) -> np.ndarray:
 
     _, chosen = linear_sum_assignment((away**2).sum(axis=-1))
     return looks[chosen].reshape(samples, LOOKS, 2)
-
-
-FEWEST_SHARED, MOST_SHARED = 16, 64
-_HAIR = np.array([1.3e-4, 0.7e-4])
-"""So that none lies on the border of a pixel, where polygons like to meet."""
-
-
-def shared_places(samples: int, looks: int) -> np.ndarray:
-    """(16 to 64, 2) places in a pixel at which polygons' edges are told, an even number.
-
-    They are where a first launch of so many samples looks at what is seen directly, so that both together fill every
-    pixel; a lattice of their own where those are too few or too many."""
-    places = pixel_lattice(samples, 0) if looks == 1 else looks_lattice(samples, 0).reshape(-1, 2)
-    if not FEWEST_SHARED <= len(places) <= MOST_SHARED or len(places) % 2 or is_in_strips(samples, 0):
-        places = pixel_lattice(MOST_SHARED, 0)
-    return places + _HAIR

@@ -31,11 +31,9 @@ def spread_samples(parameters: np.ndarray, samples: int, offset: int, bands: int
     parameters["taps_per_pixel"] = TAPS_PER_PIXEL * (samples + offset) ** 0.25
 
 
-def looks_of(samples: int, wanted: int, shows_beams: bool, single: bool) -> int:
+def looks_of(samples: int, wanted: int, single: bool) -> int:
     """Looks of a sample at what is seen directly, where a pixel gets so many samples and `wanted` looks in each."""
-    if samples > PRIMARY_SAMPLES_UNTIL or (single and not shows_beams):
-        return 1
-    return max(wanted, PRIMARY_SAMPLES if shows_beams else 1)
+    return 1 if samples > PRIMARY_SAMPLES_UNTIL or single else wanted
 
 
 def spread_alone(parameters: np.ndarray) -> None:
@@ -65,6 +63,6 @@ def spread_survey(parameters: np.ndarray) -> Iterator[None]:
     tiles = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1).reshape(-1, 2)
     looks = ((tiles + 0.5) / _SURVEY_GRID).reshape(SURVEY_SAMPLES, -1, 4)
     for index, places in enumerate(looks):
-        parameters["sample_index"] = parameters["draw_index"] = index
+        parameters["sample_index"] = index
         parameters["looks"] = places
         yield

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Protocol
 
-from ..beams.screen_polygons import PIXEL_BITS
 from ..gpu import bindings, records
 from ..gpu.device_traits import DeviceTraits
 from ..gpu.map_channels import MapChannels
@@ -57,24 +56,11 @@ FAR_TOO_LARGE = 1e15
     BIND_COUNTERS,
     BIND_LISTED,
     BIND_HALTED,
-    BIND_BEAM_OBJECTS,
-    BIND_BEAM_ENTRIES,
-    BIND_BEAM_RUNS,
-    BIND_BEAM_ORDER,
-    BIND_BEAM_FOUND,
-) = range(8, 22)
+) = range(8, 17)
 BIND_FLIGHTS, BIND_HAZE_COLOURS, BIND_HAZE = 8, 9, 10
 """Of the program that draws haze; the last is of uniform blocks."""
 UNIT_DISTANCES = 0
-UNIT_RECEIVER_LIGHT, UNIT_EMISSION, UNIT_PICTURES, UNIT_POLYGONS = 9, 10, 11, 13
-BIND_BEAM_VIEW = 9
-"""Of uniform blocks."""
-IMAGE_POLYGONS = 0
-GATHER_DEFINES = {
-    "BIND_BEAM_RUNS": BIND_BEAM_RUNS,
-    "BIND_BEAM_ORDER": BIND_BEAM_ORDER,
-    "BIND_BEAM_FOUND": BIND_BEAM_FOUND,
-}
+UNIT_RECEIVER_LIGHT, UNIT_EMISSION, UNIT_PICTURES = 9, 10, 11
 _BEYOND_ONLY = (
     "HAS_DISPERSION",
     "SPECTRAL_SWEEP",
@@ -352,11 +338,6 @@ def direct_defines(beyond: Mapping[str, int | float | str]) -> Defines:
     }
 
 
-def beside_defines(beyond: Mapping[str, int | float | str]) -> Defines:
-    """For what is seen directly beside objects that camera beams show."""
-    return direct_defines(beyond) | {"BEAM_OBJECTS": 1, "BIND_BEAM_OBJECTS": BIND_BEAM_OBJECTS}
-
-
 def moving_defines(beyond: Mapping[str, int | float | str]) -> Defines:
     """For pictures in motion: what is seen directly, and which pixels see glass or mirrors."""
     return direct_defines(beyond) | {
@@ -365,33 +346,6 @@ def moving_defines(beyond: Mapping[str, int | float | str]) -> Defines:
         "NUMBER_BITS": 27,
         "LATTICE_MAPS": "0xffffu",
         "LATTICE_OBJECTS": "0x10000u",
-    }
-
-
-def screen_beam_defines(beyond: Mapping[str, int | float | str]) -> Defines:
-    """For polygons of the picture that camera beams see, from what the listed pixels are compiled with. A beam's one
-    spectral column is by x itself, and its throughput holds what was absorbed."""
-    left_out = {"CAMERA_SPECULAR", "ABSORPTION", "ABSORBERS", "NORMAL_DERIVATIVES", "RANDOM_WAVELENGTH", "HALTS"}
-    left_out.add("POLARISED")
-    return {name: value for name, value in beyond.items() if name not in left_out} | {
-        "CAMERA_BEAMS": 1,
-        "SPECTRAL_GROUPS": 1 if "SPECTRAL_SWEEP" in beyond else 0,
-        "VARIABLE_ROW": beyond["X_ROW"],
-        "BIND_BEAM_VIEW": BIND_BEAM_VIEW,
-        "BIND_BEAM_ENTRIES": BIND_BEAM_ENTRIES,
-        "BIND_BEAM_FOUND": BIND_BEAM_FOUND,
-        "PIXEL_BITS": PIXEL_BITS,
-        "IMAGE_POLYGONS": IMAGE_POLYGONS,
-        "UNIT_POLYGONS": UNIT_POLYGONS,
-    }
-
-
-def start_defines(beyond: Mapping[str, int | float | str]) -> Defines:
-    """For paths that carry on what camera beams hand over."""
-    return single_defines(beyond) | {
-        "BEAM_STARTS": 1,
-        "BIND_BEAM_ENTRIES": BIND_BEAM_ENTRIES,
-        "BIND_BEAM_FOUND": BIND_BEAM_FOUND,
     }
 
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -40,9 +39,6 @@ from .sampling import CameraSampling, LightSampling, camera_settings, has_own_me
 from .solo import scene_seen
 from .time_budget import TimeBudget
 from .traced_light import traced_light
-
-if TYPE_CHECKING:
-    from .camera_beams import CameraBeams
 
 _ENVIRONMENT_SHARE = 0.25
 """Of a timed rendering, at most, for the light of the environment."""
@@ -82,8 +78,6 @@ class _Traced:
     camera_buffers: SceneBuffers | None = None
     """The camera's own, where it has a method of its own."""
     camera_pass: CameraPass | None = None
-    camera_beams: CameraBeams | None = None
-    """Where its scene's features have them."""
 
     @property
     def maps(self) -> CausticMaps:
@@ -195,7 +189,7 @@ class FrameRenderer:
         self.traces += 1
 
     def _add_camera_pass(self, traced: _Traced) -> None:
-        """The camera pass of `traced`, and beams for it."""
+        """The camera pass of `traced`."""
         started, light = time.perf_counter(), traced.light
         if has_own_method(self._settings):
             traced.camera_buffers = scene_buffers(self._context, light.scene, camera_settings(self._settings))
@@ -206,10 +200,6 @@ class FrameRenderer:
             light.reflectances,
             light.map_channels,
         )
-        if traced.camera_pass.scene.features.camera_beams:
-            from .camera_beams import CameraBeams  # machine code, as beams of light are
-
-            traced.camera_beams = CameraBeams(traced.camera_pass, self._context.is_software)
         self.seconds.camera = time.perf_counter() - started
 
     def _view(self, stage: Stage) -> tuple[Camera, int, int]:
@@ -222,19 +212,13 @@ class FrameRenderer:
         settings, camera_pass = self._settings, self._traced.camera_pass
         maps = self._traced.maps
         view = self._view(stage)
-        # Polygons belong to one view. A stop asked for while tracing still wants a picture: only the first sample is
-        # owed then.
-        camera_pass.take_beams(None)
+        # A stop that was requested while tracing still wants a picture: only the first sample is taken then.
         stops_at_once, samples = stop(), 1
         budget = None if stops_at_once or settings.spp is not None else self._budget
         if not stops_at_once:
             sampling = CameraSampling.of(settings)
             if budget is not None:
                 sampling = replace(sampling, budget=max(budget.samples(), 1))
-            # An animation may open the lens, through which polygons are not seen.
-            if self._traced.camera_beams is not None and stage.camera.lens_radius == 0.0:
-                for _ in self._traced.camera_beams.choosing(*view, sampling.budget, settings.seed):
-                    yield self._share(self._progress.camera(0.0))
             for _ in sampling.choosing(camera_pass, *view, maps):
                 yield self._share(self._progress.camera(0.0))
             samples = sampling.samples(camera_pass)
@@ -244,7 +228,7 @@ class FrameRenderer:
             return
         for share in camera_pass.samples(*view, samples, 0, maps, settings.seed):
             yield self._share(self._progress.camera(share))
-            # A survey and beams come before the first sample: without it all is black, and without a turn of bands
+            # A survey comes before the first sample: without it all is black, and without a turn of bands
             # colours are missing.
             turn = min(camera_pass.spectrum.bands, samples)
             if not stops_at_once and stop() and camera_pass.is_even and camera_pass.samples_taken >= turn:
@@ -287,7 +271,6 @@ class FrameRenderer:
         assert traced is not None and traced.camera_pass is not None, "steps() comes first, and not of a map"
         light = traced.light
         traced.camera_pass.release()
-        traced.camera_pass = traced.camera_beams = None
         traced.camera_pass = CameraPass(
             self._context, traced.camera_buffers or traced.buffers, layer, light.reflectances, light.map_channels
         )
@@ -321,11 +304,6 @@ class FrameRenderer:
     def camera_pass(self) -> CameraPass | None:
         """Of the last frame; None for a map."""
         return self._traced.camera_pass if self._traced is not None else None
-
-    @property
-    def camera_beams(self) -> CameraBeams | None:
-        """Of the last frame; None where only paths were thought of."""
-        return self._traced.camera_beams if self._traced is not None else None
 
     @property
     def picture(self) -> Picture:

@@ -40,7 +40,6 @@ _SETTINGS = (
     "spp",
     "smoothing",
     "local_gain",
-    "camera_beams",
 )
 """What decides the picture besides the scene."""
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from ..model.features import Features
 from ..model.scene import Camera, Scene
 from ..model.settings import RenderSettings, camera_method_of
 from ..passes.camera import CameraPass
@@ -112,8 +111,3 @@ def has_own_method(settings: RenderSettings) -> bool:
     """Whether the camera's rays follow another method than the light's, and so need programs and tables of their
     own."""
     return (settings.camera_method or settings.method) != settings.method
-
-
-def camera_features(scene: Scene, settings: RenderSettings) -> Features:
-    """What the camera's rays need: those of its own method, where it has one."""
-    return Features.of(scene, camera_settings(settings))

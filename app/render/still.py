@@ -19,7 +19,6 @@ from .notices import environment_notices, frame_notices
 
 if TYPE_CHECKING:
     from .beam_light import BeamStats
-    from .camera_beams import CameraBeamStats
 
 Progress = Callable[[float, str], None]
 Cancelled = Callable[[], bool]
@@ -34,8 +33,6 @@ class CameraStats:
     spectrum: Spectrum = field(default_factory=Spectrum)
     """How samples saw it."""
     fallbacks: Mapping[str, int] = field(default_factory=dict)
-    beams: CameraBeamStats | None = None
-    """None: only paths were thought of."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +87,6 @@ class RenderStats:
                 f"camera              {camera.samples} samples a pixel, {camera.spectrum.words}; "
                 f"{_counted(camera.fallbacks)}"
             ),
-            *([f"camera's facets      seen {camera.beams.words}"] if camera.beams is not None else []),
             (f"maps                {self.atlas_size[0]}×{self.atlas_size[1]} texels"),
             (
                 "buffers             "
@@ -173,16 +169,12 @@ def render(
             context.release()
 
 
-def _camera_beams(frames: FrameRenderer) -> CameraBeamStats | None:
-    return frames.camera_beams.stats if frames.camera_beams is not None else None
-
-
 def _stats(context: Context, frames: FrameRenderer, settings: RenderSettings) -> RenderStats:
     light, camera_pass = frames.light, frames.camera_pass
     camera = CameraStats()
     if camera_pass is not None:
         fallbacks = camera_pass.fallbacks if settings.tally else {}
-        camera = CameraStats(camera_pass.samples_taken, camera_pass.spectrum, fallbacks, _camera_beams(frames))
+        camera = CameraStats(camera_pass.samples_taken, camera_pass.spectrum, fallbacks)
     return RenderStats(
         context.renderer,
         context.is_software,

@@ -74,7 +74,6 @@ def render_picture(
         seconds=request.seconds,
         spp=request.samples,
         bins=request.bins,
-        camera_beams=settings.method == "srd",
     )
     check_picture_memory(settings.width, settings.height, settings.bins)
     return _work(context, request, targets, stage, settings, write_shown, notices, course)

@@ -19,15 +19,6 @@ layout(local_size_x = 8, local_size_y = 8) in;
 // How many pixels are listed, how many of their paths have halted, and what is to be known of the listed ones.
 layout(std430, binding = BIND_LISTED) restrict buffer Listed { uint listed_count; uint halted_count; uint listed[]; };
 layout(rgba32f, binding = 0) uniform image2D picture[TARGETS];
-#ifdef BEAM_STARTS
-// Paths that carry on what camera beams hand over, and what they find.
-layout(std430, binding = BIND_BEAM_ENTRIES) readonly restrict buffer Starts { BeamStart starts[]; };
-layout(std430, binding = BIND_BEAM_FOUND) writeonly restrict buffer Found { vec4 found_light[]; };
-#endif
-#ifdef BEAM_OBJECTS
-// Per object: whether camera beams show what is seen in it.
-layout(std430, binding = BIND_BEAM_OBJECTS) readonly restrict buffer BeamObjects { uint beam_objects[]; };
-#endif
 
 #ifdef CAMERA_SPECULAR
 // Paths that wait while another is followed; global as `radiance` is.
@@ -107,16 +98,13 @@ CameraPath camera_path(uvec2 pixel, uint primary_sample, float gain)
 #ifdef LENS
     // Looks are shared out over the lens as over the pixel, by a sequence any part of which is even too: samples of one band, every so many of
     // them, see through all of the lens.
-    uint look = p.draw_index * p.primary_samples + (primary_sample == THE_SAMPLE ? 0u : primary_sample);
+    uint look = p.sample_index * p.primary_samples + (primary_sample == THE_SAMPLE ? 0u : primary_sample);
     uint key = hash_combine(hash_combine(hash_combine(p.seed, pixel.x), pixel.y), 79u);
     lens_place = vec2(kronecker(look, LENS_1, key), kronecker(look, LENS_2, hash_pcg(key)));
 #endif
     return path_from(pixel, look_place, gain);
 }
 
-#ifdef BEAM_STARTS
-#include "camera/beam_start.glsl"
-#endif
 
 #ifdef CAMERA_SPECULAR
 #include "camera/meet.glsl"
@@ -150,24 +138,15 @@ void main()
 #else
     uint entry = listed[at_listed];
 #endif
-#ifdef BEAM_STARTS
-    uint number = starts[entry].pixel;
-    uvec2 pixel = uvec2(number % p.size.x, number / p.size.x);
-#else
     uint number = bitfieldExtract(entry, 0, int(LISTED_BITS)), primary_sample = bitfieldExtract(entry, int(LISTED_BITS), 3);
     float gain = float((entry >> (LISTED_BITS + 3u)) + 1u) / float(p.primary_samples);
     uvec2 pixel = uvec2(number % p.size.x, number / p.size.x);
-#endif
 #else
     uvec2 pixel = gl_GlobalInvocationID.xy + uvec2(0u, p.first_row);
     if (pixel.x >= p.size.x || pixel.y >= p.size.y) return;
 #endif
     uint pixel_key = hash_combine(hash_combine(p.seed, pixel.x), pixel.y);
-#ifdef BEAM_STARTS
-    BeamStart start = starts[entry];
-    CameraPath path = started_path(start);
-    pixel_key = hash_combine(pixel_key, start.key);
-#elif defined(CAMERA_SPECULAR)
+#ifdef CAMERA_SPECULAR
     CameraPath path = camera_path(pixel, primary_sample, gain);
 #endif
 #ifdef RGB_CHANNELS
@@ -195,25 +174,17 @@ void main()
     }
     Survey survey = Survey(0u, vec3(0.0));
 #ifdef FOLLOWED
-    uint specular_samples = 0u, chosen = THE_SAMPLE, draw = hash_combine(pixel_key, p.draw_index);
+    uint specular_samples = 0u, chosen = THE_SAMPLE, draw = hash_combine(pixel_key, p.sample_index);
 #endif
     for (uint k = 0u; k < p.primary_samples; ++k) {
-        look_index = p.draw_index * p.primary_samples + k;
+        look_index = p.sample_index * p.primary_samples + k;
         lights_seen = 0u;
         saw_light = skipped_texels = false;
         CameraPath path = camera_path(pixel, p.primary_samples == 1u ? THE_SAMPLE : k, 1.0 / float(p.primary_samples));
         Hit hit;
         bool met = intersect_closest(path.position, path.direction, FAR_DISTANCE, path.origin, hit);
         uint kind = met ? object_at(hit.object).kind : NONE;
-#ifdef BEAM_OBJECTS
-        bool by_beams = is_specular(kind) && beam_objects[hit.object] != 0u;
-#ifdef VISIBLE_LIGHTS
-        if (by_beams) add_lights(path, hit.distance);
-#endif
-#else
-        const bool by_beams = false;
-#endif
-        uint sees = by_beams ? SEES_BEAMS : (is_specular(kind) ? SEES_SPECULAR : SEES_DIRECTLY);
+        uint sees = is_specular(kind) ? SEES_SPECULAR : SEES_DIRECTLY;
 #if defined(COATS) && defined(FOLLOWED)
         // The base is seen directly; a path goes on from the coat.
         if (kind == KIND_DIFFUSE && is_coated(hit.object)) {
@@ -223,9 +194,7 @@ void main()
             if (unit_float(draw) * float(specular_samples) < 1.0) chosen = k;
         }
 #endif
-        if (by_beams) {
-            // The polygons of the picture show it.
-        } else if (is_specular(kind)) {
+        if (is_specular(kind)) {
 #ifdef FOLLOWED
             specular_samples += 1u;
             // Each of them as likely: the newest of c with 1 / c.
@@ -341,9 +310,6 @@ void main()
     }
 #endif
 #endif
-#ifdef BEAM_STARTS
-    for (int t = 0; t < TARGETS; ++t) found_light[entry * uint(TARGETS) + uint(t)] = radiance[t];
-#else
 #ifdef RGB_CHANNELS
     radiance[0].w = took_turn ? 1.0 : 0.0;
 #endif
@@ -351,5 +317,4 @@ void main()
         vec4 sum = imageLoad(picture[t], ivec2(pixel));
         imageStore(picture[t], ivec2(pixel), sum + radiance[t]);
     }
-#endif
 }

@@ -30,7 +30,7 @@ void meet_coat(inout CameraPath path, Hit hit, Triangle facet, uint pixel_key)
     mat3 to_world = mat3(first, second, normal);
     vec3 toward = -path.direction * to_world;
     uint key = hash_combine(hash_combine(pixel_key, path.key), 80u + uint(path.depth));
-    vec2 unit = vec2(kronecker(p.draw_index, FACET_1, key), kronecker(p.draw_index, FACET_2, hash_pcg(key)));
+    vec2 unit = vec2(kronecker(p.sample_index, FACET_1, key), kronecker(p.sample_index, FACET_2, hash_pcg(key)));
     // A pixel's only sample, as in a picture in motion, stands for all of the lobe: no grain.
     bool is_only = p.sample_side >= 1.0, draws = finish.alpha > 0.0 && !is_only;
     vec3 drawn = draws ? visible_microfacet(toward, vec3(0.0, 0.0, 1.0), finish.alpha, unit) : vec3(0.0, 0.0, 1.0);

@@ -41,7 +41,7 @@ void cut_band(inout CameraPath path, float at, uint pixel_key)
     float below = share_below(path, at);
     bool both = path.branch_weight * min(below, 1.0 - below) > CUT_THRESHOLD && stack_size < STACK;
     bool takes_low = true;
-    if (!both) takes_low = unit_float(hash_combine(hash_combine(pixel_key, path.key + uint(path.depth + path.cuts) * 2654435769u), p.draw_index)) < below;
+    if (!both) takes_low = unit_float(hash_combine(hash_combine(pixel_key, path.key + uint(path.depth + path.cuts) * 2654435769u), p.sample_index)) < below;
     path.cuts += 1;
     CameraPath whole = path;
     // What stack_size first, then what goes on.

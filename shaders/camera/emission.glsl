@@ -56,14 +56,11 @@ WavelengthInterval wavelength_interval(CameraPath path, float lo, float hi)
     interval.hi = hi;
     interval.cell_lo = emission_cell(lo);
     interval.cell_hi = emission_cell(hi);
-    interval.through = path.inverse_pdf * transmitted(path, 0.5 * (lo + hi)) MEAN_COVER(lo, hi);
+    interval.through = path.inverse_pdf * transmitted(path, 0.5 * (lo + hi));
 #ifdef ABSORPTION
     interval.steps = max(1, int(ceil((hi - lo) * float(TINT_STEPS))));
 #else
     interval.steps = path.weight.x == path.weight.z ? 1 : max(1, int(ceil((hi - lo) * float(WEIGHT_STEPS))));
-#endif
-#ifdef CAMERA_BEAMS
-    if (cover.varies) interval.steps = max(interval.steps, int(ceil(8.0 * (hi - lo) * cover.per_x)));
 #endif
     return interval;
 }
@@ -78,7 +75,7 @@ void add_spectrum(CameraPath path, WavelengthInterval interval, uint row, float 
     float step_x = (interval.hi - interval.lo) / float(interval.steps);
     for (int s = 0; s < interval.steps && interval.steps > 1; ++s) {
         float a = interval.lo + float(s) * step_x, b = s + 1 == interval.steps ? interval.hi : a + step_x;
-        float amount = factor * path.inverse_pdf * transmitted(path, 0.5 * (a + b)) MEAN_COVER(a, b);
+        float amount = factor * path.inverse_pdf * transmitted(path, 0.5 * (a + b));
         int cell_a = emission_cell(a), cell_b = emission_cell(b);
         for (int t = 0; t < TARGETS; ++t)
             radiance[t] += amount * (emission_until(row, t, cell_b) - emission_until(row, t, cell_a));
@@ -105,7 +102,7 @@ void channel_factors(CameraPath path, WavelengthInterval interval, out vec4 fact
             vec4 kept = vec4(0.0);
             for (int s = 0; s < interval.steps; ++s) {
                 float a = interval.lo + float(s) * step_x, b = s + 1 == interval.steps ? interval.hi : a + step_x;
-                kept += path.inverse_pdf * transmitted(path, 0.5 * (a + b)) MEAN_COVER(a, b) * (emission_until(uint(WHITE_ROW), t, emission_cell(b)) - emission_until(uint(WHITE_ROW), t, emission_cell(a)));
+                kept += path.inverse_pdf * transmitted(path, 0.5 * (a + b)) * (emission_until(uint(WHITE_ROW), t, emission_cell(b)) - emission_until(uint(WHITE_ROW), t, emission_cell(a)));
             }
             factors[t] = kept / max(emission_until(uint(WHITE_ROW), t, EMISSION_CELLS), vec4(1e-20));
         }

@@ -58,12 +58,6 @@ vec4 radiance[TARGETS];
 // Where in its pixel what is being followed lies.
 vec2 look_place;
 
-#ifdef CAMERA_BEAMS
-#include "camera/beam_cover.glsl"
-#define MEAN_COVER(lo, hi) * mean_cover(lo, hi)
-#else
-#define MEAN_COVER(lo, hi)
-#endif
 #include "camera/emission.glsl"
 #include "lib/footprint.glsl"
 #include "camera/finish.glsl"

@@ -6,7 +6,7 @@
 // A number for a choice at this depth: a Kronecker sequence over a pixel's samples.
 float choice(CameraPath path, uint pixel_key)
 {
-    return kronecker(p.draw_index, depth_generator(uint(path.depth)), hash_combine(pixel_key, path.key + uint(path.depth) * 2654435769u));
+    return kronecker(p.sample_index, depth_generator(uint(path.depth)), hash_combine(pixel_key, path.key + uint(path.depth) * 2654435769u));
 }
 
 #endif

@@ -101,25 +101,18 @@ void ray_at(CameraPath path, float x, out vec3 position, out vec3 direction)
 #endif
 }
 
-#ifdef CAMERA_BEAMS
-// Side of the part of the pixel that is looked at, pixels; which of the parts it is.
-float beam_side;
-uint beam_draw;
-#define DRAW_INDEX beam_draw
-#elif defined(LISTS_SPECULAR)
+#ifdef LISTS_SPECULAR
 // Counts the looks of a pixel: each sees another point of a light.
 uint look_index;
 #define DRAW_INDEX look_index
 #else
-#define DRAW_INDEX p.draw_index
+#define DRAW_INDEX p.sample_index
 #endif
 
 // Side of the share of its pixel that a sample of this path has, pixels.
 float sample_side(CameraPath path)
 {
-#if defined(CAMERA_BEAMS)
-    return beam_side;
-#elif defined(LISTS_SPECULAR)
+#ifdef LISTS_SPECULAR
     return p.sample_side * inversesqrt(float(p.primary_samples));
 #else
     return path.restricted != 0u ? p.band_side : p.sample_side;
@@ -148,9 +141,9 @@ void restrict_to_band(inout CameraPath path, uint pixel_key)
     // One of the table's cells, by how bright it looks.
 #ifdef EVEN_WAVELENGTHS
     // With the places in the pixel one net: each part of it that holds a few samples has wavelengths from all of the spectrum.
-    float u = radical_inverse(p.draw_index, hash_combine(pixel_key, 77u));
+    float u = radical_inverse(p.sample_index, hash_combine(pixel_key, 77u));
 #else
-    float u = unit_float(hash_combine(hash_combine(pixel_key, 77u), p.draw_index));
+    float u = unit_float(hash_combine(hash_combine(pixel_key, 77u), p.sample_index));
 #endif
     uint low = 0u, high = uint(EMISSION_CELLS);
     while (high - low > 1u) {

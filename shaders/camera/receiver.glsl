@@ -379,7 +379,7 @@ void add_caustic_at(CameraPath path, SurfaceInteraction seen, WavelengthInterval
     }
     box = sqrt(box);
     float side = sample_side(path);
-#if !defined(CAMERA_SPECULAR) && !defined(CAMERA_BEAMS)
+#ifndef CAMERA_SPECULAR
     if (p.cells.x > 1.0 || (p.cells.x > 0.0 && window.kind == PLACED_PICTURE)) {
         // Each look stands for its cell of the pixel. Cells fill it, so texels that fill it too are read once.
         vec2 share = side * vec2(p.pixel_width, p.pixel_height), aside = (floor(look_place * p.cells) + 0.5) / p.cells - look_place;

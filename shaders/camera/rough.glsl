@@ -23,13 +23,13 @@ RoughPlace meet_microfacet(inout CameraPath path, inout PathFrame frame, uint ob
     // Parts of a band that was cut here meet it again, and find the same microfacet.
     uint key = hash_combine(pixel_key, 80u), depth = uint(path.depth);
     vec3 normal = frame.shading.normal;
-    vec3 microfacet = visible_microfacet(-path.direction, normal, place.width, microfacet_numbers(p.draw_index, depth, key));
+    vec3 microfacet = visible_microfacet(-path.direction, normal, place.width, microfacet_numbers(p.sample_index, depth, key));
     for (int c = 0; c < COLUMNS_HELD; ++c) frame.columns[c] = turned_with(microfacet, normal, frame.columns[c]);
     // A box of these sides is as broad as the lobe. A second surface adds its axes a quarter turn aside, to the left or to the right, which adds
     // variances in the mean.
     vec3 first, second;
     lobe_axes(microfacet, normal, sqrt(12.0) * place.width, first, second);
-    float turn = depth == 0u ? 0.0 : (hash_combine(p.draw_index, key) & 1u) != 0u ? 1.0 : -1.0;
+    float turn = depth == 0u ? 0.0 : (hash_combine(p.sample_index, key) & 1u) != 0u ? 1.0 : -1.0;
     frame.columns[0] += turn == 0.0 ? first : turn * second;
     frame.columns[1] += turn == 0.0 ? second : -turn * first;
 #ifdef SPECTRAL_SWEEP

@@ -7,11 +7,7 @@
 
 const uint SURVEY_TAKES = 1u, SURVEY_KEPT = 2u;
 // What a pixel's looks have in common, in a key's lowest bits. A key of 0: nothing.
-#ifdef COATS
-const uint SEES_DIRECTLY = 1u, SEES_SPECULAR = 2u, SEES_BEAMS = 3u, SEES_COATED = 4u, KIND_BITS = 7u;
-#else
-const uint SEES_DIRECTLY = 1u, SEES_SPECULAR = 2u, SEES_BEAMS = 3u, KIND_BITS = 3u;
-#endif
+const uint SEES_DIRECTLY = 1u, SEES_SPECULAR = 2u, SEES_COATED = 3u, KIND_BITS = 3u;
 // Cosine between normals that two looks of an even pixel may have at the least.
 const float EVEN_NORMALS = 0.99;
 

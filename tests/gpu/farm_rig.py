@@ -13,7 +13,7 @@ from spectrasplat.farm.render import FarmRender, FarmResult
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.settings import RenderSettings
 
-SETTINGS = RenderSettings(width=64, height=36, photons=400_000, spp=4, batch=4096, camera_beams=True)
+SETTINGS = RenderSettings(width=64, height=36, photons=400_000, spp=4, batch=4096)
 SCENE = "lens"
 
 

@@ -138,7 +138,7 @@ def colour_noise(gl) -> float:
 def test_single_wavelengths_hardly_colour_a_pixel(gl, monkeypatch, tmp_path) -> None:
     """0.7 % of white; 3.1 % where wavelengths are a sequence of their own (the mutant), as once they were."""
     assert colour_noise(gl) < 0.012
-    old, new = "radical_inverse(p.draw_index, hash", "kronecker(p.draw_index, depth_generator(0u), hash"
+    old, new = "radical_inverse(p.sample_index, hash", "kronecker(p.sample_index, depth_generator(0u), hash"
     mutate(monkeypatch, tmp_path, "camera/path.glsl", old, new)
     assert colour_noise(gl) > 0.02
 

@@ -26,7 +26,7 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::DeprecationWarning"),
 ]
 pytest.importorskip("distributed", reason="pip install 'spectrasplat[farm]'")
-SMALL = RenderSettings(width=48, height=27, photons=30_000, spp=2, batch=4096, camera_beams=True)
+SMALL = RenderSettings(width=48, height=27, photons=30_000, spp=2, batch=4096)
 
 
 class Killer:

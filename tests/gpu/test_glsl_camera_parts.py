@@ -43,8 +43,8 @@ STANDALONE = """
 struct RayOrigin { uint primitive; uint object; uint inside; uint inside_mask; };
 struct MediumStack { uint mask; uint object; };
 #define COLUMN_LIMIT 1e6
-struct CameraParameters { uint sample_index; uint draw_index; uint dithered; uint bands; };
-CameraParameters p = CameraParameters(3u, 3u, 0u, 4u);
+struct CameraParameters { uint sample_index; uint dithered; uint bands; };
+CameraParameters p = CameraParameters(3u, 0u, 4u);
 vec3 transfer_column(vec3 dp, vec3 dd, vec3 d, vec3 n, float t) {
     vec3 q = dp + t * dd;
     return q - dot(q, n) / dot(d, n) * d;

@@ -18,7 +18,7 @@ from spectrasplat.render.still import render
 
 from tests.unit.test_staging import obj_file, opaque_file
 
-SETTINGS = RenderSettings(width=96, height=64, photons=30_000, spp=2, method="srd-photons", camera_beams=False)
+SETTINGS = RenderSettings(width=96, height=64, photons=30_000, spp=2, method="srd-photons")
 pytestmark = pytest.mark.slow
 
 

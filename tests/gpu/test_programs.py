@@ -73,7 +73,7 @@ def test_every_scenes_programs_are_strict(device: Context, path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 def test_every_methods_programs_are_strict(device: Context, method: str) -> None:
-    check(compiled_programs(device, load_scene(PRISM), settings(method=method, camera_beams=True)))
+    check(compiled_programs(device, load_scene(PRISM), settings(method=method)))
     check(compiled_programs(device, load_scene(PRISM), settings(method=method, bins=16)))
 
 

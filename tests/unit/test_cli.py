@@ -129,9 +129,7 @@ class TestRender:
     ) -> None:
         output = tmp_path / "out.npy"
         assert main(["render", str(scene_path), "-o", str(output)]) == 0
-        assert renderer.settings == RenderSettings(
-            width=32, height=16, photons=5000, exposure_ev=0.5, max_depth=20, camera_beams=True
-        )
+        assert renderer.settings == RenderSettings(width=32, height=16, photons=5000, exposure_ev=0.5, max_depth=20)
         assert np.load(output).shape == (16, 32, 3)
         captured = capsys.readouterr()
         assert str(output) in captured.out

@@ -91,7 +91,7 @@ def test_only_scenes_with_a_finish_have_its_features() -> None:
     plain = Features.of(scene, settings)
     assert not plain.coats and not plain.rough_diffuse
     glossy = Features.of(edits.set_material(scene, index, Diffuse(roughness=0.2)), settings)
-    assert glossy.coats and glossy.camera_specular and not glossy.rough_diffuse and not glossy.camera_beams
+    assert glossy.coats and glossy.camera_specular and not glossy.rough_diffuse
     rough = Features.of(edits.set_material(scene, index, Diffuse(diffuse_roughness=0.2)), settings)
     assert rough.rough_diffuse and replace(rough, rough_diffuse=False) == plain
 

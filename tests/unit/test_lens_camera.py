@@ -11,7 +11,7 @@ from spectrasplat.base.errors import UserError
 from spectrasplat.commands.inspect_report import camera_line
 from spectrasplat.commands.options import with_lens
 from spectrasplat.edit.parameters import Stage, apply_all
-from spectrasplat.model.features import Features, in_view, why_no_camera_beams
+from spectrasplat.model.features import Features, in_view
 from spectrasplat.model.io.gltf_write import save_gltf
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.io.scene_save import save_scene
@@ -74,12 +74,10 @@ def test_what_no_lens_can_be_is_refused(tmp_path: Path, lens: str, words: str) -
         scene_of(tmp_path, lens)
 
 
-def test_a_lens_is_a_feature_and_has_no_beams(tmp_path: Path) -> None:
+def test_a_lens_is_a_feature(tmp_path: Path) -> None:
     pinhole, lens = scene_of(tmp_path), scene_of(tmp_path, "lens_radius = 0.25")
-    settings = RenderSettings(camera_beams=True)
+    settings = RenderSettings()
     assert Features.of(lens, settings).lens and not Features.of(pinhole, settings).lens
-    assert why_no_camera_beams(pinhole, settings) is None
-    assert "lens" in (why_no_camera_beams(lens, settings) or "")
     assert "lens of radius 0.25 focused at 6" in camera_line(lens) and "lens" not in camera_line(pinhole)
 
 

@@ -1,4 +1,4 @@
-// What beams show of a pixel, added to its sums with every sample.
+// A picture drawn once for a view, added to the camera's sums with every sample.
 layout(binding = 0) uniform sampler2D shown[TARGETS];
 layout(location = 0) out vec4 found[TARGETS];
 
