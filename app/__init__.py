@@ -3,11 +3,11 @@
 `import spectrasplat as ss`, then `ss.render(ss.load("prism"))`: see docs/python.md.
 """
 
-__version__ = "0.1.0"
-
 import os
 from importlib import import_module
 from typing import TYPE_CHECKING
+
+from .base.version import __version__ as __version__
 
 # The matrix products here are small. Shared out over threads they wait for each other, and on a software renderer for
 # its threads: a spectral table then takes ten times as long. Only counts where numpy is imported after this.

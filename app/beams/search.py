@@ -1,6 +1,6 @@
 """The search for beams: from one facet that a light sees, through all facets that light meets after it.
 
-Depth first over an explicit stack. A beam flies (`grow.fly`): the facets ahead cut it into fragments, each of which
+Depth first over an explicit stack. A beam flies (`flight.fly`): the facets ahead cut it into fragments, each of which
 meets one facet. A fragment is halved in the spectrum where its outline moves too far, in space where rays are too far
 from affine; then it ends on a receiver, or goes on reflected and refracted. Weak children play Russian roulette, whose
 number is a hash of the path, so that the same beams live from frame to frame.
@@ -420,7 +420,7 @@ def may_touch(nodes, i, length, obstacles, works):
 
 @part
 def lay_edges(beam, flown, facet, hit, work):
-    """Whether a facet, met as `hit` says (`grow.facet_of`) on the flight of beam `flown`, may leave anything of
+    """Whether a facet, met as `hit` says (`flight.facet_of`) on the flight of beam `flown`, may leave anything of
     an outline. If so its edges lie in `work.lines`, and `work.cuts` says which of them cut. `work.moment` holds the
     flight's rays."""
     lo, hi, sign = first_place(flown), last_place(flown), 1.0 if hit >= 0 else -1.0

@@ -11,11 +11,11 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .. import __version__
 from ..base.errors import UserError, suggestion
 from ..base.interrupts import exit_code_of
 from ..base.memory import check_picture_memory
 from ..base.paths import shipped_scenes
+from ..base.version import __version__
 from ..bench.results import DEFAULT_METHODS, BenchResult, BenchSettings
 from ..model.settings import CAMERA_METHODS, METHODS
 from . import options

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
-from .. import __version__
 from ..base.errors import UserError, plain
 from ..base.interrupts import interrupt_flag
+from ..base.version import __version__
 from . import options
 from .animate import AnimateRequest, plan_of
 from .bench import CAMERA_SCENES, BenchRequest, kept_text, load_scenes, met_by, repeat_command, write_and_show

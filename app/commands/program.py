@@ -14,8 +14,8 @@ from typing import Annotated
 import typer
 from typer.core import TyperGroup
 
-from .. import __version__
 from ..base.errors import UserError
+from ..base.version import __version__
 from . import measure_program, picture_program, scene_program
 from .farm_program import add_farm
 from .printing import show

@@ -22,9 +22,9 @@ from typing import Annotated, Literal
 import msgspec
 import typer
 
-from .. import __version__
 from ..base.atomic import make_output_folder
 from ..base.errors import UserError, plain
+from ..base.version import __version__
 from .proof_steps import PARTS, Finding, Part
 
 JSON, HTML = "proof.json", "proof.html"

@@ -10,9 +10,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .. import __version__
 from ..base.atomic import make_output_folder
 from ..base.errors import UserError
+from ..base.version import __version__
 from . import options
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""Edits of a glass: which, how dispersive, how absorbing. Pure; see `edit_objects` for the manner."""
+"""Edits of a glass: which, how dispersive, how absorbing. Pure functions from a scene to a new one, as in `objects`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Edits of lights: place, shape, spectrum and power in its own unit. Pure; see `edit_objects` for the manner."""
+"""Edits of lights: place, shape, spectrum and power in its own unit. Pure functions from a scene to a new one."""
 
 from __future__ import annotations
 

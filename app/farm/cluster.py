@@ -20,8 +20,8 @@ from queue import Empty, SimpleQueue
 from types import TracebackType
 from typing import IO, TYPE_CHECKING, Any, Self
 
-from .. import __version__
 from ..base.errors import UserError
+from ..base.version import __version__
 from . import desk
 from .gpus import count_gpus
 from .jobs import Job, News

@@ -10,8 +10,8 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from .. import __version__
 from ..base.errors import UserError
+from ..base.version import __version__
 from ..gpu import shader
 from ..gpu.context import Context, create_context
 

@@ -17,7 +17,7 @@ METHODS = (
     "regular-7",
     "regular-16",
 )
-"""Sampling methods that every comparison holds (README, "Methods")."""
+"""Sampling methods that every comparison holds (docs/error-against-time.md)."""
 RANDOM_METHODS = ("stochastic", "stochastic-even", "stochastic-point", "progressive-stochastic", "hero")
 """Of those, the ones whose photons have wavelengths drawn at random."""
 LIGHT_METHODS = ("progressive", "stochastic-point", "progressive-stochastic", "hero")

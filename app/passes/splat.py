@@ -116,7 +116,7 @@ class Splatter:
         tables: SplatTables,
         atlas: MapAtlas,
         receivers: moderngl.Buffer,
-        smoothing: float = 0.6,
+        smoothing: float,
         gains: GainBuffers | None = None,
         start: int = 0,
         stride: int = 1,

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from .. import __version__
 from ..base.errors import UserError
+from ..base.version import __version__
 from ..edit.parameters import Stage
 from ..gpu.context import Context
 from ..model.scene import Scene

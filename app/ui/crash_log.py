@@ -11,8 +11,8 @@ import sys
 import traceback
 from pathlib import Path
 
-from .. import __version__
 from ..base import files
+from ..base.version import __version__
 
 FILE_NAME = "crash.log"
 MAX_BYTES = 256 * 1024

@@ -19,9 +19,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .. import __version__
 from ..base import files
 from ..base.paths import assets_dir
+from ..base.version import __version__
 from .view_model import SceneEntry
 
 if TYPE_CHECKING:

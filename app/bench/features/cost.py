@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ... import __version__
 from ...base.errors import UserError
+from ...base.version import __version__
 from ...model.features import Features
 from ...model.features_explained import explain
 from ...model.settings import RenderSettings

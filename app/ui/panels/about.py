@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from ... import __version__
 from ...base.paths import assets_dir
+from ...base.version import __version__
 from ...edit.state import State
 from .. import theme
 from ..view_model import ViewModel

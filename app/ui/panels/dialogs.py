@@ -1,7 +1,6 @@
 """The dialogues that stand between the user and lost work: open, save as, unsaved changes, quit.
 
-What is asked next (`_pending`) is memory of the interface while a dialogue is open; the host only
-ever gets the final requests.
+Which question is open is memory of the interface; the host gets only the final requests.
 """
 
 from __future__ import annotations
