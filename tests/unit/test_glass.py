@@ -193,7 +193,7 @@ def test_notes_say_index_below_one() -> None:
         (lambda w: glass.sellmeier([1.0], [0.01], range_nm=(900.0, 2000.0), where=w), "outside the visible range"),
         (lambda w: glass.sellmeier([1.0], [0.01], range_nm=(700.0, 400.0), where=w), "range 700 to 400 nm is empty"),
         (lambda w: glass.cauchy([], where=w), "at least the coefficient A"),
-        (lambda w: glass.cauchy([1.2, -0.5], where=w), "at 380 nm; it must be a positive number"),
+        (lambda w: glass.cauchy([1.2, -0.5], where=w), "at 380 nm; from 380 to 780 nm it must be a positive number"),
         (lambda w: glass.table([], [], where=w), "two or more wavelengths"),
         (lambda w: glass.table([400.0, 500.0], [1.5], where=w), "got 2 and 1"),
         (lambda w: glass.table([500.0, 400.0], [1.5, 1.6], where=w), "400 follows 500"),
@@ -202,7 +202,7 @@ def test_notes_say_index_below_one() -> None:
         (lambda w: glass.table([400.0, 500.0], [1.5, 0.0], where=w), "n = 0 at 500 nm"),
         (lambda w: glass.table([0.0, 500.0], [1.5, 1.5], where=w), "not a positive number"),
         (lambda w: glass.from_formula("formula 3", [2.0, 1.0], where=w), "does not take 2 coefficients"),
-        (lambda w: glass.from_formula("formula 9", [2.0], where=w), "unknown dispersion formula"),  # type: ignore[arg-type]
+        (lambda w: glass.from_formula("formula 10", [2.0], where=w), "unknown dispersion formula"),  # type: ignore[arg-type]
     ],
 )
 def test_impossible_data_are_refused_by_key(make, message: str) -> None:

@@ -62,7 +62,7 @@ class _Browser:
 
 _browser = _Browser()
 _OVERWRITE = "Replace file?"
-_OWN_FORMATS = (".exr", ".npy", ".hdr", ".webp", ".toml", ".json", ".glb", ".gltf", ".ies", ".obj", ".stl", ".ply")
+_OWN_FORMATS = (".exr", ".npy", ".hdr", ".webp", ".toml", ".json", ".glb", ".gltf", ".ies", ".ldt", ".obj", ".stl", ".ply")
 """Kinds of files that Python's table lacks, or has on some systems only."""
 
 
