@@ -10,7 +10,6 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..base import files
 from ..base.errors import UserError
 from ..model.lights import LIGHT_KINDS, IesLight
 from ..model.lights.ies_file import read_ies
@@ -208,7 +207,7 @@ def _spectrum(light: Light, kind: str, value: object, notes: list[str]) -> Spect
         case "lines", tuple(rows) if rows:
             return _lines(light, rows)
         case "csv", (str() | Path()) as path:
-            return spectra.from_csv(*files.with_part(path), notes)
+            return spectra.from_csv(path, notes)
     raise UserError(
         f"light '{light.name}': '{kind}' with {value!r} is no spectrum; use illuminant, blackbody, laser, lines or csv"
     )

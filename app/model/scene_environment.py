@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..base import files
 from ..base.errors import UserError
 from ..base.paths import assets_dir
 from .environment import (
@@ -70,10 +71,10 @@ def _read_constant(table: SceneTable) -> Vec3:
 
 
 def _read_map(table: SceneTable, lights: bool) -> Environment:
-    path, layer = table.file_and_part("file")
+    path = table.existing_file("file", or_part=True)
     rotation_deg = table.number("rotation_deg", 0.0)
     try:
-        return from_map(path, _intensity(table), rotation_deg, _up(table), table.notes, lights, layer)
+        return from_map(path, _intensity(table), rotation_deg, _up(table), table.notes, lights)
     except UserError as error:
         table.fail("file", f"cannot be used: {error}")
 
@@ -125,7 +126,7 @@ def environment_values(environment: Environment, scene_path: Path) -> dict[str, 
     told = dict(environment.parameters)
     if environment.kind == "map" and told and environment.source == str(STUDIO_MAP.resolve()):
         return {"kind": "studio"} | told
-    if environment.kind == "map" and told and environment.source and Path(environment.source).is_file():
+    if environment.kind == "map" and told and environment.source and files.with_part(environment.source)[0].is_file():
         return {"kind": "map", "file": picture_file(environment.rgb, environment.source, scene_path)} | told
     if environment.kind != "map" and told:
         return {"kind": environment.kind} | told

@@ -67,8 +67,9 @@ class _Row:
     is_data: bool
 
 
-def read_curve(path: str | os.PathLike[str], part: str, notes: list[str]) -> Curve:
-    """The curve that `part` names, or the only one. Raises UserError, which lists what there is, where that is open."""
+def read_curve(name: str | os.PathLike[str], notes: list[str]) -> Curve:
+    """The curve called "file:column", or the only one of a file. Raises UserError, with a list, where that is open."""
+    path, part = files.with_part(name)
     curves = read_curves(path, notes)
     names = [curve.name for curve in curves]
     key = part.casefold()

@@ -261,19 +261,15 @@ class SceneTable:
             return {}
         return {name: outer.table(name) for name in outer._values}  # type: ignore[misc]
 
-    def existing_file(self, key: str) -> Path:
-        """A file named relative to the scene file's folder; must exist, where the scene may read."""
-        return self._readable(key, self.file.parent / self.string(key))
+    def existing_file(self, key: str, or_part: bool = False) -> Path:
+        """A file named relative to the scene file's folder; must exist, where the scene may read.
 
-    def file_and_part(self, key: str) -> tuple[Path, str]:
-        """As `existing_file`, and the part of it that is meant (`files.with_part`)."""
-        path, part = files.with_part(self.file.parent / self.string(key))
-        return self._readable(key, path), part
-
-    def _readable(self, key: str, path: Path) -> Path:
-        if not files.may_read(path, self.file.parent):
+        With `or_part` the name may go on with what is meant within it (`files.with_part`)."""
+        path = self.file.parent / self.string(key)
+        file = files.with_part(path)[0] if or_part else path
+        if not files.may_read(file, self.file.parent):
             self.fail(key, f"names {path}, which {files.OUTSIDE}")
-        if not files.is_file(path):
+        if not files.is_file(file):
             self.fail(key, f"names {path}, which is not a file")
         return path
 

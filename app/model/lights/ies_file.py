@@ -120,7 +120,9 @@ def read_ies(path: str | os.PathLike[str]) -> Profile:
         if not files.is_file(path):
             raise UserError(f"{path} is not a file; choose a .ies or .ldt file")
         if path.stat().st_size > MAX_BYTES:
-            raise UserError(f"{path} is longer than {MAX_BYTES >> 20} MiB, as no lamp's file is; choose a .ies or .ldt file")
+            raise UserError(
+                f"{path} is longer than {MAX_BYTES >> 20} MiB, as no lamp's file is; choose a .ies or .ldt file"
+            )
         text = files.read_any_text(path, MAX_BYTES)
     except OSError as error:
         raise UserError(f"{path} cannot be read: {error.strerror}; choose another file") from error

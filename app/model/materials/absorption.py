@@ -91,8 +91,8 @@ def read_curve(table: SceneTable, value_key: str, what: str) -> tuple[str, np.nd
     if source is None:
         table.fail("", f"holds no curve: give 'csv', or 'nm' with '{value_key}'")
     if source == "csv":
-        path, part = table.file_and_part("csv")
-        curve = curve_file.read_curve(path, part, table.notes)
+        path = table.existing_file("csv", or_part=True)
+        curve = curve_file.read_curve(path, table.notes)
         shares = curve_file.share(path, curve, what, table.notes)
         return source, _on_visible_grid(table, source, curve.nm, shares)
     wavelengths = table.numbers("nm", at_least=2)

@@ -46,9 +46,9 @@ def named_glass(table: SceneTable, key: str, name: str) -> Dispersion:
 
 
 def _from_file(table: SceneTable, key: str) -> Dispersion:
-    path, part = table.file_and_part(key)
+    path = table.existing_file(key, or_part=True)
     try:
-        return index_file.read_index(path, part, table.notes)
+        return index_file.read_index(path, table.notes)
     except UserError as error:
         table.fail(key, f"cannot be used: {error}")
 

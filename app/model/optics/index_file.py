@@ -7,6 +7,7 @@ those beside the scene file, then those in the folder `glass` of the user's sett
 from __future__ import annotations
 
 import itertools
+import os
 import re
 from collections.abc import Iterable
 from functools import lru_cache
@@ -53,15 +54,16 @@ def find_glass(name: str, beside: Path, where: str, notes: list[str]) -> Dispers
         for folder in (beside, config_path() / "glass"):
             for path in sorted(p for p in folder.glob("*") if p.suffix.lower() == ".agf" and files.is_file(p)):
                 if files.may_read(path, folder) and (found := _key(name, _agf_glasses(path, path.stat().st_mtime_ns))):
-                    return read_index(path, found, notes)
+                    return read_index(f"{path}:{found}", notes)
         raise
 
 
-def read_index(path: Path, part: str, notes: list[str]) -> Dispersion:
-    """n(λ) in `path`, of the glass or column `part` where it holds several; what was assumed goes to `notes`.
+def read_index(name: str | os.PathLike[str], notes: list[str]) -> Dispersion:
+    """n(λ) in a file, of the glass or column "file:part" where it holds several; what was assumed goes to `notes`.
 
     Raises UserError naming the file, and what it holds where the choice is open.
     """
+    path, part = files.with_part(name)
     suffix = path.suffix.lower()
     if suffix == ".agf":
         return _from_agf(path, part, notes)

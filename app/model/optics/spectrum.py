@@ -230,13 +230,13 @@ def from_table(wavelengths_nm: np.ndarray, values: np.ndarray, where: str = "") 
     return Spectrum(np.interp(VISIBLE_NM, x, y, left=0.0, right=0.0))
 
 
-def from_csv(path: str | os.PathLike[str], part: str = "", notes: list[str] | None = None) -> Spectrum:
-    """A spectrum measured by the user: the column `part` of a table, or a TM-27 file (`curve_file`).
+def from_csv(path: str | os.PathLike[str], notes: list[str] | None = None) -> Spectrum:
+    """A spectrum measured by the user: a table's column or a TM-27 file (`curve_file`).
 
     Linear between the rows, zero outside them. What was assumed goes to `notes`. Raises `UserError` naming the file.
     """
     told = [] if notes is None else notes
-    curve = read_curve(path, part, told)
+    curve = read_curve(path, told)
     spectrum = from_table(curve.nm, clipped(path, curve, "power", told), where=os.fspath(path))
     if spectrum.power_w() == 0.0:
         raise UserError(f"{os.fspath(path)}: the spectrum is zero from 380 to 780 nm; choose another")
