@@ -16,9 +16,8 @@ from __future__ import annotations
 import errno
 import io
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -150,7 +149,12 @@ def read_image(path: Path | str, layer: str = "") -> Picture:
     """Read a .png, .exr (of it a layer) or .npy picture; raises `UserError` when it is missing or is not one."""
     path = Path(path)
     suffix = path.suffix.lower()
-    reader = {".png": _read_png, ".exr": partial(_read_exr, layer=layer), ".npy": _read_npy}.get(suffix)
+    readers: dict[str, Callable[[Path], Picture]] = {
+        ".png": _read_png,
+        ".exr": lambda path: _read_exr(path, layer),
+        ".npy": _read_npy,
+    }
+    reader = readers.get(suffix)
     if reader is None:
         raise UserError(f"cannot read {path}: '{suffix}' cannot be read; use one of {', '.join(_READ_SUFFIXES)}")
     if not os.path.exists(path):

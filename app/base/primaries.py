@@ -1,4 +1,4 @@
-"""Other RGB spaces to linear Rec.709: what the chromaticities of a picture's header say."""
+"""Other RGB spaces to linear Rec.709: what the chromaticities in a picture's header say."""
 
 from __future__ import annotations
 
@@ -16,30 +16,25 @@ _BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0
 def to_rec709(chromaticities: Sequence[float]) -> np.ndarray | None:
     """Matrix (3, 3) from linear RGB of these primaries and white to linear Rec.709; None where they are the same.
 
-    A white other than D65 becomes D65 by the Bradford transform; XYZ itself is left as it is. Raises ValueError for
-    numbers that are no primaries.
+    Another white becomes D65 (Bradford); XYZ itself is left as it is. Raises ValueError for what are no primaries.
     """
     given = np.array(chromaticities, float)
-    if given.shape != (8,) or not np.isfinite(given).all() or np.abs(given).max() > 10.0 or given[7] < 1e-3:
-        raise ValueError("its primaries are not eight numbers x, y")
-    if np.allclose(given, REC709, rtol=0.0, atol=1e-3):
+    if given.shape == (8,) and np.allclose(given, REC709, rtol=0.0, atol=1e-3):
         return None
-    source, target = _to_xyz(given), _to_xyz(np.array(REC709))
-    adapted = np.eye(3)
-    if not np.allclose(given, XYZ, rtol=0.0, atol=1e-3):
-        cones = _BRADFORD @ target.sum(axis=1) / (_BRADFORD @ source.sum(axis=1))
-        adapted = np.linalg.solve(_BRADFORD, cones[:, None] * _BRADFORD)
-    matrix = np.linalg.solve(target, adapted @ source)
-    if not np.isfinite(matrix).all() or np.abs(matrix).max() > 100.0:
-        raise ValueError("its primaries lie on a line")
-    return matrix
+    if given.shape == (8,) and (np.abs(given) <= 10.0).all() and given[7] > 1e-3:
+        is_xyz = np.allclose(given, XYZ, rtol=0.0, atol=1e-3)
+        with np.errstate(all="ignore"):
+            source, target = _to_xyz(given), _to_xyz(np.array(REC709))
+            cones = _BRADFORD @ target.sum(axis=1) / (_BRADFORD @ source.sum(axis=1))
+            adapted = np.eye(3) if is_xyz else np.linalg.inv(_BRADFORD) @ (cones[:, None] * _BRADFORD)
+            matrix = np.linalg.inv(target) @ adapted @ source
+        if (np.abs(matrix) < 100.0).all():
+            return matrix
+    raise ValueError("its primaries and white are not eight numbers x, y of colours")
 
 
 def _to_xyz(xy: np.ndarray) -> np.ndarray:
     """XYZ = M @ RGB; white has Y = 1."""
     x, y = xy.reshape(4, 2).T
     columns = np.stack([x, y, 1.0 - x - y])
-    try:
-        return columns[:, :3] * np.linalg.solve(columns[:, :3], columns[:, 3] / y[3])
-    except np.linalg.LinAlgError as error:
-        raise ValueError("its primaries lie on a line") from error
+    return columns[:, :3] * np.linalg.solve(columns[:, :3], columns[:, 3] / y[3])

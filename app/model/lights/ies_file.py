@@ -24,7 +24,8 @@ MAX_BYTES = 1 << 20
 MAX_ANGLES = 4096
 """Of either kind: one every 0.09°."""
 _WHERE = "export the file again from the lamp's maker or a photometric editor"
-_ONCE = ((1, 0.0),)
+_Images = tuple[tuple[int, float], ...]
+_ONCE: _Images = ((1, 0.0),)
 _SYMMETRIES = (
     _ONCE,
     _ONCE,
@@ -140,9 +141,7 @@ class _Numbers:
         self._path = path
         self._next = 0
 
-    def _profile(
-        self, vertical: np.ndarray, horizontal: np.ndarray, candela: np.ndarray, images: tuple[tuple[int, float], ...]
-    ) -> Profile:
+    def _profile(self, vertical: np.ndarray, horizontal: np.ndarray, candela: np.ndarray, images: _Images) -> Profile:
         """With the symmetries written out: all the way round, and dark before the first vertical angle.
 
         `images`: signs and turns (deg) that make all horizontal angles of those that are listed."""

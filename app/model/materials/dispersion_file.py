@@ -40,9 +40,9 @@ def with_gain(table: SceneTable, dispersion: Dispersion) -> Dispersion:
 
 def named_glass(table: SceneTable, key: str, name: str) -> Dispersion:
     """The glass of this name, or in the file of this name, which stands under `key`."""
-    if not index_file.names_file(name):
-        return index_file.find_glass(name, table.file.parent, table.where(key), table.notes)
-    return _from_file(table, key)
+    if index_file.names_file(name):
+        return _from_file(table, key)
+    return index_file.find_glass(name, table.file.parent, table.where(key), table.notes)
 
 
 def _from_file(table: SceneTable, key: str) -> Dispersion:
@@ -74,13 +74,13 @@ def _read_index(table: SceneTable) -> Dispersion:
         b, c = inner.numbers("B"), inner.numbers("C")
         inner.finish("sellmeier")
         if c and min(map(abs, c)) > _LEAST_NM2:  # the first pole of all glass is in the ultraviolet, C = 0.02 µm²
-            c = [_from_nm(table, key, value, 2) for value in c]
+            c = tuple(_from_nm(table, key, value, 2) for value in c)
         return glass.sellmeier(b, c, name, limits, where)
     if key == "cauchy":
-        coefficients = list(table.numbers(key))
-        if len(coefficients) > 1 and _LEAST_NM2 < abs(coefficients[1]) < _MOST_NM2:
-            coefficients[1:] = [_from_nm(table, key, v, 2 * i) for i, v in enumerate(coefficients[1:], start=1)]
-        return glass.cauchy(coefficients, name, limits, where)
+        terms = table.numbers(key)
+        if len(terms) > 1 and _LEAST_NM2 < abs(terms[1]) < _MOST_NM2:
+            terms = terms[:1] + tuple(_from_nm(table, key, v, 2 * i) for i, v in enumerate(terms[1:], start=1))
+        return glass.cauchy(terms, name, limits, where)
     if key == "formula":
         inner = table.table(key)
         if inner is None:

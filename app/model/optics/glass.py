@@ -124,7 +124,7 @@ class Dispersion:
 
 
 _MOST_INDEX = 100.0
-"""More than this is a mistake of units."""
+"""Coefficients and tables that give more have other units than they should."""
 _CHECK_NM = np.arange(380.0, 780.5, 1.0)
 _CHECK_NM.flags.writeable = False
 
@@ -290,7 +290,8 @@ def _checked(dispersion: Dispersion, where: str) -> Dispersion:
                 "the visible range; check B and C (C is in µm²)"
             )
     n = dispersion.index(_CHECK_NM)
-    bad = ~(np.isfinite(n) & (n > 0.0) & (n < _MOST_INDEX))
+    most = math.inf if dispersion.kind in ("abbe", "constant") else _MOST_INDEX
+    bad = ~(np.isfinite(n) & (n > 0.0) & (n < most))
     if np.any(bad):
         at = int(np.argmax(bad))
         state = "imaginary or infinite" if not np.isfinite(n[at]) else f"{n[at]:.6g}"

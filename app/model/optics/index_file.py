@@ -9,10 +9,9 @@ from __future__ import annotations
 import itertools
 import os
 import re
-from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
-from typing import NoReturn, cast
+from typing import cast
 
 import numpy as np
 import yaml
@@ -20,18 +19,18 @@ import yaml
 from ...base import files
 from ...base.errors import UserError, suggestion
 from ...base.paths import config_path
-from ..io.curve_file import Curve, read_curves
+from ..io.curve_file import read_curves
 from . import catalogue, glass
 from .colorimetry import VISIBLE_NM
 from .dispersion_formulas import Kind
 from .glass import Dispersion
 from .spectrum import rgb_under_white
 
-SUFFIXES = (".agf", ".yml", ".yaml", ".csv", ".txt")
-"""Of files that hold an index."""
+_NAMES_FILE = re.compile(r"\.(?:agf|ya?ml|csv|txt)(?::|$)", re.IGNORECASE)
 _MAX_BYTES = 4 << 20
 _OPAQUE_K = 0.01
 """Extinction coefficient from which on a hundredth of a millimetre is black."""
+_N_D_APART = 1e-3
 _SERIES = {
     1: (2, -2, -4, -6, -8),
     10: (2, -2, -4, -6, -8, -10, -12),
@@ -43,18 +42,20 @@ _SERIES = {
 
 def names_file(name: str) -> bool:
     """Whether `name` is that of a file with an index, or of a part of one, rather than of a glass."""
-    return re.search(rf"(?:{'|'.join(map(re.escape, SUFFIXES))})(?::|$)", name, re.IGNORECASE) is not None
+    return _NAMES_FILE.search(name) is not None
 
 
 def find_glass(name: str, beside: Path, where: str, notes: list[str]) -> Dispersion:
-    """The glass `name` of the program's catalogue or of an AGF file beside or among the user's settings."""
+    """The glass `name`: of a file, of the program's catalogue, of an AGF file in `beside` or the user's settings."""
+    if names_file(name):
+        return read_index(beside / name, notes)
     try:
         return catalogue.find(name, where)
     except UserError:
         for folder in (beside, config_path() / "glass"):
-            for path in sorted(p for p in folder.glob("*") if p.suffix.lower() == ".agf" and files.is_file(p)):
-                if files.may_read(path, folder) and (found := _key(name, _agf_glasses(path, path.stat().st_mtime_ns))):
-                    return read_index(f"{path}:{found}", notes)
+            for path in sorted(p for p in folder.glob("*.[aA][gG][fF]") if files.is_file(p)):
+                if files.may_read(path, folder) and _known_as(name, _agf_glasses(path)):
+                    return _from_agf(path, name, notes)
         raise
 
 
@@ -64,43 +65,29 @@ def read_index(name: str | os.PathLike[str], notes: list[str]) -> Dispersion:
     Raises UserError naming the file, and what it holds where the choice is open.
     """
     path, part = files.with_part(name)
-    suffix = path.suffix.lower()
-    if suffix == ".agf":
+    if path.suffix.lower() == ".agf":
         return _from_agf(path, part, notes)
-    if suffix in (".yml", ".yaml"):
-        return _from_yaml(path, notes)
-    curves = read_curves(path, notes)
-    chosen = [c for c in curves if c.name.casefold() == (part or "n").casefold()] or (curves if not part else [])
-    if len(chosen) != 1:
-        listed = ", ".join(f"'{curve.name}'" for curve in curves[:12])
-        raise UserError(f'{path} holds {listed}; name the one that is n, as in "{path.name}:{curves[0].name}"')
-    extinction = [c for c in curves if c.name.casefold() == "k" and c is not chosen[0]]
-    return _measured(path, chosen[0], extinction[0] if extinction else None, notes)
-
-
-def _measured(path: Path, n: Curve, k: Curve | None, notes: list[str]) -> Dispersion:
-    found = glass.table(n.nm, n.values, path.stem, str(path))
-    if k is not None:
-        _check_clear(path, found.index(VISIBLE_NM), np.interp(VISIBLE_NM, k.nm, k.values), notes)
-    return found
-
-
-def _check_clear(path: Path, n: np.ndarray, k: np.ndarray, notes: list[str]) -> None:
-    """Raise UserError for a metal, n and k on the visible grid; a little absorption goes to `notes`."""
-    if np.median(k) > _OPAQUE_K:
+    if path.suffix.lower() in (".yml", ".yaml"):
+        found, k = _from_yaml(path)
+    else:
+        curves = read_curves(path, notes)
+        by_name = {curve.name.casefold(): curve for curve in curves}
+        chosen = by_name.get((part or "n").casefold(), curves[0] if len(curves) == 1 and not part else None)
+        if chosen is None:
+            listed = ", ".join(f"'{curve.name}'" for curve in curves[:12])
+            raise UserError(f'{path} holds {listed}; name the one that is n, as in "{path.name}:{curves[0].name}"')
+        found, absorbs = glass.table(chosen.nm, chosen.values, path.stem, str(path)), by_name.get("k")
+        k = None if absorbs is None or absorbs is chosen else np.interp(VISIBLE_NM, absorbs.nm, absorbs.values)
+    if k is not None and np.median(k) > _OPAQUE_K:
+        n = found.index(VISIBLE_NM)
         seen = rgb_under_white(((n - 1.0) ** 2 + k**2) / ((n + 1.0) ** 2 + k**2))
-        shown = ", ".join(f"{channel:.3f}" for channel in seen)
-        raise UserError(
-            f"{path}: this material absorbs so strongly (k up to {k.max():.3g}) that it is no glass; "
-            f'use material = {{ kind = "mirror", reflectance = [{shown}] }}'
-        )
-    if k.max() > 0.0:
+        remedy = f'material = {{ kind = "mirror", reflectance = [{", ".join(f"{v:.3f}" for v in seen)}] }}'
+        raise UserError(f"{path}: this absorbs so strongly (k up to {k.max():.3g}) that it is no glass; use {remedy}")
+    if k is not None and k.max() > 0.0:
         notes.append(
             f"{path}: its absorption (k up to {k.max():.2g}) is not used; 'absorption' says what glass absorbs."
         )
-
-
-# ---- Zemax AGF ----------------------------------------------------------------------------
+    return found
 
 
 def _text(path: Path) -> str:
@@ -110,60 +97,66 @@ def _text(path: Path) -> str:
         raise UserError(f"{path} cannot be read: {error.strerror}; choose another file") from error
 
 
-@lru_cache(maxsize=16)
-def _agf_glasses(path: Path, _changed_ns: int) -> dict[str, dict[str, list[str]]]:
-    """Lines NM, CD and LD, split into words, of every glass in an AGF file, by name."""
-    glasses: dict[str, dict[str, list[str]]] = {}
-    current: dict[str, list[str]] = {}
-    for line in _text(path).splitlines():
-        words = line.split()
-        if words and words[0].upper() == "NM" and len(words) > 2:
-            current = glasses.setdefault(words[1], {})
-        if words and words[0].upper() in ("NM", "CD", "LD"):
-            current.setdefault(words[0].upper(), words[1:])
-    return glasses
-
-
-def _key(name: str, glasses: Iterable[str]) -> str | None:
-    wanted = catalogue.search_key(name)
-    return next((known for known in glasses if catalogue.search_key(known) == wanted), None)
-
-
-def _from_agf(path: Path, name: str, notes: list[str]) -> Dispersion:
-    glasses = _agf_glasses(path, path.stat().st_mtime_ns)
-    found = _key(name, glasses) if name or len(glasses) != 1 else next(iter(glasses))
-    if found is None:
-        listed = ", ".join(list(glasses)[:12]) or "no glass"
-        hint = (suggestion(name, glasses) if name else "") or f"; it holds {listed}{' …' if len(glasses) > 12 else ''}"
-        raise UserError(
-            f"{path} has no glass '{name}'{hint}"
-            if name
-            else f'{path} holds {len(glasses)} glasses ({listed}); name one, as in "{path.name}:N-BK7"'
-        )
-    lines, where = glasses[found], f"{path}: {found}"
-    number, c = _numbers(lines["NM"][1:2], where)[0], _numbers(lines.get("CD", []), where)
-    kind, coefficients = _as_published(int(number), [*c, *[0.0] * 10][:10], where)
-    limits = _numbers(lines.get("LD", [])[:2], where)
-    range_nm = (1e3 * limits[0], 1e3 * limits[1]) if len(limits) == 2 else None
-    dispersion = glass.from_formula(kind, coefficients, found, range_nm, where)
-    said = _numbers(lines["NM"][3:4], where)
-    if said and said[0] > 1.0 and abs(said[0] - dispersion.n_d) > 1e-3:
-        notes.append(f"{where}: its coefficients give n_d = {dispersion.n_d:.5f}, and its line NM says {said[0]:g}.")
-    return dispersion
-
-
-def _numbers(words: list[str], where: str) -> list[float]:
+def _numbers(words: list[str], where: str | Path) -> list[float]:
     try:
         found = [float(word.replace(",", ".")) for word in words]
     except ValueError:
         found = [np.nan]
     if not np.isfinite(found).all():
-        raise UserError(f"{where} has something that is no number among its coefficients; export it again")
+        raise UserError(f"{where} has something among its coefficients that is no number; export it again")
     return found
 
 
+def _range_nm(words: list[str], where: str | Path) -> tuple[float, float] | None:
+    """The two wavelengths in µm, if there are two."""
+    limits = _numbers(words, where)
+    return (1e3 * limits[0], 1e3 * limits[1]) if len(limits) == 2 else None
+
+
+# ---- Zemax AGF ----------------------------------------------------------------------------
+
+
+def _agf_glasses(path: Path) -> dict[str, dict[str, list[str]]]:
+    """Lines NM, CD and LD, split into words, of every glass in an AGF file, by name."""
+    return _parsed_agf(_text(path))
+
+
+@lru_cache(maxsize=8)
+def _parsed_agf(text: str) -> dict[str, dict[str, list[str]]]:
+    glasses: dict[str, dict[str, list[str]]] = {}
+    current: dict[str, list[str]] = {}
+    for key, *words in filter(None, (line.split() for line in text.splitlines())):
+        if key.upper() == "NM" and len(words) > 1:
+            current = glasses.setdefault(words[0], {})
+        current.setdefault(key.upper(), words)
+    return glasses
+
+
+def _known_as(name: str, glasses: dict[str, dict[str, list[str]]]) -> str | None:
+    wanted = catalogue.search_key(name)
+    return next((known for known in glasses if catalogue.search_key(known) == wanted), None)
+
+
+def _from_agf(path: Path, name: str, notes: list[str]) -> Dispersion:
+    glasses = _agf_glasses(path)
+    found = _known_as(name, glasses) if name or len(glasses) != 1 else next(iter(glasses))
+    if found is None:
+        near = suggestion(name, glasses) if name else ""
+        listed = near or f"; it holds {len(glasses)}: {', '.join(list(glasses)[:12])}"
+        raise UserError(
+            f"{path} has no glass '{name}'{listed}" if name else f'{path}: which glass ("{path.name}:NAME"){listed}'
+        )
+    lines, where = glasses[found], f"{path}: {found}"
+    number, *said = _numbers(lines["NM"][1:2] + lines["NM"][3:4], where)
+    kind, coefficients = _as_published(int(number), [*_numbers(lines.get("CD", []), where), *[0.0] * 10][:10], where)
+    dispersion = glass.from_formula(kind, coefficients, found, _range_nm(lines.get("LD", [])[:2], where), where)
+    if said and said[0] > 1.0 and abs(said[0] - dispersion.n_d) > _N_D_APART:
+        notes.append(f"{where}: its coefficients give n_d = {dispersion.n_d:.5f}, and its line NM says {said[0]:g}.")
+    return dispersion
+
+
 def _as_published(number: int, c: list[float], where: str) -> tuple[Kind, list[float]]:
-    """AGF's formula `number` with its ten coefficients `c` as one of refractiveindex.info's (OpticStudio help, "The
+    """AGF's formula `number` with its ten coefficients `c` as one of refractiveindex.info's (OpticStudio's help, "The
     Glass Dispersion Formulas")."""
     if number in _SERIES:
         return "formula 3", [c[0], *itertools.chain(*zip(c[1:], _SERIES[number], strict=False))]
@@ -186,38 +179,28 @@ def _as_published(number: int, c: list[float], where: str) -> tuple[Kind, list[f
 # ---- refractiveindex.info -----------------------------------------------------------------
 
 
-def _from_yaml(path: Path, notes: list[str]) -> Dispersion:
-    """The first entry with n of a page of refractiveindex.info's database; λ in µm."""
+def _from_yaml(path: Path) -> tuple[Dispersion, np.ndarray | None]:
+    """n of the first entry of a database page that has it, λ in µm, and k on the visible grid where one says it."""
     try:
         page = yaml.load(_text(path), yaml.BaseLoader)  # texts, lists and tables only: nothing is constructed
     except (yaml.YAMLError, RecursionError) as error:
-        raise UserError(f"{path} is not whole YAML; download it again from refractiveindex.info") from error
-    data = page.get("DATA") if isinstance(page, dict) else None
-    entries = [e for e in data if isinstance(e, dict)] if isinstance(data, list) else []
+        raise UserError(f"{path} is not whole YAML; get it again from refractiveindex.info") from error
+    entries = page.get("DATA") if isinstance(page, dict) else None
     found, k = None, None
-    for entry in entries:
-        kind, where = str(entry.get("type", "")), f"{path}: DATA"
+    for entry in entries if isinstance(entries, list) else []:
+        said = {key: str(value) for key, value in entry.items()} if isinstance(entry, dict) else {}
+        kind = said.get("type", "")
         if kind.startswith("formula") and found is None:
-            limits = _numbers(str(entry.get("wavelength_range", entry.get("range", ""))).split(), where)
-            range_nm = (1e3 * limits[0], 1e3 * limits[1]) if len(limits) == 2 else None
-            coefficients = _numbers(str(entry.get("coefficients", "")).split(), where)
-            found = glass.from_formula(cast(Kind, kind), coefficients, path.stem, range_nm, where)
-        elif kind in ("tabulated n", "tabulated nk", "tabulated k"):
-            rows = [_numbers(line.split(), where) for line in str(entry.get("data", "")).splitlines() if line.split()]
-            if len(rows) < 2 or {len(row) for row in rows} != {len(kind) - len("tabulated ") + 1}:
-                _fail_yaml(path)
+            range_nm = _range_nm(said.get("wavelength_range", said.get("range", "")).split(), path)
+            coefficients = _numbers(said.get("coefficients", "").split(), path)
+            found = glass.from_formula(cast(Kind, kind), coefficients, path.stem, range_nm, str(path))
+        rows = [_numbers(line.split(), path) for line in said.get("data", "").splitlines() if line.split()]
+        if kind in ("tabulated n", "tabulated nk", "tabulated k") and {len(row) for row in rows} == {len(kind) - 9}:
             x, *columns = np.array(sorted(rows)).T
             x, first = np.unique(1e3 * x, return_index=True)
             if kind != "tabulated k" and found is None:
-                found = glass.table(x, columns[0][first], path.stem, where)
-            if kind != "tabulated n":
-                k = Curve("k", x, columns[-1][first])
+                found = glass.table(x, columns[0][first], path.stem, str(path))
+            k = k if kind == "tabulated n" else np.interp(VISIBLE_NM, x, columns[-1][first])
     if found is None:
-        _fail_yaml(path)
-    if k is not None:
-        _check_clear(path, found.index(VISIBLE_NM), np.interp(VISIBLE_NM, k.nm, k.values), notes)
-    return found
-
-
-def _fail_yaml(path: Path) -> NoReturn:
-    raise UserError(f"{path} holds no table or formula of n under DATA, as refractiveindex.info's files do")
+        raise UserError(f"{path} holds no table or formula of n under DATA, as refractiveindex.info's files do")
+    return found, k
