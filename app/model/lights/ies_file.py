@@ -268,13 +268,13 @@ class _Eulumdat(_Numbers):
         """All of the file."""
         symmetry = int(self._take(1, "the symmetry")[0])
         planes, verticals = self._count("C planes"), self._count("angles in each plane")
+        parts = {0: 1, 1: planes, 2: 2, 3: 2, 4: 4}[symmetry]
+        if planes % parts:
+            raise self._error(f"has {planes} C planes, which its symmetry {symmetry} does not allow")
         factor, lumens = self._take(2, "the factor on intensities and the lumens of the lamps")
         self._take(10, "the direct ratios")
         horizontal = np.array(self._take(planes, "C angles"))
         vertical = self._angles(verticals, "vertical")
-        parts = {0: 1, 1: planes, 2: 2, 3: 2, 4: 4}[symmetry]
-        if planes % parts:
-            raise self._error(f"has {planes} C planes, which its symmetry {symmetry} does not allow")
         if symmetry == 3:  # from C270 over C0 to C90
             horizontal = np.roll(horizontal, planes // 4)
         count = planes // parts + (1 < parts < planes)
