@@ -119,10 +119,8 @@ def clipped(path: PathLike, curve: Curve, what: str, notes: list[str], most: flo
         )
     values = np.clip(curve.values, 0.0, most)
     if (values != curve.values).any():
-        count, worst = int((values != curve.values).sum()), curve.values[np.abs(values - curve.values).argmax()]
-        notes.append(
-            f"{path}: {count} noisy values of the {what} (such as {worst:g}) were set to the nearest possible."
-        )
+        worst = curve.values[np.abs(values - curve.values).argmax()]
+        notes.append(f"{path}: noise in the {what} (such as {worst:g}) was set to the nearest possible value.")
     return values
 
 
@@ -188,7 +186,9 @@ def _number(cell: str, comma: bool) -> float | None:
 def _across(rows: list[_Row]) -> Iterator[_Table]:
     """Curves in rows below a row of wavelengths, as CGATS files and spreadsheets of samples have them."""
     for i, row in enumerate(rows):
-        marks = {column: found[1] for column, cell in enumerate(row.cells) if (found := _HEADED.fullmatch(cell))}
+        headed = [(column, found[1]) for column, cell in enumerate(row.cells) if (found := _HEADED.fullmatch(cell))]
+        together = itertools.groupby(enumerate(headed), key=lambda each: each[1][0] - each[0])
+        marks = dict(max(([mark for _, mark in group] for _, group in together), key=len, default=[]))
         nm = np.array([float(text.replace(",", ".")) for text in marks.values()])
         steps = np.abs(np.diff(nm))
         if len(nm) < _LEAST_ACROSS or nm.min() < 200.0 or nm.max() > 2600.0 or not 0.0 < steps.max() <= 2 * steps.min():
@@ -231,16 +231,21 @@ def _columns(path: PathLike, block: list[_Row], above: list[_Row], width: int) -
     titles = [
         [cell.strip("#!/* ") for cell in row.cells] + [""] * width
         for row in above[-_NEAR:]
-        if abs(len(row.cells) - width) <= 1 and (not any(row.numbers) or _WAVELENGTH.search(row.cells[0]))
-    ][-2:]
-    if len(titles) == 2 and not re.fullmatch(r"[\[(]?(?:nm|[µμu]m|å)[\])]?", titles[1][0], re.IGNORECASE):
-        del titles[0]  # only a row of units has the names above it
-    names = [" ".join(filter(None, cells)) for cells in zip(*titles, strict=False)] or [""] * width
-    at = next((column for column in range(width) if _WAVELENGTH.search(names[column])), 0)
+        if abs(len(row.cells) - width) <= 1
+        and (all(n is None or math.isnan(n) for n in row.numbers) or _WAVELENGTH.search(row.cells[0]))
+    ]
+    upper, lower = ([[""] * width] * 2 + titles)[-2:]
+    if len(set(lower[:width])) < width:  # pairs of columns, with what they are of above the first of each
+        upper = list(itertools.accumulate(upper, lambda before, name: name or before))
+    elif not re.fullmatch(r"[\[(]?(?:nm|[µμu]m|å)[\])]?", lower[0], re.IGNORECASE):
+        upper = [""] * width  # else the lower row has the units
+    names = [f"{a} {b}".strip() for a, b in zip(upper, lower, strict=False)]
+    waves = [column for column in range(width) if _WAVELENGTH.search(lower[column] or upper[column])]
+    at = waves[0] if waves else 0
     for column in range(at + 1, width):
         pairs = [(row, row.numbers[at], row.numbers[column]) for row in block if len(row.cells) > column]
         text = [row for row, nm, value in pairs if nm is None or value is None]
-        if _WAVELENGTH.search(names[column]):
+        if column in waves:
             at = column
         elif 2 * len(text) <= len(pairs) and not all(math.isnan(value or 0.0) for _, _, value in pairs):
             if text:

@@ -89,11 +89,13 @@ def _said(header: list[str], where: str) -> tuple[np.ndarray, tuple[float, ...] 
         try:
             numbers = np.array([float(word) for word in value.split()])
         except ValueError:
-            numbers = np.array([np.nan])
+            numbers = np.zeros(1)
+        with np.errstate(all="ignore"):
+            multiplied = product * numbers if len(numbers) in (1, 3) else np.zeros(3)
         if key == "PRIMARIES":
             chromaticities = tuple(numbers) if chromaticities is None else chromaticities
-        elif len(numbers) in (1, 3) and ((product * numbers > 1e-30) & (product * numbers < 1e30)).all():
-            product = product * numbers
+        elif ((multiplied > 1e-30) & (multiplied < 1e30)).all():
+            product = multiplied
         else:
             notes.append(f"{where}: its line {key} is not a number above 0 and was left aside.")
     return product, chromaticities, tuple(notes)

@@ -36,7 +36,6 @@ _SYMMETRIES = (
 """By EULUMDAT's number: none, about the axis, to C0–C180, to C90–C270, to both; signs and turns of the angles."""
 _IMAGES = {(0.0, 90.0): _SYMMETRIES[4], (0.0, 180.0): _SYMMETRIES[2], (90.0, 270.0): _SYMMETRIES[3]}
 """LM-63's, by the first and the last horizontal angle."""
-_MOST_LAMP_SETS = 20
 _UNLIT_DEG = 1e-3
 """A lamp whose angles begin at 90° goes dark within this of it."""
 
@@ -258,7 +257,7 @@ class _Eulumdat(_Numbers):
         super().__init__(path)
         lines = text.replace(",", ".").splitlines() + [""] * 30
         sets = lines[25].strip()
-        if not (sets.isdecimal() and 1 <= int(sets) <= _MOST_LAMP_SETS):
+        if not re.fullmatch(r"0?[1-9]|1\d", sets):
             raise self._error("does not say which lamps it has, as line 26 of a EULUMDAT file should")
         # Symmetry, C planes, angles, factor on intensities, lumens of the first set of lamps; what follows the sets.
         self._words = [lines[i].strip() for i in (2, 3, 5, 23, 28)]
