@@ -35,23 +35,37 @@ def test_known_glasses(name: str, n_f: float, n_d: float, n_c: float, v_d: float
     assert found.is_dispersive
 
 
+PEAK = (2.4, 0.02, 0.03, 0.01, 0.2, 0.03)
+
+
 def _one_of_each_kind() -> list[glass.Dispersion]:
     kinds: dict[str, glass.Dispersion] = {}
     for entry in catalogue.entries():
         kinds.setdefault(entry.dispersion.kind, entry.dispersion)
     kinds["abbe"] = glass.from_abbe(1.6, 30.0)
+    for number, c in ((7, (1.5, 0.01, 1e-4, -3e-3, 1e-5, 1e-6)), (8, (0.27, 0.02, 0.01, -1e-3)), (9, PEAK)):
+        kinds[f"formula {number}"] = glass.from_formula(f"formula {number}", c)  # type: ignore[arg-type]
     return list(kinds.values())
 
 
 def test_derivative_is_that_of_index_for_every_kind() -> None:
     """Central differences; their own error is h²n‴/6 ~ 1e-9, a wrong term is off by 1e-3."""
     kinds = _one_of_each_kind()
-    assert {d.kind for d in kinds} == {*(f"formula {i}" for i in range(1, 7)), "abbe", "constant", "table"}
+    assert {d.kind for d in kinds} == {*(f"formula {i}" for i in range(1, 10)), "abbe", "constant", "table"}
     wavelength = np.linspace(452.1, 628.7, 57)  # between the table's knots, inside every range
     for dispersion in kinds:
         h = 1e-3 if dispersion.kind == "table" else 0.02
         numeric = (dispersion.index(wavelength + h) - dispersion.index(wavelength - h)) / (2e-3 * h)
         assert dispersion.derivative(wavelength) == pytest.approx(numeric, abs=3e-7), dispersion.name
+
+
+def test_formulas_8_and_9_by_their_definitions() -> None:
+    um, (a, b, c, d, e, f) = np.array([0.45, 0.6]), PEAK
+    squares = a + b / (um**2 - c) + d * (um - e) / ((um - e) ** 2 + f)
+    assert glass.from_formula("formula 9", PEAK).index(um * 1e3) == pytest.approx(np.sqrt(squares), rel=1e-12)
+    squares = glass.from_formula("formula 8", (0.27, 0.02, 0.01, -1e-3)).index(um * 1e3) ** 2
+    lorentz = 0.27 + 0.02 * um**2 / (um**2 - 0.01) - 1e-3 * um**2
+    assert (squares - 1.0) / (squares + 2.0) == pytest.approx(lorentz, rel=1e-12)
 
 
 def test_every_catalogue_entry_is_sound() -> None:

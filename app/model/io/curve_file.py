@@ -154,7 +154,10 @@ def _rows(lines: list[str]) -> list[_Row]:
 
 def _cells(line: str, delimiter: str) -> list[str]:
     line = line[:1] + line[1:].partition("#")[0]  # comments
-    return line.split() if delimiter == " " else [c.strip() for c in next(csv.reader([line], delimiter=delimiter), [])]
+    if delimiter == " ":
+        return line.split()
+    split = next(csv.reader([line], delimiter=delimiter), []) if '"' in line else line.split(delimiter)
+    return [cell.strip() for cell in split]
 
 
 def _has_decimal_comma(cells: list[str]) -> bool:
