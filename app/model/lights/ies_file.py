@@ -152,6 +152,7 @@ class _Numbers:
             raise self._error("has vertical angles that do not run from 0 or 90 to 90 or 180")
         angles = np.concatenate([sign * horizontal + turn for sign, turn in images]) % 360.0
         rows = np.concatenate([candela] * len(images))
+        angles[angles == 360.0] = 0.0  # what was a hair below 0
         horizontal = np.unique(angles)
         candela = np.stack([rows[angles == angle].mean(axis=0) for angle in horizontal])
         # Where C0 is not listed, it is between its neighbours.
@@ -272,7 +273,7 @@ class _Eulumdat(_Numbers):
             raise self._error(f"has {planes} C planes, which its symmetry {symmetry} does not allow")
         factor, lumens = self._take(2, "the factor on intensities and the lumens of the lamps")
         self._take(10, "the direct ratios")
-        horizontal = np.array(self._take(planes, "C angles"))
+        horizontal = self._angles(planes, "horizontal")
         vertical = self._angles(verticals, "vertical")
         if symmetry == 3:  # from C270 over C0 to C90
             horizontal = np.roll(horizontal, planes // 4)
