@@ -95,6 +95,30 @@ def read_text(path: str | os.PathLike[str], limit: int, encoding: str = "utf-8-s
     return io.TextIOWrapper(io.BytesIO(read_bytes(path, limit)), encoding=encoding).read()
 
 
+def read_any_text(path: str | os.PathLike[str], limit: int) -> str:
+    """As `read_text` for what other people's programs export: UTF-8 or UTF-16, with or without a mark, or Latin-1."""
+    data = read_bytes(path, limit)
+    zeros = [data[start:512:2].count(0) * 3 > len(data[:512]) for start in (0, 1)]
+    encoding = "utf-8-sig"
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        encoding = "utf-16"
+    elif any(zeros):
+        encoding = "utf-16-be" if zeros[0] else "utf-16-le"
+    try:
+        return data.decode(encoding)
+    except UnicodeDecodeError:
+        return data.decode("latin-1")
+
+
+def with_part(name: str | os.PathLike[str]) -> tuple[Path, str]:
+    """A file and what is meant within it: "lamp.csv:Sample 2" where lamp.csv is a file; "" for all of it."""
+    text = os.fspath(name)
+    for at in [i for i, character in enumerate(text) if character == ":"]:
+        if not is_file(text) and is_file(text[:at]):
+            return Path(text[:at]), text[at + 1 :].strip()
+    return Path(text), ""
+
+
 def check_regular(path: str | os.PathLike[str], limit: int) -> None:
     """Raise as `read_bytes` would: for libraries that open a file by its name."""
     _opened(path, limit).close()

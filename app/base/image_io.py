@@ -16,8 +16,7 @@ from __future__ import annotations
 import errno
 import io
 import os
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, redirect_stdout
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,7 +25,9 @@ import numpy as np
 from . import files
 from .atomic import atomic_output
 from .errors import BrokenPictureError, UserError
+from .exr_layers import read_exr_layer
 from .glare import with_glare
+from .primaries import REC709
 from .tone_map import auto_exposure, srgb_eotf, tone_map_8bit
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".exr", ".npy")
@@ -50,6 +51,10 @@ class Picture:
     wavelengths_nm: np.ndarray | None
     """float64 (B,), centres of the bins, rising, or None."""
     metadata: dict[str, str]
+    notes: tuple[str, ...] = ()
+    """Sentences on what was assumed."""
+    is_converted: bool = False
+    """From other primaries, so that colours may lie outside of Rec.709."""
 
 
 def check_suffix(path: Path | str) -> str:
@@ -141,11 +146,16 @@ def png_bytes(rgb: np.ndarray, exposure_ev: float = 0.0, glare: float = 0.0, ant
     return buffer.getvalue()
 
 
-def read_image(path: Path | str) -> Picture:
-    """Read a .png, .exr or .npy picture; raises `UserError` when it is missing or is not one."""
+def read_image(path: Path | str, layer: str = "") -> Picture:
+    """Read a .png, .exr (of it a layer) or .npy picture; raises `UserError` when it is missing or is not one."""
     path = Path(path)
     suffix = path.suffix.lower()
-    reader = {".png": _read_png, ".exr": _read_exr, ".npy": _read_npy}.get(suffix)
+    readers: dict[str, Callable[[Path], Picture]] = {
+        ".png": _read_png,
+        ".exr": lambda path: _read_exr(path, layer),
+        ".npy": _read_npy,
+    }
+    reader = readers.get(suffix)
     if reader is None:
         raise UserError(f"cannot read {path}: '{suffix}' cannot be read; use one of {', '.join(_READ_SUFFIXES)}")
     if not os.path.exists(path):
@@ -242,8 +252,7 @@ def _write_exr(
 
     header: dict[str, object] = {str(key): str(value) for key, value in metadata.items()}
     header |= {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    # x, y of red, green, blue and white: says that R, G, B are Rec.709.
-    header["chromaticities"] = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
+    header["chromaticities"] = REC709
     channels = {name: np.ascontiguousarray(rgb[:, :, i]) for i, name in enumerate("RGB")}
     if spectral:
         header |= {"spectralLayoutVersion": "1.0", "emissiveUnits": "W.m^-2.sr^-1"}
@@ -257,38 +266,16 @@ def _write_exr(
         raise OSError(errno.EIO, "its pixels cannot be stored (is the disk full?)", str(path)) from error
 
 
-def _read_exr(path: Path) -> Picture:
-    import OpenEXR
-
-    with _silent(), OpenEXR.File(str(path), header_only=True) as file:
-        (left, top), (right, bottom) = (corner.astype(np.int64) for corner in file.header()["dataWindow"])
-    _check_pixels(int(right - left + 1), int(bottom - top + 1))
-    with _silent(), OpenEXR.File(str(path), separate_channels=True) as file:
-        # Copies: what the file hands out dies with it.
-        header, channels = dict(file.header()), file.channels()
-        pixels = {name: np.array(channel.pixels, np.float32) for name, channel in channels.items()}
-    rgb = np.stack([pixels[name] for name in "RGB"], axis=-1)
+def _read_exr(path: Path, layer: str) -> Picture:
+    held = read_exr_layer(path, layer, MAX_PIXELS)
     waves = {
-        float(name[3:-2].replace(",", ".")): name for name in pixels if name.startswith("S0.") and name.endswith("nm")
+        float(name[3:-2].replace(",", ".")): pixels
+        for name, pixels in held.others.items()
+        if name.startswith("S0.") and name.endswith("nm")
     }
     wavelengths = np.array(sorted(waves), np.float64)
-    spectral = np.stack([pixels[waves[w]] for w in wavelengths], axis=-1) if waves else None
-    texts = {key: value for key, value in header.items() if isinstance(value, str)}
-    return Picture(rgb, spectral, wavelengths if waves else None, texts)
-
-
-@contextmanager
-def _silent() -> Iterator[None]:
-    """Within the block nothing is printed: OpenEXR writes to stderr, past Python, and to stdout, before it raises."""
-    before, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, 2)
-    os.close(nowhere)
-    try:
-        with redirect_stdout(io.StringIO()):
-            yield
-    finally:
-        os.dup2(before, 2)
-        os.close(before)
+    spectral = np.stack([waves[w] for w in wavelengths], axis=-1) if waves else None
+    return Picture(held.rgb, spectral, wavelengths if waves else None, held.texts, held.notes, held.is_converted)
 
 
 def _read_npy(path: Path) -> Picture:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from functools import cache
 from pathlib import Path
 
 import platformdirs
 
 SCENE_SUFFIXES = (".toml", ".glb", ".gltf", ".ply", ".obj", ".stl")
+CONFIG_ENVIRONMENT = "SPECTRASPLAT_CONFIG"
 _PACKAGE = Path(__file__).resolve().parents[1]
 
 
@@ -33,6 +35,12 @@ def shipped_scenes() -> dict[str, Path]:
     """Name → file of the scenes that come with the program, sorted."""
     files = sorted((assets_dir() / "scenes").glob("*"))
     return {file.stem: file for file in files if file.suffix in SCENE_SUFFIXES[:3]}
+
+
+def config_path() -> Path:
+    """The user's settings folder, which may not be there yet: the platform's own or what the environment names."""
+    given = os.environ.get(CONFIG_ENVIRONMENT)
+    return Path(given or platformdirs.user_config_dir("spectrasplat", appauthor=False))
 
 
 def cache_dir() -> Path:

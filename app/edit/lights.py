@@ -28,7 +28,7 @@ from .objects import MAX_LENGTH
 
 SpectrumKind = Literal["illuminant", "blackbody", "laser", "lines", "csv", "table"]
 
-LIGHT_SUFFIXES = (".ies",)
+LIGHT_SUFFIXES = (".ies", ".ldt")
 """Photometric files."""
 _DARK = 1e-9
 """Least power, in any unit: at none at all a light would forget its colour."""
@@ -173,7 +173,9 @@ def set_light_spectrum(
     "csv" a file of wavelength_nm and power. Raises UserError for what is unknown, invisible or outside a glass's data.
     """
     light = scene.lights[index]
-    shape = _spectrum(light, kind, value)
+    notes = list(scene.notes)
+    shape = _spectrum(light, kind, value, notes)
+    scene = replace(scene, notes=tuple(notes))
     changed = _with_power(scene, index, shape.scaled_to_luminous(light.spectral_power.luminous()))
     _check_against_glass(scene, changed.lights[index], light)
     return changed
@@ -194,7 +196,7 @@ def spectrum_words(spectrum: Spectrum) -> tuple[SpectrumKind, str | float | tupl
     return "table", None
 
 
-def _spectrum(light: Light, kind: str, value: object) -> Spectrum:
+def _spectrum(light: Light, kind: str, value: object, notes: list[str]) -> Spectrum:
     match kind, value:
         case "illuminant", str(name):
             return spectra.illuminant(name)
@@ -205,7 +207,7 @@ def _spectrum(light: Light, kind: str, value: object) -> Spectrum:
         case "lines", tuple(rows) if rows:
             return _lines(light, rows)
         case "csv", (str() | Path()) as path:
-            return spectra.from_csv(path)
+            return spectra.from_csv(path, notes)
     raise UserError(
         f"light '{light.name}': '{kind}' with {value!r} is no spectrum; use illuminant, blackbody, laser, lines or csv"
     )

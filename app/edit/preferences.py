@@ -13,15 +13,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import msgspec
-import platformdirs
 
 from ..base import files
 from ..base.atomic import atomic_output
 from ..base.errors import UserError
+from ..base.paths import CONFIG_ENVIRONMENT, config_path
 from ..model.staging import UpAxis
 from .state import Preferences
 
-ENVIRONMENT = "SPECTRASPLAT_CONFIG"
 MAX_RECENT = 10
 MAX_UP = 100
 """Files whose axis is remembered."""
@@ -75,12 +74,11 @@ class Settings:
 
 def config_dir() -> Path:
     """The user's settings folder, created on demand. Raises UserError when it cannot be."""
-    given = os.environ.get(ENVIRONMENT)
-    path = Path(given) if given else Path(platformdirs.user_config_dir("spectrasplat", appauthor=False))
+    path = config_path()
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        remedy = f"make it writable or set {ENVIRONMENT} to another folder"
+        remedy = f"make it writable or set {CONFIG_ENVIRONMENT} to another folder"
         raise UserError(f"the settings folder {path} cannot be made: {error.strerror}; {remedy}") from error
     return path
 

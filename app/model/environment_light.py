@@ -91,7 +91,7 @@ class EnvironmentLight:
     @cached_property
     def _tables(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Running sums over rows (H + 1,) and within each row (H, W + 1), both from 0 to 1; brightness (H, W)."""
-        brightness = self.rgb.mean(axis=2)
+        brightness = np.abs(self.rgb).mean(axis=2)  # colours outside of Rec.709 have negative channels
         power = brightness * self._solid_angles
         rows = power.sum(axis=1)
         of_row = np.where(rows[:, None] > 0.0, power, 1.0)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..base import files
 from ..base.errors import UserError
 from ..base.paths import assets_dir
 from .environment import (
@@ -31,10 +32,10 @@ STUDIO_MAP = assets_dir() / "environments" / "studio.hdr"
 _BLACK = (0.0, 0.0, 0.0)
 
 
-def read_environment(table: SceneTable, notes: list[str]) -> tuple[Vec3, Environment | None]:
+def read_environment(table: SceneTable) -> tuple[Vec3, Environment | None]:
     """Background (linear Rec.709 radiance) and environment of a scene's table; black and None where neither is given.
 
-    What was assumed goes to `notes`. Raises UserError for both at once and for anything that is not understood.
+    What was assumed goes to the table's notes. Raises UserError for both at once and for what is not understood.
     """
     if table.one_of(("background", KEY), "what lies behind everything") != KEY:
         return read_background(table), None
@@ -47,7 +48,7 @@ def read_environment(table: SceneTable, notes: list[str]) -> tuple[Vec3, Environ
         background = _read_constant(inner)
         environment = constant(background, lights)
     elif kind == "map":
-        environment = _read_map(inner, notes, lights)
+        environment = _read_map(inner, lights)
     elif kind == "studio":
         rotation_deg = inner.number("rotation_deg", 0.0)
         environment = from_map(STUDIO_MAP, _intensity(inner), rotation_deg, _up(inner), lights=lights)
@@ -69,11 +70,11 @@ def _read_constant(table: SceneTable) -> Vec3:
     return intensity * r, intensity * g, intensity * b
 
 
-def _read_map(table: SceneTable, notes: list[str], lights: bool) -> Environment:
-    path = table.existing_file("file")
+def _read_map(table: SceneTable, lights: bool) -> Environment:
+    path = table.existing_file("file", or_part=True)
     rotation_deg = table.number("rotation_deg", 0.0)
     try:
-        return from_map(path, _intensity(table), rotation_deg, _up(table), notes, lights)
+        return from_map(path, _intensity(table), rotation_deg, _up(table), table.notes, lights)
     except UserError as error:
         table.fail("file", f"cannot be used: {error}")
 
@@ -125,7 +126,7 @@ def environment_values(environment: Environment, scene_path: Path) -> dict[str, 
     told = dict(environment.parameters)
     if environment.kind == "map" and told and environment.source == str(STUDIO_MAP.resolve()):
         return {"kind": "studio"} | told
-    if environment.kind == "map" and told and environment.source and Path(environment.source).is_file():
+    if environment.kind == "map" and told and environment.source and files.with_part(environment.source)[0].is_file():
         return {"kind": "map", "file": picture_file(environment.rgb, environment.source, scene_path)} | told
     if environment.kind != "map" and told:
         return {"kind": environment.kind} | told

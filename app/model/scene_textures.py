@@ -28,11 +28,11 @@ class TextureReader:
         """The texture under `key`: a file name, or a table {file, wrap}. Raises UserError for one that cannot be
         used."""
         if isinstance(table.raw(key), str):
-            return self._checked(table, key, table.existing_file(key), "repeat")
+            return self._checked(table, key, table.existing_file(key, or_part=True), "repeat")
         inner = table.table(key)
         assert inner is not None
         wrap = inner.choice("wrap", WRAPS, "repeat")
-        texture = self._checked(inner, "file", inner.existing_file("file"), wrap)
+        texture = self._checked(inner, "file", inner.existing_file("file", or_part=True), wrap)
         inner.finish("a texture")
         return texture
 
@@ -62,6 +62,6 @@ def as_reflectance(rgb: np.ndarray, where: str) -> np.ndarray:
             f"{where}: {count} values lie above 1 (up to {rgb.max():.3g}), which no surface reflects; scale the "
             "picture down"
         )
-    rgb = np.minimum(rgb, np.float32(1.0))
+    rgb = np.clip(rgb, np.float32(0.0), np.float32(1.0))  # colours outside of Rec.709 have negative channels
     rgb.setflags(write=False)
     return rgb

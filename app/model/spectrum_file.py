@@ -58,7 +58,7 @@ def _spectrum_of(table: SceneTable, key: str | None) -> Spectrum:
     if key == "laser":
         return _laser(table, key, table.number(key), 1.0)
     if key == "csv":
-        return spectra.from_csv(table.existing_file(key))
+        return spectra.from_csv(table.existing_file(key, or_part=True), table.notes)
     if key == "constant":
         return spectra.constant(table.number(key, above=0.0))
     if key == "nm":

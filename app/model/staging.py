@@ -8,13 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
 from ..base.errors import UserError, suggestion
 from .geometry.mesh import Mesh
-from .optics import catalogue, tints
+from .optics import tints
+from .optics.index_file import find_glass
 from .optics.tints import Tint
 from .scene import Absorption, Dielectric, SceneObject
 
@@ -83,7 +85,7 @@ def with_glass(objects: Sequence[SceneObject], staging: Staging, file_name: str)
     for name, glass in staging.glass:
         tint = tints.tint(glass)
         where = f"--glass {glass}" if name is None else f"--glass {name}={glass}"
-        material = Dielectric(catalogue.find(glass, where) if tint is None else tint.dispersion)
+        material = Dielectric(find_glass(glass, Path(), where, []) if tint is None else tint.dispersion)
         names = [item.name for item in objects]
         if name is not None and name not in names:
             hint = suggestion(name, names) or ","

@@ -236,8 +236,10 @@ def _jpegs() -> tuple[bytes, ...]:
 def _hdrs() -> tuple[bytes, ...]:
     rgbe = random_rgbe(16, 4)
     flat = hdr_file(rgbe.tobytes(), 16, 4)
-    header = b"#?RADIANCE\n# a comment\nFORMAT=32-bit_rle_rgbe\nEXPOSURE=2\nPRIMARIES=0.64 0.33 0.3 0.6\n"
-    return (flat, hdr_file(new_rows(rgbe), 16, 4), hdr_file(old_rows(rgbe), 16, 4, header))
+    header = b"#?RADIANCE\n# a comment\nFORMAT=32-bit_rle_rgbe\nEXPOSURE=2\nCOLORCORR=1 2 1\n"
+    wide = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\nPRIMARIES=0.7 0.29 0.17 0.79 0.13 0.05 0.31 0.33\n"
+    turned = hdr_file(new_rows(rgbe), 16, 4, wide, axes=("+X", "-Y"))
+    return (flat, hdr_file(new_rows(rgbe), 16, 4), hdr_file(old_rows(rgbe), 16, 4, header), turned)
 
 
 @cache
@@ -252,7 +254,26 @@ def _exrs() -> tuple[bytes, ...]:
         write_image(path, rgb)
         plain = path.read_bytes()
         write_image(path, rgb, spectral=rgb, bin_edges_nm=np.array([400.0, 500, 600, 700]), metadata={"a": "b"})
-        return plain, path.read_bytes()
+        spectral = path.read_bytes()
+        return plain, spectral, *(_exr(path, *each) for each in _EXR_KINDS)
+
+
+_EXR_KINDS: tuple[tuple[tuple[str, ...], dict[str, object]], ...] = (
+    (("R", "G", "B"), {"chromaticities": (0.713, 0.293, 0.165, 0.830, 0.128, 0.044, 0.32168, 0.33767)}),
+    (("V.Combined.R", "V.Combined.G", "V.Combined.B", "V.Depth.Z"), {"whiteLuminance": 100.0}),
+    (("Y",), {"displayWindow": (np.array([-1, -1], np.int32), np.array([8, 6], np.int32))}),
+)
+
+
+def _exr(path: Path, names: tuple[str, ...], header: dict[str, object]) -> bytes:
+    import OpenEXR
+
+    channels = {name: np.full((6, 8), 0.5, np.float16) for name in names}
+    with OpenEXR.File(
+        {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage} | header, channels
+    ) as file:
+        file.write(str(path))
+    return path.read_bytes()
 
 
 def _npys() -> tuple[bytes, ...]:
@@ -287,23 +308,79 @@ def _height_tables() -> tuple[bytes, ...]:
 
 
 def _spectrum(path: Path) -> object:
+    from spectrasplat.model.io.curve_file import read_curve, share
     from spectrasplat.model.optics.spectrum import from_csv
 
+    share(path, read_curve(path, []), "transmittance", [])
     return from_csv(path)
 
 
 def _spectra() -> tuple[bytes, ...]:
-    rows = [(380 + 20 * i, 0.1 * i) for i in range(20)]
+    rows = [(380 + 20 * i, round(0.05 * i, 2)) for i in range(20)]
+    comma = "Wellenl\u00e4nge [nm];%T\n" + "".join(f"{w};{p:g}\n" for w, p in rows).replace(".", ",")
+    across = "ID\t" + "\t".join(f"nm{w}" for w, _ in rows) + "\n1\t" + "\t".join(f"{p:g}" for _, p in rows)
     return (
         ("wavelength_nm, power\n" + "".join(f"{w}, {p:g}\n" for w, p in rows)).encode(),
         "".join(f"{w};{p:g} # a\n" for w, p in rows).encode(),
+        comma.encode("utf-16"),
+        ("Date: today\n>>>>>Begin<<<<<\n" + "".join(f"{w}\t{p:g}\n" for w, p in rows) + ">>>>>End<<<<<\n").encode(),
+        ("Tcp,3262\n" + "".join(f"Spectral Data {w}[nm],{p:g}\n" for w, p in rows)).encode(),
+        across.encode(),
     )
+
+
+def _spdx() -> tuple[bytes, ...]:
+    rows = "".join(f'<SpectralData wavelength="{380 + 20 * i}">{0.05 * i:g}</SpectralData>\n' for i in range(20))
+    return (
+        f'<?xml version="1.0"?>\n<IESTM2714><SpectralDistribution>{rows}</SpectralDistribution></IESTM2714>'.encode(),
+    )
+
+
+def _index(path: Path) -> object:
+    from spectrasplat.model.optics.index_file import read_index
+
+    return read_index(path, [])
+
+
+def _index_tables() -> tuple[bytes, ...]:
+    rows = [f"0.{35 + 5 * i}" for i in range(10)]
+    n, k = "".join(f"{w},{1.55 - 0.005 * i:g}\n" for i, w in enumerate(rows)), "".join(f"{w},1e-7\n" for w in rows)
+    return f"wl,n\n{n}\nwl,k\n{k}".encode(), f"wavelength (um)\tn\n{n.replace(',', chr(9))}".encode()
+
+
+def _index_pages() -> tuple[bytes, ...]:
+    rows = "".join(f"      0.{35 + 5 * i} {1.55 - 0.005 * i:g} 1e-8\n" for i in range(10))
+    formula = (
+        "  - type: formula 2\n    wavelength_range: 0.3 2.5\n    coefficients: 0 1.04 0.006 0.23 0.02 1.01 103.6\n"
+    )
+    others = "  - type: formula {}\n    wavelength_range: 0.3 2.5\n    coefficients: {}\n"
+    return (
+        f"DATA:\n{formula}  - type: tabulated k\n    data: |\n      0.3 1e-8\n      0.9 1e-8\n".encode(),
+        f"DATA:\n  - type: tabulated nk\n    data: |\n{rows}".encode(),
+        ("DATA:\n" + others.format(7, "1.5 0.01 0.0001 -0.003 1e-5 1e-6")).encode(),
+        ("DATA:\n" + others.format(8, "0.27 0.02 0.01 -0.001")).encode(),
+        ("DATA:\n" + others.format(9, "2.4 0.02 0.03 0.01 0.2 0.03")).encode(),
+    )
+
+
+def _agfs() -> tuple[bytes, ...]:
+    head, c = "NM G {} 517642 1.5168 64.17 0 1\nED 7 8 2.5 0 0\n", "1.04 0.006 0.23 0.02 1.01 103.6 0 0 0 0"
+    glass = f"CC own\n{head.format(2)}CD {c}\nTD 0 0 0\nLD 0.3 2.5\nIT 0.4 0.99 10\n"
+    series = f"CC own\n{head.format(13)}CD 2.27 -0.01 1e-5 0.01 2e-4 0 0 0 0\nLD 0.3 2.5\n"
+    return glass.encode(), series.encode("utf-16")
 
 
 def _ies(path: Path) -> object:
     from spectrasplat.model.lights.ies_file import read_ies
 
     return read_ies(path)
+
+
+def _ldts() -> tuple[bytes, ...]:
+    from tests.reference.lamps import ldt_text
+
+    up = [0.0, 30.0, 60.0, 90.0]
+    return tuple(ldt_text(lambda v, h: 100.0 + v, up, 8, symmetry).encode() for symmetry in (0, 1, 2, 3, 4))
 
 
 def _lamps() -> tuple[bytes, ...]:
@@ -426,6 +503,11 @@ READERS = {
     "heights-npy": Reader("heights.npy", _heights, _height_arrays),
     "heights-csv": Reader("heights.csv", _heights, _height_tables),
     "spectrum": Reader("spectrum.csv", _spectrum, _spectra),
+    "spdx": Reader("spectrum.spdx", _spectrum, _spdx),
+    "index-csv": Reader("index.csv", _index, _index_tables),
+    "index-yml": Reader("index.yml", _index, _index_pages),
+    "agf": Reader("glass.agf", _index, _agfs),
+    "ldt": Reader("lamp.ldt", _ies, _ldts),
     "ies": Reader("lamp.ies", _ies, _lamps),
     "keys": Reader("keys.toml", _keys, _key_texts),
     "settings": Reader("settings.json", _in_config(_settings), _settings_texts, ()),

@@ -154,7 +154,7 @@ def test_a_lamp_is_chosen_from_a_file(panel: PanelRig, tmp_path: Path, monkeypat
     asked = []
     monkeypatch.setattr(file_browser, "ask", asked.append)
     panel.click("File")
-    assert [question.suffixes for question in asked] == [(".ies",)]
+    assert [question.suffixes for question in asked] == [(".ies", ".ldt")]
     chosen = tmp_path / "mine.ies"
     chosen.write_text(isotropic(), encoding="ascii")
     monkeypatch.setattr(file_browser, "take", lambda name: chosen if name == "lamp" else None)

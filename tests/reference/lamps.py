@@ -34,6 +34,49 @@ def ies_text(
     return "\n".join(lines) + "\n"
 
 
+def ldt_text(
+    candela: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    vertical: np.ndarray | list[float],
+    planes: int,
+    symmetry: int,
+) -> str:
+    """A EULUMDAT file with 2 × 600 lm, as many of `planes` equal C planes listed as `symmetry` asks for."""
+    angles = 360.0 * np.arange(planes) / planes
+    first, count = {
+        0: (0, planes),
+        1: (0, 1),
+        2: (0, planes // 2 + 1),
+        3: (3 * planes // 4, planes // 2 + 1),
+        4: (0, planes // 4 + 1),
+    }[symmetry]
+    table = [
+        candela(np.asarray(vertical, float), np.full(len(vertical), angles[(first + i) % planes])) for i in range(count)
+    ]
+    head = [
+        "Maker",
+        1,
+        symmetry,
+        planes,
+        0,
+        len(vertical),
+        0,
+        "",
+        "name",
+        "",
+        "a.ldt",
+        "",
+        *[100] * 9,
+        100,
+        80,
+        1,
+        0,
+        2,
+    ]
+    sets = [1, "LED", "1200", "3000", "1A", "12", 1, "LED", "600", "4000", "1A", "6"]
+    values = [*[0.5] * 10, *angles, *vertical, *(np.concatenate(table) / 1.2)]
+    return "\r\n".join(map(str, [*head, *sets, *values])) + "\r\n"
+
+
 def lamp(folder: Path, spectrum: Spectrum, text: str, **placed: object) -> IesLight:
     """A light of this file; `spectrum` is its intensity at the peak."""
     path = folder / "lamp.ies"

@@ -16,7 +16,7 @@ from spectrasplat.model.io.picture_files import read_picture
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.io.scene_save import save_scene
 from spectrasplat.model.lights.ies_file import read_ies
-from spectrasplat.model.optics.spectrum import read_csv
+from spectrasplat.model.optics.spectrum import from_csv
 
 SECRET = "xyzzy:0:0:plugh horse battery"
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
@@ -37,7 +37,7 @@ SCENE = '[[objects]]\nmesh = "{}"\nglass = "N-BK7"\n'
         (".exr", read_picture),
         (".npy", read_picture),
         (".ies", read_ies),
-        (".csv", read_csv),
+        (".csv", from_csv),
     ],
 )
 def test_pipes_devices_and_folders_are_refused_at_once(tmp_path: Path, suffix: str, read, make) -> None:
@@ -109,7 +109,7 @@ def test_what_is_saved_elsewhere_can_be_read_there(outside: Path) -> None:
         ("a.ply", load_mesh, "ply\nformat ascii 1.0\n"),
         ("a.ply", load_mesh, "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n"),
         ("a.stl", load_mesh, "solid\nfacet normal 0 0 0\nvertex "),
-        ("a.csv", read_csv, "1 2\n"),
+        ("a.csv", from_csv, "1 2\n"),
         ("a.ies", read_ies, "TILT="),
         ("a.ies", read_ies, "TILT=NONE\n1 "),
         ("a.hdr", read_picture, "#?RADIANCE\nFORMAT="),

@@ -35,23 +35,37 @@ def test_known_glasses(name: str, n_f: float, n_d: float, n_c: float, v_d: float
     assert found.is_dispersive
 
 
+PEAK = (2.4, 0.02, 0.03, 0.01, 0.2, 0.03)
+
+
 def _one_of_each_kind() -> list[glass.Dispersion]:
     kinds: dict[str, glass.Dispersion] = {}
     for entry in catalogue.entries():
         kinds.setdefault(entry.dispersion.kind, entry.dispersion)
     kinds["abbe"] = glass.from_abbe(1.6, 30.0)
+    for number, c in ((7, (1.5, 0.01, 1e-4, -3e-3, 1e-5, 1e-6)), (8, (0.27, 0.02, 0.01, -1e-3)), (9, PEAK)):
+        kinds[f"formula {number}"] = glass.from_formula(f"formula {number}", c)  # type: ignore[arg-type]
     return list(kinds.values())
 
 
 def test_derivative_is_that_of_index_for_every_kind() -> None:
     """Central differences; their own error is h²n‴/6 ~ 1e-9, a wrong term is off by 1e-3."""
     kinds = _one_of_each_kind()
-    assert {d.kind for d in kinds} == {*(f"formula {i}" for i in range(1, 7)), "abbe", "constant", "table"}
+    assert {d.kind for d in kinds} == {*(f"formula {i}" for i in range(1, 10)), "abbe", "constant", "table"}
     wavelength = np.linspace(452.1, 628.7, 57)  # between the table's knots, inside every range
     for dispersion in kinds:
         h = 1e-3 if dispersion.kind == "table" else 0.02
         numeric = (dispersion.index(wavelength + h) - dispersion.index(wavelength - h)) / (2e-3 * h)
         assert dispersion.derivative(wavelength) == pytest.approx(numeric, abs=3e-7), dispersion.name
+
+
+def test_formulas_8_and_9_by_their_definitions() -> None:
+    um, (a, b, c, d, e, f) = np.array([0.45, 0.6]), PEAK
+    squares = a + b / (um**2 - c) + d * (um - e) / ((um - e) ** 2 + f)
+    assert glass.from_formula("formula 9", PEAK).index(um * 1e3) == pytest.approx(np.sqrt(squares), rel=1e-12)
+    squares = glass.from_formula("formula 8", (0.27, 0.02, 0.01, -1e-3)).index(um * 1e3) ** 2
+    lorentz = 0.27 + 0.02 * um**2 / (um**2 - 0.01) - 1e-3 * um**2
+    assert (squares - 1.0) / (squares + 2.0) == pytest.approx(lorentz, rel=1e-12)
 
 
 def test_every_catalogue_entry_is_sound() -> None:
@@ -193,7 +207,7 @@ def test_notes_say_index_below_one() -> None:
         (lambda w: glass.sellmeier([1.0], [0.01], range_nm=(900.0, 2000.0), where=w), "outside the visible range"),
         (lambda w: glass.sellmeier([1.0], [0.01], range_nm=(700.0, 400.0), where=w), "range 700 to 400 nm is empty"),
         (lambda w: glass.cauchy([], where=w), "at least the coefficient A"),
-        (lambda w: glass.cauchy([1.2, -0.5], where=w), "at 380 nm; it must be a positive number"),
+        (lambda w: glass.cauchy([1.2, -0.5], where=w), "at 380 nm; from 380 to 780 nm it must be a positive number"),
         (lambda w: glass.table([], [], where=w), "two or more wavelengths"),
         (lambda w: glass.table([400.0, 500.0], [1.5], where=w), "got 2 and 1"),
         (lambda w: glass.table([500.0, 400.0], [1.5, 1.6], where=w), "400 follows 500"),
@@ -202,7 +216,7 @@ def test_notes_say_index_below_one() -> None:
         (lambda w: glass.table([400.0, 500.0], [1.5, 0.0], where=w), "n = 0 at 500 nm"),
         (lambda w: glass.table([0.0, 500.0], [1.5, 1.5], where=w), "not a positive number"),
         (lambda w: glass.from_formula("formula 3", [2.0, 1.0], where=w), "does not take 2 coefficients"),
-        (lambda w: glass.from_formula("formula 9", [2.0], where=w), "unknown dispersion formula"),  # type: ignore[arg-type]
+        (lambda w: glass.from_formula("formula 10", [2.0], where=w), "unknown dispersion formula"),  # type: ignore[arg-type]
     ],
 )
 def test_impossible_data_are_refused_by_key(make, message: str) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from reference.lamps import cosine, ies_text, isotropic, lamp, lopsided
+from reference.lamps import cosine, ies_text, isotropic, lamp, ldt_text, lopsided
 from spectrasplat.base import files
 from spectrasplat.base.errors import UserError
 from spectrasplat.base.paths import assets_dir
@@ -46,13 +46,21 @@ def shape(vertical: np.ndarray, horizontal: np.ndarray) -> np.ndarray:
     return 100.0 + vertical * (2.0 + np.cos(np.radians(2.0 * horizontal)))
 
 
+UP = np.arange(0, 181, 10.0)
+
+
 @pytest.mark.parametrize(
-    "horizontal",
-    [np.arange(0, 91, 15.0), np.arange(0, 181, 15.0), np.arange(0, 361, 15.0), np.arange(90, 271, 15.0)],
-    ids=["0-90", "0-180", "0-360", "90-270"],
+    "text",
+    [
+        *(ies_text(shape, UP, np.arange(low, high, 15.0)) for low, high in ((0, 91), (0, 181), (0, 361), (90, 271))),
+        ies_text(shape, UP, np.arange(0, 346, 15.0)),  # 360 is 0
+        *(ldt_text(shape, UP, 24, symmetry) for symmetry in (0, 2, 3, 4)),
+        ldt_text(shape, UP, 24, 0).replace(".", ","),
+    ],
+    ids=["0-90", "0-180", "0-360", "90-270", "0-345", "ldt 0", "ldt 2", "ldt 3", "ldt 4", "ldt, decimal commas"],
 )
-def test_all_symmetries_are_the_same_lamp(tmp_path: Path, horizontal: np.ndarray) -> None:
-    profile = read(tmp_path, ies_text(shape, np.arange(0, 181, 10.0), horizontal))
+def test_all_symmetries_are_the_same_lamp(tmp_path: Path, text: str) -> None:
+    profile = read(tmp_path, text)
     for v in (0.0, 10.0, 90.0, 170.0, 180.0):
         for h in (-30.0, 0.0, 15.0, 75.0, 90.0, 105.0, 195.0, 255.0, 270.0, 345.0, 360.0):
             assert at(profile, v, h) == pytest.approx(float(shape(np.array(v), np.array(h))), rel=1e-12)
@@ -67,10 +75,18 @@ def test_a_half_symmetric_about_c90_is_not_the_one_about_c0(tmp_path: Path) -> N
     profile = read(tmp_path, ies_text(leaning, [0.0, 90.0, 180.0], np.arange(90, 271, 30.0)))
     assert at(profile, 90.0, 90.0) == pytest.approx(145.0) and at(profile, 90.0, 270.0) == pytest.approx(55.0)
     assert at(profile, 90.0, 30.0) == pytest.approx(at(profile, 90.0, 150.0)) == pytest.approx(122.5)
+    np.testing.assert_allclose(
+        read(tmp_path, ldt_text(leaning, [0.0, 90.0, 180.0], 12, 3)).intensity, profile.intensity
+    )
 
 
 def test_one_horizontal_angle_is_all_the_way_round(tmp_path: Path) -> None:
     profile = read(tmp_path, cosine())
+    np.testing.assert_allclose(
+        read(tmp_path, ldt_text(lambda v, h: np.cos(np.radians(v)), np.arange(91.0), 1, 1)).intensity,
+        profile.intensity,
+        atol=1e-12,
+    )
     assert at(profile, 60.0, 0.0) == at(profile, 60.0, 217.0) == pytest.approx(25.0)
     assert at(profile, 91.0, 0.0) == 0.0 and profile.cone_rad == pytest.approx(0.5 * math.pi)
 
@@ -125,6 +141,7 @@ def test_the_shipped_lamp_is_what_its_script_says() -> None:
 
 # -- refusals ---------------------------------------------------------------------------------
 
+LDT = ldt_text(shape, UP, 24, 4)
 GOOD = ies_text(lambda v, h: 5.0 + 0.0 * v, [0.0, 45.0, 90.0], [0.0, 45.0, 90.0])
 
 
@@ -155,6 +172,11 @@ GOOD = ies_text(lambda v, h: 5.0 + 0.0 * v, [0.0, 45.0, 90.0], [0.0, 45.0, 90.0]
             "keeps its tilt factors in another file, which is not read; write TILT=",
         ),
         (GOOD.replace("TILT=NONE", "TILT=INCLUDE\n1\n999"), "ends within the factors for a tilted lamp"),
+        (GOOD.replace("0 45 90\n0 45 90", "0 45 90\n0 45 200"), "horizontal angles that run neither"),
+        (LDT.replace("\r\n2\r\n1\r\nLED", "\r\n0\r\n1\r\nLED"), "does not say which lamps it has"),
+        (LDT[: len(LDT) // 2], "ends within"),
+        (LDT.replace("\r\n4\r\n24", "\r\n4\r\n22"), "has 22 C planes, which its symmetry 4 does not allow"),
+        (LDT.replace("\r\n1200\r\n", "\r\n-5\r\n"), "negative or too large"),
     ],
 )
 def test_what_cannot_be_read_is_said_in_one_sentence(tmp_path: Path, text: str, told: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from pathlib import Path
 
 import numpy as np
@@ -62,12 +63,118 @@ def test_a_sun_of_one_pixel_survives_beside_the_dark(tmp_path: Path) -> None:
     assert (rgb[3, 3] == 0.0).all()
 
 
-def test_exposure_lines_are_divided_out_and_foreign_primaries_told(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("lines", "divisor", "note"),
+    [
+        (b"EXPOSURE=2.0\nSOFTWARE=x\nEXPOSURE= 4\nVIEW=-vtv\n", 8.0, None),
+        (b"COLORCORR= 2 1 0.5\nEXPOSURE=2\n", (4.0, 2.0, 1.0), None),
+        (b"PRIMARIES=0.64 0.33 0.3 0.6 0.15 0.06 0.3127 0.329\n", 1.0, None),
+        (b"EXPOSURE=0\n", 1.0, "its line EXPOSURE is not a number above 0"),
+        (b"EXPOSURE=bright\nEXPOSURE=2\n", 2.0, "its line EXPOSURE"),
+    ],
+)
+def test_what_a_header_says(tmp_path: Path, lines: bytes, divisor: object, note: str | None) -> None:
     rgbe = random_rgbe(16, 2)
-    header = HEADER + b"EXPOSURE=2.0\nSOFTWARE=x\nEXPOSURE= 4\nPRIMARIES=0.7 0.3 0.2 0.7 0.1 0.05 0.33 0.33\n"
-    rgb, notes = read_picture(write(tmp_path / "a.hdr", hdr_file(new_rows(rgbe), 16, 2, header)))
-    np.testing.assert_allclose(rgb, radiance_of(rgbe) / 8.0, rtol=1e-7)
-    assert len(notes) == 1 and "primaries" in notes[0]
+    rgb, notes = read_picture(write(tmp_path / "a.hdr", hdr_file(new_rows(rgbe), 16, 2, HEADER + lines)))
+    np.testing.assert_allclose(rgb, radiance_of(rgbe) / np.array(divisor), rtol=1e-7)
+    assert note in notes[0] if note else notes == ()
+
+
+@pytest.mark.parametrize("rows", ["-Y", "+Y"])
+@pytest.mark.parametrize("columns", ["+X", "-X"])
+def test_pixels_in_any_order(tmp_path: Path, rows: str, columns: str) -> None:
+    rgbe = random_rgbe(16, 9)
+    stored = rgbe[:: 1 if rows == "-Y" else -1, :: 1 if columns == "+X" else -1]
+    for content in (
+        hdr_file(new_rows(stored), 16, 9, axes=(rows, columns)),
+        hdr_file(new_rows(stored.swapaxes(0, 1)), 9, 16, axes=(columns, rows)),
+    ):
+        np.testing.assert_array_equal(read_picture(write(tmp_path / "a.hdr", content))[0], radiance_of(rgbe))
+
+
+# Expected: the published matrices of ACEScg (AMPAS S-2014-004, Bradford) and of Rec.2020 (ITU-R BT.2087).
+ACESCG = (0.713, 0.293, 0.165, 0.830, 0.128, 0.044, 0.32168, 0.33767)
+REC2020 = (0.708, 0.292, 0.170, 0.797, 0.131, 0.046, 0.3127, 0.3290)
+
+
+@pytest.mark.parametrize(
+    ("chromaticities", "stored", "expected"),
+    [
+        (ACESCG, (0.1, 0.8, 0.1), (-0.335, 0.899, 0.010)),
+        (ACESCG, (1.0, 1.0, 1.0), (1.0, 1.0, 1.0)),
+        (REC2020, (0.0, 1.0, 0.0), (-0.5876, 1.1329, -0.1006)),
+        ((1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1 / 3, 1 / 3), (0.9505, 1.0, 1.089), (1.0, 1.0, 1.0)),
+    ],
+)
+def test_other_primaries(tmp_path: Path, chromaticities, stored, expected) -> None:
+    channels = {name: np.full((4, 8), value) for name, value in zip("RGB", stored, strict=True)}
+    exr(tmp_path / "a.exr", channels, chromaticities=chromaticities)
+    rgb, notes = read_picture(tmp_path / "a.exr")
+    assert rgb[1, 2] == pytest.approx(expected, abs=2e-3) and "converted to Rec.709" in notes[0]
+    codes = np.array([*(np.array(stored) * 128), 129]).astype(np.uint8)
+    line = b"PRIMARIES=" + " ".join(map(str, chromaticities)).encode() + b"\n"
+    rgb, notes = read_picture(write(tmp_path / "a.hdr", hdr_file(codes.tobytes() * 2, 2, 1, HEADER + line)))
+    assert rgb[0, 0] == pytest.approx(expected, abs=0.05) and "converted to Rec.709" in notes[0]
+
+
+def exr(path: Path, channels: dict[str, np.ndarray], **header) -> None:
+    """An OpenEXR file of half floats; channels "part|name" go into parts of their own."""
+    import OpenEXR
+
+    parts: dict[str, dict[str, np.ndarray]] = {}
+    for name, values in channels.items():
+        part, _, channel = name.rpartition("|")
+        parts.setdefault(part, {})[channel] = values.astype(np.float16)
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage} | header
+    held = [OpenEXR.Part(dict(header), pixels, name) for name, pixels in parts.items()]
+    with OpenEXR.File(held) if len(held) > 1 else OpenEXR.File(header, parts[next(iter(parts))]) as file:
+        file.write(str(path))
+
+
+def layer(name: str, value: float, letters: str = "RGB") -> dict[str, np.ndarray]:
+    return {f"{name}{letter}": np.full((4, 8), value) for letter in letters}
+
+
+COMBINED, DEPTH = layer("ViewLayer.Combined.", 0.5, "RGBA"), layer("ViewLayer.Depth.", 9.0, "Z")
+NORMAL = layer("ViewLayer.Normal.", 0.1, "XYZ")
+
+
+@pytest.mark.parametrize(
+    ("channels", "wanted", "said"),
+    [
+        (COMBINED | DEPTH | NORMAL, "", ""),
+        (COMBINED | layer("ViewLayer.Diffuse.", 2.0), "", "'ViewLayer.Combined' was taken"),
+        (COMBINED | layer("Other.Combined.", 2.0), "viewlayer.combined", ""),
+        (COMBINED | layer("ViewLayer.Diffuse.", 2.0), "Combined", ""),
+        (layer("", 0.5) | COMBINED | layer("diffuse.", 2.0), "", ""),
+        (layer("rgba|", 0.5) | layer("depth|", 3.0, "Z"), "", ""),
+        (layer("left|", 0.5) | layer("right|", 3.0), "left", ""),
+        (layer("", 0.5, "Y"), "", "luminance only"),
+        (layer("", 0.5, "rgb"), "", ""),
+        (COMBINED | layer("Other.Combined.", 2.0), "", "error: name one of 'Other.Combined', 'ViewLayer.Combined'"),
+        (layer("a|", 0.5) | layer("b|", 3.0), "", "error: name one of 'a', 'b', as in \"a.exr:b\""),
+        (COMBINED, "Diffuse", "error: no such layer; name one of 'ViewLayer.Combined'"),
+        (DEPTH | NORMAL, "", "error: holds no colours, only the channels ViewLayer.Depth.Z, ViewLayer.Normal.X"),
+    ],
+)
+def test_layers(tmp_path: Path, channels: dict[str, np.ndarray], wanted: str, said: str) -> None:
+    exr(tmp_path / "a.exr", channels)
+    name = f"{tmp_path / 'a.exr'}:{wanted}" if wanted else tmp_path / "a.exr"
+    if said.startswith("error: "):
+        with pytest.raises(UserError, match=re.escape(said.removeprefix("error: "))):
+            read_picture(name)
+        return
+    rgb, notes = read_picture(name)
+    assert rgb.shape == (4, 8, 3) and (rgb == 0.5).all()
+    assert said in " ".join(notes) and len(notes) == bool(said)
+
+
+def test_what_is_cropped_keeps_its_place(tmp_path: Path) -> None:
+    window = (np.array([-2, 1], np.int32), np.array([7, 6], np.int32))
+    exr(tmp_path / "a.exr", layer("", 0.5), displayWindow=window, whiteLuminance=100.0)
+    rgb, notes = read_picture(tmp_path / "a.exr")
+    assert rgb.shape == (6, 10, 3) and (rgb[:3, 2:] == 0.5).all() and rgb.sum() == 0.5 * 3 * 24
+    assert "is cropped" in notes[0] and "intensity = 100" in notes[1]
 
 
 @pytest.mark.parametrize("encode", [new_rows, old_rows, lambda rgbe: rgbe.tobytes()], ids=["new", "old", "flat"])
@@ -87,13 +194,12 @@ def test_a_truncated_file_is_told_with_its_row(tmp_path: Path, encode) -> None:
         (b"", "is not a Radiance picture"),
         (b"GIF89a", "is not a Radiance picture"),
         (HEADER + b"\nno size\n", "the line that gives its size is missing"),
-        (hdr_file(b"", 4, 4, axes=("+Y", "+X")), "its pixels do not run from the top left"),
-        (hdr_file(b"", 4, 4, axes=("+X", "-Y")), "its pixels do not run from the top left"),
+        (hdr_file(b"", 4, 4, axes=("+Y", "+Y")), "has no X and Y"),
+        (hdr_file(b"", 4, 4, axes=("*X", "-Y")), "has no X and Y"),
         (hdr_file(b"", 0, 4), "each side must be 1 to 65536"),
         (hdr_file(b"", 60_000, 60_000), "more than 64 million"),
-        (hdr_file(b"", 4, 4, b"#?RADIANCE\nFORMAT=32-bit_rle_xyze\n"), "its format is not 32-bit_rle_rgbe"),
-        (hdr_file(b"", 4, 4, HEADER + b"EXPOSURE=0\n"), "its EXPOSURE is not a number"),
-        (hdr_file(b"", 4, 4, HEADER + b"EXPOSURE=bright\n"), "its EXPOSURE is not a number"),
+        (hdr_file(b"", 4, 4, b"#?RADIANCE\nFORMAT=32-bit_rle_yuve\n"), "its format is not 32-bit_rle_rgbe"),
+        (hdr_file(bytes(64), 4, 4, HEADER + b"PRIMARIES=0 0 0 0 0 0 0 0\n"), "its primaries and white are not eight"),
         (hdr_file(bytes([2, 2, 0, 9]) + bytes(99), 10, 1), "holds a run that leaves its row"),
         (hdr_file(bytes([2, 2, 0, 10, 128 + 11, 7]) + bytes(99), 10, 1), "holds a run that leaves its row"),
         (hdr_file(bytes([2, 2, 0, 10, 0, 7]) + bytes(99), 10, 1), "holds a run that leaves its row"),

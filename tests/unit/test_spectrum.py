@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -124,43 +123,6 @@ def test_a_spectrum_is_a_value() -> None:
 def test_bad_spectra(make, message: str) -> None:
     with pytest.raises(UserError, match=message):
         make()
-
-
-def test_csv(tmp_path: Path) -> None:
-    file = tmp_path / "lamp.csv"
-    file.write_text("# lamp\nwavelength_nm,power\n400,1\n500, 3  # peak\n\n600;0\n")
-    lamp = sp.from_csv(file)
-    assert lamp.density[[19, 20, 70, 120, 170, 221]] == pytest.approx([0.0, 1.0, 2.0, 3.0, 1.5, 0.0])
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("400,1\n500,x\n", "line 2: expected two numbers"),
-        ("nm,power\nagain,header\n400,1\n500,1\n", "line 2: expected two numbers"),
-        ("400,1,7\n500,1,7\n", "line 1: expected two numbers"),
-        ("400,1\n500,nan\n", "line 2 holds a number that is not finite"),
-        ("500,1\n400,1\n", "wavelengths must ascend"),
-        ("400,1\n500,-1\n", "negative"),
-        ("400,1\n", "found 1"),
-        ("", "found 0"),
-        ("4000,1\n5000,1\n", "zero from 380 to 780 nm"),
-    ],
-)
-def test_bad_csv_names_file_and_line(tmp_path: Path, text: str, message: str) -> None:
-    file = tmp_path / "lamp.csv"
-    file.write_text(text)
-    with pytest.raises(UserError) as caught:
-        sp.from_csv(file)
-    assert str(file) in str(caught.value) and message in str(caught.value)
-
-
-def test_missing_or_binary_csv(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match="No such file"):
-        sp.from_csv(tmp_path / "none.csv")
-    (tmp_path / "binary.csv").write_bytes(b"\xff\xfe\x00\x80")
-    with pytest.raises(UserError, match="not text"):
-        sp.from_csv(tmp_path / "binary.csv")
 
 
 def test_rgb_matrices() -> None:

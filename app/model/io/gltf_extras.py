@@ -43,8 +43,8 @@ def write_node_dabs(node: dict[str, Any], dabs: Mapping[int, Sequence[Dab]]) -> 
 def read_scene_extras(document: GltfDocument, notes: list[str]) -> tuple[Vec3, Environment | None, RenderDefaults]:
     """Background, environment and render defaults; those of an empty scene file where there are none."""
     values = own_extras(document.json).get(_SCENE, {})
-    table = SceneTable(values if isinstance(values, dict) else {}, document.path, f"extras.{EXTRAS}.{_SCENE}")
-    background, environment = read_environment(table, notes)
+    table = SceneTable(values if isinstance(values, dict) else {}, document.path, f"extras.{EXTRAS}.{_SCENE}", notes)
+    background, environment = read_environment(table)
     return background, environment, read_render(table.table("render"))
 
 

@@ -20,38 +20,41 @@ from ...base.image_io import MAX_PIXELS
 from ...base.tone_map import srgb_eotf
 
 PICTURE_SUFFIXES = (".hdr", ".pic", ".exr", ".npy", ".png", ".jpg", ".jpeg")
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
 _NOISE = 1e-3
 """Negatives this far below 0, as a share of the brightest value, come from compression and become 0."""
 
 
 def read_picture(path: str | os.PathLike[str]) -> tuple[np.ndarray, tuple[str, ...]]:
-    """The picture in `path`, float32 (H, W, 3) linear Rec.709, row 0 the top, and notes on what was assumed.
+    """The picture in `path` (of an EXR, "a.exr:layer"), float32 (H, W, 3) linear Rec.709, row 0 the top, and notes.
 
-    Finite and not negative. Raises UserError for a missing, damaged, empty or far too large file, for another
-    format, and for values that are no radiance, with their number.
+    Finite and not negative, but for colours from other primaries that lie outside of Rec.709. Raises UserError for a
+    missing, damaged, empty or far too large file, for another format, and for values that are no radiance, with their
+    number.
     """
-    path = Path(path)
+    path, layer = files.with_part(path)
     suffix = path.suffix.lower()
     if suffix not in PICTURE_SUFFIXES:
         raise UserError(
             f"cannot read {path}: '{suffix}' is not a picture format; use one of {', '.join(PICTURE_SUFFIXES)}"
         )
-    notes: tuple[str, ...] = ()
     if suffix in (".exr", ".npy"):
         from ...base.image_io import read_image
 
-        rgb = read_image(path).rgb
+        held = read_image(path, layer)
+        rgb, notes, is_converted = held.rgb, held.notes, held.is_converted
     else:
         data = _bytes_of(path)
         if suffix in (".hdr", ".pic"):
             from .radiance_hdr import read_hdr
 
-            rgb, notes = read_hdr(data, str(path), MAX_PIXELS)
+            rgb, notes, is_converted = read_hdr(data, str(path), MAX_PIXELS)
         else:
             rgb, notes = decode_8bit(data, str(path))
+            is_converted = False
     if 0 in rgb.shape:
         raise UserError(f"{path}: the picture is empty ({rgb.shape[1]} × {rgb.shape[0]} pixels); export it again")
-    rgb, told = _checked(rgb, str(path))
+    rgb, told = _checked(rgb, str(path), is_converted)
     return rgb, notes + told
 
 
@@ -112,22 +115,22 @@ def _decoded_levels() -> np.ndarray:
     return srgb_eotf(np.arange(256) / 255.0).astype(np.float32)
 
 
-def _checked(rgb: np.ndarray, where: str) -> tuple[np.ndarray, tuple[str, ...]]:
+def _checked(rgb: np.ndarray, where: str, is_converted: bool) -> tuple[np.ndarray, tuple[str, ...]]:
     """`rgb` without the negative noise of lossy compression. Raises UserError that counts what is no radiance."""
     undefined, infinite = int(np.isnan(rgb).sum()), int(np.isinf(rgb).sum())
     if undefined or infinite:
         raise UserError(
             f"{where}: {undefined} values are not a number and {infinite} infinite; export it with finite values"
         )
-    negative = rgb < 0.0
+    # Of colours outside of Rec.709 one channel is negative and their luminance is not.
+    negative = rgb @ _LUMINANCE < 0.0 if is_converted else rgb < 0.0
     if not negative.any():
         return rgb, ()
-    count, lowest, highest = int(negative.sum()), float(rgb.min()), float(rgb.max())
+    count, lowest, highest = int(negative.sum()), float(rgb[negative].min()), float(rgb.max())
     if lowest <= -_NOISE * highest:
         raise UserError(
             f"{where}: {count} values are negative (down to {lowest:.3g}), which light cannot be; export it "
             "without them"
         )
-    return np.maximum(rgb, np.float32(0.0)), (
-        f"{where}: {count} slightly negative values (down to {lowest:.3g}) were set to 0.",
-    )
+    darkened = np.where(negative if rgb.shape == negative.shape else negative[..., None], np.float32(0.0), rgb)
+    return darkened, (f"{where}: {count} slightly negative values (down to {lowest:.3g}) were set to 0.",)

@@ -104,9 +104,7 @@ def scene_of(values: dict[str, Any], path: Path, kept: Kept | None = None) -> Sc
 
 
 def _checked(scene: Scene, path: Path) -> Scene:
-    told = set(scene.notes)
-    notes = [note for note in check_scene(scene, path.name) if note not in told]
-    return replace(scene, notes=scene.notes + tuple(notes))
+    return replace(scene, notes=tuple(dict.fromkeys((*scene.notes, *check_scene(scene, path.name)))))
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -130,8 +128,8 @@ def read_toml(path: Path) -> dict[str, Any]:
 def _scene_from_table(table: SceneTable, kept: Kept, staging: Staging) -> Scene:
     name = table.string("name", table.file.stem)
     units = table.string("units", "")
-    notes: list[str] = []
-    background, environment = _read_environment(table, kept, notes)
+    notes = table.notes
+    background, environment = _read_environment(table, kept)
     render = read_render(table.table("render"))
     textures = kept.textures
     reader = ObjectReader(read_materials(table, textures), textures, kept.meshes)
@@ -155,13 +153,13 @@ def _scene_from_table(table: SceneTable, kept: Kept, staging: Staging) -> Scene:
     return Scene(name, camera, lights, tuple(objects), background, environment, render, tuple(notes), units)
 
 
-def _read_environment(table: SceneTable, kept: Kept, notes: list[str]) -> tuple[Vec3, Environment | None]:
+def _read_environment(table: SceneTable, kept: Kept) -> tuple[Vec3, Environment | None]:
     given = table.given(("background", "environment"))
     if given == ["environment"] and isinstance(table.raw("environment"), Environment):
         return (0.0, 0.0, 0.0), table.raw("environment")
     identity = repr([(key, table.raw(key)) for key in given])
     if identity not in kept.environments:
-        kept.environments[identity] = read_environment(table, notes)
+        kept.environments[identity] = read_environment(table)
     return kept.environments[identity]
 
 

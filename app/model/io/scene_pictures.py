@@ -22,8 +22,9 @@ def picture_file(rgb: np.ndarray, source: str | None, scene_path: Path) -> str:
     folder `<stem>_pictures` beside the scene, as PNG where 8 bits hold it exactly, else as EXR. Raises UserError when
     it cannot be.
     """
-    if source is not None and files.is_file(source):
-        return kept_name(source, scene_path)
+    path, part = files.with_part(source or "")
+    if source is not None and files.is_file(path):
+        return f"{kept_name(str(path), scene_path)}:{part}".rstrip(":")
     folder = folder_beside(scene_path, "pictures")
     levels = eight_bit_levels(rgb)
     target = folder / f"{picture_name(rgb)}{'.exr' if levels is None else '.png'}"

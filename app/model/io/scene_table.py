@@ -25,8 +25,10 @@ REQUIRED: Any = object()
 class SceneTable:
     """One TOML table, the file it stands in, and its path inside that file."""
 
-    def __init__(self, values: Mapping[str, Any], file: Path, path: str = "") -> None:
+    def __init__(self, values: Mapping[str, Any], file: Path, path: str = "", notes: list[str] | None = None) -> None:
         self._values = values
+        self.notes: list[str] = [] if notes is None else notes
+        """Sentences on what was assumed, of the whole file: tables in it share the list."""
         self._asked: set[str] = set()
         self.file = file
         self.path = path
@@ -241,7 +243,7 @@ class SceneTable:
         value = self._values[key]
         if not isinstance(value, dict):
             self.fail(key, f"must be a table, not {_show(value)}")
-        return SceneTable(value, self.file, self.key_path(key))
+        return SceneTable(value, self.file, self.key_path(key), self.notes)
 
     def tables(self, key: str) -> list[SceneTable]:
         """The list of tables under `key`; none at all is the empty list."""
@@ -250,7 +252,7 @@ class SceneTable:
         value = self._values[key]
         if not isinstance(value, list) or not all(isinstance(entry, dict) for entry in value):
             self.fail(key, f"must be a list of tables: write [[{self.key_path(key)}]]")
-        return [SceneTable(entry, self.file, f"{self.key_path(key)}[{i}]") for i, entry in enumerate(value)]
+        return [SceneTable(entry, self.file, f"{self.key_path(key)}[{i}]", self.notes) for i, entry in enumerate(value)]
 
     def named_tables(self, key: str) -> dict[str, SceneTable]:
         """The tables inside the table under `key`, by name: [materials.NAME]."""
@@ -259,12 +261,15 @@ class SceneTable:
             return {}
         return {name: outer.table(name) for name in outer._values}  # type: ignore[misc]
 
-    def existing_file(self, key: str) -> Path:
-        """A file named relative to the scene file's folder; must exist, where the scene may read."""
+    def existing_file(self, key: str, or_part: bool = False) -> Path:
+        """A file named relative to the scene file's folder; must exist, where the scene may read.
+
+        With `or_part` the name may go on with what is meant within it (`files.with_part`)."""
         path = self.file.parent / self.string(key)
-        if not files.may_read(path, self.file.parent):
+        file = files.with_part(path)[0] if or_part else path
+        if not files.may_read(file, self.file.parent):
             self.fail(key, f"names {path}, which {files.OUTSIDE}")
-        if not files.is_file(path):
+        if not files.is_file(file):
             self.fail(key, f"names {path}, which is not a file")
         return path
 

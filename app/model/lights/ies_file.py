@@ -1,4 +1,4 @@
-"""Photometric files of lamps, ANSI/IES LM-63 (1986, 1991, 1995, 2002, 2019): candela over directions.
+"""Photometric files of lamps: candela over directions. ANSI/IES LM-63 (1986 to 2019) and EULUMDAT (.ldt).
 
 Angles of type C: the vertical one is 0 straight along the lamp's axis and 180° behind it, the horizontal one turns
 about that axis from the C0 plane. Between the listed directions the candela are bilinear in both angles.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
@@ -23,6 +24,18 @@ MAX_BYTES = 1 << 20
 MAX_ANGLES = 4096
 """Of either kind: one every 0.09°."""
 _WHERE = "export the file again from the lamp's maker or a photometric editor"
+_Images = tuple[tuple[int, float], ...]
+_ONCE: _Images = ((1, 0.0),)
+_SYMMETRIES = (
+    _ONCE,
+    _ONCE,
+    ((1, 0.0), (-1, 0.0)),
+    ((1, 0.0), (-1, 180.0)),
+    ((1, 0.0), (-1, 0.0), (1, 180.0), (-1, 180.0)),
+)
+"""By EULUMDAT's number: none, about the axis, to C0–C180, to C90–C270, to both; signs and turns of the angles."""
+_IMAGES = {(0.0, 90.0): _SYMMETRIES[4], (0.0, 180.0): _SYMMETRIES[2], (90.0, 270.0): _SYMMETRIES[3]}
+"""LM-63's, by the first and the last horizontal angle."""
 _UNLIT_DEG = 1e-3
 """A lamp whose angles begin at 90° goes dark within this of it."""
 
@@ -105,78 +118,49 @@ def read_ies(path: str | os.PathLike[str]) -> Profile:
     path = Path(path)
     try:
         if not files.is_file(path):
-            raise UserError(f"{path} is not a file; choose a .ies file")
+            raise UserError(f"{path} is not a file; choose a .ies or .ldt file")
         if path.stat().st_size > MAX_BYTES:
-            raise UserError(f"{path} is longer than {MAX_BYTES >> 20} MiB, as no lamp's file is; choose a .ies file")
-        # Makers write their names in any code page; numbers are ASCII in all of them.
-        text = files.read_bytes(path, MAX_BYTES).decode("latin-1")
+            raise UserError(
+                f"{path} is longer than {MAX_BYTES >> 20} MiB, as no lamp's file is; choose a .ies or .ldt file"
+            )
+        text = files.read_any_text(path, MAX_BYTES)
     except OSError as error:
         raise UserError(f"{path} cannot be read: {error.strerror}; choose another file") from error
-    return _Numbers(path, text).profile()
+    # By content: EULUMDAT's second and third line are whole numbers, and LM-63 has a line TILT=.
+    is_eulumdat = re.match(r"[^\n]*\n\s*[0-3]\s*\n\s*[0-4]\s*\n", "\n".join(text.splitlines()[:4])) is not None
+    return _Eulumdat(path, text).profile() if is_eulumdat else _Lm63(path, text).profile()
 
 
 class _Numbers:
-    """The numbers behind a file's TILT line, taken one after the other."""
+    """Numbers of a file, taken one after the other."""
 
-    def __init__(self, path: Path, text: str) -> None:
+    _words: list[str]
+
+    def __init__(self, path: Path) -> None:
         self._path = path
-        lines = text.splitlines()
-        at = next((i for i, line in enumerate(lines) if line.strip().upper().startswith("TILT=")), None)
-        if at is None:
-            told = "has no line TILT=, so it is no LM-63 file or is cut off" if text.strip() else "is empty"
-            raise self._error(told)
-        self._tilt = lines[at].partition("=")[2].strip().upper()
-        self._words = " ".join(lines[at + 1 :]).replace(",", " ").split()
         self._next = 0
 
-    def profile(self) -> Profile:
-        """All of the file."""
-        if self._tilt == "INCLUDE":
-            # What a lamp loses when it is tilted; it hangs as it was measured.
-            self._take(1, "the lamp's place in the luminaire")
-            self._take(2 * self._count("tilt angles"), "the factors for a tilted lamp")
-        elif self._tilt != "NONE":
-            raise self._error("keeps its tilt factors in another file, which is not read", "write TILT=NONE into it")
-        _, _, multiplier = self._take(3, "lamps, lumens and multiplier")
-        verticals, horizontals = self._count("vertical angles"), self._count("horizontal angles")
-        kind = int(self._take(1, "the photometric type")[0])
-        if kind != 1:
-            name = {2: "B", 3: "A"}.get(kind, str(kind))
-            raise self._error(f"is of photometric type {name} and only type C is read", "export it as type C")
-        self._take(4, "the luminaire's size")
-        ballast, ballast_lamp, _ = self._take(3, "ballast factors and watts")
-        vertical = self._angles(verticals, "vertical")
-        horizontal = self._angles(horizontals, "horizontal")
-        candela = np.array(self._take(verticals * horizontals, "candela")).reshape(horizontals, verticals)
-        if self._next < len(self._words):
-            raise self._error(f"goes on after its {verticals * horizontals} candela, so its counts of angles are wrong")
-        with np.errstate(over="ignore", invalid="ignore", under="ignore"):
-            candela = candela * multiplier * ballast * ballast_lamp
+    def _profile(self, vertical: np.ndarray, horizontal: np.ndarray, candela: np.ndarray, images: _Images) -> Profile:
+        """With the symmetries written out: all the way round, and dark before the first vertical angle.
+
+        `images`: signs and turns (deg) that make all horizontal angles of those that are listed."""
         if not (candela.min() >= 0.0 and candela.max() <= MAX_MAGNITUDE):
             raise self._error("has candela, or a factor on them, that are negative or too large")
         if candela.max() <= 0.0:
             raise self._error("gives no light in any direction", "choose another file")
-        return self._whole(vertical, horizontal, candela)
-
-    def _whole(self, vertical: np.ndarray, horizontal: np.ndarray, candela: np.ndarray) -> Profile:
-        """With the symmetries written out: all the way round, and dark before the first vertical angle."""
         if vertical[0] not in (0.0, 90.0) or vertical[-1] not in (90.0, 180.0):
             raise self._error("has vertical angles that do not run from 0 or 90 to 90 or 180")
-        first, last = horizontal[0], horizontal[-1]
-        if len(horizontal) == 1:
-            horizontal, candela = np.array([0.0, 360.0]), np.repeat(candela, 2, axis=0)
-        elif first == 90.0 and last == 270.0:
-            # Symmetric about the plane across C0: the other half is its mirror picture, 90 to −90.
-            horizontal = np.concatenate([180.0 - horizontal[::-1], horizontal[1:]])
-            candela = np.concatenate([candela[::-1], candela[1:]])
-            horizontal, candela = _from_zero(horizontal, candela)
-        elif first == 0.0 and last in (90.0, 180.0):
-            while horizontal[-1] < 360.0:
-                horizontal = np.concatenate([horizontal, 2.0 * horizontal[-1] - horizontal[-2::-1]])
-                candela = np.concatenate([candela, candela[-2::-1]])
-        elif not (first == 0.0 and last == 360.0):
-            raise self._error("has horizontal angles that run neither to 0, 90, 180 or 360 from 0, nor from 90 to 270")
-        candela[[0, -1]] = 0.5 * (candela[0] + candela[-1])
+        angles = np.concatenate([sign * horizontal + turn for sign, turn in images]) % 360.0
+        rows = np.concatenate([candela] * len(images))
+        angles[angles == 360.0] = 0.0  # what was a hair below 0
+        horizontal = np.unique(angles)
+        candela = np.stack([rows[angles == angle].mean(axis=0) for angle in horizontal])
+        # Where C0 is not listed, it is between its neighbours.
+        share = horizontal[0] / (horizontal[0] + 360.0 - horizontal[-1]) if len(horizontal) > 1 else 0.0
+        seam = candela[:1] * (1.0 - share) + candela[-1:] * share
+        inner = slice(int(horizontal[0] == 0.0 or len(horizontal) == 1), None)
+        horizontal = np.concatenate([[0.0], horizontal[inner], [360.0]])
+        candela = np.concatenate([seam, candela[inner], seam])
         if vertical[0] == 90.0:
             dark = np.zeros((len(candela), 2))
             vertical = np.concatenate([[0.0, 90.0 - _UNLIT_DEG], vertical])
@@ -218,13 +202,83 @@ class _Numbers:
         return UserError(f"{self._path} {told}; {remedy}")
 
 
-def _from_zero(horizontal: np.ndarray, candela: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rows from −90 to 270, made to run from 0 to 360."""
-    if not np.any(horizontal == 0.0):
-        low = int(np.searchsorted(horizontal, 0.0)) - 1
-        share = -horizontal[low] / (horizontal[low + 1] - horizontal[low])
-        between = candela[low] * (1.0 - share) + candela[low + 1] * share
-        horizontal, candela = np.insert(horizontal, low + 1, 0.0), np.insert(candela, low + 1, between, axis=0)
-    at = int(np.flatnonzero(horizontal == 0.0)[0])
-    turned = np.concatenate([horizontal[at:], horizontal[1 : at + 1] + 360.0])
-    return turned, np.concatenate([candela[at:], candela[1 : at + 1]])
+class _Lm63(_Numbers):
+    """What is behind the TILT line of an LM-63 file."""
+
+    def __init__(self, path: Path, text: str) -> None:
+        super().__init__(path)
+        lines = text.splitlines()
+        at = next((i for i, line in enumerate(lines) if line.strip().upper().startswith("TILT=")), None)
+        if at is None:
+            told = "has no line TILT=, so it is no LM-63 file or is cut off" if text.strip() else "is empty"
+            raise self._error(told)
+        self._tilt = lines[at].partition("=")[2].strip().upper()
+        self._words = " ".join(lines[at + 1 :]).replace(",", " ").split()
+
+    def profile(self) -> Profile:
+        """All of the file."""
+        if self._tilt == "INCLUDE":
+            # What a lamp loses when it is tilted; it hangs as it was measured.
+            self._take(1, "the lamp's place in the luminaire")
+            self._take(2 * self._count("tilt angles"), "the factors for a tilted lamp")
+        elif self._tilt != "NONE":
+            raise self._error("keeps its tilt factors in another file, which is not read", "write TILT=NONE into it")
+        _, _, multiplier = self._take(3, "lamps, lumens and multiplier")
+        verticals, horizontals = self._count("vertical angles"), self._count("horizontal angles")
+        kind = int(self._take(1, "the photometric type")[0])
+        if kind != 1:
+            name = {2: "B", 3: "A"}.get(kind, str(kind))
+            raise self._error(f"is of photometric type {name} and only type C is read", "export it as type C")
+        self._take(4, "the luminaire's size")
+        ballast, ballast_lamp, _ = self._take(3, "ballast factors and watts")
+        vertical = self._angles(verticals, "vertical")
+        horizontal = self._angles(horizontals, "horizontal")
+        candela = np.array(self._take(verticals * horizontals, "candela")).reshape(horizontals, verticals)
+        if self._next < len(self._words):
+            raise self._error(f"goes on after its {verticals * horizontals} candela, so its counts of angles are wrong")
+        with np.errstate(over="ignore", invalid="ignore", under="ignore"):
+            candela = candela * multiplier * ballast * ballast_lamp
+        first, last = horizontal[0], horizontal[-1]
+        wide = 1.5 * np.diff(horizontal).max(initial=0.0)
+        ends_early = first == 0.0 and 270.0 <= last and 360.0 - last <= wide  # 315 or 345: 360 is 0
+        if horizontals == 1 or ends_early:
+            images = _ONCE
+        elif (first, last) in _IMAGES:
+            images = _IMAGES[first, last]
+        else:
+            raise self._error("has horizontal angles that run neither to 0, 90, 180 or 360 from 0, nor from 90 to 270")
+        return self._profile(vertical, horizontal, candela, images)
+
+
+class _Eulumdat(_Numbers):
+    """EULUMDAT (A. Stockmar, 1990): one value a line, then candela for 1000 lm of the lamps in as many C planes as the
+    symmetry leaves open."""
+
+    def __init__(self, path: Path, text: str) -> None:
+        super().__init__(path)
+        lines = text.replace(",", ".").splitlines() + [""] * 30
+        sets = lines[25].strip()
+        if not re.fullmatch(r"0?[1-9]|1\d", sets):
+            raise self._error("does not say which lamps it has, as line 26 of a EULUMDAT file should")
+        # Symmetry, C planes, angles, factor on intensities, lumens of the first set of lamps; what follows the sets.
+        self._words = [lines[i].strip() for i in (2, 3, 5, 23, 28)]
+        self._words += " ".join(lines[26 + 6 * int(sets) :]).split()
+
+    def profile(self) -> Profile:
+        """All of the file."""
+        symmetry = int(self._take(1, "the symmetry")[0])
+        planes, verticals = self._count("C planes"), self._count("angles in each plane")
+        parts = {0: 1, 1: planes, 2: 2, 3: 2, 4: 4}[symmetry]
+        if planes % parts:
+            raise self._error(f"has {planes} C planes, which its symmetry {symmetry} does not allow")
+        factor, lumens = self._take(2, "the factor on intensities and the lumens of the lamps")
+        self._take(10, "the direct ratios")
+        horizontal = self._angles(planes, "horizontal")
+        vertical = self._angles(verticals, "vertical")
+        if symmetry == 3:  # from C270 over C0 to C90
+            horizontal = np.roll(horizontal, planes // 4)
+        count = planes // parts + (1 < parts < planes)
+        candela = np.array(self._take(count * verticals, "intensities")).reshape(count, verticals)
+        with np.errstate(over="ignore", invalid="ignore", under="ignore"):
+            candela = candela * factor * (lumens / 1000.0)
+        return self._profile(vertical, horizontal[:count], candela, _SYMMETRIES[symmetry])

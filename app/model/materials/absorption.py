@@ -11,10 +11,10 @@ import numpy as np
 
 from ...base.errors import suggestion
 from ..fields import Part
+from ..io import curve_file
 from ..io.scene_table import SceneTable
 from ..optics import tints
 from ..optics.colorimetry import VISIBLE_NM, attenuation_from_colour, rgb_partition
-from ..optics.spectrum import read_csv
 from ..spectrum_file import SAME, same_curve
 
 MAX_ATTENUATION = 1e15
@@ -61,7 +61,7 @@ def _read_absorption(table: SceneTable) -> Absorption | None:
         elif key == "colour":
             alpha = attenuation_from_colour(inner.colour("colour"), distance, inner.where("colour"))
         else:
-            source, transmittance = read_curve(inner, "transmittance")
+            source, transmittance = read_curve(inner, "transmittance", "transmittance")
             if transmittance.min() <= 0.0 or transmittance.max() > 1.0:
                 inner.fail(source, "must hold transmittances above 0 and at most 1")
             alpha = -np.log(transmittance) / distance
@@ -85,13 +85,16 @@ def _tint(table: SceneTable) -> np.ndarray:
     return found.coefficient
 
 
-def read_curve(table: SceneTable, value_key: str) -> tuple[str, np.ndarray]:
-    """A curve over wavelength from `csv`, or from `nm` with `value_key`: (key to blame, (401,))."""
+def read_curve(table: SceneTable, value_key: str, what: str) -> tuple[str, np.ndarray]:
+    """A share of light over wavelength from `csv`, or from `nm` with `value_key`: (key to blame, (401,))."""
     source = table.one_of(_SPECTRUM_SOURCES, "the curve")
     if source is None:
         table.fail("", f"holds no curve: give 'csv', or 'nm' with '{value_key}'")
     if source == "csv":
-        return source, _on_visible_grid(table, source, *read_csv(table.existing_file("csv")))
+        path = table.existing_file("csv", or_part=True)
+        curve = curve_file.read_curve(path, table.notes)
+        shares = curve_file.share(path, curve, what, table.notes)
+        return source, _on_visible_grid(table, source, curve.nm, shares)
     wavelengths = table.numbers("nm", at_least=2)
     values = table.numbers(value_key, count=len(wavelengths))
     return value_key, _on_visible_grid(table, "nm", np.array(wavelengths), np.array(values))
@@ -99,6 +102,8 @@ def read_curve(table: SceneTable, value_key: str) -> tuple[str, np.ndarray]:
 
 def _on_visible_grid(table: SceneTable, key: str, wavelength_nm: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Linear between the rows, held at the ends, float64 (401,)."""
+    if wavelength_nm.max() < 100.0:
+        table.fail(key, "must be in nm, and these wavelengths look like µm: give 1000 times as much")
     if np.any(np.diff(wavelength_nm) <= 0.0):
         table.fail(key, "must list its wavelengths in ascending order")
     curve = np.interp(VISIBLE_NM, wavelength_nm, values)

@@ -12,7 +12,7 @@ from ..fields import Number, write_fields
 from ..io.scene_pictures import picture_file, picture_name
 from ..io.scene_table import SceneTable
 from ..optics.colorimetry import VISIBLE_NM
-from ..optics.spectrum import Spectrum, illuminant, xyz_to_rgb709
+from ..optics.spectrum import rgb_under_white
 from ..scene_textures import TextureReader
 from ..texture import Texture
 from ..vectors import Vec3
@@ -57,11 +57,11 @@ class Diffuse(Material):
         inner = table.table(key)
         if inner is None:
             table.fail(key, "must be a table such as {csv = \"paint.csv\"}; an RGB goes under 'colour'")
-        source, values = read_curve(inner, "values")
+        source, values = read_curve(inner, "values", "reflectance")
         if values.min() < 0.0 or values.max() > 1.0:
             inner.fail(source, "must hold reflectances between 0 and 1")
         inner.finish("a reflectance")
-        return cls(reflectance_rgb=_rgb_under_white(values), reflectance=values)
+        return cls(reflectance_rgb=rgb_under_white(values), reflectance=values)
 
     def values(self, path: Path | None = None) -> dict[str, Any]:
         """Its colour and picture, or its reflectance, and its finish."""
@@ -103,11 +103,3 @@ class Diffuse(Material):
         words += "" if self.texture is None else ", wears a picture"
         words += "" if self.diffuse_roughness == 0.0 else f", rough by {self.diffuse_roughness:g}"
         return words + ("" if self.roughness is None else f", a coat of roughness {self.roughness:g}")
-
-
-def _rgb_under_white(reflectance: np.ndarray) -> Vec3:
-    """Linear Rec.709 of a reflectance (401,) under D65, clipped to [0, 1]."""
-    white = illuminant("D65")
-    seen = Spectrum(white.density * reflectance).xyz() / white.luminous()
-    r, g, b = (float(v) for v in np.clip(xyz_to_rgb709(seen), 0.0, 1.0))
-    return r, g, b

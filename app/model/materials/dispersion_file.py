@@ -10,13 +10,14 @@ from typing import Any
 from ...base.errors import UserError
 from ..fields import Part
 from ..io.scene_table import SceneTable
-from ..optics import catalogue, glass
+from ..optics import catalogue, glass, index_file
 from ..optics.glass import Dispersion
-from ..optics.spectrum import read_csv
 
 GAIN = "dispersion_gain"
 _INDEX_KEYS = ("glass", "n_d", "sellmeier", "cauchy", "formula", "table", "csv")
 _FITS_WITH_RANGE = ("sellmeier", "cauchy", "formula")
+_LEAST_NM2, _MOST_NM2 = 50.0, 2e5
+"""First coefficients in this range are in nm²: in µm² they are below 1, and in Å² larger."""
 
 
 class DispersionPart(Part):
@@ -38,8 +39,18 @@ def with_gain(table: SceneTable, dispersion: Dispersion) -> Dispersion:
 
 
 def named_glass(table: SceneTable, key: str, name: str) -> Dispersion:
-    """The catalogue's glass of this name, which stands under `key`."""
-    return catalogue.find(name, table.where(key))
+    """The glass of this name, or in the file of this name, which stands under `key`."""
+    if index_file.names_file(name):
+        return _from_file(table, key)
+    return index_file.find_glass(name, table.file.parent, table.where(key), table.notes)
+
+
+def _from_file(table: SceneTable, key: str) -> Dispersion:
+    path = table.existing_file(key, or_part=True)
+    try:
+        return index_file.read_index(path, table.notes)
+    except UserError as error:
+        table.fail(key, f"cannot be used: {error}")
 
 
 def _read_index(table: SceneTable) -> Dispersion:
@@ -62,23 +73,35 @@ def _read_index(table: SceneTable) -> Dispersion:
             table.fail(key, "must be a table {B = […], C = […]} with C in µm²")
         b, c = inner.numbers("B"), inner.numbers("C")
         inner.finish("sellmeier")
+        if c and min(map(abs, c)) > _LEAST_NM2:  # the first pole of all glass is in the ultraviolet, C = 0.02 µm²
+            c = tuple(_from_nm(table, key, value, 2) for value in c)
         return glass.sellmeier(b, c, name, limits, where)
     if key == "cauchy":
-        return glass.cauchy(table.numbers(key), name, limits, where)
+        terms = table.numbers(key)
+        if len(terms) > 1 and _LEAST_NM2 < abs(terms[1]) < _MOST_NM2:
+            terms = terms[:1] + tuple(_from_nm(table, key, v, 2 * i) for i, v in enumerate(terms[1:], start=1))
+        return glass.cauchy(terms, name, limits, where)
     if key == "formula":
         inner = table.table(key)
         if inner is None:
-            table.fail(key, "must be a table {number = 1 … 6, coefficients = […]} as refractiveindex.info numbers them")
-        number = inner.integer("number", at_least=1, at_most=6)
+            table.fail(key, "must be a table {number = 1 … 9, coefficients = […]} as refractiveindex.info numbers them")
+        number = inner.integer("number", at_least=1, at_most=9)
         coefficients = inner.numbers("coefficients")
         inner.finish("formula")
         return glass.from_formula(f"formula {number}", coefficients, name, limits, where)  # type: ignore[arg-type]
     if key == "table":
         wavelengths, n = zip(*table.rows(key, 2), strict=True)
         return glass.table(wavelengths, n, name, where)
-    path = table.existing_file(key)
-    wavelengths_nm, indices = read_csv(path)
-    return glass.table(wavelengths_nm, indices, name or path.stem, where)
+    found = _from_file(table, key)
+    return replace(found, name=name) if name else found
+
+
+def _from_nm(table: SceneTable, key: str, value: float, power: int) -> float:
+    """A coefficient in nm to `power` in µm, with a note."""
+    note = f"{table.where(key)}: its coefficients look like nm², and were taken as such; they are meant in µm²."
+    if note not in table.notes:
+        table.notes.append(note)
+    return value * 1e-3**power
 
 
 def _read_range(table: SceneTable) -> tuple[float, float] | None:

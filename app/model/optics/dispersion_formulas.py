@@ -1,6 +1,6 @@
 """The dispersion formulas themselves: n(λ) and dn/dλ together, in float64 and analytic.
 
-Kinds "formula 1" … "formula 6" are those of refractiveindex.info (M. N. Polyanskiy,
+Kinds "formula 1" … "formula 9" are those of refractiveindex.info (M. N. Polyanskiy,
 "Refractiveindex.info database of optical constants", Sci. Data 11, 94 (2024), file
 "Dispersion formulas.pdf"), with its coefficient order, so that a database entry is stored
 as it was published. Wavelengths here are vacuum or air wavelengths in micrometres, as the
@@ -22,6 +22,9 @@ Kind = Literal[
     "formula 4",
     "formula 5",
     "formula 6",
+    "formula 7",
+    "formula 8",
+    "formula 9",
     "abbe",
     "constant",
     "table",
@@ -118,6 +121,29 @@ def _formula_6(c: Coefficients, um: np.ndarray) -> IndexAndSlope:
     return n, slope
 
 
+def _formula_7(c: Coefficients, um: np.ndarray) -> IndexAndSlope:
+    """Herzberger: n = c0 + c1 L + c2 L² + c3 λ² + c4 λ⁴ + c5 λ⁶ with L = 1/(λ² − 0.028)."""
+    pole = 1.0 / (um * um - 0.028)
+    value, slope = _power_series((c[3], 2.0, c[4], 4.0, c[5], 6.0), um)
+    return c[0] + pole * (c[1] + c[2] * pole) + value, slope - 2.0 * um * pole**2 * (c[1] + 2.0 * c[2] * pole)
+
+
+def _formula_8(c: Coefficients, um: np.ndarray) -> IndexAndSlope:
+    """Retro: (n² − 1)/(n² + 2) = c0 + c1 λ²/(λ² − c2) + c3 λ²."""
+    distance = um * um - c[2]
+    value = c[0] + c[1] * um * um / distance + c[3] * um * um
+    slope = 2.0 * um * (c[3] - c[1] * c[2] / distance**2)
+    return _root((1.0 + 2.0 * value) / (1.0 - value), 3.0 * slope / (1.0 - value) ** 2)
+
+
+def _formula_9(c: Coefficients, um: np.ndarray) -> IndexAndSlope:
+    """Exotic: n² = c0 + c1/(λ² − c2) + c3 (λ − c4)/((λ − c4)² + c5)."""
+    distance, off = um * um - c[2], um - c[4]
+    width = off * off + c[5]
+    slope = -2.0 * um * c[1] / distance**2 + c[3] * (c[5] - off * off) / width**2
+    return _root(c[0] + c[1] / distance + c[3] * off / width, slope)
+
+
 def _abbe(c: Coefficients, um: np.ndarray) -> IndexAndSlope:
     """The KHR model; its floor n ≥ 1 holds only where n_d itself is at least 1."""
     n_d, v_d = c
@@ -181,6 +207,9 @@ _FORMULAS: dict[str, Callable[[Coefficients, np.ndarray], IndexAndSlope]] = {
     "formula 4": _formula_4,
     "formula 5": _formula_5,
     "formula 6": _formula_6,
+    "formula 7": _formula_7,
+    "formula 8": _formula_8,
+    "formula 9": _formula_9,
     "abbe": _abbe,
     "constant": _constant,
     "table": _table,

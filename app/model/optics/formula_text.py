@@ -37,6 +37,14 @@ def formula_text(kind: Kind, c: Coefficients) -> str:
         case "formula 6":
             lines = [f"  + {b:.12g}/({d:.12g} − λ⁻²)" for b, d in zip(c[1::2], c[2::2], strict=True)]
             return "\n".join([f"n = {1.0 + c[0]:.10g}", *lines])
+        case "formula 7":
+            poles = f"  + {c[1]:.12g} L + {c[2]:.12g} L², L = 1/(λ² − 0.028)"
+            return f"n = {_series(c[0], (c[3], 2.0, c[4], 4.0, c[5], 6.0))}\n{poles}"
+        case "formula 8":
+            return f"(n² − 1)/(n² + 2) = {_series(c[0], (c[3], 2.0))}\n  + {c[1]:.12g} λ²/(λ² − {c[2]:.12g})"
+        case "formula 9":
+            resonance = f"(λ − {c[4]:.12g})/((λ − {c[4]:.12g})² + {c[5]:.12g})"
+            return f"n² = {c[0]:.12g}\n  + {c[1]:.12g}/(λ² − {c[2]:.12g})\n  + {c[3]:.12g} {resonance}"
 
 
 def _power(p: float) -> str:

@@ -123,6 +123,8 @@ class Dispersion:
         return f"{text}\nand from it n_d + {self.gain:.10g} (n − n_d), n_d = {self.n_d:.10g}"
 
 
+_MOST_INDEX = 100.0
+"""Coefficients and tables that give more have other units than they should."""
 _CHECK_NM = np.arange(380.0, 780.5, 1.0)
 _CHECK_NM.flags.writeable = False
 
@@ -188,13 +190,16 @@ def from_formula(
     range_nm: tuple[float, float] | None = None,
     where: str = "",
 ) -> Dispersion:
-    """A refractiveindex.info formula ("formula 1" … "formula 6") with its own coefficient order."""
+    """A refractiveindex.info formula ("formula 1" … "formula 9") with its own coefficient order."""
     values = tuple(float(x) for x in coefficients)
-    known = [f"formula {i}" for i in range(1, 7)]
+    known = [f"formula {i}" for i in range(1, 10)]
     if kind not in known:
         raise UserError(f"{_prefix(where)}unknown dispersion formula '{kind}'; known are {', '.join(known)}")
-    lengths_fit = len(values) >= 9 if kind == "formula 4" else len(values) >= 1
-    if not lengths_fit or len(values) % 2 == 0:
+    fixed = {"formula 7": 6, "formula 8": 4, "formula 9": 6}.get(kind)
+    if fixed is not None:
+        values += (0.0,) * (fixed - len(values))
+    least = 9 if kind == "formula 4" else fixed or 1
+    if len(values) < least or (len(values) % 2 == 0 if fixed is None else len(values) > fixed):
         raise UserError(
             f"{_prefix(where)}{kind} does not take {len(values)} coefficients; see 'Dispersion formulas' of "
             "refractiveindex.info"
@@ -274,9 +279,9 @@ def _checked(dispersion: Dispersion, where: str) -> Dispersion:
         raise UserError(f"{who}the wavelength range {lo:g} to {hi:g} nm is empty; give the lower end first")
     first, last = max(lo, VISIBLE_RANGE_NM[0]), min(hi, VISIBLE_RANGE_NM[1])
     if first >= last:
+        remedy = "these look like µm: give nm, 1000 times as much" if hi < 100.0 else "choose another material"
         raise UserError(
-            f"{who}the data hold from {lo:g} to {hi:g} nm, outside the visible range 380 to 780 nm; choose "
-            "another material or other data"
+            f"{who}the data hold from {lo:g} to {hi:g} nm, outside the visible range 380 to 780 nm; {remedy}"
         )
     for b, c in formulas.sellmeier_poles(dispersion.kind, dispersion.coefficients):
         if b != 0.0 and (first * 1e-3) ** 2 <= c <= (last * 1e-3) ** 2:
@@ -285,12 +290,13 @@ def _checked(dispersion: Dispersion, where: str) -> Dispersion:
                 "the visible range; check B and C (C is in µm²)"
             )
     n = dispersion.index(_CHECK_NM)
-    bad = ~(np.isfinite(n) & (n > 0.0))
+    most = math.inf if dispersion.kind in ("abbe", "constant") else _MOST_INDEX
+    bad = ~(np.isfinite(n) & (n > 0.0) & (n < most))
     if np.any(bad):
         at = int(np.argmax(bad))
         state = "imaginary or infinite" if not np.isfinite(n[at]) else f"{n[at]:.6g}"
+        remedy = f"lie below {_MOST_INDEX:g}; check the units (λ in µm)" if n[at] > 0.0 else "be a positive number"
         raise UserError(
-            f"{who}the refractive index is {state} at {_CHECK_NM[at]:g} nm; it must be a positive number from 380 "
-            "to 780 nm"
+            f"{who}the refractive index is {state} at {_CHECK_NM[at]:g} nm; from 380 to 780 nm it must {remedy}"
         )
     return dispersion

@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...base import files
 from ...base.errors import UserError, suggestion
+from ..io.curve_file import clipped, read_curve
 from .colorimetry import (
     K_M,
     VISIBLE_NM,
@@ -41,9 +41,9 @@ __all__ = [
     "illuminant",
     "illuminant_names",
     "laser",
-    "read_csv",
     "rgb709_to_xyz",
     "rgb709_to_xyz_matrix",
+    "rgb_under_white",
     "xyz_to_rgb709",
     "xyz_to_rgb709_matrix",
 ]
@@ -219,6 +219,8 @@ def from_table(wavelengths_nm: np.ndarray, values: np.ndarray, where: str = "") 
         raise UserError(f"{who}a spectrum needs two or more wavelengths and as many values (got {x.size} and {y.size})")
     if not (np.all(np.isfinite(x)) and np.all(np.isfinite(y))):
         raise UserError(f"{who}the spectrum holds a value that is not a finite number; remove that row")
+    if x.max() < 100.0:
+        raise UserError(f"{who}the wavelengths {x.min():g} to {x.max():g} look like µm; give nm, 1000 times as much")
     if np.any(np.diff(x) <= 0.0):
         at = int(np.argmax(np.diff(x) <= 0.0))
         raise UserError(f"{who}wavelengths must ascend, but {x[at + 1]:g} follows {x[at]:g}; sort the rows")
@@ -228,57 +230,22 @@ def from_table(wavelengths_nm: np.ndarray, values: np.ndarray, where: str = "") 
     return Spectrum(np.interp(VISIBLE_NM, x, y, left=0.0, right=0.0))
 
 
-def from_csv(path: str | os.PathLike[str]) -> Spectrum:
-    """A spectrum measured by the user: columns wavelength_nm, power; see `read_csv`.
+def from_csv(path: str | os.PathLike[str], notes: list[str] | None = None) -> Spectrum:
+    """A spectrum measured by the user: a table's column or a TM-27 file (`curve_file`).
 
-    Linear between the rows, zero outside them. Raises `UserError` naming file and line.
+    Linear between the rows, zero outside them. What was assumed goes to `notes`. Raises `UserError` naming the file.
     """
-    spectrum = from_table(*read_csv(path), where=os.fspath(path))
+    told = [] if notes is None else notes
+    curve = read_curve(path, told)
+    spectrum = from_table(curve.nm, clipped(path, curve, "power", told), where=os.fspath(path))
     if spectrum.power_w() == 0.0:
-        raise UserError(
-            f"{os.fspath(path)}: the spectrum is zero from 380 to 780 nm; wavelengths must be in nanometres"
-        )
+        raise UserError(f"{os.fspath(path)}: the spectrum is zero from 380 to 780 nm; choose another")
     return spectrum
 
 
-def read_csv(path: str | os.PathLike[str]) -> tuple[np.ndarray, np.ndarray]:
-    """Two columns of numbers, (n,) each; comma, semicolon or blanks between, # starts a comment.
-
-    One header line is allowed. Raises `UserError` for a missing file, fewer than two rows or
-    anything but two numbers in a row.
-    """
-    shown = os.fspath(path)
-    try:
-        text = files.read_text(path, files.TABLE_BYTES)
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is not text"
-        raise UserError(f"cannot read the spectrum {shown}: {reason}; give a CSV of wavelength_nm, power") from error
-    rows: list[tuple[float, float]] = []
-    header_allowed = True
-    for number, raw in enumerate(text.splitlines(), start=1):
-        cells = raw.partition("#")[0].replace(",", " ").replace(";", " ").split()
-        if not cells:
-            continue
-        parsed = [_number(cell) for cell in cells]
-        numbers = [value for value in parsed if value is not None]
-        if header_allowed and not numbers:
-            header_allowed = False
-            continue
-        header_allowed = False
-        if len(parsed) != 2 or len(numbers) != 2:
-            raise UserError(f"{shown}, line {number}: expected two numbers, wavelength_nm and power")
-        wavelength, value = numbers
-        if not (math.isfinite(wavelength) and math.isfinite(value)):
-            raise UserError(f"{shown}, line {number} holds a number that is not finite; remove the row")
-        rows.append((wavelength, value))
-    if len(rows) < 2:
-        raise UserError(f"{shown}: a spectrum needs two or more rows of wavelength_nm, power (found {len(rows)})")
-    columns = np.array(rows).T
-    return columns[0], columns[1]
-
-
-def _number(cell: str) -> float | None:
-    try:
-        return float(cell)
-    except ValueError:
-        return None
+def rgb_under_white(reflectance: np.ndarray) -> tuple[float, float, float]:
+    """Linear Rec.709 of a reflectance (401,) under D65, clipped to [0, 1]."""
+    white = illuminant("D65")
+    seen = Spectrum(white.density * reflectance).xyz() / white.luminous()
+    r, g, b = (float(v) for v in np.clip(xyz_to_rgb709(seen), 0.0, 1.0))
+    return r, g, b

@@ -18,6 +18,7 @@ from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
 from ...base.errors import suggestion
+from ...base.paths import SCENE_SUFFIXES
 from .. import item_rects, theme
 from . import widgets
 
@@ -62,7 +63,7 @@ class _Browser:
 
 _browser = _Browser()
 _OVERWRITE = "Replace file?"
-_OWN_FORMATS = (".exr", ".npy", ".hdr", ".webp", ".toml", ".json", ".glb", ".gltf", ".ies", ".obj", ".stl", ".ply")
+_OWN_FORMATS = (".exr", ".npy", ".hdr", ".webp", ".json", ".ies", ".ldt", *SCENE_SUFFIXES)
 """Kinds of files that Python's table lacks, or has on some systems only."""
 
 
