@@ -16,6 +16,7 @@ import numpy as np
 from ..base import files
 from ..base.errors import UserError
 from .geometry.mesh import Mesh
+from .geometry.mesh_normals import ROUND_DEG, with_plausible_normals
 from .geometry.mesh_recipes import note_recipe
 from .io.mesh_raw import as_float64
 from .io.scene_table import SceneTable
@@ -35,12 +36,18 @@ class ObjectReader:
     """Reads [[objects]] one by one; equal descriptions share one `Mesh`."""
 
     def __init__(
-        self, materials: dict[str, Material], textures: TextureReader, meshes: dict[str, Mesh] | None = None
+        self,
+        materials: dict[str, Material],
+        textures: TextureReader,
+        meshes: dict[str, Mesh] | None = None,
+        smooth: bool | None = None,
     ) -> None:
-        """`meshes`: by description, what an earlier reading of the same file made; kept up."""
+        """`meshes`: by description, what an earlier reading of the same file made; kept up. `smooth`: what is asked for
+        of all mesh files."""
         self._materials = materials
         self._textures = textures
         self._meshes = {} if meshes is None else meshes
+        self._smooth = smooth
         self._names = Names()
         self.notes: list[str] = []
 
@@ -85,7 +92,7 @@ class ObjectReader:
             table.raw("shape")  # blames a misspelt key, or says that this one is missing
         if key == "mesh" and isinstance(table.raw("mesh"), Mesh):
             return table.raw("mesh")  # from Python, which may give the triangles themselves
-        recipe = _file_recipe(table) if key == "mesh" else _shape_recipe(table)
+        recipe = _file_recipe(table, self._smooth) if key == "mesh" else _shape_recipe(table)
         identity = json.dumps(recipe, sort_keys=True)
         if identity not in self._meshes:
             found: list[str] = []
@@ -109,10 +116,12 @@ class ObjectReader:
 
 
 def load_checked_mesh(path: Path, smooth: bool | float | None, notes: list[str]) -> Mesh:
-    """A mesh file, repaired where that is safe; what was found goes to `notes`."""
+    """A mesh file, repaired where that is safe, its normals passed over where they cannot be meant; what was found goes
+    to `notes`."""
     from .io.mesh_io import load_mesh
 
-    return checked_mesh(load_mesh(path, smooth), notes)
+    mesh = checked_mesh(load_mesh(path, smooth), notes)
+    return with_plausible_normals(mesh, notes, path.name) if smooth is None else mesh
 
 
 def checked_mesh(mesh: Mesh, notes: list[str]) -> Mesh:
@@ -134,7 +143,7 @@ def rested(mesh: Mesh, matrix: np.ndarray, rest: float | None) -> np.ndarray:
     return matrix
 
 
-def _file_recipe(table: SceneTable) -> dict[str, Any]:
+def _file_recipe(table: SceneTable, asked: bool | None) -> dict[str, Any]:
     path = table.existing_file("mesh").resolve()
     if path.suffix.lower() not in MESH_SUFFIXES:
         table.fail("mesh", f"must be one of {', '.join(MESH_SUFFIXES)}; open a .glb or .gltf as the scene itself")
@@ -144,7 +153,7 @@ def _file_recipe(table: SceneTable) -> dict[str, Any]:
         if not isinstance(smooth, bool):
             smooth = table.number("smooth", at_least=0.0, at_most=180.0)
         recipe["smooth"] = smooth
-    return recipe
+    return recipe if asked is None else recipe | {"smooth": asked and ROUND_DEG}
 
 
 # -- shapes: the keys are the parameters of the functions in `primitives` --------------------

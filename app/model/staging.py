@@ -14,6 +14,7 @@ import numpy as np
 
 from ..base.errors import UserError, suggestion
 from .geometry.mesh import Mesh
+from .geometry.mesh_normals import ROUND_DEG, with_plausible_normals, with_smooth
 from .optics import catalogue, tints
 from .optics.tints import Tint
 from .scene import Absorption, Dielectric, SceneObject
@@ -38,6 +39,14 @@ class Staging:
     glass: tuple[tuple[str | None, str], ...] = ()
     """Object (None: all that is no receiver below the others) and name of its glass, of the catalogue or a tint; later
     ones above."""
+    smooth: bool | None = None
+    """Whether meshes are round where edges bend by less than `ROUND_DEG`, or flat; None: as their files say."""
+
+    def settled(self, mesh: Mesh, notes: list[str], file: str) -> Mesh:
+        """`mesh` of `file` with the normals that are asked for, or those of the file where they can be meant."""
+        if self.smooth is None:
+            return with_plausible_normals(mesh, notes, file)
+        return with_smooth(mesh, self.smooth and ROUND_DEG)
 
 
 AS_FOUND = Staging()

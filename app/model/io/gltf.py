@@ -306,6 +306,7 @@ class _Reader:
         solid = isinstance(self._material(primitive.get("material")), Dielectric)
         mesh, notes = repair(raw, examine(raw), solid)
         self.notes.extend(notes)
+        mesh = self.staging.settled(mesh, self.notes, self.document.path.name)
         return replace(mesh, source=str(self.document.path))
 
     def _attribute(self, attributes: dict[str, Any], name: str, count: int) -> np.ndarray | None:

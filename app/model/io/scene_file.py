@@ -134,7 +134,7 @@ def _scene_from_table(table: SceneTable, kept: Kept, staging: Staging) -> Scene:
     background, environment = _read_environment(table, kept, notes)
     render = read_render(table.table("render"))
     textures = kept.textures
-    reader = ObjectReader(read_materials(table, textures), textures, kept.meshes)
+    reader = ObjectReader(read_materials(table, textures), textures, kept.meshes, staging.smooth)
     objects = [item for entry in table.tables("objects") for item in reader.read(entry)]
     if not objects:
         table.given(("camera", "lights"))
