@@ -210,10 +210,12 @@ def receivers_of(scene: Scene) -> list[str]:
     return list(dict.fromkeys(item.name for item in scene.objects if item.material.receives))
 
 
-def parse_opening(up: str | None, glass: Sequence[str] | None, environment: str | None) -> Opening | None:
-    """Which axis of a file is up, glasses as "GLASS" or "OBJECT=GLASS", and what lies behind it. An object's name may
-    hold "=": the last one counts. None where nothing is asked for."""
-    if up is None and not glass and environment is None:
+def parse_opening(
+    up: str | None, glass: Sequence[str] | None, environment: str | None, smooth: bool | None = None
+) -> Opening | None:
+    """Which axis of a file is up, glasses as "GLASS" or "OBJECT=GLASS", what lies behind it, and whether its meshes are
+    round. An object's name may hold "=": the last one counts. None where nothing is asked for."""
+    if up is None and not glass and environment is None and smooth is None:
         return None
     from ..edit.opening import SKY, STUDIO, Opening
     from ..model.staging import UP_AXES, Staging
@@ -231,7 +233,7 @@ def parse_opening(up: str | None, glass: Sequence[str] | None, environment: str 
         path = Path(environment).expanduser()
         if not files.is_file(path):
             raise UserError(f"--environment '{environment}' is neither studio nor sky nor a file; check the path")
-    return Opening(Staging(axis, tuple(pairs)), environment)
+    return Opening(Staging(axis, tuple(pairs), smooth), environment)
 
 
 def open_scene(text: str, opening: Opening | None) -> Scene:

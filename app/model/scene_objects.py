@@ -18,6 +18,7 @@ from ..base.errors import UserError
 from .geometry.mesh import Mesh
 from .geometry.mesh_normals import ROUND_DEG, with_plausible_normals
 from .geometry.mesh_recipes import note_recipe
+from .geometry.primitives_special import SPECIAL
 from .io.mesh_raw import as_float64
 from .io.scene_table import SceneTable
 from .materials.material_file import read_object_material
@@ -104,15 +105,12 @@ class ObjectReader:
     def _make(self, table: SceneTable, recipe: dict[str, Any], notes: list[str]) -> Mesh:
         if "mesh" in recipe:
             mesh = load_checked_mesh(Path(recipe["mesh"]), recipe.get("smooth"), notes)
-        else:
-            try:
-                mesh = _make_shape(recipe)
-            except UserError as error:
-                table.fail("shape", f"cannot be made: {error}")
-            if recipe["shape"] == INLINE:
-                mesh = checked_mesh(mesh, notes)
-        note_recipe(mesh, recipe)
-        return mesh
+            note_recipe(mesh, recipe)
+            return mesh
+        try:
+            return make_shape(notes=notes, **recipe)
+        except UserError as error:
+            table.fail("shape", f"cannot be made: {error}")
 
 
 def load_checked_mesh(path: Path, smooth: bool | float | None, notes: list[str]) -> Mesh:
@@ -175,6 +173,7 @@ _SHAPES = (
     "rippled_water",
     "plane",
     "disc",
+    *SPECIAL,
     INLINE,
 )
 _FUNCTION = {"revolution": "solid_of_revolution"}
@@ -199,9 +198,9 @@ def _parameters(shape: str) -> dict[str, tuple[str, bool]]:
 
 
 def _function(shape: str) -> Callable[..., Any]:
-    from .geometry import primitives
+    from .geometry import primitives, primitives_special
 
-    return getattr(primitives, _FUNCTION.get(shape, shape))
+    return getattr(primitives_special if shape in SPECIAL else primitives, _FUNCTION.get(shape, shape))
 
 
 def _shape_recipe(table: SceneTable) -> dict[str, Any]:
@@ -242,25 +241,23 @@ def _read_heights(table: SceneTable, key: str) -> Any:
     return [list(row) for row in table.rows(key, len(value[0]))]
 
 
-def make_shape(shape: str, **parameters: Any) -> Mesh:
-    """The mesh of a shape of the scene file, saved by that description. Raises UserError for impossible sizes."""
-    recipe = {"shape": shape} | parameters
-    mesh = _make_shape(recipe)
-    note_recipe(mesh, recipe)
-    return mesh
+def make_shape(shape: str, notes: list[str] | None = None, **parameters: Any) -> Mesh:
+    """The mesh of a shape of the scene file, saved by that description; what was repaired goes to `notes`.
 
-
-def _make_shape(recipe: dict[str, Any]) -> Mesh:
-    arguments = {key: value for key, value in recipe.items() if key not in ("shape", "part")}
-    shape = recipe["shape"]
-    if shape == INLINE:
-        return _inline_mesh(**arguments)
+    Raises UserError for impossible sizes.
+    """
+    if shape in SPECIAL:
+        return make_shape(**_function(shape)(**parameters))
+    arguments = {key: value for key, value in parameters.items() if key != "part"}
     if "heights" in arguments:
         arguments["heights"] = _load_heights(arguments["heights"])
-    made = _function(shape)(**arguments)
-    if shape == "doublet":
-        return made[("front", "back").index(recipe["part"])]
-    return made
+    if shape == INLINE:
+        mesh = checked_mesh(_inline_mesh(**arguments), [] if notes is None else notes)
+    else:
+        made = _function(shape)(**arguments)
+        mesh = made[("front", "back").index(parameters["part"])] if shape == "doublet" else made
+    note_recipe(mesh, {"shape": shape} | parameters)
+    return mesh
 
 
 def _inline_mesh(

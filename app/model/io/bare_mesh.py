@@ -37,7 +37,7 @@ def objects_of_mesh(path: Path, staging: Staging, notes: list[str]) -> list[Scen
         up = staging.up
     matrix = Y_UP_TO_Z_UP if up == "y" else np.eye(4)
     objects = [SceneObject(mesh.name, mesh, material, matrix) for mesh, material in zip(meshes, materials, strict=True)]
-    return with_glass(objects, staging, path.name)
+    return with_glass(objects, staging, path.name, [part.material or "" for part in parts])
 
 
 def _materials(

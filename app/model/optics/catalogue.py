@@ -8,14 +8,13 @@ it, as in "hikari:F2", to choose. Nothing is read before the first lookup.
 
 from __future__ import annotations
 
-import difflib
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import cast
 
 import msgspec
 
-from ...base.errors import UserError
+from ...base.errors import UserError, nearest_names
 from ...base.paths import assets_dir
 from .dispersion_formulas import Kind
 from .glass import Dispersion
@@ -149,5 +148,4 @@ def _matching(query: str) -> list[Entry]:
 def _resembling(name: str, count: int) -> list[Entry]:
     """Entries with names like `name`, most alike first, each once."""
     table = _by_key()
-    near = difflib.get_close_matches(search_key(name), table, n=3 * count, cutoff=0.5)
-    return list(dict.fromkeys(table[key] for key in near))[:count]
+    return list(dict.fromkeys(table[key] for key in nearest_names(search_key(name), table, 3 * count)))[:count]
