@@ -7,7 +7,7 @@ traceback and exits with code 2.
 
 from __future__ import annotations
 
-import os
+import difflib
 import re
 import unicodedata
 from collections.abc import Iterable
@@ -66,43 +66,19 @@ def _escaped(character: str) -> str:
 def nearest_names(name: str, known: Iterable[str], count: int = 3) -> list[str]:
     """Known names that `name` may stand for, best first (case-insensitive; may be empty).
 
-    Those that mean the same (`meanings`), or else those that a few typing errors away from it, begin with it, or have a
-    whole word in common with it.
+    Those that mean the same (`meanings`), or else those that share nearly all letters in their order, begin with it, or
+    have a whole word in common with it.
     """
     word, by_folded = name.casefold(), {candidate.casefold(): candidate for candidate in known}
-    meant = [m for m in MEANT.get("".join(filter(str.isalnum, word)), ()) if m.casefold() in by_folded]
-    if meant:
+    if meant := [m for m in MEANT.get("".join(filter(str.isalnum, word)), ()) if m.casefold() in by_folded]:
         return meant[:count]
-    words, found = _words(word), []
-    for folded, candidate in by_folded.items():
-        most = min(max(len(word), len(folded)) // 3, 3) if min(len(word), len(folded)) > 1 else 0
-        errors = _typing_errors(word, folded, most)
-        if errors <= most or (len(word) > 2 and folded.startswith(word)) or words & _words(folded):
-            found.append((errors, -len(os.path.commonprefix([word, folded])), candidate))
-    return [candidate for _, _, candidate in sorted(found, key=lambda item: item[:2])][:count]
+    near = difflib.get_close_matches(word, by_folded, count, cutoff=0.72 if len(word) > 3 else 0.66)
+    near += [each for each in by_folded if _words(word) & _words(each) or (len(word) > 2 and each.startswith(word))]
+    return [by_folded[each] for each in dict.fromkeys(near)][:count]
 
 
 def _words(text: str) -> set[str]:
-    """Its words of three letters or more."""
     return {word for word in re.split(r"[\W_]+", text) if len(word) > 2 and not word.isdigit()}
-
-
-def _typing_errors(one: str, other: str, most: int) -> int:
-    """How many letters are wrong, missing, too many or swapped with a neighbour; `most` + 1 for more than `most`.
-
-    Optimal string alignment: F. Damerau, Communications of the ACM 7 (1964).
-    """
-    if abs(len(one) - len(other)) > most:
-        return most + 1
-    older, before, row = [0], [0], list(range(len(other) + 1))
-    for i, letter in enumerate(one):
-        older, before, row = before, row, [i + 1]
-        for j, another in enumerate(other):
-            errors = min(before[j + 1] + 1, row[j] + 1, before[j] + (letter != another))
-            if i and j and letter == other[j - 1] and one[i - 1] == another:
-                errors = min(errors, older[j - 1] + 1)
-            row.append(errors)
-    return min(row[-1], most + 1)
 
 
 def suggestion(name: str, known: Iterable[str], count: int = 3) -> str:

@@ -29,7 +29,6 @@ _WORDS = {
     "position": "location translation translate origin eye pos",
     "target": "lookat",
     "rotation_deg": "rotate euler",
-    "kind": "type",
     "directional": "sun parallel distant",
     "glass": "dielectric transparent",
     "diffuse": "lambert lambertian matte matt",

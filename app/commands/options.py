@@ -158,36 +158,32 @@ def parse_integer(option: str, text: str, low: int, high: int) -> int:
     return value
 
 
+def _one_of(option: str, text: str, known: Sequence[str]) -> str:
+    if text not in known:
+        raise UserError(f"{option} '{text}' is unknown{suggestion(text, known) or ','} known are {', '.join(known)}")
+    return text
+
+
 def parse_method(text: str) -> str:
     """One of the sampling methods."""
-    if text not in METHODS:
-        hint = suggestion(text, METHODS)
-        raise UserError(f"--method '{text}' is unknown{hint or ','} known are {', '.join(METHODS)}")
-    return text
+    return _one_of("--method", text, METHODS)
 
 
 def parse_reference(text: str) -> str:
     """What a reference meets, one of `REFERENCES`."""
     from ..bench.results import REFERENCES
 
-    if text not in REFERENCES:
-        raise UserError(f"--reference '{text}' is unknown{suggestion(text, REFERENCES) or ','} known are exact, mesh")
-    return text
+    return _one_of("--reference", text, REFERENCES)
 
 
 def parse_camera_method(text: str) -> str:
     """One of those that camera rays may follow."""
-    if text not in CAMERA_METHODS:
-        hint = suggestion(text, CAMERA_METHODS)
-        raise UserError(f"--camera-method '{text}' is unknown{hint or ','} known are {', '.join(CAMERA_METHODS)}")
-    return text
+    return _one_of("--camera-method", text, CAMERA_METHODS)
 
 
 def parse_camera(text: str) -> bool:
     """Whether the camera may see by beams: "beams" or "paths"."""
-    if text not in ("beams", "paths"):
-        raise UserError(f"--camera '{text}' is unknown, known are beams, paths")
-    return text == "beams"
+    return _one_of("--camera", text, ("beams", "paths")) == "beams"
 
 
 def check_layer(text: str, scene: Scene) -> str:

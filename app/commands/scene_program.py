@@ -50,7 +50,9 @@ def view(
     from .view import ViewRequest, view_command
 
     raise typer.Exit(
-        view_command(ViewRequest(scene, size, theme, screenshot, after, options.parse_opening(up, glass, environment, smooth)))
+        view_command(
+            ViewRequest(scene, size, theme, screenshot, after, options.parse_opening(up, glass, environment, smooth))
+        )
     )
 
 
@@ -98,7 +100,9 @@ def bake(
 
     raise typer.Exit(
         bake_command(
-            BakeRequest(scene, receiver, output, size, photons, seed, options.parse_opening(up, glass, environment, smooth))
+            BakeRequest(
+                scene, receiver, output, size, photons, seed, options.parse_opening(up, glass, environment, smooth)
+            )
         )
     )
 

@@ -156,10 +156,11 @@ def _file_recipe(table: SceneTable, asked: bool | None) -> dict[str, Any]:
 
 # -- shapes: the keys are the parameters of the functions in `primitives` --------------------
 
-_SHAPES = (
+SHAPES = (
     "sphere",
     "ellipsoid",
     "box",
+    *SPECIAL,
     "slab",
     "prism",
     "polygon_prism",
@@ -173,7 +174,6 @@ _SHAPES = (
     "rippled_water",
     "plane",
     "disc",
-    *SPECIAL,
     INLINE,
 )
 _FUNCTION = {"revolution": "solid_of_revolution"}
@@ -204,7 +204,7 @@ def _function(shape: str) -> Callable[..., Any]:
 
 
 def _shape_recipe(table: SceneTable) -> dict[str, Any]:
-    shape = table.choice("shape", _SHAPES)
+    shape = table.choice("shape", SHAPES)
     recipe: dict[str, Any] = {"shape": shape}
     for key, (annotation, required) in _parameters(shape).items():
         if required or table.has(key):

@@ -65,21 +65,25 @@ def is_finely_cut(mesh: Mesh) -> bool:
     return len(mesh.triangles) >= FINE_TRIANGLES and _bends_little(Edges.of(mesh).bend_deg, 50.0)
 
 
-def with_plausible_normals(mesh: Mesh, notes: list[str], file: str) -> Mesh:
+def with_plausible_normals(mesh: Mesh, notes: list[str], file: str, is_bare: bool = False) -> Mesh:
     """`mesh` without the normals of a cut stone that were averaged over its edges, as many programs write them.
 
     A solid is taken to be cut where the normals run smoothly over edges too sharp for a tessellated curve. It becomes
-    flat, or smooth between those edges where it is finely cut; a note in `notes` says so once. Coarse balls, tori and
-    cylinders keep their normals: they bend by at most 45° at eight facets a turn.
+    flat, or smooth between those edges where it is finely cut, as a mesh of a file that `is_bare` becomes without any
+    normals; a note in `notes` says so once. Coarse balls, tori and cylinders keep their normals: they bend by at most
+    45° at eight facets a turn.
     """
-    crease = _plausible_crease(mesh)
+    if mesh.corner_normals is None:
+        why, crease = "no normals are given", SMOOTH_CREASE_DEG if is_bare and is_finely_cut(mesh) else None
+    else:
+        why, crease = (
+            "normals far off their facets, as if averaged over edges, are passed over",
+            _plausible_crease(mesh),
+        )
     if crease is None:
         return mesh
-    done = (
-        f"was smoothed where it bends by less than {crease:g}°; --flat shows facets" if crease else "has flat facets; "
-        "--smooth rounds it"
-    )
-    note = f"{file}: normals far off their facets, as if averaged over sharp edges, were passed over: the mesh {done}."
+    done = f"is smooth where it bends by less than {crease:g}°; --flat shows facets"
+    note = f"{file}: {why}; the mesh {done if crease else 'has flat facets; --smooth rounds it'}."
     if note not in notes:
         notes.append(note)
     return with_smooth(mesh, crease or False)
@@ -88,13 +92,14 @@ def with_plausible_normals(mesh: Mesh, notes: list[str], file: str) -> Mesh:
 def _plausible_crease(mesh: Mesh) -> float | None:
     """0 for a mesh whose normals should be those of its facets, a crease angle in degrees for one with sharp edges
     between smooth parts, None for one that may keep its normals."""
-    if mesh.corner_normals is None:
-        return None
+    assert mesh.corner_normals is not None
     areas = mesh.areas() / max(float(mesh.areas().sum()), 1e-300)
     cosine = np.einsum("tcj,tj->tc", mesh.corner_normals, mesh.face_normals())
     if float(areas @ (cosine < math.cos(math.radians(OFF_DEG))).mean(axis=1)) < OFF_SHARE:
         return None
     edges = Edges.of(mesh)
+    if not len(edges.one):
+        return None
     is_convex = float(edges.is_convex(mesh).mean()) > 0.98
     fans = (cosine < math.cos(math.radians(FAN_DEG))).any(axis=1)
     has_facet = edges.largest_facet(areas, fans) > FACET_SHARE
@@ -119,20 +124,17 @@ def _bends_little(bend_deg: np.ndarray, percentile: float) -> bool:
 
 @dataclass(frozen=True)
 class Edges:
-    """Edges (E,) between two triangles; a corner's number is three times its triangle's, and its place there."""
+    """Edges (E,) between two triangles: at which corners (three times the triangle's number, and the place there) they
+    begin in `one` and in `two`, and the angle between both normals. `vertex` (T, 3) is one number for one position."""
 
     vertex: np.ndarray
-    """int (T, 3): number of each corner's vertex, the same at one position."""
     one: np.ndarray
-    """int (E,): the corner where the edge begins in the first triangle."""
     two: np.ndarray
-    """int (E,): the corner where it begins in the other one."""
     bend_deg: np.ndarray
-    """float64 (E,): the angle between both triangles' normals."""
 
     @classmethod
     def of(cls, mesh: Mesh) -> Edges:
-        """All of `mesh`, by position."""
+        """All of `mesh`."""
         vertex, faces = weld_map(mesh.vertices)[1][mesh.triangles], mesh.face_normals()
         start, end = vertex.ravel(), np.roll(vertex, -1, axis=1).ravel()
         key = np.minimum(start, end).astype(np.int64) * (int(vertex.max()) + 1) + np.maximum(start, end)

@@ -6,8 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ..geometry.mesh import Mesh
-from ..geometry.mesh_normals import SMOOTH_CREASE_DEG, is_finely_cut, with_smooth
 from ..materials.dielectric import DEFAULT_GLASS
 from ..scene import Dielectric, Material, SceneObject
 from ..scene_objects import checked_mesh
@@ -27,9 +25,7 @@ def objects_of_mesh(path: Path, staging: Staging, notes: list[str]) -> list[Scen
     parts = parts_of_mesh(whole, groups)
     libraries = () if groups is None else groups.libraries
     materials = _materials(path, parts, libraries, bool(staging.glass), notes)
-    meshes = [staging.settled(checked_mesh(part.mesh, notes), notes, path.name) for part in parts]
-    if staging.smooth is None:
-        meshes = _smoothed(path, meshes, notes)
+    meshes = [staging.settled(checked_mesh(part.mesh, notes), notes, path.name, is_bare=True) for part in parts]
     if staging.up is None:
         up, reason = guessed_up(whole, path.suffix.lower())
         notes.append(f"{path.name} does not say which way is up: {up} was taken, for {reason}; --up y or z says it.")
@@ -66,14 +62,3 @@ def _materials(
 
 def _example(names: list[str]) -> str:
     return "" if len(names) == 1 else f", for one part too ({names[0]}=N-SF11); it holds {listed(names)}"
-
-
-def _smoothed(path: Path, meshes: list[Mesh], notes: list[str]) -> list[Mesh]:
-    """`meshes`, smooth where they are finely cut and say nothing of it."""
-    smoothed = [mesh.corner_normals is None and is_finely_cut(mesh) for mesh in meshes]
-    if any(smoothed):
-        notes.append(
-            f"{path.name} holds no normals: it was smoothed where it bends by less than {SMOOTH_CREASE_DEG:g}°; --flat "
-            "keeps its facets."
-        )
-    return [with_smooth(mesh, SMOOTH_CREASE_DEG if fine else None) for mesh, fine in zip(meshes, smoothed, strict=True)]

@@ -97,8 +97,8 @@ def find_entry(name: str, where: str = "") -> Entry:
     entry = _by_key().get(search_key(name))
     if entry is not None:
         return entry
-    near = {entry.qualified_name: f"'{_label(entry, key)}'" for key, entry in _resembling(name, 3)}
-    hint = f", did you mean {' or '.join(near.values())}?" if near else "; 'spectrasplat glass' lists all"
+    near = [f"'{_label(entry, key)}'" for key, entry in _resembling(name, 3)]
+    hint = f", did you mean {' or '.join(near)}?" if near else "; 'spectrasplat glass' lists all"
     raise UserError(f"{where + ': ' if where else ''}unknown glass '{name}'{hint}")
 
 
