@@ -4,7 +4,7 @@ from __future__ import annotations
 
 _WORDS = {
     "box": "cube cuboid block brick",
-    "slab": "plate pane sheet window tile cuboid",
+    "slab": "plate pane sheet window tile",
     "plane": "rectangle quad square floor ground table wall grid",
     "disc": "disk circle",
     "sphere": "ball globe uvsphere icosphere orb",
@@ -16,7 +16,6 @@ _WORDS = {
     "polygon_prism": "hexagon hexagonalprism crystal",
     "prism": "wedge triangle triangularprism",
     "lens": "biconvex planoconvex biconcave",
-    "doublet": "achromat",
     "brilliant": "gem stone roundcut roundbrilliant",
     "step_cut": "emeraldcut baguette",
     "rippled_water": "water waves ocean pool",
@@ -30,6 +29,8 @@ _WORDS = {
     "target": "lookat",
     "rotation_deg": "rotate euler",
     "directional": "sun parallel distant",
+    "point": "lamp bulb omni",
+    "spot": "spotlight",
     "glass": "dielectric transparent",
     "diffuse": "lambert lambertian matte matt",
     "mirror": "metal conductor specular",

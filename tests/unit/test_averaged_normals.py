@@ -41,7 +41,11 @@ WALLS = ((0.8, 0.0), (1.0, 0.5), (0.9, 1.2), (0.6, 1.7), (0.8, 2.1), (0.7, 2.1),
 VASE = ((0.0, 0.0), *WALLS, (0.0, 0.1))
 FLAT, ROUND, ROUND_BETWEEN_EDGES = "flat", "round", "round between edges"
 CRYSTALS = [turned(8, (0, -0.8), (1, 0), (0, 1)), turned(6, (0, -1.6), (0.5, -1), (0.5, 1), (0, 1.6))]
-CUTS = [make_shape("brilliant", girdle=0.0), make_shape("step_cut", length=1.0)]
+CUTS = [
+    make_shape("brilliant", girdle=0.0),
+    make_shape("step_cut", length=1.0),
+    turned(4, (0, -0.6), (1, 0), (0.6, 0.3), (0, 0.3)),
+]
 FACETED = [make_shape(name) for name in ("brilliant", "step_cut", "box", "prism", "polygon_prism")]
 BALLS = [ball(8, 4), ball(12, 6), ball(32, 16), ball(16, 8, 0.33), ball(12, 8, 1.6)]
 CURVED = [make_shape(name, triangles=n) for name in ("sphere", "ellipsoid", "torus") for n in (300, 5000)]
@@ -53,21 +57,12 @@ SOLIDS += [(make_shape("lens", triangles=300), 30, ROUND), (make_shape("rippled_
 SOLIDS += [(mesh, 180, ROUND_BETWEEN_EDGES) for mesh in (rod(32), make_shape("lens", triangles=2000))]
 
 
-def write_obj(mesh: Mesh, path: Path) -> None:
-    assert mesh.corner_normals is not None
-    lines = [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in mesh.vertices]
-    lines += [f"vn {x:.4f} {y:.4f} {z:.4f}" for x, y, z in mesh.corner_normals.reshape(-1, 3)]
-    for t, (a, b, c) in enumerate(mesh.triangles + 1):
-        lines.append(f"f {a}//{3 * t + 1} {b}//{3 * t + 2} {c}//{3 * t + 3}")
-    path.write_text("\n".join(lines))
-
-
 def write_glb(mesh: Mesh, path: Path) -> None:
     item = SceneObject("stone", mesh, Dielectric.usual())
     save_gltf(Scene("s", Camera((0, -5, 1), (0, 0, 0)), (), (item,)), path)
 
 
-WRITERS = {".obj": write_obj, ".ply": save_ply, ".glb": write_glb}
+WRITERS = {".ply": save_ply, ".glb": write_glb}
 
 
 def read(path: Path, staging: Staging = AS_FOUND) -> tuple[Mesh, str]:

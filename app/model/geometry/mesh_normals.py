@@ -27,8 +27,7 @@ SHARP_DEG, SHARP_BY_FACET_DEG, SHARP_ANYWHERE_DEG = 45.5, 35.0, 65.0
 whose normals fan out, and on any (coarse tori bend more)."""
 SHARP_SHARE, CUT_SHARE, FACET_SHARE = 0.1, 0.6, 0.05
 """Shares of the area: next to sharp edges, for a convex solid to have any; for it to be cut; of a facet that tells."""
-FAN_DEG = 5.0
-SAME_NORMAL = math.cos(math.radians(1.2))
+FAN_DEG, SAME_NORMAL = 5.0, math.cos(math.radians(1.2))
 
 
 def angle_weighted_normals(mesh: Mesh, crease_deg: float = 180.0) -> np.ndarray:
@@ -116,10 +115,10 @@ def _plausible_crease(mesh: Mesh) -> float | None:
 
 
 def _bends_little(bend_deg: np.ndarray, percentile: float) -> bool:
-    """Whether many edges bend, and up to this percentile of them by less than `FINE_BEND_DEG`."""
+    """Whether many edges bend, a turn's at least, and up to this percentile of them by less than `FINE_BEND_DEG`."""
     bent = bend_deg[bend_deg > FLAT_DEG]
     soft = bent[bent < SMOOTH_CREASE_DEG]
-    return len(soft) > 0.2 * len(bent) and float(np.percentile(soft, percentile)) < FINE_BEND_DEG
+    return len(soft) > max(0.2 * len(bent), 360.0 / 15.0) and float(np.percentile(soft, percentile)) < FINE_BEND_DEG
 
 
 @dataclass(frozen=True)
