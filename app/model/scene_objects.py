@@ -43,8 +43,8 @@ class ObjectReader:
         meshes: dict[str, Mesh] | None = None,
         smooth: bool | None = None,
     ) -> None:
-        """`meshes`: by description, what an earlier reading of the same file made; kept up. `smooth`: what is asked for
-        of all mesh files."""
+        """`meshes`: by description, what an earlier reading of the same file made; kept up. `smooth`: replaces
+        that of every mesh file."""
         self._materials = materials
         self._textures = textures
         self._meshes = {} if meshes is None else meshes
@@ -141,7 +141,7 @@ def rested(mesh: Mesh, matrix: np.ndarray, rest: float | None) -> np.ndarray:
     return matrix
 
 
-def _file_recipe(table: SceneTable, asked: bool | None) -> dict[str, Any]:
+def _file_recipe(table: SceneTable, override: bool | None) -> dict[str, Any]:
     path = table.existing_file("mesh").resolve()
     if path.suffix.lower() not in MESH_SUFFIXES:
         table.fail("mesh", f"must be one of {', '.join(MESH_SUFFIXES)}; open a .glb or .gltf as the scene itself")
@@ -151,7 +151,7 @@ def _file_recipe(table: SceneTable, asked: bool | None) -> dict[str, Any]:
         if not isinstance(smooth, bool):
             smooth = table.number("smooth", at_least=0.0, at_most=180.0)
         recipe["smooth"] = smooth
-    return recipe if asked is None else recipe | {"smooth": asked and ROUND_DEG}
+    return recipe if override is None else recipe | {"smooth": override and ROUND_DEG}
 
 
 # -- shapes: the keys are the parameters of the functions in `primitives` --------------------

@@ -44,7 +44,7 @@ class Staging:
     """Whether meshes are round where edges bend by less than `ROUND_DEG`, or flat; None: as their files say."""
 
     def settled(self, mesh: Mesh, notes: list[str], file: str, is_bare: bool = False) -> Mesh:
-        """`mesh` of `file` with the normals that are asked for, or those of the file where they can be meant."""
+        """`mesh` of `file` with the normals that `smooth` wishes, or those of the file where they can be meant."""
         if self.smooth is None:
             return with_plausible_normals(mesh, notes, file, is_bare)
         return with_smooth(mesh, self.smooth and ROUND_DEG)

@@ -188,15 +188,15 @@ def gems() -> dict[str, Any]:
     entries = {}
     for gem in tomllib.loads((HERE / "gems.toml").read_text(encoding="utf-8"))["gems"]:
         entry = {"a": gem.get("also", []), "l": GEM_LICENCE, "r": [380.0, 780.0], "s": GEM_SOURCE}
-        told = [gem["note"]] if "note" in gem else []
+        remarks = [gem["note"]] if "note" in gem else []
         if "dispersion" in gem:
             b = gem["dispersion"] / inverse_square
             entry |= {"f": 5, "c": [round(gem["n_D"] - b / d**2, 9), round(b, 9), -2.0]}
-            told.append("two terms of Cauchy's formula from n_D and the dispersion from G to B")
+            remarks.append("two terms of Cauchy's formula from n_D and the dispersion from G to B")
         else:
             entry |= {"f": "constant", "c": [gem["n_D"]]}
-            told.append("only n_D is published, no dispersion")
-        entries[gem["name"]] = entry | {"n": "; ".join(told)}
+            remarks.append("only n_D is published, no dispersion")
+        entries[gem["name"]] = entry | {"n": "; ".join(remarks)}
     return entries
 
 
