@@ -8,8 +8,11 @@ traceback and exits with code 2.
 from __future__ import annotations
 
 import difflib
+import re
 import unicodedata
 from collections.abc import Iterable
+
+from .meanings import MEANT
 
 
 class UserError(Exception):
@@ -61,10 +64,21 @@ def _escaped(character: str) -> str:
 
 
 def nearest_names(name: str, known: Iterable[str], count: int = 3) -> list[str]:
-    """Known names that resemble `name`, best first (case-insensitive; may be empty)."""
-    by_folded = {candidate.casefold(): candidate for candidate in known}
-    matches = difflib.get_close_matches(name.casefold(), by_folded, n=count, cutoff=0.5)
-    return [by_folded[match] for match in matches]
+    """Known names that `name` may stand for, best first (case-insensitive; may be empty).
+
+    Those that mean the same (`meanings`), or else those that share nearly all letters in their order, begin with it, or
+    have a whole word in common with it.
+    """
+    word, by_folded = name.casefold(), {candidate.casefold(): candidate for candidate in known}
+    if meant := [m for m in MEANT.get("".join(filter(str.isalnum, word)), ()) if m.casefold() in by_folded]:
+        return meant[:count]
+    near = difflib.get_close_matches(word, by_folded, count, cutoff=0.72 if len(word) > 3 else 0.66)
+    near += [each for each in by_folded if _words(word) & _words(each) or (len(word) > 2 and each.startswith(word))]
+    return [by_folded[each] for each in dict.fromkeys(near)][:count]
+
+
+def _words(text: str) -> set[str]:
+    return {word for word in re.split(r"[\W_]+", text) if len(word) > 2 and not word.isdigit()}
 
 
 def suggestion(name: str, known: Iterable[str], count: int = 3) -> str:

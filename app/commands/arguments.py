@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from ..base.files import allow_outside
+from ..model.geometry.mesh_normals import ROUND_DEG
 from ..model.settings import CAMERA_METHODS, METHODS
 from . import completion
 
@@ -54,8 +55,17 @@ GlassOption = Annotated[
     typer.Option(
         "--glass",
         metavar="GLASS",
-        help="Make all solids of a glass (diamond, 'cobalt blue'), or one (OBJECT=N-SF11); may be repeated.",
+        help="Make all solids of a glass (diamond, 'cobalt blue'), or some: OBJECT=N-SF11, MATERIAL=N-SF11, "
+        "'Gem*=diamond'; may be repeated.",
         autocompletion=completion.glasses,
+    ),
+]
+SmoothOption = Annotated[
+    bool | None,
+    typer.Option(
+        "--smooth/--flat",
+        help=f"Round meshes where edges bend by less than {ROUND_DEG:g} degrees, or keep facets flat; default: as the "
+        "file's normals say, unless they cannot be meant.",
     ),
 ]
 EnvironmentOption = Annotated[

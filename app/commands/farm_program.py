@@ -17,7 +17,7 @@ from .bench import BenchRequest
 from .farm import FarmRequest, farm_animate_command, farm_bench_command, farm_render_command
 from .render import RenderRequest
 
-_OPENING = ("up", "glass", "environment")
+_OPENING = ("up", "glass", "environment", "smooth")
 """Options that together say how a scene is opened."""
 
 

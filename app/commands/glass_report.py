@@ -14,7 +14,7 @@ import numpy as np
 
 from ..base.atomic import atomic_output
 from ..base.errors import UserError
-from ..model.optics.catalogue import LICENCE, Entry, entries, is_guess, search
+from ..model.optics.catalogue import Entry, entries, is_guess, search
 from ..model.optics.glass import LINE_C_NM, LINE_D_NM, LINE_F_NM
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def describe(entry: Entry) -> str:
         "V_d": _abbe(glass.V_d, digits=3),
         "dn/dλ at d": f"{float(glass.derivative(LINE_D_NM)):.6f} per µm",
         "source": entry.source,
-        "licence": LICENCE,
+        "licence": entry.licence,
     }
     lines += [f"  {label:<17}{value}" for label, value in view_model.items() if value]
     lines.append("  formula (λ in µm)")

@@ -158,29 +158,27 @@ def parse_integer(option: str, text: str, low: int, high: int) -> int:
     return value
 
 
+def _one_of(option: str, text: str, known: Sequence[str]) -> str:
+    if text not in known:
+        raise UserError(f"{option} '{text}' is unknown{suggestion(text, known) or ','} known are {', '.join(known)}")
+    return text
+
+
 def parse_method(text: str) -> str:
     """One of the sampling methods."""
-    if text not in METHODS:
-        hint = suggestion(text, METHODS)
-        raise UserError(f"--method '{text}' is unknown{hint or ','} known are {', '.join(METHODS)}")
-    return text
+    return _one_of("--method", text, METHODS)
 
 
 def parse_reference(text: str) -> str:
     """What a reference meets, one of `REFERENCES`."""
     from ..bench.results import REFERENCES
 
-    if text not in REFERENCES:
-        raise UserError(f"--reference '{text}' is unknown{suggestion(text, REFERENCES) or ','} known are exact, mesh")
-    return text
+    return _one_of("--reference", text, REFERENCES)
 
 
 def parse_camera_method(text: str) -> str:
     """One of those that camera rays may follow."""
-    if text not in CAMERA_METHODS:
-        hint = suggestion(text, CAMERA_METHODS)
-        raise UserError(f"--camera-method '{text}' is unknown{hint or ','} known are {', '.join(CAMERA_METHODS)}")
-    return text
+    return _one_of("--camera-method", text, CAMERA_METHODS)
 
 
 def check_layer(text: str, scene: Scene) -> str:
@@ -203,10 +201,12 @@ def receivers_of(scene: Scene) -> list[str]:
     return list(dict.fromkeys(item.name for item in scene.objects if item.material.receives))
 
 
-def parse_opening(up: str | None, glass: Sequence[str] | None, environment: str | None) -> Opening | None:
-    """Which axis of a file is up, glasses as "GLASS" or "OBJECT=GLASS", and what lies behind it. An object's name may
-    hold "=": the last one counts. None where nothing is asked for."""
-    if up is None and not glass and environment is None:
+def parse_opening(
+    up: str | None, glass: Sequence[str] | None, environment: str | None, smooth: bool | None = None
+) -> Opening | None:
+    """Which axis of a file is up, glasses as "GLASS" or "OBJECT=GLASS", what lies behind it, and whether its meshes are
+    round. An object's name may hold "=": the last one counts. None where nothing is asked for."""
+    if up is None and not glass and environment is None and smooth is None:
         return None
     from ..edit.opening import SKY, STUDIO, Opening
     from ..model.staging import UP_AXES, Staging
@@ -224,7 +224,7 @@ def parse_opening(up: str | None, glass: Sequence[str] | None, environment: str 
         path = Path(environment).expanduser()
         if not files.is_file(path):
             raise UserError(f"--environment '{environment}' is neither studio nor sky nor a file; check the path")
-    return Opening(Staging(axis, tuple(pairs)), environment)
+    return Opening(Staging(axis, tuple(pairs), smooth), environment)
 
 
 def open_scene(text: str, opening: Opening | None) -> Scene:

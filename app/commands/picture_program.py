@@ -18,6 +18,7 @@ from .arguments import (
     SceneArgument,
     SchedulerOption,
     SeedOption,
+    SmoothOption,
     StatsOption,
     Text,
     UpOption,
@@ -131,6 +132,7 @@ def render(
     stats: StatsOption = False,
     up: UpOption = None,
     glass: GlassOption = None,
+    smooth: SmoothOption = None,
     environment: EnvironmentOption = None,
     passes: Annotated[
         Text,
@@ -159,7 +161,7 @@ def render(
         spp,
         batch,
         stats,
-        options.parse_opening(up, glass, environment),
+        options.parse_opening(up, glass, environment, smooth),
         passes,
         glare,
         lens_radius,
@@ -266,6 +268,7 @@ def animate(
     ] = False,
     up: UpOption = None,
     glass: GlassOption = None,
+    smooth: SmoothOption = None,
     environment: EnvironmentOption = None,
     skip_existing: Annotated[
         bool,
@@ -296,7 +299,7 @@ def animate(
         method,
         camera_method,
         overwrite,
-        options.parse_opening(up, glass, environment),
+        options.parse_opening(up, glass, environment, smooth),
         skip_existing,
     )
     raise typer.Exit(animate_command(request))
@@ -337,6 +340,7 @@ def sweep(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace another sweep in the folder.")] = False,
     up: UpOption = None,
     glass: GlassOption = None,
+    smooth: SmoothOption = None,
     environment: EnvironmentOption = None,
     allow_outside: AllowOutside = False,
 ) -> None:
@@ -358,6 +362,6 @@ def sweep(
         exact,
         overwrite,
         FarmRequest(workers, scheduler),
-        options.parse_opening(up, glass, environment),
+        options.parse_opening(up, glass, environment, smooth),
     )
     raise typer.Exit(sweep_command(request))

@@ -15,6 +15,7 @@ from .arguments import (
     PhotonsOption,
     SceneArgument,
     SeedOption,
+    SmoothOption,
     TexelsOption,
     Text,
     UpOption,
@@ -41,6 +42,7 @@ def view(
     ] = None,
     up: UpOption = None,
     glass: GlassOption = None,
+    smooth: SmoothOption = None,
     environment: EnvironmentOption = None,
     allow_outside: AllowOutside = False,
 ) -> None:
@@ -48,7 +50,9 @@ def view(
     from .view import ViewRequest, view_command
 
     raise typer.Exit(
-        view_command(ViewRequest(scene, size, theme, screenshot, after, options.parse_opening(up, glass, environment)))
+        view_command(
+            ViewRequest(scene, size, theme, screenshot, after, options.parse_opening(up, glass, environment, smooth))
+        )
     )
 
 
@@ -87,6 +91,7 @@ def bake(
     seed: SeedOption = None,
     up: UpOption = None,
     glass: GlassOption = None,
+    smooth: SmoothOption = None,
     environment: EnvironmentOption = None,
     allow_outside: AllowOutside = False,
 ) -> None:
@@ -95,7 +100,9 @@ def bake(
 
     raise typer.Exit(
         bake_command(
-            BakeRequest(scene, receiver, output, size, photons, seed, options.parse_opening(up, glass, environment))
+            BakeRequest(
+                scene, receiver, output, size, photons, seed, options.parse_opening(up, glass, environment, smooth)
+            )
         )
     )
 
@@ -136,13 +143,14 @@ def export(
     seed: SeedOption = None,
     up: UpOption = None,
     glass: GlassOption = None,
+    smooth: SmoothOption = None,
     environment: EnvironmentOption = None,
     allow_outside: AllowOutside = False,
 ) -> None:
     """Export the caustic on an object to glTF or USD, or as a cookie for game engines."""
     from .export import ExportRequest, export_command
 
-    opening = options.parse_opening(up, glass, environment)
+    opening = options.parse_opening(up, glass, environment, smooth)
     raise typer.Exit(
         export_command(ExportRequest(scene, receiver, output, size, photons, seed, opening, plane, source))
     )

@@ -14,24 +14,11 @@ from ..model.optics import catalogue
 from ..model.scene import Dielectric, Diffuse, Material, Scene, SceneObject
 from ..model.scene_checks import check_scene
 from ..model.scene_defaults import bounds_of, environment_of
-from ..model.scene_objects import make_shape
+from ..model.scene_objects import INLINE, make_shape
+from ..model.scene_objects import SHAPES as ALL_SHAPES
 from .names import free_name
 
-SHAPES = (
-    "sphere",
-    "ellipsoid",
-    "box",
-    "slab",
-    "prism",
-    "polygon_prism",
-    "lens",
-    "brilliant",
-    "step_cut",
-    "torus",
-    "rippled_water",
-    "plane",
-    "disc",
-)
+SHAPES = tuple(shape for shape in ALL_SHAPES if shape not in ("doublet", "revolution", "height_field", INLINE))
 """What can be added, by its name in the scene file."""
 RECEIVERS = ("plane", "disc")
 """Those of them that are open and become diffuse."""

@@ -16,7 +16,9 @@ import numpy as np
 from ..base import files
 from ..base.errors import UserError
 from .geometry.mesh import Mesh
+from .geometry.mesh_normals import ROUND_DEG, with_plausible_normals
 from .geometry.mesh_recipes import note_recipe
+from .geometry.primitives_special import SPECIAL
 from .io.mesh_raw import as_float64
 from .io.scene_table import SceneTable
 from .materials.material_file import read_object_material
@@ -35,12 +37,18 @@ class ObjectReader:
     """Reads [[objects]] one by one; equal descriptions share one `Mesh`."""
 
     def __init__(
-        self, materials: dict[str, Material], textures: TextureReader, meshes: dict[str, Mesh] | None = None
+        self,
+        materials: dict[str, Material],
+        textures: TextureReader,
+        meshes: dict[str, Mesh] | None = None,
+        smooth: bool | None = None,
     ) -> None:
-        """`meshes`: by description, what an earlier reading of the same file made; kept up."""
+        """`meshes`: by description, what an earlier reading of the same file made; kept up. `smooth`: replaces
+        that of every mesh file."""
         self._materials = materials
         self._textures = textures
         self._meshes = {} if meshes is None else meshes
+        self._smooth = smooth
         self._names = Names()
         self.notes: list[str] = []
 
@@ -85,7 +93,7 @@ class ObjectReader:
             table.raw("shape")  # blames a misspelt key, or says that this one is missing
         if key == "mesh" and isinstance(table.raw("mesh"), Mesh):
             return table.raw("mesh")  # from Python, which may give the triangles themselves
-        recipe = _file_recipe(table) if key == "mesh" else _shape_recipe(table)
+        recipe = _file_recipe(table, self._smooth) if key == "mesh" else _shape_recipe(table)
         identity = json.dumps(recipe, sort_keys=True)
         if identity not in self._meshes:
             found: list[str] = []
@@ -97,22 +105,21 @@ class ObjectReader:
     def _make(self, table: SceneTable, recipe: dict[str, Any], notes: list[str]) -> Mesh:
         if "mesh" in recipe:
             mesh = load_checked_mesh(Path(recipe["mesh"]), recipe.get("smooth"), notes)
-        else:
-            try:
-                mesh = _make_shape(recipe)
-            except UserError as error:
-                table.fail("shape", f"cannot be made: {error}")
-            if recipe["shape"] == INLINE:
-                mesh = checked_mesh(mesh, notes)
-        note_recipe(mesh, recipe)
-        return mesh
+            note_recipe(mesh, recipe)
+            return mesh
+        try:
+            return make_shape(notes=notes, **recipe)
+        except UserError as error:
+            table.fail("shape", f"cannot be made: {error}")
 
 
 def load_checked_mesh(path: Path, smooth: bool | float | None, notes: list[str]) -> Mesh:
-    """A mesh file, repaired where that is safe; what was found goes to `notes`."""
+    """A mesh file, repaired where that is safe, its normals passed over where they cannot be meant; what was found goes
+    to `notes`."""
     from .io.mesh_io import load_mesh
 
-    return checked_mesh(load_mesh(path, smooth), notes)
+    mesh = checked_mesh(load_mesh(path, smooth), notes)
+    return with_plausible_normals(mesh, notes, path.name) if smooth is None else mesh
 
 
 def checked_mesh(mesh: Mesh, notes: list[str]) -> Mesh:
@@ -134,7 +141,7 @@ def rested(mesh: Mesh, matrix: np.ndarray, rest: float | None) -> np.ndarray:
     return matrix
 
 
-def _file_recipe(table: SceneTable) -> dict[str, Any]:
+def _file_recipe(table: SceneTable, override: bool | None) -> dict[str, Any]:
     path = table.existing_file("mesh").resolve()
     if path.suffix.lower() not in MESH_SUFFIXES:
         table.fail("mesh", f"must be one of {', '.join(MESH_SUFFIXES)}; open a .glb or .gltf as the scene itself")
@@ -144,15 +151,16 @@ def _file_recipe(table: SceneTable) -> dict[str, Any]:
         if not isinstance(smooth, bool):
             smooth = table.number("smooth", at_least=0.0, at_most=180.0)
         recipe["smooth"] = smooth
-    return recipe
+    return recipe if override is None else recipe | {"smooth": override and ROUND_DEG}
 
 
 # -- shapes: the keys are the parameters of the functions in `primitives` --------------------
 
-_SHAPES = (
+SHAPES = (
     "sphere",
     "ellipsoid",
     "box",
+    *SPECIAL,
     "slab",
     "prism",
     "polygon_prism",
@@ -190,13 +198,13 @@ def _parameters(shape: str) -> dict[str, tuple[str, bool]]:
 
 
 def _function(shape: str) -> Callable[..., Any]:
-    from .geometry import primitives
+    from .geometry import primitives, primitives_special
 
-    return getattr(primitives, _FUNCTION.get(shape, shape))
+    return getattr(primitives_special if shape in SPECIAL else primitives, _FUNCTION.get(shape, shape))
 
 
 def _shape_recipe(table: SceneTable) -> dict[str, Any]:
-    shape = table.choice("shape", _SHAPES)
+    shape = table.choice("shape", SHAPES)
     recipe: dict[str, Any] = {"shape": shape}
     for key, (annotation, required) in _parameters(shape).items():
         if required or table.has(key):
@@ -233,25 +241,23 @@ def _read_heights(table: SceneTable, key: str) -> Any:
     return [list(row) for row in table.rows(key, len(value[0]))]
 
 
-def make_shape(shape: str, **parameters: Any) -> Mesh:
-    """The mesh of a shape of the scene file, saved by that description. Raises UserError for impossible sizes."""
-    recipe = {"shape": shape} | parameters
-    mesh = _make_shape(recipe)
-    note_recipe(mesh, recipe)
-    return mesh
+def make_shape(shape: str, notes: list[str] | None = None, **parameters: Any) -> Mesh:
+    """The mesh of a shape of the scene file, saved by that description; what was repaired goes to `notes`.
 
-
-def _make_shape(recipe: dict[str, Any]) -> Mesh:
-    arguments = {key: value for key, value in recipe.items() if key not in ("shape", "part")}
-    shape = recipe["shape"]
-    if shape == INLINE:
-        return _inline_mesh(**arguments)
+    Raises UserError for impossible sizes.
+    """
+    if shape in SPECIAL:
+        return make_shape(**_function(shape)(**parameters))
+    arguments = {key: value for key, value in parameters.items() if key != "part"}
     if "heights" in arguments:
         arguments["heights"] = _load_heights(arguments["heights"])
-    made = _function(shape)(**arguments)
-    if shape == "doublet":
-        return made[("front", "back").index(recipe["part"])]
-    return made
+    if shape == INLINE:
+        mesh = checked_mesh(_inline_mesh(**arguments), [] if notes is None else notes)
+    else:
+        made = _function(shape)(**arguments)
+        mesh = made[("front", "back").index(parameters["part"])] if shape == "doublet" else made
+    note_recipe(mesh, {"shape": shape} | parameters)
+    return mesh
 
 
 def _inline_mesh(

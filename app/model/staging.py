@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Literal
 
@@ -15,6 +16,7 @@ import numpy as np
 
 from ..base.errors import UserError, suggestion
 from .geometry.mesh import Mesh
+from .geometry.mesh_normals import ROUND_DEG, with_plausible_normals, with_smooth
 from .optics import tints
 from .optics.index_file import find_glass
 from .optics.tints import Tint
@@ -38,8 +40,16 @@ class Staging:
 
     up: UpAxis | None = None
     glass: tuple[tuple[str | None, str], ...] = ()
-    """Object (None: all that is no receiver below the others) and name of its glass, of the catalogue or a tint; later
-    ones above."""
+    """Object, material or pattern (None: all that is no receiver below the others) and name of its glass, of the
+    catalogue or a tint; later ones above."""
+    smooth: bool | None = None
+    """Whether meshes are round where edges bend by less than `ROUND_DEG`, or flat; None: as their files say."""
+
+    def settled(self, mesh: Mesh, notes: list[str], file: str, is_bare: bool = False) -> Mesh:
+        """`mesh` of `file` with the normals that `smooth` wishes, or those of the file where they can be meant."""
+        if self.smooth is None:
+            return with_plausible_normals(mesh, notes, file, is_bare)
+        return with_smooth(mesh, self.smooth and ROUND_DEG)
 
 
 AS_FOUND = Staging()
@@ -79,23 +89,46 @@ def _base_share(mesh: Mesh, column: int) -> float:
     return max(-float(areas.sum()), 0.0) / footprint
 
 
-def with_glass(objects: Sequence[SceneObject], staging: Staging, file_name: str) -> list[SceneObject]:
-    """`objects` with the glasses asked for. Raises UserError for an object or a glass that there is not."""
+def with_glass(
+    objects: Sequence[SceneObject], staging: Staging, file_name: str, materials: Sequence[str]
+) -> list[SceneObject]:
+    """`objects`, whose materials have the names `materials` in their file ("": none), with the glasses asked for.
+
+    Raises UserError for an object or a glass that does not exist.
+    """
     changed = list(objects)
     for name, glass in staging.glass:
         tint = tints.tint(glass)
         where = f"--glass {glass}" if name is None else f"--glass {name}={glass}"
         material = Dielectric(find_glass(glass, Path(), where, []) if tint is None else tint.dispersion)
         names = [item.name for item in objects]
-        if name is not None and name not in names:
-            hint = suggestion(name, names) or ","
-            raise UserError(f"--glass: {file_name} holds no object '{name}'{hint} it holds {listed(names)}")
-        chosen = [names.index(name)] if name is not None else _bodies(objects)
+        chosen = _bodies(objects) if name is None else _called(name, names, materials)
+        if not chosen:
+            kinds = [each for each in dict.fromkeys(materials) if each]
+            hint = suggestion(name or "", (*names, *kinds)) or ","
+            also = f" and the materials {listed(kinds)}" if kinds else ""
+            raise UserError(
+                f"--glass: {file_name} holds no object '{name}' and no material of that name{hint} it holds "
+                f"{listed(names)}{also}"
+            )
         for index in chosen:
             changed[index] = replace(
                 changed[index], material=material if tint is None else tinted(changed[index], tint)
             )
     return changed
+
+
+def _called(name: str, names: Sequence[str], materials: Sequence[str]) -> list[int]:
+    """Numbers of the objects that `name` means: the one of that name, else all of which the name, or that of the
+    material, matches it as a pattern (`*`, `?`, without regard to case)."""
+    if name in names:
+        return [names.index(name)]
+    pattern = name.casefold()
+    return [
+        index
+        for index, texts in enumerate(zip(names, materials, strict=True))
+        if any(text == name or fnmatchcase(text.casefold(), pattern) for text in texts if text)
+    ]
 
 
 def tinted(item: SceneObject, tint: Tint) -> Dielectric:

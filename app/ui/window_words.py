@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 
 _INSTEAD: tuple[tuple[str, str], ...] = (
+    (r"; --(?:flat shows facets|smooth rounds it)", ""),
     (r"; --up y or z says it", "; the button on the picture stands it up along the other"),
     (r"--up is for", "an upward axis is for"),
     (r"--up '([^']*)'", r"the upward axis '\1'"),

@@ -10,6 +10,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import re
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -33,8 +34,16 @@ MAKER_FOLDERS = {
     "Cargille": ("cargille/index-matching liquids/nk",),
 }
 
-MAKER_ALIASES = {"Schott": {"N-BK7": ["BK7"]}}
-"""The withdrawn BK7 (with arsenic) and its successor N-BK7 have the same n(λ)."""
+MAKER_ALIASES = {
+    "Schott": {
+        "BOROFLOAT33": ["pyrex", "borosilicate glass"],
+        "F2": ["flint glass", "flint"],
+        "LLF1": ["lead crystal", "crystal glass", "lead glass"],
+        "N-BK7": ["BK7", "crown glass", "crown"],
+    }
+}
+"""The withdrawn BK7 (with arsenic) and its successor N-BK7 have the same n(λ). Of lead crystal only n_D >= 1.545 is
+published (European Directive 69/493/EEC, 24 % lead oxide): LLF1 is a lead silicate of such an index."""
 
 POLYMERS = (
     "organic/(C5H8O2)n - poly(methyl methacrylate)",
@@ -51,8 +60,11 @@ MATERIALS: dict[str, tuple[str, list[str]]] = {
     "calcite (ordinary)": ("main/CaCO3/nk/Ghosh-o.yml", ["calcite"]),
     "calcium fluoride": ("main/CaF2/nk/Malitson.yml", ["CaF2", "fluorite"]),
     "carbon disulfide": ("main/CS2/nk/Chang.yml", ["CS2"]),
-    "chrysoberyl": ("main/BeAl2O4/nk/Walling-beta.yml", ["alexandrite"]),
-    "cubic zirconia": ("other/mixed crystals/ZrO2-Y2O3/nk/Wood.yml", ["CZ", "YSZ", "zirconia"]),
+    "chrysoberyl": ("main/BeAl2O4/nk/Walling-beta.yml", ["alexandrite", "cymophane", "cat's eye"]),
+    "cubic zirconia": (
+        "other/mixed crystals/ZrO2-Y2O3/nk/Wood.yml",
+        ["CZ", "YSZ", "zirconia", "djevalite", "phianite"],
+    ),
     "cyclohexane": ("organic/C6H12 - cyclohexane/nk/Chang.yml", []),
     "diamond": ("main/C/nk/Peter.yml", []),
     "ethanol": ("organic/C2H6O - ethanol/nk/Chang.yml", ["alcohol"]),
@@ -67,25 +79,32 @@ MATERIALS: dict[str, tuple[str, list[str]]] = {
     "moissanite (extraordinary)": ("main/SiC/nk/Wang-6H-e.yml", []),
     "moissanite (ordinary)": ("main/SiC/nk/Wang-6H-o.yml", ["moissanite", "silicon carbide"]),
     "PDMS": ("organic/(C2H6OSi)n - polydimethylsiloxane/nk/Schneider-Sylgard184.yml", ["silicone"]),
-    "PMMA": (f"{POLYMERS[0]}/nk/Sultanova.yml", ["acrylic", "plexiglas"]),
-    "polycarbonate": (f"{POLYMERS[1]}/nk/Sultanova.yml", ["PC"]),
+    "PMMA": (
+        f"{POLYMERS[0]}/nk/Sultanova.yml",
+        ["acrylic", "acrylic glass", "lucite", "perspex", "plexiglas", "plexiglass"],
+    ),
+    "polycarbonate": (f"{POLYMERS[1]}/nk/Sultanova.yml", ["PC", "lexan"]),
     "polystyrene": (f"{POLYMERS[2]}/nk/Sultanova.yml", ["PS"]),
     "potassium bromide": ("main/KBr/nk/Li.yml", ["KBr"]),
     "potassium chloride": ("main/KCl/nk/Li.yml", ["KCl"]),
     "quartz (extraordinary)": ("main/SiO2/nk/Ghosh-e.yml", []),
-    "quartz (ordinary)": ("main/SiO2/nk/Ghosh-o.yml", ["quartz", "rock crystal"]),
+    "quartz (ordinary)": (
+        "main/SiO2/nk/Ghosh-o.yml",
+        ["quartz", "rock crystal", "amethyst", "ametrine", "citrine", "prasiolite", "rose quartz", "smoky quartz"],
+    ),
     "rutile (extraordinary)": ("main/TiO2/nk/Devore-e.yml", []),
-    "rutile (ordinary)": ("main/TiO2/nk/Devore-o.yml", ["rutile", "TiO2"]),
+    "rutile (ordinary)": ("main/TiO2/nk/Devore-o.yml", ["rutile", "TiO2", "titania"]),
     "salt": ("main/NaCl/nk/Li.yml", ["NaCl", "sodium chloride", "rock salt"]),
     "sapphire (extraordinary)": ("main/Al2O3/nk/Malitson-e.yml", []),
-    "sapphire (ordinary)": ("main/Al2O3/nk/Malitson-o.yml", ["sapphire", "Al2O3", "corundum", "ruby"]),
-    "soda-lime glass": ("glass/misc/soda-lime/nk/Rubin-clear.yml", ["window glass"]),
+    "sapphire (ordinary)": ("main/Al2O3/nk/Malitson-o.yml", ["sapphire", "Al2O3", "corundum", "padparadscha", "ruby"]),
+    "scheelite (ordinary)": ("main/CaWO4/nk/Bond-o.yml", ["scheelite", "CaWO4"]),
+    "soda-lime glass": ("glass/misc/soda-lime/nk/Rubin-clear.yml", ["window glass", "float glass", "soda glass"]),
     "spinel": ("main/MgAl2O4/nk/Tropf.yml", ["MgAl2O4"]),
     "strontium fluoride": ("main/SrF2/nk/Li.yml", ["SrF2"]),
     "strontium titanate": ("main/SrTiO3/nk/Bond.yml", ["SrTiO3", "fabulite"]),
     "toluene": ("organic/C7H8 - toluene/nk/Chang.yml", []),
     "water": ("main/H2O/nk/Daimon-20.0C.yml", ["H2O"]),
-    "YAG": ("main/Y3Al5O12/nk/Zelmon.yml", ["yttrium aluminium garnet"]),
+    "YAG": ("main/Y3Al5O12/nk/Zelmon.yml", ["yttrium aluminium garnet", "yttrium aluminum garnet"]),
     "ZBLAN": ("glass/misc/ZBLAN/nk/Gan.yml", []),
     "zinc selenide": ("main/ZnSe/nk/Marple.yml", ["ZnSe"]),
     "zinc sulfide": ("main/ZnS/nk/Debenham.yml", ["ZnS", "sphalerite"]),
@@ -158,12 +177,35 @@ def ice(data: Path) -> dict[str, Any]:
     return {"c": coefficients, "f": 5, "n": note, "r": [390.0, 790.0], "s": plain(record["REFERENCES"]), "a": []}
 
 
+GEM_LICENCE = "numbers of published tables, put together for this project (MIT)"
+GEM_SOURCE = "gem tables: W. Schumann, Gemstones of the World (2009); R. Webster, Gems (1994)"
+LINES_UM = {"B": 0.6867, "D": 0.5893, "G": 0.4308}
+
+
+def gems() -> dict[str, Any]:
+    """Two terms of Cauchy's formula for each stone of gems.toml."""
+    d, inverse_square = LINES_UM["D"], LINES_UM["G"] ** -2 - LINES_UM["B"] ** -2
+    entries = {}
+    for gem in tomllib.loads((HERE / "gems.toml").read_text(encoding="utf-8"))["gems"]:
+        entry = {"a": gem.get("also", []), "l": GEM_LICENCE, "r": [380.0, 780.0], "s": GEM_SOURCE}
+        remarks = [gem["note"]] if "note" in gem else []
+        if "dispersion" in gem:
+            b = gem["dispersion"] / inverse_square
+            entry |= {"f": 5, "c": [round(gem["n_D"] - b / d**2, 9), round(b, 9), -2.0]}
+            remarks.append("two terms of Cauchy's formula from n_D and the dispersion from G to B")
+        else:
+            entry |= {"f": "constant", "c": [gem["n_D"]]}
+            remarks.append("only n_D is published, no dispersion")
+        entries[gem["name"]] = entry | {"n": "; ".join(remarks)}
+    return entries
+
+
 def bake() -> dict[str, Any]:
     """The whole catalogue as plain values."""
     from spectrasplat.model.optics.catalogue import search_key
 
     data = database()
-    makers: dict[str, dict[str, Any]] = {"Materials": {"ice": ice(data)}}
+    makers: dict[str, dict[str, Any]] = {"Materials": gems() | {"ice": ice(data)}}
     for name, (file, aliases) in MATERIALS.items():
         entry = read_entry(data / file)
         assert entry is not None, file
@@ -182,7 +224,8 @@ def bake() -> dict[str, Any]:
         keys = [search_key(name) for name in shelf]
         doubled = {k for k in keys if keys.count(k) > 1}
         assert not doubled, (maker, doubled)
-    sources = sorted({entry["s"] for shelf in makers.values() for entry in shelf.values()})
+    found = {entry["s"] for shelf in makers.values() for entry in shelf.values()}
+    sources = sorted(found, key=lambda source: (source == GEM_SOURCE, source))
     for shelf in makers.values():
         for entry in shelf.values():
             entry["s"] = sources.index(entry["s"])

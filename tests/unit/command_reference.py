@@ -33,7 +33,8 @@ def _section(name: str, command: Any) -> str:
     others = ["[OPTIONS]"] if len(options) > len(needed) else []
     usage = " ".join(["spectrasplat", name, *arguments, *needed, *others])
     rows = [(f"`{p.metavar}`", p.help) for p in command.params if p.param_type_name == "argument"]
-    rows += [(", ".join(f"`{o}`" for o in p.opts) + (f" `{p.metavar}`" if p.metavar else ""), p.help) for p in options]
+    names = {p.name: ", ".join(f"`{o}`" for o in (*p.opts, *p.secondary_opts)) for p in options}
+    rows += [(names[p.name] + (f" `{p.metavar}`" if p.metavar else ""), p.help) for p in options]
     table = "".join(f"| {taken} | {text} |\n" for taken, text in rows)
     head = f"\n## {name}\n\n`{usage}`\n\n{command.help}\n"
     return head + (f"\n| | |\n|---|---|\n{table}" if table else "")

@@ -90,7 +90,7 @@ def seen(monkeypatch: pytest.MonkeyPatch) -> Seen:
     ("arguments", "told"),
     [
         (["prism"], "give one with -o DIR"),
-        (["prsm", "-o", "out"], "did you mean 'prism' or"),
+        (["prsm", "-o", "out"], "did you mean 'prism'"),
         (
             ["prism", "-o", "out", "--methods", "srd,stochstic"],
             "--methods 'stochstic' is unknown, did you mean 'stochastic'",

@@ -103,8 +103,29 @@ def test_lookup_spellings_and_maker_order() -> None:
     assert catalogue.find_entry("sapphire").name == "sapphire (ordinary)"
     with pytest.raises(UserError, match=r"scene.toml: material: unknown glass 'N-BK8', did you mean .*'Schott N-BK7'"):
         catalogue.find("N-BK8", "scene.toml: material")
-    with pytest.raises(UserError, match="unknown glass '§§§'"):
-        catalogue.find("§§§")
+    for name, guess in {
+        "amathyst": "amethyst",
+        "zirkon": "zircon",
+        "§§§": None,
+        "kryptonite": None,
+        "pearl": None,
+    }.items():
+        with pytest.raises(UserError) as caught:
+            catalogue.find(name)
+        hint = f", did you mean '{guess}'?" if guess else "; 'spectrasplat glass' lists all"
+        assert str(caught.value) == f"unknown glass '{name}'{hint}"
+
+
+def test_gems_have_the_published_dispersion() -> None:
+    """n_G − n_B of gem tables: of formulas to their last digit, of those made from these numbers exactly."""
+    formulas = {"diamond": 44, "ruby": 18, "citrine": 13, "spinel": 20, "YAG": 28, "cubic zirconia": 60, "fluorite": 7}
+    made = {"emerald": 14, "aquamarine": 14, "topaz": 14, "almandine": 27, "pyrope": 22, "spessartine": 27, "opal": 0}
+    made |= {"tsavorite": 28, "demantoid": 57, "tourmaline": 17, "peridot": 20, "zircon": 39, "sphene": 51}
+    for name, thousandths in (formulas | made).items():
+        found = catalogue.find(name)
+        spread = 1e3 * float(found.index(430.8) - found.index(686.7))
+        assert spread == pytest.approx(thousandths, abs=0.001 if name in made else 1.0), name
+    assert catalogue.find("lead crystal").n_d > 1.545 and "no dispersion" in catalogue.find_entry("jade").note
 
 
 def test_search_ranks_exact_then_prefix() -> None:

@@ -9,6 +9,8 @@ import pytest
 from spectrasplat.base.errors import UserError
 from spectrasplat.model.geometry import primitives
 from spectrasplat.model.geometry.mesh import Mesh, make_mesh
+from spectrasplat.model.geometry.mesh_recipes import recipe_of
+from spectrasplat.model.scene_objects import make_shape
 
 SOLIDS = [
     primitives.box((1.0, 2.0, 3.0)),
@@ -209,6 +211,15 @@ def test_revolution_keeps_creases_and_smooths_the_rest() -> None:
 def test_impossible_dimensions_are_one_sentence(make, says: str) -> None:
     with pytest.raises(UserError, match=says):
         make()
+
+
+@pytest.mark.parametrize(
+    ("shape", "volume"), [("cylinder", math.pi / 4), ("cone", math.pi / 12), ("dome", math.pi / 12)]
+)
+def test_everyday_names_are_other_shapes(shape: str, volume: float) -> None:
+    mesh = make_shape(shape)
+    assert mesh.is_closed and mesh.volume() == pytest.approx(volume, rel=1e-3)
+    assert np.abs(mesh.bounds()).max() <= 0.5 + 1e-12 and recipe_of(mesh)["shape"] in ("revolution", "lens")
 
 
 def test_half_spaces_only_for_closed_convex_flat_solids() -> None:

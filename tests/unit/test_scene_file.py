@@ -73,6 +73,12 @@ def test_a_missing_file_and_an_unknown_kind_are_told(tmp_path: Path) -> None:
         load_scene(tmp_path / "scene.blend")
 
 
+def test_american_spelling_of_colour(tmp_path: Path) -> None:
+    text = THREE_LINES + '[[objects]]\nshape = "plane"\nmaterial = {{ kind = "diffuse", {} = [0.1, 0.2, 0.3] }}'
+    one, other = (load(tmp_path, text.format(word)).objects[1].material for word in ("color", "colour"))
+    assert one == other
+
+
 # -- refusals -----------------------------------------------------------------------------
 
 
@@ -85,6 +91,18 @@ def test_a_missing_file_and_an_unknown_kind_are_told(tmp_path: Path) -> None:
         ('[[objects]]\nshap = "sphere"', "unknown key 'objects[0].shap', did you mean 'shape'?"),
         ('[[objects]]\nglass = "N-BK7"', "objects[0].shape is missing"),
         ('[[objects]]\nshape = "sfere"', "objects[0].shape is 'sfere', which is not known: did you mean 'sphere'?"),
+        *(
+            (
+                f'[[objects]]\nshape = "{word}"',
+                f"objects[0].shape is '{word}', which is not known: did you mean '{shape}'?",
+            )
+            for word, shape in [("cube", "box"), ("UV sphere", "sphere"), ("donut", "torus"), ("cilinder", "cylinder")]
+        ),
+        ('[[objects]]\nshape = "pyramid"', "which is not known: choose one of sphere, ellipsoid,"),
+        (
+            THREE_LINES + "[camera]\nposition = [0, -5, 1]\nlook_at = [0, 0, 1]",
+            "unknown key 'camera.look_at', did you mean 'target'?",
+        ),
         ('[[objects]]\nshape = "sphere"\nglass = "N-SF1l"', "objects[0].glass: unknown glass 'N-SF1l', did you mean"),
         ('[[objects]]\nshape = "sphere"\nradius = -1', "sphere: radius must be a number greater than 0, not -1"),
         ('[[objects]]\nshape = "sphere"\nradius = nan', "objects[0].radius is nan but must be a finite number"),

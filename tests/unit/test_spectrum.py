@@ -62,7 +62,7 @@ def test_illuminant_names() -> None:
     assert sp.illuminant("cie d65") == sp.illuminant("D65") == sp.illuminant("d 65")
     assert sp.illuminant("F12") == sp.illuminant("fl12")
     assert {"D65", "A", "E", "FL1", "FL3.15", "LED-B1", "HP5"} <= set(sp.illuminant_names())
-    with pytest.raises(UserError, match="unknown illuminant 'D66', did you mean 'D65'"):
+    with pytest.raises(UserError, match="unknown illuminant 'D66', did you mean .*'D65'"):
         sp.illuminant("D66")
 
 

@@ -12,7 +12,6 @@ from spectrasplat.commands import options
 from spectrasplat.edit.document import Document
 from spectrasplat.edit.opening import Opening, open_scene
 from spectrasplat.model.geometry.mesh import Mesh
-from spectrasplat.model.geometry.mesh_normals import is_finely_cut
 from spectrasplat.model.io.mesh_io import save_ply
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.io.scene_save import save_scene
@@ -116,14 +115,6 @@ def test_the_studio_is_saved_by_its_word_alone(tmp_path: Path) -> None:
     assert [light.name for light in again.lights] == ["lamp", "from above"] and again.camera == scene.camera
 
 
-def test_facets_that_stand_for_a_curve_are_smoothed_and_cut_ones_are_not(tmp_path: Path) -> None:
-    smooth = load_scene(obj_file(tmp_path / "torus.obj", make_shape("torus", triangles=4000), y_up=False))
-    assert smooth.objects[0].mesh.corner_normals is not None and any("smoothed" in note for note in smooth.notes)
-    cut = load_scene(obj_file(tmp_path / "stone.obj", make_shape("brilliant"), y_up=False))
-    assert cut.objects[0].mesh.corner_normals is None
-    assert not is_finely_cut(make_shape("step_cut")) and not is_finely_cut(make_shape("box"))
-
-
 # -- glass ----------------------------------------------------------------------------------
 
 
@@ -155,6 +146,16 @@ def test_glass_for_all_and_for_one(tmp_path: Path) -> None:
     assert table.receives and not any("Nothing here is glass" in note for note in scene.notes)
 
 
+@pytest.mark.parametrize(
+    ("name", "chosen"),
+    [("S*", "stone"), ("[fs]*", "stone foot"), ("foot", "foot"), ("paint", "stone foot"), ("P?INT", "stone foot")],
+)
+def test_glass_by_pattern_and_by_material(tmp_path: Path, name: str, chosen: str) -> None:
+    scene = load_scene(opaque_file(tmp_path / "own.glb"), Staging(glass=((name, "amethyst"), ("fo*", "N-SF11"))))
+    glasses = {o.name: o.material.dispersion.name for o in scene.objects if o.material.transmits}
+    assert glasses == {"foot": "Schott N-SF11"} | ({"stone": "quartz (ordinary)"} if "stone" in chosen else {})
+
+
 def test_what_is_not_glass_stays_in_the_picture(tmp_path: Path) -> None:
     path = opaque_file(tmp_path / "own.glb")
     before, after = load_scene(path), load_scene(path, Staging(glass=(("foot", "N-SF11"),)))
@@ -166,6 +167,7 @@ def test_what_is_not_glass_stays_in_the_picture(tmp_path: Path) -> None:
     ("glass", "said"),
     [
         (("ston", "diamond"), "no object 'ston'.*did you mean.*stone"),
+        (("*gem", "diamond"), "no object '.gem'.*it holds 'stone', 'foot' and the materials 'paint'"),
         ((None, "diamont"), "diamont"),
     ],
 )

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from ..geometry.mesh import Mesh
-from ..geometry.mesh_normals import SMOOTH_CREASE_DEG, angle_weighted_normals, is_finely_cut
 from ..materials.dielectric import DEFAULT_GLASS
 from ..scene import Dielectric, Material, SceneObject
 from ..scene_objects import checked_mesh
@@ -28,7 +25,7 @@ def objects_of_mesh(path: Path, staging: Staging, notes: list[str]) -> list[Scen
     parts = parts_of_mesh(whole, groups)
     libraries = () if groups is None else groups.libraries
     materials = _materials(path, parts, libraries, bool(staging.glass), notes)
-    meshes = _prepared(path, parts, notes)
+    meshes = [staging.settled(checked_mesh(part.mesh, notes), notes, path.name, is_bare=True) for part in parts]
     if staging.up is None:
         up, reason = guessed_up(whole, path.suffix.lower())
         notes.append(f"{path.name} does not say which way is up: {up} was taken, for {reason}; --up y or z says it.")
@@ -36,7 +33,7 @@ def objects_of_mesh(path: Path, staging: Staging, notes: list[str]) -> list[Scen
         up = staging.up
     matrix = Y_UP_TO_Z_UP if up == "y" else np.eye(4)
     objects = [SceneObject(mesh.name, mesh, material, matrix) for mesh, material in zip(meshes, materials, strict=True)]
-    return with_glass(objects, staging, path.name)
+    return with_glass(objects, staging, path.name, [part.material or "" for part in parts])
 
 
 def _materials(
@@ -65,18 +62,3 @@ def _materials(
 
 def _example(names: list[str]) -> str:
     return "" if len(names) == 1 else f", for one part too ({names[0]}=N-SF11); it holds {listed(names)}"
-
-
-def _prepared(path: Path, parts: list[MeshPart], notes: list[str]) -> list[Mesh]:
-    """Their meshes, mended, and smooth where they are finely cut and say nothing of it."""
-    meshes = [checked_mesh(part.mesh, notes) for part in parts]
-    smoothed = [mesh.corner_normals is None and is_finely_cut(mesh) for mesh in meshes]
-    if any(smoothed):
-        notes.append(
-            f"{path.name} holds no normals: it was smoothed where it bends by less than {SMOOTH_CREASE_DEG:g}°; a "
-            "scene file with smooth = false keeps its facets."
-        )
-    return [
-        replace(mesh, corner_normals=angle_weighted_normals(mesh, SMOOTH_CREASE_DEG)) if is_fine else mesh
-        for mesh, is_fine in zip(meshes, smoothed, strict=True)
-    ]

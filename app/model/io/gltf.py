@@ -106,6 +106,7 @@ class _Reader:
         self.notes: list[str] = []
         self.origins = Origins()
         self.objects: list[SceneObject] = []
+        self._material_names: list[str] = []
         self.lights: list[tuple[int, dict[str, Any], np.ndarray]] = []
         self.camera: Camera | None = None
         self._meshes: dict[str, Mesh | None] = {}
@@ -122,7 +123,7 @@ class _Reader:
             raise self.document.fail("the file holds no triangles; check that the scene was exported")
         if self.document.items("animations") or self.document.items("skins"):
             self.notes.append("Animations and skins are not played (they are kept when saving).")
-        self.objects = with_glass(self.objects, self.staging, self.document.path.name)
+        self.objects = with_glass(self.objects, self.staging, self.document.path.name, self._material_names)
         is_whole = self.camera is not None and bool(self.lights)
         if not is_whole and (note := opaque_note(self.objects)) is not None:
             self.notes.append(note)
@@ -251,12 +252,16 @@ class _Reader:
             matrix.setflags(write=False)
             dabs = read_node_dabs(self.document, index, number, material)
             self.objects.append(SceneObject(name, mesh, material, matrix, dabs))
+            self._material_names.append(self._material_name(primitive.get("material")))
             self.origins.objects[name] = (index, number)
 
     def _material(self, index: int | None) -> Material:
         if index not in self._materials:
             self._materials[index] = read_gltf_material(self.document, index, self._textures, self.notes)
         return self._materials[index]
+
+    def _material_name(self, index: int | None) -> str:
+        return "" if index is None else str(self.document.item("materials", index).get("name", ""))
 
     def _wearable(self, material: Material, mesh: Mesh, label: str) -> Material:
         """`material`, without its texture where the mesh cannot say where it goes."""
@@ -306,6 +311,7 @@ class _Reader:
         solid = isinstance(self._material(primitive.get("material")), Dielectric)
         mesh, notes = repair(raw, examine(raw), solid)
         self.notes.extend(notes)
+        mesh = self.staging.settled(mesh, self.notes, self.document.path.name)
         return replace(mesh, source=str(self.document.path))
 
     def _attribute(self, attributes: dict[str, Any], name: str, count: int) -> np.ndarray | None:

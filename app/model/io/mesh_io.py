@@ -8,7 +8,6 @@ second to import.
 from __future__ import annotations
 
 import os
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +16,7 @@ from ...base import files
 from ...base.errors import UserError
 from ..geometry.mesh import Mesh, make_mesh
 from ..geometry.mesh_health import weld_map
+from ..geometry.mesh_normals import with_smooth
 from .mesh_raw import Groups, RawMesh
 
 MESH_SUFFIXES = (".ply", ".obj", ".stl")
@@ -39,15 +39,7 @@ def load_mesh(path: str | os.PathLike[str], smooth: bool | float | None = None, 
         raise UserError(f"{path}: unknown mesh format '{suffix}'; use one of {', '.join(MESH_SUFFIXES)}")
     if smooth is not None and not isinstance(smooth, bool) and not 0.0 <= smooth <= 180.0:
         raise UserError(f"{path}: smooth must be true, false or a crease angle from 0 to 180 degrees, not {smooth:g}")
-    mesh, _ = load_grouped_mesh(path, name)
-    if smooth is None:
-        return mesh
-    if smooth is False:
-        return replace(mesh, corner_normals=None)
-    from ..geometry.mesh_normals import angle_weighted_normals
-
-    normals = angle_weighted_normals(mesh, 180.0 if smooth is True else float(smooth))
-    return replace(mesh, corner_normals=normals)
+    return with_smooth(load_grouped_mesh(path, name)[0], smooth)
 
 
 def load_grouped_mesh(path: Path, name: str | None = None) -> tuple[Mesh, Groups | None]:

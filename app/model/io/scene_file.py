@@ -132,13 +132,15 @@ def _scene_from_table(table: SceneTable, kept: Kept, staging: Staging) -> Scene:
     background, environment = _read_environment(table, kept)
     render = read_render(table.table("render"))
     textures = kept.textures
-    reader = ObjectReader(read_materials(table, textures), textures, kept.meshes)
-    objects = [item for entry in table.tables("objects") for item in reader.read(entry)]
+    reader = ObjectReader(read_materials(table, textures), textures, kept.meshes, staging.smooth)
+    placed = [(item, entry.raw("material", "")) for entry in table.tables("objects") for item in reader.read(entry)]
+    objects = [item for item, _ in placed]
     if not objects:
         table.given(("camera", "lights"))
         table.finish("a scene")  # a misspelt [[object]] is the likelier mistake
         table.fail("objects", "is missing or empty; add at least one [[objects]]")
-    objects = with_glass(objects, staging, table.file.name)
+    materials = [name if isinstance(name, str) else "" for _, name in placed]
+    objects = with_glass(objects, staging, table.file.name, materials)
     notes += textures.notes + reader.notes
     if environment is None and not table.given(("camera", "lights", "background")):
         table.finish("a scene")

@@ -200,8 +200,8 @@ def _kept_object(
     if old.name != new.name:
         values["name"] = new.name
     if not _same_mesh(old.mesh, new.mesh):
-        for key in recipe_of(old.mesh) or ("vertices", "triangles", "uv", "shape", "mesh"):
-            values.pop(key, None)
+        for key in (*(recipe_of(old.mesh) or ("vertices", "triangles", "uv", "mesh")), "shape", "radius", "length"):
+            values.pop(key, None)  # radius and length: of a `primitives_special`
         values |= _mesh(new.mesh, path)
     if old.material.values() != new.material.values():
         values = _kept_material(values, old, new, materials, path)

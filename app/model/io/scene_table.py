@@ -54,11 +54,7 @@ class SceneTable:
             self._fail_unknown(unknown[0], noun)
 
     def _fail_unknown(self, key: str, noun: str) -> NoReturn:
-        # Typing errors keep the first letter; what does not ("camera" for "name") is far-fetched.
-        initial = key.casefold()[:1]
-        near = nearest_names(key, [known for known in self._asked if known.casefold().startswith(initial)], count=1)
-        if not near and len(key) > 2:  # "fov" for "vertical_fov_deg"
-            near = [known for known in sorted(self._asked) if key.casefold() in known.casefold()]
+        near = nearest_names(key, sorted(self._asked), count=1)
         remedy = f"did you mean '{near[0]}'?" if near else f"{noun} knows {', '.join(sorted(self._asked))}"
         raise UserError(f"{self.file.name}: unknown key '{self.key_path(key)}', {remedy}")
 
@@ -67,6 +63,8 @@ class SceneTable:
     def has(self, key: str) -> bool:
         """Is `key` given? Counts as understood from now on."""
         self._asked.add(key)
+        if key == "colour" and key not in self._values and "color" in self._values:
+            self._values = {key if name == "color" else name: value for name, value in self._values.items()}
         return key in self._values
 
     def given(self, keys: Sequence[str]) -> list[str]:

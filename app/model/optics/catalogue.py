@@ -1,6 +1,6 @@
 """The glass catalogue: 1,700 optical glasses and common transparent materials by name.
 
-Baked by assets/glass/bake.py from the CC0 refractiveindex.info database. A name is looked
+Baked by assets/glass/bake.py from the CC0 refractiveindex.info database, and gems.toml. A name is looked
 up without regard to case, blanks and punctuation: "N-BK7", "nbk7" and "Schott N-BK7" are the
 same. Where several makers use a name, the first in `MAKER_ORDER` wins; write the maker before
 it, as in "hikari:F2", to choose. Nothing is read before the first lookup.
@@ -8,22 +8,19 @@ it, as in "hikari:F2", to choose. Nothing is read before the first lookup.
 
 from __future__ import annotations
 
-import difflib
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import cast
 
 import msgspec
 
-from ...base.errors import UserError
+from ...base.errors import UserError, nearest_names
 from ...base.paths import assets_dir
 from .dispersion_formulas import Kind
 from .glass import Dispersion
 
 MAKER_ORDER = ("Materials", "Schott", "Ohara", "Hoya", "CDGM", "Hikari", "Sumita", "LZOS", "Cargille")
 """Materials (water, diamond, …) first: they are what a plain word means."""
-
-LICENCE = "CC0 1.0 (refractiveindex.info database)"
 
 
 @dataclass(frozen=True)
@@ -40,6 +37,7 @@ class Entry:
     status: str = ""
     """The maker's own word (standard, preferred, special), where known."""
     note: str = ""
+    licence: str = "CC0 1.0 (refractiveindex.info database)"
 
     @property
     def qualified_name(self) -> str:
@@ -74,6 +72,7 @@ def entries() -> tuple[Entry, ...]:
             tuple(fields.get("a", ())),
             fields.get("t", ""),
             fields.get("n", ""),
+            fields.get("l", Entry.licence),
         )
         for maker in MAKER_ORDER
         for name, fields in raw["makers"][maker].items()
@@ -98,7 +97,7 @@ def find_entry(name: str, where: str = "") -> Entry:
     entry = _by_key().get(search_key(name))
     if entry is not None:
         return entry
-    near = [f"'{e.qualified_name}'" for e in _resembling(name, 3)]
+    near = [f"'{_label(entry, key)}'" for key, entry in _resembling(name, 3)]
     hint = f", did you mean {' or '.join(near)}?" if near else "; 'spectrasplat glass' lists all"
     raise UserError(f"{where + ': ' if where else ''}unknown glass '{name}'{hint}")
 
@@ -116,7 +115,7 @@ def search(query: str = "", limit: int | None = None) -> list[Entry]:
     """
     found = _matching(query)
     if not found and query.strip():
-        return _resembling(query, limit or 8)
+        return list(dict.fromkeys(entry for _, entry in _resembling(query, limit or 8)))
     return found[:limit]
 
 
@@ -146,8 +145,12 @@ def _matching(query: str) -> list[Entry]:
     return [entry for _, _, entry in sorted(ranked, key=lambda item: item[:2])]
 
 
-def _resembling(name: str, count: int) -> list[Entry]:
-    """Entries with names like `name`, most alike first, each once."""
+def _resembling(name: str, count: int) -> list[tuple[str, Entry]]:
+    """(search key, entry) of names like `name`, most alike first."""
     table = _by_key()
-    near = difflib.get_close_matches(search_key(name), table, n=3 * count, cutoff=0.5)
-    return list(dict.fromkeys(table[key] for key in near))[:count]
+    return [(key, table[key]) for key in nearest_names(search_key(name), table, count)]
+
+
+def _label(entry: Entry, key: str) -> str:
+    """The name of `entry` that has this search key."""
+    return next((alias for alias in entry.aliases if search_key(alias) == key), entry.qualified_name)

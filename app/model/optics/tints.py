@@ -16,7 +16,7 @@ import numpy as np
 
 from ...base import files
 from ...base.paths import assets_dir
-from . import catalogue, glass
+from . import catalogue
 from .catalogue import search_key
 from .colorimetry import VISIBLE_NM, cmf_xyz, daylight_per_lumen
 from .glass import Dispersion
@@ -33,9 +33,9 @@ class Tint:
     level: float = 0.0
     """Relative absorption at every wavelength."""
     glass: str = ""
-    """What is coloured so: a catalogue name, or a gem with the two numbers below."""
-    n_d: float | None = None
-    V_d: float | None = None
+    """What is coloured so: a catalogue name."""
+    also: tuple[str, ...] = ()
+    """Other names."""
 
     @cached_property
     def coefficient(self) -> np.ndarray:
@@ -50,9 +50,7 @@ class Tint:
     @property
     def dispersion(self) -> Dispersion:
         """Of what is usually coloured so."""
-        if self.n_d is None or self.V_d is None:
-            return catalogue.find(self.glass)
-        return glass.from_abbe(self.n_d, self.V_d, self.glass)
+        return catalogue.find(self.glass)
 
 
 @dataclass(frozen=True)
@@ -70,7 +68,7 @@ def tints() -> tuple[Tint, ...]:
 def tint(name: str) -> Tint | None:
     """By name, without regard to case, blanks and punctuation; None for one that does not exist."""
     key = search_key(name)
-    return next((each for each in tints() if search_key(each.name) == key), None)
+    return next((each for each in tints() if key in map(search_key, (each.name, *each.also))), None)
 
 
 def half_distance(coefficient: np.ndarray) -> float:
