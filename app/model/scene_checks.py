@@ -10,6 +10,7 @@ import numpy as np
 from ..base.errors import UserError
 from .geometry.mesh import Mesh
 from .scene import Light, Scene, SceneObject
+from .staging import listed
 
 MAX_LIGHTS, MAX_OBJECTS = 256, 0xFFFF
 """A photon remembers the light that it comes from in 8 bits, and the object it met first in 16, all of them set for
@@ -50,13 +51,17 @@ def check_scene(scene: Scene, file_name: str) -> list[str]:
     glasses = [o for o in scene.objects if o.material.transmits]
     for light in scene.lights:
         if light.has_place:
-            check_outside(light, glasses, file_name)
+            check_outside(light, [o for o in glasses if o.material.is_solid], file_name)
         check_lines(light, glasses, file_name)
-    return _glass_notes(glasses) + [
-        f"light '{light.name}' has no power: it gives no light"
-        for light in scene.lights
-        if not light.spectral_power.power_w() > 0.0
-    ]
+    return (
+        _glass_notes(glasses)
+        + _sheet_notes(glasses)
+        + [
+            f"light '{light.name}' has no power: it gives no light"
+            for light in scene.lights
+            if not light.spectral_power.power_w() > 0.0
+        ]
+    )
 
 
 def contains(item: SceneObject, point: np.ndarray) -> bool:
@@ -198,6 +203,16 @@ def check_lines(light: Light, glasses: Sequence[SceneObject], file_name: str) ->
                     f"{file_name}: the line at {wavelength_nm:g} nm of light '{light.name}' lies outside the data of "
                     f"'{item.name}' ({low:g} to {high:g} nm); choose another wavelength or glass"
                 )
+
+
+def _sheet_notes(glasses: list[SceneObject]) -> list[str]:
+    """What of thin sheets has no effect."""
+    sheets = [o for o in glasses if o.material.thin]
+    without = {
+        "what its glass absorbs": [o.name for o in sheets if o.material.absorption is not None],
+        "its roughness": [o.name for o in sheets if o.material.roughness],
+    }
+    return [f"{listed(names)}: {what} has no effect in a thin sheet" for what, names in without.items() if names]
 
 
 def _glass_notes(glasses: list[SceneObject]) -> list[str]:

@@ -56,11 +56,14 @@ void main()
         }
 #endif
 #ifdef HAS_DIELECTRIC
-        if (kind == KIND_DIELECTRIC) {
+        if (IS_GLASS(kind)) {
             MediumInterface boundary = cross_boundary(medium, hit.object, entering);
             bool total = false;
             if (boundary.changes) {
                 float eta_it = medium_index(boundary.before, starts[id].x) / medium_index(boundary.after, starts[id].x);
+#ifdef HAS_SHEET
+                if (boundary.thin) eta_it = 1.0;
+#endif
                 Deflection refracted = refract_at(frame, direction, eta_it);
                 total = !refracted.exists;
                 direction = total ? turned.direction : refracted.direction;
