@@ -272,7 +272,7 @@ class SceneBuffers:
                     record["group"] = self.groups.group[self.groups.glasses.index(material.dispersion)]
             if material.filters:
                 record["texture"] = len(weights)
-                weights.append(mirror_reflectance(material.transmittance_rgb, nm))
+                weights.append(np.interp(nm, VISIBLE_NM, material.surface_filter))
             if material.absorption is not None and material.is_solid:
                 alpha = material.absorption.coefficient
                 row = absorbers.setdefault(alpha.tobytes(), len(weights))

@@ -47,17 +47,14 @@ def tint_curves(scene: Scene, but: np.ndarray | None = None) -> np.ndarray:
         material = item.material
         found: list[np.ndarray] = []
         absorption = material.absorption if material.is_solid else None
-        if absorption is not None and but is not None and np.array_equal(absorption.coefficient, but):
-            continue
-        if absorption is not None:
+        if absorption is not None and (but is None or not np.array_equal(absorption.coefficient, but)):
             depth = absorption.coefficient * mean_chord(item)
             with np.errstate(under="ignore"):
                 found += [np.exp(-share * depth) for share in _PATHS]
-        if material.is_mirror or material.filters:
-            curve = mirror_reflectance(
-                material.reflectance_rgb if material.is_mirror else material.transmittance_rgb, VISIBLE_NM
-            )
-            found += [curve**times for times in _MIRRORS]
+        if material.is_mirror:
+            found += [mirror_reflectance(material.reflectance_rgb, VISIBLE_NM) ** times for times in _MIRRORS]
+        if material.filters:
+            found += [material.surface_filter**times for times in _MIRRORS]
         curves |= {curve.round(6).tobytes(): curve for curve in found if np.ptp(curve) > TOLERANCE}
     return np.array(list(curves.values())).reshape(-1, len(VISIBLE_NM))
 

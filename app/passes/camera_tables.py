@@ -26,7 +26,6 @@ from ..model.optics.glass import Dispersion
 from ..model.optics.spectral_tables import SpectralAxis, cumulative, index_table
 from ..model.optics.spectrum import Spectrum
 from ..model.scene import Material, Scene
-from ..model.vectors import Vec3
 from .picture_channels import Channels
 
 EMISSION_CELLS = SAMPLES - 1
@@ -73,7 +72,7 @@ class CameraTables:
             row[:3] = item.material.reflectance_rgb
             if item.material.transmits:
                 # Which filter its surface is, and the most of it.
-                row[:2] = -1.0, max(item.material.transmittance_rgb)
+                row[:2] = -1.0, item.material.surface_filter.max()
             for column, coefficient in zip((3, 0), _absorptions(item.material, scene.space.scale), strict=True):
                 if coefficient is not None:
                     row[column] = next(i for i, known in enumerate(absorptions) if np.array_equal(known, coefficient))
@@ -108,8 +107,8 @@ def _axis(scene: SceneBuffers, shown: list[Dispersion]) -> SpectralAxis:
 
 
 def _distinct_absorptions(scene: Scene, scale: float) -> list[np.ndarray]:
-    """Distinct absorption coefficients (401,) of glasses, 1/GPU unit, of coloured mirrors, a reflection, and of glasses'
-    surfaces, a passage, in the order of the objects."""
+    """Distinct absorption coefficients (401,) of glasses, 1/GPU unit, of coloured mirrors, a reflection, and of surfaces of
+    glass, a passage, in the order of the objects."""
     distinct: list[np.ndarray] = []
     for item in scene.objects:
         for coefficient in _absorptions(item.material, scale):
@@ -122,13 +121,12 @@ def _absorptions(material: Material, scale: float) -> tuple[np.ndarray | None, n
     """Within a solid, or by a mirror; on the way through a surface."""
     within = material.absorption.coefficient / scale if material.absorption is not None and material.is_solid else None
     if material.is_mirror and material.is_coloured:
-        within = _depth(material.reflectance_rgb)
-    return within, _depth(material.transmittance_rgb) if material.filters else None
+        within = _depth(rgb_basis() @ np.asarray(material.reflectance_rgb, float))
+    return within, _depth(material.surface_filter) if material.filters else None
 
 
-def _depth(rgb: Vec3) -> np.ndarray:
-    """Optical depth (401,) of what lets through `rgb`."""
-    return -np.log(np.maximum(rgb_basis() @ np.asarray(rgb, float), 1e-30))
+def _depth(kept: np.ndarray) -> np.ndarray:
+    return -np.log(np.maximum(kept, 1e-30))
 
 
 def _finishes(scene: Scene, first_row: int) -> tuple[np.ndarray | None, np.ndarray]:

@@ -101,7 +101,7 @@ class CameraRun(PartsRun[CameraPicture]):
             ) from error
         self._kernel, self._scratch = camera_kernel, sampling.scratch
         photons, centre = photon_scene.photon_scene(scene)
-        self._scene = camera_scene.with_upsampled_colours(photons, scene)
+        self._scene = camera_scene.with_upsampled_mirrors(photons, scene)
         self._camera = photon_scene.viewpoint(scene.camera, width, height, centre)
         self._start = camera_start.camera_start(scene, photons)
         self._lights = camera_lights.camera_lights(scene.lights, centre)

@@ -148,19 +148,16 @@ def _probability(sources: list[np.ndarray], seen: np.ndarray) -> np.ndarray:
     return share / share.sum() if share.any() else np.full(len(seen), 1.0 / len(seen))
 
 
-def with_upsampled_colours(photons: PhotonScene, scene: Scene) -> PhotonScene:
-    """The same arrays with what every mirror and surface of glass does to a colour as basis @ rgb, as the camera's RGB
-    colours are meant."""
-    rows, weight, filters = [photons.weights], photons.weight.copy(), photons.filter.copy()
+def with_upsampled_mirrors(photons: PhotonScene, scene: Scene) -> PhotonScene:
+    """The same arrays with every mirror's reflectance as basis @ rgb, as the camera's RGB colours are meant."""
+    rows, weight = [photons.weights], photons.weight.copy()
     for index, item in enumerate(scene.objects):
-        for rgb, of_object, is_coloured in (
-            (item.material.reflectance_rgb, weight, item.material.is_mirror),
-            (item.material.transmittance_rgb, filters, item.material.filters),
-        ):
-            if is_coloured:
-                of_object[index] = sum(len(r) for r in rows)
-                rows.append(np.interp(TABLE_NM, VISIBLE_NM, rgb_basis() @ np.asarray(rgb, float))[None])
-    return photons._replace(weights=np.concatenate(rows), weight=weight, filter=filters)
+        if item.material.is_mirror:
+            weight[index] = sum(len(r) for r in rows)
+            rows.append(
+                np.interp(TABLE_NM, VISIBLE_NM, rgb_basis() @ np.asarray(item.material.reflectance_rgb, float))[None]
+            )
+    return photons._replace(weights=np.concatenate(rows), weight=weight)
 
 
 def pictures(scene: Scene, photons: PhotonScene) -> Pictures:

@@ -161,8 +161,7 @@ def photon_scene(scene: Scene) -> tuple[PhotonScene, np.ndarray]:
         weight.append(-1)
         filters.append(-1)
         if material.filters:
-            passed = rgb_partition() @ np.asarray(material.transmittance_rgb, float)
-            filters[-1] = weights.add(np.interp(TABLE_NM, VISIBLE_NM, passed))
+            filters[-1] = weights.add(np.interp(TABLE_NM, VISIBLE_NM, material.surface_filter))
         if material.absorption is not None and material.is_solid:
             weight[-1] = weights.add(np.interp(TABLE_NM, VISIBLE_NM, material.absorption.coefficient))
         elif material.is_mirror:

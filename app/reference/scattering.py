@@ -189,8 +189,8 @@ def scatter(scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw, noi
 
     `draw` in [0, 1) decides by Fresnel's reflectance, unless all is reflected. "Is an event" is false where the same
     substance lies on both sides; a mirror keeps its reflectance, glass what its surface lets through, and rough glass
-    also the weight of a microfacet that words `event` of the hash `noise` draw (its mean is 1). In a polarised scene `field`
-    complex (2, 3), the two of `polarised`, turns with the ray.
+    also the weight of a microfacet that words `event` of the hash `noise` draw (its mean is 1). In a polarised scene
+    `field` complex (2, 3), the two of `polarised`, turns with the ray.
     """
     if scene.kind[scene.owner[triangle]] == GRATING:
         return _diffract(scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw, field)

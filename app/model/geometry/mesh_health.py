@@ -6,6 +6,7 @@ any other the program goes on with a stated assumption, never silently.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -173,6 +174,24 @@ def repair(mesh: Mesh, health: MeshHealth | None = None, solid: bool = True) -> 
     return make_mesh(
         mesh.name, mesh.vertices, mesh.triangles, mesh.corner_normals, mesh.uv, mesh.source, mesh.uv_unwraps
     ), tuple(notes)
+
+
+def is_sheet(meshes: Sequence[Mesh]) -> bool:
+    """Whether these surfaces together enclose nothing: their borders are long for their area, not mere gaps."""
+    sizes = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes])
+    vertices = np.concatenate([mesh.vertices for mesh in meshes])
+    number = weld_map(vertices)[1]
+    corners = np.concatenate([number[mesh.triangles + first] for mesh, first in zip(meshes, sizes, strict=False)])
+    ends = np.sort(np.stack([corners.ravel(), np.roll(corners, -1, axis=1).ravel()]), axis=0)
+    edges, uses = np.unique(ends, axis=1, return_counts=True)
+    vertices = vertices[weld_map(vertices)[0]]
+    border = float(np.linalg.norm(np.subtract(*vertices[edges[:, uses == 1]]), axis=1).sum())
+    return border**2 > float(sum(mesh.areas().sum() for mesh in meshes))
+
+
+def warnings_of(mesh: Mesh) -> list[str]:
+    """What makes a repaired mesh that is to be solid something else."""
+    return _warnings(f"mesh '{mesh.name}'", examine(mesh))
 
 
 def _warnings(label: str, health: MeshHealth) -> list[str]:

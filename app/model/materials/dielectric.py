@@ -64,7 +64,7 @@ class Dielectric(Material):
     thin: bool = False
     """A sheet, both of whose faces are met at once: without inside, absorption and roughness."""
     transmittance_rgb: Vec3 = CLEAR
-    """Linear Rec.709 share of what enters that each surface lets through, or a thin sheet in all."""
+    """Linear Rec.709 share of what enters that leaves a sheet, or a solid on its other side."""
 
     kind: ClassVar = "glass"
     title: ClassVar = "Glass"

@@ -9,8 +9,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 
+import numpy as np
+
 from ..fields import Number, Part, read_fields, write_fields
 from ..io.scene_table import SceneTable
+from ..optics.colorimetry import rgb_basis
 from ..scene_textures import TextureReader
 from ..vectors import Vec3
 
@@ -53,7 +56,7 @@ class Material:
     priority = 0
     thin = False
     transmittance_rgb = (1.0, 1.0, 1.0)
-    """Linear Rec.709 share of what enters glass that a surface of it lets through."""
+    """Linear Rec.709 share of what enters glass that its colour leaves of light on the way through all of it."""
 
     @property
     def met_as(self) -> int:
@@ -100,6 +103,13 @@ class Material:
     def filters(self) -> bool:
         """A surface of it lets through less than enters."""
         return self.transmittance_rgb != (1.0, 1.0, 1.0)
+
+    @property
+    def surface_filter(self) -> np.ndarray:
+        """Share that one surface lets through of what enters, float64 (401,) on the visible grid: white light has the
+        colour `transmittance_rgb` behind a sheet, or a solid, which is entered and left."""
+        passed: np.ndarray = rgb_basis() @ np.asarray(self.transmittance_rgb, float)
+        return passed if self.thin else np.sqrt(passed)
 
     @classmethod
     def usual(cls) -> Self:
