@@ -47,7 +47,7 @@ class ObjectReader:
     def read(self, table: SceneTable) -> list[SceneObject]:
         """The object of one table, or its instances."""
         material = read_object_material(table, self._materials, self._textures)
-        mesh = self._read_mesh(table, solid=material.transmits)
+        mesh = self._read_mesh(table, solid=material.is_solid)
         base = read_placement(table)
         rest = table.number("rests_at_z", None)
         painted = read_dabs(table, material)
@@ -91,7 +91,10 @@ class ObjectReader:
             found: list[str] = []
             self._meshes[identity] = self._make(table, recipe, found)
             # An open sheet is a fault in glass only: tables and blockers are open by nature.
-            self.notes += [note for note in found if solid or not note.startswith("open mesh")]
+            remedy = "; a single sheet of glass needs thin = true"
+            self.notes += [
+                n + remedy * n.startswith("open mesh") for n in found if solid or not n.startswith("open mesh")
+            ]
         return self._meshes[identity]
 
     def _make(self, table: SceneTable, recipe: dict[str, Any], notes: list[str]) -> Mesh:

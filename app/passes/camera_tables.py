@@ -107,8 +107,8 @@ def _axis(scene: SceneBuffers, shown: list[Dispersion]) -> SpectralAxis:
 
 
 def _distinct_absorptions(scene: Scene, scale: float) -> list[np.ndarray]:
-    """Distinct absorption coefficients (401,) of glasses, 1/GPU unit, of coloured mirrors, a reflection, and of surfaces of
-    glass, a passage, in the order of the objects."""
+    """Distinct absorption coefficients (401,) of glasses, 1/GPU unit, of coloured mirrors, a reflection, and of
+    surfaces of glass, a passage, in the order of the objects."""
     distinct: list[np.ndarray] = []
     for item in scene.objects:
         for coefficient in _absorptions(item.material, scale):

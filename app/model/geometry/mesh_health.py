@@ -176,8 +176,15 @@ def repair(mesh: Mesh, health: MeshHealth | None = None, solid: bool = True) -> 
     ), tuple(notes)
 
 
-def is_sheet(meshes: Sequence[Mesh]) -> bool:
-    """Whether these surfaces together enclose nothing: their borders are long for their area, not mere gaps."""
+def sheets_among(meshes: Sequence[Mesh]) -> list[bool]:
+    """Which of the surfaces enclose nothing, neither alone nor all open ones together, as parts of one solid do."""
+    alone = [_is_open([mesh]) for mesh in meshes]
+    together = any(alone) and _is_open([mesh for mesh, is_open in zip(meshes, alone, strict=True) if is_open])
+    return [is_open and together for is_open in alone]
+
+
+def _is_open(meshes: Sequence[Mesh]) -> bool:
+    """Whether borders are long for the area: of more than gaps."""
     sizes = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes])
     vertices = np.concatenate([mesh.vertices for mesh in meshes])
     number = weld_map(vertices)[1]

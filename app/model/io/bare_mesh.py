@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..geometry.mesh import Mesh
+from ..geometry.mesh_health import sheets_among
 from ..geometry.mesh_normals import SMOOTH_CREASE_DEG, angle_weighted_normals, is_finely_cut
 from ..materials.dielectric import DEFAULT_GLASS
 from ..scene import Dielectric, Material, SceneObject
@@ -28,7 +29,7 @@ def objects_of_mesh(path: Path, staging: Staging, notes: list[str]) -> list[Scen
     parts = parts_of_mesh(whole, groups)
     libraries = () if groups is None else groups.libraries
     materials = _materials(path, parts, libraries, bool(staging.glass), notes)
-    meshes = _prepared(path, parts, notes)
+    meshes = _prepared(path, parts, materials, notes)
     if staging.up is None:
         up, reason = guessed_up(whole, path.suffix.lower())
         notes.append(f"{path.name} does not say which way is up: {up} was taken, for {reason}; --up y or z says it.")
@@ -48,6 +49,8 @@ def _materials(
     names = [part.mesh.name for part in parts]
     if any(material is not None and material.transmits for material in known):
         made = [Dielectric.usual() if material is None else material.material() for material in known]
+        sheets = iter(sheets_among([part.mesh for part, each in zip(parts, made, strict=True) if each.transmits]))
+        made = [material.changed(thin=next(sheets)) if material.transmits else material for material in made]
         glass = [name for name, material in zip(names, made, strict=True) if material.transmits]
         said = (
             f"its materials make glass of {listed(glass)}; dispersion, of which they know nothing, is {DEFAULT_GLASS}'s"
@@ -67,9 +70,13 @@ def _example(names: list[str]) -> str:
     return "" if len(names) == 1 else f", for one part too ({names[0]}=N-SF11); it holds {listed(names)}"
 
 
-def _prepared(path: Path, parts: list[MeshPart], notes: list[str]) -> list[Mesh]:
+def _prepared(path: Path, parts: list[MeshPart], materials: list[Material], notes: list[str]) -> list[Mesh]:
     """Their meshes, mended, and smooth where they are finely cut and say nothing of it."""
-    meshes = [checked_mesh(part.mesh, notes) for part in parts]
+    meshes = []
+    for part, material in zip(parts, materials, strict=True):
+        found: list[str] = []
+        meshes.append(checked_mesh(part.mesh, found))
+        notes += [note for note in found if material.is_solid or not note.startswith("open mesh")]
     smoothed = [mesh.corner_normals is None and is_finely_cut(mesh) for mesh in meshes]
     if any(smoothed):
         notes.append(

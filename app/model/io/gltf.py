@@ -18,7 +18,7 @@ import numpy as np
 from ...base.errors import UserError
 from ..fields import read_fields
 from ..geometry.mesh import Mesh, make_mesh
-from ..geometry.mesh_health import examine, is_sheet, repair, warnings_of
+from ..geometry.mesh_health import examine, repair, sheets_among, warnings_of
 from ..lights import LIGHT_KINDS, DirectionalLight, PointLight, SpotLight
 from ..lights.light import made
 from ..lights.light_file import read_light
@@ -113,8 +113,8 @@ class _Reader:
         self.camera: Camera | None = None
         self._meshes: dict[str, Mesh | None] = {}
         self._materials: dict[int | None, Material] = {}
-        self._forms: dict[int, tuple[bool, bool]] = {}
-        """Of each mesh of the document: whether its glass is a sheet, or closed."""
+        self._forms: dict[int, dict[int, bool]] = {}
+        """Of each mesh of the document: which of its parts of glass are sheets."""
         self._textures = GltfTextures(document, self.notes)
         self.origins.textures = self._textures.numbers
         self._names = Names()
@@ -275,8 +275,8 @@ class _Reader:
                 if self._material(each.get("material")).transmits
             ]
             found = [part for part in parts if part is not None]
-            self._forms[number] = is_sheet(found), len(found) > 1
-        sheet, in_parts = self._forms[number]
+            self._forms[number] = {id(part): is_open for part, is_open in zip(found, sheets_among(found), strict=True)}
+        sheet, in_parts = self._forms[number][id(mesh)], len(self._forms[number]) > 1
         name = str(self.document.item("materials", index).get("name", index))
         thin_walled = is_thin_walled(self.document, index)
         if sheet and not thin_walled:

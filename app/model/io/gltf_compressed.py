@@ -57,9 +57,7 @@ def meshopt_bytes(how: dict[str, Any], data: bytes, where: str) -> bytes:
         if turn is not None:
             turn(found, count, stride)
     except (KeyError, ValueError, RuntimeError) as error:
-        raise UserError(
-            f"{where}: its meshoptimizer data cannot be read ({error}); export the file again"
-        ) from error
+        raise UserError(f"{where}: its meshoptimizer data cannot be read ({error}); export the file again") from error
     return found.tobytes()
 
 
