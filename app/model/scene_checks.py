@@ -9,6 +9,7 @@ import numpy as np
 
 from ..base.errors import UserError
 from .geometry.mesh import Mesh
+from .geometry.mesh_health import sheets_among
 from .scene import Light, Scene, SceneObject
 from .staging import listed
 
@@ -206,13 +207,16 @@ def check_lines(light: Light, glasses: Sequence[SceneObject], file_name: str) ->
 
 
 def _sheet_notes(glasses: list[SceneObject]) -> list[str]:
-    """What of thin sheets has no effect."""
+    """What of thin sheets has no effect; sheets that are to be solid."""
     sheets = [o for o in glasses if o.material.thin]
-    without = {
-        "what its glass absorbs": [o.name for o in sheets if o.material.absorption is not None],
-        "its roughness": [o.name for o in sheets if o.material.roughness],
+    said = {
+        "absorption has no effect in a thin sheet": [o for o in sheets if o.material.absorption is not None],
+        "roughness has no effect in a thin sheet": [o for o in sheets if o.material.roughness],
+        "an open sheet is taken as the face of a solid; thin = true makes it a pane": [
+            o for o in glasses if not (o.material.thin or o.mesh.is_closed) and sheets_among([o.mesh])[0]
+        ],
     }
-    return [f"{listed(names)}: {what} has no effect in a thin sheet" for what, names in without.items() if names]
+    return [f"{listed([o.name for o in of])}: {what}" for what, of in said.items() if of]
 
 
 def _glass_notes(glasses: list[SceneObject]) -> list[str]:

@@ -91,10 +91,7 @@ class ObjectReader:
             found: list[str] = []
             self._meshes[identity] = self._make(table, recipe, found)
             # An open sheet is a fault in glass only: tables and blockers are open by nature.
-            remedy = "; a single sheet of glass needs thin = true"
-            self.notes += [
-                n + remedy * n.startswith("open mesh") for n in found if solid or not n.startswith("open mesh")
-            ]
+            self.notes += [note for note in found if solid or not note.startswith("open mesh")]
         return self._meshes[identity]
 
     def _make(self, table: SceneTable, recipe: dict[str, Any], notes: list[str]) -> Mesh:

@@ -178,7 +178,7 @@ def test_a_scene_file_makes_sheets(tmp_path: Path) -> None:
     scene = load_scene(tmp_path / "s.toml")
     pane = scene.objects[1].material
     assert pane.thin and pane.transmittance_rgb == RED and "thin" in pane.words() and not pane.is_rough
-    assert [note for note in scene.notes if "'pane'" in note] == ["'pane': its roughness has no effect in a thin sheet"]
+    assert [note for note in scene.notes if "'pane'" in note] == ["'pane': roughness has no effect in a thin sheet"]
     assert pane.values()["thin"] is True and pane.values()["colour"] == [*RED]
     (tmp_path / "s.toml").write_text(table.replace("thin = true", ""))
     assert any("thin = true" in note for note in load_scene(tmp_path / "s.toml").notes)

@@ -139,7 +139,9 @@ def test_what_is_not_shown_is_told(tmp_path: Path) -> None:
     more = {"normalTexture": {"index": 0}, "pbrMetallicRoughness": {"metallicFactor": 0, "baseColorTexture": moved}}
     scene = load_gltf(quad(tmp_path, data_uri(png()), materials=[more]))
     assert poster_of(scene).rgb.shape == (4, 6, 3)
-    assert all(word in " ".join(scene.notes) for word in ("without their KHR_texture_transform", "normalTexture is not"))
+    assert all(
+        word in " ".join(scene.notes) for word in ("without their KHR_texture_transform", "normalTexture is not")
+    )
     basis = [{"extensions": {"KHR_texture_basisu": {"source": 0}}}]
     assert "KTX2" in notes_without_texture(quad(tmp_path, None, textures=basis))
 
