@@ -57,24 +57,14 @@ void cross_glass(inout CameraPath path, CameraPath whole, Hit hit, Triangle face
         cosine2 = transmitted_cosine2(theta3, n_i / n_t);
 #ifdef POLARISED
         FresnelPair reflection = fresnel_reflection(theta3, n_i / n_t, cosine2);
-#ifdef HAS_SHEET
-        if (boundary.thin) reflection = both_faces(reflection);
-#endif
-        event = polarised_event(path, frame, reflection);
+        event = polarised_event(path, frame, OF_SHEET(boundary, reflection));
         reflectance = polarised_share(event.seen, event.reflection);
         if (!begins) mirror_event = event;
 #else
         reflectance = fresnel_reflectance(theta3, n_i / n_t, cosine2);
-#ifdef HAS_SHEET
-        if (boundary.thin) reflectance = both_faces(reflectance);
+        reflectance = OF_SHEET(boundary, reflectance);
 #endif
-#endif
-#ifdef HAS_SHEET
-        if (boundary.thin) {
-            n_t = n_i;
-            cosine2 = theta3 * theta3;
-        }
-#endif
+        GO_STRAIGHT(boundary, theta3, n_i, n_t, cosine2)
         mirror_weight = begins ? mirror_weight : reflectance;
 #ifdef HAS_DISPERSION
         // What is reflected off the outside of glass knows no wavelength but in its strength: it stays whole. What goes on is one band.
@@ -86,9 +76,6 @@ void cross_glass(inout CameraPath path, CameraPath whole, Hit hit, Triangle face
         break;
 #endif
     }
-#ifdef HAS_SHEET
-    if (boundary.thin) boundary.after = boundary.before;
-#endif
 #ifdef SPECTRAL_SWEEP
     bvec3 passes = greaterThan(cosine2, vec3(0.0));
     bool may_cut = path.restricted != 0u && any(passes) && !all(passes) && path.recut == 0u;

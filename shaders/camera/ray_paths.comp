@@ -61,10 +61,7 @@ void main()
             bool total = false;
             if (boundary.changes) {
                 float eta_it = medium_index(boundary.before, starts[id].x) / medium_index(boundary.after, starts[id].x);
-#ifdef HAS_SHEET
-                if (boundary.thin) eta_it = 1.0;
-#endif
-                Deflection refracted = refract_at(frame, direction, eta_it);
+                Deflection refracted = refract_at(frame, direction, IS_THIN(boundary) ? 1.0 : eta_it);
                 total = !refracted.exists;
                 direction = total ? turned.direction : refracted.direction;
             }

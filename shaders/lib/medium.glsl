@@ -115,6 +115,14 @@ vec3 both_faces(vec3 reflectance)
 {
     return 2.0 * reflectance / (1.0 + reflectance);
 }
+
+#define IS_THIN(boundary) boundary.thin
+#define OF_SHEET(boundary, reflection) (boundary.thin ? both_faces(reflection) : reflection)
+#define GO_STRAIGHT(boundary, theta, n_i, n_t, cosine2) if (boundary.thin) { n_t = n_i; cosine2 = theta * theta; }
+#else
+#define IS_THIN(boundary) false
+#define OF_SHEET(boundary, reflection) reflection
+#define GO_STRAIGHT(boundary, theta, n_i, n_t, cosine2)
 #endif
 
 #if SPECTRAL_GROUPS > 0
@@ -133,6 +141,7 @@ float medium_slope(uint object, float x)
 float index_ratio_derivative(MediumInterface boundary, uint g, float x, float n_i, float n_t)
 {
     float derivative = 0.0;
+    if (IS_THIN(boundary)) return derivative;
     if (boundary.after != NONE && object_at(boundary.after).group == g)
         derivative -= n_i / (n_t * n_t) * medium_slope(boundary.after, x);
     if (boundary.before != NONE && object_at(boundary.before).group == g)

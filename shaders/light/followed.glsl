@@ -86,11 +86,7 @@ FollowedRay follow_specular(vec3 position, vec3 direction, RayOrigin origin, uin
                 passes = true;
                 if (boundary.changes) {
                     float eta_it = medium_index(boundary.before, x_of_rgb.w) / medium_index(boundary.after, x_of_rgb.w);
-                    float eta_beyond = eta_it;
-#ifdef HAS_SHEET
-                    if (boundary.thin) eta_beyond = 1.0;
-#endif
-                    Deflection refracted = refract_at(frame, direction, eta_beyond);
+                    Deflection refracted = refract_at(frame, direction, IS_THIN(boundary) ? 1.0 : eta_it);
 #ifdef ROUGH_SURFACES
                     // A microfacet's share is its own, also where what it lets through does not leave the surface.
                     if (width > 0.0 && refracted.geometric) {
@@ -101,15 +97,11 @@ FollowedRay follow_specular(vec3 position, vec3 direction, RayOrigin origin, uin
 #ifdef POLARISED
                     vec3 cosine2 = vec3(transmitted_cosine2(refracted.theta, eta_it));
                     pair = fresnel_reflection(vec3(refracted.theta), vec3(eta_it), cosine2);
-#ifdef HAS_SHEET
-                    if (boundary.thin) pair = both_faces(pair);
-#endif
+                    pair = OF_SHEET(boundary, pair);
                     float reflectance = polarised_share(seen, pair).x;
 #else
                     float reflectance = fresnel_reflectance(refracted.theta, eta_it, refracted.exists ? transmitted_cosine2(refracted.theta, eta_it) : 0.0);
-#ifdef HAS_SHEET
-                    if (boundary.thin) reflectance = both_faces(vec3(reflectance)).x;
-#endif
+                    reflectance = OF_SHEET(boundary, vec3(reflectance)).x;
 #endif
                     passes = refracted.exists && unit_float(hash_combine(key, event)) >= reflectance;
                     if (passes) turned = refracted;

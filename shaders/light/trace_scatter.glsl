@@ -117,22 +117,13 @@ void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint k
 #ifdef POLARISED
     Polarisation seen = met_in_plane(ray, s);
     FresnelPair reflection = fresnel_reflection(theta, n_i / n_t, cosine2);
-#ifdef HAS_SHEET
-    if (boundary.thin) reflection = both_faces(reflection);
-#endif
+    reflection = OF_SHEET(boundary, reflection);
     vec3 reflectance = polarised_share(seen, reflection);
 #else
     vec3 reflectance = fresnel_reflectance(theta, n_i / n_t, cosine2);
-#ifdef HAS_SHEET
-    if (boundary.thin) reflectance = both_faces(reflectance);
+    reflectance = OF_SHEET(boundary, reflectance);
 #endif
-#endif
-#ifdef HAS_SHEET
-    if (boundary.thin) {
-        n_t = n_i;
-        cosine2 = theta * theta;
-    }
-#endif
+    GO_STRAIGHT(boundary, theta, n_i, n_t, cosine2)
     Deflection refracted = refract_at(frame, ray.direction, n_i.y / n_t.y);
 #ifdef ANCHOR_WEIGHTS
     reflectance = vec3(reflectance.y);
@@ -151,18 +142,11 @@ void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint k
 #ifdef POLARISED
     Polarisation companions_seen = companions_in_plane(ray, s);
     FresnelPair companion_reflection = fresnel_reflection(theta, companion_eta, transmitted_cosine2(theta, companion_eta));
-#ifdef HAS_SHEET
-    if (boundary.thin) companion_reflection = both_faces(companion_reflection);
-#endif
+    companion_reflection = OF_SHEET(boundary, companion_reflection);
     vec3 companion_reflectance = polarised_share(companions_seen, companion_reflection);
 #else
     vec3 companion_reflectance = fresnel_reflectance(theta, companion_eta, transmitted_cosine2(theta, companion_eta));
-#ifdef HAS_SHEET
-    if (boundary.thin) companion_reflectance = both_faces(companion_reflectance);
-#endif
-#endif
-#ifdef HAS_SHEET
-    if (boundary.thin) companion_eta = vec3(1.0);
+    companion_reflectance = OF_SHEET(boundary, companion_reflectance);
 #endif
 #ifdef ROUGH_SURFACES
     if (rough.width <= 0.0)
@@ -170,11 +154,8 @@ void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint k
     if (!refracted.exists && cosine2.y > 0.0) companion_reflectance = vec3(1.0);
     reflected_share = common_share(ray, reflectance.y, companion_reflectance);
     // Refracted they stay together only where nothing disperses.
-    bool stay = all(lessThan(abs(companion_eta - n_i.y / n_t.y), vec3(1e-7)));
+    bool stay = IS_THIN(boundary) || all(lessThan(abs(companion_eta - n_i.y / n_t.y), vec3(1e-7)));
     refracted_share = stay ? common_share(ray, 1.0 - reflectance.y, 1.0 - companion_reflectance) : 1.0 - reflectance.y;
-#endif
-#ifdef HAS_SHEET
-    if (boundary.thin) boundary.after = boundary.before;
 #endif
 #ifdef BAND_CUTS
     float onset = -1.0, at = splits ? cut_of_band(ray, start, frame, hit.distance, boundary, cosine2, onset) : border, below = 0.0;
