@@ -52,7 +52,7 @@ def check_scene(scene: Scene, file_name: str) -> list[str]:
     glasses = [o for o in scene.objects if o.material.transmits]
     for light in scene.lights:
         if light.has_place:
-            check_outside(light, [o for o in glasses if o.material.is_solid], file_name)
+            check_outside(light, glasses, file_name)
         check_lines(light, glasses, file_name)
     return (
         _glass_notes(glasses)
@@ -187,7 +187,7 @@ def check_texture(item: SceneObject, file_name: str) -> None:
 def check_outside(light: Light, glasses: Sequence[SceneObject], file_name: str) -> None:
     """Raise UserError for a light that stands inside one of `glasses`."""
     for item in glasses:
-        if contains(item, np.array(light.position)):
+        if item.material.is_solid and contains(item, np.array(light.position)):
             raise UserError(
                 f"{file_name}: light '{light.name}' stands inside the glass of '{item.name}'; move its position "
                 "out of it"
