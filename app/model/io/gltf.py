@@ -49,9 +49,7 @@ from .gltf_extras import read_node_dabs, read_scene_extras
 from .gltf_materials import (
     EXTRAS,
     UNDERSTOOD_MATERIALS,
-    as_sheet,
-    is_of_gltf,
-    is_thin_walled,
+    formed,
     own_extras,
     read_gltf_material,
 )
@@ -252,7 +250,7 @@ class _Reader:
             if mesh is None:
                 continue
             material = self._wearable(self._material(primitive.get("material")), mesh, label)
-            if material.is_solid and is_of_gltf(self.document, primitive["material"]):
+            if material.is_solid:
                 material = self._formed(node["mesh"], entry, primitive["material"], material, mesh)
             name = self._names.unique(label)
             matrix = world.copy()
@@ -277,15 +275,9 @@ class _Reader:
             found = [part for part in parts if part is not None]
             self._forms[number] = {id(part): is_open for part, is_open in zip(found, sheets_among(found), strict=True)}
         sheet, in_parts = self._forms[number][id(mesh)], len(self._forms[number]) > 1
-        name = str(self.document.item("materials", index).get("name", index))
-        thin_walled = is_thin_walled(self.document, index)
-        if sheet and not thin_walled:
-            self._unshown.add("Glass with a thickness on an open mesh is taken as a thin sheet", name)
-        elif not sheet and thin_walled:
-            self._unshown.add("Closed meshes of glass that glTF calls thin-walled (no thicknessFactor) are solid", name)
         if not sheet and not in_parts:
             self.notes += warnings_of(mesh)
-        return as_sheet(self.document, index, material) if sheet else material
+        return formed(self.document, index, material, sheet, self._unshown)
 
     def _wearable(self, material: Material, mesh: Mesh, label: str) -> Material:
         """`material`, without its texture where the mesh cannot say where it goes."""

@@ -60,20 +60,21 @@ def read_gltf_material(document: GltfDocument, index: int | None, textures: Gltf
     name = str(values.get("name", index))
     where = f"{document.path.name}: materials[{index}]"
     own, extras = own_extras(values), values.get("extras")
+    named = own.get("glass", extras.get("glass") if isinstance(extras, dict) else None)
     if "material" in own:
         table = SceneTable(own["material"], document.path, f"materials[{index}].extras.{EXTRAS}.material")
-        return read_material(table)
-    named = own.get("glass", extras.get("glass") if isinstance(extras, dict) else None)
-    if named is not None:
+        material = read_material(table)
+    elif named is not None:
         dispersion = catalogue.find(str(named), f"{where}.extras.glass")
-        return Dielectric(dispersion, _absorption(values.get("extensions", {}), where))
-    values = _metallic_roughness(values)
-    material = _material(values, name, where, unshown)
-    if material.receives:
-        if _FINISH in own:
+        material = Dielectric(dispersion, _absorption(values.get("extensions", {}), where))
+    else:
+        values = _metallic_roughness(values)
+        material = _material(values, name, where, unshown)
+        if material.receives and _FINISH in own:
             table = SceneTable(own[_FINISH], document.path, f"materials[{index}].extras.{EXTRAS}.{_FINISH}")
             material = material.changed(**read_finish(table))
-        material = material.changed(texture=textures.base_colour(values, name, unshown))
+        if material.receives:
+            material = material.changed(texture=textures.base_colour(values, name, unshown))
     _note_unshown(values, material, name, unshown)
     return material
 
@@ -185,26 +186,25 @@ def _glass(values: dict[str, Any], name: str, where: str, rgb: Vec3, unshown: Un
     return Dielectric(dispersion, _absorption(extensions, where), roughness=roughness, transmittance_rgb=rgb)
 
 
-def is_of_gltf(document: GltfDocument, index: int | None) -> bool:
-    """Whether glTF's own words, and no word of ours, say what material `index` is."""
-    values = {} if index is None else document.item("materials", index)
+def formed(document: GltfDocument, index: int, material: Material, is_sheet: bool, unshown: Unshown) -> Material:
+    """The glass of material `index`, unless words of ours say what it is, on a mesh of this form: a sheet is thin, and
+    absorption acts over the thickness that the file gives."""
+    values = document.item("materials", index)
     extras = values.get("extras")
-    return not own_extras(values).keys() & {"material", "glass"} and "glass" not in (extras or {})
-
-
-def as_sheet(document: GltfDocument, index: int, material: Material) -> Material:
-    """The glass of material `index` as a thin sheet: absorption acts over the thickness that the file gives."""
-    volume = document.item("materials", index).get("extensions", {}).get(VOLUME, {})
-    depth = float(volume.get("thicknessFactor", 0.0)) / float(volume.get("attenuationDistance", math.inf))
+    if own_extras(values).keys() & {"material", "glass"} or "glass" in (extras or {}):
+        return material
+    volume, name = values.get("extensions", {}).get(VOLUME, {}), str(values.get("name", index))
+    thickness = float(volume.get("thicknessFactor", 0.0))
+    if not is_sheet and thickness == 0.0:
+        unshown.add("Closed meshes of glass that glTF calls thin-walled (no thicknessFactor) are solid", name)
+    if not is_sheet:
+        return material
+    if thickness > 0.0:
+        unshown.add("Glass with a thickness on an open mesh is taken as a thin sheet", name)
+    depth = thickness / float(volume.get("attenuationDistance", math.inf))
     within = (float(c) ** depth for c in volume.get("attenuationColor", (1.0, 1.0, 1.0)))
     rgb = vec3(c * w for c, w in zip(material.transmittance_rgb, within, strict=True))
     return material.changed(thin=True, absorption=None, transmittance_rgb=rgb)
-
-
-def is_thin_walled(document: GltfDocument, index: int) -> bool:
-    """Whether glTF says that the surface of material `index` has no inside."""
-    volume = document.item("materials", index).get("extensions", {}).get(VOLUME, {})
-    return float(volume.get("thicknessFactor", 0.0)) == 0.0
 
 
 def _absorption(extensions: dict[str, Any], where: str) -> Absorption | None:
