@@ -9,7 +9,7 @@ import numpy as np
 
 from ..base.errors import UserError
 from .geometry.mesh import Mesh
-from .geometry.mesh_health import sheets_among
+from .geometry.mesh_health import forms_of
 from .scene import Light, Scene, SceneObject
 from .staging import listed
 
@@ -209,11 +209,13 @@ def check_lines(light: Light, glasses: Sequence[SceneObject], file_name: str) ->
 def _sheet_notes(glasses: list[SceneObject]) -> list[str]:
     """What of thin sheets has no effect; sheets that are to be solid."""
     sheets = [o for o in glasses if o.material.thin]
+    open_ones = [o for o in glasses if o.material.is_solid and not o.mesh.is_closed]
+    opens = forms_of([o.mesh.transformed(o.object_to_world) for o in open_ones])
     said = {
         "absorption has no effect in a thin sheet": [o for o in sheets if o.material.absorption is not None],
         "roughness has no effect in a thin sheet": [o for o in sheets if o.material.roughness],
         "an open sheet is taken as the face of a solid; thin = true makes it a pane": [
-            o for o in glasses if not (o.material.thin or o.mesh.is_closed) and sheets_among([o.mesh])[0]
+            o for o, form in zip(open_ones, opens, strict=True) if form == "sheet"
         ],
     }
     return [f"{listed([o.name for o in of])}: {what}" for what, of in said.items() if of]

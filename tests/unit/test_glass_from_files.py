@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import pytest
 from spectrasplat.base.errors import UserError
 from spectrasplat.model.io import gltf_compressed
 from spectrasplat.model.io.gltf import load_gltf
+from spectrasplat.model.io.gltf_write import save_gltf
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.scene import Diffuse, Material, Scene
 
@@ -79,14 +81,20 @@ def test_gltf_glass(tmp_path: Path, name: str) -> None:
     assert len(told) == (word != "") and word in "".join(told)
 
 
-@pytest.mark.parametrize(("joined", "sheets"), [(True, False), (False, True)])
-def test_parts_of_one_solid_are_no_sheets(tmp_path: Path, joined: bool, sheets: bool) -> None:
+@pytest.mark.parametrize("closed", [True, False])
+def test_parts_of_one_solid_are_joined(tmp_path: Path, closed: bool) -> None:
     builder = Builder().tetrahedron(pbr(1, 1, 1, 1) | through(1), FACES[:2])
-    other = builder.primitive(FACES[2:] if joined else FACES[2:3]) | {"material": 0}
+    other = builder.primitive(FACES[2:] if closed else FACES[2:3]) | {"material": 0}
     builder.json["meshes"][0]["primitives"].append(other)
     scene = load_gltf(builder.glb(tmp_path / "m.glb"))
-    assert [item.material.thin for item in scene.objects[:2]] == [sheets] * 2
-    assert not any("open mesh" in note for note in scene.notes)
+    glass = [item for item in scene.objects if item.material.transmits]
+    assert [item.material.thin for item in glass] == ([False] if closed else [True, True])
+    assert glass[0].mesh.is_closed == closed and not any("open" in note for note in scene.notes)
+    if closed:  # it is saved in its parts
+        moved = replace(glass[0], object_to_world=np.diag([2.0, 2.0, 2.0, 1.0]))
+        save_gltf(replace(scene, objects=(moved, *scene.objects[1:])), tmp_path / "n.glb", original=tmp_path / "m.glb")
+        again = load_gltf(tmp_path / "n.glb").objects[0]
+        assert again.mesh.volume() == pytest.approx(1.0 / 6.0) and again.object_to_world[0, 0] == 2.0
 
 
 NOT_SHOWN: dict[str, dict[str, Any]] = {

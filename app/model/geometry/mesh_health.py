@@ -18,6 +18,10 @@ _DEGENERATE = 1e-12
 """A triangle is degenerate when twice its area is below this fraction of its longest edge squared."""
 
 
+_SEAM = 1e-5
+"""Of a mesh's longest side: corners nearer than this are one where it is asked whether anything is enclosed."""
+
+
 @dataclass(frozen=True)
 class MeshHealth:
     """Counts of everything that makes a mesh something other than a closed oriented surface."""
@@ -176,23 +180,40 @@ def repair(mesh: Mesh, health: MeshHealth | None = None, solid: bool = True) -> 
     ), tuple(notes)
 
 
-def sheets_among(meshes: Sequence[Mesh]) -> list[bool]:
-    """Which of the surfaces enclose nothing, neither alone nor all open ones together, as parts of one solid do."""
+def forms_of(meshes: Sequence[Mesh]) -> list[str]:
+    """Of each surface: "solid"; "sheet", where it encloses nothing; or "part", where all open ones together do."""
     alone = [_is_open([mesh]) for mesh in meshes]
     together = any(alone) and _is_open([mesh for mesh, is_open in zip(meshes, alone, strict=True) if is_open])
-    return [is_open and together for is_open in alone]
+    return ["solid" if not is_open else "sheet" if together else "part" for is_open in alone]
+
+
+def joined(meshes: Sequence[Mesh]) -> Mesh:
+    """One repaired mesh of several, without texture coordinates."""
+    first = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes])
+    normals = [
+        mesh.face_normals()[:, None].repeat(3, 1) if mesh.corner_normals is None else mesh.corner_normals
+        for mesh in meshes
+    ]
+    whole = make_mesh(
+        meshes[0].name,
+        np.concatenate([mesh.vertices for mesh in meshes]),
+        np.concatenate([mesh.triangles + start for mesh, start in zip(meshes, first, strict=False)]),
+        None if all(mesh.corner_normals is None for mesh in meshes) else np.concatenate(normals),
+        source=meshes[0].source,
+    )
+    return repair(whole, solid=False)[0]
 
 
 def _is_open(meshes: Sequence[Mesh]) -> bool:
     """Whether borders are long for the area: of more than gaps."""
     sizes = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes])
     vertices = np.concatenate([mesh.vertices for mesh in meshes])
-    number = weld_map(vertices)[1]
+    # Seams whose corners differ by rounding are closed.
+    kept, number = weld_map(np.round(vertices / (_SEAM * float(np.ptp(vertices, axis=0).max()) or 1.0)))
     corners = np.concatenate([number[mesh.triangles + first] for mesh, first in zip(meshes, sizes, strict=False)])
     ends = np.sort(np.stack([corners.ravel(), np.roll(corners, -1, axis=1).ravel()]), axis=0)
     edges, uses = np.unique(ends, axis=1, return_counts=True)
-    vertices = vertices[weld_map(vertices)[0]]
-    border = float(np.linalg.norm(np.subtract(*vertices[edges[:, uses == 1]]), axis=1).sum())
+    border = float(np.linalg.norm(np.subtract(*vertices[kept][edges[:, uses == 1]]), axis=1).sum())
     return border**2 > float(sum(mesh.areas().sum() for mesh in meshes))
 
 

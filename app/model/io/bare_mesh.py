@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..geometry.mesh import Mesh
-from ..geometry.mesh_health import sheets_among
+from ..geometry.mesh_health import forms_of
 from ..geometry.mesh_normals import SMOOTH_CREASE_DEG, angle_weighted_normals, is_finely_cut
 from ..materials.dielectric import DEFAULT_GLASS
 from ..scene import Dielectric, Material, SceneObject
@@ -49,8 +49,8 @@ def _materials(
     names = [part.mesh.name for part in parts]
     if any(material is not None and material.transmits for material in known):
         made = [Dielectric.usual() if material is None else material.material() for material in known]
-        sheets = iter(sheets_among([part.mesh for part, each in zip(parts, made, strict=True) if each.transmits]))
-        made = [material.changed(thin=next(sheets)) if material.transmits else material for material in made]
+        forms = iter(forms_of([part.mesh for part, each in zip(parts, made, strict=True) if each.transmits]))
+        made = [material.changed(thin=next(forms) == "sheet") if material.transmits else material for material in made]
         glass = [name for name, material in zip(names, made, strict=True) if material.transmits]
         said = (
             f"its materials make glass of {listed(glass)}; dispersion, of which they know nothing, is {DEFAULT_GLASS}'s"

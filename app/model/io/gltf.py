@@ -18,7 +18,7 @@ import numpy as np
 from ...base.errors import UserError
 from ..fields import read_fields
 from ..geometry.mesh import Mesh, make_mesh
-from ..geometry.mesh_health import examine, repair, sheets_among, warnings_of
+from ..geometry.mesh_health import examine, forms_of, joined, repair, warnings_of
 from ..lights import LIGHT_KINDS, DirectionalLight, PointLight, SpotLight
 from ..lights.light import made
 from ..lights.light_file import read_light
@@ -75,6 +75,8 @@ class Origins:
     """Node -> world matrix."""
     objects: dict[str, tuple[int, int]] = field(default_factory=dict)
     """Object -> (node, primitive of the node's mesh)."""
+    parts: dict[tuple[int, int], list[int]] = field(default_factory=dict)
+    """(Node, first primitive) -> all primitives of one solid, which are one object."""
     lights: dict[str, int] = field(default_factory=dict)
     """Light -> node."""
     camera: int | None = None
@@ -111,8 +113,7 @@ class _Reader:
         self.camera: Camera | None = None
         self._meshes: dict[str, Mesh | None] = {}
         self._materials: dict[int | None, Material] = {}
-        self._forms: dict[int, dict[int, bool]] = {}
-        """Of each mesh of the document: which of its parts of glass are sheets."""
+        self._forms: dict[int, tuple[dict[int, str], Mesh | None]] = {}
         self._textures = GltfTextures(document, self.notes)
         self.origins.textures = self._textures.numbers
         self._names = Names()
@@ -251,7 +252,19 @@ class _Reader:
                 continue
             material = self._wearable(self._material(primitive.get("material")), mesh, label)
             if material.is_solid:
-                material = self._formed(node["mesh"], entry, primitive["material"], material, mesh)
+                forms, of_parts = self._form(node["mesh"], entry)
+                if forms[number] == "part" and of_parts is not None:
+                    mesh = of_parts
+                    parts = [i for i, form in forms.items() if form == "part"]
+                    if number != parts[0]:
+                        continue
+                    self.origins.parts[(index, number)] = parts
+                    if len({entry["primitives"][i]["material"] for i in parts}) > 1:
+                        self._unshown.add("Parts that make one solid together take the glass of the first", label)
+                self.notes += [] if forms[number] == "sheet" else warnings_of(mesh)
+                material = formed(
+                    self.document, primitive["material"], material, forms[number] == "sheet", self._unshown
+                )
             name = self._names.unique(label)
             matrix = world.copy()
             matrix.setflags(write=False)
@@ -264,20 +277,19 @@ class _Reader:
             self._materials[index] = read_gltf_material(self.document, index, self._textures, self._unshown)
         return self._materials[index]
 
-    def _formed(self, number: int, entry: dict[str, Any], index: int, material: Material, mesh: Mesh) -> Material:
-        """Glass by the form of the glass of its mesh `number` in the document: a sheet, or a solid."""
+    def _form(self, number: int, entry: dict[str, Any]) -> tuple[dict[int, str], Mesh | None]:
+        """Of the glass of mesh `number` of the document: the form of each part, and parts of one solid as one mesh."""
         if number not in self._forms:
-            parts = [
-                self._mesh(number, i, each, entry)
+            parts = {
+                i: mesh
                 for i, each in enumerate(entry["primitives"])
-                if self._material(each.get("material")).transmits
-            ]
-            found = [part for part in parts if part is not None]
-            self._forms[number] = {id(part): is_open for part, is_open in zip(found, sheets_among(found), strict=True)}
-        sheet, in_parts = self._forms[number][id(mesh)], len(self._forms[number]) > 1
-        if not sheet and not in_parts:
-            self.notes += warnings_of(mesh)
-        return formed(self.document, index, material, sheet, self._unshown)
+                if self._material(each.get("material")).is_solid
+                and (mesh := self._mesh(number, i, each, entry)) is not None
+            }
+            forms = dict(zip(parts, forms_of(list(parts.values())), strict=True))
+            of_one = [mesh for i, mesh in parts.items() if forms[i] == "part"]
+            self._forms[number] = forms, joined(of_one) if of_one else None
+        return self._forms[number]
 
     def _wearable(self, material: Material, mesh: Mesh, label: str) -> Material:
         """`material`, without its texture where the mesh cannot say where it goes."""
