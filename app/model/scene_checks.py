@@ -209,7 +209,8 @@ def check_lines(light: Light, glasses: Sequence[SceneObject], file_name: str) ->
 def _sheet_notes(glasses: list[SceneObject]) -> list[str]:
     """What of thin sheets has no effect; sheets that are to be solid."""
     sheets = [o for o in glasses if o.material.thin]
-    open_ones = [o for o in glasses if o.material.is_solid and not o.mesh.is_closed]
+    # Of a mesh from a file, reading has said that it is open.
+    open_ones = [o for o in glasses if o.material.is_solid and not o.mesh.source and not o.mesh.is_closed]
     opens = forms_of([o.mesh.transformed(o.object_to_world) for o in open_ones])
     said = {
         "absorption has no effect in a thin sheet": [o for o in sheets if o.material.absorption is not None],

@@ -141,7 +141,7 @@ _NOT_SHOWN: dict[str, tuple[str, tuple[str, ...]]] = {
 UNDERSTOOD_MATERIALS = frozenset(
     {*_GLASS_EXTENSIONS, "KHR_materials_emissive_strength", *(f"KHR_materials_{name}" for name in _NOT_SHOWN)}
 )
-_NEUTRAL = {"specularFactor": 1.0, "specularColorFactor": [1.0, 1.0, 1.0]}
+_NEUTRAL: dict[str, Any] = {"specularFactor": 1.0, "specularColorFactor": [1.0, 1.0, 1.0]}
 
 
 def _note_unshown(values: dict[str, Any], material: Material, name: str, unshown: Unshown) -> None:
