@@ -99,14 +99,8 @@ class Dielectric(Material):
     def content(self) -> tuple[object, ...]:
         """Its index on the visible grid, its priority, what it absorbs and lets through, how rough and thin it is."""
         absorbed = None if self.absorption is None else self.absorption.coefficient
-        return (
-            self.dispersion.index(VISIBLE_NM),
-            self.priority,
-            absorbed,
-            self.roughness,
-            self.thin,
-            *self.transmittance_rgb,
-        )
+        index = self.dispersion.index(VISIBLE_NM)
+        return index, self.priority, absorbed, self.thin, *self.transmittance_rgb, self.roughness
 
     def words(self) -> str:
         """Its glass, and what sets it apart from it."""
