@@ -110,12 +110,6 @@ void interface_indices(MediumInterface boundary, vec3 x, out vec3 n_i, out vec3 
 }
 
 #ifdef HAS_SHEET
-// What both faces of a thin sheet send back together, with all that is reflected between them, of what one face does.
-vec3 both_faces(vec3 reflectance)
-{
-    return 2.0 * reflectance / (1.0 + reflectance);
-}
-
 #define IS_THIN(boundary) boundary.thin
 #define OF_SHEET(boundary, reflection) (boundary.thin ? both_faces(reflection) : reflection)
 #define GO_STRAIGHT(boundary, theta, n_i, n_t, cosine2) if (boundary.thin) { n_t = n_i; cosine2 = theta * theta; }

@@ -29,10 +29,12 @@ from spectrasplat.stress.rigs.camera_probe import (
     slope_sky,
     with_sky,
 )
+from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 from spectrasplat.stress.rigs.probe import blocks
 
 from tests.gpu.camera_rig import at
 
+COVERS = {"optics.glsl": ("both_faces",), "polarisation.glsl": ("both_faces",)}
 N = 1.5
 TINT = (0.9, 0.3, 0.2)
 SHEET = Dielectric(constant(N), thin=True, transmittance_rgb=TINT)
@@ -91,6 +93,19 @@ def test_a_patch_of_sun(gl: Context, name: str, method: str) -> None:
     seen = render(scene, RenderSettings(8, 8, photons=20_000, spp=16, method=method), context=gl).rgb.mean(axis=(0, 1))
     # What two reflections between a sheet and its tint would add is below a thousandth.
     assert seen == pytest.approx(LUX * 0.5 / np.pi * expected, rel=0.012)
+
+
+def test_both_faces(gl: Context) -> None:
+    one = as_f32(np.random.default_rng(3).uniform(0.0, 0.99, (64, 3)))
+    body = (
+        "r = both_faces(s); FresnelPair pair = both_faces(FresnelPair(s, s * s, -s, s)); p = pair.p; real = pair.real;"
+    )
+    libraries = ["lib/optics.glsl", "lib/polarisation.glsl"]
+    got = evaluate(gl.ctx, libraries, body, {"s": one}, dict.fromkeys(("r", "p", "real"), "vec3"), {"HAS_SHEET": 1})
+    # There and back between the faces, added up.
+    sums = [sum(r * (1.0 - r) ** 2 * r ** (2 * k) for k in range(4000)) + r for r in (one, one**2)]
+    for name, wanted in (("r", sums[0]), ("p", sums[1]), ("real", -np.sqrt(sums[0] * sums[1]))):
+        np.testing.assert_allclose(got[name], wanted, atol=2e-5)
 
 
 @pytest.mark.parametrize("degrees", [0.0, 60.0, 80.0])
