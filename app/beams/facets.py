@@ -147,11 +147,11 @@ def beam_scene(
             obstacles.append(i)
         else:
             outlines[i] = _facets_kept(item.mesh, meshes[i])
-    for i in _inside_of_obstacles(scene, meshes, [i for i in outlines if scene.objects[i].material.transmits], why_not):
+    for i in _inside_of_obstacles(scene, meshes, [i for i in outlines if scene.objects[i].material.is_solid], why_not):
         why_not[i] = "it nests in, or touches, a solid that is not faceted"
         obstacles.append(i)
         del outlines[i]
-    transparent = [i for i in outlines if scene.objects[i].material.transmits]
+    transparent = [i for i in outlines if scene.objects[i].material.is_solid]
     for i in transparent[MAX_SOLIDS:]:
         why_not[i] = f"more than {MAX_SOLIDS} transparent solids"
         obstacles.append(i)
@@ -165,7 +165,7 @@ def beam_scene(
         _solids(scene, meshes, facets, {i: bit for bit, i in enumerate(ranked)}, glass, tint),
         tables,
         np.array([meshes[i].bounds() for i in obstacles], float).reshape(-1, 2, 3),
-        any(o.material.transmits and o.material.absorption is not None for o in scene.objects),
+        any(o.material.is_solid and o.material.absorption is not None for o in scene.objects),
         any(o.material.is_mirror and len(set(o.material.reflectance_rgb)) > 1 for o in scene.objects),
         tint_curves(scene),
         tuple(i for i in outlines if scene.objects[i].material.is_specular),
@@ -375,7 +375,7 @@ def _facets(
         record["plane"] = *normal, normal @ middle
         record["kind"] = RECEIVER if material.receives else BLACK
         if material.is_specular:
-            record["kind"] = DIELECTRIC if material.transmits else MIRROR
+            record["kind"] = DIELECTRIC if material.is_solid else MIRROR
         record["owner"], record["triangle"] = i, triangle
         record["corner"][: len(outline)], record["corners"] = outline, len(outline)
         edge = np.roll(outline, -1, axis=0) - outline
@@ -418,7 +418,7 @@ def _tables(scene: Scene, axis: SpectralAxis, unit: float) -> tuple[np.ndarray, 
         material = item.material
         glass.append(_NO_ROW)
         tint.append(_NO_ROW)
-        if material.transmits:
+        if material.is_solid:
             if material.dispersion not in glasses:
                 glasses.append(material.dispersion)
                 row_of_glass.append(len(rows))
@@ -438,7 +438,7 @@ def _inside_of_obstacles(
 ) -> list[int]:
     """Faceted solids whose boxes meet that of a solid that photons carry, or of another one of these."""
     bounds = {i: np.array(mesh.bounds()) for i, mesh in enumerate(meshes)}
-    found = [i for i in why_not if scene.objects[i].material.transmits]
+    found = [i for i in why_not if scene.objects[i].material.is_solid]
     taken: list[int] = []
     while found:
         low, high = bounds[found.pop()]

@@ -49,6 +49,8 @@ def with_object(scene: Scene, index: int, item: SceneObject) -> Scene:
     if item.material is not before.material and item.material.transmits:
         for light in scene.lights:
             check_lines(light, [item], scene.name)
+        if before.material.thin:
+            _check_lights(changed, item)
     if item.object_to_world is not before.object_to_world:
         _check_matrix(item)
         _check_lights(changed, item)

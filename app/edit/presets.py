@@ -131,7 +131,7 @@ def apply_material(scene: Scene, index: int, preset: MaterialPreset) -> Scene:
     if preset.tint is not None:
         material = tinted(scene.objects[index], preset.tint)
     if before.transmits and material.transmits:
-        material = material.changed(priority=before.priority, roughness=before.roughness)
+        material = material.changed(priority=before.priority, roughness=before.roughness, thin=before.thin)
     return set_material(scene, index, material)
 
 

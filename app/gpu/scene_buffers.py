@@ -244,7 +244,7 @@ class SceneBuffers:
         for index, (record, item) in enumerate(zip(records, self.scene.objects, strict=True)):
             record["first_triangle"] = self.first_triangle[index]
             material = item.material
-            record["kind"] = material.gpu_code
+            record["kind"] = material.met_as
             record["colour"][:3] = material.reflectance_rgb
             if material.receives:
                 record["receiver"] = self.receivers.index(index)
@@ -268,9 +268,12 @@ class SceneBuffers:
                     record["colour"][:2] = width, rough_glass.ROWS * widths.index(width)
                 if index in stack_bits:
                     record["stack_bit"] = stack_bits[index]
-                if material.dispersion in self.groups.glasses and self.groups.count:
+                if material.disperses and self.groups.count:
                     record["group"] = self.groups.group[self.groups.glasses.index(material.dispersion)]
-            if material.absorption is not None:
+            if material.filters:
+                record["texture"] = len(weights)
+                weights.append(np.interp(nm, VISIBLE_NM, material.surface_filter))
+            if material.absorption is not None and material.is_solid:
                 alpha = material.absorption.coefficient
                 row = absorbers.setdefault(alpha.tobytes(), len(weights))
                 record["weight_row"] = row
@@ -357,7 +360,7 @@ def _stack_bits(scene: Scene) -> dict[int, int]:
     """Object → bit in a ray's inside mask; a higher bit wins. Raises UserError beyond 32 solids.
 
     Where no two solids meet, yet a stack is wanted (to measure it), all of them are on it."""
-    overlapping = overlapping_solids(scene) or [i for i, o in enumerate(scene.objects) if o.material.transmits]
+    overlapping = overlapping_solids(scene) or [i for i, o in enumerate(scene.objects) if o.material.is_solid]
     if len(overlapping) > 32:
         raise UserError(
             f"scene '{scene.name}': {len(overlapping)} transparent solids nest or touch and at most 32 may; "

@@ -39,7 +39,7 @@ PIECE = Struct(
 OBJECT = Struct(
     "Object",
     (
-        Field("kind", "uint", "0 black, 1 diffuse, 2 mirror, 3 dielectric, 4 grating"),
+        Field("kind", "uint", "0 black, 1 diffuse, 2 mirror, 3 dielectric, 4 grating, 5 thin sheet"),
         Field("medium", "uint", "row of the index table (dielectric, grating: its wavelength)"),
         Field(
             "weight_row", "uint", "row of absorption (1/GPU unit) or reflectance over x, texel of a grating, or NONE"
@@ -50,7 +50,11 @@ OBJECT = Struct(
         Field("receiver", "uint", "receiver index, or NONE"),
         Field("group", "uint", "spectral group of the glass, or NONE"),
         Field("first_triangle", "uint", "global source index of its first triangle"),
-        Field("texture", "uint", "its picture in the texture store, or NONE"),
+        Field(
+            "texture",
+            "uint",
+            "its picture in the texture store; of glass: row of what its surface lets through; or NONE",
+        ),
         Field(
             "colour",
             "vec4",

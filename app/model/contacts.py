@@ -30,7 +30,7 @@ def overlapping_solids(scene: Scene) -> list[int]:
     """Indices of dielectric objects whose bounds overlap or touch those of another one, or that may touch a surface
     that is not glass: a ray keeps a bit for each, up to 32 of them, those among glass first."""
     among_glass = _nested(scene)
-    on_sheets = {i for pair in contacts(scene) for i in pair if scene.objects[i].material.transmits}
+    on_sheets = {i for pair in contacts(scene) for i in pair if scene.objects[i].material.is_solid}
     return among_glass + sorted(on_sheets - set(among_glass))[: max(0, 32 - len(among_glass))]
 
 
@@ -44,7 +44,7 @@ def contacts(scene: Scene) -> list[tuple[int, int]]:
     specular = np.array([item.material.is_specular for item in objects])
     chosen = bounds[specular] if specular.any() else bounds
     slack = 0.5 * _SLACK * float(np.linalg.norm(chosen[:, 1].max(axis=0) - chosen[:, 0].min(axis=0)))
-    glass = np.array([item.material.transmits for item in objects])
+    glass = np.array([item.material.is_solid for item in objects])
 
     def reaches(i: int, j: int) -> bool:
         if glass[i]:
@@ -74,12 +74,12 @@ def standing(scene: Scene) -> list[tuple[int, int]]:
 
 def nested_pairs(scene: Scene) -> list[tuple[int, int]]:
     """Pairs of dielectric objects whose bounds overlap or touch."""
-    indices = [i for i, o in enumerate(scene.objects) if o.material.transmits]
+    indices = [i for i, o in enumerate(scene.objects) if o.material.is_solid]
     return [(indices[i], indices[j]) for pairs in _meeting_solids(scene, indices) for i, j in pairs.tolist()]
 
 
 def _nested(scene: Scene) -> list[int]:
-    indices = [i for i, o in enumerate(scene.objects) if o.material.transmits]
+    indices = [i for i, o in enumerate(scene.objects) if o.material.is_solid]
     found = np.zeros(len(indices), bool)
     for pairs in _meeting_solids(scene, indices):
         found[pairs] = True

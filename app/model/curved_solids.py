@@ -86,7 +86,7 @@ def curved_solids(scene: Scene) -> dict[int, tuple[Face, ...]]:
 def faces_of(item: SceneObject) -> tuple[Face, ...]:
     """Of an object that can be met as a curved solid, in its own frame; empty: it cannot."""
     material = item.material
-    if material.is_grating or not (material.transmits or material.is_mirror) or material.texture is not None:
+    if material.is_grating or not (material.is_solid or material.is_mirror) or material.texture is not None:
         return ()
     recipe = recipe_of(item.mesh)
     make = None if recipe is None else _FACES.get(recipe.get("shape", ""))

@@ -64,6 +64,10 @@ class Features:
     band_cuts: bool
     """Total internal reflection may cut a band."""
     dielectrics: bool
+    sheets: bool
+    """Some glass is a thin sheet, with one medium on both sides."""
+    filters: bool
+    """Some surface of glass lets through only a share of what enters."""
     mirrors: bool
     gratings: bool
     smooth_normals: bool
@@ -163,6 +167,8 @@ class Features:
             "BAND_CUTS": self.band_cuts,
             "LANDING_CUTS": self.landing_cuts,
             "HAS_DIELECTRIC": self.dielectrics,
+            "HAS_SHEET": self.sheets,
+            "SURFACE_FILTERS": self.filters,
             "HAS_MIRROR": self.mirrors,
             "HAS_GRATING": self.gratings,
             "SMOOTH_NORMALS": self.smooth_normals,
@@ -202,7 +208,7 @@ class Features:
         curved = curved_solids(scene)
         loose = [o for i, o in enumerate(scene.objects) if i not in convex and i not in curved]
         loose_triangles = sum(len(o.mesh.triangles) for o in loose)
-        absorbing = any(o.material.absorption is not None for o in dielectrics)
+        absorbing = any(o.material.absorption is not None for o in dielectrics if o.material.is_solid)
         smooth = any(
             o.mesh.corner_normals is not None and (o.material.is_specular or o.material.has_coat) for o in loose
         )
@@ -225,12 +231,12 @@ class Features:
         told = absorbing and not plain and tint_levels(scene) is not None
         by_beams = set(beam_objects(scene)) if beams else set()
         by_photons = any(o.material.is_specular for i, o in enumerate(scene.objects) if i not in by_beams)
-        coloured_mirror = any(o.material.is_mirror and o.material.is_coloured for o in scene.objects)
+        coloured = any((o.material.is_mirror or o.material.transmits) and o.material.is_coloured for o in scene.objects)
         return Features(
             method=settings.method,
             spectral_groups=groups,
             merged_groups=groups > 0 and (settings.method == "srd-lambda" or len(dispersive) > MAX_GROUPS),
-            spectral_weights=not single and ((groups > 0 and bool(dielectrics)) or absorbing or coloured_mirror),
+            spectral_weights=not single and ((groups > 0 and bool(dielectrics)) or absorbing or coloured),
             footprints=footprints,
             point_spectrum=single,
             random_wavelength=random,
@@ -241,6 +247,8 @@ class Features:
             and bool(dielectrics)
             and sum(not o.material.is_specular for o in scene.objects) > 1,
             dielectrics=bool(dielectrics),
+            sheets=any(o.material.thin for o in dielectrics),
+            filters=any(o.material.filters for o in dielectrics),
             mirrors=any(o.material.is_mirror for o in scene.objects),
             gratings=any(o.material.is_grating for o in scene.objects),
             smooth_normals=smooth,
@@ -258,7 +266,7 @@ class Features:
             camera_specular=camera_specular,
             camera_disperses=camera_disperses,
             map_tents=tents,
-            reindexed=_reindexed(scene, settings, groups, coloured=absorbing or coloured_mirror),
+            reindexed=_reindexed(scene, settings, groups, coloured=absorbing or coloured),
             local_gain=groups > 0 and settings.local_gain and any(o.local_dispersion for o in scene.objects),
             anchor_weights=settings.anchor_weights,
             beams=beams,
@@ -312,6 +320,10 @@ def why_no_beams(item: SceneObject) -> str | None:
     """Why beams cannot carry what an object of glass or a mirror throws; None: they can."""
     if item.material.is_grating:
         return "a grating sends light into several orders"
+    if item.material.thin:
+        return "it is a thin sheet"
+    if item.material.filters:
+        return "its surface is coloured"
     if item.material.is_rough:
         return "its surface is rough"
     if len(item.mesh.triangles) > MAX_BEAM_TRIANGLES:
@@ -348,7 +360,7 @@ def camera_needs(scene: Scene, settings: RenderSettings) -> tuple[bool, bool]:
     if not (settings.any_view or mirrors):
         # What is refracted or reflected first must be seen first; all else follows from it.
         glass = glass if any(in_view(o, scene.camera, settings.width / settings.height) for o in glass) else []
-    return bool(glass) or mirrors, any(o.material.dispersion.is_dispersive for o in glass)
+    return bool(glass) or mirrors, any(o.material.disperses for o in glass)
 
 
 def in_view(item: SceneObject, camera: Camera, aspect: float) -> bool:
@@ -380,7 +392,7 @@ def dispersive_materials(scene: Scene) -> list[int]:
     seen, first = set(), []
     for index, item in enumerate(scene.objects):
         glass = item.material.dispersion
-        if glass is not None and glass.is_dispersive and glass not in seen:
+        if item.material.disperses and glass not in seen:
             seen.add(glass)
             first.append(index)
     return first
@@ -393,7 +405,7 @@ def half_spaces(scene: Scene) -> dict[int, np.ndarray]:
     found: dict[int, np.ndarray] = {}
     planes = 0
     for index, item in enumerate(scene.objects):
-        own = item.mesh.convex_planes if item.material.transmits else None
+        own = item.mesh.convex_planes if item.material.is_solid else None
         if own is not None and len(own) <= MAX_SOLID_PLANES:
             found[index] = own
             planes += len(own)

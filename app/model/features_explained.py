@@ -80,6 +80,20 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
         ("refraction", features.dielectrics, "there is glass" if features.dielectrics else "there is no glass"),
         ("mirrors", features.mirrors, "there are mirrors" if features.mirrors else "there are no mirrors"),
         (
+            "thin sheets",
+            features.sheets,
+            f"of {names([o.name for o in scene.objects if o.material.thin])}"
+            if features.sheets
+            else "no glass is thin",
+        ),
+        (
+            "surface colours",
+            features.filters,
+            f"of {names([o.name for o in scene.objects if o.material.filters])}"
+            if features.filters
+            else "no glass has a coloured surface",
+        ),
+        (
             "gratings",
             features.gratings,
             "there are gratings" if features.gratings else "there is no grating",

@@ -9,7 +9,9 @@ import numpy as np
 
 from ..base.errors import UserError
 from .geometry.mesh import Mesh
+from .geometry.mesh_health import forms_of
 from .scene import Light, Scene, SceneObject
+from .staging import listed
 
 MAX_LIGHTS, MAX_OBJECTS = 256, 0xFFFF
 """A photon remembers the light that it comes from in 8 bits, and the object it met first in 16, all of them set for
@@ -52,11 +54,15 @@ def check_scene(scene: Scene, file_name: str) -> list[str]:
         if light.has_place:
             check_outside(light, glasses, file_name)
         check_lines(light, glasses, file_name)
-    return _glass_notes(glasses) + [
-        f"light '{light.name}' has no power: it gives no light"
-        for light in scene.lights
-        if not light.spectral_power.power_w() > 0.0
-    ]
+    return (
+        _glass_notes(glasses)
+        + _sheet_notes(glasses)
+        + [
+            f"light '{light.name}' has no power: it gives no light"
+            for light in scene.lights
+            if not light.spectral_power.power_w() > 0.0
+        ]
+    )
 
 
 def contains(item: SceneObject, point: np.ndarray) -> bool:
@@ -181,7 +187,7 @@ def check_texture(item: SceneObject, file_name: str) -> None:
 def check_outside(light: Light, glasses: Sequence[SceneObject], file_name: str) -> None:
     """Raise UserError for a light that stands inside one of `glasses`."""
     for item in glasses:
-        if contains(item, np.array(light.position)):
+        if item.material.is_solid and contains(item, np.array(light.position)):
             raise UserError(
                 f"{file_name}: light '{light.name}' stands inside the glass of '{item.name}'; move its position "
                 "out of it"
@@ -198,6 +204,22 @@ def check_lines(light: Light, glasses: Sequence[SceneObject], file_name: str) ->
                     f"{file_name}: the line at {wavelength_nm:g} nm of light '{light.name}' lies outside the data of "
                     f"'{item.name}' ({low:g} to {high:g} nm); choose another wavelength or glass"
                 )
+
+
+def _sheet_notes(glasses: list[SceneObject]) -> list[str]:
+    """What of thin sheets has no effect; sheets that are to be solid."""
+    sheets = [o for o in glasses if o.material.thin]
+    # Of a mesh from a file, reading has said that it is open.
+    open_ones = [o for o in glasses if o.material.is_solid and not o.mesh.source and not o.mesh.is_closed]
+    opens = forms_of([o.mesh.transformed(o.object_to_world) for o in open_ones])
+    said = {
+        "absorption has no effect in a thin sheet": [o for o in sheets if o.material.absorption is not None],
+        "roughness has no effect in a thin sheet": [o for o in sheets if o.material.roughness],
+        "an open sheet is taken as the face of a solid; thin = true makes it a pane": [
+            o for o, form in zip(open_ones, opens, strict=True) if form == "sheet"
+        ],
+    }
+    return [f"{listed([o.name for o in of])}: {what}" for what, of in said.items() if of]
 
 
 def _glass_notes(glasses: list[SceneObject]) -> list[str]:

@@ -55,7 +55,7 @@ class ObjectReader:
     def read(self, table: SceneTable) -> list[SceneObject]:
         """The object of one table, or its instances."""
         material = read_object_material(table, self._materials, self._textures)
-        mesh = self._read_mesh(table, solid=material.transmits)
+        mesh = self._read_mesh(table, solid=material.is_solid)
         base = read_placement(table)
         rest = table.number("rests_at_z", None)
         painted = read_dabs(table, material)

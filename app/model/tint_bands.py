@@ -26,7 +26,7 @@ _LEAST_SHARE = 1e-3
 _PATHS = (0.5, 1.0, 2.0)
 """Lengths of glass, in mean chords of the solid."""
 _MIRRORS = (1, 4)
-"""Reflections by a coloured mirror."""
+"""Reflections by a coloured mirror, or passages of a coloured surface of glass."""
 _BRIGHTENED = 0.5
 """Of the tolerance asked for, that the light's brightness may be off by where footprints are so broad that all
 wavelengths of a band have one weight; twice `TOLERANCE` at least, for few are.
@@ -44,17 +44,17 @@ def tint_curves(scene: Scene, but: np.ndarray | None = None) -> np.ndarray:
     `but`: coefficient (401,) of a glass that is left out."""
     curves: dict[bytes, np.ndarray] = {}
     for item in scene.objects:
-        found: Sequence[np.ndarray] = ()
-        absorption = item.material.absorption
-        if absorption is not None and but is not None and np.array_equal(absorption.coefficient, but):
-            continue
-        if absorption is not None:
+        material = item.material
+        found: list[np.ndarray] = []
+        absorption = material.absorption if material.is_solid else None
+        if absorption is not None and (but is None or not np.array_equal(absorption.coefficient, but)):
             depth = absorption.coefficient * mean_chord(item)
             with np.errstate(under="ignore"):
-                found = [np.exp(-share * depth) for share in _PATHS]
-        elif (rgb := getattr(item.material, "reflectance_rgb", None)) is not None and not item.material.receives:
-            curve = mirror_reflectance(rgb, VISIBLE_NM)
-            found = [curve**times for times in _MIRRORS]
+                found += [np.exp(-share * depth) for share in _PATHS]
+        if material.is_mirror:
+            found += [mirror_reflectance(material.reflectance_rgb, VISIBLE_NM) ** times for times in _MIRRORS]
+        if material.filters:
+            found += [material.surface_filter**times for times in _MIRRORS]
         curves |= {curve.round(6).tobytes(): curve for curve in found if np.ptp(curve) > TOLERANCE}
     return np.array(list(curves.values())).reshape(-1, len(VISIBLE_NM))
 

@@ -87,7 +87,7 @@ def tint_levels(scene: Scene) -> TintLevels | None:
         return None
     most, found = TOLERANCE, None
     for item in scene.objects:
-        if item.material.absorption is not None:
+        if item.material.absorption is not None and item.material.is_solid:
             coefficient, chord = item.material.absorption.coefficient, mean_chord(item)
             with np.errstate(under="ignore"):
                 colours = float(np.ptp(np.exp(-coefficient * chord)))

@@ -131,7 +131,7 @@ def camera_parameters(scene: SceneBuffers, camera: Camera, width: int, height: i
             parameters[name] = column
     parameters["inside_object"] = NONE
     for index, item in enumerate(scene.scene.objects):
-        if item.material.transmits and contains(item, np.array(camera.position)):
+        if item.material.is_solid and contains(item, np.array(camera.position)):
             if index in scene.stack_objects:
                 parameters["inside_mask"] |= np.uint32(1 << scene.stack_objects.index(index))
             else:

@@ -25,13 +25,7 @@ from ..model.optics.colorimetry import VISIBLE_NM, daylight_per_lumen, rgb_basis
 from ..model.optics.glass import Dispersion
 from ..model.optics.spectral_tables import SpectralAxis, cumulative, index_table
 from ..model.optics.spectrum import Spectrum
-from ..model.scene import (
-    Absorption,
-    Dielectric,
-    Material,
-    Mirror,
-    Scene,
-)
+from ..model.scene import Material, Scene
 from .picture_channels import Channels
 
 EMISSION_CELLS = SAMPLES - 1
@@ -65,7 +59,7 @@ class CameraTables:
         shown = scene.scene
         glasses = _shown_media(scene)
         axis = _axis(scene, list(glasses.values()))
-        absorptions = _absorptions(shown, scene.space.scale)
+        absorptions = _distinct_absorptions(shown, scene.space.scale)
         cell_cdf = _cell_cdf(axis, channels)
         spectra, defines = _spectra(scene, glasses, axis, absorptions, cell_cdf, maps)
         emission, rows = _emission(shown, axis, channels, reflectances, maps, scene.space.scale)
@@ -76,9 +70,12 @@ class CameraTables:
         colours[:, 3] = -1.0
         for row, item in zip(colours, shown.objects, strict=True):
             row[:3] = item.material.reflectance_rgb
-            coefficient = _absorption(item.material, scene.space.scale)
-            if coefficient is not None:
-                row[3] = next(i for i, known in enumerate(absorptions) if np.array_equal(known, coefficient))
+            if item.material.transmits:
+                # Which filter its surface is, and the most of it.
+                row[:2] = -1.0, item.material.surface_filter.max()
+            for column, coefficient in zip((3, 0), _absorptions(item.material, scene.space.scale), strict=True):
+                if coefficient is not None:
+                    row[column] = next(i for i, known in enumerate(absorptions) if np.array_equal(known, coefficient))
         return cls(
             spectra_texture(ctx, spectra),
             _texture(ctx, emission),
@@ -109,24 +106,27 @@ def _axis(scene: SceneBuffers, shown: list[Dispersion]) -> SpectralAxis:
     return SpectralAxis.build(shown if by_glass else [])
 
 
-def _absorptions(scene: Scene, scale: float) -> list[np.ndarray]:
-    """Distinct absorption coefficients (401,) of glasses, 1/GPU unit, and of coloured mirrors, a reflection, in the
-    order of the objects."""
+def _distinct_absorptions(scene: Scene, scale: float) -> list[np.ndarray]:
+    """Distinct absorption coefficients (401,) of glasses, 1/GPU unit, of coloured mirrors, a reflection, and of
+    surfaces of glass, a passage, in the order of the objects."""
     distinct: list[np.ndarray] = []
     for item in scene.objects:
-        coefficient = _absorption(item.material, scale)
-        if coefficient is not None and not any(np.array_equal(coefficient, known) for known in distinct):
-            distinct.append(coefficient)
+        for coefficient in _absorptions(item.material, scale):
+            if coefficient is not None and not any(np.array_equal(coefficient, known) for known in distinct):
+                distinct.append(coefficient)
     return distinct
 
 
-def _absorption(material: Material, scale: float) -> np.ndarray | None:
-    match material:
-        case Dielectric(absorption=Absorption(coefficient=coefficient)):
-            return coefficient / scale
-        case Mirror(reflectance_rgb=rgb) if len(set(rgb)) > 1:
-            return -np.log(np.maximum(rgb_basis() @ np.asarray(rgb, float), 1e-30))
-    return None
+def _absorptions(material: Material, scale: float) -> tuple[np.ndarray | None, np.ndarray | None]:
+    """Within a solid, or by a mirror; on the way through a surface."""
+    within = material.absorption.coefficient / scale if material.absorption is not None and material.is_solid else None
+    if material.is_mirror and material.is_coloured:
+        within = _depth(rgb_basis() @ np.asarray(material.reflectance_rgb, float))
+    return within, _depth(material.surface_filter) if material.filters else None
+
+
+def _depth(kept: np.ndarray) -> np.ndarray:
+    return -np.log(np.maximum(kept, 1e-30))
 
 
 def _finishes(scene: Scene, first_row: int) -> tuple[np.ndarray | None, np.ndarray]:

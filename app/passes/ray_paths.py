@@ -157,7 +157,7 @@ class RayPaths:
         if self._inside is None or self._inside[0] != key:
             mask, alone = 0, NONE
             for index, item in enumerate(self.scene.scene.objects):
-                if item.material.transmits and contains(item, point):
+                if item.material.is_solid and contains(item, point):
                     if index in self.scene.stack_objects:
                         mask |= 1 << self.scene.stack_objects.index(index)
                     else:

@@ -277,7 +277,7 @@ def camera_defines(scene: SceneBuffers, channels: Channels, layer: str, maps: Ma
         "ENDS_HELD": ENDS_HELD,
     }
     materials = [item.material for item in scene.scene.objects]
-    coloured = any(m.is_mirror and m.is_coloured for m in materials)
+    coloured = features.filters or any(m.is_mirror and m.is_coloured for m in materials)
     absorbs = any(m.absorption is not None for m in materials)
     lit = features.environment_lights and lighting_environment(scene.scene) is not None
     switches = {

@@ -16,7 +16,7 @@ def camera_start(scene: Scene, photons: PhotonScene) -> Start:
     does)."""
     mask, alone = 0, AIR
     for index, item in enumerate(scene.objects):
-        if item.material.transmits and contains(item, np.array(scene.camera.position)):
+        if item.material.is_solid and contains(item, np.array(scene.camera.position)):
             if photons.bit[index] >= 0:
                 mask |= 1 << int(photons.bit[index])
             else:

@@ -102,7 +102,7 @@ def _behind(scene, i, t, ox, oy, oz, dx, dy, dz, last):
     if abs(nx * mx + ny * my + nz * mz) <= _LEANING:
         return False
     height = t * abs(dx * nx + dy * ny + dz * nz)
-    return height <= (scene.contact if scene.kind[scene.owner[i]] == GRATING else scene.near)
+    return height <= (scene.contact if scene.kind[scene.owner[i]] >= GRATING else scene.near)
 
 
 @inlined

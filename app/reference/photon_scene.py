@@ -26,7 +26,7 @@ from ..model.scene import (
 from .rough_albedo import albedo_tables
 from .scene_surfaces import Surfaces
 
-BLACK, DIFFUSE, MIRROR, DIELECTRIC, GRATING = range(5)
+BLACK, DIFFUSE, MIRROR, DIELECTRIC, GRATING, SHEET = range(6)
 OUTSIDE = -1
 """In place of an object: air."""
 
@@ -72,6 +72,8 @@ class PhotonScene(NamedTuple):
     """int32 (O,): row of `refractive_index`, or −1."""
     weight: np.ndarray
     """int32 (O,): row of `weights` (absorption per unit, or a mirror's reflectance), or −1."""
+    filter: np.ndarray
+    """int32 (O,): row of `weights` (what a surface of glass lets through of what enters), or −1."""
     bit: np.ndarray
     """int32 (O,): rank of a solid among those that nest or touch, or −1."""
     stack: np.ndarray
@@ -151,13 +153,16 @@ def photon_scene(scene: Scene) -> tuple[PhotonScene, np.ndarray]:
     normals, smooth, corner_normals = surfaces.normals(order)
     rank = _ranks(scene)
     media, weights = _Rows(), _Rows()
-    kinds, medium, weight = [], [], []
+    kinds, medium, weight, filters = [], [], [], []
     for item in scene.objects:
         material = item.material
-        kinds.append(material.gpu_code)
+        kinds.append(material.met_as)
         medium.append(media.add(material.dispersion.index(TABLE_NM)) if material.transmits else -1)
         weight.append(-1)
-        if material.absorption is not None:
+        filters.append(-1)
+        if material.filters:
+            filters[-1] = weights.add(np.interp(TABLE_NM, VISIBLE_NM, material.surface_filter))
+        if material.absorption is not None and material.is_solid:
             weight[-1] = weights.add(np.interp(TABLE_NM, VISIBLE_NM, material.absorption.coefficient))
         elif material.is_mirror:
             reflectance = rgb_partition() @ np.asarray(material.reflectance_rgb, float)
@@ -186,6 +191,7 @@ def photon_scene(scene: Scene) -> tuple[PhotonScene, np.ndarray]:
         np.array(kinds, np.int32),
         np.array(medium, np.int32),
         np.array(weight, np.int32),
+        np.array(filters, np.int32),
         np.array([rank.get(i, -1) for i in range(len(meshes))], np.int32),
         np.array(sorted(rank, key=lambda i: rank[i]) or [OUTSIDE], np.int32),
         np.array(factor),

@@ -17,7 +17,7 @@ import numpy as np
 from .compiling import compiled, inlined
 from .curved_surfaces import turned_normal
 from .photon_intersect import normal_at
-from .photon_scene import GRATING, MIRROR
+from .photon_scene import GRATING, MIRROR, SHEET
 from .polarised import across, amplitudes, senkrecht, share_of, turn_fields
 from .rough_albedo import masking, sent_on
 from .sampling import mixed
@@ -167,15 +167,30 @@ def microfacet(nx, ny, nz, width, a, b):
     return c * sx + s * tx + cosine * nx, c * sy + s * ty + cosine * ny, c * sz + s * tz + cosine * nz
 
 
+@compiled
+def _both_faces(a_s, a_p):
+    """(r_s, r_p, t_s, t_p) of a thin sheet, of whose faces one alone reflects `a_s` and `a_p`: the powers of all that
+    is reflected between both add up, and phases are those of the first."""
+    s, p = abs(a_s) ** 2, abs(a_p) ** 2
+    r_s, r_p = 2.0 * s / (1.0 + s), 2.0 * p / (1.0 + p)
+    one_s, one_p = math.copysign(1.0, a_s.real), math.copysign(1.0, a_p.real)
+    return (
+        complex(one_s * math.sqrt(r_s)),
+        complex(one_p * math.sqrt(r_p)),
+        complex(math.sqrt(1.0 - r_s)),
+        complex(math.sqrt(1.0 - r_p)),
+    )
+
+
 @inlined
 def scatter(scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw, noise, event, field):
     """One event at a place (3) of glass or a mirror: (direction (3), mask, alone, on the object's inner side, is an
     event, share kept, whether `draw` mattered).
 
     `draw` in [0, 1) decides by Fresnel's reflectance, unless all is reflected. "Is an event" is false where the same
-    substance lies on both sides; a mirror keeps its reflectance, polished glass everything, and rough glass the weight
-    of a microfacet that words `event` of the hash `noise` draw (its mean is 1). In a polarised scene `field`
-    complex (2, 3), the two of `polarised`, turns with the ray.
+    substance lies on both sides; a mirror keeps its reflectance, glass what its surface lets through, and rough glass
+    also the weight of a microfacet that words `event` of the hash `noise` draw (its mean is 1). In a polarised scene
+    `field` complex (2, 3), the two of `polarised`, turns with the ray.
     """
     if scene.kind[scene.owner[triangle]] == GRATING:
         return _diffract(scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw, field)
@@ -183,9 +198,11 @@ def scatter(scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw, noi
     cosine_g = -(dx * gx + dy * gy + dz * gz)
     entering = cosine_g > 0.0
     thing = scene.owner[triangle]
-    mirror = scene.kind[thing] == MIRROR
+    mirror, sheet = scene.kind[thing] == MIRROR, scene.kind[thing] == SHEET
     before, after, mask_after, alone_after = AIR, AIR, mask, alone
-    if not mirror:
+    if sheet:
+        before, after = medium(scene, mask, alone), thing
+    elif not mirror:
         bit = scene.bit[thing]
         if bit >= 0:
             own = np.uint64(1) << np.uint64(bit)
@@ -224,9 +241,18 @@ def scatter(scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw, noi
             a_s, a_p, t_s, t_p = amplitudes(cosine, eta_it)
             if reflectance < 1.0:
                 reflectance = share_of(field, dx, dy, dz, sx, sy, sz, a_s, a_p)
+            if sheet:
+                a_s, a_p, t_s, t_p = _both_faces(a_s, a_p)
+                reflectance = share_of(field, dx, dy, dz, sx, sy, sz, a_s, a_p)
             if draw >= reflectance:
                 a_s, a_p = t_s, t_p
+        elif sheet:
+            reflectance = 2.0 * reflectance / (1.0 + reflectance)
         reflects, drawn = draw < reflectance, reflectance < 1.0
+        if sheet:
+            eta_it, cosine_t = 1.0, cosine
+        if not reflects and scene.filter[thing] >= 0:
+            kept = table(scene.weights, scene.filter[thing], nm)
     if reflects:
         rx, ry, rz = dx + 2.0 * cosine * nx, dy + 2.0 * cosine * ny, dz + 2.0 * cosine * nz
         if width <= 0.0 and rx * gx + ry * gy + rz * gz <= 0.0:  # into the facet

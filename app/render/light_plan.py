@@ -196,5 +196,5 @@ class Planner:
     def _tinted(self) -> bool:
         """Something on the way changes a spectrum's shape, and photons stand for more than one wavelength of it."""
         return (not self.features.random_wavelength and self.features.absorption) or (
-            self.features.mirrors and self.features.spectral_weights
+            (self.features.mirrors or self.features.filters) and self.features.spectral_weights
         )

@@ -11,6 +11,15 @@ float choice(CameraPath path, uint pixel_key)
 
 #endif
 
+#ifdef ABSORPTION
+// `absorber`: below 0 for none.
+void add_length(inout CameraPath path, int absorber, float length)
+{
+    for (int i = 0; i < ABSORBERS; ++i)
+        if (i == absorber) path.lengths[i] += length;
+}
+#endif
+
 #ifdef HAS_GRATING
 #include "camera/grating.glsl"
 #endif
@@ -47,12 +56,15 @@ void cross_glass(inout CameraPath path, CameraPath whole, Hit hit, Triangle face
         theta3 = incidence_over_band(path, frame);
         cosine2 = transmitted_cosine2(theta3, n_i / n_t);
 #ifdef POLARISED
-        event = polarised_event(path, frame, fresnel_reflection(theta3, n_i / n_t, cosine2));
+        FresnelPair reflection = fresnel_reflection(theta3, n_i / n_t, cosine2);
+        event = polarised_event(path, frame, OF_SHEET(boundary, reflection));
         reflectance = polarised_share(event.seen, event.reflection);
         if (!begins) mirror_event = event;
 #else
         reflectance = fresnel_reflectance(theta3, n_i / n_t, cosine2);
+        reflectance = OF_SHEET(boundary, reflectance);
 #endif
+        GO_STRAIGHT(boundary, theta3, n_i, n_t, cosine2)
         mirror_weight = begins ? mirror_weight : reflectance;
 #ifdef HAS_DISPERSION
         // What is reflected off the outside of glass knows no wavelength but in its strength: it stays whole. What goes on is one band.
@@ -129,6 +141,12 @@ void cross_glass(inout CameraPath path, CameraPath whole, Hit hit, Triangle face
     if (!reflects) {
         refract_path(path, refracted, frame, boundary, n_i, n_t);
         path.medium = boundary.behind;
+#ifdef SURFACE_FILTERS
+        // What the surface lets through of what enters is counted as by coloured mirrors.
+        vec4 passed = object_colours[hit.object];
+        add_length(path, int(passed.x), 1.0);
+        path.branch_weight *= passed.y;
+#endif
     }
     path.origin = reflects ? origin_back : origin_beyond;
 #ifdef ROUGH_SURFACES
@@ -151,8 +169,7 @@ void meet_surface(inout CameraPath path, Hit hit, uint kind, uint pixel_key)
 #ifdef ABSORPTION
     uint filling = current_medium(path.medium);
     int absorber = filling == NONE ? -1 : int(object_colours[filling].w);
-    for (int i = 0; i < ABSORBERS; ++i)
-        if (i == absorber) path.lengths[i] += hit.distance;
+    add_length(path, absorber, hit.distance);
 #endif
     transfer_columns(path, hit.normal_g, hit.distance);
     if (!columns_hold(path)) atomicAdd(fallbacks[FELL_COLUMNS], 1u);
@@ -185,8 +202,7 @@ void meet_surface(inout CameraPath path, Hit hit, uint kind, uint pixel_key)
 #ifdef ABSORPTION
         // A coloured mirror lets through like a glass of its own, once a reflection.
         int mirror = int(object_colours[hit.object].w);
-        for (int i = 0; i < ABSORBERS; ++i)
-            if (i == mirror) path.lengths[i] += 1.0;
+        add_length(path, mirror, 1.0);
         if (mirror < 0) path.weight *= colour.g;
 #else
         path.weight *= colour.g;
@@ -195,7 +211,7 @@ void meet_surface(inout CameraPath path, Hit hit, uint kind, uint pixel_key)
     }
 #endif
 #ifdef HAS_DIELECTRIC
-    if (kind == KIND_DIELECTRIC) cross_glass(path, whole, hit, facet, pixel_key);
+    if (IS_GLASS(kind)) cross_glass(path, whole, hit, facet, pixel_key);
 #endif
 #ifdef HAS_GRATING
     if (kind == KIND_GRATING) meet_grating(path, whole, hit, facet, pixel_key);

@@ -56,12 +56,12 @@ void main()
         }
 #endif
 #ifdef HAS_DIELECTRIC
-        if (kind == KIND_DIELECTRIC) {
+        if (IS_GLASS(kind)) {
             MediumInterface boundary = cross_boundary(medium, hit.object, entering);
             bool total = false;
             if (boundary.changes) {
                 float eta_it = medium_index(boundary.before, starts[id].x) / medium_index(boundary.after, starts[id].x);
-                Deflection refracted = refract_at(frame, direction, eta_it);
+                Deflection refracted = refract_at(frame, direction, IS_THIN(boundary) ? 1.0 : eta_it);
                 total = !refracted.exists;
                 direction = total ? turned.direction : refracted.direction;
             }

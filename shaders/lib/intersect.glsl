@@ -107,12 +107,12 @@ float crossing_key(float distance, float facing)
 #ifdef CONTACTS
 // Surfaces in contact are one interface, and what light passes gives way to what it ends at or is thrown back by: silver, black or paint on
 // glass is met from within the glass as from outside. Such a sheet lies behind a ray that has left it or anything in contact with it.
-// A grating, which is passed, is only met once. `height`: way to the sheet along its own normal; `normal`: unit.
+// A grating or a thin sheet, which is passed, is only met once. `height`: way to the sheet along its own normal; `normal`: unit.
 bool accept_sheet(float distance, float height, vec3 normal, uint kind, vec3 origin_p)
 {
     bool in_contact = abs(dot(normal, left_normal)) > CONTACT_COSINE;
     float rounding = CONTACT_ROUNDING * (2.0 + dot(abs(origin_p), vec3(1.0)));
-    return in_contact ? height > (kind == KIND_GRATING ? NEAR_DISTANCE : rounding) : distance > -NEAR_DISTANCE;
+    return in_contact ? height > (kind >= KIND_GRATING ? NEAR_DISTANCE : rounding) : distance > -NEAR_DISTANCE;
 }
 
 // Nobody enters a solid that he is in, nor leaves one that he is not: what says so has been crossed already, in another surface's place.

@@ -18,6 +18,9 @@ struct MediumInterface {
     uint after;         // object whose medium lies behind
     MediumStack behind; // of a ray that goes through
     bool changes;       // false: another solid of higher priority covers this surface
+#ifdef HAS_SHEET
+    bool thin;          // `after` is a sheet's glass alone: behind it is what is before it
+#endif
 };
 
 #ifdef MEDIUM_STACK
@@ -60,6 +63,15 @@ MediumInterface cross_boundary(MediumStack stack, uint object, bool entering)
     boundary.before = entering ? NONE : object;
     boundary.after = entering ? object : NONE;
     boundary.changes = true;
+#ifdef HAS_SHEET
+    boundary.thin = object_at(object).kind == KIND_SHEET;
+    if (boundary.thin) {
+        boundary.behind = stack;
+        boundary.before = current_medium(stack);
+        boundary.after = object;
+        return boundary;
+    }
+#endif
 #ifdef MEDIUM_STACK
     uint bit_index = object_at(object).stack_bit;
     if (bit_index != NONE) {
@@ -84,7 +96,7 @@ float medium_index(uint object, float x)
 // Indices before and behind a surface at three places of the spectrum.
 void interface_indices(MediumInterface boundary, vec3 x, out vec3 n_i, out vec3 n_t)
 {
-#ifdef MEDIUM_STACK
+#if defined(MEDIUM_STACK) || defined(HAS_SHEET)
     n_i = vec3(medium_index(boundary.before, x.x), medium_index(boundary.before, x.y), medium_index(boundary.before, x.z));
     n_t = vec3(medium_index(boundary.after, x.x), medium_index(boundary.after, x.y), medium_index(boundary.after, x.z));
 #else
@@ -96,6 +108,16 @@ void interface_indices(MediumInterface boundary, vec3 x, out vec3 n_i, out vec3 
     n_t = entering ? n : vec3(1.0);
 #endif
 }
+
+#ifdef HAS_SHEET
+#define IS_THIN(boundary) boundary.thin
+#define OF_SHEET(boundary, reflection) (boundary.thin ? both_faces(reflection) : reflection)
+#define GO_STRAIGHT(boundary, theta, n_i, n_t, cosine2) if (boundary.thin) { n_t = n_i; cosine2 = theta * theta; }
+#else
+#define IS_THIN(boundary) false
+#define OF_SHEET(boundary, reflection) reflection
+#define GO_STRAIGHT(boundary, theta, n_i, n_t, cosine2)
+#endif
 
 #if SPECTRAL_GROUPS > 0
 // dn/dvar of an object's glass: 1 where the variable is its own index.
@@ -113,6 +135,7 @@ float medium_slope(uint object, float x)
 float index_ratio_derivative(MediumInterface boundary, uint g, float x, float n_i, float n_t)
 {
     float derivative = 0.0;
+    if (IS_THIN(boundary)) return derivative;
     if (boundary.after != NONE && object_at(boundary.after).group == g)
         derivative -= n_i / (n_t * n_t) * medium_slope(boundary.after, x);
     if (boundary.before != NONE && object_at(boundary.before).group == g)

@@ -116,4 +116,12 @@ vec3 fresnel_reflectance(vec3 theta, vec3 eta_it, vec3 cosine2_t)
     return mix(vec3(1.0), 0.5 * (rs * rs + rp * rp), greaterThan(cosine2_t, vec3(0.0)));
 }
 
+#ifdef HAS_SHEET
+// What both faces of a thin sheet send back together, with all that is reflected between them, of what one face does.
+vec3 both_faces(vec3 reflectance)
+{
+    return 2.0 * reflectance / (1.0 + reflectance);
+}
+#endif
+
 #endif

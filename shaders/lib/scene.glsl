@@ -11,11 +11,17 @@
 #define KIND_MIRROR 2u
 #define KIND_DIELECTRIC 3u
 #define KIND_GRATING 4u
+#define KIND_SHEET 5u
+#ifdef HAS_SHEET
+#define IS_GLASS(kind) (kind == KIND_DIELECTRIC || kind == KIND_SHEET)
+#else
+#define IS_GLASS(kind) (kind == KIND_DIELECTRIC)
+#endif
 
 // Paths go on from it.
 bool is_specular(uint kind)
 {
-    return kind == KIND_MIRROR || kind == KIND_DIELECTRIC || kind == KIND_GRATING;
+    return kind == KIND_MIRROR || IS_GLASS(kind) || kind == KIND_GRATING;
 }
 
 // Tree, triangles, corner normals and objects, one after the other, in rows of 4096 texels.

@@ -44,7 +44,7 @@ FollowedRay follow_specular(vec3 position, vec3 direction, RayOrigin origin, uin
         Hit hit;
         bool met = intersect_closest(position, direction, FAR_DISTANCE, origin, hit);
         uint kind = met ? object_at(hit.object).kind : NONE;
-        follows = kind == KIND_MIRROR || kind == KIND_DIELECTRIC;
+        follows = kind == KIND_MIRROR || IS_GLASS(kind);
         bool entering = dot(direction, hit.normal_g) < 0.0;
 #ifdef ABSORPTION
         // A place in a liquid learns so where it leaves it.
@@ -81,12 +81,12 @@ FollowedRay follow_specular(vec3 position, vec3 direction, RayOrigin origin, uin
             if (kind == KIND_MIRROR) ray.weight *= at_rgb(uint(WEIGHT_ROW) + object_at(hit.object).weight_row, x_of_rgb);
 #endif
 #ifdef HAS_DIELECTRIC
-            if (kind == KIND_DIELECTRIC) {
+            if (IS_GLASS(kind)) {
                 MediumInterface boundary = cross_boundary(medium, hit.object, entering);
                 passes = true;
                 if (boundary.changes) {
                     float eta_it = medium_index(boundary.before, x_of_rgb.w) / medium_index(boundary.after, x_of_rgb.w);
-                    Deflection refracted = refract_at(frame, direction, eta_it);
+                    Deflection refracted = refract_at(frame, direction, IS_THIN(boundary) ? 1.0 : eta_it);
 #ifdef ROUGH_SURFACES
                     // A microfacet's share is its own, also where what it lets through does not leave the surface.
                     if (width > 0.0 && refracted.geometric) {
@@ -97,12 +97,18 @@ FollowedRay follow_specular(vec3 position, vec3 direction, RayOrigin origin, uin
 #ifdef POLARISED
                     vec3 cosine2 = vec3(transmitted_cosine2(refracted.theta, eta_it));
                     pair = fresnel_reflection(vec3(refracted.theta), vec3(eta_it), cosine2);
+                    pair = OF_SHEET(boundary, pair);
                     float reflectance = polarised_share(seen, pair).x;
 #else
                     float reflectance = fresnel_reflectance(refracted.theta, eta_it, refracted.exists ? transmitted_cosine2(refracted.theta, eta_it) : 0.0);
+                    reflectance = OF_SHEET(boundary, vec3(reflectance)).x;
 #endif
                     passes = refracted.exists && unit_float(hash_combine(key, event)) >= reflectance;
                     if (passes) turned = refracted;
+#ifdef SURFACE_FILTERS
+                    uint filter_row = object_at(hit.object).texture;
+                    if (passes && filter_row != NONE) ray.weight *= at_rgb(uint(WEIGHT_ROW) + filter_row, x_of_rgb);
+#endif
 #ifdef ROUGH_SURFACES
                     float leaving = dot(turned.direction, surface) * (passes ? -1.0 : 1.0);
                     if (width > 0.0) ray.weight *= turned.geometric ? 0.0 : regained(told.y, cosine, vec3(eta_it)).x * smith_share(vec3(leaving), width).x;

@@ -349,7 +349,7 @@ void main()
 #endif
 
 #ifdef FOOTPRINTS
-    if ((kind == KIND_DIELECTRIC || kind == KIND_MIRROR)) keep_columns_within(ray, start, thing.kind == KIND_MIRROR ? thing.colour.w : thing.colour.z, hit.distance);
+    if (IS_GLASS(kind) || kind == KIND_MIRROR) keep_columns_within(ray, start, thing.kind == KIND_MIRROR ? thing.colour.w : thing.colour.z, hit.distance);
 #endif
 
 #ifdef BEAMS
@@ -370,7 +370,7 @@ void main()
         outcome.what |= LOST_DEPTH;
         outcome.flux_w = carried_w(ray);
     } else {
-        scatter(ray, start, hit, shading_frame(hit, facet, ray.position, ray.direction), kind, thing.weight_row, border, k, outcome);
+        scatter(ray, start, hit, shading_frame(hit, facet, ray.position, ray.direction), kind, thing, border, k, outcome);
     }
 #ifdef FLIGHTS
 #ifdef BAND_CUTS

@@ -22,13 +22,33 @@ void send_on(inout RayRecord child, Deflection turned, vec3 share, inout Outcome
     outcome.what |= turned.geometric ? FELL_NORMAL : 0u;
 }
 
+#ifdef SURFACE_FILTERS
+// What a surface of glass lets through of what enters; the rest is absorbed. `share`: of the ray, for roulette.
+void filter_by(uint row, inout RayRecord child, inout float share, inout Outcome outcome)
+{
+    if (row == NONE) return;
+    vec3 kept = spectral_row(uint(WEIGHT_ROW) + row, band_of(child));
+    outcome.absorbed_w += carried_w(child);
+    child.flux_w *= kept.y;
+    child.throughput *= kept;
+    outcome.absorbed_w -= carried_w(child);
+#ifdef HERO
+    vec3 companions = spectral_row(uint(WEIGHT_ROW) + row, child.companion_x.xyz);
+    child.companion_throughput.xyz *= companions;
+    kept.y = common_share(child, kept.y, companions);
+#endif
+    share *= kept.y;
+}
+#endif
+
 #include "light/trace_grating.glsl"
 
 // Each child is stored in one place, whichever event made it: where every branch is executed, every
 // store costs even when no ray takes it. `border`: where the band is cut before it lands; negative: nowhere.
-void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint kind, uint weight_row, float border, uint slot, inout Outcome outcome)
+void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint kind, Object thing, float border, uint slot, inout Outcome outcome)
 {
     bool entering = dot(ray.direction, hit.normal_g) < 0.0;
+    uint weight_row = thing.weight_row;
     outcome.what |= frame.refused != 0u ? FELL_NORMAL : 0u;
     if ((ray.light_and_source >> 16) == 0xffffu)
         ray.light_and_source = (ray.light_and_source & 0xffffu) | (hit.object << 16);
@@ -80,7 +100,7 @@ void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint k
 #endif
 #ifdef HAS_DIELECTRIC
     MediumInterface boundary = cross_boundary(medium_stack(ray), hit.object, entering);
-    bool splits = kind == KIND_DIELECTRIC && boundary.changes;
+    bool splits = IS_GLASS(kind) && boundary.changes;
     vec3 n_i, n_t;
 #ifdef SPECTRAL_WEIGHTS
     interface_indices(boundary, band_of(ray), n_i, n_t);
@@ -97,10 +117,13 @@ void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint k
 #ifdef POLARISED
     Polarisation seen = met_in_plane(ray, s);
     FresnelPair reflection = fresnel_reflection(theta, n_i / n_t, cosine2);
+    reflection = OF_SHEET(boundary, reflection);
     vec3 reflectance = polarised_share(seen, reflection);
 #else
     vec3 reflectance = fresnel_reflectance(theta, n_i / n_t, cosine2);
+    reflectance = OF_SHEET(boundary, reflectance);
 #endif
+    GO_STRAIGHT(boundary, theta, n_i, n_t, cosine2)
     Deflection refracted = refract_at(frame, ray.direction, n_i.y / n_t.y);
 #ifdef ANCHOR_WEIGHTS
     reflectance = vec3(reflectance.y);
@@ -119,9 +142,11 @@ void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint k
 #ifdef POLARISED
     Polarisation companions_seen = companions_in_plane(ray, s);
     FresnelPair companion_reflection = fresnel_reflection(theta, companion_eta, transmitted_cosine2(theta, companion_eta));
+    companion_reflection = OF_SHEET(boundary, companion_reflection);
     vec3 companion_reflectance = polarised_share(companions_seen, companion_reflection);
 #else
     vec3 companion_reflectance = fresnel_reflectance(theta, companion_eta, transmitted_cosine2(theta, companion_eta));
+    companion_reflectance = OF_SHEET(boundary, companion_reflectance);
 #endif
 #ifdef ROUGH_SURFACES
     if (rough.width <= 0.0)
@@ -129,7 +154,7 @@ void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint k
     if (!refracted.exists && cosine2.y > 0.0) companion_reflectance = vec3(1.0);
     reflected_share = common_share(ray, reflectance.y, companion_reflectance);
     // Refracted they stay together only where nothing disperses.
-    bool stay = all(lessThan(abs(companion_eta - n_i.y / n_t.y), vec3(1e-7)));
+    bool stay = IS_THIN(boundary) || all(lessThan(abs(companion_eta - n_i.y / n_t.y), vec3(1e-7)));
     refracted_share = stay ? common_share(ray, 1.0 - reflectance.y, 1.0 - companion_reflectance) : 1.0 - reflectance.y;
 #endif
 #ifdef BAND_CUTS
@@ -167,7 +192,7 @@ void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint k
 #endif
         lives = reflected_share > 0.0 && survives(child, outcome.roulette_w, reflected_share, 1u);
     }
-    if (kind == KIND_DIELECTRIC && !boundary.changes) {
+    if (IS_GLASS(kind) && !boundary.changes) {
         // Another solid decides here: walk through, only remember where we are.
         child = child_of(ray, hit, entering);
         child.depth = ray.depth;
@@ -245,6 +270,9 @@ void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint k
 #endif
 #ifdef ROUGH_SURFACES
         shadow(rough, child, refracted, -1.0, refracted_share, outcome);
+#endif
+#ifdef SURFACE_FILTERS
+        filter_by(thing.texture, child, refracted_share, outcome);
 #endif
         lives = survives(child, outcome.roulette_w, refracted_share, 2u);
     }

@@ -32,11 +32,9 @@ class Builder:
         self.json["accessors"].append(entry | {"type": kind} | more)
         return len(self.json["accessors"]) - 1
 
-    def tetrahedron(self, material: dict[str, Any] | None = None) -> Builder:
-        primitive = {
-            "attributes": {"POSITION": self.accessor(POSITIONS, "VEC3", 5126)},
-            "indices": self.accessor(FACES.ravel().astype("<u2"), "SCALAR", 5123),
-        }
+    def tetrahedron(self, material: dict[str, Any] | None = None, faces: np.ndarray = FACES) -> Builder:
+        """`faces`: those of them that are there."""
+        primitive = self.primitive(faces)
         if material is not None:
             self.json["materials"] = [material]
             primitive["material"] = 0
@@ -44,9 +42,15 @@ class Builder:
         self.json |= {"scenes": [{"nodes": [0]}], "scene": 0}
         return self
 
+    def primitive(self, faces: np.ndarray) -> dict[str, Any]:
+        return {
+            "attributes": {"POSITION": self.accessor(POSITIONS, "VEC3", 5126)},
+            "indices": self.accessor(faces.ravel().astype("<u2"), "SCALAR", 5123),
+        }
+
     def glb(self, path: Path) -> Path:
         if self.data:
-            self.json["buffers"] = [{"byteLength": len(self.data)}]
+            self.json["buffers"] = [{"byteLength": len(self.data)}, *self.json.get("buffers", [])]
         text = json.dumps(self.json).encode()
         text += b" " * (-len(text) % 4)
         data = self.data + b"\0" * (-len(self.data) % 4)

@@ -102,6 +102,8 @@ def static_costs(scene: Scene, features: Features) -> dict[str, str]:
         "lamp columns": (features.lamp_columns, f"{sizes.ray - from_points.ray} B a ray"),
         "light edges": (features.light_edges, "splats beside an edge have another program; one more number a fragment"),
         "mirrors": (features.mirrors, f"{size_words(row * mirrors)} of reflectances"),
+        "thin sheets": (features.sheets, "one more kind of surface; indices of both sides are looked up"),
+        "surface colours": (features.filters, f"3 lookups a surface, {size_words(row)} a colour"),
         "gratings": (features.gratings, f"{_TEXEL} B an order; a step of the queue for each"),
         "interpolated normals": (features.smooth_normals, f"{3 * _TEXEL} B a facet, {size_words(3 * _TEXEL * smooth)}"),
         "normal derivatives": (features.normal_derivatives, "one more vector a column and surface"),

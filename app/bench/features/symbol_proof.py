@@ -59,6 +59,8 @@ FEATURE_SYMBOLS: dict[str, tuple[str, ...]] = {
     "light edges": ("packed_edge", "unpacked_edge", "cut_at_edge"),
     "lamp columns": ("cover_sides", "LAMP"),
     "mirrors": (r"\(kind == KIND_MIRROR\) ",),
+    "thin sheets": ("both_faces", "KIND_SHEET"),
+    "surface colours": ("filter_by", "passed"),
     "gratings": ("grating_at", "diffract_direction", "GRATINGS_AT"),
     "interpolated normals": (
         "corner_normal",

@@ -190,7 +190,9 @@ def _left_out(name: str, scene: Scene, base: Features, asked: Variant) -> tuple[
             return asked, Variant(scene, replace(base, border_images=False)), "without them borders are too dark"
         case "contact lines":
             return None, None, "asks the picture's own pixels, which the map that is drawn here does not have"
-        case "refraction" | "mirrors" | "gratings":
+        case "surface colours":
+            return asked, Variant(scene, replace(base, filters=False)), "without it surfaces are clear"
+        case "refraction" | "mirrors" | "gratings" | "thin sheets":
             return None, None, "cannot be left out here: light would end there"
         case "interpolated normals" | "charts":
             return None, None, "cannot be left out here: light would land elsewhere"
@@ -244,6 +246,10 @@ def _forced_in(name: str, scene: Scene, base: Features, asked: Variant) -> tuple
             return Variant(scene, replace(base, mirrors=True)), asked, ""
         case "gratings":
             return Variant(scene, replace(base, gratings=True)), asked, ""
+        case "thin sheets" if base.dielectrics:
+            return Variant(scene, replace(base, sheets=True)), asked, "no surface is thin"
+        case "surface colours":
+            return Variant(scene, replace(base, filters=True)), asked, "no surface has a colour"
         case "interpolated normals" | "normal derivatives":
             every = len(half_spaces(scene)) + len(curved_solids(scene)) == len(_specular(scene))
             note = (

@@ -6,6 +6,7 @@ any other the program goes on with a stated assumption, never silently.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +16,10 @@ from .mesh import Mesh, make_mesh
 
 _DEGENERATE = 1e-12
 """A triangle is degenerate when twice its area is below this fraction of its longest edge squared."""
+
+
+_SEAM = 1e-5
+"""Of a mesh's longest side: corners nearer than this are one where it is asked whether anything is enclosed."""
 
 
 @dataclass(frozen=True)
@@ -173,6 +178,48 @@ def repair(mesh: Mesh, health: MeshHealth | None = None, solid: bool = True) -> 
     return make_mesh(
         mesh.name, mesh.vertices, mesh.triangles, mesh.corner_normals, mesh.uv, mesh.source, mesh.uv_unwraps
     ), tuple(notes)
+
+
+def forms_of(meshes: Sequence[Mesh]) -> list[str]:
+    """Of each surface: "solid"; "sheet", where it encloses nothing; or "part", where all open ones together do."""
+    alone = [_is_open([mesh]) for mesh in meshes]
+    together = any(alone) and _is_open([mesh for mesh, is_open in zip(meshes, alone, strict=True) if is_open])
+    return ["solid" if not is_open else "sheet" if together else "part" for is_open in alone]
+
+
+def joined(meshes: Sequence[Mesh]) -> Mesh:
+    """One repaired mesh of several, without texture coordinates."""
+    first = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes])
+    normals = [
+        mesh.face_normals()[:, None].repeat(3, 1) if mesh.corner_normals is None else mesh.corner_normals
+        for mesh in meshes
+    ]
+    whole = make_mesh(
+        meshes[0].name,
+        np.concatenate([mesh.vertices for mesh in meshes]),
+        np.concatenate([mesh.triangles + start for mesh, start in zip(meshes, first, strict=False)]),
+        None if all(mesh.corner_normals is None for mesh in meshes) else np.concatenate(normals),
+        source=meshes[0].source,
+    )
+    return repair(whole, solid=False)[0]
+
+
+def _is_open(meshes: Sequence[Mesh]) -> bool:
+    """Whether borders are long for the area: of more than gaps."""
+    sizes = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes])
+    vertices = np.concatenate([mesh.vertices for mesh in meshes])
+    # Seams whose corners differ by rounding are closed.
+    kept, number = weld_map(np.round(vertices / (_SEAM * float(np.ptp(vertices, axis=0).max()) or 1.0)))
+    corners = np.concatenate([number[mesh.triangles + first] for mesh, first in zip(meshes, sizes, strict=False)])
+    ends = np.sort(np.stack([corners.ravel(), np.roll(corners, -1, axis=1).ravel()]), axis=0)
+    edges, uses = np.unique(ends, axis=1, return_counts=True)
+    border = float(np.linalg.norm(np.subtract(*vertices[kept][edges[:, uses == 1]]), axis=1).sum())
+    return border**2 > float(sum(mesh.areas().sum() for mesh in meshes))
+
+
+def warnings_of(mesh: Mesh) -> list[str]:
+    """What makes a repaired mesh that is to be solid something else."""
+    return _warnings(f"mesh '{mesh.name}'", examine(mesh))
 
 
 def _warnings(label: str, health: MeshHealth) -> list[str]:

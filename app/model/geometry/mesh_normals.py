@@ -26,7 +26,7 @@ SHARP_DEG, SHARP_BY_FACET_DEG, SHARP_ANYWHERE_DEG = 45.5, 35.0, 65.0
 """Bends that no curve has which is cut into eight or more facets a turn: on a convex solid, on one with a flat facet
 whose normals fan out, and on any (coarse tori bend more)."""
 SHARP_SHARE, CUT_SHARE, FACET_SHARE = 0.1, 0.6, 0.05
-"""Shares of the area: next to sharp edges, for a convex solid to have any; for it to be cut; of a facet that shows that."""
+"""Shares of the area: next to sharp edges, for a convex solid to have any; for it to be cut; of a facet showing it."""
 FAN_DEG, SAME_NORMAL = 5.0, math.cos(math.radians(1.2))
 
 

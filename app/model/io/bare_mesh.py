@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ..geometry.mesh import Mesh
+from ..geometry.mesh_health import forms_of
 from ..materials.dielectric import DEFAULT_GLASS
 from ..scene import Dielectric, Material, SceneObject
 from ..scene_objects import checked_mesh
@@ -25,7 +27,7 @@ def objects_of_mesh(path: Path, staging: Staging, notes: list[str]) -> list[Scen
     parts = parts_of_mesh(whole, groups)
     libraries = () if groups is None else groups.libraries
     materials = _materials(path, parts, libraries, bool(staging.glass), notes)
-    meshes = [staging.settled(checked_mesh(part.mesh, notes), notes, path.name, is_bare=True) for part in parts]
+    meshes = _prepared(path, parts, materials, staging, notes)
     if staging.up is None:
         up, reason = guessed_up(whole, path.suffix.lower())
         notes.append(f"{path.name} does not say which way is up: {up} was taken, for {reason}; --up y or z says it.")
@@ -45,6 +47,8 @@ def _materials(
     names = [part.mesh.name for part in parts]
     if any(material is not None and material.transmits for material in known):
         made = [Dielectric.usual() if material is None else material.material() for material in known]
+        forms = iter(forms_of([part.mesh for part, each in zip(parts, made, strict=True) if each.transmits]))
+        made = [material.changed(thin=next(forms) == "sheet") if material.transmits else material for material in made]
         glass = [name for name, material in zip(names, made, strict=True) if material.transmits]
         said = (
             f"its materials make glass of {listed(glass)}; dispersion, of which they know nothing, is {DEFAULT_GLASS}'s"
@@ -62,3 +66,16 @@ def _materials(
 
 def _example(names: list[str]) -> str:
     return "" if len(names) == 1 else f", for one part too ({names[0]}=N-SF11); it holds {listed(names)}"
+
+
+def _prepared(
+    path: Path, parts: list[MeshPart], materials: list[Material], staging: Staging, notes: list[str]
+) -> list[Mesh]:
+    """Their meshes, mended, with the normals that `staging` wishes."""
+    meshes = []
+    for part, material in zip(parts, materials, strict=True):
+        found: list[str] = []
+        mesh = checked_mesh(part.mesh, found)
+        notes += [note for note in found if material.is_solid or not note.startswith("open mesh")]
+        meshes.append(staging.settled(mesh, notes, path.name, is_bare=True))
+    return meshes

@@ -191,7 +191,8 @@ def _across(rows: list[_Row]) -> Iterator[_Table]:
     for i, row in enumerate(rows):
         headed = [(column, found[1]) for column, cell in enumerate(row.cells) if (found := _HEADED.fullmatch(cell))]
         together = itertools.groupby(enumerate(headed), key=lambda each: each[1][0] - each[0])
-        marks = dict(max(([mark for _, mark in group] for _, group in together), key=len, default=[]))
+        runs = [[mark for _, mark in group] for _, group in together]
+        marks = dict(max(runs, key=len, default=[]))
         nm = np.array([float(text.replace(",", ".")) for text in marks.values()])
         steps = np.abs(np.diff(nm))
         if len(nm) < _LEAST_ACROSS or nm.min() < 200.0 or nm.max() > 2600.0 or not 0.0 < steps.max() <= 2 * steps.min():
@@ -239,7 +240,8 @@ def _columns(path: PathLike, block: list[_Row], above: list[_Row], width: int) -
     ]
     upper, lower = ([[""] * width] * 2 + titles)[-2:]
     if len(set(lower[:width])) < width:  # pairs of columns, with what they are of above the first of each
-        upper = list(itertools.accumulate(upper, lambda before, name: name or before))
+        for column in range(1, len(upper)):
+            upper[column] = upper[column] or upper[column - 1]
     elif not re.fullmatch(r"[\[(]?(?:nm|[µμu]m|å)[\])]?", lower[0], re.IGNORECASE):
         upper = [""] * width  # else the lower row has the units
     names = [f"{a} {b}".strip() for a, b in zip(upper, lower, strict=False)]

@@ -18,14 +18,13 @@ import numpy as np
 from ...base.errors import UserError
 from ..fields import read_fields
 from ..geometry.mesh import Mesh, make_mesh
-from ..geometry.mesh_health import examine, repair
+from ..geometry.mesh_health import examine, forms_of, joined, repair, warnings_of
 from ..lights import LIGHT_KINDS, DirectionalLight, PointLight, SpotLight
 from ..lights.light import made
 from ..lights.light_file import read_light
 from ..placement import Surroundings
 from ..scene import (
     Camera,
-    Dielectric,
     Light,
     Material,
     Scene,
@@ -44,26 +43,27 @@ from ..scene_defaults import (
 from ..staging import AS_FOUND, Y_UP_TO_Z_UP, Staging, opaque_note, with_glass
 from ..unique_names import Names
 from ..vectors import Vec3, vec3
+from .gltf_compressed import COMPRESSION, DRACO, draco_mesh
 from .gltf_document import GltfDocument, open_document
 from .gltf_extras import read_node_dabs, read_scene_extras
 from .gltf_materials import (
-    DISPERSION,
     EXTRAS,
-    IOR,
-    TRANSMISSION,
-    VOLUME,
+    UNDERSTOOD_MATERIALS,
+    formed,
     own_extras,
     read_gltf_material,
 )
 from .gltf_textures import GltfTextures, turned_over
 from .mesh_raw import as_float64
 from .scene_table import MAX_MAGNITUDE, SceneTable
+from .unshown import Unshown
 
 LIGHTS = "KHR_lights_punctual"
-UNDERSTOOD = frozenset({LIGHTS, TRANSMISSION, VOLUME, IOR, DISPERSION, "KHR_mesh_quantization"})
+UNDERSTOOD = UNDERSTOOD_MATERIALS | COMPRESSION | {LIGHTS, "KHR_mesh_quantization"}
 _CAN_BE_LEFT_OUT = ("KHR_texture_", "KHR_materials_", "EXT_texture_", "KHR_xmp", "MSFT_", "EXT_lights_image_based")
 CAMERA_ADDED = "No camera in the file: one that sees the objects was added."
 _DEFAULT_DISTANCE = 1.0
+_READ = ("NORMAL", "TEXCOORD_0")
 _PUNCTUAL = tuple(cls.kind for cls in (PointLight, SpotLight, DirectionalLight))
 
 
@@ -75,6 +75,8 @@ class Origins:
     """Node -> world matrix."""
     objects: dict[str, tuple[int, int]] = field(default_factory=dict)
     """Object -> (node, primitive of the node's mesh)."""
+    parts: dict[tuple[int, int], list[int]] = field(default_factory=dict)
+    """(Node, first primitive) -> all primitives of one solid, which are one object."""
     lights: dict[str, int] = field(default_factory=dict)
     """Light -> node."""
     camera: int | None = None
@@ -104,6 +106,7 @@ class _Reader:
         self.staging = staging
         self._to_z_up = np.eye(4) if staging.up == "z" else Y_UP_TO_Z_UP
         self.notes: list[str] = []
+        self._unshown = Unshown()
         self.origins = Origins()
         self.objects: list[SceneObject] = []
         self._material_names: list[str] = []
@@ -111,6 +114,7 @@ class _Reader:
         self.camera: Camera | None = None
         self._meshes: dict[str, Mesh | None] = {}
         self._materials: dict[int | None, Material] = {}
+        self._forms: dict[int, tuple[dict[int, str], Mesh | None]] = {}
         self._textures = GltfTextures(document, self.notes)
         self.origins.textures = self._textures.numbers
         self._names = Names()
@@ -119,6 +123,7 @@ class _Reader:
         self._check_extensions()
         for index, world in self._nodes():
             self._node(index, world)
+        self.notes += self._unshown.notes()
         if not self.objects:
             raise self.document.fail("the file holds no triangles; check that the scene was exported")
         if self.document.items("animations") or self.document.items("skins"):
@@ -247,6 +252,20 @@ class _Reader:
             if mesh is None:
                 continue
             material = self._wearable(self._material(primitive.get("material")), mesh, label)
+            if material.is_solid:
+                forms, of_parts = self._form(node["mesh"], entry)
+                if forms[number] == "part" and of_parts is not None:
+                    mesh = of_parts
+                    parts = [i for i, form in forms.items() if form == "part"]
+                    if number != parts[0]:
+                        continue
+                    self.origins.parts[(index, number)] = parts
+                    if len({entry["primitives"][i]["material"] for i in parts}) > 1:
+                        self._unshown.add("Parts that make one solid together take the glass of the first", label)
+                self.notes += [] if forms[number] == "sheet" else warnings_of(mesh)
+                material = formed(
+                    self.document, primitive["material"], material, forms[number] == "sheet", self._unshown
+                )
             name = self._names.unique(label)
             matrix = world.copy()
             matrix.setflags(write=False)
@@ -257,11 +276,25 @@ class _Reader:
 
     def _material(self, index: int | None) -> Material:
         if index not in self._materials:
-            self._materials[index] = read_gltf_material(self.document, index, self._textures, self.notes)
+            self._materials[index] = read_gltf_material(self.document, index, self._textures, self._unshown)
         return self._materials[index]
 
     def _material_name(self, index: int | None) -> str:
         return "" if index is None else str(self.document.item("materials", index).get("name", ""))
+
+    def _form(self, number: int, entry: dict[str, Any]) -> tuple[dict[int, str], Mesh | None]:
+        """Of the glass of mesh `number` of the document: the form of each part, and parts of one solid as one mesh."""
+        if number not in self._forms:
+            parts = {
+                i: mesh
+                for i, each in enumerate(entry["primitives"])
+                if self._material(each.get("material")).is_solid
+                and (mesh := self._mesh(number, i, each, entry)) is not None
+            }
+            forms = dict(zip(parts, forms_of(list(parts.values())), strict=True))
+            of_one = [mesh for i, mesh in parts.items() if forms[i] == "part"]
+            self._forms[number] = forms, joined(of_one) if of_one else None
+        return self._forms[number]
 
     def _wearable(self, material: Material, mesh: Mesh, label: str) -> Material:
         """`material`, without its texture where the mesh cannot say where it goes."""
@@ -277,7 +310,7 @@ class _Reader:
 
         Everything that shows the same accessors shares one mesh, whatever its material.
         """
-        key = json.dumps([primitive.get(k) for k in ("attributes", "indices", "mode")], sort_keys=True)
+        key = json.dumps([primitive.get(k) for k in ("attributes", "indices", "mode", "extensions")], sort_keys=True)
         if key not in self._meshes:
             self._meshes[key] = self._read_primitive(index, number, primitive, entry)
         return self._meshes[key]
@@ -291,15 +324,20 @@ class _Reader:
             return None
         if primitive.get("targets"):
             self.notes.append(f"meshes[{index}].primitives[{number}]: its morph targets are not applied.")
-        positions = as_float64(self.document.accessor(attributes["POSITION"]))
-        indices = primitive.get("indices")
-        order = np.arange(len(positions)) if indices is None else self.document.accessor(indices).astype(np.int64)
+        how, indices = primitive.get("extensions", {}).get(DRACO), primitive.get("indices")
+        if how is not None and "bufferView" not in self.document.item("accessors", attributes["POSITION"]):
+            arrays, order = draco_mesh(how, self.document.view_bytes(how["bufferView"]), where)
+            positions, mode = arrays["POSITION"], 4
+        else:
+            positions = as_float64(self.document.accessor(attributes["POSITION"]))
+            arrays = {n: self._attribute(attributes, n, len(positions)) for n in _READ if n in attributes}
+            order = np.arange(len(positions)) if indices is None else self.document.accessor(indices).astype(np.int64)
         if positions.ndim != 2 or positions.shape[1] != 3 or order.ndim != 1:
             raise UserError(f"{where}: POSITION must be triples and indices single numbers; export the file again")
         triangles = _triangles(order, mode, where)
         if len(triangles) and not 0 <= triangles.min() <= triangles.max() < len(positions):
             make_mesh("", positions, triangles, source=where)  # raises, naming the face
-        normals, uv = (self._attribute(attributes, n, len(positions)) for n in ("NORMAL", "TEXCOORD_0"))
+        normals, uv = (arrays.get(name) for name in _READ)
         raw = make_mesh(
             str(entry.get("name") or f"mesh {index}"),
             positions,
@@ -308,15 +346,12 @@ class _Reader:
             None if uv is None else turned_over(uv)[triangles],
             source=where,
         )
-        solid = isinstance(self._material(primitive.get("material")), Dielectric)
-        mesh, notes = repair(raw, examine(raw), solid)
+        mesh, notes = repair(raw, examine(raw), solid=False)
         self.notes.extend(notes)
         mesh = self.staging.settled(mesh, self.notes, self.document.path.name)
         return replace(mesh, source=str(self.document.path))
 
-    def _attribute(self, attributes: dict[str, Any], name: str, count: int) -> np.ndarray | None:
-        if name not in attributes:
-            return None
+    def _attribute(self, attributes: dict[str, Any], name: str, count: int) -> np.ndarray:
         values = as_float64(self.document.accessor(attributes[name]))
         if len(values) != count:
             raise self.document.fail(f"{name} has {len(values)} elements for {count} positions; export the file again")

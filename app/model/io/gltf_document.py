@@ -19,6 +19,7 @@ import numpy as np
 
 from ...base import files
 from ...base.errors import UserError
+from .gltf_compressed import meshopt_bytes, meshopt_of
 
 GLB_MAGIC = b"glTF"
 JSON_CHUNK, BIN_CHUNK = 0x4E4F534A, 0x004E4942
@@ -42,6 +43,7 @@ class GltfDocument:
     other_chunks: list[tuple[int, bytes]] = field(default_factory=list)
     """GLB chunks of unknown type, kept for saving."""
     _buffers: dict[int, bytes] = field(default_factory=dict)
+    _unpacked: dict[int, bytes] = field(default_factory=dict)
     _checked: dict[str, list] = field(default_factory=dict)
     _elements_read: int = 0
 
@@ -104,8 +106,11 @@ class GltfDocument:
 
     def _view(self, label: str, index: Any, offset: int, dtype: np.dtype, width: int, count: int) -> np.ndarray:
         view = self.item("bufferViews", index)
-        data = self.buffer(view.get("buffer"))
-        start, length = view.get("byteOffset", 0), view.get("byteLength", -1)
+        how = meshopt_of(view)
+        if how is not None and meshopt_of(self.item("buffers", view.get("buffer"))) is None:
+            how = None  # its buffer is no placeholder: the bytes are there uncompressed too
+        data = self.buffer(view.get("buffer")) if how is None else self._decompressed(index, how)
+        start, length = view.get("byteOffset", 0) if how is None else 0, view.get("byteLength", -1)
         stride = view.get("byteStride") or width * dtype.itemsize
         numbers = (start, length, stride, offset, count)
         if not all(isinstance(n, int) and n >= 0 for n in numbers) or stride < width * dtype.itemsize:
@@ -120,6 +125,13 @@ class GltfDocument:
                 f"{label} promises {count} elements, more than bufferViews[{index}] holds; export the file again"
             )
         return np.ndarray((count, width), dtype, data, start + offset, (stride, dtype.itemsize))
+
+    def _decompressed(self, index: int, how: dict[str, Any]) -> bytes:
+        if index not in self._unpacked:
+            start = int(how.get("byteOffset", 0))
+            data = self.buffer(how.get("buffer"))[start : start + int(how["byteLength"])]
+            self._unpacked[index] = meshopt_bytes(how, data, f"{self.path.name}: bufferViews[{index}]")
+        return self._unpacked[index]
 
     def view_bytes(self, index: Any) -> bytes:
         """All bytes of a buffer view, such as an image's file."""

@@ -2,8 +2,9 @@
 
 A scene file's own words, kept under `extras.spectrasplat`, win over everything: `glass`
 names a catalogue glass, `material` is a whole material table. Without them transmission,
-ior, dispersion and volume make a glass, a smooth metal makes a mirror, and the base colour
-anything else a diffuse surface, with a coat where that is smooth.
+ior, dispersion and volume make a glass that the base colour filters, what is blended by a small
+alpha thin glass, a smooth metal a mirror, and the base colour anything else a diffuse surface,
+with a coat where that is smooth.
 """
 
 from __future__ import annotations
@@ -11,6 +12,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from typing import Any
+
+import numpy as np
 
 from ..fields import write_fields
 from ..materials.finish import USUAL_COAT_INDEX, read_finish
@@ -24,10 +27,11 @@ from ..scene import (
     Material,
     Mirror,
 )
-from ..vectors import vec3
+from ..vectors import Vec3, vec3
 from .gltf_document import GltfDocument
 from .gltf_textures import GltfTextures
 from .scene_table import SceneTable
+from .unshown import Unshown
 
 TRANSMISSION, VOLUME, IOR, DISPERSION = (f"KHR_materials_{n}" for n in ("transmission", "volume", "ior", "dispersion"))
 EXTRAS = "spectrasplat"
@@ -37,6 +41,7 @@ _COAT_ROUGHNESS = 0.5
 """From here on what a dielectric reflects is a faint sheen, which is left out: 0.5 is what modellers give to all."""
 _FINISH = "finish"
 _BASE_COLOUR = "baseColorTexture"
+_GLOSSINESS = "KHR_materials_pbrSpecularGlossiness"
 
 
 def own_extras(entry: Mapping[str, Any]) -> dict[str, Any]:
@@ -46,50 +51,116 @@ def own_extras(entry: Mapping[str, Any]) -> dict[str, Any]:
     return own if isinstance(own, dict) else {}
 
 
-def read_gltf_material(document: GltfDocument, index: int | None, textures: GltfTextures, notes: list[str]) -> Material:
-    """Material `index` of the document, None being glTF's default; what was assumed goes to `notes`."""
+def read_gltf_material(document: GltfDocument, index: int | None, textures: GltfTextures, unshown: Unshown) -> Material:
+    """Material `index` of the document, None being glTF's default; what was assumed or is not shown goes to
+    `unshown`."""
     if index is None:
         return Diffuse((0.8, 0.8, 0.8))
     values = document.item("materials", index)
-    label = f"material '{values.get('name', index)}'"
+    name = str(values.get("name", index))
     where = f"{document.path.name}: materials[{index}]"
     own, extras = own_extras(values), values.get("extras")
+    named = own.get("glass", extras.get("glass") if isinstance(extras, dict) else None)
     if "material" in own:
         table = SceneTable(own["material"], document.path, f"materials[{index}].extras.{EXTRAS}.material")
-        return _with_textures_told(read_material(table), values, label, notes)
-    named = own.get("glass", extras.get("glass") if isinstance(extras, dict) else None)
-    extensions = values.get("extensions", {})
-    if named is not None:
+        material = read_material(table)
+    elif named is not None:
         dispersion = catalogue.find(str(named), f"{where}.extras.glass")
-        return _with_textures_told(Dielectric(dispersion, _absorption(extensions, where)), values, label, notes)
-    pbr = values.get("pbrMetallicRoughness", {})
-    rgb = vec3(min(1.0, max(0.0, float(c))) for c in (*pbr.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0)),)[:3])
+        material = Dielectric(dispersion, _absorption(values.get("extensions", {}), where))
+    else:
+        values = _metallic_roughness(values)
+        material = _material(values, name, where, unshown)
+        if material.receives and _FINISH in own:
+            table = SceneTable(own[_FINISH], document.path, f"materials[{index}].extras.{EXTRAS}.{_FINISH}")
+            material = material.changed(**read_finish(table))
+        if material.receives:
+            material = material.changed(texture=textures.base_colour(values, name, unshown))
+    _note_unshown(values, material, name, unshown)
+    return material
+
+
+def _metallic_roughness(values: dict[str, Any]) -> dict[str, Any]:
+    """`values`, where KHR_materials_pbrSpecularGlossiness stands alone by what of it the usual words can say."""
+    old = values.get("extensions", {}).get(_GLOSSINESS)
+    if old is None or "pbrMetallicRoughness" in values:
+        return values
+    pbr = {"metallicFactor": 0.0, "roughnessFactor": 1.0 - float(old.get("glossinessFactor", 1.0))}
+    for key, named in (("baseColorFactor", "diffuseFactor"), (_BASE_COLOUR, "diffuseTexture")):
+        pbr |= {key: old[named]} if named in old else {}
+    return {**values, "pbrMetallicRoughness": pbr}
+
+
+def _material(values: dict[str, Any], name: str, where: str, unshown: Unshown) -> Material:
+    """By its factors alone."""
+    extensions, pbr = values.get("extensions", {}), values.get("pbrMetallicRoughness", {})
+    *rgb, alpha = (min(1.0, max(0.0, float(c))) for c in (*pbr.get("baseColorFactor", (1.0,)), 1.0, 1.0, 1.0)[:4])
     roughness = float(pbr.get("roughnessFactor", 1.0))
     transmission = float(extensions.get(TRANSMISSION, {}).get("transmissionFactor", 0.0))
+    blends, is_metal = values.get("alphaMode") == "BLEND", float(pbr.get("metallicFactor", 1.0)) >= 0.5
     if transmission >= 0.5:
-        return _with_textures_told(_glass(document, values, label, where, notes), values, label, notes)
+        if transmission < 1.0:
+            unshown.add(
+                "Glass of a transmissionFactor below 1 lets through that share; the rest, which its base would "
+                "scatter, is absorbed",
+                name,
+            )
+        return _glass(values, name, where, vec3(transmission * c for c in rgb), unshown)
     if transmission > 0.0:
-        notes.append(f"{label}: transmission {transmission:g} is less than one half and is taken as opaque.")
-    is_metal = float(pbr.get("metallicFactor", 1.0)) >= 0.5
+        unshown.add("A transmissionFactor of less than one half is taken as opaque", name)
+    elif blends and alpha <= 0.5 and _BASE_COLOUR not in pbr:
+        unshown.add(
+            "Materials that are alpha-blended by one half or less are taken as thin glass, which light passes straight "
+            "(--glass makes an object solid)",
+            name,
+        )
+        return _glass(values, name, where, vec3(1.0 - alpha * (1.0 - c) for c in rgb), unshown).changed(thin=True)
+    elif blends and (alpha < 1.0 or _BASE_COLOUR in pbr):
+        unshown.add("Alpha-blended materials are shown opaque", name)
     if is_metal and roughness <= _MIRROR_ROUGHNESS:
-        return _with_textures_told(Mirror(rgb), values, label, notes)
-    finish: dict[str, Any] = {}
-    if _FINISH in own:
-        finish = read_finish(SceneTable(own[_FINISH], document.path, f"materials[{index}].extras.{EXTRAS}.{_FINISH}"))
-    elif roughness < _COAT_ROUGHNESS and not is_metal:
+        return Mirror(vec3(rgb))
+    if roughness < _COAT_ROUGHNESS and not is_metal:
         ior = float(extensions.get(IOR, {}).get("ior", USUAL_COAT_INDEX))
-        finish = {"roughness": max(roughness, 0.0), "coat_index": min(max(ior, 1.0), 4.0)}
-    material = Diffuse(rgb, texture=textures.base_colour(values, label), **finish)
-    return _with_textures_told(material, values, label, notes)
+        return Diffuse(vec3(rgb), roughness=max(roughness, 0.0), coat_index=min(max(ior, 1.0), 4.0))
+    if "metallicFactor" in pbr and is_metal:
+        unshown.add("Rough metals are shown as diffuse surfaces of their colour", name)
+    return Diffuse(vec3(rgb))
 
 
-def _with_textures_told(material: Material, values: dict[str, Any], label: str, notes: list[str]) -> Material:
-    """`material`, after a note on the textures it does not show."""
+_NOT_SHOWN: dict[str, tuple[str, tuple[str, ...]]] = {
+    "anisotropy": ("Anisotropy is", ("anisotropyStrength",)),
+    "clearcoat": ("A clear coat of its own is", ("clearcoatFactor",)),
+    "diffuse_transmission": ("Light that is scattered through a sheet is", ("diffuseTransmissionFactor",)),
+    "iridescence": ("Iridescence is", ("iridescenceFactor",)),
+    "sheen": ("Sheen is", ("sheenColorFactor",)),
+    "specular": ("A specular strength or colour other than 1 is", ("specularFactor", "specularColorFactor")),
+    "volume_scatter": ("Scattering inside a volume is", ("multiscatterColor", "scatterDistance")),
+    "pbrSpecularGlossiness": ("A specular colour beside the diffuse one is", ()),
+    "unlit": ("A constant colour without light is", ()),
+}
+"""KHR_materials_…: what is not shown where one of these keys has an effect."""
+UNDERSTOOD_MATERIALS = frozenset(
+    {*_GLASS_EXTENSIONS, "KHR_materials_emissive_strength", *(f"KHR_materials_{name}" for name in _NOT_SHOWN)}
+)
+_NEUTRAL: dict[str, Any] = {"specularFactor": 1.0, "specularColorFactor": [1.0, 1.0, 1.0]}
+
+
+def _note_unshown(values: dict[str, Any], material: Material, name: str, unshown: Unshown) -> None:
+    """Name what of a material has an effect and is not shown."""
+    extensions = values.get("extensions", {})
+    for short, (words, keys) in _NOT_SHOWN.items():
+        given = extensions.get(f"KHR_materials_{short}")
+        if given is None:
+            continue
+        if not keys or any(np.any(np.subtract(given[key], _NEUTRAL.get(key, 0.0))) for key in keys if key in given):
+            unshown.add(f"{words} not shown (KHR_materials_{short})", name)
+    if any(values.get("emissiveFactor", ())):
+        unshown.add("Surfaces that give off light (emissiveFactor) are dark; add a light for them", name)
+    if values.get("alphaMode") == "MASK" and _BASE_COLOUR in values.get("pbrMetallicRoughness", {}):
+        unshown.add("Surfaces that are cut out by their texture's alpha (alphaMode MASK) are shown whole", name)
     shown = {_BASE_COLOUR} if material.receives else set()
-    if any("Texture" in key for key in _all_keys(values) if key not in shown):
-        others = "other " if getattr(material, "texture", None) is not None else ""
-        notes.append(f"{label}: its {others}textures are not shown, only its factors (they are kept when saving).")
-    return material
+    for key in dict.fromkeys(_all_keys(values)):
+        if key.endswith("Texture") and key not in shown | {"diffuseTexture"}:
+            unshown.add(f"{key} is not shown, only its factor (it is kept when saving)", name)
 
 
 def _all_keys(values: Any) -> list[str]:
@@ -98,22 +169,42 @@ def _all_keys(values: Any) -> list[str]:
     return []
 
 
-def _glass(document: GltfDocument, values: dict[str, Any], label: str, where: str, notes: list[str]) -> Dielectric:
-    extensions = values["extensions"]
+def _glass(values: dict[str, Any], name: str, where: str, rgb: Vec3, unshown: Unshown) -> Dielectric:
+    """`rgb`: what gets through it."""
+    extensions = values.get("extensions", {})
     n_d = float(extensions.get(IOR, {}).get("ior", 1.5))
     if n_d == 0.0:
-        notes.append(f"{label}: ior 0 stands for total reflection in old files; 1.5 is used.")
+        unshown.add("ior 0 stands for total reflection in old files; 1.5 is used", name)
         n_d = 1.5
-    if float(extensions.get(VOLUME, {}).get("thicknessFactor", 0.0)) == 0.0:
-        notes.append(f"{label} is thin-walled in glTF (thicknessFactor 0); its meshes are taken as solid glass.")
     strength = float(extensions.get(DISPERSION, {}).get("dispersion", 0.0))
-    name = str(values.get("name", ""))
-    dispersion = glass.from_abbe(n_d, glass.gltf_dispersion_to_abbe(strength), name, f"{where}.extensions.{IOR}.ior")
+    v_d = glass.gltf_dispersion_to_abbe(strength)
+    dispersion = glass.from_abbe(n_d, v_d, str(values.get("name", "")), f"{where}.extensions.{IOR}.ior")
     given = values.get("pbrMetallicRoughness", {}).get("roughnessFactor")
-    if given is None:
-        notes.append(f"{label} names no roughnessFactor, and is taken as polished instead of fully rough.")
+    if given is None and values.get("alphaMode") != "BLEND":
+        unshown.add("Glass without a roughnessFactor is taken as polished instead of fully rough", name)
     roughness = min(1.0, max(0.0, float(given or 0.0)))
-    return Dielectric(dispersion, _absorption(extensions, where), roughness=roughness)
+    return Dielectric(dispersion, _absorption(extensions, where), roughness=roughness, transmittance_rgb=rgb)
+
+
+def formed(document: GltfDocument, index: int, material: Material, is_sheet: bool, unshown: Unshown) -> Material:
+    """The glass of material `index`, unless words of ours say what it is, on a mesh of this form: a sheet is thin, and
+    absorption acts over the thickness that the file gives."""
+    values = document.item("materials", index)
+    extras = values.get("extras")
+    if own_extras(values).keys() & {"material", "glass"} or "glass" in (extras or {}):
+        return material
+    volume, name = values.get("extensions", {}).get(VOLUME, {}), str(values.get("name", index))
+    thickness = float(volume.get("thicknessFactor", 0.0))
+    if not is_sheet and thickness == 0.0:
+        unshown.add("Closed meshes of glass that glTF calls thin-walled (no thicknessFactor) are solid", name)
+    if not is_sheet:
+        return material
+    if thickness > 0.0:
+        unshown.add("Glass with a thickness on an open mesh is taken as a thin sheet", name)
+    depth = thickness / float(volume.get("attenuationDistance", math.inf))
+    within = (float(c) ** depth for c in volume.get("attenuationColor", (1.0, 1.0, 1.0)))
+    rgb = vec3(c * w for c, w in zip(material.transmittance_rgb, within, strict=True))
+    return material.changed(thin=True, absorption=None, transmittance_rgb=rgb)
 
 
 def _absorption(extensions: dict[str, Any], where: str) -> Absorption | None:
@@ -141,8 +232,8 @@ def write_gltf_material(values: dict[str, Any], material: Material, thickness: f
     rgb = (1.0, 1.0, 1.0)
     metallic, roughness = 0.0, 0.0
     if isinstance(material, Dielectric):
-        extensions |= _glass_extensions(material, thickness)
-        roughness = material.roughness
+        extensions |= _glass_extensions(material, 0.0 if material.thin else thickness)
+        roughness, rgb = material.roughness, material.transmittance_rgb
     elif material.is_mirror:
         rgb, metallic = material.reflectance_rgb, 1.0
     elif not material.is_specular:

@@ -17,10 +17,12 @@ from ..texture import Texture
 from .gltf_document import GltfDocument
 from .picture_files import decode_8bit
 from .scene_pictures import nearest_levels, picture_name, png_bytes
+from .unshown import Unshown
 
 _CLAMP, _MIRRORED, _REPEAT = 33071, 33648, 10497
 _FORMATS = ("image/png", "image/jpeg")
 _TRANSFORM = "KHR_texture_transform"
+_KTX2 = "KHR_texture_basisu"
 
 
 class GltfTextures:
@@ -33,8 +35,8 @@ class GltfTextures:
         self.numbers: dict[str, int] = {}
         """Content (`texture_key`) of every texture read -> its number in the document."""
 
-    def base_colour(self, material: dict[str, Any], label: str) -> Texture | None:
-        """What the glTF `material` shows as its base colour, or None; what is not shown goes to the notes.
+    def base_colour(self, material: dict[str, Any], name: str, unshown: Unshown) -> Texture | None:
+        """What the glTF `material` shows as its base colour, or None; what is not shown goes to `unshown`.
 
         Raises UserError for an image that is missing or damaged.
         """
@@ -42,32 +44,28 @@ class GltfTextures:
         if info is None:
             return None
         if info.get("texCoord", 0) != 0:
-            self._notes.append(f"{label}: its texture uses a second set of texture coordinates and is not shown.")
+            unshown.add("Textures with a second set of texture coordinates are not shown", name)
             return None
         if _TRANSFORM in info.get("extensions", {}):
-            self._notes.append(f"{label}: its texture is shown without its {_TRANSFORM}.")
+            unshown.add(f"Textures are shown without their {_TRANSFORM}", name)
         entry = self._document.item("textures", info.get("index"))
-        if "source" not in entry:
-            self._notes.append(f"{label}: its texture is neither PNG nor JPEG and is not shown.")
-            return None
-        picture = self._picture(entry["source"])
+        picture = self._picture(entry["source"]) if "source" in entry else None
         if picture is None:
-            self._notes.append(f"{label}: its texture is neither PNG nor JPEG and is not shown.")
+            kind = "KTX2 (Basis Universal)" if _KTX2 in entry.get("extensions", {}) else "neither PNG nor JPEG"
+            unshown.add(f"Textures that are {kind} are not shown; export them as PNG or JPEG", name)
             return None
-        wrap = self._wrap(entry, label)
+        wrap = self._wrap(entry, name, unshown)
         key = (entry["source"], wrap)
         if key not in self._textures:
             self._textures[key] = Texture(picture[0], wrap, picture[1])  # type: ignore[arg-type]
         self.numbers.setdefault(texture_key(self._textures[key]), info["index"])
         return self._textures[key]
 
-    def _wrap(self, entry: dict[str, Any], label: str) -> str:
+    def _wrap(self, entry: dict[str, Any], name: str, unshown: Unshown) -> str:
         sampler = self._document.item("samplers", entry["sampler"]) if "sampler" in entry else {}
         across, down = sampler.get("wrapS", _REPEAT), sampler.get("wrapT", _REPEAT)
         if _MIRRORED in (across, down) or across != down:
-            self._notes.append(
-                f"{label}: its texture is repeated; mirroring, or clamping one way only, is not understood."
-            )
+            unshown.add("Textures are repeated where they are to be mirrored, or clamped one way only", name)
             return "repeat"
         return "clamp" if across == _CLAMP else "repeat"
 

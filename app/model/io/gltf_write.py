@@ -81,7 +81,7 @@ class _Writer:
         new = {o.name: o for o in scene.objects}
         names: dict[int, dict[int, str]] = {}
         for name, (node, number) in self.origins.objects.items():
-            names.setdefault(node, {})[number] = name
+            names.setdefault(node, {}).update(dict.fromkeys(self.origins.parts.get((node, number), [number]), name))
         for node in sorted(names):
             self._update_node(node, names[node], new)
         for item in scene.objects:
@@ -113,6 +113,8 @@ class _Writer:
             item, old = new.get(name), self.old[name]
             if item is None:
                 continue
+            if number != self.origins.objects[name][1] and not _same_mesh(item.mesh, old.mesh):
+                continue  # a part of one solid, whose first part now has all of it
             if not np.array_equal(item.object_to_world, old.object_to_world):
                 moved[number] = item
             kept[number] = self._updated(primitive, item, old)

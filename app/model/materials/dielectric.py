@@ -6,14 +6,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
-from ..fields import Animated, Integer, Number, Row
+from ..fields import Animated, Colour, Flag, Integer, Number, Row
 from ..optics import catalogue
 from ..optics.colorimetry import VISIBLE_NM
 from ..optics.glass import Dispersion
 from ..optics.tints import tint_of
+from ..vectors import Vec3
 from .absorption import Absorption, AbsorptionPart
 from .dispersion_file import DispersionPart
-from .material import Material
+from .material import Material, colour_words
 
 DEFAULT_GLASS = "N-BK7"
 MAX_PRIORITY = 1_000_000
@@ -35,11 +36,24 @@ ROUGHNESS = Number(
     ),
     animated=Animated("Roughness of a glass's surface; 0 is polished", 0.0, 1.0),
 )
+THIN = Flag(
+    "thin",
+    False,
+    optional=True,
+    row=Row(
+        "Thin",
+        "A sheet whose thickness does not show, such as a window's: light goes straight through. What it absorbs and "
+        "its roughness have no effect then; its colour has.",
+    ),
+)
+CLEAR = (1.0, 1.0, 1.0)
+SHEET_CODE = 5
+"""KIND_SHEET of shaders/lib/scene.glsl."""
 
 
 @dataclass(frozen=True)
 class Dielectric(Material):
-    """A transparent solid."""
+    """A transparent solid, or a thin sheet of its material."""
 
     dispersion: Dispersion
     absorption: Absorption | None = None
@@ -47,13 +61,29 @@ class Dielectric(Material):
     """Where solids overlap, the higher priority decides; equal ones: the later object."""
     roughness: float = 0.0
     """Of all its surface: 0 is polished, and GGX's width α the square of it."""
+    thin: bool = False
+    """A sheet, both of whose faces are met at once: without inside, absorption and roughness."""
+    transmittance_rgb: Vec3 = CLEAR
+    """Linear Rec.709 share of what enters that leaves a sheet, or a solid on its other side."""
 
     kind: ClassVar = "glass"
     title: ClassVar = "Glass"
     gpu_code: ClassVar = 3
-    parts: ClassVar = (DispersionPart(), AbsorptionPart(), PRIORITY, ROUGHNESS)
+    parts: ClassVar = (
+        DispersionPart(),
+        AbsorptionPart(),
+        PRIORITY,
+        ROUGHNESS,
+        THIN,
+        Colour("transmittance_rgb", CLEAR, "colour", optional=True),
+    )
     is_specular: ClassVar = True
     transmits: ClassVar = True
+
+    @property
+    def met_as(self) -> int:
+        """A thin sheet is met in a way of its own."""
+        return SHEET_CODE if self.thin else self.gpu_code
 
     @classmethod
     def usual(cls) -> Self:
@@ -67,9 +97,10 @@ class Dielectric(Material):
         return values
 
     def content(self) -> tuple[object, ...]:
-        """Its index on the visible grid, its priority, what it absorbs and how rough it is."""
+        """Its index on the visible grid, its priority, what it absorbs and lets through, how rough and thin it is."""
         absorbed = None if self.absorption is None else self.absorption.coefficient
-        return self.dispersion.index(VISIBLE_NM), self.priority, absorbed, self.roughness
+        index = self.dispersion.index(VISIBLE_NM)
+        return index, self.priority, absorbed, self.thin, *self.transmittance_rgb, self.roughness
 
     def words(self) -> str:
         """Its glass, and what sets it apart from it."""
@@ -78,5 +109,6 @@ class Dielectric(Material):
         words += "" if glass.gain == 1.0 else f", {glass.gain:g} times as dispersive"
         tint = None if self.absorption is None else tint_of(self.absorption.coefficient)
         words += "" if self.absorption is None else ", absorbing" if tint is None else f", tinted {tint[0].name}"
-        words += f", roughness {self.roughness:g}" if self.is_rough else ""
+        words += "" if self.transmittance_rgb == CLEAR else f", surface {colour_words(self.transmittance_rgb)}"
+        words += ", thin" if self.thin else f", roughness {self.roughness:g}" if self.is_rough else ""
         return words + (f", priority {self.priority}" if self.priority else "")

@@ -9,8 +9,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 
+import numpy as np
+
 from ..fields import Number, Part, read_fields, write_fields
 from ..io.scene_table import SceneTable
+from ..optics.colorimetry import rgb_basis
 from ..scene_textures import TextureReader
 from ..vectors import Vec3
 
@@ -26,7 +29,7 @@ class Material:
     """Its word in a scene file."""
     title: ClassVar[str]
     gpu_code: ClassVar[int]
-    """KIND_… of shaders/lib/scene.glsl."""
+    """Tells kinds apart on the GPU."""
     parts: ClassVar[tuple[Part, ...]] = ()
     """What the scene file says of it."""
     is_specular: ClassVar[bool] = False
@@ -51,6 +54,24 @@ class Material:
     dispersion = cast(Any, None)
     """What its deflection of light is a function of: a glass's index, a grating's wavelength."""
     priority = 0
+    thin = False
+    transmittance_rgb = (1.0, 1.0, 1.0)
+    """Linear Rec.709 share of what enters glass that its colour leaves of light on the way through all of it."""
+
+    @property
+    def met_as(self) -> int:
+        """KIND_… of shaders/lib/scene.glsl for its surface."""
+        return self.gpu_code
+
+    @property
+    def is_solid(self) -> bool:
+        """It is a transparent body with an inside."""
+        return self.transmits and not self.thin
+
+    @property
+    def disperses(self) -> bool:
+        """It sends wavelengths different ways."""
+        return self.dispersion is not None and not self.thin and bool(self.dispersion.is_dispersive)
 
     @property
     def has_coat(self) -> bool:
@@ -65,7 +86,7 @@ class Material:
     @property
     def is_rough(self) -> bool:
         """Its surface is ground, so that paths go on from it by chance."""
-        return self.transmits and self.roughness > 0.0
+        return self.is_solid and self.roughness > 0.0
 
     @property
     def microfacet_width(self) -> float:
@@ -75,8 +96,20 @@ class Material:
 
     @property
     def is_coloured(self) -> bool:
-        """Its plain reflectance is not grey."""
-        return len(set(self.reflectance_rgb)) > 1
+        """Its plain reflectance, or what a surface of it lets through, is not grey."""
+        return len(set(self.reflectance_rgb)) > 1 or len(set(self.transmittance_rgb)) > 1
+
+    @property
+    def filters(self) -> bool:
+        """A surface of it lets through less than enters."""
+        return self.transmittance_rgb != (1.0, 1.0, 1.0)
+
+    @property
+    def surface_filter(self) -> np.ndarray:
+        """Share that one surface lets through of what enters, float64 (401,) on the visible grid: white light has the
+        colour `transmittance_rgb` behind a sheet, or a solid, which is entered and left."""
+        passed: np.ndarray = rgb_basis() @ np.asarray(self.transmittance_rgb, float)
+        return passed if self.thin else np.sqrt(passed)
 
     @classmethod
     def usual(cls) -> Self:

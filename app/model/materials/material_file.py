@@ -6,9 +6,16 @@ from ...base.errors import suggestion
 from ..io.scene_table import SceneTable
 from ..scene_textures import TextureReader
 from . import MATERIAL_KINDS
-from .dielectric import DEFAULT_GLASS, PRIORITY, ROUGHNESS, Dielectric
+from .dielectric import DEFAULT_GLASS, PRIORITY, ROUGHNESS, THIN, Dielectric
 from .dispersion_file import GAIN, named_glass, with_gain
 from .material import Material
+
+_OF_GLASS = {
+    PRIORITY: "decides between overlapping solids of glass",
+    ROUGHNESS: "is for the surface of glass",
+    THIN: "is for a sheet of glass",
+}
+"""Keys that an object may give its glass, and what they are for."""
 
 
 def read_materials(table: SceneTable, textures: TextureReader | None = None) -> dict[str, Material]:
@@ -23,7 +30,7 @@ def read_object_material(
     """The material of one object: `glass = "…"`, `material = "NAME"`, `material = {…}` or the default glass.
 
     "mirror", "diffuse" and "black" are known without being defined. The object's `priority`,
-    `roughness` and `dispersion_gain` go above the material's own.
+    `roughness`, `thin` and `dispersion_gain` go above the material's own.
     """
     key = table.one_of(("glass", "material"), "the material")
     if key == "material" and isinstance(table.raw(key), str):
@@ -45,14 +52,11 @@ def read_object_material(
         if not material.transmits:
             table.fail(GAIN, "is for glass; this object has none")
         material = material.changed(dispersion=with_gain(table, material.dispersion))
-    if table.has("priority"):
-        if not material.transmits:
-            table.fail("priority", "decides between overlapping solids of glass; this object has none")
-        material = material.changed(**PRIORITY.read(table))
-    if table.has(ROUGHNESS.attribute):
-        if not material.transmits:
-            table.fail(ROUGHNESS.attribute, "is for the surface of glass; this object has none")
-        material = material.changed(**ROUGHNESS.read(table))
+    for field, what in _OF_GLASS.items():
+        if table.has(field.attribute):
+            if not material.transmits:
+                table.fail(field.attribute, f"{what}; this object has none")
+            material = material.changed(**field.read(table))
     return material
 
 

@@ -167,7 +167,7 @@ def _object(old: SceneObject, new: SceneObject) -> DirtyLevel:
         )
         if not same_absorption:
             return DirtyLevel.BUILD if (a.absorption is None) != (b.absorption is None) else max(cost, DirtyLevel.TRACE)
-        if a.is_rough != b.is_rough:
+        if (a.is_rough, a.thin, a.transmittance_rgb) != (b.is_rough, b.thin, b.transmittance_rgb):
             return DirtyLevel.BUILD
         same = a.priority == b.priority and a.microfacet_width == b.microfacet_width
         return cost if same else max(cost, DirtyLevel.TRACE)

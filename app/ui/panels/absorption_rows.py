@@ -36,10 +36,10 @@ _memory = _Memory()
 
 
 def draw_absorption(state: State, index: int) -> State:
-    """Rows for the absorption of object `index`, which is of glass."""
+    """Rows for the absorption of object `index`, which is of glass; a thin sheet has none."""
     item = state.scene.objects[index]
     material = item.material
-    if not material.transmits:
+    if not material.is_solid:
         return state
     tip = "Let the glass absorb light on the way through it (Beer–Lambert). Off: perfectly clear."
     changed, tinted = widgets.toggle("Tinted", material.absorption is not None, tip=tip)

@@ -20,6 +20,7 @@ from ...model.scene import (
     Vec3,
 )
 from ...model.scene_render import MAX_ANISOTROPY, MAX_BOUNCES
+from ...model.vectors import vec3
 from .. import theme
 from ..view_model import ViewModel
 from . import outliner, picture_choice, widgets
@@ -149,7 +150,7 @@ def _material(state: State, view_model: ViewModel, index: int) -> State:
     if changed:
         return edits.attempt(state, f"Make {thing.name} {wanted.lower()}", edits.set_material, index, _fresh(wanted))
     if material.transmits:
-        return _glass(_declared(state, index, material), material)
+        return _surface_colour(_glass(_declared(state, index, material), material), index)
     if material.is_black:
         widgets.hint("Absorbs all light that meets it.")
         return state
@@ -257,6 +258,17 @@ def _colour(state: State, index: int, material: Material) -> State:
     return widgets.holding(state, active)
 
 
+def _surface_colour(state: State, index: int) -> State:
+    """What glass lets through by its surface."""
+    thing = state.scene.objects[index]
+    tip = "What of light its surface lets through it, linear Rec.709, 0 to 1; white is clear. Once in a thin sheet."
+    changed, rgb, active = widgets.colour("Surface colour", thing.material.transmittance_rgb, tip=tip)
+    if changed:
+        coloured = thing.material.changed(transmittance_rgb=vec3(min(max(c, 0.0), 1.0) for c in rgb))
+        state = edits.attempt(state, f"Colour of {thing.name}", edits.set_material, index, coloured)
+    return widgets.holding(state, active)
+
+
 def _mesh(thing: SceneObject) -> None:
     mesh = thing.mesh
     low, high = mesh.bounds()
@@ -267,7 +279,9 @@ def _mesh(thing: SceneObject) -> None:
     widgets.read_out(
         "Size", " × ".join(f"{s:.3g}" for s in size) + " units", tip="Extent along its own axes, scene units."
     )
-    widgets.read_out("Closed", "yes" if mesh.is_closed else "no", tip="Glass must be closed: light needs an inside.")
+    widgets.read_out(
+        "Closed", "yes" if mesh.is_closed else "no", tip="Glass must be closed, or thin: light needs an inside."
+    )
 
 
 def _scene(state: State, view_model: ViewModel) -> State:

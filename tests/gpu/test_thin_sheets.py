@@ -1,0 +1,136 @@
+"""Thin sheets and coloured surfaces of glass against closed forms, through photons, beams, camera and references.
+
+A sheet reflects R' = 2R/(1 + R), R being what one face does, and lets through 1 - R' of its colour; straight on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from spectrasplat.gpu.context import Context
+from spectrasplat.model.geometry.primitives import box, plane
+from spectrasplat.model.lights import DirectionalLight
+from spectrasplat.model.optics.colorimetry import rgb_basis
+from spectrasplat.model.optics.glass import constant
+from spectrasplat.model.optics.spectrum import illuminant
+from spectrasplat.model.placement import rotation_about
+from spectrasplat.model.scene import Camera, Dielectric, Diffuse, Scene, SceneObject
+from spectrasplat.model.settings import RenderSettings
+from spectrasplat.reference.camera_reference import render_camera_reference
+from spectrasplat.render.still import render
+from spectrasplat.stress.rigs.camera_probe import (
+    PROBE,
+    daylight_mean,
+    fresnel,
+    render_probe,
+    resized,
+    slope_sky,
+    with_sky,
+)
+from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
+from spectrasplat.stress.rigs.probe import blocks
+
+from tests.gpu.camera_rig import at
+
+COVERS = {"optics.glsl": ("both_faces",), "polarisation.glsl": ("both_faces",)}
+N = 1.5
+TINT = (0.9, 0.3, 0.2)
+SHEET = Dielectric(constant(N), thin=True, transmittance_rgb=TINT)
+SOLID = Dielectric(constant(N), transmittance_rgb=TINT)
+CLEAR = Dielectric(constant(N))
+FACE = float(fresnel(1.0, N))
+BOTH = 2.0 * FACE / (1.0 + FACE)
+LUX = 1000.0
+
+
+def tilted(degrees: float) -> np.ndarray:
+    turn = np.eye(4)
+    turn[:3, :3] = rotation_about((1.0, 0.0, 0.0), np.radians(degrees))
+    return turn
+
+
+def pane(material: Dielectric, z: float) -> SceneObject:
+    return SceneObject(f"pane {z:g}", plane(1.0, 1.0), material, at(0.0, 0.0, z))
+
+
+def block(material: Dielectric, z: float) -> SceneObject:
+    return SceneObject(f"block {z:g}", box((1.0, 1.0, 0.2)), material, at(0.0, 0.0, z))
+
+
+def behind_two(first: float, second: float) -> float:
+    """Share that gets through two that reflect so much, with all that goes to and fro between them."""
+    return (1.0 - first) * (1.0 - second) / (1.0 - first * second)
+
+
+PATCHES: dict[str, tuple[tuple[SceneObject, ...], np.ndarray]] = {
+    # What stands over the floor, and what of the sun gets through to it, by colour.
+    "sheet": ((pane(SHEET, 1.5),), (1.0 - BOTH) * np.array(TINT)),
+    # Within a tinted solid light is reflected to and fro without crossing a surface: only out of it is another filter.
+    "solid": ((block(SOLID, 1.5),), (1.0 - FACE) ** 2 / (1.0 - FACE**2) * np.array(TINT)),
+    "sheet before beams": ((pane(SHEET, 1.8), block(CLEAR, 1.2)), behind_two(BOTH, BOTH) * np.array(TINT)),
+    "beams before a sheet": ((block(CLEAR, 1.8), pane(SHEET, 1.2)), behind_two(BOTH, BOTH) * np.array(TINT)),
+    "sheet in a solid": (
+        (
+            SceneObject("solid", box((1.0, 1.0, 1.0)), CLEAR, at(0, 0, 1.5)),
+            pane(replace(SHEET, dispersion=CLEAR.dispersion), 1.5),
+        ),
+        (1.0 - BOTH) * np.array(TINT),
+    ),
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "method"), [*((name, "srd") for name in PATCHES), ("sheet", "hero"), ("solid", "stochastic-even")]
+)
+def test_a_patch_of_sun(gl: Context, name: str, method: str) -> None:
+    above, expected = PATCHES[name]
+    sun = DirectionalLight("sun", illuminant("D65").scaled_to_luminous(LUX), direction=(0.0, 0.0, -1.0))
+    floor = SceneObject("floor", plane(6.0, 6.0), Diffuse((0.5, 0.5, 0.5)))
+    camera = Camera((0.0, -6.0, 5.0), (0.0, 0.0, 0.0), vertical_fov_deg=2.0)
+    scene = Scene("patch", camera, (sun,), (floor, *above))
+    seen = render(scene, RenderSettings(8, 8, photons=20_000, spp=16, method=method), context=gl).rgb.mean(axis=(0, 1))
+    # What two reflections between a sheet and its tint would add is below a thousandth.
+    assert seen == pytest.approx(LUX * 0.5 / np.pi * expected, rel=0.012)
+
+
+def test_both_faces(gl: Context) -> None:
+    one = as_f32(np.random.default_rng(3).uniform(0.0, 0.99, (64, 3)))
+    body = (
+        "r = both_faces(s); FresnelPair pair = both_faces(FresnelPair(s, s * s, -s, s)); p = pair.p; real = pair.real;"
+    )
+    libraries = ["lib/optics.glsl", "lib/polarisation.glsl"]
+    got = evaluate(gl.ctx, libraries, body, {"s": one}, dict.fromkeys(("r", "p", "real"), "vec3"), {"HAS_SHEET": 1})
+    # There and back between the faces, added up.
+    sums = [sum(r * (1.0 - r) ** 2 * r ** (2 * k) for k in range(4000)) + r for r in (one, one**2)]
+    for name, wanted in (("r", sums[0]), ("p", sums[1]), ("real", -np.sqrt(sums[0] * sums[1]))):
+        np.testing.assert_allclose(got[name], wanted, atol=2e-5)
+
+
+@pytest.mark.parametrize("degrees", [0.0, 60.0, 80.0])
+@pytest.mark.parametrize("material", [SHEET, Dielectric(constant(N), thin=True)])
+def test_a_sheet_in_a_furnace(gl: Context, degrees: float, material: Dielectric) -> None:
+    camera = Camera((0.0, 0.0, 4.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), "orthographic", vertical_extent=0.05)
+    sheet = SceneObject("sheet", plane(1.0, 1.0), material, tilted(degrees))
+    scene = Scene("furnace", camera, (), (sheet,), background_rgb=(1.0, 1.0, 1.0))
+    r = float(fresnel(np.cos(np.radians(degrees)), N))
+    both = 2.0 * r / (1.0 + r)
+    passed = (1.0 - both) * (rgb_basis() @ np.array(material.transmittance_rgb))
+    assert render_probe(gl, scene, PROBE).mean == pytest.approx(daylight_mean(both + passed), rel=2e-3)
+
+
+@pytest.mark.parametrize("polarised", [False, True])
+def test_sheets_as_the_reference_sees_them(gl: Context, polarised: bool) -> None:
+    """Two tilted sheets and a tinted prism of a solid before a sky that changes in every direction."""
+    first, second = (
+        SceneObject(f"sheet {z}", plane(1.4, 1.4), SHEET, at(0.0, 0.0, z) @ tilted(58.0)) for z in (0.3, -0.3)
+    )
+    camera = Camera((0.2, -0.3, 4.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), vertical_fov_deg=22.0)
+    solid = SceneObject("solid", box((0.5, 0.5, 0.5)), SOLID, at(-0.6, 0.2, 1.0) @ tilted(58.0))
+    scene = with_sky(first, second, solid, camera=camera, environment=slope_sky())
+    scene = replace(scene, render=replace(scene.render, polarisation=polarised))
+    found = render_probe(gl, scene, resized(PROBE, 24, 18, 64)).picture
+    reference = render_camera_reference(scene, 24, 18, samples=1024).rgb()
+    assert found.mean(axis=(0, 1)) == pytest.approx(reference.mean(axis=(0, 1)), rel=4e-3)
+    assert np.abs(blocks(found, 6) - blocks(reference, 6)).max() < 0.03
