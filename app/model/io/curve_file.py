@@ -38,6 +38,7 @@ _WAVELENGTH = re.compile(
 )
 _UNITS_NM = {r"µm|μm|\bum\b|micro[nm]|mikrom": 1e3, r"\bnm\b|nanom": 1.0, r"å|angstr": 0.1}
 _OTHER_UNITS = re.compile(r"cm ?\^?[-⁻−] ?[1¹]|1/cm|wavenumber|\bthz\b|\bev\b", re.IGNORECASE)
+_MAX_BYTES = 4 << 20
 _LEAST_ACROSS = 8
 """Wavelengths in one row that make it the heading of a table with a curve in each row below."""
 _NEAR = 8
@@ -87,7 +88,7 @@ def read_curve(name: PathLike, notes: list[str]) -> Curve:
 def read_curves(path: PathLike, notes: list[str]) -> list[Curve]:
     """All curves in `path`, at least one; what was assumed goes to `notes`. Raises UserError with a remedy."""
     try:
-        text = files.read_any_text(path, files.SETTINGS_BYTES).replace("\0", "").lstrip("\ufeff \t\r\n")
+        text = files.read_any_text(path, _MAX_BYTES).replace("\0", "").lstrip("\ufeff \t\r\n")
         is_xml = text.startswith("<")
         rows = [] if is_xml else _rows(text.splitlines())
     except (OSError, csv.Error) as error:
@@ -239,7 +240,7 @@ def _columns(path: PathLike, block: list[_Row], above: list[_Row], width: int) -
     ]
     upper, lower = ([[""] * width] * 2 + titles)[-2:]
     if len(set(lower[:width])) < width:  # pairs of columns, with what they are of above the first of each
-        upper = list(itertools.accumulate(upper, lambda before, name: name or before))
+        upper = [next(filter(None, upper[column::-1]), "") for column in range(width)]
     elif not re.fullmatch(r"[\[(]?(?:nm|[µμu]m|å)[\])]?", lower[0], re.IGNORECASE):
         upper = [""] * width  # else the lower row has the units
     names = [f"{a} {b}".strip() for a, b in zip(upper, lower, strict=False)]
