@@ -192,7 +192,9 @@ def _across(rows: list[_Row]) -> Iterator[_Table]:
     for i, row in enumerate(rows):
         headed = [(column, found[1]) for column, cell in enumerate(row.cells) if (found := _HEADED.fullmatch(cell))]
         together = itertools.groupby(enumerate(headed), key=lambda each: each[1][0] - each[0])
-        marks = dict(max(([mark for _, mark in group] for _, group in together), key=len, default=[]))
+        runs = [[mark for _, mark in run] for _, run in together]
+        longest = max(runs, key=len, default=[])
+        marks = dict(longest)
         nm = np.array([float(text.replace(",", ".")) for text in marks.values()])
         steps = np.abs(np.diff(nm))
         if len(nm) < _LEAST_ACROSS or nm.min() < 200.0 or nm.max() > 2600.0 or not 0.0 < steps.max() <= 2 * steps.min():
