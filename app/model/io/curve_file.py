@@ -12,6 +12,7 @@ import math
 import os
 import re
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 from xml.etree import ElementTree
 
@@ -75,18 +76,19 @@ _Table = tuple[str, str, Any, Any]
 def read_curve(name: PathLike, notes: list[str]) -> Curve:
     """The curve called "file:column", or the only one of a file. Raises UserError, with a list, where that is open."""
     path, part = files.with_part(name)
-    curves = read_curves(path, notes)
-    key = part.casefold()
-    found = [c for c in curves if c.name.casefold() == key] or [c for c in curves if key in c.name.casefold()]
+    found = read_curves(path, notes, part)
+    found = [curve for curve in found if curve.name.casefold() == part.casefold()] or found
     if len(found) == 1:
         return found[0]
-    state = f"has no column '{part}' but" if part and not found else f"has {len(found)} columns of values:"
-    listed = ", ".join(f"'{curve.name}'" for curve in (found or curves)[:12])
-    raise UserError(f'{path} {state} {listed}; name one of them, as in "{path.name}:{curves[-1].name}"')
+    listed = ", ".join(f"'{curve.name}'" for curve in found[:12])
+    name_one = f'name one of them, as in "{path.name}:{found[-1].name}"'
+    raise UserError(f"{path} has {len(found)} columns of values: {listed}; {name_one}")
 
 
-def read_curves(path: PathLike, notes: list[str]) -> list[Curve]:
-    """All curves in `path`, at least one; what was assumed goes to `notes`. Raises UserError with a remedy."""
+def read_curves(path: Path, notes: list[str], part: str = "") -> list[Curve]:
+    """All curves in `path` whose names hold `part`, at least one; what was assumed goes to `notes`.
+
+    Raises UserError with a remedy."""
     try:
         text = files.read_any_text(path, _MAX_BYTES).replace("\0", "").lstrip("\ufeff \t\r\n")
         is_xml = text.startswith("<")
@@ -96,10 +98,16 @@ def read_curves(path: PathLike, notes: list[str]) -> list[Curve]:
         raise UserError(f"{reason}; give a table of wavelength_nm, value") from error
     tables = _from_xml(text, path) if is_xml else list(_across(rows)) or _down(path, rows, notes)
     curves: list[Curve] = []
+    names: list[str] = []
     for name, unit, nm, values in tables:
-        same = sum(curve.name.partition(" (#")[0] == name for curve in curves)
-        curves.append(_in_order(path, f"{name} (#{same + 1})" if same else name, unit, nm, values, notes))
+        same = sum(each.partition(" (#")[0] == name for each in names)
+        names.append(f"{name} (#{same + 1})" if same else name)
+        if part.casefold() in names[-1].casefold():
+            curves.append(_in_order(path, names[-1], unit, nm, values, notes))
     curves = [curve for curve in curves if len(curve.nm) > 1]
+    if not curves and part and names:
+        listed = ", ".join(f"'{each}'" for each in names[:12])
+        raise UserError(f"{path} has no column '{part}' but {listed}; name one of them")
     if not curves:
         raise UserError(f"{path}: there is no table of two or more rows of wavelength_nm, value; export it as text")
     return curves
