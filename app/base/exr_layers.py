@@ -110,8 +110,8 @@ def _chosen(
         found = [""] if "" in coloured else coloured if len(coloured) == 1 else usual
     listed = ", ".join(f"'{name}'" for name in list(layers)[:12])
     if len(found) == 1:
-        is_told = not wanted and found[0] and len(coloured) > 1
-        return layers[found[0]], [f"has the layers {listed}; '{found[0]}' was taken"] if is_told else []
+        is_noted = not wanted and found[0] and len(coloured) > 1
+        return layers[found[0]], [f"has the layers {listed}; '{found[0]}' was taken"] if is_noted else []
     if not layers:
         names = ", ".join(channel.name for _, header in parts for channel in header["channels"][:12])
         raise UserError(f"{path} holds no colours, only the channels {names}; export one with R, G and B")

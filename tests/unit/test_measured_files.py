@@ -59,7 +59,7 @@ SEKONIC = "Tcp [K],3262\nCRI Ra,87.5\n" + each("Spectral Data {x}[nm],{y}\n")
         (rows(",", x=NM * 1e-3), "", "look like µm"),
         ("wl (µm),P\n" + rows(","), "", "look like nm"),
         ("wavelength (Å)\tP\n" + rows("\t", x=NM * 10.0), "", ""),
-        ("wavelength,Sample 1,Sample 2\n" + each("{x},7,{y}\n"), "Sample 2", ""),
+        ("wavelength,Sample 1,Sample 2\n" + each("{x},{i}e999,{y}\n"), "Sample 2", ""),
         ("pixel,wavelength,P\n" + each("{i},{x},{y}\n"), "", ""),
         ("Dark,,Lamp,\nnm,a,nm,a\n" + each("{x},3,{x},{y}\n"), "Lamp a", ""),
         (CGATS, "A1", ""),
@@ -83,6 +83,7 @@ def test_spectra(tmp_path: Path, text: str, part: str, note: str, encoding: str)
         ("400,1\n500,2\n600;3\n", "line 3: expected numbers"),
         ("400,1,7\n500,1,7\n", "2 columns of values: 'column 2', 'column 3'; name one of them, as in \"lamp.csv:col"),
         ("nm,a,b\n400,1,7\n500,1,7\n", "'a', 'b'; name one"),
+        ("nm,a,b\n400,1,7\n500,1,7\n", "has no column 'c' but 'a', 'b'"),
         ("400,1\n500,1e999\n", "beyond 1e+30"),
         ("400,1\n500,-1\n", "power is -1 at 500 nm"),
         ("400,1\n500,1\n500,2\n", "different values of 'column 2' at 500 nm"),
@@ -99,7 +100,7 @@ def test_what_is_no_spectrum(tmp_path: Path, text: str, message: str) -> None:
     file = tmp_path / "lamp.csv"
     file.write_text(text)
     with pytest.raises(UserError) as caught:
-        sp.from_csv(file)
+        sp.from_csv(f"{file}:c" if "'c'" in message else file)
     assert str(file) in str(caught.value) and message in str(caught.value)
     with pytest.raises(UserError, match="No such file"):
         sp.from_csv(tmp_path / "none.csv")

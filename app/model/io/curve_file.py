@@ -12,6 +12,7 @@ import math
 import os
 import re
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 from xml.etree import ElementTree
 
@@ -38,6 +39,7 @@ _WAVELENGTH = re.compile(
 )
 _UNITS_NM = {r"µm|μm|\bum\b|micro[nm]|mikrom": 1e3, r"\bnm\b|nanom": 1.0, r"å|angstr": 0.1}
 _OTHER_UNITS = re.compile(r"cm ?\^?[-⁻−] ?[1¹]|1/cm|wavenumber|\bthz\b|\bev\b", re.IGNORECASE)
+_MAX_BYTES = 4 << 20
 _LEAST_ACROSS = 8
 """Wavelengths in one row that make it the heading of a table with a curve in each row below."""
 _NEAR = 8
@@ -74,20 +76,21 @@ _Table = tuple[str, str, Any, Any]
 def read_curve(name: PathLike, notes: list[str]) -> Curve:
     """The curve called "file:column", or the only one of a file. Raises UserError, with a list, where that is open."""
     path, part = files.with_part(name)
-    curves = read_curves(path, notes)
-    key = part.casefold()
-    found = [c for c in curves if c.name.casefold() == key] or [c for c in curves if key in c.name.casefold()]
+    found = read_curves(path, notes, part)
+    found = [curve for curve in found if curve.name.casefold() == part.casefold()] or found
     if len(found) == 1:
         return found[0]
-    state = f"has no column '{part}' but" if part and not found else f"has {len(found)} columns of values:"
-    listed = ", ".join(f"'{curve.name}'" for curve in (found or curves)[:12])
-    raise UserError(f'{path} {state} {listed}; name one of them, as in "{path.name}:{curves[-1].name}"')
+    listed = ", ".join(f"'{curve.name}'" for curve in found[:12])
+    name_one = f'name one of them, as in "{path.name}:{found[-1].name}"'
+    raise UserError(f"{path} has {len(found)} columns of values: {listed}; {name_one}")
 
 
-def read_curves(path: PathLike, notes: list[str]) -> list[Curve]:
-    """All curves in `path`, at least one; what was assumed goes to `notes`. Raises UserError with a remedy."""
+def read_curves(path: Path, notes: list[str], part: str = "") -> list[Curve]:
+    """All curves in `path` whose names hold `part`, at least one; what was assumed goes to `notes`.
+
+    Raises UserError with a remedy."""
     try:
-        text = files.read_any_text(path, files.SETTINGS_BYTES).replace("\0", "").lstrip("\ufeff \t\r\n")
+        text = files.read_any_text(path, _MAX_BYTES).replace("\0", "").lstrip("\ufeff \t\r\n")
         is_xml = text.startswith("<")
         rows = [] if is_xml else _rows(text.splitlines())
     except (OSError, csv.Error) as error:
@@ -95,10 +98,16 @@ def read_curves(path: PathLike, notes: list[str]) -> list[Curve]:
         raise UserError(f"{reason}; give a table of wavelength_nm, value") from error
     tables = _from_xml(text, path) if is_xml else list(_across(rows)) or _down(path, rows, notes)
     curves: list[Curve] = []
+    names: list[str] = []
     for name, unit, nm, values in tables:
-        same = sum(curve.name.partition(" (#")[0] == name for curve in curves)
-        curves.append(_in_order(path, f"{name} (#{same + 1})" if same else name, unit, nm, values, notes))
+        same = sum(each.partition(" (#")[0] == name for each in names)
+        names.append(f"{name} (#{same + 1})" if same else name)
+        if part.casefold() in names[-1].casefold():
+            curves.append(_in_order(path, names[-1], unit, nm, values, notes))
     curves = [curve for curve in curves if len(curve.nm) > 1]
+    if not curves and part and names:
+        listed = ", ".join(f"'{each}'" for each in names[:12])
+        raise UserError(f"{path} has no column '{part}' but {listed}; name one of them")
     if not curves:
         raise UserError(f"{path}: there is no table of two or more rows of wavelength_nm, value; export it as text")
     return curves
@@ -191,8 +200,9 @@ def _across(rows: list[_Row]) -> Iterator[_Table]:
     for i, row in enumerate(rows):
         headed = [(column, found[1]) for column, cell in enumerate(row.cells) if (found := _HEADED.fullmatch(cell))]
         together = itertools.groupby(enumerate(headed), key=lambda each: each[1][0] - each[0])
-        runs = [[mark for _, mark in group] for _, group in together]
-        marks = dict(max(runs, key=len, default=[]))
+        runs = [[mark for _, mark in run] for _, run in together]
+        longest = max(runs, key=len, default=[])
+        marks = dict(longest)
         nm = np.array([float(text.replace(",", ".")) for text in marks.values()])
         steps = np.abs(np.diff(nm))
         if len(nm) < _LEAST_ACROSS or nm.min() < 200.0 or nm.max() > 2600.0 or not 0.0 < steps.max() <= 2 * steps.min():
@@ -240,8 +250,7 @@ def _columns(path: PathLike, block: list[_Row], above: list[_Row], width: int) -
     ]
     upper, lower = ([[""] * width] * 2 + titles)[-2:]
     if len(set(lower[:width])) < width:  # pairs of columns, with what they are of above the first of each
-        for column in range(1, len(upper)):
-            upper[column] = upper[column] or upper[column - 1]
+        upper = [next(filter(None, upper[column::-1]), "") for column in range(width)]
     elif not re.fullmatch(r"[\[(]?(?:nm|[µμu]m|å)[\])]?", lower[0], re.IGNORECASE):
         upper = [""] * width  # else the lower row has the units
     names = [f"{a} {b}".strip() for a, b in zip(upper, lower, strict=False)]

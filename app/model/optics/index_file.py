@@ -20,6 +20,7 @@ from ...base import files
 from ...base.errors import UserError, suggestion
 from ...base.paths import config_path
 from ..io.curve_file import read_curves
+from ..io.scene_table import MAX_MAGNITUDE
 from . import catalogue, glass
 from .colorimetry import VISIBLE_NM
 from .dispersion_formulas import Kind
@@ -102,7 +103,7 @@ def _numbers(words: list[str], where: str | Path) -> list[float]:
         found = [float(word.replace(",", ".")) for word in words]
     except ValueError:
         found = [np.nan]
-    if not np.isfinite(found).all():
+    if not (np.abs(found) <= MAX_MAGNITUDE).all():
         raise UserError(f"{where} has something among its coefficients that is no number; export it again")
     return found
 
