@@ -21,17 +21,17 @@ class CursorInfo:
     """What lies under the cursor in the viewport, as of the last frame."""
 
     pixel: tuple[int, int]
-    rgb: Vec3
-    """Linear Rec.709 radiance, lm/(sr unit²)."""
+    rgb: Vec3 | None
+    """Linear Rec.709 radiance, lm/(sr unit²); None while the picture is being drawn."""
     object_index: int | None = None
-    """First surface hit."""
+    """First surface hit; None for the background."""
     position: Vec3 | None = None
     """World position of that hit."""
     normal: Vec3 | None = None
     """Unit, facing the camera."""
     is_receiver: bool = False
     spectrum_nm: np.ndarray | None = None
-    """Bin centres, when a spectrum was asked for (`Panels.spectrum`)."""
+    """Bin centres, when a spectrum was asked for (`Panels.spectrum`); None where the light is not known yet."""
     spectrum: np.ndarray | None = None
     """Spectral irradiance there, W/(unit² nm), mean of each bin: caustic, and direct light where that is known."""
     spectrum_error: float = 0.0

@@ -250,7 +250,9 @@ def draw_magnifier(canvas: Canvas, view_model: ViewModel) -> None:
     if cursor is None or cursor.magnified is None:
         return
     side, gap, palette = theme.em(_MAGNIFIER_EM), theme.em(1.6), theme.palette()
-    text = f"{cursor.pixel[0]}, {cursor.pixel[1]}   R {cursor.rgb[0]:.3g}  G {cursor.rgb[1]:.3g}  B {cursor.rgb[2]:.3g}"
+    text = f"{cursor.pixel[0]}, {cursor.pixel[1]}   " + (
+        "…" if cursor.rgb is None else "R {:.3g}  G {:.3g}  B {:.3g}".format(*cursor.rgb)
+    )
     foot = imgui.get_text_line_height() + theme.em(0.5)
     width = max(side, imgui.calc_text_size(text).x + theme.em(0.8))
     x = mouse.x + gap if mouse.x + gap + width < canvas.left + canvas.width else mouse.x - gap - width

@@ -200,10 +200,7 @@ def test_paths_end_where_they_should(gl) -> None:
             np.array([[0.2, 0.1, 2.0], [0.0, 0.0, 2.0]]), np.array([down, aslant]), np.full(2, 550.0), 4.0
         )
     assert bounced.points == pytest.approx(np.array([[0.2, 0.1, 2.0], [0.2, 0.1, 0.0], [0.2, 0.1, 3.0]]), abs=1e-5)
-    assert (bounced.first_object, bounced.last_object) == (0, 1)
     assert missed.points == pytest.approx(np.array([[0, 0, 2.0], [1.5, 0, 0], [3.9, 0, 3.2]]), abs=1e-5)
-    assert (missed.first_object, missed.last_object) == (0, None)
-    assert missed.first_normal == pytest.approx([0, 0, 1])
 
 
 def test_total_reflection_and_a_start_inside_glass(gl) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from imgui_bundle import imgui
 from spectrasplat.edit import camera_controls
+from spectrasplat.edit.picking import pick_in
 from spectrasplat.edit.projection import View
 from spectrasplat.edit.requests import BeginPull, Notice, Pull, SelectAt
 from spectrasplat.edit.state import Brush, Compare, Selection, State
@@ -36,7 +37,6 @@ class ViewportRig(HeadlessInterface):
         self.asked: list = []
         self.labels: list[str] = []
         self.held_frames = 0
-        self.on_floor = True
         self._colour = gl.ctx.texture((2, 2), 4, bytes([40, 80, 120, 255] * 4))
         viewport.reset()
         super().__init__(gl, self._draw_window, SIZE)
@@ -67,13 +67,9 @@ class ViewportRig(HeadlessInterface):
 
     def cursor(self) -> CursorInfo | None:
         """What the host found where the cursor was in the last frame."""
-        if self.state.hover is None or not self.on_floor:
-            return None
-        point = self.view().on_plane(*self.state.hover, np.zeros(3), np.array([0.0, 0.0, 1.0]))
-        floor = receiver_of(self.state)
-        return (
-            None if point is None else CursorInfo((0, 0), (1.0, 1.0, 1.0), floor, tuple(point), (0.0, 0.0, 1.0), True)
-        )
+        hit = None if self.state.hover is None else pick_in(self.state, *self.state.hover)
+        rgb = (1.0, 1.0, 1.0)
+        return None if hit is None else CursorInfo((0, 0), rgb, hit.object_index, hit.position, hit.normal, True)
 
     def at(self, point) -> tuple[float, float]:
         """Where a world point is on the screen."""
@@ -312,8 +308,9 @@ def test_brush_modifiers_and_radius(gl) -> None:
 
 def test_the_brush_refuses_what_is_no_receiver(gl) -> None:
     with brushing(gl) as rig:
-        rig.on_floor = False
-        rig.drag(CENTRE, (CENTRE[0] + 30, CENTRE[1]))
+        item = rig.state.scene.objects[0]
+        place = rig.at((item.mesh.vertices @ item.object_to_world[:3, :3].T + item.object_to_world[:3, 3]).mean(axis=0))
+        rig.drag(place, (place[0] + 5, place[1]))
         assert rig.labels == []
         assert [type(request) for request in rig.asked] == [Notice]
 
@@ -367,13 +364,21 @@ def test_pulling_a_colour_moves_it_under_the_cursor(gl, local) -> None:
         assert rig.state.pull is None
 
 
-def test_a_pull_that_came_too_late_is_dropped(gl) -> None:
+@pytest.mark.parametrize("drags", [False, True])
+def test_a_colour_that_is_found_after_the_button_was_let_go_lies_where_it_was_dragged(gl, drags) -> None:
     with ViewportRig(gl, replace(scene_state(), tool="pull")) as rig:
-        rig.click(CENTRE)
-        rig.state = replace(rig.state, pull=held_colour(rig))
+        pull = held_colour(rig)
+        place = rig.at(pull.start)
+        if drags:
+            rig.drag(place, rig.at(np.array(pull.reference) + [1.0, 0.0, 0.0]))
+        else:
+            rig.click(place)
+        rig.state = replace(rig.state, pull=pull)
         rig.frame()
         assert rig.state.pull is None
-        assert rig.labels == []
+        gain = rig.state.scene.objects[0].material.dispersion.gain
+        assert gain == (pytest.approx(2.5, rel=0.02) if drags else 1.0)
+        assert bool(rig.labels) == drags
 
 
 def test_the_wipe_is_dragged_by_its_line(rig) -> None:

@@ -20,7 +20,6 @@ from ...edit.live_inputs import LiveInputs
 from ...gpu import shader
 from ...model.environment_sun import with_sun
 from ...passes.caustic_maps import CausticMaps
-from ...passes.pick import Picker
 from ..light_maps import LightMaps
 from ..moving_beams import MovingBeams
 from ..solo import scene_seen
@@ -359,13 +358,9 @@ class LiveEngine(EngineAnswers):
 
     def _swap(self, built: Shown) -> None:
         # What does not compile (or fit) leaves everything as it was: the programs of the camera come first.
-        picker = None
         try:
-            picker = Picker(self.context, built.light.buffers)
             self._take_scene(built.traced, built.light)
         except BaseException:
-            if picker is not None:
-                picker.release()
             built.light.release()
             raise
         before, self._shown = self._shown, built
@@ -375,9 +370,6 @@ class LiveEngine(EngineAnswers):
         if before is not None:
             self._rays_before += before.light.light_pass.trace.rays_traced
             before.light.release()
-        if self._picker is not None:
-            self._picker.release()
-        self._picker = picker
         self._tell(events.Built())
         self._maps_ready()
 
@@ -418,9 +410,7 @@ class LiveEngine(EngineAnswers):
         self._building.drop()
         if self._shown is not None:
             self._shown.light.release()
-        if self._picker is not None:
-            self._picker.release()
         self._camera_pass.release()
         shader.forget_programs(self.context.ctx)
         self._splatting = self._tracing = iter(())
-        self._shown = self._maps = self._picker = None
+        self._shown = self._maps = None

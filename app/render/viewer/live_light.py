@@ -390,6 +390,12 @@ class LiveLight:
             for _ in self.light_pass.sample_steps(photons, self._samples.keep):
                 yield
 
+    @property
+    def has_records(self) -> bool:
+        """`stored_records` knows something of all light."""
+        fullest = self.stored.fullest
+        return (self._samples.rounds if self.light_pass.has_beams else fullest.store.rounds if fullest else 0) > 0
+
     def stored_records(self, limit: int) -> np.ndarray:
         """About `limit` stored records (`gpu.records.photon_record`) of all light, beams' too."""
         dtype = self.light_pass.trace.photon.dtype
