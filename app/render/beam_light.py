@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..beams.light_beams import BeamFinder, LightBeams
-from ..beams.polygons import BeamPolygons
+from ..beams.polygons import BeamPolygons, joined
 from ..beams.search import (
     SUM_ABSORBED,
     SUM_DEPOSITED,
@@ -100,6 +100,8 @@ class BeamStats:
 SURVEY_PARTS = 4
 MOVING_PARTS = 1
 """Points that stand for an extended light in motion."""
+_RESTING = 0.125
+"""Threshold of the search whose light stays where it meets nothing that is edited, over that of the ones in motion."""
 _MOVING_WORD = 1
 """Roulette's seed in motion: the same beams from frame to frame."""
 
@@ -155,6 +157,9 @@ class BeamLight:
         """What maps are fitted to."""
         self.found: LightBeams | None = None
         """The last that were drawn, or found by the survey."""
+        self._resting = np.inf, scene, LightBeams({})
+        """Threshold, what was shown, and what was found by a search in which weak beams played roulette: of light that
+        meets nothing that is edited since, it stays until there is a finer one."""
 
     def surveying(self, moving: MovingBeams | None = None) -> Iterator[str | None]:
         """Find out which objects' light beams carry, and whether that pays, with pauses that tell what it is at (None:
@@ -258,7 +263,7 @@ class BeamLight:
             enough = _ENOUGH * followed * self._photons_a_beam >= photons
             if enough or self._threshold(photons, surveyed, growth) >= threshold:
                 break
-        self.found = found
+        self.found = found = found if hands else self._with_untouched(found, threshold)
         self._count(found)
         if found.polygons is not None:
             drawn = 0
@@ -288,13 +293,33 @@ class BeamLight:
             finder = self.finder.shown_as(self.finder.shown)
             finder.set_texels(self._texels(maps.layout))
             self._coarse = maps.layout, finder
-        for step in self._coarse[1].find(moving.threshold, self._depth, _MOVING_WORD, MOVING_PARTS):
-            if isinstance(step, LightBeams):
-                self.found = step
-        if self.found is not None and self.found.polygons is not None:
+        if self._resting[0] == np.inf and self._is_lit_as(self._resting[1]):  # once, as a drag begins
+            finer = _RESTING * moving.threshold
+            self._with_untouched(_found(self.finder, finer, self._depth), finer)
+        self.found = self._with_untouched(_found(self._coarse[1], moving.threshold, self._depth), moving.threshold)
+        if self.found.polygons is not None:
             self.draw(self.found.polygons, maps, weight)
             self._context.finish()
         moving.learn(time.perf_counter() - started, seconds)
+
+    def _with_untouched(self, found: LightBeams, threshold: float) -> LightBeams:
+        """What was `found` by a search so fine, in which weak beams played roulette, but that of a finer one for light
+        that met nothing which is another since."""
+        finer, before, resting = self._resting
+        shown, is_lit_as = self.finder.shown, self._is_lit_as(before)
+        if not is_lit_as or threshold <= finer:
+            self._resting = threshold if is_lit_as else np.inf, shown, found
+            return found
+        differs = [a.material is not b.material for a, b in zip(before.objects, shown.objects, strict=True)]
+        changed = np.bitwise_or.reduce(np.int64(1) << (np.flatnonzero(differs) & 63), initial=np.int64(0))
+        pairs = (resting.polygons, False), (found.polygons, True)
+        parts = [some.where((some.met & changed != 0) == touched) for some, touched in pairs if some is not None]
+        return replace(found, polygons=joined(parts)) if parts else found
+
+    def _is_lit_as(self, scene: Scene) -> bool:
+        """Lights have the spectra that they have in `scene`."""
+        pairs = zip(scene.lights, self.finder.shown.lights, strict=True)
+        return all(a.spectral_power is b.spectral_power for a, b in pairs)
 
     @property
     def counts(self) -> tuple[int, int]:
@@ -337,9 +362,7 @@ class BeamLight:
 
     def survey_again(self) -> None:
         """Know better where light lands: with the glass that is shown, and as finely as for a still."""
-        for step in self.finder.find(SURVEY, self._depth, _MOVING_WORD, MOVING_PARTS):
-            if isinstance(step, LightBeams):
-                self._survey_polygons = step.polygons
+        self._survey_polygons = _found(self.finder, SURVEY, self._depth).polygons
 
     def pause(self) -> None:
         """Stop the search that runs beside, for something more urgent; whoever goes on waiting for it begins again."""
@@ -371,6 +394,13 @@ class BeamLight:
         """Free everything; a search that runs ends soon."""
         self._worker.release()
         self.drawing.release()
+
+
+def _found(finder: BeamFinder, threshold: float, depth: int) -> LightBeams:
+    """The beams of a search in motion."""
+    *_, found = finder.find(threshold, depth, _MOVING_WORD, MOVING_PARTS)
+    assert isinstance(found, LightBeams)
+    return found
 
 
 def _finest(threshold: float, followed: float) -> float:
