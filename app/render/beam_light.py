@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from ..beams.search import (
     SUM_NUMERIC,
     SUM_ROULETTE,
 )
+from ..gpu import shader
 from ..gpu.context import Context
 from ..gpu.scene_buffers import SceneBuffers
 from ..model.flat_shapes import is_flat
@@ -39,6 +41,9 @@ from .beam_worker import BeamWorker
 from .light_maps import LightMaps
 from .moving_beams import SURVEY, MovingBeams
 from .shown_spectra import ShownSpectra
+
+if TYPE_CHECKING:
+    import moderngl
 
 PHOTONS_A_BEAM = 2.0
 """Photons there are for a beam, half of them for what it leaves; a beam takes the time of two to four. `brilliant`,
@@ -100,8 +105,6 @@ class BeamStats:
 SURVEY_PARTS = 4
 MOVING_PARTS = 1
 """Points that stand for an extended light in motion."""
-_RESTING = 0.125
-"""Threshold of the search whose light stays where it meets nothing that is edited, over that of the ones in motion."""
 _MOVING_WORD = 1
 """Roulette's seed in motion: the same beams from frame to frame."""
 
@@ -110,6 +113,27 @@ COMPILING = "readying the search for beams, up to a minute the first time"
 SEARCHING = "searching for beams"
 _compiled: list[bool] = []
 """Holds something once a search has run in this process."""
+
+
+@dataclass(frozen=True)
+class _KeptBeams:
+    """Polygons of a search that an edit leaves as they are."""
+
+    search: LightBeams
+    changed: int
+    """Objects that differ, a bit each (`BeamPolygons.met`)."""
+    polygons: BeamPolygons
+
+    def is_like(self, other: _KeptBeams) -> bool:
+        """Whether it holds the same."""
+        return self.search is other.search and self.changed == other.changed
+
+    def joined(self, found: LightBeams) -> tuple[LightBeams, BeamPolygons | None]:
+        """What was `found`, but for light that is kept; and its polygons that are not."""
+        if found.polygons is None:
+            return replace(found, polygons=self.polygons), None
+        touched = found.polygons.where(found.polygons.met & self.changed != 0)
+        return replace(found, polygons=joined([self.polygons, touched])), touched
 
 
 class BeamLight:
@@ -157,9 +181,10 @@ class BeamLight:
         """What maps are fitted to."""
         self.found: LightBeams | None = None
         """The last that were drawn, or found by the survey."""
-        self._resting = np.inf, scene, LightBeams({})
-        """Threshold, what was shown, and what was found by a search in which weak beams played roulette: of light that
-        meets nothing that is edited since, it stays until there is a finer one."""
+        self._keeps, self._finest = beside, (np.inf, LightBeams({}))
+        """Threshold and beams of the finest search of what is traced: what meets nothing edited stays as in it."""
+        self._ground: tuple[LightMaps, _KeptBeams, list[moderngl.Texture]] | None = None
+        """Maps, what they hold while something is dragged, and a copy of that."""
 
     def surveying(self, moving: MovingBeams | None = None) -> Iterator[str | None]:
         """Find out which objects' light beams carry, and whether that pays, with pauses that tell what it is at (None:
@@ -263,7 +288,11 @@ class BeamLight:
             enough = _ENOUGH * followed * self._photons_a_beam >= photons
             if enough or self._threshold(photons, surveyed, growth) >= threshold:
                 break
-        self.found = found = found if hands else self._with_untouched(found, threshold)
+        if hands and self._keeps and found.polygons is not None and threshold <= self._finest[0]:
+            self._finest = threshold, found
+        if not hands and (kept := self._kept(threshold)) is not None:
+            found, _ = kept.joined(found)
+        self.found = found
         self._count(found)
         if found.polygons is not None:
             drawn = 0
@@ -285,41 +314,53 @@ class BeamLight:
         beams = max(photons, 1.0) / self._photons_a_beam
         return float(np.clip(SURVEY * (surveyed / beams) ** (1.0 / growth), FINEST, COARSEST))
 
-    def draw_moving(self, maps: LightMaps, weight: float, moving: MovingBeams, seconds: float) -> None:
-        """Find beams at once, as fine as `seconds` allow, and add them to `maps` of any layout times `weight`."""
+    def draw_moving(
+        self, maps: LightMaps, weight: float, moving: MovingBeams, seconds: float, *, alone: bool = False
+    ) -> None:
+        """Find beams at once, as fine as `seconds` allow, and add them to `maps` of any layout times `weight`. `alone`:
+        nothing else is in the maps; then light that meets nothing edited is drawn once and stays."""
         self.pause()
-        started = time.perf_counter()
         if self._coarse is None or self._coarse[0] is not maps.layout:
             finder = self.finder.shown_as(self.finder.shown)
             finder.set_texels(self._texels(maps.layout))
             self._coarse = maps.layout, finder
-        if self._resting[0] == np.inf and self._is_lit_as(self._resting[1]):  # once, as a drag begins
-            finer = _RESTING * moving.threshold
-            self._with_untouched(_found(self.finder, finer, self._depth), finer)
-        self.found = self._with_untouched(_found(self._coarse[1], moving.threshold, self._depth), moving.threshold)
-        if self.found.polygons is not None:
-            self.draw(self.found.polygons, maps, weight)
+        kept = self._kept(moving.threshold) if alone else None
+        if kept is not None:
+            self._lay_ground(maps, weight, kept)
+        started = time.perf_counter()
+        found = _found(self._coarse[1], moving.threshold, self._depth)
+        self.found, drawn = (found, found.polygons) if kept is None else kept.joined(found)
+        if drawn is not None:
+            self.draw(drawn, maps, weight)
             self._context.finish()
         moving.learn(time.perf_counter() - started, seconds)
 
-    def _with_untouched(self, found: LightBeams, threshold: float) -> LightBeams:
-        """What was `found` by a search so fine, in which weak beams played roulette, but that of a finer one for light
-        that met nothing which is another since."""
-        finer, before, resting = self._resting
-        shown, is_lit_as = self.finder.shown, self._is_lit_as(before)
-        if not is_lit_as or threshold <= finer:
-            self._resting = threshold if is_lit_as else np.inf, shown, found
-            return found
+    def _kept(self, threshold: float) -> _KeptBeams | None:
+        """Light of the finest search that met nothing which is another than what was traced; None where that search was
+        no finer than `threshold`. What it left to photons is missing."""
+        (finer, finest), before, shown = self._finest, self._traced.shown, self.finder.shown
+        lights = zip(before.lights, shown.lights, strict=True)
+        if threshold <= finer or any(a.spectral_power is not b.spectral_power for a, b in lights):
+            return None
         differs = [a.material is not b.material for a, b in zip(before.objects, shown.objects, strict=True)]
         changed = np.bitwise_or.reduce(np.int64(1) << (np.flatnonzero(differs) & 63), initial=np.int64(0))
-        pairs = (resting.polygons, False), (found.polygons, True)
-        parts = [some.where((some.met & changed != 0) == touched) for some, touched in pairs if some is not None]
-        return replace(found, polygons=joined(parts)) if parts else found
+        assert finest.polygons is not None
+        return _KeptBeams(finest, int(changed), finest.polygons.where(finest.polygons.met & changed == 0))
 
-    def _is_lit_as(self, scene: Scene) -> bool:
-        """Lights have the spectra that they have in `scene`."""
-        pairs = zip(scene.lights, self.finder.shown.lights, strict=True)
-        return all(a.spectral_power is b.spectral_power for a, b in pairs)
+    def _lay_ground(self, maps: LightMaps, weight: float, kept: _KeptBeams) -> None:
+        """Make `maps` hold what is kept; from the second time on by a copy."""
+        ground = self._ground
+        if ground is not None and ground[0] is maps and ground[1].is_like(kept):
+            maps.bring_back(ground[2], weight)
+            return
+        self._drop_ground()
+        self.draw(kept.polygons, maps, weight)
+        self._ground = maps, kept, maps.copied_sums()
+
+    def _drop_ground(self) -> None:
+        if self._ground is not None:
+            shader.release(*self._ground[2])
+        self._ground = None
 
     @property
     def counts(self) -> tuple[int, int]:
@@ -393,6 +434,7 @@ class BeamLight:
     def release(self) -> None:
         """Free everything; a search that runs ends soon."""
         self._worker.release()
+        self._drop_ground()
         self.drawing.release()
 
 

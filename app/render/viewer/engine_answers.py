@@ -87,6 +87,8 @@ class EngineAnswers:
         """What of the wanted scene the picture does not show yet, as in `LiveStats`."""
         if self.schedule.moved and not self.schedule.building:
             return "moved"
+        if self.schedule.splatting and not self.schedule.shows_preview and self._shown is not None:
+            return "" if self._shown.light.shows_outdated else "light"
         if self._wanted is None or not self.schedule.building:
             return ""
         return "scene" if self._level == DirtyLevel.BUILD else "light"

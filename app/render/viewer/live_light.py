@@ -281,7 +281,7 @@ class LiveLight:
         started = time.perf_counter()
         if light_pass.beams is not None:
             weight = self._preview.photon_weight
-            light_pass.beams.draw_moving(self._preview, weight, self.moving, BEAM_SECONDS)
+            light_pass.beams.draw_moving(self._preview, weight, self.moving, BEAM_SECONDS, alone=not has_photons)
         self.beam_seconds = time.perf_counter() - started
         return self._preview
 
