@@ -41,19 +41,11 @@ class Cursor:
         self.view_model = CursorInfo(
             pixel_of(state.hover, state.viewport_size),
             picture.pixel(state.hover),
+            hit,
             magnified=None if picture.magnified is None else picture.magnified.glo,
         )
-        if hit is None:
-            return
-        self.view_model = replace(
-            self.view_model,
-            object_index=hit.object_index,
-            position=hit.position,
-            normal=hit.normal,
-            is_receiver=hit.is_receiver,
-        )
-        if state.preferences.panels.spectrum and hit.is_receiver:
-            same = before is not None and before.object_index == hit.object_index
+        if state.preferences.panels.spectrum and hit is not None and hit.is_receiver:
+            same = before is not None and before.hit is not None and before.hit.object_index == hit.object_index
             self._take_spectrum(state, picture, hit, before if same else None, now_s)
 
     def _take_spectrum(

@@ -84,6 +84,8 @@ class LivePicture:
         self.shown: moderngl.Texture | None = None
         """RGBA8, sRGB codes, row 0 on top."""
         self.magnified: moderngl.Texture | None = None
+        self.seen: Scene | None = None
+        """The scene that the picture really shows."""
         self.awaits_scene = False
         """Another document was opened and nothing of it has been drawn: its objects' outlines, rays and marks would lie
         on the picture of what was there before."""
@@ -179,6 +181,7 @@ class LivePicture:
             self.stats = self._advance(self.engine, state.interacting, budget_s, slice_s, stops)
             if not self.is_busy:
                 self.awaits_scene &= self.stats.shows_other and self.problem is None
+                self.seen = self.seen if self.stats.shows_other else self.shown_scene
 
     @staticmethod
     def _advance(engine: Engine, interacting: bool, budget_s: float, slice_s: float, stops: Stops) -> LiveStats:

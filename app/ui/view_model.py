@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..edit.history import HistoryEntry
+from ..edit.picking import PickHit
 from ..model.scene import Scene, Vec3
 from ..model.staging import UpAxis
 from ..passes.ray_line import RayLine
@@ -23,13 +24,8 @@ class CursorInfo:
     pixel: tuple[int, int]
     rgb: Vec3 | None
     """Linear Rec.709 radiance, lm/(sr unit²); None while the picture is being drawn."""
-    object_index: int | None = None
-    """First surface hit; None for the background."""
-    position: Vec3 | None = None
-    """World position of that hit."""
-    normal: Vec3 | None = None
-    """Unit, facing the camera."""
-    is_receiver: bool = False
+    hit: PickHit | None = None
+    """First surface; None for the background."""
     spectrum_nm: np.ndarray | None = None
     """Bin centres, when a spectrum was asked for (`Panels.spectrum`); None where the light is not known yet."""
     spectrum: np.ndarray | None = None
@@ -94,7 +90,7 @@ class ViewModel:
 
     stats: LiveStats = LiveStats()
     shown: Scene | None = None
-    """What the picture shows, or is about to; another one while something is being prepared."""
+    """What the picture shows; another one than the state's until that is drawn."""
     picture: int | None = None
     """Texture id of the displayed picture, top row first."""
     beside: tuple[int, int] | None = None

@@ -297,7 +297,7 @@ def test_facts_under_the_cursor(rig: Rig) -> None:
     rig.frame(hover)
     rig.frame(hover)
     cursor = rig.view_model.cursor
-    assert cursor is not None and cursor.pixel == (16, 27) and cursor.is_receiver
+    assert cursor is not None and cursor.pixel == (16, 27) and cursor.hit is not None and cursor.hit.is_receiver
     grey = 0.1 * rig.session.state.camera.position[2]
     assert cursor.rgb == pytest.approx((grey,) * 3)
     assert cursor.spectrum is not None and cursor.spectrum_nm is not None
