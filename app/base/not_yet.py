@@ -1,13 +1,11 @@
 """The answer to a question whose answer is still being found, so that nobody reads 'not yet' as 'nothing'."""
 
-from __future__ import annotations
-
 from enum import Enum
 from typing import Final
 
 
 class NotYet(Enum):
-    """Its one value is what a busy renderer answers: to be asked again."""
+    """Its one value is to be asked again."""
 
     NOT_YET = "still being found"
 

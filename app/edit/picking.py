@@ -1,7 +1,6 @@
 """What lies under a point of the picture, found at once on the processor: the scene's own triangles in float64.
 
-Every mesh has its triangles in blocks of neighbours with boxes about them, made when a ray first comes near and kept as
-long as the mesh. No device is involved, so an answer does not depend on what the renderer is doing.
+A mesh has its triangles in blocks of neighbours with boxes about them, made at its first ray and kept as long as it is.
 """
 
 from __future__ import annotations
@@ -19,10 +18,8 @@ from .drawn import Drawn
 from .projection import View
 from .state import State
 
-_BLOCK = 64
-"""Triangles of a block."""
-_SLACK = 1e-9
-"""Barycentric: triangles that share an edge overlap by this much."""
+_BLOCK, _SLACK = 64, 1e-9
+"""Triangles of a block; barycentric overlap of triangles that share an edge."""
 _CONTACT = 1e-5
 """Share of the distance within which what is no glass (paint, silver) is met before the glass that it touches."""
 _SPREAD = ((16, 0x030000FF), (8, 0x0300F00F), (4, 0x030C30C3), (2, 0x09249249))
@@ -76,22 +73,22 @@ def pick(
     blocks = [_blocks_of(scene.objects[i].mesh) for i in objects]
     low, high = np.stack([b.low.min(axis=0) for b in blocks]), np.stack([b.high.max(axis=0) for b in blocks])
     enters = _enters(low, high, starts, ways)
-    best, best_key, found = np.inf, np.inf, None
+    best_key, best, index, triangle = np.inf, np.inf, -1, -1
     for k in np.argsort(enters):
-        if not enters[k] <= best * (1.0 + _CONTACT):
+        if enters[k] > best * (1.0 + _CONTACT):
             break
         item = scene.objects[objects[k]]
-        distance, triangle = _nearest(item.mesh, blocks[k], starts[k], ways[k])
+        distance, nearest = _nearest(item.mesh, blocks[k], starts[k], ways[k])
         key = distance if item.material.transmits else distance * (1.0 - _CONTACT)
         if key < best_key:
-            best, best_key, found = distance, key, (objects[k], triangle)
-    if found is None:
+            best_key, best, index, triangle = key, distance, objects[k], nearest
+    if index < 0:
         return None
-    item = scene.objects[found[0]]
-    a, b, c = item.mesh.vertices[item.mesh.triangles[found[1]]] @ item.object_to_world[:3, :3].T
+    item = scene.objects[index]
+    a, b, c = item.mesh.vertices[item.mesh.triangles[triangle]] @ item.object_to_world[:3, :3].T
     normal = np.cross(b - a, c - a)
     normal *= -np.sign(normal @ direction) / np.linalg.norm(normal)
-    return PickHit(found[0], vec3(origin + best * direction), vec3(normal), float(best), item.material.receives)
+    return PickHit(index, vec3(origin + best * direction), vec3(normal), float(best), item.material.receives)
 
 
 def _enters(low: np.ndarray, high: np.ndarray, start: np.ndarray, way: np.ndarray) -> np.ndarray:

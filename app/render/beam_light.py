@@ -124,10 +124,6 @@ class _KeptBeams:
     """Objects that differ, a bit each (`BeamPolygons.met`)."""
     polygons: BeamPolygons
 
-    def is_like(self, other: _KeptBeams) -> bool:
-        """Whether it holds the same."""
-        return self.search is other.search and self.changed == other.changed
-
     def joined(self, found: LightBeams) -> tuple[LightBeams, BeamPolygons | None]:
         """What was `found`, but for light that is kept; and its polygons that are not."""
         if found.polygons is None:
@@ -181,7 +177,7 @@ class BeamLight:
         """What maps are fitted to."""
         self.found: LightBeams | None = None
         """The last that were drawn, or found by the survey."""
-        self._keeps, self._finest = beside, (np.inf, LightBeams({}))
+        self._finest = np.inf, LightBeams({})
         """Threshold and beams of the finest search of what is traced: what meets nothing edited stays as in it."""
         self._ground: tuple[LightMaps, _KeptBeams, list[moderngl.Texture]] | None = None
         """Maps, what they hold while something is dragged, and a copy of that."""
@@ -288,7 +284,7 @@ class BeamLight:
             enough = _ENOUGH * followed * self._photons_a_beam >= photons
             if enough or self._threshold(photons, surveyed, growth) >= threshold:
                 break
-        if hands and self._keeps and found.polygons is not None and threshold <= self._finest[0]:
+        if hands and found.polygons is not None and threshold <= self._finest[0]:
             self._finest = threshold, found
         if not hands and (kept := self._kept(threshold)) is not None:
             found, _ = kept.joined(found)
@@ -350,7 +346,7 @@ class BeamLight:
     def _lay_ground(self, maps: LightMaps, weight: float, kept: _KeptBeams) -> None:
         """Make `maps` hold what is kept; from the second time on by a copy."""
         ground = self._ground
-        if ground is not None and ground[0] is maps and ground[1].is_like(kept):
+        if ground and ground[0] is maps and ground[1].search is kept.search and ground[1].changed == kept.changed:
             maps.bring_back(ground[2], weight)
             return
         self._drop_ground()

@@ -239,7 +239,7 @@ def _dismiss(session: Session, request: requests.DismissMessage) -> None:
     session.messages.close(request.text)
 
 
-_AWAITED = {requests.SelectAt: "Whose light this is", requests.BeginPull: "What gives this its colour"}
+_AWAITED = {requests.SelectAt: "What made this light", requests.BeginPull: "The glass of this colour"}
 """What a request asks the renderer."""
 _HANDLERS: dict[type, Callable] = {
     requests.NewScene: _new_scene,

@@ -25,8 +25,6 @@ def index_in(scene: Scene, shown: Scene, index: int) -> int | None:
 
 def photons_in(scene: Scene, shown: Scene, photons: StoredPhotons) -> StoredPhotons:
     """Photons of the `shown` scene with the numbers that its objects have in `scene`; -1 for what is gone."""
-    if scene is shown:
-        return photons
     found = [index_in(scene, shown, i) for i in range(len(shown.objects))]
     there = np.array([-1 if i is None else i for i in found] + [-1])  # -1, no object, stays -1
     return replace(

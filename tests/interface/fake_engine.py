@@ -82,7 +82,7 @@ class FakeEngine:
         self.stats = replace(self.stats, photons=self.stats.photons + 1000, converged=self.advanced > 5)
 
     def stored_photons(self, limit: int = 0) -> StoredPhotons | NotYet:
-        return NOT_YET if self.is_busy else self.photons or StoredPhotons.none()
+        return NOT_YET if self.is_busy else self.photons or dispersed((0.0, 0.0, 0.0), 0, 0, 0)
 
     def caustic_spectrum(self, receiver: int, position: np.ndarray) -> CausticSpectrum | NotYet:
         return NOT_YET if self.is_busy else CausticSpectrum(np.linspace(385, 775, 40), np.ones(40), 0.05)

@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.edit import requests
-from spectrasplat.edit.stored_photons import StoredPhotons
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.ui.crash_log import FILE_NAME, MAX_BYTES, write_crash
 from spectrasplat.ui.message_box import MAX_MESSAGES, NOTICE_S, MessageBox
 from spectrasplat.ui.pace import GPU_SHARE, LIGHT_SHARE, LONGEST_PATIENT_S, MIN_SHARE, SOFTWARE_FRAME_S, Pace
 from spectrasplat.ui.sentences import brief, sentence, words
 from spectrasplat.ui.shown_scene import index_in, photons_in
+
+from tests.interface.fake_engine import dispersed
 
 
 class Clock:
@@ -131,7 +132,8 @@ def test_an_object_of_a_picture_that_lags_behind_is_found_again() -> None:
     assert [index_in(edited, shown, i) for i in range(3)] == [0, 1, 2]
     deleted = replace(shown, objects=(diamond, replace(table, object_to_world=2 * table.object_to_world)))
     assert [index_in(deleted, shown, i) for i in (0, 1, 2, 7)] == [None, 0, 1, None]
-    photons = replace(StoredPhotons.none(), source=np.array([0, 1, -1]), receiver=np.array([2, 2, 0]))
+    photons = dispersed((0.0, 0.0, 0.0), 0, 2, 3)
+    photons = replace(photons, source=np.array([0, 1, -1]), receiver=np.array([2, 2, 0]))
     photons = photons_in(deleted, shown, replace(photons, group_of_object={0: 0, 1: 1}))
     assert photons.source.tolist() == [-1, 0, -1] and photons.receiver.tolist() == [1, 1, -1]
     assert photons.group_of_object == {0: 1}

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from ...edit.live_inputs import LiveInputs
     from ...gpu.context import Context
-    from ...gpu.scene_buffers import SceneBuffers
+    from .live_light import LiveLight
 
 
 class EngineAnswers:
@@ -173,23 +173,18 @@ class EngineAnswers:
 
     def stored_photons(self, limit: int = QUERIED_PHOTONS) -> StoredPhotons | NotYet:
         """About `limit` stored photons in world space, as they are shown."""
-        if self._shown is None or self._inputs is None or self._lacks_photons:
+        if self._shown is None or self._inputs is None or self._lacks_photons(self._shown.light):
             return NOT_YET
         return world_photons(self._shown.light, self._inputs, limit)
 
     def caustic_spectrum(self, receiver: int, position: np.ndarray) -> CausticSpectrum | NotYet:
         """The caustic's spectral irradiance at a world position on object `receiver`."""
-        if self._shown is None or self._inputs is None or self._lacks_photons:
+        if self._shown is None or self._inputs is None or self._lacks_photons(self._shown.light):
+            return NOT_YET
+        if receiver not in self._shown.light.buffers.receivers:  # which it is to become
             return NOT_YET
         return spectrum_at(self._shown.light, self._inputs, receiver, position)
 
-    @property
-    def _lacks_photons(self) -> bool:
+    def _lacks_photons(self, light: LiveLight) -> bool:
         """Photons that can say where light lands are still to be traced."""
-        lacks = self._shown is None or not self._shown.light.has_records
-        return self.schedule.moved or (lacks and self.schedule.has_photon_work)
-
-    @property
-    def buffers(self) -> SceneBuffers | None:
-        """The traced scene on the device, for overlays that ask it more (ray fans)."""
-        return self._shown.light.buffers if self._shown else None
+        return self.schedule.moved or (self.schedule.has_photon_work and not light.has_records)

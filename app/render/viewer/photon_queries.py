@@ -90,10 +90,7 @@ class CausticSpectrum:
 
 def spectrum_at(light: LiveLight, shown: LiveInputs, receiver: int, position: np.ndarray) -> CausticSpectrum:
     """The caustic's spectral irradiance at a world `position` on object `receiver`, as `shown` shows the photons of
-    `light`; no light where nothing is received."""
-    if receiver not in light.buffers.receivers:
-        centres = np.linspace(380.0, 780.0, FINEST_BINS, endpoint=False) + 200.0 / FINEST_BINS
-        return CausticSpectrum(centres, np.zeros(FINEST_BINS), 0.0)
+    `light`, which receives there."""
     then, now = ([each.spectral_power for each in s.lights] for s in (light.light_pass.scene, shown.scene))
     photons, weight = world_photons(light, shown, QUERIED_PHOTONS), light.stored_weight(QUERIED_PHOTONS)
     return caustic_spectrum(photons, weight, receiver, position, reach_of(light, receiver), then, now)
