@@ -12,6 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.not_yet import NotYet
+from ..edit.picking import PickHit, pick
+from ..edit.projection import View
 from ..edit.state import Display as Look
 from ..passes.display import Display
 from ..passes.sample_picture import SamplePicture
@@ -20,7 +23,6 @@ from ..ui.direct_light import DirectLightQuery
 
 if TYPE_CHECKING:
     from ..gpu.context import Context
-    from ..passes.pick import PickHit
     from ..render.viewer.engine import LiveEngine
     from ..render.viewer.photon_queries import CausticSpectrum
 
@@ -49,7 +51,7 @@ class Frames:
         self._last_s = time.monotonic()
         self._direct = DirectLightQuery()
         self._asked: tuple[object, ...] = ()
-        self._found: CausticSpectrum | None = None
+        self._found: CausticSpectrum | NotYet | None = None
 
     @property
     def is_settling(self) -> bool:
@@ -89,8 +91,11 @@ class Frames:
     def light_at(self, engine: LiveEngine, x: float, y: float) -> tuple[dict[str, Any], bool]:
         """What is under a place of the picture, 0 to 1 from its top left, as numbers; and whether that is all (direct
         light is found beside, by float64 rays: ask again)."""
-        hit, inputs = engine.pick(x, y), engine.inputs
-        if hit is None or inputs is None:
+        inputs = engine.inputs
+        if inputs is None:
+            return {"object": None}, False
+        hit = pick(inputs.scene, View.of(inputs.camera, inputs.width / inputs.height), x, y)
+        if hit is None:
             return {"object": None}, True
         told: dict[str, Any] = {
             "object": inputs.scene.objects[hit.object_index].name,
@@ -101,11 +106,11 @@ class Frames:
     def _spectrum(self, engine: LiveEngine, hit: PickHit, told: dict[str, Any]) -> tuple[dict[str, Any], bool]:
         place, normal = np.asarray(hit.position, float), np.asarray(hit.normal, float)
         asked = (hit.object_index, hit.position, engine.stats.photons, engine.inputs)
-        if asked != self._asked:
+        if asked != self._asked or isinstance(self._found, NotYet):
             self._asked, self._found = asked, engine.caustic_spectrum(hit.object_index, place)
         found = self._found
-        if found is None or engine.inputs is None:
-            return told, True
+        if found is None or isinstance(found, NotYet) or engine.inputs is None:
+            return told, False
         width = found.resolution_nm
         told |= {"wavelength_nm": found.wavelength_nm.tolist(), "error": found.error}
         told["caustic"] = None if found.irradiance is None else found.irradiance.tolist()

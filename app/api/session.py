@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from ..base.errors import UserError
+from ..base.not_yet import NotYet
 from ..edit.stored_photons import StoredPhotons
 from .asking import Asked, Count, Size, settings_of
 from .device import Cancel, Device, Progress
@@ -123,6 +124,8 @@ class Session:
         def work(context: Context, report: Callable[[float, str], None], stopped: Callable[[], bool]) -> StoredPhotons:
             self._follow(context, report, stopped)
             found = self._live.stored_photons(_ALL)
+            if isinstance(found, NotYet):
+                raise UserError(f"the session's photons are {found.value}: ask again")
             every = 1 if limit is None else -(-len(found.flux_w) // limit)
             # Records follow a space-filling curve over the lattice: every so manieth is nearly a lattice again.
             chosen = found.chosen(np.arange(0, len(found.flux_w), max(every, 1)))

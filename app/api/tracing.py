@@ -94,11 +94,12 @@ def fan(
     def work(context: Context, report: Callable[[float, str], None], stopped: Callable[[], bool]) -> Fan:
         from ..model.settings import RenderSettings
         from ..passes.ray_fan import RayFan
+        from ..passes.ray_paths import RayPaths
         from ..render.device_scene import scene_buffers
 
         buffers = scene_buffers(context, model, RenderSettings(any_view=True))
         try:
-            tracer = RayFan(context, buffers)
+            tracer = RayFan(RayPaths(context, buffers))
             try:
                 lines = [line.points for line in tracer.trace(source, placed, rays, nm.tolist())]
             finally:

@@ -86,6 +86,7 @@ def polygons_of(leaves: list[Leaves], scene: BeamScene, light: int, unit: float)
         scene.facets["receiver"][head[:, 1]].astype(np.int32),
         head[:, 3].astype(np.int32),
         head[:, 4].astype(np.int32),
+        head[:, 9],
         x[:, 0] + t[:, 0] * (x[:, 2] - x[:, 0]),
         x[:, 0] + t[:, 1] * (x[:, 2] - x[:, 0]),
         np.maximum(density, 0.0) * unit * unit,

@@ -18,8 +18,8 @@ class Leaves:
     """Rows of finished beams: L leaves with all their E edges and H corners, in their order."""
 
     head: np.ndarray
-    """int64 (L, 9): kind, facet it ends on (-1: none), facet left last, object first met, depth, mask, edges, corners,
-    hash of its path."""
+    """int64 (L, 10): kind, facet it ends on (-1: none), facet left last, object first met, depth, mask, edges, corners,
+    hash of its path, objects met (bit i mod 64 for object i)."""
     x: np.ndarray
     """(L, 3)."""
     density: np.ndarray
@@ -56,7 +56,7 @@ class Leaves:
 
 LEAF = np.dtype(
     [
-        ("head", "i8", 9),
+        ("head", "i8", 10),
         ("x", "f8", 3),
         ("density", "f8", 3),
         ("centre", "f8", 2),
@@ -193,6 +193,9 @@ def lay_leaf(beam, facets, kind, leaf, edge, corner, work):
     head[3] = facets[beam.path[0, 0]].owner if flight > 0 else -1
     head[4], head[5] = beam.depth, beam.mask
     head[8] = np.int64(beam.key >> np.uint64(33))
+    head[9] = 0
+    for k in range(flight):
+        head[9] |= np.int64(1) << np.int64(facets[beam.path[k, 0]].owner & 63)
     for a in range(3):
         b = a if lo == 0 else 1
         new.x[a] = beam.x[a]

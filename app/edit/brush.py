@@ -58,11 +58,6 @@ def resized(brush: Brush, steps: float, visible_height: float) -> Brush:
     return replace(brush, radius=radius)
 
 
-def can_paint(scene: Scene, object_index: int | None) -> bool:
-    """Whether dabs may lie on an object: only receivers take them."""
-    return object_index is not None and scene.objects[object_index].material.receives
-
-
 def begin(scene: Scene, object_index: int, brush: Brush, position: Vec3) -> Stroke:
     """A stroke with its first touch at a world position."""
     item = scene.objects[object_index]

@@ -38,15 +38,6 @@ class StoredPhotons:
     group_of_object: Mapping[int, int]
     """Spectral group of every dispersive glass object."""
 
-    @staticmethod
-    def none() -> StoredPhotons:
-        """No photons."""
-        empty = np.zeros(0)
-        ints = np.zeros(0, int)
-        return StoredPhotons(
-            np.zeros((0, 3)), np.zeros((0, 0, 3)), np.zeros((0, 0)), empty, ints, ints, np.zeros((0, 2)), ints, (), {}
-        )
-
     def chosen(self, index: np.ndarray) -> StoredPhotons:
         """Some of the photons."""
         return replace(self, **{name: getattr(self, name)[index] for name in _BY_PHOTON})

@@ -11,8 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..gpu.context import Context
-from ..gpu.scene_buffers import SceneBuffers
 from ..model.contacts import world_bounds
 from ..model.optics.glass import LINE_D_NM
 from ..model.scene import Light, SceneObject
@@ -41,13 +39,10 @@ class _Beam:
 
 
 class RayFan:
-    """Owns (or shares) the tracer of single rays for one scene."""
+    """Fans of one scene, by its tracer of single rays."""
 
-    def __init__(self, context: Context, scene: SceneBuffers, paths: RayPaths | None = None) -> None:
-        """`paths`: the tracer of the same scene to share; it is then its owner's to release."""
-        self._scene = scene.scene
-        self._owns = paths is None
-        self._paths = paths or RayPaths(context, scene)
+    def __init__(self, paths: RayPaths) -> None:
+        self._scene, self._paths = paths.scene.scene, paths
         bounds = np.stack([world_bounds(item) for item in self._scene.objects])
         self._points = [_world_points(item) for item in self._scene.objects]
         self._low, self._high = bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
@@ -93,9 +88,8 @@ class RayFan:
         return None if best is None else best[1]
 
     def release(self) -> None:
-        """Free what it owns."""
-        if self._owns:
-            self._paths.release()
+        """Free the tracer."""
+        self._paths.release()
 
     # ---- private ---------------------------------------------------------------------------
 

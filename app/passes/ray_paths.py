@@ -1,4 +1,4 @@
-"""Single paths through the scene, to point with and to look at: picking and the ray overlay.
+"""Single paths through the scene, to look at: the ray overlay.
 
 A few hundred rays in one dispatch, each at a wavelength of its own, refracted at every glass surface (totally reflected
 where it must be), up to the first surface that is neither glass nor mirror. No branching and no weights.
@@ -43,14 +43,7 @@ PATH_START = Struct(
 )
 PATH_END = Struct(
     "PathEnd",
-    (
-        Field("first_normal", "vec3", "unit, towards where the ray came from"),
-        Field("first_object", "uint", "first surface met, or NONE"),
-        Field("last_normal", "vec3", "likewise of the last surface"),
-        Field("last_object", "uint", "surface at the last point, or NONE where the path left the scene"),
-        Field("points", "uint", "how many, the start included"),
-        Field("reserved", "uint", "", 3),
-    ),
+    (Field("points", "uint", "how many, the start included"),),
 )
 
 
@@ -60,13 +53,6 @@ class Path:
 
     points: np.ndarray
     """float64 (n, 3), world, from the start on."""
-    first_object: int | None
-    """First surface met; None where nothing was."""
-    first_normal: np.ndarray
-    """float64 (3,), unit, towards where the ray came from."""
-    last_object: int | None
-    """Surface at the last point; None where the ray left the scene."""
-    last_normal: np.ndarray
 
 
 class RayPaths:
@@ -139,16 +125,7 @@ class RayPaths:
         ]
         world = self.scene.space.to_world(points.astype(float))
         world[:, 0] = origins
-        return [
-            Path(
-                world[i, : int(end["points"])],
-                _object(end["first_object"]),
-                end["first_normal"].astype(float),
-                _object(end["last_object"]),
-                end["last_normal"].astype(float),
-            )
-            for i, end in enumerate(ends)
-        ]
+        return [Path(world[i, : int(end["points"])]) for i, end in enumerate(ends)]
 
     def _media_at(self, point: np.ndarray) -> tuple[int, int]:
         """Bits of the medium stack and the solid outside of it that hold a world point; the last answer is
@@ -174,7 +151,3 @@ class RayPaths:
         self._release_paths()
         self._parameters.release()
         shader.release(self._program)
-
-
-def _object(index: np.uint32) -> int | None:
-    return None if index == NONE else int(index)

@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 from ..base.errors import UserError
-from ..edit import requests
 from ..edit.state import State
 from . import session_requests
 from .live_picture import EngineError
@@ -35,8 +35,10 @@ def run_frame(session: Session, draw: Draw, budget_s: float = DEFAULT_BUDGET_S, 
     after = _with_dropped(session, draw(before, view_model), view_model)
     session.interface_s = session.clock() - started
     _accept(session, before, after)
+    for kind in tuple(session.awaited):
+        _carry_out(session, kind, partial(session_requests.ask_again, session, kind))
     for request in after.requests:
-        _carry_out(session, request)
+        _carry_out(session, type(request), partial(session_requests.carry_out, session, request))
     session.autosave.update(
         session.document.scene, session.document.title, session.document.source, session.document.unsaved
     )
@@ -60,16 +62,16 @@ def _accept(session: Session, before: State, after: State) -> None:
         session.settings = replace(session.settings, preferences=after.preferences)
 
 
-def _carry_out(session: Session, request: requests.Request) -> None:
-    """One request; whatever goes wrong becomes a sentence."""
+def _carry_out(session: Session, kind: type, work: Callable[[], None]) -> None:
+    """What a request of that kind asks for; whatever goes wrong becomes a sentence."""
     try:
-        session_requests.carry_out(session, request)
+        work()
     except UserError as error:
         session.messages.tell(sentence(str(error)), is_error=True)
     except Exception as error:  # noqa: BLE001 - a bug: the work and the window outlive it
-        session.save_from_crash(f"{type(request).__name__}", error)
+        session.save_from_crash(kind.__name__, error)
         session.messages.tell(
-            f"{words(request)} failed by a fault of the program ({brief(error)}); your work is kept.", is_error=True
+            f"{words(kind)} failed by a fault of the program ({brief(error)}); your work is kept.", is_error=True
         )
 
 

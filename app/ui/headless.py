@@ -105,12 +105,6 @@ class HeadlessInterface:
         data = self._framebuffer.read(components=3, alignment=1)
         return np.frombuffer(data, np.uint8).reshape(self.size[1], self.size[0], 3)[::-1].copy()
 
-    def save_screenshot(self, path: str) -> None:
-        """Write `screenshot()` as a PNG."""
-        from PIL import Image
-
-        Image.fromarray(self.screenshot()).save(path)
-
     # Where things are
 
     def find(self, label: str) -> ItemRect:

@@ -16,7 +16,9 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from ..base.not_yet import NOT_YET, NotYet
 from ..edit.state import State
+from ..edit.stored_photons import StoredPhotons
 from ..gpu.shader import ShaderError
 from ..passes.display import Display
 from ..passes.glare import Glare
@@ -24,15 +26,15 @@ from ..passes.sample_picture import SamplePicture
 from ..render.viewer.dirty_level import DirtyLevel
 from ..render.viewer.stats import LiveStats
 from .auto_exposure import AutoExposure
-from .shown_scene import index_in
+from .shown_scene import index_in, photons_in
 
 if TYPE_CHECKING:
     import moderngl
 
     from ..gpu.context import Context
     from ..model.scene import Scene
-    from ..passes.pick import PickHit
     from ..render.viewer.engine import LiveEngine
+    from ..render.viewer.photon_queries import CausticSpectrum
     from ..render.viewer.threaded_engine import ThreadedEngine
 
     Engine = LiveEngine | ThreadedEngine
@@ -82,6 +84,8 @@ class LivePicture:
         self.shown: moderngl.Texture | None = None
         """RGBA8, sRGB codes, row 0 on top."""
         self.magnified: moderngl.Texture | None = None
+        self.seen: Scene | None = None
+        """The scene that the picture really shows."""
         self.awaits_scene = False
         """Another document was opened and nothing of it has been drawn: its objects' outlines, rays and marks would lie
         on the picture of what was there before."""
@@ -177,6 +181,7 @@ class LivePicture:
             self.stats = self._advance(self.engine, state.interacting, budget_s, slice_s, stops)
             if not self.is_busy:
                 self.awaits_scene &= self.stats.shows_other and self.problem is None
+                self.seen = self.seen if self.stats.shows_other else self.shown_scene
 
     @staticmethod
     def _advance(engine: Engine, interacting: bool, budget_s: float, slice_s: float, stops: Stops) -> LiveStats:
@@ -243,21 +248,23 @@ class LivePicture:
         measured = self._exposure.follow(lambda: self._sampler.run(radiance), now_s, delta_s)
         self.exposure_ev = measured + state.scene.render.exposure_ev
 
-    def pick(self, place: tuple[float, float]) -> PickHit | None:
-        """First surface at a place of the picture, 0..1 from the top left; its object is one of the scene that is
-        shown."""
-        return self.engine.pick(*place) if self.engine is not None else None
-
     @property
     def shown_scene(self) -> Scene | None:
         """What the picture shows, or is about to."""
         inputs = self.engine.inputs if self.engine is not None else None
         return None if inputs is None else inputs.scene
 
-    def object_in(self, scene: Scene, index: int) -> int | None:
-        """Index in `scene` of object `index` of the scene that is shown; None for one that is no longer there."""
+    def stored_photons(self, scene: Scene, limit: int) -> StoredPhotons | NotYet:
+        """The engine's, which met objects of `scene`."""
         shown = self.shown_scene
-        return None if shown is None else index_in(scene, shown, index)
+        photons = NOT_YET if self.engine is None else self.engine.stored_photons(limit)
+        return photons if isinstance(photons, NotYet) or shown is None else photons_in(scene, shown, photons)
+
+    def caustic_spectrum(self, scene: Scene, receiver: int, position: np.ndarray) -> CausticSpectrum | NotYet:
+        """The engine's, at a world position on object `receiver` of `scene`."""
+        shown = self.shown_scene
+        index = None if shown is None else index_in(shown, scene, receiver)
+        return NOT_YET if self.engine is None or index is None else self.engine.caustic_spectrum(index, position)
 
     @property
     def is_settling(self) -> bool:

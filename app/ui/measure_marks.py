@@ -8,6 +8,7 @@ import numpy as np
 from imgui_bundle import ImVec2, imgui
 
 from ..edit import measuring
+from ..edit.picking import pick_in
 from ..edit.state import State
 from ..model.scene import Vec3
 from . import item_rects, theme
@@ -25,7 +26,7 @@ _ARC_SHARE = 0.35
 """Radius of the angle's arc, share of its shorter side."""
 
 
-def point_at(view_model: ViewModel, canvas: Canvas, x: float, y: float) -> Vec3 | None:
+def point_at(state: State, view_model: ViewModel, canvas: Canvas, x: float, y: float) -> Vec3 | None:
     """The point at a place of the picture, 0..1: a ray's bend or a focus that is near on the screen, else a point of a
     ray, else the surface under the cursor."""
     at = np.array([canvas.left + x * canvas.width, canvas.top + y * canvas.height])
@@ -37,7 +38,8 @@ def point_at(view_model: ViewModel, canvas: Canvas, x: float, y: float) -> Vec3 
         best = int(away.argmin())
         if away[best] < SNAP_PX * canvas.scale:
             return float(points[best, 0]), float(points[best, 1]), float(points[best, 2])
-    return None if view_model.cursor is None else view_model.cursor.position
+    hit = pick_in(state, x, y)
+    return None if hit is None else hit.position
 
 
 def draw_measure(canvas: Canvas, state: State, view_model: ViewModel, mouse: tuple[float, float] | None) -> None:
@@ -57,7 +59,7 @@ def draw_measure(canvas: Canvas, state: State, view_model: ViewModel, mouse: tup
         x, y = canvas.pixels(arc[len(arc) // 2])
         _label(canvas, x, y, f"{angle:.2f}°")
     if mouse is not None:
-        taken = point_at(view_model, canvas, *mouse)
+        taken = point_at(state, view_model, canvas, *mouse)
         if taken is not None:
             _dot(canvas, canvas.pixels(np.asarray(taken)), 5.5, filled=False)
     text = named(measuring.words(state.measured))

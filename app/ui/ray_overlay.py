@@ -68,12 +68,13 @@ class RayOverlay:
     def _fan_of(self, scene: Scene) -> RayFan:
         from ..model.settings import RenderSettings
         from ..passes.ray_fan import RayFan
+        from ..passes.ray_paths import RayPaths
         from ..render.device_scene import scene_buffers
 
         if self._fan is None or scene is not self._scene:
             self.release()
             self._scene, self._buffers = scene, scene_buffers(self._context, scene, RenderSettings())
-            self._fan = RayFan(self._context, self._buffers)
+            self._fan = RayFan(RayPaths(self._context, self._buffers))
         return self._fan
 
     @staticmethod

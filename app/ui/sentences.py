@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from ..edit import requests
-
 MAX_REASON = 160
 
 
@@ -22,7 +20,6 @@ def brief(error: BaseException) -> str:
     return f"{type(cause).__name__}: {text[:MAX_REASON]}" if text else type(cause).__name__
 
 
-def words(request: requests.Request) -> str:
+def words(request: type) -> str:
     """ "SelectAt" → "Select at"."""
-    name = type(request).__name__
-    return "".join(f" {c.lower()}" if c.isupper() else c for c in name).strip().capitalize()
+    return "".join(f" {c.lower()}" if c.isupper() else c for c in request.__name__).strip().capitalize()

@@ -92,6 +92,8 @@ class Session:
         self.input_waits: Callable[[], bool] = lambda: False
         """Whether there is input that the next frame will see."""
         self._watch = ShaderWatch(clock=clock)
+        self.awaited: dict[type, Callable[[], object]] = {}
+        """By its type, what a request asks the renderer once more: `NOT_YET` until there is an answer."""
         self.dropped: list[Path] = []
         """Files to be opened in the next frame."""
         self.was_interacting = False
@@ -151,6 +153,7 @@ class Session:
             or self.jobs.is_busy
             or self.messages.is_fading
             or self.picture.is_busy
+            or bool(self.awaited)
             or (state.display.auto_exposure and self.picture.is_settling)
             or (state.playing and self.picture.engine is not None and not self.picture.stats.converged)
         )
@@ -210,6 +213,7 @@ class Session:
             solo_nm=None,
             edit_label="",
         ).with_panels(start_page=False)
+        self.awaited.clear()
         self.picture.new_scene()
         self.tell_notes()
         self._remember_file(document.source)

@@ -9,25 +9,41 @@ import numpy as np
 
 from ..base.atomic import check_writable
 from ..base.errors import UserError
+from ..base.not_yet import NOT_YET, NotYet
 from ..edit import camera_controls, requests, selecting
 from ..edit.document import Document
 from ..edit.lessons import lesson
+from ..edit.picking import PickHit, pick_in
 from ..edit.state import Selection
 from ..model.scene_defaults import bounds_of
 from .caustic_source import source_at
 from .session import Session
 from .session_pull import begin_pull_at
+from .shown_scene import index_in
 
 PICK_PHOTONS = 400_000
 """Stored photons that are asked whose caustic lies at a point."""
 
 
 def carry_out(session: Session, request: requests.Request) -> None:
-    """Do what `request` says. Raises `UserError`, and NotImplementedError for one that is unknown."""
-    handler = _HANDLERS.get(type(request))
+    """Do what `request` says; what the renderer cannot answer yet is asked again in later frames (`ask_again`). Raises
+    `UserError`, and NotImplementedError for one that is unknown."""
+    kind = type(request)
+    handler = _HANDLERS.get(kind)
     if handler is None:
-        raise NotImplementedError(f"unknown request {type(request).__name__}")
-    handler(session, request)
+        raise NotImplementedError(f"unknown request {kind.__name__}")
+    session.awaited.pop(kind, None)  # nobody waits for the one before any more
+    ask = handler(session, request)
+    if ask is not None and ask() is NOT_YET:
+        session.awaited[kind] = ask
+        session.messages.tell(f"{_AWAITED[kind]} is {NOT_YET.value} …")
+
+
+def ask_again(session: Session, kind: type) -> None:
+    """Ask what the last request of that kind awaits. Raises `UserError`."""
+    ask = session.awaited.pop(kind)
+    if ask() is NOT_YET:
+        session.awaited[kind] = ask
 
 
 def _new_scene(session: Session, _request: requests.NewScene) -> None:
@@ -101,32 +117,50 @@ def _recover(session: Session, request: requests.Recover) -> None:
     session.messages.tell(f"Recovered {recovery.note.title}. Save it to keep it.")
 
 
-def _select_at(session: Session, request: requests.SelectAt) -> None:
-    picture, scene = session.picture, session.state.scene
-    hit = picture.pick((request.x, request.y))
-    chosen = None if hit is None else picture.object_in(scene, hit.object_index)
-    if hit is None or chosen is None:
+def _select_at(session: Session, request: requests.SelectAt) -> Callable[[], NotYet | None] | None:
+    hit = pick_in(session.state, request.x, request.y)
+    if hit is None:
         session.state = replace(session.state, selection=Selection(), also=())
-        return
-    if not request.itself and scene.objects[chosen].material.receives:
-        source = _source_at(session, np.asarray(hit.position), hit.object_index)
-        found = None if source is None else picture.object_in(scene, source)
-        chosen = chosen if found is None else found
-    name = scene.objects[chosen].name
-    if ("object", name) in session.state.locked:
+        return None
+    if not request.itself and hit.is_receiver:
+        return _select_source(session, hit, request.add)
+    _select(session, hit.object_index, request.add)
+    return None
+
+
+def _select(session: Session, index: int, add: bool) -> None:
+    chosen = Selection("object", index)
+    if selecting.is_locked(session.state, chosen):
+        name = session.state.scene.objects[index].name
         session.messages.tell(f"{name} is locked: unlock it in the outliner to select it here.")
-        return
-    session.state = selecting.chosen(session.state, Selection("object", chosen), request.add)
+    else:
+        session.state = selecting.chosen(session.state, chosen, add)
 
 
-def _source_at(session: Session, position: np.ndarray, receiver: int) -> int | None:
-    assert session.picture.engine is not None
-    photons = session.picture.engine.stored_photons(PICK_PHOTONS)
-    return source_at(position, receiver, photons.position, photons.flux_w, photons.source, photons.receiver)
+def _select_source(session: Session, hit: PickHit, add: bool) -> Callable[[], NotYet | None]:
+    """Select the receiver at `hit`; what is returned asks whose caustic lies there, and selects that instead."""
+    clicked, receiver = session.state, Selection("object", hit.object_index)
+    if not selecting.is_locked(clicked, receiver):
+        _select(session, receiver.index, add)
+    meanwhile = session.state.selection, session.state.also
 
+    def ask() -> NotYet | None:
+        state = session.state
+        index = index_in(state.scene, clicked.scene, hit.object_index)
+        if index is None or (state.selection, state.also) != meanwhile:
+            return None
+        photons = session.picture.stored_photons(state.scene, PICK_PHOTONS)
+        if isinstance(photons, NotYet):
+            return photons
+        landed = photons.position, photons.flux_w, photons.source, photons.receiver
+        source = source_at(np.asarray(hit.position), index, *landed)
+        if source is not None:
+            session.state = replace(state, selection=clicked.selection, also=clicked.also)
+        if source is not None or selecting.is_locked(state, receiver):
+            _select(session, index if source is None else source, add)
+        return None
 
-def _begin_pull(session: Session, request: requests.BeginPull) -> None:
-    session.state = replace(session.state, pull=begin_pull_at(session, request))
+    return ask
 
 
 def _frame_selection(session: Session, _request: requests.FrameSelection) -> None:
@@ -205,6 +239,8 @@ def _dismiss(session: Session, request: requests.DismissMessage) -> None:
     session.messages.close(request.text)
 
 
+_AWAITED = {requests.SelectAt: "What made this light", requests.BeginPull: "The glass of this colour"}
+"""What a request asks the renderer."""
 _HANDLERS: dict[type, Callable] = {
     requests.NewScene: _new_scene,
     requests.Open: _open,
@@ -220,7 +256,7 @@ _HANDLERS: dict[type, Callable] = {
     requests.FullScreen: _full_screen,
     requests.Recover: _recover,
     requests.SelectAt: _select_at,
-    requests.BeginPull: _begin_pull,
+    requests.BeginPull: begin_pull_at,
     requests.FrameSelection: _frame_selection,
     requests.Retrace: _retrace,
     requests.ReloadShaders: _reload_shaders,

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..edit.history import HistoryEntry
+from ..edit.picking import PickHit
 from ..model.scene import Scene, Vec3
 from ..model.staging import UpAxis
 from ..passes.ray_line import RayLine
@@ -21,17 +22,12 @@ class CursorInfo:
     """What lies under the cursor in the viewport, as of the last frame."""
 
     pixel: tuple[int, int]
-    rgb: Vec3
-    """Linear Rec.709 radiance, lm/(sr unit²)."""
-    object_index: int | None = None
-    """First surface hit."""
-    position: Vec3 | None = None
-    """World position of that hit."""
-    normal: Vec3 | None = None
-    """Unit, facing the camera."""
-    is_receiver: bool = False
+    rgb: Vec3 | None
+    """Linear Rec.709 radiance, lm/(sr unit²); None while the picture is being drawn."""
+    hit: PickHit | None = None
+    """First surface; None for the background."""
     spectrum_nm: np.ndarray | None = None
-    """Bin centres, when a spectrum was asked for (`Panels.spectrum`)."""
+    """Bin centres, when a spectrum was asked for (`Panels.spectrum`); None where the light is not known yet."""
     spectrum: np.ndarray | None = None
     """Spectral irradiance there, W/(unit² nm), mean of each bin: caustic, and direct light where that is known."""
     spectrum_error: float = 0.0
@@ -84,7 +80,7 @@ class ViewModel:
 
     stats: LiveStats = LiveStats()
     shown: Scene | None = None
-    """What the picture shows, or is about to; another one while something is being prepared."""
+    """What the picture shows; another one than the state's until that is drawn."""
     picture: int | None = None
     """Texture id of the displayed picture, top row first."""
     beside: tuple[int, int] | None = None

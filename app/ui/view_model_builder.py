@@ -14,7 +14,7 @@ def view_model_of(session: Session) -> ViewModel:
     stats, comparison = picture.stats, session.jobs.comparison
     return ViewModel(
         stats=stats,
-        shown=picture.shown_scene,
+        shown=picture.seen,
         picture=None if shown is None or picture.awaits_scene else shown.glo,
         beside=None if picture.beside is None else (picture.beside[0].glo, picture.beside[1].glo),
         picture_size=(0, 0) if shown is None else shown.size,

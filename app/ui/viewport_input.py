@@ -18,13 +18,14 @@ from ..edit import brush as brushes
 from ..edit import camera_controls as controls
 from ..edit import measuring
 from ..edit import pull as pulling
+from ..edit.picking import pick_in
 from ..edit.projection import View
 from ..edit.requests import BeginPull, Notice, SelectAt
 from ..edit.state import State
 from ..model.scene import Scene
 from .measure_marks import point_at
 from .overlay import Canvas
-from .view_model import CursorInfo, ViewModel
+from .view_model import ViewModel
 
 Grip = Literal["orbit", "pan", "dolly", "fly", "click", "measure", "brush", "pull", "wipe"]
 CLICK_PX = 4.0
@@ -62,6 +63,8 @@ class ViewportInput:
         self._travelled_px = 0.0
         self._pivot: np.ndarray | None = None
         self._stroke: brushes.Stroke | None = None
+        self._pulled_to: tuple[np.ndarray, np.ndarray] | None = None
+        """The ray on which the button was let go before the renderer told what colour was taken."""
 
     @property
     def is_free(self) -> bool:
@@ -73,10 +76,11 @@ class ViewportInput:
         if self.grip is not None and not imgui.is_mouse_down(self._button):
             state = self._let_go(state, view_model, canvas, mouse)
         if state.pull is not None and self.grip != "pull":
-            state = replace(state, pull=None)  # the button was let go before the host had found anything to hold
+            state = replace(state if self._pulled_to is None else _pulled(state, *self._pulled_to), pull=None)
+            self._pulled_to = None
         if self.grip is None and mouse.is_over:
             state = self._take(state, view_model, canvas, mouse)
-        state = self._wheel(state, view_model, canvas, mouse) if mouse.is_over or self.grip == "fly" else state
+        state = self._wheel(state, canvas, mouse) if mouse.is_over or self.grip == "fly" else state
         state = self._keys(state, canvas, mouse)
         return state if self.grip is None else self._hold(state, view_model, canvas, mouse)
 
@@ -84,23 +88,25 @@ class ViewportInput:
 
     def _take(self, state: State, view_model: ViewModel, canvas: Canvas, mouse: Mouse) -> State:
         io = imgui.get_io()
-        position = _position(view_model.cursor)
+        if not any(imgui.is_mouse_clicked(button) for button in range(3)):
+            return state
+        hit = pick_in(state, mouse.x, mouse.y)
+        position = None if hit is None else np.asarray(hit.position)
         if imgui.is_mouse_clicked(2) or (io.key_alt and imgui.is_mouse_clicked(0)):
             grip: Grip = "pan" if io.key_shift else "dolly" if io.key_ctrl else "orbit"
             return self._grip(state, grip, 2 if imgui.is_mouse_clicked(2) else 0, position)
         if imgui.is_mouse_clicked(1):
             self.fly_speed = 1.0
             return self._grip(state, "fly", 1, position)
-        if not imgui.is_mouse_clicked(0):
-            return state
         if (
             state.compare.mode == "wipe"
             and abs(mouse.x - state.compare.wipe) * canvas.width < WIPE_REACH_PX * canvas.scale
         ):
             return self._grip(state, "wipe", 0, position)
         if state.tool == "brush":
-            return self._begin_stroke(self._grip(state, "brush", 0, position), view_model)
+            return self._begin_stroke(self._grip(state, "brush", 0, position), view_model, mouse)
         if state.tool == "pull":
+            self._pulled_to = None
             return self._grip(state, "pull", 0, position).asking(BeginPull(mouse.x, mouse.y, io.key_shift))
         return self._grip(state, "measure" if state.tool == "measure" else "click", 0, position)
 
@@ -111,8 +117,10 @@ class ViewportInput:
     def _let_go(self, state: State, view_model: ViewModel, canvas: Canvas, mouse: Mouse) -> State:
         grip, self.grip, self._stroke = self.grip, None, None
         if grip == "measure" and self._travelled_px <= CLICK_PX and mouse.is_over:
-            point = point_at(view_model, canvas, mouse.x, mouse.y)
+            point = point_at(state, view_model, canvas, mouse.x, mouse.y)
             return state if point is None else measuring.with_point(state, point)
+        if grip == "pull" and state.pull is None and self._travelled_px > CLICK_PX:
+            self._pulled_to = canvas.view.ray(mouse.x, mouse.y)
         if grip == "click" and self._travelled_px <= CLICK_PX and mouse.is_over:
             return state.asking(SelectAt(mouse.x, mouse.y, imgui.get_io().key_ctrl, imgui.get_io().key_shift))
         return state
@@ -139,7 +147,7 @@ class ViewportInput:
             case "wipe":
                 return replace(state, compare=replace(state.compare, wipe=float(np.clip(mouse.x, 0.0, 1.0))))
             case "brush":
-                return self._paint(state, view_model)
+                return self._paint(state, view_model, mouse)
         return self._pull(state, canvas, mouse)
 
     def _flown(self, camera: controls.Camera, dt: float) -> controls.Camera:
@@ -152,41 +160,32 @@ class ViewportInput:
         haste = controls.FAST if io.key_shift else controls.SLOW if io.key_ctrl else 1.0
         return controls.fly(camera, keys, self.fly_speed * haste * FLY_SPEED * View.of(camera, 1.0).target_distance, dt)
 
-    def _begin_stroke(self, state: State, view_model: ViewModel) -> State:
-        cursor = view_model.cursor
-        if cursor is None or cursor.position is None or not brushes.can_paint(state.scene, cursor.object_index):
+    def _begin_stroke(self, state: State, view_model: ViewModel, mouse: Mouse) -> State:
+        hit = pick_in(state, mouse.x, mouse.y)
+        if hit is None or not hit.is_receiver:
             return state.asking(Notice("The brush paints on diffuse surfaces, where colours land."))
         # What is painted must be seen.
-        return self._paint(replace(state, physical=False, interacting=True), view_model)
+        return self._paint(replace(state, physical=False, interacting=True), view_model, mouse)
 
-    def _paint(self, state: State, view_model: ViewModel) -> State:
-        cursor, io = view_model.cursor, imgui.get_io()
-        if (
-            cursor is None
-            or cursor.position is None
-            or cursor.object_index is None
-            or not brushes.can_paint(state.scene, cursor.object_index)
-        ):
+    def _paint(self, state: State, view_model: ViewModel, mouse: Mouse) -> State:
+        hit, io = pick_in(state, mouse.x, mouse.y), imgui.get_io()
+        if hit is None or not hit.is_receiver:
             return state
         brush = brushes.mode_held(state.brush, io.key_shift, io.key_ctrl)
         stroke = self._stroke
-        if stroke is None or (stroke.object_index, stroke.brush) != (cursor.object_index, brush):
-            stroke = brushes.begin(state.scene, cursor.object_index, brush, cursor.position)
+        if stroke is None or (stroke.object_index, stroke.brush) != (hit.object_index, brush):
+            stroke = brushes.begin(state.scene, hit.object_index, brush, hit.position)
         else:
-            stroke = brushes.extend(stroke, state.scene, cursor.position, view_model.delta_s)
+            stroke = brushes.extend(stroke, state.scene, hit.position, view_model.delta_s)
         self._stroke = stroke
         return _edited(state, lambda: (brushes.applied(state.scene, stroke), brushes.LABEL))
 
     def _pull(self, state: State, canvas: Canvas, mouse: Mouse) -> State:
-        pull = state.pull
-        if pull is None or self._travelled_px <= CLICK_PX:
-            return state
-        point = pulling.nearest_on_line(pull, *canvas.view.ray(mouse.x, mouse.y))
-        return _edited(state, lambda: pulling.apply(state.scene, pull, point, state.brush.radius, state.brush.falloff))
+        return state if self._travelled_px <= CLICK_PX else _pulled(state, *canvas.view.ray(mouse.x, mouse.y))
 
     # ---- wheel and keys ---------------------------------------------------------------------
 
-    def _wheel(self, state: State, view_model: ViewModel, canvas: Canvas, mouse: Mouse) -> State:
+    def _wheel(self, state: State, canvas: Canvas, mouse: Mouse) -> State:
         io = imgui.get_io()
         notches = io.mouse_wheel + io.mouse_wheel_h
         if notches == 0.0:
@@ -194,12 +193,11 @@ class ViewportInput:
         if self.grip == "fly":
             self.fly_speed = float(np.clip(self.fly_speed * FLY_STEP**notches, 0.02, 50.0))
             return state
+        hit = pick_in(state, mouse.x, mouse.y)
+        position = None if hit is None else np.asarray(hit.position)
         if io.key_shift:
-            return replace(
-                state, brush=brushes.resized(state.brush, notches, visible_height(canvas.view, view_model.cursor))
-            )
-        hit = _position(view_model.cursor)
-        camera = controls.zoom_to(state.camera, notches, (mouse.x, mouse.y), canvas.view.aspect, hit)
+            return replace(state, brush=brushes.resized(state.brush, notches, visible_height(canvas.view, position)))
+        camera = controls.zoom_to(state.camera, notches, (mouse.x, mouse.y), canvas.view.aspect, position)
         return replace(state, camera=camera, interacting=True)
 
     def _keys(self, state: State, canvas: Canvas, mouse: Mouse) -> State:
@@ -213,15 +211,19 @@ class ViewportInput:
         )
 
 
-def visible_height(view: View, cursor: CursorInfo | None) -> float:
-    """Scene units that the picture's height shows where the cursor is, else at the target."""
-    position = _position(cursor)
+def visible_height(view: View, position: np.ndarray | None) -> float:
+    """Scene units that the picture's height shows at a world `position`, else at the target."""
     depth = view.target_distance if position is None else max(float(view.depth(position)), 1e-9)
     return view.height_at(depth)
 
 
-def _position(cursor: CursorInfo | None) -> np.ndarray | None:
-    return None if cursor is None or cursor.position is None else np.asarray(cursor.position, float)
+def _pulled(state: State, origin: np.ndarray, direction: np.ndarray) -> State:
+    """With the held colour, if there is one, where a camera ray says."""
+    pull = state.pull
+    if pull is None:
+        return state
+    point = pulling.nearest_on_line(pull, origin, direction)
+    return _edited(state, lambda: pulling.apply(state.scene, pull, point, state.brush.radius, state.brush.falloff))
 
 
 def _edited(state: State, edit: Callable[[], tuple[Scene, str]]) -> State:

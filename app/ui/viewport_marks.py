@@ -9,6 +9,7 @@ from imgui_bundle import icons_fontawesome_6 as icons
 
 from ..edit import brush as brushes
 from ..edit import placing, pull, selecting
+from ..edit.picking import PickHit
 from ..edit.projection import View
 from ..edit.state import Brush, Selection, State
 from ..model.scene import Camera, Scene, SceneObject
@@ -20,7 +21,7 @@ from .panels.methods import METHOD_NAMES
 from .panels.rows import tooltip
 from .panels.spectral_colour import colour_of_nm
 from .view_axes import RADIUS_EM
-from .view_model import CursorInfo, ViewModel
+from .view_model import ViewModel
 
 _RING_COLOURS = {"widen": (1.0, 0.84, 0.45, 0.95), "narrow": (0.55, 0.80, 1.0, 0.95), "erase": (1.0, 0.55, 0.50, 0.95)}
 _MAGNIFIER_EM = 11.0
@@ -30,12 +31,14 @@ _ARROW_EM = 3.2
 
 def draw_marks(canvas: Canvas, state: State, view_model: ViewModel, is_painting: bool) -> None:
     """What lies in the scene: selection, the ring of the brush, a colour being pulled."""
-    if view_model.stats.differs == "scene" and view_model.shown is not None:
-        for item in not_shown(state.scene, view_model.shown):
-            _draw_proxy(canvas, item)
+    if state.preview_s is None:
+        seen = None if view_model.picture is None else view_model.shown
+        for item in state.scene.objects if seen is None else not_shown(state.scene, seen):
+            if ("object", item.name) not in state.hidden:
+                _draw_proxy(canvas, item)
     _draw_selection(canvas, state)
-    if state.tool == "brush" and view_model.cursor is not None:
-        _draw_ring(canvas, state, view_model.cursor, is_painting)
+    if state.tool == "brush" and view_model.cursor is not None and view_model.cursor.hit is not None:
+        _draw_ring(canvas, state, view_model.cursor.hit, is_painting)
     if state.pull is not None:
         _draw_pull(canvas, state)
 
@@ -92,10 +95,8 @@ def camera_lines(camera: Camera, aspect: float) -> list[np.ndarray]:
     return [np.vstack([frame, frame[:1]]), *(np.stack([position, corner]) for corner in frame)]
 
 
-def _draw_ring(canvas: Canvas, state: State, cursor: CursorInfo, is_painting: bool) -> None:
-    if cursor.position is None or cursor.normal is None:
-        return
-    if not brushes.can_paint(state.scene, cursor.object_index):
+def _draw_ring(canvas: Canvas, state: State, hit: PickHit, is_painting: bool) -> None:
+    if not hit.is_receiver:
         imgui.set_mouse_cursor(imgui.MouseCursor_.not_allowed)
         return
     io = imgui.get_io()
@@ -103,13 +104,13 @@ def _draw_ring(canvas: Canvas, state: State, cursor: CursorInfo, is_painting: bo
     red, green, blue, opacity = _RING_COLOURS[brush.mode]
     draw_outlined(
         canvas,
-        brushes.ring(cursor.position, cursor.normal, brush.radius),
+        brushes.ring(hit.position, hit.normal, brush.radius),
         (red, green, blue, opacity),
         2.2 if is_painting else 1.6,
     )
     inner = brush.radius * (1.0 - brush.falloff)
     if 0.05 < 1.0 - brush.falloff < 0.95:
-        draw_outlined(canvas, brushes.ring(cursor.position, cursor.normal, inner), (red, green, blue, 0.4), 1.0)
+        draw_outlined(canvas, brushes.ring(hit.position, hit.normal, inner), (red, green, blue, 0.4), 1.0)
 
 
 def _draw_pull(canvas: Canvas, state: State) -> None:
@@ -250,7 +251,9 @@ def draw_magnifier(canvas: Canvas, view_model: ViewModel) -> None:
     if cursor is None or cursor.magnified is None:
         return
     side, gap, palette = theme.em(_MAGNIFIER_EM), theme.em(1.6), theme.palette()
-    text = f"{cursor.pixel[0]}, {cursor.pixel[1]}   R {cursor.rgb[0]:.3g}  G {cursor.rgb[1]:.3g}  B {cursor.rgb[2]:.3g}"
+    text = f"{cursor.pixel[0]}, {cursor.pixel[1]}   " + (
+        "…" if cursor.rgb is None else "R {:.3g}  G {:.3g}  B {:.3g}".format(*cursor.rgb)
+    )
     foot = imgui.get_text_line_height() + theme.em(0.5)
     width = max(side, imgui.calc_text_size(text).x + theme.em(0.8))
     x = mouse.x + gap if mouse.x + gap + width < canvas.left + canvas.width else mouse.x - gap - width

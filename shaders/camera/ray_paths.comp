@@ -1,6 +1,5 @@
 // Single paths, one an invocation, each at a wavelength of its own: refracted at every glass surface (totally reflected
-// where it must be), mirrored by mirrors, up to the first surface that is neither. For what people point at and look at:
-// picking and the ray overlay.
+// where it must be), mirrored by mirrors, up to the first surface that is neither. For the ray overlay.
 layout(local_size_x = 32) in;
 
 #include "lib/medium.glsl"
@@ -22,10 +21,6 @@ void main()
     RayOrigin origin = RayOrigin(NONE, NONE, 0u, p.inside_mask);
     MediumStack medium = MediumStack(p.inside_mask, p.inside_object);
     PathEnd path;
-    path.first_object = NONE;
-    path.last_object = NONE;
-    path.first_normal = vec3(0.0);
-    path.last_normal = vec3(0.0);
     path.points = 1u;
     uint at = id * uint(MAX_POINTS);
     points[at] = vec4(position, 0.0);
@@ -37,12 +32,6 @@ void main()
         ShadingFrame frame = shading_frame(hit, facet, there, direction);
         path.points = event + 2u;
         points[at + event + 1u] = vec4(there, 0.0);
-        path.last_object = met ? hit.object : NONE;
-        path.last_normal = met ? frame.normal_g : vec3(0.0);
-        if (event == 0u) {
-            path.first_object = path.last_object;
-            path.first_normal = path.last_normal;
-        }
         uint kind = met ? object_at(hit.object).kind : NONE;
         bool goes_on = false;
         position = there;

@@ -89,6 +89,45 @@ def test_the_brush_asks_for_photons_and_back(gl: Context) -> None:
         light.release()
 
 
+def test_a_dragged_glass_leaves_the_light_of_others_as_fine_as_it_was(gl: Context) -> None:
+    scene = shipped("default")
+    light = begun(gl, scene)
+    try:
+        for _ in light.light_pass.pass_steps(0, PHOTONS):
+            pass
+        before = light.light_pass.beams.found.polygons
+        alone = before.met & 1 == 0  # light that never met the prism
+        assert 0 < alone.sum() < len(before) and alone[before.source == 1].any()
+        first = edited(scene, 1.5).objects[0]
+        light.show(inputs(replace(scene, objects=(first, *scene.objects[1:]))))
+        previews = [light.splat_preview(4096).flux(True) for _ in range(2)]
+        after = light.light_pass.beams.found.polygons
+        assert np.array_equal(after.flux[after.met & 1 == 0], before.flux[alone])
+        assert 0 < (after.met & 1 != 0).sum() < (~alone).sum()  # as coarse as a drag has them
+        assert previews[1] == pytest.approx(previews[0], rel=0.02)  # the first is drawn, the second begins from a copy
+    finally:
+        light.release()
+
+
+def test_light_traced_anew_takes_the_place_of_light_as_fine(gl: Context) -> None:
+    engine = LiveEngine(gl, replace(Budget.of(gl), first_photons=1 << 12, largest_photons=1 << 14))
+    engine.target_photons, engine.camera_samples = 1 << 14, 1
+    try:
+        engine.set(inputs(scene := shipped("prism")))
+        until_idle(engine)
+        traced = engine._shown
+        assert traced is not None and traced.accumulation.finest == 1 << 14
+        engine.set(inputs(edited(scene, 2.0)))
+        deadline = time.perf_counter() + 60.0
+        while engine._shown is traced:
+            engine.advance(0.02)
+            assert time.perf_counter() < deadline and (engine.stats.differs == "light") >= engine.schedule.building
+        assert engine._shown is not None and engine._shown.accumulation.finest == 1 << 14
+        assert not engine.schedule.maps_are_coarse
+    finally:
+        engine.release()
+
+
 def test_the_engine_answers_questions_about_beams(gl: Context) -> None:
     engine = LiveEngine(gl, replace(Budget.of(gl), first_photons=1 << 12, largest_photons=1 << 14))
     engine.target_photons, engine.camera_samples = 1 << 14, 1
@@ -116,13 +155,16 @@ def test_leaving_one_wavelength_finds_the_light_as_it_was(gl: Context) -> None:
         engine.set(replace(wanted, solo_nm=550.0))
         until_idle(engine)
         assert nrmse(live_maps(engine), maps_before) > 0.1
-        engine.set(wanted)
-        frames = 0
-        while engine.stats.photons != photons or not engine.stats.converged:
-            engine.advance(0.02)
-            frames += 1
-            assert frames < 400 and engine.stats.photons in (photons, 0)  # never again from few on
-        assert np.array_equal(live_maps(engine), maps_before)
+        for other in (replace(wanted, solo_nm=550.0), inputs(edited(wanted.scene, 2.0))):
+            engine.set(other)
+            engine.advance(0.02, interacting=True)
+            engine.set(wanted)
+            frames = 0
+            while engine.stats.photons != photons or not engine.stats.converged:
+                engine.advance(0.02)
+                frames += 1
+                assert frames < 400 and engine.stats.photons in (photons, 1, 0)  # never again from few on
+            assert np.array_equal(live_maps(engine), maps_before)
         # Another glass is other light: nothing of what was kept may be shown.
         engine.set(replace(wanted, solo_nm=550.0))
         until_idle(engine)

@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.edit.live_inputs import LiveInputs
+from spectrasplat.edit.picking import pick
+from spectrasplat.edit.projection import View
 from spectrasplat.gpu.context import Context
 from spectrasplat.model.environment import gradient, world_to_local
 from spectrasplat.model.io.scene_file import load_scene
@@ -114,7 +116,9 @@ def in_glass(engine: LiveEngine, shape: tuple[int, ...]) -> np.ndarray:
     """bool (h, w): pixels whose middle shows glass, and their neighbours too."""
     height, width = shape[:2]
     glass = {i for i, o in enumerate(engine.inputs.scene.objects) if isinstance(o.material, Dielectric)}
-    hits = [[engine.pick((x + 0.5) / width, (y + 0.5) / height) for x in range(width)] for y in range(height)]
+    view = View.of(engine.inputs.camera, width / height)
+    places = [[((x + 0.5) / width, (y + 0.5) / height) for x in range(width)] for y in range(height)]
+    hits = [[pick(engine.inputs.scene, view, *place) for place in row] for row in places]
     mask = np.array([[hit is not None and hit.object_index in glass for hit in row] for row in hits])
     return mask & np.roll(mask, 1, 0) & np.roll(mask, -1, 0) & np.roll(mask, 1, 1) & np.roll(mask, -1, 1)
 

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import numpy as np
 from imgui_bundle import imgui
+from spectrasplat.base.not_yet import NotYet
+from spectrasplat.edit.picking import pick_in
 from spectrasplat.edit.projection import View
 from spectrasplat.edit.state import Selection
 from spectrasplat.gpu.context import Context
@@ -74,6 +76,7 @@ class Hands:
         """Where on the screen the light that came through the glass lands: its middle, or another percentile along its
         length."""
         photons = self.engine.stored_photons(100_000)
+        assert not isinstance(photons, NotYet)
         state = self.session.state
         mine = (photons.source == self.glass()) & (photons.receiver == self.receiver())
         view = View.of(state.camera, state.viewport_size[0] / state.viewport_size[1])
@@ -87,7 +90,7 @@ class Hands:
         # A photon itself, not a mean of places, which may lie beside a bent caustic; and none that glass hides.
         ordered = seen[np.argsort(seen[:, 0])]
         for at in ordered[int(share * (len(ordered) - 1)) :]:
-            hit = self.engine.pick(float(at[0]), float(at[1]))
+            hit = pick_in(state, float(at[0]), float(at[1]))
             if hit is not None and hit.object_index == self.receiver():
                 return self.interface.find("Picture").at(float(at[0]), float(at[1]))
         raise AssertionError("the caustic is hidden by glass")

@@ -9,6 +9,7 @@ import pytest
 from imgui_bundle import imgui
 from spectrasplat.edit import requests
 from spectrasplat.edit.drawn import Drawn
+from spectrasplat.edit.picking import PickHit
 from spectrasplat.edit.selecting import chosen, everything
 from spectrasplat.edit.state import Selection, State
 from spectrasplat.gpu.context import Context
@@ -112,8 +113,8 @@ def test_what_is_locked_keeps_its_place(gl: Context) -> None:
 
 def test_what_is_locked_is_not_taken_in_the_picture(gl: Context, monkeypatch: pytest.MonkeyPatch) -> None:
     session = Session(gl, make_engine=FakeEngine)
-    monkeypatch.setattr(session.picture, "pick", lambda _place: type("Hit", (), {"object_index": 0})())
-    monkeypatch.setattr(session.picture, "object_in", lambda _scene, index: index)
+    hit = PickHit(0, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 1.0, False)
+    monkeypatch.setattr("spectrasplat.ui.session_requests.pick_in", lambda *_place: hit)
     from spectrasplat.ui.session_requests import carry_out
 
     name = session.state.scene.objects[0].name

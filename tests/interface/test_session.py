@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 from spectrasplat.base.errors import UserError
 from spectrasplat.edit import requests
+from spectrasplat.edit.picking import pick_in
 from spectrasplat.edit.preferences import config_dir
 from spectrasplat.edit.state import Selection, State
-from spectrasplat.edit.stored_photons import StoredPhotons
 from spectrasplat.gpu.context import Context
 from spectrasplat.model.scene import Camera, Dielectric, Diffuse
-from spectrasplat.passes.pick import PickHit
 from spectrasplat.render.viewer.dirty_level import DirtyLevel
 from spectrasplat.ui.crash_log import FILE_NAME
 from spectrasplat.ui.frame import run_frame
@@ -25,7 +24,7 @@ from spectrasplat.ui.panels.timing import counts_of
 from spectrasplat.ui.session import LAYOUT_FRAMES, Session
 from spectrasplat.ui.view_model import ViewModel
 
-from tests.interface.fake_engine import FakeEngine
+from tests.interface.fake_engine import FakeEngine, dispersed
 from tests.interface.soak import resident_bytes
 
 Edit = Callable[[State], State]
@@ -211,8 +210,7 @@ def test_a_bug_in_a_request_is_logged_and_the_work_autosaved(
         raise ZeroDivisionError("a fault")
 
     monkeypatch.setattr("spectrasplat.ui.session_requests.source_at", bug)
-    rig.engine.hit = _hit(rig, Diffuse)
-    rig.ask(requests.SelectAt(0.5, 0.5))
+    rig.ask(requests.SelectAt(*place_on(rig, Diffuse)))
     assert any("a fault" in message.text and message.is_error for message in rig.view_model.messages)
     log = (config / FILE_NAME).read_text()
     assert "SelectAt" in log and "ZeroDivisionError" in log
@@ -268,42 +266,38 @@ def test_recovery_after_a_crash(gl: Context, rig: Rig, config: Path, monkeypatch
     second.session.release()
 
 
-def _hit(rig: Rig, kind: type) -> PickHit:
-    index = next(i for i, o in enumerate(rig.session.state.scene.objects) if isinstance(o.material, kind))
-    return PickHit(index, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 5.0, kind is Diffuse)
+def place_on(rig: Rig, kind: type) -> tuple[float, float]:
+    """Where in the picture something of that material is seen."""
+    state = replace(rig.session.state, viewport_size=(64, 36))
+    for x, y in ((x, y) for y in np.linspace(0.98, 0.02, 25).tolist() for x in np.linspace(0.02, 0.98, 25).tolist()):
+        hit = pick_in(state, x, y)
+        if hit is not None and isinstance(state.scene.objects[hit.object_index].material, kind):
+            return x, y
+    raise AssertionError(f"{kind} is not in view")
 
 
 def test_a_click_selects_glass_or_whose_caustic_it_is(rig: Rig) -> None:
-    objects = rig.session.state.scene.objects
+    place = place_on(rig, Diffuse)
+    hit = pick_in(replace(rig.session.state, viewport_size=(64, 36)), *place)
+    assert hit is not None
+    objects, receiver = rig.session.state.scene.objects, hit.object_index
     glass = next(i for i, o in enumerate(objects) if isinstance(o.material, Dielectric))
-    hit = _hit(rig, Diffuse)
-    count = 2000
-    rng = np.random.default_rng(2)
-    places = rng.normal(0, 0.3, (count, 3)) * [1, 1, 0]
-    rig.engine.hit = hit
-    rig.engine.photons = replace(
-        StoredPhotons.none(),
-        position=places,
-        flux_w=np.ones(count),
-        source=np.full(count, glass),
-        receiver=np.full(count, hit.object_index),
-        dposition_dn=np.zeros((count, 0, 3)),
-    )
-    assert rig.ask(requests.SelectAt(0.5, 0.5)).selection == Selection("object", glass)
-    assert rig.ask(requests.SelectAt(0.5, 0.5, itself=True)).selection == Selection("object", hit.object_index)
+    rig.engine.photons = dispersed(hit.position, glass, receiver)
+    assert rig.ask(requests.SelectAt(*place)).selection == Selection("object", glass)
+    assert rig.ask(requests.SelectAt(*place, itself=True)).selection == Selection("object", receiver)
     rig.engine.photons = None
-    assert rig.ask(requests.SelectAt(0.5, 0.5)).selection == Selection("object", hit.object_index)
-    rig.engine.hit = None
+    assert rig.ask(requests.SelectAt(*place)).selection == Selection("object", receiver)
+    up = replace(rig.session.state.camera, target=tuple(np.add(rig.session.state.camera.position, (0.0, 0.1, 1.0))))
+    rig.frame(lambda state: replace(state, camera=up))
     assert rig.ask(requests.SelectAt(0.5, 0.5)).selection == Selection()
 
 
 def test_facts_under_the_cursor(rig: Rig) -> None:
-    rig.engine.hit = _hit(rig, Diffuse)
     hover: Edit = lambda state: replace(state, hover=(0.25, 0.75))  # noqa: E731
     rig.frame(hover)
     rig.frame(hover)
     cursor = rig.view_model.cursor
-    assert cursor is not None and cursor.pixel == (16, 27) and cursor.is_receiver
+    assert cursor is not None and cursor.pixel == (16, 27) and cursor.hit is not None and cursor.hit.is_receiver
     grey = 0.1 * rig.session.state.camera.position[2]
     assert cursor.rgb == pytest.approx((grey,) * 3)
     assert cursor.spectrum is not None and cursor.spectrum_nm is not None

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from imgui_bundle import imgui
 from spectrasplat.edit import edits, requests
+from spectrasplat.edit.picking import PickHit
 from spectrasplat.edit.state import Panels, Preferences, Selection
 from spectrasplat.gpu.context import Context
 from spectrasplat.model.scene import Diffuse
@@ -51,7 +52,11 @@ def full_view_model() -> ViewModel:
         frame_ms=tuple(float(v) for v in range(10, 30)),
         pass_ms={"trace": 8.0, "splat": 5.0, "interface": 2.0},
         cursor=CursorInfo(
-            (10, 10), (0.8, 0.4, 0.0), 1, (0, 0, 0), (0, 0, 1), True, NM, 1e-3 * np.exp(-(((NM - 560) / 60) ** 2))
+            (10, 10),
+            (0.8, 0.4, 0.0),
+            PickHit(1, (0, 0, 0), (0, 0, 1), 1.0, True),
+            NM,
+            1e-3 * np.exp(-(((NM - 560) / 60) ** 2)),
         ),
         title="prism",
         history=tuple(HistoryEntry(label, i == 1) for i, label in enumerate(("Open", "Move prism", "Brush"))),

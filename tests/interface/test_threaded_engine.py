@@ -6,7 +6,9 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
+from spectrasplat.base.not_yet import NOT_YET
 from spectrasplat.edit.document import Document
 from spectrasplat.edit.live_inputs import LiveInputs
 from spectrasplat.edit.state import State
@@ -56,8 +58,7 @@ def test_work_that_overruns_lets_the_window_be_drawn(engine: ThreadedEngine) -> 
     engine.advance(0.04)
     while engine.is_busy:
         said = engine.stats
-        # It is asked nothing, and answers nothing.
-        assert engine.picture is None and engine.pick(0.5, 0.5) is None and not engine.stored_photons().position.size
+        assert engine.picture is None and engine.stored_photons() is engine.caustic_spectrum(0, np.zeros(3)) is NOT_YET
         assert engine.set(replace(inputs, width=7)) == DirtyLevel.NOTHING
         engine.advance(0.04)
         frames += 1

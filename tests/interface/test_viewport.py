@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from imgui_bundle import imgui
 from spectrasplat.edit import camera_controls
+from spectrasplat.edit.picking import PickHit, pick_in
 from spectrasplat.edit.projection import View
 from spectrasplat.edit.requests import BeginPull, Notice, Pull, SelectAt
 from spectrasplat.edit.state import Brush, Compare, Selection, State
@@ -36,7 +37,6 @@ class ViewportRig(HeadlessInterface):
         self.asked: list = []
         self.labels: list[str] = []
         self.held_frames = 0
-        self.on_floor = True
         self._colour = gl.ctx.texture((2, 2), 4, bytes([40, 80, 120, 255] * 4))
         viewport.reset()
         super().__init__(gl, self._draw_window, SIZE)
@@ -53,7 +53,9 @@ class ViewportRig(HeadlessInterface):
         imgui.begin("Viewport", None, imgui.WindowFlags_.no_title_bar | imgui.WindowFlags_.no_resize)
         imgui.pop_style_var()
         before = replace(self.state, interacting=False, hover=None, requests=())
-        view_model = replace(self.view_model, picture=self._colour.glo, cursor=self.cursor())
+        view_model = replace(
+            self.view_model, picture=self._colour.glo, cursor=CursorInfo((0, 0), (1.0, 1.0, 1.0), self.under())
+        )
         self.state = viewport.draw_viewport(before, view_model)
         if self.state.scene is not before.scene:
             self.labels.append(self.state.edit_label)
@@ -65,15 +67,9 @@ class ViewportRig(HeadlessInterface):
         wide, high = self.state.viewport_size
         return View.of(self.state.camera, wide / high)
 
-    def cursor(self) -> CursorInfo | None:
+    def under(self) -> PickHit | None:
         """What the host found where the cursor was in the last frame."""
-        if self.state.hover is None or not self.on_floor:
-            return None
-        point = self.view().on_plane(*self.state.hover, np.zeros(3), np.array([0.0, 0.0, 1.0]))
-        floor = receiver_of(self.state)
-        return (
-            None if point is None else CursorInfo((0, 0), (1.0, 1.0, 1.0), floor, tuple(point), (0.0, 0.0, 1.0), True)
-        )
+        return None if self.state.hover is None else pick_in(self.state, *self.state.hover)
 
     def at(self, point) -> tuple[float, float]:
         """Where a world point is on the screen."""
@@ -119,7 +115,7 @@ def test_a_click_selects_and_a_drag_does_not(rig) -> None:
 def test_middle_drag_orbits_round_what_lies_under_the_cursor(rig, button, keys) -> None:
     rig.move(CENTRE)
     rig.frame()
-    pivot = rig.cursor().position
+    pivot = rig.under().position
     before = rig.state.camera
     rig.drag(CENTRE, (CENTRE[0] + 60, CENTRE[1] + 20), button=button, keys=keys)
     expected = camera_controls.orbit(before, 60 / SIZE[1], 20 / SIZE[1], pivot)
@@ -131,7 +127,7 @@ def test_middle_drag_orbits_round_what_lies_under_the_cursor(rig, button, keys) 
 def test_shift_middle_drag_keeps_the_point_under_the_cursor(rig) -> None:
     rig.move(CENTRE)
     rig.frame()
-    point = rig.cursor().position
+    point = rig.under().position
     rig.drag(CENTRE, (CENTRE[0] - 90, CENTRE[1] + 40), button=2, keys=[KEY.mod_shift])
     assert rig.at(point) == pytest.approx((CENTRE[0] - 90, CENTRE[1] + 40), abs=0.5)
 
@@ -140,8 +136,8 @@ def test_the_wheel_zooms_to_the_cursor(rig) -> None:
     rig.move(CENTRE)
     rig.frame()
     point, before = (
-        np.array(rig.cursor().position),
-        np.linalg.norm(np.subtract(rig.state.camera.position, rig.cursor().position)),
+        np.array(rig.under().position),
+        np.linalg.norm(np.subtract(rig.state.camera.position, rig.under().position)),
     )
     rig.wheel(CENTRE, 3.0)
     assert rig.at(point) == pytest.approx(CENTRE, abs=0.5)
@@ -312,8 +308,9 @@ def test_brush_modifiers_and_radius(gl) -> None:
 
 def test_the_brush_refuses_what_is_no_receiver(gl) -> None:
     with brushing(gl) as rig:
-        rig.on_floor = False
-        rig.drag(CENTRE, (CENTRE[0] + 30, CENTRE[1]))
+        item = rig.state.scene.objects[0]
+        place = rig.at((item.mesh.vertices @ item.object_to_world[:3, :3].T + item.object_to_world[:3, 3]).mean(axis=0))
+        rig.drag(place, (place[0] + 5, place[1]))
         assert rig.labels == []
         assert [type(request) for request in rig.asked] == [Notice]
 
@@ -326,7 +323,7 @@ def test_the_ring_of_the_brush_lies_on_the_surface(gl) -> None:
         rig.move(CENTRE)
         rig.frame(2)
         drawn = np.abs(rig.screenshot().astype(int) - without).sum(axis=2) > 60
-        centre = np.array(rig.cursor().position)
+        centre = np.array(rig.under().position)
         for way in ([0.3, 0, 0], [-0.3, 0, 0], [0, 0.3, 0], [0, -0.3, 0]):
             x, y = (int(v) for v in rig.at(centre + way))
             assert drawn[y - 2 : y + 3, x - 2 : x + 3].any()

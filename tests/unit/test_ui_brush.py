@@ -106,12 +106,6 @@ def test_modifiers_and_radius() -> None:
     assert brushes.resized(BRUSH, -1000.0, 10.0).radius == pytest.approx(10.0 * brushes.MIN_RADIUS)
 
 
-def test_only_receivers_take_paint() -> None:
-    assert brushes.can_paint(scene(), 0)
-    assert not brushes.can_paint(scene(), 1)
-    assert not brushes.can_paint(scene(), None)
-
-
 def test_the_ring_lies_on_the_tangent_plane() -> None:
     normal = np.array([0.6, 0.0, 0.8])
     points = brushes.ring((1.0, 2.0, 3.0), tuple(normal), 0.5) - [1.0, 2.0, 3.0]

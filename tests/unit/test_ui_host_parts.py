@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.edit import requests
@@ -13,7 +14,9 @@ from spectrasplat.ui.crash_log import FILE_NAME, MAX_BYTES, write_crash
 from spectrasplat.ui.message_box import MAX_MESSAGES, NOTICE_S, MessageBox
 from spectrasplat.ui.pace import GPU_SHARE, LIGHT_SHARE, LONGEST_PATIENT_S, MIN_SHARE, SOFTWARE_FRAME_S, Pace
 from spectrasplat.ui.sentences import brief, sentence, words
-from spectrasplat.ui.shown_scene import has_same_objects, index_in
+from spectrasplat.ui.shown_scene import index_in, photons_in
+
+from tests.interface.fake_engine import dispersed
 
 
 class Clock:
@@ -115,7 +118,7 @@ def test_a_crash_log_that_cannot_be_written_is_no_second_crash(tmp_path: Path) -
 def test_sentences() -> None:
     assert sentence("the scene has no file yet") == "The scene has no file yet."
     assert sentence("prism.toml is broken.") == "prism.toml is broken."
-    assert words(requests.SelectAt(0, 0)) == "Select at"
+    assert words(requests.SelectAt) == "Select at"
     error = RuntimeError("outer")
     error.__cause__ = ValueError("inner  fault")
     assert brief(error) == "ValueError: inner fault"
@@ -129,4 +132,8 @@ def test_an_object_of_a_picture_that_lags_behind_is_found_again() -> None:
     assert [index_in(edited, shown, i) for i in range(3)] == [0, 1, 2]
     deleted = replace(shown, objects=(diamond, replace(table, object_to_world=2 * table.object_to_world)))
     assert [index_in(deleted, shown, i) for i in (0, 1, 2, 7)] == [None, 0, 1, None]
-    assert has_same_objects(edited, shown) and not has_same_objects(deleted, shown)
+    photons = dispersed((0.0, 0.0, 0.0), 0, 2, 3)
+    photons = replace(photons, source=np.array([0, 1, -1]), receiver=np.array([2, 2, 0]))
+    photons = photons_in(deleted, shown, replace(photons, group_of_object={0: 0, 1: 1}))
+    assert photons.source.tolist() == [-1, 0, -1] and photons.receiver.tolist() == [1, 1, -1]
+    assert photons.group_of_object == {0: 1}

@@ -34,6 +34,8 @@ class Accumulation:
     begun: bool = False
     first: int = 0
     """Photons of the first pass."""
+    finest: int = 0
+    """Photons of the finest pass that was published."""
 
     def __post_init__(self) -> None:
         self.first = self.photons
@@ -64,6 +66,7 @@ class Accumulation:
             yield from light_pass.settling()
             if self.photons > self.first:
                 self.light.keep(self.photons, self.number)
+            self.finest = max(self.finest, self.photons)
             self.publish()
             yield
             yield from self._refine()

@@ -105,13 +105,15 @@ def build(
     target: int,
     publish: Callable[[], None],
     moving: MovingBeams,
+    as_fine: int = 0,
 ) -> Iterator[Shown | str | None]:
     """Everything for a scene that photons must be traced for, up to its first picture; while it is not done, what it is
     at (None: as before).
 
     `largest`: photons of the finest pass, `target`: after which nothing more is traced. `publish` is called for every
-    later picture, `moving`: how fine the first beams are. What was made is freed when the generator is closed
-    before its end.
+    later picture, `moving`: how fine the first beams are, `as_fine`: photons of a pass as fine as which the first
+    picture must be, in proper maps, since another of the same light is shown meanwhile. What was made is freed when
+    the generator is closed before its end.
     """
     width, height = preview_size(wanted.width, wanted.height)
     settings = RenderSettings(
@@ -132,6 +134,8 @@ def build(
         yield "following the first photons"
         yield from light.light_pass.preparing()
         light.show(wanted)
+        if as_fine:
+            light.fit_to(wanted)
         if light.environment is not None:
             # The first picture is not a dark one.
             yield "asking the environment for its light"
@@ -140,13 +144,14 @@ def build(
                 if light.environment.is_worth_showing:
                     break
             light.show_environment()
-        published: list[bool] = []
+        published = [-1]
         first = min(budget.first_photons, largest)
-        accumulation = Accumulation(light, first, largest, target, wanted.seed, lambda: published.append(True))
+        accumulation = Accumulation(
+            light, first, largest, target, wanted.seed, lambda: published.append(accumulation.finest)
+        )
         steps = chain(accumulation.survey(), accumulation.steps())
         yield "tracing its first light"
-        while not published:
-            next(steps, None)
+        while published[-1] < as_fine and next(steps, published) is not published:
             yield None
         accumulation.publish = publish
     except BaseException:  # also when the generator is closed because nobody wants this scene any more

@@ -20,7 +20,6 @@ from ...edit.live_inputs import LiveInputs
 from ...gpu import shader
 from ...model.environment_sun import with_sun
 from ...passes.caustic_maps import CausticMaps
-from ...passes.pick import Picker
 from ..light_maps import LightMaps
 from ..moving_beams import MovingBeams
 from ..solo import scene_seen
@@ -28,7 +27,7 @@ from . import schedule as events
 from .building import Budget, Shown, build
 from .dirty_level import DirtyLevel
 from .engine_answers import EngineAnswers
-from .invalidation import appearance_differs, dirty_level, moves_view, only_moves
+from .invalidation import appearance_differs, dirty_level, lights_differ, moves_view, only_moves
 from .live_camera import DIRECT_S, MOVED_S
 from .live_light import LiveLight
 from .refit import wants_new_maps
@@ -44,6 +43,8 @@ PREVIEW_S = 0.016
 """What a coarse picture should take on a software renderer."""
 PREVIEW_GPU_S = 0.004
 """And elsewhere."""
+HELD = 4
+"""First passes' photons, at most, for which what is shown stays although the same light is being traced anew."""
 CAMERA_SHARE = 0.4
 """Of a frame, where photons are traced as well."""
 
@@ -135,6 +136,7 @@ class LiveEngine(EngineAnswers):
         that fails."""
         shader.drop_programs(self.context.ctx)
         self.problem = None
+        self.schedule = replace(self.schedule, first_order=False)  # nobody waits for fine light
         if self._wanted is None:
             return
         self._tell(events.BuildAsked())
@@ -220,7 +222,7 @@ class LiveEngine(EngineAnswers):
                 if self._shown is not None and self._shown.light.light_pass.beams is not None:
                     self._shown.light.light_pass.beams.pause()
                 sizes = self.budget, self._wanted, self._largest, self._target_photons
-                self._building.begin(build(self.context, *sizes, self._maps_ready, self._moving))
+                self._building.begin(build(self.context, *sizes, self._maps_ready, self._moving, self._held_photons))
             case Action.FOLLOW_PHOTONS:
                 self._follow_photons(self._wanted, 0.4 * budget_s)
             case Action.FOLLOW_CAMERA | Action.MOVE_CAMERA:
@@ -241,6 +243,14 @@ class LiveEngine(EngineAnswers):
                 self._set_maps(self._shown.light.light_pass.maps)
                 self._restart_camera(same_view=same_view, finer_maps=finer_maps)
 
+    @property
+    def _held_photons(self) -> int:
+        """Photons of a pass as fine as which light is to be that replaces what follows the same edit to first order."""
+        if self._shown is None or self._inputs is None or self.schedule.moved or not self.schedule.first_order:
+            return 0
+        same = self._wanted is not None and dirty_level(self._inputs, self._inputs, self._wanted) < DirtyLevel.SPLAT
+        return min(self._shown.accumulation.finest, HELD * self._shown.accumulation.first) if same else 0
+
     def _maps_ready(self) -> None:
         """The maps as they are are worth showing."""
         assert self._shown is not None
@@ -251,6 +261,7 @@ class LiveEngine(EngineAnswers):
     def _follow_photons(self, wanted: LiveInputs, seconds: float) -> None:
         shown, before = self._shown, self._inputs
         assert shown is not None and before is not None
+        self._building.drop()
         shown.light.show(wanted)
         self._inputs = wanted
         if appearance_differs(before, wanted):
@@ -259,8 +270,10 @@ class LiveEngine(EngineAnswers):
             shown.accumulation.bring_back()
             assert shown.light.light_pass.maps is not None
             self._show_for_now(shown.light.light_pass.maps)
-        else:
+        elif self.schedule.interacting or lights_differ(before, wanted):
             self._show_preview(seconds)
+        else:  # the maps there are stay until all photons are in the next
+            self._restart_camera(same_view=True)
         self._splat_again(shown)
 
     def _follow_camera(self, wanted: LiveInputs, *, view_only: bool) -> None:
@@ -359,13 +372,9 @@ class LiveEngine(EngineAnswers):
 
     def _swap(self, built: Shown) -> None:
         # What does not compile (or fit) leaves everything as it was: the programs of the camera come first.
-        picker = None
         try:
-            picker = Picker(self.context, built.light.buffers)
             self._take_scene(built.traced, built.light)
         except BaseException:
-            if picker is not None:
-                picker.release()
             built.light.release()
             raise
         before, self._shown = self._shown, built
@@ -375,10 +384,7 @@ class LiveEngine(EngineAnswers):
         if before is not None:
             self._rays_before += before.light.light_pass.trace.rays_traced
             before.light.release()
-        if self._picker is not None:
-            self._picker.release()
-        self._picker = picker
-        self._tell(events.Built())
+        self._tell(events.Built(built.light.is_coarse))
         self._maps_ready()
 
     # ---- light -------------------------------------------------------------------------------
@@ -418,9 +424,7 @@ class LiveEngine(EngineAnswers):
         self._building.drop()
         if self._shown is not None:
             self._shown.light.release()
-        if self._picker is not None:
-            self._picker.release()
         self._camera_pass.release()
         shader.forget_programs(self.context.ctx)
         self._splatting = self._tracing = iter(())
-        self._shown = self._maps = self._picker = None
+        self._shown = self._maps = None

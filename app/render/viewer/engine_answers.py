@@ -1,5 +1,4 @@
-"""What a live rendering answers when the window asks: what is shown and how good it is, what lies under the cursor,
-what the stored photons say.
+"""What a live rendering answers when the window asks: what is shown and how good it is, what the stored photons say.
 
 Nothing here works or changes anything: `LiveEngine` does, which keeps the fields.
 """
@@ -9,6 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
+from ...base.not_yet import NOT_YET, NotYet
 from ...edit.stored_photons import StoredPhotons
 from .building import Building, Shown
 from .dirty_level import DirtyLevel
@@ -26,8 +26,7 @@ if TYPE_CHECKING:
 
     from ...edit.live_inputs import LiveInputs
     from ...gpu.context import Context
-    from ...gpu.scene_buffers import SceneBuffers
-    from ...passes.pick import Picker, PickHit
+    from .live_light import LiveLight
 
 
 class EngineAnswers:
@@ -45,7 +44,6 @@ class EngineAnswers:
         """What the picture shows."""
         self._shown: Shown | None = None
         self._building = Building(context)
-        self._picker: Picker | None = None
         self._tally = WorkTally()
         self._rays_before = 0
         """Rays of the light passes that are gone."""
@@ -89,6 +87,8 @@ class EngineAnswers:
         """What of the wanted scene the picture does not show yet, as in `LiveStats`."""
         if self.schedule.moved and not self.schedule.building:
             return "moved"
+        if self.schedule.splatting and not self.schedule.shows_preview and self._shown is not None:
+            return "" if self._shown.light.shows_outdated else "light"
         if self._wanted is None or not self.schedule.building:
             return ""
         return "scene" if self._level == DirtyLevel.BUILD else "light"
@@ -171,25 +171,20 @@ class EngineAnswers:
 
     # ---- the scene and its light -------------------------------------------------------------
 
-    def pick(self, x: float, y: float) -> PickHit | None:
-        """First surface at (x, y) of the picture, 0 to 1 from its top left corner; None beyond everything."""
-        if self._picker is None or self._inputs is None:
-            return None
-        return self._picker.pick(self._inputs.camera, self._inputs.width, self._inputs.height, x, y)
-
-    def stored_photons(self, limit: int = QUERIED_PHOTONS) -> StoredPhotons:
+    def stored_photons(self, limit: int = QUERIED_PHOTONS) -> StoredPhotons | NotYet:
         """About `limit` stored photons in world space, as they are shown."""
-        if self._shown is None or self._inputs is None or self.schedule.moved:
-            return StoredPhotons.none()
+        if self._shown is None or self._inputs is None or self._lacks_photons(self._shown.light):
+            return NOT_YET
         return world_photons(self._shown.light, self._inputs, limit)
 
-    def caustic_spectrum(self, receiver: int, position: np.ndarray) -> CausticSpectrum | None:
+    def caustic_spectrum(self, receiver: int, position: np.ndarray) -> CausticSpectrum | NotYet:
         """The caustic's spectral irradiance at a world position on object `receiver`."""
-        if self._shown is None or self._inputs is None or self.schedule.moved:
-            return None
+        if self._shown is None or self._inputs is None or self._lacks_photons(self._shown.light):
+            return NOT_YET
+        if receiver not in self._shown.light.buffers.receivers:  # which it is to become
+            return NOT_YET
         return spectrum_at(self._shown.light, self._inputs, receiver, position)
 
-    @property
-    def buffers(self) -> SceneBuffers | None:
-        """The traced scene on the device, for overlays that ask it more (ray fans)."""
-        return self._shown.light.buffers if self._shown else None
+    def _lacks_photons(self, light: LiveLight) -> bool:
+        """Photons that can say where light lands are still to be traced."""
+        return self.schedule.moved or (self.schedule.has_photon_work and not light.has_records)

@@ -242,11 +242,15 @@ def appearance_differs(old: LiveInputs, new: LiveInputs) -> bool:
     a, b = old.scene, new.scene
     if _haze(a.render) != _haze(b.render):
         return True
-    if old.solo_nm != new.solo_nm or a.background_rgb != b.background_rgb or a.environment is not b.environment:
-        return True
-    if a.lights is not b.lights and any(x is not y for x, y in zip(a.lights, b.lights, strict=True)):
+    if lights_differ(old, new) or a.background_rgb != b.background_rgb or a.environment is not b.environment:
         return True
     return any(_material_differs(x.material, y.material) for x, y in zip(a.objects, b.objects, strict=True))
+
+
+def lights_differ(old: LiveInputs, new: LiveInputs) -> bool:
+    """Whether lights shine otherwise, or in another wavelength alone."""
+    pairs = zip(old.scene.lights, new.scene.lights, strict=True)
+    return old.solo_nm != new.solo_nm or any(x is not y for x, y in pairs)
 
 
 def _material_differs(old: Material, new: Material) -> bool:

@@ -1,4 +1,5 @@
-"""The light of all wavelengths, kept while one alone is shown, so that whoever leaves that finds it as it was.
+"""The finest light of all wavelengths, kept while one alone is shown or an edit is tried, so that whoever takes that
+back finds it as it was.
 
 Stored photons are splatted again, whatever is shown. Beams are not stored: where they carry everything, they would be
 searched for anew, from the coarsest on, and minutes of light be lost for a look at one wavelength.
@@ -45,10 +46,11 @@ class KeptLight:
 
     def keep(self, light_pass: LightPass, shown: LiveInputs, photons: int, number: int) -> None:
         """Remember what the maps hold after `number` passes of `photons`, where all wavelengths are shown."""
-        maps = light_pass.maps
+        maps, kept = light_pass.maps, self._kept
         if maps is None or shown.solo_nm is not None:
             return
-        kept = self._kept
+        if kept is not None and kept.maps is maps and number * photons < kept.number * kept.photons:
+            return  # what an edit may be undone to is finer
         reused = kept.sums if kept is not None and kept.maps is maps else None
         if reused is None:
             self.release()

@@ -281,7 +281,7 @@ class LiveLight:
         started = time.perf_counter()
         if light_pass.beams is not None:
             weight = self._preview.photon_weight
-            light_pass.beams.draw_moving(self._preview, weight, self.moving, BEAM_SECONDS)
+            light_pass.beams.draw_moving(self._preview, weight, self.moving, BEAM_SECONDS, alone=not has_photons)
         self.beam_seconds = time.perf_counter() - started
         return self._preview
 
@@ -389,6 +389,12 @@ class LiveLight:
             self._sampled = photons
             for _ in self.light_pass.sample_steps(photons, self._samples.keep):
                 yield
+
+    @property
+    def has_records(self) -> bool:
+        """`stored_records` knows something of all light."""
+        fullest = self.stored.fullest
+        return (self._samples.rounds if self.light_pass.has_beams else fullest.store.rounds if fullest else 0) > 0
 
     def stored_records(self, limit: int) -> np.ndarray:
         """About `limit` stored records (`gpu.records.photon_record`) of all light, beams' too."""

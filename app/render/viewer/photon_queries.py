@@ -88,11 +88,9 @@ class CausticSpectrum:
         return float(self.wavelength_nm[1] - self.wavelength_nm[0])
 
 
-def spectrum_at(light: LiveLight, shown: LiveInputs, receiver: int, position: np.ndarray) -> CausticSpectrum | None:
+def spectrum_at(light: LiveLight, shown: LiveInputs, receiver: int, position: np.ndarray) -> CausticSpectrum:
     """The caustic's spectral irradiance at a world `position` on object `receiver`, as `shown` shows the photons of
-    `light`; None where nothing is received."""
-    if receiver not in light.buffers.receivers:
-        return None
+    `light`, which receives there."""
     then, now = ([each.spectral_power for each in s.lights] for s in (light.light_pass.scene, shown.scene))
     photons, weight = world_photons(light, shown, QUERIED_PHOTONS), light.stored_weight(QUERIED_PHOTONS)
     return caustic_spectrum(photons, weight, receiver, position, reach_of(light, receiver), then, now)

@@ -106,7 +106,9 @@ class Examined:
 
 @dataclass(frozen=True)
 class Built:
-    """What was built is shown."""
+    """What was built is shown. `coarse_maps`: in those of a first preview."""
+
+    coarse_maps: bool = True
 
 
 @dataclass(frozen=True)
@@ -264,8 +266,8 @@ def step(schedule: Schedule, event: Event, now: float) -> Next:
             return replace(s, interacting=interacting), ()
         case Examined():
             return _examine(s, event, now)
-        case Built():
-            return _built(s), ()
+        case Built(coarse_maps):
+            return replace(_built(s), maps_are_coarse=coarse_maps), ()
         case Failed():
             return replace(s, building=False, wish_is_newer=False, failed=True), ()
         case PreviewShown():
@@ -312,8 +314,8 @@ def _fulfil(s: Schedule, event: Examined) -> Next:
         # A build that runs is finished first and shown; then the newest wish is examined.
         s, actions = (replace(s, wish_is_due=s.wish_is_newer), ()) if s.building else _build(s)
         return s, (*actions, Action.MOVE_CAMERA) if event.moves_view else actions
-    if event.level == DirtyLevel.SPLAT:
-        return s, (Action.FOLLOW_PHOTONS,)
+    if event.level == DirtyLevel.SPLAT:  # which nobody builds for any more
+        return replace(s, building=False, wish_is_newer=False), (Action.FOLLOW_PHOTONS,)
     if event.level == DirtyLevel.CAMERA:
         return s, (Action.MOVE_CAMERA if s.building else Action.FOLLOW_CAMERA,)
     return s, ()
@@ -334,7 +336,6 @@ def _built(s: Schedule) -> Schedule:
         splatting=False,
         tracing=True,
         first_order=False,
-        maps_are_coarse=True,
         moved=False,
         maps_wait=False,
     )

@@ -2,7 +2,7 @@
 
 Work and drawing take turns as they would on one thread: `advance` waits for the work that it asks for. Only where
 that takes much longer than its budget, because the driver compiles, does it return early. Until that work is done the
-engine `is_busy`: it follows nothing, answers nothing, and tells how long it has been at it.
+engine `is_busy`: it follows nothing, answers `NOT_YET`, and tells how long it has been at it.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, TypeVar
 
+from ...base.not_yet import NOT_YET, NotYet
 from ...edit.stored_photons import StoredPhotons
 from ...gpu.context_thread import ContextThread, SteppedWork
 from .building import PATIENCE_S
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
 
     from ...edit.live_inputs import LiveInputs
     from ...gpu.context import Context
-    from ...passes.pick import PickHit
     from .photon_queries import CausticSpectrum
     from .stats import LiveStats
 
@@ -80,11 +80,11 @@ class ThreadedEngine:
 
     def set(self, inputs: LiveInputs) -> DirtyLevel:
         """As of a `LiveEngine`; whoever asks while it is busy asks again in the next frame."""
-        return self._asked(lambda: self._engine.set(inputs), DirtyLevel.NOTHING)
+        return DirtyLevel.NOTHING if self.is_busy else self._thread.run(lambda: self._engine.set(inputs))
 
     def retrace(self) -> None:
-        """As of a `LiveEngine`."""
-        self._asked(self._engine.retrace, None)
+        """As of a `LiveEngine`; while it is busy, after what it is at."""
+        self._thread.submit(self._engine.retrace)
 
     def rebuild(self) -> None:
         """As of a `LiveEngine`; waits until all is compiled."""
@@ -105,9 +105,9 @@ class ThreadedEngine:
             finally:
                 self._thread.close()
 
-    def _asked(self, question: Callable[[], T], answer: T) -> T:
-        """What the engine answers on its thread; `answer` while it is busy."""
-        return answer if self.is_busy else self._thread.run(question)
+    def _asked(self, question: Callable[[], T]) -> T | NotYet:
+        """What the engine answers on its thread."""
+        return NOT_YET if self.is_busy else self._thread.run(question)
 
     # ---- wishes ------------------------------------------------------------------------------
 
@@ -196,14 +196,10 @@ class ThreadedEngine:
         before_s = stats.preparing_s if stats.preparing else 0.0
         return replace(stats, preparing=preparing, preparing_s=before_s + waited_s)
 
-    def pick(self, x: float, y: float) -> PickHit | None:
+    def stored_photons(self, limit: int = QUERIED_PHOTONS) -> StoredPhotons | NotYet:
         """As of a `LiveEngine`."""
-        return self._asked(lambda: self._engine.pick(x, y), None)
+        return self._asked(lambda: self._engine.stored_photons(limit))
 
-    def stored_photons(self, limit: int = QUERIED_PHOTONS) -> StoredPhotons:
+    def caustic_spectrum(self, receiver: int, position: np.ndarray) -> CausticSpectrum | NotYet:
         """As of a `LiveEngine`."""
-        return self._asked(lambda: self._engine.stored_photons(limit), StoredPhotons.none())
-
-    def caustic_spectrum(self, receiver: int, position: np.ndarray) -> CausticSpectrum | None:
-        """As of a `LiveEngine`."""
-        return self._asked(lambda: self._engine.caustic_spectrum(receiver, position), None)
+        return self._asked(lambda: self._engine.caustic_spectrum(receiver, position))

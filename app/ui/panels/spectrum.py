@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from imgui_bundle import imgui, implot
 
+from ...base.not_yet import NOT_YET
 from ...edit.chromaticity import ColourInfo, colour_info, ready
 from ...edit.state import State
 from .. import theme
@@ -25,8 +26,12 @@ def draw_spectrum(state: State, view_model: ViewModel) -> State:
     if is_ready and cursor.spectrum is not None and cursor.spectrum_nm is not None:
         colour = colour_info(cursor.spectrum_nm, cursor.spectrum)
     _told(state, cursor, colour)
-    if cursor.spectrum is None or cursor.spectrum_nm is None:
+    if cursor.hit is None:
+        widgets.hint("Nothing but background is under the cursor.")
+    elif not cursor.hit.is_receiver:
         widgets.hint("The surface under the cursor is no receiver: caustics are recorded on diffuse objects only.")
+    elif cursor.spectrum is None or cursor.spectrum_nm is None:
+        widgets.hint(f"The light here is {NOT_YET.value} …")
     elif colour is None and (is_ready or not cursor.spectrum.any()):
         widgets.hint(_TOO_FEW if cursor.too_few_photons else "No light falls here.")
     else:
@@ -37,9 +42,8 @@ def draw_spectrum(state: State, view_model: ViewModel) -> State:
 
 
 def _told(state: State, cursor: CursorInfo, colour: ColourInfo | None) -> None:
-    parts = [
-        ("Radiance", "  ".join(f"{c:.3g}" for c in cursor.rgb), "Linear Rec.709 radiance of the pixel, lm/(sr unit²).")
-    ]
+    radiance = "…" if cursor.rgb is None else "  ".join(f"{c:.3g}" for c in cursor.rgb)
+    parts = [("Radiance", radiance, "Linear Rec.709 radiance of the pixel, lm/(sr unit²).")]
     if colour is not None:
         parts += [
             (
@@ -75,8 +79,9 @@ def _told(state: State, cursor: CursorInfo, colour: ColourInfo | None) -> None:
                 "Width of a bin, by the number of photons, and the standard error of the caustic in one.",
             )
         )
-    if cursor.object_index is not None and cursor.object_index < len(state.scene.objects):
-        parts.insert(0, ("On", state.scene.objects[cursor.object_index].name, "The first surface under the cursor."))
+    if cursor.hit is not None and cursor.hit.object_index < len(state.scene.objects):
+        name = state.scene.objects[cursor.hit.object_index].name
+        parts.insert(0, ("On", name, "The first surface under the cursor."))
     room = imgui.get_content_region_avail().x
     gap, used = theme.em(1.2), 0.0
     for label, text, tip in ((label, named(text), tip) for label, text, tip in parts):
