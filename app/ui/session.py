@@ -19,7 +19,7 @@ from ..edit.document import Document
 from ..edit.drawn import Drawn
 from ..edit.opening import Opening
 from ..edit.preferences import Settings, config_dir, load_settings, save_settings
-from ..edit.state import Selection, State
+from ..edit.state import Display, Selection, State
 from ..gpu.context_thread import no_thread
 from ..gpu.shader_watch import ShaderWatch
 from ..model.staging import Staging
@@ -80,6 +80,8 @@ class Session:
         self.asks_to_quit = self.asks_about_export = False
         self.quits_after_export = False
         """Somebody wants to quit, and waits for what is being exported."""
+        self._panels_before = self.settings.preferences.panels
+        """Open before the lesson that is shown."""
         self._discarded: Scene | None = None
         """What may be lost, as somebody has said."""
         self.is_full_screen = False
@@ -190,15 +192,27 @@ class Session:
             self.settings = replace(self.settings, is_new=False)
 
     def show_document(self, document: Document) -> None:
-        """Take up another document; preferences and display stay as they are."""
+        """Take up another document. Preferences stay as they are, and of the display what belongs to no scene."""
         self.document = document
-        kept = self.state
+        kept, before = self.state, self.state.display
+        display = Display(
+            tone=before.tone,
+            false_colour_stops=before.false_colour_stops,
+            ray_wavelengths=before.ray_wavelengths,
+            ray_labels=before.ray_labels,
+        )
+        if kept.lesson:  # the panels that were opened for it close with it
+            preferences = replace(kept.preferences, panels=self._panels_before)
+            kept = replace(kept, preferences=preferences, compare=replace(kept.compare, mode="off", plot=False))
         self.state = replace(
             kept,
             scene=document.scene,
             camera=document.scene.camera,
             views=State(document.scene, document.scene.camera).views,
             selection=Selection(),
+            tool="select",
+            display=display,
+            physical=False,
             pull=None,
             animation=(),
             preview_s=None,
@@ -217,12 +231,15 @@ class Session:
     def show_lesson(self, lesson: Lesson) -> None:
         """A lesson's scene, with what it is about selected and its rays drawn. Raises `UserError`."""
         self.show_document(Document.open(lesson.path))
+        self._panels_before = self.state.preferences.panels
         names = [item.name for item in self.state.scene.objects]
         chosen = Selection("object", names.index(lesson.select)) if lesson.select in names else Selection()
         if lesson.rays:
             layout.raise_panel("rays")
-        state = replace(self.state, lesson=lesson.name, selection=chosen).with_display(ray_overlay=lesson.rays)
-        self.state = state.with_panels(lesson=True, rays=lesson.rays or state.preferences.panels.rays)
+        state = replace(self.state, lesson=lesson.name, selection=chosen).with_display(
+            ray_overlay=lesson.rays, ray_count=lesson.ray_count, ray_reflections=lesson.reflections
+        )
+        self.state = state.with_panels(lesson=True, rays=lesson.rays or self._panels_before.rays)
 
     def tell_losses(self) -> None:
         """Once a picture is whole: what of its light was lost."""

@@ -111,7 +111,7 @@ class ViewportInput:
     def _let_go(self, state: State, view_model: ViewModel, canvas: Canvas, mouse: Mouse) -> State:
         grip, self.grip, self._stroke = self.grip, None, None
         if grip == "measure" and self._travelled_px <= CLICK_PX and mouse.is_over:
-            point = point_at(view_model, canvas, mouse.x, mouse.y)
+            point = point_at(state, view_model, canvas, mouse.x, mouse.y)
             return state if point is None else measuring.with_point(state, point)
         if grip == "click" and self._travelled_px <= CLICK_PX and mouse.is_over:
             return state.asking(SelectAt(mouse.x, mouse.y, imgui.get_io().key_ctrl, imgui.get_io().key_shift))
@@ -131,7 +131,8 @@ class ViewportInput:
                 return replace(state, camera=controls.orbit(camera, mouse.dx, mouse.dy, self._pivot))
             case "pan":
                 depth = None if self._pivot is None else float(canvas.view.depth(self._pivot))
-                return replace(state, camera=controls.pan(camera, mouse.dx, mouse.dy, depth))
+                shown = _share_shown(state, canvas)
+                return replace(state, camera=controls.pan(camera, shown * mouse.dx, shown * mouse.dy, depth))
             case "dolly":
                 return replace(state, camera=controls.dolly(camera, mouse.dy))
             case "fly":
@@ -199,7 +200,9 @@ class ViewportInput:
                 state, brush=brushes.resized(state.brush, notches, visible_height(canvas.view, view_model.cursor))
             )
         hit = _position(view_model.cursor)
-        camera = controls.zoom_to(state.camera, notches, (mouse.x, mouse.y), canvas.view.aspect, hit)
+        shown = _share_shown(state, canvas)
+        cursor = (0.5 + shown * (mouse.x - 0.5), 0.5 + shown * (mouse.y - 0.5))
+        camera = controls.zoom_to(state.camera, notches, cursor, canvas.view.aspect, hit)
         return replace(state, camera=camera, interacting=True)
 
     def _keys(self, state: State, canvas: Canvas, mouse: Mouse) -> State:
@@ -211,6 +214,11 @@ class ViewportInput:
             if steps
             else state
         )
+
+
+def _share_shown(state: State, canvas: Canvas) -> float:
+    """Height of the picture over that of the camera's own frame, in which it moves."""
+    return canvas.view.half_height / View.of(state.camera, 1.0).half_height
 
 
 def visible_height(view: View, cursor: CursorInfo | None) -> float:

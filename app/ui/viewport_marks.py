@@ -76,7 +76,7 @@ def _draw_selection(canvas: Canvas, state: State) -> None:
             opacity = 0.8 if chosen == state.selection else 0.45
             draw_box(canvas, box_corners(item.mesh.vertices, item.object_to_world), (*accent[:3], opacity))
     if state.selection.kind == "camera":
-        for line in camera_lines(state.scene.camera, canvas.view.aspect):
+        for line in camera_lines(state.scene.camera, state.frame_aspect):
             draw_outlined(canvas, line, (*accent[:3], 0.8), 1.4, closed=False)
 
 

@@ -45,4 +45,7 @@ def draw_lesson_items(state: State, view_model: ViewModel) -> State:
 
 
 def _open(state: State, view_model: ViewModel, lesson: Lesson) -> State:
+    """A lesson that was tried out is nobody's work: the next one comes without a question."""
+    if state.lesson:
+        return state.asking(OpenLesson(lesson.name)).with_panels(start_page=False)
     return dialogs.unless_unsaved(state, view_model, OpenLesson(lesson.name))
