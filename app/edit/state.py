@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 from ..model.scene import Camera, Material, Scene, Vec3
 from .live_inputs import LiveInputs
-from .projection import fitted
+from .projection import View, fitted
 from .requests import Pull, Request
 
 Tool = Literal["select", "move", "rotate", "scale", "brush", "pull", "measure"]
@@ -197,6 +197,12 @@ class State:
     def camera_for(self, size: tuple[int, int]) -> Camera:
         """The camera of a picture of `size` pixels, which shows all of the scene's frame."""
         return fitted(self.camera, self.frame_aspect, size[0] / size[1])
+
+    @property
+    def view(self) -> View:
+        """What the picture in the window shows."""
+        width, height = self.viewport_size
+        return View.of(self.camera_for(self.viewport_size), width / height)
 
     @property
     def live_inputs(self) -> LiveInputs:

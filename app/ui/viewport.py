@@ -11,7 +11,6 @@ from dataclasses import replace
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
-from ..edit.projection import View
 from ..edit.state import State
 from . import item_rects, overlay, theme
 from .gizmo import Gizmo
@@ -118,10 +117,8 @@ def _draw_picture(state: State, view_model: ViewModel, corner: ImVec2, size: ImV
 
 
 def _canvas(state: State, corner: ImVec2, width: float, height: float) -> Canvas:
-    wide, high = state.viewport_size
     scale = theme.em(1.0) / theme.FONT_SIZE
-    view = View.of(state.camera_for(state.viewport_size), wide / high)
-    return Canvas(imgui.get_window_draw_list(), view, corner.x, corner.y, width, height, scale)
+    return Canvas(imgui.get_window_draw_list(), state.view, corner.x, corner.y, width, height, scale)
 
 
 def _mouse(canvas: Canvas) -> Mouse:

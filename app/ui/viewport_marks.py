@@ -128,9 +128,7 @@ def _draw_pull(canvas: Canvas, state: State) -> None:
             canvas.drawing.add_circle_filled(ImVec2(x, y), 0.68 * radius, colour, 24)
     x, y = canvas.pixels(now)
     if np.isfinite(x):
-        what = (
-            f"local gain × {gain:.2f}" if held.local else f"gain × {gain:.2f}   V_d {pull.abbe_number(held, gain):.1f}"
-        )
+        what = f"local gain × {gain:.2f}" if held.local else f"gain × {gain:.2f}"
         _label(canvas, x + theme.em(0.9), y - theme.em(1.6), f"{held.wavelength_nm:.0f} nm   {what}")
 
 

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 from imgui_bundle import imgui
-from spectrasplat.edit.projection import View
 from spectrasplat.edit.state import Selection
 from spectrasplat.gpu.context import Context
 from spectrasplat.model.scene import Dielectric, Diffuse
@@ -76,8 +75,7 @@ class Hands:
         photons = self.engine.stored_photons(100_000)
         state = self.session.state
         mine = (photons.source == self.glass()) & (photons.receiver == self.receiver())
-        view = View.of(state.camera, state.viewport_size[0] / state.viewport_size[1])
-        seen, depth = view.project(photons.position[mine])
+        seen, depth = state.view.project(photons.position[mine])
         inside = (depth > 0) & ((seen > 0.1) & (seen < 0.9)).all(axis=1)
         assert inside.sum() > 50, "the caustic is not in view"
         seen, flux = seen[inside], photons.flux_w[mine][inside]

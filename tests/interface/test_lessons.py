@@ -9,7 +9,6 @@ import pytest
 from imgui_bundle import imgui
 from spectrasplat.edit import measuring, requests
 from spectrasplat.edit.lessons import lesson
-from spectrasplat.edit.projection import View
 from spectrasplat.edit.state import Selection
 from spectrasplat.gpu.context import Context
 from spectrasplat.ui.frame import run_frame
@@ -100,7 +99,7 @@ def test_the_ruler_takes_hold_of_rays_and_measures_the_deviation(gl: Context) ->
         rig.frame(2)
         assert rig.state.tool == "measure"
         picture = rig.find("Picture")
-        view = View.of(rig.state.camera, picture.size[0] / picture.size[1])
+        view = rig.state.view
         start, entry, out, _ = rays[0].points
         for point in (0.3 * start + 0.7 * entry, entry, out):
             (x, y), _ = view.project(point)

@@ -7,6 +7,8 @@ from imgui_bundle import imgui, implot
 
 from ...edit.chromaticity import ColourInfo, colour_info, ready
 from ...edit.state import State
+from ...model.optics.colorimetry import VISIBLE_NM
+from ...model.scene import Scene
 from .. import theme
 from ..view_model import CursorInfo, ViewModel
 from . import numbers, rows, spectral_colour, widgets
@@ -23,7 +25,7 @@ def draw_spectrum(state: State, view_model: ViewModel) -> State:
         return state
     colour, is_ready = None, ready()
     if is_ready and cursor.spectrum is not None and cursor.spectrum_nm is not None:
-        colour = colour_info(cursor.spectrum_nm, cursor.spectrum)
+        colour = colour_info(cursor.spectrum_nm, cursor.spectrum, _source(state.scene))
     _told(state, cursor, colour)
     if cursor.spectrum is None or cursor.spectrum_nm is None:
         widgets.hint("The surface under the cursor is no receiver: caustics are recorded on diffuse objects only.")
@@ -34,6 +36,12 @@ def draw_spectrum(state: State, view_model: ViewModel) -> State:
             widgets.hint(_TOO_FEW)
         _plot(cursor.spectrum_nm, cursor.spectrum)
     return state
+
+
+def _source(scene: Scene) -> np.ndarray:
+    """The spectrum of all lamps together, on `VISIBLE_NM`."""
+    edges = np.append(VISIBLE_NM - 0.5, VISIBLE_NM[-1] + 0.5)
+    return np.sum([light.spectral_power.binned(edges) for light in scene.lights], axis=0)
 
 
 def _told(state: State, cursor: CursorInfo, colour: ColourInfo | None) -> None:
