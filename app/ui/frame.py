@@ -24,6 +24,8 @@ from .view_model_builder import view_model_of
 
 Draw = Callable[[State, ViewModel], State]
 DEFAULT_BUDGET_S = 0.03
+_MINOR = (requests.Notice, requests.DismissMessage, requests.SelectAt, requests.FrameSelection, requests.CancelQuit)
+"""Requests that mend nothing which an error said."""
 
 
 def run_frame(session: Session, draw: Draw, budget_s: float = DEFAULT_BUDGET_S, slice_s: float = math.inf) -> None:
@@ -54,6 +56,7 @@ def _accept(session: Session, before: State, after: State) -> None:
         session.document.history.push(
             after.edit_label or "Edit", after.scene, merge=after.interacting or session.was_interacting
         )
+        _succeeded(session)
     if not after.interacting:
         session.document.history.settle()
     if after.preferences != session.settings.preferences:
@@ -64,6 +67,8 @@ def _carry_out(session: Session, request: requests.Request) -> None:
     """One request; whatever goes wrong becomes a sentence."""
     try:
         session_requests.carry_out(session, request)
+        if not isinstance(request, _MINOR):
+            _succeeded(session)
     except UserError as error:
         session.messages.tell(sentence(str(error)), is_error=True)
     except Exception as error:  # noqa: BLE001 - a bug: the work and the window outlive it
@@ -71,6 +76,11 @@ def _carry_out(session: Session, request: requests.Request) -> None:
         session.messages.tell(
             f"{words(request)} failed by a fault of the program ({brief(error)}); your work is kept.", is_error=True
         )
+
+
+def _succeeded(session: Session) -> None:
+    if session.picture.engine is not None:
+        session.messages.succeed()
 
 
 def _work(session: Session, budget_s: float, slice_s: float) -> None:

@@ -39,6 +39,9 @@ class Docked:
 _raised: set[str] = set()
 """Fields of the panels that somebody wants to see in front."""
 
+floating: list[str] = []
+"""Titles of the panels that floated in this frame."""
+
 behind: set[str] = set()
 """Fields of the panels that lay behind another one's tab in the last frame."""
 

@@ -166,7 +166,9 @@ class Session:
         """The picture cannot go on: keep the work and say so."""
         self.save_from_crash("rendering", error)
         self.messages.tell(
-            f"The renderer stopped ({brief(error)}). Your work is kept; press F5 to try again.", is_error=True
+            f"The renderer stopped ({brief(error)}). Your work is kept; press F5 to try again.",
+            is_error=True,
+            stays=True,
         )
 
     # What requests use
