@@ -12,7 +12,9 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from ..base.errors import UserError
+from ..edit import brush as brushes
 from ..edit import requests
+from ..edit.projection import View
 from ..edit.state import State
 from . import session_requests
 from .live_picture import EngineError
@@ -39,6 +41,9 @@ def run_frame(session: Session, draw: Draw, budget_s: float = DEFAULT_BUDGET_S, 
     _accept(session, before, after)
     for request in after.requests:
         _carry_out(session, request)
+    if session.state.camera is not before.camera:
+        views = (View.of(camera, 1.0) for camera in (before.camera, session.state.camera))
+        session.state = replace(session.state, brush=brushes.followed(session.state.brush, *views))
     session.autosave.update(
         session.document.scene, session.document.title, session.document.source, session.document.unsaved
     )

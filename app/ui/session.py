@@ -14,12 +14,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..base.errors import UserError
+from ..edit.brush import USUAL_RADIUS
 from ..edit.autosave import Autosave, Recovery, recoveries
 from ..edit.document import Document
 from ..edit.drawn import Drawn
 from ..edit.opening import Opening
 from ..edit.preferences import Settings, config_dir, load_settings, save_settings
-from ..edit.state import Display, Selection, State
+from ..edit.projection import View
+from ..edit.state import Brush, Display, Selection, State
 from ..gpu.context_thread import no_thread
 from ..gpu.shader_watch import ShaderWatch
 from ..model.staging import Staging
@@ -325,6 +327,8 @@ class Session:
 
 
 def _first_state(scene: Scene, settings: Settings, welcome: bool) -> State:
-    state = State(scene=scene, camera=scene.camera, preferences=settings.preferences)
+    view = View.of(scene.camera, 1.0)
+    brush = Brush(radius=USUAL_RADIUS * view.height_at(view.target_distance))
+    state = State(scene=scene, camera=scene.camera, preferences=settings.preferences, brush=brush)
     # Opening Compare begins a second picture, which nobody asked for at a start.
     return state.with_panels(start_page=welcome, compare=False)

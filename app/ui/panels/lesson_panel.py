@@ -28,7 +28,10 @@ def draw_lesson(state: State, view_model: ViewModel) -> State:
         widgets.hint(f"{number}. {step}")
     imgui.end_child()
     following = lessons()[(index + 1) % len(lessons())]
-    if widgets.button(f"Next: {following.title}###next lesson", tip="Open the next lesson.", width=-1):
+    words = f"Next: {following.title}"
+    if imgui.calc_text_size(words).x > imgui.get_content_region_avail().x - theme.em(0.8):
+        words = "Next"
+    if widgets.button(f"{words}###next lesson", tip=f"Open the next lesson: {following.title}.", width=-1):
         state = _open(state, view_model, following)
     return state
 
