@@ -104,7 +104,9 @@ def fan(
         try:
             tracer = RayFan(context, buffers)
             try:
-                lines = [line.points for line in tracer.trace(source, placed, rays, nm.tolist(), reflections=reflections)]
+                lines = [
+                    line.points for line in tracer.trace(source, placed, rays, nm.tolist(), reflections=reflections)
+                ]
             finally:
                 tracer.release()
         finally:

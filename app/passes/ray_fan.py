@@ -106,9 +106,7 @@ class RayFan:
         """Of the specular part of the scene, which is what one looks at: floors may be endless."""
         return 1.0 / self._paths.scene.space.scale
 
-    def _follow(
-        self, origins: np.ndarray, directions: np.ndarray, nm: np.ndarray, reflections: int = 0
-    ) -> list[Path]:
+    def _follow(self, origins: np.ndarray, directions: np.ndarray, nm: np.ndarray, reflections: int = 0) -> list[Path]:
         return self._paths.trace(origins, directions, nm, 2.0 * self._radius, reflections)
 
     def _beam(self, light: Light, object_index: int) -> _Beam:

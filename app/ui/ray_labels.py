@@ -48,7 +48,13 @@ def labelled(count: int) -> list[int]:
 def _end_of(canvas: Canvas, path: np.ndarray) -> np.ndarray:
     """Where a ray ends on the screen, as far as it is in the picture; NaN where none of it is."""
     segments = canvas.segments(path)
-    return np.asarray(segments[-1, 1]) if len(segments) else np.full(2, np.nan)
+    if not len(segments):
+        return np.full(2, np.nan)
+    start, way = segments[-1, 0], segments[-1, 1] - segments[-1, 0]  # which reaches beyond the picture's borders
+    low = np.array([canvas.left, canvas.top])
+    border = np.where(way > 0.0, low + [canvas.width, canvas.height], low)
+    share = (border - start) / np.where(way == 0.0, np.inf, way)
+    return np.asarray(start + float(np.min(share, where=share > 0.0, initial=1.0)) * way)
 
 
 def _cross(canvas: Canvas, place: np.ndarray, colour: int) -> None:

@@ -386,7 +386,6 @@ class Window:
         glfw.set_drop_callback(self._handle, cast(Any, dropped))  # glfw hands a list over, whatever its types say
         glfw.set_window_close_callback(self._handle, closing)
 
-
     def _type(self, typed: Callable[[], None]) -> None:
         """Do `typed` once a text field that is being opened can take it."""
         awaited = 0 if imgui.internal.get_top_most_popup_modal() is None else -DIALOGUE_FRAMES

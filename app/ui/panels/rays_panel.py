@@ -16,7 +16,10 @@ from .spectral_colour import colour_of_nm
 _COLUMNS: tuple[tuple[str, str], ...] = (
     ("nm", "Vacuum wavelength."),
     ("n", "Refractive index of the glass."),
-    ("Deviation", "Angle between the middle ray before and behind the glass; with inner reflections the least turn of all rays."),
+    (
+        "Deviation",
+        "Angle between the middle ray before and behind the glass; with inner reflections the least turn of all rays.",
+    ),
     (
         "Minimum",
         "Minimum deviation of a prism with these two faces: 2 asin(n sin(A/2)) - A, for rays in its principal section.",
