@@ -98,11 +98,6 @@ class Animation:
         """Paths of the parameters whose value changes."""
         return frozenset(track.path for track in self.tracks if len(set(track.values)) > 1)
 
-    @property
-    def camera_only(self) -> bool:
-        """Whether light stays as it is: caustic maps do not depend on the camera."""
-        return all(path.startswith("camera.") or path == "exposure_ev" for path in self.moves)
-
 
 def turntable(stage: Stage, frames: int, fps: float, turns: float = 1.0) -> Animation:
     """Once about the target in `frames` frames; the last comes before the first again, so that it can loop."""

@@ -23,7 +23,7 @@ FIRST_TOUCH_S = 0.1
 """What a mere click is worth, seconds of painting."""
 MIN_RADIUS, MAX_RADIUS = 1e-3, 0.5
 """Of the brush, as shares of the picture's height at the cursor's distance."""
-USUAL_RADIUS = 0.02
+USUAL_RADIUS = 0.01
 """Likewise, to begin with."""
 RADIUS_STEP = 1.15
 LABEL = "Brush dispersion"

@@ -81,8 +81,8 @@ def _usual(scene: Scene, direction: np.ndarray) -> dict[str, Any]:
 
 
 def _in_view(scene: Scene, light: Light, view: View) -> Light:
-    """The light nearer to what it is aimed at, as far as the picture shows its place; or in the picture's upper left, as
-    far away as the objects."""
+    """The light nearer to its target, as far as the picture shows that place; or in the picture's upper left, as far
+    away as the objects."""
     around = environment_of(scene.objects)
     places = [around.centre + share * (light.position - around.centre) for share in np.linspace(1.0, 0.25, 16)]
     seen = view.project(np.array(places))[0]

@@ -1,34 +1,23 @@
-"""Ready-made glasses, lights and views: what a user reaches for first, as data.
+"""Ready-made glasses and lights: what a user reaches for first, as data.
 
-A preset of a light changes its spectrum and keeps place, kind and brightness; one of a view looks at
-the objects from a side and keeps the lens. Users' own presets live in `own_presets`.
+A preset of a light changes its spectrum and keeps place, kind and brightness.
 """
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-import numpy as np
-
 from ..model.lights.directional import SUN_DIAMETER_DEG
-from ..model.lights.light import made
 from ..model.optics import catalogue
 from ..model.optics.tints import Tint, tints
 from ..model.scene import (
-    Camera,
     Dielectric,
-    Light,
     Material,
     Scene,
-    Vec3,
 )
-from ..model.scene_defaults import environment_of
 from ..model.staging import tinted
-from ..model.vectors import vec3
-from .adding import up_frame
 from .lights import SpectrumKind, light_power, set_light, set_light_power, set_light_spectrum
 from .objects import set_material
 
@@ -47,28 +36,14 @@ class MaterialPreset:
 
 @dataclass(frozen=True)
 class LightPreset:
-    """A spectrum by name, as `edits.set_light_spectrum` takes it; or all of a user's light."""
+    """A spectrum by name, as `edits.set_light_spectrum` takes it."""
 
     name: str
-    kind: SpectrumKind | None
-    """None: `light` says it."""
-    value: str | float | Path | tuple[tuple[float, float], ...] | None
+    kind: SpectrumKind
+    value: str | float | Path | tuple[tuple[float, float], ...]
     remark: str = ""
     angular_diameter_deg: float | None = None
     """Of directional lights; None keeps it."""
-    light: Light | None = None
-    """A user's light: all but name and place is taken over."""
-
-
-@dataclass(frozen=True)
-class ViewPreset:
-    """A side to look from, in a z-up world whose front is −y; or a user's camera."""
-
-    name: str
-    toward_camera: Vec3 = (0.0, -1.0, 0.0)
-    up: Vec3 = (0.0, 0.0, 1.0)
-    camera: Camera | None = None
-    """A user's view, taken over as it is."""
 
 
 _GLASSES = (
@@ -133,17 +108,6 @@ _LIGHTS = (
     LightPreset("Red laser", "laser", 632.8, "Helium and neon, one line at 632.8 nm"),
 )
 
-_DIAGONAL = (0.45, -0.75, 0.5)
-_VIEWS = (
-    ViewPreset("Front", (0.0, -1.0, 0.0)),
-    ViewPreset("Back", (0.0, 1.0, 0.0)),
-    ViewPreset("Left", (-1.0, 0.0, 0.0)),
-    ViewPreset("Right", (1.0, 0.0, 0.0)),
-    ViewPreset("Top", (0.0, 0.0, 1.0), (0.0, 1.0, 0.0)),
-    ViewPreset("Bottom", (0.0, 0.0, -1.0), (0.0, -1.0, 0.0)),
-    ViewPreset("Corner", _DIAGONAL),
-)
-
 
 @cache
 def material_presets() -> tuple[MaterialPreset, ...]:
@@ -162,11 +126,6 @@ def light_presets() -> tuple[LightPreset, ...]:
     return _LIGHTS
 
 
-def view_presets() -> tuple[ViewPreset, ...]:
-    """Sides to look from."""
-    return _VIEWS
-
-
 def apply_material(scene: Scene, index: int, preset: MaterialPreset) -> Scene:
     """Give object `index` the preset's material; a glass keeps its surface and its priority among overlapping
     solids."""
@@ -179,38 +138,10 @@ def apply_material(scene: Scene, index: int, preset: MaterialPreset) -> Scene:
 
 
 def apply_light(scene: Scene, index: int, preset: LightPreset) -> Scene:
-    """Give light `index` the preset's spectrum at the brightness it had; a user's light brings kind, shape and power
-    too."""
+    """Give light `index` the preset's spectrum at the brightness it had."""
     light = scene.lights[index]
-    if preset.light is not None:
-        kept = ("name", "position", "direction", "tangent")
-        placed = {key: value for key, value in light.given().items() if key in kept}
-        return set_light(scene, index, made(type(preset.light), preset.light.given() | placed))
-    assert preset.kind is not None and preset.value is not None
     changed = set_light_spectrum(scene, index, preset.kind, preset.value)
     if preset.angular_diameter_deg is not None and not light.has_place:
         wide = changed.lights[index].changed(angular_diameter_deg=preset.angular_diameter_deg)
         changed = set_light_power(set_light(changed, index, wide), index, light_power(light))
     return changed
-
-
-def view_camera(scene: Scene, camera: Camera, preset: ViewPreset) -> Camera:
-    """The camera that shows the objects from the preset's side, with the lens of `camera`."""
-    if preset.camera is not None:
-        return preset.camera
-    frame, around = up_frame(scene), environment_of(scene.objects)
-    reach = 1.8 * around.radius  # the caustic beside the objects is in the picture too
-    if camera.kind == "pinhole":
-        distance = reach / math.sin(math.radians(0.5 * camera.vertical_fov_deg))
-    else:
-        distance = 6.0 * around.radius
-    away = frame @ np.array(preset.toward_camera)
-    away = away / np.linalg.norm(away)
-    target = vec3(around.centre)
-    return replace(
-        camera,
-        position=vec3(around.centre + distance * away),
-        target=target,
-        up=vec3(frame @ preset.up),
-        vertical_extent=2.0 * reach,
-    )

@@ -92,12 +92,6 @@ class MapAtlas:
         texture.repeat_x = texture.repeat_y = False
         return texture
 
-    def set_placements(self, placements: np.ndarray) -> None:
-        """Replace all placements (the window was fitted again)."""
-        data = np.ascontiguousarray(placements)
-        self.placements.orphan(data.nbytes)
-        self.placements.write(data)
-
     @property
     def drawn_into(self) -> list[moderngl.Texture]:
         """What splats are added to: a texture for each target, in their order."""

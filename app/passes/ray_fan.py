@@ -65,8 +65,8 @@ class RayFan:
 
         A path ends on the first surface that is neither glass nor mirror, after 24 segments, or a scene's radius beyond
         the last surface. `light_index` None takes the light that shines on the object most. Empty where the light's
-        beam passes the object by. `share`: of the object's extent that the fan spreads over, about its middle. `reflections`: within
-        glass, before a path may leave it: 1 and 2 in a drop make the two rainbows.
+        beam passes the object by. `share`: of the object's extent that the fan spreads over, about its middle.
+        `reflections`: within glass, before a path may leave it: 1 and 2 in a drop make the two rainbows.
         """
         light_index = self.brightest_light(object_index) if light_index is None else light_index
         if light_index is None or rays < 1 or not len(wavelengths_nm):

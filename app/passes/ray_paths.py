@@ -1,7 +1,8 @@
 """Single paths through the scene, to point with and to look at: picking and the ray overlay.
 
-Rays in one dispatch, each at a wavelength of its own, refracted at every glass surface (reflected within it where it must
-be, or as often as is asked for), up to the first surface that is neither glass nor mirror. No branching and no weights.
+Rays in one dispatch, each at a wavelength of its own, refracted at every glass surface (reflected within it where it
+must be, or as often as is asked for), up to the first surface that is neither glass nor mirror. No branching, no
+weights.
 """
 
 from __future__ import annotations

@@ -394,8 +394,3 @@ _BY_NAME = {command.name: command for command in (*COMMANDS, *VIEWS)} | {
 def command(name: str) -> Command:
     """By name; panels are "Panel: Outliner" …. KeyError for a name that does not exist."""
     return _BY_NAME[name]
-
-
-def has_glass_selected(state: State, view_model: ViewModel) -> bool:
-    """Whether the selection is an object of glass."""
-    return _is_object(state, view_model) and state.scene.objects[state.selection.index].material.transmits

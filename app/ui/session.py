@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..base.errors import UserError
-from ..edit.brush import USUAL_RADIUS
 from ..edit.autosave import Autosave, Recovery, recoveries
+from ..edit.brush import USUAL_RADIUS
 from ..edit.document import Document
 from ..edit.drawn import Drawn
 from ..edit.opening import Opening

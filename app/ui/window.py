@@ -395,8 +395,8 @@ class Window:
             typed()
 
     def _key(self, key: int, scancode: int, action: int, modifiers: int) -> None:
-        """Tell imgui of a key. While a text is typed, letters are left to the characters that come with them: imgui takes
-        a key's second change in a frame of its own, so that a word would take as many frames as it has letters."""
+        """Pass a key on to imgui. While a text is typed, letters are left to the characters that come with them: imgui
+        takes a key's second change in a frame of its own, and a word would need as many frames as it has letters."""
         is_typing = imgui.get_io().want_text_input
         if is_typing and key in LETTERS and action != glfw.RELEASE and not modifiers & COMMANDS:
             return

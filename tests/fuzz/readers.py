@@ -368,36 +368,6 @@ def _settings_texts() -> tuple[bytes, ...]:
     return (msgspec.json.encode(settings, enc_hook=os.fspath),)
 
 
-def _presets() -> object:
-    from spectrasplat.edit.own_presets import load_own_presets
-
-    return load_own_presets()
-
-
-def _preset_texts() -> tuple[bytes, ...]:
-    text = """[materials.mine]
-kind = "glass"
-glass = "N-BK7"
-[materials.table]
-kind = "diffuse"
-colour = [0.5, 0.5, 0.5]
-[lights.sun]
-kind = "directional"
-direction = [0, 0.5, -1]
-[lights.lamp]
-kind = "area"
-size = [0.2, 0.2]
-direction = [0, 0, -1]
-position = [0, 0, 4]
-spectrum = {blackbody = 3200}
-[views.top]
-position = [0, 0, 5]
-target = [0, 0, 0]
-up = [0, 1, 0]
-"""
-    return (text.encode(),)
-
-
 def _recoveries() -> object:
     from spectrasplat.edit.autosave import recoveries
     from spectrasplat.edit.preferences import config_dir
@@ -459,7 +429,6 @@ READERS = {
     "ies": Reader("lamp.ies", _ies, _lamps),
     "keys": Reader("keys.toml", _keys, _key_texts),
     "settings": Reader("settings.json", _in_config(_settings), _settings_texts, ()),
-    "presets": Reader("presets.toml", _in_config(_presets), _preset_texts, ()),
     "autosave": Reader("autosave/12_a.json", _in_config(_recoveries), _notes, ()),
     "frames": Reader("animation.json", _frames, _manifests),
     "cache": Reader("cache.npz", _kept, _caches, ()),

@@ -12,8 +12,7 @@ from reference.lamps import cosine, ies_text, isotropic, lamp, lopsided
 from spectrasplat.base import files
 from spectrasplat.base.errors import UserError
 from spectrasplat.base.paths import assets_dir
-from spectrasplat.edit import edits, parameters, presets
-from spectrasplat.edit.own_presets import OwnPresets, load_own_presets, save_own_presets
+from spectrasplat.edit import edits, parameters
 from spectrasplat.edit.placing import moved_light
 from spectrasplat.model.io.gltf import load_gltf
 from spectrasplat.model.io.gltf_write import save_gltf
@@ -319,16 +318,9 @@ def test_a_file_makes_a_lamp_of_any_light(tmp_path: Path) -> None:
         edits.set_light_file(before, 0, tmp_path / "none.ies")
 
 
-def test_a_new_one_begins_with_the_shipped_lamp_and_own_presets_keep_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("SPECTRASPLAT_CONFIG", str(tmp_path))
+def test_a_new_one_begins_with_the_shipped_lamp(tmp_path: Path) -> None:
     lit = edits.add_light(scene(tmp_path), "ies").lights[1]
     assert isinstance(lit, IesLight) and Path(lit.profile.source).name == "downlight.ies"
-    save_own_presets(OwnPresets().with_light("mine", lit))
-    kept = load_own_presets()[0].lights[0]
-    applied = presets.apply_light(scene(tmp_path), 0, kept).lights[0]
-    assert isinstance(applied, IesLight) and applied.profile == lit.profile and applied.position == (1.0, 0.0, 5.0)
 
 
 def test_equal_files_are_equal_lamps(tmp_path: Path) -> None:

@@ -62,7 +62,7 @@ def draw_glass_picker(state: State, view_model: ViewModel) -> State:
 
 
 def apply_glass(state: State, entry: Entry) -> State:
-    """The selected object of that glass, without a gain, which belonged to the other one. A refusal becomes a notice."""
+    """The selected object of that glass, without the gain of the other one. A refusal becomes a notice."""
     selected = selected_glass(state)
     if selected is None:
         return state

@@ -85,7 +85,7 @@ def _toast(state: State, message: Message, index: int, width: float) -> tuple[St
 
 
 def _put_in_front() -> None:
-    """The message that is being drawn: over the picture, but under floating panels and dialogues, which have buttons."""
+    """The message that is being drawn: over the picture, but under floating panels and dialogues."""
     own = imgui.internal.get_current_window()
     imgui.internal.bring_window_to_display_front(own)
     dialogue = imgui.internal.get_top_most_popup_modal()

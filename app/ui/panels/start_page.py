@@ -51,8 +51,8 @@ def _title(view_model: ViewModel) -> None:
     with theme.heading(1.9):
         imgui.text_unformatted("SpectraSplat")
     widgets.hint(
-        "See the coloured light that glass throws, and change the glass while you look. Click a scene or a lesson to begin; "
-        "drop a scene, a GLB or a mesh of your own on the window."
+        "See the coloured light that glass throws, and change the glass while you look. Click a scene or a lesson to "
+        "begin; drop a scene, a GLB or a mesh of your own on the window."
     )
     if view_model.stats.renderer:
         widgets.hint(f"Draws with {view_model.stats.renderer}")
