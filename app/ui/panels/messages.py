@@ -43,7 +43,7 @@ def draw_messages(state: State, view_model: ViewModel) -> State:
     is_over_picture = picture is not None and not state.preferences.panels.start_page
     if picture is not None and is_over_picture:
         right, bottom = picture.pos.x + picture.size.x - gap, picture.pos.y + picture.size.y - theme.em(_BADGES_EM)
-        width = min(width, max(picture.size.x - theme.em(_TOOLS_EM + 4.5), theme.em(8.0)))
+        width = min(width, max(picture.size.x - theme.em(_TOOLS_EM + 6.5), theme.em(8.0)))
         card = imgui.internal.find_window_by_name(opened_card.WINDOW)
         if card is not None and card.active:
             bottom = min(bottom, card.pos.y - gap)

@@ -373,7 +373,8 @@ def note(text: str) -> None:
 
 def error(text: str) -> None:
     """Something that was refused, and why; written as a sentence whatever its ends."""
-    words(f"{text[:1].upper()}{text[1:].rstrip('.')}.", theme.palette().error)
+    end = "" if text.endswith("?") else "."
+    words(f"{text[:1].upper()}{text[1:].rstrip('.')}{end}", theme.palette().error)
 
 
 def unless_locked(state: State, selection: Selection, draw: Callable[[State], State]) -> State:
