@@ -55,7 +55,7 @@ def draw_rays_panel(state: State, view_model: ViewModel) -> State:
     apex = view_model.readings[0].apex_deg
     if apex is not None:
         imgui.text_unformatted(f"Prism: the faces that the rays go through make {apex:.2f}°.")
-    flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.sizing_stretch_same | imgui.TableFlags_.scroll_y
+    flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.sizing_stretch_prop | imgui.TableFlags_.scroll_y
     if not imgui.begin_table("##readings", len(_COLUMNS), flags):
         return state
     imgui.table_setup_scroll_freeze(0, 1)
