@@ -19,7 +19,7 @@ from .session import Session
 if TYPE_CHECKING:
     from ..gpu.context import Context
 
-MAX_RAYS = 100_000
+MAX_RAYS, MAX_REFLECTIONS = 100_000, 20
 LINES_NM = (486.1327, 587.5618, 656.2725)
 """Fraunhofer F, d and C."""
 
@@ -72,10 +72,12 @@ def fan(
     light: str | None = None,
     rays: int = 9,
     wavelengths_nm: Sequence[float] = LINES_NM,
+    reflections: int = 0,
 ) -> Fan:
     """Rays from a light (default: that which shines on it most) through object `through`, spread in the plane in which
     it bends light. No ray branches: each is refracted, or reflected where it must be, up to the first surface that is
-    neither glass nor mirror; one that leaves the scene ends a scene's radius beyond its last surface.
+    neither glass nor mirror; one that leaves the scene ends a scene's radius beyond its last surface. `reflections`:
+    within glass, before a ray may leave it; 1 and 2 in a drop of water make the two rainbows.
 
     Raises `UserError` where a name is unknown or the light misses the object.
     """
@@ -90,6 +92,8 @@ def fan(
         raise UserError(f"rays {rays!r} times {len(nm)} wavelengths is out of range: give 1 to {MAX_RAYS} in all")
     if not len(nm) or not ((nm >= 380.0) & (nm <= 780.0)).all():
         raise UserError("wavelengths_nm must be one or more wavelengths between 380 and 780 nm")
+    if isinstance(reflections, bool) or not isinstance(reflections, int) or not 0 <= reflections <= MAX_REFLECTIONS:
+        raise UserError(f"reflections {reflections!r} is out of range: give 0 to {MAX_REFLECTIONS}")
 
     def work(context: Context, report: Callable[[float, str], None], stopped: Callable[[], bool]) -> Fan:
         from ..model.settings import RenderSettings
@@ -101,7 +105,9 @@ def fan(
         try:
             tracer = RayFan(RayPaths(context, buffers))
             try:
-                lines = [line.points for line in tracer.trace(source, placed, rays, nm.tolist())]
+                lines = [
+                    line.points for line in tracer.trace(source, placed, rays, nm.tolist(), reflections=reflections)
+                ]
             finally:
                 tracer.release()
         finally:

@@ -121,7 +121,7 @@ def _glasses_table(glasses: list) -> Table:
     for glass in glasses:
         low, high = glass.range_nm
         reach = "any wavelength" if math.isinf(high) else f"{low:g}–{high:g} nm"
-        v_d = "∞ (no dispersion)" if math.isinf(glass.V_d) else f"{glass.V_d:.2f}"
+        v_d = "∞ (no dispersion)" if math.isinf(glass.natural.V_d) else f"{glass.natural.V_d:.2f}"
         table.add_row(
             (glass.name or "(unnamed)") + _gain_words(glass),
             f"{glass.n_d:.6f}",

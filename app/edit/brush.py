@@ -14,6 +14,7 @@ import numpy as np
 
 from ..model.local_dispersion import plane_of
 from ..model.scene import Dab, Scene, SceneObject, Vec3
+from .projection import View
 from .state import Brush
 
 SPACING = 0.25
@@ -22,6 +23,8 @@ FIRST_TOUCH_S = 0.1
 """What a mere click is worth, seconds of painting."""
 MIN_RADIUS, MAX_RADIUS = 1e-3, 0.5
 """Of the brush, as shares of the picture's height at the cursor's distance."""
+USUAL_RADIUS = 0.01
+"""Likewise, to begin with."""
 RADIUS_STEP = 1.15
 LABEL = "Brush dispersion"
 _RING_POINTS = 64
@@ -56,6 +59,13 @@ def resized(brush: Brush, steps: float, visible_height: float) -> Brush:
     """With a radius larger by `steps` notches, kept usable for a picture that shows `visible_height` scene units."""
     radius = float(np.clip(brush.radius * RADIUS_STEP**steps, MIN_RADIUS * visible_height, MAX_RADIUS * visible_height))
     return replace(brush, radius=radius)
+
+
+def followed(brush: Brush, before: View, after: View) -> Brush:
+    """As large in the picture as it was before the view changed."""
+    heights = (view.height_at(view.target_distance) for view in (before, after))
+    was, now = heights
+    return brush if was == now else replace(brush, radius=brush.radius * now / was)
 
 
 def begin(scene: Scene, object_index: int, brush: Brush, position: Vec3) -> Stroke:

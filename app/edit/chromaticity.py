@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz, illuminant_table
+from ..model.optics.spectrum import blackbody
 
 if TYPE_CHECKING:
     from colour import MultiSpectralDistributions
@@ -40,7 +41,7 @@ class ColourInfo:
     purity: float
     """Excitation purity: distance from white over that of the border."""
     temperature_k: float | None
-    """Correlated colour temperature, K (Ohno 2014); None where the colour is too far from any black body's."""
+    """Correlated colour temperature, K (CIE 15:2004, 9.5); None where the colour is too far from any black body's."""
 
 
 def ready() -> bool:
@@ -56,14 +57,21 @@ def _loading() -> threading.Thread:
     return thread
 
 
-def colour_info(wavelengths_nm: np.ndarray, spectrum: np.ndarray) -> ColourInfo | None:
-    """Colour of `spectrum` (n,) at bin centres `wavelengths_nm` (n,), evenly spaced; None when it is dark."""
+def colour_info(
+    wavelengths_nm: np.ndarray, spectrum: np.ndarray, source: np.ndarray | float = 1.0
+) -> ColourInfo | None:
+    """Colour of `spectrum` (n,) at bin centres `wavelengths_nm` (n,), evenly spaced; None when it is dark.
+
+    `source`: the shape of the light's spectrum within bins, on `VISIBLE_NM`; flat where it is not known or dark.
+    """
     at = np.asarray(wavelengths_nm, float)
     density = np.asarray(spectrum, float)
     width = float(at[1] - at[0]) if at.size > 1 else 1.0
     # Means over each bin: in wide ones the middle says too little.
-    within = np.abs(VISIBLE_NM[None] - at[:, None]) <= 0.5 * width
-    weights = within @ cmf_xyz() / np.maximum(within.sum(axis=1, keepdims=True), 1)
+    within = (np.abs(VISIBLE_NM[None] - at[:, None]) <= 0.5 * width) * 1.0
+    shaped = within * source
+    within = np.where(shaped.sum(axis=1, keepdims=True) > 0.0, shaped, within)
+    weights = within @ cmf_xyz() / np.maximum(within.sum(axis=1, keepdims=True), 1e-300)
     xyz = density @ weights * width
     total = float(xyz.sum())
     if not np.isfinite(total) or total <= 0.0 or xyz[1] <= 0.0:
@@ -76,15 +84,33 @@ def colour_info(wavelengths_nm: np.ndarray, spectrum: np.ndarray) -> ColourInfo 
 def _described(x: float, y: float) -> tuple[float | None, bool, float, float | None]:
     """(dominant wavelength, whether it is the complementary one, purity, temperature) of a chromaticity."""
     science, place = _colour_science(), np.array([x, y])
-    with science.utilities.suppress_warnings(colour_runtime_warnings=True):  # strong colours have no temperature
-        kelvin, duv = science.uv_to_CCT(science.xy_to_UCS_uv(place), method="Ohno 2013")
-    temperature = float(kelvin) if abs(duv) <= _MAX_DUV and _KELVIN[0] <= kelvin <= _KELVIN[1] else None
+    temperature = _temperature_k(x, y)
     if np.linalg.norm(place - _white()) < _GREY:
         return None, False, 0.0, temperature
     observer = _observer()
     wavelength = float(science.dominant_wavelength(place, _white(), observer)[0])
     purity = float(science.excitation_purity(place, _white(), observer))
     return abs(wavelength), wavelength < 0.0, min(purity, 1.0), temperature
+
+
+def _temperature_k(x: float, y: float) -> float | None:
+    """Of the black body nearest in CIE 1960 uv, by our own tables: D65 has 6,504 K and a black body its own."""
+    kelvin, locus = _planckian_locus()
+    place = np.array([4.0 * x, 6.0 * y]) / (12.0 * y - 2.0 * x + 3.0)
+    start, way = locus[:-1], np.diff(locus, axis=0)
+    share = np.clip(((place - start) * way).sum(axis=1) / (way**2).sum(axis=1), 0.0, 1.0)
+    away = np.linalg.norm(start + share[:, None] * way - place, axis=1)
+    best = int(away.argmin())
+    temperature = float(kelvin[best] * (kelvin[best + 1] / kelvin[best]) ** share[best])
+    return temperature if away[best] <= _MAX_DUV and kelvin[0] < temperature < kelvin[-1] else None
+
+
+@cache
+def _planckian_locus() -> tuple[np.ndarray, np.ndarray]:
+    """Temperatures (n,), 0.5 % apart, and CIE 1960 uv (n, 2) of black bodies."""
+    kelvin = np.geomspace(*_KELVIN, 925)
+    x, y, z = np.array([blackbody(float(k)).xyz() for k in kelvin]).T
+    return kelvin, np.stack([4.0 * x, 6.0 * y], axis=-1) / (x + 15.0 * y + 3.0 * z)[:, None]
 
 
 def _colour_science() -> ModuleType:

@@ -18,12 +18,9 @@ from ..model.scene_render import MAX_ANISOTROPY, MAX_BOUNCES, MAX_DEPTH, MAX_GLA
 from .adding import RECEIVERS, SHAPES, add_object
 from .glass import (
     abbe_numbers,
-    index_points,
-    set_abbe,
     set_absorption,
     set_dispersion,
     set_dispersion_gain,
-    set_index_points,
     set_priority,
 )
 from .lights import (
@@ -74,20 +71,17 @@ __all__ = [
     "delete_light",
     "duplicate",
     "duplicate_light",
-    "index_points",
     "light_power",
     "make_glass",
     "photometric_key",
     "rename",
     "rename_light",
-    "set_abbe",
     "set_absorption",
     "set_background",
     "set_camera",
     "set_diffuse_colour",
     "set_dispersion",
     "set_dispersion_gain",
-    "set_index_points",
     "set_light",
     "set_light_file",
     "set_light_kind",

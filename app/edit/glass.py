@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
-
-import numpy as np
 
 from ..base.errors import UserError
 from ..model.materials.absorption import MAX_ATTENUATION
@@ -37,10 +34,10 @@ def set_dispersion_gain(scene: Scene, index: int, gain: float) -> Scene:
 
 
 def abbe_numbers(dispersion: Dispersion) -> tuple[float, float]:
-    """n_d and V_d (inf without dispersion) to show and to edit: giving them to `set_abbe` again changes nothing.
+    """n_d and V_d (inf without dispersion) to show and to edit: giving them to `glass.from_abbe` again changes nothing.
 
-    For a glass made by `set_abbe` they are the numbers it was made of, not those the formula gives back, which
-    differ in the sixth digit and would creep while a slider is dragged.
+    For a glass made by it they are the numbers it was made of, not those the formula gives back, which differ in the
+    sixth digit and would creep while a slider is dragged.
     """
     if dispersion.kind == "abbe":
         n_d, v_d = dispersion.coefficients
@@ -48,38 +45,6 @@ def abbe_numbers(dispersion: Dispersion) -> tuple[float, float]:
     if dispersion.kind == "constant":
         return dispersion.coefficients[0], math.inf
     return dispersion.n_d, dispersion.V_d
-
-
-def set_abbe(scene: Scene, index: int, n_d: float, v_d: float) -> Scene:
-    """Make object `index` of a glass with this index and Abbe number (inf: no dispersion), without a gain."""
-    if not math.isfinite(n_d):
-        raise UserError(f"{_where(scene, index)}: n_d is {n_d:g}; give a number such as 1.5")
-    return set_dispersion(scene, index, glass.from_abbe(n_d, v_d, where=_where(scene, index)))
-
-
-def set_index_points(scene: Scene, index: int, wavelength_nm: Sequence[float], n: Sequence[float]) -> Scene:
-    """Make object `index` of a glass whose n(λ) runs smoothly through these points, wavelengths ascending."""
-    name = _glass(scene, index).dispersion.name
-    drawn = name if name.endswith(_DRAWN) else f"{name}{_DRAWN}".strip()
-    return set_dispersion(scene, index, glass.table(wavelength_nm, n, drawn, _where(scene, index)))
-
-
-_DRAWN = " (drawn)"
-
-
-def index_points(dispersion: Dispersion, count: int = 9) -> tuple[np.ndarray, np.ndarray]:
-    """Points to drag: wavelengths (nm) and n, float64. Those of a table are its own; of others `count`, evenly in λ⁻².
-
-    A gain is worked in. Points lie within 380–780 nm and the glass's data.
-    """
-    low, high = max(380.0, dispersion.range_nm[0]), min(780.0, dispersion.range_nm[1])
-    if dispersion.kind == "table":
-        own = np.round(np.array(dispersion.coefficients[::2]) * 1e3, 9)
-        if len(own) <= 32:
-            return own, dispersion.index(own)
-    inverse_square = np.linspace(low**-2.0, high**-2.0, count)
-    wavelength = np.round(inverse_square**-0.5, 3)
-    return wavelength, dispersion.index(wavelength)
 
 
 def set_absorption(scene: Scene, index: int, colour: Vec3 | None, distance: float = 1.0) -> Scene:

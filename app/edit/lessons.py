@@ -31,6 +31,9 @@ class Lesson:
     """Whether a fan of rays is drawn through that object."""
     words: str
     steps: tuple[str, ...]
+    ray_count: int = 5
+    reflections: int = 0
+    """Of the rays within the object, before they leave it."""
 
     @property
     def path(self) -> Path:

@@ -25,11 +25,14 @@ from ..model.vectors import vec3
 from .adding import up_frame
 from .names import checked_name, free_name
 from .objects import MAX_LENGTH
+from .projection import View
 
 SpectrumKind = Literal["illuminant", "blackbody", "laser", "lines", "csv", "table"]
 
 LIGHT_SUFFIXES = (".ies", ".ldt")
 """Photometric files."""
+_VIEW_MARGIN = 0.08
+"""Share of the picture's sides that a new light keeps away from its borders."""
 _DARK = 1e-9
 """Least power, in any unit: at none at all a light would forget its colour."""
 
@@ -51,13 +54,16 @@ def set_light(scene: Scene, index: int, light: Light) -> Scene:
     return replace(scene, lights=(*scene.lights[:index], light, *scene.lights[index + 1 :]))
 
 
-def add_light(scene: Scene, kind: str = "directional") -> Scene:
-    """With a white light at the end, aimed at the objects and as bright there as a scene file's default."""
+def add_light(scene: Scene, kind: str = "directional", view: View | None = None) -> Scene:
+    """With a white light at the end, aimed at the objects and as bright there as a scene file's default; where it has
+    a place, that is in the picture of `view`."""
     cls = _class_of(kind)
     name = free_name(f"{kind} light", [light.name for light in scene.lights])
     direction = vec3(up_frame(scene) @ default_direction())
     given = {"name": name, "spectral_power": spectra.illuminant("D65"), "direction": direction}
     light = made(cls, _usual(scene, np.array(direction)) | given)
+    if light.has_place and view is not None:
+        light = _in_view(scene, light, view)
     return set_light(scene, len(scene.lights), _lighting(scene, light, DEFAULT_ILLUMINANCE))
 
 
@@ -72,6 +78,26 @@ def _usual(scene: Scene, direction: np.ndarray) -> dict[str, Any]:
     around = environment_of(scene.objects)
     position = vec3(around.centre - 6.0 * around.radius * direction)
     return {"position": position, "radius": 0.5 * around.radius, "width": around.radius, "height": around.radius}
+
+
+def _in_view(scene: Scene, light: Light, view: View) -> Light:
+    """The light nearer to its target, as far as the picture shows that place; or in the picture's upper left, as far
+    away as the objects."""
+    around = environment_of(scene.objects)
+    places = [around.centre + share * (light.position - around.centre) for share in np.linspace(1.0, 0.25, 16)]
+    seen = view.project(np.array(places))[0]
+    inside = ((seen > _VIEW_MARGIN) & (seen < 1.0 - _VIEW_MARGIN)).all(axis=1)
+    if inside.any():
+        place = places[int(inside.argmax())]
+    else:
+        origin, way = view.ray(0.25, 0.2)
+        depth = max(float(view.depth(around.centre)), 2.0 * around.radius)
+        place = origin + way * (depth / float(way @ view.forward))
+    aimed = light.changed(position=vec3(place))
+    toward = around.centre - place
+    if aimed.has_direction and np.linalg.norm(toward) > 1e-9 * around.radius:
+        aimed = aimed.changed(direction=_unit(light, "direction", vec3(toward)))
+    return aimed
 
 
 def duplicate_light(scene: Scene, index: int) -> Scene:

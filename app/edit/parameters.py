@@ -247,7 +247,7 @@ def _object_value(item: SceneObject, name: str) -> float:
         return getattr(item.material, numbers[field].attribute)
     dispersion = item.material.dispersion
     # The gain is a parameter of its own: V_d is the glass's without it.
-    return {"dispersion_gain": dispersion.gain, "n_d": dispersion.n_d, "V_d": replace(dispersion, gain=1.0).V_d}[name]
+    return {"dispersion_gain": dispersion.gain, "n_d": dispersion.n_d, "V_d": dispersion.natural.V_d}[name]
 
 
 def _with_object(item: SceneObject, name: str, value: float) -> SceneObject:
@@ -269,7 +269,7 @@ def _with_object(item: SceneObject, name: str, value: float) -> SceneObject:
 def _with_glass(dispersion: Dispersion, name: str, value: float) -> Dispersion:
     if name == "dispersion_gain":
         return glass.with_gain(dispersion, value)
-    plain = replace(dispersion, gain=1.0)
+    plain = dispersion.natural
     n_d, v_d = (value, plain.V_d) if name == "n_d" else (plain.n_d, value)
     return glass.with_gain(glass.from_abbe(n_d, v_d, dispersion.name), dispersion.gain)
 

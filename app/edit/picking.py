@@ -54,7 +54,7 @@ _BLOCKS: WeakKeyDictionary[Mesh, _Blocks] = WeakKeyDictionary()
 def pick_in(state: State, x: float, y: float) -> PickHit | None:
     """The first surface at (x, y), 0..1 from the picture's top left, of the scene as `state` wants it drawn; None where
     there is nothing but background. Its object is one of `state.scene`."""
-    view = View.of(state.camera, state.viewport_size[0] / state.viewport_size[1])
+    view = state.view
     return pick(Drawn().staged(state).scene, view, x, y, state.hidden)
 
 

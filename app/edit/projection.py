@@ -6,12 +6,25 @@ Matrices are for column vectors and OpenGL's clip space.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
 from ..model.camera_rays import camera_frame
 from ..model.scene import Camera
+
+
+@lru_cache(64)
+def fitted(camera: Camera, frame_aspect: float, aspect: float) -> Camera:
+    """The camera of a picture `aspect` times as wide as high that shows all of a frame `frame_aspect` times as wide as
+    high: with more above and below where the picture is narrower, at the sides where it is wider."""
+    wider = max(frame_aspect / aspect, 1.0)
+    if wider == 1.0:
+        return camera
+    half = wider * np.tan(np.radians(0.5 * camera.vertical_fov_deg))
+    fov_deg = float(np.degrees(2.0 * np.arctan(half)))
+    return replace(camera, vertical_fov_deg=fov_deg, vertical_extent=wider * camera.vertical_extent)
 
 
 @dataclass(frozen=True)

@@ -95,7 +95,6 @@ def begin_pull(
         vec3(moved / length),
         wavelength_nm,
         material.dispersion.gain,
-        material.dispersion.V_d,
         local,
     )
     return replace(pull, gain_at_start=local_gain(receiver, pull)) if local else pull
@@ -181,11 +180,6 @@ def solve(pull: Pull, point: Vec3 | np.ndarray) -> float:
     return float(
         np.clip(pull.gain_at_start * ((np.asarray(point, float) - reference) @ direction) / held, 0.0, MAX_GAIN)
     )
-
-
-def abbe_number(pull: Pull, gain: float) -> float:
-    """V_d of the held glass at a gain; inf where it has no dispersion left."""
-    return pull.v_d_at_start * pull.gain_at_start / gain if gain > 0.0 else np.inf
 
 
 def apply(scene: Scene, pull: Pull, point: Vec3 | np.ndarray, radius: float, falloff: float) -> tuple[Scene, str]:

@@ -272,5 +272,4 @@ class Pull:
     wavelength_nm: float
     gain_at_start: float
     """The material's dispersion gain, or the local gain there, when it was taken."""
-    v_d_at_start: float
     local: bool = False

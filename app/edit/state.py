@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 from ..model.scene import Camera, Material, Scene, Vec3
 from .live_inputs import LiveInputs
+from .projection import View, fitted
 from .requests import Pull, Request
 
 Tool = Literal["select", "move", "rotate", "scale", "brush", "pull", "measure"]
@@ -45,6 +46,8 @@ class Display:
     ray_overlay: bool = False
     ray_count: int = 5
     ray_wavelengths: int = 9
+    ray_reflections: int = 0
+    """Within glass, before a ray leaves it."""
     ray_labels: bool = True
     """Wavelengths and deviations beside the rays."""
 
@@ -190,9 +193,31 @@ class State:
         return replace(self, display=replace(self.display, **changes))
 
     @property
+    def frame_aspect(self) -> float:
+        """Width over height of the picture that the scene is meant to be."""
+        return self.scene.render.width / self.scene.render.height
+
+    def camera_for(self, size: tuple[int, int]) -> Camera:
+        """The camera of a picture of `size` pixels, which shows all of the scene's frame."""
+        return fitted(self.camera, self.frame_aspect, size[0] / size[1])
+
+    @property
+    def view(self) -> View:
+        """What the picture in the window shows."""
+        width, height = self.viewport_size
+        return View.of(self.camera_for(self.viewport_size), width / height)
+
+    @property
     def live_inputs(self) -> LiveInputs:
         """What the picture depends on."""
         width, height = self.viewport_size
         return LiveInputs(
-            self.scene, self.camera, width, height, self.method, self.smoothing, self.solo_nm, not self.physical
+            self.scene,
+            self.camera_for(self.viewport_size),
+            width,
+            height,
+            self.method,
+            self.smoothing,
+            self.solo_nm,
+            not self.physical,
         )

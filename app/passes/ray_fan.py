@@ -54,12 +54,14 @@ class RayFan:
         rays: int,
         wavelengths_nm: Sequence[float],
         share: float = 1.0,
+        reflections: int = 0,
     ) -> list[RayLine]:
         """`rays` rays from a light to an object, each at every wavelength: rays × wavelengths paths.
 
         A path ends on the first surface that is neither glass nor mirror, after 24 segments, or a scene's radius beyond
         the last surface. `light_index` None takes the light that shines on the object most. Empty where the light's
         beam passes the object by. `share`: of the object's extent that the fan spreads over, about its middle.
+        `reflections`: within glass, before a path may leave it: 1 and 2 in a drop make the two rainbows.
         """
         light_index = self.brightest_light(object_index) if light_index is None else light_index
         if light_index is None or rays < 1 or not len(wavelengths_nm):
@@ -70,7 +72,7 @@ class RayFan:
             return []
         nm = np.asarray(wavelengths_nm, float)
         origins, directions = (np.repeat(values, len(nm), axis=0) for values in starts)
-        paths = self._follow(origins, directions, np.tile(nm, len(starts[0])))
+        paths = self._follow(origins, directions, np.tile(nm, len(starts[0])), reflections)
         return [RayLine(float(w), path.points) for w, path in zip(np.tile(nm, len(starts[0])), paths, strict=True)]
 
     def brightest_light(self, object_index: int) -> int | None:
@@ -98,8 +100,8 @@ class RayFan:
         """Of the specular part of the scene, which is what one looks at: floors may be endless."""
         return 1.0 / self._paths.scene.space.scale
 
-    def _follow(self, origins: np.ndarray, directions: np.ndarray, nm: np.ndarray) -> list[Path]:
-        return self._paths.trace(origins, directions, nm, 2.0 * self._radius)
+    def _follow(self, origins: np.ndarray, directions: np.ndarray, nm: np.ndarray, reflections: int = 0) -> list[Path]:
+        return self._paths.trace(origins, directions, nm, 2.0 * self._radius, reflections)
 
     def _beam(self, light: Light, object_index: int) -> _Beam:
         points = self._points[object_index]

@@ -1,7 +1,8 @@
 """Single paths through the scene, to look at: the ray overlay.
 
-A few hundred rays in one dispatch, each at a wavelength of its own, refracted at every glass surface (totally reflected
-where it must be), up to the first surface that is neither glass nor mirror. No branching and no weights.
+Rays in one dispatch, each at a wavelength of its own, refracted at every glass surface (reflected within it where it
+must be, or as often as is asked for), up to the first surface that is neither glass nor mirror. No branching, no
+weights.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ PATH_PARAMETERS = Struct(
         Field("inside_mask", "uint", "solids that all paths start in, bits of the medium stack"),
         Field("inside_object", "uint", "solid outside the stack that they start in, or NONE"),
         Field("escape", "float", "length of the last segment of a path that leaves the scene, GPU units"),
+        Field("reflections", "uint", "inner reflections before a path may leave glass"),
     ),
 )
 PATH_START = Struct(
@@ -89,12 +91,17 @@ class RayPaths:
         self._points = ctx.buffer(reserve=self._room * _MAX_POINTS * 16)
 
     def trace(
-        self, origins: np.ndarray, directions: np.ndarray, wavelengths_nm: np.ndarray, escape: float
+        self,
+        origins: np.ndarray,
+        directions: np.ndarray,
+        wavelengths_nm: np.ndarray,
+        escape: float,
+        reflections: int = 0,
     ) -> list[Path]:
         """Follow rays from `origins` along unit `directions` (n, 3), world, each at a wavelength (n,).
 
         All start in the medium that the first one starts in. A path that leaves the scene ends `escape` scene units
-        beyond its last surface.
+        beyond its last surface. The first `reflections` times that a path meets glass from within, it is reflected.
         """
         origins = np.asarray(origins, float).reshape(-1, 3)
         count = len(origins)
@@ -106,7 +113,7 @@ class RayPaths:
         starts["position"], starts["direction"] = space.to_gpu(origins), directions
         starts["x"] = self.scene.axis.x_of_nm(np.asarray(wavelengths_nm, float))
         parameters = PATH_PARAMETERS.zeros(1)
-        parameters[0] = (count, *self._media_at(origins[0]), escape * space.scale)
+        parameters[0] = (count, *self._media_at(origins[0]), escape * space.scale, reflections)
         self._parameters.write(parameters.tobytes())
         self._starts.write(starts.tobytes())
         self.scene.bind()

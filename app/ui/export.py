@@ -125,7 +125,9 @@ class Exports:
         return self._writer.release()
 
     def _made(self, request: requests.Export, state: State, shown: Shown) -> ExportJob:
-        stage = Stage(state.scene, state.camera, shown.exposure_ev, state.solo_nm)
+        is_map = isinstance(request, requests.Bake)
+        size = (not is_map and getattr(request, "size", None)) or state.viewport_size
+        stage = Stage(state.scene, state.camera_for(size), shown.exposure_ev, state.solo_nm)
         name, notices = request.path.name, FrameNotices()
         thread = self._find_thread()
         context = self._context if thread is None else thread.context

@@ -13,6 +13,9 @@ from dataclasses import replace
 from functools import partial
 
 from ..base.errors import UserError
+from ..edit import brush as brushes
+from ..edit import requests
+from ..edit.projection import View
 from ..edit.state import State
 from . import session_requests
 from .live_picture import EngineError
@@ -24,6 +27,8 @@ from .view_model_builder import view_model_of
 
 Draw = Callable[[State, ViewModel], State]
 DEFAULT_BUDGET_S = 0.03
+_MINOR = (requests.Notice, requests.DismissMessage, requests.SelectAt, requests.FrameSelection, requests.CancelQuit)
+"""Requests that mend nothing which an error said."""
 
 
 def run_frame(session: Session, draw: Draw, budget_s: float = DEFAULT_BUDGET_S, slice_s: float = math.inf) -> None:
@@ -39,6 +44,9 @@ def run_frame(session: Session, draw: Draw, budget_s: float = DEFAULT_BUDGET_S, 
         _carry_out(session, kind, partial(session_requests.ask_again, session, kind))
     for request in after.requests:
         _carry_out(session, type(request), partial(session_requests.carry_out, session, request))
+    if session.state.camera is not before.camera:
+        views = (View.of(camera, 1.0) for camera in (before.camera, session.state.camera))
+        session.state = replace(session.state, brush=brushes.followed(session.state.brush, *views))
     session.autosave.update(
         session.document.scene, session.document.title, session.document.source, session.document.unsaved
     )
@@ -56,6 +64,7 @@ def _accept(session: Session, before: State, after: State) -> None:
         session.document.history.push(
             after.edit_label or "Edit", after.scene, merge=after.interacting or session.was_interacting
         )
+        _succeeded(session)
     if not after.interacting:
         session.document.history.settle()
     if after.preferences != session.settings.preferences:
@@ -66,6 +75,8 @@ def _carry_out(session: Session, kind: type, work: Callable[[], None]) -> None:
     """What a request of that kind asks for; whatever goes wrong becomes a sentence."""
     try:
         work()
+        if not issubclass(kind, _MINOR) and kind not in session.awaited:
+            _succeeded(session)
     except UserError as error:
         session.messages.tell(sentence(str(error)), is_error=True)
     except Exception as error:  # noqa: BLE001 - a bug: the work and the window outlive it
@@ -73,6 +84,11 @@ def _carry_out(session: Session, kind: type, work: Callable[[], None]) -> None:
         session.messages.tell(
             f"{words(kind)} failed by a fault of the program ({brief(error)}); your work is kept.", is_error=True
         )
+
+
+def _succeeded(session: Session) -> None:
+    if session.picture.engine is not None:
+        session.messages.succeed()
 
 
 def _work(session: Session, budget_s: float, slice_s: float) -> None:

@@ -36,8 +36,12 @@ class Docked:
     place: Place
 
 
-_raised: set[str] = set()
-"""Fields of the panels that somebody wants to see in front."""
+_raised: dict[str, int] = {}
+"""Fields of the panels that somebody wants to see in front, and for how many frames: a panel that is opened has its tab
+only in the second."""
+
+floating: list[str] = []
+"""Titles of the panels that floated in this frame."""
 
 behind: set[str] = set()
 """Fields of the panels that lay behind another one's tab in the last frame."""
@@ -92,7 +96,7 @@ def _build(dock: int, size: imgui.ImVec2, windows: tuple[Docked, ...]) -> None:
     builder.dock_builder_set_node_size(dock, size)
     nodes: dict[str, int] = {}
     # Side columns in text heights, so that labels fit at every scale; never more than their share of a small window.
-    right = min(theme.em(24.0) / size.x, 0.30)
+    right = min(theme.em(24.0) / size.x, 0.36)
     nodes["right top"], rest = _split(dock, imgui.Dir.right, right)
     nodes["right bottom"] = nodes["right top"]
     if size.y > theme.em(_TALL_EM):
@@ -118,16 +122,17 @@ def lies_on_ground(title: str) -> bool:
 
 def raise_panel(field: str) -> None:
     """Show this panel before the tabs beside it in the next frame."""
-    _raised.add(field)
+    _raised[field] = 3
 
 
 def is_raised(field: str) -> bool:
     """Whether somebody asked for it since the last time; not before a new window's tabs are in their order."""
     if imgui.get_frame_count() <= _SETTLED_AFTER + 2:
         return False
-    found = field in _raised
-    _raised.discard(field)
-    return found
+    frames = _raised.pop(field, 0)
+    if frames > 1:
+        _raised[field] = frames - 1
+    return frames > 0
 
 
 def _bring_to_front(windows: tuple[Docked, ...]) -> None:

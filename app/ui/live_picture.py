@@ -161,7 +161,7 @@ class LivePicture:
     def new_scene(self) -> None:
         """Another scene: its exposure is found at once."""
         self._exposure.restart()
-        self.awaits_scene = self.shown is not None
+        self.awaits_scene = True
 
     def advance(self, state: State, budget_s: float, slice_s: float = math.inf, stops: Stops = _never) -> None:
         """Let the engine follow `state`. Raises `EngineError`.
@@ -244,6 +244,8 @@ class LivePicture:
     def _expose(self, state: State, radiance: moderngl.Texture, now_s: float, delta_s: float) -> None:
         if not state.display.auto_exposure:
             self.exposure_ev = state.display.exposure_ev
+            return
+        if self.awaits_scene:  # the picture is still another scene's
             return
         measured = self._exposure.follow(lambda: self._sampler.run(radiance), now_s, delta_s)
         self.exposure_ev = measured + state.scene.render.exposure_ev

@@ -12,12 +12,12 @@ from ..edit.picking import pick_in
 from ..edit.state import State
 from ..model.scene import Vec3
 from . import item_rects, theme
-from .overlay import Canvas, draw_outlined
+from .overlay import Canvas, box_corners, draw_outlined
 from .panels.unit_words import named
 from .view_model import ViewModel
 
 SNAP_PX = 9.0
-"""From a ray's bend or a focus within which a click means that point, logical pixels."""
+"""From a ray's bend, a focus or the middle of a glass within which a click means that point, logical pixels."""
 _COLOUR = (1.0, 0.86, 0.35, 1.0)
 _ALONG = 200
 """Points of a ray's segment that can be clicked."""
@@ -27,10 +27,10 @@ _ARC_SHARE = 0.35
 
 
 def point_at(state: State, view_model: ViewModel, canvas: Canvas, x: float, y: float) -> Vec3 | None:
-    """The point at a place of the picture, 0..1: a ray's bend or a focus that is near on the screen, else a point of a
-    ray, else the surface under the cursor."""
+    """The point at a place of the picture, 0..1: a ray's bend, a focus or a glass's middle that is near on the screen,
+    else a point of a ray, else the surface under the cursor."""
     at = np.array([canvas.left + x * canvas.width, canvas.top + y * canvas.height])
-    for points in (_special_points(view_model), _points_along(view_model)):
+    for points in (_special_points(state, view_model), _points_along(view_model)):
         if not len(points):
             continue
         away = np.linalg.norm(canvas.pixels(points) - at, axis=1)
@@ -68,8 +68,10 @@ def draw_measure(canvas: Canvas, state: State, view_model: ViewModel, mouse: tup
     item_rects.note("Measured")
 
 
-def _special_points(view_model: ViewModel) -> np.ndarray:
-    places = [ray.points for ray in view_model.rays]
+def _special_points(state: State, view_model: ViewModel) -> np.ndarray:
+    glasses = (item for item in state.scene.objects if item.material.transmits)
+    places = [box_corners(item.mesh.vertices, item.object_to_world).mean(axis=0, keepdims=True) for item in glasses]
+    places += [ray.points for ray in view_model.rays]
     places += [np.asarray([reading.focus]) for reading in view_model.readings if reading.focus is not None]
     return np.concatenate(places) if places else np.zeros((0, 3))
 

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
-from ..passes.ray_line import RayLine
 from . import theme
 from .overlay import Canvas
 from .panels.spectral_colour import colour_of_nm
@@ -18,14 +17,14 @@ MOST_LABELS = 5
 _BORDER_EM = 0.6
 
 
-def draw_ray_labels(canvas: Canvas, rays: Sequence[RayLine], readings: Sequence[RayReading]) -> None:
-    """Labels in a column beside the middle rays' ends, none over another; a small cross at each focus."""
+def draw_ray_labels(canvas: Canvas, readings: Sequence[RayReading]) -> None:
+    """Labels in a column next to the ends of the rays that are read, none over another; a small cross at each focus."""
     for reading in readings:
         if reading.focus is not None:
             _cross(canvas, canvas.pixels(np.asarray(reading.focus)), colour_of_nm(reading.wavelength_nm))
     chosen = [readings[i] for i in labelled(len(readings))]
     line = imgui.get_text_line_height() + theme.em(0.25)
-    places = [(_end_of(canvas, rays, reading.wavelength_nm), reading) for reading in chosen]
+    places = [(_end_of(canvas, reading.path), reading) for reading in chosen]
     lowest = -np.inf
     for (x, y), reading in sorted((each for each in places if np.isfinite(each[0]).all()), key=lambda each: each[0][1]):
         text = f"{reading.wavelength_nm:.0f} nm  {reading.deviation_deg:.2f}°"
@@ -46,14 +45,16 @@ def labelled(count: int) -> list[int]:
     return sorted({round(i * (count - 1) / 2) for i in range(3)})
 
 
-def _end_of(canvas: Canvas, rays: Sequence[RayLine], nm: float) -> np.ndarray:
-    """Where the middle ray of a wavelength ends on the screen; NaN where there is none in sight."""
-    mine = [ray for ray in rays if ray.wavelength_nm == nm]
-    if not mine:
+def _end_of(canvas: Canvas, path: np.ndarray) -> np.ndarray:
+    """Where a ray ends on the screen, as far as it is in the picture; NaN where none of it is."""
+    segments = canvas.segments(path)
+    if not len(segments):
         return np.full(2, np.nan)
-    # As far as it is in the picture.
-    segments = canvas.segments(mine[len(mine) // 2].points)
-    return np.asarray(segments[-1, 1]) if len(segments) else np.full(2, np.nan)
+    start, way = segments[-1, 0], segments[-1, 1] - segments[-1, 0]  # which reaches beyond the picture's borders
+    low = np.array([canvas.left, canvas.top])
+    border = np.where(way > 0.0, low + [canvas.width, canvas.height], low)
+    share = (border - start) / np.where(way == 0.0, np.inf, way)
+    return np.asarray(start + float(np.min(share, where=share > 0.0, initial=1.0)) * way)
 
 
 def _cross(canvas: Canvas, place: np.ndarray, colour: int) -> None:

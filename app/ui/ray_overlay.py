@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 FIRST_NM, LAST_NM = 400.0, 700.0
 BUNDLE_SHARE = 0.02
 """Of the object's extent: the thin bundle that focal points are measured with."""
+DENSE_RAYS = 401
+"""Of the fan in which the ray that turns least is looked for."""
 
 
 class RayOverlay:
@@ -39,15 +41,17 @@ class RayOverlay:
         if index is None:
             self.rays, self.readings, self._key = (), (), ()
             return
-        key = (index, state.selection, state.display.ray_count, state.display.ray_wavelengths, state.solo_nm)
+        display, reflections = state.display, state.display.ray_reflections
+        key = (index, state.selection, display.ray_count, display.ray_wavelengths, reflections, state.solo_nm)
         if key == self._key and state.scene is self._scene:
             return
         self._key = key
         light = state.selection.index if state.selection.kind == "light" else None
         fan, wanted = self._fan_of(state.scene), wavelengths_of(state)
         light = fan.brightest_light(index) if light is None else light
-        self.rays = tuple(fan.trace(light, index, state.display.ray_count, wanted))
-        bundle = fan.trace(light, index, 3, wanted, BUNDLE_SHARE)
+        self.rays = tuple(fan.trace(light, index, display.ray_count, wanted, reflections=reflections))
+        bundle_of = (DENSE_RAYS, wanted, 1.0, reflections) if reflections else (3, wanted, BUNDLE_SHARE)
+        bundle = fan.trace(light, index, *bundle_of)
         glass = state.scene.objects[index].material
         indices = (
             {nm: float(glass.dispersion.index(nm)) for nm in wanted}
@@ -55,7 +59,9 @@ class RayOverlay:
             else {}
         )
         is_parallel = light is not None and state.scene.lights[light].is_parallel
-        self.readings = readings(self.rays, bundle, indices, is_parallel)
+        self.readings = readings(self.rays, bundle, indices, is_parallel, reflections)
+        if reflections:  # those that the readings are of are seen too
+            self.rays += tuple(RayLine(reading.wavelength_nm, reading.path) for reading in self.readings)
 
     def release(self) -> None:
         """Free the tracer and its scene."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -27,7 +28,10 @@ class RayReading:
     index: float | None
     """Refractive index of the glass, where it is one."""
     deviation_deg: float
-    """Between the middle ray's first and last segment."""
+    """Between the middle ray's first and last segment; with inner reflections the whole turn of the ray that turns
+    least, where rays crowd."""
+    path: np.ndarray
+    """float64 (n, 3), that ray."""
     apex_deg: float | None = None
     """Angle between the two flat faces that the rays went through; None where they are not flat, or more or fewer."""
     least_deg: float | None = None
@@ -41,10 +45,15 @@ class RayReading:
 
 
 def readings(
-    rays: Sequence[RayLine], bundle: Sequence[RayLine], indices: dict[float, float], is_parallel: bool
+    rays: Sequence[RayLine],
+    bundle: Sequence[RayLine],
+    indices: dict[float, float],
+    is_parallel: bool,
+    reflections: int = 0,
 ) -> tuple[RayReading, ...]:
-    """One reading a wavelength. `bundle`: three rays a wavelength close together, of which the middle one is the fan's;
-    `indices`: wavelength to index of the glass, empty where it is none; `is_parallel`: the light is."""
+    """One reading a wavelength. `bundle`: three rays a wavelength close together, of which the middle one is the fan's,
+    or with inner `reflections` many over the whole object; `indices`: wavelength to index of the glass, empty where it
+    is none; `is_parallel`: the light is."""
     found = []
     for nm in sorted({ray.wavelength_nm for ray in bundle}):
         thin = [ray.points for ray in bundle if ray.wavelength_nm == nm]
@@ -52,13 +61,19 @@ def readings(
         if len(middle) < 3:
             continue  # it passed by
         index = indices.get(nm)
+        if reflections:
+            turning = [path for path in thin if len(path) == reflections + 4]
+            if turning:
+                least_turned = min(turning, key=turn_deg)
+                found.append(RayReading(nm, index, turn_deg(least_turned), least_turned))
+            continue
         apex = (
             None if index is None else _apex_deg([ray.points for ray in rays if ray.wavelength_nm == nm], thin, index)
         )
         least = None if apex is None or index is None else least_deviation_deg(index, apex)
         focus, length, distance = _focus(thin, is_parallel)
         found.append(
-            RayReading(nm, index, angle_deg(*_ends(middle)), apex, least, focus, length, distance),
+            RayReading(nm, index, angle_deg(*_ends(middle)), middle, apex, least, focus, length, distance),
         )
     return tuple(found)
 
@@ -73,6 +88,11 @@ def least_deviation_deg(index: float, apex_deg: float) -> float | None:
 def angle_deg(first: np.ndarray, second: np.ndarray) -> float:
     """Between two directions (3,), exact for small angles too."""
     return float(np.degrees(np.arctan2(np.linalg.norm(np.cross(first, second)), first @ second)))
+
+
+def turn_deg(points: np.ndarray) -> float:
+    """How far a path of points (n, 3) turns in all, with what it turns at every surface added up."""
+    return sum(angle_deg(before, behind) for before, behind in pairwise(np.diff(points, axis=0)))
 
 
 def _ends(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

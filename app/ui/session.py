@@ -15,11 +15,13 @@ from typing import TYPE_CHECKING
 
 from ..base.errors import UserError
 from ..edit.autosave import Autosave, Recovery, recoveries
+from ..edit.brush import USUAL_RADIUS
 from ..edit.document import Document
 from ..edit.drawn import Drawn
 from ..edit.opening import Opening
 from ..edit.preferences import Settings, config_dir, load_settings, save_settings
-from ..edit.state import Selection, State
+from ..edit.projection import View
+from ..edit.state import Brush, Display, Selection, State
 from ..gpu.context_thread import no_thread
 from ..gpu.shader_watch import ShaderWatch
 from ..model.staging import Staging
@@ -80,6 +82,8 @@ class Session:
         self.asks_to_quit = self.asks_about_export = False
         self.quits_after_export = False
         """Somebody wants to quit, and waits for what is being exported."""
+        self._panels_before = self.settings.preferences.panels
+        """Open before the lesson that is shown."""
         self._discarded: Scene | None = None
         """What may be lost, as somebody has said."""
         self.is_full_screen = False
@@ -167,7 +171,9 @@ class Session:
         """The picture cannot go on: keep the work and say so."""
         self.save_from_crash("rendering", error)
         self.messages.tell(
-            f"The renderer stopped ({brief(error)}). Your work is kept; press F5 to try again.", is_error=True
+            f"The renderer stopped ({brief(error)}). Your work is kept; press F5 to try again.",
+            is_error=True,
+            stays=True,
         )
 
     # What requests use
@@ -193,15 +199,27 @@ class Session:
             self.settings = replace(self.settings, is_new=False)
 
     def show_document(self, document: Document) -> None:
-        """Take up another document; preferences and display stay as they are."""
+        """Take up another document. Preferences stay as they are, and of the display what belongs to no scene."""
         self.document = document
-        kept = self.state
+        kept, before = self.state, self.state.display
+        display = Display(
+            tone=before.tone,
+            false_colour_stops=before.false_colour_stops,
+            ray_wavelengths=before.ray_wavelengths,
+            ray_labels=before.ray_labels,
+        )
+        if kept.lesson:  # the panels that were opened for it close with it
+            preferences = replace(kept.preferences, panels=self._panels_before)
+            kept = replace(kept, preferences=preferences, compare=replace(kept.compare, mode="off"))
         self.state = replace(
             kept,
             scene=document.scene,
             camera=document.scene.camera,
             views=State(document.scene, document.scene.camera).views,
             selection=Selection(),
+            tool="select",
+            display=display,
+            physical=False,
             pull=None,
             animation=(),
             preview_s=None,
@@ -221,12 +239,15 @@ class Session:
     def show_lesson(self, lesson: Lesson) -> None:
         """A lesson's scene, with what it is about selected and its rays drawn. Raises `UserError`."""
         self.show_document(Document.open(lesson.path))
+        self._panels_before = self.state.preferences.panels
         names = [item.name for item in self.state.scene.objects]
         chosen = Selection("object", names.index(lesson.select)) if lesson.select in names else Selection()
         if lesson.rays:
             layout.raise_panel("rays")
-        state = replace(self.state, lesson=lesson.name, selection=chosen).with_display(ray_overlay=lesson.rays)
-        self.state = state.with_panels(lesson=True, rays=lesson.rays or state.preferences.panels.rays)
+        state = replace(self.state, lesson=lesson.name, selection=chosen).with_display(
+            ray_overlay=lesson.rays, ray_count=lesson.ray_count, ray_reflections=lesson.reflections
+        )
+        self.state = state.with_panels(lesson=True, rays=lesson.rays or self._panels_before.rays)
 
     def tell_losses(self) -> None:
         """Once a picture is whole: what of its light was lost."""
@@ -310,6 +331,8 @@ class Session:
 
 
 def _first_state(scene: Scene, settings: Settings, welcome: bool) -> State:
-    state = State(scene=scene, camera=scene.camera, preferences=settings.preferences)
+    view = View.of(scene.camera, 1.0)
+    brush = Brush(radius=USUAL_RADIUS * view.height_at(view.target_distance))
+    state = State(scene=scene, camera=scene.camera, preferences=settings.preferences, brush=brush)
     # Opening Compare begins a second picture, which nobody asked for at a start.
     return state.with_panels(start_page=welcome, compare=False)

@@ -10,7 +10,6 @@ import numpy as np
 from ..base.errors import UserError
 from ..base.not_yet import NOT_YET, NotYet
 from ..edit.picking import pick_in
-from ..edit.projection import View
 from ..edit.pull import begin_pull
 from ..edit.requests import BeginPull
 from ..model.optics.colorimetry import rgb709_to_xyz
@@ -34,7 +33,7 @@ def begin_pull_at(session: Session, request: BeginPull) -> Callable[[], NotYet |
         state, picture = session.state, session.picture
         if len(state.scene.objects) != len(clicked.objects):
             return None  # indices mean something else
-        view = View.of(state.camera, state.viewport_size[0] / state.viewport_size[1])
+        view = state.view
         x, y = view.project(np.asarray(hit.position))[0]
         rgb, photons = picture.pixel((x, y)), picture.stored_photons(state.scene, PHOTONS)
         if rgb is None or isinstance(photons, NotYet):

@@ -178,7 +178,8 @@ def _frame_selection(session: Session, _request: requests.FrameSelection) -> Non
     if state.selection.kind is None:
         low, high = _without_endless_receivers(session, low, high)
     width, height = state.viewport_size
-    session.state = replace(state, camera=camera_controls.frame(state.camera, low, high, width / height))
+    aspect = max(width / height, state.frame_aspect)  # that of what `camera_for` makes room for
+    session.state = replace(state, camera=camera_controls.frame(state.camera, low, high, aspect))
 
 
 def _looking_at(camera: camera_controls.Camera, position: np.ndarray) -> camera_controls.Camera:

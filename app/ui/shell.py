@@ -102,6 +102,7 @@ def draw_interface(state: State, view_model: ViewModel) -> State:
     state = shortcuts.handle(state, view_model)
     shortcuts.focused_panel["field"] = ""
     shortcuts.floating_panels.clear()
+    layout.floating.clear()
     state = menu.draw_menu(state, view_model)
     if state.preferences.panels.start_page:
         state = start_page.draw_start_page(state, view_model)
@@ -157,6 +158,7 @@ def _draw_panel(window: PanelWindow, state: State, view_model: ViewModel) -> Sta
     (layout.behind.discard if shown or is_floating else layout.behind.add)(window.field)
     if is_floating:
         shortcuts.floating_panels.append(window.field)
+        layout.floating.append(window.title)
     is_leavable = is_floating or (window.field in _CALLED_UP and state.tool == "select")
     if is_leavable and imgui.is_window_focused(imgui.FocusedFlags_.child_windows):
         shortcuts.focused_panel["field"] = window.field

@@ -54,11 +54,12 @@ class SceneEntry:
 
 @dataclass(frozen=True)
 class Message:
-    """A sentence to the user that fades after a while; `is_error` stays until it is closed."""
+    """A sentence to the user that fades after a while."""
 
     text: str
     is_error: bool
-    age_s: float
+    left_s: float
+    """Until it is gone."""
 
 
 @dataclass(frozen=True)

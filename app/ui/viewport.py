@@ -11,7 +11,6 @@ from dataclasses import replace
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
-from ..edit.projection import View
 from ..edit.state import State
 from . import item_rects, overlay, theme
 from .gizmo import Gizmo
@@ -83,7 +82,7 @@ def _draw_inside(state: State, view_model: ViewModel) -> State:
     if state.display.ray_overlay:
         overlay.draw_rays(canvas, view_model.rays)
         if state.display.ray_labels:
-            draw_ray_labels(canvas, view_model.rays, view_model.readings)
+            draw_ray_labels(canvas, view_model.readings)
     draw_marks(canvas, state, view_model, viewport_input.grip == "brush")
     state = draw_lights(canvas, state)
     state = gizmo.draw(state, canvas.view, (corner.x, corner.y, width, height))
@@ -118,11 +117,8 @@ def _draw_picture(state: State, view_model: ViewModel, corner: ImVec2, size: ImV
 
 
 def _canvas(state: State, corner: ImVec2, width: float, height: float) -> Canvas:
-    wide, high = state.viewport_size
     scale = theme.em(1.0) / theme.FONT_SIZE
-    return Canvas(
-        imgui.get_window_draw_list(), View.of(state.camera, wide / high), corner.x, corner.y, width, height, scale
-    )
+    return Canvas(imgui.get_window_draw_list(), state.view, corner.x, corner.y, width, height, scale)
 
 
 def _mouse(canvas: Canvas) -> Mouse:

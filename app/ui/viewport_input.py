@@ -139,7 +139,8 @@ class ViewportInput:
                 return replace(state, camera=controls.orbit(camera, mouse.dx, mouse.dy, self._pivot))
             case "pan":
                 depth = None if self._pivot is None else float(canvas.view.depth(self._pivot))
-                return replace(state, camera=controls.pan(camera, mouse.dx, mouse.dy, depth))
+                shown = _share_shown(state, canvas)
+                return replace(state, camera=controls.pan(camera, shown * mouse.dx, shown * mouse.dy, depth))
             case "dolly":
                 return replace(state, camera=controls.dolly(camera, mouse.dy))
             case "fly":
@@ -197,7 +198,9 @@ class ViewportInput:
         position = None if hit is None else np.asarray(hit.position)
         if io.key_shift:
             return replace(state, brush=brushes.resized(state.brush, notches, visible_height(canvas.view, position)))
-        camera = controls.zoom_to(state.camera, notches, (mouse.x, mouse.y), canvas.view.aspect, position)
+        shown = _share_shown(state, canvas)
+        cursor = (0.5 + shown * (mouse.x - 0.5), 0.5 + shown * (mouse.y - 0.5))
+        camera = controls.zoom_to(state.camera, notches, cursor, canvas.view.aspect, position)
         return replace(state, camera=camera, interacting=True)
 
     def _keys(self, state: State, canvas: Canvas, mouse: Mouse) -> State:
@@ -209,6 +212,11 @@ class ViewportInput:
             if steps
             else state
         )
+
+
+def _share_shown(state: State, canvas: Canvas) -> float:
+    """Height of the picture over that of the camera's own frame, in which it moves."""
+    return canvas.view.half_height / View.of(state.camera, 1.0).half_height
 
 
 def visible_height(view: View, position: np.ndarray | None) -> float:

@@ -79,7 +79,7 @@ def _draw_selection(canvas: Canvas, state: State) -> None:
             opacity = 0.8 if chosen == state.selection else 0.45
             draw_box(canvas, box_corners(item.mesh.vertices, item.object_to_world), (*accent[:3], opacity))
     if state.selection.kind == "camera":
-        for line in camera_lines(state.scene.camera, canvas.view.aspect):
+        for line in camera_lines(state.scene.camera, state.frame_aspect):
             draw_outlined(canvas, line, (*accent[:3], 0.8), 1.4, closed=False)
 
 
@@ -129,9 +129,7 @@ def _draw_pull(canvas: Canvas, state: State) -> None:
             canvas.drawing.add_circle_filled(ImVec2(x, y), 0.68 * radius, colour, 24)
     x, y = canvas.pixels(now)
     if np.isfinite(x):
-        what = (
-            f"local gain × {gain:.2f}" if held.local else f"gain × {gain:.2f}   V_d {pull.abbe_number(held, gain):.1f}"
-        )
+        what = f"local gain × {gain:.2f}" if held.local else f"gain × {gain:.2f}"
         _label(canvas, x + theme.em(0.9), y - theme.em(1.6), f"{held.wavelength_nm:.0f} nm   {what}")
 
 

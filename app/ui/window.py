@@ -37,6 +37,12 @@ SETTLE_FRAMES = 3
 """Frames drawn after an event before waiting again: imgui's layout and hovering need two."""
 MIN_SIDE = 320
 MODIFIER_KEYS = frozenset(range(glfw.KEY_LEFT_SHIFT, glfw.KEY_RIGHT_SUPER + 1))
+SHIFTS = (glfw.KEY_LEFT_SHIFT, glfw.KEY_RIGHT_SHIFT)
+LETTERS = frozenset((*range(glfw.KEY_SPACE, glfw.KEY_WORLD_2 + 1), *range(glfw.KEY_KP_0, glfw.KEY_KP_ENTER), *SHIFTS))
+"""Keys whose presses come as characters too."""
+COMMANDS = glfw.MOD_CONTROL | glfw.MOD_ALT | glfw.MOD_SUPER
+ANSWER_FRAMES, DIALOGUE_FRAMES = 3, 5
+"""From a command or a click until a dialogue that it opens is there, and until that one's field takes what is typed."""
 NO_DISPLAY = "there is no display to open a window on: 'spectrasplat render SCENE -o OUT.png' needs none"
 
 
@@ -128,9 +134,13 @@ class Window:
         were hovered for a frame."""
         self._has_event = False
         """Since the last frame began."""
+        self._typed: list[Callable[[], None]] = []
+        """Keys and characters that wait for what the last command or click opens."""
+        self._answer_frames = 0
+        self._pointer = ctypes.cast(self._handle, ctypes.c_void_p).value or 0
         self._listen()
         self._host = ImguiHost()
-        imgui.backends.glfw_init_for_opengl(ctypes.cast(self._handle, ctypes.c_void_p).value or 0, True)
+        imgui.backends.glfw_init_for_opengl(self._pointer, False)
         self._title = ""
         self._before_full_screen: tuple[int, int, int, int] | None = None
         """Position and size to go back to; None while it is a window."""
@@ -243,6 +253,10 @@ class Window:
         """Draw one frame and show it."""
         self._host.make_current()
         self._has_moved = self._has_event = False
+        self._answer_frames -= 1
+        waiting, self._typed = self._typed, []
+        for typed in waiting:
+            self._type(typed)
         width = max(glfw.get_window_size(self._handle)[0], 1)
         guest.prepare(self.interface_scale, self.framebuffer_size[0] / width)
         theme.apply(guest.preferences, self.interface_scale)
@@ -315,38 +329,50 @@ class Window:
             guest.ask_to_close()
 
     def _listen(self) -> None:
-        """Any event wakes the loop. imgui's own callbacks, installed later, call these first."""
+        """Any event wakes the loop, and goes on to imgui."""
+        backend = imgui.backends
 
         def wake(*_event: object) -> None:
             self._has_event = True
             self.wake()
 
-        def key(_window: object, key: int, _scancode: int, action: int, _modifiers: int) -> None:
-            wake()
-            if action == glfw.RELEASE and key in MODIFIER_KEYS:
-                self._host.keep_for_next_frame()
+        def passed_on(to_imgui: Callable[..., None]) -> Callable[..., None]:
+            def listen(_window: object, *event: float) -> None:
+                wake()
+                to_imgui(self._pointer, *event)
 
-        def button(_window: object, _button: int, action: int, _modifiers: int) -> None:
+            return listen
+
+        def key(_window: object, *event: int) -> None:
+            wake()
+            self._type(lambda: self._key(*event))
+
+        def character(_window: object, code: int) -> None:
+            wake()
+            self._type(lambda: backend.glfw_char_callback(self._pointer, code))
+
+        def button(_window: object, button: int, action: int, modifiers: int) -> None:
             wake()
             if action == glfw.PRESS and self._has_moved:
                 self._host.keep_for_next_frame()
+            if action == glfw.RELEASE:
+                self._answer_frames = ANSWER_FRAMES
+            backend.glfw_mouse_button_callback(self._pointer, button, action, modifiers)
 
-        def moved(_window: object, _x: float, _y: float) -> None:
+        def moved(_window: object, x: float, y: float) -> None:
             wake()
             self._has_moved = True
+            backend.glfw_cursor_pos_callback(self._pointer, x, y)
 
         glfw.set_key_callback(self._handle, key)
+        glfw.set_char_callback(self._handle, character)
         glfw.set_mouse_button_callback(self._handle, button)
         glfw.set_cursor_pos_callback(self._handle, moved)
-        for listen in (
-            glfw.set_char_callback,
-            glfw.set_cursor_enter_callback,
-            glfw.set_scroll_callback,
-            glfw.set_window_focus_callback,
-            glfw.set_framebuffer_size_callback,
-            glfw.set_window_refresh_callback,
-        ):
-            listen(self._handle, wake)
+        glfw.set_cursor_enter_callback(self._handle, passed_on(backend.glfw_cursor_enter_callback))
+        glfw.set_scroll_callback(self._handle, passed_on(backend.glfw_scroll_callback))
+        glfw.set_window_focus_callback(self._handle, passed_on(backend.glfw_window_focus_callback))
+        glfw.set_framebuffer_size_callback(self._handle, wake)
+        glfw.set_window_refresh_callback(self._handle, wake)
 
         def dropped(_window: object, paths: list[str]) -> None:
             self._dropped += [Path(path) for path in paths]
@@ -359,6 +385,26 @@ class Window:
 
         glfw.set_drop_callback(self._handle, cast(Any, dropped))  # glfw hands a list over, whatever its types say
         glfw.set_window_close_callback(self._handle, closing)
+
+    def _type(self, typed: Callable[[], None]) -> None:
+        """Do `typed` once a text field that is being opened can take it."""
+        awaited = 0 if imgui.internal.get_top_most_popup_modal() is None else -DIALOGUE_FRAMES
+        if self._typed or (self._answer_frames > awaited and not imgui.get_io().want_text_input):
+            self._typed.append(typed)
+        else:
+            typed()
+
+    def _key(self, key: int, scancode: int, action: int, modifiers: int) -> None:
+        """Pass a key on to imgui. While a text is typed, letters are left to the characters that come with them: imgui
+        takes a key's second change in a frame of its own, and a word would need as many frames as it has letters."""
+        is_typing = imgui.get_io().want_text_input
+        if is_typing and key in LETTERS and action != glfw.RELEASE and not modifiers & COMMANDS:
+            return
+        if action == glfw.RELEASE and key in MODIFIER_KEYS and not (is_typing and key in SHIFTS):
+            self._host.keep_for_next_frame()
+        if action == glfw.PRESS and modifiers & glfw.MOD_CONTROL and key not in MODIFIER_KEYS:
+            self._answer_frames = ANSWER_FRAMES
+        imgui.backends.glfw_key_callback(self._pointer, key, scancode, action, modifiers)
 
 
 def _create(place: WindowPlace, visible: bool) -> Any:

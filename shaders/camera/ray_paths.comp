@@ -1,5 +1,6 @@
-// Single paths, one an invocation, each at a wavelength of its own: refracted at every glass surface (totally reflected
-// where it must be), mirrored by mirrors, up to the first surface that is neither. For the ray overlay.
+// Single paths, one an invocation, each at a wavelength of its own: refracted at every glass surface (reflected within it
+// where it must be, or as often as is asked for), mirrored by mirrors, up to the first surface that is neither. For the
+// ray overlay.
 layout(local_size_x = 32) in;
 
 #include "lib/medium.glsl"
@@ -22,6 +23,7 @@ void main()
     MediumStack medium = MediumStack(p.inside_mask, p.inside_object);
     PathEnd path;
     path.points = 1u;
+    uint reflections = p.reflections;
     uint at = id * uint(MAX_POINTS);
     points[at] = vec4(position, 0.0);
     for (uint event = 0u; event < uint(MAX_POINTS) - 1u; ++event) {
@@ -47,15 +49,16 @@ void main()
 #ifdef HAS_DIELECTRIC
         if (IS_GLASS(kind)) {
             MediumInterface boundary = cross_boundary(medium, hit.object, entering);
-            bool total = false;
+            bool reflects = false;
             if (boundary.changes) {
                 float eta_it = medium_index(boundary.before, starts[id].x) / medium_index(boundary.after, starts[id].x);
                 Deflection refracted = refract_at(frame, direction, IS_THIN(boundary) ? 1.0 : eta_it);
-                total = !refracted.exists;
-                direction = total ? turned.direction : refracted.direction;
+                reflects = !refracted.exists || (reflections > 0u && !entering && !IS_THIN(boundary));
+                direction = reflects ? turned.direction : refracted.direction;
             }
-            if (!total) medium = boundary.behind;
-            origin = RayOrigin(hit.primitive, hit.object, uint(total ? !entering : entering), medium.mask);
+            if (reflects && !entering) reflections -= min(reflections, 1u);
+            if (!reflects) medium = boundary.behind;
+            origin = RayOrigin(hit.primitive, hit.object, uint(reflects ? !entering : entering), medium.mask);
             goes_on = true;
         }
 #endif

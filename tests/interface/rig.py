@@ -12,7 +12,6 @@ import numpy as np
 from imgui_bundle import imgui
 from spectrasplat.base.not_yet import NotYet
 from spectrasplat.edit.picking import pick_in
-from spectrasplat.edit.projection import View
 from spectrasplat.edit.state import Selection
 from spectrasplat.gpu.context import Context
 from spectrasplat.model.scene import Dielectric, Diffuse
@@ -79,8 +78,7 @@ class Hands:
         assert not isinstance(photons, NotYet)
         state = self.session.state
         mine = (photons.source == self.glass()) & (photons.receiver == self.receiver())
-        view = View.of(state.camera, state.viewport_size[0] / state.viewport_size[1])
-        seen, depth = view.project(photons.position[mine])
+        seen, depth = state.view.project(photons.position[mine])
         inside = (depth > 0) & ((seen > 0.1) & (seen < 0.9)).all(axis=1)
         assert inside.sum() > 50, "the caustic is not in view"
         seen, flux = seen[inside], photons.flux_w[mine][inside]

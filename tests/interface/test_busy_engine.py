@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from spectrasplat.base.paths import assets_dir
-from spectrasplat.edit.projection import View
 from spectrasplat.edit.state import Brush, Selection
 from spectrasplat.gpu.context import Context
 from spectrasplat.ui import layout
@@ -37,7 +36,7 @@ class Busy:
 
     def at(self, point: np.ndarray) -> tuple[float, float]:
         state = self.session.state
-        view = View.of(state.camera, state.viewport_size[0] / state.viewport_size[1])
+        view = state.view
         x, y = view.project(point)[0]
         return self.interface.find("Picture").at(float(x), float(y))
 

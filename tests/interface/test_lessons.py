@@ -9,8 +9,7 @@ import pytest
 from imgui_bundle import imgui
 from spectrasplat.edit import measuring, requests
 from spectrasplat.edit.lessons import lesson
-from spectrasplat.edit.projection import View
-from spectrasplat.edit.state import Selection
+from spectrasplat.edit.state import Selection, State
 from spectrasplat.gpu.context import Context
 from spectrasplat.ui.frame import run_frame
 from spectrasplat.ui.ray_labels import labelled
@@ -34,16 +33,23 @@ def test_lessons_open_from_the_menu_and_the_start_page(gl: Context) -> None:
 
 def test_a_lesson_selects_what_it_is_about_and_says_the_next(gl: Context) -> None:
     session = Session(gl, make_engine=FakeEngine)
+    panels = session.state.preferences.panels
     session.show_lesson(lesson("minimum_deviation"))
     state = session.state
     assert state.selection == Selection("object", 0) and state.display.ray_overlay and state.preferences.panels.lesson
     assert session.document.path is None  # Save does not write to the program's own folder
+    # What was opened, chosen and set for it goes with it.
+    session.state = replace(session.state, tool="measure").with_panels(abbe=True)
+    session.state = session.state.with_display(auto_exposure=False, exposure_ev=5.0, ray_reflections=2)
     session.show_document(session.document)
-    assert session.state.lesson == ""
+    left, kept = session.state, State(session.state.scene, session.state.camera)
+    assert (left.lesson, left.tool, left.display) == ("", kept.tool, kept.display)
+    assert left.preferences.panels == panels
     session.autosave.close()
     session.release()
     with ShellRig(gl, state) as rig:
         rig.open_panel(lesson=True)
+        rig.view_model = replace(rig.view_model, unsaved=True)  # what was tried out in a lesson is nobody's work
         rig.click("Next: The rainbow drop")
         rig.frame(2)
         assert rig.asked[-1] == requests.OpenLesson("rainbow_drop")
@@ -100,7 +106,7 @@ def test_the_ruler_takes_hold_of_rays_and_measures_the_deviation(gl: Context) ->
         rig.frame(2)
         assert rig.state.tool == "measure"
         picture = rig.find("Picture")
-        view = View.of(rig.state.camera, picture.size[0] / picture.size[1])
+        view = rig.state.view
         start, entry, out, _ = rays[0].points
         for point in (0.3 * start + 0.7 * entry, entry, out):
             (x, y), _ = view.project(point)
@@ -110,6 +116,31 @@ def test_the_ruler_takes_hold_of_rays_and_measures_the_deviation(gl: Context) ->
             180.0 - 0.5 * readings[0].deviation_deg, abs=0.3
         )
         assert rig.find("Measured")
+
+
+@pytest.mark.parametrize(("reflections", "radius_deg"), [(1, (40.567, 42.019, 42.440)), (2, (53.620, 50.996, 50.238))])
+def test_rays_that_make_the_rainbows_crowd_where_descartes_says(
+    gl: Context, reflections: int, radius_deg: tuple
+) -> None:
+    """Radii of the bows at 400 nm, the d line and 700 nm: cos² i = (n² − 1)/(k (k + 2)) for k reflections."""
+    session = Session(gl, make_engine=FakeEngine)
+    session.show_lesson(lesson("rainbow_drop"))
+    state = session.state.with_display(ray_reflections=reflections, ray_wavelengths=1)
+    session.autosave.close()
+    session.release()
+    overlay = RayOverlay(gl)
+    for nm, radius in zip((400.0, 587.5618, 700.0), radius_deg, strict=True):
+        overlay.update(replace(state, solo_nm=nm))
+        turn = overlay.readings[0].deviation_deg
+        assert abs(turn - 180.0) == pytest.approx(radius, abs=0.02)
+        start, *_, wall = overlay.rays[-1].points  # which is shown
+        assert len(overlay.rays[-1].points) == reflections + 4
+        # The closed form of `rainbow_drop.toml` for a wall that is near: L tan a ± b / cos a.
+        beside = np.hypot(*start[1:])
+        sign = 1.0 if reflections == 1 else -1.0
+        place = 2.0 * np.tan(np.radians(radius)) + sign * beside / np.cos(np.radians(radius))
+        assert np.hypot(*wall[1:]) == pytest.approx(place, rel=2e-3)
+    overlay.release()
 
 
 def test_few_of_many_wavelengths_are_labelled() -> None:

@@ -11,6 +11,7 @@ import pytest
 from panel_rig import PanelRig, receiver_of, scene_state
 from reference.lamps import isotropic
 from spectrasplat.edit import edits
+from spectrasplat.edit.brush import USUAL_RADIUS
 from spectrasplat.edit.state import Selection
 from spectrasplat.gpu.context import Context
 from spectrasplat.model.lights import IesLight
@@ -213,7 +214,8 @@ def test_brush_settings_and_tools(painted: PanelRig) -> None:
     assert (brush.mode, brush.radius) == ("erase", 0.25)
     assert brush.falloff == pytest.approx(0.1, abs=0.05)
     painted.double_click("Radius")
-    assert painted.state.brush.radius == 0.05
+    view = painted.state.view
+    assert painted.state.brush.radius == pytest.approx(USUAL_RADIUS * view.height_at(view.target_distance))
 
 
 def test_strength_of_the_eraser_leaves_that_of_the_others(painted: PanelRig) -> None:

@@ -213,11 +213,14 @@ def test_start_page_offers_the_recovery(rig: ShellRig) -> None:
     assert rig.asked == [requests.Recover()]
 
 
-def test_errors_stay_until_closed_and_shader_errors_have_a_window(rig: ShellRig) -> None:
+def test_errors_are_over_no_button_and_shader_errors_have_a_window(rig: ShellRig) -> None:
     rig.view_model = replace(
-        rig.view_model, messages=(Message("The disk is full.", True, 99.0),), shader_error="camera.comp:12: oh"
+        rig.view_model, messages=(Message("The disk is full.", True, 9.0),), shader_error="camera.comp:12: oh"
     )
     rig.frame(3)
+    close, picture = rig.find("Close message 0"), rig.find("Picture")
+    (left, top), (right, bottom) = picture.at(0, 0), picture.at(1, 1)
+    assert left < close.centre[0] < right and top < close.centre[1] < bottom
     rig.click("Close message 0")
     assert rig.asked[-1] == requests.DismissMessage("The disk is full.")
     rig.click("Compile again")

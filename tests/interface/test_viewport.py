@@ -11,7 +11,6 @@ import pytest
 from imgui_bundle import imgui
 from spectrasplat.edit import camera_controls
 from spectrasplat.edit.picking import PickHit, pick_in
-from spectrasplat.edit.projection import View
 from spectrasplat.edit.requests import BeginPull, Notice, Pull, SelectAt
 from spectrasplat.edit.state import Brush, Compare, Selection, State
 from spectrasplat.gpu.context import Context
@@ -63,17 +62,13 @@ class ViewportRig(HeadlessInterface):
         self.held_frames += self.state.interacting
         imgui.end()
 
-    def view(self) -> View:
-        wide, high = self.state.viewport_size
-        return View.of(self.state.camera, wide / high)
-
     def under(self) -> PickHit | None:
         """What the host found where the cursor was in the last frame."""
         return None if self.state.hover is None else pick_in(self.state, *self.state.hover)
 
     def at(self, point) -> tuple[float, float]:
         """Where a world point is on the screen."""
-        (x, y), _ = self.view().project(np.asarray(point, float))
+        (x, y), _ = self.state.view.project(np.asarray(point, float))
         return self.find("Picture").at(float(x), float(y))
 
 
@@ -146,7 +141,7 @@ def test_the_wheel_zooms_to_the_cursor(rig) -> None:
 
 
 def test_flying_needs_the_right_button(rig) -> None:
-    before, forward = np.array(rig.state.camera.position), rig.view().forward
+    before, forward = np.array(rig.state.camera.position), rig.state.view.forward
     rig.move(CENTRE)
     with rig.held([KEY.w]):
         rig.frame(3)
@@ -167,9 +162,9 @@ def test_flying_needs_the_right_button(rig) -> None:
 
 def test_an_axis_in_the_corner_turns_the_view(rig) -> None:
     rig.click("View from +X")
-    assert rig.view().forward == pytest.approx([-1, 0, 0], abs=1e-9)
+    assert rig.state.view.forward == pytest.approx([-1, 0, 0], abs=1e-9)
     rig.click("View from +Z")
-    assert rig.view().forward[2] == pytest.approx(-1.0, abs=1e-3)
+    assert rig.state.view.forward[2] == pytest.approx(-1.0, abs=1e-3)
     assert rig.asked == []
 
 
@@ -207,12 +202,12 @@ def test_the_gizmo_moves_the_prism_with_the_mouse(gl, orthographic) -> None:
     with ViewportRig(gl, looking_along_y(scene_state(), orthographic)) as rig:
         before = rig.state.scene.objects[0].object_to_world
         x, y = rig.find("Gizmo").centre
-        middle = rig.view().depth(_middle(rig.state, 0))
+        middle = rig.state.view.depth(_middle(rig.state, 0))
         rig.move((x + 35, y))
         rig.frame(2)
         rig.drag((x + 35, y), (x + 95, y), steps=5)
         moved = rig.state.scene.objects[0].object_to_world - before
-        unit = rig.view().height_at(float(middle)) / SIZE[1]
+        unit = rig.state.view.height_at(float(middle)) / SIZE[1]
         assert moved[:3, 3] == pytest.approx([60 * unit, 0, 0], abs=1.5 * unit)
         assert moved[:3, :3] == pytest.approx(0.0, abs=1e-12)
         assert set(rig.labels) == {"Move prism"}
@@ -260,7 +255,7 @@ def test_the_gizmo_moves_a_light_that_is_clicked(gl) -> None:
         rig.move((x, y - 35))
         rig.frame(2)
         rig.drag((x, y - 35), (x, y - 75), steps=5)
-        unit = rig.view().height_at(8.0) / SIZE[1]
+        unit = rig.state.view.height_at(8.0) / SIZE[1]
         assert np.subtract(rig.state.scene.lights[0].position, lamp.position) == pytest.approx(
             [0, 0, 40 * unit], abs=1.5 * unit
         )
@@ -330,10 +325,8 @@ def test_the_ring_of_the_brush_lies_on_the_surface(gl) -> None:
 
 
 def held_colour(rig: ViewportRig, local: bool = False) -> Pull:
-    start = rig.view().on_plane(0.5, 0.7, np.zeros(3), np.array([0.0, 0.0, 1.0]))
-    return Pull(
-        0, receiver_of(rig.state), tuple(start), tuple(start - [0.4, 0, 0]), (1.0, 0.0, 0.0), 450.0, 1.0, 25.7, local
-    )
+    start = rig.state.view.on_plane(0.5, 0.7, np.zeros(3), np.array([0.0, 0.0, 1.0]))
+    return Pull(0, receiver_of(rig.state), tuple(start), tuple(start - [0.4, 0, 0]), (1.0, 0.0, 0.0), 450.0, 1.0, local)
 
 
 @pytest.mark.parametrize("local", [False, True], ids=["glass", "local"])
@@ -395,8 +388,8 @@ def test_badges_say_what_the_picture_is_not(gl) -> None:
 
 
 def test_rays_are_drawn_in_their_colour_and_behind_the_camera_not_at_all(rig) -> None:
-    a, b = (rig.view().on_plane(x, 0.85, np.zeros(3), np.array([0.0, 0.0, 1.0])) for x in (0.3, 0.7))
-    behind = np.asarray(rig.state.camera.position) - 3.0 * rig.view().forward
+    a, b = (rig.state.view.on_plane(x, 0.85, np.zeros(3), np.array([0.0, 0.0, 1.0])) for x in (0.3, 0.7))
+    behind = np.asarray(rig.state.camera.position) - 3.0 * rig.state.view.forward
     rig.state = replace(rig.state, display=replace(rig.state.display, ray_overlay=True))
     rig.view_model = replace(
         rig.view_model,

@@ -192,3 +192,62 @@ def test_a_picture_dropped_while_comparing_is_compared_with(tmp_path: Path) -> N
     """What glfw itself calls for a drop, as the window has installed it."""
     done = in_a_window(A_PICTURE_IS_DROPPED, tmp_path)
     assert done.stdout.strip() == "['wipe', 'file', 'größer.exr'] 0", done.stderr
+
+
+A_PATH_IS_TYPED_IN_ONE_FRAME = """
+import ctypes, glfw, shutil
+from pathlib import Path
+from spectrasplat.base.paths import assets_dir
+from spectrasplat.ui.panels import dialogs
+from spectrasplat.ui.session import Session
+from spectrasplat.ui.shell import draw_interface
+from spectrasplat.ui.viewer import Viewer
+from spectrasplat.ui.window import Window
+from tests.interface.fake_engine import FakeEngine
+
+with Window() as window:
+    session = Session(window.context, make_engine=FakeEngine)
+    opens = []
+    def draw(state, model):
+        state = draw_interface(state, model)
+        return dialogs.open_file(state, model) if opens and opens.pop() else state
+    viewer = Viewer(session, draw)
+    handle = ctypes.cast(window._handle, ctypes.c_void_p).value
+    def installed(name, numbers):
+        exchange = ctypes.CFUNCTYPE(*[ctypes.c_void_p] * 3)((name, glfw._glfw))
+        call = ctypes.CFUNCTYPE(None, ctypes.c_void_p, *[ctypes.c_int] * numbers)(exchange(handle, None))
+        return lambda *event: call(handle, *event)
+    key, character = installed("glfwSetKeyCallback", 4), installed("glfwSetCharCallback", 1)
+    button = installed("glfwSetMouseButtonCallback", 3)
+    def stroke(code, modifiers=0, text=""):
+        key(code, 0, glfw.PRESS, modifiers)
+        for letter in text:
+            character(ord(letter))
+        key(code, 0, glfw.RELEASE, modifiers)
+    path = Path("Grass__lens.toml").absolute()
+    shutil.copy(assets_dir() / "scenes" / "prism.toml", path)
+    for _ in range(10):
+        window.frame(viewer)
+    for action in (glfw.PRESS, glfw.RELEASE):
+        button(0, action, 0)
+    opens.append(True)  # what the click does
+    for letter in str(path):
+        shifted = letter.isupper() or letter == "_"
+        if shifted:
+            key(glfw.KEY_LEFT_SHIFT, 0, glfw.PRESS, 0)
+        stroke(ord(letter.upper()) if letter.isascii() else 32, glfw.MOD_SHIFT * shifted, letter)
+        if shifted:
+            key(glfw.KEY_LEFT_SHIFT, 0, glfw.RELEASE, 0)
+    stroke(glfw.KEY_ENTER)
+    for frames in range(1, 40):
+        window.frame(viewer)
+        if session.document.source == path:
+            break
+    print(session.document.source == path, frames <= 9, frames)
+"""
+
+
+def test_a_path_that_is_typed_at_once_takes_no_frame_a_letter(tmp_path: Path) -> None:
+    """A click on Open, a whole path and Enter, all while one long frame is drawn."""
+    done = in_a_window(A_PATH_IS_TYPED_IN_ONE_FRAME, tmp_path)
+    assert done.stdout.startswith("True True"), done.stdout + done.stderr

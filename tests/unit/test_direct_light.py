@@ -70,3 +70,6 @@ def test_bins_hold_the_power_and_the_lumens(spectrum: Spectrum, bins: int) -> No
     if not spectrum.lines and bins == 40:
         found = colour_info(0.5 * (edges[:-1] + edges[1:]), binned)
         assert found is not None and found.illuminance == pytest.approx(1000.0, rel=0.02)
+    if spectrum == illuminant("D65"):  # however wide the bins are
+        found = colour_info(0.5 * (edges[:-1] + edges[1:]), binned, spectrum.density)
+        assert found is not None and found.temperature_k == pytest.approx(6504.0, abs=0.6)

@@ -136,6 +136,7 @@ def test_a_copy_is_its_own() -> None:
         (lambda s: ss.render(s, camera_method="hero"), "camera_method 'hero' is unknown"),
         (lambda s: ss.caustic(s, "tabel"), "'tabel' is no receiver of scene 'prism', did you mean 'table'?"),
         (lambda s: ss.fan(s, "prism", wavelengths_nm=[1000]), "between 380 and 780 nm"),
+        (lambda s: ss.fan(s, "prism", reflections=-1), "reflections -1 is out of range"),
         (lambda s: ss.fan(s, "prism", rays=0), "rays 0 times 3 wavelengths is out of range"),
         (lambda s: ss.fan(s, "prism", light="lamp"), "has no light 'lamp'; it has 'slit', 'room'"),
         (lambda s: ss.glass("N-SF11").index("blue"), "'blue' is no wavelength"),

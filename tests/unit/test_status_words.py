@@ -43,7 +43,7 @@ def test_nothing_accumulates_while_all_time_is_an_export_s() -> None:
 
 
 @pytest.mark.parametrize(
-    ("temperature_k", "said"), [(6394.2, "6,390 K"), (2855.6, "2,856 K"), (25_000.0, "25,000 K"), (999.6, "1,000 K")]
+    ("temperature_k", "said"), [(6503.7, "6,504 K"), (2855.6, "2,856 K"), (25_373.0, "25,370 K"), (999.6, "1,000 K")]
 )
 def test_a_colour_temperature_has_no_power_of_ten(temperature_k: float, said: str) -> None:
     assert kelvin(temperature_k) == said

@@ -7,7 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from spectrasplat.edit import camera_controls as controls
-from spectrasplat.edit.projection import View
+from spectrasplat.edit.brush import followed
+from spectrasplat.edit.projection import View, fitted
+from spectrasplat.edit.state import Brush
 from spectrasplat.model.scene import Camera
 
 PINHOLE = Camera(position=(1.5, -6.6, 5.4), target=(1.35, 0.3, 0.05), vertical_fov_deg=30.0)
@@ -142,3 +144,21 @@ def test_looking_along_an_axis_keeps_the_distance():
         along = controls.look_along(PINHOLE, direction)
         assert View.of(along, 1.0).forward == pytest.approx(direction, abs=0.01)
         assert distance(along, PINHOLE.target) == pytest.approx(distance(PINHOLE, PINHOLE.target))
+
+
+@pytest.mark.parametrize("camera", [PINHOLE, ORTHOGRAPHIC], ids=lambda c: c.kind)
+@pytest.mark.parametrize("aspect", [4 / 3, 1.0, 16 / 9, 2.4])
+def test_every_picture_shows_all_of_the_scenes_frame(camera: Camera, aspect: float) -> None:
+    frame = 16 / 9
+    shown, meant = View.of(fitted(camera, frame, aspect), aspect), View.of(camera, frame)
+    assert shown.half_height >= meant.half_height - 1e-12
+    assert shown.half_height * aspect >= meant.half_height * frame - 1e-12
+    assert aspect < frame or fitted(camera, frame, aspect) is camera
+
+
+@pytest.mark.parametrize("zoom", [0.0, 3.0, -6.0])
+def test_a_brush_is_as_large_in_every_view(zoom: float) -> None:
+    before, after = View.of(PINHOLE, 1.0), View.of(controls.zoom_to(PINHOLE, zoom), 1.0)
+    radius = followed(Brush(radius=0.1), before, after).radius
+    share = [view.height_at(view.target_distance) for view in (before, after)]
+    assert radius / share[1] == pytest.approx(0.1 / share[0])

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from spectrasplat.base.errors import UserError
 from spectrasplat.edit import edits
+from spectrasplat.edit.projection import View
 from spectrasplat.edit.requests import Notice
 from spectrasplat.edit.state import State
 from spectrasplat.model.io.scene_file import load_scene
@@ -200,35 +201,15 @@ def test_a_gain_keeps_n_d_absorption_and_priority(scene: Scene) -> None:
 
 
 def test_abbe_numbers_do_not_creep_while_a_slider_is_dragged(scene: Scene) -> None:
-    changed = edits.set_abbe(scene, BLOCK, 1.6, 30.0)
+    changed = glass.from_abbe(1.6, 30.0)
     for _ in range(1000):
-        n_d, v_d = edits.abbe_numbers(changed.objects[BLOCK].material.dispersion)
-        changed = edits.set_abbe(changed, BLOCK, n_d, v_d)
-    assert edits.abbe_numbers(changed.objects[BLOCK].material.dispersion) == (1.6, 30.0)
-    flat = edits.set_abbe(scene, BLOCK, 1.6, math.inf)
-    assert edits.abbe_numbers(flat.objects[BLOCK].material.dispersion) == (1.6, math.inf)
+        changed = glass.from_abbe(*edits.abbe_numbers(changed))
+    assert edits.abbe_numbers(changed) == (1.6, 30.0)
+    assert edits.abbe_numbers(glass.from_abbe(1.6, math.inf)) == (1.6, math.inf)
     stronger = glass.with_gain(glass.from_abbe(1.6, 30.0), 2.0)
     assert edits.abbe_numbers(stronger) == (1.6, 15.0)
     sf11 = scene.objects[BLOCK].material.dispersion
     assert edits.abbe_numbers(sf11) == (sf11.n_d, sf11.V_d)
-    refusal(edits.set_abbe, scene, BLOCK, math.nan, 30.0)
-    refusal(edits.set_abbe, scene, BLOCK, 1.5, 0.0)
-
-
-def test_points_of_the_curve_can_be_taken_and_given_back(scene: Scene) -> None:
-    strong = edits.set_dispersion_gain(scene, BLOCK, 2.0)
-    before = strong.objects[BLOCK].material.dispersion
-    nm, n = edits.index_points(before)
-    drawn = edits.set_index_points(strong, BLOCK, nm, n).objects[BLOCK].material.dispersion
-    assert drawn.gain == 1.0 and "drawn" in drawn.name
-    between = np.linspace(380.0, 780.0, 50)
-    np.testing.assert_allclose(drawn.index(between), before.index(between), atol=2e-3)
-    again, values = edits.index_points(drawn)
-    np.testing.assert_array_equal(again, nm)
-    np.testing.assert_allclose(values, n, rtol=1e-14)
-    twice = edits.set_index_points(edits.set_index_points(scene, BLOCK, nm, n), BLOCK, nm, n + 0.01)
-    assert twice.objects[BLOCK].material.dispersion.name.count("drawn") == 1
-    assert "ascend" in refusal(edits.set_index_points, scene, BLOCK, nm[::-1], n)
 
 
 def test_a_glass_without_data_at_a_lamps_line_is_refused(scene: Scene) -> None:
@@ -311,6 +292,15 @@ def test_lights_can_be_added_copied_saved_and_deleted(scene: Scene, kind: str, t
     assert edits.delete_light(more, 2).lights[2].name == f"{kind} light 2"
     alone = edits.delete_light(scene, 0)
     assert "only light" in refusal(edits.delete_light, alone, 0)
+
+
+@pytest.mark.parametrize("kind", [kind for kind, cls in LIGHT_KINDS.items() if cls.has_place])
+@pytest.mark.parametrize("position", [(0.0, -6.0, 1.0), (0.2, -0.2, 9.0), (8.0, 0.0, -0.5)])
+def test_a_new_light_is_in_the_picture(scene: Scene, kind: str, position: tuple[float, float, float]) -> None:
+    view = View.of(replace(scene.camera, position=position, target=(0.0, 0.0, 0.3)), 1.6)
+    light = edits.add_light(scene, kind, view).lights[-1]
+    (x, y), depth = view.project(np.array(light.position))
+    assert 0.0 < x < 1.0 and 0.0 < y < 1.0 and depth > 0.0
 
 
 @pytest.mark.parametrize(

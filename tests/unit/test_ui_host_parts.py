@@ -11,7 +11,7 @@ from spectrasplat.base.paths import assets_dir
 from spectrasplat.edit import requests
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.ui.crash_log import FILE_NAME, MAX_BYTES, write_crash
-from spectrasplat.ui.message_box import MAX_MESSAGES, NOTICE_S, MessageBox
+from spectrasplat.ui.message_box import ERROR_S, MAX_MESSAGES, NOTICE_S, READ_S, MessageBox
 from spectrasplat.ui.pace import GPU_SHARE, LIGHT_SHARE, LONGEST_PATIENT_S, MIN_SHARE, SOFTWARE_FRAME_S, Pace
 from spectrasplat.ui.sentences import brief, sentence, words
 from spectrasplat.ui.shown_scene import index_in, photons_in
@@ -60,7 +60,7 @@ def test_a_gpu_keeps_to_the_screen() -> None:
     assert Pace(is_software=False, refresh_s=1 / 144).budget_s == pytest.approx(GPU_SHARE / 144)
 
 
-def test_notices_fade_and_errors_stay() -> None:
+def test_notices_fade_errors_later_or_with_a_success_once_read() -> None:
     clock = Clock()
     box = MessageBox(clock)
     box.tell("Saved\nmine.toml.")
@@ -69,8 +69,17 @@ def test_notices_fade_and_errors_stay() -> None:
     assert box.is_fading
     clock.now = NOTICE_S + 1
     assert [m.text for m in box.messages()] == ["No."]
+    box.tell("Stopped.", is_error=True, stays=True)
+    box.messages()
+    clock.now += ERROR_S
+    assert [m.text for m in box.messages()] == ["Stopped."]
     assert not box.is_fading
-    box.close("No.")
+    box.tell("Not saved.", is_error=True)
+    box.messages()
+    box.succeed()
+    assert [m.text for m in box.messages()] == ["Not saved."]  # nobody can have read it yet
+    clock.now += READ_S
+    box.succeed()
     assert box.messages() == ()
 
 

@@ -1,9 +1,8 @@
-"""Presets: every one applies, and says the reference about itself."""
+"""Presets: every one applies, and says the truth about itself."""
 
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 import pytest
 from spectrasplat.base.paths import assets_dir
@@ -15,12 +14,6 @@ from spectrasplat.model.scene import Dielectric, Scene
 @pytest.fixture(scope="module")
 def scene() -> Scene:
     return load_scene(assets_dir() / "scenes" / "prism.toml")
-
-
-@pytest.fixture(autouse=True)
-def config(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setenv("SPECTRASPLAT_CONFIG", str(tmp_path))
-    return tmp_path
 
 
 def glass_index(scene: Scene) -> int:

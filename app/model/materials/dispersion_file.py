@@ -114,7 +114,7 @@ def _read_range(table: SceneTable) -> tuple[float, float] | None:
 def describe_dispersion(dispersion: Dispersion) -> dict[str, Any]:
     """The keys that give this dispersion."""
     if dispersion.gain != 1.0:
-        return describe_dispersion(replace(dispersion, gain=1.0)) | {"dispersion_gain": dispersion.gain}
+        return describe_dispersion(dispersion.natural) | {"dispersion_gain": dispersion.gain}
     try:
         if catalogue.find(dispersion.name) == dispersion:
             return {"glass": dispersion.name}

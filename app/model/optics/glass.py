@@ -72,6 +72,11 @@ class Dispersion:
         return math.inf if abs(spread) < 1e-12 else (self.n_d - 1.0) / spread
 
     @cached_property
+    def natural(self) -> Dispersion:
+        """The material itself, without a gain: its V_d is the one that people know it by."""
+        return self if self.gain == 1.0 else replace(self, gain=1.0)
+
+    @cached_property
     def is_dispersive(self) -> bool:
         """Whether n differs by more than 1e-7 anywhere between 380 and 780 nm."""
         n = self.index(_CHECK_NM)

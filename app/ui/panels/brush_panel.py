@@ -10,6 +10,7 @@ import numpy as np
 from imgui_bundle import ImVec2, imgui
 
 from ...edit import edits
+from ...edit.brush import USUAL_RADIUS
 from ...edit.state import Brush, State, Tool
 from ...model.local_dispersion import dab_weight
 from ...model.scene import Dab
@@ -56,13 +57,25 @@ def _draw_tools(state: State) -> State:
     return state
 
 
+def _usual_radius(state: State) -> float:
+    return USUAL_RADIUS * state.view.height_at(state.view.target_distance)
+
+
 def _draw_settings(state: State) -> State:
     brush = state.brush
     tip = "What a stroke does. While painting, Shift erases and Ctrl does the opposite of widening or narrowing."
     _, mode = widgets.combo("Mode", _MODES, brush.mode, tip=tip)
     tip = "Radius on the receiver. Shift+wheel over the picture, or [ and ], change it too."
     _, radius, radius_held = widgets.drag(
-        "Radius", brush.radius, 1e-4, 1e4, unit="units", tip=tip, reset=_DEFAULT.radius, format="%.4g", logarithmic=True
+        "Radius",
+        brush.radius,
+        1e-4,
+        1e4,
+        unit="units",
+        tip=tip,
+        reset=_usual_radius(state),
+        format="%.4g",
+        logarithmic=True,
     )
     if mode == "erase":
         tip = "Share of what was painted that goes in a quarter of a second under a still cursor."

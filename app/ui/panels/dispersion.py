@@ -26,7 +26,6 @@ from .glass_values import (
     base_name,
     is_as_sold,
     lines_of,
-    natural,
     notes_of,
     own_numbers,
     selected_glass,
@@ -83,7 +82,7 @@ def _draw_header(item: SceneObject, dispersion: Dispersion) -> None:
         imgui.text_unformatted(item.name)
     imgui.text_unformatted(shown_name(dispersion))
     sold = as_sold(dispersion)
-    if sold is not None and natural(dispersion) == sold:
+    if sold is not None and dispersion.natural == sold:
         widgets.tooltip("As in the catalogue.")
     if dispersion.gain != 1.0:
         imgui.same_line()
@@ -208,7 +207,11 @@ def _draw_lines(dispersion: Dispersion) -> None:
         ("n_d", f"{lines.n_d:.5f}", "Index at the helium d line, 587.56 nm (yellow)."),
         ("n_C", f"{lines.n_c:.5f}", "Index at the hydrogen C line, 656.27 nm (red)."),
         ("n_F − n_C", f"{lines.principal:.5f}", "Principal dispersion, gain included."),
-        ("V_d", abbe_text(lines.v_d), "Abbe number of what is rendered, gain included."),
+        (
+            "V_d" if dispersion.gain == 1.0 else "V_d / gain",
+            abbe_text(lines.v_d),
+            "Abbe number over the gain: that of what is rendered.",
+        ),
         (
             "P_g,F",
             "–" if lines.partial_gf is None else f"{lines.partial_gf:.4f}",

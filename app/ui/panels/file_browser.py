@@ -248,8 +248,11 @@ def _choose(question: Question) -> None:
     elif not path.is_file() and _browser.name.strip() in question.known:
         _answer(question, question.known[_browser.name.strip()])
     elif not path.is_file():
-        near = suggestion(path.name, [*(entry.path.name for entry in _browser.entries), *question.known])
-        where = "here" if path.parent == _browser.folder else f"in {path.parent}"
+        is_here = path.parent == _browser.folder
+        near = suggestion(
+            path.name, [*(entry.path.name for entry in _browser.entries), *question.known] if is_here else ()
+        )
+        where = "here" if is_here else f"in {path.parent}"
         _browser.error = f"There is no file {path.name} {where}{near.rstrip('?')}{'?' if near else '.'}"
     else:
         _answer(question, path)

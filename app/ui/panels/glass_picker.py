@@ -13,9 +13,8 @@ from imgui_bundle import ImVec2, imgui
 
 from ...edit import edits
 from ...edit.state import State
-from ...model.optics import catalogue, glass
+from ...model.optics import catalogue
 from ...model.optics.catalogue import Entry
-from ...model.scene import Scene
 from .. import item_rects, theme
 from ..view_model import ViewModel
 from . import widgets
@@ -63,16 +62,12 @@ def draw_glass_picker(state: State, view_model: ViewModel) -> State:
 
 
 def apply_glass(state: State, entry: Entry) -> State:
-    """The selected object of that glass; its dispersion gain stays as it is. A refusal becomes a notice."""
+    """The selected object of that glass, without the gain of the other one. A refusal becomes a notice."""
     selected = selected_glass(state)
     if selected is None:
         return state
-    index, item, material = selected
-
-    def edit(scene: Scene) -> Scene:
-        return edits.set_dispersion(scene, index, glass.with_gain(entry.dispersion, material.dispersion.gain))
-
-    return edits.attempt(state, f"Glass of {item.name}: {entry.name}", edit)
+    index, item, _ = selected
+    return edits.attempt(state, f"Glass of {item.name}: {entry.name}", edits.set_dispersion, index, entry.dispersion)
 
 
 @lru_cache(maxsize=64)

@@ -6,7 +6,7 @@ Pure functions of `Dispersion`; nothing here draws.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -74,12 +74,7 @@ def glasses_of(scene: Scene) -> list[tuple[int, SceneObject, Dielectric]]:
 
 def own_numbers(dispersion: Dispersion) -> tuple[float, float]:
     """n_d and V_d of the material before its gain, such that `with_abbe` of them changes nothing."""
-    return edits.abbe_numbers(natural(dispersion))
-
-
-def natural(dispersion: Dispersion) -> Dispersion:
-    """The material itself, its gain back at 1."""
-    return replace(dispersion, gain=1.0)
+    return edits.abbe_numbers(dispersion.natural)
 
 
 def base_name(dispersion: Dispersion) -> str:

@@ -16,7 +16,7 @@ from ...model.optics.glass import LINE_C_NM, LINE_D_NM, LINE_F_NM, Dispersion
 from .. import item_rects, theme
 from ..view_model import ViewModel
 from . import widgets
-from .glass_values import CONTROL_NM, as_sold, natural, selected_glass, with_point
+from .glass_values import CONTROL_NM, as_sold, selected_glass, with_point
 from .rows import begin_row
 from .spectral_colour import colour_of_nm, draw_strip
 
@@ -82,7 +82,7 @@ def draw_index_curve(state: State, view_model: ViewModel) -> State:
 
 def _draw_reset(state: State, index: int, dispersion: Dispersion) -> State:
     sold = as_sold(dispersion)
-    can_reset = sold is not None and natural(dispersion) != sold
+    can_reset = sold is not None and dispersion.natural != sold
     tip = (
         f"Back to the curve of {sold.name}; the dispersion gain stays."
         if sold

@@ -27,6 +27,7 @@ from . import outliner, picture_choice, widgets
 from .camera_rows import draw_camera_rows
 from .declared_rows import draw_flags, draw_numbers
 from .environment_rows import draw_environment
+from .glass_values import abbe_text, own_numbers
 
 _KINDS = {cls.title: cls for cls in MATERIAL_KINDS.values()}
 _UNITS = "units"
@@ -176,9 +177,10 @@ def _glass(state: State, material: Material) -> State:
         dispersion.name or "unnamed",
         tip="Name of the glass. Its dispersion is edited in the Dispersion panel.",
     )
-    number = f"{dispersion.V_d:.2f}" if np.isfinite(dispersion.V_d) else "none"
     widgets.read_out(
-        "n_d, V_d", f"{dispersion.n_d:.5f}, {number}", tip="Index at 587.56 nm and Abbe number, gain included. No unit."
+        "n_d, V_d",
+        f"{dispersion.n_d:.5f}, {abbe_text(own_numbers(dispersion)[1])}",
+        tip="Index at 587.56 nm and Abbe number of the glass, before its gain. No unit.",
     )
     if not state.preferences.panels.dispersion and widgets.button(
         "Edit dispersion", tip="Open the Dispersion panel.", width=-1

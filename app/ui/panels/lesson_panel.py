@@ -28,7 +28,10 @@ def draw_lesson(state: State, view_model: ViewModel) -> State:
         widgets.hint(f"{number}. {step}")
     imgui.end_child()
     following = lessons()[(index + 1) % len(lessons())]
-    if widgets.button(f"Next: {following.title}###next lesson", tip="Open the next lesson.", width=-1):
+    words = f"Next: {following.title}"
+    if imgui.calc_text_size(words).x > imgui.get_content_region_avail().x - theme.em(0.8):
+        words = "Next"
+    if widgets.button(f"{words}###next lesson", tip=f"Open the next lesson: {following.title}.", width=-1):
         state = _open(state, view_model, following)
     return state
 
@@ -45,4 +48,7 @@ def draw_lesson_items(state: State, view_model: ViewModel) -> State:
 
 
 def _open(state: State, view_model: ViewModel, lesson: Lesson) -> State:
+    """A lesson that was tried out is nobody's work: the next one comes without a question."""
+    if state.lesson:
+        return state.asking(OpenLesson(lesson.name)).with_panels(start_page=False)
     return dialogs.unless_unsaved(state, view_model, OpenLesson(lesson.name))

@@ -35,5 +35,5 @@ def percent(share: float) -> str:
 
 
 def kelvin(temperature_k: float) -> str:
-    """A colour temperature: "6,390 K", "2,856 K"; to ten kelvin from 3,000 K on, as well as it can be told."""
-    return f"{round(temperature_k, -1 if temperature_k >= 3000.0 else 0):,.0f} K"
+    """A colour temperature: "6,504 K", "25,370 K"; to ten kelvin from 10,000 K on, as well as it can be said."""
+    return f"{round(temperature_k, -1 if temperature_k >= 1e4 else 0):,.0f} K"

@@ -24,6 +24,7 @@ _FLAGS = (
 _BORDER_EM = 0.8
 _WIDTH_EM = 26.0
 _MOST_PARTS = 12
+WINDOW = "##opened"
 
 _memory = {"closed": "", "part": "0", "glass": DEFAULT_GLASS, "selected": ""}
 """The file whose questions were closed, and what was last chosen: memory of the interface."""
@@ -43,7 +44,7 @@ def draw_opened_card(state: State, view_model: ViewModel, middle_x: float, botto
     imgui.set_next_window_pos((middle_x, bottom - theme.em(_BORDER_EM)), imgui.Cond_.always, imgui.ImVec2(0.5, 1.0))
     # Darker than fields and buttons, which must stand out on it whatever the picture.
     imgui.push_style_color(imgui.Col_.window_bg, (*theme.palette().window[:3], 0.97))
-    imgui.begin("##opened", None, _FLAGS)
+    imgui.begin(WINDOW, None, _FLAGS)
     item_rects.note("Window: opened")
     if view_model.up is not None:
         state = _up(state, view_model)

@@ -67,7 +67,12 @@ def draw_add_items(state: State) -> State:
             widgets.tooltip(cls.remark)
             if pressed:
                 state = _added(
-                    state, Selection("light", len(state.scene.lights)), f"Add {kind} light", edits.add_light, kind
+                    state,
+                    Selection("light", len(state.scene.lights)),
+                    f"Add {kind} light",
+                    edits.add_light,
+                    kind,
+                    state.view,
                 )
         imgui.end_menu()
     item_rects.note("Add light")

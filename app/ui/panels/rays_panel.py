@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from imgui_bundle import imgui
 
 from ...edit.state import State
@@ -14,7 +16,10 @@ from .spectral_colour import colour_of_nm
 _COLUMNS: tuple[tuple[str, str], ...] = (
     ("nm", "Vacuum wavelength."),
     ("n", "Refractive index of the glass."),
-    ("Deviation", "Angle between the middle ray before and behind the glass."),
+    (
+        "Deviation",
+        "Angle between the middle ray before and behind the glass; with inner reflections the least turn of all rays.",
+    ),
     (
         "Minimum",
         "Minimum deviation of a prism with these two faces: 2 asin(n sin(A/2)) - A, for rays in its principal section.",
@@ -30,13 +35,27 @@ def draw_rays_panel(state: State, view_model: ViewModel) -> State:
         if widgets.button("Draw rays", tip="Draw a fan of rays through the selected object (R)."):
             state = state.with_display(ray_overlay=True)
         return state
+    changed, reflections, _ = widgets.slider(
+        "Inner reflections",
+        state.display.ray_reflections,
+        0,
+        4,
+        unit="",
+        format="%.0f",
+        reset=0,
+        tip="How often rays are reflected within the glass before they leave it: 1 and 2 in a drop make the rainbows.",
+    )
+    if changed:
+        state = state.with_display(ray_reflections=round(reflections))
     if not view_model.readings:
         widgets.hint("No ray of this light meets the selected object. Select an object of glass, or another light.")
         return state
+    if state.display.ray_reflections:
+        imgui.text_wrapped(_bow(view_model.readings))
     apex = view_model.readings[0].apex_deg
     if apex is not None:
         imgui.text_unformatted(f"Prism: the faces that the rays go through make {apex:.2f}°.")
-    flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.sizing_stretch_same | imgui.TableFlags_.scroll_y
+    flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.sizing_stretch_prop | imgui.TableFlags_.scroll_y
     if not imgui.begin_table("##readings", len(_COLUMNS), flags):
         return state
     imgui.table_setup_scroll_freeze(0, 1)
@@ -52,6 +71,12 @@ def draw_rays_panel(state: State, view_model: ViewModel) -> State:
         _row(reading)
     imgui.end_table()
     return state
+
+
+def _bow(readings: Sequence[RayReading]) -> str:
+    ends = ((abs((r.deviation_deg + 180.0) % 360.0 - 180.0), r.wavelength_nm) for r in (readings[0], readings[-1]))
+    bow = " and ".join(f"{180.0 - turn:.1f}° ({nm:.0f} nm)" for turn, nm in ends)
+    return f"Rays crowd where they turn least: a bow at {bow} from the point opposite the light."
 
 
 def _row(reading: RayReading) -> None:

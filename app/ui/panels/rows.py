@@ -17,25 +17,28 @@ _TIP_HOVERS = imgui.HoveredFlags_.for_tooltip.value | imgui.HoveredFlags_.allow_
 """Put together once: a hundred items ask in every frame."""
 
 
-def begin_row(label: str) -> bool:
+def begin_row(label: str, needs: float = 0.0) -> bool:
     """Draw the label and give the next item the rest of the row; True when the label was double-clicked.
 
-    A label wider than its column pushes the field aside, or onto a line of its own: nothing is cut off.
+    A label wider than its column pushes the field aside, or onto a line of its own, as does a field whose text `needs`
+    more pixels than it would get: nothing is cut off.
     """
     shown = named(label.split("##")[0])
     room = imgui.get_content_region_avail().x
     column = min(theme.em(_LABEL_EM), _LABEL_SHARE * room)
     gap = imgui.get_style().item_inner_spacing.x
     start, hit = imgui.get_cursor_pos_x(), False
+    if room - column - gap < needs:
+        column = 0.0
     if shown:
         imgui.align_text_to_frame_padding()
         imgui.text_unformatted(shown)
         hit = double_clicked()
         column = max(column, imgui.calc_text_size(shown).x)
-        if room - column - gap >= theme.em(_MIN_FIELD_EM):
+        if room - column - gap >= max(theme.em(_MIN_FIELD_EM), needs):
             imgui.same_line()  # its offset would count from a table's column, the cursor's place does not
             imgui.set_cursor_pos_x(start + column + gap)
-    else:
+    elif column:
         imgui.set_cursor_pos_x(start + column + gap)
     imgui.set_next_item_width(-1.0)
     return hit

@@ -8,6 +8,8 @@ from imgui_bundle import imgui, implot
 from ...base.not_yet import NOT_YET
 from ...edit.chromaticity import ColourInfo, colour_info, ready
 from ...edit.state import State
+from ...model.optics.colorimetry import VISIBLE_NM
+from ...model.scene import Scene
 from .. import theme
 from ..view_model import CursorInfo, ViewModel
 from . import numbers, rows, spectral_colour, widgets
@@ -24,7 +26,7 @@ def draw_spectrum(state: State, view_model: ViewModel) -> State:
         return state
     colour, is_ready = None, ready()
     if is_ready and cursor.spectrum is not None and cursor.spectrum_nm is not None:
-        colour = colour_info(cursor.spectrum_nm, cursor.spectrum)
+        colour = colour_info(cursor.spectrum_nm, cursor.spectrum, _source(state.scene))
     _told(state, cursor, colour)
     if cursor.hit is None:
         widgets.hint("Nothing but background is under the cursor.")
@@ -39,6 +41,12 @@ def draw_spectrum(state: State, view_model: ViewModel) -> State:
             widgets.hint(_TOO_FEW)
         _plot(cursor.spectrum_nm, cursor.spectrum)
     return state
+
+
+def _source(scene: Scene) -> np.ndarray:
+    """The spectrum of all lamps together, on `VISIBLE_NM`."""
+    edges = np.append(VISIBLE_NM - 0.5, VISIBLE_NM[-1] + 0.5)
+    return np.sum([light.spectral_power.binned(edges) for light in scene.lights], axis=0)
 
 
 def _told(state: State, cursor: CursorInfo, colour: ColourInfo | None) -> None:

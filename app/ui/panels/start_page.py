@@ -9,7 +9,7 @@ from ...edit.requests import Recover
 from ...edit.state import State
 from .. import item_rects, theme
 from ..view_model import SceneEntry, ViewModel
-from . import dialogs, lesson_panel, widgets
+from . import dialogs, lesson_panel, messages, widgets
 
 _CARD_EM, _GAP_EM = 17.0, 1.1
 _ASPECT = 9 / 16
@@ -35,7 +35,7 @@ def draw_start_page(state: State, view_model: ViewModel) -> State:
     _title(view_model)
     if view_model.recovery is not None:
         state = _recovery(state, view_model)
-    imgui.dummy(imgui.ImVec2(0, theme.em(0.4)))
+    imgui.dummy(imgui.ImVec2(0, max(theme.em(0.4), messages.end_on_start_page["y"] - imgui.get_cursor_screen_pos().y)))
     imgui.begin_child("##side", imgui.ImVec2(theme.em(15), 0))
     state = _side(state, view_model)
     imgui.end_child()
@@ -50,7 +50,10 @@ def draw_start_page(state: State, view_model: ViewModel) -> State:
 def _title(view_model: ViewModel) -> None:
     with theme.heading(1.9):
         imgui.text_unformatted("SpectraSplat")
-    widgets.hint("Dispersive caustics, live. Choose a scene, or drop a scene, a GLB or a mesh on the window.")
+    widgets.hint(
+        "See the coloured light that glass throws, and change the glass while you look. Click a scene or a lesson to "
+        "begin; drop a scene, a GLB or a mesh of your own on the window."
+    )
     if view_model.stats.renderer:
         widgets.hint(f"Draws with {view_model.stats.renderer}")
 

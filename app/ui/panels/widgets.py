@@ -183,9 +183,10 @@ def combo(
 ) -> tuple[bool, Choice]:
     """A choice. A mapping shows its values and returns its keys; `current` need not be among the options."""
     shown: Mapping[Choice, str] = options if isinstance(options, Mapping) else {option: option for option in options}
-    begin_row(label)
+    preview = named(shown.get(current, current))
+    begin_row(label, _boxed(preview))
     chosen = current
-    opened = imgui.begin_combo(f"##{label}", named(shown.get(current, current)))
+    opened = imgui.begin_combo(f"##{label}", preview)
     if opened:
         for key, text in shown.items():
             if imgui.selectable(f"{named(text)}##{key}", key == current)[0]:
@@ -200,10 +201,16 @@ def combo(
 
 def toggle(label: str, value: bool, *, tip: str) -> tuple[bool, bool]:
     """A box to tick, in the column of the fields, its words behind it."""
-    begin_row("")
+    begin_row("", _boxed(label))
     changed, ticked = imgui.checkbox(label, value)
     explain(label, tip)
     return changed, ticked
+
+
+def _boxed(text: str) -> float:
+    """Width of a text with a square button and their margins, pixels."""
+    style = imgui.get_style()
+    return imgui.calc_text_size(text).x + imgui.get_frame_height() + 2.0 * style.frame_padding.x
 
 
 def button(label: str, *, tip: str, enabled: bool = True, width: float = 0.0) -> bool:
@@ -366,7 +373,8 @@ def note(text: str) -> None:
 
 def error(text: str) -> None:
     """Something that was refused, and why; written as a sentence whatever its ends."""
-    words(f"{text[:1].upper()}{text[1:].rstrip('.')}.", theme.palette().error)
+    end = "" if text.endswith("?") else "."
+    words(f"{text[:1].upper()}{text[1:].rstrip('.')}{end}", theme.palette().error)
 
 
 def unless_locked(state: State, selection: Selection, draw: Callable[[State], State]) -> State:
