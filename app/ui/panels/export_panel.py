@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -247,9 +247,3 @@ def reset() -> None:
     fresh = _Choices()
     for name, value in vars(fresh).items():
         setattr(_choices, name, value)
-
-
-def with_keys(state: State) -> State:
-    """The state with the panel open at the animation's keys."""
-    _choices.kind = "keys"
-    return replace(state.with_panels(export=True))
