@@ -16,7 +16,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 _LINE = re.compile(r"^\s*(?:(%\d+)\s*=\s*)?(Op\w+)\s*(.*)$")
-_IDENTIFIER = re.compile(r"%\d+")
 _STRING = re.compile(r'"(?:[^"\\]|\\.)*"')
 _BOUNDS = frozenset(("OpFunction", "OpFunctionEnd"))
 _MERGES = frozenset(("OpLoopMerge", "OpSelectionMerge"))

@@ -21,7 +21,6 @@ _ENVIRONMENT = "opengl4.5"
 APT_LINE = "apt-get install glslang-tools spirv-tools"
 PATIENCE_S = 60.0
 _REFLECTION = "Uniform block reflection:"
-_UNKNOWN = "0:"
 
 
 def missing() -> str:

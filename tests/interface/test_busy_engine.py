@@ -72,10 +72,9 @@ def busy(gl: Context, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterat
 def test_a_click_on_a_stone_selects_it_and_one_on_nothing_clears(busy: Busy) -> None:
     busy.interface.click(busy.stone)
     assert busy.session.state.selection == Selection("object", PRISM) and not busy.session.awaited
-    away = np.add(busy.session.state.camera.position, (0.0, 0.3, 1.0))
-    busy.session.state = replace(
-        busy.session.state, camera=replace(busy.session.state.camera, target=tuple(away.tolist()))
-    )
+    camera = busy.session.state.camera
+    away = replace(camera, target=tuple(np.add(camera.position, (0.0, 0.3, 1.0))))
+    busy.session.state = replace(busy.session.state, camera=away)
     busy.interface.frame()
     busy.interface.click(busy.interface.find("Picture").at(0.5, 0.5))
     assert busy.session.state.selection == Selection()

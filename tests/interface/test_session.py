@@ -14,7 +14,7 @@ from spectrasplat.edit.picking import pick_in
 from spectrasplat.edit.preferences import config_dir
 from spectrasplat.edit.state import Selection, State
 from spectrasplat.gpu.context import Context
-from spectrasplat.model.scene import Camera, Dielectric, Diffuse
+from spectrasplat.model.scene import Camera, Dielectric
 from spectrasplat.render.viewer.dirty_level import DirtyLevel
 from spectrasplat.ui.crash_log import FILE_NAME
 from spectrasplat.ui.frame import run_frame
@@ -28,6 +28,7 @@ from tests.interface.fake_engine import FakeEngine, dispersed
 from tests.interface.soak import resident_bytes
 
 Edit = Callable[[State], State]
+ON_TABLE = 0.25, 0.75
 
 
 @dataclass
@@ -210,7 +211,7 @@ def test_a_bug_in_a_request_is_logged_and_the_work_autosaved(
         raise ZeroDivisionError("a fault")
 
     monkeypatch.setattr("spectrasplat.ui.session_requests.source_at", bug)
-    rig.ask(requests.SelectAt(*place_on(rig, Diffuse)))
+    rig.ask(requests.SelectAt(*ON_TABLE))
     assert any("a fault" in message.text and message.is_error for message in rig.view_model.messages)
     log = (config / FILE_NAME).read_text()
     assert "SelectAt" in log and "ZeroDivisionError" in log
@@ -266,18 +267,8 @@ def test_recovery_after_a_crash(gl: Context, rig: Rig, config: Path, monkeypatch
     second.session.release()
 
 
-def place_on(rig: Rig, kind: type) -> tuple[float, float]:
-    """Where in the picture something of that material is seen."""
-    state = replace(rig.session.state, viewport_size=(64, 36))
-    for x, y in ((x, y) for y in np.linspace(0.98, 0.02, 25).tolist() for x in np.linspace(0.02, 0.98, 25).tolist()):
-        hit = pick_in(state, x, y)
-        if hit is not None and isinstance(state.scene.objects[hit.object_index].material, kind):
-            return x, y
-    raise AssertionError(f"{kind} is not in view")
-
-
 def test_a_click_selects_glass_or_whose_caustic_it_is(rig: Rig) -> None:
-    place = place_on(rig, Diffuse)
+    place = ON_TABLE
     hit = pick_in(replace(rig.session.state, viewport_size=(64, 36)), *place)
     assert hit is not None
     objects, receiver = rig.session.state.scene.objects, hit.object_index
@@ -293,7 +284,7 @@ def test_a_click_selects_glass_or_whose_caustic_it_is(rig: Rig) -> None:
 
 
 def test_facts_under_the_cursor(rig: Rig) -> None:
-    hover: Edit = lambda state: replace(state, hover=(0.25, 0.75))  # noqa: E731
+    hover: Edit = lambda state: replace(state, hover=ON_TABLE)  # noqa: E731
     rig.frame(hover)
     rig.frame(hover)
     cursor = rig.view_model.cursor

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,13 +11,11 @@ from spectrasplat.edit.projection import View
 from spectrasplat.edit.state import State
 from spectrasplat.model.geometry import primitives
 from spectrasplat.model.geometry.mesh import make_mesh
-from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.optics import glass
 from spectrasplat.model.scene import Camera, Dielectric, Diffuse, Scene, SceneObject
 
 PINHOLE = Camera(position=(1.0, -6.0, 3.5), target=(0.3, 0.2, 0.0), vertical_fov_deg=28.0)
 ORTHOGRAPHIC = replace(PINHOLE, kind="orthographic", vertical_extent=4.0)
-SCENES = Path(__file__).parents[2] / "assets" / "scenes"
 
 
 def quad(half: float, z: float, material, name: str) -> SceneObject:
@@ -77,13 +74,6 @@ def test_what_is_hidden_is_looked_past() -> None:
     assert pick_in(state, *place).object_index == 1  # type: ignore[union-attr]
     everything = frozenset(("object", item.name) for item in scene.objects)
     assert pick_in(replace(state, hidden=everything), *place).object_index == 0  # type: ignore[union-attr]
-
-
-def test_objects_of_a_real_scene_are_picked_where_they_are() -> None:
-    scene = load_scene(SCENES / "default.toml")
-    for index, item in enumerate(scene.objects[:2]):
-        middle = (item.mesh.vertices @ item.object_to_world[:3, :3].T + item.object_to_world[:3, 3]).mean(axis=0)
-        assert at(scene, scene.camera, middle).object_index == index  # type: ignore[union-attr]
 
 
 def test_blocks_of_triangles_find_what_all_triangles_do() -> None:

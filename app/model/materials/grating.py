@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from ..geometry.mesh import Mesh
 
 MAX_ORDER = 50
-MAX_ORDERS = 2 * MAX_ORDER + 1
 MIN_LINES, MAX_LINES = 1.0, 10_000.0
 _SUM_SLACK = 1e-9
 _MIN_SINE = 1e-3
