@@ -28,7 +28,7 @@ NOISE = 0.05
 LEAST_TRANSMITTANCE = 1e-6
 """What a measured 0 is taken for: no instrument sees less, and nothing is quite opaque."""
 
-_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[ed][-+]?\d+)?", re.IGNORECASE)
+_NUMBER = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[ed][-+]?\d+)?", re.IGNORECASE)
 _WITH_UNIT = re.compile(r"(?:.*[^\d.,])?(\d+(?:[.,]\d+)?) ?[\[(]?nm[\])]?", re.IGNORECASE)
 """A wavelength in a cell of text: "380nm" (UPRtek), "Spectral Data 380[nm]" (Sekonic)."""
 _HEADED = re.compile(r"\D*(\d{3,4}(?:[.,]\d+)?)\D*")
