@@ -21,7 +21,7 @@ from .polarised_arrays import from_one_axis
 from .rays import PARALLEL, PINHOLE, SOURCE
 from .screen_polygons import ScreenPolygons
 from .search import LEAF_OPEN, LEAF_PIECE, LEAF_TAIL, SUM_BEAMS, SUM_ENTERED, SUM_LEAVES, SUMS
-from .sources import colour_edges, mask_at
+from .sources import colour_edges, distance_to, mask_at
 
 TOLERANCE_PX = 0.1
 """How far, in pixels at the objects' distance, places and edges may be from linear."""
@@ -105,7 +105,6 @@ class CameraView:
             return None, 1.0
         right, up, forward = camera_frame(camera)
         place = self._to_gpu(np.array(camera.position, float))
-        corners = np.concatenate([f["corner"][: f["corners"]] for f in facets])
         width, height = size
         limits = np.array([[width, 2.0, 0.0], [width, -2.0, 0.0], [height, 0.0, 2.0], [height, 0.0, -2.0]]) * 0.5
         if camera.kind == "orthographic":
@@ -113,7 +112,10 @@ class CameraView:
             footprint, kind, scale = pixel, PARALLEL, 1.0
         else:
             pixel = 2.0 * np.tan(np.radians(0.5 * camera.vertical_fov_deg)) / height
-            distance = np.linalg.norm(corners - place, axis=1).min()
+            # A wide facet may be far nearer than its corners: only those are measured that may be nearest.
+            within = np.linalg.norm(facets["centre"] - place, axis=1) - facets["radius"]
+            farthest = np.linalg.norm(facets["corner"][:, 0] - place, axis=1).min()
+            distance = min(distance_to(place, f["corner"][: f["corners"]]) for f in facets[within <= farthest])
             footprint, kind = pixel * max(float(distance), 0.02), PINHOLE
             scale = pixel / footprint
         limits[:, 0] *= footprint

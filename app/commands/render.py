@@ -20,6 +20,7 @@ from . import options
 
 if TYPE_CHECKING:
     from ..edit.opening import Opening
+    from ..render.still import RenderStats
 
 
 START_S, FRESH_S = 0.3, 20.0
@@ -101,6 +102,8 @@ def render_command(request: RenderRequest) -> int:
         stopped = interrupted()
     if better := advice(result.stats.renderer, result.stats.is_software):
         print(f"note: {better}", file=sys.stderr)
+    if request.camera == "beams" and (reason := _why_paths(scene, settings, result.stats)):
+        print(f"note: --camera beams is not followed: {reason}; the picture is seen by paths", file=sys.stderr)
     for notice in result.stats.notices:
         print(f"note: {plain(notice)}", file=sys.stderr)
     write_image(
@@ -231,6 +234,14 @@ def complete_settings(asked: dict[str, Any], scene: Scene, stats: bool) -> Rende
     options.check_layer(settings.layer, scene)
     check_picture_memory(settings.width, settings.height, settings.bins)
     return settings
+
+
+def _why_paths(scene: Scene, settings: RenderSettings, stats: RenderStats) -> str:
+    """Why the camera saw nothing by beams; "" where it did."""
+    from ..model.features import why_no_camera_beams  # it need not be read before the checks
+
+    beams = stats.camera_pass.beams
+    return beams.reason if beams is not None else why_no_camera_beams(scene, settings) or ""
 
 
 def _unused_options(request: RenderRequest) -> list[str]:

@@ -21,6 +21,7 @@ from ..beams.screen_pairs import count_pixel_parts
 from ..beams.screen_polygons import ScreenPolygons
 from ..beams.screen_starts import ScreenStarts
 from ..model.scene import Camera
+from ..model.scene_checks import contains
 from ..passes.camera import CameraPass
 from ..passes.pixel_lattice import shared_places
 from ..passes.sample_spread import PRIMARY_SAMPLES, PRIMARY_SAMPLES_UNTIL
@@ -105,7 +106,7 @@ class CameraBeams:
         """Give the pass this frame's polygons, or none where paths serve it better; pauses between searches."""
         self._pass.take_beams(None)
         self.stats = CameraBeamStats()
-        self.stats.reason = self._why_never()
+        self.stats.reason = self._why_never(camera)
         if self.stats.reason:
             return
         view = camera, (width, height), samples, seed
@@ -157,7 +158,11 @@ class CameraBeams:
         # What nothing chooses now (`CameraPass.chooses`) must not be left from another frame.
         self._pass.spectrum = Spectrum(self._pass.fixed_bands or 1)
 
-    def _why_never(self) -> str:
+    def _why_never(self, camera: Camera) -> str:
         if not self._is_software:
             return "costs are known of software renderers only"
+        objects, place = self._pass.scene.scene.objects, np.array(camera.position)
+        if any(item.material.transmits and contains(item, place) for item in objects):
+            # The first facet may reflect everything about its normal, where edges of beams are straight.
+            return "the camera is inside glass"
         return "" if self._pass.disperses else "nothing in view disperses"
