@@ -14,11 +14,13 @@ from .features import (
     half_spaces,
     has_borders,
     why_no_beams,
+    why_no_camera_beams,
     why_no_haze,
 )
 from .flat_shapes import is_flat
 from .scene import Scene
-from .settings import divides_spectrum, has_beams
+from .settings import RenderSettings, has_beams
+from .tint_bands import tint_curves
 from .tint_levels import MAX_LIGHTS
 
 
@@ -279,20 +281,10 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
             features.camera_beams,
             "flat facets in view may be seen by beams, where that is cheaper"
             if features.camera_beams
-            else _no_camera_beams_words(scene, features),
+            else why_no_camera_beams(scene, RenderSettings(method=features.method)) or "--camera beams would try them",
         ),
         ("blockers", black > 0, f"{black} black object(s)" if black else "no black object"),
     ]
-
-
-def _no_camera_beams_words(scene: Scene, features: Features) -> str:
-    if not divides_spectrum(features.method):
-        return f"method {features.method} follows paths"
-    if not features.camera_specular:
-        return "no glass and no mirror is in view"
-    if any(o.material.has_coat for o in scene.objects):
-        return "a receiver is glossy"
-    return "--camera beams would try them" if beam_objects(scene) else "no glass and no mirror has flat facets only"
 
 
 def _beam_words(scene: Scene, features: Features) -> str:
@@ -337,7 +329,9 @@ def _tint_words(scene: Scene, features: Features) -> str:
         return "haze knows tints at three wavelengths a band"
     if features.anchor_weights:
         return "in the viewer photons know tints at three wavelengths a band"
-    return "tints are too faint" if len(scene.lights) <= MAX_LIGHTS else f"there are more than {MAX_LIGHTS} lights"
+    if len(scene.lights) > MAX_LIGHTS:
+        return f"there are more than {MAX_LIGHTS} lights"
+    return "several tints need bands all the same" if len(tint_curves(scene)) else "tints are too faint"
 
 
 def _polarisation_words(scene: Scene, features: Features) -> str:

@@ -49,9 +49,12 @@ def tint_curves(scene: Scene, but: np.ndarray | None = None) -> np.ndarray:
         if absorption is not None and but is not None and np.array_equal(absorption.coefficient, but):
             continue
         if absorption is not None:
-            depth = absorption.coefficient * mean_chord(item)
+            chord, turn = mean_chord(item), item.object_to_world[:3, :3]
+            _, broad, long = np.sort(np.ptp(item.mesh.vertices @ turn.T, axis=0))
             with np.errstate(under="ignore"):
-                found = [np.exp(-share * depth) for share in _PATHS]
+                # Light may come the long way through a rod.
+                paths = (*_PATHS, long / chord) if long > 4.0 * max(broad, chord) else _PATHS
+                found = [np.exp(-share * absorption.coefficient * chord) for share in paths]
         elif (rgb := getattr(item.material, "reflectance_rgb", None)) is not None and not item.material.receives:
             curve = mirror_reflectance(rgb, VISIBLE_NM)
             found = [curve**times for times in _MIRRORS]
