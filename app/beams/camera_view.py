@@ -53,6 +53,18 @@ class CameraView:
         self.gave_up = False
         """It found too much to go on; what it returned is a part."""
 
+    def sees_all_angles(self, camera: Camera) -> bool:
+        """Whether it sees a facet both from straight ahead and from more than 60° beside that: what the facet reflects
+        and transmits has no slope where the search would take it, and is another farther out."""
+        place = self._to_gpu(np.array(camera.position, float))
+        facets = self.scene.facets[self.scene.facets["kind"] < BLACK]
+        heights = np.abs(facets["plane"][:, :3] @ place - facets["plane"][:, 3])
+        is_wide = 2.0 * heights < np.linalg.norm(facets["centre"] - place, axis=1) + facets["radius"]
+        near = (distance_to(place, f["corner"][: f["corners"]]) for f in facets[is_wide])
+        return camera.kind != "orthographic" and any(
+            d < 1.0001 * h for d, h in zip(near, heights[is_wide], strict=True)
+        )
+
     def find_screen_polygons(
         self,
         camera: Camera,

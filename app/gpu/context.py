@@ -50,8 +50,8 @@ def check_device(ctx: moderngl.Context, where: str) -> None:
         raise OwnCallError(own_fault(f"OpenGL was asked wrongly ({error} in {where})"))
     if error != "GL_NO_ERROR":  # moderngl has no name for a lost context
         raise DeviceError(
-            f"the device was lost ({error} in {where}), as after a reset or sleep: start again; where it happens again, "
-            "a smaller --batch or another device may do ('spectrasplat doctor' lists them)"
+            f"the device was lost ({error} in {where}), as after a reset or sleep: start again, with a smaller --batch "
+            "or on another device where it happens again"
         )
 
 

@@ -163,6 +163,7 @@ class CameraBeams:
             return "costs are known of software renderers only"
         objects, place = self._pass.scene.scene.objects, np.array(camera.position)
         if any(item.material.transmits and contains(item, place) for item in objects):
-            # The first facet may reflect everything about its normal, where edges of beams are straight.
             return "the camera is inside glass"
+        if self._view.sees_all_angles(camera):
+            return "a wide facet is seen from straight ahead to grazing"
         return "" if self._pass.disperses else "nothing in view disperses"
