@@ -31,13 +31,29 @@ class DeviceError(UserError, RuntimeError):
     """OpenGL could not do what was asked of it."""
 
 
+class OwnCallError(DeviceError):
+    """OpenGL was asked for what cannot be done."""
+
+    exit_code = 1
+
+
+def own_fault(what: str) -> str:
+    """A sentence: `what` went wrong by a fault of the program, and what a report of it needs."""
+    return (
+        f"{what}: this is a fault of SpectraSplat itself; please report it with this line, the scene and what "
+        "'spectrasplat doctor' prints"
+    )
+
+
 def sentence_of(error: BaseException) -> str | None:
     """What running out of memory, or an error of OpenGL's, means to a user; None for anything else."""
     if isinstance(error, MemoryError):
         return "out of memory: use fewer photons, a smaller picture or a simpler mesh"
-    # moderngl says so where a buffer, a texture or a program cannot be made; it may not even be imported.
+    # moderngl may not even be imported.
     if type(error).__module__.split(".")[0] in ("moderngl", "_moderngl", "mgl"):
-        return f"OpenGL failed ({error}): use a smaller picture or fewer photons, or update the driver"
+        if str(error).startswith("cannot create"):
+            return f"the device has no memory left, or was lost ({error}): use a smaller picture or fewer photons"
+        return own_fault(f"OpenGL was asked wrongly ({error})")
     return None
 
 

@@ -24,7 +24,7 @@ import numpy as np
 
 from . import files
 from .atomic import atomic_output
-from .errors import BrokenPictureError, UserError
+from .errors import BrokenPictureError, UserError, own_fault
 from .exr_layers import read_exr_layer
 from .glare import with_glare
 from .primaries import REC709
@@ -38,6 +38,8 @@ LARGEST_WEBP_SIDE = 16383
 _READ_SUFFIXES = (".png", ".exr", ".npy")
 MAX_PIXELS = 1 << 26
 """Of a picture that is read; 805 MB as float32: a mistake rather than a wish."""
+_HUGE = 1e30
+"""Radiance beyond which sums may be more than float32 holds."""
 
 
 @dataclass(frozen=True)
@@ -131,11 +133,13 @@ def write_into(
 
 def check_finite(name: str, *pictures: np.ndarray | None) -> None:
     """Raise `BrokenPictureError` where a picture that is to be written as `name` holds NaN or infinity."""
-    if not all(picture is None or np.isfinite(picture).all() for picture in pictures):
-        raise BrokenPictureError(
-            f"{name} is not written: the picture holds numbers that are not finite; a power or a size of the scene is "
-            "beyond what float32 can hold, choose others"
-        )
+    broken = [picture for picture in pictures if picture is not None and not np.isfinite(picture).all()]
+    if not broken:
+        return
+    what = f"{name} is not written: the picture holds numbers that are not finite"
+    if any(np.abs(picture).max(where=np.isfinite(picture), initial=0.0) > _HUGE for picture in broken):
+        raise BrokenPictureError(f"{what}, and others above {_HUGE:g}: light of the scene is too strong, choose less")
+    raise BrokenPictureError(own_fault(what))
 
 
 def png_bytes(rgb: np.ndarray, exposure_ev: float = 0.0, glare: float = 0.0, antialias: bool = True) -> bytes:

@@ -20,12 +20,33 @@ if TYPE_CHECKING:
 SHOW_AFTER_S = 2.0
 LOG_EVERY_S = 10.0
 _BAR_EVERY_S = 0.05
-_TELLING_SHARE = 1e-3
-"""Of the whole: less since the last line says nothing about what is left."""
+_MARK_EVERY = 0.01
+"""Of a phase's time."""
+_OBSERVED_S = 2.0
+"""For which a part of the work must have gone on evenly before the time left is foretold: …"""
+_EVEN = 1.5
+"""… its rates before and after the middle of that time within this factor."""
+_LEAST = 1e-3
+"""Of the whole, that has been done by then."""
+_UNKNOWN = 0.15
+"""Share of what is left, that parts of the work whose rate nobody knows yet may be."""
+
+
+class Phase(str):
+    """What a job is at, in words; `ends`: the job's fraction at which that is done. What follows goes at a rate of its
+    own."""
+
+    ends: float
+
+    def __new__(cls, text: str, ends: float) -> Self:
+        phase = super().__new__(cls, text)
+        phase.ends = ends
+        return phase
 
 
 class ProgressReporter:
-    """Call it with (fraction 0…1, text); use it as a context manager so that the bar ends.
+    """Call it with (fraction 0…1, text, which may be a `Phase`); use it as a context manager so that the bar ends.
+    The time left is told once it can be known.
 
     `clock` returns seconds and `stream` is stderr unless a test says otherwise.
     """
@@ -41,8 +62,9 @@ class ProgressReporter:
         self._clock = clock
         self._started = clock()
         self._told = self._started
-        self._last = (0.0, self._started)
-        """What was told last, and when."""
+        self._ends = 1.0
+        self._marks = [(self._started, 0.0)]
+        """When the phase's fraction was what, since it began to move."""
         self._furthest = 0.0
         self._bar: Progress | None = None
         self._task: TaskID | None = None
@@ -50,10 +72,11 @@ class ProgressReporter:
     def __call__(self, fraction: float, text: str = "") -> None:
         """Report; cheap enough to be called for every batch."""
         now = self._clock()
-        if now - self._started < SHOW_AFTER_S:
-            return
         # What is left may turn out to be more than was thought; the bar then stands still.
         self._furthest = fraction = min(max(fraction, self._furthest), 1.0)
+        self._mark(fraction, getattr(text, "ends", 1.0), now)
+        if now - self._started < SHOW_AFTER_S:
+            return
         if not self._stream.isatty():
             if now - self._told >= LOG_EVERY_S:
                 self._told = now
@@ -65,7 +88,7 @@ class ProgressReporter:
             return
         self._told = now
         assert self._bar is not None and self._task is not None
-        self._bar.update(self._task, completed=fraction, text=text)
+        self._bar.update(self._task, completed=fraction, text=text + (self._left_words(now) or ", estimating"))
 
     def close(self) -> None:
         """Take the bar away."""
@@ -84,14 +107,30 @@ class ProgressReporter:
     ) -> None:
         self.close()
 
+    def _mark(self, fraction: float, ends: float, now: float) -> None:
+        if ends != self._ends or fraction == self._marks[0][1]:  # it begins, or compiles first
+            self._ends, self._marks = ends, [(now, fraction)]
+        elif now - self._marks[-1][0] >= _MARK_EVERY * (now - self._marks[0][0]):
+            self._marks.append((now, fraction))
+
+    def _left_words(self, now: float) -> str:
+        """How long the rest takes; "" while that is not known."""
+        (begun, first), fraction = self._marks[0], self._furthest
+        middle = 0.5 * (begun + now)
+        then, before = next(mark for mark in self._marks[::-1] if mark[0] <= middle)
+        left = 1.0 - fraction
+        if now - begun < _OBSERVED_S or fraction - first < _LEAST or 1.0 - self._ends > _UNKNOWN * left:
+            return ""
+        if not first < before < fraction:
+            return ""
+        change = (fraction - before) / (now - then) * (then - begun) / (before - first)
+        if not 1.0 / _EVEN <= change <= _EVEN:
+            return ""
+        return f", about {left * (now - begun) / (fraction - first):.0f} s left"
+
     def _log(self, fraction: float, text: str, now: float) -> None:
         elapsed = now - self._started
-        detail = f", {text}" if text else ""
-        # One phase may be slower than those before it, and begin with compiling: halfway between of late and so far.
-        (before, then), self._last = self._last, (fraction, now)
-        if fraction - before > _TELLING_SHARE:
-            rate = 0.5 * ((fraction - before) / (now - then) + fraction / elapsed)
-            detail += f", about {(1.0 - fraction) / rate:.0f} s left"
+        detail = (f", {text}" if text else "") + self._left_words(now)
         print(
             f"{self._title}: {100.0 * fraction:.0f} % after {elapsed:.0f} s{detail}",
             file=self._stream,
@@ -105,14 +144,12 @@ class ProgressReporter:
             Progress,
             TaskProgressColumn,
             TextColumn,
-            TimeRemainingColumn,
         )
 
         self._bar = Progress(
             TextColumn("{task.description}", markup=False),
             BarColumn(),
             TaskProgressColumn(),
-            TimeRemainingColumn(),
             TextColumn("{task.fields[text]}", markup=False),
             console=Console(file=self._stream),
             transient=True,

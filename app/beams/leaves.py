@@ -259,7 +259,8 @@ def density_slope(beam, facets, solids, tables, source, kind, new, work):
                 low = value
             else:
                 high = value
-        change[w] = (high - low) / (step * (low + high)) if low + high > 0.0 else 0.0
+        # In this order: what next to nothing is left of must not be divided by a product that underflows.
+        change[w] = (high - low) / (low + high) / step if low + high > 0.0 else 0.0
     if kind == 0:
         _, det = plane_map(facets[beam.facet], beam.position[1], beam.direction[1], m, work)
         if abs(det) < 1e-30:

@@ -45,14 +45,14 @@ def is_beside_facets(light: Light, scene: BeamScene, to_gpu: Callable[[np.ndarra
         return False
     place, reach = to_gpu(np.array(light.position)), max(light.half_extent) * unit
     facets = [f for f in scene.facets[scene.facets["kind"] < BLACK] if int(f["owner"]) in scene.beam_objects]
-    if any(_distance(place, f["corner"][: f["corners"]]) < _NEAREST * reach for f in facets):
+    if any(distance_to(place, f["corner"][: f["corners"]]) < _NEAREST * reach for f in facets):
         return True
     corners = _specular_corners(scene)
     edges = reach * light.axes()[:, :2].T
     return any(len(_charts(place + edge, corners)) > 1 for edge in (*edges, *-edges))
 
 
-def _distance(place: np.ndarray, corners: np.ndarray) -> float:
+def distance_to(place: np.ndarray, corners: np.ndarray) -> float:
     """From a point to a flat convex polygon (n, 3)."""
     starts = corners - place
     along = np.roll(starts, -1, axis=0) - starts

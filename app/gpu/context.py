@@ -13,7 +13,7 @@ from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, Self
 
-from ..base.errors import DeviceError, UserError, suggestion
+from ..base.errors import DeviceError, OwnCallError, UserError, own_fault, suggestion
 from .better_device import advice
 from .device_traits import DeviceTraits
 from .limits import Limits
@@ -36,11 +36,23 @@ APT_LINE_OSMESA = "apt-get install libosmesa6"
 _MAX_EGL_DEVICES = 16
 
 
-def device_sentence(error: str, where: str) -> str:
-    """OpenGL's error as a sentence with a way out."""
+def check_device(ctx: moderngl.Context, where: str) -> None:
+    """Raise `DeviceError` if OpenGL has reported an error since the last check: a sentence with a way out.
+
+    moderngl does not look by itself: a dispatch past the limits silently does nothing.
+    """
+    error = ctx.error
     if error == "GL_OUT_OF_MEMORY":
-        return f"the device is out of memory ({error} in {where}): use a smaller picture or a smaller --batch"
-    return f"OpenGL failed ({error} in {where}): update the graphics driver, or try another with 'doctor'"
+        raise DeviceError(
+            f"the device is out of memory ({error} in {where}): use a smaller picture or a smaller --batch"
+        )
+    if error.startswith("GL_INVALID"):
+        raise OwnCallError(own_fault(f"OpenGL was asked wrongly ({error} in {where})"))
+    if error != "GL_NO_ERROR":  # moderngl has no name for a lost context
+        raise DeviceError(
+            f"the device was lost ({error} in {where}), as after a reset or sleep: start again, with a smaller --batch "
+            "or on another device where it happens again"
+        )
 
 
 class Context:
@@ -84,13 +96,8 @@ class Context:
         self.ctx.finish()
 
     def check(self, where: str) -> None:
-        """Raise `DeviceError` if OpenGL has reported an error since the last check.
-
-        moderngl does not look by itself: a dispatch past the limits silently does nothing.
-        """
-        error = self.ctx.error
-        if error != "GL_NO_ERROR":
-            raise DeviceError(device_sentence(error, f"{where} ({self.renderer}, OpenGL {self.version})"))
+        """`check_device`, which names the device."""
+        check_device(self.ctx, f"{where} ({self.renderer}, OpenGL {self.version})")
 
     def release(self) -> None:
         """Destroy the context; its buffers, textures and programs are gone with it."""

@@ -29,8 +29,12 @@ SIGMAS = np.concatenate([2.0 ** (np.arange(16) / 4.0 - 8.0), 2.0 ** (np.arange(7
 """Standard deviation / sweep length of each row: 2^-8 to 2^5, closer together from 2^-4 on (as in splat_shapes.glsl),
 where it shapes the splat. The footprint pass makes every splat fit a row, so that the nearest texel serves; filtering
 would cost a software renderer a fifth of its rate."""
-WIDTH, WIDTH_WITH_LINES = 512, 1024
+WIDTH, WIDTH_WITH_LINES, LEAST_WIDTH = 512, 1024, 64
 """Samples along xi; a line needs more, since nothing but the splat's width blurs it."""
+MOST_BYTES = 512 << 20
+"""Of all tables, beyond which they have fewer samples along xi: there are so many where bands are narrow."""
+MOST_LAYERS = 2048
+"""Of a texture array: as many as OpenGL 4.3 promises."""
 FINEST = 512
 """Cells of a band for the sharpest row."""
 DENSITY_CELLS, CUMULATIVE_SAMPLES = 1024, 2049
@@ -39,10 +43,10 @@ DENSITY_CELLS, CUMULATIVE_SAMPLES = 1024, 2049
 @dataclass(frozen=True)
 class SplatTables:
     """GPU tables of every (light, reflectance class, band). Layers: ((light · classes + class) · bands + band) ·
-    targets + g."""
+    targets + g; layer n is layer n mod `layers` of the texture, below n div `layers` others' rows."""
 
     texture: moderngl.TextureArray
-    """RGBA32F (layers, rows, width): T(xi), whose integral over xi in [-1, 1] is the band's energy."""
+    """RGBA32F (layers, stacked · rows, width): T(xi), whose integral over xi in [-1, 1] is the band's energy."""
     band_buffer: moderngl.Buffer
     """vec4 per (light, class, band): x_lo, x_hi, mean place of the energy in the band (0–1), its power (W). Behind
     them, from `first_power` on and four to a vec4, a float per (light, class) and sample of x: power below x, W."""
@@ -57,6 +61,8 @@ class SplatTables:
     targets: int
     rows: int
     width: int
+    layers: int
+    stacked: int
 
     @classmethod
     def build(
@@ -82,7 +88,12 @@ class SplatTables:
         targets = channels.targets
         width = width or (WIDTH_WITH_LINES if any(light.lines for light in lights) else WIDTH)
         shape = (len(lights), len(reflectances), band_count)
-        texels = np.zeros((*shape, targets, len(SIGMAS), width, 4), np.float32)
+        spectra = np.arange(np.prod(shape)).reshape(shape)
+        while width > LEAST_WIDTH and 16 * width * len(SIGMAS) * targets * spectra.size > MOST_BYTES:
+            width //= 2
+        across = min(spectra.size, MOST_LAYERS // targets)
+        stacked = -(-spectra.size // across)
+        texels = np.zeros((across, targets, stacked, len(SIGMAS), width, 4), np.float32)
         integrals = np.zeros((*shape, targets, 3, 4), np.float32)
         spans = np.zeros((*shape, 4), np.float32)
         density = np.zeros((*shape[:2], targets, DENSITY_CELLS, 4), np.float32)
@@ -98,10 +109,11 @@ class SplatTables:
                 count = len(edges)
                 table, summary, place = source.blurred(edges, width)
                 energy = summary[:, 0]
-                texels[i, j, :count] = table.reshape(len(SIGMAS), width, count, targets, 4).transpose(2, 3, 0, 1, 4)
+                table = table.reshape(len(SIGMAS), width, count, targets, 4).transpose(2, 3, 0, 1, 4)
+                texels[spectra[i, j, :count] % across, :, spectra[i, j, :count] // across] = table
                 integrals[i, j, :count] = summary.reshape(count, 3, targets, 4).swapaxes(1, 2)
                 spans[i, j, :count] = np.column_stack([edges, place, energy[:, channels.power].sum(axis=-1)])
-        texture = ctx.texture_array((width, len(SIGMAS), texels[..., 0, 0, 0].size), 4, texels, dtype="f4")
+        texture = ctx.texture_array((width, stacked * len(SIGMAS), across * targets), 4, texels, dtype="f4")
         texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         texture.repeat_x = texture.repeat_y = False
         return cls(
@@ -115,6 +127,8 @@ class SplatTables:
             targets=targets,
             rows=len(SIGMAS),
             width=width,
+            layers=across * targets,
+            stacked=stacked,
         )
 
     @property

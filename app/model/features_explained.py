@@ -19,6 +19,7 @@ from .features import (
 from .flat_shapes import is_flat
 from .scene import Scene
 from .settings import has_beams
+from .tint_bands import tint_curves
 from .tint_levels import MAX_LIGHTS
 
 
@@ -334,7 +335,9 @@ def _tint_words(scene: Scene, features: Features) -> str:
         return "haze knows tints at three wavelengths a band"
     if features.anchor_weights:
         return "in the viewer photons know tints at three wavelengths a band"
-    return "tints are too faint" if len(scene.lights) <= MAX_LIGHTS else f"there are more than {MAX_LIGHTS} lights"
+    if len(scene.lights) > MAX_LIGHTS:
+        return f"there are more than {MAX_LIGHTS} lights"
+    return "several tints need bands all the same" if len(tint_curves(scene)) else "tints are too faint"
 
 
 def _polarisation_words(scene: Scene, features: Features) -> str:

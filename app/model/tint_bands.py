@@ -48,9 +48,12 @@ def tint_curves(scene: Scene, but: np.ndarray | None = None) -> np.ndarray:
         found: list[np.ndarray] = []
         absorption = material.absorption if material.is_solid else None
         if absorption is not None and (but is None or not np.array_equal(absorption.coefficient, but)):
-            depth = absorption.coefficient * mean_chord(item)
+            chord, turn = mean_chord(item), item.object_to_world[:3, :3]
+            _, broad, long = np.sort(np.ptp(item.mesh.vertices @ turn.T, axis=0))
+            # Light may come the long way through a rod.
+            paths = (*_PATHS, long / chord) if long > 4.0 * max(broad, chord) else _PATHS
             with np.errstate(under="ignore"):
-                found += [np.exp(-share * depth) for share in _PATHS]
+                found += [np.exp(-share * absorption.coefficient * chord) for share in paths]
         if material.is_mirror:
             found += [mirror_reflectance(material.reflectance_rgb, VISIBLE_NM) ** times for times in _MIRRORS]
         if material.filters:

@@ -16,10 +16,11 @@ from functools import cached_property
 import numpy as np
 
 from .optics.colorimetry import VISIBLE_NM, cmf_xyz
+from .optics.spectral_tables import SpectralAxis
 from .optics.spectrum import Spectrum
 from .scene import Scene
 from .scene_defaults import surroundings_of
-from .tint_bands import TOLERANCE, mean_chord, power_by_nm
+from .tint_bands import TOLERANCE, cut_by_tints, ends_of, mean_chord, power_by_nm, tint_curves
 
 LEVELS = 32
 """Steps, as many as a photon's flags hold. Rounding by turns between neighbours is right for all of the light, by power
@@ -31,6 +32,8 @@ _NOTHING = 1e-12
 """Share of the light that is none: what of it is brightness has no digits left."""
 MAX_LIGHTS = 4
 """Every level of every light has tables of its own: more lights would take more memory than fewer photons save."""
+MAX_BANDS = 4
+"""The same of spectral bands that other tints need all the same."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +85,8 @@ class TintLevels:
 
 
 def tint_levels(scene: Scene) -> TintLevels | None:
-    """Of the glass whose mean chord colours light most; None where none does, or lights are too many."""
+    """Of the glass whose mean chord colours light most; None where none does, or where lights are too many or other
+    tints need many bands."""
     if not 0 < len(scene.lights) <= MAX_LIGHTS:
         return None
     most, found = TOLERANCE, None
@@ -94,4 +98,9 @@ def tint_levels(scene: Scene) -> TintLevels | None:
             if colours > most:
                 usual = max(chord, 2.0 * surroundings_of([item]).radius / DIAGONALS)
                 most, found = colours, TintLevels(coefficient, usual)
-    return found
+    if found is None:
+        return None
+    others, axis = tint_curves(scene, found.coefficient), SpectralAxis.build([])
+    spectra = [light.spectral_power for light in scene.lights]
+    cuts = [cut_by_tints(ends_of(light, axis), 1, MAX_BANDS + 1, others, light, axis) for light in spectra]
+    return found if all(len(edges) - 1 <= MAX_BANDS for edges in cuts) else None

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..beams.polygons import BeamPolygons
 from ..gpu import shader
+from ..gpu.context import check_device
 from ..gpu.dispatch_budget import DISPATCH_S, DispatchBudget
 from ..gpu.records import NONE
 from ..gpu.schema import Field, Struct
@@ -113,9 +114,7 @@ class BeamSplatter:
                 if atlas.pending >= FLUSH:
                     atlas.flush()
                 yield len(part)
-        error = self._ctx.error
-        if error != "GL_NO_ERROR":
-            raise RuntimeError(f"{error} while drawing {len(polygons)} beam polygons")
+        check_device(self._ctx, f"drawing {len(polygons)} beam polygons")
 
     def _draw(self, beams: PackedBeams, tables: BeamTables, atlas: MapAtlas, rect: np.ndarray) -> None:
         import moderngl

@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.errors import DeviceError
 from ..gpu import shader
-from ..gpu.context import device_sentence
+from ..gpu.context import check_device
 from ..gpu.schema import Field, Struct
 from ..gpu.splat_way import way_of
 from .footprint import (
@@ -60,7 +59,7 @@ PARAMETERS = Struct(
         Field("bands", "uint", ""),
         Field("density_cells", "uint", ""),
         Field("cumulative_samples", "uint", ""),
-        Field("reserved", "uint", ""),
+        Field("tables", "uint", "layers of the texture; from bit 16 on: tables that lie one below the other in each"),
     ),
 )
 
@@ -153,17 +152,15 @@ class Splatter:
             atlas.pending += part
             if atlas.pending >= chunk:
                 atlas.flush()
-        error = self._ctx.error
-        if error != "GL_NO_ERROR":
-            where = f"splatting {count} photons into a {atlas.size[0]} x {atlas.size[1]} atlas"
-            raise DeviceError(device_sentence(error, where))
+        check_device(self._ctx, f"splatting {count} photons into a {atlas.size[0]} x {atlas.size[1]} atlas")
 
     def draw(self, tables: SplatTables, atlas: MapAtlas) -> None:
         """Add the splats of the last group of photons to the atlas: to its scratch textures, or to its sums."""
         from ..gpu.splat_tables import CUMULATIVE_SAMPLES, DENSITY_CELLS
 
         values = PARAMETERS.zeros(1)
-        values[0] = (atlas.size, (0.5, 0.5), tables.bands, DENSITY_CELLS, CUMULATIVE_SAMPLES, 0)
+        packing = tables.layers | tables.stacked << 16
+        values[0] = (atlas.size, (0.5, 0.5), tables.bands, DENSITY_CELLS, CUMULATIVE_SAMPLES, packing)
         self._parameters.write(values.tobytes())
         self._parameters.bind_to_uniform_block(0)
         curve = tables.density_buffer if self._features.point_spectrum else tables.cumulative_buffer

@@ -16,6 +16,8 @@ class FrameProgress:
     def __init__(self) -> None:
         self._environment_s = self._light_s = self._camera_s = 0.0
         self._share = 0.0
+        self.ends = 0.0
+        """The frame's share when the part that was asked about last is done."""
 
     def expect_photons(self, photons: int) -> None:
         """So many will be traced."""
@@ -29,18 +31,20 @@ class FrameProgress:
         """The frame's share when `share` of the environment's light is known after `seconds`."""
         if share > 0.0:
             self._environment_s = seconds / share
-        return self._done(seconds)
+        return self._done(seconds, self._environment_s)
 
     def light(self, share: float) -> float:
         """The frame's share when `share` of the photons is traced."""
-        return self._done(self._environment_s + share * self._light_s)
+        return self._done(self._environment_s + share * self._light_s, self._environment_s + self._light_s)
 
     def camera(self, share: float) -> float:
         """The frame's share when `share` of the camera's samples is taken."""
-        return self._done(self._environment_s + self._light_s + share * self._camera_s)
+        before = self._environment_s + self._light_s
+        return self._done(before + share * self._camera_s, before + self._camera_s)
 
-    def _done(self, seconds: float) -> float:
+    def _done(self, seconds: float, end: float) -> float:
         whole = self._environment_s + self._light_s + self._camera_s
         if whole > 0.0:
             self._share = max(self._share, min(seconds / whole, 1.0))
+            self.ends = end / whole
         return self._share

@@ -260,6 +260,11 @@ class FrameRenderer:
             progress.expect_samples(settings.width * settings.height * CameraSampling.of(settings).budget)
         return progress
 
+    @property
+    def phase_ends(self) -> float:
+        """Progress at which the phase is done."""
+        return self._progress.ends if self._budget is None else 1.0
+
     def _share(self, of_work: float) -> float:
         """Progress: of the time where that is given, else of the work."""
         return of_work if self._budget is None else self._budget.spent

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from ..base.memory import peak_bytes
+from ..base.progress import Phase
 from ..edit.parameters import Stage
 from ..gpu.context import Context, create_context
 from ..model.scene import Scene
@@ -152,7 +153,7 @@ def render(
     frames = FrameRenderer(context, settings, [stage], begun, fill)
     try:
         for share in frames.steps(stage, cancelled):
-            progress(share, frames.phase)
+            progress(share, Phase(frames.phase, frames.phase_ends))
         picture = frames.picture
         notices = tuple(frame_notices(frames.light, scene.camera, settings, picture.rgb))
         notices += tuple(environment_notices(frames.environment, frames.bounces))
@@ -160,7 +161,7 @@ def render(
         layers = {}
         for layer in more_layers:
             for share in frames.steps_of_layer(layer, stage, cancelled):
-                progress(share, frames.phase)
+                progress(share, Phase(frames.phase, frames.phase_ends))
             layers[layer] = frames.picture
         return RenderResult(**vars(picture), stats=stats, layers=layers)
     finally:

@@ -123,9 +123,10 @@ class LivePicture:
     def resize(self, state: State, other: Other | None = None) -> None:
         """Give the shown texture the size of `state`'s viewport, for the frame that begins.
 
-        Only between frames: a texture that imgui is about to draw must not be made anew.
+        Only between frames: a texture that imgui is about to draw must not be made anew. While the engine is busy the
+        one that is shown keeps its size.
         """
-        if state.viewport_size == self._size:
+        if state.viewport_size == self._size or (self.radiance is None and self.shown is not None):
             return
         self._size = state.viewport_size
         if self.radiance is not None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from ..base.errors import UserError
+
 MAX_REASON = 160
 
 
@@ -17,6 +19,8 @@ def brief(error: BaseException) -> str:
     """What went wrong, by its cause, short enough for a message."""
     cause = error.__cause__ or error
     text = " ".join(str(cause).split())
+    if isinstance(cause, UserError):
+        return text
     return f"{type(cause).__name__}: {text[:MAX_REASON]}" if text else type(cause).__name__
 
 

@@ -82,8 +82,12 @@ vec2 cycles_at(SplatRecord splat, vec2 at) { return at.x * splat.waves.xz + at.y
 float lit_at(SplatRecord splat, vec2 at) { return splat.lit + at.x * splat.x_range.x + at.y * splat.x_range.y; }
 #endif
 
-// Half texel across, table row, layer.
-vec3 shape_of(SplatRecord splat) { return vec3(splat.y_box, splat.table_row, float(splat.layer)); }
+// Half texel across, table row, layer of the texture.
+vec3 shape_of(SplatRecord splat) {
+    uint layers = tables & 0xffffu;
+    float row = (splat.table_row + float(splat.layer / layers)) / float(tables >> 16u);
+    return vec3(splat.y_box, row, float(splat.layer % layers));
+}
 
 #ifndef ONE_COLOUR
 vec4 throughput_of(SplatRecord splat) { return vec4(splat.throughput.x, splat.amplitude * splat.throughput.yzw); }

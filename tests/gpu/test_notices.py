@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
+import moderngl
 import numpy as np
 import pytest
 from spectrasplat.__main__ import main
-from spectrasplat.base.errors import BrokenPictureError, DeviceError, UserError
+from spectrasplat.base.errors import BrokenPictureError, DeviceError, UserError, sentence_of
 from spectrasplat.base.image_io import write_image
-from spectrasplat.gpu.context import device_sentence
+from spectrasplat.gpu.context import check_device
 from spectrasplat.model.geometry.primitives import box, plane
 from spectrasplat.model.lights import AreaLight, PointLight
 from spectrasplat.model.optics.glass import constant
@@ -96,18 +99,36 @@ def test_scenes_that_can_give_no_picture_are_refused() -> None:
 
 
 @pytest.mark.parametrize("suffix", [".png", ".exr", ".npy"])
-def test_a_picture_that_is_not_finite_is_never_written(tmp_path: Path, suffix: str) -> None:
-    rgb = np.ones((4, 6, 3), np.float32)
+@pytest.mark.parametrize(("others", "told"), [(1.0, "fault of SpectraSplat"), (1e36, "too strong, choose less")])
+def test_a_picture_that_is_not_finite_is_never_written(tmp_path: Path, suffix: str, others: float, told: str) -> None:
+    rgb = np.full((4, 6, 3), others, np.float32)
     rgb[1, 2, 0] = np.nan
-    with pytest.raises(BrokenPictureError, match="not written") as error:
+    with pytest.raises(BrokenPictureError, match=f"not written.*{told}") as error:
         write_image(tmp_path / f"x{suffix}", rgb)
     assert error.value.exit_code == 1 and not list(tmp_path.iterdir())
 
 
-def test_what_opengl_says_is_a_sentence() -> None:
-    told = device_sentence("GL_OUT_OF_MEMORY", "the splat pass")
-    assert "out of memory" in told and "smaller picture" in told
-    assert issubclass(DeviceError, UserError) and DeviceError.exit_code == 2
+@pytest.mark.parametrize(
+    ("error", "code", "told"),
+    [
+        ("GL_OUT_OF_MEMORY", 2, "out of memory .*smaller picture"),
+        ("GL_CONTEXT_LOST", 2, "device was lost .*start again"),
+        ("GL_UNKNOWN_ERROR", 2, "device was lost .*start again"),
+        ("GL_INVALID_VALUE", 1, "fault of SpectraSplat itself; please report it with .*doctor"),
+        ("GL_INVALID_OPERATION", 1, "fault of SpectraSplat itself; please report it with .*doctor"),
+        ("cannot create texture", None, "no memory left, or was lost .*smaller picture"),
+        ("data size mismatch 80 (expected 100)", None, "fault of SpectraSplat itself"),
+    ],
+)
+def test_what_opengl_says_is_a_sentence_that_blames_nobody_else(error: str, code: int | None, told: str) -> None:
+    if code is None:
+        sentence = sentence_of(moderngl.Error(error))
+    else:
+        with pytest.raises(DeviceError, match="in the splat pass") as raised:
+            check_device(SimpleNamespace(error=error), "the splat pass")
+        assert raised.value.exit_code == code
+        sentence = str(raised.value)
+    assert sentence is not None and error in sentence and re.search(told, sentence) and "driver" not in sentence
 
 
 GIVEN_UP = SCENE + "[render]\nmax_depth = 2\n"

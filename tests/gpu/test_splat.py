@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from reference.splat_reference import splat_image
+from spectrasplat.gpu import splat_tables
 from spectrasplat.gpu.map_channels import MapChannels
 from spectrasplat.gpu.records import FLAG_FOOTPRINT_DROPPED, RECEIVER
 from spectrasplat.gpu.tiles import pack
@@ -316,3 +317,25 @@ def test_charts_splat_by_triangle_and_seams_fold_home(gl) -> None:
     carried = len(records) * rig.light.power_w()
     assert folded[..., 3].sum() == pytest.approx(carried, rel=0.01)
     assert total[y0:y1, x0:x1, 3][charts.owner < 0].sum() > 0.02 * carried
+
+
+@pytest.mark.parametrize("by_compute", [False, True])
+def test_tables_that_lie_below_others_in_a_layer_draw_the_same(gl, monkeypatch, by_compute: bool) -> None:
+    """A texture array has 2,048 layers: two tinted panes asked for 2,112, and nothing was drawn."""
+    bands = [(k / 8.0, (k + 1) / 8.0) for k in range(8)]
+
+    def drawn() -> np.ndarray:
+        rig = Rig(gl.ctx, PLAIN, bands=bands, by_compute=by_compute)
+        long, short = frame(0.4, 3.0, 2.0)
+        sweeps = [
+            photons(PLAIN, (20.0 + 3.0 * k, 32.0), long, short, (90.0, 20.0), lo, hi, band=k)
+            for k, (lo, hi) in enumerate(bands)
+        ]
+        return rig.draw(np.concatenate(sweeps))
+
+    whole = drawn()
+    monkeypatch.setattr(splat_tables, "MOST_LAYERS", 3)
+    np.testing.assert_array_equal(drawn(), whole)
+    monkeypatch.setattr(splat_tables, "MOST_BYTES", 1 << 20)
+    narrow = drawn()
+    assert 0.0 < relative_error(narrow, whole) < 0.03 and narrow.sum() == pytest.approx(whole.sum(), rel=2e-3)

@@ -14,6 +14,7 @@ from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz
 from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings
+from spectrasplat.model.tint_levels import LEVELS
 from spectrasplat.render.device_scene import spectral_axis
 from spectrasplat.render.light_pass import LightPass
 
@@ -121,3 +122,16 @@ def test_bands_need_not_be_cut_for_a_tint(gl, tmp_path: Path) -> None:
     assert told.mean(axis=(0, 1)) == pytest.approx(cut.mean(axis=(0, 1)), rel=0.1)
     for light in (with_levels, without):
         light.release()
+
+
+def test_levels_are_not_made_where_another_tint_needs_many_bands(tmp_path: Path) -> None:
+    """32 levels for each of 22 bands were more tables than a texture holds, and spared two bands of 24."""
+    one = scene_of(tmp_path, WINE, 1.0)
+    slab, table = one.objects
+
+    def also(colour: list[float]) -> int:
+        other = replace(slab, material=scene_of(tmp_path, colour, 1.0).objects[0].material)
+        return Features.of(replace(one, objects=(slab, other, table)), settings_of()).tint_levels
+
+    assert also([0.95, 0.96, 0.97]) == Features.of(one, settings_of()).tint_levels == LEVELS
+    assert also([0.01, 0.6, 0.02]) == 0

@@ -162,3 +162,35 @@ def test_while_the_engine_is_busy_the_window_stays_awake_and_waits_for_the_scene
         assert not session.picture.awaits_scene
     session.autosave.close()
     session.release()
+
+
+def test_a_busy_engine_does_not_take_the_shown_texture_from_under_the_interface(
+    gl: Context, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The interface at 150 % resizes the viewport while the engine works; its picture comes back within a frame."""
+    monkeypatch.setenv("SPECTRASPLAT_CONFIG", str(tmp_path / "config"))
+    session = Session(gl, make_engine=FakeEngine)
+    session.jobs.gallery.release()
+    session.state = session.state.with_panels(start_page=False)
+    with headless_viewer(Viewer(session)) as interface:
+        interface.frame(LAYOUT_FRAMES + 3)
+        engine, shown = session.picture.engine, session.picture.shown
+        assert isinstance(engine, FakeEngine) and shown is not None
+        advance, picture, engine.picture, engine.is_busy = engine.advance, engine.picture, None, True
+        monkeypatch.setattr(engine, "advance", lambda *_: None)
+        preferences = replace(session.state.preferences, ui_scale=1.5)
+        session.state = replace(session.state, preferences=preferences)
+        interface.frame(3)
+        assert session.state.viewport_size != shown.size == session.picture.shown.size
+
+        def back_again(*asked) -> None:
+            engine.picture, engine.is_busy = engine.picture or picture, False
+            advance(*asked)
+
+        monkeypatch.setattr(engine, "advance", back_again)
+        for _ in range(3):
+            interface.frame()
+            assert gl.ctx.error == "GL_NO_ERROR"
+        assert session.picture.shown.size == session.state.viewport_size
+    session.autosave.close()
+    session.release()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -52,6 +53,44 @@ def test_what_lies_ahead_of_a_grazed_facet_is_no_coat_on_it(angle_rad: float) ->
     """The floor was taken for one: a sliver of the light left the glass through no facet."""
     block = placed("block", extruded("block", np.array([(-0.3, -0.3), (0.3, -0.3), (0.3, 0.3), (-0.3, 0.3)])), BK7)
     assert books_of([block], beam_light((0.1, 0.0, 2.0), (angle_rad, 0.0, -1.0), 0.4), angle_rad, "").broken() == []
+
+
+PANE = """
+[camera]
+position = [3.5, -4.5, 1.7]
+target = [1.2, 0.0, 0.5]
+[[lights]]
+kind = "{kind}"
+position = [-3.0, 0.0, 4.0]
+intensity_cd = 80000
+[[objects]]
+name = "pane"
+shape = "box"
+size = [0.004, 0.4, 0.6]
+position = [0.0, 0.0, 1.5]
+material = {{ glass = "N-BK7", absorption = {{ colour = [0.2, 0.3, 0.9], distance = 0.004 }} }}
+[[objects]]
+name = "floor"
+shape = "plane"
+width = 12.0
+height = 12.0
+material = "diffuse"
+"""
+
+
+@pytest.mark.parametrize("kind", ["point", "spot"])
+def test_light_that_is_caught_in_a_tinted_pane_ends_finite(tmp_path: Path, kind: str) -> None:
+    """What is absorbed to 1e-320 in the middle of its band had an infinite slope: NaN round a blue window pane."""
+    (tmp_path / "pane.toml").write_text(PANE.format(kind=kind))
+    scene = load_scene(tmp_path / "pane.toml")
+    meshes = [o.mesh.transformed(o.object_to_world) for o in scene.objects]
+    axis = SpectralAxis.build([scene.objects[0].material.dispersion])
+    beams = beam_scene(scene, meshes, {0: (np.zeros(3), np.eye(3)[:2])}, axis, 1.0)
+    beams.facets["texel"] = 1e-3
+    for emission in emissions(scene.lights[0], beams, lambda p: np.asarray(p, float), 1.0, axis, 1):
+        found = Leaves.joined(search(beams, emission, Search(1e-5, 1, 96, 1e-3))[0])
+        assert len(found.flux) and (found.density[:, 1] < 1e-300).any()
+        assert np.isfinite(found.slope).all() and np.isfinite(found.density).all()
 
 
 def test_threads_do_not_matter(stone: tuple[BeamScene, Emission]) -> None:

@@ -21,9 +21,10 @@ def test_progress_is_the_share_of_the_time(environment_s: float) -> None:
         assert asked == pytest.approx(shares[1:] * environment_s / whole)
     traced = [progress.light(share) for share in shares]
     assert traced == pytest.approx((environment_s + shares * PHOTONS * PHOTON_S) / whole)
+    assert progress.ends == traced[-1]
     seen = [progress.camera(share) for share in shares]
     assert seen == pytest.approx((environment_s + PHOTONS * PHOTON_S + shares * SAMPLES * SAMPLE_S) / whole)
-    assert seen[-1] == 1.0
+    assert seen[-1] == 1.0 == progress.ends
 
 
 def test_progress_never_falls_when_a_part_takes_longer_than_it_seemed() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 
 import pytest
-from spectrasplat.base.progress import ProgressReporter
+from spectrasplat.base.progress import Phase, ProgressReporter
 
 
 class Clock:
@@ -43,24 +43,29 @@ def test_log_gets_a_line_every_ten_seconds(clock: Clock) -> None:
     ]
 
 
-def test_what_hardly_moved_foretells_nothing(clock: Clock) -> None:
-    """A first phase that cannot tell its share: 40 million years were foretold."""
+@pytest.mark.parametrize(
+    ("course", "told"),
+    [
+        # A first phase that cannot tell its share: 40 million years were foretold.
+        ([(10, 1e-8, 1.0), (20, 2e-8, 1.0), (30, 0.5, 1.0)], ["", "", ""]),
+        # While the camera's program was compiled, half an hour was foretold of what took a minute.
+        ([(50, 0.39, 1.0), (76, 0.395, 1.0)], ["", ""]),
+        # What compiles before it begins to move is no part of its rate: 105 s were foretold of what took 12.
+        ([(8, 0.0, 1.0), (10, 0.1, 1.0), (11, 0.15, 1.0), (12, 0.2, 1.0), (20, 0.6, 1.0)], ["", "8"]),
+        # How long the camera takes is not known while photons are traced, unless it hardly matters.
+        ([(5, 0.1, 0.4), (8, 0.2, 0.4), (10, 0.3, 0.4), (12, 0.4, 1.0), (16, 0.6, 1.0), (20, 0.8, 1.0)], ["", "4"]),
+        ([(5, 0.1, 0.98), (7, 0.14, 0.98), (10, 0.2, 0.98), (20, 0.4, 0.98)], ["40", "30"]),
+    ],
+    ids=["nothing moved", "a pause", "compiled first", "photons first", "nearly all photons"],
+)
+def test_the_time_left_is_told_once_it_is_known(clock: Clock, course, told) -> None:
     stream = io.StringIO()
     reporter = ProgressReporter("ball", stream, clock)
-    for fraction in (1e-8, 2e-8, 0.5):
-        clock.now += 10.0
-        reporter(fraction)
-    assert [line.partition(", ")[2] for line in stream.getvalue().splitlines()] == ["", "", "about 15 s left"]
-
-
-def test_a_pause_does_not_foretell_hours(clock: Clock) -> None:
-    """While the camera's program was compiled, half an hour was foretold of what took a minute."""
-    stream = io.StringIO()
-    reporter = ProgressReporter("ball", stream, clock)
-    for seconds, fraction in ((50.0, 0.39), (76.0, 0.395)):
+    for seconds, fraction, ends in course:
         clock.now = 100.0 + seconds
-        reporter(fraction)
-    assert stream.getvalue().splitlines()[-1].endswith("about 225 s left")
+        reporter(fraction, Phase("working", ends))
+    lines = [line.partition("working")[2] for line in stream.getvalue().splitlines()]
+    assert lines == [words and f", about {words} s left" for words in told]
 
 
 def test_quick_jobs_are_silent(clock: Clock) -> None:
@@ -84,7 +89,7 @@ def test_fractions_outside_are_clamped(clock: Clock) -> None:
     reporter = ProgressReporter("ball", stream, clock)
     clock.now += 10.0
     reporter(1.7)
-    assert stream.getvalue() == "ball: 100 % after 10 s, about 0 s left\n"
+    assert stream.getvalue() == "ball: 100 % after 10 s\n"
 
 
 def test_a_share_is_never_taken_back(clock: Clock) -> None:

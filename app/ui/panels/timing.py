@@ -53,7 +53,7 @@ _COUNTERS = {
         "Spectrum not split",
         "Part of a camera ray's band is totally reflected, but too near its end or too far for its place to be found.",
     ),
-    "loops_ended": ("Path cut short", "The driver ended the loops of camera rays; anything but zero here is a fault."),
+    "loops_ended": ("Path cut short", "Loops ended before the camera's rays did; anything but zero here is a fault."),
     "queue_overflow": ("Queue full", "Photons that found no room among those in flight."),
 }
 """What the engine counts -> its name on the screen, and what it means."""
