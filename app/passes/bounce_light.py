@@ -32,6 +32,7 @@ from ..model.environment_light import even_points
 from ..model.scene import Scene
 from .bounce_sources import BounceSources
 from .caustic_maps import CausticMaps
+from .covered_places import covered_places
 from .environment_light import (
     ANCHOR_NM,
     MAX_EVENTS,
@@ -116,7 +117,9 @@ class BounceLightPass:
         self._context, self._ctx, self._buffers = context, context.ctx, buffers
         self._environment, self._seed, self.total = environment, seed, directions
         self.places: EnvironmentPlaces = (
-            environment.places if environment is not None else environment_places(buffers, finer, _GUTTER)
+            environment.places
+            if environment is not None
+            else covered_places(buffers, environment_places(buffers, finer, _GUTTER))
         )
         self.bounces = buffers.features.bounces
         count = max(1, len(self.places.places))

@@ -30,6 +30,7 @@ from ..gpu.schema import Field, Struct
 from ..model.environment_light import EnvironmentLight, even_points, lighting_environment
 from ..model.materials import Grating
 from ..model.scene import Scene
+from .covered_places import covered_places
 from .environment_places import PLACE, EnvironmentPlaces, environment_places
 
 DIRECTIONS = 512
@@ -112,7 +113,7 @@ class EnvironmentLightPass:
         assert environment is not None
         self._context, self._ctx, self._buffers = context, context.ctx, buffers
         self._seed, self.total = seed, directions
-        self.places: EnvironmentPlaces = environment_places(buffers, finer)
+        self.places: EnvironmentPlaces = covered_places(buffers, environment_places(buffers, finer))
         self.texture = self._ctx.texture(self.places.size, 4, dtype="f4")
         self.texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self.asked = 0

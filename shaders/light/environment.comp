@@ -6,6 +6,7 @@ layout(local_size_x = 64) in;
 
 #include "lib/interface.glsl"
 #include "lib/random.glsl"
+#include "light/place.glsl"
 #ifdef FOLLOWS_SPECULAR
 #include "light/followed.glsl"
 #endif
@@ -44,7 +45,7 @@ void main()
     for (uint i = 0u; i < p.straight; ++i) {
         vec3 toward = asked[i].toward;
         vec3 amount = asked[i].weight * max(dot(toward, place.normal), 0.0);
-        vec3 position = place.position + (asked[i].within.x - 0.5) * place.step_u + (asked[i].within.y - 0.5) * place.step_v;
+        vec3 position = position_in(place, asked[i].within);
         sum.all += amount;
         bool reaches = false;
         if (amount != vec3(0.0)) reaches = !intersect_any(position, toward, FAR_DISTANCE, origin);
@@ -52,7 +53,7 @@ void main()
     }
 #ifdef FOLLOWS_SPECULAR
     for (uint i = p.straight; i < p.straight + p.followed; ++i) {
-        vec3 position = place.position + (asked[i].within.x - 0.5) * place.step_u + (asked[i].within.y - 0.5) * place.step_v;
+        vec3 position = position_in(place, asked[i].within);
         float weight, lost = 0.0;
         bool narrow;
         // Neighbours ask in other directions: their mean, which is what is shown, knows many more than each.
