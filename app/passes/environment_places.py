@@ -23,7 +23,7 @@ from ..model.scene_checks import contains
 from .map_layout import Window
 from .plane_frame import PlaneFrame, plane_frame
 
-FINE_TEXELS, BETWEEN_TEXELS, COARSE_TEXELS, CHART_TEXELS = 100 * 100, 32 * 32, 40 * 40, 88 * 88
+FINE_TEXELS, BETWEEN_TEXELS, COARSE_TEXELS, CHART_TEXELS = 104 * 104, 32 * 32, 40 * 40, 88 * 88
 """Of a flat receiver's windows, each side, and of a curved one."""
 _GROWTH = 6.0
 """Of a window's side to that of the next one, at most."""

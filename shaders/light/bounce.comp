@@ -15,7 +15,7 @@ layout(local_size_x = 64) in;
 layout(std140, binding = BIND_PARAMETERS) uniform Parameters { BounceParameters p; };
 layout(std430, binding = BIND_PLACES) readonly restrict buffer Places { EnvironmentPlace places[]; };
 layout(std140, binding = BIND_ASKED) uniform Asked { BounceAsked asked[MOST_ASKED]; };
-layout(std430, binding = BIND_SUMS) restrict buffer Sums { BounceSum sums[]; };
+layout(std430, binding = BIND_SUMS) restrict buffer Sums { GatheredSum sums[]; };
 // What receivers send back: linear Rec.709 radiance, and with what density per GPU unit² a place there is drawn.
 layout(binding = UNIT_RADIANCE) uniform sampler2D receiver_radiance;
 
@@ -42,7 +42,7 @@ void main()
     uint id = gl_GlobalInvocationID.x;
     if (id >= p.count) return;
     EnvironmentPlace place = places[id];
-    BounceSum sum = sums[id];
+    GatheredSum sum = sums[id];
     RayOrigin origin = RayOrigin(place.primitive, place.object, place.inside, 0u);
     for (uint i = 0u; i < p.straight; ++i) {
         vec3 position = position_in(place, asked[i].within);

@@ -14,7 +14,7 @@ layout(local_size_x = 64) in;
 layout(std140, binding = BIND_PARAMETERS) uniform Parameters { EnvironmentParameters p; };
 layout(std430, binding = BIND_PLACES) readonly restrict buffer Places { EnvironmentPlace places[]; };
 layout(std140, binding = BIND_ASKED) uniform Asked { EnvironmentAsked asked[MOST_ASKED]; };
-layout(std430, binding = BIND_SUMS) restrict buffer Sums { EnvironmentSum sums[]; };
+layout(std430, binding = BIND_SUMS) restrict buffer Sums { GatheredSum sums[]; };
 #ifdef FOLLOWS_SPECULAR
 layout(binding = UNIT_ENVIRONMENT) uniform sampler2D environment_levels;
 
@@ -40,7 +40,7 @@ void main()
     uint id = gl_GlobalInvocationID.x;
     if (id >= p.count) return;
     EnvironmentPlace place = places[id];
-    EnvironmentSum sum = sums[id];
+    GatheredSum sum = sums[id];
     RayOrigin origin = RayOrigin(place.primitive, place.object, place.inside, 0u);
     for (uint i = 0u; i < p.straight; ++i) {
         vec3 toward = asked[i].toward;
