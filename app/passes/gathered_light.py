@@ -137,8 +137,8 @@ class GatheredLight:
         return self._places.size + sum(sums.size for sums in self._sums) + sum(sizes)
 
     def _release(self, others: Sequence[moderngl.Texture | None]) -> None:
-        owned = (self._places, self._asked_buffer, self._parameters, self._program, self.texture, *self._sums)
-        shader.release(*owned, *(texture for texture in others if texture is not None))
+        shader.release(self._places, self._asked_buffer, self._parameters, self._program, self.texture, *self._sums)
+        shader.release(*(texture for texture in others if texture is not None))
 
 
 def specular_sphere(buffers: SceneBuffers) -> np.ndarray | None:
