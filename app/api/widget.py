@@ -16,7 +16,7 @@ def lack_of_front_end() -> str | None:
         import anywidget  # noqa: F401
         from IPython import get_ipython
     except ImportError:
-        return "for a live view install anywidget: pip install 'spectrasplat[notebook]', then restart the kernel"
+        return "for a live view install anywidget: pip install anywidget, then restart the kernel"
     shell = get_ipython()
     if getattr(shell, "kernel", None) is None:
         return "a live view needs a notebook with a running kernel (Jupyter, VS Code, Colab); this is the picture alone"

@@ -206,7 +206,12 @@ def _cache() -> Check:
 def _data() -> Check:
     absent = [str(folder) for folder in (shaders_dir(), assets_dir()) if not folder.is_dir()]
     if absent:
-        return Check("program files", f"{' and '.join(absent)} missing", "missing", f"reinstall: {REINSTALL} {PACKAGE}")
+        return Check(
+            "program files",
+            f"{' and '.join(absent)} missing",
+            "missing",
+            "reinstall: pip install . in the program's checkout",
+        )
     return Check("program files", str(shaders_dir().parent), "ok")
 
 

@@ -29,7 +29,7 @@ from .jobs import Job, News
 if TYPE_CHECKING:
     from distributed import Client, Future, LocalCluster, Security
 
-PIP_LINE = "pip install 'spectrasplat[farm]'"
+PIP_LINE = "pip install '.[farm]' in the program's checkout"
 DEVICE_VARIABLE = "GLCONTEXT_DEVICE_INDEX"
 _ADDRESS = re.compile(r"([a-z]+://)?[^/\s]+:\d{1,5}")
 _CONNECT_S = 10.0

@@ -255,6 +255,8 @@ class SceneBuffers:
                 record["colour"][3] = size
                 record["weight_row"] = len(weights)
                 weights.append(mirror_reflectance(material.reflectance_rgb, nm))
+            if material.dispersion is None and (self.features.environment_lights or self.features.bounces):
+                record["medium"] = 0 if item.mesh.is_closed else NONE
             if isinstance(material, Grating):
                 record["weight_row"] = sum(len(texels) for texels in gratings)
                 gratings.append(_grating_texels(material, item.object_to_world))

@@ -40,7 +40,11 @@ OBJECT = Struct(
     "Object",
     (
         Field("kind", "uint", "0 black, 1 diffuse, 2 mirror, 3 dielectric, 4 grating, 5 thin sheet"),
-        Field("medium", "uint", "row of the index table (dielectric, grating: its wavelength)"),
+        Field(
+            "medium",
+            "uint",
+            "row of the index table (dielectric, sheet; grating: its wavelength); of others 0 where the mesh is closed",
+        ),
         Field(
             "weight_row", "uint", "row of absorption (1/GPU unit) or reflectance over x, texel of a grating, or NONE"
         ),

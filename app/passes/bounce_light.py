@@ -17,38 +17,27 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 
-import moderngl
 import numpy as np
 
 from ..base.random_words import random_word
-from ..gpu import bindings, shader
 from ..gpu.context import Context
 from ..gpu.dispatch_budget import DispatchBudget
 from ..gpu.map_channels import MapChannels
 from ..gpu.scene_buffers import SceneBuffers
-from ..gpu.scene_records import SCENE_STRUCTS
 from ..gpu.schema import Field, Struct
 from ..model.environment_light import even_points
 from ..model.scene import Scene
 from .bounce_sources import BounceSources
 from .caustic_maps import CausticMaps
-from .environment_light import (
-    ANCHOR_NM,
-    MAX_EVENTS,
-    PER_FOLLOWED,
-    RGB_NM,
-    SMOOTHING,
-    EnvironmentLightPass,
-    specular_sphere,
-)
-from .environment_places import PLACE, EnvironmentPlaces, environment_places
+from .covered_places import covered_places
+from .environment_light import EnvironmentLightPass
+from .environment_places import environment_places
+from .gathered_light import FIRST_DIRECTIONS, PER_FOLLOWED, GatheredLight
 
 DIRECTIONS = 256
 """Asked of every bounce, and as many places."""
 LEAST_DIRECTIONS = 32
 """That a still asks, however little time it has."""
-FIRST_DIRECTIONS = 16
-"""After which the light is worth showing."""
 FINER = 0.25
 """Factor on the number of texels where no environment asks for more: this light has no sharp edges."""
 _GUTTER = 2
@@ -56,8 +45,6 @@ _GUTTER = 2
 _PAIRS = 8
 """Of one dispatch at most: Mesa's software renderer ends loops that run long."""
 _MOST_ASKED = 2 * _PAIRS + -(-_PAIRS // PER_FOLLOWED)
-_GROUP = 64
-_BIND_PLACES, _BIND_ASKED, _BIND_SUMS, _UNIT_RADIANCE = 8, 9, 10, 0
 _KEY = 80
 """First of the words of a bounce's directions, places and choices …"""
 _KEYS = 16
@@ -88,19 +75,11 @@ ASKED = Struct(
         Field("reserved", "vec2", ""),
     ),
 )
-SUM = Struct(
-    "BounceSum",
-    (
-        Field("straight", "vec3", "irradiance, linear Rec.709"),
-        Field("lost", "float", "paths given up"),
-        Field("specular", "vec3", "by way of glass and mirrors"),
-        Field("reserved", "float", ""),
-    ),
-)
 
 
-class BounceLightPass:
-    """Owns programs, sums and textures of one scene's receivers."""
+class BounceLightPass(GatheredLight):
+    """Owns the sources and each bounce's radiance besides what `GatheredLight` does; its texture holds the
+    environment's light too."""
 
     def __init__(
         self,
@@ -113,61 +92,27 @@ class BounceLightPass:
     ) -> None:
         """Of a scene whose receivers light each other (`Features.bounces`). `environment`: what else is in the texture,
         and whose texels these are; where there is none, `finer` is a factor on their number."""
-        self._context, self._ctx, self._buffers = context, context.ctx, buffers
-        self._environment, self._seed, self.total = environment, seed, directions
-        self.places: EnvironmentPlaces = (
-            environment.places if environment is not None else environment_places(buffers, finer, _GUTTER)
+        self._environment, self.bounces = environment, buffers.features.bounces
+        places = (
+            environment.places
+            if environment is not None
+            else covered_places(buffers, environment_places(buffers, finer, _GUTTER))
         )
-        self.bounces = buffers.features.bounces
-        count = max(1, len(self.places.places))
-        self._places = self._ctx.buffer(self.places.places.tobytes() or bytes(PLACE.stride))
+        program = ("light/bounce.comp", "UNIT_RADIANCE", PARAMETERS, ASKED)
+        budget = DispatchBudget(PER_FOLLOWED, PER_FOLLOWED, _PAIRS)
+        super().__init__(context, buffers, places, seed, directions, program, _MOST_ASKED, budget, self.bounces)
         self.sources = BounceSources(context, buffers, self.places, self._places)
-        self.texture = self._texture()
-        """What the camera looks up: the environment's light and this."""
         self._radiance = [self._texture() for _ in range(self.bounces)]
-        self._sums = [self._ctx.buffer(bytes(count * SUM.stride)) for _ in range(self.bounces)]
-        self._asked_buffer = self._ctx.buffer(reserve=_MOST_ASKED * ASKED.stride)
-        self._parameters = self._ctx.buffer(reserve=PARAMETERS.stride)
-        self._budget = DispatchBudget(PER_FOLLOWED, PER_FOLLOWED, _PAIRS)
-        self._sphere = specular_sphere(buffers)
         self._areas = self.places.areas
         self._rows = self.places.rows
         self._scene: Scene | None = None
-        self.asked = 0
-        """Directions asked so far, of every bounce."""
-        self.shown = 0
-        """Those of them that the texture holds."""
         self._keeps = False
         """Until all is known the texture stays as it is: it holds the same things in nearly the same light."""
-        self.seconds = 0.0
-        """Spent on it."""
         self._light = np.zeros((len(self.places.places), 3))
         self._stages: list[tuple[np.ndarray, np.ndarray]] = []
         self._running: Iterator[bool] | None = None
         self._dispatch_s = context.traits.dispatch_s
-        self._program = self._compiled()
         self._write()
-
-    def _texture(self) -> moderngl.Texture:
-        texture = self._ctx.texture(self.places.size, 4, dtype="f4")
-        texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        return texture
-
-    def _compiled(self) -> moderngl.ComputeShader:
-        defines = self._buffers.features.defines() | bindings.SCENE_DEFINES | self._buffers.defines
-        defines |= {
-            "BIND_PLACES": _BIND_PLACES,
-            "BIND_ASKED": _BIND_ASKED,
-            "BIND_SUMS": _BIND_SUMS,
-            "UNIT_RADIANCE": _UNIT_RADIANCE,
-            "MOST_ASKED": _MOST_ASKED,
-            "MAX_EVENTS": MAX_EVENTS,
-        }
-        defines.pop("NORMAL_DERIVATIVES", None)
-        if self._sphere is not None:
-            defines["FOLLOWS_SPECULAR"] = 1
-        structs = (*SCENE_STRUCTS, PLACE, PARAMETERS, ASKED, SUM)
-        return shader.compute(self._ctx, "light/bounce.comp", defines, structs)
 
     # ---- what is asked -----------------------------------------------------------------------
 
@@ -271,22 +216,9 @@ class BounceLightPass:
             points = even_points(followed, seed, key + 12)
             part["place"][:, :2], part["within"] = points[:, :2], points[:, 2:]
             part["object"] = [random_word(seed, 2 + bounce, int(n), _KEY) for n in followed]
-            parameters["specular"] = self._sphere
-        parameters["x_of_rgb"] = self._buffers.axis.x_of_nm(np.array([*RGB_NM, ANCHOR_NM]))
-        parameters["count"], parameters["by_cosine"] = len(self.places.places), count
+        parameters["by_cosine"] = count
         parameters["straight"], parameters["followed"], parameters["aims"] = straight, len(followed), aims
-        self._parameters.write(parameters.tobytes())
-        self._asked_buffer.write(asked.tobytes())
-        self._buffers.bind()
-        self._parameters.bind_to_uniform_block(bindings.PARAMETERS)
-        self._asked_buffer.bind_to_uniform_block(_BIND_ASKED)
-        self._places.bind_to_storage_buffer(_BIND_PLACES)
-        self._sums[bounce].bind_to_storage_buffer(_BIND_SUMS)
-        self._radiance[bounce].use(_UNIT_RADIANCE)
-        with self._context.timers.timing("bounces"):
-            self._program.run(-(-len(self.places.places) // _GROUP))
-            self._ctx.memory_barrier()
-        self._ctx.finish()
+        self._dispatch(parameters, asked, self._radiance[bounce], "bounces", bounce)
 
     def _draw(self, asked: np.ndarray, points: np.ndarray, running: np.ndarray, density: np.ndarray) -> None:
         """Set ASKED (n,) to places drawn by `points` (n, 4): their first number chooses among rows of texels and goes
@@ -303,25 +235,13 @@ class BounceLightPass:
 
     def _arrived(self, bounce: int, asked: int) -> np.ndarray:
         """Irradiance of every place after so many bounces and one, float64 (n, 3), by what was asked."""
-        count = len(self.places.places)
-        sums = np.frombuffer(self._sums[bounce].read(), SUM.dtype)[:count]
-        specular = sums["specular"].astype(float)
-        if specular.any():
-            specular = self.places.smoothed(specular, SMOOTHING)
-        return sums["straight"].astype(float) / max(asked, 1) + specular / max(asked // PER_FOLLOWED, 1)
+        sums = self._found(bounce)
+        return sums["straight"].astype(float) / max(asked, 1) + self._specular(sums, asked)
 
     def irradiance(self) -> np.ndarray:
         """What every place gets from other receivers, float64 (n, 3), linear Rec.709, lm/unit²: as far as it is
         known."""
         return self._arrived(self.bounces - 1, self.asked)
-
-    @property
-    def lost(self) -> float:
-        """Share of followed paths that were given up after `MAX_EVENTS`, in all bounces."""
-        if not len(self.places.places) or self.asked < PER_FOLLOWED:
-            return 0.0
-        lost = [np.frombuffer(sums.read(), SUM.dtype)["lost"].mean(dtype=float) for sums in self._sums]
-        return float(np.mean(lost) / (self.asked // PER_FOLLOWED))
 
     def show(self) -> None:
         """What was found, and what is known of the environment's light, becomes what the camera looks up."""
@@ -336,14 +256,12 @@ class BounceLightPass:
     @property
     def bytes(self) -> int:
         """Device memory held."""
-        textures = sum(16 * t.width * t.height for t in (self.texture, *self._radiance))
-        return textures + self._places.size + sum(s.size for s in self._sums) + self.sources.bytes
+        return self._bytes(*self._radiance) + self.sources.bytes
 
     def release(self) -> None:
         """Free everything."""
         self.sources.release()
-        owned = (self._places, self._asked_buffer, self._parameters, self._program, self.texture)
-        shader.release(*owned, *self._radiance, *self._sums)
+        self._release(self._radiance)
 
 
 def _found(running: np.ndarray, borders: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

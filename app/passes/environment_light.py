@@ -21,37 +21,22 @@ import moderngl
 import numpy as np
 
 from ..base.random_words import random_word
-from ..gpu import bindings, shader
 from ..gpu.context import Context
 from ..gpu.dispatch_budget import DispatchBudget
 from ..gpu.scene_buffers import SceneBuffers
-from ..gpu.scene_records import SCENE_STRUCTS
 from ..gpu.schema import Field, Struct
 from ..model.environment_light import EnvironmentLight, even_points, lighting_environment
-from ..model.materials import Grating
 from ..model.scene import Scene
-from .environment_places import PLACE, EnvironmentPlaces, environment_places
+from .covered_places import covered_places
+from .environment_places import environment_places
+from .gathered_light import FIRST_DIRECTIONS, PER_FOLLOWED, GatheredLight
 
 DIRECTIONS = 512
 """Asked in all, straight."""
 LEAST_DIRECTIONS = 64
 """That a still asks, however little time it has."""
-PER_FOLLOWED = 4
-"""Straight ones for each that is followed through glass and over mirrors, which takes as long as many of them."""
-FIRST_DIRECTIONS = 16
-"""After which the light is worth showing."""
-MAX_EVENTS = 40
-"""Surfaces of glass and mirrors on one path; what goes on is lost and counted."""
 MOST_ASKED = 24
 """Directions of one dispatch at most: Mesa's software renderer ends loops that run long."""
-ANCHOR_NM = 587.56
-"""Wavelength whose index bends what is followed: the environment's light through glass does not part into colours."""
-RGB_NM = (612.0, 549.0, 465.0)
-"""Wavelengths at which glass and mirrors tint linear red, green and blue."""
-SMOOTHING = 1.5
-"""Texels over which what came by glass and mirrors is averaged: neighbours follow other paths."""
-_GROUP = 64
-_BIND_PLACES, _BIND_ASKED, _BIND_SUMS, _UNIT_ENVIRONMENT = 8, 9, 10, 0
 _KEY = 70
 """Of the words that decide at surfaces of glass; those after it place directions towards glass."""
 
@@ -82,21 +67,10 @@ ASKED = Struct(
         Field("reserved_too", "vec2", ""),
     ),
 )
-SUM = Struct(
-    "EnvironmentSum",
-    (
-        Field("all", "vec3", "asked for"),
-        Field("lost", "float", "paths given up"),
-        Field("straight", "vec3", "of it what arrived"),
-        Field("reserved", "float", ""),
-        Field("specular", "vec3", "by way of glass and mirrors"),
-        Field("reserved_too", "float", ""),
-    ),
-)
 
 
-class EnvironmentLightPass:
-    """Owns the program, the places, the sums and the texture of one scene's receivers."""
+class EnvironmentLightPass(GatheredLight):
+    """Owns the environment's levels besides what `GatheredLight` does; `asked` counts straight directions."""
 
     def __init__(
         self,
@@ -110,39 +84,11 @@ class EnvironmentLightPass:
         texels."""
         environment = lighting_environment(buffers.scene)
         assert environment is not None
-        self._context, self._ctx, self._buffers = context, context.ctx, buffers
-        self._seed, self.total = seed, directions
-        self.places: EnvironmentPlaces = environment_places(buffers, finer)
-        self.texture = self._ctx.texture(self.places.size, 4, dtype="f4")
-        self.texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        self.asked = 0
-        """Straight directions asked so far."""
-        self.shown = 0
-        """Those that the texture holds."""
-        self.seconds = 0.0
-        """Spent on it."""
-        count = max(1, len(self.places.places))
-        self._places = self._ctx.buffer(self.places.places.tobytes() or bytes(PLACE.stride))
-        self._sums = self._ctx.buffer(reserve=count * SUM.stride)
-        self._asked_buffer = self._ctx.buffer(reserve=MOST_ASKED * ASKED.stride)
-        self._parameters = self._ctx.buffer(reserve=PARAMETERS.stride)
+        places = covered_places(buffers, environment_places(buffers, finer))
+        budget = DispatchBudget(PER_FOLLOWED, PER_FOLLOWED, MOST_ASKED * PER_FOLLOWED // (PER_FOLLOWED + 1))
+        program = ("light/environment.comp", "UNIT_ENVIRONMENT", PARAMETERS, ASKED)
+        super().__init__(context, buffers, places, seed, directions, program, MOST_ASKED, budget)
         self._levels: moderngl.Texture | None = None
-        self._sphere = specular_sphere(buffers)
-        self._budget = DispatchBudget(PER_FOLLOWED, PER_FOLLOWED, MOST_ASKED * PER_FOLLOWED // (PER_FOLLOWED + 1))
-        defines = buffers.features.defines() | bindings.SCENE_DEFINES | buffers.defines
-        defines |= {
-            "BIND_PLACES": _BIND_PLACES,
-            "BIND_ASKED": _BIND_ASKED,
-            "BIND_SUMS": _BIND_SUMS,
-            "UNIT_ENVIRONMENT": _UNIT_ENVIRONMENT,
-            "MOST_ASKED": MOST_ASKED,
-            "MAX_EVENTS": MAX_EVENTS,
-        }
-        defines.pop("NORMAL_DERIVATIVES", None)
-        if self._sphere is not None:
-            defines["FOLLOWS_SPECULAR"] = 1
-        structs = (*SCENE_STRUCTS, PLACE, PARAMETERS, ASKED, SUM)
-        self._program = shader.compute(self._ctx, "light/environment.comp", defines, structs)
         self._light: EnvironmentLight | None = None
         self._write(np.zeros((len(self.places.places), 3)))
         self.take(buffers.scene)
@@ -164,7 +110,7 @@ class EnvironmentLightPass:
         self._levels.filter = (moderngl.NEAREST, moderngl.NEAREST)
         # What is shown stays until something is known of the new one.
         self.asked = self.shown = 0
-        self._sums.clear()
+        self._sums[0].clear()
 
     @property
     def is_done(self) -> bool:
@@ -213,26 +159,11 @@ class EnvironmentLightPass:
         columns = np.asarray(self._light.environment.world_to_local, float).T
         for name, column in zip(("sky_x", "sky_y", "sky_z"), columns, strict=True):
             parameters[name][0, :3] = column
-        if self._sphere is not None:
-            parameters["specular"] = self._sphere
-        nm = np.array([*RGB_NM, ANCHOR_NM])
-        parameters["x_of_rgb"] = self._buffers.axis.x_of_nm(nm)
         wide = 2.0 * np.pi * PER_FOLLOWED / self.total
         parameters["level_wide"][0, :3] = self._level(wide)
         parameters["level_narrow"][0, :3] = self._level(0.25 * wide)
-        parameters["count"], parameters["straight"], parameters["followed"] = len(self.places.places), count, followed
-        self._parameters.write(parameters.tobytes())
-        self._asked_buffer.write(asked.tobytes())
-        self._buffers.bind()
-        self._parameters.bind_to_uniform_block(bindings.PARAMETERS)
-        self._asked_buffer.bind_to_uniform_block(_BIND_ASKED)
-        self._places.bind_to_storage_buffer(_BIND_PLACES)
-        self._sums.bind_to_storage_buffer(_BIND_SUMS)
-        self._levels.use(_UNIT_ENVIRONMENT)
-        with self._context.timers.timing("environment"):
-            self._program.run(-(-len(self.places.places) // _GROUP))
-            self._ctx.memory_barrier()
-        self._ctx.finish()
+        parameters["straight"], parameters["followed"] = count, followed
+        self._dispatch(parameters, asked, self._levels, "environment")
         self.asked += count
         took = time.perf_counter() - started
         self.seconds += took
@@ -248,24 +179,10 @@ class EnvironmentLightPass:
 
     def irradiance(self) -> np.ndarray:
         """Of every place, float64 (n, 3), linear Rec.709, lm/unit²: as far as it is known."""
-        count = len(self.places.places)
-        sums = np.frombuffer(self._sums.read(count * SUM.stride), SUM.dtype) if count else SUM.zeros(0)
+        sums = self._found()
         asked_for, straight = sums["all"].astype(float), sums["straight"].astype(float)
         share = np.divide(straight, asked_for, out=np.zeros_like(straight), where=asked_for > 0.0)
-        followed = self.asked // PER_FOLLOWED
-        specular = sums["specular"].astype(float)
-        if specular.any():
-            specular = self.places.smoothed(specular, SMOOTHING)
-        return share * self._unshadowed + specular / max(followed, 1)
-
-    @property
-    def lost(self) -> float:
-        """Share of followed paths that were given up after `MAX_EVENTS`."""
-        count = len(self.places.places)
-        if not count or self.asked < PER_FOLLOWED:
-            return 0.0
-        sums = np.frombuffer(self._sums.read(count * SUM.stride), SUM.dtype)
-        return float(sums["lost"].mean(dtype=float) / (self.asked // PER_FOLLOWED))
+        return share * self._unshadowed + self._specular(sums, self.asked)
 
     def show(self) -> None:
         """What was found becomes what the camera looks up."""
@@ -280,32 +197,13 @@ class EnvironmentLightPass:
     @property
     def bytes(self) -> int:
         """Device memory held."""
-        textures = [t for t in (self.texture, self._levels) if t is not None]
-        return self._places.size + self._sums.size + sum(16 * t.width * t.height for t in textures)
+        return self._bytes(self._levels)
 
     def release(self) -> None:
         """Free everything."""
-        owned = (self._places, self._sums, self._asked_buffer, self._parameters, self._program, self.texture)
-        shader.release(*owned)
-        if self._levels is not None:
-            self._levels.release()
+        self._release([self._levels])
 
 
 def without_light(ctx: moderngl.Context, receivers: int) -> moderngl.Texture:
     """The texture of a scene whose so many receivers are lit by nothing."""
     return ctx.texture((max(1, receivers), 1), 4, bytes(16 * max(1, receivers)), dtype="f4")
-
-
-def specular_sphere(buffers: SceneBuffers) -> np.ndarray | None:
-    """What holds all glass and mirrors that rays are followed by: centre and radius, float64 (4,), GPU space; None
-    where there are none."""
-    corners = [
-        buffers.space.to_gpu(mesh.vertices)
-        for mesh, item in zip(buffers.world_meshes, buffers.scene.objects, strict=True)
-        if item.material.is_specular and not isinstance(item.material, Grating)
-    ]
-    if not corners:
-        return None
-    points = np.concatenate(corners)
-    centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    return np.append(centre, 1.0001 * np.linalg.norm(points - centre, axis=1).max())

@@ -2,14 +2,14 @@
 charts, coarser than caustic maps.
 
 A flat receiver has a coarse window over all of it and, where other things stand on or near a part of it, a fine one
-round those, since only there shadows are sharp; of an open sheet both sides, of a room that holds anything its inside.
-A curved receiver has charts. Positions, normals and facets of all texels are worked out here, so that the programs that
-ask know nothing of windows.
+round those, since only there shadows are sharp, and some between both where they differ much; of an open sheet both
+sides, of a room that holds anything its inside. A curved receiver has charts.
+Positions, normals and facets of all texels are worked out here, so that the programs that ask know nothing of windows.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -23,8 +23,14 @@ from ..model.scene_checks import contains
 from .map_layout import Window
 from .plane_frame import PlaneFrame, plane_frame
 
-FINE_TEXELS, COARSE_TEXELS, CHART_TEXELS = 104 * 104, 40 * 40, 88 * 88
+FINE_TEXELS, BETWEEN_TEXELS, COARSE_TEXELS, CHART_TEXELS = 104 * 104, 32 * 32, 40 * 40, 88 * 88
 """Of a flat receiver's windows, each side, and of a curved one."""
+_GROWTH = 6.0
+"""Of a window's side to that of the next one, at most."""
+_BORDER = 0.07
+"""Of a thing's size: the fine window reaches beyond it by as much at least, and fades into the next one there."""
+ALL_PARTS = 0xFFFF
+"""`PLACE.parts` of a whole texel."""
 MOST_TEXELS = 1 << 17
 """Of all together: many receivers share them."""
 RECORD_TEXELS = 3
@@ -42,7 +48,7 @@ PLACE = Struct(
         Field("step_u", "vec3", "to the next texel, GPU space; zero on charts"),
         Field("inside", "uint", "1: the facet's back is lit"),
         Field("step_v", "vec3", "likewise"),
-        Field("reserved", "uint", ""),
+        Field("parts", "uint", "of 4 × 4, row by row, those that it stands for, as bits (`covered_places`)"),
         Field("span_u", "vec3", "side of what the texel covers, GPU space; on charts too"),
         Field("reserved_too", "uint", ""),
         Field("span_v", "vec3", "likewise"),
@@ -73,6 +79,10 @@ class EnvironmentPlaces:
     """bool (n,): of a window, in a part of it that no finer one covers: looked up at its own middle."""
     is_window: np.ndarray
     """bool (n,): of a window, not of charts."""
+    covered: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
+    """int (k,): of the last k places, which stand for the covered parts of a texel, those for its other parts."""
+    shares: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    """float (n - k,): how much of each texel is open and covered, in 64ths: 128 times the one plus the other."""
 
     @property
     def areas(self) -> np.ndarray:
@@ -89,30 +99,44 @@ class EnvironmentPlaces:
         return np.append(np.flatnonzero(ends), len(self.places))
 
     def image(self, values: np.ndarray) -> np.ndarray:
-        """float32 (height, width, 4): the texture with `values` (n, 3 or 4) in its texels."""
+        """float32 (height, width, 4): the texture with `values` (n, 3 or 4) in its texels. Where some are covered in
+        part the lower half has the covered parts' values, with `shares`; a fourth channel's sign says that both
+        differ."""
         width, height = self.size
+        own = len(values) - len(self.covered)
+        texels = np.zeros((own, 4), np.float32)
+        texels[:, : values.shape[1]] = values[:own]
         image = np.zeros((height, width, 4), np.float32)
+        halves = [texels]
+        if len(self.covered):
+            halves.append(texels.copy())
+            halves[1][self.covered, :3], halves[1][:, 3] = values[own:, :3], self.shares
+            texels[self.covered, 3] *= -1.0
+        for half, part in zip(np.split(image, len(halves)), halves, strict=True):
+            half[self.texel_xy[:own, 1], self.texel_xy[:own, 0]] = part
+            half[self.filled_xy[:, 1], self.filled_xy[:, 0]] = part[self.source]
         image[: len(self.records)] = self.records
-        channels = values.shape[1]
-        x, y = self.texel_xy.T
-        image[y, x, :channels] = values
-        x, y = self.filled_xy.T
-        image[y, x, :3] = values[self.source, :3]
         return image
 
     def smoothed(self, values: np.ndarray, texels: float) -> np.ndarray:
-        """`values` (n, 3) averaged over neighbours by a Gaussian of so many texels, within each tile."""
+        """`values` (n, 3) averaged over neighbours by a Gaussian of so many texels, within each tile; what is covered
+        and what is open each by itself."""
         from scipy.ndimage import gaussian_filter
 
         found = np.array(values, float)
+        own = len(values) - len(self.covered)
+        texel, covered = np.append(np.arange(own), self.covered), np.arange(len(values)) >= own
+        covered[: len(self.shares)] = self.shares < 128.0
         for first, end in self.tiles:
-            x, y = (self.texel_xy[first:end] - self.texel_xy[first:end].min(axis=0, initial=1 << 30)).T
-            if end - first < 2:
-                continue
-            image = np.zeros((y.max() + 1, x.max() + 1, 4))
-            image[y, x, :3], image[y, x, 3] = values[first:end], 1.0
-            mean = gaussian_filter(image, (texels, texels, 0.0), mode="constant", truncate=2.5)
-            found[first:end] = mean[y, x, :3] / mean[y, x, 3:]
+            within = (texel >= first) & (texel < end)
+            for chosen in (within & covered, within & ~covered):
+                if chosen.sum() < 2:
+                    continue
+                x, y = (self.texel_xy[chosen] - self.texel_xy[chosen].min(axis=0)).T
+                image = np.zeros((y.max() + 1, x.max() + 1, 4))
+                image[y, x, :3], image[y, x, 3] = values[chosen], 1.0
+                mean = gaussian_filter(image, (texels, texels, 0.0), mode="constant", truncate=2.5)
+                found[chosen] = mean[y, x, :3] / mean[y, x, 3:]
         return found
 
     def spread(self, values: np.ndarray) -> np.ndarray:
@@ -162,9 +186,10 @@ def environment_places(buffers: SceneBuffers, finer: float = 1.0, gutter: int = 
         windows = _windows(buffers, index, frame)
         for back in (False, True):
             for number, window in enumerate(windows):
-                texels = COARSE_TEXELS if number and len(windows) > 1 else FINE_TEXELS
+                texels = COARSE_TEXELS if number + 1 == len(windows) else BETWEEN_TEXELS
+                texels = FINE_TEXELS if number == 0 else texels
                 size = _size(window, share * texels * (0.25 if back else 1.0))
-                tiles.append(_Side(receiver, size, frame, window, back, finer=windows[0] if number else None))
+                tiles.append(_Side(receiver, size, frame, window, back, finer=windows[number - 1] if number else None))
     placed, size = pack([tile.size for tile in tiles], 4096)
     # Mesa compiles its programs once more for sides that are powers of two.
     width = max(size[0], 64)
@@ -184,7 +209,7 @@ def _holds_anything(buffers: SceneBuffers, index: int) -> bool:
 
 
 def _windows(buffers: SceneBuffers, index: int, frame: PlaneFrame) -> list[Window]:
-    """Fine (where it pays) and coarse window on a flat receiver, finest first."""
+    """Fine (where it pays) and coarser windows on a flat receiver, finest first."""
     points = frame.project(buffers.space.to_gpu(buffers.world_meshes[index].vertices))
     extent = Window(points.min(axis=0), points.max(axis=0))
     normal = np.cross(frame.axes[0], frame.axes[1])
@@ -194,16 +219,25 @@ def _windows(buffers: SceneBuffers, index: int, frame: PlaneFrame) -> list[Windo
             continue
         box = buffers.space.to_gpu(world_bounds(item))
         corners = np.array(np.meshgrid(*box.T, indexing="ij")).reshape(3, 8).T
-        flat, height = frame.project(corners), np.abs((corners - frame.origin) @ normal)
-        # A shadow under a uniform sky has faded as far beside a thing as that is high.
-        reach = min(float(height.max()), float(np.linalg.norm(box[1] - box[0])))
+        flat = frame.project(corners)
+        # A shadow under a uniform sky has nearly faded as far beside a thing as that is high, beside one that hovers
+        # at three times its height.
+        above, size = (corners - frame.origin) @ normal, float(np.linalg.norm(box[1] - box[0]))
+        height = np.abs(above)
+        gap = height.min() if (above > 0.0).all() or (above < 0.0).all() else 0.0
+        reach = max(min(float(height.max() + 2.0 * gap), size), _BORDER * size)
         least, most = flat.min(axis=0) - reach, flat.max(axis=0) + reach
         if (least < extent.high).all() and (most > extent.low).all() and height.min() < 3.0 * reach:
             low, high = np.minimum(low, least), np.maximum(high, most)
     fine = Window(np.maximum(low, extent.low), np.minimum(high, extent.high))
     if not (fine.size > 1e-9).all() or np.prod(fine.size) > _FULL_SHARE * np.prod(extent.size):
         return [extent]
-    return [fine, extent]
+    ratio, windows = extent.size.max() / fine.size.max(), [fine]
+    steps = int(np.ceil(np.log(ratio) / np.log(_GROWTH)))
+    for step in range(1, steps):
+        more = 0.5 * (ratio ** (step / steps) - 1.0) * fine.size.max()
+        windows.append(Window(np.maximum(fine.low - more, extent.low), np.minimum(fine.high + more, extent.high)))
+    return [*windows, extent]
 
 
 def _size(window: Window, texels: float) -> tuple[int, int]:
@@ -248,11 +282,13 @@ def _packed(buffers: SceneBuffers, tiles: list[_Side], placed, size: tuple[int, 
     image = np.zeros((rows * size[0], 4), np.float32)
     image[: len(texels)] = texels
     none = np.zeros((0, 2), int)
+    places = np.concatenate([p for p, _ in parts]) if parts else PLACE.zeros(0)
+    places["parts"] = ALL_PARTS
     ends = np.cumsum([len(places) for places, _ in parts]).tolist()
     return EnvironmentPlaces(
         (size[0], size[1] + rows),
         image.reshape(rows, size[0], 4),
-        np.concatenate([p for p, _ in parts]) if parts else PLACE.zeros(0),
+        places,
         np.concatenate([xy for _, xy in parts]) if parts else none,
         tuple((end - len(places), end) for (places, _), end in zip(parts, ends, strict=True)),
         np.concatenate([none, *filled]),

@@ -14,7 +14,8 @@ from ..model.optics.colorimetry import rgb709_to_xyz_matrix
 from ..model.scene import Camera
 from ..model.settings import RenderSettings
 from ..passes.bounce_light import BounceLightPass
-from ..passes.environment_light import MAX_EVENTS, EnvironmentLightPass
+from ..passes.environment_light import EnvironmentLightPass
+from ..passes.gathered_light import MAX_EVENTS
 from ..passes.map_layout import Window, pixel_side, project
 from ..passes.picture_window import PictureWindow
 from ..passes.plane_frame import plane_frame

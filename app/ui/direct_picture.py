@@ -15,7 +15,8 @@ from ..gpu.map_channels import MapChannels
 from ..model.settings import RenderSettings
 from ..passes.camera import CameraPass
 from ..passes.caustic_maps import CausticMaps
-from ..passes.environment_light import FIRST_DIRECTIONS, EnvironmentLightPass
+from ..passes.environment_light import EnvironmentLightPass
+from ..passes.gathered_light import FIRST_DIRECTIONS
 from ..passes.spectrum_choice import Spectrum
 from ..render.device_scene import scene_buffers
 from ..render.shown_spectra import reflectance_classes

@@ -1,7 +1,7 @@
 """Dispersive caustics for Blender: SpectraSplat bakes what glass throws on an object, and it is put back as light.
 
-One file: Edit, Preferences, Add-ons, Install from Disk. It calls the installed program (`pip install spectrasplat`),
-so nothing is installed into Blender. Docs: docs/blender.md of SpectraSplat. Licence: MIT.
+One file: Edit, Preferences, Add-ons, Install from Disk. It calls the installed program (`pip install .` in its
+checkout), so nothing is installed into Blender. Docs: docs/blender.md of SpectraSplat. Licence: MIT.
 """
 
 import json
@@ -394,7 +394,7 @@ class SpectraSplatPreferences(bpy.types.AddonPreferences):
     def draw(self, context):
         self.layout.prop(self, "program")
         found = find_program(self.program)
-        told = f"Found {found[0]}" if found else "Not found: pip install spectrasplat, or name its command here"
+        told = f"Found {found[0]}" if found else "Not found: pip install . in its checkout, or name its command here"
         self.layout.label(text=told, icon="CHECKMARK" if found else "ERROR")
 
 
@@ -420,7 +420,7 @@ class SPECTRASPLAT_OT_bake(bpy.types.Operator):
             raise RuntimeError(f"The receiver '{settings.receiver.name}' is hidden: show it first")
         program = find_program(_wished_program(context))
         if program is None:
-            raise RuntimeError("The program is not found: pip install spectrasplat, or name it in the preferences")
+            raise RuntimeError("The program is not found: pip install . in its checkout, or name it in the preferences")
         self._folder = tempfile.TemporaryDirectory(prefix="spectrasplat_")
         scene = Path(self._folder.name) / "scene.glb"
         if not export_scene(context, scene):

@@ -3,7 +3,7 @@
 #ifndef CAMERA_RECEIVER_LIGHT_GLSL
 #define CAMERA_RECEIVER_LIGHT_GLSL
 
-#include "lib/receiver_light.glsl"
+#include "lib/covered.glsl"
 
 // Irradiance, linear Rec.709, lm/unit².
 layout(binding = UNIT_RECEIVER_LIGHT) uniform sampler2D known_light;
@@ -11,7 +11,8 @@ layout(binding = UNIT_RECEIVER_LIGHT) uniform sampler2D known_light;
 void add_receiver_light(CameraPath path, SurfaceInteraction seen, WavelengthInterval interval)
 {
     bool back = dot(seen.direction, seen.normal_g) > 0.0;
-    vec3 light = receiver_light(known_light, object_at(seen.object).receiver, seen.source, seen.position, back).rgb;
+    RayOrigin origin = RayOrigin(seen.primitive, seen.object, uint(back), 0u);
+    vec3 light = receiver_light(known_light, seen.source, origin, seen.position, back ? -seen.normal_g : seen.normal_g).rgb;
 #if defined(COATS) || defined(ROUGH_DIFFUSE)
     // Of a measured reflectance its colour counts here.
     bool is_plain = receivers[object_at(seen.object).receiver].reflectance_class == 0u;

@@ -7,6 +7,7 @@ layout(local_size_x = 64) in;
 #include "lib/interface.glsl"
 #include "lib/random.glsl"
 #include "lib/receiver_light.glsl"
+#include "light/place.glsl"
 #ifdef FOLLOWS_SPECULAR
 #include "light/followed.glsl"
 #endif
@@ -14,16 +15,25 @@ layout(local_size_x = 64) in;
 layout(std140, binding = BIND_PARAMETERS) uniform Parameters { BounceParameters p; };
 layout(std430, binding = BIND_PLACES) readonly restrict buffer Places { EnvironmentPlace places[]; };
 layout(std140, binding = BIND_ASKED) uniform Asked { BounceAsked asked[MOST_ASKED]; };
-layout(std430, binding = BIND_SUMS) restrict buffer Sums { BounceSum sums[]; };
+layout(std430, binding = BIND_SUMS) restrict buffer Sums { GatheredSum sums[]; };
 // What receivers send back: linear Rec.709 radiance, and with what density per GPU unit² a place there is drawn.
 layout(binding = UNIT_RADIANCE) uniform sampler2D receiver_radiance;
+
+// Over the receiver that a ray meets, of the place that it comes from, where that faces it.
+float height_over = FAR_DISTANCE;
+
+// Under what is so near a receiver it alone sees the covered part.
+bool is_covered(sampler2D map, RayOrigin origin, vec3 position, vec3 normal, float reach) { return height_over < reach; }
 
 vec4 radiance_from(Hit hit, vec3 position, vec3 direction)
 {
     Object thing = object_at(hit.object);
     vec4 found = vec4(0.0);
-    if (thing.kind == KIND_DIFFUSE)
-        found = receiver_light(receiver_radiance, thing.receiver, hit_triangle(hit).source, position + hit.distance * direction, dot(direction, hit.normal_g) > 0.0);
+    if (thing.kind == KIND_DIFFUSE) {
+        bool back = dot(direction, hit.normal_g) > 0.0;
+        RayOrigin origin = RayOrigin(hit.primitive, hit.object, uint(back), 0u);
+        found = receiver_light(receiver_radiance, hit_triangle(hit).source, origin, position + hit.distance * direction, back ? -hit.normal_g : hit.normal_g);
+    }
     return found;
 }
 
@@ -32,10 +42,10 @@ void main()
     uint id = gl_GlobalInvocationID.x;
     if (id >= p.count) return;
     EnvironmentPlace place = places[id];
-    BounceSum sum = sums[id];
+    GatheredSum sum = sums[id];
     RayOrigin origin = RayOrigin(place.primitive, place.object, place.inside, 0u);
     for (uint i = 0u; i < p.straight; ++i) {
-        vec3 position = place.position + (asked[i].within.x - 0.5) * place.step_u + (asked[i].within.y - 0.5) * place.step_v;
+        vec3 position = position_in(place, asked[i].within);
         bool aims = i >= p.by_cosine;
         vec3 way = aims ? asked[i].place - position : cosine_direction(place.normal, asked[i].place.xy);
         float distance2 = dot(way, way);
@@ -46,6 +56,8 @@ void main()
         bool met = false;
         if (faces) met = intersect_closest(position, toward, FAR_DISTANCE, origin, hit);
         if (met) {
+            vec3 way_up = dot(toward, hit.normal_g) > 0.0 ? -hit.normal_g : hit.normal_g;
+            height_over = dot(place.normal, way_up) < -0.5 ? -hit.distance * dot(toward, way_up) : FAR_DISTANCE;
             vec4 radiance = radiance_from(hit, position, toward);
             // The very place that was drawn, and not one of the finer texels that lie over a part of it.
             bool counts = !aims || (hit.object == asked[i].object && abs(hit.distance * hit.distance - distance2) < 1e-3 * distance2
@@ -55,7 +67,7 @@ void main()
     }
 #ifdef FOLLOWS_SPECULAR
     for (uint i = p.straight; i < p.straight + p.followed; ++i) {
-        vec3 position = place.position + (asked[i].within.x - 0.5) * place.step_u + (asked[i].within.y - 0.5) * place.step_v;
+        vec3 position = position_in(place, asked[i].within);
         float weight, lost = 0.0;
         bool narrow;
         uint own = hash_combine(asked[i].object, id);
@@ -63,6 +75,7 @@ void main()
         vec3 toward = toward_specular(p.specular, position, place.normal, fract(asked[i].place.xy + shift), weight, narrow);
         if (weight > 0.0) {
             FollowedRay ray = follow_specular(position, toward, origin, own, p.x_of_rgb, lost);
+            height_over = FAR_DISTANCE;
             if (ray.events > 0u && ray.met != 0u) sum.specular += weight * ray.weight * radiance_from(ray.hit, ray.position, ray.direction).rgb;
         }
         sum.lost += lost;

@@ -3,6 +3,7 @@ layout(local_size_x = 64) in;
 
 #include "lib/intersect.glsl"
 #include "lib/lookup.glsl"
+#include "light/place.glsl"
 #ifdef HAS_TEXTURES
 #include "lib/textures.glsl"
 #endif
@@ -11,9 +12,7 @@ layout(std140, binding = BIND_PARAMETERS) uniform Parameters { BounceCausticPara
 layout(std430, binding = BIND_PLACES) readonly restrict buffer Places { EnvironmentPlace places[]; };
 layout(std430, binding = BIND_SOURCES) restrict buffer Sources { BounceSource sources[]; };
 
-// Parts of a place along either side, each looked up by itself …
-#define PARTS 4
-// … with so many lookups a side at most.
+// Lookups in each part of a place along a side at most.
 #define MAX_TEXELS 16
 
 #ifdef HAS_TEXTURES
@@ -45,17 +44,18 @@ void main()
     Object thing = object_at(place.object);
     uint source = triangle_at(place.primitive).source;
     vec3 sum = vec3(0.0);
-    for (uint part = 0u; part < uint(PARTS * PARTS); ++part) {
-        vec2 within = (vec2(part % uint(PARTS), part / uint(PARTS)) + 0.5) / float(PARTS) - 0.5;
+    for (uint left = place.parts; left != 0u; left &= left - 1u) {
+        uint part = uint(findLSB(left));
+        vec2 within = (vec2(part % PLACE_PARTS, part / PLACE_PARTS) + 0.5) / float(PLACE_PARTS) - 0.5;
         uint placement;
         vec3 at;
         bool covered = find_texel(thing.receiver, source, place.position + within.x * place.span_u + within.y * place.span_v, placement, at);
         if (covered) {
             Placement window = placements[placement];
-            vec2 box = (abs(texels_along(window, at, place.span_u)) + abs(texels_along(window, at, place.span_v))) / float(PARTS);
+            vec2 box = (abs(texels_along(window, at, place.span_u)) + abs(texels_along(window, at, place.span_v))) / float(PLACE_PARTS);
             ivec2 lookups = clamp(ivec2(ceil(box)), ivec2(1), ivec2(MAX_TEXELS));
             vec2 step = box / vec2(lookups), corner = at.xy / at.z - 0.5 * (box - step);
-            float share = 1.0 / (float(PARTS * PARTS * lookups.x * lookups.y) * texel_area_at(window, at));
+            float share = 1.0 / (float(bitCount(place.parts) * lookups.x * lookups.y) * texel_area_at(window, at));
             for (int i = 0; i < lookups.x * lookups.y; ++i) {
                 vec4 energy = caustic_energy(caustic_map[0], placement, corner + step * vec2(i % lookups.x, i / lookups.x), step);
                 sum += share * (energy.x * p.colours[0].rgb + energy.y * p.colours[1].rgb + energy.z * p.colours[2].rgb + energy.w * p.colours[3].rgb);

@@ -6,6 +6,7 @@ layout(local_size_x = 64) in;
 #include "lib/lattice.glsl"
 #include "lib/lights.glsl"
 #include "lib/random.glsl"
+#include "light/place.glsl"
 
 layout(std140, binding = BIND_PARAMETERS) uniform Parameters { BounceDirectParameters p; };
 layout(std430, binding = BIND_PLACES) readonly restrict buffer Places { EnvironmentPlace places[]; };
@@ -24,7 +25,7 @@ void main()
     for (uint i = p.first_sample; i < p.end_sample; ++i) {
         vec2 within = vec2(kronecker(i, PLASTIC_1, 0u), kronecker(i, PLASTIC_2, 0u));
         vec2 unit = vec2(kronecker(i, depth_generator(0u), key), kronecker(i, depth_generator(1u), hash_pcg(key)));
-        vec3 position = place.position + (within.x - 0.5) * place.step_u + (within.y - 0.5) * place.step_v;
+        vec3 position = position_in(place, within);
         LightSample s = sample_light(light, position, unit);
         float gain = s.gain * max(dot(s.toward, place.normal), 0.0);
         // Up to the light, less a hair so that a surface the light lies on does not hide it.

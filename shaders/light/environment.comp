@@ -6,6 +6,7 @@ layout(local_size_x = 64) in;
 
 #include "lib/interface.glsl"
 #include "lib/random.glsl"
+#include "light/place.glsl"
 #ifdef FOLLOWS_SPECULAR
 #include "light/followed.glsl"
 #endif
@@ -13,7 +14,7 @@ layout(local_size_x = 64) in;
 layout(std140, binding = BIND_PARAMETERS) uniform Parameters { EnvironmentParameters p; };
 layout(std430, binding = BIND_PLACES) readonly restrict buffer Places { EnvironmentPlace places[]; };
 layout(std140, binding = BIND_ASKED) uniform Asked { EnvironmentAsked asked[MOST_ASKED]; };
-layout(std430, binding = BIND_SUMS) restrict buffer Sums { EnvironmentSum sums[]; };
+layout(std430, binding = BIND_SUMS) restrict buffer Sums { GatheredSum sums[]; };
 #ifdef FOLLOWS_SPECULAR
 layout(binding = UNIT_ENVIRONMENT) uniform sampler2D environment_levels;
 
@@ -39,12 +40,12 @@ void main()
     uint id = gl_GlobalInvocationID.x;
     if (id >= p.count) return;
     EnvironmentPlace place = places[id];
-    EnvironmentSum sum = sums[id];
+    GatheredSum sum = sums[id];
     RayOrigin origin = RayOrigin(place.primitive, place.object, place.inside, 0u);
     for (uint i = 0u; i < p.straight; ++i) {
         vec3 toward = asked[i].toward;
         vec3 amount = asked[i].weight * max(dot(toward, place.normal), 0.0);
-        vec3 position = place.position + (asked[i].within.x - 0.5) * place.step_u + (asked[i].within.y - 0.5) * place.step_v;
+        vec3 position = position_in(place, asked[i].within);
         sum.all += amount;
         bool reaches = false;
         if (amount != vec3(0.0)) reaches = !intersect_any(position, toward, FAR_DISTANCE, origin);
@@ -52,7 +53,7 @@ void main()
     }
 #ifdef FOLLOWS_SPECULAR
     for (uint i = p.straight; i < p.straight + p.followed; ++i) {
-        vec3 position = place.position + (asked[i].within.x - 0.5) * place.step_u + (asked[i].within.y - 0.5) * place.step_v;
+        vec3 position = position_in(place, asked[i].within);
         float weight, lost = 0.0;
         bool narrow;
         // Neighbours ask in other directions: their mean, which is what is shown, knows many more than each.

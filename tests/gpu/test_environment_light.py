@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from reference.form_factors import form_factor, rectangle
 from spectrasplat.edit.live_inputs import LiveInputs
 from spectrasplat.edit.parameters import Stage
 from spectrasplat.gpu.context import Context
@@ -173,6 +174,33 @@ def test_a_scene_says_whether_its_environment_lights(gl: Context) -> None:
     # ∫ over the upper half of the blend s²(3 − 2s), cosine-weighted: 2 ∫ s (s²(3 − 2s)) ds = 7/10.
     expected = 0.5 * (0.7 * np.array([0.2, 0.5, 2.0]) + 0.3 * np.array([1.0, 0.9, 0.8]))
     np.testing.assert_allclose(lit.mean(axis=(0, 1)), expected, rtol=3e-3)
+
+
+ANGLES = 2.0 * np.pi * np.arange(96) / 96
+COIN = primitives.disc(1.0), 0.0, np.stack([np.cos(ANGLES), np.sin(ANGLES), 0.0 * ANGLES], axis=1)
+BLOCK = primitives.box((2.0, 2.0, 1.0)), 1.0, rectangle((-1.0, -1.0, 0.0), (2.0, 0.0, 0.0), (0.0, 2.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("thing", "gap", "side"),
+    [(COIN, 0.01, 30.0), (COIN, 0.001, 200.0), (COIN, 0.3, 200.0)]
+    + [(BLOCK, 0.0, 30.0), (BLOCK, 0.002, 200.0), (BLOCK, -0.01, 200.0)],
+)
+def test_no_halo_is_about_what_stands_on_a_wide_floor_or_just_above(gl: Context, thing, gap, side) -> None:
+    (mesh, height, foot), view, size = thing, 8.0, 160
+    fov = math.degrees(2.0 * math.atan(view / 120.0))
+    camera = Camera((0.0, 0.0, 60.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0), vertical_fov_deg=fov)
+    item = place(mesh, Diffuse((0.9,) * 3), (0.0, 0.0, gap + 0.5 * height))
+    scene = scene_of(item, floor(side, Diffuse((1.0, 1.0, 1.0))), camera=camera)
+    shown = picture(gl, scene, replace(SETTINGS, width=size, height=size))[size // 2, :, 1]
+    x = ((np.arange(size) + 0.5) / size - 0.5) * view
+    beside = x > 1.06
+    at, up, low = np.c_[x, 0.0 * x, 0.0 * x][beside], np.array([[0.0, 0.0, 1.0]]), max(gap, 0.0)
+    expected = np.ones(len(at)) - (form_factor(at, up, foot + [0.0, 0.0, gap]) if gap > 0.0 else 0.0)
+    if height:
+        expected -= form_factor(at, up, rectangle((1.0, -1.0, low), (0.0, 2.0, 0.0), (0.0, 0.0, gap + height - low)))
+    np.testing.assert_allclose(shown[beside], expected, atol=0.022)
+    assert abs((shown[beside] - expected)[-size // 4 :].mean()) < 4e-3  # no window's border shows
 
 
 MUTANTS = {

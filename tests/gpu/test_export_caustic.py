@@ -244,6 +244,6 @@ def test_without_usd_core_the_remedy_is_told(
     baked: ss.CausticMap, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(__import__("sys").modules, "pxr", None)
-    with pytest.raises(ss.UserError, match=r"pip install 'spectrasplat\[usd\]'"):
+    with pytest.raises(ss.UserError, match=r"pip install usd-core"):
         baked.export(tmp_path / "a.usda")
     assert list(tmp_path.iterdir()) == []

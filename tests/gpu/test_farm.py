@@ -25,7 +25,7 @@ pytestmark = [
     pytest.mark.skipif(sys.platform == "win32", reason="workers are looked after as POSIX has it"),
     pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::DeprecationWarning"),
 ]
-pytest.importorskip("distributed", reason="pip install 'spectrasplat[farm]'")
+pytest.importorskip("distributed", reason="pip install '.[farm]'")
 SMALL = RenderSettings(width=48, height=27, photons=30_000, spp=2, batch=4096)
 
 

@@ -1,12 +1,16 @@
-"""lib/bounce.glsl and lib/receiver_light.glsl against float64."""
+"""lib/bounce.glsl, lib/receiver_light.glsl and lib/covered.glsl against float64."""
 
 from __future__ import annotations
 
 import moderngl
 import numpy as np
+from spectrasplat.gpu import bindings
+from spectrasplat.gpu.scene_records import SCENE_STRUCTS
+from spectrasplat.model.environment import constant
 from spectrasplat.model.geometry import primitives
-from spectrasplat.model.scene import Camera, Diffuse, RenderDefaults, Scene, SceneObject
+from spectrasplat.model.scene import Black, Camera, Diffuse, RenderDefaults, Scene, SceneObject
 from spectrasplat.model.settings import RenderSettings
+from spectrasplat.passes.covered_places import covered_places
 from spectrasplat.passes.environment_places import environment_places
 from spectrasplat.reference import optics
 from spectrasplat.render.device_scene import scene_buffers
@@ -15,8 +19,9 @@ from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 COVERS = {
     "bounce.glsl": ("cosine_direction", "gathered"),
     "receiver_light.glsl": ("receiver_record", "receiver_light"),
+    "covered.glsl": ("is_covered",),
 }
-COUNT = 4096
+COUNT, KNOWN = 4096, 6
 
 
 def test_directions_are_as_likely_as_their_cosine(gl) -> None:
@@ -60,6 +65,7 @@ def test_light_is_looked_up_between_the_texels_of_either_side(gl) -> None:
     scene = Scene("plate", camera, (), things, render=RenderDefaults())
     buffers = scene_buffers(gl, scene, RenderSettings())
     places = environment_places(buffers, 0.1)
+    assert covered_places(buffers, places) is places
     position = places.places["position"].astype(float)
     back = places.places["inside"].astype(float)
     light = np.stack([position @ [1.0, 2.0, 0.0] + 3.0, position @ [-1.0, 0.5, 0.0] + 3.0, back], axis=1)
@@ -72,12 +78,15 @@ def test_light_is_looked_up_between_the_texels_of_either_side(gl) -> None:
     try:
         found = evaluate(
             gl.ctx,
-            ["lib/receiver_light.glsl"],
-            "vec4 all = receiver_light(known, 0u, 0u, at, side == 1u); light = all.rgb; nearest = all.a;",
+            ["lib/covered.glsl"],
+            "vec4 all = receiver_light(known, 0u, RayOrigin(NONE, 0u, side, 0u), at, vec3(0.0, 0.0, 1.0));"
+            " light = all.rgb; nearest = all.a;",
             {"at": at, "side": side},
             {"light": "vec3", "nearest": "float"},
-            binders=[lambda: texture.use(0)],
-            declarations="layout(binding = 0) uniform sampler2D known;",
+            buffers.features.defines() | bindings.SCENE_DEFINES | buffers.defines,
+            SCENE_STRUCTS,
+            binders=[buffers.bind, lambda: texture.use(KNOWN)],
+            declarations="layout(binding = 6) uniform sampler2D known;",
         )
     finally:
         texture.release()
@@ -93,3 +102,47 @@ def test_light_is_looked_up_between_the_texels_of_either_side(gl) -> None:
     gap = np.abs(position[nearest] - at)[:, :2]
     step = np.abs(places.places["span_u"][nearest] + places.places["span_v"][nearest])[:, :2]
     assert (gap <= 0.5 * step + 1e-5).all()
+
+
+def test_what_is_covered_hangs_near_or_holds_the_place(gl) -> None:
+    """A disc near a floor, one far above, a ball sunk into it to a third; and the parts of texels that say so."""
+    things = (
+        ("near", primitives.disc(0.4), (-1.0, 0.0, 0.003), Black()),
+        ("far", primitives.disc(0.4), (0.0, 0.0, 0.6), Black()),
+        ("sunk", primitives.sphere(0.5, 20000), (1.0, 0.0, 0.25), Diffuse()),
+        ("floor", primitives.plane(4.0, 2.0), (0.0, 0.0, 0.0), Diffuse()),
+    )
+    items = [
+        SceneObject(n, m, material, np.block([[np.eye(3), np.reshape(at, (3, 1))], [0, 0, 0, 1]]))
+        for n, m, at, material in things
+    ]
+    camera = Camera((0.0, -4.0, 2.0), (0.0, 0.0, 0.0))
+    scene = Scene("covers", camera, (), tuple(items), environment=constant((1.0, 1.0, 1.0)))
+    buffers = scene_buffers(gl, scene, RenderSettings())
+    places = environment_places(buffers)
+    both = covered_places(buffers, places)
+    texture = gl.ctx.texture(places.size, 4, places.image(np.zeros((len(places.places), 3))).tobytes(), dtype="f4")
+    xy = np.random.default_rng(6).uniform((-2.0, -1.0), (2.0, 1.0), (COUNT, 2))
+    try:
+        found = evaluate(
+            gl.ctx,
+            ["lib/covered.glsl"],
+            "covered = uint(is_covered(known, RayOrigin(NONE, 3u, 0u, 0u), at, vec3(0.0, 0.0, 1.0), reach));",
+            {
+                "at": as_f32(buffers.space.to_gpu(np.c_[xy, np.zeros(COUNT)])),
+                "reach": np.full(COUNT, 0.05) * buffers.space.scale,
+            },
+            {"covered": "uint"},
+            buffers.features.defines() | bindings.SCENE_DEFINES | buffers.defines,
+            SCENE_STRUCTS,
+            binders=[buffers.bind, lambda: texture.use(KNOWN)],
+            declarations=f"layout(binding = {KNOWN}) uniform sampler2D known;",
+        )["covered"]
+    finally:
+        texture.release()
+        buffers.release()
+    middles, radii = np.array([[-1.0, 0.0], [1.0, 0.0]]), np.array([0.4, np.sqrt(0.5**2 - 0.2**2)])
+    beyond = np.linalg.norm(xy[:, None] - middles, axis=2) - radii
+    clear = np.abs(beyond).min(axis=1) > 0.005
+    np.testing.assert_array_equal(found[clear], (beyond < 0.0).any(axis=1)[clear])
+    assert len(both.places) > len(places.places)

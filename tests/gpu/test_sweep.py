@@ -51,7 +51,7 @@ def test_a_dispersion_sweep_traces_once(tmp_path: Path, capsys: pytest.CaptureFi
 
 @pytest.mark.slow
 def test_a_light_sweep_on_workers_is_that_of_one_process(tmp_path: Path) -> None:
-    pytest.importorskip("distributed", reason="pip install 'spectrasplat[farm]'")
+    pytest.importorskip("distributed", reason="pip install '.[farm]'")
     grid = {"lights.slit.rotation.z": [0.0, 4.0], "camera.orbit_deg": [0.0, 20.0]}
     wanted = {"size": (48, 27), "photons": 20_000, "spp": 2}
     here = {p.number: p for p in ss.sweep(ss.load("prism"), grid, **wanted)}

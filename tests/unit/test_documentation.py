@@ -150,6 +150,17 @@ def test_every_scene_is_described() -> None:
     assert [name for name in scenes if f"`{name}`" not in page] == []
 
 
+def test_no_text_installs_a_package_of_our_name() -> None:
+    """Nobody has registered it: whoever does would run code on the machines of those who follow the advice."""
+    told = re.compile(r"pip3?\s+install\b[^\n`]*?\bspectrasplat(?![\w.-]*\.whl)\b|spectrasplat\[\w+\]")
+    assert all(told.search(f"pip install {rest}") for rest in ("spectrasplat", "-U 'spectrasplat[farm]'"))
+    assert not any(told.search(line) for line in ("pip install .", "`pip install .` it is called `spectrasplat`"))
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=False).stdout
+    files = [ROOT / name for name in listed.split("\0") if name and ROOT / name != Path(__file__)]
+    texts = {file: file.read_bytes().decode("utf-8", "ignore") for file in files if file.is_file()}
+    assert [str(file.relative_to(ROOT)) for file, text in texts.items() if told.search(text)] == []
+
+
 def test_one_version() -> None:
     from spectrasplat import __version__
 

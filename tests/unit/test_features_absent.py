@@ -23,7 +23,7 @@ from spectrasplat.model.features_explained import explain
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.passes import bounce_light, environment_light
+from spectrasplat.passes import bounce_light, environment_light, gathered_light
 from spectrasplat.passes.camera_records import CAMERA_LIGHT, CAMERA_PARAMETERS
 from spectrasplat.passes.environment_places import PLACE
 from spectrasplat.passes.footprint import SPLAT
@@ -214,10 +214,10 @@ def sources(features: Features) -> list[shader.Source]:
         made += [shader.load_source(name, splat | {kind: 1}, (SPLAT,)) for name in ("light/splat.vert", fragment)]
     soft = light | {"MOST_ASKED": 24, "BIND_PLACES": 8, "BIND_ASKED": 9, "BIND_SUMS": 10}
     if features.environment_lights:
-        structs = (*SCENE_STRUCTS, PLACE, environment_light.PARAMETERS, environment_light.ASKED, environment_light.SUM)
+        structs = (*SCENE_STRUCTS, PLACE, environment_light.PARAMETERS, environment_light.ASKED, gathered_light.SUM)
         made.append(shader.load_source("light/environment.comp", soft, structs))
     if features.bounces:
-        structs = (*SCENE_STRUCTS, PLACE, bounce_light.PARAMETERS, bounce_light.ASKED, bounce_light.SUM)
+        structs = (*SCENE_STRUCTS, PLACE, bounce_light.PARAMETERS, bounce_light.ASKED, gathered_light.SUM)
         made.append(shader.load_source("light/bounce.comp", soft, structs))
     if features.haze:
         structs = (records.FLIGHT, CAMERA_PARAMETERS, HAZE_PARAMETERS)

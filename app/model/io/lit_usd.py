@@ -18,7 +18,7 @@ def check_usd() -> None:
     try:
         import pxr  # noqa: F401
     except ImportError:
-        raise UserError("USD files need the package usd-core: pip install 'spectrasplat[usd]'") from None
+        raise UserError("USD files need the package usd-core: pip install usd-core") from None
 
 
 def texture_path(path: Path) -> Path:

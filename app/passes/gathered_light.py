@@ -1,0 +1,156 @@
+"""What finding the environment's light and the light of other receivers have in common: the places of a scene's
+receivers, of all of which a few directions are asked at a time, the sums of what was found, and the texture that the
+camera looks up."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import moderngl
+import numpy as np
+
+from ..gpu import bindings, shader
+from ..gpu.context import Context
+from ..gpu.dispatch_budget import DispatchBudget
+from ..gpu.scene_buffers import SceneBuffers
+from ..gpu.scene_records import SCENE_STRUCTS
+from ..gpu.schema import Field, Struct
+from ..model.materials import Grating
+from .environment_places import PLACE, EnvironmentPlaces
+
+PER_FOLLOWED = 4
+"""Straight ones for each that is followed through glass and over mirrors, which takes as long as many of them."""
+FIRST_DIRECTIONS = 16
+"""After which the light is worth showing."""
+MAX_EVENTS = 40
+"""Surfaces of glass and mirrors on one path; what goes on is lost and counted."""
+ANCHOR_NM = 587.56
+"""Wavelength whose index bends what is followed: this light through glass does not part into colours."""
+RGB_NM = (612.0, 549.0, 465.0)
+"""Wavelengths at which glass and mirrors tint linear red, green and blue."""
+SMOOTHING = 1.5
+"""Texels over which what came by glass and mirrors is averaged: neighbours follow other paths."""
+_GROUP = 64
+_BIND_PLACES, _BIND_ASKED, _BIND_SUMS, _UNIT = 8, 9, 10, 0
+
+SUM = Struct(
+    "GatheredSum",
+    (
+        Field("all", "vec3", "asked for (the environment's)"),
+        Field("lost", "float", "paths given up"),
+        Field("straight", "vec3", "what arrived straight: of that, or irradiance, linear Rec.709"),
+        Field("reserved", "float", ""),
+        Field("specular", "vec3", "by way of glass and mirrors"),
+        Field("reserved_too", "float", ""),
+    ),
+)
+
+
+class GatheredLight:
+    """Owns the program, the places, the sums of each bounce and the texture of one scene's receivers."""
+
+    def __init__(
+        self,
+        context: Context,
+        buffers: SceneBuffers,
+        places: EnvironmentPlaces,
+        seed: int,
+        total: int,
+        program: tuple[str, str, Struct, Struct],
+        most_asked: int,
+        budget: DispatchBudget,
+        bounces: int = 1,
+    ) -> None:
+        """`program`: shader, name of its texture unit, records of its parameters and of what is asked."""
+        self._context, self._ctx, self._buffers = context, context.ctx, buffers
+        self._seed, self.total, self.places, self._budget = seed, total, places, budget
+        self.asked = 0
+        """Directions asked so far."""
+        self.shown = 0
+        """Those of them that the texture holds."""
+        self.seconds = 0.0
+        """Spent on it."""
+        self.texture = self._texture()
+        """What the camera looks up."""
+        name, unit, parameters, asked = program
+        self._places = self._ctx.buffer(places.places.tobytes() or bytes(PLACE.stride))
+        size = max(1, len(places.places)) * SUM.stride
+        self._sums = [self._ctx.buffer(bytes(size)) for _ in range(bounces)]
+        self._asked_buffer = self._ctx.buffer(reserve=most_asked * asked.stride)
+        self._parameters = self._ctx.buffer(reserve=parameters.stride)
+        self._sphere = specular_sphere(buffers)
+        defines = buffers.features.defines() | bindings.SCENE_DEFINES | buffers.defines
+        defines |= {"BIND_PLACES": _BIND_PLACES, "BIND_ASKED": _BIND_ASKED, "BIND_SUMS": _BIND_SUMS, unit: _UNIT}
+        defines |= {"MOST_ASKED": most_asked, "MAX_EVENTS": MAX_EVENTS}
+        defines.pop("NORMAL_DERIVATIVES", None)
+        if self._sphere is not None:
+            defines["FOLLOWS_SPECULAR"] = 1
+        self._program = shader.compute(self._ctx, name, defines, (*SCENE_STRUCTS, PLACE, parameters, asked, SUM))
+
+    def _texture(self) -> moderngl.Texture:
+        texture = self._ctx.texture(self.places.size, 4, dtype="f4")
+        texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        return texture
+
+    def _dispatch(
+        self, parameters: np.ndarray, asked: np.ndarray, texture: moderngl.Texture, timer: str, bounce: int = 0
+    ) -> None:
+        """Ask of all places; `parameters` lack what all have in common."""
+        if self._sphere is not None:
+            parameters["specular"] = self._sphere
+        parameters["x_of_rgb"] = self._buffers.axis.x_of_nm(np.array([*RGB_NM, ANCHOR_NM]))
+        parameters["count"] = len(self.places.places)
+        self._parameters.write(parameters.tobytes())
+        self._asked_buffer.write(asked.tobytes())
+        self._buffers.bind()
+        self._parameters.bind_to_uniform_block(bindings.PARAMETERS)
+        self._asked_buffer.bind_to_uniform_block(_BIND_ASKED)
+        self._places.bind_to_storage_buffer(_BIND_PLACES)
+        self._sums[bounce].bind_to_storage_buffer(_BIND_SUMS)
+        texture.use(_UNIT)
+        with self._context.timers.timing(timer):
+            self._program.run(-(-len(self.places.places) // _GROUP))
+            self._ctx.memory_barrier()
+        self._ctx.finish()
+
+    def _found(self, bounce: int = 0) -> np.ndarray:
+        """Sums of all places, records (n,)."""
+        return np.frombuffer(self._sums[bounce].read(), SUM.dtype)[: len(self.places.places)]
+
+    def _specular(self, sums: np.ndarray, asked: int) -> np.ndarray:
+        """Irradiance by way of glass and mirrors, float64 (n, 3)."""
+        specular = sums["specular"].astype(float)
+        if specular.any():
+            specular = self.places.smoothed(specular, SMOOTHING)
+        return specular / max(asked // PER_FOLLOWED, 1)
+
+    @property
+    def lost(self) -> float:
+        """Share of followed paths that were given up after `MAX_EVENTS`, in all bounces."""
+        if not len(self.places.places) or self.asked < PER_FOLLOWED:
+            return 0.0
+        lost = [self._found(bounce)["lost"].mean(dtype=float) for bounce in range(len(self._sums))]
+        return float(np.mean(lost) / (self.asked // PER_FOLLOWED))
+
+    def _bytes(self, *textures: moderngl.Texture | None) -> int:
+        sizes = [16 * t.width * t.height for t in (self.texture, *textures) if t is not None]
+        return self._places.size + sum(sums.size for sums in self._sums) + sum(sizes)
+
+    def _release(self, others: Sequence[moderngl.Texture | None]) -> None:
+        shader.release(self._places, self._asked_buffer, self._parameters, self._program, self.texture, *self._sums)
+        shader.release(*(texture for texture in others if texture is not None))
+
+
+def specular_sphere(buffers: SceneBuffers) -> np.ndarray | None:
+    """What holds all glass and mirrors that rays are followed by: centre and radius, float64 (4,), GPU space; None
+    where there are none."""
+    corners = [
+        buffers.space.to_gpu(mesh.vertices)
+        for mesh, item in zip(buffers.world_meshes, buffers.scene.objects, strict=True)
+        if item.material.is_specular and not isinstance(item.material, Grating)
+    ]
+    if not corners:
+        return None
+    points = np.concatenate(corners)
+    centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    return np.append(centre, 1.0001 * np.linalg.norm(points - centre, axis=1).max())
