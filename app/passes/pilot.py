@@ -28,14 +28,10 @@ MAX_DEPTH = 12
 on its way then."""
 RIM = ((1.0, 0.5), (0.5, 1.0))
 """Places on an extended light, its middle being (0.5, 0.5)."""
-BAND_TOLERANCE = 0.45
-"""A chord may miss the true path by this share of its photon's own footprint, for every half pixel that footprints are
-broad: where they are, every band more blurs by more than it mends, and where they are not, a miss as broad as they are
-is what is left of a picture's error.
-
-Measured (160×90, with a miss of at most a quarter of half a pixel asked for, and with this): `achromat`, 320,000
-photons, relMSE 0.00107, 0.00037, nRMSE 0.0173, 0.0113; `spectrometer`, 320,000, 0.00088, 0.00062 and 0.0185, 0.0083;
-`lens`, 320,000, 0.000038, 0.000016; `ball`, 40,000, where a second band came too early, 0.072, 0.041."""
+BAND_TOLERANCE = 0.2
+"""In no channel may a chord miss the true path by more than this share of its photon's own footprint (root mean square
+over the channel's light), and by less where that is narrower than half a pixel: a miss is then what is left of a
+picture's error, while every band more blurs by more than it mends where footprints are broad."""
 GROUND_TOLERANCE = 0.1
 """The same of photons behind ground glass, whose footprints no band widens, for up to half a pixel.
 
@@ -57,7 +53,7 @@ than an eighth of one.
 
 Measured on `prism_case` (160×90, most photons end on its slit, nRMSE): 20,000 photons, 0.0097 with 7 bands, 0.024 with
 19; 80,000, 0.0042 with 11, 0.0073 with 25."""
-COARSE_TOLERANCE = 0.25
+COARSE_TOLERANCE = 0.11
 NARROW_TEXELS = 0.125
 COARSEST_TINTS = 0.1
 """At most this much of a tint is missed, however few photons there are.
@@ -206,6 +202,10 @@ class PilotFit:
     """Texel side of each receiver's finest map, GPU units."""
     variables: np.ndarray
     """Spectral variables over x, (groups, samples)."""
+    light: np.ndarray
+    """Shares of each channel's light in even cells between `ends`, (cells, channels); each channel's add up to 1."""
+    ends: tuple[float, float]
+    """x between which the light has power."""
     smoothing: float
     budget: int
     """Photons of the light in a pass."""
@@ -217,10 +217,10 @@ class PilotFit:
     """Footprints behind ground glass are as broad as gaps between the light of one microfacet and the next."""
 
     def band_count(self) -> int:
-        """Bands needed so that nearly all of the flux keeps the chord's error below the tolerance."""
+        """Bands needed so that nearly all of every channel's light keeps the chord's error below the tolerance."""
         whole = self.pilot.whole
-        errors, axes, weights, grounds = [], [], [], []
-        for place, record in zip(PLACES, self.pilot.spectral, strict=True):
+        errors, photons, shares = [], [], []
+        for place, record, share in zip(PLACES, self.pilot.spectral, self._light_about_places(), strict=True):
             mine, theirs = same_paths(whole, record)
             if not len(mine):
                 continue
@@ -230,41 +230,53 @@ class PilotFit:
             # A pair that went separate ways (over an edge, round a facet) says nothing about curvature.
             together = miss < 2.0 * np.maximum(spread, 1e-12)
             errors.append((miss / (2.0 * place - 1.0) ** 2 / self.texel[mine["receiver"]])[together])
-            axes.append((self._longer(mine) / self.texel[mine["receiver"]])[together])
-            weights.append(mine["flux_w"][together])
-            grounds.append(self._ground(mine)[together])
+            photons.append(mine[together])
+            shares.append(np.broadcast_to(share, (len(errors[-1]), share.size)))
         # The chord itself: halfway between the band's ends it should meet the anchor.
         sag = 0.5 * (self._sweep(whole, 0.0) + self._sweep(whole, 1.0))
         errors.append(np.linalg.norm(sag, axis=1) / self.texel[whole["receiver"]])
-        axes.append(self._longer(whole) / self.texel[whole["receiver"]])
-        weights.append(whole["flux_w"])
-        grounds.append(self._ground(whole))
+        photons.append(whole)
+        shares.append(np.ones((len(whole), self.light.shape[1])))
         if not sum(map(len, errors)):
             return 1
-        error, axis, weight, ground = map(np.concatenate, (errors, axes, weights, grounds))
-        behind, whole_flux, count = weight[ground].sum(), weight.sum(), 1
+        error, met, share = map(np.concatenate, (errors, photons, shares))
+        axis, flux, ground = self._longer(met) / self.texel[met["receiver"]], met["flux_w"], self._ground(met)
+        behind, whole_flux, count = flux[ground].sum(), flux.sum(), 1
         if behind <= FOLLOWED * whole_flux and not ground.all():
-            count = self._lattice_bands(error[~ground], axis[~ground], weight[~ground])
+            weights = (share * flux[:, None])[~ground]
+            count = self._lattice_bands(error[~ground], axis[~ground], weights)
         # Elsewhere they blur the rest.
         if behind >= MOSTLY_GROUND * whole_flux and ground.any():
-            count = max(count, self._ground_bands(error[ground], axis[ground], weight[ground]))
+            count = max(count, self._ground_bands(error[ground], axis[ground], flux[ground]))
         return count
 
-    def _lattice_bands(self, error: np.ndarray, axis: np.ndarray, weight: np.ndarray) -> int:
+    def _light_about_places(self) -> np.ndarray:
+        """Share of each channel's light whose nearest of `PLACES` each is, (places, channels)."""
+        cells = (np.arange(len(self.light)) + 0.5) / len(self.light)
+        nearest = np.abs(np.interp(cells, (0.0, 1.0), self.ends)[:, None] - np.array(PLACES)).argmin(axis=1)
+        return np.array([self.light[nearest == place].sum(axis=0) for place in range(len(PLACES))])
+
+    def _misses(self, count: int) -> np.ndarray:
+        """Root mean square over each channel's light of what chords of `count` bands miss, over what the chord of a
+        single one misses at the spectrum's ends, (channels,)."""
+        cells = (np.arange(len(self.light)) + 0.5) / len(self.light)
+        aside = 2.0 * abs(self.ends[1] - self.ends[0]) * (cells - (np.floor(cells * count) + 0.5) / count)
+        return np.sqrt(aside**4 @ self.light)
+
+    def _lattice_bands(self, error: np.ndarray, axis: np.ndarray, weights: np.ndarray) -> int:
         """Bands for photons whose footprints widen with every band: `error` of the chord of one band and longer `axis`
-        of footprints, texels, and `weight`, all (n,)."""
-        relative = _weighted_quantile(error / axis, weight, FOLLOWED)
-        typical = _weighted_quantile(error, weight, 0.9)
+        of footprints, texels, both (n,); `weights` in each channel, (n, channels)."""
+        followed, most = FOLLOWED * weights.sum(axis=0), 0.9 * weights.sum(axis=0)
         for count in range(1, MAX_BANDS):
-            # The miss shrinks with the square of the bands, while footprints grow with their root.
-            broad, coarsening = self._broad_texels(count), self._coarsening(count)
-            if relative / count**2 / (self.smoothing * coarsening) <= BAND_TOLERANCE * max(broad, LEAST_BROAD):
+            missed, coarsening = error[:, None] * self._misses(count), self._coarsening(count)
+            own = self.smoothing * coarsening * axis[:, None]
+            is_met = missed <= BAND_TOLERANCE * own * np.clip(own, LEAST_BROAD, 1.0)
+            if ((weights * is_met).sum(axis=0) >= followed).all():
                 return count
-            narrow = min(broad / NARROW_TEXELS, 1.0)
-            if (
-                len(self.pilot.whole) / coarsening**2 < FEW_OF_A_BAND
-                and typical / count**2 <= COARSE_TOLERANCE * narrow**2
-            ):
+            narrow = min(self._broad_texels(count) / NARROW_TEXELS, 1.0)
+            is_met = missed <= COARSE_TOLERANCE * narrow**2
+            is_rough = len(self.pilot.whole) / coarsening**2 < FEW_OF_A_BAND
+            if is_rough and ((weights * is_met).sum(axis=0) >= most).all():
                 return count
         return MAX_BANDS
 
