@@ -33,38 +33,26 @@ BAND_TOLERANCE = 0.2
 over the channel's light), and by less where that is narrower than half a pixel: a miss is then what is left of a
 picture's error, while every band more blurs by more than it mends where footprints are broad."""
 GROUND_TOLERANCE = 0.1
-"""The same of photons behind ground glass, whose footprints no band widens, for up to half a pixel.
-
-Measured (64×64, nRMSE, a beam through a prism of N-SF11 of roughness 0.2): 60,000 photons, 0.046 with two bands, 0.028
-with the four of this, 0.026 with 16; 400,000, 0.034 with two, 0.018 and 0.016."""
+"""The same of photons behind ground glass, whose footprints no band widens, for up to half a pixel."""
 MOSTLY_GROUND = 0.9
-"""Share of the light behind ground glass from which on that asks for bands: they blur the rest. In a scene of chance
-with half of it (`random_all_4_8`, 100,000 photons) a second band lost 1.3 % of the light."""
-FOLLOWED = 0.97
-"""Share of the flux that keeps to it: a focus is a small part of the light and most of what is looked at."""
+"""Share of the light behind ground glass from which on that asks for bands: they blur the rest."""
+FOLLOWED = 0.93
+"""Share of each channel's light that keeps to it; the rest is weak branches, which are wide and dim."""
 LEAST_BROAD = 0.3
 """Half pixels. Narrower footprints are no reason for more bands: they are blurred alike by the pixel. What a chord may
 miss still shrinks as they do: bands then grow as the fifth root of the photons, and the picture's error goes on
 falling."""
 FEW_OF_A_BAND = 2000.0
 """Photons that land. Of fewer, the edges of what they draw are rough, and rougher with every band: no more are taken
-than keep nine tenths of the flux within a quarter of half a pixel of the chord, or less where footprints are narrower
-than an eighth of one.
-
-Measured on `prism_case` (160×90, most photons end on its slit, nRMSE): 20,000 photons, 0.0097 with 7 bands, 0.024 with
-19; 80,000, 0.0042 with 11, 0.0073 with 25."""
+than keep nine tenths of each channel's light within `COARSE_TOLERANCE` texels of the chord, root mean square, or less
+where footprints are narrower than `NARROW_TEXELS`."""
 COARSE_TOLERANCE = 0.11
 NARROW_TEXELS = 0.125
 COARSEST_TINTS = 0.1
-"""At most this much of a tint is missed, however few photons there are.
-
-Measured on `wine_glass` (120×68, relMSE with the six bands of 0.01 and the three of 0.1): 0.42, 0.20 with 5,000
-photons, 0.067, 0.034 with 20,000; nRMSE 0.034, 0.045 with 80,000 (footprints half a texel broad)."""
+"""At most this much of a tint is missed, however few photons there are."""
 KEPT_THRESHOLDS = (0.003, 0.03, 0.1)
-"""Shares of a photon's power below which roulette decides, where parts that weak add little work; the first that does.
-
-`ball`, 50,000 and 200,000 photons (480×270): nRMSE 0.039 and 0.024 with `SPLIT_THRESHOLD`, 0.034 and 0.022 with 0.1,
-which it gets; 0.032 and 0.022 with 0.03, whose splats take a third longer."""
+"""Shares of a photon's power below which roulette decides, where parts that weak add little work; the first that
+does."""
 MOST_MORE_FLIGHTS = 1.4
 """How many times the flights of a pilot that may take."""
 _FULL = 0.8
@@ -74,25 +62,15 @@ _FLIGHTS_OF_EVERY = 8
 MAX_LIGHT_POINTS = 256
 FEWEST_COPIES = 3.4
 """With fewer, a single one from the lamp's middle errs by less: it lacks the lamp's variance r²/4 but for its own
-footprint's s², and M copies have M s² too much; r²/4 - s² = M s² at r = 4.2 s, where M = 0.8 r / s is 3.4.
-
-Measured on `wine_glass` (120×68, relMSE with one point and with what bridges copies): 0.006, 0.013 (two points) with
-320,000 photons, 0.0030, 0.0056 (four) with 1.28 million."""
+footprint's s², and M copies have M s² too much; r²/4 - s² = M s² at r = 4.2 s, where M = 0.8 r / s is 3.4."""
 FEWEST_COVERED = 14.0
 """The same for photons that know how broad the lamp is (`Features.lamp_columns`): footprints of a single point are then
-as broad as its light, and copies only tell that from a disc's.
-
-Measured on `wine_glass` (160×90, relMSE and nRMSE with one point and with what bridges copies): 0.0038 and 0.033,
-0.0061 and 0.036 (four) with 320,000 photons, 0.0030 and 0.033, 0.0035 and 0.033 (eight) with 1.28 million."""
+as broad as its light, and copies only tell that from a disc's."""
 MAX_POINTS = 1 << 16
 """Lattice points of a pilot, however little of the domain holds glass."""
 MIN_LATTICE = 1024
 """Points a sub-lattice keeps, however many an extended light would like: with fewer, surfaces are not straight any more
-over a footprint.
-
-Measured on scenes of chance (96×54, `random_1_1`, `random_1_3`, `random_1_4` of `--random-seed 1`, nRMSE with 256, 1024
-and 4096): 20,000 photons 0.147, 0.147, 0.226; 0.0163, 0.0146, 0.0145; 0.064, 0.064, 0.067; 100,000 photons 0.133,
-0.114, 0.104; 0.0083, 0.0081, 0.0100; 0.061, 0.061, 0.061."""
+over a footprint."""
 
 
 @dataclass(frozen=True)

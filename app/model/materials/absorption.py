@@ -32,7 +32,8 @@ class Absorption:
 
     @classmethod
     def of_colour(cls, rgb: Vec3, distance: float, where: str = "") -> Absorption:
-        """White light has the linear colour `rgb` after `distance` scene units. Raises `UserError`, opened by `where`."""
+        """White light has the linear colour `rgb` after `distance` scene units. Raises `UserError` that begins with
+        `where`."""
         coefficient = attenuation_from_colour(rgb, distance, where)
         coefficient.setflags(write=False)
         return cls(coefficient, (rgb, distance))
