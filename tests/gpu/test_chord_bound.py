@@ -17,26 +17,10 @@ from spectrasplat.render.device_scene import scene_buffers
 from spectrasplat.render.light_pass import LightPass
 
 SCENE = """
-[camera]
-position = [0.0, -6.0, 6.0]
-target = [0.0, 0.0, -1.2]
-vertical_fov_deg = 12.0
-[[lights]]
-kind = "collimated"
-position = [0.0, 0.0, 4.0]
-direction = [0.0, 0.0, -1.0]
-radius = 0.8
-illuminance_lx = 1000
-[[objects]]
-shape = "sphere"
-radius = 1.0
-material = { kind = "glass", n_d = 1.52, V_d = %g }
-[[objects]]
-shape = "plane"
-width = 20.0
-height = 20.0
-position = [0.0, 0.0, -1.2]
-material = "diffuse"
+camera = { position = [0.0, -6.0, 6.0], target = [0.0, 0.0, -1.2], vertical_fov_deg = 12.0 }
+lights = [{ kind = "collimated", position = [0, 0, 4], direction = [0, 0, -1], radius = 0.8, illuminance_lx = 1000 }]
+objects = [{ shape = "sphere", radius = 1.0, material = { kind = "glass", n_d = 1.52, V_d = %g } },
+    { shape = "plane", width = 20.0, height = 20.0, position = [0.0, 0.0, -1.2], material = "diffuse" }]
 """
 
 

@@ -17,26 +17,10 @@ SIZE = (64, 36)
 PHOTONS = (5_000, 20_000, 80_000, 320_000)
 REFERENCE_PHOTONS = 8_000_000
 SCENE = """
-[camera]
-position = [{camera}]
-target = [0.5, 0.0, -1.0]
-vertical_fov_deg = {fov}
-[[lights]]
-kind = "spot"
-position = [-5.0, 0.0, 8.66]
-target = [0.0, 0.0, 0.0]
-half_angle_deg = 6.5
-intensity_cd = 10000
-[[objects]]
-shape = "{shape}"
-{size}
-material = {{ kind = "glass", cauchy = {cauchy} }}
-[[objects]]
-shape = "plane"
-width = 40.0
-height = 40.0
-position = [0.0, 0.0, -1.001]
-material = "diffuse"
+camera = {{ position = [{camera}], target = [0.5, 0.0, -1.0], vertical_fov_deg = {fov} }}
+lights = [{{ kind = "spot", position = [-5, 0, 8.66], target = [0, 0, 0], half_angle_deg = 6.5, intensity_cd = 9e3 }}]
+objects = [{{ shape = "{shape}", {size}, material = {{ kind = "glass", cauchy = {cauchy} }} }},
+    {{ shape = "plane", width = 40.0, height = 40.0, position = [0.0, 0.0, -1.001], material = "diffuse" }}]
 """
 BALL, GEM = ("8.0, -6.0, 6.0", 8.0, "sphere", "radius = 1.0"), ("0.0, -6.4, 4.6", 36.0, "brilliant", "diameter = 1.5")
 OWN = {
