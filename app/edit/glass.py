@@ -9,7 +9,6 @@ from ..base.errors import UserError
 from ..model.materials.absorption import MAX_ATTENUATION
 from ..model.materials.dielectric import MAX_PRIORITY
 from ..model.optics import glass
-from ..model.optics.colorimetry import attenuation_from_colour
 from ..model.optics.glass import Dispersion
 from ..model.optics.tints import Tint
 from ..model.scene import Absorption, Dielectric, Scene, Vec3
@@ -56,14 +55,13 @@ def set_absorption(scene: Scene, index: int, colour: Vec3 | None, distance: floa
         raise UserError(
             f"{_where(scene, index)}: the distance of the absorption is {distance:g}; give a length above 0"
         )
-    alpha = attenuation_from_colour(colour, distance, _where(scene, index))
-    if alpha.max() > MAX_ATTENUATION:
+    absorption = Absorption.of_colour(colour, distance, _where(scene, index))
+    if absorption.coefficient.max() > MAX_ATTENUATION:
         raise UserError(
             f"{_where(scene, index)}: the glass would be opaque within {1.0 / MAX_ATTENUATION:g} units; choose a "
             "longer distance"
         )
-    alpha.setflags(write=False)
-    return _with_glass(scene, index, replace(_glass(scene, index), absorption=Absorption(alpha)))
+    return _with_glass(scene, index, replace(_glass(scene, index), absorption=absorption))
 
 
 def set_tint(scene: Scene, index: int, tint: Tint, distance: float) -> Scene:

@@ -28,47 +28,31 @@ MAX_DEPTH = 12
 on its way then."""
 RIM = ((1.0, 0.5), (0.5, 1.0))
 """Places on an extended light, its middle being (0.5, 0.5)."""
-BAND_TOLERANCE = 0.45
-"""A chord may miss the true path by this share of its photon's own footprint, for every half pixel that footprints are
-broad: where they are, every band more blurs by more than it mends, and where they are not, a miss as broad as they are
-is what is left of a picture's error.
-
-Measured (160×90, with a miss of at most a quarter of half a pixel asked for, and with this): `achromat`, 320,000
-photons, relMSE 0.00107, 0.00037, nRMSE 0.0173, 0.0113; `spectrometer`, 320,000, 0.00088, 0.00062 and 0.0185, 0.0083;
-`lens`, 320,000, 0.000038, 0.000016; `ball`, 40,000, where a second band came too early, 0.072, 0.041."""
+BAND_TOLERANCE = 0.2
+"""In no channel may a chord miss the true path by more than this share of its photon's own footprint (root mean square
+over the channel's light), and by less where that is narrower than half a pixel: a miss is then what is left of a
+picture's error, while every band more blurs by more than it mends where footprints are broad."""
 GROUND_TOLERANCE = 0.1
-"""The same of photons behind ground glass, whose footprints no band widens, for up to half a pixel.
-
-Measured (64×64, nRMSE, a beam through a prism of N-SF11 of roughness 0.2): 60,000 photons, 0.046 with two bands, 0.028
-with the four of this, 0.026 with 16; 400,000, 0.034 with two, 0.018 and 0.016."""
+"""The same of photons behind ground glass, whose footprints no band widens, for up to half a pixel."""
 MOSTLY_GROUND = 0.9
-"""Share of the light behind ground glass from which on that asks for bands: they blur the rest. In a scene of chance
-with half of it (`random_all_4_8`, 100,000 photons) a second band lost 1.3 % of the light."""
-FOLLOWED = 0.97
-"""Share of the flux that keeps to it: a focus is a small part of the light and most of what is looked at."""
+"""Share of the light behind ground glass from which on that asks for bands: they blur the rest."""
+FOLLOWED = 0.93
+"""Share of each channel's light that keeps to it; the rest is weak branches, which are wide and dim."""
 LEAST_BROAD = 0.3
 """Half pixels. Narrower footprints are no reason for more bands: they are blurred alike by the pixel. What a chord may
 miss still shrinks as they do: bands then grow as the fifth root of the photons, and the picture's error goes on
 falling."""
 FEW_OF_A_BAND = 2000.0
 """Photons that land. Of fewer, the edges of what they draw are rough, and rougher with every band: no more are taken
-than keep nine tenths of the flux within a quarter of half a pixel of the chord, or less where footprints are narrower
-than an eighth of one.
-
-Measured on `prism_case` (160×90, most photons end on its slit, nRMSE): 20,000 photons, 0.0097 with 7 bands, 0.024 with
-19; 80,000, 0.0042 with 11, 0.0073 with 25."""
-COARSE_TOLERANCE = 0.25
+than keep nine tenths of each channel's light within `COARSE_TOLERANCE` texels of the chord, root mean square, or less
+where footprints are narrower than `NARROW_TEXELS`."""
+COARSE_TOLERANCE = 0.11
 NARROW_TEXELS = 0.125
 COARSEST_TINTS = 0.1
-"""At most this much of a tint is missed, however few photons there are.
-
-Measured on `wine_glass` (120×68, relMSE with the six bands of 0.01 and the three of 0.1): 0.42, 0.20 with 5,000
-photons, 0.067, 0.034 with 20,000; nRMSE 0.034, 0.045 with 80,000 (footprints half a texel broad)."""
+"""At most this much of a tint is missed, however few photons there are."""
 KEPT_THRESHOLDS = (0.003, 0.03, 0.1)
-"""Shares of a photon's power below which roulette decides, where parts that weak add little work; the first that does.
-
-`ball`, 50,000 and 200,000 photons (480×270): nRMSE 0.039 and 0.024 with `SPLIT_THRESHOLD`, 0.034 and 0.022 with 0.1,
-which it gets; 0.032 and 0.022 with 0.03, whose splats take a third longer."""
+"""Shares of a photon's power below which roulette decides, where parts that weak add little work; the first that
+does."""
 MOST_MORE_FLIGHTS = 1.4
 """How many times the flights of a pilot that may take."""
 _FULL = 0.8
@@ -78,25 +62,15 @@ _FLIGHTS_OF_EVERY = 8
 MAX_LIGHT_POINTS = 256
 FEWEST_COPIES = 3.4
 """With fewer, a single one from the lamp's middle errs by less: it lacks the lamp's variance r²/4 but for its own
-footprint's s², and M copies have M s² too much; r²/4 - s² = M s² at r = 4.2 s, where M = 0.8 r / s is 3.4.
-
-Measured on `wine_glass` (120×68, relMSE with one point and with what bridges copies): 0.006, 0.013 (two points) with
-320,000 photons, 0.0030, 0.0056 (four) with 1.28 million."""
+footprint's s², and M copies have M s² too much; r²/4 - s² = M s² at r = 4.2 s, where M = 0.8 r / s is 3.4."""
 FEWEST_COVERED = 14.0
 """The same for photons that know how broad the lamp is (`Features.lamp_columns`): footprints of a single point are then
-as broad as its light, and copies only tell that from a disc's.
-
-Measured on `wine_glass` (160×90, relMSE and nRMSE with one point and with what bridges copies): 0.0038 and 0.033,
-0.0061 and 0.036 (four) with 320,000 photons, 0.0030 and 0.033, 0.0035 and 0.033 (eight) with 1.28 million."""
+as broad as its light, and copies only tell that from a disc's."""
 MAX_POINTS = 1 << 16
 """Lattice points of a pilot, however little of the domain holds glass."""
 MIN_LATTICE = 1024
 """Points a sub-lattice keeps, however many an extended light would like: with fewer, surfaces are not straight any more
-over a footprint.
-
-Measured on scenes of chance (96×54, `random_1_1`, `random_1_3`, `random_1_4` of `--random-seed 1`, nRMSE with 256, 1024
-and 4096): 20,000 photons 0.147, 0.147, 0.226; 0.0163, 0.0146, 0.0145; 0.064, 0.064, 0.067; 100,000 photons 0.133,
-0.114, 0.104; 0.0083, 0.0081, 0.0100; 0.061, 0.061, 0.061."""
+over a footprint."""
 
 
 @dataclass(frozen=True)
@@ -206,6 +180,10 @@ class PilotFit:
     """Texel side of each receiver's finest map, GPU units."""
     variables: np.ndarray
     """Spectral variables over x, (groups, samples)."""
+    light: np.ndarray
+    """Shares of each channel's light in even cells between `ends`, (cells, channels); each channel's add up to 1."""
+    ends: tuple[float, float]
+    """x between which the light has power."""
     smoothing: float
     budget: int
     """Photons of the light in a pass."""
@@ -217,10 +195,10 @@ class PilotFit:
     """Footprints behind ground glass are as broad as gaps between the light of one microfacet and the next."""
 
     def band_count(self) -> int:
-        """Bands needed so that nearly all of the flux keeps the chord's error below the tolerance."""
+        """Bands needed so that nearly all of every channel's light keeps the chord's error below the tolerance."""
         whole = self.pilot.whole
-        errors, axes, weights, grounds = [], [], [], []
-        for place, record in zip(PLACES, self.pilot.spectral, strict=True):
+        errors, photons, shares = [], [], []
+        for place, record, share in zip(PLACES, self.pilot.spectral, self._light_about_places(), strict=True):
             mine, theirs = same_paths(whole, record)
             if not len(mine):
                 continue
@@ -230,41 +208,53 @@ class PilotFit:
             # A pair that went separate ways (over an edge, round a facet) says nothing about curvature.
             together = miss < 2.0 * np.maximum(spread, 1e-12)
             errors.append((miss / (2.0 * place - 1.0) ** 2 / self.texel[mine["receiver"]])[together])
-            axes.append((self._longer(mine) / self.texel[mine["receiver"]])[together])
-            weights.append(mine["flux_w"][together])
-            grounds.append(self._ground(mine)[together])
+            photons.append(mine[together])
+            shares.append(np.broadcast_to(share, (len(errors[-1]), share.size)))
         # The chord itself: halfway between the band's ends it should meet the anchor.
         sag = 0.5 * (self._sweep(whole, 0.0) + self._sweep(whole, 1.0))
         errors.append(np.linalg.norm(sag, axis=1) / self.texel[whole["receiver"]])
-        axes.append(self._longer(whole) / self.texel[whole["receiver"]])
-        weights.append(whole["flux_w"])
-        grounds.append(self._ground(whole))
+        photons.append(whole)
+        shares.append(np.ones((len(whole), self.light.shape[1])))
         if not sum(map(len, errors)):
             return 1
-        error, axis, weight, ground = map(np.concatenate, (errors, axes, weights, grounds))
-        behind, whole_flux, count = weight[ground].sum(), weight.sum(), 1
+        error, met, share = map(np.concatenate, (errors, photons, shares))
+        axis, flux, ground = self._longer(met) / self.texel[met["receiver"]], met["flux_w"], self._ground(met)
+        behind, whole_flux, count = flux[ground].sum(), flux.sum(), 1
         if behind <= FOLLOWED * whole_flux and not ground.all():
-            count = self._lattice_bands(error[~ground], axis[~ground], weight[~ground])
+            weights = (share * flux[:, None])[~ground]
+            count = self._lattice_bands(error[~ground], axis[~ground], weights)
         # Elsewhere they blur the rest.
         if behind >= MOSTLY_GROUND * whole_flux and ground.any():
-            count = max(count, self._ground_bands(error[ground], axis[ground], weight[ground]))
+            count = max(count, self._ground_bands(error[ground], axis[ground], flux[ground]))
         return count
 
-    def _lattice_bands(self, error: np.ndarray, axis: np.ndarray, weight: np.ndarray) -> int:
+    def _light_about_places(self) -> np.ndarray:
+        """Share of each channel's light whose nearest of `PLACES` each is, (places, channels)."""
+        cells = (np.arange(len(self.light)) + 0.5) / len(self.light)
+        nearest = np.abs(np.interp(cells, (0.0, 1.0), self.ends)[:, None] - np.array(PLACES)).argmin(axis=1)
+        return np.array([self.light[nearest == place].sum(axis=0) for place in range(len(PLACES))])
+
+    def _misses(self, count: int) -> np.ndarray:
+        """Root mean square over each channel's light of what chords of `count` bands miss, over what the chord of a
+        single one misses at the spectrum's ends, (channels,)."""
+        cells = (np.arange(len(self.light)) + 0.5) / len(self.light)
+        aside = 2.0 * abs(self.ends[1] - self.ends[0]) * (cells - (np.floor(cells * count) + 0.5) / count)
+        return np.sqrt(aside**4 @ self.light)
+
+    def _lattice_bands(self, error: np.ndarray, axis: np.ndarray, weights: np.ndarray) -> int:
         """Bands for photons whose footprints widen with every band: `error` of the chord of one band and longer `axis`
-        of footprints, texels, and `weight`, all (n,)."""
-        relative = _weighted_quantile(error / axis, weight, FOLLOWED)
-        typical = _weighted_quantile(error, weight, 0.9)
+        of footprints, texels, both (n,); `weights` in each channel, (n, channels)."""
+        followed, most = FOLLOWED * weights.sum(axis=0), 0.9 * weights.sum(axis=0)
         for count in range(1, MAX_BANDS):
-            # The miss shrinks with the square of the bands, while footprints grow with their root.
-            broad, coarsening = self._broad_texels(count), self._coarsening(count)
-            if relative / count**2 / (self.smoothing * coarsening) <= BAND_TOLERANCE * max(broad, LEAST_BROAD):
+            missed, coarsening = error[:, None] * self._misses(count), self._coarsening(count)
+            own = self.smoothing * coarsening * axis[:, None]
+            is_met = missed <= BAND_TOLERANCE * own * np.clip(own, LEAST_BROAD, 1.0)
+            if ((weights * is_met).sum(axis=0) >= followed).all():
                 return count
-            narrow = min(broad / NARROW_TEXELS, 1.0)
-            if (
-                len(self.pilot.whole) / coarsening**2 < FEW_OF_A_BAND
-                and typical / count**2 <= COARSE_TOLERANCE * narrow**2
-            ):
+            narrow = min(self._broad_texels(count) / NARROW_TEXELS, 1.0)
+            is_met = missed <= COARSE_TOLERANCE * narrow**2
+            is_rough = len(self.pilot.whole) / coarsening**2 < FEW_OF_A_BAND
+            if is_rough and ((weights * is_met).sum(axis=0) >= most).all():
                 return count
         return MAX_BANDS
 

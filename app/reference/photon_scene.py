@@ -16,7 +16,7 @@ from ..base.errors import UserError
 from ..model.contacts import overlapping_solids
 from ..model.geometry.bvh import Bvh, build_bvh
 from ..model.geometry.mesh import Mesh
-from ..model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz, rgb_partition, xyz_to_rgb709_matrix
+from ..model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz, rgb_basis, xyz_to_rgb709_matrix
 from ..model.optics.spectrum import Spectrum, cmf_at
 from ..model.scene import (
     Camera,
@@ -165,7 +165,7 @@ def photon_scene(scene: Scene) -> tuple[PhotonScene, np.ndarray]:
         if material.absorption is not None and material.is_solid:
             weight[-1] = weights.add(np.interp(TABLE_NM, VISIBLE_NM, material.absorption.coefficient))
         elif material.is_mirror:
-            reflectance = rgb_partition() @ np.asarray(material.reflectance_rgb, float)
+            reflectance = rgb_basis() @ np.asarray(material.reflectance_rgb, float)
             weight[-1] = weights.add(np.interp(TABLE_NM, VISIBLE_NM, reflectance))
     _, reflectance_class = reflectance_classes(scene)
     factor = [

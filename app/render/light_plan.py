@@ -22,6 +22,8 @@ from ..passes.trace import Band, LatticeSlice
 
 SMALLEST_BATCH = MAX_BANDS * MAX_LIGHT_POINTS
 """One point of every sub-lattice a light may have."""
+SPECTRUM_CELLS = 512
+"""Even cells of x in which it is known where each channel's light is."""
 
 
 @dataclass(frozen=True)
@@ -134,6 +136,7 @@ class Planner:
                 self.pilots[i],
                 texel,
                 self.buffers.variable_table,
+                *self._light_between_ends(i),
                 self.settings.smoothing,
                 budget,
                 self.domains[i].active_share,
@@ -161,6 +164,13 @@ class Planner:
         return (
             min(SMALLEST_BATCH // bands, max(1, budget // (16 * bands))) if self.scene.lights[light].has_extent else 1
         )
+
+    def _light_between_ends(self, light: int) -> tuple[np.ndarray, tuple[float, float]]:
+        """`light` and `ends` of a `PilotFit`: X, Y and Z, and where bins are kept, the dim as well as the bright, W."""
+        ends = ends_of(self.scene.lights[light].spectral_power, self.buffers.axis)
+        below = self.buffers.light_power[light].at(np.linspace(*ends, SPECTRUM_CELLS + 1))
+        cells = np.abs(np.diff(below[:, : 4 if self.settings.bins else 3], axis=0))
+        return cells / np.maximum(cells.sum(axis=0), 1e-300), ends
 
     def _bands(self, light: int, fit: PilotFit, aside: float) -> tuple[Band, ...]:
         """`aside`: how far the borders between bands are shifted, in bands."""

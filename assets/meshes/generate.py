@@ -13,7 +13,6 @@ from spectrasplat.model.geometry.mesh import Mesh, make_mesh, normalised
 from spectrasplat.model.io.gltf_write import save_gltf
 from spectrasplat.model.io.mesh_io import save_ply
 from spectrasplat.model.optics import catalogue
-from spectrasplat.model.optics.colorimetry import attenuation_from_colour
 from spectrasplat.model.optics.spectrum import illuminant
 from spectrasplat.model.scene import (
     Absorption,
@@ -66,7 +65,7 @@ def gems() -> Scene:
     tints = {"clear": (1.0, 1.0, 1.0), "rose": (0.9, 0.45, 0.5), "sea": (0.4, 0.8, 0.85)}
     objects = []
     for index, (name, colour) in enumerate(tints.items()):
-        absorption = Absorption(attenuation_from_colour(colour, 1.0)) if min(colour) < 1.0 else None
+        absorption = Absorption.of_colour(colour, 1.0) if min(colour) < 1.0 else None
         matrix = y_up.copy()
         matrix[:3, 3] = (1.35 * (index - 1), 0.45, 0.25 * (index % 2))
         glass = catalogue.find("diamond" if name == "clear" else "N-SF11")

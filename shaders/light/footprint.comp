@@ -268,6 +268,26 @@ void shrink(inout PhotonRecord photon, inout vec3 middle, inout vec3 sweep, floa
     sweep = is_left ? share * sweep : vec3(0.0);
 }
 
+// Which of the steps whose power `step_w` holds have their middles in a window, a bit each.
+uint steps_within(vec4 rect, Footprint f, PhotonRecord photon) {
+    uint within = 0u;
+    for (uint k = 0u; k < 2u * POWER_STEPS; ++k) within |= contains(rect, f.centre + step_place(k, 0.5, anchor_in_band(photon) - 0.5) * f.chord, 0.0) ? 1u << k : 0u;
+    return within;
+}
+
+// Share of a photon's power in those steps.
+float share_within(PhotonRecord photon, uint within) {
+    vec2 power = vec2(0.0);
+#ifndef POINT_SPECTRUM
+    for (uint k = 0u; k < 2u * POWER_STEPS && photon.x_hi > photon.x_lo; ++k) {
+        float to_anchor = (float(k % POWER_STEPS) + 0.5) / float(POWER_STEPS);
+        float here = step_w[k] * (k < POWER_STEPS ? mix(photon.throughput.x, photon.throughput.y, to_anchor) : mix(photon.throughput.y, photon.throughput.z, to_anchor));
+        power += vec2((within >> k & 1u) != 0u ? here : 0.0, here);
+    }
+#endif
+    return power.y > 0.0 ? power.x / power.y : float(bitCount(within)) / float(2u * POWER_STEPS);
+}
+
 #if SLOTS == 2
 // Whether a splat lies so deep inside a fine window that nobody reads it in the coarse one `outer`: that is read up to the fine one's border, plus what a
 // bilinear lookup there reaches.
@@ -390,7 +410,7 @@ void main() {
         sums[i].yz += vec2(power_w, 1.0);
     }
 
-    bool inside = shown && contains(place.rect, f.centre, 0.0);
+    uint within = shown ? steps_within(place.rect, f, photon) : 0u;
     Placement drawn_in = place;
 #ifdef CONTACT_LINES
     float kept = 1.0, lost = 0.0;
@@ -439,7 +459,7 @@ void main() {
             shrink(photon, middle, sweep, held_there);
             g = footprint_in(outer, photon, middle, sweep);
         }
-        inside = inside || contains(outer.rect, g.centre, 0.0);
+        within |= steps_within(outer.rect, g, photon);
         choose_level(outer, g, photon, middle, sweep);
         if (!shown || !is_only_fine(fine, drawn_in, outer, photon.position)) {
             coarse = splat_of(photon, power_w, mean, g, table, table_band);
@@ -458,7 +478,5 @@ void main() {
     splats[slot + 1u] = coarse;
 #endif
 
-    if (!inside) {
-        sums[i].x += power_w;
-    }
+    sums[i].x += power_w * (1.0 - share_within(photon, within));
 }

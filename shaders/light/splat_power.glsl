@@ -9,6 +9,8 @@ float power_until(uint light_and_class, float x) {
     return mix(power_sample(base), power_sample(base + 1u), at - float(i));
 }
 
+const uint POWER_STEPS = 4u;
+
 #ifdef POINT_SPECTRUM
 // Power per unit of x in the cell of the density table (`SplatTables`) in which a wavelength falls.
 float power_density(uint light_and_class, float x) {
@@ -16,7 +18,6 @@ float power_density(uint light_and_class, float x) {
     return cells * (power_until(light_and_class, (cell + 1.0) / cells) - power_until(light_and_class, cell / cells));
 }
 #else
-const uint POWER_STEPS = 4u;
 // The light's power in each step from the band's low end to the anchor, and from there to its high end.
 float step_w[2u * POWER_STEPS];
 

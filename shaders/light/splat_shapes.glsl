@@ -52,7 +52,7 @@ void flatten_lattice(inout SplatRecord splat, Blur blur, Footprint f, uint latti
         float coarse = max(abs(k[i].x), abs(k[i].y)), along = TWO_PI * dot(k[i], blur.e);
         // As a footprint's own Gaussian damps it, or more; of a needle's width float32 knows nothing, nor of waves across it.
         float own_cycles = f.per_spacing * length(steps[i]), most = 2.0 * exp(-0.5 * TWO_PI * TWO_PI * own_cycles * own_cycles);
-        heights[i] = min(damping(blur, k[i]), most) * clamp(5.0 - 5.0 * coarse, 0.0, 1.0);
+        heights[i] = clamp(damping(blur, k[i]), 0.0, most) * clamp(5.0 - 5.0 * coarse, 0.0, 1.0);
         kept[i] = 2.0 * exp(-0.5 * along * along * share * own);
     }
     // Each splat's own waves are summed over the lattice too: what that adds at the others' frequencies is second order.
@@ -93,13 +93,19 @@ void carry_companions(inout SplatRecord splat, PhotonRecord photon) {
 }
 #endif
 
-#ifndef POINT_SPECTRUM
 // Middle of step k of those whose power `step_w` holds, where the band ends at -half and half and its anchor is at `anchor`.
 float step_place(uint k, float half_band, float anchor) {
     float place = (float(k % POWER_STEPS) + 0.5) / float(POWER_STEPS);
     return k < POWER_STEPS ? mix(-half_band, anchor, place) : mix(anchor, half_band, place);
 }
 
+// Where in its band a photon's anchor is, 0 to 1.
+float anchor_in_band(PhotonRecord photon) {
+    float width = photon.x_hi - photon.x_lo;
+    return width > 0.0 ? clamp((photon.x_anchor - photon.x_lo) / width, 0.0, 1.0) : 0.5;
+}
+
+#ifndef POINT_SPECTRUM
 // Mean place of the light's power, and its standard deviation.
 vec2 spread_of_power(float half_band, float anchor) {
     vec3 moments = vec3(0.0);
@@ -114,7 +120,7 @@ vec2 spread_of_power(float half_band, float anchor) {
 // Throughput over a band that ends at `ends`, as `throughput_over` takes it.
 vec4 straight_throughput(PhotonRecord photon, vec2 ends) {
     float width = photon.x_hi - photon.x_lo;
-    float anchor = width > 0.0 ? clamp((photon.x_anchor - photon.x_lo) / width, 0.0, 1.0) : 0.5;
+    float anchor = anchor_in_band(photon);
     float at = mix(ends.x, ends.y, anchor);
     return vec4(at, photon.throughput.y,
                 anchor > 1e-3 && width > 0.0 ? (photon.throughput.y - photon.throughput.x) / (at - ends.x) : 0.0,

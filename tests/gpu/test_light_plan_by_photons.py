@@ -65,12 +65,10 @@ def test_bands_grow_with_the_cube_root_of_the_photons_while_footprints_are_broad
     assert abs(slope - 1.0 / 3.0) < 0.05
 
 
-def test_broad_footprints_leave_the_bands_as_they_are(gl: Context, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With few photons one band is enough: every other one would widen what blurs the picture already."""
-    light = prepared(gl, "ball")
-    assert (bands(light, 30_000), bands(light, 200_000), bands(light, 1_000_000)) == (1, 2, 3)
-    monkeypatch.setattr(pilot.PilotFit, "_broad_texels", lambda fit, lattices: 0.0)
-    assert bands(light, 30_000) > 1
+def test_each_photon_s_own_footprint_says_what_its_chord_may_miss(gl: Context) -> None:
+    """A ball's reflected light is broad, and says nothing of what its focus needs; more photons get more bands."""
+    counts = [bands(prepared(gl, "ball"), photons) for photons in (2_000, 30_000, 1_000_000)]
+    assert counts[0] < counts[1] < counts[2] <= 5, counts
 
 
 def test_ground_glass_gets_the_bands_that_its_lobes_can_tell_apart(

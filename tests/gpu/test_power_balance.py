@@ -7,13 +7,17 @@ shows.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.lights.spot import SpotLight
+from spectrasplat.model.optics import glass
+from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings
+from spectrasplat.passes import pilot
 from spectrasplat.render.still import render
 
 from tests.gpu.mutants import mutate
@@ -34,9 +38,15 @@ class Balance:
     """Excess of the maps, and what lies outside of them, over what was drawn."""
 
 
-def balance(gl, scene: str, method: str = "srd-photons") -> Balance:
-    settings = RenderSettings(width=160, height=90, photons=60_000, spp=1, method=method, tally=True)
-    stats = render(load_scene(assets_dir() / "scenes" / f"{scene}.toml"), settings, context=gl).stats
+def shipped(name: str) -> Scene:
+    return load_scene(assets_dir() / "scenes" / f"{name}.toml")
+
+
+def balance(
+    gl, scene: str | Scene, method: str = "srd-photons", size: tuple[int, int] = (160, 90), photons: int = 60_000
+) -> Balance:
+    settings = RenderSettings(*size, photons=photons, spp=1, method=method, tally=True)
+    stats = render(shipped(scene) if isinstance(scene, str) else scene, settings, context=gl).stats
     light = stats.light
     return Balance(
         light.tally.imbalance,
@@ -57,6 +67,24 @@ def test_maps_hold_what_beams_of_a_lamp_throw(gl) -> None:
     """Through a slit and a prism, whose image is four to eight texels wide and swept over hundreds; chords of bands may
     miss by a texel, which is half a pixel (0.06 % too much)."""
     assert abs(balance(gl, "prism_case", "srd").held) < 1e-3
+
+
+@pytest.mark.parametrize("mutant", [False, True])
+def test_bands_cut_at_total_reflection_give_back_what_their_waves_take(
+    gl, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, mutant: bool
+) -> None:
+    """A gem of n from 2.2 to 1.2, with few bands, many of which are cut: blurred by a box, whose transform may be
+    negative. A wave so turned round would add light (0.3 % of all)."""
+    if mutant:
+        old, new = "clamp(damping(blur, k[i]), 0.0, most)", "min(damping(blur, k[i]), most)"
+        mutate(monkeypatch, tmp_path, "light/splat_shapes.glsl", old, new)
+    monkeypatch.setattr(pilot.PilotFit, "band_count", lambda fit: 7)
+    brilliant = shipped("brilliant")
+    gem, table = brilliant.objects
+    strong = gem.material.changed(dispersion=glass.cauchy([0.8888, 0.18935]))
+    lamp = SpotLight("lamp", brilliant.lights[0].spectral_power, (-1.2, 0.8, 5.0), (0.2747, -0.1831, -0.9155), 8.0, 8.0)
+    scene = replace(brilliant, lights=(lamp,), objects=(replace(gem, material=strong), table))
+    assert (abs(balance(gl, scene, size=(256, 256), photons=30_000).held) < 1.5e-3) != mutant
 
 
 @pytest.mark.slow

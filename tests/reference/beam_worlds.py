@@ -13,7 +13,7 @@ from spectrasplat.beams.find import Emission, Search, search
 from spectrasplat.beams.sources import RIM, emissions, mask_at
 from spectrasplat.model.flat_shapes import is_flat
 from spectrasplat.model.io.scene_file import load_scene
-from spectrasplat.model.optics.colorimetry import VISIBLE_NM, rgb_partition
+from spectrasplat.model.optics.colorimetry import VISIBLE_NM, rgb_basis
 from spectrasplat.model.optics.spectral_tables import SpectralAxis
 from spectrasplat.model.scene import Scene
 
@@ -106,7 +106,7 @@ class Rig:
                     absorption[i] = np.interp(nm, VISIBLE_NM, material.absorption.coefficient)
             elif material.is_mirror:
                 kind[i] = MIRROR
-                rho[i] = np.interp(nm, VISIBLE_NM, rgb_partition() @ np.asarray(material.reflectance_rgb, float))
+                rho[i] = np.interp(nm, VISIBLE_NM, rgb_basis() @ np.asarray(material.reflectance_rgb, float))
             else:
                 kind[i] = RECEIVER if material.receives else BLACK
         corners = np.concatenate([mesh.corners() for mesh in self.meshes])

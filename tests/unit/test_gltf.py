@@ -13,7 +13,6 @@ from spectrasplat.base.errors import UserError
 from spectrasplat.model.io.gltf import load_gltf
 from spectrasplat.model.io.gltf_document import open_document
 from spectrasplat.model.optics import catalogue, glass
-from spectrasplat.model.optics.colorimetry import attenuation_from_colour
 from spectrasplat.model.optics.spectrum import xyz_to_rgb709
 from spectrasplat.model.scene import Absorption, Dielectric, Diffuse, Mirror
 
@@ -170,7 +169,7 @@ MATERIALS: dict[str, tuple[dict[str, Any], Any]] = {
     "named wins": (glass_material() | {"extras": {"glass": "F2"}}, Dielectric(catalogue.find("F2"))),
     "tinted": (
         glass_material(attenuationColor=[0.5, 0.9, 1.0], attenuationDistance=2.0),
-        Dielectric(glass.from_abbe(1.6, 40.0, "crown"), Absorption(attenuation_from_colour((0.5, 0.9, 1.0), 2.0))),
+        Dielectric(glass.from_abbe(1.6, 40.0, "crown"), Absorption.of_colour((0.5, 0.9, 1.0), 2.0)),
     ),
     "table": (
         {"extras": {"spectrasplat": {"material": {"n_d": 1.7, "V_d": 30.0, "priority": 2}}}},

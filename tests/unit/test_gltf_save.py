@@ -18,7 +18,7 @@ from spectrasplat.model.io.gltf_document import open_document
 from spectrasplat.model.io.gltf_write import save_gltf
 from spectrasplat.model.lights import AreaLight, CollimatedLight, DirectionalLight, PointLight, SpotLight
 from spectrasplat.model.optics import catalogue, glass
-from spectrasplat.model.optics.colorimetry import VISIBLE_NM, attenuation_from_colour
+from spectrasplat.model.optics.colorimetry import VISIBLE_NM
 from spectrasplat.model.optics.spectrum import blackbody, illuminant, laser
 from spectrasplat.model.scene import (
     Absorption,
@@ -40,7 +40,7 @@ def _rich_scene() -> Scene:
     ball = primitives.sphere(0.5, 320)
     moved, mirrored = np.eye(4), np.diag([-1.0, 2.0, 1.0, 1.0])
     moved[:3, 3] = (0.0, 1.5, 0.25)
-    tint = Absorption(attenuation_from_colour((0.5, 0.9, 0.8), 1.5))
+    tint = Absorption.of_colour((0.5, 0.9, 0.8), 1.5)
     grey = np.full(401, 0.4) + 0.1 * np.sin(VISIBLE_NM / 50.0)
     return Scene(
         "rich",

@@ -411,7 +411,7 @@ class _Reader:
         return light.changed(**placed | ({"position": self._turned(light.position)} if light.has_place else {}))
 
     def _light(self, entry: dict[str, Any], label: str, world: np.ndarray, around: Surroundings) -> Light | None:
-        from ..optics.colorimetry import illuminant_table, rgb709_to_xyz_matrix, rgb_partition
+        from ..optics.colorimetry import illuminant_table, rgb709_to_xyz_matrix, rgb_basis
         from ..optics.spectrum import Spectrum
 
         self._check_turn(world, f"light '{label}'")
@@ -435,7 +435,7 @@ class _Reader:
         luminance = float(rgb709_to_xyz_matrix()[1] @ rgb) * intensity
         if luminance == 0.0:
             return None
-        tinted = Spectrum(illuminant_table()["D65"] * (rgb_partition() @ rgb)).scaled_to_luminous(luminance)
+        tinted = Spectrum(illuminant_table()["D65"] * (rgb_basis() @ rgb)).scaled_to_luminous(luminance)
         placed = {"name": label, "spectral_power": tinted, "position": position, "direction": direction}
         if kind == SpotLight.kind:
             cone = entry.get("spot", {})

@@ -19,7 +19,6 @@ from ..fields import write_fields
 from ..materials.finish import USUAL_COAT_INDEX, read_finish
 from ..materials.material_file import read_material
 from ..optics import catalogue, glass
-from ..optics.colorimetry import attenuation_from_colour
 from ..scene import (
     Absorption,
     Dielectric,
@@ -213,7 +212,7 @@ def _absorption(extensions: dict[str, Any], where: str) -> Absorption | None:
     colour = vec3(float(c) for c in volume.get("attenuationColor", (1.0, 1.0, 1.0)))
     if math.isinf(distance) or colour == (1.0, 1.0, 1.0):
         return None
-    return Absorption(attenuation_from_colour(colour, distance, f"{where}.extensions.{VOLUME}.attenuationDistance"))
+    return Absorption.of_colour(colour, distance, f"{where}.extensions.{VOLUME}.attenuationDistance")
 
 
 def write_gltf_material(values: dict[str, Any], material: Material, thickness: float, texture: int | None) -> set[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,8 +13,8 @@ from ..fields import Part
 from ..io import curve_file
 from ..io.scene_table import SceneTable
 from ..optics import tints
-from ..optics.colorimetry import VISIBLE_NM, attenuation_from_colour, rgb_partition
-from ..spectrum_file import SAME, same_curve
+from ..optics.colorimetry import VISIBLE_NM, attenuation_from_colour
+from ..vectors import Vec3
 
 MAX_ATTENUATION = 1e15
 """Per scene unit; float32 holds it in any unit the renderer may choose."""
@@ -28,6 +27,16 @@ class Absorption:
 
     coefficient: np.ndarray
     """float64 (401,), 1/unit, at 380, 381, … 780 nm."""
+    colour: tuple[Vec3, float] | None = None
+    """Linear Rec.709 colour that it was given by, and the distance at which white light has it; None: by a curve."""
+
+    @classmethod
+    def of_colour(cls, rgb: Vec3, distance: float, where: str = "") -> Absorption:
+        """White light has the linear colour `rgb` after `distance` scene units. Raises `UserError` that begins with
+        `where`."""
+        coefficient = attenuation_from_colour(rgb, distance, where)
+        coefficient.setflags(write=False)
+        return cls(coefficient, (rgb, distance))
 
 
 class AbsorptionPart(Part):
@@ -49,6 +58,7 @@ def _read_absorption(table: SceneTable) -> Absorption | None:
     inner = table.table("absorption")
     if inner is None:
         table.fail("absorption", "must be a table such as {colour = [0.4, 0.9, 0.7], distance = 2.0}")
+    colour = None
     if inner.has("coefficient"):
         wavelengths = inner.numbers("nm", at_least=2)
         values = np.array(inner.numbers("coefficient", count=len(wavelengths)))
@@ -59,7 +69,8 @@ def _read_absorption(table: SceneTable) -> Absorption | None:
         if key == "tint":
             alpha = _tint(inner) / distance
         elif key == "colour":
-            alpha = attenuation_from_colour(inner.colour("colour"), distance, inner.where("colour"))
+            absorption = Absorption.of_colour(inner.colour("colour"), distance, inner.where("colour"))
+            alpha, colour = absorption.coefficient, absorption.colour
         else:
             source, transmittance = read_curve(inner, "transmittance", "transmittance")
             if transmittance.min() <= 0.0 or transmittance.max() > 1.0:
@@ -73,7 +84,7 @@ def _read_absorption(table: SceneTable) -> Absorption | None:
             f'makes the glass opaque within {1.0 / MAX_ATTENUATION:g} units; use material = "black" for that',
         )
     inner.finish("absorption")
-    return Absorption(alpha)
+    return Absorption(alpha, colour)
 
 
 def _tint(table: SceneTable) -> np.ndarray:
@@ -112,14 +123,10 @@ def _on_visible_grid(table: SceneTable, key: str, wavelength_nm: np.ndarray, val
 
 
 def _describe_absorption(absorption: Absorption) -> dict[str, Any]:
+    if absorption.colour is not None:
+        return {"colour": list(absorption.colour[0]), "distance": absorption.colour[1]}
     alpha = absorption.coefficient
     tinted = tints.tint_of(alpha)
     if tinted is not None:
         return {"tint": tinted[0].name, "distance": tinted[1]}
-    strength, *_ = np.linalg.lstsq(rgb_partition(), alpha, rcond=None)
-    strongest = float(strength.max())
-    if strongest > 0.0 and strength.min() > -SAME * strongest and same_curve(rgb_partition() @ strength, alpha):
-        # The distance at which the strongest channel has fallen to one half.
-        distance = math.log(2.0) / strongest
-        return {"colour": np.exp(-np.maximum(strength, 0.0) * distance).tolist(), "distance": distance}
     return {"nm": VISIBLE_NM.tolist(), "coefficient": alpha.tolist()}

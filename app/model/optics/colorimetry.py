@@ -95,8 +95,7 @@ def rgb_basis() -> np.ndarray:
     """Reflectances of Rec.709 red, green and blue: float64 (401, 3) on `VISIBLE_NM`, in [0, 1], read-only.
 
     They sum to 1 at every wavelength, and `rgb_basis() @ rgb` under D65 has exactly the linear colour `rgb`, so
-    `(rgb_basis() @ rgb) * daylight_per_lumen()` is the spectrum of a radiance `rgb`. Linear, unlike
-    `rgb_partition`, whose three curves do not show the primaries: that one is for exponents (transmittance).
+    `(rgb_basis() @ rgb) * daylight_per_lumen()` is the spectrum of a radiance `rgb`.
 
     I. Mallett, C. Yuksel: Spectral Primary Decomposition for Rendering with sRGB Reflectance, EGSR 2019; this table
     is our own solution of their problem, baked by assets/spectra/bake_rgb_basis.py.
@@ -106,36 +105,18 @@ def rgb_basis() -> np.ndarray:
     return _frozen(values / values.sum(axis=1, keepdims=True))
 
 
-_BLUE_EDGE_NM, _BLUE_WIDTH_NM = 489.5, 8.0
-_RED_EDGE_NM, _RED_WIDTH_NM = 592.0, 3.0
-
-
-@cache
-def rgb_partition() -> np.ndarray:
-    """Smooth r(λ), g(λ), b(λ) >= 0 with r + g + b = 1 at every wavelength: float64 (401, 3).
-
-    Two logistic edges, fitted so that D65 seen through exp(Σ ln(colour) basis) has the linear
-    Rec.709 colour asked for: within 0.02 where every channel is at least 0.5, within 0.08 where
-    every channel is at least 0.05. Purer colours than that lie outside what a positive
-    transmittance can give and come out paler.
-    """
-    above_blue = 1.0 / (1.0 + np.exp((_BLUE_EDGE_NM - VISIBLE_NM) / _BLUE_WIDTH_NM))
-    red = 1.0 / (1.0 + np.exp((_RED_EDGE_NM - VISIBLE_NM) / _RED_WIDTH_NM))
-    return _frozen(np.stack([red, above_blue * (1.0 - red), (1.0 - above_blue) * (1.0 - red)], axis=-1))
-
-
 def mirror_reflectance(rgb: tuple[float, float, float], nm: np.ndarray) -> np.ndarray:
-    """Smooth spectral reflectance at wavelengths (N,) whose bands average to the linear Rec.709 `rgb`, float64 (N,)."""
-    return np.interp(nm, VISIBLE_NM, rgb_partition() @ np.asarray(rgb, float))
+    """Spectral reflectance at wavelengths (N,) that gives D65 the linear Rec.709 colour `rgb`, float64 (N,)."""
+    return np.interp(nm, VISIBLE_NM, rgb_basis() @ np.asarray(rgb, float))
 
 
 def attenuation_from_colour(rgb: tuple[float, float, float], distance: float, where: str = "") -> np.ndarray:
     """Absorption coefficient α(λ) on `VISIBLE_NM`, float64 (401,), per unit of `distance`.
 
-    White light that has travelled `distance` has the linear Rec.709 colour `rgb`
-    (KHR_materials_volume's attenuationColor and attenuationDistance). Channels are clamped to
-    1e-4 … 1: black would need infinite absorption, above 1 is gain. A neutral colour gives
-    a constant, white gives 0. An infinite distance gives 0 as well.
+    D65 that has travelled `distance` has exactly the linear Rec.709 colour `rgb` (KHR_materials_volume's
+    attenuationColor and attenuationDistance), the transmittance there being `rgb_basis() @ rgb`. Channels are clamped
+    to 1e-4 … 1: black would need infinite absorption, above 1 is gain. A neutral colour gives a constant, white gives
+    0. An infinite distance gives 0 as well.
 
     Raises `UserError` (opened by `where`) when the distance is not positive or the colour no number.
     """
@@ -145,10 +126,11 @@ def attenuation_from_colour(rgb: tuple[float, float, float], distance: float, wh
     colour = np.asarray(rgb, dtype=np.float64)
     if colour.shape != (3,) or not np.all(np.isfinite(colour)) or np.any(colour < 0.0):
         raise UserError(f"{who}attenuation colour must be three numbers from 0 to 1, such as [0.8, 0.95, 0.9]")
-    optical_depth = -np.log(np.clip(colour, 1e-4, 1.0))
-    if np.all(optical_depth == optical_depth[0]):
-        return np.full(401, optical_depth[0] / distance)
-    return rgb_partition() @ optical_depth / distance
+    colour = np.clip(colour, 1e-4, 1.0)
+    if np.all(colour == colour[0]):
+        return np.full(401, -np.log(colour[0]) / distance)
+    # Its rounding must not make light brighter.
+    return -np.log(np.minimum(rgb_basis() @ colour, 1.0)) / distance
 
 
 def _frozen(values: np.ndarray) -> np.ndarray:

@@ -2,15 +2,9 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
-
-import numpy as np
-
 from ...edit import edits
 from ...edit.glass import set_tint
 from ...edit.state import State
-from ...model.optics.colorimetry import rgb_partition
 from ...model.optics.tints import Tint, half_distance, tint, tint_of, tints
 from ...model.scene import Absorption, Vec3
 from ...model.staging import tinted
@@ -18,21 +12,7 @@ from . import widgets
 
 _FIRST_COLOUR, _FIRST_DISTANCE = (0.55, 0.85, 0.75), 1.0
 """What a glass starts with when it is tinted: bottle green."""
-
-
 _OWN = "own"
-
-
-@dataclass
-class _Memory:
-    """Colour and distance as they were set: a coefficient alone does not distinguish them."""
-
-    coefficient: np.ndarray | None = None
-    rgb: Vec3 = _FIRST_COLOUR
-    distance: float = _FIRST_DISTANCE
-
-
-_memory = _Memory()
 
 
 def draw_absorption(state: State, index: int) -> State:
@@ -44,7 +24,7 @@ def draw_absorption(state: State, index: int) -> State:
     tip = "Let the glass absorb light on the way through it (Beer–Lambert). Off: perfectly clear."
     changed, tinted = widgets.toggle("Tinted", material.absorption is not None, tip=tip)
     if changed:
-        return _tinted(state, index, _memory.rgb if tinted else None, _memory.distance)
+        return _tinted(state, index, _FIRST_COLOUR if tinted else None, _FIRST_DISTANCE)
     if material.absorption is None:
         return state
     known = tint_of(material.absorption.coefficient)
@@ -65,7 +45,7 @@ def _chosen(state: State, index: int, name: str, known: tuple[Tint, float] | Non
     """Another tint as deep as the last, or the colour of one's own."""
     found = tint(name)
     if found is None:
-        return _tinted(state, index, _memory.rgb, _memory.distance)
+        return _tinted(state, index, _FIRST_COLOUR, _FIRST_DISTANCE)
     item = state.scene.objects[index]
     absorption = tinted(item, found).absorption
     assert absorption is not None
@@ -92,11 +72,10 @@ def _draw_depth(state: State, index: int, present: Tint, distance: float) -> Sta
 
 
 def _draw_colour(state: State, index: int, absorption: Absorption) -> State:
-    described = colour_of(absorption)
-    if described is None:
+    if absorption.colour is None:
         widgets.hint("The absorption is a measured curve, which no colour describes.")
         return state
-    rgb, distance = described
+    rgb, distance = absorption.colour
     tip = "Colour of white light after the distance below."
     colour_changed, rgb, colour_active = widgets.colour("Colour", rgb, tip=tip)
     tip = "How far white light travels inside the glass until it has this colour. Shorter is deeper."
@@ -115,34 +94,8 @@ def _draw_colour(state: State, index: int, absorption: Absorption) -> State:
     return _tinted(state, index, rgb, distance) if colour_changed or depth_changed else state
 
 
-def colour_of(absorption: Absorption) -> tuple[Vec3, float] | None:
-    """Linear colour and the distance at which white light has it; None where no colour gives this curve.
-
-    Where it was not set here, the distance at which the strongest channel has fallen to one half.
-    """
-    if _memory.coefficient is not None and np.array_equal(_memory.coefficient, absorption.coefficient):
-        return _memory.rgb, _memory.distance
-    strength, *_ = np.linalg.lstsq(rgb_partition(), absorption.coefficient, rcond=None)
-    strongest = float(strength.max())
-    if strongest <= 0.0:
-        return (1.0, 1.0, 1.0), _FIRST_DISTANCE
-    off = np.abs(rgb_partition() @ strength - absorption.coefficient).max()
-    if off > 1e-6 * strongest or strength.min() < -1e-6 * strongest:
-        return None
-    distance = math.log(2.0) / strongest
-    r, g, b = (float(c) for c in np.exp(-np.maximum(strength, 0.0) * distance))
-    return (r, g, b), distance
-
-
 def _tinted(state: State, index: int, rgb: Vec3 | None, distance: float) -> State:
-    """Object `index` with that absorption, which is remembered as it was set."""
+    """Object `index` with that absorption; `rgb` None: clear."""
     label = f"Tint of {state.scene.objects[index].name}"
-    if rgb is None:
-        return edits.attempt(state, label, edits.set_absorption, index, None)
-    r, g, b = (min(max(c, 0.0), 1.0) for c in rgb)
-    after = edits.attempt(state, label, edits.set_absorption, index, (r, g, b), distance)
-    material = after.scene.objects[index].material
-    is_done = after.scene is not state.scene
-    if is_done and material.absorption is not None:
-        _memory.coefficient, _memory.rgb, _memory.distance = material.absorption.coefficient, (r, g, b), distance
-    return after
+    colour = rgb and (min(max(rgb[0], 0.0), 1.0), min(max(rgb[1], 0.0), 1.0), min(max(rgb[2], 0.0), 1.0))
+    return edits.attempt(state, label, edits.set_absorption, index, colour, distance)
