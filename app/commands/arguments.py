@@ -56,7 +56,7 @@ GlassOption = Annotated[
         "--glass",
         metavar="GLASS",
         help="Make all solids of a glass (diamond, 'cobalt blue'), or some: OBJECT=N-SF11, MATERIAL=N-SF11, "
-        "'Gem*=diamond'; may be repeated.",
+        "'Gem*=diamond', 'Window*=thin N-BK7' (a sheet); may be repeated.",
         autocompletion=completion.glasses,
     ),
 ]

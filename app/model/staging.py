@@ -41,7 +41,7 @@ class Staging:
     up: UpAxis | None = None
     glass: tuple[tuple[str | None, str], ...] = ()
     """Object, material or pattern (None: all that is no receiver below the others) and name of its glass, of the
-    catalogue or a tint; later ones above."""
+    catalogue or a tint, after "thin " a sheet of it; later ones above."""
     smooth: bool | None = None
     """Whether meshes are round where edges bend by less than `ROUND_DEG`, or flat; None: as their files say."""
 
@@ -97,9 +97,11 @@ def with_glass(
     Raises UserError for an object or a glass that does not exist.
     """
     changed = list(objects)
-    for name, glass in staging.glass:
+    for name, wish in staging.glass:
+        is_thin = wish.casefold().startswith("thin ")
+        glass = wish[5:].strip() if is_thin else wish
         tint = tints.tint(glass)
-        where = f"--glass {glass}" if name is None else f"--glass {name}={glass}"
+        where = f"--glass {wish}" if name is None else f"--glass {name}={wish}"
         material = Dielectric(find_glass(glass, Path(), where, []) if tint is None else tint.dispersion)
         names = [item.name for item in objects]
         chosen = _bodies(objects) if name is None else _called(name, names, materials)
@@ -112,9 +114,11 @@ def with_glass(
                 f"{listed(names)}{also}"
             )
         for index in chosen:
-            changed[index] = replace(
-                changed[index], material=material if tint is None else tinted(changed[index], tint)
-            )
+            item = changed[index]
+            # An open part that the file makes a sheet stays one.
+            thin = is_thin or (item.material.transmits and item.material.thin and not item.mesh.is_closed)
+            made = material if tint is None else tinted(item, tint)
+            changed[index] = replace(item, material=made.changed(thin=thin))
     return changed
 
 

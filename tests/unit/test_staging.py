@@ -151,7 +151,8 @@ def test_glass_for_all_and_for_one(tmp_path: Path) -> None:
     [("S*", "stone"), ("[fs]*", "stone foot"), ("foot", "foot"), ("paint", "stone foot"), ("P?INT", "stone foot")],
 )
 def test_glass_by_pattern_and_by_material(tmp_path: Path, name: str, chosen: str) -> None:
-    scene = load_scene(opaque_file(tmp_path / "own.glb"), Staging(glass=((name, "amethyst"), ("fo*", "N-SF11"))))
+    scene = load_scene(opaque_file(tmp_path / "own.glb"), Staging(glass=((name, "amethyst"), ("fo*", "Thin N-SF11"))))
+    assert [o.name for o in scene.objects if o.material.transmits and o.material.thin] == ["foot"]
     glasses = {o.name: o.material.dispersion.name for o in scene.objects if o.material.transmits}
     assert glasses == {"foot": "Schott N-SF11"} | ({"stone": "quartz (ordinary)"} if "stone" in chosen else {})
 
