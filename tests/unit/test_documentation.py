@@ -26,7 +26,7 @@ PAGES = sorted(
         ROOT / "assets" / "scenes" / "README.md",
     ]
 )
-MAX_README_LINES = 150
+MAX_README_LINES = 120
 SOURCES = {".py", ".glsl", ".comp", ".vert", ".frag"}
 NOT_FILES = ("NAME", "…")
 """Marks of paths that stand for others."""
