@@ -3,22 +3,25 @@ there; let go, it is traced as if it had always stood there."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.edit.live_inputs import LiveInputs
 from spectrasplat.edit.projection import View
+from spectrasplat.gpu import shader
 from spectrasplat.gpu.context import Context
 from spectrasplat.model.io.scene_file import load_scene
-from spectrasplat.model.scene import Dielectric, Scene
+from spectrasplat.model.scene import Dab, Dielectric, Scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes.camera_records import camera_parameters
 from spectrasplat.passes.first_surfaces import FirstSurfaces
 from spectrasplat.passes.ray_paths import RayPaths
 from spectrasplat.render.device_scene import scene_buffers
+from spectrasplat.render.viewer import rehearsal
 from spectrasplat.render.viewer.engine import Budget, LiveEngine
 from spectrasplat.render.viewer.invalidation import only_moves
 from spectrasplat.render.viewer.live_light import LiveLight
@@ -192,3 +195,47 @@ def test_surfaces_of_another_size_leave_no_error(gl: Context) -> None:
         buffers.release()
     gl.ctx.framebuffer([gl.ctx.texture((4, 4), 4)]).release()
     gl.check("making a framebuffer after it")
+
+
+@pytest.mark.parametrize("name", ["prism", "ball"])  # beams, photons
+def test_edits_of_a_rehearsed_scene_compile_nothing(gl: Context, engine: LiveEngine, name: str) -> None:
+    shader.drop_programs(gl.ctx)
+    scene = shipped(name)
+    settled(engine, scene)
+    with shader.recorded() as rehearsed:
+        for _ in rehearsal.rehearse(gl, inputs(scene)):
+            pass
+    assert "light/footprint.comp" in {program.name for program in rehearsed if program.seconds}
+    glass, floor = glass_of(scene), next(i for i, o in enumerate(scene.objects) if o.material.receives)
+    objects = list(scene.objects)
+    material = objects[glass].material
+    objects[glass] = replace(
+        objects[glass], material=material.changed(dispersion=replace(material.dispersion, gain=1.7))
+    )
+    dispersed, objects = replace(scene, objects=tuple(objects)), list(scene.objects)
+    objects[floor] = replace(objects[floor], local_dispersion=(Dab((0.1, 0.2, 0.0), 0.5, 1.5),))
+    with shader.recorded() as needed:
+        for edited in (dispersed, moved(scene, 0.1, 15.0), replace(scene, objects=tuple(objects))):
+            version = engine.picture_version
+            engine.set(inputs(edited))
+            while engine.picture_version == version or engine.differs not in ("", "moved"):
+                engine.advance(0.05, interacting=True)
+    assert needed and [program.name for program in needed if program.seconds] == []
+
+
+def test_a_kind_of_scene_is_rehearsed_once_and_left_for_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    works: list[Callable[[], None]] = []
+    taken: list[str] = []
+    monkeypatch.setattr(rehearsal, "rehearse", lambda _, wanted: (taken.append(wanted.scene.name) for _ in range(3)))
+    thread = SimpleNamespace(context=None, submit=works.append)
+    rehearsals = rehearsal.Rehearsals(lambda: thread)  # type: ignore[arg-type, return-value]
+    prism, ball = (inputs(shipped(name)) for name in ("prism", "ball"))
+    for wanted in (prism, ball, None, ball, replace(ball, scene=moved(ball.scene, 0.1))):
+        rehearsals.follow(wanted)
+    for work in works:
+        work()
+    rehearsals.follow(prism)  # which was left at once
+    rehearsals.follow(ball)
+    rehearsals.end()
+    works.pop()()
+    assert taken == [prism.scene.name] + 3 * [ball.scene.name] + [prism.scene.name] and len(works) == 2
