@@ -90,8 +90,9 @@ class BackgroundJobs:
         self.comparison.advance(state, picture.engine, share * max(left, 0.0))
         if self.comparison.is_waiting and not state.interacting:
             time.sleep(REFERENCE_WAIT_S)
-        rests = state.interacting or self.is_busy or picture.engine is None or not picture.is_presentable
-        self._rehearsals.follow(None if rests or picture.engine is None else picture.engine.inputs)
+        inputs = None if picture.engine is None else picture.engine.inputs
+        if inputs is not None and picture.is_presentable and not (state.interacting or self.is_busy):
+            self._rehearsals.follow(inputs)
         is_exporting = self.exports.job is not None
         self.engine_rests = is_exporting and not state.interacting and picture.is_presentable
         if self.engine_rests:
@@ -141,7 +142,7 @@ class BackgroundJobs:
 
     def release(self) -> list[str]:
         """End and free everything, before the engine is released; sentences about what could not be written."""
-        self._rehearsals.end()
+        self._rehearsals.release()
         self.cursor.release()
         problems = self.exports.release()
         self.comparison.release()

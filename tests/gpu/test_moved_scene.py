@@ -3,13 +3,15 @@ there; let go, it is traced as if it had always stood there."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from spectrasplat.base.paths import assets_dir
+from spectrasplat.edit import edits
 from spectrasplat.edit.live_inputs import LiveInputs
 from spectrasplat.edit.projection import View
 from spectrasplat.gpu import shader
@@ -207,15 +209,10 @@ def test_edits_of_a_rehearsed_scene_compile_nothing(gl: Context, engine: LiveEng
             pass
     assert "light/footprint.comp" in {program.name for program in rehearsed if program.seconds}
     glass, floor = glass_of(scene), next(i for i, o in enumerate(scene.objects) if o.material.receives)
-    objects = list(scene.objects)
-    material = objects[glass].material
-    objects[glass] = replace(
-        objects[glass], material=material.changed(dispersion=replace(material.dispersion, gain=1.7))
-    )
-    dispersed, objects = replace(scene, objects=tuple(objects)), list(scene.objects)
-    objects[floor] = replace(objects[floor], local_dispersion=(Dab((0.1, 0.2, 0.0), 0.5, 1.5),))
+    stroke = [Dab((0.1, 0.2, 0.0), 0.5, 1.5)]
+    made = edits.set_dispersion_gain(scene, glass, 1.7), moved(scene, 0.1, 15.0), edits.add_dabs(scene, floor, stroke)
     with shader.recorded() as needed:
-        for edited in (dispersed, moved(scene, 0.1, 15.0), replace(scene, objects=tuple(objects))):
+        for edited in made:
             version = engine.picture_version
             engine.set(inputs(edited))
             while engine.picture_version == version or engine.differs not in ("", "moved"):
@@ -223,19 +220,15 @@ def test_edits_of_a_rehearsed_scene_compile_nothing(gl: Context, engine: LiveEng
     assert needed and [program.name for program in needed if program.seconds] == []
 
 
-def test_a_kind_of_scene_is_rehearsed_once_and_left_for_another(monkeypatch: pytest.MonkeyPatch) -> None:
-    works: list[Callable[[], None]] = []
+def test_a_kind_of_scene_is_rehearsed_once(monkeypatch: pytest.MonkeyPatch) -> None:
     taken: list[str] = []
-    monkeypatch.setattr(rehearsal, "rehearse", lambda _, wanted: (taken.append(wanted.scene.name) for _ in range(3)))
-    thread = SimpleNamespace(context=None, submit=works.append)
-    rehearsals = rehearsal.Rehearsals(lambda: thread)  # type: ignore[arg-type, return-value]
-    prism, ball = (inputs(shipped(name)) for name in ("prism", "ball"))
-    for wanted in (prism, ball, None, ball, replace(ball, scene=moved(ball.scene, 0.1))):
-        rehearsals.follow(wanted)
-    for work in works:
-        work()
-    rehearsals.follow(prism)  # which was left at once
-    rehearsals.follow(ball)
-    rehearsals.end()
-    works.pop()()
-    assert taken == [prism.scene.name] + 3 * [ball.scene.name] + [prism.scene.name] and len(works) == 2
+    steps = lambda _, wanted: ((taken.append(wanted.scene.name), True)[1] for _ in range(3))  # noqa: E731
+    monkeypatch.setattr(rehearsal, "rehearse", steps)
+    with ThreadPoolExecutor(1) as thread:
+        rehearsals = rehearsal.Rehearsals(lambda: SimpleNamespace(context=None, submit=thread.submit))  # type: ignore[arg-type, return-value]
+        prism, ball = (inputs(shipped(name)) for name in ("prism", "ball"))
+        for wanted in [prism] + 6 * [ball] + [prism, replace(ball, scene=moved(ball.scene, 0.1)), ball]:
+            rehearsals.follow(wanted)
+            thread.submit(int).result()
+        rehearsals.release()
+    assert taken == 3 * [prism.scene.name] + 3 * [ball.scene.name]
