@@ -230,5 +230,4 @@ def test_a_kind_of_scene_is_rehearsed_once(monkeypatch: pytest.MonkeyPatch) -> N
         for wanted in [prism] + 6 * [ball] + [prism, replace(ball, scene=moved(ball.scene, 0.1)), ball]:
             rehearsals.follow(wanted)
             thread.submit(int).result()
-        rehearsals.release()
     assert taken == 3 * [prism.scene.name] + 3 * [ball.scene.name]

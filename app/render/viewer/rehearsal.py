@@ -23,26 +23,25 @@ if TYPE_CHECKING:
     from ...gpu.context_thread import ContextThread
 
 PHOTONS, WIDTH, HEIGHT = 1 << 12, 97, 55
-STEP_S = 0.1
+STEP_S = 0.5
 MOST_TRIANGLES = 1_000_000
 """Of a scene, which is on the device twice meanwhile."""
 
 
 def rehearse(context: Context, inputs: LiveInputs) -> Generator[bool]:
-    """Compile in `context` what edits of `inputs` need, True after every step; ends at an edit that cannot be shown."""
+    """Compile in `context` what edits of `inputs` need, True after every step. Left before its end, it leaves what it
+    holds to the end of `context`."""
     engine = LiveEngine(context, replace(Budget.of(context), first_photons=PHOTONS, largest_photons=PHOTONS))
     engine.target_photons = PHOTONS
-    try:
-        for scene in _edited(inputs.scene):
-            version = engine.picture_version
-            engine.set(replace(inputs, scene=scene, width=WIDTH, height=HEIGHT))
-            while (engine.picture_version == version or engine.differs not in ("", "moved")) and not engine.is_idle:
-                engine.advance(STEP_S, interacting=version > 0)
-                if engine.problem:
-                    return
-                yield True
-    finally:
-        engine.release()
+    for scene in _edited(inputs.scene):
+        version = engine.picture_version
+        engine.set(replace(inputs, scene=scene, width=WIDTH, height=HEIGHT))
+        while (engine.picture_version == version or engine.differs not in ("", "moved")) and not engine.is_idle:
+            engine.advance(STEP_S, interacting=version > 0)
+            if engine.problem:
+                break
+            yield True
+    engine.release()
 
 
 def _edited(scene: Scene) -> Iterator[Scene]:
@@ -84,8 +83,3 @@ class Rehearsals:
             self._steps = rehearse(thread.context, inputs)
         steps = self._steps
         self._step = thread.submit(lambda: next(steps, False))
-
-    def release(self) -> None:
-        """End what was begun, after the step that is being taken; the thread is the caller's."""
-        if self._step is not None and (thread := self._thread()) is not None:
-            thread.submit(self._steps.close)
