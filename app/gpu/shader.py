@@ -98,8 +98,8 @@ def load_source(
     """
     root = root or paths.shaders_dir()
     asked = (name, tuple((defines or {}).items()), tuple(structs), root, tuple(extensions))
-    if _kept and asked in _sources:
-        return _sources[asked]
+    if _kept and (known := _sources.get(asked)) is not None:
+        return known
     lines: list[Line] = []
 
     def emit(text: str, file: str, line: int) -> None:
@@ -137,8 +137,8 @@ def load_source(
     )
     if _kept:
         _sources[asked] = source
-        while len(_sources) > 2 * KEPT_PROGRAMS:
-            _sources.pop(next(iter(_sources)))
+        for old in list(_sources)[: -2 * KEPT_PROGRAMS]:
+            _sources.pop(old, None)  # other threads' engines use them too
     return source
 
 

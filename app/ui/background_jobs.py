@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from ..base.errors import UserError
 from ..base.paths import shipped_scenes
 from ..gpu.context_thread import no_thread
+from ..render.viewer.rehearsal import Rehearsals
 from .compare import Comparison, engine_beside
 from .cursor_info import Cursor
 from .export import Exports, Shown
@@ -54,6 +55,7 @@ class BackgroundJobs:
             lambda: self._thread("reference"),
         )
         self.exports = Exports(context, lambda: self._thread("export"))
+        self._rehearsals = Rehearsals(lambda: self._thread("rehearsal"))
         self.overlay = RayOverlay(context)
         self.cursor = Cursor()
         self.gallery = Gallery(context, config, best_first(shipped_scenes()))
@@ -88,6 +90,9 @@ class BackgroundJobs:
         self.comparison.advance(state, picture.engine, share * max(left, 0.0))
         if self.comparison.is_waiting and not state.interacting:
             time.sleep(REFERENCE_WAIT_S)
+        inputs = None if picture.engine is None else picture.engine.inputs
+        if inputs is not None and picture.is_presentable and not (state.interacting or self.is_busy):
+            self._rehearsals.follow(inputs)
         is_exporting = self.exports.job is not None
         self.engine_rests = is_exporting and not state.interacting and picture.is_presentable
         if self.engine_rests:

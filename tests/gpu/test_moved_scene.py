@@ -4,21 +4,26 @@ there; let go, it is traced as if it had always stood there."""
 from __future__ import annotations
 
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from spectrasplat.base.paths import assets_dir
+from spectrasplat.edit import edits
 from spectrasplat.edit.live_inputs import LiveInputs
 from spectrasplat.edit.projection import View
+from spectrasplat.gpu import shader
 from spectrasplat.gpu.context import Context
 from spectrasplat.model.io.scene_file import load_scene
-from spectrasplat.model.scene import Dielectric, Scene
+from spectrasplat.model.scene import Dab, Dielectric, Scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes.camera_records import camera_parameters
 from spectrasplat.passes.first_surfaces import FirstSurfaces
 from spectrasplat.passes.ray_paths import RayPaths
 from spectrasplat.render.device_scene import scene_buffers
+from spectrasplat.render.viewer import rehearsal
 from spectrasplat.render.viewer.engine import Budget, LiveEngine
 from spectrasplat.render.viewer.invalidation import only_moves
 from spectrasplat.render.viewer.live_light import LiveLight
@@ -192,3 +197,37 @@ def test_surfaces_of_another_size_leave_no_error(gl: Context) -> None:
         buffers.release()
     gl.ctx.framebuffer([gl.ctx.texture((4, 4), 4)]).release()
     gl.check("making a framebuffer after it")
+
+
+@pytest.mark.parametrize("name", ["prism", "ball"])  # beams, photons
+def test_edits_of_a_rehearsed_scene_compile_nothing(gl: Context, engine: LiveEngine, name: str) -> None:
+    shader.drop_programs(gl.ctx)
+    scene = shipped(name)
+    settled(engine, scene)
+    with shader.recorded() as rehearsed:
+        for _ in rehearsal.rehearse(gl, inputs(scene)):
+            pass
+    assert "light/footprint.comp" in {program.name for program in rehearsed if program.seconds}
+    glass, floor = glass_of(scene), next(i for i, o in enumerate(scene.objects) if o.material.receives)
+    stroke = [Dab((0.1, 0.2, 0.0), 0.5, 1.5)]
+    made = edits.set_dispersion_gain(scene, glass, 1.7), moved(scene, 0.1, 15.0), edits.add_dabs(scene, floor, stroke)
+    with shader.recorded() as needed:
+        for edited in made:
+            version = engine.picture_version
+            engine.set(inputs(edited))
+            while engine.picture_version == version or engine.differs not in ("", "moved"):
+                engine.advance(0.05, interacting=True)
+    assert needed and [program.name for program in needed if program.seconds] == []
+
+
+def test_a_kind_of_scene_is_rehearsed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    taken: list[str] = []
+    steps = lambda _, wanted: ((taken.append(wanted.scene.name), True)[1] for _ in range(3))  # noqa: E731
+    monkeypatch.setattr(rehearsal, "rehearse", steps)
+    with ThreadPoolExecutor(1) as thread:
+        rehearsals = rehearsal.Rehearsals(lambda: SimpleNamespace(context=None, submit=thread.submit))  # type: ignore[arg-type, return-value]
+        prism, ball = (inputs(shipped(name)) for name in ("prism", "ball"))
+        for wanted in [prism] + 6 * [ball] + [prism, replace(ball, scene=moved(ball.scene, 0.1)), ball]:
+            rehearsals.follow(wanted)
+            thread.submit(int).result()
+    assert taken == 3 * [prism.scene.name] + 3 * [ball.scene.name]
