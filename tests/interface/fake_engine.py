@@ -21,7 +21,7 @@ def dispersed(place: Sequence[float], source: int, receiver: int, count: int = 2
     ones, at = np.ones(count), np.random.default_rng(2).normal(0.0, 0.3, (count, 3)) * [1.0, 1.0, 0.0]
     return StoredPhotons(
         np.asarray(place, float) + at,
-        np.tile([[[20.0, 0.0, 0.0]]], (count, 1, 1)),
+        np.tile([[[30.0, 0.0, 0.0]]], (count, 1, 1)),
         1.52 * ones[:, None],
         ones,
         np.full(count, source),
