@@ -340,6 +340,8 @@ class BeamLight:
             return None
         differs = [a.material is not b.material for a, b in zip(before.objects, shown.objects, strict=True)]
         changed = np.bitwise_or.reduce(np.int64(1) << (np.flatnonzero(differs) & 63), initial=np.int64(0))
+        if not changed:
+            return None  # a search of everything misses nothing
         assert finest.polygons is not None
         return _KeptBeams(finest, int(changed), finest.polygons.where(finest.polygons.met & changed == 0))
 

@@ -154,8 +154,8 @@ MUTANTS = {
     ),
     "camera absorption by the last chord only": Mutant(
         "camera/meet.glsl",
-        "path.lengths[i] += hit.distance",
-        "path.lengths[i] = hit.distance",
+        "path.lengths[i] += length;",
+        "path.lengths[i] = length;",
         "gpu/test_camera_glass.py::test_absorption_follows_beers_law",
     ),
     "camera band ends with the anchor's index": Mutant(

@@ -110,25 +110,25 @@ def ring_of_sapphire() -> Scene:
     return Scene("ring", ABOVE, (light,), (ring, table), render=RenderDefaults(max_depth=16))
 
 
-def kept_by_ring(gl: Context) -> tuple[float, float]:
-    """Of the light that went through the ring: what its microfacets kept. And of what landed: what the map holds, with
-    that of photons which landed where it does not reach."""
+def kept_by_ring(gl: Context) -> tuple[float, float, float]:
+    """Of the light that went through the ring: what its microfacets kept. And of what landed: what the map holds, and
+    what landed where it does not reach."""
     with passed(gl, ring_of_sapphire(), photons=60_000) as light:
         ended = light.stats.tally.ended
         sent_on = ended["deposited"] + ended["escaped"]
-        return ended["absorbed"] / sent_on, held(light) + light.stats.outside_map_w / ended["deposited"]
+        return ended["absorbed"] / sent_on, held(light), light.stats.outside_map_w / ended["deposited"]
 
 
 def test_steep_derivatives_by_wavelength_take_no_light(gl: Context) -> None:
-    kept, drawn = kept_by_ring(gl)
+    kept, drawn, outside = kept_by_ring(gl)
     assert abs(kept) < 1.5e-3
-    assert drawn == pytest.approx(1.0, abs=4e-3)
+    assert drawn + outside == pytest.approx(1.0, abs=4e-3) and outside < 0.025
 
 
 def test_believed_they_would(gl: Context, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """The mutants: ends of bands thrown out of the scene, and their shares as far off as derivatives tell."""
     monkeypatch.setattr(trace, "WIDEST_SWEEP", 1e6)
-    assert kept_by_ring(gl)[1] < 0.993
+    assert kept_by_ring(gl)[2] > 0.025
     monkeypatch.undo()
     mutate(monkeypatch, tmp_path, "light/trace_rough.glsl", "#define MOST_CHANGE 0.3", "#define MOST_CHANGE 1e6")
     assert abs(kept_by_ring(gl)[0]) > 3e-3
