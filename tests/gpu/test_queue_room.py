@@ -13,7 +13,7 @@ from spectrasplat.model.scene import Scene
 from spectrasplat.passes.trace import Band, LatticeSlice
 from spectrasplat.stress.rigs.probe import SMALL, light_pass, probe
 
-ORDERS = 101
+ORDERS = 161
 FEW = 3
 """Surfaces that paths meet: the first grating fills the queue."""
 
@@ -52,16 +52,16 @@ def test_full_queues_lose_nothing(gl, crowded: Scene) -> None:
 
 def test_a_slice_that_overflows_is_traced_again_in_parts(gl, crowded: Scene) -> None:
     """Before: 7 % of the flux was gone."""
-    with light_pass(gl, crowded, replace(SMALL, photons=12_288, batch=16_384, max_depth=FEW)) as (light, _):
-        light.begin(12_288, 1)
+    with light_pass(gl, crowded, replace(SMALL, photons=20_480, batch=16_384, max_depth=FEW)) as (light, _):
+        light.begin(20_480, 1)
         plan = light.plans[0]
-        part = plan.slice(1, 0, plan.lattice_count(12_288), 0, 1, plan.lattice_count(12_288), 12_288.0)
+        part = plan.slice(1, 0, plan.lattice_count(20_480), 0, 1, plan.lattice_count(20_480), 20_480.0)
         whole = light.trace.run(part, plan.domain)
         assert whole.overflow > 0 and whole.tally.imbalance > 0.01
-        for _ in light.pass_steps(0, 12_288):
+        for _ in light.pass_steps(0, 20_480):
             pass
         tally = light.stats.tally
-        assert tally.imbalance < 1e-5 and np.isclose(tally.emitted, whole.tally.emitted + _others(light, 12_288))
+        assert tally.imbalance < 1e-5 and np.isclose(tally.emitted, whole.tally.emitted + _others(light, 20_480))
 
 
 def _others(light, photons: int) -> float:
