@@ -88,7 +88,7 @@ def nearest_names(name: str, known: Iterable[str], count: int = 3) -> list[str]:
     word, by_folded = name.casefold(), {candidate.casefold(): candidate for candidate in known}
     if meant := [m for m in MEANT.get("".join(filter(str.isalnum, word)), ()) if m.casefold() in by_folded]:
         return meant[:count]
-    near = difflib.get_close_matches(word, by_folded, count, cutoff=0.71 if len(word) > 3 else 0.66)
+    near = difflib.get_close_matches(word, by_folded, count, cutoff=0.72 if len(word) > 3 else 0.66)
     near += [each for each in by_folded if _words(word) & _words(each) or (len(word) > 2 and each.startswith(word))]
     return [by_folded[each] for each in dict.fromkeys(near)][:count]
 

@@ -34,6 +34,7 @@ _WORDS = {
     "glass": "dielectric transparent",
     "diffuse": "lambert lambertian matte matt",
     "mirror": "metal conductor specular",
+    "diamond": "diamant diamante",
 }
 MEANT: dict[str, list[str]] = {}
 """Word without punctuation -> names that may be meant by it, the likeliest first."""

@@ -142,6 +142,7 @@ class BackgroundJobs:
 
     def release(self) -> list[str]:
         """End and free everything, before the engine is released; sentences about what could not be written."""
+        self._rehearsals.release()
         self.cursor.release()
         problems = self.exports.release()
         self.comparison.release()

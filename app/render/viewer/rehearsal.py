@@ -29,19 +29,20 @@ MOST_TRIANGLES = 1_000_000
 
 
 def rehearse(context: Context, inputs: LiveInputs) -> Generator[bool]:
-    """Compile in `context` what edits of `inputs` need, True after every step. Left before its end, it leaves what it
-    holds to the end of `context`."""
+    """Compile in `context` what edits of `inputs` need, True after every step."""
     engine = LiveEngine(context, replace(Budget.of(context), first_photons=PHOTONS, largest_photons=PHOTONS))
-    engine.target_photons = PHOTONS
-    for scene in _edited(inputs.scene):
-        version = engine.picture_version
-        engine.set(replace(inputs, scene=scene, width=WIDTH, height=HEIGHT))
-        while (engine.picture_version == version or engine.differs not in ("", "moved")) and not engine.is_idle:
-            engine.advance(STEP_S, interacting=version > 0)
-            if engine.problem:
-                break
-            yield True
-    engine.release()
+    try:
+        engine.target_photons = PHOTONS
+        for scene in _edited(inputs.scene):
+            version = engine.picture_version
+            engine.set(replace(inputs, scene=scene, width=WIDTH, height=HEIGHT))
+            while (engine.picture_version == version or engine.differs not in ("", "moved")) and not engine.is_idle:
+                engine.advance(STEP_S, interacting=version > 0)
+                if engine.problem:
+                    break
+                yield True
+    finally:  # its search for beams has a thread, which must not outlive the program
+        engine.release()
 
 
 def _edited(scene: Scene) -> Iterator[Scene]:
@@ -63,7 +64,7 @@ class Rehearsals:
         self._thread = thread
         self._known: set[Hashable] = set()
         self._scene: object = None
-        self._steps: Generator[bool]
+        self._steps: Generator[bool] | None = None
         self._step: Future[bool] | None = None
 
     def follow(self, inputs: LiveInputs) -> None:
@@ -82,4 +83,11 @@ class Rehearsals:
             self._known.add(kind)
             self._steps = rehearse(thread.context, inputs)
         steps = self._steps
+        assert steps is not None
         self._step = thread.submit(lambda: next(steps, False))
+
+    def release(self) -> None:
+        """End the one that is under way, on its thread."""
+        if self._steps is not None and (thread := self._thread()) is not None:
+            thread.submit(self._steps.close).exception()
+        self._steps = None
