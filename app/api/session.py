@@ -127,7 +127,7 @@ class Session:
             if isinstance(found, NotYet):
                 raise UserError(f"the session's photons are {found.value}: ask again")
             every = 1 if limit is None else -(-len(found.flux_w) // limit)
-            # Records follow a space-filling curve over the lattice: every so manieth is nearly a lattice again.
+            # Records follow a space-filling curve over the lattice: every n-th of them is nearly a lattice again.
             chosen = found.chosen(np.arange(0, len(found.flux_w), max(every, 1)))
             # A record holds its share of the light times the photons of the pass.
             share = len(found.flux_w) / max(len(chosen.flux_w), 1)

@@ -62,7 +62,7 @@ class PassRounds:
         """The whole pass, pausing after every event of the rays and after every splatting.
 
         `first_round`: where a pass goes on that was left before. `first_group`, `stride`: of the groups of rounds that
-        have their beams together, this one and every so manieth after it, where others trace the rest."""
+        have their beams together, this one and every `stride`-th after it, where others trace the rest."""
         if not self.plans:
             yield from self._only_beams(range(first_round + first_group, self.count, stride))
             return

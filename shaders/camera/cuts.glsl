@@ -44,7 +44,7 @@ void cut_band(inout CameraPath path, float at, uint pixel_key)
     if (!both) takes_low = unit_float(hash_combine(hash_combine(pixel_key, path.key + uint(path.depth + path.cuts) * 2654435769u), p.sample_index)) < below;
     path.cuts += 1;
     CameraPath whole = path;
-    // What stack_size first, then what goes on.
+    // The part that is put on the stack first, then the one that is followed.
     for (int part = both ? 0 : 1; part < 2; ++part) {
         bool low = part == 0 ? !takes_low : takes_low;
         float share = low ? below : 1.0 - below;

@@ -288,7 +288,7 @@ class LiveLight:
     def _splat_some(self, kept: StoredPass, photons: int, maps: LightMaps) -> None:
         rounds = kept.store.first_rounds(photons)
         slabs = kept.store.of_rounds(0, rounds)
-        # Records follow a space-filling curve over the lattice: every so manieth is nearly a lattice again.
+        # Records follow a space-filling curve over the lattice: every n-th of them is nearly a lattice again.
         stride = max(1, sum(slab.count for slab in slabs) // photons)
         share = rounds / kept.store.rounds_of_pass / stride
         wider = share**-0.5 * self.widening(kept.pass_photons * share)
