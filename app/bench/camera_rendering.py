@@ -13,10 +13,10 @@ from contextlib import ExitStack, contextmanager
 
 import numpy as np
 
+from ..features.features import Features
 from ..gpu.context import Context
 from ..gpu.map_channels import MapChannels
 from ..gpu.scene_buffers import SceneBuffers
-from ..model.features import Features
 from ..model.optics.colorimetry import rgb709_to_xyz
 from ..model.scene import Scene
 from ..model.settings import RenderSettings

@@ -6,7 +6,7 @@ import time
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from ..model.features import Features
+from ..features.features import Features
 from ..model.settings import RenderSettings
 from ..passes.camera import CameraPass
 from ..render.device_scene import scene_buffers

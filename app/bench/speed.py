@@ -17,10 +17,10 @@ from pathlib import Path
 import numpy as np
 
 from ..base.errors import UserError
+from ..features.features import Features
 from ..gpu.context import Context, create_context
 from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.shader import recorded
-from ..model.features import Features
 from ..model.geometry import primitives_round
 from ..model.geometry.bvh import build_bvh
 from ..model.geometry.primitives import plane

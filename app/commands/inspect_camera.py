@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..bench.features.static_costs import picture_bytes, size_words
+from ..features.features import Features
 from ..gpu.map_channels import tents
 from ..gpu.mip_chain import level_count
-from ..model.features import Features
 from ..model.scene import Scene
 from ..model.texture import Environment, Texture
 from ..render.device_scene import spectral_axis

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
     from rich.table import Table
 
-    from ..model.features import Features
+    from ..features.features import Features
     from ..model.optics.glass import Dispersion
 
 
@@ -160,8 +160,8 @@ def _lights_table(lights: tuple[Light, ...]) -> Table:
 
 def _compiled(scene: Scene) -> list[RenderableType]:
     from ..bench.features.static_costs import RecordSizes, static_costs
-    from ..model.features import Features
-    from ..model.features_explained import explain
+    from ..features.explained import explain
+    from ..features.features import Features
     from ..model.settings import RenderSettings
 
     wishes = scene.render

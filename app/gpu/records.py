@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..model.features import Features
+from ..features.features import Features
 from ..model.scene_checks import MAX_OBJECTS
 from ..model.tint_levels import LEVELS
 from .schema import Field, Struct

@@ -12,10 +12,10 @@ import moderngl
 import numpy as np
 
 from ..base.errors import UserError
-from ..model.contacts import overlapping_solids
-from ..model.features import (
+from ..features.features import (
     Features,
 )
+from ..model.contacts import overlapping_solids
 from ..model.flat_shapes import is_faceted
 from ..model.geometry.mesh import Mesh
 from ..model.optics import rough_glass

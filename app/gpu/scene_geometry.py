@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..features.features import Features, half_spaces
 from ..model.curved_solids import Face, curved_solids
-from ..model.features import Features, half_spaces
 from ..model.geometry.bvh import Bvh, build_bvh
 from ..model.geometry.mesh import Mesh
 from ..model.scene import Scene, SceneObject

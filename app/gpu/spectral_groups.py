@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model.features import MAX_GROUPS, Features, dispersive_materials
+from ..features.features import MAX_GROUPS, Features, dispersive_materials
 from ..model.optics.glass import Dispersion
 from ..model.optics.spectral_tables import SpectralAxis
 from ..model.scene import Scene

@@ -12,12 +12,12 @@ from itertools import pairwise
 
 import numpy as np
 
+from ..features.features import Features
 from ..gpu.context import Context
 from ..gpu.gpu_space import GpuSpace
 from ..gpu.records import FLIGHT, MAX_BANDS
 from ..gpu.scene_buffers import SceneBuffers
 from ..model.contacts import world_bounds
-from ..model.features import Features
 from ..model.optics.spectral_tables import SpectralAxis, cumulative
 from ..model.scene import Scene
 from ..model.settings import RenderSettings

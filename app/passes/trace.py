@@ -14,11 +14,11 @@ from functools import lru_cache
 import moderngl
 import numpy as np
 
+from ..features.features import Features
 from ..gpu import bindings, records, shader
 from ..gpu.context import Context
 from ..gpu.scene_buffers import UNBOUNDED, SceneBuffers
 from ..gpu.scene_records import SCENE_STRUCTS
-from ..model.features import Features
 from .emission_domain import EmissionDomain
 from .lattice_order import morton_order
 from .variants import emit_defines, light_defines

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Protocol
 
+from ..features.features import Features
 from ..gpu import bindings, records
 from ..gpu.device_traits import DeviceTraits
 from ..gpu.map_channels import MapChannels
@@ -16,7 +17,6 @@ from ..gpu.splat_tables import CUMULATIVE_SAMPLES, DENSITY_CELLS
 from ..gpu.splat_way import SplatWay
 from ..gpu.texture_store import place_defines
 from ..model.environment_light import lighting_environment
-from ..model.features import Features
 from .camera_tables import EMISSION_CELLS
 from .picture_channels import Channels
 
@@ -115,7 +115,7 @@ def emit_defines(features: Features, kind: str, thins: bool = False) -> Defines:
 
 
 class SplatFeatures(Protocol):
-    """What decides the programs' variant (a part of `spectrasplat.model.features.Features`)."""
+    """What decides the programs' variant (a part of `spectrasplat.features.features.Features`)."""
 
     @property
     def spectral_groups(self) -> int: ...

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from ..base.memory import available_bytes
+from ..features.features import Features
 from ..gpu import records
 from ..gpu.context import Context
-from ..model.features import Features
 from ..passes.trace import RAY_ROOM, queue_bytes
 from .light_plan import SMALLEST_BATCH
 

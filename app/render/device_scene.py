@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from ..features.features import Features
 from ..gpu.context import Context
 from ..gpu.scene_buffers import SceneBuffers
-from ..model.features import Features
 from ..model.optics.spectral_tables import SpectralAxis
 from ..model.scene import Scene
 from ..model.settings import RenderSettings

@@ -16,10 +16,10 @@ import numpy as np
 
 from ..edit.live_inputs import LiveInputs
 from ..edit.parameters import Stage
+from ..features.features import Features
 from ..gpu.context import Context
 from ..gpu.scene_buffers import SceneBuffers
 from ..model.environment_sun import with_sun
-from ..model.features import Features
 from ..model.optics.spectral_tables import SpectralAxis
 from ..model.scene import Camera, Scene
 from ..model.settings import RenderSettings

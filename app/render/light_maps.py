@@ -8,12 +8,12 @@ from dataclasses import replace
 import moderngl
 import numpy as np
 
+from ..features.features import Features
 from ..gpu import shader
 from ..gpu.records import RECEIVER
 from ..gpu.shader import Releasable
 from ..gpu.splat_way import way_of
 from ..gpu.tiles import Tile
-from ..model.features import Features
 from ..passes.accumulate import LevelsFold, SeamFold, copy_texture
 from ..passes.border_maps import border_texture, inside_share
 from ..passes.caustic_maps import CausticMaps

@@ -16,12 +16,12 @@ from typing import TYPE_CHECKING
 import moderngl
 import numpy as np
 
+from ..features.features import Features
 from ..gpu import splat_tables
 from ..gpu.context import Context
 from ..gpu.limits import check_brush, check_splats
 from ..gpu.map_channels import MapChannels
 from ..gpu.scene_buffers import SceneBuffers
-from ..model.features import Features
 from ..model.scene import Scene
 from ..model.settings import RenderSettings
 from ..passes.caustic_maps import CausticMaps

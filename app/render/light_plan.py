@@ -9,9 +9,9 @@ from itertools import pairwise
 import numpy as np
 
 from ..base.random_words import PASS_GENERATORS, Dimension, random_word, shift
+from ..features.features import Features
 from ..gpu.records import MAX_BANDS
 from ..gpu.scene_buffers import SceneBuffers
-from ..model.features import Features
 from ..model.optics.spectral_tables import CumulativeSpectrum
 from ..model.scene import Scene
 from ..model.settings import RenderSettings, divides_spectrum

@@ -18,9 +18,9 @@ from ..passes.guided_emission import guided
 from ..passes.pilot import Pilot, landings_of, pilot_steps, split_threshold
 
 if TYPE_CHECKING:
+    from ..features.features import Features
     from ..gpu.context import Context
     from ..gpu.scene_buffers import SceneBuffers
-    from ..model.features import Features
     from ..model.scene import Scene
     from ..passes.landings import Landings
     from ..passes.trace import TracePass

@@ -6,11 +6,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from spectrasplat.features.features import Features
 from spectrasplat.gpu.map_channels import MapChannels
 from spectrasplat.gpu.records import NONE, PLACEMENT, RECEIVER
 from spectrasplat.gpu.scene_buffers import SceneBuffers
 from spectrasplat.model.camera_rays import camera_frame
-from spectrasplat.model.features import Features
 from spectrasplat.model.geometry.mesh import make_mesh
 from spectrasplat.model.optics import spectrum
 from spectrasplat.model.optics.colorimetry import K_M, cmf_xyz, daylight_per_lumen, rgb709_to_xyz, xyz_to_rgb709

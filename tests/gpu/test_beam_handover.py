@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from spectrasplat.beams.polygons import joined
+from spectrasplat.features.features import Features
 from spectrasplat.gpu.records import FLAG_INSIDE, NONE
 from spectrasplat.gpu.scene_buffers import SceneBuffers
-from spectrasplat.model.features import Features
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.lights import PointLight
 from spectrasplat.model.optics.spectrum import constant, laser

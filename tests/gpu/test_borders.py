@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from spectrasplat.model import features
+from spectrasplat.features import features
+from spectrasplat.features.features import Features
 from spectrasplat.model.camera_rays import camera_frame
-from spectrasplat.model.features import Features
 from spectrasplat.model.geometry.primitives import box, plane
 from spectrasplat.model.optics.glass import constant
 from spectrasplat.model.scene import Camera, Diffuse, Scene, SceneObject

@@ -9,9 +9,9 @@ import moderngl
 import numpy as np
 import pytest
 from spectrasplat.base.paths import assets_dir
+from spectrasplat.features.features import Features
 from spectrasplat.gpu import shader
 from spectrasplat.gpu.scene_buffers import SceneBuffers
-from spectrasplat.model.features import Features
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.optics.colorimetry import rgb709_to_xyz
 from spectrasplat.model.scene import Scene

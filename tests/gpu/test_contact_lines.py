@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.ndimage import uniform_filter
 from spectrasplat.base.paths import assets_dir
+from spectrasplat.features.features import Features
 from spectrasplat.model.camera_rays import camera_frame
 from spectrasplat.model.contacts import standing
-from spectrasplat.model.features import Features
 from spectrasplat.model.geometry.primitives import box, polygon_prism
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.optics.glass import constant

@@ -15,10 +15,10 @@ from spectrasplat.bench.features import report as features_report
 from spectrasplat.bench.features.rig import Rig, Work, map_difference
 from spectrasplat.bench.features.symbol_proof import FEATURE_SYMBOLS, compiled_sources, program_texts, prove
 from spectrasplat.bench.features.variants import DISPERSION, Trial, Variant, trials
+from spectrasplat.features.explained import explain
+from spectrasplat.features.features import Features
 from spectrasplat.gpu.context import Context
 from spectrasplat.gpu.scene_buffers import SceneBuffers
-from spectrasplat.model.features import Features
-from spectrasplat.model.features_explained import explain
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings

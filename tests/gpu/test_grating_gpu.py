@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from reference import tracer
 from reference.grating import diffract
+from spectrasplat.features.features import Features
 from spectrasplat.gpu import bindings
 from spectrasplat.gpu.context import Context
 from spectrasplat.gpu.scene_buffers import SceneBuffers
 from spectrasplat.gpu.scene_records import SCENE_STRUCTS
-from spectrasplat.model.features import Features
 from spectrasplat.model.geometry.mesh import Mesh
 from spectrasplat.model.geometry.primitives import box, plane
 from spectrasplat.model.optics import catalogue

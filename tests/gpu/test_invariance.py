@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from spectrasplat.model.features import Features
+from spectrasplat.features.features import Features
 from spectrasplat.model.geometry.mesh import Mesh, make_mesh
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.lights import CollimatedLight, SpotLight

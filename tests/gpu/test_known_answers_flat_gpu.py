@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from reference.far_field import outgoing
+from spectrasplat.features.features import Features
 from spectrasplat.gpu.context import Context
 from spectrasplat.gpu.scene_buffers import SceneBuffers
 from spectrasplat.gpu.scene_records import SCENE_STRUCTS
-from spectrasplat.model.features import Features
 from spectrasplat.model.geometry.primitives import box, slab
 from spectrasplat.model.lights import PointLight
 from spectrasplat.model.optics.spectrum import constant

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.ndimage import map_coordinates
 from scipy.stats import norm
 from spectrasplat.base.paths import assets_dir
-from spectrasplat.model.features import Features
+from spectrasplat.features.features import Features
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.render.still import render

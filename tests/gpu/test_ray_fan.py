@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from reference import tracer
 from reference.tracer import Body, Index, TriangleList
+from spectrasplat.features.features import Features
 from spectrasplat.gpu.scene_buffers import SceneBuffers
-from spectrasplat.model.features import Features
 from spectrasplat.model.geometry import primitives_round
 from spectrasplat.model.geometry.mesh import make_mesh
 from spectrasplat.model.io.scene_file import load_scene

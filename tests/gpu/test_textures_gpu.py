@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from reference import textures as cpu_reference
 from spectrasplat.base.errors import UserError
+from spectrasplat.features.features import Features
 from spectrasplat.gpu import mip_chain, shader
 from spectrasplat.gpu.scene_buffers import SceneBuffers
 from spectrasplat.gpu.scene_records import SCENE_STRUCTS
 from spectrasplat.gpu.texture_store import PICTURE, TextureStore, place_defines
-from spectrasplat.model.features import Features
 from spectrasplat.model.geometry import primitives
 from spectrasplat.model.geometry.mesh import Mesh, make_mesh
 from spectrasplat.model.lights import PointLight

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from spectrasplat.features.features import Features
 from spectrasplat.gpu.context import Context
 from spectrasplat.gpu.scene_buffers import SceneBuffers
-from spectrasplat.model.features import Features
 from spectrasplat.model.geometry.mesh import Mesh, make_mesh
 from spectrasplat.model.scene import (
     Camera,

@@ -17,9 +17,9 @@ import numpy as np
 import pytest
 from scipy import stats
 from scipy.spatial import KDTree
+from spectrasplat.features.features import Features
 from spectrasplat.gpu.context import Context
 from spectrasplat.gpu.scene_buffers import SceneBuffers
-from spectrasplat.model.features import Features
 from spectrasplat.model.geometry.mesh import make_mesh
 from spectrasplat.model.lights import DirectionalLight
 from spectrasplat.model.optics.spectrum import laser

@@ -15,9 +15,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from spectrasplat.features.features import Features
 from spectrasplat.gpu.context import Context
 from spectrasplat.gpu.scene_buffers import SceneBuffers
-from spectrasplat.model.features import Features
 from spectrasplat.model.geometry.mesh import make_mesh
 from spectrasplat.model.lights import SpotLight
 from spectrasplat.model.optics.colorimetry import K_M, cmf_xyz

@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from spectrasplat.features.features import Features
 from spectrasplat.gpu import records as records_of_the_device
 from spectrasplat.gpu.scene_buffers import SceneBuffers
-from spectrasplat.model.features import Features
 from spectrasplat.model.geometry.mesh import make_mesh
 from spectrasplat.model.lights import CollimatedLight
 from spectrasplat.model.optics.spectrum import constant

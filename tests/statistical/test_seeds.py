@@ -14,9 +14,9 @@ import pytest
 from spectrasplat.base import random_words
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.base.random_words import PASS_GENERATORS, Dimension, random_word
+from spectrasplat.features.features import Features
 from spectrasplat.gpu.context import Context
 from spectrasplat.gpu.scene_buffers import SceneBuffers
-from spectrasplat.model.features import Features
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.reference.emission_maps import GOLDEN

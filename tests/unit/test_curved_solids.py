@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from spectrasplat.features.features import Features
 from spectrasplat.gpu.gpu_space import GpuSpace
 from spectrasplat.gpu.scene_geometry import Curved
 from spectrasplat.model.curved_solids import MOST_FACES, curved_solids, faces_of
-from spectrasplat.model.features import Features
 from spectrasplat.model.geometry import primitives
 from spectrasplat.model.geometry.mesh import Mesh
 from spectrasplat.model.geometry.mesh_recipes import note_recipe

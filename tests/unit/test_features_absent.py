@@ -13,13 +13,13 @@ import pytest
 from spectrasplat.base import paths
 from spectrasplat.bench.features.static_costs import RecordSizes, static_costs
 from spectrasplat.bench.features.symbol_proof import FEATURE_SYMBOLS, occurring, program_texts, prove
+from spectrasplat.features.explained import explain
+from spectrasplat.features.features import Features
 from spectrasplat.gpu import records, shader
 from spectrasplat.gpu.limits import BRUSH_STORAGE_BLOCKS, NEEDED
 from spectrasplat.gpu.program_use import use_of
 from spectrasplat.gpu.scene_records import SCENE_STRUCTS
 from spectrasplat.gpu.texture_store import PICTURE
-from spectrasplat.model.features import Features
-from spectrasplat.model.features_explained import explain
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings

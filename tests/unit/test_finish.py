@@ -12,7 +12,7 @@ from reference import finish
 from spectrasplat.base.errors import UserError
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.edit import edits, parameters
-from spectrasplat.model.features import Features
+from spectrasplat.features.features import Features
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.io.scene_table import SceneTable
 from spectrasplat.model.io.toml_text import toml_text

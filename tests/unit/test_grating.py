@@ -12,8 +12,8 @@ from spectrasplat.base.errors import UserError
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.edit import objects
 from spectrasplat.edit.parameters import Stage, apply, paths, value_of
-from spectrasplat.model.features import Features, camera_needs
-from spectrasplat.model.features_explained import explain
+from spectrasplat.features.explained import explain
+from spectrasplat.features.features import Features, camera_needs
 from spectrasplat.model.geometry.primitives import box
 from spectrasplat.model.io.gltf import load_gltf
 from spectrasplat.model.io.gltf_write import save_gltf

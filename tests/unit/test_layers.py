@@ -1,6 +1,7 @@
 """The rooms of app/ stand in layers: a file imports from its own or from lower ones, and no files import in a circle.
 
-    base < model < gpu, edit, beams < passes < render < ui, reference < bench < stress < farm < commands < api
+    base < model < features < gpu, edit, beams < passes < render < ui, reference < bench < stress < farm < commands
+      < api
 
 Rooms of one layer do not import each other, but for `ui`, whose compare panel shows the reference.
 """
@@ -19,6 +20,7 @@ APP = Path(spectrasplat.__path__[0])
 LAYERS = (
     ("base",),
     ("model",),
+    ("features",),
     ("gpu", "edit", "beams"),
     ("passes",),
     ("render",),

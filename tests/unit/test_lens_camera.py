@@ -11,7 +11,7 @@ from spectrasplat.base.errors import UserError
 from spectrasplat.commands.inspect_report import camera_line
 from spectrasplat.commands.options import with_lens
 from spectrasplat.edit.parameters import Stage, apply_all
-from spectrasplat.model.features import Features, in_view
+from spectrasplat.features.features import Features, in_view
 from spectrasplat.model.io.gltf_write import save_gltf
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.io.scene_save import save_scene

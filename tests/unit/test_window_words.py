@@ -63,7 +63,7 @@ OF_THE_COMMAND_LINE_ALONE = (
     "bvh.py",
     "cookie.py",
     "export_caustic.py",
-    "features_explained.py",
+    "explained.py",
     "lit_receiver.py",
     "map_layout.py",
     "parts.py",

@@ -16,8 +16,8 @@ import numpy as np
 
 from ...base.errors import UserError
 from ...base.version import __version__
-from ...model.features import Features
-from ...model.features_explained import explain
+from ...features.explained import explain
+from ...features.features import Features
 from ...model.settings import RenderSettings
 from ...render.device_scene import spectral_axis
 from ...render.light_pass import LightPass

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from ...features.features import Features, beam_objects, half_spaces
 from ...gpu.mip_chain import level_count
 from ...gpu.records import photon_record, ray_record_of
 from ...gpu.scene_records import PIECE, TRIANGLE
 from ...gpu.spectral_groups import SAMPLES
 from ...model.contacts import contacts, overlapping_solids
 from ...model.curved_solids import curved_solids
-from ...model.features import Features, beam_objects, half_spaces
 from ...model.scene import Scene
 from ...model.texture import Environment, Texture
 from ...passes.footprint import SPLAT

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...features.explained import explain
+from ...features.features import Features, half_spaces
 from ...model.curved_solids import curved_solids
-from ...model.features import Features, half_spaces
-from ...model.features_explained import explain
 from ...model.geometry.mesh import Mesh
 from ...model.scene import Absorption, Scene, SceneObject
 from ...reference.exact_shapes import as_triangles
@@ -39,7 +39,7 @@ class Trial:
     """One feature: two variants that differ in it alone, or why there are none."""
 
     feature: str
-    """As `spectrasplat.model.features_explained.explain` calls it."""
+    """As `spectrasplat.features.explained.explain` calls it."""
     included: bool
     reason: str
     carried: Variant | None

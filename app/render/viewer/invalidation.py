@@ -13,8 +13,8 @@ from dataclasses import fields, replace
 import numpy as np
 
 from ...edit.live_inputs import LiveInputs
+from ...features.features import is_painted
 from ...model.environment_light import lighting_environment
-from ...model.features import is_painted
 from ...model.optics.glass import Dispersion
 from ...model.scene import (
     Light,

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...features.features import Features
 from ...gpu import shader
-from ...model.features import Features
 from ...passes.bounce_light import BounceLightPass
 from ...passes.environment_light import EnvironmentLightPass
 from ...passes.map_layout import LIVE

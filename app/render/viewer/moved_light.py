@@ -21,8 +21,8 @@ from ..thrown_photons import thrown
 from .photon_store import PhotonStore
 
 if TYPE_CHECKING:
+    from ...features.features import Features
     from ...gpu.context import Context
-    from ...model.features import Features
     from ..light_pass import LightPass
     from ..light_plan import LightPlan
 

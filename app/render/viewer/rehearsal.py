@@ -12,7 +12,7 @@ import numpy as np
 
 from ...edit import edits
 from ...edit.live_inputs import LiveInputs
-from ...model.features import Features
+from ...features.features import Features
 from ...model.scene import Dab, Scene
 from ...model.settings import RenderSettings
 from .building import Budget

@@ -14,12 +14,12 @@ from functools import wraps
 
 import numpy as np
 
+from ...features.features import Features
 from ...gpu import shader
 from ...gpu.context import Context
 from ...gpu.map_channels import MapChannels
 from ...gpu.scene_buffers import SceneBuffers
 from ...model.environment import direction_of
-from ...model.features import Features
 from ...model.optics.colorimetry import K_M, cmf_xyz, daylight_per_lumen, rgb709_to_xyz, xyz_to_rgb709
 from ...model.scene import Camera, Scene, SceneObject
 from ...model.settings import RenderSettings

@@ -14,11 +14,11 @@ from functools import reduce
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...features.features import Features
 from ...gpu.context import Context
 from ...gpu.records import specular_events
 from ...gpu.scene_buffers import UNBOUNDED, SceneBuffers
 from ...gpu.spectral_groups import Groups
-from ...model.features import Features
 from ...model.geometry.mesh import Mesh, make_mesh
 from ...model.lights import CollimatedLight
 from ...model.optics.glass import sellmeier

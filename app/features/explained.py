@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from .bounces import why_no_bounces
-from .contacts import contacts, overlapping_solids, standing
-from .curved_solids import curved_solids
-from .environment_light import why_no_environment_light
-from .environment_sun import with_sun
+from ..model.bounces import why_no_bounces
+from ..model.contacts import contacts, overlapping_solids, standing
+from ..model.curved_solids import curved_solids
+from ..model.environment_light import why_no_environment_light
+from ..model.environment_sun import with_sun
+from ..model.flat_shapes import is_flat
+from ..model.scene import Scene
+from ..model.settings import has_beams
+from ..model.tint_bands import tint_curves
+from ..model.tint_levels import MAX_LIGHTS
 from .features import (
     Features,
     beam_objects,
@@ -16,11 +21,6 @@ from .features import (
     why_no_beams,
     why_no_haze,
 )
-from .flat_shapes import is_flat
-from .scene import Scene
-from .settings import has_beams
-from .tint_bands import tint_curves
-from .tint_levels import MAX_LIGHTS
 
 
 def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:

@@ -10,20 +10,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .bounces import why_no_bounces
-from .camera_rays import camera_frame
-from .contacts import contacts, overlapping_solids, standing, world_bounds
-from .curved_solids import curved_solids
-from .environment_light import why_no_environment_light
-from .flat_shapes import is_faceted, is_flat
-from .geometry.outline import convex_outline
-from .scene import (
+from ..model.bounces import why_no_bounces
+from ..model.camera_rays import camera_frame
+from ..model.contacts import contacts, overlapping_solids, standing, world_bounds
+from ..model.curved_solids import curved_solids
+from ..model.environment_light import why_no_environment_light
+from ..model.flat_shapes import is_faceted, is_flat
+from ..model.geometry.outline import convex_outline
+from ..model.scene import (
     Camera,
     Scene,
     SceneObject,
 )
-from .settings import RANDOM_METHODS, RenderSettings, divides_spectrum, has_beams
-from .tint_levels import LEVELS, tint_levels
+from ..model.settings import RANDOM_METHODS, RenderSettings, divides_spectrum, has_beams
+from ..model.tint_levels import LEVELS, tint_levels
+from .program_switches import PROGRAM_SWITCHES
 
 MAX_GROUPS = 4
 """Spectral columns a photon may carry; further dispersive materials share the last one."""
@@ -39,6 +40,59 @@ MAX_SOLID_PLANES = 96
 MOST_PLANES = 256
 """Of all convex solids of a scene. A pass of 65,536 photons among glass boxes by planes and by a tree (llvmpipe): 0.18
 and 0.18 s with 120 planes, 0.22 and 0.15 s with 240, 1.2 and 0.28 s with 960."""
+
+
+SYMBOLS = {
+    "MERGED_GROUPS": "merged_groups",
+    "SPECTRAL_WEIGHTS": "spectral_weights",
+    "FOOTPRINTS": "footprints",
+    "POINT_SPECTRUM": "point_spectrum",
+    "BAND_CUTS": "band_cuts",
+    "LANDING_CUTS": "landing_cuts",
+    "HAS_DIELECTRIC": "dielectrics",
+    "HAS_SHEET": "sheets",
+    "SURFACE_FILTERS": "filters",
+    "HAS_MIRROR": "mirrors",
+    "HAS_GRATING": "gratings",
+    "SMOOTH_NORMALS": "smooth_normals",
+    "NORMAL_DERIVATIVES": "normal_derivatives",
+    "ABSORPTION": "absorption",
+    "MEDIUM_STACK": "medium_stack",
+    "CONTACTS": "contacts",
+    "HAS_TREE": "tree",
+    "LOOSE_TRIANGLES": "loose_triangles",
+    "CONVEX_SOLIDS": "convex_solids",
+    "CURVED_SOLIDS": "curved_solids",
+    "CHARTS": "charts",
+    "NESTED_WINDOWS": "nested_windows",
+    "ANCHOR_WEIGHTS": "anchor_weights",
+    "LIGHT_PROFILES": "light_profiles",
+    "BEAMS": "beams",
+    "HERO": "hero",
+    "POLARISED": "polarised",
+    "ROUGH_SURFACES": "rough",
+    "LOBE_COLUMNS": "has_lobe_columns",
+    "LAMP_COLUMNS": "lamp_columns",
+    "LIGHT_EDGES": "light_edges",
+    "FLIGHTS": "flights",
+}
+"""Switch in the shaders → its field."""
+
+OWN_SYMBOLS = {
+    "LOCAL_GAIN": "local_gain",
+    "REINDEXED": "reindexed",
+    "CONTACT_LINES": "contact_lines",
+    "BORDER_IMAGES": "border_images",
+    "COATS": "coats",
+    "ROUGH_DIFFUSE": "rough_diffuse",
+    "LENS": "lens",
+}
+"""Of single passes (`passes/variants.py`)."""
+
+
+def all_symbols() -> tuple[str, ...]:
+    """Every name that shaders test as a switch, of 0 or 1."""
+    return tuple(dict.fromkeys([*SYMBOLS, *OWN_SYMBOLS, *PROGRAM_SWITCHES]))
 
 
 @dataclass(frozen=True)
@@ -159,42 +213,8 @@ class Features:
             "TARGETS": self.targets,
             "COLUMNS": 2 * (self.footprints + self.has_lobe_columns + self.lamp_columns) + self.spectral_groups,
         }
-        switches = {
-            "MERGED_GROUPS": self.merged_groups,
-            "SPECTRAL_WEIGHTS": self.spectral_weights,
-            "FOOTPRINTS": self.footprints,
-            "POINT_SPECTRUM": self.point_spectrum,
-            "BAND_CUTS": self.band_cuts,
-            "LANDING_CUTS": self.landing_cuts,
-            "HAS_DIELECTRIC": self.dielectrics,
-            "HAS_SHEET": self.sheets,
-            "SURFACE_FILTERS": self.filters,
-            "HAS_MIRROR": self.mirrors,
-            "HAS_GRATING": self.gratings,
-            "SMOOTH_NORMALS": self.smooth_normals,
-            "NORMAL_DERIVATIVES": self.normal_derivatives,
-            "ABSORPTION": self.absorption,
-            "MEDIUM_STACK": self.medium_stack,
-            "CONTACTS": self.contacts,
-            "HAS_TREE": self.tree,
-            "LOOSE_TRIANGLES": self.loose_triangles,
-            "CONVEX_SOLIDS": self.convex_solids,
-            "CURVED_SOLIDS": self.curved_solids,
-            "CHARTS": self.charts,
-            "NESTED_WINDOWS": self.nested_windows,
-            "ANCHOR_WEIGHTS": self.anchor_weights,
-            "LIGHT_PROFILES": self.light_profiles,
-            "BEAMS": self.beams,
-            "HERO": self.hero,
-            "POLARISED": self.polarised,
-            "ROUGH_SURFACES": self.rough,
-            "LOBE_COLUMNS": self.has_lobe_columns,
-            "LAMP_COLUMNS": self.lamp_columns,
-            "LIGHT_EDGES": self.light_edges,
-            "FLIGHTS": self.flights,
-        }
         levels = {"TINT_LEVELS": self.tint_levels} if self.tint_levels else {}
-        return numbers | levels | {name: 1 for name, on in switches.items() if on}
+        return numbers | levels | {symbol: 1 for symbol, field in SYMBOLS.items() if getattr(self, field)}
 
     @staticmethod
     def of(scene: Scene, settings: RenderSettings) -> Features:
@@ -301,7 +321,7 @@ def why_no_haze(scene: Scene) -> str | None:
 def _reindexed(scene: Scene, settings: RenderSettings, groups: int, *, coloured: bool) -> bool:
     """Whether an edit of the dispersion, or the brush, moves wavelengths between paths: where n alone says what a path
     is and weighs."""
-    from .optics.spectral_tables import SpectralAxis
+    from ..model.optics.spectral_tables import SpectralAxis
 
     edited = settings.anchor_weights or (settings.local_gain and any(o.local_dispersion for o in scene.objects))
     if not edited or groups != 1 or coloured or not divides_spectrum(settings.method):
