@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from spectrasplat.model import contacts, features
+from spectrasplat.features import features
+from spectrasplat.model import contacts
 from spectrasplat.model.contacts import _meet, _meeting
 from spectrasplat.model.geometry.primitives import box
 from spectrasplat.stress.rigs.scene_parts import FLINT, SUN, solid, stage
