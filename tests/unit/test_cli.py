@@ -177,57 +177,6 @@ class TestRender:
         assert "stopped early" in capsys.readouterr().out
         assert signal.getsignal(signal.SIGINT) is before
 
-    @pytest.mark.parametrize(
-        ("options", "sentence"),
-        [
-            ("--size 0x4", "--size 0x4 holds no pixel"),
-            ("--size -3x4", "--size -3x4 holds no pixel"),
-            ("--size 4", "--size '4' is not WIDTHxHEIGHT"),
-            ("--size 4x4x4", "is not WIDTHxHEIGHT"),
-            ("--size 20000x4", "no side may exceed 16384"),
-            ("--photons 0", "--photons 0 is too few"),
-            ("--photons -5", "--photons -5 is too few"),
-            ("--photons 1.5", "--photons '1.5' is not a whole number"),
-            ("--photons many", "--photons 'many' is not a whole number"),
-            ("--photons nan", "is not a whole number"),
-            ("--photons inf", "beyond what memory can hold"),
-            ("--photons 1e30", "beyond what memory can hold"),
-            ("--photons 2e12", "beyond what can be counted"),
-            ("--batch 1e15", "--batch 1e15 is beyond this machine's memory"),
-            ("--seconds 0", "--seconds 0 is out of range"),
-            ("--seconds nan", "--seconds 'nan' is not a number"),
-            ("--seconds inf", "--seconds inf is out of range"),
-            ("--photons 5 --seconds 5", "exclude each other"),
-            ("--method srd-lamda", "--method 'srd-lamda' is unknown, did you mean 'srd-lambda'"),
-            ("--method zzz", "known are srd, srd-photons, progressive, srd-lambda"),
-            ("--layer beuty", "did you mean 'beauty'"),
-            ("--layer map:flor", "it has 'map:floor', 'map:wall'"),
-            ("--layer map:stop", "names no receiver"),
-            ("--bins 3", "--bins 3 is out of range: give between 4 and 32"),
-            ("--bins 33", "between 4 and 32"),
-            ("--bins four", "--bins 'four' is not a whole number"),
-            ("--exposure bright", "--exposure 'bright' is not a number"),
-            ("--exposure inf", "--exposure inf is out of range"),
-            ("--max-depth 0", "--max-depth 0 is out of range"),
-            ("--spp 0", "--spp 0 is out of range"),
-            ("--seed -1", "--seed -1 is out of range"),
-            ("--sise 4x4", "no such option: --sise"),
-        ],
-    )
-    def test_bad_option(
-        self,
-        renderer: FakeRenderer,
-        scene_path: Path,
-        tmp_path: Path,
-        capsys: pytest.CaptureFixture[str],
-        options: str,
-        sentence: str,
-    ) -> None:
-        output = tmp_path / "out.png"
-        assert sentence in complaint(capsys, "render", scene_path, "-o", output, *options.split())
-        assert renderer.settings is None
-        assert sorted(tmp_path.iterdir()) == [scene_path]  # nothing half-written
-
     def test_a_picture_beyond_memory(
         self,
         renderer: FakeRenderer,
@@ -239,37 +188,6 @@ class TestRender:
         monkeypatch.setattr("spectrasplat.base.memory.available_bytes", lambda: 1 << 30)
         told = complaint(capsys, "render", scene_path, "-o", tmp_path / "o.exr", "--size", "4096x4096", "--bins", "32")
         assert "--size 4096x4096 with --bins 32 needs about 6.2 GiB and 1.0 GiB are left" in told
-
-    @pytest.mark.parametrize(
-        ("output", "sentence"),
-        [
-            ("out.gif", "'.gif' is not a picture format"),
-            ("out", "no suffix"),
-            ("nowhere/out.png", "does not exist"),
-            ("folder.png", "is a folder"),
-            ("small.toml/out.png", "is not a folder"),
-        ],
-    )
-    def test_bad_output(
-        self,
-        renderer: FakeRenderer,
-        scene_path: Path,
-        tmp_path: Path,
-        capsys: pytest.CaptureFixture[str],
-        output: str,
-        sentence: str,
-    ) -> None:
-        (tmp_path / "folder.png").mkdir()
-        assert sentence in complaint(capsys, "render", scene_path, "-o", tmp_path / output)
-        assert renderer.settings is None
-
-    def test_the_scene_is_not_overwritten(
-        self, renderer: FakeRenderer, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-    ) -> None:
-        path = tmp_path / "scene.npy"
-        path.write_text("precious")
-        assert "it is the scene itself" in complaint(capsys, "render", path, "-o", path)
-        assert path.read_text() == "precious"
 
     def test_a_failing_renderer_leaves_the_old_picture(
         self,

@@ -267,6 +267,22 @@ def test_glb_cut_anywhere_is_refused(tmp_path: Path, fraction: float) -> None:
         load_gltf(tmp_path / "cut.glb")
 
 
+@pytest.mark.parametrize(
+    ("at", "number", "says"),
+    [
+        (4, 7, "version 7.*glTF 2.0"),
+        (8, 1 << 31, "promises 2147483648 bytes"),
+        (12, 1 << 31, "promises 2147483648 bytes"),
+    ],
+)
+def test_a_header_that_lies_is_refused(tmp_path: Path, at: int, number: int, says: str) -> None:
+    data = bytearray(Builder().tetrahedron().glb(tmp_path / "m.glb").read_bytes())
+    data[at : at + 4] = number.to_bytes(4, "little")
+    (tmp_path / "m.glb").write_bytes(data)
+    with pytest.raises(UserError, match=says):
+        load_gltf(tmp_path / "m.glb")
+
+
 def test_random_damage_never_gives_a_traceback(tmp_path: Path) -> None:
     builder = Builder().tetrahedron(glass_material())
     whole = bytearray(builder.glb(tmp_path / "m.glb").read_bytes())
