@@ -20,44 +20,19 @@ from spectrasplat.ui.view_model import ViewModel
 from tests.interface.rig import Hands
 
 Key = imgui.Key
-KEYS = (
-    Key.g,
-    Key.t,
-    Key.y,
-    Key.b,
-    Key.p,
-    Key.v,
-    Key.x,
-    Key.r,
-    Key.m,
-    Key.l,
-    Key.f,
-    Key.h,
-    Key.c,
+KEYS = [getattr(Key, letter) for letter in "gtybpvxrmlfhcwasdqe"] + [Key._0, Key._1, Key._2, Key.f1, Key.f5, Key.home]
+KEYS += [
     Key.space,
-    Key.home,
     Key.escape,
     Key.delete,
     Key.enter,
     Key.tab,
-    Key.f1,
-    Key.f5,
-    Key._0,
-    Key._1,
-    Key._2,
     Key.left_bracket,
     Key.right_bracket,
     Key.equal,
     Key.minus,
-    Key.w,
-    Key.a,
-    Key.s,
-    Key.d,
-    Key.q,
-    Key.e,
-    Key.up_arrow,
-    Key.down_arrow,
-)
+]
+KEYS += [Key.up_arrow, Key.down_arrow]
 CHORDS = (Key.z, Key.y, Key.c, Key.v, Key.d, Key.r, Key.e, Key.s, Key.n, Key.o, Key.q, Key._1, Key._2)
 MODIFIERS = ((), (), (), (Key.mod_shift,), (Key.mod_ctrl,), (Key.mod_alt,))
 TEXTS = ("1.5", "0", "-3", "1e9", "nan", "inf", "-inf", "1e39", "589.3", "N-BK7", "λ", "", "a" * 40)

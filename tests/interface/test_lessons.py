@@ -21,6 +21,16 @@ from tests.interface.fake_engine import FakeEngine
 from tests.interface.shell_rig import ShellRig
 
 
+def lesson_state(gl: Context, name: str) -> State:
+    """What a session shows of a lesson."""
+    session = Session(gl, make_engine=FakeEngine)
+    session.show_lesson(lesson(name))
+    state = session.state
+    session.autosave.close()
+    session.release()
+    return state
+
+
 def test_lessons_open_from_the_menu_and_the_start_page(gl: Context) -> None:
     with ShellRig(gl) as rig:
         rig.menu("Help", "Lessons", "Lesson: fire")
@@ -56,12 +66,7 @@ def test_a_lesson_selects_what_it_is_about_and_says_the_next(gl: Context) -> Non
 
 
 def test_nobody_is_asked_for_glass_where_a_grating_parts_the_light(gl: Context) -> None:
-    session = Session(gl, make_engine=FakeEngine)
-    session.show_lesson(lesson("spectrometer"))
-    state = session.state
-    session.autosave.close()
-    session.release()
-    with ShellRig(gl, state) as rig:
+    with ShellRig(gl, lesson_state(gl, "spectrometer")) as rig:
         assert "Window: opened" not in rig.items.items
 
 
@@ -91,11 +96,7 @@ def test_no_other_scenes_picture_lies_below_a_lesson_that_is_being_prepared(gl: 
 
 
 def test_the_ruler_takes_hold_of_rays_and_measures_the_deviation(gl: Context) -> None:
-    session = Session(gl, make_engine=FakeEngine)
-    session.show_lesson(lesson("minimum_deviation"))
-    state = replace(session.state, display=replace(session.state.display, ray_count=1, ray_wavelengths=1))
-    session.autosave.close()
-    session.release()
+    state = lesson_state(gl, "minimum_deviation").with_display(ray_count=1, ray_wavelengths=1)
     overlay = RayOverlay(gl)
     overlay.update(state)
     rays, readings = overlay.rays, overlay.readings
@@ -123,11 +124,7 @@ def test_rays_that_make_the_rainbows_crowd_where_descartes_says(
     gl: Context, reflections: int, radius_deg: tuple
 ) -> None:
     """Radii of the bows at 400 nm, the d line and 700 nm: cos² i = (n² − 1)/(k (k + 2)) for k reflections."""
-    session = Session(gl, make_engine=FakeEngine)
-    session.show_lesson(lesson("rainbow_drop"))
-    state = session.state.with_display(ray_reflections=reflections, ray_wavelengths=1)
-    session.autosave.close()
-    session.release()
+    state = lesson_state(gl, "rainbow_drop").with_display(ray_reflections=reflections, ray_wavelengths=1)
     overlay = RayOverlay(gl)
     for nm, radius in zip((400.0, 587.5618, 700.0), radius_deg, strict=True):
         overlay.update(replace(state, solo_nm=nm))

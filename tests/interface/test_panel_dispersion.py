@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from imgui_bundle import imgui
-from panel_rig import PanelRig, scene_state
 from spectrasplat.edit import edits
 from spectrasplat.edit.state import Selection
 from spectrasplat.gpu.context import Context
@@ -21,6 +20,8 @@ from spectrasplat.ui.panels.abbe import N_D_RANGE, V_D_RANGE, draw_abbe
 from spectrasplat.ui.panels.dispersion import draw_dispersion
 from spectrasplat.ui.panels.glass_values import CONTROL_NM, base_name, own_numbers, with_abbe, with_point
 from spectrasplat.ui.panels.index_curve import draw_index_curve
+
+from tests.interface.panel_rig import PanelRig, scene_state
 
 N_SF11 = "Schott N-SF11"
 

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from panel_rig import PanelRig, receiver_of, scene_state
 from PIL import Image
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.edit import environments
@@ -19,6 +18,8 @@ from spectrasplat.model.materials import Grating
 from spectrasplat.ui.panels import dialogs, file_browser, picture_choice
 from spectrasplat.ui.panels.inspector import draw_inspector
 from spectrasplat.ui.view_model import ViewModel
+
+from tests.interface.panel_rig import PanelRig, receiver_of, scene_state
 
 STUDIO = assets_dir() / "environments" / "studio.hdr"
 

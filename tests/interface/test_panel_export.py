@@ -7,13 +7,14 @@ from pathlib import Path
 
 import pytest
 from imgui_bundle import imgui
-from panel_rig import PanelRig, scene_state
 from spectrasplat.edit import requests
 from spectrasplat.edit.state import Compare, Key, State
 from spectrasplat.ui.panels import export_panel, file_browser
 from spectrasplat.ui.panels.compare_panel import draw_compare
 from spectrasplat.ui.panels.export_panel import draw_export
 from spectrasplat.ui.view_model import JobInfo, ViewModel
+
+from tests.interface.panel_rig import PanelRig, scene_state
 
 
 def with_browser(state: State, view_model: ViewModel) -> State:

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from panel_rig import PanelRig, receiver_of, scene_state
 from reference.lamps import isotropic
 from spectrasplat.edit import edits
 from spectrasplat.edit.brush import USUAL_RADIUS
@@ -20,6 +19,8 @@ from spectrasplat.ui.panels import file_browser, light_panel, light_spectrum, pi
 from spectrasplat.ui.panels.brush_panel import draw_brush
 from spectrasplat.ui.panels.light_panel import angles_of, direction_of, draw_light
 from spectrasplat.ui.panels.light_spectrum import LAMPS
+
+from tests.interface.panel_rig import PanelRig, receiver_of, scene_state
 
 
 @pytest.fixture(autouse=True)

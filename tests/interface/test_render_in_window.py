@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from imgui_bundle import imgui
-from panel_rig import PanelRig, scene_state
 from PIL import Image
 from spectrasplat.base.errors import UserError
 from spectrasplat.edit import requests
@@ -22,6 +21,8 @@ from spectrasplat.ui.panels import export_panel, file_browser, keys_editor
 from spectrasplat.ui.panels.export_panel import draw_export
 from spectrasplat.ui.screenshot import Shown
 from spectrasplat.ui.view_model import ViewModel
+
+from tests.interface.panel_rig import PanelRig, scene_state
 
 GAIN = "objects.prism.dispersion_gain"
 

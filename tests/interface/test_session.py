@@ -18,7 +18,6 @@ from spectrasplat.model.scene import Camera, Dielectric
 from spectrasplat.render.viewer.dirty_level import DirtyLevel
 from spectrasplat.ui.crash_log import FILE_NAME
 from spectrasplat.ui.frame import run_frame
-from spectrasplat.ui.live_picture import LivePicture
 from spectrasplat.ui.panels import numbers
 from spectrasplat.ui.panels.timing import counts_of
 from spectrasplat.ui.session import LAYOUT_FRAMES, Session
@@ -347,13 +346,6 @@ def test_exposure_is_automatic_until_it_is_set(rig: Rig) -> None:
     rig.frame(lambda s: replace(s, display=replace(s.display, auto_exposure=False, exposure_ev=-2.5)))
     rig.frame()
     assert rig.view_model.exposure_ev == -2.5
-
-
-def test_the_live_picture_frees_what_it_owns(gl: Context) -> None:
-    picture = LivePicture(gl, FakeEngine)
-    engine = picture.engine
-    picture.release()
-    assert isinstance(engine, FakeEngine) and engine.released
 
 
 def test_the_timing_panel_tells_the_memory_of_the_whole_program(rig: Rig) -> None:

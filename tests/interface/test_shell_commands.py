@@ -9,11 +9,10 @@ from pathlib import Path
 import pytest
 from imgui_bundle import imgui
 from spectrasplat.edit import requests
-from spectrasplat.edit.state import Panels, Selection, State
+from spectrasplat.edit.state import Panels, Selection
 from spectrasplat.gpu.context import Context
-from spectrasplat.ui.commands import COMMANDS, PANELS, VIEWS, command
+from spectrasplat.ui.commands import COMMANDS, PANELS, VIEWS
 from spectrasplat.ui.shortcuts import chord, listed
-from spectrasplat.ui.view_model import ViewModel
 
 from tests.interface.panel_rig import scene_state
 from tests.interface.shell_rig import ShellRig
@@ -230,10 +229,3 @@ def test_a_folder_that_cannot_be_read_is_said(rig: ShellRig, tmp_path: Path) -> 
     rig.key(imgui.Key.escape)
     rig.frame(2)
     assert "Folder" not in rig.items.items
-
-
-def test_command_looks_up_by_name() -> None:
-    state: State = scene_state()
-    assert command("Physical picture").act(state, ViewModel()).physical
-    with pytest.raises(KeyError):
-        command("Fly to the moon")

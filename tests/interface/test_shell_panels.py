@@ -141,17 +141,12 @@ def test_exposure_slider_takes_over_from_automatic(rig: ShellRig) -> None:
     assert rig.state.display.exposure_ev == 0.0
 
 
-def test_glare_slider_belongs_to_the_scene(rig: ShellRig) -> None:
+def test_glare_and_highlights_belong_to_the_scene(rig: ShellRig) -> None:
     rig.show_tab("View")
     rig.drag_slider("Glare", 0.0, 0.5)
     assert rig.state.scene.render.glare == pytest.approx(0.25, abs=0.03)
     rig.double_click("Glare")
-    assert rig.state.scene.render.glare == 0.0
-
-
-def test_highlights_switch_belongs_to_the_scene(rig: ShellRig) -> None:
-    rig.show_tab("View")
-    assert rig.state.scene.render.antialias_highlights
+    assert rig.state.scene.render.glare == 0.0 and rig.state.scene.render.antialias_highlights
     rig.click("Antialias highlights")
     assert not rig.state.scene.render.antialias_highlights
 

@@ -1,4 +1,5 @@
-"""Keys that always work, panels that Esc closes, what is remembered at once, folders that are the user's own."""
+"""Keys and menus from anywhere, panels that Esc closes, typed names, what is remembered, importing, films, guesses that
+are said to be guesses."""
 
 from __future__ import annotations
 
@@ -9,14 +10,22 @@ import numpy as np
 import pytest
 from imgui_bundle import imgui
 from PIL import Image
-from spectrasplat.base.image_io import write_image
+from spectrasplat.base.errors import UserError
+from spectrasplat.base.image_io import save_codes, write_image
+from spectrasplat.base.movie import open_sink
 from spectrasplat.base.paths import assets_dir
+from spectrasplat.commands.glass import glass_command
 from spectrasplat.edit import requests
+from spectrasplat.edit.importing import import_objects
 from spectrasplat.edit.preferences import load_settings
 from spectrasplat.gpu.context import Context
+from spectrasplat.model.contacts import world_bounds
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.optics import catalogue
 from spectrasplat.ui import layout
 from spectrasplat.ui.commands import command
-from spectrasplat.ui.panels import dialogs
+from spectrasplat.ui.panels import dialogs, file_browser
+from spectrasplat.ui.panels.abbe import place_of_name
 from spectrasplat.ui.session import Session
 from spectrasplat.ui.view_model import ViewModel
 
@@ -24,15 +33,16 @@ from tests.interface.fake_engine import FakeEngine
 from tests.interface.shell_rig import ShellRig
 
 
-def test_escape_closes_the_floating_panel_that_has_the_keyboard_and_no_other(gl: Context) -> None:
-    rig = ShellRig(gl)
-    rig.open_panel(abbe=True, shortcuts=True)
-    rig.click(rig.find("Window: Shortcuts").at(0.5, 0.5))
-    rig.frame(2)
-    rig.key(imgui.Key.escape)
-    rig.frame(2)
-    panels = rig.state.preferences.panels
-    assert not panels.shortcuts and panels.abbe and panels.inspector
+@pytest.mark.parametrize("clicked", ["Shortcuts", "Outliner"])
+def test_escape_closes_a_floating_panel_whoever_has_the_keyboard_and_no_other(gl: Context, clicked: str) -> None:
+    with ShellRig(gl) as rig:
+        rig.open_panel(abbe=clicked == "Shortcuts", shortcuts=True)
+        rig.click(rig.find(f"Window: {clicked}").at(0.5, 0.5))
+        rig.frame(2)
+        rig.key(imgui.Key.escape)
+        rig.frame(2)
+        panels = rig.state.preferences.panels
+        assert not panels.shortcuts and panels.outliner and panels.inspector and panels.abbe == (clicked == "Shortcuts")
 
 
 def test_escape_closes_a_docked_panel_that_was_called_up_and_leaves_those_of_the_first_layout(gl: Context) -> None:
@@ -66,15 +76,6 @@ def test_help_and_quit_work_while_a_text_is_typed(gl: Context) -> None:
     rig.key(imgui.Key.q, [imgui.Key.mod_ctrl])
     rig.frame(2)
     assert requests.Quit() in rig.asked
-
-
-def test_the_recovery_says_whose_and_when(gl: Context) -> None:
-    rig = ShellRig(gl)
-    rig.view_model = replace(
-        rig.view_model, recovery=Path("a.toml"), recovery_title="vase.toml", recovery_time="22 November 2026, 14:05"
-    )
-    rig.open_panel(start_page=True)
-    assert rig.find("Recover")
 
 
 def test_what_is_remembered_is_written_at_once(gl: Context, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -151,3 +152,176 @@ def test_a_panel_behind_a_tab_is_brought_to_the_front_and_not_closed(gl: Context
     rig.frame(2)
     assert not rig.state.preferences.panels.spectrum
     rig.release()
+
+
+SCENES = assets_dir() / "scenes"
+CUBE = "\n".join(
+    [f"v {x} {y} {z}" for x in (0, 90) for y in (0, 90) for z in (0, 90)]
+    + ["f 1 2 4 3", "f 5 7 8 6", "f 1 5 6 2", "f 3 4 8 7", "f 1 3 7 5", "f 2 6 8 4"]
+)
+
+
+def test_help_is_seen_on_the_start_page_and_quit_works_in_a_menu(gl: Context) -> None:
+    with ShellRig(gl) as rig:
+        rig.open_panel(start_page=True)
+        rig.key(imgui.Key.f1)
+        rig.frame(3)
+        assert rig.find("Search shortcuts")
+        rig.key(imgui.Key.escape)  # the list first, the page it lies on with the next one
+        rig.frame(3)
+        assert rig.state.preferences.panels.start_page and not rig.state.preferences.panels.shortcuts
+        rig.open_panel(start_page=False, shortcuts=False)
+        rig.click("Menu: View")
+        rig.frame(2)
+        rig.key(imgui.Key.q, [imgui.Key.mod_ctrl])
+        assert requests.Quit() in rig.asked
+
+
+def test_f11_asks_for_the_whole_screen(gl: Context) -> None:
+    with ShellRig(gl) as rig:
+        rig.key(imgui.Key.f11)
+        assert rig.asked == [requests.FullScreen()]
+
+
+def test_render_comes_before_the_tabs_beside_it(gl: Context) -> None:
+    with ShellRig(gl, size=(1440, 900)) as rig:
+        for _ in range(2):
+            rig.key(imgui.Key.f12)
+            rig.frame(3)
+            assert "Render…" in rig.items.items
+            rig.key(imgui.Key.b)  # the brush's panel comes to the same place
+            rig.frame(3)
+            assert "Render…" not in rig.items.items and "Radius" in rig.items.items
+
+
+def test_the_abbe_diagram_stands_beside_the_caustic(gl: Context) -> None:
+    with ShellRig(gl, size=(1440, 900)) as rig:
+        rig.open_panel(abbe=True)
+        rig.frame(4)
+        assert rig.find("Abbe plot").left >= rig.find("Picture").right
+
+
+def test_the_name_of_a_glass_stays_within_the_abbe_diagram() -> None:
+    assert place_of_name(100.0, 40.0, 8.0, 400.0) == 108.0
+    assert place_of_name(380.0, 40.0, 8.0, 400.0) + 40.0 == 372.0  # left of the ring, and it ends before it
+
+
+def test_open_takes_a_typed_name_and_a_whole_path(gl: Context, tmp_path: Path) -> None:
+    (tmp_path / "own").mkdir()
+    path = tmp_path / "own" / "vase.toml"
+    path.write_bytes((SCENES / "prism.toml").read_bytes())
+    with ShellRig(gl) as rig:
+        rig.view_model = replace(rig.view_model, path=path)
+        for typed in ("vase.toml", str(path)):
+            rig.asked.clear()
+            rig.menu("File", "Open…")
+            rig.frame(3)
+            rig.click("File name")
+            rig.type(typed)
+            rig.key(imgui.Key.enter)
+            rig.frame(3)
+            assert rig.asked == [requests.Open(path)]
+        rig.menu("File", "Open…")
+        rig.frame(3)
+        rig.click("File name")
+        rig.type("vsae.toml")
+        rig.key(imgui.Key.enter)
+        rig.frame(3)
+        assert "did you mean 'vase.toml'?" in file_browser._browser.error
+        rig.asked.clear()
+        rig.click("File name")
+        rig.key(imgui.Key.a, [imgui.Key.mod_ctrl])
+        rig.type("lens")
+        rig.key(imgui.Key.enter)
+        rig.frame(3)
+        assert rig.asked == [requests.Open(SCENES / "lens.toml")]  # a shipped one is found from anywhere
+    file_browser.close()
+
+
+def test_a_mesh_joins_the_scene_beside_the_others(tmp_path: Path) -> None:
+    (tmp_path / "cube.obj").write_text(CUBE)
+    scene = load_scene(SCENES / "prism.toml")
+    once = import_objects(scene, tmp_path / "cube.obj")
+    assert [item.name for item in once.objects] == ["prism", "table", "cube"]
+    assert once.lights == scene.lights and once.camera == scene.camera
+    low, high = world_bounds(once.objects[2])
+    assert 0.2 < np.max(high - low) < 3.0  # a cube of ninety units is millimetres
+    other_low, other_high = world_bounds(scene.objects[0])
+    assert (low >= other_high - 1e-6).any() or (high <= other_low + 1e-6).any()
+    twice = import_objects(once, SCENES / "lens.toml")
+    assert [item.name for item in twice.objects[3:]] == ["lens", "table 2"]
+
+
+def test_import_is_undone_by_its_name(gl: Context, tmp_path: Path) -> None:
+    (tmp_path / "cube.obj").write_text(CUBE)
+    with ShellRig(gl) as rig:
+        rig.view_model = replace(rig.view_model, path=tmp_path / "scene.toml")
+        rig.menu("File", "Import…")
+        rig.frame(3)
+        rig.click("File name")
+        rig.type("cube.obj")
+        rig.key(imgui.Key.enter)
+        rig.frame(3)
+        assert rig.state.edit_label == "Import cube.obj" and rig.state.selection.index == 2
+
+
+def test_the_start_page_is_shown_at_the_first_launch_only(
+    gl: Context, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SPECTRASPLAT_CONFIG", str(tmp_path / "config"))
+    for expected in (True, False):
+        session = Session(gl, make_engine=FakeEngine)
+        session.welcome()
+        assert session.state.preferences.panels.start_page is expected
+        session.state = session.state.with_panels(start_page=False)
+        session.close()
+    assert not load_settings()[0].is_new
+
+
+@pytest.mark.parametrize(
+    ("suffix", "fps", "shown_ms", "tolerance"),
+    [(".gif", 24.0, 40, 10), (".gif", 200.0, 20, 0), (".WebP", 24.0, 42, 1), (".webp", 200.0, 11, 0)],
+)
+def test_films_of_pictures_play_for_ever_at_their_pace_and_in_their_colours(
+    tmp_path: Path, suffix: str, fps: float, shown_ms: int, tolerance: int
+) -> None:
+    path = tmp_path / f"a{suffix}"
+    sink = open_sink(path, (33, 15), fps, {})
+    for level in (0, 80, 160):
+        codes = np.full((15, 33, 3), level, np.uint8)
+        codes[:, :16, 0] = 200
+        sink.write(level, codes)
+    assert not path.exists() and not sink.has(0)
+    sink.close()
+    with Image.open(path) as image:
+        assert image.n_frames == 3 and image.size == (33, 15) and image.info["loop"] == 0
+        for index, level in enumerate((0, 80, 160)):
+            image.seek(index)
+            frame = np.asarray(image.convert("RGB")).astype(int)
+            assert abs(image.info["duration"] - shown_ms) <= tolerance
+            assert abs(frame[:, :14] - [200, level, level]).max() <= 6 and abs(frame[:, 20:] - level).max() <= 6
+    open_sink(tmp_path / "none.webp", (8, 8), 24.0, {}).close()
+    assert not (tmp_path / "none.webp").exists()  # without a frame nothing appears
+
+
+def test_a_webp_larger_than_the_format_allows_is_refused_before_anything_is_drawn(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="at most 16383 pixels a side, not 20000×10; choose a smaller size or another"):
+        open_sink(tmp_path / "a.webp", (20000, 10), 24.0, {})
+    with pytest.raises(UserError, match="at most 16383 pixels"):
+        save_codes(tmp_path / "still.webp", np.zeros((1, 20000, 3), np.uint8))
+
+
+def test_a_still_webp_keeps_colours_that_change_from_pixel_to_pixel(tmp_path: Path) -> None:
+    codes = np.random.default_rng(5).integers(0, 256, (40, 60, 3), np.uint8)
+    save_codes(tmp_path / "a.webp", codes)
+    with Image.open(tmp_path / "a.webp") as image:
+        np.testing.assert_array_equal(np.asarray(image.convert("RGB")), codes)
+
+
+def test_a_guessed_glass_is_said_to_be_a_guess() -> None:
+    told: list[object] = []
+    glass_command("diamant", None, told.append)
+    assert str(told[0]).startswith("Nothing in the catalogue is called 'diamant'.")
+    told.clear()
+    glass_command("N-BK7", None, told.append)
+    assert "Nothing" not in str(told[0]) and catalogue.is_guess("NBK77") and not catalogue.is_guess("bk7")

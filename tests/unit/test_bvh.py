@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -288,17 +287,6 @@ half_area = bvh_build._half_area(np.array([0.0, 0.0, 0.0, 1.0, 2.0, 3.0]))
 assert half_area == 11.0, half_area
 """
     subprocess.run([sys.executable, "-c", program], check=True, cwd=Path(bvh.__file__).parents[3])
-
-
-def test_build_time_is_told(capsys) -> None:
-    triangles = bumpy_sphere(200, 200)
-    build_bvh(triangles[:9], use_cache=False)  # load the compiled builder
-    started = time.perf_counter()
-    tree = build_bvh(triangles, use_cache=False)
-    seconds = time.perf_counter() - started
-    with capsys.disabled():
-        print(f"\n{len(triangles)} triangles: {seconds:.3f} s, depth {tree.depth}, expected work {tree.sah_cost():.1f}")
-    assert len(tree.nodes) <= 2 * len(triangles) - 1
 
 
 def test_a_refitted_tree_holds_what_has_moved() -> None:

@@ -70,11 +70,6 @@ def test_outputs(output: str, told: tuple[str, ...], here: Path, capsys: pytest.
     refused(["animate", "prism", "-o", output, "--size", "16x16"], told, here, capsys)
 
 
-def test_a_webp_is_told_its_largest_side(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    asked = ["animate", "prism", "-o", "out.webp", "--size", "16384x16"]
-    refused(asked, ("at most 16383 pixels a side, not 16384×16", "another format"), here, capsys)
-
-
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [

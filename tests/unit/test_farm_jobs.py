@@ -6,10 +6,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from farm_simulation import SimulatedCrew, difference, merge_tree, simulate, without_copies, write_parts
 from spectrasplat.base.errors import UserError
 from spectrasplat.farm.jobs import TRIES, Foreman, Job, News
 from spectrasplat.farm.weighing import Weighing
+
+from tests.unit.farm_simulation import SimulatedCrew, difference, merge_tree, simulate, without_copies, write_parts
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,8 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from test_documentation import complaint
+
+from tests.unit.test_documentation import complaint
 
 INTEGRATIONS = Path(__file__).resolve().parents[2] / "integrations"
 

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scene_texts import load
 from spectrasplat.base.errors import UserError
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.bench.features.static_costs import RecordSizes, static_costs
@@ -34,6 +33,7 @@ from spectrasplat.render.viewer.dirty_level import DirtyLevel
 from spectrasplat.render.viewer.invalidation import _object
 
 from tests.unit.gltf_builder import Builder, glass_material
+from tests.unit.scene_texts import load
 
 GLASS, GRATING, PAINT = 'glass = "N-SF11"\n', 'kind = "grating"\n', 'kind = "diffuse"\ncolour = [0.5, 0.25, 0.125]\n'
 MEASURED = 'kind = "diffuse"\nreflectance = { nm = [380, 780], values = [0.2, 0.6] }\n'

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
-from scene_texts import FLOOR, THREE_LINES, load, refusal
 from spectrasplat.base.errors import UserError
 from spectrasplat.commands.render import RenderRequest, scene_as_asked
 from spectrasplat.edit import edits
@@ -20,6 +19,8 @@ from spectrasplat.model.scene_key import picture_key, scene_key
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.render.viewer.dirty_level import DirtyLevel
 from spectrasplat.render.viewer.invalidation import appearance_differs, dirty_level
+
+from tests.unit.scene_texts import FLOOR, THREE_LINES, load, refusal
 
 TEXT = THREE_LINES + FLOOR
 
