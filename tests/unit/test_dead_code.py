@@ -1,14 +1,19 @@
-"""What cannot run is not in the text that the driver gets; what can run is, in its order and with its line numbers."""
+"""What cannot run is not in the text that the driver gets; stripped texts on disk; changes of files are noticed."""
 
 from __future__ import annotations
 
+import os
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
+from spectrasplat.base import paths
+from spectrasplat.gpu import dead_code, stripped_store
 from spectrasplat.gpu.dead_code import stripped
 from spectrasplat.gpu.glsl_conditionals import Line
 from spectrasplat.gpu.schema import Field, Struct
 from spectrasplat.gpu.shader import ShaderError, load_source
+from spectrasplat.gpu.shader_watch import INTERVAL_S, ShaderWatch
 
 
 def stripped_source(text: str) -> list[str]:
@@ -157,3 +162,132 @@ def test_messages_still_name_file_and_line(tmp_path: Path) -> None:
     with pytest.raises(ShaderError, match="nowhere.glsl asked for by main.comp:1"):
         (tmp_path / "main.comp").write_text('#include "nowhere.glsl"\n')
         load_source("main.comp", {}, (), tmp_path)
+
+
+TEXTS = (
+    "#define USED 1",
+    "float unused() { return 2.0; } // never",
+    "#ifdef USED",
+    "void main() { int é = 1; }",
+    "#endif",
+)
+
+
+def lines(shift: int = 0) -> list[Line]:
+    return [Line(text, "ab"[n % 2], n + shift) for n, text in enumerate(TEXTS)]
+
+
+@pytest.fixture
+def stripping(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[int]:
+    """A folder of its own; how many lines were stripped, each time that happened."""
+    monkeypatch.setattr(paths, "cache_dir", lambda: tmp_path)
+    counts: list[int] = []
+    real = dead_code.stripped
+
+    def counted(given: Sequence[Line]) -> list[Line]:
+        counts.append(len(given))
+        return real(given)
+
+    monkeypatch.setattr(dead_code, "stripped", counted)
+    return counts
+
+
+def test_the_second_time_is_read(stripping: list[int]) -> None:
+    first, second = stripped_store.stripped(lines()), stripped_store.stripped(lines())
+    assert first == second == [line for line in first if "main" in line.text]
+    assert len(stripping) == 1
+
+
+def test_other_places_of_the_same_text_are_another_text(stripping: list[int]) -> None:
+    assert stripped_store.stripped(lines()) != stripped_store.stripped(lines(7))
+    assert len(stripping) == 2
+
+
+def test_other_code_strips_anew(stripping: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
+    stripped_store.stripped(lines())
+    monkeypatch.setattr(stripped_store, "_version", lambda: b"newer")
+    stripped_store.stripped(lines())
+    assert len(stripping) == 2
+
+
+@pytest.mark.parametrize("damage", [b"", b"nothing", None])
+def test_damage_costs_time_only(stripping: list[int], tmp_path: Path, damage: bytes | None) -> None:
+    kept = stripped_store.stripped(lines())
+    (file,) = (tmp_path / "shaders").iterdir()
+    file.write_bytes(file.read_bytes()[:-5] if damage is None else damage)
+    assert stripped_store.stripped(lines()) == kept
+    assert stripped_store.stripped(lines()) == kept
+    assert len(stripping) == 2
+
+
+def test_without_a_folder_it_works(stripping: list[int], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    monkeypatch.setattr(paths, "cache_dir", lambda: tmp_path / "file")
+    assert stripped_store.stripped(lines()) == stripped_store.stripped(lines())
+    assert len(stripping) == 2
+
+
+def test_what_is_oldest_is_forgotten(stripping: list[int], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(stripped_store, "_MOST_FILES", 3)
+    for shift in range(6):
+        stripped_store.stripped(lines(shift))
+    assert len(list((tmp_path / "shaders").iterdir())) == 3
+
+
+def test_sources_are_the_same_from_the_disk(stripping: list[int]) -> None:
+    defines = {"COLUMNS": 0, "TARGETS": 1}
+    assert load_source("camera/average.comp", defines) == load_source("camera/average.comp", defines)
+    assert len(stripping) == 1
+
+
+class Clock:
+    """A clock that stands until it is moved."""
+
+    now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+    def wait(self) -> None:
+        """Until the next look."""
+        self.now += 1.01 * INTERVAL_S
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "lib").mkdir()
+    (tmp_path / "trace.comp").write_text("void main() {}")
+    (tmp_path / "lib" / "optics.glsl").write_text("float f() { return 1.0; }")
+    return tmp_path
+
+
+def test_each_change_is_told_once(folder: Path) -> None:
+    clock = Clock()
+    watch = ShaderWatch(folder, clock)
+    clock.wait()
+    assert watch.changed() == ()
+    (folder / "lib" / "optics.glsl").write_text("float f() { return 2.5; }")
+    (folder / "new.frag").write_text("void main() {}")
+    (folder / "trace.comp").unlink()
+    clock.wait()
+    assert watch.changed() == ("lib/optics.glsl", "new.frag", "trace.comp")
+    clock.wait()
+    assert watch.changed() == ()
+
+
+def test_same_length_is_told_by_the_time(folder: Path) -> None:
+    clock = Clock()
+    watch = ShaderWatch(folder, clock)
+    os.utime(folder / "trace.comp", ns=(1, 1))
+    clock.wait()
+    assert watch.changed() == ("trace.comp",)
+
+
+def test_other_files_and_too_early_looks_tell_nothing(folder: Path) -> None:
+    clock = Clock()
+    watch = ShaderWatch(folder, clock)
+    (folder / "README.md").write_text("not a shader")
+    (folder / "trace.comp").write_text("void main() { /* later */ }")
+    assert watch.changed() == ()
+    clock.wait()
+    assert watch.changed() == ("trace.comp",)

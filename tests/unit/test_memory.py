@@ -1,13 +1,16 @@
-"""How much memory there is, and sentences where it does not suffice."""
+"""How much memory there is, sentences where it does not suffice, and the age of the process."""
 
 from __future__ import annotations
 
 import resource
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 from spectrasplat.base import memory
 from spectrasplat.base.errors import UserError
+from spectrasplat.base.process_age import process_age_s
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.render import memory_estimate
 from spectrasplat.render.memory_estimate import MemoryEstimate, check_room
@@ -92,3 +95,14 @@ def test_limits_of_the_process_count(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(resource, "getrlimit", limits)
     assert memory.available_bytes() <= GIB // 8
+
+
+LATE = "import time; time.sleep(0.5); from spectrasplat.base.process_age import process_age_s; print(process_age_s())"
+
+
+@pytest.mark.skipif(process_age_s() is None, reason="this system does not tell when a process began")
+def test_it_counts_from_the_start_of_the_process() -> None:
+    """And not from that of a module; the parent, which is older, must not be told."""
+    told = float(subprocess.run([sys.executable, "-c", LATE], capture_output=True, text=True, check=True).stdout)
+    parent = process_age_s()
+    assert parent is not None and 0.5 <= told < parent

@@ -1,12 +1,16 @@
-"""Mesh values: geometry, transforms and refusal of broken input."""
+"""Meshes: geometry, transforms, refusal of broken input; every fault is counted exactly, and repairs say what they
+did."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from spectrasplat.base.errors import UserError
 from spectrasplat.model.geometry import primitives
-from spectrasplat.model.geometry.mesh import make_mesh
+from spectrasplat.model.geometry.mesh import Mesh, make_mesh
+from spectrasplat.model.geometry.mesh_health import examine, repair, weld_map
 
 TRIANGLE = np.array([(0.0, 0.0, 0.0), (2.0, 0.0, 0.0), (0.0, 1.0, 0.0)])
 
@@ -101,3 +105,143 @@ def test_normals_that_are_no_directions_become_zero() -> None:
     normals = np.array([[(0.0, 0.0, 2.0), (0.0, 0.0, np.nan), (0.0, 0.0, 0.0)]])
     mesh = make_mesh("t", TRIANGLE, [(0, 1, 2)], corner_normals=normals)
     np.testing.assert_array_equal(mesh.corner_normals[0], [(0, 0, 1), (0, 0, 0), (0, 0, 0)])
+
+
+BOX = primitives.box()
+
+
+def _joined(*meshes: Mesh) -> Mesh:
+    starts = np.cumsum([0] + [len(m.vertices) for m in meshes])
+    triangles = np.concatenate([m.triangles + s for m, s in zip(meshes, starts, strict=False)])
+    return make_mesh("joined", np.concatenate([m.vertices for m in meshes]), triangles)
+
+
+def _scaled(mesh: Mesh, factor: float) -> Mesh:
+    return mesh.transformed(np.diag([factor, factor, factor, 1.0]))
+
+
+def test_good_solid_has_no_faults() -> None:
+    health = examine(primitives.sphere(1.0, 500))
+    assert health.summary() == "watertight"
+    assert health.components == 1 and health.signed_volume > 4.0
+    mesh, notes = repair(primitives.sphere(1.0, 500))
+    assert notes == () and len(mesh.triangles) == 500
+
+
+def test_open_mesh_is_counted_and_told() -> None:
+    opened = replace(BOX, triangles=BOX.triangles[1:], uv=BOX.uv[1:])
+    assert examine(opened).boundary_edges == 3
+    mesh, notes = repair(opened)
+    assert notes == ("open mesh 'box': 3 boundary edges; the side is decided by the face normals",)
+    assert len(mesh.triangles) == 11
+
+
+def test_non_manifold_edge() -> None:
+    fin = make_mesh("fin", np.vstack([BOX.vertices, (0.0, 0.0, 2.0)]), np.vstack([BOX.triangles, (4, 5, 8)]))
+    health = examine(fin)
+    assert (health.non_manifold_edges, health.boundary_edges) == (1, 2)
+    assert any("non-manifold mesh 'fin': 1 edge with more" in note for note in repair(fin)[1])
+
+
+def test_one_turned_triangle() -> None:
+    turned = BOX.triangles.copy()
+    turned[0] = turned[0, ::-1]
+    health = examine(replace(BOX, triangles=turned))
+    assert (health.inconsistent_edges, health.boundary_edges) == (3, 0)
+    assert not health.watertight and not health.inside_out
+
+
+def test_inside_out_solid_is_turned() -> None:
+    ball = primitives.sphere(1.0, 320)
+    health = examine(ball.flipped())
+    assert health.inside_out and health.summary().startswith("inside out")
+    mesh, notes = repair(ball.flipped())
+    assert mesh.volume() == pytest.approx(ball.volume())
+    assert np.einsum("tcj,tj->tc", mesh.corner_normals, mesh.face_normals()).min() > 0.9
+    assert len(notes) == 1 and "inside out" in notes[0]
+
+
+def test_winding_and_normals_are_turned_each_for_itself() -> None:
+    ball = primitives.sphere(1.0, 320)
+    for triangles, normals, said in (
+        (ball.triangles[:, ::-1], ball.corner_normals[:, ::-1], "inside out"),
+        (ball.triangles, -ball.corner_normals, "its normals pointed away"),
+    ):
+        mesh, notes = repair(make_mesh("ball", ball.vertices, triangles, normals))
+        assert len(notes) == 1 and said in notes[0]
+        assert mesh.volume() > 4.0
+        assert np.einsum("tcj,tj->tc", mesh.corner_normals, mesh.face_normals()).min() > 0.9
+
+
+def test_cavity_is_kept_and_told() -> None:
+    hollow = _joined(BOX, _scaled(BOX, 0.5).flipped())
+    health = examine(hollow)
+    assert (health.components, health.inward_components) == (2, 1)
+    assert health.signed_volume == pytest.approx(1.0 - 0.125)
+    assert "1 of 2 parts face inward" in repair(hollow)[1][0]
+
+
+def test_degenerate_triangles_are_dropped() -> None:
+    extra = np.vstack([BOX.triangles, (0, 0, 1), (3, 4, 4)])
+    health = examine(make_mesh("b", BOX.vertices, extra))
+    assert health.degenerate_triangles == 2
+    mesh, notes = repair(make_mesh("b", BOX.vertices, extra))
+    assert mesh.is_closed and len(mesh.triangles) == 12
+    assert notes == ("mesh 'b': 2 degenerate triangles dropped",)
+    sliver = make_mesh("s", [(0, 0, 0), (1, 0, 0), (2, 0, 0), (0, 1, 0)], [(0, 1, 2), (0, 2, 3)])
+    assert len(repair(sliver)[0].triangles) == 1
+    with pytest.raises(UserError, match="every triangle is degenerate"):
+        repair(make_mesh("s", [(0, 0, 0), (1, 0, 0), (2, 0, 0)], [(0, 1, 2)]))
+
+
+def test_seam_of_a_t_junction_stays_closed() -> None:
+    # The middle of a box's edge belongs to one of its two faces only; a flat triangle stitches it.
+    a, b = 0, 1
+    middle = 0.5 * (BOX.vertices[a] + BOX.vertices[b])
+    rows = []
+    for t in BOX.triangles.tolist():
+        if any((t[i], t[(i + 1) % 3]) == (a, b) for i in range(3)):
+            c = next(v for v in t if v not in (a, b))
+            rows += [(a, 8, c), (8, b, c)]
+        else:
+            rows.append(t)
+    mesh = make_mesh("t", np.vstack([BOX.vertices, middle]), np.array([*rows, (a, b, 8)]))
+    assert mesh.is_closed and examine(mesh).degenerate_triangles == 1
+    mended, notes = repair(mesh)
+    assert mended.is_closed and notes == ()
+
+
+def test_zero_normals_take_the_face_normal() -> None:
+    ball = primitives.sphere(1.0, 80)
+    normals = ball.corner_normals.copy()
+    normals[3, 1] = 0.0
+    normals[5, 0] = np.nan
+    mesh = make_mesh("ball", ball.vertices, ball.triangles, normals)
+    assert examine(mesh).zero_normals == 2
+    mended, notes = repair(mesh)
+    np.testing.assert_allclose(mended.corner_normals[3, 1], ball.face_normals()[3])
+    assert notes == ("mesh 'ball': 2 zero normals replaced by the face normal",)
+
+
+def test_loose_triangles_are_welded_and_then_judged() -> None:
+    loose = make_mesh("loose", BOX.corners().reshape(-1, 3), np.arange(36).reshape(-1, 3))
+    health = examine(loose)
+    assert health.duplicate_vertices == 28 and health.boundary_edges == 36 and health.components == 12
+    mended, notes = repair(loose)
+    assert mended.is_closed and len(mended.vertices) == 8 and notes == ()
+    assert len(mended.convex_planes) == 6
+
+
+def test_components_of_a_long_chain() -> None:
+    strip = np.stack([np.arange(5000), np.arange(5000) + 1, np.arange(5000) + 2], axis=1)
+    points = np.random.default_rng(0).normal(size=(5002, 3))
+    order = np.random.default_rng(1).permutation(5002)
+    assert examine(make_mesh("chain", points, order[strip])).components == 1
+    assert examine(make_mesh("two", points, order[np.delete(strip, [2499, 2500], axis=0)])).components == 2
+
+
+def test_weld_is_exact() -> None:
+    rows = np.array([(0.0, 1.0, 2.0), (-0.0, 1.0, 2.0), (np.nextafter(0.0, 1.0), 1.0, 2.0), (2.0, 1.0, 0.0)])
+    kept, number = weld_map(rows)
+    np.testing.assert_array_equal(kept, [0, 2, 3])
+    np.testing.assert_array_equal(number, [0, 0, 1, 2])

@@ -1,17 +1,97 @@
-"""What the gizmo's frame does to objects and lights."""
+"""Placements taken apart and put together, what the gizmo does to objects and lights, ruler and protractor."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from spectrasplat.base.errors import UserError
 from spectrasplat.base.paths import assets_dir
-from spectrasplat.edit import placing
-from spectrasplat.edit.state import Selection
+from spectrasplat.commands.lesson import lessons_text
+from spectrasplat.edit import measuring, placing
+from spectrasplat.edit.lessons import lesson, lessons
+from spectrasplat.edit.matrices import (
+    compose,
+    decompose,
+    rotation_matrix,
+    with_position,
+    with_rotation,
+    with_scale,
+)
+from spectrasplat.edit.state import Selection, State
 from spectrasplat.model.contacts import world_bounds
 from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.io.scene_table import SceneTable
+from spectrasplat.model.placement import read_placement
+from spectrasplat.model.scene import Camera, Scene
 from spectrasplat.ui import gizmo
+
+SHEARED = np.array([(1.0, 0.7, 0, 3), (0, 2.0, 0.2, 4), (0.1, 0, 1.5, 5), (0, 0, 0, 1)])
+
+
+@pytest.mark.parametrize(
+    ("angles", "start", "end"),
+    [((90, 0, 0), (0, 1, 0), (0, 0, 1)), ((0, 90, 0), (0, 0, 1), (1, 0, 0)), ((0, 0, 90), (1, 0, 0), (0, 1, 0))],
+)
+def test_rotations_are_right_handed(angles: tuple, start: tuple, end: tuple) -> None:
+    np.testing.assert_allclose(rotation_matrix(angles) @ start, end, atol=1e-15)
+
+
+def test_compose_is_what_a_scene_file_means() -> None:
+    values = {"position": [1.0, 2.0, 3.0], "rotation_deg": [20.0, -50.0, 130.0], "scale": [2.0, -0.5, 1.5]}
+    from_file = read_placement(SceneTable(values, Path("scene.toml")))
+    np.testing.assert_allclose(compose((1, 2, 3), (20, -50, 130), (2, -0.5, 1.5)), from_file, atol=1e-14)
+
+
+def test_decompose_undoes_compose() -> None:
+    rng = np.random.default_rng(5)
+    for _ in range(200):
+        position, scale = tuple(rng.uniform(-9, 9, 3)), tuple(rng.uniform(0.01, 9, 3))
+        rotation = tuple(rng.uniform((-179, -89, -179), (179, 89, 179)))
+        found = decompose(compose(position, rotation, scale))
+        np.testing.assert_allclose(found, [position, rotation, scale], rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("y", [90.0, -90.0])
+def test_looking_straight_up_loses_no_rotation(y: float) -> None:
+    matrix = compose((0, 0, 0), (30.0, y, 50.0), (1, 2, 3))
+    position, rotation, scale = decompose(matrix)
+    assert rotation[0] == 0.0
+    np.testing.assert_allclose(compose(position, rotation, scale), matrix, atol=1e-12)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_mirror_shows_where_it_was_typed(axis: int) -> None:
+    scale = [1.0, 2.0, 3.0]
+    scale[axis] *= -1.0
+    _, rotation, found = decompose(compose((0, 0, 0), (10.0, 5.0, -8.0), tuple(scale)))
+    np.testing.assert_allclose(found, scale)
+    np.testing.assert_allclose(rotation, (10.0, 5.0, -8.0), atol=1e-9)
+
+
+def test_editing_one_part_leaves_the_others_and_the_shear() -> None:
+    position, rotation, scale = decompose(SHEARED)
+    moved = with_position(SHEARED, (9.0, 8.0, 7.0))
+    np.testing.assert_array_equal(moved[:3, :3], SHEARED[:3, :3])
+    assert decompose(moved)[0] == (9.0, 8.0, 7.0)
+    turned = with_rotation(SHEARED, (10.0, 20.0, 30.0))
+    np.testing.assert_allclose(decompose(turned)[1], (10, 20, 30), atol=1e-9)
+    np.testing.assert_allclose(turned[:3, :3].T @ turned[:3, :3], SHEARED[:3, :3].T @ SHEARED[:3, :3], atol=1e-12)
+    scaled = with_scale(SHEARED, (2.0, 2.0, 2.0))
+    np.testing.assert_allclose(decompose(scaled)[2], (2, 2, 2))
+    np.testing.assert_allclose(scaled[:3, :3] / np.linalg.norm(scaled[:3, :3], axis=0), SHEARED[:3, :3] / scale)
+    for same in (with_position(SHEARED, position), with_rotation(SHEARED, rotation), with_scale(SHEARED, scale)):
+        np.testing.assert_allclose(same, SHEARED, atol=1e-12)
+
+
+def test_what_rounding_leaves_of_an_angle_is_nothing() -> None:
+    """It would be shown as "-0.00°"."""
+    for degrees in range(-170, 180, 7):
+        found = decompose(compose((0, 0, 0), (-90.0, 0.0, float(degrees)), (1, 1, 1)))[1]
+        assert f"{found[1]:.2f}" == "0.00"
+
 
 SCENE = load_scene(assets_dir() / "scenes" / "prism.toml")
 PRISM, SLIT, ROOM = Selection("object", 0), Selection("light", 0), Selection("light", 1)
@@ -108,3 +188,37 @@ def test_matrices_survive_the_way_through_imguizmo() -> None:
     shift = np.eye(4)
     shift[:3, 3] = 7.0, 8.0, 9.0
     assert gizmo._to_guizmo(shift).values[12:15].tolist() == [7.0, 8.0, 9.0]
+
+
+EMPTY = Scene("none", Camera((0, -1, 0), (0, 0, 0)), (), ())
+
+
+def test_three_points_give_two_lengths_and_the_angle_between() -> None:
+    state = State(EMPTY, EMPTY.camera)
+    for point in ((3.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 2.0, 2.0)):
+        state = measuring.with_point(state, point)
+    assert measuring.lengths(state.measured) == pytest.approx([3.0, 8.0**0.5])
+    assert measuring.angle_deg(state.measured) == pytest.approx(90.0)
+    assert "90.00°" in measuring.words(state.measured)
+    assert measuring.with_point(state, (1.0, 0.0, 0.0)).measured == ((1.0, 0.0, 0.0),)
+
+
+def test_small_angles_are_exact() -> None:
+    assert measuring.angle_deg(((1.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1.0, 1e-7, 0.0))) == pytest.approx(
+        5.7296e-6, rel=1e-4
+    )
+    assert measuring.angle_deg(((1.0, 0.0, 0.0), (1.0, 0.0, 0.0), (2.0, 0.0, 0.0))) is None
+
+
+def test_there_are_six_lessons_each_with_a_scene_that_holds_what_it_is_about() -> None:
+    assert len(lessons()) == 6
+    for each in lessons():
+        scene = load_scene(each.path)
+        assert each.select in [item.name for item in scene.objects]
+        assert len(each.steps) == 3 and 100 < len(each.words) < 400
+        assert each.name in lessons_text() and each.title in lessons_text()
+
+
+def test_an_unknown_lesson_is_refused_with_a_way_out() -> None:
+    with pytest.raises(UserError, match="did you mean 'newton'"):
+        lesson("newtn")

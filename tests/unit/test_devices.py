@@ -1,11 +1,67 @@
-"""A software renderer or a lesser GPU is not taken without a word where a better one may be there."""
+"""What a driver has: traits of renderers, limits, better devices that are there."""
 
 from __future__ import annotations
 
+import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from spectrasplat.base.errors import UserError
 from spectrasplat.gpu.better_device import NVIDIA_EGL, Machine, advice
+from spectrasplat.gpu.device_traits import DeviceTraits, assumed, is_software_renderer
+from spectrasplat.gpu.limits import BRUSH_STORAGE_BLOCKS, NEEDED, check_brush, check_splats
+
+
+def test_llvmpipe_has_all_of_them() -> None:
+    traits = DeviceTraits.of("llvmpipe (LLVM 15.0.6, 256 bits)")
+    assert traits.is_software and traits.texels_as_images and traits.loops_may_end and not traits.work_is_queued
+    assert traits.queue_read_steps == 1 and traits.clock is time.process_time
+    assert traits.paths_group == 8 < DeviceTraits().paths_group
+    assert traits.viewer_batch < DeviceTraits().viewer_batch
+
+
+def test_other_software_reads_textures() -> None:
+    traits = DeviceTraits.of("Google SwiftShader")
+    assert traits.is_software and not traits.texels_as_images
+
+
+def test_a_card_has_none() -> None:
+    assert DeviceTraits.of("NVIDIA H100/PCIe/SSE2") == DeviceTraits()
+    assert DeviceTraits().clock is time.perf_counter
+
+
+def test_what_is_assumed_does_not_hide_a_software_renderer() -> None:
+    with assumed(DeviceTraits(splats_by_compute=True)):
+        assert (
+            is_software_renderer("llvmpipe (LLVM 15.0.6, 256 bits)") and DeviceTraits.of("llvmpipe").splats_by_compute
+        )
+    assert not is_software_renderer("NVIDIA H200/PCIe/SSE2") and not DeviceTraits().splats_by_compute
+
+
+def test_what_is_needed_is_enough_for_splats() -> None:
+    check_splats(NEEDED)
+    check_brush(replace(NEEDED, storage_blocks=BRUSH_STORAGE_BLOCKS))
+
+
+@pytest.mark.parametrize(
+    ("name", "found", "words"),
+    [
+        ("vertex_storage_blocks", 0, "0 storage blocks in a vertex shader, and splats need 5"),
+        ("storage_bindings", 8, "8 binding points of storage blocks"),
+        ("storage_blocks", 4, "4 storage blocks in a compute shader"),
+    ],
+)
+def test_too_few_are_told_with_a_remedy(name: str, found: int, words: str) -> None:
+    with pytest.raises(UserError, match=words) as told:
+        check_splats(replace(NEEDED, **{name: found}))
+    assert "doctor" in str(told.value)
+
+
+def test_the_brush_asks_for_more() -> None:
+    with pytest.raises(UserError, match="local dispersion takes 10 storage blocks"):
+        check_brush(NEEDED)
+
 
 VENDOR = {"NVIDIA": "0x10de", "AMD": "0x1002", "Intel": "0x8086", "ASPEED": "0x1a03"}
 LLVMPIPE = "llvmpipe (LLVM 15.0.6, 256 bits)"

@@ -1,4 +1,4 @@
-"""The caustic of the camera's reference on disk: made once, grown as far as a picture needs, kept over interrupts."""
+"""Parts of the camera's reference: its caustic on disk, the windows it is kept in, direct light."""
 
 from __future__ import annotations
 
@@ -7,13 +7,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from spectrasplat.edit.chromaticity import colour_info
 from spectrasplat.model.geometry import primitives
+from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.lights import CollimatedLight
+from spectrasplat.model.optics.spectrum import Spectrum, illuminant, laser
 from spectrasplat.model.scene import Camera, Dielectric, Scene
 from spectrasplat.reference import caustic_cache, photon_run, spectral_caustic
 from spectrasplat.reference.camera_reference import cached_camera_reference, render_camera_reference
 from spectrasplat.reference.camera_run import summed_camera
 from spectrasplat.reference.caustic_cache import CachedCaustic, picture_noise
+from spectrasplat.reference.caustic_windows import Landed, Planes, VisiblePoints, _shared, fit_windows
+from spectrasplat.reference.direct_light import DirectLight
 from spectrasplat.reference.photon_run import TALLY_SIZE
 from spectrasplat.reference.rounds import PARTS
 from spectrasplat.reference.spectral_caustic import CausticPlan, CausticRun, build_caustic
@@ -162,3 +167,143 @@ def test_what_halves_of_the_caustic_have_apart_is_in_the_variance() -> None:
     np.testing.assert_allclose(picture.variance, 0.3**2)  # of a mean of two that are 0.6 apart
     apart = summed_camera(sums, units, tallies, 1.0)
     np.testing.assert_allclose(apart.variance, 0.3**2 / (PARTS - 1))
+
+
+RNG = np.random.default_rng(4)
+PAGE, FLOOR = 0, 1
+TEXEL = 0.01
+
+
+def planes() -> Planes:
+    """The front of a page from −1 to 1 and that of a floor from −20 to 20."""
+    frame = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    extent = np.array([[[-1.0, -1.0], [1.0, 1.0]], [[-20.0, -20.0], [20.0, 20.0]]])
+    return Planes(
+        np.array([[0, -1], [1, -1]], np.int32), np.arange(2), np.stack([frame, frame]), extent, np.ones(2, bool)
+    )
+
+
+def points(count: int, half: float) -> np.ndarray:
+    flat = RNG.uniform(-half, half, (count, 3))
+    flat[:, 2] = 0.0
+    return flat
+
+
+def looks(stray: int) -> VisiblePoints:
+    """3000 at the page, 1000 at the floor's middle, `stray` anywhere on the floor."""
+    where = np.concatenate([points(3000, 1.0), points(1000, 1.5), points(stray, 20.0)])
+    return VisiblePoints(where, np.ones(len(where)), np.repeat(np.array([PAGE, FLOOR], np.int32), [3000, 1000 + stray]))
+
+
+def light() -> Landed:
+    """As much on the page as on all the floor."""
+    side = np.repeat(np.array([PAGE, FLOOR], np.int32), 20_000)
+    return Landed(
+        np.concatenate([points(20_000, 1.0), points(20_000, 20.0)]),
+        np.ones(40_000),
+        np.stack([side, *np.zeros((3, 40_000), np.int32)], axis=1),
+    )
+
+
+@pytest.mark.parametrize("stray", [0, 5])
+def test_stray_looks_do_not_spread_the_texels(stray: int) -> None:
+    tables, wanted = fit_windows(planes(), looks(stray), light(), 4, lambda _: TEXEL, 1 << 18)
+    assert wanted.all()
+    span = tables.size / tables.texels_per_unit
+    assert (span[FLOOR, 1] < 4.0).all() and (span[PAGE, 1] > 1.9).all()
+    assert (1.0 / tables.texels_per_unit[:, 1] < 1.01 * TEXEL).all()
+    assert (span[FLOOR, 0] > (10.0 if stray else 2.0)).all()  # what is seldom seen is in the coarse one
+
+
+def test_where_looks_and_light_are_apart_the_light_is_covered() -> None:
+    beside = light()
+    beside.points[beside.ends[:, 0] == FLOOR] = (18.0, 18.0, 0.0)
+    tables, wanted = fit_windows(planes(), looks(400), beside, 4, lambda _: TEXEL, 1 << 18)
+    assert wanted[FLOOR]
+    high = tables.low[FLOOR, 1] + tables.size[FLOOR, 1] / tables.texels_per_unit[FLOOR, 1]
+    assert (tables.low[FLOOR, 1] <= 18.0).all() and (high >= 18.0 - 1e-6).all()
+
+
+def test_too_many_texels_are_shared_by_looks() -> None:
+    most = 1 << 14
+    tables, _ = fit_windows(planes(), looks(0), light(), 4, lambda _: TEXEL, most)
+    texels = np.prod(tables.size[:, 1], axis=1)
+    assert texels.sum() == pytest.approx(most, rel=0.05)
+    assert texels[PAGE] / texels[FLOOR] == pytest.approx(3.0, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("asked", "weight", "most", "got"),
+    [
+        ((3.0, 4.0), (1.0, 9.0), 8.0, (3.0, 4.0)),
+        ((6.0, 6.0), (1.0, 3.0), 8.0, (2.0, 6.0)),
+        ((1.0, 20.0, 20.0), (5.0, 1.0, 3.0), 9.0, (1.0, 2.0, 6.0)),
+        ((0.0, 20.0, 5.0, 4.0), (0.0, 1.0, 1.0, 6.0), 12.0, (0.0, 4.0, 4.0, 4.0)),
+    ],
+)
+def test_sharing(asked: tuple[float, ...], weight: tuple[float, ...], most: float, got: tuple[float, ...]) -> None:
+    np.testing.assert_allclose(_shared(np.array(asked), np.array(weight), most), got)
+
+
+LIT = """
+lights = [
+  { kind = "directional", direction = [0.6, 0, -0.8], illuminance_lx = 1000 },
+  { kind = "point", position = [0, 0, 2], intensity_cd = 40 },
+  { kind = "area", position = [0, 0, 3], direction = [0, 0, -1], radius = 1.0, luminance_nt = 10 },
+]
+[[objects]]
+shape = "plane"
+width = 40
+height = 40
+material = "diffuse"
+[[objects]]
+shape = "sphere"
+radius = 0.5
+position = [8, 0, 1]
+"""
+
+
+@pytest.fixture
+def lit(tmp_path: Path):
+    path = tmp_path / "lit.toml"
+    path.write_text(LIT)
+    return load_scene(path)
+
+
+def luxes(lit, place, normal=(0.0, 0.0, 1.0)) -> np.ndarray:
+    gains = DirectLight.of(lit).gains(np.array(place), np.array(normal))
+    return gains * [light.spectral_power.luminous() for light in lit.lights]
+
+
+def test_sun_point_and_disc_by_their_closed_forms(lit) -> None:
+    sun, point, disc = luxes(lit, (0.0, 0.0, 0.0))
+    assert sun == pytest.approx(800.0, rel=1e-9)  # E cos θ
+    assert point == pytest.approx(40.0 / 4.0, rel=1e-6)  # I / d²
+    assert disc == pytest.approx(np.pi * 10.0 * 1.0 / (1.0 + 9.0), rel=1e-3)  # π L r² / (r² + h²) on the axis
+    assert luxes(lit, (1.0, 0.0, 0.0))[1] == pytest.approx(40.0 * 2.0 / 5.0**1.5, rel=1e-6)
+
+
+def test_glass_and_the_surface_itself_are_in_the_way(lit) -> None:
+    # Behind the ball as the sun sees it; its middle is at height 1, the sun's slope 0.6 to 0.8.
+    assert luxes(lit, (8.75, 0.0, 0.0))[0] == 0.0
+    assert luxes(lit, (7.0, 0.0, 0.0))[0] == pytest.approx(800.0)
+    assert not luxes(lit, (0.0, 0.0, 0.0), (0.0, 0.0, -1.0)).any()
+
+
+def test_nothing_is_there_where_nothing_is(lit) -> None:
+    assert not luxes(lit, (0.0, 0.0, 1.0)).any()
+
+
+@pytest.mark.parametrize("bins", [10, 20, 40])
+@pytest.mark.parametrize("spectrum", [illuminant("D65"), illuminant("F11"), laser(532.0, 1.0), laser(780.0, 1.0)])
+def test_bins_hold_the_power_and_the_lumens(spectrum: Spectrum, bins: int) -> None:
+    scaled = spectrum.scaled_to_luminous(1000.0)
+    edges = np.linspace(380.0, 780.0, bins + 1)
+    binned = scaled.binned(edges)
+    assert binned.sum() * 400.0 / bins == pytest.approx(scaled.power_w(), rel=1e-12)
+    if not spectrum.lines and bins == 40:
+        found = colour_info(0.5 * (edges[:-1] + edges[1:]), binned)
+        assert found is not None and found.illuminance == pytest.approx(1000.0, rel=0.02)
+    if spectrum == illuminant("D65"):  # however wide the bins are
+        found = colour_info(0.5 * (edges[:-1] + edges[1:]), binned, spectrum.density)
+        assert found is not None and found.temperature_k == pytest.approx(6504.0, abs=0.6)
