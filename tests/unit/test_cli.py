@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
@@ -386,28 +387,29 @@ def test_sizes_are_read(text: str) -> None:
 SHELLS = ("bash", "zsh", "fish")
 
 
-def answer(shell: str, line: str, folder: Path | None = None) -> str:
-    """What the program prints when `shell` asks how `line` goes on."""
-    words = line.split(" ")
-    asked = {
-        "bash": {"COMP_WORDS": line, "COMP_CWORD": str(len(words) - 1)},
-        "zsh": {"_TYPER_COMPLETE_ARGS": line},
-        "fish": {"_TYPER_COMPLETE_ARGS": line, "_TYPER_COMPLETE_FISH_ACTION": "get-args"},
-    }[shell]
-    done = subprocess.run(
-        [sys.executable, "-P", "-m", "spectrasplat"],
-        env=os.environ | asked | {"_SPECTRASPLAT_COMPLETE": f"complete_{shell}"},
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=folder,
-    )
-    assert done.stderr == ""
-    return done.stdout
+@pytest.fixture
+def answer(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Callable[[str, str], str]:
+    """What the program prints when a shell asks how a line goes on."""
+
+    def ask(shell: str, line: str) -> str:
+        asked = {
+            "bash": {"COMP_WORDS": line, "COMP_CWORD": str(len(line.split(" ")) - 1)},
+            "zsh": {"_TYPER_COMPLETE_ARGS": line},
+            "fish": {"_TYPER_COMPLETE_ARGS": line, "_TYPER_COMPLETE_FISH_ACTION": "get-args"},
+        }[shell]
+        for name, value in (asked | {"_SPECTRASPLAT_COMPLETE": f"complete_{shell}"}).items():
+            monkeypatch.setenv(name, value)
+        with pytest.raises(SystemExit):
+            main(["render"])
+        captured = capsys.readouterr()
+        assert captured.err == ""
+        return captured.out
+
+    return ask
 
 
 @pytest.mark.parametrize("shell", SHELLS)
-def test_shipped_scenes(shell: str) -> None:
+def test_shipped_scenes_are_offered(answer: Callable[[str, str], str], shell: str) -> None:
     offered = answer(shell, "spectrasplat render pri")
     assert all(name in offered for name in ("prism", "prism_case", "prism_edge")) and "ball" not in offered
 
@@ -426,25 +428,23 @@ def test_shipped_scenes(shell: str) -> None:
         ("spectrasplat glass N-SF", "N-SF11", "N-BK7"),
     ],
 )
-def test_what_is_offered(line: str, wanted: str, unwanted: str) -> None:
+def test_what_is_offered(answer: Callable[[str, str], str], line: str, wanted: str, unwanted: str) -> None:
     offered = answer("bash", line).splitlines()
     assert wanted in offered and unwanted not in offered
 
 
 @pytest.mark.parametrize("scene", ["nowhere", "broken.toml", "folder"])
-def test_a_scene_that_cannot_be_read_offers_nothing(scene: str, tmp_path: Path) -> None:
+def test_a_scene_that_cannot_be_read_offers_nothing(
+    answer: Callable[[str, str], str], scene: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "broken.toml").write_text("= 3")
     (tmp_path / "folder").mkdir()
-    assert answer("bash", f"spectrasplat bake {scene} ", tmp_path).strip() == ""
+    monkeypatch.chdir(tmp_path)
+    assert answer("bash", f"spectrasplat bake {scene} ").strip() == ""
 
 
-@pytest.mark.parametrize("shell", SHELLS)
-def test_scripts_are_shown(shell: str) -> None:
-    done = subprocess.run(
-        [sys.executable, "-P", "-m", "spectrasplat"],
-        env=os.environ | {"_SPECTRASPLAT_COMPLETE": f"source_{shell}"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+def test_the_script_of_a_shell_is_shown() -> None:
+    asked = os.environ | {"_SPECTRASPLAT_COMPLETE": "source_bash"}
+    command = [sys.executable, "-P", "-m", "spectrasplat"]
+    done = subprocess.run(command, env=asked, capture_output=True, text=True, check=False)
     assert "_SPECTRASPLAT_COMPLETE" in done.stdout and "spectrasplat" in done.stdout

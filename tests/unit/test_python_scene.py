@@ -171,15 +171,25 @@ def test_the_interface_offers_what_it_says() -> None:
         ss.nonsense  # noqa: B018
 
 
-def test_importing_is_quick_and_draws_in_nothing_heavy() -> None:
-    """Half a second of processor time before the first rendering; libraries that take most of one are not there yet."""
-    program = (
-        "import sys, time\n"
-        "import spectrasplat as ss\n"
-        "ss.load('prism').objects['prism'].dispersion_gain = 2\n"
-        "print(time.process_time(), *({'colour', 'matplotlib', 'numba', 'moderngl', 'scipy'} & set(sys.modules)))\n"
-    )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    seconds, *heavy = done.stdout.split()
-    assert heavy == []
-    assert float(seconds) < 1.0, "twice what is promised, for a machine that others use"
+LATE = ("IPython", "anywidget", "colour", "imgui_bundle", "matplotlib", "moderngl", "numba", "pxr", "scipy")
+STARTS = f"""
+import sys, time
+began = time.process_time()
+import spectrasplat as ss
+ss.load, ss.render, ss.Session
+imported = time.process_time() - began
+ss.load('prism').objects['prism'].dispersion_gain = 2
+print(imported, time.process_time(), *[name for name in {LATE} if name in sys.modules])
+"""
+
+
+def test_importing_takes_half_a_second_and_nothing_heavy_is_there_before_the_first_rendering() -> None:
+    """Of this process's own time, numpy included: the fastest of three, for machines that do other things too. With a
+    scene that is loaded and edited, twice what is promised."""
+    told = [
+        subprocess.run([sys.executable, "-c", STARTS], capture_output=True, text=True, check=True).stdout.split()
+        for _ in range(3)
+    ]
+    assert [late for _, _, *late in told] == [[], [], []]
+    assert min(float(imported) for imported, *_ in told) < 0.5
+    assert min(float(whole) for _, whole, *_ in told) < 1.0
