@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import io
 import json
 import os
@@ -15,10 +14,8 @@ import numpy as np
 from spectrasplat.base.errors import UserError
 from spectrasplat.base.paths import assets_dir
 
+from tests.unit.gltf_builder import FACES, POSITIONS, Builder, glass_material
 from tests.unit.picture_bytes import hdr_file, new_rows, old_rows, random_rgbe
-
-TETRAHEDRON = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], "<f4")
-FACES = np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)], "<u2")
 
 
 @dataclass(frozen=True)
@@ -44,92 +41,45 @@ def _scene_texts() -> tuple[bytes, ...]:
     return tuple(t.replace(b'"../', f'"{assets_dir().as_posix()}/'.encode()) for t in texts)
 
 
-def _gltf() -> tuple[dict[str, object], bytes]:
-    uv = np.array([(0, 0), (1, 0), (0, 1), (1, 1)], "<f4")
-    parts = [TETRAHEDRON.tobytes(), FACES.tobytes(), uv.tobytes(), _png()]
-    starts = [sum(len(p) + -len(p) % 4 for p in parts[:i]) for i in range(len(parts))]
-    data = b"".join(p + b"\0" * (-len(p) % 4) for p in parts)
-    views = [{"buffer": 0, "byteOffset": s, "byteLength": len(p)} for s, p in zip(starts, parts, strict=True)]
-    volume = {"attenuationColor": [0.9, 0.5, 0.5], "attenuationDistance": 0.5, "thicknessFactor": 1}
-    glass = {
-        "extensions": {
-            "KHR_materials_transmission": {"transmissionFactor": 1.0},
-            "KHR_materials_volume": volume,
-            "KHR_materials_ior": {"ior": 1.6},
-            "KHR_materials_dispersion": {"dispersion": 0.3},
-        }
-    }
-    worn = {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}, "metallicFactor": 0}, "name": "worn"}
-    touches = [{"position": [0, 0, 0], "radius": 0.5, "log2_gain": 1.0}]
-    dabs = [{"primitive": 0, "dabs": touches}]
-    return {
-        "asset": {"version": "2.0"},
-        "buffers": [{"byteLength": len(data)}],
-        "bufferViews": views,
-        "accessors": [
-            {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 1]},
-            {"bufferView": 1, "componentType": 5123, "count": 12, "type": "SCALAR"},
-            {"bufferView": 2, "componentType": 5126, "count": 4, "type": "VEC2"},
-        ],
-        "images": [{"bufferView": 3, "mimeType": "image/png"}],
+@cache
+def _gltf() -> Builder:
+    """A file with something of everything that is read."""
+    tint = {"attenuationColor": [0.9, 0.5, 0.5], "attenuationDistance": 0.5}
+    made = Builder().tetrahedron(glass_material(**tint))
+    worn = made.primitive(FACES) | {"material": 1}
+    worn["attributes"]["TEXCOORD_0"] = made.accessor(np.array([(0, 0), (1, 0), (0, 1), (1, 1)], "<f4"), "VEC2", 5126)
+    area = {"spectrasplat": {"light": {"kind": "area", "size": [0.2, 0.1], "spectrum": "D65"}}}
+    lights = [
+        {"type": "spot", "intensity": 9, "color": [1, 0.9, 0.8], "spot": {"outerConeAngle": 0.5}},
+        {"type": "point", "extras": area},
+    ]
+    dabs = [{"primitive": 0, "dabs": [{"position": [0, 0, 0], "radius": 0.5, "log2_gain": 1.0}]}]
+    made.json["meshes"].append({"primitives": [worn]})
+    made.json["materials"].append(
+        {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}, "metallicFactor": 0}, "name": "worn"}
+    )
+    made.json["accessors"][0] |= {"min": [0, 0, 0], "max": [1, 1, 1]}
+    made.json |= {
+        "images": [{"bufferView": made.view(_png()), "mimeType": "image/png"}],
         "samplers": [{"wrapS": 33071, "wrapT": 33071}],
         "textures": [{"source": 0, "sampler": 0}],
-        "materials": [glass, worn],
-        "meshes": [
-            {"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 2}, "indices": 1, "material": m}]}
-            for m in range(2)
-        ],
         "cameras": [
             {"type": "perspective", "perspective": {"yfov": 0.7, "znear": 0.1}},
             {"type": "orthographic", "orthographic": {"xmag": 1, "ymag": 1, "znear": 0, "zfar": 9}},
         ],
         "extensionsUsed": ["KHR_lights_punctual", "KHR_materials_transmission"],
-        "extensions": {
-            "KHR_lights_punctual": {
-                "lights": [
-                    {"type": "spot", "intensity": 9, "color": [1, 0.9, 0.8], "spot": {"outerConeAngle": 0.5}},
-                    {
-                        "type": "point",
-                        "extras": {"spectrasplat": {"light": {"kind": "area", "size": [0.2, 0.1], "spectrum": "D65"}}},
-                    },
-                ]
-            }
-        },
+        "extensions": {"KHR_lights_punctual": {"lights": lights}},
         "extras": {"spectrasplat": {"scene": {"background": [0, 0, 1], "render": {"size": [64, 36]}}}},
         "nodes": [
             {"mesh": 0, "name": "glass", "translation": [0, 1, 0], "children": [1], "extras": {}},
-            {
-                "mesh": 1,
-                "extras": {"spectrasplat": {"local_dispersion": dabs}},
-                "name": "worn",
-                "scale": [2, 2, 2],
-                "rotation": [0, 0, 0, 1],
-            },
+            {"mesh": 1, "extras": {"spectrasplat": {"local_dispersion": dabs}}, "name": "worn", "scale": [2, 2, 2]},
             {"camera": 0, "matrix": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 5, 1]},
-            {"extensions": {"KHR_lights_punctual": {"light": 0}}},
+            {"extensions": {"KHR_lights_punctual": {"light": 0}}, "rotation": [0, 0, 0, 1]},
             {"extensions": {"KHR_lights_punctual": {"light": 1}}, "camera": 1},
         ],
         "scenes": [{"nodes": [0, 2, 3, 4]}],
-        "scene": 0,
-    }, data
-
-
-def _gltf_texts() -> tuple[bytes, ...]:
-    document, data = _gltf()
-    document["buffers"] = [{"byteLength": len(data), "uri": "data:;base64," + base64.b64encode(data).decode()}]
-    return (json.dumps(document).encode(),)
-
-
-def _glbs() -> tuple[bytes, ...]:
-    document, data = _gltf()
-    text = json.dumps(document).encode()
-    text += b" " * (-len(text) % 4)
-
-    def number(value: int) -> bytes:
-        return value.to_bytes(4, "little")
-
-    chunks = number(len(text)) + b"JSON" + text + number(len(data)) + b"BIN\0" + data
-    return (b"glTF" + number(2) + number(12 + len(chunks)) + chunks,)
+    }
+    return made
 
 
 def _mesh(path: Path) -> object:
@@ -139,7 +89,7 @@ def _mesh(path: Path) -> object:
 
 
 def _objs() -> tuple[bytes, ...]:
-    corners = "".join(f"v {x:g} {y:g} {z:g}\n" for x, y, z in TETRAHEDRON)
+    corners = "".join(f"v {x:g} {y:g} {z:g}\n" for x, y, z in POSITIONS)
     extra = "vt 0 0\nvt 1 0\nvt 0 1\nvn 0 0 1\nvn 1 0 0\n"
     plain = "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in FACES)
     full = "".join(f"f {a + 1}/1/1 {b + 1}/2/2 {c + 1}/3/1\n" for a, b, c in FACES)
@@ -161,13 +111,13 @@ def _material_texts() -> tuple[bytes, ...]:
 def _plys() -> tuple[bytes, ...]:
     names = "".join(f"property float {n}\n" for n in ("x", "y", "z"))
     head = "element vertex 4\n" + names + "element face 4\nproperty list uchar int vertex_indices\nend_header\n"
-    body = "".join(f"{x:g} {y:g} {z:g}\n" for x, y, z in TETRAHEDRON)
+    body = "".join(f"{x:g} {y:g} {z:g}\n" for x, y, z in POSITIONS)
     body += "".join(f"3 {a} {b} {c}\n" for a, b, c in FACES)
-    binary = [TETRAHEDRON.tobytes() + b"".join(b"\3" + face.astype("<i4").tobytes() for face in FACES)]
-    binary += [TETRAHEDRON.astype(">f4").tobytes() + b"".join(b"\3" + face.astype(">i4").tobytes() for face in FACES)]
+    binary = [POSITIONS.tobytes() + b"".join(b"\3" + face.astype("<i4").tobytes() for face in FACES)]
+    binary += [POSITIONS.astype(">f4").tobytes() + b"".join(b"\3" + face.astype(">i4").tobytes() for face in FACES)]
     more = head.replace(names, names + "property uchar red\nproperty float s\nproperty float t\n")
     mixed = body.replace("3 0 3 2\n", "4 0 3 2 1\n")
-    rows = [(*p, i, i / 4, 0.5) for i, p in enumerate(TETRAHEDRON.tolist())]
+    rows = [(*p, i, i / 4, 0.5) for i, p in enumerate(POSITIONS.tolist())]
     coloured = "".join(" ".join(f"{v:g}" for v in row) + "\n" for row in rows) + body[body.index("3 0") :]
     return (
         f"ply\nformat ascii 1.0\ncomment a\n{head}{body}".encode(),
@@ -179,7 +129,7 @@ def _plys() -> tuple[bytes, ...]:
 
 
 def _stls() -> tuple[bytes, ...]:
-    corners = TETRAHEDRON[FACES]
+    corners = POSITIONS[FACES]
     text = "".join(
         "facet normal 0 0 0\nouter loop\n" + "".join("vertex {:g} {:g} {:g}\n".format(*p) for p in t) + "endloop\n"
         "endfacet\n"
@@ -487,8 +437,8 @@ def _caches() -> tuple[bytes, ...]:
 
 READERS = {
     "scene": Reader("scene.toml", _scene, _scene_texts),
-    "gltf": Reader("scene.gltf", _scene, _gltf_texts),
-    "glb": Reader("scene.glb", _scene, _glbs),
+    "gltf": Reader("scene.gltf", _scene, lambda: (_gltf().content(".gltf"),)),
+    "glb": Reader("scene.glb", _scene, lambda: (_gltf().content(".glb"),)),
     "obj": Reader("mesh.obj", _mesh, _objs),
     "obj-parts": Reader("mesh.obj", _scene, _objs),
     "mtl": Reader("own.mtl", _materials, _material_texts),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import struct
 from pathlib import Path
@@ -48,14 +49,24 @@ class Builder:
             "indices": self.accessor(faces.ravel().astype("<u2"), "SCALAR", 5123),
         }
 
-    def glb(self, path: Path) -> Path:
-        if self.data:
-            self.json["buffers"] = [{"byteLength": len(self.data)}, *self.json.get("buffers", [])]
-        text = json.dumps(self.json).encode()
+    def content(self, suffix: str) -> bytes:
+        """The whole file: a .glb, or a .gltf with its buffer inside."""
+        buffer = {"byteLength": len(self.data)} if self.data else {}
+        if suffix == ".gltf" and buffer:
+            buffer["uri"] = "data:;base64," + base64.b64encode(self.data).decode()
+        document = self.json | ({"buffers": [buffer, *self.json.get("buffers", [])]} if buffer else {})
+        text = json.dumps(document).encode()
+        if suffix == ".gltf":
+            return text
         text += b" " * (-len(text) % 4)
         data = self.data + b"\0" * (-len(self.data) % 4)
         body = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(data), 0x004E4942) + data
-        path.write_bytes(struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body)
+        return struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body
+
+    def written(self, path: Path) -> Path:
+        """Written to a .glb or, by the name, to a .gltf."""
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(self.content(path.suffix))
         return path
 
 

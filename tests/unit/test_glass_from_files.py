@@ -31,7 +31,7 @@ def through(factor: float, **extensions: Any) -> dict[str, Any]:
 
 
 def opened(path: Path, material: dict[str, Any], faces: np.ndarray) -> tuple[Material, Scene]:
-    scene = load_gltf(Builder().tetrahedron(material | {"name": "it"}, faces).glb(path / "m.glb"))
+    scene = load_gltf(Builder().tetrahedron(material | {"name": "it"}, faces).written(path / "m.glb"))
     return scene.objects[0].material, scene
 
 
@@ -86,7 +86,7 @@ def test_parts_of_one_solid_are_joined(tmp_path: Path, closed: bool) -> None:
     builder = Builder().tetrahedron(pbr(1, 1, 1, 1) | through(1), FACES[:2])
     other = builder.primitive(FACES[2:] if closed else FACES[2:3]) | {"material": 0}
     builder.json["meshes"][0]["primitives"].append(other)
-    scene = load_gltf(builder.glb(tmp_path / "m.glb"))
+    scene = load_gltf(builder.written(tmp_path / "m.glb"))
     glass = [item for item in scene.objects if item.material.transmits]
     assert [item.material.thin for item in glass] == ([False] if closed else [True, True])
     assert glass[0].mesh.is_closed == closed and not any("open" in note for note in scene.notes)
@@ -123,7 +123,7 @@ def test_what_glass_has_besides_is_said_once_a_kind(tmp_path: Path) -> None:
         builder.json["nodes"].append({"mesh": material})
     builder.json["scenes"][0]["nodes"] = [0, 1, 2]
     builder.json["extensionsUsed"] = list(extensions)
-    notes = load_gltf(builder.glb(tmp_path / "m.glb")).notes
+    notes = load_gltf(builder.written(tmp_path / "m.glb")).notes
     for word in (*extensions, "normalTexture", "transmissionTexture", "emissiveFactor"):
         assert sum(word in note and "'a', 'b'" in note for note in notes) == 1, word
     assert not any("'c'" in note or "left aside" in note for note in notes)
@@ -236,7 +236,7 @@ def compressed(method: str) -> Builder:
 
 @pytest.mark.parametrize("method", [gltf_compressed.DRACO, gltf_compressed.MESHOPT[0]])
 def test_compressed_meshes(tmp_path: Path, method: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = compressed(method).glb(tmp_path / "m.glb")
+    path = compressed(method).written(tmp_path / "m.glb")
     mesh = load_gltf(path).objects[0].mesh
     assert mesh.is_closed and mesh.volume() == pytest.approx(1.0 / 6.0, rel=1e-3)
     monkeypatch.setattr(gltf_compressed, "import_module", _missing)

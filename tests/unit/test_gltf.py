@@ -20,7 +20,7 @@ from tests.unit.gltf_builder import FACES, POSITIONS, Builder, glass_material
 
 
 def test_bare_glb_gets_light_camera_and_table_and_says_so(tmp_path: Path) -> None:
-    scene = load_gltf(Builder().tetrahedron(glass_material()).glb(tmp_path / "m.glb"))
+    scene = load_gltf(Builder().tetrahedron(glass_material()).written(tmp_path / "m.glb"))
     glass_object, table = scene.objects
     assert glass_object.name == "tetra" and glass_object.mesh.is_closed
     assert glass_object.mesh.volume() == pytest.approx(1.0 / 6.0)
@@ -41,7 +41,7 @@ def test_index_types(tmp_path: Path, component: tuple[str, int]) -> None:
     builder.json["meshes"][0]["primitives"][0]["indices"] = builder.accessor(
         FACES.ravel().astype(component[0]), "SCALAR", component[1]
     )
-    assert load_gltf(builder.glb(tmp_path / "m.glb")).objects[0].mesh.is_closed
+    assert load_gltf(builder.written(tmp_path / "m.glb")).objects[0].mesh.is_closed
 
 
 def test_strided_sparse_and_normalised_accessors(tmp_path: Path) -> None:
@@ -63,7 +63,7 @@ def test_strided_sparse_and_normalised_accessors(tmp_path: Path) -> None:
     attributes["NORMAL"] = builder.accessor(
         np.array([(0, 0, 127, 0)] * 4, "i1")[:, :3].copy(), "VEC3", 5120, normalized=True
     )
-    path = builder.glb(tmp_path / "m.glb")
+    path = builder.written(tmp_path / "m.glb")
     assert load_gltf(path).objects[0].mesh.volume() == pytest.approx(1.0 / 6.0)
     np.testing.assert_allclose(open_document(path).accessor(attributes["NORMAL"]), [(0.0, 0.0, 1.0)] * 4)
 
@@ -75,7 +75,7 @@ def test_strips_and_fans(tmp_path: Path, mode: int, order: list[int]) -> None:
     primitive = builder.json["meshes"][0]["primitives"][0]
     primitive |= {"mode": mode, "indices": builder.accessor(np.array(order, "<u2"), "SCALAR", 5123)}
     primitive["attributes"]["POSITION"] = builder.accessor(square, "VEC3", 5126)
-    mesh = load_gltf(builder.glb(tmp_path / "m.glb")).objects[0].mesh
+    mesh = load_gltf(builder.written(tmp_path / "m.glb")).objects[0].mesh
     np.testing.assert_allclose(mesh.face_normals(), [(0, 0, 1), (0, 0, 1)])
     assert mesh.areas().sum() == pytest.approx(1.0)
 
@@ -88,7 +88,7 @@ def test_hierarchy_instances_and_mirroring(tmp_path: Path) -> None:
         {"mesh": 0, "translation": [1, 0, 0]},
         {"mesh": 0, "matrix": [-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 5, 6, 7, 1]},
     ]
-    scene = load_gltf(builder.glb(tmp_path / "m.glb"))
+    scene = load_gltf(builder.written(tmp_path / "m.glb"))
     first, second, _table = scene.objects
     assert first.mesh is second.mesh
     assert first.name != second.name
@@ -115,7 +115,7 @@ def test_cameras_and_lights(tmp_path: Path) -> None:
         {"type": "directional", "intensity": 3.0},
     ]
     builder.json["extensions"] = {"KHR_lights_punctual": {"lights": lamps}}
-    scene = load_gltf(builder.glb(tmp_path / "m.glb"))
+    scene = load_gltf(builder.written(tmp_path / "m.glb"))
     assert scene.camera.vertical_fov_deg == pytest.approx(math.degrees(0.5))
     assert scene.camera.position == (0.0, 0.0, 5.0) and scene.camera.target[2] < 5.0
     light, bulb, sun = scene.lights
@@ -135,7 +135,7 @@ def test_orthographic_camera(tmp_path: Path) -> None:
     builder.json["cameras"] = [
         {"type": "orthographic", "orthographic": {"xmag": 2, "ymag": 1.5, "znear": 0, "zfar": 9}}
     ]
-    camera = load_gltf(builder.glb(tmp_path / "m.glb")).camera
+    camera = load_gltf(builder.written(tmp_path / "m.glb")).camera
     assert camera.kind == "orthographic" and camera.vertical_extent == 3.0
 
 
@@ -181,14 +181,14 @@ MATERIALS: dict[str, tuple[dict[str, Any], Any]] = {
 @pytest.mark.parametrize("name", MATERIALS)
 def test_materials(tmp_path: Path, name: str) -> None:
     values, expected = MATERIALS[name]
-    material = load_gltf(Builder().tetrahedron(values).glb(tmp_path / "m.glb")).objects[0].material
+    material = load_gltf(Builder().tetrahedron(values).written(tmp_path / "m.glb")).objects[0].material
     assert material.values() == expected.values()
 
 
 def test_what_is_left_aside_is_said(tmp_path: Path) -> None:
     builder = Builder().tetrahedron(glass_material())
     builder.json |= {"extensionsUsed": ["EXT_of_tomorrow"], "animations": [{"channels": [], "samplers": []}]}
-    text = " ".join(load_gltf(builder.glb(tmp_path / "m.glb")).notes)
+    text = " ".join(load_gltf(builder.written(tmp_path / "m.glb")).notes)
     assert "EXT_of_tomorrow" in text and "Animations" in text
 
 
@@ -248,7 +248,7 @@ def test_lying_glb_is_one_sentence(tmp_path: Path, name: str) -> None:
     builder = Builder().tetrahedron({})
     change(builder)
     with pytest.raises(UserError, match=says) as caught:
-        load_gltf(builder.glb(tmp_path / "m.glb"))
+        load_gltf(builder.written(tmp_path / "m.glb"))
     assert "m.glb" in str(caught.value) and "\n" not in str(caught.value)
 
 
@@ -256,12 +256,12 @@ def test_index_out_of_range_names_the_face(tmp_path: Path) -> None:
     builder = Builder().tetrahedron()
     builder.json["meshes"][0]["primitives"][0]["indices"] = builder.accessor(np.array([0, 1, 9], "<u2"), "SCALAR", 5123)
     with pytest.raises(UserError, match=r"meshes\[0\].primitives\[0\]: face 0 names vertex 9"):
-        load_gltf(builder.glb(tmp_path / "m.glb"))
+        load_gltf(builder.written(tmp_path / "m.glb"))
 
 
 @pytest.mark.parametrize("fraction", np.linspace(0.0, 0.99, 23))
 def test_glb_cut_anywhere_is_refused(tmp_path: Path, fraction: float) -> None:
-    whole = Builder().tetrahedron().glb(tmp_path / "m.glb").read_bytes()
+    whole = Builder().tetrahedron().written(tmp_path / "m.glb").read_bytes()
     (tmp_path / "cut.glb").write_bytes(whole[: int(fraction * len(whole))])
     with pytest.raises(UserError, match="cut.glb"):
         load_gltf(tmp_path / "cut.glb")
@@ -276,7 +276,7 @@ def test_glb_cut_anywhere_is_refused(tmp_path: Path, fraction: float) -> None:
     ],
 )
 def test_a_header_that_lies_is_refused(tmp_path: Path, at: int, number: int, says: str) -> None:
-    data = bytearray(Builder().tetrahedron().glb(tmp_path / "m.glb").read_bytes())
+    data = bytearray(Builder().tetrahedron().written(tmp_path / "m.glb").read_bytes())
     data[at : at + 4] = number.to_bytes(4, "little")
     (tmp_path / "m.glb").write_bytes(data)
     with pytest.raises(UserError, match=says):
@@ -285,7 +285,7 @@ def test_a_header_that_lies_is_refused(tmp_path: Path, at: int, number: int, say
 
 def test_random_damage_never_gives_a_traceback(tmp_path: Path) -> None:
     builder = Builder().tetrahedron(glass_material())
-    whole = bytearray(builder.glb(tmp_path / "m.glb").read_bytes())
+    whole = bytearray(builder.written(tmp_path / "m.glb").read_bytes())
     rng = np.random.default_rng(5)
     refused = 0
     for _ in range(150):

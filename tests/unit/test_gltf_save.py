@@ -155,7 +155,7 @@ def _foreign(path: Path) -> Path:
         "extensions": {"EXT_unknown": {"y": 3}},
         "extras": {"pipeline": "x"},
     }
-    return builder.glb(path)
+    return builder.written(path)
 
 
 def test_unchanged_scene_keeps_the_document(tmp_path: Path) -> None:
@@ -211,7 +211,7 @@ def test_one_of_two_instances_can_change(tmp_path: Path) -> None:
         {"mesh": 0, "name": "a", "children": [1]},
         {"mesh": 0, "name": "b", "translation": [3, 0, 0]},
     ]
-    path = builder.glb(tmp_path / "a.glb")
+    path = builder.written(tmp_path / "a.glb")
     scene = load_gltf(path)
     first, second, _table = scene.objects
     shift = first.object_to_world.copy()
@@ -303,14 +303,7 @@ def test_dabs_follow_their_primitive_when_others_leave_the_node(tmp_path: Path) 
     builder = Builder().tetrahedron({"name": "paint"})
     mesh = builder.json["meshes"][0]
     mesh["primitives"] = [dict(mesh["primitives"][0]) for _ in range(3)]
-    path = tmp_path / "a.gltf"
-    builder.json["buffers"] = [
-        {
-            "byteLength": len(builder.data),
-            "uri": "data:application/octet-stream;base64," + base64.b64encode(builder.data).decode(),
-        }
-    ]
-    path.write_text(json.dumps(builder.json))
+    path = builder.written(tmp_path / "a.gltf")
     scene = load_gltf(path)
     _, second, third, _table = scene.objects
     dabs = [(Dab((float(i), 0.0, 0.0), 1.0, 1.0),) for i in range(3)]

@@ -203,7 +203,7 @@ def test_scene_files_and_glb_keep_them(prism: Scene, spectrometer: Scene, tmp_pa
 def test_other_programs_files_bring_their_roughness(tmp_path: Path) -> None:
     for factor, wanted in ((0.35, 0.35), (None, 0.0), (7.0, 1.0)):
         values = glass_material() | ({} if factor is None else {"pbrMetallicRoughness": {"roughnessFactor": factor}})
-        found = load_gltf(Builder().tetrahedron(values).glb(tmp_path / "m.glb"))
+        found = load_gltf(Builder().tetrahedron(values).written(tmp_path / "m.glb"))
         assert found.objects[0].material.roughness == wanted
         assert any("roughnessFactor" in note for note in found.notes) == (factor is None)
     told = _materials("newmtl ice\nNi 1.6\nillum 7\nPr 0.3\nnewmtl pane\nd 0.1\nPr two\n", "m.mtl", notes := [])

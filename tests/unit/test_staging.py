@@ -124,7 +124,7 @@ def opaque_file(path: Path) -> Path:
     )
     builder.json["nodes"] = [{"mesh": 0, "name": "stone"}, {"mesh": 0, "name": "foot", "translation": [0, -3, 0]}]
     builder.json["scenes"][0]["nodes"] = [0, 1]
-    return builder.glb(path)
+    return builder.written(path)
 
 
 def test_an_opaque_glb_is_lit_stands_on_a_table_and_says_why_nothing_is_glass(tmp_path: Path) -> None:
@@ -195,7 +195,7 @@ def test_a_table_of_the_files_own_is_enough(tmp_path: Path) -> None:
         {"mesh": 1, "name": "board", "translation": [-5, -1, -5], "scale": [20, 0.01, 20]},
     ]
     builder.json["scenes"][0]["nodes"] = [0, 1]
-    scene = load_scene(builder.glb(tmp_path / "own.glb"))
+    scene = load_scene(builder.written(tmp_path / "own.glb"))
     assert [o.name for o in scene.objects] == ["stone", "board"]
 
 
