@@ -11,6 +11,8 @@ import pytest
 from spectrasplat.base.errors import UserError
 from spectrasplat.base.image_io import write_image
 from spectrasplat.edit import environments
+from spectrasplat.features.explained import explain
+from spectrasplat.features.features import Features
 from spectrasplat.model.environment import (
     constant,
     direction_of,
@@ -23,8 +25,6 @@ from spectrasplat.model.environment import (
 )
 from spectrasplat.model.environment_light import EnvironmentLight, lighting_environment, why_no_environment_light
 from spectrasplat.model.environment_sun import sun_of, with_sun
-from spectrasplat.model.features import Features
-from spectrasplat.model.features_explained import explain
 from spectrasplat.model.geometry import primitives
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.io.scene_save import save_scene

@@ -15,8 +15,8 @@ from spectrasplat.base.paths import assets_dir
 from spectrasplat.bench.features.static_costs import RecordSizes, static_costs
 from spectrasplat.edit import edits, objects
 from spectrasplat.edit.parameters import Stage, apply, paths, value_of
-from spectrasplat.model.features import Features, beam_objects, camera_needs, why_no_beams
-from spectrasplat.model.features_explained import explain
+from spectrasplat.features.explained import explain
+from spectrasplat.features.features import Features, beam_objects, camera_needs, why_no_beams
 from spectrasplat.model.geometry.primitives import box, plane
 from spectrasplat.model.io.gltf import load_gltf
 from spectrasplat.model.io.gltf_write import save_gltf
