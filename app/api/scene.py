@@ -18,7 +18,7 @@ from typing import Any
 from ..base.errors import UserError
 from ..commands.options import find_scene
 from ..model import scene as values_of
-from ..model.geometry.mesh_recipes import recipe_of
+from ..model.geometry.mesh import recipe_of
 from ..model.io.scene_file import Kept, load_scene, read_toml, scene_of
 from ..model.lights import Light
 from ..model.lights.light_file import light_values
@@ -255,8 +255,7 @@ def _object_table(item: values_of.SceneObject) -> dict[str, Any]:
 
 def _tables_of(model: values_of.Scene) -> dict[str, Any]:
     """The tables of a scene that came from no scene file."""
-    from ..model.scene_dabs import KEY as DABS
-    from ..model.scene_dabs import describe_dabs
+    from ..model.local_dispersion import DABS, describe_dabs
 
     behind: dict[str, Any] = {"environment": model.environment}
     if model.environment is None:

@@ -10,8 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..base.errors import UserError, suggestion
-from ..model.geometry.mesh import Mesh
-from ..model.geometry.mesh_recipes import note_recipe
+from ..model.geometry.mesh import Mesh, note_recipe
 from ..model.materials.material import Material
 from ..model.scene_objects import load_checked_mesh
 from ..model.texture import Environment

@@ -24,8 +24,7 @@ import msgspec
 from ..base import files
 from ..base.atomic import atomic_output
 from ..base.errors import UserError
-from ..model.geometry.mesh import Mesh
-from ..model.geometry.mesh_recipes import recipe_of
+from ..model.geometry.mesh import Mesh, recipe_of
 from ..model.io.scene_file import load_scene
 from ..model.io.scene_save import save_scene
 from ..model.scene import Scene

@@ -11,8 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..model.camera_rays import camera_frame
 from ..model.scene import Camera, Vec3
+from ..model.scene_camera import camera_frame
 from ..model.vectors import vec3
 from .projection import View
 

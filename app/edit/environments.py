@@ -19,8 +19,7 @@ from ..model.environment import constant, from_map, gradient, sky, up_and_rotati
 from ..model.lights.directional import DirectionalLight
 from ..model.scene import Diffuse, Light, Scene, Vec3
 from ..model.scene_defaults import environment_of
-from ..model.scene_textures import TextureReader
-from ..model.texture import Environment, Texture
+from ..model.texture import Environment, Texture, TextureReader
 from ..model.vectors import vec3
 from .adding import up_frame
 

@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..base.errors import UserError
+from ..model.local_dispersion import MAX_DAB_LOG2
 from ..model.optics import catalogue
 from ..model.scene import (
     Dab,
@@ -26,7 +27,6 @@ from ..model.scene import (
     Vec3,
 )
 from ..model.scene_checks import check_lines, check_outside, check_scene
-from ..model.scene_dabs import MAX_DAB_LOG2
 from . import matrices
 from .adding import add_object, beside
 from .names import checked_name, free_name

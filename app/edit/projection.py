@@ -11,8 +11,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..model.camera_rays import camera_frame
 from ..model.scene import Camera
+from ..model.scene_camera import camera_frame
 
 
 @lru_cache(64)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from ..model.bounces import why_no_bounces
 from ..model.contacts import contacts, overlapping_solids, standing
 from ..model.curved_solids import curved_solids
-from ..model.environment_light import why_no_environment_light
-from ..model.environment_sun import with_sun
+from ..model.environment_light import why_no_bounces, why_no_environment_light, with_sun
 from ..model.flat_shapes import is_flat
 from ..model.scene import Scene
 from ..model.settings import has_beams

@@ -10,11 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model.bounces import why_no_bounces
-from ..model.camera_rays import camera_frame
 from ..model.contacts import contacts, overlapping_solids, standing, world_bounds
 from ..model.curved_solids import curved_solids
-from ..model.environment_light import why_no_environment_light
+from ..model.environment_light import why_no_bounces, why_no_environment_light
 from ..model.flat_shapes import is_faceted, is_flat
 from ..model.geometry.outline import convex_outline
 from ..model.scene import (
@@ -22,6 +20,7 @@ from ..model.scene import (
     Scene,
     SceneObject,
 )
+from ..model.scene_camera import camera_frame
 from ..model.settings import RANDOM_METHODS, RenderSettings, divides_spectrum, has_beams
 from ..model.tint_levels import LEVELS, tint_levels
 from .program_switches import PROGRAM_SWITCHES

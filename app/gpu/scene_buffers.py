@@ -18,7 +18,7 @@ from ..features.features import (
 from ..model.contacts import overlapping_solids
 from ..model.flat_shapes import is_faceted
 from ..model.geometry.mesh import Mesh
-from ..model.optics import rough_glass
+from ..model.optics import rough_surfaces
 from ..model.optics.colorimetry import VISIBLE_NM, mirror_reflectance
 from ..model.optics.glass import Dispersion
 from ..model.optics.spectral_tables import (
@@ -57,7 +57,7 @@ class SpectraLayout:
     brightness_row: int
     """Likewise, where wavelengths are drawn at random: share of the draws below x (`wavelength_cdf`)."""
     rough_row: int
-    """`rough_glass.tables`."""
+    """`rough_surfaces.glass_tables`."""
     rows: int
 
 
@@ -228,7 +228,7 @@ class SceneBuffers:
         gratings: list[np.ndarray] = []
         absorbers: dict[bytes, int] = {}
         """Row of each curve."""
-        widths = rough_glass.distinct(item.material.microfacet_width for item in self.scene.objects)
+        widths = rough_surfaces.distinct_widths(item.material.microfacet_width for item in self.scene.objects)
         x = np.linspace(0.0, 1.0, SAMPLES)
         nm = self.axis.nm_of_samples(SAMPLES)
         stack_bits: dict[int, int] = {}
@@ -267,7 +267,7 @@ class SceneBuffers:
                 record["colour"][2:] = size, material.dispersion.n_d
                 if material.is_rough:
                     width = material.microfacet_width
-                    record["colour"][:2] = width, rough_glass.ROWS * widths.index(width)
+                    record["colour"][:2] = width, rough_surfaces.GLASS_ROWS * widths.index(width)
                 if index in stack_bits:
                     record["stack_bit"] = stack_bits[index]
                 if material.disperses and self.groups.count:
@@ -315,7 +315,7 @@ class SceneBuffers:
             powers = [cumulative(self.axis, spectrum) for spectrum in behind]
             self.tint_halfway = [levels.halfway(light.spectral_power).reshape(-1, 4) for light in self.scene.lights]
         rows.append(np.array([power.at(x)[:, 3] for power in powers]).reshape(-1, SAMPLES))
-        rows += [self._draws(), rough_glass.tables(widths, SAMPLES)]
+        rows += [self._draws(), rough_surfaces.glass_tables(widths, SAMPLES)]
         counts = np.cumsum([0] + [len(r) for r in rows])
         self.layout = SpectraLayout(*counts.tolist())
         self.variables = variables
@@ -333,7 +333,7 @@ class SceneBuffers:
             "STACK_OBJECTS": "uint[](" + ", ".join(f"{o}u" for o in (self.stack_objects or [0])) + ")",
         }
         if self.features.rough:
-            self.defines |= rough_glass.row_defines(self.layout.rough_row)
+            self.defines |= rough_surfaces.glass_defines(self.layout.rough_row)
 
     def _draws(self) -> np.ndarray:
         """Each light's density of random wavelengths as a running integral, (lights, SAMPLES); none where none are

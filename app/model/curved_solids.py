@@ -16,7 +16,7 @@ import numpy as np
 
 from .contacts import contacts, nested_pairs
 from .flat_shapes import is_flat
-from .geometry.mesh_recipes import recipe_of
+from .geometry.mesh import recipe_of
 from .scene import Scene, SceneObject
 
 MOST_FACES = 24
@@ -57,7 +57,7 @@ class Face(NamedTuple):
 def curved_solids(scene: Scene) -> dict[int, tuple[Face, ...]]:
     """Faces, in their own frames, of the objects that are met as curved solids, by index.
 
-    They are of glass or mirrors made by description (`mesh_recipes`) and wear no picture. What they lie in or against
+    They are of glass or mirrors made by a recipe (`geometry.mesh`) without a picture. What they lie in or against
     is flat, or glass that is met exactly too, else a surface that both share would be in two places.
     None is where they have more than `MOST_FACES` together.
     """

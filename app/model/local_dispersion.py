@@ -3,7 +3,8 @@
 Not physical. Dabs are laid down in order, each mixing the doublings of the gain (log2) found
 so far with its own, and the result scales how far a photon's colours spread where they land.
 `gain_at` is the definition; `GainGrid` samples it for the GPU and grows while one paints.
-Positions are in the receiver's own space, float64.
+Positions are in the receiver's own space, float64. In a scene file dabs are written
+`local_dispersion = [{ position, radius, … }, …]`.
 """
 
 from __future__ import annotations
@@ -12,11 +13,14 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
+from .fields import Number, Vector, read_fields, write_fields
 from .flat_shapes import is_flat
-from .scene import Dab, SceneObject
+from .io.scene_table import SceneTable
+from .scene import Dab, Material, SceneObject
 
 MIN_LOG2_GAIN = -6.0
 MAX_LOG2_GAIN = math.log2(10.0)
@@ -247,3 +251,36 @@ def _voxel_size(dabs: Sequence[Dab], box: tuple[np.ndarray, np.ndarray], axis: i
     while math.ceil(longest / voxel) + 1 > most:
         voxel *= 2.0
     return voxel
+
+
+DABS = "local_dispersion"
+MAX_DAB_LOG2 = 60.0
+"""Doublings one dab may ask for: more than any gain can use."""
+
+
+def read_dabs(table: SceneTable, material: Material) -> tuple[Dab, ...]:
+    """`local_dispersion` of an object's table, oldest first. Raises UserError on anything but a diffuse object."""
+    if table.has(DABS) and not material.receives:
+        table.fail(DABS, "is painted on what receives the caustic; this object is not diffuse")
+    return tuple(_read_dab(entry) for entry in table.tables(DABS))
+
+
+_FIELDS = (
+    Vector("position"),
+    Number("radius", above=0.0),
+    Number("falloff", 0.5, at_least=0.0, at_most=1.0),
+    # An eraser's own gain counts for nothing, but is kept where it is not the default.
+    Number("log2_gain", 0.0, optional=True, at_least=-MAX_DAB_LOG2, at_most=MAX_DAB_LOG2),
+    Number("erase", 0.0, optional=True, at_least=0.0, at_most=1.0),
+)
+
+
+def _read_dab(table: SceneTable) -> Dab:
+    dab = Dab(**read_fields(_FIELDS, table))
+    table.finish("a touch of the dispersion brush")
+    return dab
+
+
+def describe_dabs(dabs: Sequence[Dab]) -> list[dict[str, Any]]:
+    """The tables that `read_dabs` makes into `dabs`."""
+    return [write_fields(_FIELDS, dab) for dab in dabs]

@@ -10,8 +10,8 @@ import numpy as np
 from ..base.errors import UserError
 from .geometry.mesh import Mesh
 from .geometry.mesh_health import forms_of
+from .naming import listed
 from .scene import Light, Scene, SceneObject
-from .staging import listed
 
 MAX_LIGHTS, MAX_OBJECTS = 256, 0xFFFF
 """A photon remembers the light that it comes from in 8 bits, and the object it met first in 16, all of them set for

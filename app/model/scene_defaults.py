@@ -14,11 +14,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from .environment import from_map
-from .geometry.mesh_recipes import note_recipe
+from .geometry.mesh import note_recipe
 from .geometry.primitives import plane
 from .lights.directional import SUN_DIAMETER_DEG, DirectionalLight
 from .lights.light import DEFAULT_ILLUMINANCE
-from .lights.spot import SpotLight
+from .lights.point import SpotLight
 from .optics.spectrum import illuminant
 from .placement import Surroundings, default_direction
 from .scene import Camera, Diffuse, Light, SceneObject

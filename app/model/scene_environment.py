@@ -25,7 +25,7 @@ from .scene_render import read_background
 from .texture import Environment
 from .vectors import Vec3
 
-KEY = "environment"
+ENVIRONMENT = "environment"
 KINDS = ("map", "studio", "gradient", "sky", "constant")
 STUDIO_MAP = assets_dir() / "environments" / "studio.hdr"
 """The shipped panorama, which has a word of its own so that saved scenes name no file of this installation."""
@@ -37,9 +37,9 @@ def read_environment(table: SceneTable) -> tuple[Vec3, Environment | None]:
 
     What was assumed goes to the table's notes. Raises UserError for both at once and for what is not understood.
     """
-    if table.one_of(("background", KEY), "what lies behind everything") != KEY:
+    if table.one_of(("background", ENVIRONMENT), "what lies behind everything") != ENVIRONMENT:
         return read_background(table), None
-    inner = table.table(KEY)
+    inner = table.table(ENVIRONMENT)
     assert inner is not None
     kind = inner.choice("kind", KINDS)
     lights = inner.boolean("lights", True)

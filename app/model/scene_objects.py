@@ -15,18 +15,17 @@ import numpy as np
 
 from ..base import files
 from ..base.errors import UserError
-from .geometry.mesh import Mesh
+from .geometry import primitives
+from .geometry.mesh import Mesh, note_recipe
 from .geometry.mesh_normals import ROUND_DEG, with_plausible_normals
-from .geometry.mesh_recipes import note_recipe
-from .geometry.primitives_special import SPECIAL
 from .io.mesh_raw import as_float64
 from .io.scene_table import SceneTable
+from .local_dispersion import read_dabs
 from .materials.material_file import read_object_material
+from .naming import Names
 from .placement import read_placement
 from .scene import Material, SceneObject
-from .scene_dabs import read_dabs
-from .scene_textures import TextureReader
-from .unique_names import Names
+from .texture import TextureReader
 
 MESH_SUFFIXES = (".ply", ".obj", ".stl")
 INLINE = "inline"
@@ -160,7 +159,7 @@ SHAPES = (
     "sphere",
     "ellipsoid",
     "box",
-    *SPECIAL,
+    *primitives.SPECIAL,
     "slab",
     "prism",
     "polygon_prism",
@@ -198,9 +197,7 @@ def _parameters(shape: str) -> dict[str, tuple[str, bool]]:
 
 
 def _function(shape: str) -> Callable[..., Any]:
-    from .geometry import primitives, primitives_special
-
-    return getattr(primitives_special if shape in SPECIAL else primitives, _FUNCTION.get(shape, shape))
+    return getattr(primitives, _FUNCTION.get(shape, shape))
 
 
 def _shape_recipe(table: SceneTable) -> dict[str, Any]:
@@ -246,7 +243,7 @@ def make_shape(shape: str, notes: list[str] | None = None, **parameters: Any) ->
 
     Raises UserError for impossible sizes.
     """
-    if shape in SPECIAL:
+    if shape in primitives.SPECIAL:
         return make_shape(**_function(shape)(**parameters))
     arguments = {key: value for key, value in parameters.items() if key != "part"}
     if "heights" in arguments:

@@ -17,6 +17,7 @@ import numpy as np
 from ..base.errors import UserError, suggestion
 from .geometry.mesh import Mesh
 from .geometry.mesh_normals import ROUND_DEG, with_plausible_normals, with_smooth
+from .naming import listed
 from .optics import tints
 from .optics.index_file import find_glass
 from .optics.tints import Tint
@@ -160,9 +161,3 @@ def opaque_note(objects: Sequence[SceneObject]) -> str | None:
         f"diamond, or one part with --glass {names[0]}=N-SF11, in the window with Make glass. "
         f"The file holds {listed(names)}."
     )
-
-
-def listed(names: Sequence[str], most: int = 6) -> str:
-    """Names for a sentence, the first `most` of them."""
-    told = ", ".join(f"'{name}'" for name in names[:most])
-    return told if len(names) <= most else f"{told} and {len(names) - most} more"

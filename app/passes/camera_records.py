@@ -7,9 +7,9 @@ import numpy as np
 from ..gpu.records import NONE
 from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.schema import Field, Struct
-from ..model.camera_rays import camera_frame
 from ..model.optics.colorimetry import xyz_to_rgb709_matrix
 from ..model.scene import Camera, Light
+from ..model.scene_camera import camera_frame
 from ..model.scene_checks import contains
 
 CAMERA_LIGHT = Struct(

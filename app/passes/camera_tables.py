@@ -18,11 +18,10 @@ from ..gpu.map_channels import MapChannels
 from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.scene_texels import spectra_texture
 from ..gpu.spectral_groups import SAMPLES, index_slope
-from ..model.materials.finish import SMOOTH_ROUGHNESS
-from ..model.optics import rough_glass
-from ..model.optics.coat import coat_tables
+from ..model.materials.diffuse import SMOOTH_ROUGHNESS
 from ..model.optics.colorimetry import VISIBLE_NM, daylight_per_lumen, rgb_basis
 from ..model.optics.glass import Dispersion
+from ..model.optics.rough_surfaces import coat_tables, glass_defines, glass_tables
 from ..model.optics.spectral_tables import SpectralAxis, cumulative, index_table
 from ..model.optics.spectrum import Spectrum
 from ..model.scene import Material, Scene
@@ -132,7 +131,7 @@ def _depth(kept: np.ndarray) -> np.ndarray:
 def _finishes(scene: Scene, first_row: int) -> tuple[np.ndarray | None, np.ndarray]:
     """What camera rays know of each object's finish, float32 (O, 4): the coat's alpha (below 0: none; 0: perfectly
     smooth), its index, its first row of tables, the base's roughness; None where all is plain. The tables
-    (rows, SAMPLES), over the cosine, stand after `first_row` others (`optics.coat.coat_tables`)."""
+    (rows, SAMPLES), over the cosine, stand after `first_row` others (`optics.rough_surfaces.coat_tables`)."""
     materials = [item.material for item in scene.objects]
     if not any(m.has_coat or m.diffuse_roughness for m in materials):
         return None, np.zeros((0, SAMPLES))
@@ -174,13 +173,13 @@ def _spectra(
         "BASIS_ROW": np.array([np.interp(nm, VISIBLE_NM, column) for column in rgb_basis().T]),
         "BIN_ROW": maps.coordinate(axis, x)[None],
         "QUANTILE_ROW": np.interp(x, cell_cdf, np.linspace(0.0, 1.0, EMISSION_CELLS + 1))[None],
-        "ROUGH_ROW": rough_glass.tables(widths, SAMPLES),
+        "ROUGH_ROW": glass_tables(widths, SAMPLES),
     }
     starts = np.cumsum([0] + [len(rows) for rows in sections.values()])
     defines: dict[str, int | str] = dict(zip(sections, starts.tolist(), strict=False))
     rough_row = int(defines.pop("ROUGH_ROW"))
     if any(width > 0.0 for width in widths):
-        defines |= rough_glass.row_defines(rough_row)
+        defines |= glass_defines(rough_row)
     return np.concatenate(list(sections.values())), defines | {"ABSORBERS": len(absorptions)}
 
 

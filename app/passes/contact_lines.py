@@ -80,7 +80,7 @@ class _Drawn:
     """Owns the scene's corners and the programs."""
 
     def __init__(self, ctx: moderngl.Context, scene: SceneBuffers, camera: Camera) -> None:
-        from ..model.camera_rays import camera_frame
+        from ..model.scene_camera import camera_frame
 
         self._ctx = ctx
         self._program = shader.program(ctx, "light/contact.vert", "light/contact.frag")

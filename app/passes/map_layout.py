@@ -16,9 +16,9 @@ from ..base.errors import UserError
 from ..gpu.records import NONE, PLACEMENT, RECEIVER
 from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.tiles import Tile, pack
-from ..model.camera_rays import camera_frame, camera_rays
 from ..model.flat_shapes import is_flat
 from ..model.scene import Camera, Scene
+from ..model.scene_camera import camera_frame, camera_rays
 from .borders import lit_borders
 from .landings import Landings
 from .map_atlas import placement_rows

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..gpu.gpu_space import GpuSpace
-from ..model.camera_rays import camera_frame
 from ..model.scene import Camera
+from ..model.scene_camera import camera_frame
 from .plane_frame import PlaneFrame
 
 _MARGIN, _MARGIN_PIXELS = 0.04, 4.0

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..model.materials.finish import SMOOTH_ROUGHNESS
-from ..model.optics.coat import coat_tables
+from ..model.materials.diffuse import SMOOTH_ROUGHNESS
+from ..model.optics.rough_surfaces import coat_tables
 from ..model.scene import Scene
 from .compiling import inlined
 from .rough_albedo import masking
@@ -30,7 +30,7 @@ class Finishes(NamedTuple):
     coat_index: np.ndarray
     """float64 (O,): its refractive index."""
     tables: np.ndarray
-    """float64 (O, 2, 1025): `optics.coat.coat_tables`."""
+    """float64 (O, 2, 1025): `optics.rough_surfaces.coat_tables`."""
     roughness: np.ndarray
     """float64 (O,): of the base."""
 

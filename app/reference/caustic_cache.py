@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..model.content_key import ContentKey
 from ..model.scene import Scene
+from ..model.scene_key import ContentKey
 from .camera_run import CameraRun
 from .kept import kept_path, load_kept, save_kept
 from .photon_run import relative_variance

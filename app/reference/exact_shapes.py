@@ -1,6 +1,6 @@
 """Which objects the reference meets as the surfaces they are meant to be, and not as the triangles that stand for them.
 
-A mesh that was made from a description (`mesh_recipes`) is taken at its word where that names a sphere, an ellipsoid, a
+A mesh with a recipe (`geometry.mesh`) is taken at its word where that names a sphere, an ellipsoid, a
 lens, half a doublet, a torus or a solid of revolution: tessellation is then an error of the renderer, which is
 measured, and no part of the truth. Everything else, what shows a picture (whose place is known on triangles only), and
 all of `as_triangles(scene)` is met as triangles.
@@ -16,10 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..model.geometry import primitives
-from ..model.geometry.cone_rows import in_rows
-from ..model.geometry.mesh import Mesh
-from ..model.geometry.mesh_recipes import recipe_of
-from ..model.geometry.primitives_round import profile_with_normals
+from ..model.geometry.mesh import Mesh, recipe_of
+from ..model.geometry.primitives_round import in_rows, profile_with_normals
 from ..model.scene import Scene, SceneObject
 
 QUADRIC, TORUS = 0.0, 1.0

@@ -14,8 +14,7 @@ from ..base.atomic import atomic_outputs
 from ..base.errors import UserError
 from ..base.image_io import check_finite, save_codes, write_into
 from ..base.tone_map import srgb_oetf
-from ..model.io.lit_gltf import write_lit_gltf
-from ..model.io.lit_usd import check_usd, texture_path, write_lit_usd
+from ..model.io.lit_mesh import check_usd, texture_path, write_lit_gltf, write_lit_usd
 from ..model.scene import Scene
 from .bake import placement_path
 from .cookie import cookie

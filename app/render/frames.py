@@ -19,7 +19,7 @@ from ..edit.parameters import Stage
 from ..features.features import Features
 from ..gpu.context import Context
 from ..gpu.scene_buffers import SceneBuffers
-from ..model.environment_sun import with_sun
+from ..model.environment_light import with_sun
 from ..model.optics.spectral_tables import SpectralAxis
 from ..model.scene import Camera, Scene
 from ..model.settings import RenderSettings

@@ -17,7 +17,7 @@ from ..base.errors import UserError
 from ..edit.live_inputs import LiveInputs
 from ..edit.state import Selection
 from ..gpu.context_thread import no_thread
-from ..model.environment_sun import with_sun
+from ..model.environment_light import with_sun
 from ..render.solo import scene_seen
 from ..render.viewer.dirty_level import DirtyLevel
 from ..render.viewer.invalidation import dirty_level

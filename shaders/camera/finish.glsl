@@ -1,4 +1,4 @@
-// How a receiver's surface is finished (app/model/materials/finish.py): the coat over its base, and how rough that is.
+// How a receiver's surface is finished (app/model/materials/diffuse.py): the coat over its base, and how rough that is.
 #ifndef CAMERA_FINISH_GLSL
 #define CAMERA_FINISH_GLSL
 

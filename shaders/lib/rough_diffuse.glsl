@@ -1,4 +1,4 @@
-// A rough diffuse surface that loses no energy: EON [Portsmouth, Kutz and Hill 2025]. Pure functions; app/model/optics/rough_diffuse.py tells more.
+// A rough diffuse surface that loses no energy: EON [Portsmouth, Kutz and Hill 2025]. Pure functions; app/model/optics/rough_surfaces.py tells more.
 #ifndef ROUGH_DIFFUSE_GLSL
 #define ROUGH_DIFFUSE_GLSL
 

@@ -6,7 +6,7 @@
 #include "lib/scene.glsl"
 
 // One over the share of light, coming at this cosine to the surface's normal, that one microfacet sends on, at three places of a band. `table`: the
-// surface's, whose rows are evenly spaced ratios of indices, by logarithm (app/model/optics/rough_glass.py).
+// surface's, whose rows are evenly spaced ratios of indices, by logarithm (app/model/optics/rough_surfaces.py).
 vec3 regained(float table, float cosine, vec3 eta_it)
 {
     vec3 at = clamp((log(eta_it) / ROUGH_REACH + 1.0) * float(ROUGH_STEPS), 0.0, float(2 * ROUGH_STEPS) - 0.001);

@@ -10,11 +10,11 @@ from spectrasplat.features.features import Features
 from spectrasplat.gpu.map_channels import MapChannels
 from spectrasplat.gpu.records import NONE, PLACEMENT, RECEIVER
 from spectrasplat.gpu.scene_buffers import SceneBuffers
-from spectrasplat.model.camera_rays import camera_frame
 from spectrasplat.model.geometry.mesh import make_mesh
 from spectrasplat.model.optics import spectrum
 from spectrasplat.model.optics.colorimetry import K_M, cmf_xyz, daylight_per_lumen, rgb709_to_xyz, xyz_to_rgb709
 from spectrasplat.model.scene import Camera, Diffuse, Scene, SceneObject
+from spectrasplat.model.scene_camera import camera_frame
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes.camera import CameraPass
 from spectrasplat.passes.caustic_maps import CausticMaps

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from spectrasplat.features import features
 from spectrasplat.features.features import Features
-from spectrasplat.model.camera_rays import camera_frame
 from spectrasplat.model.geometry.primitives import box, plane
 from spectrasplat.model.optics.glass import constant
 from spectrasplat.model.scene import Camera, Diffuse, Scene, SceneObject
+from spectrasplat.model.scene_camera import camera_frame
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.render.still import render
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate

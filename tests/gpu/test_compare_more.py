@@ -11,7 +11,7 @@ import pytest
 from spectrasplat.base.image_io import write_image
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.edit.state import Compare, Selection, State
-from spectrasplat.model.environment_sun import with_sun
+from spectrasplat.model.environment_light import with_sun
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.ui.compare import Comparison
 from spectrasplat.ui.compared_with import GlassSwap, histogram_of, of_height, resized

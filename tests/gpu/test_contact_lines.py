@@ -10,12 +10,12 @@ import pytest
 from scipy.ndimage import uniform_filter
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.features.features import Features
-from spectrasplat.model.camera_rays import camera_frame
 from spectrasplat.model.contacts import standing
 from spectrasplat.model.geometry.primitives import box, polygon_prism
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.optics.glass import constant
 from spectrasplat.model.scene import Black, Camera, Scene, SceneObject
+from spectrasplat.model.scene_camera import camera_frame
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes.contact_lines import PARTS, contact_words, read_words
 from spectrasplat.passes.picture_window import PictureWindow

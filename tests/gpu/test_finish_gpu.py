@@ -12,8 +12,8 @@ from spectrasplat.edit.parameters import Stage
 from spectrasplat.model.environment import constant
 from spectrasplat.model.geometry import primitives
 from spectrasplat.model.lights import DirectionalLight
-from spectrasplat.model.optics import coat
 from spectrasplat.model.optics.glass import from_abbe
+from spectrasplat.model.optics.rough_surfaces import coat_tables
 from spectrasplat.model.optics.spectrum import illuminant
 from spectrasplat.model.scene import Camera, Dielectric, Diffuse, Scene, SceneObject
 from spectrasplat.model.settings import RenderSettings
@@ -191,7 +191,7 @@ def test_parallel_light_on_a_coat_is_the_lobe_over_the_base(gl) -> None:
     o = np.array([0.0, -1.0, 1.0]) / np.sqrt(2.0)
     i = finish.unit(-np.array(lamp.direction))
     alpha = roughness**2
-    albedo, under = coat.coat_tables(alpha, index, 1025)
+    albedo, under = coat_tables(alpha, index, 1025)
     cosines = np.linspace(0.0, 1.0, 1025)
     base = (1.0 - np.interp(o[2], cosines, albedo)) * np.interp(i[2], cosines, under) * rho * i[2] / np.pi
     want = finish.lobe(np.array(alpha), np.array(index), o, i) + base

@@ -10,7 +10,7 @@ from spectrasplat.gpu import bindings
 from spectrasplat.gpu.scene_records import SCENE_STRUCTS
 from spectrasplat.gpu.scene_texels import spectra_texture
 from spectrasplat.gpu.spectral_groups import SAMPLES
-from spectrasplat.model.optics import rough_glass
+from spectrasplat.model.optics import rough_surfaces
 from spectrasplat.passes import pilot
 from spectrasplat.reference import optics, random_numbers, rough_albedo
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
@@ -90,8 +90,10 @@ def test_what_microfacets_throw_at_each_other_is_given_back(gl) -> None:
     as much as the edge of total reflection makes of a table's steps where surfaces are roughest."""
     widths, ratios, angles = [1.0, 0.16], [1.0 / 1.52, 1.52, 1.0 / 1.333], [0.0, 30.0, 60.0, 80.0]
     width, ratio, angle = (part.ravel() for part in np.meshgrid(widths, ratios, np.radians(angles), indexing="ij"))
-    texture = spectra_texture(gl.ctx, np.concatenate([np.ones((3, SAMPLES)), rough_glass.tables(widths, SAMPLES)]))
-    first = np.array([rough_glass.ROWS * rough_glass.distinct(widths).index(w) for w in width])
+    texture = spectra_texture(
+        gl.ctx, np.concatenate([np.ones((3, SAMPLES)), rough_surfaces.glass_tables(widths, SAMPLES)])
+    )
+    first = np.array([rough_surfaces.GLASS_ROWS * rough_surfaces.distinct_widths(widths).index(w) for w in width])
     got = evaluate(
         gl.ctx,
         ["lib/rough_energy.glsl"],
@@ -101,7 +103,7 @@ def test_what_microfacets_throw_at_each_other_is_given_back(gl) -> None:
         {
             **bindings.SCENE_DEFINES,
             **dict.fromkeys(("TRIANGLES_AT", "NORMALS_AT", "OBJECTS_AT"), 0),
-            **rough_glass.row_defines(3),
+            **rough_surfaces.glass_defines(3),
             "SPECTRAL_SAMPLES": SAMPLES,
         },
         SCENE_STRUCTS,

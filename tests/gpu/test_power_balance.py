@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.model.io.scene_file import load_scene
-from spectrasplat.model.lights.spot import SpotLight
+from spectrasplat.model.lights.point import SpotLight
 from spectrasplat.model.optics import glass
 from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings

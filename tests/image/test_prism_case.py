@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.features.features import Features
-from spectrasplat.model.camera_rays import camera_frame
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.optics.spectrum import laser
 from spectrasplat.model.scene import Dielectric
+from spectrasplat.model.scene_camera import camera_frame
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.render.still import RenderResult, render
 

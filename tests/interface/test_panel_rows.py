@@ -8,9 +8,9 @@ import pytest
 from imgui_bundle import imgui
 from spectrasplat.edit.state import Selection, State
 from spectrasplat.gpu.context import Context
-from spectrasplat.model.camera_rays import camera_frame
 from spectrasplat.model.contacts import world_bounds
 from spectrasplat.model.scene import Diffuse, Grating
+from spectrasplat.model.scene_camera import camera_frame
 from spectrasplat.ui.panels.inspector import draw_inspector
 from spectrasplat.ui.panels.spectrum import axis_labels
 from spectrasplat.ui.panels.view_panel import draw_view

@@ -11,8 +11,7 @@ from spectrasplat.gpu.gpu_space import GpuSpace
 from spectrasplat.gpu.scene_geometry import Curved
 from spectrasplat.model.curved_solids import MOST_FACES, curved_solids, faces_of
 from spectrasplat.model.geometry import primitives
-from spectrasplat.model.geometry.mesh import Mesh
-from spectrasplat.model.geometry.mesh_recipes import note_recipe
+from spectrasplat.model.geometry.mesh import Mesh, note_recipe
 from spectrasplat.model.scene import Dielectric, Diffuse, Mirror, Scene, SceneObject
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.reference.exact_shapes import as_triangles

@@ -14,21 +14,27 @@ from spectrasplat.edit import environments
 from spectrasplat.features.explained import explain
 from spectrasplat.features.features import Features
 from spectrasplat.model.environment import (
+    SKY_TYPES,
     constant,
     direction_of,
     from_map,
     gradient,
     horizontal_illuminance,
+    relative_luminance,
     sky,
     up_and_rotation,
     world_to_local,
 )
-from spectrasplat.model.environment_light import EnvironmentLight, lighting_environment, why_no_environment_light
-from spectrasplat.model.environment_sun import sun_of, with_sun
+from spectrasplat.model.environment_light import (
+    EnvironmentLight,
+    lighting_environment,
+    sun_of,
+    why_no_environment_light,
+    with_sun,
+)
 from spectrasplat.model.geometry import primitives
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.io.scene_save import save_scene
-from spectrasplat.model.optics.cie_sky import SKY_TYPES, relative_luminance
 from spectrasplat.model.optics.colorimetry import xyz_to_rgb709
 from spectrasplat.model.scene import Black, Camera, Diffuse, Scene, SceneObject
 from spectrasplat.model.settings import RenderSettings

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from spectrasplat.base.errors import UserError
-from spectrasplat.model.io import gltf_compressed
+from spectrasplat.model.io import gltf_document
 from spectrasplat.model.io.gltf import load_gltf
 from spectrasplat.model.io.gltf_write import save_gltf
 from spectrasplat.model.io.scene_file import load_scene
@@ -199,7 +199,7 @@ def compressed(method: str) -> Builder:
     builder = Builder()
     builder.json["extensionsUsed"] = builder.json["extensionsRequired"] = [method]
     builder.json |= {"nodes": [{"mesh": 0}], "scenes": [{"nodes": [0]}], "scene": 0}
-    if method == gltf_compressed.DRACO:
+    if method == gltf_document.DRACO:
         draco = pytest.importorskip("DracoPy")
         view = builder.view(draco.encode(POSITIONS, FACES.astype(np.uint32), quantization_bits=14))
         accessors = [
@@ -234,12 +234,12 @@ def compressed(method: str) -> Builder:
     return builder
 
 
-@pytest.mark.parametrize("method", [gltf_compressed.DRACO, gltf_compressed.MESHOPT[0]])
+@pytest.mark.parametrize("method", [gltf_document.DRACO, gltf_document.MESHOPT[0]])
 def test_compressed_meshes(tmp_path: Path, method: str, monkeypatch: pytest.MonkeyPatch) -> None:
     path = compressed(method).written(tmp_path / "m.glb")
     mesh = load_gltf(path).objects[0].mesh
     assert mesh.is_closed and mesh.volume() == pytest.approx(1.0 / 6.0, rel=1e-3)
-    monkeypatch.setattr(gltf_compressed, "import_module", _missing)
+    monkeypatch.setattr(gltf_document, "import_module", _missing)
     with pytest.raises(UserError, match=r"pip install '\.\[gltf\]'"):
         load_gltf(path)
 

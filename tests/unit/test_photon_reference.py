@@ -19,7 +19,7 @@ from spectrasplat.model.geometry import primitives
 from spectrasplat.model.geometry.primitives_round import sphere
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.lights import AreaLight, CollimatedLight, DirectionalLight, PointLight, SpotLight
-from spectrasplat.model.lights.spot import spot_solid_angle_sr
+from spectrasplat.model.lights.point import spot_solid_angle_sr
 from spectrasplat.model.optics.colorimetry import K_M, xyz_to_rgb709
 from spectrasplat.model.optics.glass import constant as constant_index
 from spectrasplat.model.optics.spectrum import cmf_at, constant, laser

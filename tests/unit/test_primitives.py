@@ -7,9 +7,8 @@ import math
 import numpy as np
 import pytest
 from spectrasplat.base.errors import UserError
-from spectrasplat.model.geometry import cone_rows, primitives
-from spectrasplat.model.geometry.mesh import Mesh, make_mesh
-from spectrasplat.model.geometry.mesh_recipes import recipe_of
+from spectrasplat.model.geometry import primitives, primitives_round
+from spectrasplat.model.geometry.mesh import Mesh, make_mesh, recipe_of
 from spectrasplat.model.geometry.primitives import solid_of_revolution
 from spectrasplat.model.scene_objects import make_shape
 
@@ -278,12 +277,12 @@ def test_normals_turn_as_their_places_do() -> None:
     """To half of a row's taper at most over a segment, however narrow segments are (a quarter of it, at the worst
     place, is what a triangle's edge between two rings leaves)."""
     for segments in (64, 512):
-        assert uneven_share(segments) < 0.3 * cone_rows.TAPER
+        assert uneven_share(segments) < 0.3 * primitives_round.TAPER
 
 
 def test_without_rows_more_segments_do_not_help(monkeypatch: pytest.MonkeyPatch) -> None:
     """What the rows are there for: in one row it is as uneven with 512 segments as with 64."""
-    monkeypatch.setattr(cone_rows, "TAPER", 1.0)
+    monkeypatch.setattr(primitives_round, "TAPER", 1.0)
     few, many = uneven_share(64), uneven_share(512)
     assert min(few, many) > 0.05
     assert many == pytest.approx(few, rel=0.1)
@@ -293,7 +292,7 @@ def test_rows_keep_the_profile() -> None:
     """Its points stay, rows lie on its segments, and none tapers by more than is said but towards a tip."""
     points = np.array([(0.0, 0.0), (0.5, 0.0), (0.5, 1.0), (0.8, 2.2), (0.0, 3.0)])
     normals = np.array([(0.0, -1.0), (1.0, 0.0), (0.97, -0.24), (0.71, 0.71)])
-    found, start, end = cone_rows.in_rows(points, normals, normals, loop=False)
+    found, start, end = primitives_round.in_rows(points, normals, normals, loop=False)
     assert all((found == point).all(axis=1).any() for point in points)
     # Discs and cylinders stay one row.
     assert (found[:3] == points[:3]).all()
@@ -305,8 +304,8 @@ def test_rows_keep_the_profile() -> None:
     cones = np.flatnonzero((upper != lower) & (found[1:, 1] != found[:-1, 1]))
     shoulder = [row for row in cones if found[row, 1] < 2.2]
     assert len(shoulder) > 5
-    assert (upper[shoulder] / lower[shoulder] <= 1.0 + cone_rows.TAPER + 1e-9).all()
-    assert len(cones) - len(shoulder) == cone_rows.MOST_ROWS
+    assert (upper[shoulder] / lower[shoulder] <= 1.0 + primitives_round.TAPER + 1e-9).all()
+    assert len(cones) - len(shoulder) == primitives_round.MOST_ROWS
 
 
 def test_rows_of_a_smooth_loop_turn_from_end_to_end() -> None:
@@ -314,7 +313,7 @@ def test_rows_of_a_smooth_loop_turn_from_end_to_end() -> None:
     angle = 2.0 * np.pi * np.arange(12) / 12
     circle = np.stack([1.0 + 0.3 * np.cos(angle), 0.3 * np.sin(angle)], axis=1)
     normals = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    found, start, end = cone_rows.in_rows(circle, normals, np.roll(normals, -1, axis=0), loop=True)
+    found, start, end = primitives_round.in_rows(circle, normals, np.roll(normals, -1, axis=0), loop=True)
     assert len(found) == len(start) == len(end) > 12
     assert np.roll(start, -1, axis=0) == pytest.approx(end)
     assert np.linalg.norm(start, axis=1) == pytest.approx(1.0)

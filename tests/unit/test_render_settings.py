@@ -12,7 +12,7 @@ from spectrasplat.commands.render import RenderRequest, scene_as_asked
 from spectrasplat.edit import edits
 from spectrasplat.edit.live_inputs import LiveInputs
 from spectrasplat.features.features import Features, why_no_haze
-from spectrasplat.model.bounces import why_no_bounces
+from spectrasplat.model.environment_light import why_no_bounces
 from spectrasplat.model.io.scene_save import save_scene
 from spectrasplat.model.scene import Black, Diffuse
 from spectrasplat.model.scene_key import picture_key, scene_key

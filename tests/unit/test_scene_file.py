@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from spectrasplat.base.errors import UserError
 from spectrasplat.model.io.scene_file import load_scene
-from spectrasplat.model.lights.spot import spot_solid_angle_sr
+from spectrasplat.model.lights.point import spot_solid_angle_sr
 from spectrasplat.model.scene import Black, Diffuse, Mirror
 from spectrasplat.model.scene_checks import contains
 

@@ -73,11 +73,11 @@ def test_a_texture_is_read_with_its_factor_and_wrap(folder: Path) -> None:
 
 
 def test_one_picture_is_read_once(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from spectrasplat.model import scene_textures
+    from spectrasplat.model import texture
 
     reads = []
-    read = scene_textures.read_picture
-    monkeypatch.setattr(scene_textures, "read_picture", lambda path: reads.append(path) or read(path))
+    read = texture.read_picture
+    monkeypatch.setattr(texture, "read_picture", lambda path: reads.append(path) or read(path))
     scene = load(
         folder,
         LIGHT

@@ -1,22 +1,23 @@
-"""Solids and receivers a scene file can name: flat-faced ones here, round ones, gems and water beside it.
+"""Solids and receivers that a scene file can name: flat-faced ones here, round ones, gems and water in other files.
 
 Every solid is closed, faces outward and is centred on the origin unless its docstring says
 otherwise; lengths are in scene units. Impossible dimensions raise UserError with one
-sentence that begins with the shape's name.
+sentence that begins with the shape's name. Those in `SPECIAL` are other shapes by an everyday name: their functions
+give the other shape's keys, and they are met, saved and drawn as those.
 """
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
 from .mesh import Mesh, make_mesh
-from .primitives_check import count, in_range, positive
 from .primitives_gem import brilliant, step_cut
 from .primitives_lens import doublet, lens
+from .primitives_parts import count, in_range, positive, with_box_uv
 from .primitives_round import ellipsoid, solid_of_revolution, sphere, torus
-from .primitives_uv import with_box_uv
 from .primitives_water import height_field, rippled_water
 
 __all__ = [
@@ -40,7 +41,7 @@ __all__ = [
 
 
 def box(size: tuple[float, float, float] = (1.0, 1.0, 1.0), name: str = "box") -> Mesh:
-    """A box of edge lengths `size` along x, y, z; every face shows the whole of a picture (`primitives_uv`)."""
+    """A box of edge lengths `size` along x, y, z; every face shows the whole of a picture (`primitives_parts`)."""
     x, y, z = (positive("box", f"size along {axis}", s) for axis, s in zip("xyz", size, strict=True))
     return with_box_uv(_extruded(name, _rectangle(x, y), z))
 
@@ -124,3 +125,24 @@ def _extruded(name: str, outline: np.ndarray, length: float, upright: bool = Tru
     )
     triangles = np.concatenate([_fan(low[::-1]), _fan(high), sides])
     return make_mesh(name, vertices, triangles)
+
+
+SPECIAL = ("cylinder", "cone", "dome")
+
+
+def cylinder(radius: float = 0.5, length: float = 1.0) -> dict[str, Any]:
+    """A round rod with flat ends."""
+    radius, half = positive("cylinder", "radius", radius), 0.5 * positive("cylinder", "length", length)
+    return {"shape": "revolution", "profile": [[0.0, -half], [radius, -half], [radius, half], [0.0, half]]}
+
+
+def cone(radius: float = 0.5, length: float = 1.0) -> dict[str, Any]:
+    """A round cone with a flat base, its tip up."""
+    radius, half = positive("cone", "radius", radius), 0.5 * positive("cone", "length", length)
+    return {"shape": "revolution", "profile": [[0.0, -half], [radius, -half], [0.0, half]]}
+
+
+def dome(radius: float = 0.5) -> dict[str, Any]:
+    """Half a ball, its flat side down."""
+    radius = positive("dome", "radius", radius)
+    return {"shape": "lens", "radius1": math.inf, "radius2": -radius, "thickness": radius, "diameter": 2.0 * radius}

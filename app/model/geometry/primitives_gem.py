@@ -13,7 +13,7 @@ import numpy as np
 
 from ...base.errors import UserError
 from .mesh import Mesh, make_mesh
-from .primitives_check import in_range, positive
+from .primitives_parts import in_range, positive
 
 
 def brilliant(

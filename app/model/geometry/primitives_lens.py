@@ -14,7 +14,7 @@ import numpy as np
 
 from ...base.errors import UserError
 from .mesh import Mesh, make_mesh, normalised
-from .primitives_check import count, positive
+from .primitives_parts import count, positive
 
 
 def lens(

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...base.errors import UserError
 from .mesh import Mesh, make_mesh, normalised
-from .primitives_check import MAX_TRIANGLES, count, in_range, positive
+from .primitives_parts import MAX_TRIANGLES, count, in_range, positive
 
 MAX_HEIGHT = 1e30
 """Beyond it slopes overflow."""

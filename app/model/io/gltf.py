@@ -22,6 +22,7 @@ from ..geometry.mesh_health import examine, forms_of, joined, repair, warnings_o
 from ..lights import LIGHT_KINDS, DirectionalLight, PointLight, SpotLight
 from ..lights.light import made
 from ..lights.light_file import read_light
+from ..naming import Names, Unshown
 from ..placement import Surroundings
 from ..scene import (
     Camera,
@@ -41,22 +42,20 @@ from ..scene_defaults import (
     surroundings_of,
 )
 from ..staging import AS_FOUND, Y_UP_TO_Z_UP, Staging, opaque_note, with_glass
-from ..unique_names import Names
 from ..vectors import Vec3, vec3
-from .gltf_compressed import COMPRESSION, DRACO, draco_mesh
-from .gltf_document import GltfDocument, open_document
-from .gltf_extras import read_node_dabs, read_scene_extras
+from .gltf_document import COMPRESSION, DRACO, GltfDocument, draco_mesh, open_document
 from .gltf_materials import (
     EXTRAS,
     UNDERSTOOD_MATERIALS,
     formed,
     own_extras,
     read_gltf_material,
+    read_node_dabs,
+    read_scene_extras,
 )
 from .gltf_textures import GltfTextures, turned_over
 from .mesh_raw import as_float64
 from .scene_table import MAX_MAGNITUDE, SceneTable
-from .unshown import Unshown
 
 LIGHTS = "KHR_lights_punctual"
 UNDERSTOOD = UNDERSTOOD_MATERIALS | COMPRESSION | {LIGHTS, "KHR_mesh_quantization"}

@@ -13,11 +13,11 @@ from urllib.parse import unquote
 
 import numpy as np
 
+from ..naming import Unshown
 from ..texture import Texture
 from .gltf_document import GltfDocument
 from .picture_files import decode_8bit
 from .scene_pictures import nearest_levels, picture_name, png_bytes
-from .unshown import Unshown
 
 _CLAMP, _MIRRORED, _REPEAT = 33071, 33648, 10497
 _FORMATS = ("image/png", "image/jpeg")

@@ -31,8 +31,7 @@ from ..scene import (
 from ..scene_camera import LENS
 from .gltf import LIGHTS, Origins, open_document, read_scene
 from .gltf_document import GltfDocument, save_document
-from .gltf_extras import write_node_dabs, write_scene_extras
-from .gltf_materials import EXTRAS, write_gltf_material
+from .gltf_materials import EXTRAS, write_gltf_material, write_node_dabs, write_scene_extras
 from .gltf_textures import TextureWriter, turned_over
 
 _SUFFIXES = (".glb", ".gltf")

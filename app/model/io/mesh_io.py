@@ -71,7 +71,7 @@ def _read(path: Path) -> RawMesh:
         from .mesh_obj import read_obj
 
         return read_obj(data, str(path))
-    from .mesh_stl import read_stl
+    from .mesh_raw import read_stl
 
     return read_stl(data, str(path))
 

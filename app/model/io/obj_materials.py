@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ...base import files
+from ..naming import Unshown
 from ..optics import glass
 from ..scene import Dielectric, Diffuse, Material
 from ..vectors import Vec3, vec3
-from .unshown import Unshown
 
 _REFRACTS = (4, 6, 7, 9)
 """Values of `illum` that stand for glass or refraction."""

@@ -18,6 +18,7 @@ from ...base.errors import UserError
 from ..geometry.mesh import Mesh
 from ..lights.light_file import read_light
 from ..materials.material_file import read_materials
+from ..naming import Names
 from ..placement import Surroundings
 from ..scene import (
     Camera,
@@ -40,10 +41,8 @@ from ..scene_defaults import (
 from ..scene_environment import read_environment
 from ..scene_objects import MESH_SUFFIXES, ObjectReader
 from ..scene_render import read_render
-from ..scene_textures import TextureReader
 from ..staging import AS_FOUND, Staging, with_glass
-from ..texture import Environment
-from ..unique_names import Names
+from ..texture import Environment, TextureReader
 from ..vectors import Vec3
 from .scene_table import SceneTable
 

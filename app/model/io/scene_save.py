@@ -19,17 +19,14 @@ import numpy as np
 from ...base import files
 from ...base.atomic import atomic_output, check_writable
 from ...base.errors import UserError
-from ..geometry.mesh import Mesh
-from ..geometry.mesh_recipes import recipe_of
+from ..geometry.mesh import Mesh, recipe_of
 from ..lights.light_file import light_values
+from ..local_dispersion import DABS, describe_dabs
 from ..placement import PLACEMENT_KEYS
 from ..scene import Scene, SceneObject
 from ..scene_camera import camera_values
-from ..scene_dabs import KEY as DABS
-from ..scene_dabs import describe_dabs
 from ..scene_defaults import environment_of
-from ..scene_environment import KEY as ENVIRONMENT
-from ..scene_environment import environment_values
+from ..scene_environment import ENVIRONMENT, environment_values
 from ..scene_objects import INLINE
 from ..scene_render import render_values
 from ..texture import Environment
@@ -201,7 +198,7 @@ def _kept_object(
         values["name"] = new.name
     if not _same_mesh(old.mesh, new.mesh):
         for key in (*(recipe_of(old.mesh) or ("vertices", "triangles", "uv", "mesh")), "shape", "radius", "length"):
-            values.pop(key, None)  # radius and length: of a `primitives_special`
+            values.pop(key, None)  # radius and length: of one of `primitives.SPECIAL`
         values |= _mesh(new.mesh, path)
     if old.material.values() != new.material.values():
         values = _kept_material(values, old, new, materials, path)

@@ -1,6 +1,6 @@
 """Kinds of material, one class each: this is the list of them.
 
-A new kind is a file here and its name in `MATERIAL_KINDS`; the scene file, saving, glTF's extras, the inspector's rows
+A new kind is a class here and its name in `MATERIAL_KINDS`; the scene file, saving, glTF's extras, the inspector's rows
 and reports follow from what the class declares. Where light meets it as no kind does yet, CONTRIBUTING.md lists what
 it also wants in shaders and references.
 """
@@ -8,12 +8,11 @@ it also wants in shaders and references.
 from __future__ import annotations
 
 from .absorption import Absorption
-from .black import Black
 from .dielectric import Dielectric
 from .diffuse import Diffuse
 from .grating import Grating
 from .material import Material
-from .mirror import Mirror
+from .opaque import Black, Mirror
 
 MATERIAL_KINDS: dict[str, type[Material]] = {cls.kind: cls for cls in (Dielectric, Mirror, Diffuse, Black, Grating)}
 """By their word in a scene file."""

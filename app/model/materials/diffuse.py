@@ -1,4 +1,7 @@
-"""What receives caustics: a two-sided diffuse surface, plain, measured or wearing a picture, coated or not."""
+"""What receives caustics: a two-sided diffuse surface, plain, measured or with a picture on it.
+
+Its finish is a glossy coat over the diffuse base, and how rough that base is.
+"""
 
 from __future__ import annotations
 
@@ -8,17 +11,87 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from ..fields import Number, write_fields
+from ..fields import Animated, Number, Row, write_fields
 from ..io.scene_pictures import picture_file, picture_name
 from ..io.scene_table import SceneTable
 from ..optics.colorimetry import VISIBLE_NM
 from ..optics.spectrum import rgb_under_white
-from ..scene_textures import TextureReader
-from ..texture import Texture
+from ..texture import Texture, TextureReader
 from ..vectors import Vec3
 from .absorption import read_curve
-from .finish import COAT_INDEX, DIFFUSE_ROUGHNESS, ROUGHNESS, USUAL_COAT_INDEX, read_finish
 from .material import Material, colour_words
+
+USUAL_ROUGHNESS = 0.25
+"""Of a coat that somebody asks for without saying more: a polished table."""
+USUAL_COAT_INDEX = 1.5
+SMOOTH_ROUGHNESS = 0.03
+"""A coat less rough than this is met as a perfectly smooth one: its lobe is narrower than a pixel."""
+
+ROUGHNESS = Number(
+    "roughness",
+    None,
+    optional=True,
+    at_least=0.0,
+    at_most=1.0,
+    row=Row(
+        "Roughness",
+        "Of the coat: 0 is polished like glass, 0.25 a varnished table, 1 reflects to all sides.",
+        0.0,
+        1.0,
+        USUAL_ROUGHNESS,
+        "%.3f",
+        is_slider=True,
+    ),
+    animated=Animated("Roughness of a receiver's coat", 0.0, 1.0),
+)
+COAT_INDEX = Number(
+    "coat_index",
+    USUAL_COAT_INDEX,
+    optional=True,
+    at_least=1.0,
+    at_most=4.0,
+    row=Row(
+        "Coat's index",
+        "Refractive index of the coat: how much it reflects, 4 % at 1.5 where it is seen from straight above.",
+        1.0,
+        4.0,
+        USUAL_COAT_INDEX,
+        "%.3f",
+        is_slider=True,
+    ),
+    animated=Animated("Refractive index of a receiver's coat", 1.0, 4.0),
+)
+DIFFUSE_ROUGHNESS = Number(
+    "diffuse_roughness",
+    0.0,
+    optional=True,
+    at_least=0.0,
+    at_most=1.0,
+    row=Row(
+        "Diffuse roughness",
+        "0 is Lambertian; with 1 (plaster, clay, the moon) what is lit from behind the camera looks flat.",
+        0.0,
+        1.0,
+        0.0,
+        "%.3f",
+        is_slider=True,
+    ),
+    animated=Animated("Roughness of a receiver's diffuse base", 0.0, 1.0),
+)
+
+
+def read_finish(table: SceneTable) -> dict[str, Any]:
+    """`roughness`, `coat_index` and `diffuse_roughness` as attributes of a `Diffuse`."""
+    found: dict[str, Any] = COAT_INDEX.read(table) | DIFFUSE_ROUGHNESS.read(table)
+    if table.has("roughness"):
+        found |= ROUGHNESS.read(table)
+    elif table.has("coat_index"):
+        table.fail("coat_index", "is that of a coat, and there is none; give its 'roughness' (0 to 1) as well")
+    if found["diffuse_roughness"] > 0.0 and table.has("reflectance"):
+        table.fail(
+            "diffuse_roughness", "goes with 'colour' only; leave it out, or give a 'colour' in place of 'reflectance'"
+        )
+    return found
 
 
 @dataclass(frozen=True)
@@ -34,7 +107,7 @@ class Diffuse(Material):
     coat_index: float = USUAL_COAT_INDEX
     """The coat's refractive index over that of what is before it."""
     diffuse_roughness: float = 0.0
-    """0: Lambertian, up to 1 (`optics.rough_diffuse`); never beside `reflectance`."""
+    """0: Lambertian, up to 1 (`shaders/lib/rough_diffuse.glsl`); never beside `reflectance`."""
 
     kind: ClassVar = "diffuse"
     title: ClassVar = "Diffuse"

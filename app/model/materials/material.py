@@ -1,6 +1,6 @@
-"""What every material is asked: does light go on, end, or land on it, and what is it called.
+"""What every material answers: does light go on, end, or land on it, and what is it called.
 
-A kind of material is one class in a file of its own beside this one; it overrides what differs.
+A kind of material is one class, which overrides what differs.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from ..fields import Number, Part, read_fields, write_fields
 from ..io.scene_table import SceneTable
 from ..optics.colorimetry import rgb_basis
-from ..scene_textures import TextureReader
+from ..texture import TextureReader
 from ..vectors import Vec3
 
 if TYPE_CHECKING:

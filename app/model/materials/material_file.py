@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ...base.errors import suggestion
 from ..io.scene_table import SceneTable
-from ..scene_textures import TextureReader
+from ..texture import TextureReader
 from . import MATERIAL_KINDS
 from .dielectric import DEFAULT_GLASS, PRIORITY, ROUGHNESS, THIN, Dielectric
 from .dispersion_file import GAIN, named_glass, with_gain

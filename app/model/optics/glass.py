@@ -120,7 +120,7 @@ class Dispersion:
 
     def formula_text(self) -> str:
         """The formula with its coefficients, for people (λ in µm)."""
-        from .formula_text import formula_text
+        from .dispersion_formulas import formula_text
 
         text = formula_text(self.kind, self.coefficients)
         if self.gain == 1.0:

@@ -18,7 +18,7 @@ import numpy as np
 from ...base.errors import UserError
 from ...edit.live_inputs import LiveInputs
 from ...gpu import shader
-from ...model.environment_sun import with_sun
+from ...model.environment_light import with_sun
 from ...passes.caustic_maps import CausticMaps
 from ..light_maps import LightMaps
 from ..moving_beams import MovingBeams

@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 
 from ...gpu.context import Context
-from ...model.camera_rays import camera_rays
 from ...model.geometry.primitives import box, plane
 from ...model.geometry.primitives_gem import brilliant
 from ...model.geometry.primitives_round import sphere
@@ -25,6 +24,7 @@ from ...model.scene import (
     Scene,
     SceneObject,
 )
+from ...model.scene_camera import camera_rays
 from ...model.texture import Environment, Texture
 from ...passes.variants import TINT_STEPS
 from ...reference.camera_reference import render_camera_reference

@@ -11,7 +11,7 @@ from imgui_bundle import imgui
 from ...edit import edits, environments
 from ...edit.state import Selection, State
 from ...model.materials import MATERIAL_KINDS
-from ...model.materials.finish import USUAL_COAT_INDEX, USUAL_ROUGHNESS
+from ...model.materials.diffuse import USUAL_COAT_INDEX, USUAL_ROUGHNESS
 from ...model.scene import (
     Diffuse,
     Grating,

@@ -1,16 +1,43 @@
-"""Texture coordinates of primitives: how a picture lies on a box's faces and round a globe.
+"""What primitives share: range checks of their dimensions, each failure one sentence, and coordinates for pictures.
 
 Seen from outside u runs to the right and v up. These are made for pictures; faces share the picture and globes
-stretch it at the poles, so no caustic map is laid out by them (`Mesh.uv_unwraps`).
-"""
+stretch it at the poles, so no caustic map is laid out by them (`Mesh.uv_unwraps`)."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 
+from ...base.errors import UserError
 from .mesh import Mesh
+
+MAX_TRIANGLES = 4_000_000
+"""Of one shape: making twice as many takes more than 2 GiB."""
+
+
+def positive(shape: str, key: str, value: float) -> float:
+    """`value` as a float, finite and greater than zero."""
+    value = float(value)
+    if not (math.isfinite(value) and value > 0.0):
+        raise UserError(f"{shape}: {key} must be a number greater than 0, not {value:g}")
+    return value
+
+
+def in_range(shape: str, key: str, value: float, low: float, high: float) -> float:
+    """`value` as a float, strictly between `low` and `high`."""
+    value = float(value)
+    if not low < value < high:
+        raise UserError(f"{shape}: {key} must lie between {low:g} and {high:g}, not {value:g}")
+    return value
+
+
+def count(shape: str, key: str, value: int, low: int, high: int = MAX_TRIANGLES) -> int:
+    """`value` as an int, from `low` to `high` inclusive."""
+    if int(value) != value or not low <= value <= high:
+        raise UserError(f"{shape}: {key} must be a whole number from {low} to {high}, not {value:g}")
+    return int(value)
 
 
 def with_box_uv(mesh: Mesh) -> Mesh:

@@ -1,4 +1,4 @@
-"""A perfect specular reflector."""
+"""What light does not enter: a perfect mirror, and a perfect absorber."""
 
 from __future__ import annotations
 
@@ -26,3 +26,12 @@ class Mirror(Material):
     def words(self) -> str:
         """With its colour."""
         return f"mirror {colour_words(self.reflectance_rgb)}"
+
+
+@dataclass(frozen=True)
+class Black(Material):
+    """A perfect absorber."""
+
+    kind: ClassVar = "black"
+    title: ClassVar = "Black"
+    gpu_code: ClassVar = 0

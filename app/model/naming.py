@@ -1,0 +1,45 @@
+"""Names in files and in sentences: each given once, a few of many, and what of a file is not shown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+
+class Names(set[str]):
+    """Names that are taken: of a file that repeats a name, later ones are numbered."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._last: dict[str, int] = {}
+
+    def unique(self, name: str) -> str:
+        """`name`, or with the first number from 2 on that is free ("ball 2"); taken from now on."""
+        chosen, number = name, self._last.get(name, 1)
+        while chosen in self:
+            number += 1
+            chosen = f"{name} {number}"
+        # Lower ones stay taken: ten thousand equal names are not searched from the start each time.
+        self._last[name] = number
+        self.add(chosen)
+        return chosen
+
+
+def listed(names: Sequence[str], most: int = 6) -> str:
+    """Names for a sentence, the first `most` of them."""
+    shown = ", ".join(f"'{name}'" for name in names[:most])
+    return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
+
+
+class Unshown:
+    """What of a file's materials is not shown, or was taken for something else: one sentence for each kind of it."""
+
+    def __init__(self) -> None:
+        self._names: dict[str, dict[str, None]] = {}
+
+    def add(self, kind: str, name: str) -> None:
+        """Note `kind`, a sentence up to the names of the materials that it concerns, for one of these."""
+        self._names.setdefault(kind, {})[name] = None
+
+    def notes(self) -> list[str]:
+        """A sentence for each kind, in the order in which they were met."""
+        return [f"{kind}: {listed(list(names))}." for kind, names in self._names.items()]
