@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
-from pathlib import Path
 
 from ..base.errors import UserError
-from ..commands.render import RenderRequest, complete_settings, parse_settings
+from ..commands import options
+from ..commands.render import picture_settings
+from ..commands.table import Render
 from ..model.settings import RenderSettings
 from .scene import Scene
 
@@ -17,31 +17,14 @@ Count = int | float | str
 """A whole number; "4M" is understood as well."""
 
 
-@dataclass(frozen=True)
-class Asked:
-    """Arguments of a rendering; None where nothing was said."""
-
-    size: Size | None = None
-    photons: Count | None = None
-    seconds: float | None = None
-    seed: int | None = None
-    method: str | None = None
-    camera_method: str | None = None
-    layer: str | None = None
-    bins: int | None = None
-    exposure: float | None = None
-    max_depth: int | None = None
-    spp: int | None = None
-    batch: Count | None = None
-
-
-def settings_of(scene: Scene, asked: Asked) -> RenderSettings:
-    """The settings of a rendering of `scene`. Raises `UserError`."""
+def settings_of(scene: Scene, **asked: object) -> RenderSettings:
+    """The settings of a rendering of `scene`; `asked` by the names of `render`'s options, None for what was not said.
+    Raises `UserError`."""
     check_scene(scene)
-    texts = {name: _text(name, value) for name, value in vars(asked).items() if value is not None}
+    texts = {name: _text(name, value) for name, value in asked.items() if value is not None}
     try:
-        parsed = parse_settings(RenderRequest(scene.name, Path(), **texts))  # type: ignore[arg-type]
-        return complete_settings(parsed, scene._model, True)
+        values = options.read(Render, {"scene": scene.name, "output": "", **texts})
+        return picture_settings(values, scene._model, True)
     except UserError as error:
         raise UserError(in_python(str(error))) from None
 

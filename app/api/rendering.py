@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from ..base.errors import UserError
-from .asking import Asked, Count, Size, check_scene, settings_of
+from .asking import Count, Size, check_scene, settings_of
 from .device import Cancel, Device, Progress
 from .picture import CausticMap, Picture, Statistics
 from .scene import Scene
@@ -51,10 +51,21 @@ def render(
     first, *more = _layers(layers)
     settings = settings_of(
         scene,
-        Asked(size, photons, seconds, seed, method, camera_method, first, bins, exposure, max_depth, spp, batch),
+        size=size,
+        photons=photons,
+        seconds=seconds,
+        seed=seed,
+        method=method,
+        camera_method=camera_method,
+        layer=first,
+        bins=bins,
+        exposure=exposure,
+        max_depth=max_depth,
+        spp=spp,
+        batch=batch,
     )
     for layer in more:
-        settings_of(scene, Asked(layer=layer))
+        settings_of(scene, layer=layer)
     model = scene._model
 
     def work(context: Context, report: Callable[[float, str], None], stopped: Callable[[], bool]) -> Picture:
@@ -88,8 +99,9 @@ def caustic(
 
     `size`: about how many texels; the rest as for `render`. Raises `UserError`.
     """
-    asked = Asked(size, photons, seconds, seed, method, bins=bins, max_depth=max_depth)
-    settings = settings_of(scene, asked)
+    settings = settings_of(
+        scene, size=size, photons=photons, seconds=seconds, seed=seed, method=method, bins=bins, max_depth=max_depth
+    )
     model = scene._model
 
     def work(context: Context, report: Callable[[float, str], None], stopped: Callable[[], bool]) -> CausticMap:

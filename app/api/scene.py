@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from ..base.errors import UserError
-from ..commands.options import find_scene
+from ..commands.scenes import find_scene
 from ..model import scene as values_of
 from ..model.geometry.mesh import recipe_of
 from ..model.io.scene_file import Kept, load_scene, read_toml, scene_of

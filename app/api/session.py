@@ -16,7 +16,7 @@ import numpy as np
 from ..base.errors import UserError
 from ..base.not_yet import NotYet
 from ..edit.stored_photons import StoredPhotons
-from .asking import Asked, Count, Size, settings_of
+from .asking import Count, Size, settings_of
 from .device import Cancel, Device, Progress
 from .picture import Picture, Statistics
 from .scene import Scene
@@ -60,7 +60,7 @@ class Session:
     ) -> None:
         """`exact`: trace again after an edit that would be followed to first order only. The rest as for `render`.
         Raises `UserError`, also where there is no OpenGL."""
-        self._settings = settings_of(scene, Asked(size, photons, seed=seed, method=method, spp=spp))
+        self._settings = settings_of(scene, size=size, photons=photons, seed=seed, method=method, spp=spp)
         self._scene = scene.copy()
         self._exact = exact
         self._device: Device | None = Device()

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from ..base.errors import UserError
 from ..edit.parameters import Stage
 from ..model.settings import RenderSettings
-from .asking import Asked, Count, Size, settings_of
+from .asking import Count, Size, settings_of
 from .device import Cancel, Device, Progress
 from .picture import Picture, Statistics
 from .scene import Scene
@@ -62,7 +62,7 @@ def sweep(
     """
     from ..farm.sweep import SweepPlan, check_values, points_of
 
-    settings = settings_of(scene, Asked(size, photons, seed=seed, method=method, bins=bins, spp=spp))
+    settings = settings_of(scene, size=size, photons=photons, seed=seed, method=method, bins=bins, spp=spp)
     if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
         raise UserError(f"workers {workers!r} is no number of processes: give 1 or more")
     model = scene._model

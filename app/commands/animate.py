@@ -2,56 +2,28 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ..base.errors import UserError, plain
+from ..base.errors import UserError
 from ..base.interrupts import interrupt_flag
-from ..base.memory import check_picture_memory
-from ..model.scene import Scene
 from ..model.settings import RenderSettings
-from . import options
+from .opened import note_assumptions, open_scene, settings_for
+from .printing import note
+from .table import Animate
 
 if TYPE_CHECKING:
     from ..edit.animation import Animation
-    from ..edit.opening import Opening
+    from ..edit.parameters import Stage
 
 DEFAULT_FRAMES = 120
-DEFAULT_FPS = 24.0
-MAX_FPS = 240.0
-MAX_FRAMES = 1_000_000
-
-
-@dataclass(frozen=True)
-class AnimateRequest:
-    """The animate command's options as typed; None where the user said nothing."""
-
-    scene: str
-    output: Path
-    turntable: bool = False
-    keys: Path | None = None
-    ranges: tuple[str, ...] = ()
-    frames: str | None = None
-    fps: str | None = None
-    size: str | None = None
-    photons: str | None = None
-    spp: str | None = None
-    exposure: str | None = None
-    seed: str | None = None
-    method: str | None = None
-    camera_method: str | None = None
-    overwrite: bool = False
-    opening: Opening | None = None
-    skip_existing: bool = False
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What a request amounts to."""
+    """What the options amount to."""
 
     animation: Animation
     settings: RenderSettings
@@ -61,44 +33,42 @@ class Plan:
     manifest: Mapping[str, object]
 
 
-def plan_of(request: AnimateRequest) -> Plan:
-    """Everything checked; what was assumed is told. Raises `UserError`."""
+def plan_of(asked: Animate) -> Plan:
+    """Everything checked; what was assumed is noted. Raises `UserError`."""
     from ..base.movie import FILM_SUFFIXES
     from ..edit.parameters import Stage
     from ..render.animate import description
 
-    frames, only = _parse_frames(request.frames)
-    if request.skip_existing and request.overwrite:
+    if asked.skip_existing and asked.overwrite:
         raise UserError(
             "--skip-existing and --overwrite exclude each other: keep the frames there are, or replace them"
         )
-    if request.skip_existing and request.output.suffix.lower() in FILM_SUFFIXES:
+    if asked.skip_existing and asked.output.suffix.lower() in FILM_SUFFIXES:
         raise UserError(
-            f"--skip-existing is for a folder of frames: a film ({request.output.suffix}) is written in one go"
+            f"--skip-existing is for a folder of frames: a film ({asked.output.suffix}) is written in one go"
         )
-    fps = DEFAULT_FPS if request.fps is None else _parse_fps(request.fps)
-    scene = options.open_scene(request.scene, request.opening)
-    settings = _settings(request, scene)
-    exposure = scene.render.exposure_ev if request.exposure is None else options.parse_exposure(request.exposure)
-    animation = _animation(request, Stage(scene, scene.camera, exposure), frames, fps)
-    photons = settings.photons or scene.render.photons
+    scene = open_scene(asked)
+    settings = settings_for(asked, scene)
+    exposure = scene.render.exposure_ev if asked.exposure is None else asked.exposure
+    frames, only = asked.frames
+    animation = _animation(asked, Stage(scene, scene.camera, exposure), frames)
     only = _checked_range(only, len(animation.times_s))
-    for note in scene.notes:
-        print(f"note: {plain(note)}", file=sys.stderr)
-    return Plan(animation, settings, fps, only, description(animation, settings, fps, photons))
+    note_assumptions(scene)
+    photons = settings.photons or scene.render.photons
+    return Plan(animation, settings, asked.fps, only, description(animation, settings, asked.fps, photons))
 
 
-def animate_command(request: AnimateRequest) -> int:
+def animate(asked: Animate) -> int:
     """Render an animation; returns the exit code. Raises `UserError`."""
     from ..base.movie import MANIFEST, open_sink
     from ..base.progress import ProgressReporter
     from ..render.animate import render_animation
     from ..render.notices import FrameNotices
 
-    plan = plan_of(request)
+    plan = plan_of(asked)
     animation, settings, fps, only = plan.animation, plan.settings, plan.fps, plan.only
     scene = animation.start.scene
-    sink = open_sink(request.output, (settings.width, settings.height), fps, plan.manifest, request.overwrite)
+    sink = open_sink(asked.output, (settings.width, settings.height), fps, plan.manifest, asked.overwrite)
 
     from ..gpu.context import create_context
     from ..gpu.shader import keep_programs
@@ -122,12 +92,12 @@ def animate_command(request: AnimateRequest) -> int:
             work.close()
             progress.close()
             for notice in notices.lines(of_frames=count > 1):
-                print(f"note: {plain(notice)}", file=sys.stderr)
+                note(notice)
         stopped = interrupted() and done < 1.0
     written = int(done * count + 1e-6)
     kept = f" ({there} were there)" if there else ""
     early = ", stopped early" if stopped else ""
-    place = request.output.resolve()
+    place = asked.output.resolve()
     if not stopped and written < count:
         early = f"; {count - written} are in the hands of other processes (the same command again sees to them)"
     if stopped and written == 0:
@@ -141,23 +111,6 @@ def animate_command(request: AnimateRequest) -> int:
     return interrupted.exit_code if stopped else 0
 
 
-def _parse_frames(text: str | None) -> tuple[int | None, range | None]:
-    """How many frames in all, and which of them: "240", "101-200" or "101-200/240"."""
-    if text is None:
-        return None, None
-    which, slash, total = text.partition("/")
-    first, dash, last = which.partition("-")
-    if not dash and not slash:
-        return options.parse_integer("--frames", text, 1, MAX_FRAMES), None
-    if not (dash and first.strip() and last.strip()):
-        raise UserError(f"--frames '{text}' is no range: give for example 0-119, or 101-200/240 of 240 in all")
-    begin = options.parse_integer("--frames", first, 0, MAX_FRAMES - 1)
-    end = options.parse_integer("--frames", last, 0, MAX_FRAMES - 1)
-    if end < begin:
-        raise UserError(f"--frames {text} runs backwards: give the lower number first")
-    return options.parse_integer("--frames", total, 1, MAX_FRAMES) if slash else None, range(begin, end + 1)
-
-
 def _checked_range(only: range | None, count: int) -> range:
     """`only`, where the animation has those frames; all without."""
     if only is not None and only.stop > count:
@@ -168,53 +121,24 @@ def _checked_range(only: range | None, count: int) -> range:
     return range(count) if only is None else only
 
 
-def _parse_fps(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 0.1 <= value <= MAX_FPS:
-        raise UserError(f"--fps '{text}' is out of range: give between 0.1 and {MAX_FPS:.0f} frames a second")
-    return value
-
-
-def _settings(request: AnimateRequest, scene: Scene) -> RenderSettings:
-    settings = RenderSettings(width=scene.render.width, height=scene.render.height, max_depth=scene.render.max_depth)
-    if request.size is not None:
-        width, height = options.parse_size(request.size)
-        settings = replace(settings, width=width, height=height)
-    if request.photons is not None:
-        settings = replace(settings, photons=options.parse_photons(request.photons))
-    if request.spp is not None:
-        settings = replace(settings, spp=options.parse_integer("--spp", request.spp, 1, options.MAX_SPP))
-    if request.seed is not None:
-        settings = replace(settings, seed=options.parse_integer("--seed", request.seed, 0, options.MAX_SEED))
-    if request.method is not None:
-        settings = replace(settings, method=options.parse_method(request.method))
-    if request.camera_method is not None:
-        settings = replace(settings, camera_method=options.parse_camera_method(request.camera_method))
-    check_picture_memory(settings.width, settings.height, None)
-    return settings
-
-
-def _animation(request: AnimateRequest, stage, frames: int | None, fps: float):
+def _animation(asked: Animate, stage: Stage, frames: int | None) -> Animation:
     """What the options describe: keys and ranges together, and the turntable with them or alone."""
     from ..edit import animation
 
-    tracks = () if request.keys is None else animation.read_keys(request.keys, stage)
-    if request.ranges:
+    tracks = () if asked.keys is None else animation.read_keys(asked.keys, stage)
+    if asked.ranges:
         last = max((track.times_s[-1] for track in tracks), default=0.0)
-        duration = last or ((frames or DEFAULT_FRAMES) - 1) / fps
-        ranges = tuple(animation.parse_range(text, stage, duration) for text in request.ranges)
+        duration = last or ((frames or DEFAULT_FRAMES) - 1) / asked.fps
+        ranges = tuple(animation.parse_range(text, stage, duration) for text in asked.ranges)
         twice = {track.path for track in tracks} & {track.path for track in ranges}
         if twice or len({track.path for track in ranges}) < len(ranges):
-            path = next(iter(twice), request.ranges[-1].partition("=")[0])
+            path = next(iter(twice), asked.ranges[-1].partition("=")[0])
             raise UserError(f"{path} is given twice: set each parameter once, by --keys or by --set")
         tracks += ranges
     if not tracks:
-        return animation.turntable(stage, frames or DEFAULT_FRAMES, fps)
-    made = animation.keyed(stage, tracks, frames, fps)
-    if not request.turntable:
+        return animation.turntable(stage, frames or DEFAULT_FRAMES, asked.fps)
+    made = animation.keyed(stage, tracks, frames, asked.fps)
+    if not asked.turntable:
         return made
     if animation.ORBIT in {track.path for track in tracks}:
         raise UserError(f"--turntable moves {animation.ORBIT}, which has keys of its own: leave one of them out")

@@ -1,83 +1,102 @@
-"""The bake command: a receiver's caustic map as a texture with its placement."""
+"""The commands that bake a receiver's caustic map: `bake`, to a texture with its placement, and `export`, for the
+programs in which scenes are modelled and played."""
 
 from __future__ import annotations
 
 import sys
 import time
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..base.errors import plain
 from ..base.interrupts import interrupt_flag
-from ..base.memory import check_picture_memory
-from ..model.settings import RenderSettings
-from . import options
+from .opened import note_assumptions, open_scene, settings_for
+from .printing import note
+from .table import Bake, Export
 
 if TYPE_CHECKING:
-    from ..edit.opening import Opening
     from ..model.scene import Scene
+    from ..model.settings import RenderSettings
 
 
-@dataclass(frozen=True)
-class BakeRequest:
-    """The bake command's options as typed; None where the user said nothing."""
-
-    scene: str
-    receiver: str
-    output: Path
-    size: str | None = None
-    photons: str | None = None
-    seed: str | None = None
-    opening: Opening | None = None
-
-
-def map_asked_for(request: BakeRequest, outputs: Iterable[Path]) -> tuple[Scene, RenderSettings]:
-    """The scene whose map is asked for, and how it is rendered. Raises `UserError` for all that can be refused
-    beforehand: numbers, memory, files that cannot be written, the scene, its receiver."""
+def _checked(asked: Bake | Export, outputs: Iterable[Path]) -> tuple[Scene, RenderSettings]:
+    """The scene and how its map is rendered. Raises `UserError` for all that can be refused beforehand: numbers,
+    memory, files that cannot be written, the scene, its receiver."""
     from ..base.atomic import check_writable
     from ..render import bake
 
-    width, height = bake.DEFAULT_SIZE if request.size is None else options.parse_size(request.size)
-    photons = None if request.photons is None else options.parse_photons(request.photons)
-    seed = 1 if request.seed is None else options.parse_integer("--seed", request.seed, 0, options.MAX_SEED)
-    check_picture_memory(width, height, None)
     for path in outputs:
         check_writable(path)
-    scene = options.open_scene(request.scene, request.opening)
-    bake.check_receiver(scene, request.receiver)
-    for note in scene.notes:
-        print(f"note: {plain(note)}", file=sys.stderr)
-    settings = RenderSettings(width=width, height=height, photons=photons, seed=seed, max_depth=scene.render.max_depth)
-    return scene, settings
+    scene = open_scene(asked)
+    bake.check_receiver(scene, asked.receiver)
+    note_assumptions(scene)
+    width, height = bake.DEFAULT_SIZE
+    return scene, settings_for(asked, scene, width=width, height=height)
 
 
-def bake_command(request: BakeRequest) -> int:
+def bake_texture(asked: Bake) -> int:
     """Bake to a file; returns the exit code. Raises `UserError`."""
     from ..base.progress import ProgressReporter
     from ..edit.parameters import Stage
     from ..render import bake
     from ..render.notices import FrameNotices
 
-    bake.check_output(request.output)
-    scene, settings = map_asked_for(request, (request.output, bake.placement_path(request.output)))
+    bake.check_output(asked.output)
+    scene, settings = _checked(asked, (asked.output, bake.placement_path(asked.output)))
 
     from ..gpu.context import create_context
 
     started, notices = time.perf_counter(), FrameNotices()
     with create_context() as context, interrupt_flag() as interrupted, ProgressReporter(scene.name) as progress:
         stage = Stage(scene, scene.camera)
-        for share in bake.bake(context, stage, settings, request.receiver, request.output, notices):
+        for share in bake.bake(context, stage, settings, asked.receiver, asked.output, notices):
             progress(share, "baking")
             if interrupted() and share < 1.0:
                 print("spectrasplat: nothing was written: a map is whole or not at all", file=sys.stderr)
                 return interrupted.exit_code
     for notice in notices.lines():
-        print(f"note: {plain(notice)}", file=sys.stderr)
-    place = request.output.resolve()
+        note(notice)
+    place = asked.output.resolve()
     print(
-        f"{place}: caustic map of '{request.receiver}' in {time.perf_counter() - started:.1f} s; where it lies is in "
+        f"{place}: caustic map of '{asked.receiver}' in {time.perf_counter() - started:.1f} s; where it lies is in "
         f"{bake.placement_path(place).name}"
+    )
+    return 0
+
+
+def export(asked: Export) -> int:
+    """Bake and write; returns the exit code. Raises `UserError`."""
+    from ..base.progress import ProgressReporter
+    from ..edit.parameters import Stage
+    from ..render import bake
+    from ..render.export_caustic import check_export, write_export
+    from ..render.notices import FrameNotices
+
+    outputs = check_export(asked.output, asked.plane, asked.source)
+    scene, settings = _checked(asked, outputs)
+
+    from ..gpu.context import create_context
+
+    started, notices = time.perf_counter(), FrameNotices()
+    with create_context() as context, interrupt_flag() as interrupted, ProgressReporter(scene.name) as progress:
+        steps = bake.bake_map(context, Stage(scene, scene.camera), settings, asked.receiver)
+        while True:
+            try:
+                progress(next(steps), "baking")
+            except StopIteration as finished:
+                baked: bake.BakedMap = finished.value
+                break
+            if interrupted():
+                print("spectrasplat: nothing was written: a map is whole or not at all", file=sys.stderr)
+                return interrupted.exit_code
+    notices.take(baked.notices)
+    for notice in notices.lines():
+        note(notice)
+    rgb, where = baked.picture.rgb, baked.placement
+    write_export(scene, asked.receiver, rgb, where, asked.output, asked.plane, asked.source)
+    names = ", ".join(path.name for path in outputs[1:])
+    print(
+        f"{asked.output.resolve()}: the caustic on '{asked.receiver}' in {time.perf_counter() - started:.1f} s; "
+        f"beside it {names}"
     )
     return 0

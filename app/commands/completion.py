@@ -11,7 +11,7 @@ import typer
 from ..base.errors import UserError
 from ..base.paths import shipped_scenes
 from ..model.settings import CAMERA_METHODS, METHODS
-from . import options
+from .scenes import find_scene, receivers_of
 
 
 def lessons() -> list[str]:
@@ -33,7 +33,7 @@ def receivers(ctx: typer.Context) -> list[str]:
     # Where the option to complete lacks its value, click keeps the arguments apart.
     scene = ctx.params.get("scene") or next(iter(ctx.args), "")
     try:
-        return options.receivers_of(load_scene(options.find_scene(scene)))
+        return receivers_of(load_scene(find_scene(scene)))
     except (UserError, OSError):
         return []
 

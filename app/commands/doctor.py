@@ -17,6 +17,7 @@ from ..base.errors import UserError
 from ..base.paths import assets_dir, cache_dir, shaders_dir
 from ..gpu import context as gpu
 from ..gpu.limits import BRUSH_STORAGE_BLOCKS, NEEDED, Limits
+from .table import Doctor
 
 PACKAGE = "spectrasplat"
 PYTHON = (3, 11)
@@ -49,6 +50,13 @@ class Check:
     def usable(self) -> bool:
         """Whether SpectraSplat can work in spite of it."""
         return self.state != "missing"
+
+
+def doctor(asked: Doctor) -> int:
+    """Print the findings; returns 2 where something that is needed is missing."""
+    checks = examine()
+    print(report(checks))
+    return 0 if all(check.usable for check in checks) else 2
 
 
 def examine() -> list[Check]:

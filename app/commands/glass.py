@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
-
 from ..base.errors import UserError
 from ..model.optics.catalogue import Entry, is_guess, search, search_key
 from .glass_report import describe, list_glasses, plot
+from .printing import show
+from .table import Glass
 
 MAX_PLOTTED = 6
 """Curves that can be distinguished in one plot."""
 
 
-def glass_command(query: str | None, plot_file: Path | None, show: Callable[[object], None]) -> None:
-    """Answer `query` through `show`; write `plot_file` when given. Raises `UserError`."""
-    hits = _hits(query or "")
+def glass(asked: Glass) -> int:
+    """Show what a query finds, and plot it where that is asked for. Raises `UserError`."""
+    hits, plot_file = _hits(asked.query), asked.plot
     if plot_file is not None and len(hits) > MAX_PLOTTED:
         raise UserError(
             f"--plot shows at most {MAX_PLOTTED} glasses and {len(hits)} match: give more of the name, for example "
@@ -23,14 +22,15 @@ def glass_command(query: str | None, plot_file: Path | None, show: Callable[[obj
         )
     if plot_file is not None:
         plot(hits, plot_file)  # first, so that a refused file name is all that is said
-    if hits and is_guess(query or ""):
-        show(f"Nothing in the catalogue is called '{query}'. A guess by its letters:")
+    if hits and is_guess(asked.query):
+        show(f"Nothing in the catalogue is called '{asked.query}'. A guess by its letters:")
     if len(hits) == 1:
         show(describe(hits[0]))
     else:
-        show(list_glasses(query or ""))
+        show(list_glasses(asked.query))
     if plot_file is not None:
         show(f"plot: {plot_file.resolve()}")
+    return 0
 
 
 def _hits(query: str) -> list[Entry]:

@@ -10,12 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..model.scene import (
-    Camera,
-    Light,
-    Scene,
-    SceneObject,
-)
+from ..model.scene import Camera, Light, Scene, SceneObject
+from .printing import show
+from .scenes import find_scene
+from .table import Inspect
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -23,6 +21,15 @@ if TYPE_CHECKING:
 
     from ..features.features import Features
     from ..model.optics.glass import Dispersion
+
+
+def inspect(asked: Inspect) -> int:
+    """Show a scene, or its programs. Raises `UserError`."""
+    from ..model.io.scene_file import load_scene
+    from .inspect_programs import programs_text
+
+    show((programs_text if asked.programs else inspect_text)(load_scene(find_scene(asked.scene))))
+    return 0
 
 
 def inspect_text(scene: Scene) -> RenderableType:

@@ -2,58 +2,45 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections import Counter
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..base.errors import UserError, plain
+from ..base.errors import UserError
 from ..base.interrupts import interrupt_flag
-from . import options
+from .printing import note
+from .scenes import find_scene
+from .table import Merge
 
 if TYPE_CHECKING:
     from ..render.parts import PartHeader
 
 
-@dataclass(frozen=True)
-class MergeRequest:
-    """The merge command's options as typed; None where the user said nothing."""
-
-    parts: tuple[Path, ...]
-    output: Path
-    scene: str | None = None
-    exposure: str | None = None
-    partial: bool = False
-    stats: bool = False
-
-
-def merge_command(request: MergeRequest) -> int:
+def merge(asked: Merge) -> int:
     """Merge to a picture file; returns the exit code. Raises `UserError`."""
     from ..base.atomic import check_writable
     from ..base.image_io import check_suffix, write_image
     from ..base.progress import ProgressReporter
 
-    if request.output.suffix.lower() == ".ssp":
-        return _merge_to_part(request)
-    check_suffix(request.output)
-    exposure = None if request.exposure is None else options.parse_exposure(request.exposure)
-    check_writable(request.output)
+    if asked.output.suffix.lower() == ".ssp":
+        return _merge_to_part(asked)
+    check_suffix(asked.output)
+    check_writable(asked.output)
 
     from ..model.io.scene_file import load_scene
     from ..render.part_file import merged_sums
     from ..render.parts import check_maps, merged_light, rendering_key, settings_of
     from ..render.still import render
 
-    headers = _headers(request)
-    chosen = _chosen(headers, request.partial)
+    headers = _headers(asked)
+    chosen = _chosen(headers, asked.partial)
     first = headers[chosen[0]]
     settings = settings_of(first)
-    scene = load_scene(options.find_scene(request.scene or first.scene))
+    scene = load_scene(find_scene(asked.scene or first.scene))
     if rendering_key(scene, settings) != first.key:
         raise UserError(
-            f"{request.scene or first.scene} is not as it was when {chosen[0]} was traced (or this is another version "
+            f"{asked.scene or first.scene} is not as it was when {chosen[0]} was traced (or this is another version "
             "of the program): give the scene that was rendered with --scene, or trace all parts again"
         )
 
@@ -67,54 +54,54 @@ def merge_command(request: MergeRequest) -> int:
         result = render(scene, settings, progress, interrupted, fill=fill)
         stopped = interrupted()
     for notice in result.stats.notices:
-        print(f"note: {plain(notice)}", file=sys.stderr)
+        note(notice)
     write_image(
-        request.output,
+        asked.output,
         result.rgb,
-        exposure_ev=scene.render.exposure_ev if exposure is None else exposure,
+        exposure_ev=scene.render.exposure_ev if asked.exposure is None else asked.exposure,
         glare=scene.render.glare,
         antialias=scene.render.antialias_highlights,
         spectral=result.spectral,
         bin_edges_nm=result.bin_edges_nm,
     )
     print(
-        f"{request.output.resolve()}: {settings.width}×{settings.height}, "
+        f"{asked.output.resolve()}: {settings.width}×{settings.height}, "
         f"{sum(len(headers[path].indices) for path in chosen)} of {first.share.count} parts, "
         f"{result.stats.photons:,} photons in {time.perf_counter() - started:.1f} s"
         + (", stopped early" if stopped else "")
     )
-    if request.stats:
+    if asked.stats:
         print("\n".join(result.stats.lines()))
     return interrupted.exit_code if stopped else 0
 
 
-def _merge_to_part(request: MergeRequest) -> int:
+def _merge_to_part(asked: Merge) -> int:
     """Merge to one part that holds them all: what many machines trace is then merged in a tree."""
     from ..base.atomic import check_writable
     from ..render.part_file import merged_sums, write_part
     from ..render.parts import Part, merged_header
 
-    for option, value in (("--exposure", request.exposure), ("--scene", request.scene)):
+    for option, value in (("--exposure", asked.exposure), ("--scene", asked.scene)):
         if value is not None:
-            print(f"note: {option} does not change a part; give it when the picture is made", file=sys.stderr)
-    check_writable(request.output)
-    started, headers = time.perf_counter(), _headers(request)
+            note(f"{option} does not change a part; give it when the picture is made")
+    check_writable(asked.output)
+    started, headers = time.perf_counter(), _headers(asked)
     chosen = _chosen(headers, partial=None)
     header = merged_header([headers[path] for path in chosen])
-    write_part(request.output, Part(header, list(merged_sums(chosen, header))))
+    write_part(asked.output, Part(header, list(merged_sums(chosen, header))))
     print(
-        f"{request.output.resolve()}: {len(header.indices)} of {header.share.count} parts in one, in "
-        f"{time.perf_counter() - started:.1f} s, {request.output.stat().st_size / 1e6:.1f} MB"
+        f"{asked.output.resolve()}: {len(header.indices)} of {header.share.count} parts in one, in "
+        f"{time.perf_counter() - started:.1f} s, {asked.output.stat().st_size / 1e6:.1f} MB"
     )
     return 0
 
 
-def _headers(request: MergeRequest) -> dict[Path, PartHeader]:
+def _headers(asked: Merge) -> dict[Path, PartHeader]:
     """Of all files that are given, each once. Raises `UserError`."""
     from ..render.part_file import SUFFIX, read_header
 
     paths: list[Path] = []
-    for path in request.parts:
+    for path in asked.parts:
         inside = sorted(path.glob(f"*{SUFFIX}")) if path.is_dir() else [path]
         if not inside:
             raise UserError(
@@ -123,7 +110,7 @@ def _headers(request: MergeRequest) -> dict[Path, PartHeader]:
         paths += inside
     for path, times in Counter(paths).items():
         if times > 1:
-            print(f"note: {plain(str(path))} is given {times} times: counted once", file=sys.stderr)
+            note(f"{path} is given {times} times: counted once")
     return {path: read_header(path) for path in paths}
 
 
@@ -154,7 +141,7 @@ def _chosen(headers: dict[Path, PartHeader], partial: bool | None) -> list[Path]
             found |= dict.fromkeys(header.indices, path)
         elif len(again) == len(header.indices):
             told = f"{path} is part {_listed(again)} again, as {found[again[0]]}"
-            print(f"note: {plain(told)}: counted once", file=sys.stderr)
+            note(f"{told}: counted once")
         else:
             raise UserError(
                 f"{path} holds part {_listed(again)}, as {found[again[0]]} does, and others besides: it cannot be "
@@ -165,7 +152,7 @@ def _chosen(headers: dict[Path, PartHeader], partial: bool | None) -> list[Path]
         words = f"of {first.share.count} parts {len(missing)} are missing: {_listed(missing)}"
         if not partial:
             raise UserError(f"{words}; trace them, or merge what there is with --partial, which is noisier")
-        print(f"note: {words}", file=sys.stderr)
+        note(words)
     return list(dict.fromkeys(found[index] for index in sorted(found)))
 
 

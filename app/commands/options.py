@@ -1,29 +1,27 @@
-"""Command line values checked by hand, so that each mistake gets one sentence with a way out.
+"""What an option of the command line is: its help, how its text becomes a value, and what that value sets.
 
-The options arrive as strings: click's own conversions would say less and differ between
-versions. Every function raises `UserError`.
+The commands' options are the fields of the classes in `table`. Texts are read by the functions below, not by click,
+whose own conversions say less and differ between versions: every mistake is one sentence with a way out.
 """
 
 from __future__ import annotations
 
+import inspect
 import math
-import os
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import MISSING, dataclass, field
+from dataclasses import fields as dataclass_fields
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Annotated, Any, TypeVar, get_args, get_type_hints
 
-from ..base import files
-from ..base.errors import UserError, nearest_names, suggestion
+import typer
+
+from ..base.errors import UserError, suggestion
 from ..base.memory import MAX_SIDE_PX, memory_bytes
-from ..base.paths import SCENE_SUFFIXES, shipped_scenes
-from ..model.scene import Scene
-from ..model.scene_camera import FOCUS_DISTANCE, LENS_RADIUS
-from ..model.scene_render import HAZE, HAZE_ANISOTROPY, MAX_ANISOTROPY, MAX_BOUNCES, MAX_GLARE, MAX_HAZE
-from ..model.settings import CAMERA_METHODS, METHODS
 
-if TYPE_CHECKING:
-    from ..edit.opening import Opening
+Parse = Callable[[str, str], Any]
+"""Reads a text: its arguments are the option's flag, for the sentence of a mistake, and the text."""
+Values = TypeVar("Values")
 
 MAX_PHOTONS = 10**12
 MAX_SEED = 2**32 - 1
@@ -32,43 +30,211 @@ MIN_BINS, MAX_BINS = 4, 32
 MAX_DEPTH = 4096
 MAX_SPP = 4096
 MAX_PARTS = 100_000
-MAX_EXPOSURE_EV = 64.0
+MAX_FRAMES = 1_000_000
 _MULTIPLES = {"k": 10**3, "m": 10**6, "g": 10**9}
 _BYTES_PER_PHOTON = 256
 """A photon record with several spectral columns, rounded up."""
 
 
-def parse_size(text: str) -> tuple[int, int]:
+@dataclass(frozen=True)
+class Option:
+    """How a field of a command's class is given on the command line: a `bool` by its flag alone, all else by a text."""
+
+    metavar: str | None
+    help: str
+    parse: Parse | None = None
+    """None: the text itself."""
+    flags: tuple[str, ...] = ()
+    """Default: the field's name after two hyphens."""
+    sets: str = ""
+    """Whose fields it sets: "settings" (how a picture is rendered or measured), "render" (the scene's own defaults) or
+    "camera" (the scene's); "" where the command uses the value itself."""
+    fields: tuple[str, ...] = ()
+    """What those fields are called, where not as the option; a value for several is a tuple."""
+    complete: Callable[..., list[str]] | None = None
+    """What a shell offers for it."""
+    repeated: bool = False
+    """Whether it may be given several times: its value is then the tuple of what is read from each text."""
+    is_argument: bool = False
+    """Whether it is given by its place instead of a flag."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """An option of one command."""
+
+    name: str
+    option: Option
+    type: Any
+    default: Any
+    """`MISSING` where it is required."""
+
+    @property
+    def flag(self) -> str:
+        """What it is called in sentences."""
+        return next((flag for flag in self.option.flags if flag.startswith("--")), f"--{self.name.replace('_', '-')}")
+
+    def parameter(self) -> inspect.Parameter:
+        """The same in typer's terms."""
+        option, is_required = self.option, self.default is MISSING
+        more: dict[str, Any] = {"metavar": option.metavar, "help": option.help, "autocompletion": option.complete}
+        if option.is_argument:
+            how = typer.Argument(**more)
+        else:
+            how = typer.Option(*(option.flags or (self.flag,)), **more)
+        base: Any = Path if Path in (self.type, *get_args(self.type)) else str
+        default: Any = None if base is str else self.default
+        if self.is_switch:
+            base, default = self.type, self.default
+        elif option.repeated:
+            base, default = list[base], None
+        annotation = base if is_required or base is bool else base | None
+        default = inspect.Parameter.empty if is_required else default
+        return inspect.Parameter(
+            self.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[annotation, how]
+        )
+
+    @property
+    def is_switch(self) -> bool:
+        """Whether it takes no text."""
+        return self.type in (bool, bool | None)
+
+    def value(self, given: Any) -> Any:
+        """What is meant by what typer gives. Raises `UserError`."""
+        parse = self.option.parse
+        if self.option.repeated:
+            return tuple(given if parse is None else (parse(self.flag, text) for text in given))
+        return given if parse is None else parse(self.flag, given)
+
+
+def shared(one: Option, default: Any = None) -> Any:
+    """A field of a command's class; `default` `MISSING` for what must be given."""
+    return field(default=default, metadata={Option: one})
+
+
+def option(
+    metavar: str | None,
+    help: str,
+    parse: Parse | None = None,
+    *,
+    flags: tuple[str, ...] = (),
+    sets: str = "",
+    fields: tuple[str, ...] = (),
+    complete: Callable[..., list[str]] | None = None,
+    repeated: bool = False,
+    default: Any = None,
+) -> Any:
+    """A field of a command's class: see `Option`; `default` `MISSING` for what must be given."""
+    return shared(Option(metavar, help, parse, flags, sets, fields, complete, repeated), default)
+
+
+def setting(metavar: str, help: str, parse: Parse | None = None, **more: Any) -> Any:
+    """An option that sets a field of `RenderSettings`, or of a bench's settings."""
+    return option(metavar, help, parse, sets="settings", **more)
+
+
+def switch(help: str, *, flags: tuple[str, ...] = (), sets: str = "", default: bool | None = False) -> Any:
+    """An option without a text; `default` None: with a flag for each of yes and no."""
+    return option(None, help, flags=flags, sets=sets, default=default)
+
+
+def target(metavar: str, help: str, default: Any = MISSING) -> Any:
+    """Where the command writes."""
+    return option(metavar, help, flags=("-o", "--output"), default=default)
+
+
+def argument(
+    metavar: str,
+    help: str,
+    *,
+    complete: Callable[..., list[str]] | None = None,
+    repeated: bool = False,
+    default: Any = MISSING,
+) -> Any:
+    """A value that is given by its place."""
+    return shared(Option(metavar, help, complete=complete, repeated=repeated, is_argument=True), default)
+
+
+def rows(command: type) -> tuple[Row, ...]:
+    """The arguments and options of a command's class, without those in its `without`; of the options its own come
+    first, then those of the classes it extends."""
+    hints, known = get_type_hints(command), {each.name: each for each in dataclass_fields(command)}
+    names = dict.fromkeys(name for each in command.__mro__ for name in inspect.get_annotations(each) if name in known)
+    found = [Row(name, known[name].metadata[Option], hints[name], known[name].default) for name in names]
+    arguments = [row for row in found if row.option.is_argument]
+    arguments.sort(key=lambda row: [*known].index(row.name))
+    left = [row for row in found if not row.option.is_argument]
+    return tuple(row for row in arguments + left if row.name not in getattr(command, "without", ()))
+
+
+def read(command: type[Values], given: Mapping[str, Any]) -> Values:
+    """A command's values, from what was given by the names of its options. Raises `UserError`."""
+    texts = {name: value for name, value in given.items() if value not in (None, [])}
+    return command(**{row.name: row.value(texts[row.name]) for row in rows(command) if row.name in texts})
+
+
+def given_for(place: str, values: Any) -> dict[str, Any]:
+    """What the values of a command set in `place` (`Option.sets`), by the names of the fields there; without what was
+    not given."""
+    found: dict[str, Any] = {}
+    for row in rows(type(values)):
+        value = getattr(values, row.name)
+        if row.option.sets == place and value is not None:
+            names = row.option.fields or (row.name,)
+            found |= zip(names, value if len(names) > 1 else (value,), strict=True)
+    return found
+
+
+def words(values: Any, leave_out: Sequence[str]) -> list[str]:
+    """Options as they could be typed, without those left at their defaults and those named in `leave_out`."""
+    found: list[str] = []
+    for row in rows(type(values)):
+        value = getattr(values, row.name)
+        if row.name not in leave_out and value != row.default:
+            found += [row.flag] if value is True else [row.flag, _text_of(value)]
+    return found
+
+
+def _text_of(value: Any) -> str:
+    if isinstance(value, tuple):
+        return ("," if isinstance(value[0], str) else "x").join(map(str, value))
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+# ---- how texts are read: each function raises `UserError` -------------------------------------
+
+
+def size(flag: str, text: str) -> tuple[int, int]:
     """ "960x540" (or with ×, X) as (width, height) in pixels."""
     parts = text.strip().lower().replace("×", "x").split("x")
     if len(parts) != 2 or not all(_is_integer(part) for part in parts):
-        raise UserError(f"--size '{text}' is not WIDTHxHEIGHT, for example --size 960x540")
+        raise UserError(f"{flag} '{text}' is not WIDTHxHEIGHT, for example {flag} 960x540")
     width, height = int(parts[0]), int(parts[1])
     if width < 1 or height < 1:
-        raise UserError(f"--size {text} holds no pixel: both sides must be at least 1")
+        raise UserError(f"{flag} {text} holds no pixel: both sides must be at least 1")
     if width > MAX_SIDE_PX or height > MAX_SIDE_PX:
-        raise UserError(f"--size {text} is too large: no side may exceed {MAX_SIDE_PX} pixels")
+        raise UserError(f"{flag} {text} is too large: no side may exceed {MAX_SIDE_PX} pixels")
     return width, height
 
 
-def parse_photons(text: str) -> int:
+def photons(flag: str, text: str) -> int:
     """A count of photons; "2M", "500k" and "1e6" are understood."""
-    count = _count("--photons", text)
+    count = _count(flag, text)
     if count > MAX_PHOTONS:
-        raise UserError(f"--photons {text} is beyond what can be counted: give at most {MAX_PHOTONS:.0e}")
+        raise UserError(f"{flag} {text} is beyond what can be counted: give at most {MAX_PHOTONS:.0e}")
     return count
 
 
-def parse_batch(text: str) -> int:
+def batch(flag: str, text: str) -> int:
     """Photons in flight at once; their records must fit into memory."""
-    count = _count("--batch", text)
+    count = _count(flag, text)
     limit = memory_bytes() // _BYTES_PER_PHOTON
     if count > limit:
-        raise UserError(f"--batch {text} is beyond this machine's memory: give at most {limit}")
+        raise UserError(f"{flag} {text} is beyond this machine's memory: give at most {limit}")
     return count
 
 
-def _count(option: str, text: str) -> int:
+def _count(flag: str, text: str) -> int:
     stripped = text.strip().lower().replace("_", "").replace(",", "")
     multiple = _MULTIPLES.get(stripped[-1:], 1)
     try:
@@ -76,210 +242,103 @@ def _count(option: str, text: str) -> int:
     except ValueError:
         value = math.nan
     if math.isnan(value) or (math.isfinite(value) and not value.is_integer()):
-        raise UserError(f"{option} '{text}' is not a whole number: give for example 1000000, 1e6 or 1M")
+        raise UserError(f"{flag} '{text}' is not a whole number: give for example 1000000, 1e6 or 1M")
     if value < 1:
-        raise UserError(f"{option} {text} is too few: give at least 1")
+        raise UserError(f"{flag} {text} is too few: give at least 1")
     if value > 10**18:
-        raise UserError(f"{option} {text} is beyond what memory can hold: give at most {MAX_PHOTONS:.0e}")
+        raise UserError(f"{flag} {text} is beyond what memory can hold: give at most {MAX_PHOTONS:.0e}")
     return int(value)
 
 
-def parse_seconds(text: str) -> float:
-    """A time budget in seconds."""
-    value = _number("--seconds", text, "for example 10")
-    if not 0.0 < value <= MAX_SECONDS:
-        raise UserError(f"--seconds {text} is out of range: give more than 0 and at most {MAX_SECONDS:.0f}")
-    return value
+def integer(low: int, high: int) -> Parse:
+    """A whole number in [low, high]."""
+
+    def parse(flag: str, text: str) -> int:
+        if not _is_integer(text.strip()):
+            raise UserError(f"{flag} '{text}' is not a whole number, give between {low} and {high}")
+        value = int(text)
+        if not low <= value <= high:
+            raise UserError(f"{flag} {text} is out of range: give between {low} and {high}")
+        return value
+
+    return parse
 
 
-def parse_exposure(text: str) -> float:
-    """Stops."""
-    value = _number("--exposure", text, "in stops, for example -1.5")
-    if not abs(value) <= MAX_EXPOSURE_EV:
-        raise UserError(
-            f"--exposure {text} is out of range: give between -{MAX_EXPOSURE_EV:.0f} and {MAX_EXPOSURE_EV:.0f} stops"
-        )
-    return value
+def number(holds: Callable[[float], bool], range_words: str, example: str) -> Parse:
+    """A number for which `holds`; `range_words` says which those are."""
+
+    def parse(flag: str, text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if math.isnan(value):
+            raise UserError(f"{flag} '{text}' is not a number, give one{example}")
+        if not holds(value):
+            raise UserError(f"{flag} {text} is out of range: give {range_words}")
+        return value
+
+    return parse
 
 
-def parse_glare(text: str) -> float:
-    """A share."""
-    value = _number("--glare", text, "a share, for example 0.03")
-    if not 0.0 <= value <= MAX_GLARE:
-        raise UserError(f"--glare {text} is out of range: give a share of 0 to {MAX_GLARE:g}")
-    return value
+def seconds(longest: float = MAX_SECONDS) -> Parse:
+    """A time in seconds."""
+    return number(lambda value: 0.0 < value <= longest, f"more than 0 and at most {longest:.0f}", ", for example 3")
 
 
-def parse_bounces(text: str) -> int:
-    """How often light goes on from one diffuse surface to another."""
-    return parse_integer("--bounces", text, 0, MAX_BOUNCES)
+def one_of(*known: str) -> Parse:
+    """One of these words."""
 
-
-def parse_haze(text: str) -> float:
-    """Scattering coefficient of the haze round all objects, 1/scene unit."""
-    value = _number("--haze", text, "per scene unit, for example 0.03")
-    if not HAZE.holds(value):
-        raise UserError(f"--haze {text} is out of range: give 0 (clear air) to {MAX_HAZE:g} per scene unit")
-    return value
-
-
-def parse_haze_anisotropy(text: str) -> float:
-    """Mean cosine of the angle by which haze scatters."""
-    value = _number("--haze-anisotropy", text, "between -0.99 and 0.99, for example 0.3")
-    if not HAZE_ANISOTROPY.holds(value):
-        raise UserError(f"--haze-anisotropy {text} is out of range: give -{MAX_ANISOTROPY:g} to {MAX_ANISOTROPY:g}")
-    return value
-
-
-def with_lens(scene: Scene, radius: str | None, distance: str | None) -> Scene:
-    """The scene with another lens on its camera; None: its own."""
-    lens: dict[str, float] = {}
-    for option, text, field in (("--lens-radius", radius, LENS_RADIUS), ("--focus-distance", distance, FOCUS_DISTANCE)):
-        if text is None:
-            continue
-        value = _number(option, text, "a length in the scene's unit, for example 0.05")
-        if not field.holds(value):
-            least = "0 or more" if field is LENS_RADIUS else "more than 0"
-            raise UserError(f"{option} {text} is out of range: give {least} and up to {field.at_most:g}")
-        lens[field.attribute] = value
-    camera = replace(scene.camera, **lens)  # type: ignore[arg-type]
-    if distance is not None and camera.lens_radius == 0.0:
-        raise UserError("--focus-distance changes nothing where the lens has no radius: give --lens-radius as well")
-    return replace(scene, camera=camera)
-
-
-def parse_integer(option: str, text: str, low: int, high: int) -> int:
-    """A whole number in [low, high] for `option`."""
-    if not _is_integer(text.strip()):
-        raise UserError(f"{option} '{text}' is not a whole number, give between {low} and {high}")
-    value = int(text)
-    if not low <= value <= high:
-        raise UserError(f"{option} {text} is out of range: give between {low} and {high}")
-    return value
-
-
-def _one_of(option: str, text: str, known: Sequence[str]) -> str:
-    if text not in known:
-        raise UserError(f"{option} '{text}' is unknown{suggestion(text, known) or ','} known are {', '.join(known)}")
-    return text
-
-
-def parse_method(text: str) -> str:
-    """One of the sampling methods."""
-    return _one_of("--method", text, METHODS)
-
-
-def parse_reference(text: str) -> str:
-    """What a reference meets, one of `REFERENCES`."""
-    from ..bench.results import REFERENCES
-
-    return _one_of("--reference", text, REFERENCES)
-
-
-def parse_camera_method(text: str) -> str:
-    """One of those that camera rays may follow."""
-    return _one_of("--camera-method", text, CAMERA_METHODS)
-
-
-def check_layer(text: str, scene: Scene) -> str:
-    """ "beauty", "caustic" or "map:RECEIVER" with a diffuse object of `scene`."""
-    if text in ("beauty", "caustic"):
+    def parse(flag: str, text: str) -> str:
+        if text not in known:
+            raise UserError(f"{flag} '{text}' is unknown{suggestion(text, known) or ','} known are {', '.join(known)}")
         return text
-    receivers = receivers_of(scene)
-    kind, _, name = text.partition(":")
-    if kind != "map":
-        hint = suggestion(text, ("beauty", "caustic", "map"))
-        raise UserError(f"--layer '{text}' is unknown{hint or ','} known are beauty, caustic and map:RECEIVER")
-    if name not in receivers:
-        listed = ", ".join(f"'map:{receiver}'" for receiver in receivers) or "none, for nothing in it is diffuse"
-        raise UserError(f"--layer '{text}' names no receiver of scene '{scene.name}'; it has {listed}")
-    return text
+
+    return parse
 
 
-def receivers_of(scene: Scene) -> list[str]:
-    """Names of the diffuse objects, in the scene's order."""
-    return list(dict.fromkeys(item.name for item in scene.objects if item.material.receives))
+def names(flag: str, text: str) -> tuple[str, ...]:
+    """Words with commas between."""
+    return tuple(dict.fromkeys(part.strip() for part in text.split(",")))
 
 
-def parse_opening(
-    up: str | None, glass: Sequence[str] | None, environment: str | None, smooth: bool | None = None
-) -> Opening | None:
-    """Which axis of a file is up, glasses as "GLASS" or "OBJECT=GLASS", what lies behind it, and whether its meshes are
-    round. An object's name may hold "=": the last one counts. None where nothing is asked for."""
-    if up is None and not glass and environment is None and smooth is None:
-        return None
-    from ..edit.opening import SKY, STUDIO, Opening
-    from ..model.staging import UP_AXES, Staging
-
-    axis = next((each for each in UP_AXES if each == up), None)
-    if up is not None and axis is None:
-        raise UserError(f"--up '{up}' is no axis that can be up: give y or z")
-    pairs = []
-    for text in glass or ():
-        name, equals, kind = text.rpartition("=")
-        if not kind or (equals and not name):
-            raise UserError(f"--glass '{text}' names no glass: give --glass diamond, or --glass OBJECT=N-SF11")
-        pairs.append((name if equals else None, kind))
-    if environment is not None and environment not in (STUDIO, SKY):
-        path = Path(environment).expanduser()
-        if not files.is_file(path):
-            raise UserError(f"--environment '{environment}' is neither studio nor sky nor a file; check the path")
-    return Opening(Staging(axis, tuple(pairs), smooth), environment)
-
-
-def open_scene(text: str, opening: Opening | None) -> Scene:
-    """The scene given by path or bare name, as wished."""
-    path = find_scene(text)
-    if opening is None:
-        from ..model.io.scene_file import load_scene
-
-        return load_scene(path)
-    from ..edit.opening import open_scene as opened
-
-    return opened(path, opening)
-
-
-def find_scene(text: str) -> Path:
-    """The file of a scene given by path, or by the bare name of a shipped one."""
-    path = Path(text)
-    if files.is_file(path):
-        return path
-    if os.path.isdir(path):
-        raise UserError(f"scene {text} is a folder: give a scene file in it")
-    shipped = shipped_scenes()
-    if text in shipped:
-        return shipped[text]
-    if os.path.exists(path):
-        raise UserError(f"scene {text} is a device or a pipe: give an ordinary file")
-    if os.sep in text or path.suffix:
-        near = nearest_names(path.name, _files_beside(path))
-        hint = f", did you mean '{path.with_name(near[0])}'?" if near else ""
-        if not hint and path.stem in shipped:
-            hint = f", did you mean the shipped scene '{path.stem}'?"
-        raise UserError(f"scene file {text} does not exist{hint or ': check the path'}")
-    hint = suggestion(text, shipped)
-    names = ", ".join(shipped) or "none"
-    raise UserError(f"scene '{text}' is neither a file nor shipped{hint or ','} shipped are {names}")
-
-
-def _files_beside(path: Path) -> list[str]:
+def place(flag: str, text: str) -> tuple[float, float, float]:
+    """ "1,2,3" as a place."""
     try:
-        return [entry.name for entry in path.parent.iterdir() if entry.suffix.lower() in SCENE_SUFFIXES]
-    except OSError:
-        return []
+        x, y, z = (float(part) for part in text.split(","))
+    except ValueError:
+        raise UserError(f"{flag} '{text}' is no place: give three numbers, for example {flag} 0,-2,5") from None
+    if not all(map(math.isfinite, (x, y, z))):
+        raise UserError(f"{flag} '{text}' is no place: its numbers must be finite")
+    return x, y, z
+
+
+def frames(flag: str, text: str) -> tuple[int | None, range | None]:
+    """How many frames in all, and which of them: "240", "101-200" or "101-200/240"."""
+    which, slash, total = text.partition("/")
+    first, dash, last = which.partition("-")
+    if not dash and not slash:
+        return integer(1, MAX_FRAMES)(flag, text), None
+    if not (dash and first.strip() and last.strip()):
+        raise UserError(f"{flag} '{text}' is no range: give for example 0-119, or 101-200/240 of 240 in all")
+    begin, end = (integer(0, MAX_FRAMES - 1)(flag, each) for each in (first, last))
+    if end < begin:
+        raise UserError(f"{flag} {text} runs backwards: give the lower number first")
+    return integer(1, MAX_FRAMES)(flag, total) if slash else None, range(begin, end + 1)
+
+
+def share(flag: str, text: str) -> tuple[int, int]:
+    """ "1/8" as the index and the number of parts."""
+    parts = text.split("/")
+    if len(parts) != 2 or not all(part.isascii() and part.isdigit() and len(part) < 8 for part in parts):
+        raise UserError(f"{flag} '{text}' is no part: give which of how many, for example 1/8")
+    index, count = map(int, parts)
+    if not 1 <= index <= count <= MAX_PARTS:
+        raise UserError(f"{flag} {text} is out of range: give 1/N to N/N, N at most {MAX_PARTS}")
+    return index, count
 
 
 def _is_integer(text: str) -> bool:
     """ASCII digits with an optional sign, of a length that int() takes gladly."""
     digits = text.removeprefix("-").removeprefix("+")
     return digits.isascii() and digits.isdigit() and len(digits) <= 18
-
-
-def _number(option: str, text: str, example: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if math.isnan(value):
-        raise UserError(f"{option} '{text}' is not a number, give one {example}")
-    return value

@@ -1,16 +1,22 @@
-"""What commands print: text as it is, and tables."""
+"""What commands print: text as it is, tables, and notes."""
 
 from __future__ import annotations
 
+import sys
 from typing import TYPE_CHECKING, Any
 
-from ..base.errors import visible
+from ..base.errors import plain, visible
 
 if TYPE_CHECKING:
     from rich.text import Text as RichText
 
 PIPE_WIDTH = 200
 """Columns where no terminal sets a limit: tables are then not cut."""
+
+
+def note(sentence: str) -> None:
+    """Report on stderr what was assumed or met."""
+    print(f"note: {plain(sentence)}", file=sys.stderr)
 
 
 def show(content: object) -> None:

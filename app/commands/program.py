@@ -1,25 +1,49 @@
-"""The command line: what the commands are called and which options they take.
+"""The command line: what the commands are called and which function each of them runs.
 
-Options arrive as text and are checked in `options`; the work is in the modules that each
-command imports when it runs, so that `--help` and small commands start at once. Commands that
-make pictures are in `picture_program`, those about a scene in `scene_program`, those that measure
-in `measure_program`, those that spread over machines in `farm_program`.
+Their options are in `table` and `measuring_table`. A command's module is imported when it runs, so that `--help` and
+small commands start at once.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Annotated
+import inspect
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
 from ..base.errors import UserError
+from ..base.files import allow_outside
 from ..base.version import __version__
-from . import measure_program, picture_program, scene_program
-from .farm_program import add_farm
-from .printing import show
-from .prove_gpu import prove_gpu
+from . import measuring_table, options, table
+
+COMMANDS = {
+    "render": (table.Render, "render:render_picture"),
+    "merge": (table.Merge, "merge:merge"),
+    "animate": (table.Animate, "animate:animate"),
+    "sweep": (table.Sweep, "sweep:sweep"),
+    "view": (table.View, "view:view"),
+    "lesson": (table.Lesson, "view:lesson"),
+    "bake": (table.Bake, "bake:bake_texture"),
+    "export": (table.Export, "bake:export"),
+    "inspect": (table.Inspect, "inspect_report:inspect"),
+    "glass": (table.Glass, "glass:glass"),
+    "doctor": (table.Doctor, "doctor:doctor"),
+    "bench": (measuring_table.Bench, "bench:bench"),
+    "stress": (measuring_table.Stress, "stress:stress"),
+    "bench-speed": (measuring_table.BenchSpeed, "bench_parts:bench_speed"),
+    "bench-beams": (measuring_table.BenchBeams, "bench_parts:bench_beams"),
+    "bench-agreement": (measuring_table.BenchAgreement, "bench_agreement:bench_agreement"),
+    "bench-view": (measuring_table.BenchView, "bench_parts:bench_view"),
+    "prove-gpu": (measuring_table.ProveGpu, "prove_gpu:prove_gpu"),
+    "farm render": (table.FarmRender, "farm:render"),
+    "farm animate": (table.FarmAnimate, "farm:animate"),
+    "farm bench": (measuring_table.FarmBench, "farm:bench"),
+}
+"""By name: the class of a command's values, and the function that gets them and returns the exit code, with its
+module."""
 
 
 class _Interrupted(Exception):
@@ -78,25 +102,25 @@ def program(
     """Dispersive caustics: light through glass, split into its colours."""
 
 
-for _command in (
-    picture_program.render,
-    picture_program.merge,
-    picture_program.animate,
-    picture_program.sweep,
-    scene_program.view,
-    scene_program.lesson,
-    scene_program.bake,
-    scene_program.export,
-    scene_program.inspect,
-    scene_program.glass,
-    scene_program.doctor,
-    measure_program.bench,
-    measure_program.stress,
-    measure_program.bench_speed,
-    measure_program.bench_beams,
-    measure_program.bench_agreement,
-    measure_program.bench_view,
-    prove_gpu,
-):
-    app.command(_command.__name__.replace("_", "-"))(_command)
-add_farm(app, picture_program.render, picture_program.animate, measure_program.bench, show)
+def _command(values: type, runs: str) -> Callable[..., None]:
+    """The function whose signature tells typer which options there are."""
+    module, function = runs.split(":")
+
+    def command(**given: Any) -> None:
+        asked: Any = options.read(values, given)
+        if isinstance(asked, table.ReadsScenes):
+            allow_outside(asked.allow_outside)
+        raise typer.Exit(getattr(import_module(f"{__package__}.{module}"), function)(asked))
+
+    parameters = [row.parameter() for row in options.rows(values)]
+    command.__doc__ = values.__doc__
+    command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    command.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    return command
+
+
+_farm = typer.Typer(help="Render on many workers, here or on a Dask cluster; needs the extra 'farm'.")
+app.add_typer(_farm, name="farm")
+for _name, (_values, _runs) in COMMANDS.items():
+    _group = _farm if _name.startswith("farm ") else app
+    _group.command(_name.removeprefix("farm "))(_command(_values, _runs))

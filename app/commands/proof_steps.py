@@ -277,7 +277,8 @@ def _line(line: str) -> Finding:
 
 
 def _bench(short: bool, folder: Path) -> Iterator[Finding]:
-    from .bench import BenchRequest, bench_command
+    from .bench import bench
+    from .measuring_table import Bench
 
     said: list[str] = []
 
@@ -288,18 +289,18 @@ def _bench(short: bool, folder: Path) -> Iterator[Finding]:
         Console(file=text, width=200).print(content)
         said.append(text.getvalue())
 
-    request = BenchRequest(
-        ("prism",) if short else ("prism", "ball_plain"),
-        folder / "bench",
-        seconds="0.2" if short else "1",
-        horizon="0.2" if short else "1",
-        seeds="1" if short else "2",
-        methods="srd,srd-photons,hero",
-        size="96x54" if short else "480x270",
-        reference_seconds="2" if short else "15",
+    asked = Bench(
+        scenes=("prism",) if short else ("prism", "ball_plain"),
+        output=folder / "bench",
+        seconds=0.2 if short else 1.0,
+        horizon=0.2 if short else 1.0,
+        seeds=1 if short else 2,
+        methods=("srd", "srd-photons", "hero"),
+        size=(96, 54) if short else (480, 270),
+        reference_seconds=2.0 if short else 15.0,
         fresh=True,
     )
-    code = bench_command(request, show)
+    code = bench(asked, show)
     yield from (Finding("", text.rstrip()) for text in said)
     if code:
         raise UserError(f"bench ended with {code}")

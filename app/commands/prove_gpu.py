@@ -17,14 +17,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
 import msgspec
-import typer
 
 from ..base.atomic import make_output_folder
 from ..base.errors import UserError, plain
 from ..base.version import __version__
+from .measuring_table import ProveGpu
 from .proof_steps import PARTS, Finding, Part
 
 JSON, HTML = "proof.json", "proof.html"
@@ -83,48 +83,36 @@ class Proof(msgspec.Struct):
         return 0 if all(part.state == "holds" for part in self.parts) else 130
 
 
-def prove_gpu(
-    output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="DIR", help=f"Folder for {JSON}, {HTML} and the bench's report.")
-    ],
-    short: Annotated[
-        bool,
-        typer.Option("--short", help="Smaller pictures and fewer scenes, as on a software renderer in any case."),
-    ] = False,
-    parts: Annotated[
-        str | None,
-        typer.Option(metavar="A,B", help=f"Only these parts beside doctor: {', '.join(p.key for p in PARTS[1:])}."),
-    ] = None,
-) -> None:
-    """Prove that this machine's GPU draws what it should, and measure how fast; exits with 10 and up where not."""
+def prove_gpu(asked: ProveGpu) -> int:
+    """Run all parts, keep what they find; returns the exit code. Raises `UserError`."""
     from ..base.progress import ProgressReporter
 
-    chosen = chosen_parts(parts)
-    make_output_folder(output, JSON, HTML)
+    chosen = chosen_parts(asked.parts)
+    make_output_folder(asked.output, JSON, HTML)
     started = time.monotonic()
     proof = Proof(
         __version__,
         datetime.now(UTC).isoformat(timespec="seconds"),
-        short,
+        asked.short,
         [PartResult(part.key, part.title) for part in chosen],
     )
     with ProgressReporter("proof") as progress:
         try:
-            _run_all(proof, chosen, output, progress, started)
+            _run_all(proof, chosen, asked.output, progress, started)
         except KeyboardInterrupt:
             print("spectrasplat: stopped; what was found is kept", file=sys.stderr)
     proof.seconds = time.monotonic() - started
-    _keep(proof, output)
+    _keep(proof, asked.output)
     print(summary(proof))
-    print((output / HTML).resolve())
-    raise typer.Exit(proof.exit_code)
+    print((asked.output / HTML).resolve())
+    return proof.exit_code
 
 
-def chosen_parts(names: str | None) -> list[Part]:
-    """The parts called so, separated by commas, in their own order, the doctor always; None: all."""
+def chosen_parts(names: Sequence[str] | None) -> list[Part]:
+    """The parts called so, in their own order, the doctor always; None: all."""
     if names is None:
         return list(PARTS)
-    wanted = {name.strip() for name in names.split(",") if name.strip()}
+    wanted = {*names} - {""}
     known = {part.key for part in PARTS}
     if unknown := sorted(wanted - known):
         raise UserError(f"--parts '{unknown[0]}' is no part of the proof: choose among {', '.join(known)}")

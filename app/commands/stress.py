@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..base.atomic import make_output_folder
-from ..base.errors import UserError
 from ..base.version import __version__
-from . import options
+from .measuring_table import Stress
+from .options import words
+from .printing import show
+from .scenes import load_scenes
 
 if TYPE_CHECKING:
     from ..stress.case import Case
@@ -25,32 +26,21 @@ INTERRUPTED = 130
 JSON, HTML = "stress.json", "stress.html"
 
 
-@dataclass(frozen=True)
-class StressRequest:
-    """The stress command's options as typed; None where the user said nothing."""
-
-    scenes: tuple[str, ...] = ()
-    output: Path | None = None
-    cases: str | None = None
-    list_cases: bool = False
-
-
-def stress_command(request: StressRequest, show: Callable[[object], None]) -> int:
+def stress(asked: Stress) -> int:
     """Run the cases; returns 0 where every promise holds, 1 where one is broken, 130 after Ctrl-C. Raises
     `UserError`."""
     from ..stress.runner import choose
 
-    files = [options.find_scene(name) for name in request.scenes]
-    if request.output is not None and not request.list_cases:
-        make_output_folder(request.output, JSON, HTML)
-    cases = choose(_cases(files), request.cases)
-    if request.list_cases:
+    cases = choose(_cases(asked.scenes), asked.cases)
+    if asked.list_cases:
         show("\n".join(f"{case.name:<24} {case.steps:>3}  {case.title}" for case in cases))
         return 0
-    return _measure(request, cases, show)
+    if asked.output is not None:
+        make_output_folder(asked.output, JSON, HTML)
+    return _measure(asked, cases)
 
 
-def _measure(request: StressRequest, cases: Sequence[Case], show: Callable[[object], None]) -> int:
+def _measure(asked: Stress, cases: Sequence[Case]) -> int:
     from ..base.progress import ProgressReporter
     from ..bench.machine import machine
     from ..gpu.context import create_context
@@ -59,41 +49,33 @@ def _measure(request: StressRequest, cases: Sequence[Case], show: Callable[[obje
 
     with create_context() as context:
         date = datetime.now(UTC).isoformat(timespec="seconds")
-        result = StressResult(__version__, date, repeat_command(request), machine(context), asked=len(cases))
+        result = StressResult(__version__, date, repeat_command(asked), machine(context), asked=len(cases))
         with ProgressReporter("stress") as progress:
-            finished = run(result, cases, context, progress, lambda so_far: _keep(so_far, request.output))
+            finished = run(result, cases, context, progress, lambda so_far: _keep(so_far, asked.output))
     if not finished:
         print("spectrasplat: stopped; what was measured is shown and kept", file=sys.stderr)
-    _keep(result, request.output)
+    _keep(result, asked.output)
     show(table(result))
-    if request.output is not None:
+    if asked.output is not None:
         from ..stress.report import write_html
 
-        write_html(result, request.output / HTML)
-        show(f"{(request.output / HTML).resolve()}")
+        write_html(result, asked.output / HTML)
+        show(f"{(asked.output / HTML).resolve()}")
     show(summary(result))
     if result.broken():
         return BROKEN
     return 0 if finished else INTERRUPTED
 
 
-def _cases(files: Sequence[Path]) -> tuple[Case, ...]:
-    """The sweep over the scenes in `files`, or without any all cases."""
-    if not files:
+def _cases(names: Sequence[str]) -> tuple[Case, ...]:
+    """The sweep over the scenes that are named, or without any all cases."""
+    if not names:
         from ..stress.runner import all_cases
 
         return all_cases()
-    from ..model.io.scene_file import load_scene
+    scenes = load_scenes(names)
     from ..stress.cases.scene_cases import sweeps
 
-    scenes = {}
-    for file in files:
-        if file.stem in scenes:
-            raise UserError(
-                f"scene {file}: another scene of this run is called '{file.stem}' too; rename the file or run them "
-                "apart"
-            )
-        scenes[file.stem] = load_scene(file)
     return sweeps(list(scenes.items()))
 
 
@@ -104,9 +86,8 @@ def _keep(result: StressResult, folder: Path | None) -> None:
         write_json(result, folder / JSON)
 
 
-def repeat_command(request: StressRequest) -> str:
+def repeat_command(asked: Stress) -> str:
     """The one command that repeats this run."""
-    words = ["spectrasplat", "stress", *request.scenes]
-    words += [] if request.output is None else ["-o", request.output.name or "."]
-    words += [] if request.cases is None else ["--cases", request.cases]
-    return shlex.join(words)
+    output = [] if asked.output is None else ["-o", asked.output.name or "."]
+    options = words(asked, leave_out=("scenes", "output", "list_cases"))
+    return shlex.join(["spectrasplat", "stress", *asked.scenes, *output, *options])

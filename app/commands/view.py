@@ -1,4 +1,4 @@
-"""The view command: checks what was typed, opens the window, and sees to it that no work is lost on the way out."""
+"""The commands that open the window, `view` and `lesson`: no work is lost on the way out."""
 
 from __future__ import annotations
 
@@ -6,41 +6,28 @@ import os
 import sys
 import time
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..base.errors import UserError, suggestion
+from ..base.errors import UserError
 from ..base.interrupts import Interruption, interrupt_flag
-from . import options
+from . import table
+from .printing import show
+from .scenes import find_scene
+from .table import View
 
 if TYPE_CHECKING:
     from ..edit.lessons import Lesson
-    from ..edit.opening import Opening
     from ..edit.preferences import WindowPlace
-    from ..edit.state import Theme
     from ..ui.session import Session
     from ..ui.viewer import Viewer
     from ..ui.window import Window
 
-THEMES: tuple[Theme, ...] = ("dark", "light")
 DEFAULT_AFTER_S = 10.0
 LONGEST_WAIT_S = 120.0
 """For the first picture."""
 _ENGINE_WAIT_S = 5.0
-
-
-@dataclass(frozen=True)
-class ViewRequest:
-    """The view command's options as typed; None where the user said nothing."""
-
-    scene: str | None = None
-    size: str | None = None
-    theme: str | None = None
-    screenshot: Path | None = None
-    after: str | None = None
-    opening: Opening | None = None
-    lesson: Lesson | None = None
 
 
 def has_display() -> bool:
@@ -48,65 +35,59 @@ def has_display() -> bool:
     return sys.platform in ("win32", "darwin") or any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
 
 
-def view_command(request: ViewRequest) -> int:
-    """Open the viewer until it is closed; returns the exit code. Raises `UserError`."""
-    size = None if request.size is None else options.parse_size(request.size)
-    theme = None if request.theme is None else _parse_theme(request.theme)
-    after = DEFAULT_AFTER_S if request.after is None else options.parse_seconds(request.after)
-    if request.after is not None and request.screenshot is None:
+def view(asked: View, at: Lesson | None = None) -> int:
+    """Open the viewer, `at` a lesson, until it is closed; returns the exit code. Raises `UserError`."""
+    if asked.after is not None and asked.screenshot is None:
         raise UserError("--after says when the --screenshot is taken: give that too")
-    if request.screenshot is not None:
-        _check_screenshot(request.screenshot)
-    scene = None if request.scene is None else options.find_scene(request.scene)
+    if asked.screenshot is not None:
+        _check_screenshot(asked.screenshot)
+    scene = None if asked.scene is None else find_scene(asked.scene)
 
     # What needs a display comes last, so that a wrong option is reported on any machine.
     from ..edit.preferences import load_settings
     from ..ui.window import Window
 
     settings, _ = load_settings()
-    place = settings.window if size is None else replace(settings.window, size=size, maximised=False)
+    place = settings.window if asked.size is None else replace(settings.window, size=asked.size, maximised=False)
     with Window(place) as window, interrupt_flag() as interrupted:
-        _run(
-            window,
-            scene,
-            request.opening,
-            theme,
-            None if request.screenshot is None else (request.screenshot, after),
-            interrupted,
-            request.lesson,
-        )
+        _run(window, scene, asked, interrupted, at)
     return interrupted.exit_code
 
 
-def _run(
-    window: Window,
-    scene: Path | None,
-    opening: Opening | None,
-    theme: Theme | None,
-    screenshot: tuple[Path, float] | None,
-    interrupted: Interruption,
-    lesson: Lesson | None = None,
-) -> None:
+def lesson(asked: table.Lesson) -> int:
+    """List the lessons, or open the one that is named; returns the exit code. Raises `UserError`."""
+    from ..edit import lessons
+
+    if asked.name is not None:
+        return view(View(scene=None), lessons.lesson(asked.name))
+    known = lessons.lessons()
+    width = max(len(each.name) for each in known)
+    lines = [f"{each.name:<{width}}  {each.title}" for each in known]
+    show("\n".join([*lines, "", f"Open one: spectrasplat lesson {known[0].name}"]))
+    return 0
+
+
+def _run(window: Window, scene: Path | None, asked: View, interrupted: Interruption, at: Lesson | None) -> None:
     from ..ui import layout_memory
     from ..ui.session import Session
     from ..ui.viewer import Viewer
 
-    session = Session(window.context, scene, window.engine, opening=opening, open_thread=window.open_thread)
-    if theme is not None:
-        preferences = replace(session.state.preferences, theme=theme)
+    session = Session(window.context, scene, window.engine, opening=asked.opening, open_thread=window.open_thread)
+    if asked.theme is not None:
+        preferences = replace(session.state.preferences, theme=asked.theme)
         session.state = replace(session.state, preferences=preferences)
-    if lesson is not None:
-        session.show_lesson(lesson)
-    elif scene is None and screenshot is None:
+    if at is not None:
+        session.show_lesson(at)
+    elif scene is None and asked.screenshot is None:
         session.welcome()
     viewer = Viewer(session, refresh_s=window.refresh_s)
     session.input_waits = window.input_waits
     layout_memory.load()
     try:
-        if screenshot is None:
+        if asked.screenshot is None:
             window.run(viewer, until=interrupted)
         else:
-            _take_screenshot(window, viewer, session, *screenshot, interrupted)
+            _take_screenshot(window, viewer, session, asked.screenshot, asked.after or DEFAULT_AFTER_S, interrupted)
     except Exception as error:
         raise _rescued(session, error) from error
     place = _place(window, session.settings.window)
@@ -118,7 +99,7 @@ def _run(
         session.jobs.finish_export()
         _tell(session.jobs.notes, session.release())
         return
-    if screenshot is None:
+    if asked.screenshot is None:
         layout_memory.save()
         session.settings = replace(session.settings, window=place)
         _tell((), session.close())
@@ -185,14 +166,6 @@ def _place(window: Window, before: WindowPlace) -> WindowPlace:
     """Where the window is; a maximised one remembers the size it had before."""
     place = window.place
     return replace(before, maximised=True) if place.maximised else place
-
-
-def _parse_theme(text: str) -> Theme:
-    for theme in THEMES:
-        if text == theme:
-            return theme
-    hint = suggestion(text, THEMES)
-    raise UserError(f"--theme '{text}' is unknown{hint or ','} known are {' and '.join(THEMES)}")
 
 
 def _check_screenshot(path: Path) -> None:

@@ -7,7 +7,7 @@ import signal
 from collections.abc import Callable
 from pathlib import Path
 
-from spectrasplat.commands.options import find_scene
+from spectrasplat.commands.scenes import find_scene
 from spectrasplat.farm.cluster import open_crew
 from spectrasplat.farm.render import FarmRender, FarmResult
 from spectrasplat.model.io.scene_file import load_scene

@@ -16,7 +16,7 @@ from spectrasplat.bench.measured_passes import LIGHT
 from spectrasplat.bench.rendering import KERNELS, MethodRig
 from spectrasplat.bench.results import BenchResult, Trial
 from spectrasplat.bench.tuning import Tuning
-from spectrasplat.commands.options import find_scene
+from spectrasplat.commands.scenes import find_scene
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.optics.colorimetry import rgb709_to_xyz
 from spectrasplat.model.scene import Scene

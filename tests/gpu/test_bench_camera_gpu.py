@@ -15,7 +15,7 @@ from spectrasplat.bench import camera_rendering, reference_picture, runner
 from spectrasplat.bench.camera_rendering import CameraRig, SharedLight
 from spectrasplat.bench.rendering import NothingToMeasure
 from spectrasplat.bench.results import BenchResult
-from spectrasplat.commands.options import find_scene
+from spectrasplat.commands.scenes import find_scene
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.optics.colorimetry import rgb709_to_xyz
 from spectrasplat.model.scene import Scene

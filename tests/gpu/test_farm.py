@@ -14,7 +14,7 @@ from PIL import Image
 from spectrasplat.__main__ import main
 from spectrasplat.base import atomic
 from spectrasplat.base.errors import UserError
-from spectrasplat.commands.options import find_scene
+from spectrasplat.commands.scenes import find_scene
 from spectrasplat.farm.render import FarmRender
 from spectrasplat.gpu.context import create_context
 from spectrasplat.model.io.scene_file import load_scene

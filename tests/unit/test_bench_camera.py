@@ -217,7 +217,7 @@ def test_halves_and_subjects_fit() -> None:
 
 def test_a_caustic_is_planned_where_light_may_fall() -> None:
     """Light and something diffuse are both needed; depth is the scene's, as in the maps."""
-    from spectrasplat.commands.options import find_scene
+    from spectrasplat.commands.scenes import find_scene
     from spectrasplat.model.io.scene_file import load_scene
 
     ball = load_scene(find_scene("ball_plain"))

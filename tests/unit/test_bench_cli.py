@@ -100,7 +100,7 @@ def seen(monkeypatch: pytest.MonkeyPatch) -> Seen:
         (["prism", "-o", "out", "--seeds", "2.5"], "--seeds '2.5' is not a whole number"),
         (["prism", "-o", "out", "--seconds", "0"], "--seconds 0 is out of range: give more than 0"),
         (["prism", "-o", "out", "--seconds", "-1"], "--seconds -1 is out of range"),
-        (["prism", "-o", "out", "--seconds", "nan"], "--seconds nan is out of range"),
+        (["prism", "-o", "out", "--seconds", "nan"], "--seconds 'nan' is not a number"),
         (["prism", "-o", "out", "--seconds", "soon"], "--seconds 'soon' is not a number"),
         (
             ["prism", "-o", "out", "--horizon", "2"],
@@ -191,7 +191,7 @@ def test_options_reach_the_runner(seen: Seen, tmp_path: Path, capsys: pytest.Cap
         "--seeds",
         "2",
         "--methods",
-        "srd, regular",
+        "srd,regular",
         "--size",
         "64x36",
         "--reference-seconds",

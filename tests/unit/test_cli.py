@@ -9,6 +9,7 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -18,7 +19,11 @@ import pytest
 from spectrasplat import __version__
 from spectrasplat.__main__ import main
 from spectrasplat.base.errors import UserError
-from spectrasplat.commands import options as cli_options
+from spectrasplat.commands import options
+from spectrasplat.commands.measuring_table import PROOF_PARTS
+from spectrasplat.commands.program import COMMANDS
+from spectrasplat.commands.proof_steps import PARTS
+from spectrasplat.commands.scenes import find_scene
 from spectrasplat.model.geometry.mesh import make_mesh
 from spectrasplat.model.scene import (
     Black,
@@ -221,13 +226,13 @@ class TestFindScene:
         return folder
 
     def test_by_name(self, shipped: Path) -> None:
-        assert cli_options.find_scene("prism") == shipped / "prism.toml"
-        assert cli_options.find_scene("ball") == shipped / "ball.glb"
+        assert find_scene("prism") == shipped / "prism.toml"
+        assert find_scene("ball") == shipped / "ball.glb"
 
     def test_a_file_wins_over_a_name(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.chdir(tmp_path)
         Path("prism").write_text("")
-        assert cli_options.find_scene("prism") == Path("prism")
+        assert find_scene("prism") == Path("prism")
 
     @pytest.mark.parametrize(
         ("text", "sentence"),
@@ -243,7 +248,7 @@ class TestFindScene:
     def test_unknown(self, text: str, sentence: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.chdir(tmp_path)
         with pytest.raises(UserError) as caught:
-            cli_options.find_scene(text)
+            find_scene(text)
         assert sentence in str(caught.value)
 
 
@@ -285,6 +290,17 @@ class TestGlass:
 
 
 class TestProgram:
+    @pytest.mark.parametrize("name", COMMANDS)
+    def test_every_command_has_a_function_of_its_options(self, name: str) -> None:
+        values, runs = COMMANDS[name]
+        module, function = runs.split(":")
+        found = getattr(import_module(f"spectrasplat.commands.{module}"), function)
+        notes = found.__annotations__
+        assert notes["asked"].split(".")[-1] == values.__name__ and notes["return"] == "int"
+
+    def test_every_part_of_the_proof_can_be_chosen(self) -> None:
+        assert [part.key for part in PARTS] == ["doctor", *PROOF_PARTS]
+
     def test_help_without_arguments(self, capsys: pytest.CaptureFixture[str]) -> None:
         assert main([]) == 0
         out = capsys.readouterr().out
@@ -376,12 +392,12 @@ class TestProgram:
     [("1", 1), ("1000000", 10**6), ("1e6", 10**6), ("2M", 2 * 10**6), ("1.5k", 1500), ("1_000", 1000)],
 )
 def test_photons_are_read(text: str, count: int) -> None:
-    assert cli_options.parse_photons(text) == count
+    assert options.photons("--photons", text) == count
 
 
 @pytest.mark.parametrize("text", ["960x540", "960X540", " 960×540"])
 def test_sizes_are_read(text: str) -> None:
-    assert cli_options.parse_size(text) == (960, 540)
+    assert options.size("--size", text) == (960, 540)
 
 
 SHELLS = ("bash", "zsh", "fish")

@@ -13,7 +13,7 @@ GAIN = "objects.prism.dispersion_gain"
 CASES = {
     "no frames": (["--frames", "0"], ("--frames 0", "between 1")),
     "frames text": (["--frames", "many"], ("--frames 'many'", "whole number")),
-    "no rate": (["--fps", "0"], ("--fps '0'", "between 0.1 and 240")),
+    "no rate": (["--fps", "0"], ("--fps 0 ", "between 0.1 and 240")),
     "rate text": (["--fps", "fast"], ("--fps 'fast'",)),
     "size": (["--size", "9x"], ("--size '9x'", "960x540")),
     "photons": (["--photons", "0"], ("--photons 0",)),

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 import spectrasplat as ss
 from spectrasplat.__main__ import main
-from spectrasplat.commands.options import find_scene
+from spectrasplat.commands.scenes import find_scene
 from spectrasplat.edit.parameters import Stage
 from spectrasplat.farm import cluster
 from spectrasplat.farm.cluster import PIP_LINE

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 from spectrasplat.base.errors import UserError
 from spectrasplat.commands.inspect_report import camera_line
-from spectrasplat.commands.options import with_lens
+from spectrasplat.commands.opened import open_scene
+from spectrasplat.commands.options import read
+from spectrasplat.commands.table import Render
 from spectrasplat.edit.parameters import Stage, apply_all
 from spectrasplat.features.features import Features, in_view
 from spectrasplat.model.io.gltf_write import save_gltf
@@ -90,13 +92,17 @@ def test_a_picture_without_a_lens_has_no_plane_of_focus(tmp_path: Path) -> None:
 
 def test_the_command_line_opens_the_lens(tmp_path: Path) -> None:
     scene = scene_of(tmp_path)
-    assert with_lens(scene, None, None) == scene
-    camera = with_lens(scene, "0.1", "3").camera
-    assert (camera.lens_radius, camera.plane_of_focus) == (0.1, 3.0)
-    assert with_lens(scene, "0.1", None).camera.plane_of_focus == pytest.approx(6.0)
+
+    def camera(radius: str | None, distance: str | None) -> Camera:
+        given = {"scene": str(tmp_path / "scene.toml"), "output": "", "lens_radius": radius, "focus_distance": distance}
+        return open_scene(read(Render, given)).camera
+
+    assert camera(None, None) == scene.camera
+    assert (camera("0.1", "3").lens_radius, camera("0.1", "3").plane_of_focus) == (0.1, 3.0)
+    assert camera("0.1", None).plane_of_focus == pytest.approx(6.0)
     for radius, distance in (("-1", None), ("x", None), ("0.1", "0"), (None, "3")):
         with pytest.raises(UserError, match="--lens-radius|--focus-distance"):
-            with_lens(scene, radius, distance)
+            camera(radius, distance)
 
 
 def test_focus_is_animated(tmp_path: Path) -> None:

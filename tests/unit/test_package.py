@@ -96,7 +96,7 @@ def test_the_unpacked_wheel_runs_and_finds_its_files(wheel: Path, tmp_path: Path
     check = (
         "import spectrasplat\n"
         "from spectrasplat.base import paths\n"
-        "from spectrasplat.commands.options import shipped_scenes\n"
+        "from spectrasplat.commands.scenes import shipped_scenes\n"
         "from spectrasplat.model.io.scene_file import load_scene\n"
         "load_scene(shipped_scenes()['brilliant_studio'])\n"
         "assert (paths.shaders_dir() / 'light' / 'trace.comp').is_file()\n"

@@ -20,7 +20,8 @@ from spectrasplat.base.tone_map import (
     to_display,
     tone_map_8bit,
 )
-from spectrasplat.commands.options import parse_glare
+from spectrasplat.commands.options import read
+from spectrasplat.commands.table import Render
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.optics.colorimetry import VISIBLE_NM, cmf_xyz, rgb709_to_xyz, xyz_to_rgb709
 from spectrasplat.ui.auto_exposure import ARRIVED_EV, DEADBAND_EV, MEASURE_S, AutoExposure
@@ -295,9 +296,9 @@ def test_only_pictures_to_look_at_have_it(tmp_path: Path) -> None:
 
 
 def test_what_is_no_share_is_refused(tmp_path: Path) -> None:
-    assert parse_glare("0.03") == 0.03
+    assert read(Render, {"scene": "", "output": "", "glare": "0.03"}).glare == 0.03
     with pytest.raises(UserError, match="--glare 2 is out of range"):
-        parse_glare("2")
+        read(Render, {"glare": "2"})
     scene = tmp_path / "a.toml"
     scene.write_text('[[objects]]\nshape = "sphere"\n[render]\nglare = 0.7\n')
     with pytest.raises(UserError, match="glare"):

@@ -8,7 +8,9 @@ from pathlib import Path
 
 import pytest
 from spectrasplat.base.errors import UserError
-from spectrasplat.commands.render import RenderRequest, scene_as_asked
+from spectrasplat.commands.opened import open_scene
+from spectrasplat.commands.options import read
+from spectrasplat.commands.table import Render
 from spectrasplat.edit import edits
 from spectrasplat.edit.live_inputs import LiveInputs
 from spectrasplat.features.features import Features, why_no_haze
@@ -87,18 +89,16 @@ def test_it_is_saved_where_it_is_no_default(tmp_path: Path, setting: Setting) ->
 def test_other_values_are_refused(tmp_path: Path, setting: Setting) -> None:
     for value in setting.refused_in_file:
         assert setting.key in refusal(tmp_path, TEXT + f"[render]\n{setting.key} = {value}\n")
-    (tmp_path / "scene.toml").write_text(TEXT)
     for value in setting.refused_option:
         with pytest.raises(UserError, match=f"--{setting.key}"):
-            scene_as_asked(RenderRequest(str(tmp_path / "scene.toml"), tmp_path / "out.png", **{setting.key: value}))
+            read(Render, {setting.key: value})
 
 
 @pytest.mark.parametrize("value", ["1.0", "-1"])
 def test_haze_scatters_neither_all_forward_nor_all_back(tmp_path: Path, value: str) -> None:
     assert "haze_anisotropy" in refusal(tmp_path, TEXT + f"[render]\nhaze_anisotropy = {value}\n")
-    (tmp_path / "scene.toml").write_text(TEXT)
     with pytest.raises(UserError, match="--haze-anisotropy"):
-        scene_as_asked(RenderRequest(str(tmp_path / "scene.toml"), tmp_path / "out.png", haze_anisotropy=value))
+        read(Render, {"haze_anisotropy": value})
 
 
 @pytest.mark.parametrize(("key", "value", "bounds"), [("bounces", 4, "0 and 3"), ("haze", -1.0, "")])
@@ -110,11 +110,12 @@ def test_an_edit_has_the_bounds_of_the_file(tmp_path: Path, key: str, value: flo
 @pytest.mark.parametrize("in_file", [False, True])
 def test_the_command_line_overrules_the_scene(tmp_path: Path, setting: Setting, in_file: bool) -> None:
     (tmp_path / "scene.toml").write_text(setting.file(setting.other) if in_file else TEXT)
-    request = RenderRequest(str(tmp_path / "scene.toml"), tmp_path / "out.png")
-    assert getattr(scene_as_asked(request).render, setting.key) == (setting.other if in_file else setting.default)
+    given = {"scene": str(tmp_path / "scene.toml"), "output": "out.png"}
+    scene = open_scene(read(Render, given))
+    assert getattr(scene.render, setting.key) == (setting.other if in_file else setting.default)
     for value in (setting.default, setting.other):
-        given = replace(request, **{setting.key: setting.option(value)})
-        assert getattr(scene_as_asked(given).render, setting.key) == value
+        scene = open_scene(read(Render, given | {setting.key: setting.option(value)}))
+        assert getattr(scene.render, setting.key) == value
 
 
 def test_what_an_edit_does_again(tmp_path: Path, setting: Setting) -> None:

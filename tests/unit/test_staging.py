@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from spectrasplat.base.errors import UserError
-from spectrasplat.commands import options
+from spectrasplat.commands.options import read
+from spectrasplat.commands.table import View
 from spectrasplat.edit.document import Document
 from spectrasplat.edit.opening import Opening, open_scene
 from spectrasplat.model.geometry.mesh import Mesh
@@ -203,23 +204,23 @@ def test_a_table_of_the_files_own_is_enough(tmp_path: Path) -> None:
 
 
 def test_options_are_parsed() -> None:
-    assert options.parse_opening(None, None, None) is None
-    asked = options.parse_opening("y", ["diamond", "a=b=N-BK7"], "sky")
-    assert asked == Opening(Staging("y", ((None, "diamond"), ("a=b", "N-BK7"))), "sky")
+    assert View().opening is None
+    asked = read(View, {"up": "y", "glass": ["diamond", "a=b=N-BK7"], "environment": "sky"})
+    assert asked.opening == Opening(Staging("y", ((None, "diamond"), ("a=b", "N-BK7"))), "sky")
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("given", "said"),
     [
-        (("x", None, None), "--up 'x'"),
-        ((None, ["stone="], None), "names no glass"),
-        ((None, ["=N-BK7"], None), "names no glass"),
-        ((None, None, "nowhere.hdr"), "neither studio nor sky nor a file"),
+        ({"up": "x"}, "--up 'x'"),
+        ({"glass": ["stone="]}, "names no glass"),
+        ({"glass": ["=N-BK7"]}, "names no glass"),
+        ({"environment": "nowhere.hdr"}, "neither studio nor sky nor a file"),
     ],
 )
-def test_mistakes_are_sentences(arguments: tuple, said: str) -> None:
+def test_mistakes_are_sentences(given: dict[str, object], said: str) -> None:
     with pytest.raises(UserError, match=said):
-        options.parse_opening(*arguments)
+        read(View, given)
 
 
 @pytest.mark.parametrize("y_up", [True, False])

@@ -1,0 +1,54 @@
+"""What a command's options make of its scene: the scene as it is opened, and the settings of its rendering."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from ..base.errors import UserError
+from ..base.memory import check_picture_memory
+from ..model.settings import RenderSettings
+from .options import given_for
+from .printing import note
+from .scenes import check_layer, find_scene
+from .table import OpensScene
+
+if TYPE_CHECKING:
+    from ..model.scene import Scene
+
+
+def open_scene(values: OpensScene) -> Scene:
+    """The scene of a command, with what its options say of the scene's own defaults and camera. Raises `UserError`."""
+    path, opening = find_scene(values.scene), values.opening
+    if opening is None:
+        from ..model.io.scene_file import load_scene
+
+        scene = load_scene(path)
+    else:
+        from ..edit.opening import open_scene as opened
+
+        scene = opened(path, opening)
+    camera, defaults = given_for("camera", values), given_for("render", values)
+    if camera:
+        scene = replace(scene, camera=replace(scene.camera, **camera))
+    if "focus_distance" in camera and scene.camera.lens_radius == 0.0:
+        raise UserError("--focus-distance changes nothing where the lens has no radius: give --lens-radius as well")
+    return replace(scene, render=replace(scene.render, **defaults)) if defaults else scene
+
+
+def note_assumptions(scene: Scene) -> None:
+    """Report what was assumed when the scene was read."""
+    for sentence in scene.notes:
+        note(sentence)
+
+
+def settings_for(values: object, scene: Scene, **defaults: object) -> RenderSettings:
+    """Settings as a command's options say, else as `defaults`, else as the scene. Raises `UserError`."""
+    wishes = scene.render
+    own = {"width": wishes.width, "height": wishes.height, "max_depth": wishes.max_depth}
+    settings = RenderSettings(**(own | defaults | given_for("settings", values)))  # type: ignore[arg-type]
+    if settings.photons is not None and settings.seconds is not None:
+        raise UserError("--photons and --seconds exclude each other: give a count or a time, not both")
+    check_layer(settings.layer, scene)
+    check_picture_memory(settings.width, settings.height, settings.bins)
+    return settings
