@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from imgui_bundle import imgui
 from PIL import Image
+from spectrasplat.__main__ import main
 from spectrasplat.base.errors import UserError
 from spectrasplat.base.image_io import save_codes, write_image
 from spectrasplat.base.movie import open_sink
 from spectrasplat.base.paths import assets_dir
-from spectrasplat.commands.glass import glass_command
 from spectrasplat.edit import requests
 from spectrasplat.edit.importing import import_objects
 from spectrasplat.edit.preferences import load_settings
@@ -318,10 +318,8 @@ def test_a_still_webp_keeps_colours_that_change_from_pixel_to_pixel(tmp_path: Pa
         np.testing.assert_array_equal(np.asarray(image.convert("RGB")), codes)
 
 
-def test_a_guessed_glass_is_said_to_be_a_guess() -> None:
-    told: list[object] = []
-    glass_command("diamant", None, told.append)
-    assert str(told[0]).startswith("Nothing in the catalogue is called 'diamant'.")
-    told.clear()
-    glass_command("N-BK7", None, told.append)
-    assert "Nothing" not in str(told[0]) and catalogue.is_guess("NBK77") and not catalogue.is_guess("bk7")
+def test_a_guessed_glass_is_said_to_be_a_guess(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["glass", "diamant"]) == 0
+    assert capsys.readouterr().out.startswith("Nothing in the catalogue is called 'diamant'.")
+    assert main(["glass", "N-BK7"]) == 0
+    assert "Nothing" not in capsys.readouterr().out and catalogue.is_guess("NBK77") and not catalogue.is_guess("bk7")

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from spectrasplat.__main__ import main
 from spectrasplat.base.errors import UserError
 from spectrasplat.base.paths import assets_dir
-from spectrasplat.commands.lesson import lessons_text
 from spectrasplat.edit import measuring, placing
 from spectrasplat.edit.lessons import lesson, lessons
 from spectrasplat.edit.matrices import (
@@ -210,13 +210,16 @@ def test_small_angles_are_exact() -> None:
     assert measuring.angle_deg(((1.0, 0.0, 0.0), (1.0, 0.0, 0.0), (2.0, 0.0, 0.0))) is None
 
 
-def test_there_are_six_lessons_each_with_a_scene_that_holds_what_it_is_about() -> None:
-    assert len(lessons()) == 6
+def test_there_are_six_lessons_each_with_a_scene_that_holds_what_it_is_about(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert len(lessons()) == 6 and main(["lesson"]) == 0
+    listed = capsys.readouterr().out
     for each in lessons():
         scene = load_scene(each.path)
         assert each.select in [item.name for item in scene.objects]
         assert len(each.steps) == 3 and 100 < len(each.words) < 400
-        assert each.name in lessons_text() and each.title in lessons_text()
+        assert each.name in listed and each.title in listed
 
 
 def test_an_unknown_lesson_is_refused_with_a_way_out() -> None:
