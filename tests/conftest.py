@@ -6,9 +6,15 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
+import platformdirs
 import pytest
+from spectrasplat.gpu import stripped_store
+
+if TYPE_CHECKING:
+    from spectrasplat.gpu.context import Context
 
 PROCESS_BYTES = 3 << 30
 """Memory that one process of the tests may come to need, mostly for compiled programs that are kept (1.7 GB were
@@ -25,6 +31,12 @@ def usable_cores() -> int:
 if "PYTEST_XDIST_WORKER_COUNT" in os.environ:
     # A software renderer takes a thread for every core, and every process would. Set before the driver is loaded.
     os.environ.setdefault("LP_NUM_THREADS", str(max(usable_cores() // int(os.environ["PYTEST_XDIST_WORKER_COUNT"]), 1)))
+
+
+# What the driver compiled and what was stripped from shaders is kept for the next run. Mesa's folder is named for tests
+# that set a cache folder of their own; all tests together build more programs than one user does.
+os.environ.setdefault("MESA_SHADER_CACHE_DIR", platformdirs.user_cache_dir())
+stripped_store.MOST_FILES = 4096
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -46,22 +58,33 @@ def strict_floating_point() -> Iterator[None]:
         yield
 
 
-@pytest.fixture(scope="module")
-def gl():
-    """A file's OpenGL 4.3 context (`spectrasplat.gpu.context.Context`); `gl.ctx` is moderngl's.
-
-    A file's tests share compiled programs, as a viewer's edits and a stress run's cases do: most of what they draw are
-    variants of a few scenes, and a software renderer compiles longer than it draws. Files share nothing: what one
-    leaves behind must not fail another.
-    """
+@pytest.fixture(scope="session")
+def session_gl() -> Iterator[Context]:
+    """One context with its compiled programs for all files of a process: most of what tests draw are variants of a few
+    scenes, and a software renderer compiles longer than it draws. The programs' number is bounded
+    (`shader.KEPT_PROGRAMS`)."""
     from spectrasplat.gpu import shader
     from spectrasplat.gpu.context import create_context
 
     context = create_context()
+    context.ctx.gc_mode = "context_gc"  # what a test did not release is listed, and freed when its file ends
     shader.keep_programs(context.ctx)
     yield context
     shader.forget_programs(context.ctx)
     context.release()
+
+
+@pytest.fixture(scope="module")
+def gl(session_gl: Context) -> Iterator[Context]:
+    """The process's OpenGL 4.3 context (`spectrasplat.gpu.context.Context`); `gl.ctx` is moderngl's."""
+    session_gl.ctx.__enter__()  # an earlier file may have made a context of its own
+    yield session_gl
+    session_gl.ctx.__enter__()
+    left = session_gl.ctx.objects
+    while left:
+        resource = left.popleft()
+        if hasattr(resource, "release"):  # those that were released are in the list too
+            resource.release()
 
 
 @pytest.fixture(autouse=True)

@@ -19,7 +19,7 @@ from ..base.errors import UserError
 from . import dead_code, glsl_conditionals
 from .glsl_conditionals import Line
 
-_MOST_FILES = 512
+MOST_FILES = 512
 _MOST_BYTES = 1 << 22
 """Of one file, packed and unpacked."""
 _SUFFIX = ".glsl.z"
@@ -81,5 +81,5 @@ def _save(path: Path, kept: list[Line]) -> None:
         with atomic_output(path, lasting=False) as temporary:
             temporary.write_bytes(packed)
         by_age = sorted(path.parent.glob(f"*{_SUFFIX}"), key=lambda file: file.stat().st_mtime_ns, reverse=True)
-        for old in by_age[_MOST_FILES:]:
+        for old in by_age[MOST_FILES:]:
             old.unlink(missing_ok=True)

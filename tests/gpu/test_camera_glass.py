@@ -67,6 +67,7 @@ def stack_reflectance(surfaces: list[float], kept: list[float]) -> float:
     return total
 
 
+@pytest.mark.core
 def test_slab_before_a_black_floor_reflects_from_both_faces(gl):
     rgb = render(gl, [slab(1.5), BLACK_FLOOR], background=(1, 2, 3), split_threshold=EVERY_PART)
     assert rgb[5, 5] == pytest.approx(np.array([1, 2, 3]) * stack_reflectance([0.04, 0.04], [1.0]), rel=1e-4)
@@ -84,6 +85,7 @@ def test_chance_for_the_weak_parts_leaves_the_mean_as_it_is(gl):
     assert rgb[..., 1].mean(dtype=float) == pytest.approx(stack_reflectance([0.04, 0.04], [1.0]), abs=4.0 * spread)
 
 
+@pytest.mark.core
 def test_absorption_follows_beers_law(gl):
     clear = slab(1.5, absorption=Absorption(np.full(401, 1.3)))
     kept = np.exp(-1.3 * 0.5)

@@ -176,6 +176,7 @@ def test_the_fringe_notices_a_wrong_sign(gl, monkeypatch, tmp_path) -> None:
 # ---- a slab ------------------------------------------------------------------------------------
 
 
+@pytest.mark.core
 @pytest.mark.parametrize(("name", "offset_d"), [("N-BK7", 0.526946), ("N-SF11", 0.431514)])
 @pytest.mark.parametrize("height", [1.0, 3.0])
 def test_shift_of_an_edge_behind_a_slab_at_45_degrees(gl, name: str, offset_d: float, height: float) -> None:

@@ -37,6 +37,8 @@ from spectrasplat.stress.rigs.gpu_paths import (
     trace_light,
 )
 
+pytestmark = pytest.mark.core
+
 N_BK7_D = float(glasses.index("N-BK7", D_NM))
 LINES = (F_NM, D_NM, C_NM)
 

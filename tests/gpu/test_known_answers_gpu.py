@@ -37,6 +37,8 @@ from spectrasplat.stress.rigs.gpu_paths import Photons, extruded, glass, screen,
 
 from tests.gpu.mutants import mutate
 
+pytestmark = pytest.mark.core
+
 APEX = np.pi / 3
 
 

@@ -63,6 +63,7 @@ def test_all_that_was_emitted_is_drawn_or_accounted_for_where_reflection_is_tota
     assert abs(found.held) < 1e-3
 
 
+@pytest.mark.core
 def test_maps_hold_what_beams_of_a_lamp_throw(gl) -> None:
     """Through a slit and a prism, whose image is four to eight texels wide and swept over hundreds; chords of bands may
     miss by a texel, which is half a pixel (0.06 % too much)."""

@@ -24,6 +24,8 @@ from spectrasplat.gpu.records import photon_record, ray_record
 from spectrasplat.gpu.schema import Struct
 from spectrasplat.passes import beam_splat, footprint, splat
 
+pytestmark = pytest.mark.core
+
 ONE = 0x3F800000
 """Bits of 1.0: words just above are ordinary floats, so that no driver flushes them."""
 ROWS = 5

@@ -237,6 +237,7 @@ def test_methods_agree_on_energy(gl, tmp_path: Path, method: str) -> None:
     assert render(scene, replace(settings, method=method), context=gl).rgb.sum() == pytest.approx(reference, rel=0.03)
 
 
+@pytest.mark.core
 def test_map_layer_and_bins(gl, tmp_path: Path) -> None:
     scene = scene_of(tmp_path)
     settings = replace(SMALL, photons=60_000, layer="map:table", width=128, height=128)

@@ -42,6 +42,8 @@ from spectrasplat.stress.rigs.gpu_paths import (
 
 from tests.gpu.mutants import mutate
 
+pytestmark = pytest.mark.core
+
 BAND = (579.0, 581.0)
 """So narrow that the columns' second order is below the tolerance, and what absorption gains by a path's change of
 length; absorption steep enough to differ within it."""

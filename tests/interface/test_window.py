@@ -43,6 +43,7 @@ def run(tmp_path: Path, *arguments: str, display: bool) -> subprocess.CompletedP
     )
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("theme", ["dark", pytest.param("light", marks=pytest.mark.slow)])
 def test_the_window_shows_interface_and_caustic(tmp_path: Path, theme: str) -> None:
     done = run(

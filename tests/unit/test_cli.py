@@ -35,6 +35,8 @@ from spectrasplat.model.scene import (
 )
 from spectrasplat.model.settings import RenderSettings
 
+pytestmark = pytest.mark.core
+
 ROOT = Path(__file__).resolve().parents[2]
 
 

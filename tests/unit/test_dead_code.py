@@ -228,7 +228,7 @@ def test_without_a_folder_it_works(stripping: list[int], monkeypatch: pytest.Mon
 
 
 def test_what_is_oldest_is_forgotten(stripping: list[int], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(stripped_store, "_MOST_FILES", 3)
+    monkeypatch.setattr(stripped_store, "MOST_FILES", 3)
     for shift in range(6):
         stripped_store.stripped(lines(shift))
     assert len(list((tmp_path / "shaders").iterdir())) == 3

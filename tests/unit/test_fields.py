@@ -29,6 +29,8 @@ from spectrasplat.model.optics.colorimetry import VISIBLE_NM
 from spectrasplat.model.optics.spectrum import illuminant
 from spectrasplat.model.placement import Surroundings
 
+pytestmark = pytest.mark.core
+
 AROUND = Surroundings(np.zeros(3), 1.0)
 ODD = {
     "position": (1.5, -2.0, 3.25),

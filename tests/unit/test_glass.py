@@ -12,6 +12,8 @@ from spectrasplat.commands import glass_report
 from spectrasplat.model.optics import catalogue, glass
 from spectrasplat.model.optics.glass import LINE_C_NM, LINE_D_NM, LINE_F_NM
 
+pytestmark = pytest.mark.core
+
 VISIBLE = np.arange(380.0, 780.5, 1.0)
 
 # name, n_F, n_d, n_C, V_d, dn/dλ at d (1/µm); computed from the makers' coefficients in double precision

@@ -18,6 +18,8 @@ from spectrasplat.model.scene import Absorption, Dielectric, Diffuse, Mirror
 
 from tests.unit.gltf_builder import FACES, POSITIONS, Builder, glass_material
 
+pytestmark = pytest.mark.core
+
 
 def test_bare_glb_gets_light_camera_and_table_and_says_so(tmp_path: Path) -> None:
     scene = load_gltf(Builder().tetrahedron(glass_material()).written(tmp_path / "m.glb"))

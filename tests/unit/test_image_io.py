@@ -7,6 +7,8 @@ import pytest
 from spectrasplat.base.errors import UserError
 from spectrasplat.base.image_io import channel_name, check_suffix, read_image, write_image
 
+pytestmark = pytest.mark.core
+
 
 @pytest.fixture
 def picture() -> np.ndarray:

@@ -25,6 +25,8 @@ from reference.tracer import (
 from spectrasplat.reference import glasses, optics
 from spectrasplat.reference.glasses import C_NM, D_NM, F_NM
 
+pytestmark = pytest.mark.core
+
 N_BK7_D = float(glasses.index("N-BK7", D_NM))
 BALL = sphere((0.0, 0.0, 0.0), 1.0)
 

@@ -16,6 +16,8 @@ from pathlib import Path
 import pytest
 import spectrasplat
 
+pytestmark = pytest.mark.core
+
 APP = Path(spectrasplat.__path__[0])
 LAYERS = (
     ("base",),

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.core
+
 ROOT = Path(__file__).resolve().parents[2]
 needs_ruff = pytest.mark.skipif(
     find_spec("ruff") is None and shutil.which("ruff") is None, reason="ruff is not installed: pip install '.[test]'"

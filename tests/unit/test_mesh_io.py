@@ -13,6 +13,8 @@ from spectrasplat.model.geometry.mesh import Mesh
 from spectrasplat.model.geometry.mesh_health import examine, repair
 from spectrasplat.model.io.mesh_io import load_mesh, save_ply
 
+pytestmark = pytest.mark.core
+
 TETRAHEDRON_OBJ = """# comment
 v 0 0 0
 v 1 0 0 1.0 0.5 0.5

@@ -15,6 +15,8 @@ from spectrasplat.model.scene_checks import contains
 
 from tests.unit.scene_texts import FLOOR, THREE_LINES, load, refusal
 
+pytestmark = pytest.mark.core
+
 # -- defaults -----------------------------------------------------------------------------
 
 
