@@ -80,7 +80,7 @@ _BEYOND_ONLY = (
 def light_defines(features: Features, traits: DeviceTraits) -> Defines:
     """Defines common to the programs that emit, trace and queue rays."""
     copies = " ".join(
-        f"photon.dposition_dvar{g} = ray.dposition[SPATIAL + {g}];" for g in range(features.spectral_groups)
+        f"photon.dposition_dvar{g} = vec4(path.dposition[SPATIAL + {g}], 0.0);" for g in range(features.spectral_groups)
     )
     defines: Defines = {
         "FLAG_FOOTPRINT_DROPPED": f"{records.FLAG_FOOTPRINT_DROPPED}u",

@@ -7,47 +7,18 @@ layout(local_size_x = 64) in;
 #include "lib/finite.glsl"
 #include "lib/random.glsl"
 #include "lib/lattice.glsl"
-#include "lib/medium.glsl"
-#include "lib/band.glsl"
-#include "lib/interface.glsl"
 #ifdef FOOTPRINTS
 #include "lib/fan.glsl"
 #endif
 #include "light/trace_records.glsl"
-#ifdef HAS_GRATING
-#include "lib/grating.glsl"
-#endif
 #if defined(ROUGH_SURFACES) || defined(LAMP_COLUMNS)
 #include "lib/footprint.glsl"
-#endif
-#ifdef ROUGH_SURFACES
-#include "lib/rough_surface.glsl"
 #endif
 
 // Change of W per spacing: more is no footprint.
 #define FAN_LIMIT 1e4
 // Narrower bands are not cut at total internal reflection.
 #define MIN_CUT_BAND 1e-4
-// A grating of up to so many orders sends each on as a whole lattice where it is met first.
-#define MAX_WHOLE_ORDERS 3u
-// Bits of `flags` from which on the order of a grating stands that is to be sent on next.
-#define ORDER_BIT 8
-
-#if defined(NORMAL_DERIVATIVES) || defined(LOBE_COLUMNS)
-#define HAS_NORMAL_COLUMNS
-// Derivatives of the shading normal by the ray's columns.
-vec3 normal_columns[COLUMNS];
-#define NORMAL_COLUMN(c) normal_columns[c]
-#else
-#define NORMAL_COLUMN(c) vec3(0.0)
-#endif
-#ifdef POLARISED
-#include "light/trace_polarisation.glsl"
-#endif
-#ifdef ROUGH_SURFACES
-// Width of GGX of the object that a ray has met; 0: it is polished. And the table of what that sends on.
-float surface_width, surface_table;
-#endif
 
 // What a weight at each of the three places adds to the integral of the weights, straight between them, times the density whose running integral
 // stands in `row`. Simpson's rule for the running integral's own: exact where the density is quadratic over half a band.
@@ -66,10 +37,10 @@ vec3 band_powers(uint row, vec3 band)
 #define TINT_GENERATOR 3774877043u
 
 // How far a ray has come through the glass whose tint has levels: up or down to one of them, the same way all along its path.
-uint tint_level(RayRecord ray)
+uint tint_level(Path path)
 {
-    float rounding = kronecker(ray.photon_id / p.lattices, TINT_GENERATOR, p.tint_key + ray.photon_id % p.lattices * 2654435769u);
-    float place = min(float(TINT_LEVELS) * ray.tinted.x / (1.0 + ray.tinted.x), float(TINT_LEVELS - 1)), level = floor(place);
+    float rounding = kronecker(path.walk.photon_id / p.lattices, TINT_GENERATOR, p.tint_key + path.walk.photon_id % p.lattices * 2654435769u);
+    float place = min(float(TINT_LEVELS) * path.walk.tinted / (1.0 + path.walk.tinted), float(TINT_LEVELS - 1)), level = floor(place);
     // What is left falls the less the less of it there is: odds of a half lie before or behind the middle.
     float halfway = p.tint_halfway[uint(level) >> 2][uint(level) & 3u], beyond = (place - level) * halfway;
     float further = beyond / (beyond + (1.0 - (place - level)) * (1.0 - halfway));
@@ -78,10 +49,10 @@ uint tint_level(RayRecord ray)
 #endif
 
 // Row of what is left of the light's power, over the spectrum, where a ray has come to.
-uint power_row(RayRecord ray)
+uint power_row(Path path)
 {
 #ifdef TINT_LEVELS
-    return uint(p.power_row) + tint_level(ray);
+    return uint(p.power_row) + tint_level(path);
 #else
     return uint(p.power_row);
 #endif
@@ -92,60 +63,38 @@ vec3 band_w;
 
 // Power that a ray carries: its throughput, straight between three places, times the light's power over its band. That is what is drawn where it
 // lands, and so what is accounted for; `flux_w` is what its anchor alone would carry.
-float carried_w(RayRecord ray)
+float carried_w(Path path)
 {
-    return ray.x_hi > ray.x_lo ? dot(band_w, ray.throughput) : ray.flux_w;
+    return path.band.z > path.band.x ? dot(band_w, path.throughput) : path.walk.flux_w;
 }
 
 #include "light/roulette.glsl"
-
-#ifdef HERO
-// From here on the hero's path is not that of its companions: none of them would have led to it, and it has all of its weight.
-void leave_companions(inout RayRecord ray)
-{
-    ray.throughput *= ray.companion_x.w > 0.0 ? 4.0 : 1.0;
-    ray.companion_x.w = 0.0;
-    ray.companion_throughput = vec4(0.0);
-}
-
-// The share of the hero and its companions together, by which roulette asks: whoever of them leads, the odds are the same.
-float common_share(RayRecord ray, float own, vec3 companions)
-{
-    return ray.companion_x.w > 0.0 ? 0.25 * (own + dot(companions, vec3(1.0))) : own;
-}
-#endif
+#include "light/trace_companions.glsl"
 
 #ifdef ABSORPTION
 // What the medium on the way takes.
-void absorb(inout RayRecord ray, float distance, inout float absorbed_w)
+void absorb(inout Path path, float distance, inout float absorbed_w)
 {
-    uint row = medium_weight_row(medium_stack(ray));
+    uint row = medium_weight_row(path.medium);
     if (row == NONE) return;
 #ifdef TINT_LEVELS
-    if (row == p.tint_row && ray.x_hi > ray.x_lo) {
-        float before = carried_w(ray);
-        ray.tinted.x += p.tint_rate * distance;
-        ray.flux_w *= exp(-spectral_row(uint(WEIGHT_ROW) + row, ray.x_anchor) * distance);
-        band_w = band_powers(power_row(ray), band_of(ray));
-        float left = carried_w(ray);
+    if (row == p.tint_row && path.band.z > path.band.x) {
+        float before = carried_w(path);
+        path.walk.tinted += p.tint_rate * distance;
+        path.walk.flux_w *= exp(-spectral_row(uint(WEIGHT_ROW) + row, path.band.y) * distance);
+        band_w = band_powers(power_row(path), path.band);
+        float left = carried_w(path);
         absorbed_w += before - left;
-        ray.survival *= left / max(before, 1e-30);
+        path.walk.survival *= left / max(before, 1e-30);
         return;
     }
 #endif
-    vec3 alpha = spectral_row(uint(WEIGHT_ROW) + row, band_of(ray));
-    vec3 kept = exp(-alpha * distance);
-    absorbed_w += carried_w(ray);
-    ray.flux_w *= kept.y;
-    ray.throughput *= kept;
-    absorbed_w -= carried_w(ray);
-#ifdef HERO
-    vec3 companions = exp(-spectral_row(uint(WEIGHT_ROW) + row, ray.companion_x.xyz) * distance);
-    ray.companion_throughput.xyz *= companions;
-    ray.survival *= common_share(ray, kept.y, companions);
-#else
-    ray.survival *= kept.y;
-#endif
+    vec3 kept = exp(-spectral_row(uint(WEIGHT_ROW) + row, path.band) * distance);
+    vec3 companions = exp(-companion_row(path, uint(WEIGHT_ROW) + row) * distance);
+    absorbed_w += carried_w(path);
+    weaken(path, kept, companions);
+    absorbed_w -= carried_w(path);
+    path.walk.survival *= common_share(path, kept.y, companions);
 }
 #endif
 
@@ -154,72 +103,71 @@ void absorb(inout RayRecord ray, float distance, inout float absorbed_w)
 #endif
 #include "light/trace_bands.glsl"
 #include "light/trace_landing.glsl"
-#include "light/trace_rough.glsl"
 
 #ifdef FOOTPRINTS
 // Of the photon's footprint, per spacing of its own lattice.
-uint fan_where_it_landed(RayRecord ray, RayRecord start, Hit hit)
+uint fan_where_it_landed(Path path, Path start, Hit hit)
 {
     vec2 way;
-    for (int c = 0; c < 2; ++c) way[c] = change_of_way(start.dposition[c].xyz, start.ddirection[c].xyz, ray.direction, hit.normal_g, hit.distance);
-    vec2 fan = fan_of_footprint(ray.dposition[0].xyz, ray.dposition[1].xyz, ray.ddirection[0].xyz, ray.ddirection[1].xyz, way, ray.direction, hit.normal_g);
-    fan *= ray.footprint_scale;
+    for (int c = 0; c < 2; ++c) way[c] = change_of_way(start.dposition[c], start.ddirection[c], path.direction, hit.normal_g, hit.distance);
+    vec2 fan = fan_of_footprint(path.dposition[0], path.dposition[1], path.ddirection[0], path.ddirection[1], way, path.direction, hit.normal_g);
+    fan *= path.walk.footprint_scale;
     return is_within2(fan, FAN_LIMIT) ? packHalf2x16(fan) : 0u;
 }
 #endif
 
 // A photon on a receiver. The share that no specular event precedes the camera pass draws.
-void land(inout RayRecord ray, RayRecord start, uint receiver, uint triangle, Hit hit, uint slot, inout Outcome outcome)
+void land(inout Path path, Path start, uint receiver, uint triangle, Hit hit, uint slot, inout Outcome outcome)
 {
-    outcome.what |= ray.depth == 0u ? DIRECT : DEPOSITED;
-    outcome.flux_w = carried_w(ray);
-    if (ray.depth == 0u) return;
+    outcome.what |= path.depth == 0u ? DIRECT : DEPOSITED;
+    outcome.flux_w = carried_w(path);
+    if (path.depth == 0u) return;
     PhotonRecord photon;
-    photon.position = ray.position;
-    photon.flux_w = ray.flux_w;
+    photon.position = path.position;
+    photon.flux_w = path.walk.flux_w;
     photon.dposition_ds = vec3(0.0);
     photon.dposition_dt = vec3(0.0);
     photon.fan = 0u;
 #ifdef FOOTPRINTS
-    photon.dposition_ds = ray.dposition[0].xyz * ray.footprint_scale;
-    photon.dposition_dt = ray.dposition[1].xyz * ray.footprint_scale;
-    photon.fan = fan_where_it_landed(ray, start, hit);
+    photon.dposition_ds = path.dposition[0] * path.walk.footprint_scale;
+    photon.dposition_dt = path.dposition[1] * path.walk.footprint_scale;
+    photon.fan = fan_where_it_landed(path, start, hit);
 #endif
     uint lattice_bits = p.lattice_bits;
 #ifdef LAMP_COLUMNS
     // A footprint blurs what light from a point would draw, and an extended light has that coming: the broader of the two is drawn.
     vec2 fan = unpackHalf2x16(photon.fan);
 #ifdef LOBE_COLUMNS
-    narrow_lamp_by_lobe(ray);
+    narrow_lamp_by_lobe(path);
 #endif
-    if (cover_sides(hit.normal_g, photon.dposition_ds, photon.dposition_dt, fan, ray.dposition[LAMP].xyz, ray.dposition[LAMP + 1].xyz)) {
+    if (cover_sides(hit.normal_g, photon.dposition_ds, photon.dposition_dt, fan, path.dposition[LAMP], path.dposition[LAMP + 1])) {
         lattice_bits = 0u;
         photon.fan = is_within2(fan, FAN_LIMIT) ? packHalf2x16(fan) : 0u;
     }
 #endif
 #ifdef LOBE_COLUMNS
-    if (widen_by_lobe(ray, hit.normal_g, photon.dposition_ds, photon.dposition_dt)) {
+    if (widen_by_lobe(path, hit.normal_g, photon.dposition_ds, photon.dposition_dt)) {
         lattice_bits = 0u;
         photon.fan = 0u;
     }
 #endif
-    photon.x_lo = ray.x_lo;
-    photon.x_hi = ray.x_hi;
-    photon.throughput = ray.throughput;
+    photon.x_lo = path.band.x;
+    photon.x_hi = path.band.z;
+    photon.throughput = path.throughput;
 #ifdef HERO
-    photon.companion_x = ray.companion_x;
-    photon.companion_throughput = ray.companion_throughput;
+    photon.companion_x = path.walk.companion_x;
+    photon.companion_throughput = path.walk.companion_throughput;
 #endif
-    photon.x_anchor = ray.x_anchor;
+    photon.x_anchor = path.band.y;
     photon.triangle = triangle;
     photon.receiver = receiver;
-    photon.photon_id = ray.photon_id;
-    photon.light_and_source = ray.light_and_source;
-    photon.branch_key = ray.branch_key;
-    photon.depth = min(ray.depth, (1u << EDGE_BIT) - 1u);
+    photon.photon_id = path.walk.photon_id;
+    photon.light_and_source = path.walk.light_and_source;
+    photon.branch_key = path.walk.branch_key;
+    photon.depth = min(path.depth, (1u << EDGE_BIT) - 1u);
 #ifdef LIGHT_EDGES
     // The edge is told in steps of the lattice as emitted: footprints of a coarser one, or broader ones, reach over it from farther away.
-    if (lattice_bits == p.lattice_bits && ray.footprint_scale == 1.0) photon.depth |= uint(ray.dposition[0].w) << EDGE_BIT;
+    if (lattice_bits == p.lattice_bits && path.walk.footprint_scale == 1.0) photon.depth |= uint(path.walk.edge) << EDGE_BIT;
 #endif
 #if SPECTRAL_GROUPS > 0
     SPECTRAL_COPY
@@ -227,17 +175,17 @@ void land(inout RayRecord ray, RayRecord start, uint receiver, uint triangle, Hi
     bool holds = true;
 #if COLUMNS > 0
     for (int c = 0; c < COLUMNS; ++c) {
-        float widened = c < SPATIAL ? ray.footprint_scale * ray.footprint_scale : 1.0;
-        holds = holds && is_within(widened * dot(ray.dposition[c].xyz, ray.dposition[c].xyz), COLUMN_LIMIT * COLUMN_LIMIT);
+        float widened = c < SPATIAL ? path.walk.footprint_scale * path.walk.footprint_scale : 1.0;
+        holds = holds && is_within(widened * dot(path.dposition[c], path.dposition[c]), COLUMN_LIMIT * COLUMN_LIMIT);
     }
 #endif
     if (!holds) {
-        ray.flags |= FLAG_FOOTPRINT_DROPPED;
+        path.walk.dropped = FLAG_FOOTPRINT_DROPPED;
         outcome.what |= FELL_FOOTPRINT;
     }
-    photon.flags = (ray.flags & FLAG_FOOTPRINT_DROPPED) | lattice_bits;
+    photon.flags = path.walk.dropped | lattice_bits;
 #ifdef TINT_LEVELS
-    photon.flags |= tint_level(ray) << uint(TINT_BIT);
+    photon.flags |= tint_level(path) << uint(TINT_BIT);
 #endif
     store_photon(slot, photon);
     outcome.what |= LEFT_PHOTON;
@@ -255,34 +203,37 @@ bool is_beam_object(uint object)
 
 #ifdef FLIGHTS
 // The ray's way to what it meets; it has come so far through haze then.
-Flight flight_of(inout RayRecord ray, float distance)
+Flight flight_of(inout Path path, float distance)
 {
+    bool outside = !is_inside(path.medium);
+#ifdef HAS_GRATING
     // What is left of a grating's orders has flown here before.
-    bool outside = !is_inside(medium_stack(ray)) && (ray.flags >> uint(ORDER_BIT)) == 0u;
+    outside = outside && path.order == 0u;
+#endif
     Flight flight;
-    flight.position = ray.position;
-    flight.direction = ray.direction;
+    flight.position = path.position;
+    flight.direction = path.direction;
     flight.distance = distance;
-    flight.flux_w = outside ? carried_w(ray) : 0.0;
-    flight.flown = ray.flown.x;
-    flight.x_lo = ray.x_lo;
-    flight.x_hi = ray.x_hi;
-    flight.light_and_source = ray.light_and_source;
-    flight.photon_id = ray.photon_id;
-    flight.what = ray.depth << 8u;
-    flight.dposition_ds = ray.footprint_scale * ray.dposition[0].xyz;
-    flight.dposition_dt = ray.footprint_scale * ray.dposition[1].xyz;
-    flight.ddirection_ds = ray.footprint_scale * ray.ddirection[0].xyz;
-    flight.ddirection_dt = ray.footprint_scale * ray.ddirection[1].xyz;
+    flight.flux_w = outside ? carried_w(path) : 0.0;
+    flight.flown = path.walk.flown;
+    flight.x_lo = path.band.x;
+    flight.x_hi = path.band.z;
+    flight.light_and_source = path.walk.light_and_source;
+    flight.photon_id = path.walk.photon_id;
+    flight.what = path.depth << 8u;
+    flight.dposition_ds = path.walk.footprint_scale * path.dposition[0];
+    flight.dposition_dt = path.walk.footprint_scale * path.dposition[1];
+    flight.ddirection_ds = path.walk.footprint_scale * path.ddirection[0];
+    flight.ddirection_dt = path.walk.footprint_scale * path.ddirection[1];
     flight.dposition_dband = flight.ddirection_dband = vec3(0.0);
 #if SPECTRAL_GROUPS > 0
     for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
-        float over_band = variable_step(uint(g), ray.x_hi, ray.x_lo);
-        flight.dposition_dband += over_band * ray.dposition[SPATIAL + g].xyz;
-        flight.ddirection_dband += over_band * ray.ddirection[SPATIAL + g].xyz;
+        float over_band = variable_step(uint(g), path.band.z, path.band.x);
+        flight.dposition_dband += over_band * path.dposition[SPATIAL + g];
+        flight.ddirection_dband += over_band * path.ddirection[SPATIAL + g];
     }
 #endif
-    ray.flown.x += is_inside(medium_stack(ray)) ? 0.0 : distance;
+    path.walk.flown += is_inside(path.medium) ? 0.0 : distance;
     return flight;
 }
 #endif
@@ -291,30 +242,29 @@ void main()
 {
     uint k = gl_GlobalInvocationID.x;
     if (k >= state.alive) return;
-    RayRecord ray = load_ray(indices[k]);
+    Path path = load_path(indices[k]);
 #if SPECTRAL_GROUPS > 0
-    keep_sweeps_within(ray);
+    keep_sweeps_within(path);
 #endif
-    RayRecord start = ray;
+    Path start = path;
     Outcome outcome = Outcome(0u, 0.0, 0.0, 0.0);
 #ifndef POINT_SPECTRUM
-    band_w = band_powers(power_row(ray), band_of(ray));
+    band_w = band_powers(power_row(path), path.band);
 #endif
 
-    RayOrigin origin = RayOrigin(ray.last_primitive, ray.last_object, uint((ray.flags & FLAG_INSIDE) != 0u), ray.inside_mask);
     Hit hit;
     float border = -1.0;
 #ifdef LANDING_CUTS
-    bool met = meet_with_band(ray, origin, hit, border);
+    bool met = meet_with_band(path, hit, border);
 #else
-    bool met = intersect_closest(ray.position, ray.direction, FAR_DISTANCE, origin, hit);
+    bool met = intersect_closest(path.position, path.direction, FAR_DISTANCE, path.origin, hit);
 #endif
 #ifdef LOOPS_MAY_END
     // llvmpipe ends every loop of an invocation once they have run 65,535 rounds together, and goes on with what there is.
     uint rounds = 0u;
     while (rounds < 2u) rounds += min(p.lattices, 1u);
     if (rounds < 2u) {
-        outcomes[k] = uvec4(LOST_NUMERIC, floatBitsToUint(carried_w(ray)), 0u, 0u);
+        outcomes[k] = uvec4(LOST_NUMERIC, floatBitsToUint(carried_w(path)), 0u, 0u);
         return;
     }
 #endif
@@ -324,53 +274,45 @@ void main()
     uint kind = met ? thing.kind : NONE;
 
 #ifdef FLIGHTS
-    Flight flight = flight_of(ray, met ? hit.distance : FAR_DISTANCE);
+    Flight flight = flight_of(path, met ? hit.distance : FAR_DISTANCE);
 #endif
 #ifdef ABSORPTION
-    if (met) absorb(ray, hit.distance, outcome.absorbed_w);
+    if (met) absorb(path, hit.distance, outcome.absorbed_w);
 #endif
-#ifdef ROUGH_SURFACES
-    surface_width = kind == KIND_DIELECTRIC ? thing.colour.x : 0.0;
-    surface_table = thing.colour.y;
-#endif
-    if (met) ray.position = surface_point(hit, facet, ray.position, ray.direction);
+    if (met) path.position = surface_point(hit, facet, path.position, path.direction);
 #ifdef FOOTPRINTS
-    if (ray.depth > 0u) keep_directions_within(ray);
+    if (path.depth > 0u) keep_directions_within(path);
 #endif
 #ifdef LAMP_COLUMNS
-    if (met && ray.depth > 0u && p.bounded != 0u) keep_pair_above(ray, LAMP, hit.normal_g);
+    if (met && path.depth > 0u && p.bounded != 0u) keep_pair_above(path, LAMP, hit.normal_g);
 #endif
 #ifdef LOBE_COLUMNS
-    if (met && p.bounded != 0u) keep_pair_above(ray, LOBE, hit.normal_g);
+    if (met && p.bounded != 0u) keep_pair_above(path, LOBE, hit.normal_g);
 #endif
-#if COLUMNS > 0
-    for (int c = 0; c < COLUMNS; ++c)
-        ray.dposition[c].xyz = transfer_column(ray.dposition[c].xyz, ray.ddirection[c].xyz, ray.direction, hit.normal_g, hit.distance);
-#endif
-
+    transfer_columns(path, hit.normal_g, hit.distance);
 #ifdef FOOTPRINTS
-    if (IS_GLASS(kind) || kind == KIND_MIRROR) keep_columns_within(ray, start, thing.kind == KIND_MIRROR ? thing.colour.w : thing.colour.z, hit.distance);
+    if (IS_GLASS(kind) || kind == KIND_MIRROR) keep_columns_within(path, start, thing.kind == KIND_MIRROR ? thing.colour.w : thing.colour.z, hit.distance);
 #endif
 
 #ifdef BEAMS
-    if (met && (ray.light_and_source >> 16) == 0xffffu && is_beam_object(hit.object)) {
-        outcome = Outcome(LEFT_TO_BEAMS, carried_w(ray), 0.0, 0.0);
+    if (met && (path.walk.light_and_source >> 16) == 0xffffu && is_beam_object(hit.object)) {
+        outcome = Outcome(LEFT_TO_BEAMS, carried_w(path), 0.0, 0.0);
     } else
 #endif
     if (kind == KIND_DIFFUSE && border < 0.0) {
-        land(ray, start, thing.receiver, facet.source, hit, k, outcome);
+        land(path, start, thing.receiver, facet.source, hit, k, outcome);
     } else if (kind == KIND_BLACK && border < 0.0) {
         outcome.what |= ABSORBED;
-        outcome.flux_w = carried_w(ray);
+        outcome.flux_w = carried_w(path);
     } else if (kind == NONE) {
         // A ray that leaves the scene from inside a solid slipped through a crack.
-        outcome.what |= is_inside(medium_stack(ray)) ? LOST_NUMERIC : ESCAPED;
-        outcome.flux_w = carried_w(ray);
-    } else if (ray.depth >= p.max_depth && border < 0.0) {
+        outcome.what |= is_inside(path.medium) ? LOST_NUMERIC : ESCAPED;
+        outcome.flux_w = carried_w(path);
+    } else if (path.depth >= p.max_depth && border < 0.0) {
         outcome.what |= LOST_DEPTH;
-        outcome.flux_w = carried_w(ray);
+        outcome.flux_w = carried_w(path);
     } else {
-        scatter(ray, start, hit, shading_frame(hit, facet, ray.position, ray.direction), kind, thing, border, k, outcome);
+        scatter(path, start, hit, facet, kind, thing, border, k, outcome);
     }
 #ifdef FLIGHTS
 #ifdef BAND_CUTS

@@ -9,45 +9,40 @@
 #define NARROWEST_LANDING 0.0078125
 
 // Whether the ends of a ray's band land so far apart that each may meet something else than the anchor has, at `hit`.
-bool lands_broadly(RayRecord ray, Hit hit)
+bool lands_broadly(Path path, Hit hit)
 {
     uint kind = object_at(hit.object).kind;
-    bool lands = (kind == KIND_DIFFUSE || kind == KIND_BLACK) && ray.depth > 0u;
-    if (!lands || ray.x_hi - ray.x_lo < NARROWEST_LANDING || (ray.flags & FLAG_FOOTPRINT_DROPPED) != 0u) return false;
+    bool lands = (kind == KIND_DIFFUSE || kind == KIND_BLACK) && path.depth > 0u;
+    if (!lands || path.band.z - path.band.x < NARROWEST_LANDING || path.walk.dropped != 0u) return false;
     vec3 column[COLUMNS];
-    for (int c = 0; c < COLUMNS; ++c) column[c] = transfer_column(ray.dposition[c].xyz, ray.ddirection[c].xyz, ray.direction, hit.normal_g, hit.distance);
+    for (int c = 0; c < COLUMNS; ++c) column[c] = transfer_column(path.dposition[c], path.ddirection[c], path.direction, hit.normal_g, hit.distance);
     vec3 chord = vec3(0.0);
-    for (int g = 0; g < SPECTRAL_GROUPS; ++g) chord += variable_step(uint(g), ray.x_hi, ray.x_lo) * column[SPATIAL + g];
-    float least = SHORTEST_CUT_CHORD * ray.footprint_scale;
+    for (int g = 0; g < SPECTRAL_GROUPS; ++g) chord += variable_step(uint(g), path.band.z, path.band.x) * column[SPATIAL + g];
+    float least = SHORTEST_CUT_CHORD * path.walk.footprint_scale;
     return dot(chord, chord) > least * least * min(dot(column[0], column[0]), dot(column[1], column[1]));
 }
 
 // The nearest hit of a ray's anchor. `border`: where in its band that begins to meet another object, if it may be cut there; else a negative number.
-bool meet_with_band(RayRecord ray, RayOrigin origin, out Hit hit, out float border)
+bool meet_with_band(Path path, out Hit hit, out float border)
 {
-    float x = ray.x_anchor, inside = ray.x_anchor, outside = ray.x_anchor;
+    float x = path.band.y, inside = path.band.y, outside = path.band.y;
     bool met = false;
     // The anchor, then the band's ends, then halvings between what lands with the anchor and what does not.
     uint end = 1u;
     for (uint turn = 0u; turn < end;) {
-        vec3 position = ray.position, direction = ray.direction;
-        for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
-            float change = variable_step(uint(g), x, ray.x_anchor);
-            position += change * ray.dposition[SPATIAL + g].xyz;
-            direction += change * ray.ddirection[SPATIAL + g].xyz;
-        }
-        direction = turn == 0u ? ray.direction : normalize(direction);
+        vec3 position = path.position, direction = path.direction;
+        if (turn > 0u) ray_at(path, x, position, direction);
         Hit seen;
-        bool sees = intersect_closest(position, direction, FAR_DISTANCE, origin, seen);
+        bool sees = intersect_closest(position, direction, FAR_DISTANCE, path.origin, seen);
         bool together = sees && seen.object == hit.object;
         if (turn == 0u) {
             hit = seen;
             met = sees;
-            end = met && lands_broadly(ray, hit) ? 3u : 1u;
-            x = mix(ray.x_lo, ray.x_anchor, ASIDE_OF_ENDS);
+            end = met && lands_broadly(path, hit) ? 3u : 1u;
+            x = mix(path.band.x, path.band.y, ASIDE_OF_ENDS);
             turn = 1u;
         } else if (turn < 3u && together) {
-            x = mix(ray.x_hi, ray.x_anchor, ASIDE_OF_ENDS);
+            x = mix(path.band.z, path.band.y, ASIDE_OF_ENDS);
             ++turn;
         } else {
             end = 3u + BORDER_HALVINGS;
@@ -57,7 +52,7 @@ bool meet_with_band(RayRecord ray, RayOrigin origin, out Hit hit, out float bord
             x = 0.5 * (inside + outside);
         }
     }
-    border = end > 3u ? clear_cut(ray, ray, x, hit.distance) : -1.0;
+    border = end > 3u ? clear_cut(path, path, x, hit.distance) : -1.0;
     return met;
 }
 #endif
