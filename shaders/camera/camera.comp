@@ -31,11 +31,11 @@ int asked = 0;
 #include "camera/halts.glsl"
 #define STACKED(i) halted[place].path_stack[i]
 #else
-CameraPath path_stack[STACK];
+Path path_stack[STACK];
 #define STACKED(i) path_stack[i]
 #endif
 // What this event adds to them, put there in one place: storing a path at an index takes a compiler long.
-CameraPath pending_path;
+Path pending_path;
 bool pushes_path;
 #ifdef SPECTRAL_SWEEP
 // Where this event cuts the path's band; negative: nowhere.
@@ -47,7 +47,7 @@ float cut_at;
 // Ends of paths are looked at together, when there are that many or no path is left: a software renderer, and a GPU, looks at those of
 // neighbouring pixels side by side then.
 struct PathEnd {
-    CameraPath path;
+    Path path;
     Hit hit;
     uint met;  // 1: `hit` was met
     uint same_hit;
@@ -55,10 +55,6 @@ struct PathEnd {
 PathEnd ended[ENDS_HELD];
 #endif
 
-#include "camera/interface.glsl"
-#ifdef CAMERA_SPECULAR
-#include "camera/rough.glsl"
-#endif
 #if defined(CAMERA_SPECULAR) && defined(SPECTRAL_SWEEP)
 #include "camera/cuts.glsl"
 #endif
@@ -92,7 +88,7 @@ uint listed_entry(uint number, uint primary_sample, uint count)
     return number | (primary_sample << LISTED_BITS) | ((count - 1u) << (LISTED_BITS + 3u));
 }
 
-CameraPath camera_path(uvec2 pixel, uint primary_sample, float gain)
+Path camera_path(uvec2 pixel, uint primary_sample, float gain)
 {
     look_place = primary_sample_place(primary_sample);
 #ifdef LENS
@@ -112,7 +108,7 @@ CameraPath camera_path(uvec2 pixel, uint primary_sample, float gain)
 
 #ifndef CAMERA_SPECULAR
 // What a camera ray meets that nothing specular is in the way of.
-void see_directly(CameraPath path, bool met, Hit hit, uint kind, uint pixel_key)
+void see_directly(Path path, bool met, Hit hit, uint kind, uint pixel_key)
 {
 #if defined(LAYER_BEAUTY) && defined(VISIBLE_LIGHTS)
     add_lights(path, met ? hit.distance : FAR_DISTANCE);
@@ -147,7 +143,7 @@ void main()
 #endif
     uint pixel_key = hash_combine(hash_combine(p.seed, pixel.x), pixel.y);
 #ifdef CAMERA_SPECULAR
-    CameraPath path = camera_path(pixel, primary_sample, gain);
+    Path path = camera_path(pixel, primary_sample, gain);
 #endif
 #ifdef RGB_CHANNELS
     turn = p.counts_turns != 0u ? uint(imageLoad(picture[0], ivec2(pixel)).w) : p.sample_index;
@@ -180,7 +176,7 @@ void main()
         look_index = p.sample_index * p.primary_samples + k;
         lights_seen = 0u;
         saw_light = skipped_texels = false;
-        CameraPath path = camera_path(pixel, p.primary_samples == 1u ? THE_SAMPLE : k, 1.0 / float(p.primary_samples));
+        Path path = camera_path(pixel, p.primary_samples == 1u ? THE_SAMPLE : k, 1.0 / float(p.primary_samples));
         Hit hit;
         bool met = intersect_closest(path.position, path.direction, FAR_DISTANCE, path.origin, hit);
         uint kind = met ? object_at(hit.object).kind : NONE;
@@ -246,7 +242,7 @@ void main()
 #endif
 #ifdef SPECTRAL_SWEEP
             cut_at = -1.0;
-            bool asks = path.restricted != 0u && !event_limit_reached && (ends || (path.planar_so_far != 0u && kind != KIND_BLACK && asked < MAX_ASKED));
+            bool asks = path.restricted != 0u && !event_limit_reached && (ends || (path.walk.planar_so_far != 0u && kind != KIND_BLACK && asked < MAX_ASKED));
             float ahead = met ? hit.distance : FAR_DISTANCE;
             if (asks) asks = ends ? shown_sweep(path, ahead) > MIN_SWEEP : sweep_pixels(path, ahead) > MIN_CUT_SWEEP * sample_side(path);
             if (asks) cut_at = where_paths_diverge(path, met, ends, hit, same_hit);
@@ -261,24 +257,24 @@ void main()
 #endif
 #ifdef COATS
                 // Before a coat that is seen first, the program for what is seen directly has added them.
-                met_before = met_before || (coated && path.depth == 0);
+                met_before = met_before || (coated && path.depth == 0u);
 #endif
                 if (!met_before) add_lights(path, met ? hit.distance : FAR_DISTANCE);
 #endif
                 // Light that would still be caught inside is as if it left here.
-                bool specular = !ends && kind != KIND_BLACK, leaves = specular && (event_limit_reached || path.depth >= MAX_DEPTH);
+                bool specular = !ends && kind != KIND_BLACK, leaves = specular && (event_limit_reached || path.depth >= uint(MAX_DEPTH));
                 if (leaves) atomicAdd(fallbacks[FELL_DEPTH], 1u);
 #ifdef HAS_GRATING
-                if (leaves && kind == KIND_GRATING) path.weight *= efficiency_left(path, hit.object);
+                if (leaves && kind == KIND_GRATING) path.throughput *= efficiency_left(path, hit.object);
 #endif
                 if (ends || leaves) ended[found++] = PathEnd(path, hit, uint(met && ends), uint(same_hit || leaves));
                 goes_on = specular && !leaves;
 #ifdef COATS
-                goes_on = goes_on || (coated && !event_limit_reached && path.depth < MAX_DEPTH);
+                goes_on = goes_on || (coated && !event_limit_reached && path.depth < uint(MAX_DEPTH));
 #endif
                 if (goes_on) meet_surface(path, hit, kind, pixel_key);
 #if defined(HAS_GRATING) || defined(COATS) || defined(ROUGH_SURFACES)
-                goes_on = goes_on && path.inverse_pdf > 0.0;
+                goes_on = goes_on && path.walk.inverse_pdf > 0.0;
 #endif
             }
 #ifdef SPECTRAL_SWEEP

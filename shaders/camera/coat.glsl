@@ -10,7 +10,7 @@ const float WIDEST_LOBE = 1.5, LOBE_OVERLAP = 1.4;
 
 // What a direction of this density stands for, as the side of a square (filtered importance sampling [Krivanek and Colbert 2008]): what is looked
 // up along it is averaged over its sample's share of that.
-void widen_columns(inout CameraPath path, float density)
+void widen_columns(inout Path path, float density)
 {
     float width = min(LOBE_OVERLAP * inversesqrt(density), WIDEST_LOBE);
     for (int c = 0; c < 2; ++c) {
@@ -21,15 +21,15 @@ void widen_columns(inout CameraPath path, float density)
 }
 
 // The path stands at the surface, and its columns too.
-void meet_coat(inout CameraPath path, Hit hit, Triangle facet, uint pixel_key)
+void meet_coat(inout Path path, Hit hit, Triangle facet, uint pixel_key)
 {
     Finish finish = finish_of(hit.object);
-    PathFrame frame = path_frame(path, hit, facet);
-    vec3 first, second, normal = frame.shading.normal;
+    Event event = event_at(path, hit, facet);
+    vec3 first, second, normal = event.frame.normal;
     axes_across(normal, first, second);
     mat3 to_world = mat3(first, second, normal);
     vec3 toward = -path.direction * to_world;
-    uint key = hash_combine(hash_combine(pixel_key, path.key), 80u + uint(path.depth));
+    uint key = hash_combine(hash_combine(pixel_key, path.walk.key), 80u + path.depth);
     vec2 unit = vec2(kronecker(p.sample_index, FACET_1, key), kronecker(p.sample_index, FACET_2, hash_pcg(key)));
     // A pixel's only sample, as in a picture in motion, stands for all of the lobe: no grain.
     bool is_only = p.sample_side >= 1.0, draws = finish.alpha > 0.0 && !is_only;
@@ -38,24 +38,23 @@ void meet_coat(inout CameraPath path, Hit hit, Triangle facet, uint pixel_key)
     vec3 away = 2.0 * facing * drawn - toward;
     float weight = draws ? coat_weight(finish.alpha, finish.index, toward, away, facing) : 1.0 - share_under(finish, facing);
     vec3 turn = to_world * drawn - normal;
-    frame.shading.normal += turn;
+    event.frame.normal += turn;
 #ifdef SPECTRAL_SWEEP
-    for (int end = 0; end < 2; ++end) frame.end_normal[end] = normalize(frame.end_normal[end] + turn);
+    for (int end = 0; end < 2; ++end) event.end_normal[end] = normalize(event.end_normal[end] + turn);
 #endif
-    bool leaves = dot(reflect_direction(path.direction, frame.shading.normal, -facing), frame.shading.normal_g) > 0.0;
-    reflect_path(path, frame);
-    path.weight *= weight;
-    path.branch_weight *= weight;
+    bool geometric, leaves = dot(reflect_direction(path.direction, event.frame.normal, -facing), event.frame.normal_g) > 0.0;
+    reflect_path(path, event, geometric);
+    path.throughput *= weight;
+    path.walk.branch_weight *= weight;
     // A weak path goes on by chance.
-    float stays = path.depth > 1 ? clamp(path.branch_weight / p.split_threshold, 0.05, 1.0) : 1.0;
+    float stays = path.depth > 1u ? clamp(path.walk.branch_weight / p.split_threshold, 0.05, 1.0) : 1.0;
     bool goes_on = weight > 0.0 && leaves && facing > 0.0 && (stays >= 1.0 || choice(path, pixel_key) < stays);
-    path.inverse_pdf = goes_on ? path.inverse_pdf / stays : 0.0;
-    path.branch_weight /= stays;
-    path.key = hash_combine(path.key, 5u);
-    path.coat_pdf = finish.alpha > 0.0 ? coat_direction_density(finish.alpha, toward, drawn) : 1e30;
-    widen_columns(path, path.coat_pdf);
-    path.origin = RayOrigin(hit.primitive, hit.object, uint(dot(path.direction, hit.normal_g) < 0.0), path.origin.inside_mask);
-    path.recut = 0u;
+    path.walk.inverse_pdf = goes_on ? path.walk.inverse_pdf / stays : 0.0;
+    path.walk.branch_weight /= stays;
+    path.walk.key = hash_combine(path.walk.key, 5u);
+    path.walk.coat_pdf = finish.alpha > 0.0 ? coat_direction_density(finish.alpha, toward, drawn) : 1e30;
+    widen_columns(path, path.walk.coat_pdf);
+    leave_surface(path, hit, dot(path.direction, hit.normal_g) < 0.0);
 #ifdef POLARISED
     path.polarisation = unpolarised(path.direction);
 #endif

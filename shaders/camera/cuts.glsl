@@ -4,7 +4,7 @@
 #define CAMERA_CUTS_GLSL
 
 // Cuts of the band of one path.
-#define MAX_CUTS 4
+#define MAX_CUTS 4u
 // Sweep, in sides of a sample's share of its pixel, below which nobody sees which colour went where.
 #define MIN_CUT_SWEEP 0.5
 // Halvings between the middle of a band and an end: a cut is told to 1/256 of the band.
@@ -22,37 +22,38 @@ float cell_border(float at)
     return float(emission_cell(at)) / float(EMISSION_CELLS);
 }
 
-bool may_cut_at(CameraPath path, float at)
+bool may_cut_at(Path path, float at)
 {
     return min(at - path.band.x, path.band.z - at) > 0.5 / float(EMISSION_CELLS);
 }
 
 // How much of what looks bright in the band lies below `at`.
-float share_below(CameraPath path, float at)
+float share_below(Path path, float at)
 {
     vec2 brightness = brightness_of(path.band);
     return clamp((cell_cdf[emission_cell(at)] - brightness.x) / max(brightness.y - brightness.x, 1e-9), 0.05, 0.95);
 }
 
-// Both parts of a cut band set out again from the path's last surface (`restrict_to_part`): `path` is one, the other is pending. Of weak parts one is
+// Both parts of a cut band set out again from the path's last surface (`restrict_to`): `path` is one, the other is pending. Of weak parts one is
 // chosen by chance.
-void cut_band(inout CameraPath path, float at, uint pixel_key)
+void cut_band(inout Path path, float at, uint pixel_key)
 {
     float below = share_below(path, at);
-    bool both = path.branch_weight * min(below, 1.0 - below) > CUT_THRESHOLD && stack_size < STACK;
+    bool both = path.walk.branch_weight * min(below, 1.0 - below) > CUT_THRESHOLD && stack_size < STACK;
     bool takes_low = true;
-    if (!both) takes_low = unit_float(hash_combine(hash_combine(pixel_key, path.key + uint(path.depth + path.cuts) * 2654435769u), p.sample_index)) < below;
-    path.cuts += 1;
-    CameraPath whole = path;
+    if (!both) takes_low = unit_float(hash_combine(hash_combine(pixel_key, path.walk.key + (path.depth + path.walk.cuts) * 2654435769u), p.sample_index)) < below;
+    path.walk.cuts += 1u;
+    Path whole = path;
     // The part that is put on the stack first, then the one that is followed.
     for (int part = both ? 0 : 1; part < 2; ++part) {
         bool low = part == 0 ? !takes_low : takes_low;
         float share = low ? below : 1.0 - below;
         path = whole;
-        path.key = hash_combine(whole.key, part == 0 ? 6u : (takes_low ? 5u : 7u));
-        if (both) path.branch_weight *= share;
-        else path.inverse_pdf /= share;
-        restrict_to_part(path, low ? whole.band.x : at, low ? at : whole.band.z);
+        path.walk.key = hash_combine(whole.walk.key, part == 0 ? 6u : (takes_low ? 5u : 7u));
+        if (both) path.walk.branch_weight *= share;
+        else path.walk.inverse_pdf /= share;
+        float lo = low ? whole.band.x : at, hi = low ? at : whole.band.z;
+        restrict_to(path, vec3(lo, anchor_of(whole, lo, hi), hi));
         if (part == 0) pending_path = path;
     }
     pushes_path = both;
@@ -60,7 +61,7 @@ void cut_band(inout CameraPath path, float at, uint pixel_key)
 
 // Whether the ray at the wavelength x meets what the path's own ray met. `ends`: the path ends there; colours that end elsewhere, or in
 // nothing, then go along, for every lookup along the sweep finds out for itself; `same_hit` is made false by them.
-bool follows_same_path(CameraPath path, float x, bool met, bool ends, Hit hit, inout bool same_hit, out Hit found)
+bool follows_same_path(Path path, float x, bool met, bool ends, Hit hit, inout bool same_hit, out Hit found)
 {
     asked += 1;
     vec3 position, direction;
@@ -85,7 +86,7 @@ float sooner(vec3 position, vec3 direction, vec3 normal_a, vec3 on_a, vec3 norma
 
 // Asks both ends; where the way of one of them parts from the middle's, the wavelength where it does, else a negative one.
 // `same_hit`: whether all of the band ends on the facet, or in the nothing, that its middle ends in.
-float where_paths_diverge(CameraPath path, bool met, bool ends, Hit hit, out bool same_hit)
+float where_paths_diverge(Path path, bool met, bool ends, Hit hit, out bool same_hit)
 {
     same_hit = true;
     bool parts = false, bisects = true;
@@ -111,7 +112,7 @@ float where_paths_diverge(CameraPath path, bool met, bool ends, Hit hit, out boo
             parted = goes ? parted : x;
         }
         if (i == 1) {
-            bisects = parts && path.planar_so_far != 0u && path.cuts < MAX_CUTS;
+            bisects = parts && path.walk.planar_so_far != 0u && path.walk.cuts < MAX_CUTS;
             if (bisects && met && other.object == hit.object) {
                 // Two facets of one solid part in the edge where they meet: where both are as far.
                 vec3 position, direction;
@@ -131,7 +132,7 @@ float where_paths_diverge(CameraPath path, bool met, bool ends, Hit hit, out boo
         }
     }
     float at = cell_border(0.5 * (along + parted));
-    return parts && path.planar_so_far != 0u && path.cuts < MAX_CUTS && may_cut_at(path, at) ? at : -1.0;
+    return parts && path.walk.planar_so_far != 0u && path.walk.cuts < MAX_CUTS && may_cut_at(path, at) ? at : -1.0;
 }
 
 #endif

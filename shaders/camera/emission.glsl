@@ -24,13 +24,13 @@ vec4 emission_until(uint row, int target, int cell)
 }
 
 // What a path lets through at the wavelength x.
-float transmitted(CameraPath path, float x)
+float transmitted(Path path, float x)
 {
-    float kept = band_weights(path.band, path.weight, vec3(x)).x;
+    float kept = band_weights(path.band, path.throughput, vec3(x)).x;
 #ifdef ABSORPTION
     float depth = 0.0;
     for (int i = 0; i < ABSORBERS; ++i)
-        if (path.lengths[i] > 0.0) depth += path.lengths[i] * spectral_row(uint(ABSORPTION_ROW + i), x);
+        if (path.walk.lengths[i] > 0.0) depth += path.walk.lengths[i] * spectral_row(uint(ABSORPTION_ROW + i), x);
     kept *= exp(-depth);
 #endif
     return kept;
@@ -49,24 +49,24 @@ struct WavelengthInterval {
     int steps;      // parts that differ in what the path lets through
 };
 
-WavelengthInterval wavelength_interval(CameraPath path, float lo, float hi)
+WavelengthInterval wavelength_interval(Path path, float lo, float hi)
 {
     WavelengthInterval interval;
     interval.lo = lo;
     interval.hi = hi;
     interval.cell_lo = emission_cell(lo);
     interval.cell_hi = emission_cell(hi);
-    interval.through = path.inverse_pdf * transmitted(path, 0.5 * (lo + hi));
+    interval.through = path.walk.inverse_pdf * transmitted(path, 0.5 * (lo + hi));
 #ifdef ABSORPTION
     interval.steps = max(1, int(ceil((hi - lo) * float(TINT_STEPS))));
 #else
-    interval.steps = path.weight.x == path.weight.z ? 1 : max(1, int(ceil((hi - lo) * float(WEIGHT_STEPS))));
+    interval.steps = path.throughput.x == path.throughput.z ? 1 : max(1, int(ceil((hi - lo) * float(WEIGHT_STEPS))));
 #endif
     return interval;
 }
 
 // Adds a light whose spectrum is that of `row`, `factor` times.
-void add_spectrum(CameraPath path, WavelengthInterval interval, uint row, float factor)
+void add_spectrum(Path path, WavelengthInterval interval, uint row, float factor)
 {
     if (interval.steps == 1)
         for (int t = 0; t < TARGETS; ++t)
@@ -75,7 +75,7 @@ void add_spectrum(CameraPath path, WavelengthInterval interval, uint row, float 
     float step_x = (interval.hi - interval.lo) / float(interval.steps);
     for (int s = 0; s < interval.steps && interval.steps > 1; ++s) {
         float a = interval.lo + float(s) * step_x, b = s + 1 == interval.steps ? interval.hi : a + step_x;
-        float amount = factor * path.inverse_pdf * transmitted(path, 0.5 * (a + b));
+        float amount = factor * path.walk.inverse_pdf * transmitted(path, 0.5 * (a + b));
         int cell_a = emission_cell(a), cell_b = emission_cell(b);
         for (int t = 0; t < TARGETS; ++t)
             radiance[t] += amount * (emission_until(row, t, cell_b) - emission_until(row, t, cell_a));
@@ -83,7 +83,7 @@ void add_spectrum(CameraPath path, WavelengthInterval interval, uint row, float 
 }
 
 // The same under a colour: `row` holds the light itself, the three after it the light times the functions of the reflectance basis.
-void add_colour(CameraPath path, WavelengthInterval interval, uint row, vec3 colour)
+void add_colour(Path path, WavelengthInterval interval, uint row, vec3 colour)
 {
     bool grey = colour.r == colour.g && colour.g == colour.b;
     if (grey) add_spectrum(path, interval, row, colour.r);
@@ -91,7 +91,7 @@ void add_colour(CameraPath path, WavelengthInterval interval, uint row, vec3 col
 }
 
 // Factor on every channel of light whose spectrum is no longer known: that of white light along the same path.
-void channel_factors(CameraPath path, WavelengthInterval interval, out vec4 factors[TARGETS])
+void channel_factors(Path path, WavelengthInterval interval, out vec4 factors[TARGETS])
 {
     bool whole = interval.steps == 1 && path.restricted == 0u;
     for (int t = 0; t < TARGETS; ++t) factors[t] = vec4(interval.through);
@@ -102,7 +102,7 @@ void channel_factors(CameraPath path, WavelengthInterval interval, out vec4 fact
             vec4 kept = vec4(0.0);
             for (int s = 0; s < interval.steps; ++s) {
                 float a = interval.lo + float(s) * step_x, b = s + 1 == interval.steps ? interval.hi : a + step_x;
-                kept += path.inverse_pdf * transmitted(path, 0.5 * (a + b)) * (emission_until(uint(WHITE_ROW), t, emission_cell(b)) - emission_until(uint(WHITE_ROW), t, emission_cell(a)));
+                kept += path.walk.inverse_pdf * transmitted(path, 0.5 * (a + b)) * (emission_until(uint(WHITE_ROW), t, emission_cell(b)) - emission_until(uint(WHITE_ROW), t, emission_cell(a)));
             }
             factors[t] = kept / max(emission_until(uint(WHITE_ROW), t, EMISSION_CELLS), vec4(1e-20));
         }

@@ -53,14 +53,14 @@ float share_of_points(float lobe_density, float extent)
     return 1.0 / (1.0 + lobe_density * extent);
 }
 
-float share_of_lobe(CameraPath path, CameraLight light, vec3 position, vec3 direction)
+float share_of_lobe(Path path, CameraLight light, vec3 position, vec3 direction)
 {
     float extent = 1.0 / max(light.measure, 1e-30);
     if (light.kind == LIGHT_KIND_AREA) {
         float cosine = -dot(direction, light.axis), distance = dot(position - light.position, light.axis) / max(cosine, 1e-6);
         extent = light.measure * cosine / max(distance * distance, 1e-20);
     }
-    return path.coat_pdf > 0.0 ? 1.0 - share_of_points(path.coat_pdf, extent) : 1.0;
+    return path.walk.coat_pdf > 0.0 ? 1.0 - share_of_points(path.walk.coat_pdf, extent) : 1.0;
 }
 #endif
 

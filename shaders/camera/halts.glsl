@@ -14,7 +14,7 @@ struct Halted {
     int asked;
     bool took_turn;
     vec4 radiance[TARGETS];
-    CameraPath path_stack[STACK + 1];
+    Path path_stack[STACK + 1];
 };
 layout(std430, binding = BIND_HALTED) restrict buffer HaltedSamples { Halted halted[]; };
 uint place;

@@ -38,7 +38,7 @@ vec3 normal_of(uint primitive)
 }
 
 // Where the path's ray meets the plane, or the curved face, of what it sees first.
-Hit hit_on(uvec2 first, CameraPath path)
+Hit hit_on(uvec2 first, Path path)
 {
     Hit hit;
     hit.primitive = first.x;

@@ -21,7 +21,7 @@ struct Look { vec4 place; vec4 light; uint mark; };
 Look look_at(uvec2 pixel)
 {
     uvec2 first = seen_first(pixel);
-    CameraPath path = path_from(pixel, PIXEL_MIDDLE, 1.0);
+    Path path = path_from(pixel, PIXEL_MIDDLE, 1.0);
     Hit hit = hit_on(first, path);
     bool met = first.y != NONE;
     uint key = 0u, placement = NONE;

@@ -14,7 +14,7 @@ void main()
     bool met = first.y != NONE;
     radiance[0] = vec4(0.0);
     lights_seen = look_index = 0u;
-    CameraPath path = path_from(pixel, PIXEL_MIDDLE, 1.0);
+    Path path = path_from(pixel, PIXEL_MIDDLE, 1.0);
     Hit hit = hit_on(first, path);
 #if defined(LAYER_BEAUTY) && defined(VISIBLE_LIGHTS)
     add_lights(path, met ? hit.distance : FAR_DISTANCE);

@@ -20,7 +20,7 @@ struct SurfaceInteraction {
 #endif
 };
 
-SurfaceInteraction seen_on(CameraPath path, Hit hit, Triangle facet, vec3 position, vec3 direction)
+SurfaceInteraction seen_on(Path path, Hit hit, Triangle facet, vec3 position, vec3 direction)
 {
     SurfaceInteraction seen;
     seen.position = position;
@@ -174,7 +174,7 @@ struct Steady {
 };
 
 // Adds the direct light of one place; that of `steady` lights as their ends have it.
-void add_direct(CameraPath path, SurfaceInteraction seen, WavelengthInterval interval, uint pixel_key, Steady steady)
+void add_direct(Path path, SurfaceInteraction seen, WavelengthInterval interval, uint pixel_key, Steady steady)
 {
     uint reflectance_class = receivers[object_at(seen.object).receiver].reflectance_class;
     float share = clamp(dot(seen.position - steady.from, steady.along), 0.0, 1.0);
@@ -220,7 +220,7 @@ void add_direct(CameraPath path, SurfaceInteraction seen, WavelengthInterval int
 
 #if defined(COATS) && defined(CAMERA_SPECULAR)
 // What a coat reflects of the lights themselves, each by one of its points; `share_of_lobe` weighs what the path that goes on sees of them.
-void add_coat_lights(CameraPath path, SurfaceInteraction seen, WavelengthInterval interval, uint pixel_key)
+void add_coat_lights(Path path, SurfaceInteraction seen, WavelengthInterval interval, uint pixel_key)
 {
     Finish finish = finish_of(seen.object);
     vec3 first, second;
@@ -229,7 +229,7 @@ void add_coat_lights(CameraPath path, SurfaceInteraction seen, WavelengthInterva
     vec3 toward = to_surface * -seen.direction;
     // Chance seldom leads from a rough coat into a smooth one's highlight of a lamp that is a point: that is as wide as few samples can find it
     // [Kaplanyan and Dachsbacher 2013].
-    float wide = path.coat_pdf > 0.0 ? max(finish.alpha, 0.5 * sqrt(sample_side(path) / path.coat_pdf)) : finish.alpha;
+    float wide = path.walk.coat_pdf > 0.0 ? max(finish.alpha, 0.5 * sqrt(sample_side(path) / path.walk.coat_pdf)) : finish.alpha;
     // A perfectly smooth coat shows lights of some extent only, to the path that goes on.
     for (uint i = 0u; i < uint(LIGHT_COUNT) && finish.alpha > 0.0; ++i) {
         LightSample s;
@@ -368,7 +368,7 @@ float spectrum_share(WavelengthInterval interval, bool positive, float part, flo
 #endif
 
 // Irradiance by what glass and mirrors threw at a place of a map.
-void add_caustic_at(CameraPath path, SurfaceInteraction seen, WavelengthInterval interval, uint receiver, uint placement, vec3 texel)
+void add_caustic_at(Path path, SurfaceInteraction seen, WavelengthInterval interval, uint receiver, uint placement, vec3 texel)
 {
     // Texels larger than pixels are interpolated, smaller ones, and pixels themselves, weighed by their share of the sample.
     Placement window = placements[placement];
@@ -462,7 +462,7 @@ void add_caustic_at(CameraPath path, SurfaceInteraction seen, WavelengthInterval
 }
 
 // Irradiance by what glass and mirrors threw here, where a map covers it.
-void add_caustic(CameraPath path, SurfaceInteraction seen, WavelengthInterval interval)
+void add_caustic(Path path, SurfaceInteraction seen, WavelengthInterval interval)
 {
     uint placement;
     vec3 texel;

@@ -8,7 +8,7 @@
 // Irradiance, linear Rec.709, lm/unit².
 layout(binding = UNIT_RECEIVER_LIGHT) uniform sampler2D known_light;
 
-void add_receiver_light(CameraPath path, SurfaceInteraction seen, WavelengthInterval interval)
+void add_receiver_light(Path path, SurfaceInteraction seen, WavelengthInterval interval)
 {
     bool back = dot(seen.direction, seen.normal_g) > 0.0;
     RayOrigin origin = RayOrigin(seen.primitive, seen.object, uint(back), 0u);

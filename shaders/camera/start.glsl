@@ -11,7 +11,7 @@ const float DISC_SIDE = 1.7724538509;
 
 // From the middle of the lens, a pinhole, to a place on it: a thin lens sends what comes from one point of the plane of focus, wherever it passes,
 // to one point of the film [Cook, Porter and Carpenter 1984].
-void begin_on_lens(inout CameraPath path)
+void begin_on_lens(inout Path path)
 {
     vec3 across[2] = vec3[](normalize(p.half_right), normalize(p.half_up));
     vec2 at = p.lens_radius * concentric_disc(lens_place);
@@ -33,16 +33,16 @@ void begin_on_lens(inout CameraPath path)
 }
 #endif
 
-CameraPath path_from(uvec2 pixel, vec2 within_pixel, float gain)
+Path path_from(uvec2 pixel, vec2 within_pixel, float gain)
 {
     vec2 place = picture_point(pixel, within_pixel, p.size);
     CameraRay ray = camera_ray(p.position, p.forward, p.half_right, p.half_up, p.orthographic != 0u, place);
-    CameraPath path;
+    Path path;
     path.position = ray.position;
     path.direction = ray.direction;
     path.origin = RayOrigin(NONE, NONE, 0u, p.inside_mask);
     path.medium = MediumStack(p.inside_mask, p.inside_object);
-    for (int c = 0; c < COLUMNS_HELD; ++c) path.dposition[c] = path.ddirection[c] = vec3(0.0);
+    for (int c = 0; c < PATH_COLUMNS; ++c) path.dposition[c] = path.ddirection[c] = vec3(0.0);
     vec3 right = p.half_right * (2.0 * p.pixel_width / float(p.size.x)), up = p.half_up * (2.0 * p.pixel_height / float(p.size.y));
     if (p.orthographic != 0u) {
         path.dposition[0] = right;
@@ -57,36 +57,33 @@ CameraPath path_from(uvec2 pixel, vec2 within_pixel, float gain)
     begin_on_lens(path);
 #endif
     path.band = vec3(0.0, 0.5, 1.0);
-    path.weight = vec3(1.0);
-    path.inverse_pdf = gain;
-    path.branch_weight = 1.0;
-    path.key = 0u;
-    path.depth = 0;
+    path.throughput = vec3(1.0);
+    path.walk.inverse_pdf = gain;
+    path.walk.branch_weight = 1.0;
+    path.walk.key = 0u;
+    path.depth = 0u;
     path.restricted = 0u;
     path.recut = 0u;
-    path.planar_so_far = 1u;
-    path.cuts = 0;
+    path.walk.planar_so_far = 1u;
+    path.walk.cuts = 0u;
 #ifdef POLARISED
     path.polarisation = unpolarised(path.direction);
 #endif
 #ifdef ROUGH_SURFACES
-    path.ground = 0u;
+    path.walk.ground = 0u;
 #endif
 #ifdef COATS
-    path.coat_pdf = 0.0;
+    path.walk.coat_pdf = 0.0;
 #endif
 #ifdef HAS_GRATING
     path.order = 0u;
 #endif
 #ifdef SPECTRAL_SWEEP
-    for (int end = 0; end < 2; ++end) {
-        path.end_position[end] = path.position;
-        path.end_direction[end] = path.direction;
-    }
+    gather_ends(path);
     for (int g = 0; g < SPECTRAL_GROUPS; ++g) path.end_step[g] = vec2(0.0);
 #endif
 #ifdef ABSORPTION
-    for (int i = 0; i < ABSORBERS; ++i) path.lengths[i] = 0.0;
+    for (int i = 0; i < ABSORBERS; ++i) path.walk.lengths[i] = 0.0;
 #endif
     return path;
 }

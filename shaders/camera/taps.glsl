@@ -5,7 +5,7 @@
 
 #ifdef SPECTRAL_SWEEP
 // Where the lookup number `tap` of so many begins: each stands for as much of what looks bright, and looks in the midst of it.
-float tap_border(CameraPath path, vec2 brightness, float tap, int taps)
+float tap_border(Path path, vec2 brightness, float tap, int taps)
 {
     return tap <= 0.0 ? path.band.x : (tap >= float(taps) ? path.band.z : clamp(quantile(brightness, tap / float(taps)), path.band.x, path.band.z));
 }
@@ -14,7 +14,7 @@ float tap_border(CameraPath path, vec2 brightness, float tap, int taps)
 #define MIN_SWEEP 0.2
 
 // Sweep of the path over the distance ahead, in widths of a pixel.
-float sweep_pixels(CameraPath path, float distance)
+float sweep_pixels(Path path, float distance)
 {
     vec3 p_lo = path.end_position[0], d_lo = path.end_direction[0], p_hi = path.end_position[1], d_hi = path.end_direction[1];
     float reach = min(distance, 1e4);
@@ -26,20 +26,20 @@ float sweep_pixels(CameraPath path, float distance)
 }
 
 // The same in widths of what has to tell colours apart: a pixel, or of the lobe of a rough surface, which is many pixels wide, a sample's share.
-float shown_sweep(CameraPath path, float distance)
+float shown_sweep(Path path, float distance)
 {
 #ifdef ROUGH_SURFACES
-    return sweep_pixels(path, distance) / (path.ground != 0u ? sample_side(path) : 1.0);
+    return sweep_pixels(path, distance) / (path.walk.ground != 0u ? sample_side(path) : 1.0);
 #else
     return sweep_pixels(path, distance);
 #endif
 }
 
 // Looks that this sweep needs: where it shows at all, one for either half; the fewer, the less of the sample the path is.
-int taps_of(CameraPath path, float distance)
+int taps_of(Path path, float distance)
 {
     float pixels = shown_sweep(path, distance);
-    return clamp(int(min(ceil(pixels * p.taps_per_pixel), float(p.max_taps)) * sqrt(min(path.branch_weight, 1.0)) + 0.99), pixels > MIN_SWEEP ? 2 : 1, int(p.max_taps));
+    return clamp(int(min(ceil(pixels * p.taps_per_pixel), float(p.max_taps)) * sqrt(min(path.walk.branch_weight, 1.0)) + 0.99), pixels > MIN_SWEEP ? 2 : 1, int(p.max_taps));
 }
 #endif
 
@@ -64,7 +64,7 @@ vec3 sky_colour(vec3 direction, vec3 ddirection[3])
 }
 
 #ifdef LAYER_BEAUTY
-void add_sky(CameraPath path, WavelengthInterval interval, vec3 direction, vec3 sweep)
+void add_sky(Path path, WavelengthInterval interval, vec3 direction, vec3 sweep)
 {
     vec3 columns[3];
     columns[0] = sample_side(path) * path.ddirection[0];
@@ -78,14 +78,14 @@ void add_sky(CameraPath path, WavelengthInterval interval, vec3 direction, vec3 
 
 #ifdef VISIBLE_LIGHTS
 // Diameter of what a sample stands for: where its ray starts (GPU units), and how that grows with distance.
-vec2 sample_width(CameraPath path)
+vec2 sample_width(Path path)
 {
     return sample_side(path) * sqrt(vec2(length(cross(path.dposition[0], path.dposition[1])), length(cross(path.ddirection[0], path.ddirection[1]))));
 }
 
 #ifdef LENS
 // The same of lights infinitely far away, where a place on the lens is but a direction.
-vec2 far_width(CameraPath path, vec2 width)
+vec2 far_width(Path path, vec2 width)
 {
     float by_lens = sample_side(path) * sample_side(path) * length(cross(path.ddirection[LENS_COLUMNS], path.ddirection[LENS_COLUMNS + 1]));
     return vec2(width.x, sqrt(width.y * width.y + by_lens));
@@ -96,7 +96,7 @@ vec2 far_width(CameraPath path, vec2 width)
 #endif
 
 // Lights that can be seen over the distance `far`; edges are as soft as what the ray stands for is wide.
-void add_lights(CameraPath path, float far)
+void add_lights(Path path, float far)
 {
     vec2 width = sample_width(path), sweep = vec2(0.0);
     int taps = 1;
@@ -162,7 +162,7 @@ vec3 arrival(vec3 position, vec3 direction, Hit hit, vec3 middle)
     return position + dot(hit.normal_g, middle - position) / dot(hit.normal_g, direction) * direction;
 }
 
-ArrivalCurve arrival_curve(CameraPath path, Hit hit)
+ArrivalCurve arrival_curve(Path path, Hit hit)
 {
     ArrivalCurve curve;
     curve.middle = path.position + hit.distance * path.direction;
@@ -179,7 +179,7 @@ ArrivalCurve arrival_curve(CameraPath path, Hit hit)
     return curve;
 }
 
-vec3 arrival_at(CameraPath path, ArrivalCurve curve, float x)
+vec3 arrival_at(Path path, ArrivalCurve curve, float x)
 {
     bool below = x < path.band.y;
     float reach = (x - path.band.y) / max(abs((below ? path.band.x : path.band.z) - path.band.y), 1e-9);
@@ -191,7 +191,7 @@ vec3 arrival_at(CameraPath path, ArrivalCurve curve, float x)
 
 // A path that has met nothing, or a diffuse surface. Without a sweep that is one lookup. Where all of a sweep ends on the facet that the path's own
 // wavelength met (`same_hit`), its lookups are of that; else every lookup finds out for itself.
-void add_end(CameraPath path, bool met, Hit hit, bool same_hit, uint pixel_key)
+void add_end(Path path, bool met, Hit hit, bool same_hit, uint pixel_key)
 {
     int taps = 1;
 #ifdef SPECTRAL_SWEEP
@@ -295,7 +295,7 @@ void add_end(CameraPath path, bool met, Hit hit, bool same_hit, uint pixel_key)
             bool coated = is_coated(seen.object);
             if (coated) add_coat_lights(path, seen, interval, pixel_key);
             // The base of what is seen first is left to the program for what is seen directly.
-            if (!coated || path.depth > 0) {
+            if (!coated || path.depth > 0u) {
 #endif
             add_caustic(path, seen, interval);
 #ifdef LAYER_BEAUTY
