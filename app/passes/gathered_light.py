@@ -82,7 +82,9 @@ class GatheredLight:
         defines = buffers.features.defines() | bindings.SCENE_DEFINES | buffers.defines
         defines |= {"BIND_PLACES": _BIND_PLACES, "BIND_ASKED": _BIND_ASKED, "BIND_SUMS": _BIND_SUMS, unit: _UNIT}
         defines |= {"MOST_ASKED": most_asked, "MAX_EVENTS": MAX_EVENTS}
-        defines.pop("NORMAL_DERIVATIVES", None)
+        defines["SPECTRAL_GROUPS"] = 0  # rays of one index carry no columns
+        for columns in ("NORMAL_DERIVATIVES", "LOBE_COLUMNS"):
+            defines.pop(columns, None)
         if self._sphere is not None:
             defines["FOLLOWS_SPECULAR"] = 1
         self._program = shader.compute(self._ctx, name, defines, (*SCENE_STRUCTS, PLACE, parameters, asked, SUM))

@@ -65,8 +65,11 @@ class RayPaths:
         self.scene = scene
         self._context = context
         defines = scene.features.defines() | bindings.SCENE_DEFINES | scene.defines
-        # Without glass no slopes are asked for, and with it only indices are.
+        # Rays of one wavelength carry no columns, and meet ground glass as if it were polished.
+        for carried in ("NORMAL_DERIVATIVES", "LOBE_COLUMNS", "ROUGH_SURFACES", "POLARISED", "ANCHOR_WEIGHTS"):
+            defines.pop(carried, None)
         defines |= {
+            "SPECTRAL_GROUPS": 0,
             "BIND_STARTS": _BIND_STARTS,
             "BIND_PATHS": _BIND_PATHS,
             "BIND_POINTS": _BIND_POINTS,

@@ -3,10 +3,14 @@
 // ray overlay.
 layout(local_size_x = 32) in;
 
-#include "lib/medium.glsl"
-#include "lib/interface.glsl"
+struct Walk {
+    uint reflections;   // within glass, still to come
+};
+#define SPATIAL 0
+#define PATH_COLUMNS 0
+#include "path/event.glsl"
 #ifdef HAS_GRATING
-#include "lib/grating.glsl"
+#include "path/grating.glsl"
 #endif
 
 layout(std430, binding = BIND_PARAMETERS) readonly restrict buffer Parameters { PathParameters p; };
@@ -18,70 +22,58 @@ void main()
 {
     uint id = gl_GlobalInvocationID.x;
     if (id >= p.count) return;
-    vec3 position = starts[id].position, direction = starts[id].direction;
     RayOrigin origin = RayOrigin(NONE, NONE, 0u, p.inside_mask);
-    MediumStack medium = MediumStack(p.inside_mask, p.inside_object);
-    PathEnd path;
-    path.points = 1u;
-    uint reflections = p.reflections;
+    Path path = path_at(starts[id].position, starts[id].direction, origin, MediumStack(p.inside_mask, p.inside_object), starts[id].x);
+    path.walk.reflections = p.reflections;
+    PathEnd end;
+    end.points = 1u;
     uint at = id * uint(MAX_POINTS);
-    points[at] = vec4(position, 0.0);
-    for (uint event = 0u; event < uint(MAX_POINTS) - 1u; ++event) {
+    points[at] = vec4(path.position, 0.0);
+    for (uint number = 0u; number < uint(MAX_POINTS) - 1u; ++number) {
         Hit hit;
-        bool met = intersect_closest(position, direction, FAR_DISTANCE, origin, hit);
+        bool met = intersect_closest(path.position, path.direction, FAR_DISTANCE, path.origin, hit);
         Triangle facet = hit_triangle(hit);
-        vec3 there = met ? surface_point(hit, facet, position, direction) : position + p.escape * direction;
-        ShadingFrame frame = shading_frame(hit, facet, there, direction);
-        path.points = event + 2u;
-        points[at + event + 1u] = vec4(there, 0.0);
-        uint kind = met ? object_at(hit.object).kind : NONE;
-        bool goes_on = false;
-        position = there;
-        Deflection turned = reflect_at(frame, direction);
-        bool entering = dot(direction, hit.normal_g) < 0.0;
-#ifdef HAS_MIRROR
-        if (kind == KIND_MIRROR) {
-            direction = turned.direction;
-            origin = RayOrigin(hit.primitive, hit.object, uint(!entering), origin.inside_mask);
-            goes_on = true;
-        }
-#endif
+        Object thing = object_at(met ? hit.object : 0u);
+        uint kind = met ? thing.kind : NONE;
+        path.position = met ? surface_point(hit, facet, path.position, path.direction) : path.position + p.escape * path.direction;
+        end.points = number + 2u;
+        points[at + number + 1u] = vec4(path.position, 0.0);
+        if (!is_specular(kind)) break;
+        bool entering = dot(path.direction, hit.normal_g) < 0.0, reflects = true, goes_on = true, geometric;
+        Event event = interact(path, hit, facet, thing, MicrofacetDraw(0u, 0u, 0u));
 #ifdef HAS_DIELECTRIC
         if (IS_GLASS(kind)) {
-            MediumInterface boundary = cross_boundary(medium, hit.object, entering);
-            bool reflects = false;
-            if (boundary.changes) {
-                float eta_it = medium_index(boundary.before, starts[id].x) / medium_index(boundary.after, starts[id].x);
-                Deflection refracted = refract_at(frame, direction, IS_THIN(boundary) ? 1.0 : eta_it);
-                reflects = !refracted.exists || (reflections > 0u && !entering && !IS_THIN(boundary));
-                direction = reflects ? turned.direction : refracted.direction;
-            }
-            if (reflects && !entering) reflections -= min(reflections, 1u);
-            if (!reflects) medium = boundary.behind;
-            origin = RayOrigin(hit.primitive, hit.object, uint(reflects ? !entering : entering), medium.mask);
-            goes_on = true;
+            reflects = event.boundary.changes && (!event.refracted.exists || (path.walk.reflections > 0u && !entering && !IS_THIN(event.boundary)));
+            if (reflects && !entering) path.walk.reflections -= min(path.walk.reflections, 1u);
+            if (!event.boundary.changes) path.medium = event.boundary.behind;
+            else if (!reflects) refract_path(path, event);
         }
 #endif
 #ifdef HAS_GRATING
         if (kind == KIND_GRATING) {
             // The strongest order that leaves.
-            uint row = object_at(hit.object).weight_row;
-            Grating grating = grating_at(row);
+            GratingEvent met_grating = grating_event(path, event, hit, thing.weight_row);
+            Path sent = path;
             float strongest = 0.0;
-            vec3 incident = direction;
-            for (uint number = 0u; number < grating.orders; ++number) {
-                GratingOrder order = order_at(row, number);
-                float step = order_steps(order, hit.object, current_medium(medium), vec3(starts[id].x)).x;
-                Deflection sent = diffract_at(frame, incident, grating.lines, entering ? 1.0 : -1.0, step, order.reflects != 0u);
-                if (!sent.exists || order.efficiency <= strongest) continue;
+            for (uint order_number = 0u; order_number < met_grating.grating.orders; ++order_number) {
+                GratingOrder order = order_at(thing.weight_row, order_number);
+                vec3 steps = order_steps(order, hit.object, met_grating.medium, path.band);
+                if (!order_passes(path, event, met_grating, steps).y || order.efficiency <= strongest) continue;
                 strongest = order.efficiency;
-                direction = sent.direction;
-                origin = RayOrigin(hit.primitive, hit.object, uint(dot(direction, hit.normal_g) < 0.0), origin.inside_mask);
-                goes_on = true;
+                sent = path;
+                diffract_path(sent, event, met_grating, order, steps, geometric);
             }
-        }
+            reflects = false;
+            goes_on = strongest > 0.0;
+            path = sent;
+            leave_surface(path, hit, dot(path.direction, hit.normal_g) < 0.0);
+        } else
 #endif
+        {
+            if (reflects) reflect_path(path, event, geometric);
+            leave_surface(path, hit, reflects != entering);
+        }
         if (!goes_on) break;
     }
-    paths[id] = path;
+    paths[id] = end;
 }

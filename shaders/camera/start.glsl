@@ -37,12 +37,7 @@ Path path_from(uvec2 pixel, vec2 within_pixel, float gain)
 {
     vec2 place = picture_point(pixel, within_pixel, p.size);
     CameraRay ray = camera_ray(p.position, p.forward, p.half_right, p.half_up, p.orthographic != 0u, place);
-    Path path;
-    path.position = ray.position;
-    path.direction = ray.direction;
-    path.origin = RayOrigin(NONE, NONE, 0u, p.inside_mask);
-    path.medium = MediumStack(p.inside_mask, p.inside_object);
-    for (int c = 0; c < PATH_COLUMNS; ++c) path.dposition[c] = path.ddirection[c] = vec3(0.0);
+    Path path = path_at(ray.position, ray.direction, RayOrigin(NONE, NONE, 0u, p.inside_mask), MediumStack(p.inside_mask, p.inside_object), 0.5);
     vec3 right = p.half_right * (2.0 * p.pixel_width / float(p.size.x)), up = p.half_up * (2.0 * p.pixel_height / float(p.size.y));
     if (p.orthographic != 0u) {
         path.dposition[0] = right;
@@ -56,31 +51,22 @@ Path path_from(uvec2 pixel, vec2 within_pixel, float gain)
 #ifdef LENS
     begin_on_lens(path);
 #endif
-    path.band = vec3(0.0, 0.5, 1.0);
-    path.throughput = vec3(1.0);
-    path.walk.inverse_pdf = gain;
-    path.walk.branch_weight = 1.0;
-    path.walk.key = 0u;
-    path.depth = 0u;
-    path.restricted = 0u;
-    path.recut = 0u;
-    path.walk.planar_so_far = 1u;
-    path.walk.cuts = 0u;
 #ifdef POLARISED
     path.polarisation = unpolarised(path.direction);
 #endif
+#ifdef SPECTRAL_SWEEP
+    gather_ends(path);
+#endif
+    path.band = vec3(0.0, 0.5, 1.0);
+    path.walk.inverse_pdf = gain;
+    path.walk.branch_weight = 1.0;
+    path.walk.key = path.walk.cuts = 0u;
+    path.walk.planar_so_far = 1u;
 #ifdef ROUGH_SURFACES
     path.walk.ground = 0u;
 #endif
 #ifdef COATS
     path.walk.coat_pdf = 0.0;
-#endif
-#ifdef HAS_GRATING
-    path.order = 0u;
-#endif
-#ifdef SPECTRAL_SWEEP
-    gather_ends(path);
-    for (int g = 0; g < SPECTRAL_GROUPS; ++g) path.end_step[g] = vec2(0.0);
 #endif
 #ifdef ABSORPTION
     for (int i = 0; i < ABSORBERS; ++i) path.walk.lengths[i] = 0.0;

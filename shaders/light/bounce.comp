@@ -20,10 +20,10 @@ layout(std430, binding = BIND_SUMS) restrict buffer Sums { GatheredSum sums[]; }
 layout(binding = UNIT_RADIANCE) uniform sampler2D receiver_radiance;
 
 // Over the receiver that a ray meets, of the place that it comes from, where that faces it.
-float height_over = FAR_DISTANCE;
+float over_receiver = FAR_DISTANCE;
 
 // Under what is so near a receiver it alone sees the covered part.
-bool is_covered(sampler2D map, RayOrigin origin, vec3 position, vec3 normal, float reach) { return height_over < reach; }
+bool is_covered(sampler2D map, RayOrigin origin, vec3 position, vec3 normal, float reach) { return over_receiver < reach; }
 
 vec4 radiance_from(Hit hit, vec3 position, vec3 direction)
 {
@@ -57,7 +57,7 @@ void main()
         if (faces) met = intersect_closest(position, toward, FAR_DISTANCE, origin, hit);
         if (met) {
             vec3 way_up = dot(toward, hit.normal_g) > 0.0 ? -hit.normal_g : hit.normal_g;
-            height_over = dot(place.normal, way_up) < -0.5 ? -hit.distance * dot(toward, way_up) : FAR_DISTANCE;
+            over_receiver = dot(place.normal, way_up) < -0.5 ? -hit.distance * dot(toward, way_up) : FAR_DISTANCE;
             vec4 radiance = radiance_from(hit, position, toward);
             // The very place that was drawn, and not one of the finer texels that lie over a part of it.
             bool counts = !aims || (hit.object == asked[i].object && abs(hit.distance * hit.distance - distance2) < 1e-3 * distance2
@@ -75,8 +75,8 @@ void main()
         vec3 toward = toward_specular(p.specular, position, place.normal, fract(asked[i].place.xy + shift), weight, narrow);
         if (weight > 0.0) {
             FollowedRay ray = follow_specular(position, toward, origin, own, p.x_of_rgb, lost);
-            height_over = FAR_DISTANCE;
-            if (ray.events > 0u && ray.met != 0u) sum.specular += weight * ray.weight * radiance_from(ray.hit, ray.position, ray.direction).rgb;
+            over_receiver = FAR_DISTANCE;
+            if (ray.events > 0u && ray.met != 0u) sum.specular += weight * ray.path.walk.tint * radiance_from(ray.hit, ray.path.position, ray.path.direction).rgb;
         }
         sum.lost += lost;
     }

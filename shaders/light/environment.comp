@@ -62,7 +62,7 @@ void main()
         vec3 toward = toward_specular(p.specular, position, place.normal, fract(asked[i].toward.xy + shift), weight, narrow);
         if (weight > 0.0) {
             FollowedRay ray = follow_specular(position, toward, origin, own, p.x_of_rgb, lost);
-            if (ray.events > 0u && ray.met == 0u) sum.specular += weight * ray.weight * environment_at(ray.direction, narrow ? p.level_narrow : p.level_wide);
+            if (ray.events > 0u && ray.met == 0u) sum.specular += weight * ray.path.walk.tint * environment_at(ray.path.direction, narrow ? p.level_narrow : p.level_wide);
         }
         sum.lost += lost;
     }

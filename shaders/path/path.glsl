@@ -46,6 +46,34 @@ struct Path {
     Walk walk;
 };
 
+// A path that sets out, at the wavelength x and with columns of no length; its walk is left to the walk.
+Path path_at(vec3 position, vec3 direction, RayOrigin origin, MediumStack medium, float x)
+{
+    Path path;
+    path.position = position;
+    path.direction = direction;
+    path.origin = origin;
+    path.medium = medium;
+    for (int c = 0; c < COLUMNS_HELD; ++c) path.dposition[c] = path.ddirection[c] = vec3(0.0);
+    path.band = vec3(x);
+    path.throughput = vec3(1.0);
+    path.depth = path.restricted = path.recut = 0u;
+#ifdef HAS_GRATING
+    path.order = 0u;
+#endif
+#ifdef POLARISED
+    path.polarisation = unpolarised(direction);
+#endif
+#ifdef SPECTRAL_SWEEP
+    for (int end = 0; end < 2; ++end) {
+        path.end_position[end] = position;
+        path.end_direction[end] = direction;
+    }
+    for (int g = 0; g < SPECTRAL_GROUPS; ++g) path.end_step[g] = vec2(0.0);
+#endif
+    return path;
+}
+
 #ifdef SPECTRAL_SWEEP
 // Where the columns alone put an end's ray.
 void linear_end(Path path, int end, out vec3 position, out vec3 direction)
