@@ -68,8 +68,8 @@ def test_parted_colours_go_their_own_ways(gl, edge: Scene, drawn, monkeypatch, t
         monkeypatch,
         tmp_path,
         "camera/cuts.glsl",
-        "return parts && path.planar_so_far != 0u",
-        "return false && parts && path.planar_so_far != 0u",
+        "return parts && path.walk.planar_so_far != 0u",
+        "return false && parts && path.walk.planar_so_far != 0u",
     )
     whole = error(picture(gl, edge, 32), drawn)
     assert cut < 1.2e-3 and whole > 1.5 * cut, (cut, whole)

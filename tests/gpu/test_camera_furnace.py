@@ -110,7 +110,11 @@ def test_a_loss_of_two_per_cent_a_surface_would_be_seen(gl, monkeypatch, tmp_pat
     """The mutant: what goes on through a surface is 2 % too weak. The mean falls short by twenty times its
     tolerance."""
     mutate(
-        monkeypatch, tmp_path, "camera/meet.glsl", "vec3(1.0) : 1.0 - reflectance;", "vec3(1.0) : 0.98 - reflectance;"
+        monkeypatch,
+        tmp_path,
+        "camera/meet.glsl",
+        "vec3(1.0) : 1.0 - event.reflectance;",
+        "vec3(1.0) : 0.98 - event.reflectance;",
     )
     rgb = render(gl, solids("slab"), background=(1, 1, 1), camera=NEAR, size=SIZE, samples=16)
     assert 1.0 - rgb[8:16, 8:16].mean() > 0.02

@@ -157,7 +157,7 @@ def test_the_fringe_notices_a_wrong_sign(gl, monkeypatch, tmp_path) -> None:
     mutate(
         monkeypatch,
         tmp_path,
-        "camera/interface.glsl",
+        "path/event.glsl",
         "deta_it = index_ratio_derivative(",
         "deta_it = abs(1.0) * -index_ratio_derivative(",
     )

@@ -115,7 +115,7 @@ def test_a_column_of_the_wrong_sign_is_noticed(gl, drawn, monkeypatch, tmp_path,
     mutate(
         monkeypatch,
         tmp_path,
-        "camera/interface.glsl",
+        "path/event.glsl",
         "deta_it = index_ratio_derivative(",
         "deta_it = -index_ratio_derivative(",
     )

@@ -256,11 +256,8 @@ MUTANTS = {
     ),
     "position follows the shading normal": (
         "light/trace.comp",
-        "ray.ddirection[c].xyz, ray.direction, hit.normal_g, hit.distance)",
-        (
-            "ray.ddirection[c].xyz, ray.direction, "
-            "shading_frame(hit, facet, ray.position, ray.direction).normal, hit.distance)"
-        ),
+        "transfer_columns(path, hit.normal_g, hit.distance)",
+        "transfer_columns(path, shading_frame(hit, facet, path.position, path.direction).normal, hit.distance)",
         "sun",
     ),
     "axes swapped": (

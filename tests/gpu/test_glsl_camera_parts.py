@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from spectrasplat.gpu import bindings
+from spectrasplat.gpu.scene_records import SCENE_STRUCTS
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
 COVERS = {"footprint.glsl": ("box_of_covariance", "box_of_three")}
@@ -38,19 +40,10 @@ def test_the_box_of_three_sides_has_their_covariance(gl) -> None:
     assert (np.abs(without - want).max(axis=(1, 2)) > 2e-6 * size + 1e-30)[600:].mean() > 0.9
 
 
-PATH = {"SPECTRAL_GROUPS": 0, "NONE": "0xffffffffu"}
+PATH = bindings.SCENE_DEFINES | {"SPECTRAL_GROUPS": 0, "SPATIAL": 2, "PATH_COLUMNS": 2}
 STANDALONE = """
-struct RayOrigin { uint primitive; uint object; uint inside; uint inside_mask; };
-struct MediumStack { uint mask; uint object; };
-#define COLUMN_LIMIT 1e6
-struct CameraParameters { uint sample_index; uint dithered; uint bands; };
-CameraParameters p = CameraParameters(3u, 0u, 4u);
-vec3 transfer_column(vec3 dp, vec3 dd, vec3 d, vec3 n, float t) {
-    vec3 q = dp + t * dd;
-    return q - dot(q, n) / dot(d, n) * d;
-}
-uint hash_combine(uint a, uint b) { return a ^ b; }
-#include "camera/path.glsl"
+struct Walk { uint none; };
+#include "path/path.glsl"
 """
 
 
@@ -60,13 +53,15 @@ def test_columns_that_are_no_numbers_or_without_bound_are_dropped(gl) -> None:
     dp = dp.astype(np.float32)
     dp[:50, 1], dp[50:100, 2], dp[100:150, 0] = np.nan, np.inf, -np.inf
     body = """
-    CameraPath path;
+    Path path;
     for (int c = 0; c < COLUMNS_HELD; ++c) path.dposition[c] = path.ddirection[c] = vec3(0.5);
     path.dposition[1] = column;
     held = columns_hold(path) ? 1u : 0u;
     left = path.dposition[1];
     """
-    got = evaluate(gl.ctx, [], body, {"column": dp}, {"held": "uint", "left": "vec3"}, PATH, declarations=STANDALONE)
+    got = evaluate(
+        gl.ctx, [], body, {"column": dp}, {"held": "uint", "left": "vec3"}, PATH, SCENE_STRUCTS, declarations=STANDALONE
+    )
     with np.errstate(invalid="ignore", over="ignore"):
         length = np.linalg.norm(dp.astype(np.float64), axis=1)
         good = length < 1e6

@@ -38,16 +38,16 @@ class Mutant:
 MUTANTS = {
     "bands that land on several surfaces left whole": Mutant(
         "light/trace_landing.glsl",
-        "border = end > 3u ? clear_cut(ray, ray, x, hit.distance) : -1.0;",
+        "border = end > 3u ? clear_cut(path, path, x, hit.distance) : -1.0;",
         "border = -1.0;",
         "gpu/test_invariance.py::test_a_floor_may_be_several_objects",
     ),
     "survivor's boost dropped from throughput": Mutant(
-        "light/roulette.glsl", "ray.throughput *= boost;", "", f"{_BALANCE}[prism]"
+        "light/roulette.glsl", "path.throughput *= boost;", "", f"{_BALANCE}[prism]"
     ),
     "unwidened footprints": Mutant(
         "light/roulette.glsl",
-        "ray.footprint_scale *= sqrt(boost);",
+        "path.walk.footprint_scale *= sqrt(boost);",
         "",
         "statistical/test_samplers_numbers.py::"
         "test_survivors_of_roulette_have_the_power_and_the_place_of_those_that_died",
@@ -66,14 +66,14 @@ MUTANTS = {
     ),
     "what is refracted was reflected as well": Mutant(
         "light/trace_scatter.glsl",
-        "send_on(child, refracted, 1.0 - reflectance, outcome);",
-        "send_on(child, refracted, vec3(1.0), outcome);",
+        "send_on(child, event, let_through,",
+        "send_on(child, event, vec3(1.0),",
         f"{_BALANCE}[prism]",
     ),
     "power lost on landing": Mutant(
         "light/trace.comp",
-        "photon.throughput = ray.throughput;",
-        "photon.throughput = 0.85 * ray.throughput;",
+        "photon.throughput = path.throughput;",
+        "photon.throughput = 0.85 * path.throughput;",
         f"{_BALANCE}[prism]",
     ),
     "power lost in swept splats": Mutant(
@@ -89,18 +89,21 @@ MUTANTS = {
         "gpu/test_splat_throughput.py::test_power_is_what_the_photon_carries[broad]",
     ),
     "band ends without direction dispersion": Mutant(
-        "light/trace_bands.glsl",
+        "path/event.glsl",
         "theta.x += dtheta * variable_step",
         "theta.x += 0.0 * variable_step",
         f"{_PATHS}[steep Fresnel]",
     ),
     "one coefficient of absorption for the band": Mutant(
-        "light/trace.comp", "exp(-alpha * distance)", "vec3(exp(-alpha.y * distance))", f"{_PATHS}[absorption]"
+        "light/trace.comp",
+        "weaken(path, kept, companions)",
+        "weaken(path, kept.yyy, companions)",
+        f"{_PATHS}[absorption]",
     ),
     "grey mirror": Mutant(
         "light/trace_scatter.glsl",
-        "send_on(child, reflected, kept, outcome)",
-        "send_on(child, reflected, kept.yyy, outcome)",
+        "send_on(child, event, kept, of_companions",
+        "send_on(child, event, kept.yyy, of_companions",
         f"{_PATHS}[coloured mirror]",
     ),
     "sweep centred on the anchor": Mutant(
@@ -154,19 +157,22 @@ MUTANTS = {
     ),
     "camera absorption by the last chord only": Mutant(
         "camera/meet.glsl",
-        "path.lengths[i] += length;",
-        "path.lengths[i] = length;",
+        "path.walk.lengths[i] += length;",
+        "path.walk.lengths[i] = length;",
         "gpu/test_camera_glass.py::test_absorption_follows_beers_law",
     ),
     "camera band ends with the anchor's index": Mutant(
-        "camera/meet.glsl",
-        "interface_indices(boundary, path.band, n_i, n_t);",
-        "interface_indices(boundary, path.band.yyy, n_i, n_t);",
+        "path/event.glsl",
+        "interface_indices(event.boundary, path.band, event.n_i, event.n_t);",
+        "interface_indices(event.boundary, path.band.yyy, event.n_i, event.n_t);",
         "gpu/test_camera_cuts.py::test_parted_colours_go_their_own_ways",
     ),
     "one polarisation": Mutant("lib/optics.glsl", "0.5 * (rs * rs + rp * rp)", "rs * rs", f"{_PATHS}[steep Fresnel]"),
     "power not absorbed": Mutant(
-        "light/trace.comp", "ray.flux_w *= kept.y", "ray.flux_w *= 1.0", f"{_PATHS}[absorption without dispersion]"
+        "light/trace_companions.glsl",
+        "path.walk.flux_w *= share.y",
+        "path.walk.flux_w *= 1.0",
+        f"{_PATHS}[absorption without dispersion]",
     ),
     "absorption of the lower priority": Mutant(
         "lib/medium.glsl",
@@ -178,10 +184,10 @@ MUTANTS = {
         "lib/medium.glsl", "boundary.before != boundary.after", "true", f"{_PATHS}[nested, the outer decides]"
     ),
     "a cut part anchored at its end": Mutant(
-        "light/trace_bands.glsl", "float x = 0.5 * (lo + hi);", "float x = lo;", _CUTS
+        "light/trace_bands.glsl", "vec3(lo, 0.5 * (lo + hi), hi)", "vec3(lo, lo, hi)", _CUTS
     ),
     "a cut part starts where the whole did": Mutant(
-        "light/trace_bands.glsl", "ray.position += change * ray.dposition[SPATIAL + g].xyz;", "", _CUTS
+        "path/path.glsl", "position += change * path.dposition[SPATIAL + g];", "", _CUTS
     ),
     "columns end before the surface's tilt": Mutant(
         "lib/optics.glsl",

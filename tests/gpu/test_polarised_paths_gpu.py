@@ -63,7 +63,7 @@ def test_throughput_of_whole_paths(gl, name: str) -> None:
     weights_agree(gl, CASES[name])
 
 
-LIBRARY, FLIGHT = "lib/polarisation.glsl", "light/trace_polarisation.glsl"
+LIBRARY, FLIGHT = "lib/polarisation.glsl", "light/trace_records.glsl"
 MUTANTS = {
     "planes do not turn": (LIBRARY, "state.q = cosine * q + sine * state.u;", "state.q = q;", "stone"),
     "no retardance": (LIBRARY, "mix(2.0 * x * y * per, vec3(0.0), passes)", "vec3(0.0)", "stone"),
@@ -73,7 +73,7 @@ MUTANTS = {
         "vec3(1.0), vec3(0.0));",
         "panes with a mirror between",
     ),
-    "unpolarised again": (FLIGHT, "ray.stokes_q = state.q;", "ray.stokes_q = vec3(0.0);", "stone"),
+    "unpolarised again": (FLIGHT, "ray.stokes_q = path.polarisation.q;", "ray.stokes_q = vec3(0.0);", "stone"),
 }
 QUICK = ("planes do not turn",)
 

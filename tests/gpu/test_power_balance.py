@@ -101,13 +101,13 @@ def test_single_wavelengths_are_drawn_with_the_power_that_landed(gl, method: str
 @pytest.mark.parametrize(
     ("file", "old", "new", "noticed"),
     [
-        pytest.param("light/roulette.glsl", "ray.throughput *= boost;", "", "unaccounted", id="a survivor's boost"),
+        pytest.param("light/roulette.glsl", "path.throughput *= boost;", "", "unaccounted", id="a survivor's boost"),
         pytest.param(
-            "light/trace_scatter.glsl", "child.throughput *= share;", "child.throughput *= 0.85 * share;",
+            "light/trace_companions.glsl", "path.throughput *= share;", "path.throughput *= 0.85 * share;",
             "unaccounted", id="a share of each event",
         ),
         pytest.param(
-            "light/trace.comp", "photon.throughput = ray.throughput;", "photon.throughput = 0.85 * ray.throughput;",
+            "light/trace.comp", "photon.throughput = path.throughput;", "photon.throughput = 0.85 * path.throughput;",
             "drawn", id="a share of what landed",
         ),
         pytest.param(

@@ -111,7 +111,7 @@ def test_flags_that_lie_in_memory_are_no_bools() -> None:
     ]
     assert [found for text in texts for found in re.findall(r"\bbool\s+\w+\s*\[.*", text)] == []
     bodies = {name: body for text in texts for name, body in re.findall(r"struct (\w+) \{(.*?)\n\};", text, re.DOTALL)}
-    for name in ("CameraPath", "RayOrigin", "ShadingFrame", "PathEnd", "Hit"):
+    for name in ("Path", "Walk", "RayOrigin", "ShadingFrame", "PathEnd", "Hit"):
         assert not re.search(r"^\s*bool\b", bodies[name], re.MULTILINE), name
 
 

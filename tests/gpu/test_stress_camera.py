@@ -83,13 +83,13 @@ MUTANTS = {
     "total reflection before its time": (
         "eye-tir-margin",
         "camera/meet.glsl",
-        "bool total = !refracted.exists",
-        "bool total = cosine2.y <= 0.01",
+        "bool total = !event.refracted.exists",
+        "bool total = event.cosine2.y <= 0.01",
         "inside the edge",
     ),
     "a reflection that turns a little": (
         "eye-corner",
-        "camera/interface.glsl",
+        "path/event.glsl",
         "path.direction = turned.direction;",
         "path.direction = normalize(turned.direction + vec3(5e-3, 0.0, 0.0));",
         "returned",
@@ -97,8 +97,8 @@ MUTANTS = {
     "paths given up too early": (
         "eye-guide",
         "camera/camera.comp",
-        "path.depth >= MAX_DEPTH",
-        "path.depth >= 9",
+        "path.depth >= uint(MAX_DEPTH)",
+        "path.depth >= 9u",
         "transmittance",
     ),
     "paths given up and not counted": (
@@ -125,8 +125,8 @@ MUTANTS = {
     "leaving taken for entering": (
         "eye-inside",
         "camera/meet.glsl",
-        "bool entering = dot(whole.direction, hit.normal_g) < 0.0;",
-        "bool entering = true;",
+        "bool entering = dot(whole.direction, hit.normal_g) < 0.0,",
+        "bool entering = true,",
         "wards",
     ),
     "a sky upside down": (
@@ -146,15 +146,15 @@ MUTANTS = {
     "a per cent of the way through glass lost": (
         "eye-absorption",
         "camera/meet.glsl",
-        "path.lengths[i] += hit.distance;",
-        "path.lengths[i] += 0.99 * hit.distance;",
+        "path.walk.lengths[i] += length;",
+        "path.walk.lengths[i] += 0.99 * length;",
         "radiance",
     ),
     "bands that are not cut": (
         "eye-cut",
         "camera/meet.glsl",
-        "bool may_cut = path.restricted != 0u",
-        "bool may_cut = false && path.restricted != 0u",
+        "float onset = path.restricted != 0u",
+        "float onset = false && path.restricted != 0u",
         "colour",
     ),
     "lamps as bright as they are where they only graze a sample": (

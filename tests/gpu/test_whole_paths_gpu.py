@@ -191,14 +191,14 @@ def test_position_and_throughput_at_three_wavelengths(gl, name: str) -> None:
 MUTANTS = {
     "one coefficient for the band": (
         "light/trace.comp",
-        "exp(-alpha * distance)",
-        "vec3(exp(-alpha.y * distance))",
+        "weaken(path, kept, companions)",
+        "weaken(path, kept.yyy, companions)",
         "absorption",
     ),
     "flux not absorbed": (
-        "light/trace.comp",
-        "ray.flux_w *= kept.y",
-        "ray.flux_w *= 1.0",
+        "light/trace_companions.glsl",
+        "path.walk.flux_w *= share.y",
+        "path.walk.flux_w *= 1.0",
         "absorption without dispersion",
     ),
     "absorption of the lower priority": (
@@ -209,8 +209,8 @@ MUTANTS = {
     ),
     "grey mirror": (
         "light/trace_scatter.glsl",
-        "send_on(child, reflected, kept, outcome)",
-        "send_on(child, reflected, kept.yyy, outcome)",
+        "send_on(child, event, kept, of_companions",
+        "send_on(child, event, kept.yyy, of_companions",
         "coloured mirror",
     ),
     "one polarisation": ("lib/optics.glsl", "0.5 * (rs * rs + rp * rp)", "rs * rs", "steep Fresnel"),

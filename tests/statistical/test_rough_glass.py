@@ -81,8 +81,8 @@ def test_one_surface_reflects_what_its_microfacets_do(gl: Context, angle_deg: fl
 
 def test_without_shadowing_a_surface_reflects_too_much(gl: Context, monkeypatch, tmp_path: Path) -> None:
     """The mutant: at 70° the microfacets hide a tenth of what is reflected."""
-    old, new = "smith_share(vec3(side * cosine), place.width)", "vec3(1.0)"
-    mutate(monkeypatch, tmp_path, "light/trace_rough.glsl", old, new)
+    old, new = "ground.regained * smith_share(cosine, ground.width)", "vec3(1.0)"
+    mutate(monkeypatch, tmp_path, "path/event.glsl", old, new)
     found = shares_of(caustic(gl, black_block(np.radians(70.0), 0.6), 40_000, (8, 8)))
     reflected, transmitted = microfacet.shares(np.radians(70.0), 0.36, 1.0 / INDEX)
     assert found["deposited"] > 1.05 * reflected / (reflected + transmitted)
@@ -130,7 +130,7 @@ def test_believed_they_would(gl: Context, monkeypatch: pytest.MonkeyPatch, tmp_p
     monkeypatch.setattr(trace, "WIDEST_SWEEP", 1e6)
     assert kept_by_ring(gl)[2] > 0.025
     monkeypatch.undo()
-    mutate(monkeypatch, tmp_path, "light/trace_rough.glsl", "#define MOST_CHANGE 0.3", "#define MOST_CHANGE 1e6")
+    mutate(monkeypatch, tmp_path, "path/microfacet.glsl", "#define MOST_CHANGE 0.3", "#define MOST_CHANGE 1e6")
     assert abs(kept_by_ring(gl)[0]) > 3e-3
 
 

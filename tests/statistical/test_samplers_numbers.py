@@ -14,7 +14,7 @@ import pytest
 from scipy.spatial import KDTree
 from spectrasplat.base import paths
 from spectrasplat.base.random_words import PASS_GENERATORS
-from spectrasplat.gpu.records import LATTICE_BIT, TRACE_PARAMETERS, ray_record
+from spectrasplat.gpu.records import LATTICE_BIT, TRACE_PARAMETERS
 from spectrasplat.passes.pixel_lattice import cells_of, pixel_lattice
 from spectrasplat.reference.emission_maps import GOLDEN, PLASTIC, lattice_point, mirrored_lattice_point
 from spectrasplat.reference.random_numbers import hash_combine, hash_pcg, kronecker, radical_inverse, unit_float
@@ -192,7 +192,11 @@ def survives_source(lattice_count: int = 0) -> str:
         f"made.lattice_bits = {lattice_count << LATTICE_BIT}u; made.lattice_shift = {LATTICE_SHIFT}u;"
     )
     made = f"TraceParameters parameters() {{ TraceParameters made; {values} return made; }}"
-    carried = "float carried_w(RayRecord ray) { return ray.flux_w; }"
+    carried = """
+struct Walk { float flux_w; float footprint_scale; float survival; uint photon_id; uint branch_key; };
+struct Path { vec3 throughput; uint depth; Walk walk; };
+float carried_w(Path path) { return path.walk.flux_w; }
+"""
     return f"{made}\n#define LATTICE_BIT {LATTICE_BIT}\nTraceParameters p = parameters();\n{carried}\n{text}"
 
 
@@ -224,15 +228,13 @@ def play(
     lattice_count: int = 0,
 ) -> dict[str, np.ndarray]:
     body = """
-    RayRecord ray;
-    ray.flux_w = survival; ray.throughput = vec3(survival); ray.survival = survival;
-    ray.photon_id = photon; ray.depth = depth; ray.branch_key = key;
-    ray.footprint_scale = scale;
+    Path path;
+    path.throughput = vec3(survival * share); path.depth = depth;
+    path.walk = Walk(survival * share, scale, survival, photon, key);
     float roulette = 0.0;
-    ray.flux_w *= share; ray.throughput *= share;
-    alive = survives(ray, roulette, share, 2u) ? 1u : 0u;
-    flux = ray.flux_w; taken = roulette; left = ray.survival; next_key = ray.branch_key; throughput = ray.throughput.y;
-    wide = ray.footprint_scale;
+    alive = survives(path, roulette, share, 2u) ? 1u : 0u;
+    flux = path.walk.flux_w; taken = roulette; left = path.walk.survival; next_key = path.walk.branch_key;
+    throughput = path.throughput.y; wide = path.walk.footprint_scale;
     """
     inputs = {
         "photon": photon.astype(np.uint32),
@@ -257,7 +259,7 @@ def play(
         body,
         inputs,
         outputs,
-        structs=[ray_record(0), TRACE_PARAMETERS],
+        structs=[TRACE_PARAMETERS],
         declarations=survives_source(lattice_count),
     )
 
