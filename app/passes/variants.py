@@ -297,6 +297,7 @@ def camera_defines(scene: SceneBuffers, channels: Channels, layer: str, maps: Ma
         "POLARISED": specular and features.polarised,
         "COATS": features.coats,
         "ROUGH_DIFFUSE": features.rough_diffuse,
+        "ANCHOR_WEIGHTS": False,
     }
     for name in switches:
         defines.pop(name, None)
