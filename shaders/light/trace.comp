@@ -40,7 +40,7 @@ vec3 band_powers(uint row, vec3 band)
 uint tint_level(Path path)
 {
     float rounding = kronecker(path.walk.photon_id / p.lattices, TINT_GENERATOR, p.tint_key + path.walk.photon_id % p.lattices * 2654435769u);
-    float place = min(float(TINT_LEVELS) * path.walk.tinted / (1.0 + path.walk.tinted), float(TINT_LEVELS - 1)), level = floor(place);
+    float place = min(float(TINT_LEVELS) * path.walk.tinted.x / (1.0 + path.walk.tinted.x), float(TINT_LEVELS - 1)), level = floor(place);
     // What is left falls the less the less of it there is: odds of a half lie before or behind the middle.
     float halfway = p.tint_halfway[uint(level) >> 2][uint(level) & 3u], beyond = (place - level) * halfway;
     float further = beyond / (beyond + (1.0 - (place - level)) * (1.0 - halfway));
@@ -80,7 +80,7 @@ void absorb(inout Path path, float distance, inout float absorbed_w)
 #ifdef TINT_LEVELS
     if (row == p.tint_row && path.band.z > path.band.x) {
         float before = carried_w(path);
-        path.walk.tinted += p.tint_rate * distance;
+        path.walk.tinted.x += p.tint_rate * distance;
         path.walk.flux_w *= exp(-spectral_row(uint(WEIGHT_ROW) + row, path.band.y) * distance);
         band_w = band_powers(power_row(path), path.band);
         float left = carried_w(path);
@@ -167,7 +167,7 @@ void land(inout Path path, Path start, uint receiver, uint triangle, Hit hit, ui
     photon.depth = min(path.depth, (1u << EDGE_BIT) - 1u);
 #ifdef LIGHT_EDGES
     // The edge is told in steps of the lattice as emitted: footprints of a coarser one, or broader ones, reach over it from farther away.
-    if (lattice_bits == p.lattice_bits && path.walk.footprint_scale == 1.0) photon.depth |= uint(path.walk.edge) << EDGE_BIT;
+    if (lattice_bits == p.lattice_bits && path.walk.footprint_scale == 1.0) photon.depth |= uint(path.walk.dposition[0].w) << EDGE_BIT;
 #endif
 #if SPECTRAL_GROUPS > 0
     SPECTRAL_COPY
@@ -180,10 +180,10 @@ void land(inout Path path, Path start, uint receiver, uint triangle, Hit hit, ui
     }
 #endif
     if (!holds) {
-        path.walk.dropped = FLAG_FOOTPRINT_DROPPED;
+        path.walk.flags = FLAG_FOOTPRINT_DROPPED;
         outcome.what |= FELL_FOOTPRINT;
     }
-    photon.flags = path.walk.dropped | lattice_bits;
+    photon.flags = path.walk.flags | lattice_bits;
 #ifdef TINT_LEVELS
     photon.flags |= tint_level(path) << uint(TINT_BIT);
 #endif
@@ -215,7 +215,7 @@ Flight flight_of(inout Path path, float distance)
     flight.direction = path.direction;
     flight.distance = distance;
     flight.flux_w = outside ? carried_w(path) : 0.0;
-    flight.flown = path.walk.flown;
+    flight.flown = path.walk.flown.x;
     flight.x_lo = path.band.x;
     flight.x_hi = path.band.z;
     flight.light_and_source = path.walk.light_and_source;
@@ -233,7 +233,7 @@ Flight flight_of(inout Path path, float distance)
         flight.ddirection_dband += over_band * path.ddirection[SPATIAL + g];
     }
 #endif
-    path.walk.flown += is_inside(path.medium) ? 0.0 : distance;
+    path.walk.flown.x += is_inside(path.medium) ? 0.0 : distance;
     return flight;
 }
 #endif

@@ -13,7 +13,7 @@ bool lands_broadly(Path path, Hit hit)
 {
     uint kind = object_at(hit.object).kind;
     bool lands = (kind == KIND_DIFFUSE || kind == KIND_BLACK) && path.depth > 0u;
-    if (!lands || path.band.z - path.band.x < NARROWEST_LANDING || path.walk.dropped != 0u) return false;
+    if (!lands || path.band.z - path.band.x < NARROWEST_LANDING || path.walk.flags != 0u) return false;
     vec3 column[COLUMNS];
     for (int c = 0; c < COLUMNS; ++c) column[c] = transfer_column(path.dposition[c], path.ddirection[c], path.direction, hit.normal_g, hit.distance);
     vec3 chord = vec3(0.0);

@@ -45,27 +45,8 @@ layout(std430, binding = BIND_STATE) readonly restrict buffer StateBlock { Queue
 #define HAS_NORMAL_COLUMNS
 #endif
 
-// What a photon's path carries besides (`ray_record` in app/gpu/records.py).
-struct Walk {
-    float flux_w;           // what its anchor alone would carry
-    float footprint_scale;  // grows as 1/sqrt(survival) where roulette thinned the lattice
-    float survival;         // share of the emitted weight still carried, before roulette's boost
-    uint photon_id;
-    uint light_and_source;
-    uint branch_key;        // hash of the choices so far
-    uint dropped;           // FLAG_FOOTPRINT_DROPPED or 0
-    float edge;             // where the light's emission ends beside it (`packed_edge`)
-    float flown;            // way outside glass so far, GPU units
-    float tinted;           // way through the glass whose tint has levels so far, times its rate
-#ifdef HERO
-    vec4 companion_x;
-    vec4 companion_throughput;
-#ifdef POLARISED
-    vec4 companion_q, companion_u, companion_v;
-#endif
-#endif
-};
-
+// What a photon's path carries besides is in its record (`ray_record` in app/gpu/records.py); of the flags there, FLAG_FOOTPRINT_DROPPED.
+#define Walk RayRecord
 #include "path/event.glsl"
 
 // Bits of a record's flags from which on the order of a grating stands that is to be sent on next.
@@ -77,6 +58,8 @@ Path load_path(uint slot)
     for (uint i = 0u; i < uint(RayRecord_TEXELS); ++i) texels[i] = rays_in[slot * uint(RayRecord_TEXELS) + i];
     RayRecord ray = RayRecord_of(texels);
     Path path;
+    path.walk = ray;
+    path.walk.flags &= FLAG_FOOTPRINT_DROPPED;
     path.position = ray.position;
     path.direction = ray.direction;
     path.medium = MediumStack(ray.inside_mask, ray.inside_object);
@@ -86,15 +69,7 @@ Path load_path(uint slot)
     path.depth = ray.depth;
     path.restricted = 1u;
     path.recut = uint((ray.flags & FLAG_BAND_FINAL) != 0u);
-    path.walk.flux_w = ray.flux_w;
-    path.walk.footprint_scale = ray.footprint_scale;
-    path.walk.survival = ray.survival;
-    path.walk.photon_id = ray.photon_id;
-    path.walk.light_and_source = ray.light_and_source;
-    path.walk.branch_key = ray.branch_key;
-    path.walk.dropped = ray.flags & FLAG_FOOTPRINT_DROPPED;
 #if COLUMNS > 0
-    path.walk.edge = ray.dposition[0].w;
     for (int c = 0; c < COLUMNS; ++c) {
         path.dposition[c] = ray.dposition[c].xyz;
         path.ddirection[c] = ray.ddirection[c].xyz;
@@ -106,27 +81,12 @@ Path load_path(uint slot)
 #ifdef POLARISED
     path.polarisation = Polarisation(vec3(ray.axis_x, ray.axis_y, ray.axis_z), ray.stokes_q, ray.stokes_u, ray.stokes_v);
 #endif
-#ifdef HERO
-    path.walk.companion_x = ray.companion_x;
-    path.walk.companion_throughput = ray.companion_throughput;
-#ifdef POLARISED
-    path.walk.companion_q = ray.companion_q;
-    path.walk.companion_u = ray.companion_u;
-    path.walk.companion_v = ray.companion_v;
-#endif
-#endif
-#ifdef FLIGHTS
-    path.walk.flown = ray.flown.x;
-#endif
-#ifdef TINT_LEVELS
-    path.walk.tinted = ray.tinted.x;
-#endif
     return path;
 }
 
 void store_path(uint slot, Path path)
 {
-    RayRecord ray;
+    RayRecord ray = path.walk;
     ray.position = path.position;
     ray.direction = path.direction;
     ray.inside_mask = path.medium.mask;
@@ -138,17 +98,11 @@ void store_path(uint slot, Path path)
     ray.x_hi = path.band.z;
     ray.throughput = path.throughput;
     ray.depth = path.depth;
-    ray.flags = path.walk.dropped | (path.origin.inside != 0u ? FLAG_INSIDE : 0u) | (path.recut != 0u ? FLAG_BAND_FINAL : 0u);
-    ray.flux_w = path.walk.flux_w;
-    ray.footprint_scale = path.walk.footprint_scale;
-    ray.survival = path.walk.survival;
-    ray.photon_id = path.walk.photon_id;
-    ray.light_and_source = path.walk.light_and_source;
-    ray.branch_key = path.walk.branch_key;
+    ray.flags |= (path.origin.inside != 0u ? FLAG_INSIDE : 0u) | (path.recut != 0u ? FLAG_BAND_FINAL : 0u);
 #if COLUMNS > 0
     for (int c = 0; c < COLUMNS; ++c) {
-        ray.dposition[c] = vec4(path.dposition[c], c == 0 ? path.walk.edge : 0.0);
-        ray.ddirection[c] = vec4(path.ddirection[c], 0.0);
+        ray.dposition[c].xyz = path.dposition[c];
+        ray.ddirection[c].xyz = path.ddirection[c];
     }
 #endif
 #ifdef HAS_GRATING
@@ -161,21 +115,6 @@ void store_path(uint slot, Path path)
     ray.stokes_q = path.polarisation.q;
     ray.stokes_u = path.polarisation.u;
     ray.stokes_v = path.polarisation.v;
-#endif
-#ifdef HERO
-    ray.companion_x = path.walk.companion_x;
-    ray.companion_throughput = path.walk.companion_throughput;
-#ifdef POLARISED
-    ray.companion_q = path.walk.companion_q;
-    ray.companion_u = path.walk.companion_u;
-    ray.companion_v = path.walk.companion_v;
-#endif
-#endif
-#ifdef FLIGHTS
-    ray.flown = vec4(path.walk.flown, 0.0, 0.0, 0.0);
-#endif
-#ifdef TINT_LEVELS
-    ray.tinted = vec4(path.walk.tinted, 0.0, 0.0, 0.0);
 #endif
     uvec4 texels[RayRecord_TEXELS];
     to_texels(ray, texels);

@@ -39,7 +39,7 @@ void keep_columns_within(inout Path path, Path start, float size, float distance
     keep_within(widest, s, t, turn_s, turn_t);
 #ifdef LIGHT_EDGES
     // Made smaller, it no longer says where its neighbours and the edge are.
-    if (s != path.dposition[0]) path.walk.edge = 0.0;
+    if (s != path.dposition[0]) path.walk.dposition[0].w = 0.0;
 #endif
     path.dposition[0] = s;
     path.dposition[1] = t;
@@ -61,7 +61,7 @@ void keep_directions_within(inout Path path)
     vec3 s = path.dposition[0], t = path.dposition[1], turn_s = path.ddirection[0], turn_t = path.ddirection[1];
     keep_within(p.widest_turn / max(path.walk.footprint_scale, 1e-30), turn_s, turn_t, s, t);
 #ifdef LIGHT_EDGES
-    if (turn_s != path.ddirection[0]) path.walk.edge = 0.0;
+    if (turn_s != path.ddirection[0]) path.walk.dposition[0].w = 0.0;
 #endif
     path.ddirection[0] = turn_s;
     path.ddirection[1] = turn_t;
