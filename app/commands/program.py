@@ -37,6 +37,7 @@ COMMANDS = {
     "bench-beams": (measuring_table.BenchBeams, "bench_parts:bench_beams"),
     "bench-agreement": (measuring_table.BenchAgreement, "bench_agreement:bench_agreement"),
     "bench-view": (measuring_table.BenchView, "bench_parts:bench_view"),
+    "fingerprint": (measuring_table.Fingerprint, "fingerprint:fingerprint"),
     "prove-gpu": (measuring_table.ProveGpu, "prove_gpu:prove_gpu"),
     "farm render": (table.FarmRender, "farm:render"),
     "farm animate": (table.FarmAnimate, "farm:animate"),
