@@ -79,9 +79,11 @@ void cross_glass(inout Path path, Path whole, Hit hit, Event event, uint pixel_k
     float onset = path.restricted != 0u && path.recut == 0u ? total_reflection_in_band(path, event) : -1.0;
     if (onset >= 0.0) {
         onset = cell_border(onset);
-        if (may_cut_at(path, onset) && may_cut_near(whole, onset, hit.distance)) {
+        Path start = whole;
+        if (start.restricted == 0u) restrict_to_band(start, pixel_key);
+        if (may_cut_near(start, onset, hit.distance)) {
             // Both parts meet this surface again, each from its own start.
-            path = whole;
+            path = start;
             path.recut = 1u;
             cut_at = onset;
             return;
