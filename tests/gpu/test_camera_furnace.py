@@ -120,6 +120,22 @@ def test_a_loss_of_two_per_cent_a_surface_would_be_seen(gl, monkeypatch, tmp_pat
     assert 1.0 - rgb[8:16, 8:16].mean() > 0.02
 
 
+def test_nothing_is_counted_twice_from_under_water(gl, monkeypatch, tmp_path) -> None:
+    """Where total reflection begins (Snell's window), a path that nothing has dispersed yet is cut as the one band that
+    it becomes there. The mutant cuts it as the whole spectrum."""
+    inside = Camera((0.0, 0.0, -0.4), (0.0, 0.05, 1.0), vertical_fov_deg=90.0)
+    block = [SceneObject("block", primitives.box((2.0, 2.0, 2.0)), glass("water"))]
+
+    def excess() -> float:
+        rgb = render(gl, block, background=(1, 1, 1), camera=inside, size=SIZE, samples=64)
+        return float(np.abs(rgb.mean(axis=(0, 1), dtype=float) - 1.0).max())
+
+    assert excess() < 3e-3
+    old = "if (start.restricted == 0u) restrict_to_band(start, pixel_key);\n        if (may_cut_near"
+    mutate(monkeypatch, tmp_path, "camera/meet.glsl", old, "if (may_cut_near")
+    assert excess() > 0.01
+
+
 @pytest.mark.parametrize("roughness", [0.2, 0.5, 1.0])
 def test_rough_glass_vanishes_too(gl, roughness: float) -> None:
     """What microfacets throw at each other comes out again: the mean to 1 %, where following one of them alone leaves
