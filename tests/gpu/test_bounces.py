@@ -153,6 +153,24 @@ def test_in_a_furnace_everything_gets_the_same(gl: Context, material) -> None:
     assert abs(light[inside] / math.pi - 1.0).max() < 0.2
 
 
+def test_a_ball_that_stands_on_the_floor_changes_little_when_it_is_raised(gl: Context) -> None:
+    """A curved solid in contact has rules of its own for what rays cross there."""
+
+    def picture(height: float) -> np.ndarray:
+        lit = corner()
+        ball = place(primitives.sphere(0.2, 5000), Dielectric(CROWN), (0.0, 0.1, 0.2 + height), "ball")
+        renderer = FrameRenderer(
+            gl, SETTINGS, [Stage(scene := replace(lit, objects=(*lit.objects, ball)), scene.camera)]
+        )
+        try:
+            renderer.run(Stage(scene, scene.camera))
+            return renderer.picture.rgb.astype(float)
+        finally:
+            renderer.release()
+
+    assert picture(0.0).sum() == pytest.approx(picture(0.01).sum(), rel=0.02)
+
+
 def by_a_mirror() -> Scene:
     """A beam goes by way of a mirror to a patch of the floor."""
     beam = CollimatedLight(
