@@ -7,6 +7,7 @@ be printed could not be (a closed pipe, a full disk), or a bug with its tracebac
 from __future__ import annotations
 
 import errno
+import gc
 import os
 import sys
 from collections.abc import Sequence
@@ -77,6 +78,7 @@ class _Patient:
 
 def _run(arguments: Sequence[str] | None) -> int:
     waste_little()
+    gc.set_threshold(50_000)  # what is imported stays: looking through it again and again is a tenth of the start
     from .commands.program import run
 
     return run(sys.argv[1:] if arguments is None else list(arguments))

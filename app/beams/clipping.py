@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from .compiling import jit
+from .compiling import part
 
 
-@jit
+@part
 def clip(polygon, count, scratch, a_u, a_v, c):
     """Keep a . p + c >= 0 of a convex polygon, in place; the number of corners left [Sutherland, Hodgman 1974]."""
     kept = 0

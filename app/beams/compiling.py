@@ -1,34 +1,225 @@
-"""The functions of this folder as machine code."""
+"""The functions of this folder as machine code.
+
+numba compiles them, which takes it most of a minute for all. What it made is kept on the disk and from then on loaded
+by llvmlite alone: numba itself takes longer to start (half a second) than most searches for beams.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import ctypes
+import json
+import os
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cache, cached_property
+from importlib.util import find_spec
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
-from numba import njit
+import numpy as np
 
-from ..base.compiling import compiled, version_of
+from ..base.atomic import atomic_output
+from ..base.compiling import version_of
+from ..base.errors import UserError
+from ..base.files import read_bytes
+from ..base.paths import cache_dir
 
-_ALLOCATING: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
-_OPTIONS: dict[str, Any] = _ALLOCATING | {"_nrt": False}
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
+_OPTIONS |= {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 """References are not counted, so nothing may be allocated inside: scratch comes from the caller (`search.WORK`)."""
+_MOST_BYTES = 1 << 26
+"""Of a file."""
+_RESULTS: dict[str, Any] = {"none": ctypes.c_void_p, "bool": ctypes.c_bool, "float64": ctypes.c_double}
+_COMPILERS = "numba", "llvmlite"
+_SUCCESS = 0, -2
+"""What functions of numba return; -2: their result is None."""
+_lock = Lock()
 
-_TEXTS = (path.read_bytes() for path in sorted(Path(__file__).parent.glob("*.py")))
-_VERSION = version_of(text for text in _TEXTS if b"from .compiling import" in text)
-
-
-def jit(function: Callable) -> Callable:
-    """`function` as machine code, which calls no function that allocates."""
-    return compiled(function, _VERSION, **_OPTIONS)
-
-
-def part(function: Callable) -> Callable:
-    """The same for what compiled functions alone call: neither wrapped for Python nor kept on disk by itself."""
-    options: dict[str, Any] = _OPTIONS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-    return njit(**options)(function)
+Kinds = tuple[tuple[np.dtype, int, str] | str, ...]
+"""What numba compiles for: of each argument an array's dtype, dimensions and layout, or "int64" or "float64"."""
 
 
-def allocating(function: Callable) -> Callable:
-    """`function` as machine code, which makes arrays."""
-    return compiled(function, _VERSION, **_ALLOCATING)
+class Part:
+    """A function that only compiled functions call."""
+
+    def __init__(self, function: Callable) -> None:
+        self._function = function
+
+    @cached_property
+    def _dispatcher(self) -> Any:
+        from numba import njit
+
+        return njit(**_OPTIONS)(self._function)
+
+    @property
+    def _numba_type_(self) -> Any:
+        """What numba takes a global variable of this class for."""
+        from numba import types
+
+        return types.Dispatcher(self._dispatcher)
+
+
+class Kernel:
+    """A function that Python calls with arrays, integers and floats; it holds no lock of the interpreter."""
+
+    def __init__(self, function: Callable) -> None:
+        self._function = function
+        self._native: dict[Kinds, _Native] = {}
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Compile it for arguments of these kinds where that was never done, then call it."""
+        kinds = tuple(_kind_of(argument) for argument in arguments)
+        native = self._native.get(kinds)
+        if native is None:
+            with _lock:
+                native = self._native.get(kinds) or _Native(self._machine_code(kinds), kinds)
+            self._native[kinds] = native
+        return native(arguments)
+
+    def _machine_code(self, kinds: Kinds) -> _MachineCode:
+        """From the disk where it was compiled before; a folder that cannot be written only costs time."""
+        source = Path(self._function.__code__.co_filename)
+        folder = source.parent / "__pycache__"
+        if not os.access(folder if folder.is_dir() else source.parent, os.W_OK):
+            folder = cache_dir() / "beams"
+        path = folder / f"{source.stem}.{self._function.__name__}-{version_of([repr(kinds).encode()])}.machine"
+        kept = _MachineCode.read(path)
+        if kept is None:
+            kept = _compiled(self._function, kinds)
+            with suppress(OSError, UserError):
+                folder.mkdir(exist_ok=True)
+                kept.write(path)
+        return kept
+
+
+@dataclass(frozen=True)
+class _MachineCode:
+    """One function for arguments of some kinds."""
+
+    version: str
+    """`_version` when it was compiled."""
+    triple: str
+    """LLVM's name of the platform."""
+    symbol: str
+    """Its name in the object file."""
+    result: str
+    """One of `_RESULTS`."""
+    needs: list[str]
+    """Functions of the C library that it calls."""
+    code: bytes
+    """An object file."""
+
+    @staticmethod
+    def read(path: Path) -> _MachineCode | None:
+        """What `write` wrote; None where there is nothing of this version."""
+        try:
+            head, _, code = read_bytes(path, _MOST_BYTES).partition(b"\n")
+            kept = _MachineCode(**json.loads(head), code=code)
+        except (OSError, UserError, ValueError, TypeError):
+            return None
+        return kept if kept.version == _version() else None
+
+    def write(self, path: Path) -> None:
+        """Keep it. Raises `OSError` and `UserError`."""
+        head = {name: value for name, value in vars(self).items() if name != "code"}
+        with atomic_output(path, lasting=False) as temporary:
+            temporary.write_bytes(json.dumps(head).encode() + b"\n" + self.code)
+
+
+class _Native:
+    """Machine code in memory, called as numba calls it: pointers to the result and to what was raised, then each array
+    as owner, parent, elements, bytes of one, data, shape, strides."""
+
+    def __init__(self, machine: _MachineCode, kinds: Kinds) -> None:
+        from llvmlite import binding
+
+        empty = binding.parse_assembly(f'target triple = "{machine.triple}"')
+        self._engine = binding.create_mcjit_compiler(empty, _target_machine(machine.triple))
+        if not all(binding.address_of_symbol(name) for name in machine.needs):
+            from numba.core.registry import cpu_target  # knows where this platform has them
+
+            assert cpu_target.target_context
+        self._engine.add_object_file(binding.ObjectFileRef.from_data(machine.code))
+        self._engine.finalize_object()
+        self._result = _RESULTS[machine.result]
+        types: list[Any] = [ctypes.c_void_p, ctypes.c_void_p]
+        for kind in kinds:
+            if isinstance(kind, str):
+                types.append(ctypes.c_double if kind == "float64" else ctypes.c_int64)
+            else:
+                pointer, number = ctypes.c_void_p, ctypes.c_int64
+                types += [pointer, pointer, number, number, pointer, *[number] * (2 * kind[1])]
+        self._call = ctypes.CFUNCTYPE(ctypes.c_int32, *types)(self._engine.get_function_address(machine.symbol))
+
+    def __call__(self, arguments: Sequence[Any]) -> Any:
+        values: list[Any] = []
+        for a in arguments:
+            if isinstance(a, np.ndarray):
+                values += (None, None, a.size, a.itemsize, a.ctypes.data, *a.shape, *a.strides)
+            else:
+                values.append(a)
+        result, raised = self._result(), ctypes.c_void_p()
+        status = self._call(ctypes.byref(result), ctypes.byref(raised), *values)
+        if status not in _SUCCESS:
+            raise RuntimeError(f"compiled code raised an exception ({status})")
+        return result.value
+
+
+def _kind_of(argument: Any) -> tuple[np.dtype, int, str] | str:
+    if isinstance(argument, np.ndarray):
+        return argument.dtype, argument.ndim, "C" if argument.flags.c_contiguous else "A"
+    return "float64" if isinstance(argument, float) else "int64"
+
+
+def _compiled(function: Callable, kinds: Kinds) -> _MachineCode:
+    from llvmlite import binding
+    from numba import from_dtype, njit, types
+
+    dispatcher = njit(**_OPTIONS)(function)
+    arguments = tuple(
+        getattr(types, kind) if isinstance(kind, str) else types.Array(from_dtype(kind[0]), *kind[1:]) for kind in kinds
+    )
+    dispatcher.compile(arguments)
+    symbol = dispatcher.overloads[arguments].fndesc.llvm_func_name
+    module = binding.parse_assembly(dispatcher.inspect_llvm(arguments))
+    return _MachineCode(
+        _version(),
+        module.triple,
+        symbol,
+        str(dispatcher.overloads[arguments].signature.return_type),
+        [f.name for f in module.functions if f.is_declaration and not f.name.startswith("llvm.")],
+        _target_machine(module.triple).emit_object(module),
+    )
+
+
+def _target_machine(triple: str) -> Any:
+    from llvmlite import binding
+
+    binding.initialize_native_target()
+    binding.initialize_native_asmprinter()
+    cpu, features = binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
+    return binding.Target.from_triple(triple).create_target_machine(cpu, features, opt=3, jit=True)
+
+
+@cache
+def _version() -> str:
+    """Changes with the functions, with what compiles them and with the processor."""
+    from llvmlite import binding
+
+    compilers = [str(spec and spec.origin and os.stat(spec.origin).st_mtime_ns) for spec in map(find_spec, _COMPILERS)]
+    machine = binding.get_process_triple(), binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
+    texts = [path.read_bytes() for path in sorted(Path(__file__).parent.glob("*.py"))]
+    sources = [text for text in texts if b"compiling import" in text]  # this file too
+    return version_of([*sources, *(text.encode() for text in (*compilers, *machine))])
+
+
+def jit(function: Callable) -> Kernel:
+    """`function` for Python to call; it calls no function that allocates."""
+    return Kernel(function)
+
+
+def part(function: Callable) -> Part:
+    """`function` for compiled functions to call."""
+    return Part(function)

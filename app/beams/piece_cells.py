@@ -9,24 +9,22 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from .compiling import allocating
+from .compiling import part
 from .piece_measure import keep_lit, moments_of, parabola, power_between, weight_at
 
 CELL_STEPS = 2
 """Places of each of three parts of the time that a cell is lit at which it is measured, where an edge crosses it."""
 _LEAST_HELD = 1e-12
 """Share of a light's power below which a ray stands for nothing."""
-COLUMNS = 31
+COLUMNS = 33
 """Of a ray: position, direction, their derivatives by the cell's two axes (dp dp dd dd) and by x (dp dd), x_lo,
-x_anchor, x_hi, throughput there, flux."""
+x_anchor, x_hi, throughput there, flux; its piece, and its number on the piece's lattice."""
 BODY = 11
 """Numbers that `cell_body` gives, and which cell of the lattice it is."""
 
 
-@allocating
-def cell_body(edges, weight, x_lo, x_hi, curve_x, curve_w, cell, band_content, polygon, scratch, body):
+@part
+def cell_body(edges, weight, x_lo, x_hi, curve_x, curve_w, cell, band_content, polygon, cut, scratch, body):
     """The part of a cell that is lit: `body` is content, mean u, v, first and last t, slope of u, v by t, spread uu,
     uv, vv. `cell`: u, v of its middle, its half axes' u, v, u, v."""
     u, v = cell[0], cell[1]
@@ -65,7 +63,8 @@ def cell_body(edges, weight, x_lo, x_hi, curve_x, curve_w, cell, band_content, p
     # Straight in between: it grows, stays and shrinks again.
     risen, falls = min(max(risen, first), last), min(max(falls, first), last)
     bounds = (first, min(risen, falls), max(risen, falls), last)
-    moments, sums = np.empty(6), np.zeros(12)
+    moments, sums = scratch.moments, scratch.sums
+    sums[:] = 0.0
     for k in range(3 * CELL_STEPS if x_hi > x_lo else 1):
         start, end = bounds[k // CELL_STEPS], bounds[k // CELL_STEPS + 1]
         step = (end - start) / CELL_STEPS
@@ -79,12 +78,12 @@ def cell_body(edges, weight, x_lo, x_hi, curve_x, curve_w, cell, band_content, p
             s, r = (1.0 if corner in (1, 2) else -1.0), (1.0 if corner >= 2 else -1.0)
             polygon[corner, 0] = s * cell[2] + r * cell[4]
             polygon[corner, 1] = s * cell[3] + r * cell[5]
-        moments_of(polygon, keep_lit(edges, t, u, v, polygon, 4, scratch), moments)
+        moments_of(polygon, keep_lit(edges, t, u, v, polygon, 4, cut), moments)
         if moments[0] > 0.0:
             power = power_between(curve_x, curve_w, x_lo + (x_hi - x_lo) * lo, x_lo + (x_hi - x_lo) * (lo + step))
             sums[0] += moments[0] * power * weight_at(weight, t)
-            moments *= step if step > 0.0 else 1.0
             for m in range(6):
+                moments[m] *= step if step > 0.0 else 1.0
                 sums[1 + m] += moments[m]
             sums[7] += moments[0] * t
             sums[8] += moments[0] * t * t
@@ -115,7 +114,7 @@ def cell_body(edges, weight, x_lo, x_hi, curve_x, curve_w, cell, band_content, p
     return True
 
 
-@allocating
+@part
 def _at(affine, t, u, v, out):
     """X + X_u u + X_v v at t, `affine` (3, 3, 3)."""
     a, b, c = parabola(t)
@@ -127,15 +126,16 @@ def _at(affine, t, u, v, out):
         )
 
 
-@allocating
+@part
 def _normalise(direction):
     length = math.sqrt(direction[0] ** 2 + direction[1] ** 2 + direction[2] ** 2)
-    direction /= length
+    for j in range(3):
+        direction[j] /= length
     return length
 
 
-@allocating
-def ray_of(position, direction, weight, x_lo, x_hi, curve_x, curve_w, body, content, ray):
+@part
+def ray_of(position, direction, weight, x_lo, x_hi, curve_x, curve_w, body, content, scratch, ray):
     """The ray of a lit cell that carries `content`."""
     first, last = body[3], body[4]
     if x_hi == x_lo:
@@ -172,12 +172,13 @@ def ray_of(position, direction, weight, x_lo, x_hi, curve_x, curve_w, body, cont
     start, middle, end = x_lo + (x_hi - x_lo) * first, x_lo + (x_hi - x_lo) * t, x_lo + (x_hi - x_lo) * last
     ray[18:24] = 0.0
     if end - start > 1e-12:
-        low, high = np.empty(6), np.empty(6)
+        low, high = scratch.low, scratch.high
         for place, out in ((first, low), (last, high)):
             _at(position, place, u + body[5] * (place - t), v + body[6] * (place - t), out[:3])
             _at(direction, place, u + body[5] * (place - t), v + body[6] * (place - t), out[3:])
             _normalise(out[3:])
-        ray[18:24] = (high - low) / (end - start)
+        for j in range(6):
+            ray[18 + j] = (high[j] - low[j]) / (end - start)
     ray[24], ray[25], ray[26] = start, middle, end
     w_lo, w_mid, w_hi = weight_at(weight, first), weight_at(weight, t), weight_at(weight, last)
     if end > start:

@@ -1,7 +1,4 @@
-"""The compiled half of `piece_lattice`: a lattice over each piece of a beam, cell by cell.
-
-In a file of its own so that numba is imported (0.4 s) only when a beam has pieces.
-"""
+"""The compiled half of `piece_lattice`: a lattice over each piece of a beam, cell by cell."""
 
 from __future__ import annotations
 
@@ -10,29 +7,26 @@ import math
 import numpy as np
 
 from .clipping import clip
-from .compiling import allocating
-from .piece_cells import BODY, COLUMNS, cell_body, ray_of
-from .piece_measure import STEPS, keep_lit, moments_of, power_between, weight_at
+from .compiling import jit, part
+from .piece_cells import cell_body, ray_of
+from .piece_measure import MOMENTS_OF_BAND, STEPS, TANGENTS, copy, keep_lit, moments_of, power_between, weight_at
 
-MOMENTS_OF_BAND, TANGENTS = 5, 16
-"""Times at which what is lit is measured for its lattice, and sides of what is laid about it."""
 GOLDEN = 0.6180339887498949
 
 
-@allocating
-def _frame(own, hull, moves, out):
+@part
+def _frame(own, hull, moves, polygons, cut, scratch, out):
     """Principal axis (cosine, sine) of what is lit at some time; low and high of the hull, and of that, along it and
     across it; area of the convex hull of that."""
     times = MOMENTS_OF_BAND if moves else 1
-    room = len(own) + len(hull) + 4
-    polygons, counts = np.empty((times, room, 2)), np.empty(times, np.int64)
-    scratch, moments, total = np.empty((2 * room, 2)), np.empty(6), np.zeros(6)
+    counts, moments, total = scratch.counts, scratch.moments, scratch.total
+    total[:] = 0.0
     for k in range(times):
-        polygons[k, : len(hull)] = hull
         t = k / (times - 1) if times > 1 else 0.0
-        counts[k] = keep_lit(own, t, 0.0, 0.0, polygons[k], len(hull), scratch)
+        counts[k] = keep_lit(own, t, 0.0, 0.0, polygons[k], copy(hull, polygons[k]), cut)
         moments_of(polygons[k], counts[k], moments)
-        total += moments
+        for m in range(6):
+            total[m] += moments[m]
     if not total[0] > 0.0:
         return False
     u, v = total[1] / total[0], total[2] / total[0]
@@ -52,15 +46,14 @@ def _frame(own, hull, moves, out):
     length, width = out[7] - out[6], out[9] - out[8]
     if not (length > 0.0 and width > 0.0):
         return False
-    if not moves or not np.any(own[:, :3] != own[:, 3:]):
+    if not moves or not _moves(own):
         out[10] = total[0] / times
         return True
     # About the hull as many tangents, in proportion to its box.
-    round_it = np.empty((2 * TANGENTS + 8, 2))
+    round_it, count = scratch.hull, 4
     for corner in range(4):
         round_it[corner, 0] = 1.0 if corner in (1, 2) else -1.0
         round_it[corner, 1] = 1.0 if corner >= 2 else -1.0
-    count, scratch = 4, np.empty((4 * TANGENTS + 16, 2))
     for tangent in range(TANGENTS):
         turn = 2.0 * math.pi * (tangent + 0.5) / TANGENTS
         a_u, a_v, farthest = math.cos(turn), math.sin(turn), -np.inf
@@ -71,18 +64,28 @@ def _frame(own, hull, moves, out):
                 along = 2.0 * (along - out[6]) / length - 1.0
                 across = 2.0 * (across - out[8]) / width - 1.0
                 farthest = max(farthest, a_u * along + a_v * across)
-        count = clip(round_it, count, scratch, -a_u, -a_v, farthest)
+        count = clip(round_it, count, scratch.hull_cut, -a_u, -a_v, farthest)
     moments_of(round_it, count, moments)
     out[10] = 0.25 * moments[0] * length * width
     return out[10] > 0.0
 
 
-@allocating
+@part
+def _moves(edges):
+    """Whether an edge lies elsewhere at the end of the band than at its start."""
+    for e in range(len(edges)):
+        for j in range(3):
+            if edges[e, j] != edges[e, 3 + j]:
+                return True
+    return False
+
+
+@part
 def _widen(span, value):
     span[0], span[1] = min(span[0], value), max(span[1], value)
 
 
-@allocating
+@part
 def _mixed(state):
     """SplitMix64's output function ("Mix13" of Stafford 2011)."""
     state = (state ^ (state >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
@@ -90,7 +93,7 @@ def _mixed(state):
     return state ^ (state >> np.uint64(31))
 
 
-@allocating
+@part
 def _random(key, piece, dimension):
     """Uniform in [0, 1)."""
     state = _mixed(np.uint64(key) + np.uint64(0x9E3779B97F4A7C15))
@@ -99,7 +102,7 @@ def _random(key, piece, dimension):
     return float(state >> np.uint64(11)) / 9007199254740992.0
 
 
-@allocating
+@part
 def _divide(frame, points):
     """Cells of a lattice of about `points` over what is lit, along and across it."""
     length, width = frame[7] - frame[6], frame[9] - frame[8]
@@ -108,7 +111,7 @@ def _divide(frame, points):
     return max(1.0, np.rint(cells / across)), across
 
 
-@allocating
+@jit
 def rays(
     chosen,
     points,
@@ -131,24 +134,29 @@ def rays(
     key,
     first,
     stride,
+    polygons,
+    cut,
+    scratches,
+    bodies,
+    found,
+    done,
 ):
-    """Rays (n, COLUMNS) of the pieces `chosen`, their pieces and their numbers on each piece's lattice.
+    """Rays of the pieces `chosen`, from the `done[0]`th on, into `found` (n, COLUMNS) from its row `done[1]` on; ends
+    where that is full, or where `bodies` are fewer than the cells of a piece: `done[2]` is 1 then.
 
     Piece chosen[k] has about points[k] >= 1 lattice points and is to carry boost[k] times its `content`. Of the cells
     those of sub-lattice `first` of `stride`. `path`: hashes by piece.
     """
-    room = 1024
-    found, owner, number = np.empty((room, COLUMNS)), np.empty(room, np.int64), np.empty(room, np.int64)
-    count = 0
-    frame, cell = np.empty(11), np.empty(6)
+    scratch = scratches[0]
+    frame, cell, polygon = scratch.frame, scratch.cell, polygons[0]
     # Rows of cells are shifted against each other, so that every sub-lattice is spread over the whole.
     row_step = max(1, int(np.rint(GOLDEN * stride)))
     while stride > 1 and math.gcd(row_step, stride) != 1:
         row_step += 1
-    for k in range(len(chosen)):
-        i = chosen[k]
+    for k in range(done[0], len(chosen)):
+        done[0], i = k, chosen[k]
         own = edges[edge_start[i] : edge_start[i + 1]]
-        if not _frame(own, hulls[hull_start[i] : hull_start[i + 1]], x_hi[i] > x_lo[i], frame):
+        if not _frame(own, hulls[hull_start[i] : hull_start[i + 1]], x_hi[i] > x_lo[i], polygons, cut, scratch, frame):
             continue
         along_it, across_it = _divide(frame, points[k])
         length, width = (frame[7] - frame[6]) / along_it, (frame[9] - frame[8]) / across_it
@@ -165,9 +173,6 @@ def rays(
             t = (step + 0.5) / steps if steps > 1 else 0.0
             band_content += power_between(curve_x, curve_w, lo, hi) * weight_at(weight[i], t)
 
-        room = int(2.0 * (along_it + 1.0) * (across_it + 1.0) / stride) + 16
-        bodies = np.empty((room, BODY))
-        polygon, scratch = np.empty((len(own) + 8, 2)), np.empty((2 * len(own) + 16, 2))
         # Lit cells that hold less than `least` are chosen by chance, in order along the lattice.
         least = content[i] / points[k] / min(across_it, 4.0)
         lit, small = 0, 0.0
@@ -175,6 +180,9 @@ def rays(
         for row in range(rows + 1):
             column = (first + offset + row * row_step) % stride
             while column <= columns:
+                if lit == len(bodies):
+                    done[2] = 1
+                    return
                 # Rows go on by the golden ratio: as even a lattice along every line as that of emission.
                 along, across = u0 + (column + 0.5 - (row * GOLDEN) % 1.0) * length, v0 + (row + 0.5) * width
                 cell[0], cell[1] = frame[0] * along - frame[1] * across, frame[1] * along + frame[0] * across
@@ -188,6 +196,7 @@ def rays(
                     cell,
                     band_content,
                     polygon,
+                    cut,
                     scratch,
                     bodies[lit],
                 ):
@@ -195,9 +204,10 @@ def rays(
                     if bodies[lit, 0] < least:
                         small += bodies[lit, 0]
                     lit += 1
-                    if lit == len(bodies):
-                        bodies = np.concatenate((bodies, np.empty_like(bodies)))
                 column += stride
+        count = done[1]
+        if count + lit > len(found):
+            return
         # All that the small ones hold, in equal parts; where it is less than one part, a sub-lattice has it by chance.
         parts = max(1.0, np.rint(small / least))
         part = small / parts
@@ -212,12 +222,6 @@ def rays(
                 carried = part * (math.floor(running + at) - math.floor(before + at)) if parts > 0.0 else 0.0
             if carried <= 0.0:
                 continue
-            if count == len(found):
-                more = np.empty((2 * count, COLUMNS))
-                more[:count] = found
-                found = more
-                owner = np.concatenate((owner, np.empty(count, np.int64)))
-                number = np.concatenate((number, np.empty(count, np.int64)))
             if ray_of(
                 position[i],
                 direction[i],
@@ -228,8 +232,10 @@ def rays(
                 curve_w,
                 bodies[body],
                 carried * boost[k],
+                scratch,
                 found[count],
             ):
-                owner[count], number[count] = i, int(bodies[body, 10])
+                found[count, 31], found[count, 32] = i, bodies[body, 10]
                 count += 1
-    return found[:count], owner[:count], number[:count]
+        done[1] = count
+    done[0] = len(chosen)

@@ -15,13 +15,17 @@ from typing import Any
 
 import numpy as np
 
-from ..base.errors import UserError
 from ..model.optics.spectral_tables import CumulativeSpectrum
+from . import piece_kernel
+from .piece_cells import BODY, COLUMNS
+from .piece_measure import contents, room_for
 from .polygons import BeamPieces
 
 _WORD = float(1 << 32)
 _CHUNK = 2048
 """Pieces that a thread takes at once."""
+_ROOM = 1024
+"""For cells of a piece and for rays, at first."""
 
 
 @dataclass(frozen=True)
@@ -56,12 +60,7 @@ class PieceLattice:
 
     def __init__(self, pieces: BeamPieces, powers: Sequence[CumulativeSpectrum], measures: Sequence[float]) -> None:
         """`powers` of the lights (`SceneBuffers.light_power`); `measures`: what one unit of each light's q counts
-        (scene unit² or sr). Raises UserError without numba."""
-        try:
-            from . import piece_kernel, piece_measure
-        except ImportError as error:
-            raise UserError(f"following beams needs numba ({error}); install it with: pip install numba") from error
-        self._kernel = piece_kernel
+        (scene unit² or sr)."""
         self.pieces = pieces
         starts = np.cumsum([0, *(len(power.x) for power in powers)])
         self._curves = [(power.x.astype(float), np.ascontiguousarray(power.values[:, 3])) for power in powers]
@@ -82,7 +81,7 @@ class PieceLattice:
 
         def measure(first: int) -> None:
             part, ends = slice(first, first + _CHUNK), slice(first, first + _CHUNK + 1)
-            piece_measure.contents(
+            contents(
                 self._bands[0][part],
                 self._bands[1][part],
                 self._weight[part],
@@ -96,6 +95,7 @@ class PieceLattice:
                 curve_w,
                 self._content[part],
                 self._power[part],
+                *room_for(edge_start[ends], hull_start[ends]),
             )
 
         _in_threads(measure, 0, len(pieces))
@@ -131,33 +131,46 @@ class PieceLattice:
             np.ascontiguousarray(rays, float) for rays in (self.pieces.position, self.pieces.direction)
         )
 
-        def lay(start: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        def lay(start: int) -> np.ndarray:
             part = slice(start, start + _CHUNK)
-            return self._kernel.rays(
-                mine[part],
-                points[part],
-                boost[part],
-                path,
-                *self._bands,
-                position,
-                direction,
-                self._weight,
-                *self._edges,
-                self._content,
-                *self._curves[light],
-                shift[0] / _WORD,
-                shift[1] / _WORD,
-                key,
-                first,
-                stride,
-            )
+            bodies, found, done = np.empty((_ROOM, BODY)), np.empty((_ROOM, COLUMNS)), np.zeros(3, np.int64)
+            room = room_for(self._edges[0], self._edges[2])
+            while True:
+                piece_kernel.rays(
+                    mine[part],
+                    points[part],
+                    boost[part],
+                    path,
+                    *self._bands,
+                    position,
+                    direction,
+                    self._weight,
+                    *self._edges,
+                    self._content,
+                    *self._curves[light],
+                    shift[0] / _WORD,
+                    shift[1] / _WORD,
+                    key,
+                    first,
+                    stride,
+                    *room,
+                    bodies,
+                    found,
+                    done,
+                )
+                if done[0] == len(mine[part]):
+                    return found[: done[1]]
+                if done[2]:
+                    bodies, done[2] = np.empty((2 * len(bodies), BODY)), 0
+                else:
+                    found = np.concatenate([found, np.empty_like(found)])
 
         start = 0
         while start == 0 or start < len(mine):
             before = running[start - 1] if start else 0.0
             end = int(np.searchsorted(running, before + stride * float(most)))
             end = max(end - end % _CHUNK, start + _CHUNK) if end < len(mine) else len(mine)
-            yield _joined(_in_threads(lay, start, end), self._kernel.COLUMNS)
+            yield _joined(_in_threads(lay, start, end))
             start = max(end, 1)
 
     def _drawn(self, light: int, count: int, key: int) -> tuple[np.ndarray, np.ndarray]:
@@ -189,14 +202,13 @@ def _units(keys: np.ndarray, key: int) -> np.ndarray:
     return ((state ^ (state >> np.uint64(31))) >> np.uint64(11)) * 2.0**-53
 
 
-def _joined(parts: list[tuple[np.ndarray, np.ndarray, np.ndarray]], columns: int) -> PieceRays:
+def _joined(parts: list[np.ndarray]) -> PieceRays:
     """Rays as the kernel writes them."""
-    parts = parts or [(np.zeros((0, columns)), np.zeros(0, int), np.zeros(0, int))]
-    found, owner, number = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+    found = np.concatenate([np.zeros((0, COLUMNS)), *parts])
     derivatives = found[:, 6:24].reshape(len(found), 6, 3)
     return PieceRays(
-        owner,
-        number,
+        found[:, 31].astype(np.int64),
+        found[:, 32].astype(np.int64),
         found[:, 0:3],
         found[:, 3:6],
         derivatives[:, [0, 1, 4]],

@@ -8,15 +8,38 @@ from __future__ import annotations
 import numpy as np
 
 from .clipping import clip
-from .compiling import allocating
+from .compiling import jit, part
 
 STEPS = 16
 """Places of the band at which a whole piece is measured."""
+MOMENTS_OF_BAND, TANGENTS = 5, 16
+"""Times at which what is lit is measured for its lattice, and sides of what is laid about it."""
+SCRATCH = np.dtype(
+    [
+        ("moments", "f8", 6),
+        ("total", "f8", 6),
+        ("sums", "f8", 12),
+        ("low", "f8", 6),
+        ("high", "f8", 6),
+        ("frame", "f8", 11),
+        ("cell", "f8", 6),
+        ("counts", "i8", MOMENTS_OF_BAND),
+        ("hull", "f8", (2 * TANGENTS + 8, 2)),
+        ("hull_cut", "f8", (4 * TANGENTS + 16, 2)),
+    ]
+)
+"""What functions need besides `polygons` and `cut`: those of `room_for`."""
 _LINE_X = 1e-9
 """An emission line is looked for so far on both sides of its x."""
 
 
-@allocating
+def room_for(edge_start: np.ndarray, hull_start: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """`polygons`, `cut` and `scratch` for pieces with these starts of edges and corners."""
+    room = int(np.diff(edge_start).max(initial=0) + np.diff(hull_start).max(initial=0)) + 8
+    return np.empty((MOMENTS_OF_BAND, room, 2)), np.empty((2 * room, 2)), np.empty(1, SCRATCH)
+
+
+@part
 def _power_below(curve_x, curve_w, x):
     """Cumulative power at x, a line there included (`CumulativeSpectrum.at`)."""
     x = min(max(x, 0.0), 1.0)
@@ -26,26 +49,26 @@ def _power_below(curve_x, curve_w, x):
     return curve_w[i] + share * (curve_w[i + 1] - curve_w[i])
 
 
-@allocating
+@part
 def power_between(curve_x, curve_w, x_lo, x_hi):
     """Power between two places of the spectrum; of the line, where they are one."""
     widen = _LINE_X if x_hi == x_lo else 0.0
     return _power_below(curve_x, curve_w, x_hi + widen) - _power_below(curve_x, curve_w, x_lo - widen)
 
 
-@allocating
+@part
 def parabola(t):
     """Weights of the values at 0, 1/2, 1."""
     return 2.0 * (t - 0.5) * (t - 1.0), 4.0 * t * (1.0 - t), 2.0 * t * (t - 0.5)
 
 
-@allocating
+@part
 def weight_at(weight, t):
     a, b, c = parabola(t)
     return max(a * weight[0] + b * weight[1] + c * weight[2], 0.0)
 
 
-@allocating
+@part
 def moments_of(polygon, count, out):
     """Area, first moments, second moments uu, uv, vv about the origin."""
     out[:] = 0.0
@@ -61,7 +84,15 @@ def moments_of(polygon, count, out):
         out[5] += cross * (y * y + y * w + w * w) / 12.0
 
 
-@allocating
+@part
+def copy(hull, polygon):
+    """Lay out a polygon; its number of corners."""
+    for c in range(len(hull)):
+        polygon[c, 0], polygon[c, 1] = hull[c, 0], hull[c, 1]
+    return len(hull)
+
+
+@part
 def keep_lit(edges, t, u, v, polygon, count, scratch):
     """Clip a polygon about (u, v) by all edges at t."""
     for e in range(len(edges)):
@@ -74,18 +105,31 @@ def keep_lit(edges, t, u, v, polygon, count, scratch):
     return count
 
 
-@allocating
+@jit
 def contents(
-    x_lo, x_hi, weight, edge_start, edges, hull_start, hulls, light, curve_start, curve_x, curve_w, out, powers
+    x_lo,
+    x_hi,
+    weight,
+    edge_start,
+    edges,
+    hull_start,
+    hulls,
+    light,
+    curve_start,
+    curve_x,
+    curve_w,
+    out,
+    powers,
+    polygons,
+    cut,
+    scratch,
 ):
     """What each piece holds, `out` (M,): weight · power · area, W per unit of the measure's scale; `powers` (M,) of the
     bands, W."""
-    moments = np.empty(6)
+    moments, polygon = scratch[0].moments, polygons[0]
     for i in range(len(out)):
         own = edges[edge_start[i] : edge_start[i + 1]]
         hull = hulls[hull_start[i] : hull_start[i + 1]]
-        room = len(own) + len(hull) + 4
-        polygon, scratch = np.empty((room, 2)), np.empty((2 * room, 2))
         first, end = curve_start[light[i]], curve_start[light[i] + 1]
         steps = STEPS if x_hi[i] > x_lo[i] else 1
         total = 0.0
@@ -94,8 +138,7 @@ def contents(
             lo = x_lo[i] + (x_hi[i] - x_lo[i]) * k / steps
             hi = x_lo[i] + (x_hi[i] - x_lo[i]) * (k + 1) / steps
             power = power_between(curve_x[first:end], curve_w[first:end], lo, hi)
-            polygon[: len(hull)] = hull
-            moments_of(polygon, keep_lit(own, t, 0.0, 0.0, polygon, len(hull), scratch), moments)
+            moments_of(polygon, keep_lit(own, t, 0.0, 0.0, polygon, copy(hull, polygon), cut), moments)
             total += moments[0] * power * weight_at(weight[i], t)
             powers[i] += power
         out[i] = total

@@ -54,7 +54,8 @@ def _path_of(lines: Sequence[Line]) -> Path | None:
         digest = hashlib.blake2b(_version(), digest_size=16)
     except OSError:
         return None
-    digest.update("\n".join(f"{line.file}:{line.number}:{line.text}" for line in lines).encode())
+    texts, names, numbers = zip(*lines, strict=True)
+    digest.update("\n".join((*texts, *dict.fromkeys(names), str(numbers))).encode())
     return folder / (digest.hexdigest() + _SUFFIX)
 
 

@@ -47,6 +47,74 @@ def test_a_version_is_that_of_all_files() -> None:
     assert len(versions) == 3 and all(len(version) == 12 for version in versions)
 
 
+KERNEL = """
+import sys
+import numpy as np
+from spectrasplat.beams.compiling import jit, part
+
+@part
+def root(x):
+    return np.sqrt(x)
+
+@jit
+def roots(values, first, factor, out):
+    total = 0.0
+    for i in range(first, len(values)):
+        out[i] = factor * np.arctan2(root(values[i]), 1.0)
+        total += out[i]
+    return total
+
+values, out = np.arange(12.0)[::3], np.zeros(4)
+total = roots(values, 1, 2.0, out)
+assert np.array_equal(out, 2.0 * np.arctan2(np.sqrt([0, 3, 6, 9]), 1.0)) and total == out.sum(), (out, total)
+print("numba" in sys.modules)
+"""
+
+
+def test_a_kernel_is_compiled_once_and_then_needs_no_compiler(tmp_path: Path) -> None:
+    """Another version's and what is damaged is compiled again."""
+    program = tmp_path / "program.py"
+    program.write_text(KERNEL)
+
+    def compiles() -> bool:
+        run = subprocess.run([sys.executable, str(program)], check=True, capture_output=True, text=True)
+        return run.stdout == "True\n"
+
+    assert [compiles(), compiles()] == [True, False]
+    (kept,) = (tmp_path / "__pycache__").glob("*.machine")
+    whole = kept.read_bytes()
+    for damaged in (whole.replace(b'"version": "', b'"version": "0', 1), whole[:20]):
+        kept.write_bytes(damaged)
+        assert [compiles(), compiles()] == [True, False]
+
+
+UNUSED = (
+    "IPython",
+    "OpenEXR",
+    "colour",
+    "dask",
+    "glfw",
+    "imgui_bundle",
+    "matplotlib",
+    "numba",
+    "rich",
+    "scipy",
+    "yaml",
+)
+RENDERING = f"""
+import sys
+from spectrasplat.__main__ import main
+assert main(["render", "prism_case", "-o", sys.argv[1], "--size", "32x18", "--photons", "1000", "--spp", "1"]) == 0
+print([name for name in {UNUSED} if name in sys.modules])
+"""
+
+
+def test_a_rendering_with_beams_imports_no_compiler_and_nothing_of_windows_and_plots(tmp_path: Path) -> None:
+    subprocess.run([sys.executable, "-P", "-m", "spectrasplat.beams.compile"], check=True)
+    run = [sys.executable, "-c", RENDERING, str(tmp_path / "prism.png")]
+    assert subprocess.run(run, capture_output=True, text=True, check=True).stdout.splitlines()[-1] == "[]"
+
+
 @pytest.fixture
 def copy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A copy of the rooms that references are made in; keys are of that."""

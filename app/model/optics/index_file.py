@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import cast
 
 import numpy as np
-import yaml
 
 from ...base import files
 from ...base.errors import UserError, suggestion
@@ -182,6 +181,8 @@ def _as_published(number: int, c: list[float], where: str) -> tuple[Kind, list[f
 
 def _from_yaml(path: Path) -> tuple[Dispersion, np.ndarray | None]:
     """n of the first entry of a database page that has it, λ in µm, and k on the visible grid where one says it."""
+    import yaml
+
     try:
         page = yaml.load(_text(path), yaml.BaseLoader)  # texts, lists and tables only: nothing is constructed
     except (yaml.YAMLError, RecursionError) as error:
