@@ -16,7 +16,7 @@ from functools import cache, cached_property
 from importlib.util import find_spec
 from pathlib import Path
 from threading import Lock
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -37,8 +37,8 @@ _SUCCESS = 0, -2
 """What functions of numba return; -2: their result is None."""
 _lock = Lock()
 
-Kinds = tuple[tuple[np.dtype, int, str] | str, ...]
-"""What numba compiles for: of each argument an array's dtype, dimensions and layout, or "int64" or "float64"."""
+Kind = tuple[np.dtype, int, Literal["C", "A"]] | Literal["int64", "float64"]
+"""What numba compiles for: of an array dtype, dimensions and layout, or the type of a number."""
 
 
 class Part:
@@ -66,7 +66,7 @@ class Kernel:
 
     def __init__(self, function: Callable) -> None:
         self._function = function
-        self._native: dict[Kinds, _Native] = {}
+        self._native: dict[tuple[Kind, ...], _Native] = {}
 
     def __call__(self, *arguments: Any) -> Any:
         """Compile it for arguments of these kinds where that was never done, then call it."""
@@ -78,7 +78,7 @@ class Kernel:
             self._native[kinds] = native
         return native(arguments)
 
-    def _machine_code(self, kinds: Kinds) -> _MachineCode:
+    def _machine_code(self, kinds: tuple[Kind, ...]) -> _MachineCode:
         """From the disk where it was compiled before; a folder that cannot be written only costs time."""
         source = Path(self._function.__code__.co_filename)
         folder = source.parent / "__pycache__"
@@ -132,7 +132,7 @@ class _Native:
     """Machine code in memory, called as numba calls it: pointers to the result and to what was raised, then each array
     as owner, parent, elements, bytes of one, data, shape, strides."""
 
-    def __init__(self, machine: _MachineCode, kinds: Kinds) -> None:
+    def __init__(self, machine: _MachineCode, kinds: tuple[Kind, ...]) -> None:
         from llvmlite import binding
 
         empty = binding.parse_assembly(f'target triple = "{machine.triple}"')
@@ -167,13 +167,13 @@ class _Native:
         return result.value
 
 
-def _kind_of(argument: Any) -> tuple[np.dtype, int, str] | str:
+def _kind_of(argument: Any) -> Kind:
     if isinstance(argument, np.ndarray):
         return argument.dtype, argument.ndim, "C" if argument.flags.c_contiguous else "A"
     return "float64" if isinstance(argument, float) else "int64"
 
 
-def _compiled(function: Callable, kinds: Kinds) -> _MachineCode:
+def _compiled(function: Callable, kinds: tuple[Kind, ...]) -> _MachineCode:
     from llvmlite import binding
     from numba import from_dtype, njit, types
 
@@ -220,6 +220,6 @@ def jit(function: Callable) -> Kernel:
     return Kernel(function)
 
 
-def part(function: Callable) -> Part:
+def part(function: Callable) -> Any:
     """`function` for compiled functions to call."""
     return Part(function)
