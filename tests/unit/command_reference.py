@@ -15,7 +15,7 @@ MARK = "<!-- From here on written by tests/unit/command_reference.py -->\n"
 def commands() -> dict[str, Any]:
     """Every command of the program, as click has it, by name; those of a group by both words."""
     found: dict[str, Any] = {}
-    for name, command in typer.main.get_command(program.app).commands.items():
+    for name, command in typer.main.get_command(program.program()).commands.items():
         inner = getattr(command, "commands", None)
         found |= {name: command} if inner is None else {f"{name} {word}": each for word, each in inner.items()}
     return found

@@ -62,7 +62,7 @@ def complaint(command: str) -> str:
         return ""
     known: dict[str, Any] = commands()
     if words[0].startswith("-"):
-        options = {o for p in typer.main.get_command(program.app).params for o in p.opts}
+        options = {o for p in typer.main.get_command(program.program()).params for o in p.opts}
         return "" if words[0] in options else f"no option {words[0]}"
     name = next((name for name in (" ".join(words[:2]), words[0]) if name in known), None)
     if name is None:
