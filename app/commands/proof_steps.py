@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from ..gpu.shader import Built
-    from ..stress.runner import CaseResult
+    from ..stress.results import CaseResult
 
 _MOST_COMPILERS = 8
 """Processes that compile at a time; each holds some 400 MiB."""
@@ -181,7 +181,8 @@ def _stress(short: bool, folder: Path) -> Iterator[Finding]:
 def _cases(names: tuple[str, ...]) -> Iterator[Finding]:
     from ..bench.machine import machine
     from ..gpu.context import create_context
-    from ..stress.runner import StressResult, all_cases, choose, run
+    from ..stress.results import StressResult
+    from ..stress.runner import all_cases, choose, run
 
     cases = choose(all_cases(), ",".join(names))
     with create_context() as context:

@@ -18,7 +18,7 @@ from .scenes import load_scenes
 
 if TYPE_CHECKING:
     from ..stress.case import Case
-    from ..stress.runner import StressResult
+    from ..stress.results import StressResult
 
 BROKEN = 1
 """Exit code where a promise is broken."""
@@ -44,8 +44,8 @@ def _measure(asked: Stress, cases: Sequence[Case]) -> int:
     from ..base.progress import ProgressReporter
     from ..bench.machine import machine
     from ..gpu.context import create_context
-    from ..stress.runner import StressResult, run
-    from ..stress.table import summary, table
+    from ..stress.results import StressResult, table
+    from ..stress.runner import run
 
     with create_context() as context:
         date = datetime.now(UTC).isoformat(timespec="seconds")
@@ -61,7 +61,7 @@ def _measure(asked: Stress, cases: Sequence[Case]) -> int:
 
         write_html(result, asked.output / HTML)
         show(f"{(asked.output / HTML).resolve()}")
-    show(summary(result))
+    show(result.summary())
     if result.broken():
         return BROKEN
     return 0 if finished else INTERRUPTED
@@ -74,14 +74,14 @@ def _cases(names: Sequence[str]) -> tuple[Case, ...]:
 
         return all_cases()
     scenes = load_scenes(names)
-    from ..stress.cases.scene_cases import sweeps
+    from ..stress.cases.scenes import sweeps
 
     return sweeps(list(scenes.items()))
 
 
 def _keep(result: StressResult, folder: Path | None) -> None:
     if folder is not None:
-        from ..stress.record import write_json
+        from ..stress.results import write_json
 
         write_json(result, folder / JSON)
 

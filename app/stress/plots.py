@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from ..bench.report.style import PALETTE, new_figure
 from ..bench.report.text import superscript
-from .runner import CaseResult
+from .results import CaseResult
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,8 +10,7 @@ from ..bench.report.page import inlined, render
 from ..bench.report.style import plot_style, svg_text
 from .case import FLUX_CLOSURE, Measurement
 from .plots import case_plot
-from .runner import CaseResult, StressResult
-from .table import summary
+from .results import CaseResult, StressResult
 
 
 def write_html(result: StressResult, path: Path) -> None:
@@ -28,7 +27,7 @@ def html_text(result: StressResult) -> str:
         "stress.html",
         result=result,
         broken=result.broken(),
-        summary=summary(result),
+        summary=result.summary(),
         closure=f"{FLUX_CLOSURE:.0e}",
         run={"version": result.version, "date": result.date, **result.machine},
         cases=cases,

@@ -6,79 +6,45 @@ ends the run; what was measured by then is the result.
 
 from __future__ import annotations
 
+import importlib
 import time
 import traceback
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from types import ModuleType
 
 from ..base.errors import UserError, suggestion
 from ..gpu import shader
 from ..gpu.context import Context
-from .case import Case, Measurement
+from .case import Case, Measured
+from .results import CaseResult, StressResult
 
 Progress = Callable[[float, str], None]
-Keep = Callable[["StressResult"], None]
+Keep = Callable[[StressResult], None]
 
 
-@dataclass
-class CaseResult:
-    """What one case measured."""
-
-    case: Case
-    measurements: list[Measurement] = field(default_factory=list)
-    seconds: float = 0.0
-    failure: str = ""
-    """Why the case could not go on, in a line; empty where it did."""
-    trace: str = ""
-    """The failure's traceback, for the JSON file only."""
-
-    @property
-    def complete(self) -> bool:
-        """Whether every severity was measured."""
-        return not self.failure and len(self.measurements) == self.case.steps
-
-    def broken(self) -> list[str]:
-        """The promises that do not hold, each with its severity."""
-        found = [f"{m.label}: {sentence}" for m in self.measurements for sentence in m.broken()]
-        return found + ([f"stopped by an error: {self.failure}"] if self.failure else [])
-
-
-@dataclass
-class StressResult:
-    """One run of `spectrasplat stress`."""
-
-    version: str
-    date: str
-    command: str
-    machine: dict[str, str]
-    asked: int
-    """Cases that were to run."""
-    cases: list[CaseResult] = field(default_factory=list)
-    seconds: float = 0.0
-
-    @property
-    def partial(self) -> bool:
-        """Stopped before everything was measured (a failed case was measured as far as it went)."""
-        return len(self.cases) < self.asked or any(not c.complete and not c.failure for c in self.cases)
-
-    def broken(self) -> list[str]:
-        """The promises that do not hold, each with its case and severity."""
-        return [f"{c.case.name}, {sentence}" for c in self.cases for sentence in c.broken()]
-
-    @property
-    def measured(self) -> int:
-        """Severities measured."""
-        return sum(len(c.measurements) for c in self.cases)
+FILES = (
+    *("optics", "materials", "caustics", "chains", "meshes", "splats"),
+    *("camera_surfaces", "camera_solids", "camera_lights"),
+    *("contacts", "lights", "losses", "crowds", "scenes"),
+)
+"""Files of `cases`, in the order of the report: light, then the camera, then whole scenes."""
 
 
 def all_cases() -> tuple[Case, ...]:
-    """The synthetic cases of the light, those of the camera, then those of whole scenes, then the sweep over shipped
-    scenes."""
-    from .cases import camera_cases, optics_cases, path_cases, scene_cases, splat_cases
+    """Every case, in each file as they are written there, then the sweep over shipped scenes."""
+    from .cases.scenes import default_sweeps
 
-    modules = (optics_cases, path_cases, splat_cases, camera_cases, scene_cases)
-    return tuple(case for module in modules for case in module.CASES) + scene_cases.default_sweeps()
+    files = [importlib.import_module(f".cases.{name}", __package__) for name in FILES]
+    return tuple(case for file in files for case in cases_of(file)) + default_sweeps()
+
+
+def cases_of(module: ModuleType) -> tuple[Case, ...]:
+    """The cases of one file, single or in a tuple."""
+    found: list[Case] = []
+    for value in vars(module).values():
+        found += [c for c in (value if isinstance(value, tuple) else (value,)) if isinstance(c, Case)]
+    return tuple(found)
 
 
 def choose(cases: Sequence[Case], names: str | None) -> tuple[Case, ...]:
@@ -94,6 +60,10 @@ def choose(cases: Sequence[Case], names: str | None) -> tuple[Case, ...]:
     if not wanted:
         raise UserError("--cases names no case; 'spectrasplat stress --list' shows them")
     return tuple(case for case in cases if any(_matches(name, case.name) for name in wanted))
+
+
+def _matches(name: str, case: str) -> bool:
+    return case == name or (name.endswith("/") and case.startswith(name))
 
 
 def run(result: StressResult, cases: Iterable[Case], context: Context, progress: Progress, keep: Keep) -> bool:
@@ -132,27 +102,19 @@ def _run(result: StressResult, cases: Iterable[Case], context: Context, progress
     return True
 
 
-def _measured(case: Case, context: Context, found: CaseResult) -> Iterator[Measurement]:
+def _measured(case: Case, context: Context, found: CaseResult) -> Measured:
     """The case's measurements; an error ends them and goes to `found`."""
     started = time.perf_counter()
     try:
         yield from case.measure(context)
         context.check(f"stress case {case.name}")
-    except Exception as error:  # noqa: BLE001 - whatever a case dies of is its result
+    except Exception as error:  # noqa: BLE001 - whatever a case fails with is its result
         found.failure = " ".join(f"{type(error).__name__}: {error}".split())
         found.trace = traceback.format_exc()
-        _forget_gl_errors(context)
+        with suppress(RuntimeError):
+            # What a failed case left unread must not be blamed on the next.
+            context.check("a failed stress case")
     finally:
         found.seconds = time.perf_counter() - started
     if not found.failure and len(found.measurements) != case.steps:
         found.failure = f"measured {len(found.measurements)} of {case.steps} severities"
-
-
-def _forget_gl_errors(context: Context) -> None:
-    """What a failed case left unread must not be blamed on the next."""
-    with suppress(RuntimeError):
-        context.check("a failed stress case")
-
-
-def _matches(name: str, case: str) -> bool:
-    return case == name or (name.endswith("/") and case.startswith(name))

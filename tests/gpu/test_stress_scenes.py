@@ -13,7 +13,8 @@ from spectrasplat.gpu import records
 from spectrasplat.model.geometry.primitives import box
 from spectrasplat.model.lights import PointLight
 from spectrasplat.render import light_plan, still
-from spectrasplat.stress.cases import contact_cases, crowd_cases, line_cases, loss_cases, sweep_cases
+from spectrasplat.stress.case import Case, not_finite
+from spectrasplat.stress.cases import contacts, crowds, losses, sweeps
 from spectrasplat.stress.rigs import probe
 from spectrasplat.stress.rigs.probe import WatchedRecords, with_photons
 from spectrasplat.stress.rigs.scene_parts import (
@@ -34,18 +35,22 @@ def block():
     return stage(solid("block", box(), FLINT, (0.3, 0.0, 0.8), turned=turn((1.0, 0.3, 0.2), 25.0)))
 
 
+def swept(name: str) -> Case:
+    """One case of the sweep over the block."""
+    return next(case for case in sweeps.scene_sweep(block()) if case.name == name)
+
+
 def test_a_pile_of_plates_transmits_what_reflections_add_up_to() -> None:
     """Closed forms for one plate of n and for a film of air, and light that goes in comes out: reversed, the pile is as
     clear."""
     r = (0.5 / 2.5) ** 2
-    assert contact_cases.plates([1.5]) == pytest.approx((1 - r) / (1 + r), abs=1e-14)
-    assert contact_cases.plates([1.5, 1.0, 1.5]) == pytest.approx((1 - r) / (1 + 3 * r), abs=1e-14)
-    assert contact_cases.plates([1.5, 1.9, 1.2]) == pytest.approx(contact_cases.plates([1.2, 1.9, 1.5]), abs=1e-14)
+    assert contacts.plates(1.5) == pytest.approx((1 - r) / (1 + r), abs=1e-14)
+    assert contacts.plates(1.5, 1.0, 1.5) == pytest.approx((1 - r) / (1 + 3 * r), abs=1e-14)
+    assert contacts.plates(1.5, 1.9, 1.2) == pytest.approx(contacts.plates(1.2, 1.9, 1.5), abs=1e-14)
 
 
-def test_gap_and_contact_hold(gl, monkeypatch) -> None:
-    monkeypatch.setattr(contact_cases, "GAPS", (1e-3, 0.0))
-    found = list(contact_cases.measure_gaps(gl))
+def test_gap_and_contact_hold(gl) -> None:
+    found = list(contacts.gap.only(1e-3, 0.0).measure(gl))
     assert [m.note for m in found] == ["a film of air", "optical contact"]
     assert [m.broken() for m in found] == [[], []]
 
@@ -53,41 +58,36 @@ def test_gap_and_contact_hold(gl, monkeypatch) -> None:
 @pytest.mark.slow
 def test_lines_narrower_than_even_bands_are_absorbed(gl, monkeypatch) -> None:
     """Bands are cut about the lines; sixteen even ones, as there once were, miss one part in fifty or more."""
-    monkeypatch.setattr(line_cases, "WIDTHS_NM", (5.0,))
-    (found,) = line_cases.measure_lines(gl)
+    case = crowds.absorption_lines.only(5.0)
+    (found,) = case.measure(gl)
     assert found.broken() == []
     monkeypatch.setattr(light_plan, "cut_by_tints", lambda ends, *_: np.linspace(*ends, 17))
-    (found,) = line_cases.measure_lines(gl)
+    (found,) = case.measure(gl)
     assert any("error of power" in sentence for sentence in found.broken()), found.errors
 
 
 def test_more_lights_and_objects_than_a_photon_can_tell_are_refused(gl, monkeypatch) -> None:
-    monkeypatch.setattr(crowd_cases, "LIGHTS", (300,))
-    monkeypatch.setattr(crowd_cases, "OBJECTS", (70_000,))
-    monkeypatch.setattr(crowd_cases, "probe", lambda *_: None)
-    for case in (crowd_cases.measure_lights, crowd_cases.measure_objects):
-        (found,) = case(gl)
+    monkeypatch.setattr(crowds, "probe", lambda *_: None)
+    for case in (crowds.many_lights.only(300), crowds.many_objects.only(70_000)):
+        (found,) = case.measure(gl)
         assert found.broken() == [] and "at most" in found.note
 
 
-def test_a_pile_of_sixteen_keeps_its_light(gl, monkeypatch) -> None:
+def test_a_pile_of_sixteen_keeps_its_light(gl) -> None:
     """Pilots once gave up after twelve events and saw nothing; roulette once drew the same numbers every eight events
     (1.6e-2)."""
-    monkeypatch.setattr(contact_cases, "STACKS", (16,))
-    (found,) = contact_cases.measure_stacks(gl)
+    (found,) = contacts.stack.only(16).measure(gl)
     assert found.broken() == []
 
 
-def test_scale_holds(gl, monkeypatch) -> None:
-    monkeypatch.setattr(sweep_cases, "SCALES", (1e-4,))
-    (found,) = sweep_cases._scales(gl, sweep_cases.Base(block()))
+def test_scale_holds(gl) -> None:
+    (found,) = swept("scale").only(1e-4).measure(gl)
     assert found.broken() == []
     assert found.errors["picture"] < 1e-3
 
 
-def test_passes_add_up(gl, monkeypatch) -> None:
-    monkeypatch.setattr(sweep_cases, "PASSES", (3,))
-    (found,) = sweep_cases._passes(gl, block())
+def test_passes_add_up(gl) -> None:
+    (found,) = swept("passes").only(3).measure(gl)
     assert found.broken() == []
 
 
@@ -97,8 +97,7 @@ def test_a_picture_that_knows_its_scale_is_found(gl, monkeypatch) -> None:
     base = probe.probe(gl, scene, FEW)
     brighter_one = replace(scene, lights=(replace(BEAM, spectral_power=brighter(BEAM.spectral_power, 1.02)),))
     found = probe.probe(gl, moved(brighter_one, scale=1e-4), FEW)
-    held = sweep_cases._compared(found, base, sweep_cases.SAME_PICTURE, sweep_cases.SAME_ENERGY)
-    broken = probe.measurement(1.0, "", found, held).broken()
+    broken = probe.rendered(1.0, "", found, sweeps.unchanged(found, base)).broken()
     assert len(broken) == 2 and "picture" in broken[0] and "energy" in broken[1]
 
 
@@ -114,7 +113,7 @@ def test_every_nan_is_found_and_every_dropped_footprint_must_be_counted(gl, monk
         watch(self, photons)
 
     monkeypatch.setattr(WatchedRecords, "_watch", spoil)
-    found = probe.measurement(1.0, "", probe.probe(gl, block(), FEW))
+    found = probe.rendered(1.0, "", probe.probe(gl, block(), FEW))
     assert found.nonfinite == 3 and found.dropped == 2
     assert len([s for s in found.broken() if "finite" in s or "uncounted" in s]) == 2
 
@@ -123,7 +122,7 @@ def test_nan_in_maps_and_pictures_are_counted() -> None:
     values = np.ones((4, 5, 3))
     values[1, 2] = np.nan
     values[0, 0, 0] = -np.inf
-    assert probe.nonfinite(values) == 4
+    assert not_finite([values]) == 4
     assert probe.picture_error(np.zeros((2, 2)), np.zeros((2, 2))) == 0.0
     assert probe.picture_error(np.ones((2, 2)), np.zeros((2, 2))) == np.inf
     assert np.allclose(
@@ -156,10 +155,11 @@ def test_the_whole_run_keeps_every_promise(tmp_path: Path, capsys) -> None:
     assert sum(len(case["measurements"]) for case in held["cases"]) > 200
 
 
-@pytest.mark.parametrize("case", [case for case in loss_cases.CASES if case.steps < 6], ids=lambda case: case.name)
-def test_little_is_lost_and_nothing_in_silence(gl, case, monkeypatch) -> None:
-    monkeypatch.setattr(loss_cases, "GAPS", (1e-5, 0.0))
-    monkeypatch.setattr(loss_cases, "HEIGHTS", (1e-2, 0.0))
+LOSSES = (*(case.only(1e-5, 0.0) for case in losses.CONTACTS), losses.lamp_on_floor.only(1e-2, 0.0), losses.dark_lights)
+
+
+@pytest.mark.parametrize("case", LOSSES, ids=lambda case: case.name)
+def test_little_is_lost_and_nothing_in_silence(gl, case) -> None:
     assert [m.broken() for m in case.measure(gl) if m.broken()] == []
 
 
@@ -168,7 +168,7 @@ def test_a_loss_without_a_word_is_found(gl) -> None:
     settings = replace(FEW, max_depth=2)
     said = still.render(block(), settings, context=gl)
     silent = replace(said, stats=replace(said.stats, notices=()))
-    assert "unsaid" not in " ".join(loss_cases.measured(said, 1.0, "").broken())
-    assert any("unsaid" in s for s in loss_cases.measured(silent, 1.0, "").broken())
-    found = loss_cases.measured(still.render(block(), FEW, context=gl), 1.0, "", lacking=0.9)
+    assert "unsaid" not in " ".join(losses.honest(said, 1.0, "").broken())
+    assert any("unsaid" in s for s in losses.honest(silent, 1.0, "").broken())
+    found = losses.honest(still.render(block(), FEW, context=gl), 1.0, "", lacking=0.9)
     assert found.note == "a picture that lacks light"

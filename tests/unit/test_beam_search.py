@@ -17,7 +17,7 @@ from spectrasplat.beams.search import SUM_ENTERED, SUM_ROULETTE
 from spectrasplat.beams.sources import RIM, _places, emissions
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.optics.spectral_tables import SpectralAxis
-from spectrasplat.stress.cases.beam_cases import kept as books_of
+from spectrasplat.stress.cases.chains import kept as books_of
 from spectrasplat.stress.rigs.gpu_paths import beam_light, extruded, glass, placed
 
 BK7 = glass("N-BK7")

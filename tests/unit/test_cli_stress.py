@@ -13,21 +13,13 @@ from spectrasplat.stress.case import Case, Measurement
 
 
 def made_up(*measurements: Measurement, fails: BaseException | None = None) -> tuple[Case, ...]:
-    def measure(_: object) -> Iterator[Measurement]:
+    def measured(_: object, sweep: range) -> Iterator[Measurement]:
         yield from measurements
         if fails is not None:
             raise fails
 
-    return (
-        Case(
-            "made-up",
-            "a made-up case",
-            "to see what comes of it",
-            "severity",
-            measure,
-            len(measurements) + (fails is not None),
-        ),
-    )
+    sweep = range(len(measurements) + (fails is not None))
+    return (Case("made-up", "a made-up case", "to see what comes of it", "severity", measured, sweep),)
 
 
 GOOD = Measurement(1.0, "one", 0, {"energy": 1e-4}, {"energy": 1e-3})

@@ -15,7 +15,7 @@ from spectrasplat.model.optics.spectral_tables import SpectralAxis
 from spectrasplat.model.optics.spectrum import Spectrum, blackbody, illuminant
 from spectrasplat.model.scene import Mirror, Scene, SceneObject
 from spectrasplat.model.tint_bands import TOLERANCE, bin_of_nm, cut_by_tints, tint_curves
-from spectrasplat.stress.cases.line_cases import LINES_NM, behind_the_slab
+from spectrasplat.stress.cases.crowds import LINES_NM, behind_the_slab
 from spectrasplat.stress.rigs.scene_parts import solid, stage
 
 WHITE = illuminant("D65")

@@ -1,21 +1,20 @@
-"""What the stress sweep's camera cases share: one picture by the camera pass with its fall-backs, closed forms to hold
-it against, and skies.
+"""What the camera cases share: one picture by the camera pass with its fall-backs, closed forms to hold it against, and
+skies.
 
 No light is traced: what a case is about lies between the camera and what shines by itself, or is lit directly. Pictures
-are small, and most of them of the same few programs, which are kept while a case runs.
+are small, and most of them come from the same few programs.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
-from functools import wraps
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...features.features import Features
-from ...gpu import shader
 from ...gpu.context import Context
 from ...gpu.map_channels import MapChannels
 from ...gpu.scene_buffers import SceneBuffers
@@ -24,18 +23,21 @@ from ...model.optics.colorimetry import K_M, cmf_xyz, daylight_per_lumen, rgb709
 from ...model.scene import Camera, Scene, SceneObject
 from ...model.settings import RenderSettings
 from ...model.texture import Environment
+from ...model.vectors import vec3
 from ...passes.camera import CameraPass
 from ...passes.spectrum_choice import Spectrum
 from ...render.device_scene import spectral_axis
-from ..case import Measurement
-from .probe import nonfinite
+from ..case import Held, Measurement, judged, not_finite
 
 PROBE = RenderSettings(width=48, height=32, spp=16)
-"""What a case looks at unless it is about just that."""
+"""The picture that a case takes unless it is about just that."""
+FEW = replace(PROBE, width=12, height=8, spp=64)
+"""Of flat glass, which appears the same in every pixel."""
 WHITE = (1.0, 1.0, 1.0)
-UNCHECKED = np.inf
 CHANCE = 4.0
 """Standard deviations of chance that an error may have: one in sixteen thousand is larger."""
+ANY = dict.fromkeys(("depth_reached", "columns_dropped", "band_uncut", "stack_full"), np.inf)
+"""Fall-backs that may be taken however often."""
 
 
 @dataclass(frozen=True)
@@ -63,18 +65,12 @@ class Sight:
         return self.fallbacks[fallback] / self.samples
 
 
-def sharing_programs(measure: Callable[[Context], Iterator[Measurement]]) -> Callable[[Context], Iterator[Measurement]]:
-    """A case's `measure` during which a program that was compiled before is not compiled again."""
-
-    @wraps(measure)
-    def sharing(context: Context) -> Iterator[Measurement]:
-        shader.keep_programs(context.ctx)
-        try:
-            yield from measure(context)
-        finally:
-            shader.forget_programs(context.ctx)
-
-    return sharing
+def together(first: Sight, *others: Sight) -> Sight:
+    """The first, with what is not finite in any of them and all their fall-backs."""
+    sights = (first, *others)
+    fallbacks = {name: sum(s.fallbacks[name] for s in sights) for name in first.fallbacks}
+    samples, bad = (sum(getattr(s, name) for s in sights) for name in ("samples", "nonfinite"))
+    return replace(first, nonfinite=bad, fallbacks=fallbacks, samples=samples)
 
 
 @contextmanager
@@ -112,49 +108,35 @@ def look_with(
     before = camera_pass.fallbacks
     samples = -(-samples // bands) * bands
     camera_pass.run(camera, settings.width, settings.height, samples, seed=settings.seed)
-    picture = camera_pass.read_rgb()
-    spectral = camera_pass.read_spectral() if settings.bins else None
-    bad = nonfinite(picture) + (0 if spectral is None else nonfinite(spectral))
+    picture = camera_pass.read_rgb().astype(float)
+    spectral = camera_pass.read_spectral().astype(float) if settings.bins else None
+    bad = not_finite([picture] if spectral is None else [picture, spectral])
     taken = {name: count - before[name] for name, count in camera_pass.fallbacks.items()}
-    in_bins = None if spectral is None else spectral.astype(float)
-    return Sight(picture.astype(float), bad, taken, samples * settings.width * settings.height, bands, in_bins)
+    return Sight(picture, bad, taken, samples * settings.width * settings.height, bands, spectral)
 
 
-@dataclass
-class Judged:
-    """Errors and bounds of one severity, side by side."""
-
-    errors: dict[str, float] = field(default_factory=dict)
-    bounds: dict[str, float] = field(default_factory=dict)
-
-    def hold(self, name: str, error: float, bound: float) -> Judged:
-        """Add one promise."""
-        self.errors[name], self.bounds[name] = float(error), float(bound)
-        return self
-
-    def tell(self, name: str, error: float) -> Judged:
-        """Add a number that is shown and not judged."""
-        self.errors[name] = float(error)
-        return self
-
-
-def measurement_of(
-    severity: float, label: str, sight: Sight, judged: Judged, shares: dict[str, float] | None = None, note: str = ""
+def seen(
+    severity: float, label: str, sight: Sight, held: Held, shares: Mapping[str, float] | None = None, note: str = ""
 ) -> Measurement:
     """A sight's measurement: finite, and no fall-back taken more often than `shares` says, as a share of the samples
     (those not named: never)."""
-    allowed = dict.fromkeys(sight.fallbacks, 0.0) | (shares or {})
-    for name, most in allowed.items():
-        if np.isfinite(most):
-            judged.hold(name.replace("_", " "), sight.share(name), most)
+    allowed = dict.fromkeys(sight.fallbacks, 0.0) | dict(shares or {})
+    taken = {name.replace("_", " "): (sight.share(name), most) for name, most in allowed.items() if np.isfinite(most)}
+    errors, bounds = judged({**held, **taken})
     bands = f"{sight.bands} band{'s' if sight.bands > 1 else ''}"
     noted = f"{note}; {bands}" if note else bands
-    return Measurement(
-        severity, label, sight.nonfinite, judged.errors, judged.bounds, fallbacks=dict(sight.fallbacks), note=noted
-    )
+    return Measurement(severity, label, sight.nonfinite, errors, bounds, fallbacks=dict(sight.fallbacks), note=noted)
 
 
 # ---- what is to be seen ----------------------------------------------------------------------
+
+
+def straight(foot: ArrayLike, direction: ArrayLike, extent: float, distance: float = 3.0) -> Camera:
+    """Parallel rays along `direction` (3,) in the plane z = 0 or near it, which meet `foot` after `distance`."""
+    position = np.asarray(foot, float) - distance * np.asarray(direction, float)
+    return Camera(
+        vec3(position), vec3(np.asarray(foot, float)), (0.0, 0.0, 1.0), "orthographic", vertical_extent=extent
+    )
 
 
 def sky(radiance: Callable[[np.ndarray], np.ndarray], height: int = 128) -> Environment:
@@ -165,14 +147,13 @@ def sky(radiance: Callable[[np.ndarray], np.ndarray], height: int = 128) -> Envi
     return Environment(np.ascontiguousarray(rgb, np.float32))
 
 
-def half_sky(toward: tuple[float, float, float]) -> Environment:
-    """White on the side of `toward`, black on the other."""
-    axis = np.asarray(toward, float)
-    return sky(lambda d: (d @ axis > 0.0).astype(float))
+def ahead(directions: np.ndarray) -> np.ndarray:
+    """Radiance (…) of directions (…, 3): white towards x, black on the other side."""
+    return (directions[..., 0] > 0.0).astype(float)
 
 
 def slope(directions: np.ndarray) -> np.ndarray:
-    """Radiance (…) of directions (…, 3) that changes in every one: a little wrong way shows."""
+    """Radiance (…) of directions (…, 3) that changes in every one: a small error of direction shows."""
     return 1.0 + 0.8 * (directions @ np.array([0.36, 0.48, 0.8]))
 
 
@@ -189,13 +170,6 @@ def white_furnace(*objects: SceneObject, camera: Camera, **more) -> Scene:
 def with_sky(*objects: SceneObject, camera: Camera, environment: Environment) -> Scene:
     """Objects under a sky, without any light."""
     return Scene("sky", camera, (), objects, environment=environment)
-
-
-def at(x: float, y: float, z: float) -> np.ndarray:
-    """Placement of an object's origin, (4, 4)."""
-    place = np.eye(4)
-    place[:3, 3] = x, y, z
-    return place
 
 
 # ---- what is to be expected ------------------------------------------------------------------
@@ -223,11 +197,11 @@ def difference(picture: np.ndarray, expected: np.ndarray) -> float:
         return float(np.sqrt(np.mean((picture - expected) ** 2)) / max(np.abs(np.mean(expected)), 1e-300))
 
 
-def furnace_errors(judged: Judged, picture: np.ndarray, mean: float, worst: float) -> Judged:
+def in_furnace(picture: np.ndarray, mean: float, worst: float) -> Held:
     """A furnace's two promises: over the picture, and of each pixel (its luminance)."""
     luminance = rgb709_to_xyz(picture)[..., 1]
-    judged.hold("energy", np.abs(picture.mean(axis=(0, 1)) - 1.0).max(), mean)
-    return judged.hold("energy of a pixel", np.abs(luminance - 1.0).max(), worst)
+    error = np.abs(picture.mean(axis=(0, 1)) - 1.0).max()
+    return {"energy": (error, mean), "energy of a pixel": (np.abs(luminance - 1.0).max(), worst)}
 
 
 def resized(settings: RenderSettings, width: int, height: int, spp: int | None = None) -> RenderSettings:

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...model.geometry.mesh import Mesh, make_mesh
 from .camera_probe import fresnel
@@ -31,9 +32,7 @@ class Way:
     """Surfaces met."""
 
 
-def ways(
-    outline: np.ndarray, n: float, position: tuple[float, float], direction: tuple[float, float], inside: bool = False
-) -> list[Way]:
+def ways(outline: np.ndarray, n: float, position: ArrayLike, direction: ArrayLike, inside: bool = False) -> list[Way]:
     """All ways of a ray from `position` (x, y) in `direction` that weigh something, out of the polygon `outline` (k, 2)
     of index `n`.
 
@@ -60,24 +59,16 @@ def ways(
         waiting.append((p, d - 2.0 * cosine * m, within, weight * reflectance, events + 1, number))
         if reflectance < 1.0:
             along = (d - cosine * m) / relative
-            waiting.append(
-                (
-                    p,
-                    along + np.sqrt(1.0 - along @ along) * m,
-                    not within,
-                    weight * (1.0 - reflectance),
-                    events + 1,
-                    number,
-                )
-            )
+            refracted = along + np.sqrt(1.0 - along @ along) * m
+            waiting.append((p, refracted, not within, weight * (1.0 - reflectance), events + 1, number))
     return found
 
 
 def radiance_seen(
     outline: np.ndarray,
     n: float,
-    position: tuple[float, float],
-    direction: tuple[float, float],
+    position: ArrayLike,
+    direction: ArrayLike,
     radiance: Callable[[np.ndarray], np.ndarray],
     inside: bool = False,
 ) -> float:

@@ -24,17 +24,7 @@ from ...model.lights import CollimatedLight
 from ...model.optics.glass import sellmeier
 from ...model.optics.spectral_tables import SpectralAxis
 from ...model.optics.spectrum import constant
-from ...model.scene import (
-    Camera,
-    Dielectric,
-    Diffuse,
-    Light,
-    Material,
-    Mirror,
-    RenderDefaults,
-    Scene,
-    SceneObject,
-)
+from ...model.scene import Camera, Dielectric, Diffuse, Light, Material, Mirror, RenderDefaults, Scene, SceneObject
 from ...model.settings import RenderSettings
 from ...model.vectors import vec3
 from ...passes.emission_domain import emission_domain, orthonormal_frame
@@ -44,8 +34,7 @@ from ...reference.glasses import sellmeier_terms
 from ...reference.optics import unit
 from ...reference.random_numbers import hash_combine
 from ...render.device_scene import spectral_axis
-from ..case import FLUX_CLOSURE, Measurement
-from ..judging import not_finite, not_finite_in
+from ..case import FLUX_CLOSURE, Held, Measurement, judged, not_finite, not_finite_in
 
 SHIFT = (123456789, 987654321)
 SEED = 1
@@ -118,18 +107,8 @@ class Photons:
         return self.where(self.band == band)
 
     def where(self, chosen: np.ndarray) -> Photons:
-        names = (
-            "records",
-            "q",
-            "start",
-            "direction",
-            "position",
-            "dposition_ds",
-            "dposition_dt",
-            "dposition_dvar",
-            "weight",
-            "nm",
-        )
+        names = ["records", "q", "start", "direction", "position", "weight", "nm"]
+        names += ["dposition_ds", "dposition_dt", "dposition_dvar"]
         return replace(self, **{name: getattr(self, name)[chosen] for name in names})
 
     @property
@@ -159,15 +138,12 @@ def extruded(name: str, section: np.ndarray, half: float = 0.5) -> Mesh:
     """A closed convex solid: a polygon (P, 2), counter-clockwise in x-y, drawn out along z by ±half."""
     count = len(section)
     low, high = (np.column_stack([section, np.full(count, z)]) for z in (-half, half))
-    caps = [[0, k + 1, k] for k in range(1, count - 1)] + [
-        [count, count + k, count + k + 1] for k in range(1, count - 1)
-    ]
-    sides = [
-        t
-        for k in range(count)
-        for t in ([k, (k + 1) % count, count + k], [(k + 1) % count, count + (k + 1) % count, count + k])
-    ]
-    return make_mesh(name, np.concatenate([low, high]), np.array(caps + sides))
+    inner = range(1, count - 1)
+    faces = [[0, k + 1, k] for k in inner] + [[count, count + k, count + k + 1] for k in inner]
+    for k in range(count):
+        following = (k + 1) % count
+        faces += [[k, following, count + k], [following, count + following, count + k]]
+    return make_mesh(name, np.concatenate([low, high]), np.array(faces))
 
 
 def placed(name: str, mesh: Mesh, material: Material) -> SceneObject:
@@ -195,7 +171,7 @@ def trace_light(
     """
     camera, render = Camera((0, 0, 9), (0, 0, 0), up=(0, 1, 0)), RenderDefaults(polarisation=polarisation)
     scene = Scene("question", camera, (light,), tuple(objects), render=render)
-    # What a photon's weights hold is looked at: all of a tint.
+    # What a photon's weights hold is examined: all of a tint.
     features = replace(Features.of(scene, RenderSettings(method=method)), tint_levels=0)
     buffers = SceneBuffers(gl.ctx, scene, features, spectral_axis(scene, features))
     room = max(2 * count * len(bands_nm), 1024)
@@ -305,14 +281,12 @@ def traced(
     severity: float,
     label: str,
     photons: Photons,
-    errors: dict[str, float],
-    bounds: dict[str, float],
+    held: Held,
     images: Sequence[np.ndarray] = (),
     dropped: int = 0,
     note: str = "",
 ) -> Measurement:
     """The measurement of one beam: its values, and those of `images`, are finite; its tally closes."""
-    tally, nonfinite = photons.tally, not_finite_in(photons.records) + not_finite(images)
-    return Measurement(
-        severity, label, nonfinite, errors, bounds, tally.imbalance, dict(tally.fallbacks), dropped, note
-    )
+    bad, tally = not_finite_in(photons.records) + not_finite(images), photons.tally
+    errors, bounds = judged(held)
+    return Measurement(severity, label, bad, errors, bounds, tally.imbalance, dict(tally.fallbacks), dropped, note)

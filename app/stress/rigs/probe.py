@@ -1,4 +1,4 @@
-"""One small rendering for the stress sweep, with everything it made looked at: photons, maps, picture, flux.
+"""One small rendering for the stress sweep, with everything it made examined: photons, maps, picture, flux.
 
 The product's own light pass and camera pass do the work. What is added only reads: every photon
 record of every batch, every texel of every map, every pixel.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,7 +20,7 @@ from ...render.device_scene import scene_buffers
 from ...render.light_pass import LightPass
 from ...render.light_stats import LightStats
 from ...render.photon_records import NoRecords
-from ..case import Measurement
+from ..case import Held, Measurement, judged, not_finite
 
 if TYPE_CHECKING:
     import moderngl
@@ -34,9 +34,22 @@ if TYPE_CHECKING:
 
 SMALL = RenderSettings(width=160, height=90, photons=32_768, spp=16, method="srd-photons")
 """What a sweep renders unless the case is about just that. Fewer than 16 samples a pixel would miss texels of a sharp
-focus. By photons: beams have cases of their own (`cases.beam_cases`)."""
+focus. By photons: beams have cases of their own."""
+CAUSTIC = replace(SMALL, layer="caustic")
 LOST_TO_NUMERICS = 1e-3
 """Largest share of the flux that may end for numerical reasons (cracks, overflows): a tenth of what a picture shows."""
+SAME_PICTURE = 0.01
+"""nRMSE of a picture whose photons are the same but for rounding: one photon in a thousand may choose otherwise
+(√(2·1e-3) of its own contrast of about a fifth)."""
+SAME_ENERGY = 1e-3
+"""The same, summed over the picture: one photon in a thousand."""
+NOISE = 3.0
+"""A picture drawn anew may differ by as much as two seeds do, times this: two seeds still share the lattice's shape and
+the texels."""
+TEXELS = 0.05
+"""nRMSE of a picture read from maps whose texels (half a pixel) lie otherwise: where an edge crosses a pixel half a
+texel more or less of blur is a quarter of the contrast, and in so small a picture some 4 % of the pixels lie on edges:
+0.25 √0.04."""
 
 
 class WatchedRecords:
@@ -65,7 +78,7 @@ class WatchedRecords:
         self._forgotten.release()
 
     def keep(self, photons: moderngl.Buffer, batch: Batch, stride: int, of: RoundOf) -> None:
-        """Look at the batch."""
+        """Examine the batch."""
         if batch.photons:
             self._watch(np.frombuffer(photons.read(batch.photons * stride), self._dtype))
 
@@ -78,10 +91,9 @@ class WatchedRecords:
         columns = [name for name in names if name.startswith("dposition")]
         floats = [name for name in names if photons.dtype[name].base == np.float32 and name not in columns]
         bad = np.zeros(len(photons), bool)
-        for name in floats:
-            bad |= ~_finite_rows(photons[name])
-        for name in columns:
-            bad |= ~_finite_rows(photons[name]) & ~dropped
+        for name in (*floats, *columns):
+            finite = np.isfinite(photons[name]).reshape(len(photons), -1).all(axis=1)
+            bad |= ~finite & ~dropped if name in columns else ~finite
         self.nonfinite_photons += int(bad.sum())
 
 
@@ -98,7 +110,6 @@ class Probe:
     """Photon records whose flag says that the footprint was dropped."""
     map_flux_w: float
     """What the maps hold where they are read, per pass weight."""
-    spectral: np.ndarray | None = None
 
     @property
     def shares(self) -> dict[str, float]:
@@ -128,7 +139,7 @@ def light_pass(context: Context, scene: Scene, settings: RenderSettings) -> Iter
 
 
 def probe(context: Context, scene: Scene, settings: RenderSettings = SMALL) -> Probe:
-    """Render `scene` in one pass and look at everything."""
+    """Render `scene` in one pass and examine everything."""
     photons = settings.photons or scene.render.photons
     with light_pass(context, scene, settings) as (light, photon_records):
         light.begin(photons, settings.seed)
@@ -144,9 +155,9 @@ def probe(context: Context, scene: Scene, settings: RenderSettings = SMALL) -> P
             spectral = camera_pass.read_spectral() if settings.bins else None
         finally:
             camera_pass.release()
-        bad = photon_records.nonfinite_photons + nonfinite(picture) + nonfinite(read_maps(light))
-        bad += 0 if spectral is None else nonfinite(spectral)
-        return Probe(picture.astype(float), light.stats, bad, photon_records.dropped, light.map_flux(), spectral)
+        seen = (picture, read_maps(light), *([] if spectral is None else [spectral]))
+        bad = photon_records.nonfinite_photons + not_finite(seen)
+        return Probe(picture.astype(float), light.stats, bad, photon_records.dropped, light.map_flux())
 
 
 def read_maps(light: LightPass) -> np.ndarray:
@@ -157,11 +168,6 @@ def read_maps(light: LightPass) -> np.ndarray:
     for texture, layer in zip(textures, values, strict=True):
         texture.read_into(layer)
     return values
-
-
-def nonfinite(values: np.ndarray) -> int:
-    """How many of `values` are NaN or infinite."""
-    return int(values.size - np.count_nonzero(np.isfinite(values)))
 
 
 def picture_error(picture: np.ndarray, expected: np.ndarray) -> float:
@@ -183,36 +189,50 @@ def blocks(picture: np.ndarray, side: int = 10) -> np.ndarray:
     return cut.reshape(height // side, side, width // side, side, -1).mean(axis=(1, 3))
 
 
-@dataclass(frozen=True)
-class Held:
-    """Errors and bounds beyond those that every rendering is held to."""
+def compared(found: Probe, base: Probe, picture: float, energy: float) -> Held:
+    """A rendering against another of the same light, each within its bound."""
+    return {
+        "picture": (picture_error(found.picture, base.picture), picture),
+        "energy": (energy_error(found.picture, base.picture), energy),
+    }
 
-    errors: dict[str, float] = field(default_factory=dict)
-    bounds: dict[str, float] = field(default_factory=dict)
-    note: str = ""
 
-
-def measurement(
-    severity: float, label: str, found: Probe, held: Held = Held(), lost: float = LOST_TO_NUMERICS
+def rendered(
+    severity: float,
+    label: str,
+    found: Probe,
+    held: Held | None = None,
+    note: str = "",
+    lost: float = LOST_TO_NUMERICS,
 ) -> Measurement:
     """A rendering's measurement: finite, flux closed, every dropped footprint counted, little lost to numerics."""
-    counted = found.stats.tally.fallbacks["footprint_dropped"]
-    errors = {
-        "uncounted": float(max(0, found.dropped - counted)),
-        "lost": found.shares.get("lost_numeric", 0.0),
-        **held.errors,
-    }
+    tally = found.stats.tally
+    uncounted = max(0, found.dropped - tally.fallbacks["footprint_dropped"])
+    promised = {"uncounted": (uncounted, 0.0), "lost": (found.shares.get("lost_numeric", 0.0), lost)}
+    fallbacks = {**tally.fallbacks, "splat_footprint_dropped": found.stats.footprints_dropped}
+    errors, bounds = judged({**promised, **(held or {})})
     return Measurement(
-        severity=severity,
-        label=label,
-        nonfinite=found.nonfinite,
-        errors=errors,
-        bounds={"uncounted": 0.0, "lost": lost, **held.bounds},
-        flux_imbalance=found.stats.tally.imbalance,
-        fallbacks={**found.stats.tally.fallbacks, "splat_footprint_dropped": found.stats.footprints_dropped},
-        dropped=found.dropped,
-        note=held.note,
+        severity, label, found.nonfinite, errors, bounds, tally.imbalance, fallbacks, found.dropped, note
     )
+
+
+def against_single_wavelengths(
+    context: Context, scene: Scene, severity: float, label: str, smeared: float = 0.0
+) -> Measurement:
+    """The default method against `stochastic` (one random wavelength a photon, no spectral column) on blocks of ten
+    pixels.
+
+    Its bound is the difference between two seeds of `stochastic`, which is what chance alone makes, and 3 % of the
+    picture for the kernel's tails across the blocks' borders, and `smeared`; the energy's is 3 %.
+    """
+    found = probe(context, scene, CAUSTIC)
+    one, other = (probe(context, scene, replace(CAUSTIC, method="stochastic", seed=seed)).picture for seed in (1, 2))
+    chance, mean = picture_error(blocks(other), blocks(one)), 0.5 * (one + other)
+    held: Held = {
+        "blocks": (picture_error(blocks(found.picture), blocks(mean)), chance + 0.03 + smeared),
+        "energy": (energy_error(found.picture, mean), 0.03),
+    }
+    return rendered(severity, label, found, held)
 
 
 def with_photons(photons: int) -> RenderSettings:
@@ -224,8 +244,3 @@ def _ratio(difference: float, size: float) -> float:
     if size == 0.0:
         return 0.0 if difference == 0.0 else float("inf")
     return difference / size
-
-
-def _finite_rows(values: np.ndarray) -> np.ndarray:
-    """Which records' values are all finite, bool (n,)."""
-    return np.isfinite(values).reshape(len(values), -1).all(axis=1)

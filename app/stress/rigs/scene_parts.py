@@ -11,17 +11,12 @@ from ...model.geometry.mesh import Mesh
 from ...model.geometry.primitives import plane
 from ...model.lights import CollimatedLight, DirectionalLight
 from ...model.lights.light import made
-from ...model.optics.glass import Dispersion, from_abbe
+from ...model.optics.glass import Dispersion, constant, from_abbe, table
 from ...model.optics.spectrum import Spectrum, illuminant
 from ...model.placement import rotation_about
-from ...model.scene import (
-    Camera,
-    Dielectric,
-    Diffuse,
-    Light,
-    Scene,
-    SceneObject,
-)
+from ...model.scene import Camera, Dielectric, Diffuse, Light, Scene, SceneObject
+from ...model.scene_defaults import bounds_of
+from ...model.vectors import vec3
 
 TABLE = SceneObject("table", plane(8.0, 8.0), Diffuse())
 """Receiver in z = 0."""
@@ -36,22 +31,42 @@ SUN = DirectionalLight("sun", illuminant("D65").scaled_to_luminous(10.0), direct
 FLINT = from_abbe(1.7, 30.0, "flint")
 CROWN = from_abbe(1.5, 60.0, "crown")
 WATER = from_abbe(1.333, 55.0, "water")
+ANOMALOUS, RAINBOW, STEP = "V_d −20, anomalous", "n 2.2 (violet) to 1.2 (red)", "a step from 1.7 to 1.5 within 1 nm"
+IMPOSSIBLE = {
+    RAINBOW: table((380.0, 780.0), (2.2, 1.2), "rainbow gem"),
+    "n 1.2 (violet) to 2.2 (red)": table((380.0, 780.0), (1.2, 2.2), "reversed gem"),
+    ANOMALOUS: from_abbe(1.6, -20.0, "anomalous"),
+    STEP: table((380.0, 549.5, 550.5, 780.0), (1.7, 1.7, 1.5, 1.5), "step"),
+    "n 4 and V_d 10": from_abbe(4.0, 10.0, "heavy"),
+    "n 1 + 1e-6": constant(1.0 + 1e-6, "hardly glass"),
+}
+"""Glasses that no maker sells."""
+
+
+def at(x: float = 0.0, y: float = 0.0, z: float = 0.0, turned: np.ndarray | None = None) -> np.ndarray:
+    """Placement of an object's origin, (4, 4), first turned by a matrix (3, 3)."""
+    place = np.eye(4)
+    place[:3, :3] = np.eye(3) if turned is None else turned
+    place[:3, 3] = x, y, z
+    return place
 
 
 def solid(
     name: str,
     mesh: Mesh,
     glass: Dispersion,
-    at: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    place: tuple[float, float, float] = (0.0, 0.0, 0.0),
     priority: int = 0,
     turned: np.ndarray | None = None,
 ) -> SceneObject:
-    """A piece of glass with its own origin at `at`, first turned by the matrix `turned` (3, 3)."""
-    place = np.eye(4)
-    if turned is not None:
-        place[:3, :3] = turned
-    place[:3, 3] = at
-    return SceneObject(name, mesh, Dielectric(glass, priority=priority), place)
+    """A piece of glass with its own origin at `place`, first turned by the matrix `turned` (3, 3)."""
+    return SceneObject(name, mesh, Dielectric(glass, priority=priority), at(*place, turned))
+
+
+def tilted(*items: SceneObject) -> list[SceneObject]:
+    """Objects modelled round the origin, turned together and lifted over the table: no face lies along an axis."""
+    matrix = at(0.0, 0.0, 1.2, turn((1.0, 0.4, 0.2), 28.0))
+    return [replace(item, object_to_world=matrix @ item.object_to_world) for item in items]
 
 
 def stage(
@@ -72,16 +87,13 @@ def moved(
     Lengths grow by `scale`, hence intensities by its square and absorption by its inverse.
     """
     turn = np.eye(3) if rotation is None else rotation
-    matrix = np.eye(4)
-    matrix[:3, :3], matrix[:3, 3] = scale * turn, offset
+    matrix = at(*offset, scale * turn)
 
     def point(p: Sequence[float]) -> tuple[float, float, float]:
-        x, y, z = (float(v) for v in matrix[:3, :3] @ p + matrix[:3, 3])
-        return x, y, z
+        return vec3(matrix[:3, :3] @ p + matrix[:3, 3])
 
     def direction(d: Sequence[float]) -> tuple[float, float, float]:
-        x, y, z = (float(v) for v in turn @ d)
-        return x, y, z
+        return vec3(turn @ d)
 
     camera = replace(
         scene.camera,
@@ -113,8 +125,7 @@ def moved(
 
 def turn(axis: Sequence[float], degrees: float) -> np.ndarray:
     """Rotation about `axis` (of any length), float64 (3, 3)."""
-    x, y, z = (float(v) for v in np.asarray(axis, float) / np.linalg.norm(axis))
-    return rotation_about((x, y, z), np.radians(degrees))
+    return rotation_about(vec3(np.asarray(axis, float) / np.linalg.norm(axis)), np.radians(degrees))
 
 
 def brighter(spectrum: Spectrum, factor: float) -> Spectrum:
@@ -135,8 +146,6 @@ def with_glass(scene: Scene, change: Callable[[Dispersion], Dispersion]) -> Scen
 
 def extent(scene: Scene) -> float:
     """Diagonal of what is not a receiver (else of everything), scene units."""
-    from ...model.scene_defaults import bounds_of
-
     items = [o for o in scene.objects if not o.material.receives] or list(scene.objects)
     low, high = bounds_of(items)
     return float(np.linalg.norm(np.asarray(high) - np.asarray(low)))

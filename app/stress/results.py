@@ -1,0 +1,188 @@
+"""What a stress run measured: on the screen a line a severity, and as JSON, which has no word for NaN."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..base.atomic import atomic_output
+from .case import FLUX_CLOSURE, Case, Measurement
+
+if TYPE_CHECKING:
+    from rich.table import Table
+    from rich.text import Text
+
+
+@dataclass
+class CaseResult:
+    """What one case measured."""
+
+    case: Case
+    measurements: list[Measurement] = field(default_factory=list)
+    seconds: float = 0.0
+    failure: str = ""
+    """Why the case could not go on, in a line; empty where it did."""
+    trace: str = ""
+    """The failure's traceback, for the JSON file only."""
+
+    @property
+    def complete(self) -> bool:
+        """Whether every severity was measured."""
+        return not self.failure and len(self.measurements) == self.case.steps
+
+    def broken(self) -> list[str]:
+        """The promises that do not hold, each with its severity."""
+        found = [f"{m.label}: {sentence}" for m in self.measurements for sentence in m.broken()]
+        return found + ([f"stopped by an error: {self.failure}"] if self.failure else [])
+
+
+@dataclass
+class StressResult:
+    """One run of `spectrasplat stress`."""
+
+    version: str
+    date: str
+    command: str
+    machine: dict[str, str]
+    asked: int
+    """Cases that were to run."""
+    cases: list[CaseResult] = field(default_factory=list)
+    seconds: float = 0.0
+
+    @property
+    def partial(self) -> bool:
+        """Stopped before everything was measured (a failed case was measured as far as it went)."""
+        return len(self.cases) < self.asked or any(not c.complete and not c.failure for c in self.cases)
+
+    def broken(self) -> list[str]:
+        """The promises that do not hold, each with its case and severity."""
+        return [f"{c.case.name}, {sentence}" for c in self.cases for sentence in c.broken()]
+
+    def summary(self) -> str:
+        """One line: how many cases and severities, how many promises are broken."""
+        broken, severities = self.broken(), sum(len(c.measurements) for c in self.cases)
+        state = "stopped early; " if self.partial else ""
+        verdict = f"{len(broken)} promise{'s' if len(broken) > 1 else ''} broken"
+        if not broken:
+            verdict = "every promise measured so far holds" if self.partial else "every promise holds"
+        done = f"{len(self.cases)} of {self.asked} cases, {severities} severities in {self.seconds:.0f} s"
+        return f"{state}{done}: {verdict}"
+
+
+# ---- JSON ------------------------------------------------------------------------------------
+
+
+def write_json(result: StressResult, path: Path) -> None:
+    """The whole result, in one piece or not at all. Raises `UserError` where it cannot be written."""
+    text = json.dumps(_plain(_record(result)), indent=1, ensure_ascii=False, allow_nan=False)
+    with atomic_output(path) as temporary:
+        temporary.write_text(text + "\n", encoding="utf-8")
+
+
+def _record(result: StressResult) -> dict[str, Any]:
+    return {
+        "version": result.version,
+        "date": result.date,
+        "command": result.command,
+        "machine": result.machine,
+        "partial": result.partial,
+        "seconds": result.seconds,
+        "cases_asked": result.asked,
+        "flux_closure": FLUX_CLOSURE,
+        "broken": result.broken(),
+        "cases": [
+            {
+                "name": found.case.name,
+                "title": found.case.title,
+                "why": found.case.why,
+                "severity": found.case.severity_name,
+                "logarithmic": found.case.logarithmic,
+                "steps": found.case.steps,
+                "seconds": found.seconds,
+                "failure": found.failure,
+                "traceback": found.trace,
+                "measurements": [asdict(m) | {"broken": m.broken()} for m in found.measurements],
+            }
+            for found in result.cases
+        ],
+    }
+
+
+def _plain(value: Any) -> Any:
+    """What JSON can say; numbers that it cannot are "NaN", "Infinity", "-Infinity"."""
+    if isinstance(value, Mapping):
+        return {name: _plain(inner) for name, inner in value.items()}
+    if isinstance(value, list):
+        return [_plain(inner) for inner in value]
+    if value is None or isinstance(value, str | int):
+        return value
+    if isinstance(value, np.integer):
+        return int(value)
+    value = float(value)
+    if math.isfinite(value):
+        return value
+    return "NaN" if math.isnan(value) else ("Infinity" if value > 0.0 else "-Infinity")
+
+
+# ---- the screen ------------------------------------------------------------------------------
+
+
+def table(result: StressResult) -> Table:
+    """All measurements."""
+    from rich.table import Table
+    from rich.text import Text
+
+    shown = Table(title="stress", title_justify="left", header_style="bold", pad_edge=False)
+    for name, options in (
+        ("case", {"no_wrap": True}),
+        ("severity", {"overflow": "fold", "max_width": 34}),
+        ("not finite", {"justify": "right"}),
+        ("flux off", {"justify": "right"}),
+        ("fall-backs", {"overflow": "fold", "max_width": 28}),
+        ("errors / bounds", {"overflow": "fold"}),
+        ("verdict", {"overflow": "fold"}),
+    ):
+        shown.add_column(name, **options)
+    for found in result.cases:
+        for number, m in enumerate(found.measurements):
+            shown.add_row(
+                found.case.name if number == 0 else "",
+                Text(m.label),
+                str(m.nonfinite),
+                "" if m.flux_imbalance is None else f"{m.flux_imbalance:.0e}",
+                Text(", ".join(f"{name} {count}" for name, count in m.fallbacks.items() if count)),
+                _errors(m),
+                _verdict(m.broken()),
+            )
+        if found.failure:
+            name = "" if found.measurements else found.case.name
+            shown.add_row(name, "", "", "", "", "", _verdict([found.failure]))
+        shown.add_section()
+    return shown
+
+
+def _errors(m: Measurement) -> Text:
+    """ "energy 3e-04 / 1e-03", those beyond their bound in red; a bounded error of exactly zero is not worth the
+    room."""
+    from rich.text import Text
+
+    text = Text()
+    for name, error in m.errors.items():
+        bound = m.bounds.get(name)
+        if error == 0.0 and bound is not None:
+            continue
+        part = f"{name} {error:.1e}" + ("" if bound is None else f" / {bound:.0e}")
+        text.append((", " if text else "") + part, style=None if bound is None or error <= bound else "bold red")
+    return text
+
+
+def _verdict(broken: Sequence[str]) -> Text:
+    from rich.text import Text
+
+    return Text("ok", style="green") if not broken else Text("BROKEN: " + "; ".join(broken), style="bold red")
