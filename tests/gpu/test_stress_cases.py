@@ -217,8 +217,8 @@ MUTANTS = {
     "lamps as bright as they are where they only graze a sample": (
         "eye-lamps",
         "camera/taps.glsl",
-        "? light_seen(lights[i], position, direction, far, width + sweep * part) :",
-        "? lights[i].measure * sign(light_seen(lights[i], position, direction, far, width + sweep / float(taps))) :",
+        "? light_seen(light, position, direction, far, WIDTH_OF(light) + sweep * part) :",
+        "? light.measure * sign(light_seen(light, position, direction, far, WIDTH_OF(light) + sweep * part)) :",
         "light in all",
     ),
     "light that is not linear": (

@@ -43,13 +43,13 @@ __all__ = [
 def box(size: tuple[float, float, float] = (1.0, 1.0, 1.0), name: str = "box") -> Mesh:
     """A box of edge lengths `size` along x, y, z; every face shows the whole of a picture (`primitives_parts`)."""
     x, y, z = (positive("box", f"size along {axis}", s) for axis, s in zip("xyz", size, strict=True))
-    return with_box_uv(_extruded(name, _rectangle(x, y), z))
+    return with_box_uv(extruded(name, _rectangle(x, y), z))
 
 
 def slab(width: float = 1.0, height: float = 1.0, thickness: float = 0.1, name: str = "slab") -> Mesh:
     """A plane-parallel plate: `width` along x, `height` along y, `thickness` along z; pictures as on a `box`."""
     outline = _rectangle(positive("slab", "width", width), positive("slab", "height", height))
-    return with_box_uv(_extruded(name, outline, positive("slab", "thickness", thickness)))
+    return with_box_uv(extruded(name, outline, positive("slab", "thickness", thickness)))
 
 
 def prism(apex_angle_deg: float = 60.0, side: float = 1.0, length: float = 1.0, name: str = "prism") -> Mesh:
@@ -63,7 +63,7 @@ def prism(apex_angle_deg: float = 60.0, side: float = 1.0, length: float = 1.0, 
     x, z = side * math.sin(half), side * math.cos(half)
     # Extruded along its own z, then turned about x so that z becomes -y and y becomes z.
     outline = np.array([(-x, -z / 3.0), (x, -z / 3.0), (0.0, 2.0 * z / 3.0)])
-    return _extruded(name, outline, positive("prism", "length", length), upright=False)
+    return extruded(name, outline, positive("prism", "length", length), upright=False)
 
 
 def polygon_prism(sides: int = 6, radius: float = 0.5, length: float = 1.0, name: str = "polygon prism") -> Mesh:
@@ -71,7 +71,7 @@ def polygon_prism(sides: int = 6, radius: float = 0.5, length: float = 1.0, name
     sides = count("polygon prism", "sides", sides, 3, 4096)
     angle = 2.0 * np.pi * np.arange(sides) / sides
     outline = positive("polygon prism", "radius", radius) * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    return _extruded(name, outline, positive("polygon prism", "length", length))
+    return extruded(name, outline, positive("polygon prism", "length", length))
 
 
 def plane(width: float = 1.0, height: float = 1.0, name: str = "plane") -> Mesh:
@@ -107,7 +107,7 @@ def _fan(ring: np.ndarray) -> np.ndarray:
     return np.stack([np.full(len(ring) - 2, ring[0]), ring[1:-1], ring[2:]], axis=1)
 
 
-def _extruded(name: str, outline: np.ndarray, length: float, upright: bool = True) -> Mesh:
+def extruded(name: str, outline: np.ndarray, length: float, upright: bool = True) -> Mesh:
     """A right prism over a convex counter-clockwise `outline` (N, 2).
 
     Upright: the outline lies in (x, y) and the axis along z. Otherwise the outline lies in

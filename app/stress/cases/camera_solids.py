@@ -14,7 +14,7 @@ import numpy as np
 
 from ...gpu.context import Context
 from ...model.geometry.mesh import Mesh, make_mesh
-from ...model.geometry.primitives import box
+from ...model.geometry.primitives import box, extruded
 from ...model.geometry.primitives_gem import brilliant
 from ...model.geometry.primitives_round import ellipsoid, sphere
 from ...model.optics.colorimetry import rgb_basis
@@ -43,7 +43,7 @@ from ..rigs.camera_probe import (
     white_furnace,
     with_sky,
 )
-from ..rigs.flat_glass import extruded, radiance_seen, rectangle, ways
+from ..rigs.flat_glass import radiance_seen, rectangle, ways
 from ..rigs.probe import NOISE
 from ..rigs.scene_parts import FLINT, SUN, at, extent, moved, solid, stage, tilted, with_glass
 from .contacts import PAIRS, Pair
@@ -66,7 +66,7 @@ def eye_guide(context: Context, counts: Sequence[int]) -> Measured:
         outline = rectangle(bounces * 0.2 * cosine / sine, 0.2)
         foot = np.array([outline[0, 0], 0.013])
         start = foot - 2.0 * direction
-        guide = solid("guide", extruded(outline, 0.2, "guide"), constant(n, "guide"))
+        guide = solid("guide", extruded("guide", outline, 0.2), constant(n, "guide"))
         camera = straight((*foot, 0.0), (*direction, 0.0), 0.01, 2.0)
         sight = render_probe(context, with_sky(guide, camera=camera, environment=sky(ahead)), FEW)
         out = ways(outline, n, start, direction)
@@ -199,7 +199,7 @@ def eye_inside(context: Context, distances: Sequence[float]) -> Measured:
     Which medium a path begins in decides all that follows, and on a face rounding decides that; either is right,
     anything else is not."""
     n, outline, angle = 1.5, rectangle(1.0, 1.0), np.radians(20.0)
-    glass = solid("cube", extruded(outline, 1.0, "cube"), constant(n))
+    glass = solid("cube", extruded("cube", outline, 1.0), constant(n))
     for number, distance in enumerate(distances):
         held, sights = {}, []
         for name, sign in (("outwards", 1.0), ("inwards", -1.0)):

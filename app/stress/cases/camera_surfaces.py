@@ -14,7 +14,7 @@ import numpy as np
 
 from ...gpu.context import Context
 from ...gpu.map_channels import MapChannels
-from ...model.geometry.primitives import box, plane, prism
+from ...model.geometry.primitives import box, extruded, plane, prism
 from ...model.geometry.primitives_round import sphere
 from ...model.lights import DirectionalLight
 from ...model.optics.colorimetry import VISIBLE_NM, daylight_per_lumen
@@ -47,7 +47,7 @@ from ..rigs.camera_probe import (
     together,
     with_sky,
 )
-from ..rigs.flat_glass import extruded, radiance_seen, rectangle, trapezium
+from ..rigs.flat_glass import radiance_seen, rectangle, trapezium
 from ..rigs.probe import blocks
 from ..rigs.scene_parts import ANOMALOUS, FLINT, IMPOSSIBLE, RAINBOW, STEP, at, solid, turn
 
@@ -65,7 +65,7 @@ def eye_tir_margin(context: Context, margins: Sequence[float]) -> Measured:
         held, sights = {}, []
         for name, side in (("inside the edge", -1.0), ("beyond the edge", 1.0)):
             outline = trapezium(float(np.arcsin(1.0 / n)) + side * margin)
-            glass = solid("prism", extruded(outline, 1.0, "prism"), constant(n, "glass"))
+            glass = solid("prism", extruded("prism", outline, 1.0), constant(n, "glass"))
             camera = straight(ORIGIN, ALONG_X, 0.02)
             sight = render_probe(context, with_sky(glass, camera=camera, environment=slope_sky()), FEW)
             expected = radiance_seen(outline, n, (-3.0, 0.0), (1.0, 0.0), slope)
@@ -88,7 +88,7 @@ def eye_cut(context: Context, counts: Sequence[int]) -> Measured:
     Half of a band leaves the glass (N-BK7 at 41.10°, from 503 nm on), half stays. The band is cut there, in colour and
     in 32 spectral bins."""
     outline, glass = trapezium(np.radians(41.10)), sellmeier(*sellmeier_terms("N-BK7"), name="N-BK7")
-    wedge = solid("prism", extruded(outline, 1.0, "prism"), glass)
+    wedge = solid("prism", extruded("prism", outline, 1.0), glass)
     scene = with_sky(wedge, camera=straight(ORIGIN, ALONG_X, 0.02), environment=sky(ahead))
     ways = [radiance_seen(outline, float(n), (-3.0, 0.0), (1.0, 0.0), ahead) for n in glass.index(VISIBLE_NM)]
     through, edges = np.array(ways), np.linspace(380.0, 780.0, CUT_BINS + 1)
@@ -116,7 +116,7 @@ def eye_grazing(context: Context, angles_deg: Sequence[float]) -> Measured:
     A pixel's columns land as 1/cos of the angle, and what was let in is reflected to and fro hundreds of times."""
     thickness = 0.2
     outline = rectangle(4.0, thickness)
-    glass = solid("slab", extruded(outline, 4.0, "slab"), FLINT)
+    glass = solid("slab", extruded("slab", outline, 4.0), FLINT)
     # Black walls hide all below the slab's middle: what is reflected is seen, what is let through is not.
     walls = [SceneObject(f"wall {x:+g}", box((0.1, 8.0, 20.0)), Black(), at(x, -4.0, 0.0)) for x in (-6.0, 6.0)]
     coarse = VISIBLE_NM[::40]

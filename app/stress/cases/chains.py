@@ -55,13 +55,11 @@ and of the scaling to length one."""
 
 @dataclass(frozen=True)
 class Chain:
-    """Where float64 rays end, with columns by start (2), by start direction (2) and by n."""
+    """Where float64 rays (N, 3) end, with columns (5, N, 3) by start (2), by start direction (2) and by n."""
 
     position: np.ndarray
-    """(N, 3)."""
     direction: np.ndarray
     dposition: np.ndarray
-    """(5, N, 3)."""
     ddirection: np.ndarray
     from_edge: np.ndarray
     """(N,): the least distance of a hit from another facet's plane."""
@@ -190,17 +188,7 @@ def long_chain(context: Context, counts: Sequence[int]) -> Measured:
             "paths astray without an edge": (unexplained, 0.0),
         }
         note = f"{np.count_nonzero(same)} paths; {np.count_nonzero(~same)} more over other facets, by an edge"
-        bad, tally = not_finite_in(low.records), near.tally
-        yield Measurement(
-            float(events),
-            f"{events} events",
-            bad,
-            *judged(held),
-            tally.imbalance,
-            dict(tally.fallbacks),
-            int(np.count_nonzero(dropped)),
-            note,
-        )
+        yield traced(events, f"{events} events", low, held, dropped=int(np.count_nonzero(dropped)), note=note)
 
 
 # ---- columns that outgrow every scale ----------------------------------------------------------

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...model.geometry.mesh import Mesh, make_mesh
 from .camera_probe import fresnel
 
 NOTHING = 1e-5
@@ -75,16 +74,6 @@ def radiance_seen(
     """Radiance along a ray into a scene of nothing but the polygon and what `radiance` says of directions (…, 3)."""
     out = ways(outline, n, position, direction, inside)
     return float(radiance(np.array([way.direction for way in out])) @ np.array([way.weight for way in out]))
-
-
-def extruded(outline: np.ndarray, length: float, name: str) -> Mesh:
-    """The solid over an anticlockwise convex outline (k, 2), from z = −length/2 to length/2."""
-    k = len(outline)
-    vertices = np.concatenate([np.column_stack([outline, np.full(k, z)]) for z in (-0.5 * length, 0.5 * length)])
-    following = np.roll(np.arange(k), -1)
-    sides = [[i, j, j + k] for i, j in enumerate(following)] + [[i, j + k, i + k] for i, j in enumerate(following)]
-    caps = [[0, i + 1, i] for i in range(1, k - 1)] + [[k, k + i, k + i + 1] for i in range(1, k - 1)]
-    return make_mesh(name, vertices, np.array(sides + caps))
 
 
 def trapezium(incidence_rad: float, height: float = 1.0) -> np.ndarray:

@@ -19,6 +19,7 @@ from ...gpu.context import Context
 from ...gpu.records import specular_events
 from ...gpu.scene_buffers import UNBOUNDED, SceneBuffers
 from ...gpu.spectral_groups import Groups
+from ...model.geometry import primitives
 from ...model.geometry.mesh import Mesh, make_mesh
 from ...model.lights import CollimatedLight
 from ...model.optics.glass import sellmeier
@@ -136,14 +137,7 @@ def screen(centre: ArrayLike, normal: ArrayLike, half: float = 50.0) -> Mesh:
 
 def extruded(name: str, section: np.ndarray, half: float = 0.5) -> Mesh:
     """A closed convex solid: a polygon (P, 2), counter-clockwise in x-y, drawn out along z by ±half."""
-    count = len(section)
-    low, high = (np.column_stack([section, np.full(count, z)]) for z in (-half, half))
-    inner = range(1, count - 1)
-    faces = [[0, k + 1, k] for k in inner] + [[count, count + k, count + k + 1] for k in inner]
-    for k in range(count):
-        following = (k + 1) % count
-        faces += [[k, following, count + k], [following, count + following, count + k]]
-    return make_mesh(name, np.concatenate([low, high]), np.array(faces))
+    return primitives.extruded(name, section, 2.0 * half)
 
 
 def placed(name: str, mesh: Mesh, material: Material) -> SceneObject:
