@@ -11,16 +11,15 @@ from typing import TYPE_CHECKING
 
 from ..base.errors import UserError
 from ..edit.parameters import Stage
-from ..model.settings import RenderSettings
 from .asking import Count, Size, settings_of
 from .device import Cancel, Device, Progress
 from .picture import Picture, Statistics
 from .scene import Scene
 
 if TYPE_CHECKING:
-    from ..farm.point_tasks import Drawn
-    from ..farm.sweep import SweepPlan
     from ..gpu.context import Context
+    from ..render.sweep import SweepPlan
+    from ..render.sweep_points import Drawn
 
 DEFAULT_SAMPLES = 32
 
@@ -60,7 +59,7 @@ def sweep(
     over `workers` processes of this machine or those of a Dask `scheduler` (which needs the extra `farm`). `exact`, and
     `bins`, trace every point. The rest as for `render`. Raises `UserError` before anything is rendered.
     """
-    from ..farm.sweep import SweepPlan, check_values, points_of
+    from ..render.sweep import SweepPlan, check_values, points_of
 
     settings = settings_of(scene, size=size, photons=photons, seed=seed, method=method, bins=bins, spp=spp)
     if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
@@ -71,63 +70,48 @@ def sweep(
     for path, values in grid.items():
         check_values(path, values, start)
     plan = SweepPlan.of(points_of(start, grid), settings, exact)
-    spreads = (workers > 1 or scheduler is not None) and not (len(plan.groups) == 1 and plan.keeps_photons)
-    if spreads:
+    if plan.can_spread and (workers > 1 or scheduler is not None):
         from ..farm.cluster import check_installed
 
         check_installed()
-        return _spread(plan, settings, workers, scheduler, progress, cancel)
-    return _here(plan, settings, progress, cancel)
+        return _spread(plan, workers, scheduler, progress, cancel)
+    return _here(plan, progress, cancel)
 
 
-def _here(
-    plan: SweepPlan, settings: RenderSettings, progress: Progress | None, cancel: Cancel | None
-) -> Generator[SweepPoint]:
-    """One by one, in a thread of their own."""
-    from ..farm.desk import Desk
-    from ..farm.sweep_run import by_group, draw_point, shared_of
-    from ..gpu import shader
+def _here(plan: SweepPlan, progress: Progress | None, cancel: Cancel | None) -> Generator[SweepPoint]:
+    """One by one, in a thread of their own; those of a group together, for they share photons."""
+    from ..gpu.shader import keep_programs
+    from ..render.sweep_points import SweepPainter
 
-    shared, desks = shared_of(plan, settings), list[Desk]()
+    painters: list[SweepPainter] = []
 
-    def draw(group: int, number: int) -> Callable[..., Drawn | None]:
+    def draw(number: int) -> Callable[..., Drawn | None]:
         def work(context: Context, report: Callable[[float, str], None], stopped: Callable[[], bool]) -> Drawn | None:
-            if not desks:
-                shader.keep_programs(context.ctx)
-                desks.append(Desk(context))
-            return draw_point(desks[0], plan, shared, group, number, _Told(report, stopped))
+            if not painters:
+                keep_programs(context.ctx)
+                painters.append(SweepPainter(context, plan))
+            return painters[0].draw(number, report, stopped)
 
         return work
 
-    def clear(context: Context, report: Callable[[float, str], None], stopped: Callable[[], bool]) -> None:
-        for desk in desks:
-            desk.clear()
+    def release(context: Context, report: Callable[[float, str], None], stopped: Callable[[], bool]) -> None:
+        for painter in painters:
+            painter.release()
 
     with Device() as device:
         try:
-            for group, number in by_group(plan.groups, lambda number: True):
+            for number in (point.number for group in plan.groups for point in group.points):
                 started = time.perf_counter()
-                drawn = device.run(draw(group, number), progress, cancel)
+                drawn = device.run(draw(number), progress, cancel)
                 if drawn is None:
                     return
-                yield _point(plan, settings, drawn, time.perf_counter() - started)
+                yield _point(plan, drawn, time.perf_counter() - started)
         finally:
-            device.run(clear)
-
-
-class _Told:
-    """Progress of one point."""
-
-    def __init__(self, report: Callable[[float, str], None], stopped: Callable[[], bool]) -> None:
-        self._report, self.unwanted = report, stopped
-
-    def __call__(self, share: float, text: str = "") -> None:
-        self._report(share, text)
+            device.run(release)
 
 
 def _spread(
     plan: SweepPlan,
-    settings: RenderSettings,
     workers: int,
     scheduler: str | None,
     progress: Progress | None,
@@ -135,7 +119,8 @@ def _spread(
 ) -> Generator[SweepPoint]:
     """By a crew, which a thread looks after; callbacks run in the caller's."""
     from ..farm.cluster import open_crew
-    from ..farm.sweep_run import FarmSweep
+    from ..farm.jobs import Foreman
+    from ..farm.kinds import PointsJob
 
     news: SimpleQueue[Drawn | tuple[float, str] | BaseException | None] = SimpleQueue()
     stop = threading.Event()
@@ -143,7 +128,8 @@ def _spread(
     def work() -> None:
         try:
             with open_crew(None if scheduler else workers, scheduler) as crew:
-                FarmSweep(crew, plan, settings, news.put).run(lambda share, text: news.put((share, text)), stop.is_set)
+                job = PointsJob(plan, news.put)
+                Foreman(crew, job, stop.is_set).run(lambda share, text: news.put((share, text)))
             news.put(None)
         except BaseException as error:  # noqa: BLE001 - raised where the pictures are waited for
             news.put(error)
@@ -161,13 +147,13 @@ def _spread(
                 if cancel is not None and cancel():
                     stop.set()
             else:
-                yield _point(plan, settings, told, time.perf_counter() - started)
+                yield _point(plan, told, time.perf_counter() - started)
     finally:
         stop.set()
         thread.join()
 
 
-def _point(plan: SweepPlan, settings: RenderSettings, drawn: Drawn, seconds: float) -> SweepPoint:
+def _point(plan: SweepPlan, drawn: Drawn, seconds: float) -> SweepPoint:
     stats = Statistics(
         drawn.photons,
         drawn.photons if drawn.traced else 0,
@@ -179,6 +165,6 @@ def _point(plan: SweepPlan, settings: RenderSettings, drawn: Drawn, seconds: flo
         drawn.notices,
     )
     picture = Picture(
-        drawn.rgb, drawn.spectral, drawn.bin_edges_nm, stats, {"beauty": drawn.rgb}, settings.exposure_ev or 0.0
+        drawn.rgb, drawn.spectral, drawn.bin_edges_nm, stats, {"beauty": drawn.rgb}, plan.settings.exposure_ev or 0.0
     )
     return SweepPoint(drawn.number, plan.points[drawn.number].values, picture)

@@ -6,8 +6,7 @@ import os
 import shutil
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from ..base.errors import UserError
@@ -17,29 +16,31 @@ from .bench import empty_result, kept_text, scenes_of, settings_of, write_and_sh
 from .measuring_table import FarmBench
 from .opened import note_assumptions, open_scene
 from .printing import note, show
-from .render import check_output, picture_settings
+from .render import check_output, picture_settings, write_result
 from .table import ByWorkers, FarmAnimate, FarmRender
 
 if TYPE_CHECKING:
     from ..bench.store import Store
-    from ..farm.cluster import DaskCrew
+    from ..farm.jobs import Job, Tally
 
 FOLDER_SUFFIX = ".parts"
 
 
-@contextmanager
-def crew(asked: ByWorkers) -> Iterator[DaskCrew]:
-    """Those who work. Raises `UserError`."""
+def run(asked: ByWorkers, job: Job, name: str, stop: Callable[[], bool]) -> Tally | None:
+    """Have a job done by those who are asked for; None where `stop()` turned true before. Raises `UserError`."""
+    from ..base.progress import ProgressReporter
     from ..farm.cluster import open_crew
+    from ..farm.jobs import Foreman
 
-    with open_crew(workers_of(asked), asked.scheduler) as found:
-        yield found
+    with open_crew(workers_of(asked), asked.scheduler) as crew, ProgressReporter(name) as progress:
+        if crew.workers is None and not crew.size():
+            note(f"the scheduler at {crew.address} has no workers yet: waiting for some")
+        return Foreman(crew, job, stop).run(progress)
 
 
 def workers_of(asked: ByWorkers) -> int | None:
     """How many of this machine; None where a scheduler has its own. Raises `UserError`, also where Dask is missing."""
-    from ..farm.cluster import check_installed
-    from ..farm.gpus import count_gpus
+    from ..farm.cluster import check_installed, count_gpus
 
     if asked.workers is not None and asked.scheduler is not None:
         raise UserError("--workers and --scheduler exclude each other: a running cluster has its own workers")
@@ -51,8 +52,7 @@ def workers_of(asked: ByWorkers) -> int | None:
 
 def render(asked: FarmRender) -> int:
     """Render to a picture file; returns the exit code. Raises `UserError`."""
-    from ..base.image_io import check_suffix, write_image
-    from ..base.progress import ProgressReporter
+    from ..base.image_io import check_suffix
 
     check_suffix(asked.output)
     workers_of(asked)
@@ -61,63 +61,55 @@ def render(asked: FarmRender) -> int:
     settings = picture_settings(asked, scene, asked.stats)
     note_assumptions(scene)
 
-    from ..farm.part_folder import PREVIEW, held
-    from ..farm.render import FarmRender
+    from ..farm.jobs import held
+    from ..farm.still import PREVIEW, StillJob
 
     started = time.perf_counter()
     folder = asked.output.with_name(asked.output.name + FOLDER_SUFFIX)
-    with held(folder, asked.output), interrupt_flag() as interrupted, crew(asked) as workers:
+    with held(folder, asked.output), interrupt_flag() as interrupted:
         note(f"{folder / PREVIEW} shows now and then what there is")
-        work = FarmRender(workers, scene, settings, scene_file, folder, asked.parts, note)
+        job = StillJob(scene, settings, scene_file, folder, asked.parts, note)
+        kept = job.kept
         try:
-            with ProgressReporter(scene.name) as progress:
-                result = work.run(progress, interrupted)
+            tally = run(asked, job, scene.name, interrupted)
         except UserError as error:
-            raise UserError(f"{error} ({work.kept.leave()})") from error
+            raise UserError(f"{error} ({kept.leave()})") from error
         except BaseException:
-            work.kept.leave()
+            kept.leave()
             raise
-        if result is None:
-            print(f"spectrasplat: stopped; {work.kept.leave()}: the same command goes on", file=sys.stderr)
+        picture = job.picture
+        if tally is None or picture is None:
+            print(f"spectrasplat: stopped; {kept.leave()}: the same command goes on", file=sys.stderr)
             return interrupted.exit_code
-        for told in result.picture.stats.notices:
-            note(told)
-        write_image(
-            asked.output,
-            result.picture.rgb,
-            exposure_ev=settings.exposure_ev,
-            glare=settings.glare,
-            antialias=scene.render.antialias_highlights,
-            spectral=result.picture.spectral,
-            bin_edges_nm=result.picture.bin_edges_nm,
-        )
+        write_result(asked, scene, settings, picture)
         if not asked.keep_parts:
-            work.kept.remove()
-    stats, tally = result.picture.stats, result.tally
-    again = f", {result.taken_up} of them from before" if result.taken_up else ""
-    copied = f", {tally.copied} begun a second time" if tally.copied else ""
+            kept.remove()
+    again = f", {job.taken_up} of them from before" if job.taken_up else ""
     print(
-        f"{asked.output.resolve()}: {settings.width}×{settings.height}, {result.parts} parts{again}{copied}, "
-        f"{stats.photons:,} photons in {time.perf_counter() - started:.1f} s, of which merging "
-        f"{result.part_bytes / 1e6:.1f} MB took {result.merge_seconds:.1f} s ({stats.renderer})"
+        f"{asked.output.resolve()}: {settings.width}×{settings.height}, {kept.count} parts{again}{_copied(tally)}, "
+        f"{picture.stats.photons:,} photons in {time.perf_counter() - started:.1f} s, of which merging "
+        f"{kept.size_bytes / 1e6:.1f} MB took {kept.seconds:.1f} s ({picture.stats.renderer})"
     )
     if asked.stats:
-        print("\n".join(stats.lines()))
+        print("\n".join(picture.stats.lines()))
     return 0
+
+
+def _copied(tally: Tally) -> str:
+    return f", {tally.copied} begun a second time" if tally.copied else ""
 
 
 def animate(asked: FarmAnimate) -> int:
     """Render an animation; returns the exit code. Raises `UserError`."""
     from ..base.movie import FILM_SUFFIXES, Frames, check_film, check_folder, open_sink
-    from ..base.progress import ProgressReporter
 
     workers_of(asked)
     plan = plan_of(asked)
     settings, count = plan.settings, len(plan.only)
     size = settings.width, settings.height
 
-    from ..farm.animate import FarmFrames
-    from ..farm.part_folder import held
+    from ..farm.jobs import held
+    from ..farm.kinds import FramesJob
 
     is_movie, started = asked.output.suffix.lower() in FILM_SUFFIXES, time.perf_counter()
     folder = asked.output.with_name(asked.output.name + ".frames") if is_movie else asked.output
@@ -125,18 +117,17 @@ def animate(asked: FarmAnimate) -> int:
         check_film(asked.output, size)
     else:
         check_folder(folder)
-    with held(folder, asked.output), interrupt_flag() as interrupted, crew(asked) as workers:
+    with held(folder, asked.output), interrupt_flag() as interrupted:
         sink = Frames(folder, plan.manifest, asked.overwrite)
         there = sum(sink.has(index) for index in plan.only)
-        work = FarmFrames(workers, plan.animation, settings, sink, plan.only)
+        job = FramesJob(plan.animation, settings, sink, plan.only)
         try:
-            with ProgressReporter(plan.animation.start.scene.name) as progress:
-                tally = work.run(progress, interrupted)
+            tally = run(asked, job, plan.animation.start.scene.name, interrupted)
         except UserError as error:
             made = sum(sink.has(index) for index in plan.only)
             raise UserError(f"{error} ({made} of {count} frames are in {folder})") from error
         finally:
-            for told in work.notices.lines(of_frames=count > 1):
+            for told in job.notices.lines(of_frames=count > 1):
                 note(told)
     made = sum(sink.has(index) for index in plan.only)
     if tally is None:
@@ -154,10 +145,9 @@ def animate(asked: FarmAnimate) -> int:
             movie.close()
         shutil.rmtree(folder, ignore_errors=True)
     kept = f" ({there} were there)" if there else ""
-    copied = f", {tally.copied} begun a second time" if tally.copied else ""
     print(
-        f"{asked.output.resolve()}: {made} of {count} frames{kept}{copied}, {size[0]}×{size[1]} at {plan.fps:g} a "
-        f"second, in {time.perf_counter() - started:.1f} s"
+        f"{asked.output.resolve()}: {made} of {count} frames{kept}{_copied(tally)}, {size[0]}×{size[1]} at "
+        f"{plan.fps:g} a second, in {time.perf_counter() - started:.1f} s"
     )
     return 0
 
@@ -175,9 +165,8 @@ def bench(asked: FarmBench) -> int:
         if len(scenes) < count:
             note(f"a scene is measured by one worker, so {len(scenes)} of {count} have something to do")
 
-    from ..base.progress import ProgressReporter
-    from ..farm.bench import FarmBench
-    from ..farm.part_folder import held
+    from ..farm.jobs import held
+    from ..farm.kinds import ScenesJob
 
     output = asked.output
 
@@ -186,12 +175,11 @@ def bench(asked: FarmBench) -> int:
 
         return Store(output, empty_result([*scenes], asked, settings, where), asked.fresh)
 
-    with held(output, output), interrupt_flag() as interrupted, crew(asked) as workers:
-        work = FarmBench(workers, scenes, settings, open_store, start_s, note)
-        with ProgressReporter("bench") as progress:
-            is_done = work.run(progress, interrupted)
-        if work.store is not None:
-            if not is_done:
-                print(f"spectrasplat: stopped; {kept_text(work.store.result)}", file=sys.stderr)
-            write_and_show(work.store.result, output, show)
-    return 0 if is_done else interrupted.exit_code
+    with held(output, output), interrupt_flag() as interrupted:
+        job = ScenesJob(scenes, settings, open_store, start_s, note)
+        tally = run(asked, job, "bench", interrupted)
+        if job.store is not None:
+            if tally is None:
+                print(f"spectrasplat: stopped; {kept_text(job.store.result)}", file=sys.stderr)
+            write_and_show(job.store.result, output, show)
+    return interrupted.exit_code if tally is None else 0

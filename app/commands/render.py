@@ -6,7 +6,7 @@ import os
 import sys
 import time
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..base.errors import UserError
 from ..base.interrupts import interrupt_flag
@@ -17,6 +17,9 @@ from .opened import note_assumptions, open_scene, settings_for
 from .printing import note
 from .scenes import find_scene
 from .table import Render
+
+if TYPE_CHECKING:
+    from ..render.still import RenderResult
 
 START_S, FRESH_S = 0.3, 20.0
 """What a process takes to start, where the system does not tell: --seconds holds that too …; an older one was not
@@ -39,7 +42,7 @@ def render_picture(asked: Render) -> int:
     starting_s = process_age_s() or START_S
     starting_s = starting_s if starting_s < FRESH_S else START_S
     begun = time.perf_counter() - starting_s
-    from ..base.image_io import check_suffix, write_image
+    from ..base.image_io import check_suffix
     from ..base.progress import ProgressReporter
 
     # What costs nothing to check comes before the scene is read, and that before the device.
@@ -65,6 +68,17 @@ def render_picture(asked: Render) -> int:
         stopped = interrupted()
     if better := advice(result.stats.renderer, result.stats.is_software):
         note(better)
+    write_result(asked, scene, settings, result)
+    print(_summary(asked, settings, result.stats, stopped))
+    if asked.stats:
+        print("\n".join(result.stats.lines()))
+    return interrupted.exit_code if stopped else 0
+
+
+def write_result(asked: Render, scene: Scene, settings: RenderSettings, result: RenderResult) -> None:
+    """Note what is to be said of a picture, and write it. Raises `UserError`."""
+    from ..base.image_io import write_image
+
     for notice in result.stats.notices:
         note(notice)
     write_image(
@@ -76,10 +90,6 @@ def render_picture(asked: Render) -> int:
         spectral=result.spectral,
         bin_edges_nm=result.bin_edges_nm,
     )
-    print(_summary(asked, settings, result.stats, stopped))
-    if asked.stats:
-        print("\n".join(result.stats.lines()))
-    return interrupted.exit_code if stopped else 0
 
 
 def check_output(asked: Render) -> Path:

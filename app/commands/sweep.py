@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
+import json
+import os
 import time
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..base import files
+from ..base.atomic import atomic_output
 from ..base.errors import UserError
 from ..base.interrupts import interrupt_flag
 from ..model.settings import RenderSettings
-from .farm import crew, workers_of
+from .farm import run, workers_of
 from .opened import note_assumptions, open_scene, settings_for
 from .printing import note
 from .table import Sweep
 
 if TYPE_CHECKING:
     from ..edit.parameters import Stage
-    from ..farm.point_tasks import Drawn
-    from ..farm.sweep import SweepPlan
-    from ..farm.sweep_folder import SweepFolder
+    from ..render.sweep import Point, SweepPlan
+    from ..render.sweep_points import Drawn
 
 DEFAULT_SAMPLES = 32
+INDEX = "sweep.json"
+_DIGITS = 4
 
 
 def sweep(asked: Sweep) -> int:
@@ -36,9 +42,8 @@ def sweep(asked: Sweep) -> int:
     settings = settings_for(asked, scene, spp=DEFAULT_SAMPLES, photons=scene.render.photons)
     exposure = scene.render.exposure_ev if asked.exposure is None else asked.exposure
 
-    from ..farm.part_folder import held
-    from ..farm.sweep import SweepPlan, parse_set, points_of
-    from ..farm.sweep_folder import SweepFolder
+    from ..farm.jobs import held
+    from ..render.sweep import SweepPlan, parse_set, points_of
 
     start = Stage(scene, scene.camera, exposure)
     grid: dict[str, tuple[float, ...]] = {}
@@ -52,17 +57,20 @@ def sweep(asked: Sweep) -> int:
     if asked.bins is not None and not asked.exact:
         note("--bins: photons that are kept have colours only, so every point is traced")
     note(plan.told(workers))
-    started, drawn_by = (
-        time.perf_counter(),
-        _here if is_here or (len(plan.groups) == 1 and plan.keeps_photons) else _by_crew,
-    )
+    started = time.perf_counter()
     with held(asked.output, asked.output), interrupt_flag() as interrupted:
         folder = SweepFolder(
             asked.output, plan.points, _description(start, settings, plan), f".{asked.format}", asked.overwrite
         )
         there = sum(folder.has(point.number) for point in plan.points)
-        with ProgressReporter(scene.name) as progress:
-            drawn_by(asked, plan, settings, folder, progress, interrupted)
+        if is_here or not plan.can_spread:
+            with ProgressReporter(scene.name) as progress:
+                _draw_here(plan, folder, progress, interrupted)
+        else:
+            from ..farm.kinds import PointsJob
+
+            job = PointsJob(plan, folder.put, lambda number: not folder.has(number), folder.first)
+            run(asked, job, scene.name, interrupted)
         made = sum(folder.has(point.number) for point in plan.points)
     kept = f" ({there} were there)" if there else ""
     stopped = interrupted() and made < len(plan.points)
@@ -74,71 +82,23 @@ def sweep(asked: Sweep) -> int:
     return interrupted.exit_code if stopped else 0
 
 
-class _Told:
-    """A local point's progress."""
-
-    def __init__(self, tell: Callable[[float, str], None], stop: Callable[[], bool]) -> None:
-        self.unwanted = stop
-        self._tell = tell
-        self.begin, self.count = 0, 1
-
-    def __call__(self, share: float, text: str = "") -> None:
-        self._tell((self.begin + share) / self.count, f"picture {self.begin + 1} of {self.count}")
-
-
-def _here(
-    asked: Sweep,
-    plan: SweepPlan,
-    settings: RenderSettings,
-    folder: SweepFolder,
-    tell: Callable[[float, str], None],
-    stop: Callable[[], bool],
+def _draw_here(
+    plan: SweepPlan, folder: SweepFolder, tell: Callable[[float, str], None], stop: Callable[[], bool]
 ) -> None:
-    from ..farm.desk import Desk
-    from ..farm.sweep_run import by_group, draw_point, shared_of
+    """One point after the other in this process."""
+    from ..gpu.context import create_context
+    from ..gpu.shader import keep_programs
+    from ..render.sweep_points import SweepPainter
 
-    due = list(by_group(plan.groups, lambda number: not folder.has(number)))
-    desk, shared, told = Desk(), shared_of(plan, settings), _Told(tell, stop)
-    told.count, take = len(due), _taker(folder)
-    try:
-        for place, (group, number) in enumerate(due):
-            told.begin = place
-            drawn = draw_point(desk, plan, shared, group, number, told)
-            if drawn is None:
-                return
-            take(drawn)
-    finally:
-        desk.clear()
-
-
-def _taker(folder: SweepFolder) -> Callable[[Drawn], None]:
-    """Writes pictures, and tells what they say of themselves, each sentence once."""
-    said: set[str] = set()
-
-    def take(drawn: Drawn) -> None:
-        folder.put(drawn)
-        for sentence in drawn.notices:
-            if sentence not in said:
-                said.add(sentence)
-                note(f"picture {drawn.number}: {sentence}")
-
-    return take
-
-
-def _by_crew(
-    asked: Sweep,
-    plan: SweepPlan,
-    settings: RenderSettings,
-    folder: SweepFolder,
-    tell: Callable[[float, str], None],
-    stop: Callable[[], bool],
-) -> None:
-    from ..farm.sweep_run import FarmSweep
-
-    with crew(asked) as workers:
-        FarmSweep(
-            workers, plan, settings, _taker(folder), lambda number: not folder.has(number), first=folder.first
-        ).run(tell, stop)
+    due = [point.number for group in plan.groups for point in group.points if not folder.has(point.number)]
+    with create_context() as context:
+        keep_programs(context.ctx)
+        painter = SweepPainter(context, plan)
+        try:
+            for drawn in painter.draw_all(due, tell, stop):
+                folder.put(drawn)
+        finally:
+            painter.release()
 
 
 def _description(start: Stage, settings: RenderSettings, plan: SweepPlan) -> Mapping[str, object]:
@@ -151,3 +111,103 @@ def _description(start: Stage, settings: RenderSettings, plan: SweepPlan) -> Map
         "exposure_ev": start.exposure_ev,
         "keeps_photons": plan.keeps_photons,
     }
+
+
+class SweepFolder:
+    """Pictures of `points`; those to look at share the exposure of the first point."""
+
+    def __init__(
+        self, folder: Path, points: tuple[Point, ...], description: Mapping[str, object], suffix: str, overwrite: bool
+    ) -> None:
+        """`description`: what decides the pictures besides their values. The folder is there and held. Raises
+        `UserError` where it holds another sweep."""
+        self._folder, self._points, self._suffix = folder, points, suffix
+        self._description = json.loads(json.dumps(dict(description) | {"suffix": suffix}))
+        self._base_ev: float | None = None
+        self._noted: set[str] = set()
+        before = self._stored()
+        told = {"sweep": self._description, "pictures": self._pictures()}
+        if before is not None and {key: before.get(key) for key in told} != told:
+            if not overwrite:
+                raise UserError(f"{folder} holds another sweep: choose another folder, or replace it with --overwrite")
+            self._empty(before)
+            before = None
+        elif before is not None and overwrite:
+            self._empty(before)
+            before = None
+        if before is not None:
+            found = before.get("base_ev")
+            self._base_ev = float(found) if isinstance(found, int | float) else None
+        self._save()
+
+    def path(self, number: int) -> Path:
+        """Of a point's picture."""
+        return self._folder / f"{number:0{_DIGITS}}{self._suffix}"
+
+    def has(self, number: int) -> bool:
+        """Whether it is there: files appear whole or not at all."""
+        is_settled = self._base_ev is not None or not self.shares_exposure
+        return is_settled and os.path.isfile(self.path(number)) and self.path(number).stat().st_size > 0
+
+    @property
+    def shares_exposure(self) -> bool:
+        """Whether pictures are for looking at."""
+        from ..base.image_io import SHOWN_SUFFIXES
+
+        return self._suffix in SHOWN_SUFFIXES
+
+    @property
+    def first(self) -> int | None:
+        """The point that must be drawn before the others can be written; None where that is settled."""
+        return 0 if self.shares_exposure and self._base_ev is None else None
+
+    def put(self, drawn: Drawn) -> None:
+        """Write a point's picture, and note what it says of itself, each sentence once. Raises `UserError`."""
+        from ..base.image_io import write_image
+        from ..base.tone_map import auto_exposure
+
+        exposure = None
+        if self.shares_exposure:
+            if self._base_ev is None:
+                self._base_ev = auto_exposure(drawn.rgb)
+                self._save()
+            exposure = self._base_ev - auto_exposure(drawn.rgb) + self._points[drawn.number].stage.exposure_ev
+        for sentence in drawn.notices:
+            if sentence not in self._noted:
+                self._noted.add(sentence)
+                note(f"picture {drawn.number}: {sentence}")
+        stage = self._points[drawn.number].stage
+        write_image(
+            self.path(drawn.number),
+            drawn.rgb,
+            exposure_ev=exposure,
+            glare=stage.scene.render.glare,
+            antialias=stage.scene.render.antialias_highlights,
+            spectral=drawn.spectral if self._suffix == ".exr" else None,
+            bin_edges_nm=drawn.bin_edges_nm if self._suffix == ".exr" else None,
+        )
+
+    def _pictures(self) -> list[dict[str, object]]:
+        return [{"file": self.path(point.number).name, **point.values} for point in self._points]
+
+    def _stored(self) -> dict | None:
+        try:
+            stored = json.loads(files.read_text(self._folder / INDEX, files.TABLE_BYTES))
+        except FileNotFoundError:
+            return None
+        except (OSError, ValueError, RecursionError) as error:
+            raise UserError(f"{self._folder / INDEX} cannot be read: remove it, or choose another folder") from error
+        return stored if isinstance(stored, dict) else {}
+
+    def _save(self) -> None:
+        told = {"sweep": self._description, "pictures": self._pictures(), "base_ev": self._base_ev}
+        with atomic_output(self._folder / INDEX) as temporary:
+            temporary.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
+
+    def _empty(self, before: dict) -> None:
+        """Remove the pictures of the sweep that was here, and nothing else."""
+        for picture in before.get("pictures", ()):
+            name = picture.get("file", "") if isinstance(picture, dict) else ""
+            path = self._folder / str(name)
+            if path.parent == self._folder and path.stem.isdigit():
+                path.unlink(missing_ok=True)

@@ -1,13 +1,20 @@
 """Dask as a crew: workers of this machine, each a process with its share of the cores or a GPU of its own, or those of
-a scheduler that runs already."""
+a scheduler that runs already.
+
+`python -m spectrasplat.farm.cluster ADDRESS NAME` is such a process: it finds its share in its environment and the
+cluster's keys on its standard input, and ends when the scheduler does.
+"""
 
 from __future__ import annotations
 
+import asyncio
+import ctypes
 import json
 import logging
 import os
 import pickle
 import re
+import signal
 import subprocess
 import sys
 import tempfile
@@ -23,8 +30,7 @@ from typing import IO, TYPE_CHECKING, Any, Self
 from ..base.errors import UserError
 from ..base.version import __version__
 from . import desk
-from .gpus import count_gpus
-from .jobs import Job, News
+from .jobs import News, Task
 
 if TYPE_CHECKING:
     from distributed import Client, Future, LocalCluster, Security
@@ -37,7 +43,10 @@ _EARLY_S = 15.0
 _EARLY_DEATHS = 3
 """A worker that dies so often, each time so soon after it began, will not live."""
 _DEATHS = 10
-"""Workers that may die with one job before that is blamed."""
+"""Workers that may die with one task before that is blamed."""
+_MOST_GPUS = 64
+_EXTENSIONS = 0x3055
+_DRM_DEVICE_FILE = 0x3233
 
 
 def check_installed() -> None:
@@ -47,6 +56,39 @@ def check_installed() -> None:
         import distributed  # noqa: F401
     except ImportError as error:
         raise UserError(f"farms need Dask, which is not installed ({error}): {PIP_LINE}") from error
+
+
+def count_gpus() -> int:
+    """How many GPUs there are to share out, those with the lowest numbers, without a gap; 0 where nothing can be told.
+
+    EGL's devices that are no software renderers, each card once, by EGL_EXT_device_enumeration and EGL_EXT_device_query
+    (Khronos), in the order in which moderngl counts them."""
+    try:
+        egl = ctypes.CDLL("libEGL.so.1")
+        egl.eglGetProcAddress.restype = ctypes.c_void_p
+        query = egl.eglGetProcAddress(b"eglQueryDevicesEXT")
+        text_of = egl.eglGetProcAddress(b"eglQueryDeviceStringEXT")
+    except (OSError, AttributeError):
+        return 0
+    if not query or not text_of:
+        return 0
+    devices = (ctypes.c_void_p * _MOST_GPUS)()
+    found = ctypes.c_int(0)
+    ask = ctypes.CFUNCTYPE(ctypes.c_uint, ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)(query)
+    ask_text = ctypes.CFUNCTYPE(ctypes.c_char_p, ctypes.c_void_p, ctypes.c_int)(text_of)
+    if not ask(_MOST_GPUS, devices, ctypes.byref(found)):
+        return 0
+    files: list[bytes] = []
+    for device in devices[: found.value]:
+        extensions = (ask_text(device, _EXTENSIONS) or b"").split()
+        if b"EGL_MESA_device_software" in extensions:
+            break
+        has_file = b"EGL_EXT_device_drm" in extensions
+        file = (ask_text(device, _DRM_DEVICE_FILE) or b"") if has_file else b""
+        if file and file in files:
+            break  # the same card again, by another driver
+        files.append(file)
+    return len(files)
 
 
 @dataclass
@@ -103,20 +145,15 @@ class LocalWorkers:
     def _start(self, number: int) -> _Process:
         log = tempfile.TemporaryFile()  # noqa: SIM115 - as long as the worker
         process = subprocess.Popen(
-            [sys.executable, "-m", "spectrasplat.farm.worker", self._cluster.scheduler_address, str(number)],
+            [sys.executable, "-m", "spectrasplat.farm.cluster", self._cluster.scheduler_address, str(number)],
             stdin=subprocess.PIPE,
             stdout=log,
             stderr=log,
             env=self.environment(number),
             start_new_session=True,
         )
-        keys = {
-            name: getattr(self._security, name)
-            for name in (
-                "tls_ca_file",
-                *(f"tls_{role}_{kind}" for role in ("client", "worker") for kind in ("cert", "key")),
-            )
-        }
+        names = ["tls_ca_file", *(f"tls_{role}_{kind}" for role in ("client", "worker") for kind in ("cert", "key"))]
+        keys = {name: getattr(self._security, name) for name in names}
         assert process.stdin is not None
         try:
             process.stdin.write((json.dumps(keys) + "\n").encode())
@@ -162,16 +199,15 @@ class DaskCrew:
     workers: LocalWorkers | None = None
     _topic: str = field(default_factory=lambda: f"spectrasplat-{uuid.uuid4().hex}")
     _shared: Future | None = None
-    _futures: dict[tuple[Job, int], Future] = field(default_factory=dict)
-    _jobs: dict[int, Job] = field(default_factory=dict)
+    _submitted: dict[int, tuple[Task, Future]] = field(default_factory=dict)
     """By the attempt, whose numbers are never used twice."""
     _news: SimpleQueue[News] = field(default_factory=SimpleQueue)
     _size: tuple[float, int] = (-1.0, 0)
 
     def share(self, value: Any) -> None:
-        """What all jobs from now on are about."""
+        """See `Crew`."""
         self._shared = self.client.submit(desk.same, pickle.dumps(value, 5), pure=False)
-        self.client.subscribe_topic(self._topic, self._told)
+        self.client.subscribe_topic(self._topic, self._heard)
 
     def clock(self) -> float:
         """Of this process."""
@@ -185,29 +221,21 @@ class DaskCrew:
             self._size = now, sum(worker["nthreads"] for worker in found.values())
         return self._size[1]
 
-    def submit(self, job: Job, attempt: int) -> None:
-        """See `Crew`; `job.call` is a function of this package and its arguments."""
-        function, *arguments = job.call
-        key = f"{self._topic}-{attempt}"
-        future = self.client.submit(
-            desk.do,
-            function,
-            self._shared,
-            __version__,
-            (self._topic, job.number, attempt, key),
-            *arguments,
-            key=key,
-            pure=False,
-            priority=10 if job.urgent else 0,
-        )
-        self._futures[job, attempt] = future
-        self._jobs[attempt] = job
-        future.add_done_callback(lambda done: self._news.put(News(job, attempt, is_done=True, result=done)))
-
-    def drop(self, job: Job, attempt: int) -> None:
+    def submit(self, task: Task, attempt: int) -> None:
         """See `Crew`."""
-        self._jobs.pop(attempt, None)
-        future = self._futures.pop((job, attempt), None)
+        function, *arguments = task.call
+        key = f"{self._topic}-{attempt}"
+        report = (self._topic, attempt, key)
+        priority = 10 if task.urgent else 0
+        future = self.client.submit(
+            desk.do, function, self._shared, __version__, report, *arguments, key=key, pure=False, priority=priority
+        )
+        self._submitted[attempt] = task, future
+        future.add_done_callback(lambda done: self._news.put(News(task, attempt, is_done=True, result=done)))
+
+    def drop(self, task: Task, attempt: int) -> None:
+        """See `Crew`."""
+        _, future = self._submitted.pop(attempt, (task, None))
         if future is not None and self.client.status == "running":
             with suppress(Exception):  # the scheduler may go at any moment, and takes it along
                 future.cancel()
@@ -226,27 +254,25 @@ class DaskCrew:
             self.workers.look_after()
         return [self._opened(news) if news.is_done else news for news in found]
 
-    def _told(self, event: tuple[float, Any]) -> None:
-        _, attempt, share = event[1]
-        job = self._jobs.get(attempt)
-        if job is not None:
-            self._news.put(News(job, attempt, share))
+    def _heard(self, event: tuple[float, Any]) -> None:
+        attempt, share = event[1]
+        if attempt in self._submitted:
+            self._news.put(News(self._submitted[attempt][0], attempt, share))
 
     def _opened(self, news: News) -> News:
         """What a future that is done holds."""
         from distributed.scheduler import KilledWorker
 
-        job, attempt, future = news.job, news.attempt, news.result
-        self._futures.pop((job, attempt), None)
-        self._jobs.pop(attempt, None)
+        task, attempt, future = news.task, news.attempt, news.result
+        self._submitted.pop(attempt, None)
         try:
-            return News(job, attempt, 1.0, future.result(timeout=600), is_done=True)
+            return News(task, attempt, 1.0, future.result(timeout=600), is_done=True)
         except UserError as error:
             failed: Exception = error
         except KilledWorker as error:
             failed = UserError(
-                f"{job.name} took down every worker that began it, {error.allowed_failures + 1} in turn: look at their "
-                "memory and their drivers"
+                f"{task.name} took down every worker that began it, {error.allowed_failures + 1} in turn: look at "
+                "their memory and their drivers"
             )
         except ModuleNotFoundError as error:
             failed = UserError(
@@ -255,11 +281,11 @@ class DaskCrew:
         except Exception as error:  # noqa: BLE001 - whatever a worker meets
             self._check_scheduler()
             failed = error
-        return News(job, attempt, is_done=True, error=failed)
+        return News(task, attempt, is_done=True, error=failed)
 
     def _check_scheduler(self) -> None:
         """Raise `UserError` where the scheduler is gone, or was for a moment: it has forgotten all then."""
-        lost = any(future.status in ("lost", "cancelled") for future in self._futures.values())
+        lost = any(future.status in ("lost", "cancelled") for _, future in self._submitted.values())
         if lost or self.client.status != "running":
             raise UserError(f"the scheduler at {self.address} is gone: start it again and give the same command")
 
@@ -269,8 +295,8 @@ class DaskCrew:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        for job, attempt in [*self._futures]:
-            self.drop(job, attempt)
+        for attempt, (task, _) in [*self._submitted.items()]:
+            self.drop(task, attempt)
         self.client.close(timeout=2)
         if self.workers is not None:
             self.workers.close()
@@ -312,3 +338,34 @@ def open_crew(workers: int | None, scheduler: str | None) -> Iterator[DaskCrew]:
         except (OSError, ValueError, ImportError) as error:
             raise UserError(f"no scheduler answers at '{scheduler}' ({type(error).__name__}): {refusal}") from error
         yield stack.enter_context(DaskCrew(client, scheduler))
+
+
+async def _work(address: str, name: str, keys: dict[str, str]) -> None:
+    from distributed import Security, Worker
+
+    with tempfile.TemporaryDirectory(prefix="spectrasplat-worker-") as folder:
+        worker = Worker(
+            address,
+            nthreads=1,
+            name=name,
+            memory_limit=0,  # what a rendering takes is checked before it begins
+            local_directory=folder,
+            dashboard=False,
+            security=Security(require_encryption=True, **keys),
+            death_timeout=30,
+        )
+        await worker
+        await worker.finished()
+
+
+def _main() -> None:
+    """Be a worker until there is no scheduler any more."""
+    # Ctrl-C is for the process that hands out the work, which then ends this one.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    address, name = sys.argv[1:3]
+    asyncio.run(_work(address, name, json.loads(sys.stdin.readline())))
+    os._exit(0)  # nobody wants what may still be traced
+
+
+if __name__ == "__main__":
+    _main()

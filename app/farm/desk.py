@@ -1,5 +1,5 @@
-"""What runs on a worker: one job at a time in a thread that keeps its OpenGL context, its programs and what frames
-share from job to job."""
+"""What runs on a worker: one task at a time in a thread that keeps its OpenGL context, its programs and what tasks
+share from one to the next."""
 
 from __future__ import annotations
 
@@ -20,14 +20,13 @@ _own = threading.local()
 
 
 class Desk:
-    """One thread's; `kept` holds what jobs on the same shared value leave for each other."""
+    """One thread's."""
 
-    def __init__(self, context: Context | None = None) -> None:
-        """`context`: the caller's, which is not released; None: one of its own."""
-        self._lent, self._context = context, context
+    def __init__(self) -> None:
+        self._context: Context | None = None
         self._of = b""
         self._value: Any = None
-        self.kept: dict[str, Any] = {}
+        self._kept: Any = None
 
     @property
     def context(self) -> Context:
@@ -36,6 +35,12 @@ class Desk:
             self._context = create_context()
             shader.keep_programs(self._context.ctx)
         return self._context
+
+    def keep(self, make: Callable[[], Any]) -> Any:
+        """What tasks on the same shared value leave for each other; made by the first of them."""
+        if self._kept is None:
+            self._kept = make()
+        return self._kept
 
     def take(self, shared: bytes) -> Any:
         """The value that was pickled; another one than before clears the desk."""
@@ -47,22 +52,21 @@ class Desk:
 
     def clear(self) -> None:
         """Forget all, the context too."""
-        for thing in self.kept.values():
-            thing.release()
-        if self._context is not None and self._lent is None:
+        if self._kept is not None:
+            self._kept.release()
+        if self._context is not None:
             shader.forget_programs(self._context.ctx)
             self._context.release()
-        self._context, self._value, self._of, self.kept = self._lent, None, b"", {}
+        self._context, self._value, self._of, self._kept = None, None, b"", None
 
 
 class Report:
-    """Tells how far a job is, now and then, and hears whether it is wanted at all."""
+    """Reports how far a task is, now and then, and knows whether it is wanted at all."""
 
-    def __init__(self, topic: str, number: int, attempt: int, key: str) -> None:
+    def __init__(self, topic: str, attempt: int, key: str) -> None:
         from distributed import get_worker
 
-        self._worker, self._topic, self._key = get_worker(), topic, key
-        self._of = [number, attempt]
+        self._worker, self._topic, self._attempt, self._key = get_worker(), topic, attempt, key
         self._told_s = 0.0
         self(0.0)
 
@@ -70,22 +74,16 @@ class Report:
         now = time.monotonic()
         if now - self._told_s >= _TELL_EVERY_S:
             self._told_s = now
-            self._worker.log_event(self._topic, [*self._of, float(share)])
+            self._worker.log_event(self._topic, [self._attempt, float(share)])
 
     def unwanted(self) -> bool:
-        """Whether the job was dropped meanwhile: another copy was quicker, or all was stopped."""
+        """Whether the task was dropped meanwhile: another copy was quicker, or all was stopped."""
         task = self._worker.state.tasks.get(self._key)
         return task is None or task.state == "cancelled"
 
 
-def do(
-    function: Callable[..., Any],
-    shared: bytes,
-    version: str,
-    report: tuple[str, int, int, str],
-    *arguments: Any,
-) -> Any:
-    """One job: `function(desk, value, report, *arguments)`, where `value` was pickled as `shared`."""
+def do(function: Callable[..., Any], shared: bytes, version: str, report: tuple[str, int, str], *arguments: Any) -> Any:
+    """One task: `function(desk, value, report, *arguments)`, where `value` was pickled as `shared`."""
     if version != __version__:
         raise UserError(
             f"a worker has version {__version__} of spectrasplat and this is {version}: install the same one everywhere"
@@ -96,10 +94,10 @@ def do(
     except UserError:
         raise
     except BaseException:
-        desk.clear()  # whatever it was, the next job begins with a context of its own
+        desk.clear()  # whatever it was, the next task begins with a context of its own
         raise
 
 
 def same(value: bytes) -> bytes:
-    """What all jobs share: the result of a job, so that it is made again where the worker that held it is gone."""
+    """What all tasks share: the result of a task, so that it is made again where the worker that held it is gone."""
     return value

@@ -9,7 +9,8 @@ from pathlib import Path
 
 from spectrasplat.commands.scenes import find_scene
 from spectrasplat.farm.cluster import open_crew
-from spectrasplat.farm.render import FarmRender, FarmResult
+from spectrasplat.farm.jobs import Foreman, Tally
+from spectrasplat.farm.still import StillJob
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.settings import RenderSettings
 
@@ -21,23 +22,21 @@ def farmed(
     folder: Path,
     workers: int,
     parts: int,
-    meddle: Callable[[FarmRender, list[int]], None] = lambda work, process_ids: None,
+    meddle: Callable[[StillJob, list[int]], None] = lambda job, process_ids: None,
     notes: list[str] | None = None,
     settings: RenderSettings = SETTINGS,
-) -> FarmResult | None:
-    """A picture by so many workers; `meddle` is called again and again with the work and the workers' processes."""
+) -> tuple[StillJob, Tally]:
+    """A picture by so many workers; `meddle` is called again and again with the job and the workers' processes."""
     folder.mkdir(exist_ok=True)
     scene = load_scene(find_scene(SCENE))
     with open_crew(workers, None) as crew:
         told = [] if notes is None else notes
-        work = FarmRender(crew, scene, settings, find_scene(SCENE), folder, parts, told.append)
+        job = StillJob(scene, settings, find_scene(SCENE), folder, parts, told.append)
         assert crew.workers is not None
         local = crew.workers
-
-        def tell(share: float, text: str) -> None:
-            meddle(work, local.process_ids)
-
-        return work.run(tell, lambda: False)
+        tally = Foreman(crew, job).run(lambda share, text: meddle(job, local.process_ids))
+        assert tally is not None
+        return job, tally
 
 
 def kill(process_id: int) -> None:

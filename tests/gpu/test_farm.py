@@ -15,7 +15,7 @@ from spectrasplat.__main__ import main
 from spectrasplat.base import atomic
 from spectrasplat.base.errors import UserError
 from spectrasplat.commands.scenes import find_scene
-from spectrasplat.farm.render import FarmRender
+from spectrasplat.farm.still import StillJob
 from spectrasplat.gpu.context import create_context
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.settings import RenderSettings
@@ -36,8 +36,8 @@ class Killer:
         self.times, self.after = times, after
         self.killed: list[int] = []
 
-    def __call__(self, work: FarmRender, process_ids: list[int]) -> None:
-        is_time = len(self.killed) < self.times and len(work.kept.indices) >= self.after * (1 + len(self.killed))
+    def __call__(self, job: StillJob, process_ids: list[int]) -> None:
+        is_time = len(self.killed) < self.times and len(job.kept.indices) >= self.after * (1 + len(self.killed))
         if is_time and process_ids[0] not in self.killed:  # the same worker, begun again
             self.killed.append(process_ids[0])
             kill(process_ids[0])
@@ -52,20 +52,20 @@ def whole(settings: RenderSettings) -> np.ndarray:
 @pytest.mark.slow
 def test_a_killed_worker_loses_nothing(tmp_path: Path) -> None:
     killer = Killer(1, after=1)
-    result = farmed(tmp_path / "parts", 1, 3, killer, settings=SMALL)
-    assert result is not None and len(killer.killed) == 1 and result.parts == 3
+    job, _ = farmed(tmp_path / "parts", 1, 3, killer, settings=SMALL)
+    assert len(killer.killed) == 1 and job.kept.count == 3
     one = whole(SMALL)
-    assert np.abs(result.picture.rgb - one).max() <= 4e-6 * one.max()
+    assert np.abs(job.picture.rgb - one).max() <= 4e-6 * one.max()
     assert len(list((tmp_path / "parts").glob("*.ssp"))) == 3
 
 
 @pytest.mark.slow
 def test_eight_parts_on_four_workers_of_which_one_is_killed_twice(tmp_path: Path) -> None:
     killer = Killer(2, after=1)
-    result = farmed(tmp_path / "parts", 4, 8, killer, settings=SETTINGS)
-    assert result is not None and len(set(killer.killed)) == 2
+    job, _ = farmed(tmp_path / "parts", 4, 8, killer, settings=SETTINGS)
+    assert len(set(killer.killed)) == 2
     one = whole(SETTINGS)
-    assert np.abs(result.picture.rgb - one).max() <= 4e-6 * one.max()
+    assert np.abs(job.picture.rgb - one).max() <= 4e-6 * one.max()
     # It can fail: without one of its parts the picture is another.
     parts = sorted((tmp_path / "parts").glob("*.ssp"))
     assert len(parts) == 8
@@ -80,8 +80,8 @@ def test_what_is_stopped_is_gone_on_from_and_what_is_cut_short_done_again(
 ) -> None:
     folder, notes = tmp_path / "parts", list[str]()
 
-    def fill_the_disk(work: FarmRender, process_ids: list[int]) -> None:
-        if work.kept.indices:
+    def fill_the_disk(job: StillJob, process_ids: list[int]) -> None:
+        if job.kept.indices:
             raise UserError("cannot write: the disk is full")
 
     with pytest.raises(UserError, match="the disk is full"):
@@ -89,14 +89,14 @@ def test_what_is_stopped_is_gone_on_from_and_what_is_cut_short_done_again(
     there = sorted(folder.glob("*.ssp"))
     assert 1 <= len(there) < 3
     there[0].write_bytes(there[0].read_bytes()[:1000])
-    result = farmed(folder, 2, 3, notes=notes, settings=SMALL)
-    assert result is not None and result.taken_up == len(there) - 1
+    job, _ = farmed(folder, 2, 3, notes=notes, settings=SMALL)
+    assert job.taken_up == len(there) - 1
     assert len(notes) == 1 and "cut short" in notes[0] and str(there[0]) in notes[0]
     one = whole(SMALL)
-    assert np.abs(result.picture.rgb - one).max() <= 4e-6 * one.max()
+    assert np.abs(job.picture.rgb - one).max() <= 4e-6 * one.max()
     # All is there: a farm that begins again only looks at the parts.
-    again = farmed(folder, 1, 3, settings=SMALL)
-    assert again is not None and again.taken_up == 3 and again.tally.done == 1
+    job, tally = farmed(folder, 1, 3, settings=SMALL)
+    assert job.taken_up == 3 and tally.done == 1
     # Parts of another rendering are not touched.
     with pytest.raises(UserError, match="holds parts of another rendering"):
         farmed(folder, 1, 3, settings=RenderSettings(48, 27, photons=50_000, batch=4096))

@@ -11,16 +11,16 @@ import heapq
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from spectrasplat.__main__ import main
 from spectrasplat.farm import jobs
-from spectrasplat.farm.jobs import Foreman, Job, News
-from spectrasplat.farm.weighing import Weighing
+from spectrasplat.farm.jobs import Foreman, News, Tally, Task
 from spectrasplat.render.light_stats import LightStats
 from spectrasplat.render.part_file import merged_sums, read_header, write_part
 from spectrasplat.render.parts import Part, PartHeader, Share, _plain
@@ -52,6 +52,9 @@ class SimulatedCrew:
         self._random = np.random.default_rng(self.seed)
         self._free = list(self._random.lognormal(0.0, 0.15, self.workers))
 
+    def share(self, value: Any) -> None:
+        """Nothing: tasks are numbers."""
+
     def clock(self) -> float:
         """Simulated seconds."""
         return self.now
@@ -60,11 +63,11 @@ class SimulatedCrew:
         """All."""
         return self.workers
 
-    def submit(self, job: Job, attempt: int) -> None:
+    def submit(self, task: Task, attempt: int) -> None:
         """Queue it."""
-        self._queue.append((job, attempt))
+        self._queue.append((task, attempt))
 
-    def drop(self, job: Job, attempt: int) -> None:
+    def drop(self, task: Task, attempt: int) -> None:
         """Its worker is free at once, as one that asks whether its job is wanted."""
         self._dropped.add(attempt)
         if attempt in self._at:
@@ -76,53 +79,76 @@ class SimulatedCrew:
         """What happens next."""
         told = []
         while self._queue and self._free:
-            job, attempt = self._queue.pop(0)
+            task, attempt = self._queue.pop(0)
             if attempt not in self._dropped:
-                told.append(self._begin(job, attempt, self._free.pop()))
+                told.append(self._begin(task, attempt, self._free.pop()))
         if told or not self._events:
             return told
-        self.now, _, kind, job, attempt, share = heapq.heappop(self._events)
+        self.now, _, kind, task, attempt, share = heapq.heappop(self._events)
         if kind == "back":
             self._free.append(share)
             return []
         if attempt in self._dropped or attempt not in self._at:
             return []
         if kind == "told":
-            return [News(job, attempt, share)]
+            return [News(task, attempt, share)]
         slowness, began = self._at.pop(attempt)
         self.busy_s += self.now - began
         if kind == "dies":
             self.died += 1
-            self._queue.insert(0, (job, attempt))
-            self._push(self.restart_s, "back", job, attempt, slowness)
+            self._queue.insert(0, (task, attempt))
+            self._push(self.restart_s, "back", task, attempt, slowness)
             return []
         self._free.append(slowness)
-        return [News(job, attempt, 1.0, job.call, is_done=True)]
+        return [News(task, attempt, 1.0, task.call, is_done=True)]
 
-    def _begin(self, job: Job, attempt: int, slowness: float) -> News:
+    def _begin(self, task: Task, attempt: int, slowness: float) -> News:
         takes = PART_S * slowness * self._random.lognormal(0.0, 0.1)
         takes *= 10.0 if self._random.random() < self.late else 1.0
         self._at[attempt] = slowness, self.now
         if self._random.random() < self.deaths:
-            self._push(takes * self._random.random(), "dies", job, attempt, 0.0)
+            self._push(takes * self._random.random(), "dies", task, attempt, 0.0)
         else:
             for share in (0.25, 0.5, 0.75):
-                self._push(takes * share, "told", job, attempt, share)
-            self._push(takes, "done", job, attempt, 1.0)
-        return News(job, attempt, 0.0)
+                self._push(takes * share, "told", task, attempt, share)
+            self._push(takes, "done", task, attempt, 1.0)
+        return News(task, attempt, 0.0)
 
-    def _push(self, after: float, kind: str, job: Job, attempt: int, share: float) -> None:
-        heapq.heappush(self._events, (self.now + after, self._random.random(), kind, job, attempt, share))
+    def _push(self, after: float, kind: str, task: Task, attempt: int, share: float) -> None:
+        heapq.heappush(self._events, (self.now + after, self._random.random(), kind, task, attempt, share))
 
 
-def simulate(crew: SimulatedCrew, parts: int) -> tuple[list[int], Foreman, list[float]]:
-    """Numbers of the parts as they were taken, who handed them out, and what the bar showed."""
-    taken: list[int] = []
+class ListedJob:
+    """Tasks that are all known from the start; what each brought is listed."""
+
+    guesses: Mapping[str, float] = {"part": 1.0}
+    shared = None
+
+    def __init__(self, tasks: Iterable[Task]) -> None:
+        self.tasks = list(tasks)
+        self.taken: list[tuple[int, Any]] = []
+
+    def begin(self) -> Iterable[Task]:
+        """All."""
+        return self.tasks
+
+    def take(self, task: Task, result: Any, workers: int) -> Iterable[Task]:
+        """Nothing follows."""
+        self.taken.append((task.number, result))
+        return ()
+
+    def ahead(self) -> Mapping[str, int]:
+        """Nothing is."""
+        return {}
+
+
+def simulate(crew: SimulatedCrew, parts: int) -> tuple[list[int], Tally, list[float]]:
+    """Numbers of the parts as they were taken, what came to pass, and what the bar showed."""
     shown: list[float] = []
-    foreman = Foreman(crew, Weighing({"part": 1.0}))
-    foreman.add(Job("part", number, number) for number in range(1, parts + 1))
-    assert foreman.run(lambda job, result: taken.append(result), lambda share, text: shown.append(share))
-    return taken, foreman, shown
+    job = ListedJob(Task("part", number, number) for number in range(1, parts + 1))
+    tally = Foreman(crew, job).run(lambda share, text: shown.append(share))
+    assert tally is not None
+    return [number for number, _ in job.taken], tally, shown
 
 
 @contextmanager
@@ -175,14 +201,14 @@ if __name__ == "__main__":
     print("workers  parts  late  died  copies  ends after  without copies  work that was wasted")
     for workers, late in ((1000, 0.0), (1000, 0.01), (1000, 0.05), (250, 0.01), (250, 0.05)):
         crew = SimulatedCrew(workers, late=late)
-        taken, foreman, _ = simulate(crew, 1000)
+        taken, tally, _ = simulate(crew, 1000)
         assert sorted(taken) == list(range(1, 1001))
         alone = SimulatedCrew(workers, late=late)
         with without_copies():
             simulate(alone, 1000)
         print(
-            f"{workers:7}  {1000:5}  {late:4.0%}  {crew.died:4}  {foreman.tally.copied:6}  {crew.now:8.0f} s  "
-            f"{alone.now:12.0f} s  {max(1.0 - sum(foreman.tally.seconds['part']) / crew.busy_s, 0.0):18.1%}"
+            f"{workers:7}  {1000:5}  {late:4.0%}  {crew.died:4}  {tally.copied:6}  {crew.now:8.0f} s  "
+            f"{alone.now:12.0f} s  {max(1.0 - sum(tally.seconds['part']) / crew.busy_s, 0.0):18.1%}"
         )
     side = int(sys.argv[1]) if len(sys.argv) > 1 else 256
     with tempfile.TemporaryDirectory() as name:

@@ -14,10 +14,10 @@ from spectrasplat.commands.scenes import find_scene
 from spectrasplat.edit.parameters import Stage
 from spectrasplat.farm import cluster
 from spectrasplat.farm.cluster import PIP_LINE
-from spectrasplat.farm.part_folder import held
-from spectrasplat.farm.sweep import SweepPlan, parse_set, points_of
+from spectrasplat.farm.jobs import held
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.settings import RenderSettings
+from spectrasplat.render.sweep import SweepPlan, parse_set, points_of
 
 GAIN = "objects.prism.dispersion_gain=0:3:31"
 

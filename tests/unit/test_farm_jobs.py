@@ -7,10 +7,17 @@ from typing import Any
 
 import pytest
 from spectrasplat.base.errors import UserError
-from spectrasplat.farm.jobs import TRIES, Foreman, Job, News
-from spectrasplat.farm.weighing import Weighing
+from spectrasplat.farm.jobs import TRIES, Foreman, News, Task, share_done
 
-from tests.unit.farm_simulation import SimulatedCrew, difference, merge_tree, simulate, without_copies, write_parts
+from tests.unit.farm_simulation import (
+    ListedJob,
+    SimulatedCrew,
+    difference,
+    merge_tree,
+    simulate,
+    without_copies,
+    write_parts,
+)
 
 
 @pytest.mark.parametrize(
@@ -19,26 +26,26 @@ from tests.unit.farm_simulation import SimulatedCrew, difference, merge_tree, si
 )
 def test_every_part_is_taken_once(workers: int, parts: int) -> None:
     crew = SimulatedCrew(workers, late=0.04, deaths=0.04)
-    taken, foreman, shown = simulate(crew, parts)
+    taken, tally, shown = simulate(crew, parts)
     assert sorted(taken) == list(range(1, parts + 1))
-    assert crew.died >= 3 and foreman.tally.copied >= 2, "else it shows nothing"
+    assert crew.died >= 3 and tally.copied >= 2, "else it shows nothing"
     assert shown == sorted(shown) and shown[-1] == 1.0
 
 
 @pytest.mark.parametrize(("workers", "parts"), [(50, 200), pytest.param(250, 1000, marks=pytest.mark.slow)])
 def test_copies_end_what_stragglers_hold_up(workers: int, parts: int) -> None:
     with_copies, without = SimulatedCrew(workers, late=0.01), SimulatedCrew(workers, late=0.01)
-    _, foreman, _ = simulate(with_copies, parts)
+    _, tally, _ = simulate(with_copies, parts)
     with without_copies():
         simulate(without, parts)
     assert with_copies.now < 0.7 * without.now
-    wasted = 1.0 - sum(foreman.tally.seconds["part"]) / with_copies.busy_s
+    wasted = 1.0 - sum(tally.seconds["part"]) / with_copies.busy_s
     assert wasted < 0.06
 
 
 def test_nothing_is_copied_where_none_is_late() -> None:
-    _, foreman, _ = simulate(SimulatedCrew(40, late=0.0, deaths=0.0), 200)
-    assert foreman.tally.copied == 0
+    _, tally, _ = simulate(SimulatedCrew(40, late=0.0, deaths=0.0), 200)
+    assert tally.copied == 0
 
 
 @pytest.mark.parametrize(("parts", "fan_in"), [(40, 7), pytest.param(1000, 32, marks=pytest.mark.slow)])
@@ -57,60 +64,70 @@ class Scripted:
     def __init__(self, ends: dict[int, list[Any]]) -> None:
         self.ends, self.told, self.dropped = ends, [], []
 
+    def share(self, value: Any) -> None:
+        pass
+
     def clock(self) -> float:
         return 0.0
 
     def size(self) -> int:
         return 1
 
-    def submit(self, job: Job, attempt: int) -> None:
-        end = self.ends[job.number].pop(0)
+    def submit(self, task: Task, attempt: int) -> None:
+        end = self.ends[task.number].pop(0)
         is_error = isinstance(end, Exception)
-        self.told.append(News(job, attempt, result=end, is_done=True, error=end if is_error else None))
+        self.told.append(News(task, attempt, result=end, is_done=True, error=end if is_error else None))
         if not is_error:
             self.told.append(self.told[-1])  # told twice, as by a worker that was thought dead
 
-    def drop(self, job: Job, attempt: int) -> None:
-        self.dropped.append(job.number)
+    def drop(self, task: Task, attempt: int) -> None:
+        self.dropped.append(task.number)
 
     def news(self, timeout_s: float) -> list[News]:
         told, self.told = self.told, []
         return told
 
 
-def run(crew: Scripted, jobs: list[Job]) -> list[tuple[int, Any]]:
+def run(crew: Scripted, tasks: list[Task]) -> list[tuple[int, Any]]:
     """What was taken."""
-    taken: list[tuple[int, Any]] = []
-    foreman = Foreman(crew, Weighing({"part": 1.0}))
-    foreman.add(jobs)
-    foreman.run(lambda job, result: taken.append((job.number, result)), lambda share, text: None)
-    return taken
+    job = ListedJob(tasks)
+    assert Foreman(crew, job).run(lambda share, text: None) is not None
+    return job.taken
 
 
 def test_what_fails_is_tried_again_and_what_is_told_twice_counts_once() -> None:
     crew = Scripted({1: [RuntimeError("driver"), "one"], 2: ["two"]})
-    assert sorted(run(crew, [Job("part", 1), Job("part", 2)])) == [(1, "one"), (2, "two")]
+    assert sorted(run(crew, [Task("part", 1), Task("part", 2)])) == [(1, "one"), (2, "two")]
 
 
 def test_what_fails_again_and_again_is_a_sentence() -> None:
     with pytest.raises(UserError, match=r"part 1 failed 3 times, at last with 'RuntimeError: driver'"):
-        run(Scripted({1: [RuntimeError("driver")] * TRIES}), [Job("part", 1)])
+        run(Scripted({1: [RuntimeError("driver")] * TRIES}), [Task("part", 1)])
     with pytest.raises(UserError, match="too dark"):
-        run(Scripted({1: [UserError("too dark")]}), [Job("part", 1)])
-    assert run(Scripted({1: [RuntimeError("driver")]}), [Job("part", 1, optional=True)]) == []
+        run(Scripted({1: [UserError("too dark")]}), [Task("part", 1)])
+    assert run(Scripted({1: [RuntimeError("driver")]}), [Task("part", 1, optional=True)]) == []
 
 
 def test_the_bar_weighs_by_time() -> None:
-    weighing = Weighing({"part": 1.0, "the picture": 1.0})
-    weighing.add("part", 4)
-    weighing.add("the picture")
-    assert weighing.share([("part", 0.5)]) == pytest.approx(0.1)
-    weighing.finish("part", 30.0)
-    weighing.finish("part", 10.0)
-    assert weighing.share([]) == pytest.approx(0.4)
-    weighing.finish("part", 20.0)
-    weighing.finish("part", 20.0)
-    weighing.finish("the picture", 80.0)
-    assert weighing.share([]) == 1.0
-    weighing.add("part", 10)
-    assert weighing.share([]) == 1.0, "it never goes back"
+    guesses = {"part": 1.0, "the picture": 1.0}
+    for seconds, waiting, running, share in (
+        ({}, {"part": 4, "the picture": 1}, [("part", 0.5)], 0.1),
+        ({"part": [30.0, 10.0]}, {"part": 2, "the picture": 1}, [], 0.4),
+        ({"part": [30.0, 10.0, 20.0, 20.0], "the picture": [80.0]}, {}, [], 1.0),
+        ({}, {}, [], 0.0),
+    ):
+        assert share_done(guesses, seconds, waiting, running) == pytest.approx(share)
+
+
+def test_the_bar_never_goes_back() -> None:
+    """Neither where what is done brings more to do than was known of."""
+
+    class Growing(ListedJob):
+        def take(self, task: Task, result: Any, workers: int) -> list[Task]:
+            super().take(task, result, workers)
+            return [Task("part", number) for number in range(2, 9)] if task.number == 1 else []
+
+    shown: list[float] = []
+    crew = Scripted({number: [number] for number in range(1, 9)})
+    assert Foreman(crew, Growing([Task("part", 1)])).run(lambda share, text: shown.append(share)) is not None
+    assert shown == sorted(shown) and len(shown) > 2

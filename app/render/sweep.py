@@ -18,9 +18,9 @@ from ..base.errors import UserError
 from ..edit.parameters import Stage, apply_all, check_value
 from ..model.optics.glass import Dispersion
 from ..model.settings import RenderSettings
-from ..render.frame_fit import inputs_of, share_light
-from ..render.viewer.dirty_level import DirtyLevel
-from ..render.viewer.invalidation import dirty_level
+from .frame_fit import inputs_of, share_light
+from .viewer.dirty_level import DirtyLevel
+from .viewer.invalidation import dirty_level
 
 MAX_POINTS = 100_000
 _BLUE_NM, _RED_NM = 486.13, 656.27
@@ -103,10 +103,16 @@ class SweepPlan:
 
     points: tuple[Point, ...]
     groups: tuple[Group, ...]
+    settings: RenderSettings
     keeps_photons: bool
     """Whether photons are kept for the points of a group."""
     first_order: bool = False
     """Whether some points' glass is another than that of their photons, which follow to first order."""
+
+    @property
+    def can_spread(self) -> bool:
+        """Whether several processes have something to do."""
+        return len(self.groups) > 1 or not self.keeps_photons
 
     @staticmethod
     def of(points: Sequence[Point], settings: RenderSettings, exact: bool) -> SweepPlan:
@@ -130,7 +136,7 @@ class SweepPlan:
         made = (Group(anchor, tuple(sorted(found, key=lambda point: point.number))) for anchor, found in groups)
         found = tuple(sorted(made, key=lambda group: group.points[0].number))
         follows = any(_glasses(group.anchor) != _glasses(p.stage) for group in found for p in group.points)
-        return SweepPlan(tuple(points), found, keeps, keeps and follows)
+        return SweepPlan(tuple(points), found, settings, keeps, keeps and follows)
 
     def told(self, workers: int | None) -> str:
         """Which points are spread, and why, in a sentence; `workers` None: those of a cluster."""
