@@ -9,6 +9,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ..base import files
 from ..base.atomic import atomic_output
 from ..base.errors import UserError
@@ -43,7 +45,7 @@ def sweep(asked: Sweep) -> int:
     exposure = scene.render.exposure_ev if asked.exposure is None else asked.exposure
 
     from ..farm.jobs import held
-    from ..render.sweep import SweepPlan, parse_set, points_of
+    from ..render.sweep import SweepPlan, points_of
 
     start = Stage(scene, scene.camera, exposure)
     grid: dict[str, tuple[float, ...]] = {}
@@ -56,7 +58,7 @@ def sweep(asked: Sweep) -> int:
     note_assumptions(scene)
     if asked.bins is not None and not asked.exact:
         note("--bins: photons that are kept have colours only, so every point is traced")
-    note(plan.told(workers))
+    note(plan_words(plan, workers))
     started = time.perf_counter()
     with held(asked.output, asked.output), interrupt_flag() as interrupted:
         folder = SweepFolder(
@@ -80,6 +82,52 @@ def sweep(asked: Sweep) -> int:
         + ("; stopped early, and the same command goes on" if stopped else "")
     )
     return interrupted.exit_code if stopped else 0
+
+
+def parse_set(text: str, stage: Stage) -> tuple[str, tuple[float, ...]]:
+    """ "objects.prism.dispersion_gain=0:3:31" (31 values from 0 to 3) or "…=0,0.5,2" as a path with its values. Raises
+    `UserError`."""
+    from ..render.sweep import MAX_POINTS, check_values
+
+    path, equals, numbers = text.partition("=")
+    path = path.strip()
+    refusal = UserError(
+        f"--set '{text}' is no sweep: give PARAMETER=FROM:TO:COUNT, for example objects.prism.dispersion_gain=0:3:31, "
+        "or PARAMETER=A,B,C"
+    )
+    try:
+        if ":" in numbers:
+            first, last, count = numbers.split(":")
+            if not 2 <= int(count) <= MAX_POINTS:
+                raise UserError(f"--set '{text}' asks for {count} values: give 2 to {MAX_POINTS}")
+            values = tuple(np.linspace(float(first), float(last), int(count)).tolist())
+        else:
+            values = tuple(float(number) for number in numbers.split(","))
+    except ValueError:
+        raise refusal from None
+    if not equals or not path:
+        raise refusal
+    check_values(path, values, stage, "--set ")
+    return path, values
+
+
+def plan_words(plan: SweepPlan, workers: int | None) -> str:
+    """Which points are spread, and why, in a sentence; `workers` None: those of a cluster."""
+    points, groups = len(plan.points), len(plan.groups)
+    who = "the cluster's workers" if workers is None else f"{workers} workers"
+    spread = "" if workers == 1 else f", spread over {who}"
+    if not plan.keeps_photons:
+        if groups == points:
+            return f"{points} points, each traced anew{spread}"
+        which = "points that differ" if groups == 1 else f"points in {groups} groups, each of which differ"
+        return f"{points} {which} by the camera alone, on which light does not depend{spread}"
+    followed = ""
+    if plan.first_order:
+        followed = "; it follows the glass to first order in the change of its index (--exact traces every point)"
+    if groups == 1:
+        alone = "" if workers == 1 else ", so that there is nothing to spread over workers"
+        return f"{points} points from one store of photons: light is traced once{alone}{followed}"
+    return f"{points} points from {groups} stores of photons{spread}{followed}"
 
 
 def _draw_here(

@@ -28,31 +28,6 @@ Grid = Mapping[str, Sequence[float]]
 """Values of each parameter, by its path."""
 
 
-def parse_set(text: str, stage: Stage) -> tuple[str, tuple[float, ...]]:
-    """ "objects.prism.dispersion_gain=0:3:31" (31 values from 0 to 3) or "…=0,0.5,2" as a path with its values. Raises
-    `UserError`."""
-    path, equals, numbers = text.partition("=")
-    path = path.strip()
-    refusal = UserError(
-        f"--set '{text}' is no sweep: give PARAMETER=FROM:TO:COUNT, for example objects.prism.dispersion_gain=0:3:31, "
-        "or PARAMETER=A,B,C"
-    )
-    try:
-        if ":" in numbers:
-            first, last, count = numbers.split(":")
-            if not 2 <= int(count) <= MAX_POINTS:
-                raise UserError(f"--set '{text}' asks for {count} values: give 2 to {MAX_POINTS}")
-            values = tuple(np.linspace(float(first), float(last), int(count)).tolist())
-        else:
-            values = tuple(float(number) for number in numbers.split(","))
-    except ValueError:
-        raise refusal from None
-    if not equals or not path:
-        raise refusal
-    check_values(path, values, stage, "--set ")
-    return path, values
-
-
 def check_values(path: str, values: Sequence[float], stage: Stage, where: str = "") -> None:
     """Raise `UserError` where a parameter is none, or cannot take one of its values, or gets one twice."""
     if not values:
@@ -76,7 +51,7 @@ class Point:
 def points_of(start: Stage, grid: Grid) -> tuple[Point, ...]:
     """All combinations, the last parameter running fastest. Raises `UserError` where one cannot be drawn."""
     if not grid:
-        raise UserError("a sweep needs a parameter: give --set, for example objects.prism.dispersion_gain=0:3:31")
+        raise UserError("a sweep needs a parameter with its values, for example objects.prism.dispersion_gain")
     count = int(np.prod([len(values) for values in grid.values()], dtype=float))
     if count > MAX_POINTS:
         raise UserError(f"this sweep has {count} pictures: give at most {MAX_POINTS}")
@@ -137,24 +112,6 @@ class SweepPlan:
         found = tuple(sorted(made, key=lambda group: group.points[0].number))
         follows = any(_glasses(group.anchor) != _glasses(p.stage) for group in found for p in group.points)
         return SweepPlan(tuple(points), found, settings, keeps, keeps and follows)
-
-    def told(self, workers: int | None) -> str:
-        """Which points are spread, and why, in a sentence; `workers` None: those of a cluster."""
-        points, groups = len(self.points), len(self.groups)
-        who = "the cluster's workers" if workers is None else f"{workers} workers"
-        spread = "" if workers == 1 else f", spread over {who}"
-        if not self.keeps_photons:
-            if groups == points:
-                return f"{points} points, each traced anew{spread}"
-            which = "points that differ" if groups == 1 else f"points in {groups} groups, each of which differ"
-            return f"{points} {which} by the camera alone, on which light does not depend{spread}"
-        followed = ""
-        if self.first_order:
-            followed = "; it follows the glass to first order in the change of its index (--exact traces every point)"
-        if groups == 1:
-            alone = "" if workers == 1 else ", so that there is nothing to spread over workers"
-            return f"{points} points from one store of photons: light is traced once{alone}{followed}"
-        return f"{points} points from {groups} stores of photons{spread}{followed}"
 
 
 def _dispersion(stage: Stage) -> float:

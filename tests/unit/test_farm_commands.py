@@ -11,13 +11,14 @@ import pytest
 import spectrasplat as ss
 from spectrasplat.__main__ import main
 from spectrasplat.commands.scenes import find_scene
+from spectrasplat.commands.sweep import parse_set, plan_words
 from spectrasplat.edit.parameters import Stage
 from spectrasplat.farm import cluster
 from spectrasplat.farm.cluster import PIP_LINE
 from spectrasplat.farm.jobs import held
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.render.sweep import SweepPlan, parse_set, points_of
+from spectrasplat.render.sweep import SweepPlan, points_of
 
 GAIN = "objects.prism.dispersion_gain=0:3:31"
 
@@ -137,9 +138,9 @@ def test_a_sweep_knows_what_one_store_of_photons_serves(
     points = points_of(start, dict(parse_set(text, start) for text in sets))
     plan = SweepPlan.of(points, RenderSettings(), exact)
     assert (len(plan.groups), plan.keeps_photons) == (groups, keeps)
-    assert plan.told(4).startswith(told)
+    assert plan_words(plan, 4).startswith(told)
     assert sorted(point.number for group in plan.groups for point in group.points) == list(range(len(points)))
-    follows = "first order" in plan.told(4)
+    follows = "first order" in plan_words(plan, 4)
     assert follows == (GAIN in sets and not exact)
 
 
