@@ -39,7 +39,7 @@ from ..passes.trace import FluxTally
 from .beam_drawing import BeamDrawing
 from .beam_worker import BeamWorker
 from .light_maps import LightMaps
-from .moving_beams import SURVEY, MovingBeams
+from .sampling import SURVEY, MovingBeams
 from .shown_spectra import ShownSpectra
 
 if TYPE_CHECKING:

@@ -32,21 +32,18 @@ from ..passes.map_layout import MapLayout, check_map_receiver, layout_maps
 from ..passes.pilot import Pilot
 from ..passes.splat import Splatter
 from ..passes.trace import TracePass
-from . import shrinking
-from .batch_size import batch_size
 from .light_maps import LightMaps
 from .light_plan import Division, LightPlan, Planner
 from .light_stats import LightStats, PassStep
 from .light_survey import LightSurvey
 from .map_fit import MapFit
-from .moving_beams import MovingBeams
 from .pass_rounds import PassRounds, roulette_word
-from .pass_sizes import PROGRESSIVE, emphasis
-from .photon_batches import Deposit, PhotonBatches
+from .pass_sizes import FIRST_KERNEL, PROGRESSIVE, SHRINKING, emphasis, kernel_scale
+from .photon_batches import Deposit, Keep, PhotonBatches, batch_size, traced_besides
 from .photon_records import NoRecords, PhotonRecords
+from .sampling import MovingBeams
 from .shown_spectra import ShownSpectra, ShownTables
 from .splatting import Pace
-from .thrown_photons import Keep, thrown
 
 if TYPE_CHECKING:
     from .beam_light import BeamLight, BeamStats
@@ -96,8 +93,8 @@ class LightPass:
             context, scene, features, buffers, self.trace, self.shown, self._division, pace, moving
         )
         self.batches = PhotonBatches(context, self.trace, self.shown, photon_records or NoRecords(), pace)
-        self._shrinks = features.method == shrinking.METHOD
-        self.smoothing = settings.smoothing * (shrinking.FIRST_KERNEL if self._shrinks else 1.0)
+        self._shrinks = features.method == SHRINKING
+        self.smoothing = settings.smoothing * (FIRST_KERNEL if self._shrinks else 1.0)
         """Standard deviation of a footprint in lattice spacings; where passes shrink it, of the first one's."""
         self.widening = 1.0
         """Footprints of what is traced are so many times wider still, in pictures on the way to a better one."""
@@ -301,7 +298,7 @@ class LightPass:
     def sample_steps(self, photons: int, keep: Keep) -> Iterator[str | None]:
         """Trace about `photons` as if there were no beams and hand them to `keep`; the maps stay as they are."""
         plans = yield from self.sample_plans(photons)
-        yield from thrown(self.trace, self.settings.seed, plans, photons, keep)
+        yield from traced_besides(self.trace, self.settings.seed, plans, photons, keep)
 
     def sample_plans(self, photons: int) -> Generator[str | None, None, list[LightPlan]]:
         """Of `sample_steps`."""
@@ -349,7 +346,7 @@ class LightPass:
 
     def deposit(self, number: int) -> Deposit:
         """Where photons of pass `number` go."""
-        coarsening = self.widening * (shrinking.kernel_scale(number) if self._shrinks else 1.0)
+        coarsening = self.widening * (kernel_scale(number) if self._shrinks else 1.0)
         return Deposit(self._maps, self.stats, self.smoothing * coarsening)
 
     @property

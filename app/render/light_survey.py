@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from .beam_light import BeamLight
     from .light_plan import Division
     from .map_fit import MapFit
-    from .moving_beams import MovingBeams
+    from .sampling import MovingBeams
     from .shown_spectra import ShownSpectra
     from .splatting import Pace
 
@@ -72,7 +72,7 @@ class LightSurvey:
         """Find out everything, pausing often with what it is at (None: as before)."""
         self.domains = self._domains()
         if self._features.beams and self.domains:
-            from .beam_light import SEARCHING, BeamLight  # machine code, whose import takes 0.7 s
+            from .beam_light import SEARCHING, BeamLight
 
             yield SEARCHING
             self.beam_light = BeamLight(

@@ -9,9 +9,10 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from ..base.random_words import Dimension, random_word
+import numpy as np
+
+from ..base.random_words import Dimension, random_word, shift
 from ..passes.beam_emission import BeamEmission
-from .handed_rays import handed_rays
 from .light_plan import LightPlan
 from .light_stats import PassStep
 from .light_survey import LightSurvey
@@ -22,6 +23,12 @@ BEAM_ROUND = 1 << 19
 """Photons' worth of beams, where they carry everything, after which a pass may be left."""
 MIN_BEAM_PHOTONS = 1 << 17
 """Photons, at least, whose beams are found at once, where photons are traced besides."""
+_TAIL_SHARE = 1.0
+"""Photons that carry on weak beams, over those that a round asks for."""
+_TAIL_DENSITY = 64.0
+"""As many times more of them than an even lattice would have there, at most."""
+_FEWEST = 256
+"""Photons over the pieces of a light."""
 
 
 def roulette_word(seed: int, number: int) -> int:
@@ -101,7 +108,7 @@ class PassRounds:
                 yield PassStep((done + 1) / (rounds * lights), False)
 
     def _beams(self, of: RoundOf, done: float = 0.0, rounds: int = 1) -> Iterator[PassStep]:
-        """The beams of so many `rounds` from one on, and what they hand to photons."""
+        """The beams of so many `rounds` from one on, and the photons that carry on what those left."""
         beams, stats = self.survey.beams, self.into.stats
         if beams is None:
             return
@@ -112,9 +119,9 @@ class PassRounds:
         after = beams.stats.find_seconds, beams.stats.draw_seconds
         stats.trace_seconds += after[0] - before[0]
         stats.splat_seconds += after[1] - before[1]
-        thrown = beams.tally(weight)
-        stats.tally.merge(thrown)
-        stats.polygons_w += thrown.ended["deposited"]
+        tally = beams.tally(weight)
+        stats.tally.merge(tally)
+        stats.polygons_w += tally.ended["deposited"]
         for tails in (False, True):
             for _ in self._handed(of, share, weight, tails):
                 yield PassStep(done, False)
@@ -130,7 +137,7 @@ class PassRounds:
             return
         emission = BeamEmission(self.survey.buffers, batches.trace.ray, pieces, batches.records.tables.spans)
         most, entered_w = batches.budget.units, beams.stats.entered_w
-        for light, rays in handed_rays(emission, entered_w, share, weight, most, self.seed, self._nth(of)):
+        for light, rays in _continuing_rays(emission, entered_w, share, weight, most, self.seed, self._nth(of)):
             self.into.stats.trace_seconds += time.perf_counter() - started
             yield from batches.handed(rays, light, of, self.into, of_tails=tails)
             started = time.perf_counter()
@@ -139,3 +146,30 @@ class PassRounds:
     def _nth(of: RoundOf) -> int:
         """A round's number among those of all passes."""
         return of.number * of.count + of.index
+
+
+def _continuing_rays(
+    emission: BeamEmission, entered_w: float, photons: float, weight: float, most: int, seed: int, number: int
+) -> Iterator[tuple[int, np.ndarray]]:
+    """Light and ray records, at most `most` at once, of photons that carry on what beams left in round `number` of all
+    passes, all of it tails or none.
+
+    `entered_w`: W that met facets, `photons`: of the round, `weight`: factor on their flux. What something curved may
+    meet is as dense as the lattices of emission; tails, which are little light, are denser, and shared out among lights
+    by the root of their flux."""
+    pieces = emission.pieces
+    flux_w = {int(light): emission.flux_w(int(light)) for light in np.unique(pieces.light)}
+    entered_w, total = max(entered_w, 1e-300), sum(flux_w.values())
+    roots = sum(watts**0.5 for watts in flux_w.values())
+    for light, watts in flux_w.items():
+        if watts <= 0.0:
+            continue
+        count = photons * min(1.0, watts / entered_w)
+        if pieces.is_tail[0]:
+            count = photons * min(_TAIL_SHARE, _TAIL_DENSITY * total / entered_w) * watts**0.5 / roots
+            if count < 1.0:
+                continue  # less than a 64th of a photon's power
+        shifts = shift(seed, light, number, Dimension.LATTICE_U), shift(seed, light, number, Dimension.LATTICE_V)
+        key = random_word(seed, light, number, Dimension.BRANCH)
+        for rays in emission.batches(light, max(_FEWEST, int(count)), weight, shifts, key, most):
+            yield light, rays

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base.memory import available_bytes
+from ..gpu import records
 from ..gpu.dispatch_budget import DISPATCH_S, DispatchBudget
-from ..passes.trace import Batch, LatticeSlice, TracePass
+from ..passes.trace import RAY_ROOM, Batch, LatticeSlice, TracePass, queue_bytes
+from .light_plan import SMALLEST_BATCH, LightPlan
 from .photon_records import PhotonRecords, RoundOf
 from .splatting import Pace, Splatting
 
 if TYPE_CHECKING:
     import moderngl
 
+    from ..features.features import Features
     from ..gpu.context import Context
     from ..passes.emission_domain import EmissionDomain
     from ..passes.map_atlas import MapAtlas
@@ -26,6 +30,11 @@ if TYPE_CHECKING:
 
 MIN_RAYS = 1 << 10
 """Rays of a batch that are not divided further, however slow the device is."""
+DEFAULT_BATCH = 1 << 16
+QUEUE_BYTES = 64 << 20
+"""What the queue of a batch that nobody asked for may take; more on a GPU. Less where memory is short."""
+Keep = Callable[["moderngl.Buffer", int, int, RoundOf], None]
+"""Takes records: (their buffer, how many, bytes of one, where they belong)."""
 
 
 @dataclass(frozen=True)
@@ -164,3 +173,48 @@ class PhotonBatches:
         self.trace.release()
         self.records.release()
         self.splatting.release()
+
+
+def traced_besides(
+    trace: TracePass, seed: int, plans: Sequence[LightPlan], photons: int, keep: Keep, max_depth: int | None = None
+) -> Iterator[None]:
+    """Trace about `photons` by `plans` that belong to no map of a light pass, for `keep`, pausing after every batch;
+    `max_depth`: specular events, by default those of `trace`."""
+    counts = [plan.lattice_count(photons) for plan in plans]
+    rounds = max((-(-n // (trace.batch // plan.lattices)) for n, plan in zip(counts, plans, strict=True)), default=0)
+    for j in range(rounds):
+        for i, (plan, lattice) in enumerate(zip(plans, counts, strict=True)):
+            points = len(range(j, lattice, rounds))
+            if points:
+                waiting = [plan.slice(seed, 0, lattice, j, rounds, points, float(photons))]
+                while waiting:
+                    part = waiting.pop()
+                    batch = yield from trace.steps(part, plan.domain, max_depth)
+                    if batch.overflow and part.points > 1:
+                        waiting += part.halves
+                        continue
+                    of = RoundOf(0, j, rounds, i + 1 == len(plans) and not waiting)
+                    keep(trace.photons, batch.photons, trace.photon.stride, of)
+            yield
+
+
+def batch_size(context: Context, features: Features, asked: int | None) -> int:
+    """Lattice points in flight at once: `asked`, or what the device and its memory have room for."""
+    batch = asked or DEFAULT_BATCH * context.traits.batch_scale
+    if asked is None:
+        batch = _batch_that_fits(features, batch, QUEUE_BYTES * context.traits.batch_scale)
+    return min(batch, _largest_batch(context, features))
+
+
+def _batch_that_fits(features: Features, batch: int, most_bytes: int) -> int:
+    """`batch`, halved until its queue takes no more than that, nor more than an eighth of the memory there is."""
+    while batch > SMALLEST_BATCH and queue_bytes(features, batch) > min(most_bytes, available_bytes() // 8):
+        batch >>= 1
+    return batch
+
+
+def _largest_batch(context: Context, features: Features) -> int:
+    """Lattice points whose queue fits the device's largest storage buffer."""
+    ray = records.ray_record_of(features).stride
+    limit = context.limits.storage_block_bytes
+    return max(64, int(limit // (2 * RAY_ROOM * ray)) // 64 * 64)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from ..model.scene import Camera, Scene
 from ..model.settings import RenderSettings, camera_method_of
 from ..passes.camera import CameraPass
@@ -19,6 +21,26 @@ half of the error there is (`ball`, 160×90, 400,000 photons: nRMSE 0.025 with 1
 LIVE_BANDS_FOR = 16
 """Samples whose error the viewer's number of bands is fitted to: a still picture shall be whole within seconds, so not
 to all that it gets in the end."""
+
+SURVEY = 1e-3
+"""Threshold of the search that finds out which objects beams carry, and what they cost."""
+MOVING_COARSEST, MOVING_FINEST = 2e-3, 1e-5
+"""Of thresholds in motion; a coarser search takes hardly less time."""
+
+
+@dataclass
+class MovingBeams:
+    """How fine beams are while something is dragged: as fine as their time allows. One value for all light passes of a
+    live rendering."""
+
+    threshold: float = SURVEY
+
+    def learn(self, took: float, seconds: float) -> None:
+        """A search and its drawing `took` so long. Small changes are left out: other beams would play roulette."""
+        if not 0.5 * seconds <= took <= 1.2 * seconds:
+            self.threshold = float(
+                np.clip(self.threshold * np.clip(took / seconds, 0.5, 2.0), MOVING_FINEST, MOVING_COARSEST)
+            )
 
 
 @dataclass(frozen=True)

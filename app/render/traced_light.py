@@ -5,9 +5,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 
-from . import shrinking
 from .light_pass import LightPass
-from .pass_sizes import FIRST_PHOTONS, endless_passes, pass_sizes
+from .pass_sizes import FIRST_PHOTONS, SHRINKING, endless_passes, pass_sizes
 from .sampling import LightSampling
 
 _TRIALS_SHARE = 0.1
@@ -52,7 +51,7 @@ def _traced_for(light: LightPass, seconds: float, seed: int, stop: Callable[[], 
         if spent() >= 1.0 or stop():
             return
         number += 1
-        if spent() < _TRIALS_SHARE or light.features.method == shrinking.METHOD:
+        if spent() < _TRIALS_SHARE or light.features.method == SHRINKING:
             photons = next(trials)
         else:
             affordable = (1.0 - spent()) * seconds / (time.perf_counter() - started) * photons

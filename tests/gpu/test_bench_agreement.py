@@ -8,7 +8,7 @@ import msgspec
 import pytest
 from spectrasplat.__main__ import main
 from spectrasplat.bench.agreement import SceneAgreement
-from spectrasplat.render import handed_rays
+from spectrasplat.render import pass_rounds
 
 pytestmark = pytest.mark.slow
 
@@ -27,7 +27,7 @@ def test_beams_agree_and_beams_without_their_tail_do_not(
     whole = found(tmp_path / "whole")
     assert whole.energy == pytest.approx(1.0, abs=0.01) and whole.blocks.deviation < 0.02
     assert "two_stones" in capsys.readouterr().out
-    monkeypatch.setattr(handed_rays, "_TAIL_SHARE", 0.0)
+    monkeypatch.setattr(pass_rounds, "_TAIL_SHARE", 0.0)
     less = found(tmp_path / "less")
     assert less.energy < whole.energy and less.blocks.chi2 > 2.0 * whole.blocks.chi2
 

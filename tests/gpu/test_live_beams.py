@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from spectrasplat.gpu.context import Context
-from spectrasplat.render.moving_beams import MovingBeams
+from spectrasplat.render.sampling import MovingBeams
 from spectrasplat.render.viewer.dirty_level import DirtyLevel
 from spectrasplat.render.viewer.engine import Budget, LiveEngine
 from spectrasplat.render.viewer.invalidation import dirty_level

@@ -13,15 +13,17 @@ from spectrasplat.passes.beam_splat import TEXELS, portion_end
 from spectrasplat.passes.lattice_order import GOLDEN, morton_order
 from spectrasplat.passes.pixel_lattice import LOOKS, cells_of, looks_lattice, pixel_lattice
 from spectrasplat.render.pass_sizes import (
+    ALPHA,
     FIRST_PHOTONS,
     GROWTH,
     LARGEST_PHOTONS,
+    PASS_PHOTONS,
     WEIGHT_POWER,
     emphasis,
     endless_passes,
+    kernel_scale,
     pass_sizes,
 )
-from spectrasplat.render.shrinking import ALPHA, PASS_PHOTONS, kernel_scale
 
 
 @pytest.mark.parametrize(

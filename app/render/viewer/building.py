@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from ...model.settings import RenderSettings
 from ..map_fit import preview_size
-from ..moving_beams import MovingBeams
+from ..sampling import MovingBeams
 from .accumulation import Accumulation
 from .live_light import LiveLight
 

@@ -21,7 +21,7 @@ from ...gpu import shader
 from ...model.environment_light import with_sun
 from ...passes.caustic_maps import CausticMaps
 from ..light_maps import LightMaps
-from ..moving_beams import MovingBeams
+from ..sampling import MovingBeams
 from ..solo import scene_seen
 from . import schedule as events
 from .building import Budget, Shown, build

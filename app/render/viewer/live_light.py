@@ -19,7 +19,7 @@ from ..device_scene import scene_buffers
 from ..light_maps import LightMaps
 from ..light_pass import LightPass
 from ..map_fit import PREVIEW_FINENESS, MapFit
-from ..moving_beams import MovingBeams
+from ..sampling import MovingBeams
 from ..solo import solo, solo_scene
 from ..splatting import Pace
 from .invalidation import shown_glasses

@@ -16,8 +16,8 @@ from ...model.scene import Scene, SceneObject
 from ...passes.emission_domain import EmissionDomain, emission_domain
 from ...passes.pilot import Pilot, landings_of
 from ..light_maps import LightMaps
+from ..photon_batches import traced_besides
 from ..shown_spectra import PassTables
-from ..thrown_photons import thrown
 from .photon_store import PhotonStore
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ class MovedLight:
         light_pass, photons, started = self._light_pass, self.photons, time.perf_counter()
         plans = self._plans_for(scene)
         self._store.clear()
-        for _ in thrown(light_pass.trace, light_pass.settings.seed, plans, photons, self._store.keep, DEPTH):
+        for _ in traced_besides(light_pass.trace, light_pass.settings.seed, plans, photons, self._store.keep, DEPTH):
             pass
         slabs = self._store.of_rounds(0, self._store.rounds)
         records = self._store.read(len(slabs) and 1 << 30, light_pass.trace.photon.dtype)
