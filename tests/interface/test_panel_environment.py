@@ -128,11 +128,8 @@ def test_a_surface_wears_a_picture_and_takes_it_off(gl: Context, picture: Path) 
 def test_dropped_pictures(nothing_selected: State, picture: Path) -> None:
     view_model = ViewModel(unsaved=True)
     round_it = dialogs.open_path(nothing_selected, view_model, STUDIO)
-    assert (
-        round_it.scene.environment.kind == "map"
-        and round_it.edit_label == "Environment studio.hdr"
-        and not round_it.requests
-    )
+    assert round_it.scene.environment.kind == "map" and round_it.edit_label == "Environment studio.hdr"
+    assert not round_it.requests
     lost = dialogs.open_path(nothing_selected, view_model, picture)
     assert lost.scene is nothing_selected.scene and "Select a diffuse object" in lost.requests[-1].text
     table = receiver_of(nothing_selected)

@@ -16,14 +16,7 @@ from spectrasplat.gpu.context import Context
 from spectrasplat.model.scene import Diffuse
 from spectrasplat.render.viewer.stats import LiveStats
 from spectrasplat.ui.panels.view_panel import SWEEP_NM_PER_S
-from spectrasplat.ui.view_model import (
-    CursorInfo,
-    HistoryEntry,
-    JobInfo,
-    Message,
-    SceneEntry,
-    ViewModel,
-)
+from spectrasplat.ui.view_model import CursorInfo, HistoryEntry, JobInfo, Message, SceneEntry, ViewModel
 
 from tests.interface.panel_rig import scene_state
 from tests.interface.shell_rig import ShellRig

@@ -11,16 +11,7 @@ from pathlib import Path
 
 import numpy as np
 from spectrasplat.bench.curves import speed_ups
-from spectrasplat.bench.results import (
-    BenchResult,
-    Claim,
-    Curve,
-    Point,
-    ReferenceInfo,
-    Sample,
-    SceneResult,
-    Trial,
-)
+from spectrasplat.bench.results import BenchResult, Claim, Curve, Point, ReferenceInfo, Sample, SceneResult, Trial
 
 # Seconds per photon, variance at 1000 photons, its exponent, bias².
 METHODS = {

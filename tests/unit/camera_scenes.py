@@ -11,16 +11,7 @@ from spectrasplat.model.lights import DirectionalLight
 from spectrasplat.model.optics.colorimetry import VISIBLE_NM, rgb709_to_xyz
 from spectrasplat.model.optics.glass import Dispersion, from_abbe
 from spectrasplat.model.optics.spectrum import illuminant
-from spectrasplat.model.scene import (
-    Black,
-    Camera,
-    Dielectric,
-    Diffuse,
-    Light,
-    Material,
-    Scene,
-    SceneObject,
-)
+from spectrasplat.model.scene import Black, Camera, Dielectric, Diffuse, Light, Material, Scene, SceneObject
 
 FLINT = from_abbe(1.7, 25.0)
 D65 = illuminant("D65").scaled_to_luminous(1.0)

@@ -11,15 +11,7 @@ import numpy as np
 import pytest
 from spectrasplat.base.errors import UserError
 from spectrasplat.base.paths import assets_dir
-from spectrasplat.edit.animation import (
-    Track,
-    keyed,
-    parse_range,
-    read_keys,
-    tracks_of,
-    turntable,
-    with_turntable,
-)
+from spectrasplat.edit.animation import Track, keyed, parse_range, read_keys, tracks_of, turntable, with_turntable
 from spectrasplat.edit.parameters import Stage, apply, apply_all, paths, value_of
 from spectrasplat.edit.state import Key
 from spectrasplat.model.io.scene_file import load_scene

@@ -17,14 +17,7 @@ from spectrasplat.bench.curves import (
     tail_slope,
     time_to_error,
 )
-from spectrasplat.bench.results import (
-    Claim,
-    Curve,
-    Point,
-    ReferenceInfo,
-    Sample,
-    SceneResult,
-)
+from spectrasplat.bench.results import Claim, Curve, Point, ReferenceInfo, Sample, SceneResult
 from spectrasplat.reference.metrics import ReferencePicture
 
 BUDGETS = [int(n) for n in np.geomspace(1000, 200_000, 10)]
@@ -88,9 +81,8 @@ def test_a_curve_that_never_gets_there_and_one_that_is_there_at_once() -> None:
     slow = law(0.1)
     assert speed_up(law(0.01, floor=1.0), slow) is None
     at_once = speed_up(law(1e-6), slow)
-    assert (
-        at_once is not None and at_once.at_once and at_once.seconds == pytest.approx(slow[-1].seconds / slow[0].seconds)
-    )
+    assert at_once is not None and at_once.at_once
+    assert at_once.seconds == pytest.approx(slow[-1].seconds / slow[0].seconds)
     assert speed_up(law(1.0), []) is None and time_to_error([], 1.0) is None
 
 
@@ -177,14 +169,12 @@ def test_points_hold_all_seeds() -> None:
     assert point.relmse == pytest.approx(0.02) and (made.slope, made.slope_half_width) == (0.0, 0.0)
 
 
-def by_name(claims: list[Claim]) -> dict[str, Claim]:
-    return {claim.name: claim for claim in claims}
+def by_name(*curves: Curve, abbe: float = 25.7, seconds: float = 200_000 / RATE) -> dict[str, Claim]:
+    return {claim.name: claim for claim in claims_of(scene(*curves, abbe=abbe, seconds=seconds))}
 
 
 def test_claims_that_hold() -> None:
-    claims = by_name(
-        claims_of(scene(curve("stochastic", law(1.0)), curve("srd-lambda", law(0.05)), curve("srd", law(0.001))))
-    )
+    claims = by_name(curve("stochastic", law(1.0)), curve("srd-lambda", law(0.05)), curve("srd", law(0.001)))
     assert set(claims) == {"time to equal error", "first picture", "index against wavelength"}
     assert all(claim.holds and not claim.why for claim in claims.values())
     # Against the best of them, which is not `stochastic`.
@@ -194,9 +184,7 @@ def test_claims_that_hold() -> None:
 
 
 def test_claims_that_fall_short_say_by_how_much_and_why() -> None:
-    claims = by_name(
-        claims_of(scene(curve("stochastic", law(1.0)), curve("srd-lambda", law(0.05)), curve("srd", law(0.1))))
-    )
+    claims = by_name(curve("stochastic", law(1.0)), curve("srd-lambda", law(0.05)), curve("srd", law(0.1)))
     short = claims["time to equal error"]
     assert not short.holds and "not reached" in short.measured and "variance" in short.why
     assert not claims["first picture"].holds and "60 times srd-lambda's" in claims["first picture"].why
@@ -204,7 +192,7 @@ def test_claims_that_fall_short_say_by_how_much_and_why() -> None:
 
 
 def test_a_ratio_that_is_too_small_is_told() -> None:
-    claims = by_name(claims_of(scene(curve("stochastic", law(1.0)), curve("srd", law(0.1)))))
+    claims = by_name(curve("stochastic", law(1.0)), curve("srd", law(0.1)))
     short = claims["time to equal error"]
     assert not short.holds and "10 times sooner" in short.measured and "short by a factor of 3" in short.why
 
@@ -252,7 +240,7 @@ def test_the_best_baseline_is_the_best_where_all_are_followed() -> None:
 
 
 def test_a_bias_floor_is_named() -> None:
-    claims = by_name(claims_of(scene(curve("stochastic", law(0.1)), curve("srd", law(1e-4, floor=0.2)))))
+    claims = by_name(curve("stochastic", law(0.1)), curve("srd", law(1e-4, floor=0.2)))
     assert "not reached" in claims["time to equal error"].measured and "bias²" in claims["time to equal error"].why
     assert "footprints" in claims["time to equal error"].why
 
@@ -270,18 +258,18 @@ def test_the_texels_share_of_a_bias_is_told() -> None:
 def test_claims_need_their_methods_their_time_and_their_glass() -> None:
     srd, stochastic = curve("srd", law(0.01)), curve("stochastic", law(1.0))
     assert claims_of(scene(stochastic)) == []
-    assert set(by_name(claims_of(scene(srd, stochastic, seconds=1.0)))) == {"time to equal error"}
-    assert "index against wavelength" not in by_name(claims_of(scene(srd, curve("srd-lambda", law(0.05)), abbe=64.2)))
+    assert set(by_name(srd, stochastic, seconds=1.0)) == {"time to equal error"}
+    assert "index against wavelength" not in by_name(srd, curve("srd-lambda", law(0.05)), abbe=64.2)
     assert ratios_of([srd]) == {} and ratios_of([stochastic, srd])["srd"] == pytest.approx(100.0)
 
 
 def test_curves_without_a_common_time_show_nothing() -> None:
     late = [Point(p.photons, p.seconds + 100.0, p.relmse, p.relmse, p.relmse, 0.0, p.variance) for p in law(0.001)]
-    claim = by_name(claims_of(scene(curve("srd-lambda", law(1.0)), curve("srd", late))))["index against wavelength"]
+    claim = by_name(curve("srd-lambda", law(1.0)), curve("srd", late))["index against wavelength"]
     assert not claim.holds and "no time at which both" in claim.measured
 
 
 def test_no_picture_that_early_is_said() -> None:
     late = [Point(p.photons, p.seconds + 0.2, p.relmse, p.relmse, p.relmse, 0.0, p.variance) for p in law(0.001)]
-    claim = by_name(claims_of(scene(curve("stochastic", law(1.0)), curve("srd", late))))["first picture"]
+    claim = by_name(curve("stochastic", law(1.0)), curve("srd", late))["first picture"]
     assert not claim.holds and "no picture before 0.22 s" in claim.measured

@@ -23,14 +23,7 @@ from spectrasplat.bench.store import Store
 from spectrasplat.bench.subjects import Subject
 from spectrasplat.model.geometry.mesh import make_mesh
 from spectrasplat.model.optics.catalogue import find
-from spectrasplat.model.scene import (
-    Camera,
-    Dielectric,
-    Diffuse,
-    RenderDefaults,
-    Scene,
-    SceneObject,
-)
+from spectrasplat.model.scene import Camera, Dielectric, Diffuse, RenderDefaults, Scene, SceneObject
 from spectrasplat.reference import metrics
 from spectrasplat.reference.metrics import ReferencePicture
 
@@ -175,19 +168,15 @@ def test_one_whole_run(tmp_path: Path, rigs: Rigs) -> None:
     result = bench.run()
     assert bench.stored() == result and [s.scene for s in result.scenes] == ["one", "two"] and bench.references == 2
     scene = result.scenes[0]
-    assert (
-        scene.complete
-        and scene.strongest_glass == "Schott N-SF11"
-        and scene.strongest_abbe == pytest.approx(25.68, abs=0.01)
-    )
-    assert {len(curve.samples) for curve in scene.curves} == {12} and {len(curve.points) for curve in scene.curves} == {
-        4
-    }
+    assert scene.complete and scene.strongest_glass == "Schott N-SF11"
+    assert scene.strongest_abbe == pytest.approx(25.68, abs=0.01)
+    assert {len(curve.samples) for curve in scene.curves} == {12}
+    assert {len(curve.points) for curve in scene.curves} == {4}
     noise = {curve.method: curve for curve in scene.curves}
-    assert noise["srd"].points[-1].bias2 == pytest.approx(1e-4, rel=0.3) and noise["stochastic"].points[
-        0
-    ].variance == pytest.approx(0.09, rel=0.3)
-    assert scene.time_to_equal_error["srd"] > 1.0 and {c.name for c in scene.claims} == {
+    assert noise["srd"].points[-1].bias2 == pytest.approx(1e-4, rel=0.3)
+    assert noise["stochastic"].points[0].variance == pytest.approx(0.09, rel=0.3)
+    assert scene.time_to_equal_error["srd"] > 1.0
+    assert {c.name for c in scene.claims} == {
         "time to equal error",
         "first picture",
     }
@@ -196,18 +185,14 @@ def test_one_whole_run(tmp_path: Path, rigs: Rigs) -> None:
     assert first_of_seed == ["stochastic", "srd", "stochastic"]  # who begins changes
     for name, file in scene.pictures.items():
         picture = np.load(bench.directory / file)
-        assert (
-            picture.shape == (HEIGHT, WIDTH, 3)
-            and picture.dtype == np.float32
-            and (name == "reference" or name in scene.picture_samples)
-        )
+        assert picture.shape == (HEIGHT, WIDTH, 3) and picture.dtype == np.float32
+        assert name == "reference" or name in scene.picture_samples
     assert set(scene.pictures) == {"reference", "srd", "srd early", "stochastic", "stochastic early"}
     assert not (bench.directory / "partial").exists()
     fractions = [fraction for fraction, _ in bench.told]
     assert fractions == sorted(fractions) and 0.0 <= fractions[0] and fractions[-1] <= 1.0
-    assert bench.told[0][1] == "one: preparing stochastic" and any(
-        text.startswith("one: reference") for _, text in bench.told
-    )
+    assert bench.told[0][1] == "one: preparing stochastic"
+    assert any(text.startswith("one: reference") for _, text in bench.told)
 
 
 @pytest.mark.parametrize("stop_at", [0, 1, 5, 12, 13, 22, 25, 30])

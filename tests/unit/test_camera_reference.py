@@ -18,14 +18,7 @@ from reference.lamps import cosine, isotropic, lamp, lopsided
 from spectrasplat.model.geometry import primitives
 from spectrasplat.model.geometry.primitives_round import sphere
 from spectrasplat.model.lights import AreaLight, CollimatedLight, DirectionalLight, PointLight, SpotLight
-from spectrasplat.model.optics.colorimetry import (
-    K_M,
-    VISIBLE_NM,
-    cmf_xyz,
-    daylight_per_lumen,
-    rgb709_to_xyz,
-    rgb_basis,
-)
+from spectrasplat.model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz, daylight_per_lumen, rgb709_to_xyz, rgb_basis
 from spectrasplat.model.optics.glass import constant as constant_index
 from spectrasplat.model.optics.glass import from_abbe
 from spectrasplat.model.optics.spectrum import cmf_at, laser
@@ -50,16 +43,7 @@ from spectrasplat.reference.camera_reference import (
 from spectrasplat.reference.camera_run import CameraPicture, CameraRun
 from spectrasplat.reference.spectral_caustic import CausticPlan
 
-from tests.unit.camera_scenes import (
-    ABOVE,
-    D65,
-    FLINT,
-    WHITE,
-    place,
-    plate,
-    scene_of,
-    slab_scene,
-)
+from tests.unit.camera_scenes import ABOVE, D65, FLINT, WHITE, place, plate, scene_of, slab_scene
 
 
 def z_squared(picture: CameraPicture, expected: np.ndarray) -> float:
@@ -147,12 +131,8 @@ def test_lights_are_seen_from_the_front_through_each_other_and_hide_nothing() ->
     below = replace(front, position=(0.0, 0.0, -1.0))
     picture = render_camera_reference(scene_of(front, through, from_behind, below, plate(Black())), 21, 21, samples=8)
     y = picture.xyz[..., 1]
-    assert (
-        y[10, 10] == pytest.approx(3.0)
-        and y[10, 13] == pytest.approx(1.0)
-        and y[4, 10] == pytest.approx(2.0)
-        and y[4, 4] == 0.0
-    )
+    assert y[10, 10] == pytest.approx(3.0) and y[10, 13] == pytest.approx(1.0) and y[4, 10] == pytest.approx(2.0)
+    assert y[4, 4] == 0.0
 
 
 def test_the_suns_disc_is_seen_where_nothing_hides_it() -> None:
@@ -163,9 +143,8 @@ def test_the_suns_disc_is_seen_where_nothing_hides_it() -> None:
     columns = picture.xyz[..., 1].sum(axis=0)
     hidden, seen = sorted([columns[:20].sum(), columns[20:].sum()])
     # Solid angle on the film: π tan² r of 4 tan² r, halved; its radiance 1/(π sin² r).
-    assert hidden == 0.0 and seen == pytest.approx(
-        0.5 * math.pi / 4 * 1600 / (math.pi * math.sin(math.radians(4.0)) ** 2), rel=3e-3
-    )
+    assert hidden == 0.0
+    assert seen == pytest.approx(0.5 * math.pi / 4 * 1600 / (math.pi * math.sin(math.radians(4.0)) ** 2), rel=3e-3)
 
 
 def test_shadow_rays_stop_at_glass() -> None:

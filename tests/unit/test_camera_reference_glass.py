@@ -20,16 +20,7 @@ from spectrasplat.model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz
 from spectrasplat.model.optics.glass import Dispersion
 from spectrasplat.model.optics.glass import constant as constant_index
 from spectrasplat.model.optics.spectrum import Spectrum, laser
-from spectrasplat.model.scene import (
-    Absorption,
-    Black,
-    Camera,
-    Dielectric,
-    Diffuse,
-    Mirror,
-    Scene,
-    SceneObject,
-)
+from spectrasplat.model.scene import Absorption, Black, Camera, Dielectric, Diffuse, Mirror, Scene, SceneObject
 from spectrasplat.model.texture import Texture
 from spectrasplat.reference import photon_run
 from spectrasplat.reference.camera_reference import render_camera_reference
@@ -38,16 +29,7 @@ from spectrasplat.reference.direct_view import seen_directly
 from spectrasplat.reference.photon_reference import render_reference
 from spectrasplat.reference.spectral_caustic import CausticPlan, build_caustic
 
-from tests.unit.camera_scenes import (
-    D65,
-    FLINT,
-    THICKNESS,
-    TILT,
-    place,
-    plate,
-    scene_of,
-    slab_scene,
-)
+from tests.unit.camera_scenes import D65, FLINT, THICKNESS, TILT, place, plate, scene_of, slab_scene
 
 # ---- a slab before an edge -------------------------------------------------------------------
 

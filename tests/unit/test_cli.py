@@ -25,14 +25,7 @@ from spectrasplat.commands.program import COMMANDS
 from spectrasplat.commands.proof_steps import PARTS
 from spectrasplat.commands.scenes import find_scene
 from spectrasplat.model.geometry.mesh import make_mesh
-from spectrasplat.model.scene import (
-    Black,
-    Camera,
-    Diffuse,
-    RenderDefaults,
-    Scene,
-    SceneObject,
-)
+from spectrasplat.model.scene import Black, Camera, Diffuse, RenderDefaults, Scene, SceneObject
 from spectrasplat.model.settings import RenderSettings
 
 pytestmark = pytest.mark.core

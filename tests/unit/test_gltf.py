@@ -158,10 +158,7 @@ MATERIALS: dict[str, tuple[dict[str, Any], Any]] = {
         },
         Diffuse((0.1, 0.2, 0.3), roughness=0.3, coat_index=1.7),
     ),
-    "sheen": (
-        {"pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0.5}},
-        Diffuse((1.0, 1.0, 1.0)),
-    ),
+    "sheen": ({"pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0.5}}, Diffuse((1.0, 1.0, 1.0))),
     "mirror": (
         {"pbrMetallicRoughness": {"baseColorFactor": [0.9, 0.8, 0.7, 1], "roughnessFactor": 0.05}},
         Mirror((0.9, 0.8, 0.7)),

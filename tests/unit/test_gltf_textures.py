@@ -191,10 +191,8 @@ def test_textures_survive_saving_as_gltf(tmp_path: Path, suffix: str) -> None:
     back = load_gltf(tmp_path / f"walls{suffix}")
     assert back.notes == ()
     for old, new in zip(scene.objects, back.objects, strict=True):
-        assert (
-            new.material.reflectance_rgb == old.material.reflectance_rgb
-            and new.material.texture.wrap == old.material.texture.wrap
-        )
+        assert new.material.reflectance_rgb == old.material.reflectance_rgb
+        assert new.material.texture.wrap == old.material.texture.wrap
         np.testing.assert_array_equal(new.material.texture.rgb, old.material.texture.rgb)
         np.testing.assert_allclose(new.mesh.uv, old.mesh.uv, atol=1e-7)
     assert back.objects[0].material.texture is back.objects[1].material.texture

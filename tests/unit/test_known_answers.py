@@ -14,14 +14,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from reference.surfaces import Plane, sphere
-from reference.tracer import (
-    AIR,
-    Index,
-    Ray,
-    make_ray,
-    refracted,
-    through,
-)
+from reference.tracer import AIR, Index, Ray, make_ray, refracted, through
 from spectrasplat.reference import glasses, optics
 from spectrasplat.reference.glasses import C_NM, D_NM, F_NM
 

@@ -7,14 +7,7 @@ import math
 import numpy as np
 import pytest
 from spectrasplat.model.geometry import primitives
-from spectrasplat.model.local_dispersion import (
-    MAX_FLAT_SIDE,
-    MAX_VOLUME_SIDE,
-    GainGrid,
-    dab_weight,
-    gain_at,
-    plane_of,
-)
+from spectrasplat.model.local_dispersion import MAX_FLAT_SIDE, MAX_VOLUME_SIDE, GainGrid, dab_weight, gain_at, plane_of
 from spectrasplat.model.scene import Dab, Diffuse, SceneObject
 
 

@@ -13,14 +13,7 @@ from spectrasplat.base.errors import UserError
 from spectrasplat.base.image_io import write_image
 from spectrasplat.model.io.picture_files import read_picture
 
-from tests.unit.picture_bytes import (
-    HEADER,
-    hdr_file,
-    new_rows,
-    old_rows,
-    radiance_of,
-    random_rgbe,
-)
+from tests.unit.picture_bytes import HEADER, hdr_file, new_rows, old_rows, radiance_of, random_rgbe
 
 
 def write(path: Path, content: bytes) -> Path:

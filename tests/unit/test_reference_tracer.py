@@ -241,9 +241,7 @@ def test_columns_of_a_grating_behind_a_prism_are_derivatives(throws_back: bool) 
 
     def path_of(place: np.ndarray) -> Path:
         ray = make_ray(
-            [-3.0, 0.2 + place[0], 1.0 + place[1]],
-            [1.0, 0.05, 0.3],
-            [[0, 1, 0], [0, 0, 1], [0, 0, 0], [0, 0, 0]],
+            [-3.0, 0.2 + place[0], 1.0 + place[1]], [1.0, 0.05, 0.3], [[0, 1, 0], [0, 0, 1], [0, 0, 0], [0, 0, 0]]
         )
         bodies = [
             Body(Index(1.6 + place[2], np.array([0, 0, 1, 0]))),

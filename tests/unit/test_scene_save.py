@@ -285,10 +285,7 @@ CASES: dict[str, tuple[Edit, list[str]]] = {
             "+rotation_deg = [-90.0, 0.0, 30.0]      # stands upright, its refracting edge towards +y",
         ],
     ),
-    "move": (
-        lambda s: edits.set_position(s, 0, (0.2, 0.0, 0.601)),
-        ["+position = [0.2, 0.0, 0.601]"],
-    ),
+    "move": (lambda s: edits.set_position(s, 0, (0.2, 0.0, 0.601)), ["+position = [0.2, 0.0, 0.601]"]),
     "lift": (
         lambda s: edits.set_position(s, 0, (0.0, 0.0, 0.9)),
         ["-rests_at_z = 0.001", "+position = [0.0, 0.0, 0.9]"],

@@ -215,12 +215,8 @@ def test_the_wine_reaches_into_the_wall_and_the_glass_has_priority() -> None:
 def test_the_studio_lights_the_brilliant_alone() -> None:
     """Values from 0.05 to 50, whatever the coding: the reader is ours, the file was written by a script."""
     scene = shipped("brilliant_studio")
-    assert (
-        scene.lights == ()
-        and len(scene.objects) == 1
-        and scene.environment is not None
-        and scene.notes == ("diamond: data reach from 226 to 760 nm; above 760 nm the nearest value is used.",)
-    )
+    assert scene.lights == () and len(scene.objects) == 1 and scene.environment is not None
+    assert scene.notes == ("diamond: data reach from 226 to 760 nm; above 760 nm the nearest value is used.",)
     rgb = scene.environment.rgb
     assert rgb.shape == (512, 1024, 3)
     assert rgb.min() == pytest.approx(0.05, rel=0.02) and rgb.max() == pytest.approx(50.0, rel=0.01)

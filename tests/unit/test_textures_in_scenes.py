@@ -65,10 +65,8 @@ def test_a_texture_is_read_with_its_factor_and_wrap(folder: Path) -> None:
         folder,
         text + 'material = { kind = "diffuse", texture = { file = "poster.png", wrap = "clamp" }, colour = 0.5 }',
     )
-    assert (
-        tinted.objects[1].material.reflectance_rgb == (0.5, 0.5, 0.5)
-        and tinted.objects[1].material.texture.wrap == "clamp"
-    )
+    assert tinted.objects[1].material.reflectance_rgb == (0.5, 0.5, 0.5)
+    assert tinted.objects[1].material.texture.wrap == "clamp"
     assert load(folder, text + 'material = "diffuse"').objects[1].material.reflectance_rgb == (0.8, 0.8, 0.8)
 
 
@@ -151,12 +149,8 @@ def test_a_mesh_without_texture_coordinates_cannot_wear_one(folder: Path) -> Non
 def test_each_kind_of_environment_is_read(folder: Path) -> None:
     text = CAMERA + BALL
     scene = load(folder, text + '[environment]\nkind = "map"\nfile = "room.exr"\nintensity = 2.0\nrotation_deg = 30\n')
-    assert (
-        scene.environment.kind == "map"
-        and scene.environment.rgb.max() > 60.0
-        and scene.lights == ()
-        and len(scene.objects) == 1
-    )
+    assert scene.environment.kind == "map" and scene.environment.rgb.max() > 60.0 and scene.lights == ()
+    assert len(scene.objects) == 1
     np.testing.assert_allclose(scene.environment.world_to_local, world_to_local((0, 0, 1), 30.0))
     scene = load(folder, text + '[environment]\nkind = "gradient"\nzenith = [1, 2, 30]\nhorizon = 4\nup = [0, 2, 0]\n')
     assert scene.environment.kind == "gradient"
@@ -241,11 +235,8 @@ def test_textures_survive_saving_elsewhere(folder: Path, monkeypatch: pytest.Mon
     (folder / "deep" / "er").mkdir(parents=True)
     back = again(scene, folder / "deep" / "er" / "copy.toml")
     old, new = scene.objects[1].material, back.objects[1].material
-    assert (
-        new.reflectance_rgb == old.reflectance_rgb
-        and new.texture.wrap == "clamp"
-        and new.texture.source == old.texture.source
-    )
+    assert new.reflectance_rgb == old.reflectance_rgb and new.texture.wrap == "clamp"
+    assert new.texture.source == old.texture.source
     np.testing.assert_array_equal(new.texture.rgb, old.texture.rgb)
     assert 'file = "../../poster.png"' in (folder / "deep" / "er" / "copy.toml").read_text()
 

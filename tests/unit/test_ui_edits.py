@@ -18,16 +18,7 @@ from spectrasplat.model.io.scene_save import save_scene
 from spectrasplat.model.lights import LIGHT_KINDS, SpotLight
 from spectrasplat.model.optics import catalogue, glass
 from spectrasplat.model.optics.spectrum import illuminant
-from spectrasplat.model.scene import (
-    Black,
-    Camera,
-    Dab,
-    Dielectric,
-    Diffuse,
-    Mirror,
-    Scene,
-    SceneObject,
-)
+from spectrasplat.model.scene import Black, Camera, Dab, Dielectric, Diffuse, Mirror, Scene, SceneObject
 from spectrasplat.model.scene_defaults import bounds_of, default_light
 from spectrasplat.model.scene_objects import make_shape
 
@@ -354,9 +345,5 @@ def test_an_attempt_is_an_edit_or_a_notice(scene: Scene) -> None:
     refused = edits.attempt(state, "Rename block", edits.rename, BLOCK, "floor")
     assert refused.scene is scene
     (notice,) = refused.requests
-    assert (
-        isinstance(notice, Notice)
-        and notice.is_error
-        and notice.text.startswith("Another object")
-        and notice.text.endswith(".")
-    )
+    assert isinstance(notice, Notice) and notice.is_error and notice.text.startswith("Another object")
+    assert notice.text.endswith(".")

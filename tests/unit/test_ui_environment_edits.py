@@ -167,10 +167,8 @@ def test_a_picture_is_worn_tinted_shared_and_taken_off(scene: Scene, picture: Pa
     assert cpu_reference.objects[-1].material.texture is worn.objects[table].material.texture
     assert cost(scene, worn) == DirtyLevel.BUILD and cost(worn, tinted) == DirtyLevel.CAMERA
     clamped = environment.set_texture_wrap(worn, table, "clamp")
-    assert (
-        cost(worn, clamped) == DirtyLevel.CAMERA
-        and clamped.objects[table].material.texture.rgb is worn.objects[table].material.texture.rgb
-    )
+    assert cost(worn, clamped) == DirtyLevel.CAMERA
+    assert clamped.objects[table].material.texture.rgb is worn.objects[table].material.texture.rgb
     plain = environment.clear_texture(worn, table)
     assert plain.objects[table].material.texture is None
 

@@ -12,14 +12,7 @@ from spectrasplat.base.errors import UserError
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.edit import measuring, placing
 from spectrasplat.edit.lessons import lesson, lessons
-from spectrasplat.edit.matrices import (
-    compose,
-    decompose,
-    rotation_matrix,
-    with_position,
-    with_rotation,
-    with_scale,
-)
+from spectrasplat.edit.matrices import compose, decompose, rotation_matrix, with_position, with_rotation, with_scale
 from spectrasplat.edit.state import Selection, State
 from spectrasplat.model.contacts import world_bounds
 from spectrasplat.model.io.scene_file import load_scene
