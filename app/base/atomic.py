@@ -17,6 +17,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from .errors import UserError
+from .locks import lock
 
 _PART = re.compile(r"\..*\.[0-9a-f]{8}\.part(\.[^.]*)?", re.DOTALL)
 _open_parts: set[Path] = set()
@@ -150,7 +151,7 @@ def _reserved(target: Path, part: Path) -> Iterator[int]:
             _sweep(part.parent)
             while descriptor < 0:
                 descriptor = os.open(part, os.O_CREAT | os.O_EXCL | os.O_WRONLY | getattr(os, "O_CLOEXEC", 0), 0o666)
-                if not _lock(descriptor, wait=True) or os.path.exists(part):
+                if not lock(descriptor, wait=True) or os.path.exists(part):
                     break
                 os.close(descriptor)  # swept before it was locked
                 descriptor = -1
@@ -180,23 +181,10 @@ def _sweep(folder: Path) -> None:
                 with suppress(OSError):
                     descriptor = os.open(entry.path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
                     try:
-                        if os.fstat(descriptor).st_uid == os.geteuid() and _lock(descriptor):
+                        if os.fstat(descriptor).st_uid == os.geteuid() and lock(descriptor):
                             os.unlink(entry.path)
                     finally:
                         os.close(descriptor)
-
-
-def _lock(descriptor: int, wait: bool = False) -> bool:
-    """Lock a file that is being written, until it is closed; whether it could be (on Windows an open file is held)."""
-    if sys.platform == "win32":
-        return False
-    import fcntl
-
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-    except OSError:  # somebody else's; or a file system without locks, where nothing is ever swept
-        return False
-    return True
 
 
 def _settle(folder: Path) -> None:

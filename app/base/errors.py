@@ -12,8 +12,6 @@ import re
 import unicodedata
 from collections.abc import Iterable
 
-from .meanings import MEANT
-
 
 class UserError(Exception):
     """A mistake in what the user gave us, told in one sentence with a way out."""
@@ -79,14 +77,56 @@ def _escaped(character: str) -> str:
     return f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}"
 
 
+_OTHER_WORDS = {
+    "box": "cube cuboid block brick",
+    "slab": "plate pane sheet window tile",
+    "plane": "rectangle quad square floor ground table wall grid",
+    "disc": "disk circle",
+    "sphere": "ball globe uvsphere icosphere orb",
+    "ellipsoid": "egg ellipse spheroid pebble",
+    "cylinder": "rod bar column",
+    "dome": "hemisphere halfsphere halfball cabochon",
+    "torus": "donut doughnut ring",
+    "revolution": "tube pipe vase bottle bowl cup glass goblet lathe capsule",
+    "polygon_prism": "hexagon hexagonalprism crystal",
+    "prism": "wedge triangle triangularprism",
+    "lens": "biconvex planoconvex biconcave",
+    "brilliant": "gem stone roundcut roundbrilliant",
+    "step_cut": "emeraldcut baguette",
+    "rippled_water": "water waves ocean pool",
+    "height_field": "terrain heightmap heightfield landscape",
+    "mesh": "file model obj ply stl",
+    "colour": "color albedo kd basecolor basecolour diffuse",
+    "vertical_fov_deg": "fov fovy fieldofview angle",
+    "n_d": "ior index refractiveindex nd",
+    "V_d": "abbe abbenumber vd",
+    "position": "location translation translate origin eye pos",
+    "target": "lookat",
+    "rotation_deg": "rotate euler",
+    "directional": "sun parallel distant",
+    "point": "lamp bulb omni",
+    "spot": "spotlight",
+    "glass": "dielectric transparent",
+    "diffuse": "lambert lambertian matte matt",
+    "mirror": "metal conductor specular",
+    "diamond": "diamant diamante",
+}
+"""Words that people use for what has another name here: shapes, keys, kinds."""
+_MEANT: dict[str, list[str]] = {}
+"""Word without punctuation -> names that may be meant by it, the likeliest first."""
+for _name, _others in _OTHER_WORDS.items():
+    for _word in _others.split():
+        _MEANT.setdefault(_word, []).append(_name)
+
+
 def nearest_names(name: str, known: Iterable[str], count: int = 3) -> list[str]:
     """Known names that `name` may stand for, best first (case-insensitive; may be empty).
 
-    Those that mean the same (`meanings`), or else those that share nearly all letters in their order, begin with it, or
+    Those that mean the same, or else those that share nearly all letters in their order, begin with it, or
     have a whole word in common with it.
     """
     word, by_folded = name.casefold(), {candidate.casefold(): candidate for candidate in known}
-    if meant := [m for m in MEANT.get("".join(filter(str.isalnum, word)), ()) if m.casefold() in by_folded]:
+    if meant := [m for m in _MEANT.get("".join(filter(str.isalnum, word)), ()) if m.casefold() in by_folded]:
         return meant[:count]
     near = difflib.get_close_matches(word, by_folded, count, cutoff=0.72 if len(word) > 3 else 0.66)
     near += [each for each in by_folded if _words(word) & _words(each) or (len(word) > 2 and each.startswith(word))]

@@ -35,7 +35,6 @@ SHOWN_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp")
 """Suffixes of pictures for looking at: tone mapped, 8 bits."""
 LARGEST_WEBP_SIDE = 16383
 """Pixels a side that the format can say."""
-_READ_SUFFIXES = (".png", ".exr", ".npy")
 MAX_PIXELS = 1 << 26
 """Of a picture that is read; 805 MB as float32: a mistake rather than a wish."""
 _HUGE = 1e30
@@ -63,12 +62,8 @@ def check_suffix(path: Path | str) -> str:
     """The suffix of `path` in lower case; raises `UserError` when no writer knows it."""
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES:
-        told = (
-            f"the suffix '{suffix}' is not a picture format"
-            if suffix
-            else "it has no suffix to tell the picture format"
-        )
-        raise UserError(f"cannot write {path}: {told}; use one of {', '.join(SUFFIXES)}")
+        what = f"the suffix '{suffix}' is not a picture format" if suffix else "its name has no suffix"
+        raise UserError(f"cannot write {path}: {what}; use one of {', '.join(SUFFIXES)}")
     return suffix
 
 
@@ -154,19 +149,18 @@ def read_image(path: Path | str, layer: str = "") -> Picture:
     """Read a .png, .exr (of it a layer) or .npy picture; raises `UserError` when it is missing or is not one."""
     path = Path(path)
     suffix = path.suffix.lower()
-    readers: dict[str, Callable[[Path], Picture]] = {
-        ".png": _read_png,
-        ".exr": lambda path: _read_exr(path, layer),
-        ".npy": _read_npy,
+    readers: dict[str, Callable[[], Picture]] = {
+        ".png": lambda: _read_png(path),
+        ".exr": lambda: _read_exr(path, layer),
+        ".npy": lambda: _read_npy(path),
     }
-    reader = readers.get(suffix)
-    if reader is None:
-        raise UserError(f"cannot read {path}: '{suffix}' cannot be read; use one of {', '.join(_READ_SUFFIXES)}")
+    if suffix not in readers:
+        raise UserError(f"cannot read {path}: '{suffix}' cannot be read; use one of {', '.join(readers)}")
     if not os.path.exists(path):
         raise UserError(f"cannot read {path}: there is no such file; check the name")
     try:
         files.check_regular(path, files.DATA_BYTES)
-        return reader(path)
+        return readers[suffix]()
     except (OSError, EOFError, ValueError, RuntimeError, KeyError, TypeError, SyntaxError, MemoryError) as error:
         raise UserError(
             f"cannot read {path}: it is not a whole {suffix[1:].upper()} picture ({files.reason_of(error)}); write it "
@@ -184,13 +178,11 @@ def channel_name(wavelength_nm: float) -> str:
 
 def save_codes(path: Path, codes: np.ndarray) -> None:
     """Save sRGB codes uint8 (H, W, 3) in the format of the suffix, one of `SHOWN_SUFFIXES`."""
-    from PIL import Image, PngImagePlugin
+    from PIL import Image
 
     suffix = path.suffix.lower()
     if suffix == ".png":
-        texts = PngImagePlugin.PngInfo()
-        texts.add(b"sRGB", b"\x00")  # rendering intent: perceptual
-        Image.fromarray(codes).save(path, format="PNG", pnginfo=texts, compress_level=6)
+        _save_png(path, codes, {})
     elif suffix == ".webp":
         check_webp_size(path, (codes.shape[1], codes.shape[0]))
         # Without loss: its other way halves the resolution of colours, and those of a caustic change from pixel to
@@ -209,16 +201,20 @@ def _write_png(
     glare: float,
     antialias: bool,
 ) -> None:
+    ev = auto_exposure(rgb) + exposure_ev
+    codes = tone_map_8bit(with_glare(rgb, glare), ev, antialias)
+    _save_png(file, codes, {"Exposure": f"{ev:+.3f} EV", **metadata})
+
+
+def _save_png(file: Path | io.BytesIO, codes: np.ndarray, texts: dict[str, str]) -> None:
     from PIL import Image, PngImagePlugin
 
-    ev = auto_exposure(rgb) + exposure_ev
-    texts = PngImagePlugin.PngInfo()
-    for key, value in {"Exposure": f"{ev:+.3f} EV", **metadata}.items():
-        texts.add_itxt(key, str(value))
-    texts.add(b"sRGB", b"\x00")  # rendering intent: perceptual
+    chunks = PngImagePlugin.PngInfo()
+    for key, value in texts.items():
+        chunks.add_itxt(key, str(value))
+    chunks.add(b"sRGB", b"\x00")  # rendering intent: perceptual
     # Level 6 is three times smaller than 1 on caustics and still takes less than a tone map.
-    codes = tone_map_8bit(with_glare(rgb, glare), ev, antialias)
-    Image.fromarray(codes).save(file, format="PNG", pnginfo=texts, compress_level=6)
+    Image.fromarray(codes).save(file, format="PNG", pnginfo=chunks, compress_level=6)
 
 
 def _read_png(path: Path) -> Picture:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable
-from types import TracebackType
 from typing import TYPE_CHECKING, Self, TextIO
 
 from .errors import plain
@@ -51,12 +50,7 @@ class ProgressReporter:
     `clock` returns seconds and `stream` is stderr unless a test says otherwise.
     """
 
-    def __init__(
-        self,
-        title: str,
-        stream: TextIO | None = None,
-        clock: Callable[[], float] = time.monotonic,
-    ) -> None:
+    def __init__(self, title: str, stream: TextIO | None = None, clock: Callable[[], float] = time.monotonic) -> None:
         self._title = plain(title)
         self._stream = stream or sys.stderr
         self._clock = clock
@@ -99,12 +93,7 @@ class ProgressReporter:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        _kind: type[BaseException] | None,
-        _error: BaseException | None,
-        _trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _mark(self, fraction: float, ends: float, now: float) -> None:
@@ -131,20 +120,11 @@ class ProgressReporter:
     def _log(self, fraction: float, text: str, now: float) -> None:
         elapsed = now - self._started
         detail = (f", {text}" if text else "") + self._left_words(now)
-        print(
-            f"{self._title}: {100.0 * fraction:.0f} % after {elapsed:.0f} s{detail}",
-            file=self._stream,
-            flush=True,
-        )
+        print(f"{self._title}: {100.0 * fraction:.0f} % after {elapsed:.0f} s{detail}", file=self._stream, flush=True)
 
     def _open_bar(self) -> None:
         from rich.console import Console
-        from rich.progress import (
-            BarColumn,
-            Progress,
-            TaskProgressColumn,
-            TextColumn,
-        )
+        from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 
         self._bar = Progress(
             TextColumn("{task.description}", markup=False),

@@ -7,59 +7,47 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
+from spectrasplat.__main__ import main
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def in_a_window(program: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    """`program`, run by a process that has a display of its own."""
-    environment = os.environ | {"PYTHONPATH": str(ROOT), "SPECTRASPLAT_CONFIG": str(folder / "config")}
-    command = ["xvfb-run", "-a", sys.executable, "-P", "-c", program]
-    return subprocess.run(command, env=environment, cwd=folder, capture_output=True, text=True, check=False)
+@pytest.fixture(scope="module")
+def display() -> Iterator[str]:
+    """One virtual screen for all windows of this file."""
+    assert shutil.which("Xvfb"), "install xvfb ('apt-get install xvfb'): the window cannot be tested without"
+    reader, writer = os.pipe()
+    command = ["Xvfb", "-displayfd", str(writer), "-screen", "0", "1400x900x24", "-nolisten", "tcp"]
+    with subprocess.Popen(command, pass_fds=[writer], stderr=subprocess.DEVNULL) as server:
+        os.close(writer)
+        with os.fdopen(reader) as answer:
+            yield ":" + answer.readline().strip()
+        server.terminate()
 
 
-def run(tmp_path: Path, *arguments: str, display: bool) -> subprocess.CompletedProcess[str]:
-    """`spectrasplat ARGUMENTS` with a virtual screen or without any."""
+def run(folder: Path, display: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Python with `arguments` on a display, or without any."""
     environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
-    command = [sys.executable, "-P", "-m", "spectrasplat", *arguments]
+    environment |= {"PYTHONPATH": str(ROOT), "SPECTRASPLAT_CONFIG": str(folder / "config")}
     if display:
-        assert shutil.which("xvfb-run"), (
-            "install xvfb and xauth ('apt-get install xvfb xauth'): the window cannot be tested without"
-        )
-        command = ["xvfb-run", "-a", "-s", "-screen 0 1400x900x24", *command]
+        environment["DISPLAY"] = display
+    command = [sys.executable, "-P", *arguments]
     return subprocess.run(
-        command,
-        cwd=tmp_path,
-        env=environment | {"SPECTRASPLAT_CONFIG": str(tmp_path / "config"), "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
+        command, env=environment, cwd=folder, capture_output=True, text=True, timeout=120, check=False
     )
 
 
 @pytest.mark.core
 @pytest.mark.parametrize("theme", ["dark", pytest.param("light", marks=pytest.mark.slow)])
-def test_the_window_shows_interface_and_caustic(tmp_path: Path, theme: str) -> None:
-    done = run(
-        tmp_path,
-        "view",
-        "prism",
-        "--size",
-        "1000x700",
-        "--theme",
-        theme,
-        "--screenshot",
-        "window.png",
-        "--after",
-        "5",
-        display=True,
-    )
+def test_the_window_shows_interface_and_caustic(tmp_path: Path, display: str, theme: str) -> None:
+    options = f"view prism --size 1000x700 --theme {theme} --screenshot window.png --after 5"
+    done = run(tmp_path, display, "-m", "spectrasplat", *options.split())
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip() == str(tmp_path / "window.png")
     picture = np.asarray(Image.open(tmp_path / "window.png").convert("RGB")).astype(int)
@@ -78,7 +66,7 @@ def test_the_window_shows_interface_and_caustic(tmp_path: Path, theme: str) -> N
 
 
 def test_without_a_display_one_sentence_names_the_way_out(tmp_path: Path) -> None:
-    done = run(tmp_path, "view", display=False)
+    done = run(tmp_path, "", "-m", "spectrasplat", "view")
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1 and "spectrasplat render" in done.stderr
 
@@ -86,16 +74,21 @@ def test_without_a_display_one_sentence_names_the_way_out(tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["view", "nosuch"], "scene 'nosuch' is neither a file nor shipped"),
-        (["view", "--theme", "blue"], "--theme 'blue' is unknown"),
-        (["view", "--size", "10"], "--size '10' is not WIDTHxHEIGHT"),
-        (["view", "--after", "3"], "--after says when the --screenshot is taken"),
-        (["view", "--screenshot", "x.jpg"], "must end in .png"),
+        ("nosuch", "scene 'nosuch' is neither a file nor shipped"),
+        ("--theme blue", "--theme 'blue' is unknown"),
+        ("--size 10", "--size '10' is not WIDTHxHEIGHT"),
+        ("--after 3", "--after says when the --screenshot is taken"),
+        ("--screenshot x.jpg", "must end in .png"),
     ],
 )
-def test_wrong_options_are_told_before_a_window_is_opened(tmp_path: Path, arguments: list[str], told: str) -> None:
-    done = run(tmp_path, *arguments, display=False)
-    assert done.returncode == 2 and told in done.stderr and done.stderr.count("\n") == 1
+def test_wrong_options_are_told_before_a_window_is_opened(
+    arguments: str, told: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for variable in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(variable, raising=False)
+    assert main(["view", *arguments.split()]) == 2
+    error = capsys.readouterr().err
+    assert told in error and error.count("\n") == 1
 
 
 LETTER_OUTLIVES_CTRL = """
@@ -128,8 +121,8 @@ print(seen)
 
 
 @pytest.mark.slow
-def test_the_window_keeps_ctrl_down_for_the_letter_of_a_long_frame(tmp_path: Path) -> None:
-    done = in_a_window(LETTER_OUTLIVES_CTRL, tmp_path)
+def test_the_window_keeps_ctrl_down_for_the_letter_of_a_long_frame(tmp_path: Path, display: str) -> None:
+    done = run(tmp_path, display, "-c", LETTER_OUTLIVES_CTRL)
     assert done.stdout.strip() == "[True]", done.stderr
 
 
@@ -160,8 +153,8 @@ with Window() as window:
 """
 
 
-def test_a_long_frame_hears_of_input(tmp_path: Path) -> None:
-    done = in_a_window(INPUT_IS_SEEN_WHILE_A_FRAME_IS_DRAWN, tmp_path)
+def test_a_long_frame_hears_of_input(tmp_path: Path, display: str) -> None:
+    done = run(tmp_path, display, "-c", INPUT_IS_SEEN_WHILE_A_FRAME_IS_DRAWN)
     assert done.stdout.strip() == "[(False, True)]", done.stderr
 
 
@@ -189,9 +182,9 @@ with Window() as window:
 """
 
 
-def test_a_picture_dropped_while_comparing_is_compared_with(tmp_path: Path) -> None:
+def test_a_picture_dropped_while_comparing_is_compared_with(tmp_path: Path, display: str) -> None:
     """What glfw itself calls for a drop, as the window has installed it."""
-    done = in_a_window(A_PICTURE_IS_DROPPED, tmp_path)
+    done = run(tmp_path, display, "-c", A_PICTURE_IS_DROPPED)
     assert done.stdout.strip() == "['wipe', 'file', 'größer.exr'] 0", done.stderr
 
 
@@ -248,7 +241,7 @@ with Window() as window:
 """
 
 
-def test_a_path_that_is_typed_at_once_takes_no_frame_a_letter(tmp_path: Path) -> None:
+def test_a_path_that_is_typed_at_once_takes_no_frame_a_letter(tmp_path: Path, display: str) -> None:
     """A click on Open, a whole path and Enter, all while one long frame is drawn."""
-    done = in_a_window(A_PATH_IS_TYPED_IN_ONE_FRAME, tmp_path)
+    done = run(tmp_path, display, "-c", A_PATH_IS_TYPED_IN_ONE_FRAME)
     assert done.stdout.startswith("True True"), done.stdout + done.stderr

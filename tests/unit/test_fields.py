@@ -72,15 +72,6 @@ def test_every_field_of_a_light_is_written_and_read_back(kind: str, shape: str, 
 
 
 @pytest.mark.parametrize("kind", LIGHT_KINDS)
-def test_every_power_is_told_as_it_was_given(kind: str) -> None:
-    light = light_of(kind)
-    for key in light.power_keys:
-        assert light.with_power(key, 12.5).power(key) == pytest.approx(12.5, rel=1e-12)
-    assert light.own_keys[0].is_photometric and not light.own_keys[1].is_photometric
-    assert {key.key for key in light.own_keys} <= {key.key for key in light.power_keys}
-
-
-@pytest.mark.parametrize("kind", LIGHT_KINDS)
 def test_a_misspelt_key_of_every_number_is_met_by_the_right_one(kind: str, tmp_path: Path) -> None:
     for number in light_of(kind).shown_numbers():
         assert isinstance(number, Number)

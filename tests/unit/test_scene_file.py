@@ -260,13 +260,6 @@ def test_spectra_add_by_power(tmp_path: Path) -> None:
     assert lines == ((450.0, pytest.approx(3.0)), (650.0, pytest.approx(1.0)))
 
 
-def test_inside_and_outside_by_winding_number(tmp_path: Path) -> None:
-    ring = load(tmp_path, '[[objects]]\nshape = "torus"\nmajor_radius = 1.0\nminor_radius = 0.25\n').objects[0]
-    assert not contains(ring, np.array([0.0, 0.0, 0.0]))
-    assert contains(ring, np.array([1.0, 0.0, 0.2]))
-    assert not contains(ring, np.array([1.0, 0.0, 0.26]))
-
-
 @pytest.mark.parametrize("scale", [(1.0, 1.0, 1.0), (2.0, -0.5, 1.0)])
 def test_counting_crossings_is_the_winding_number(scale: tuple[float, float, float]) -> None:
     from spectrasplat.model.geometry import primitives

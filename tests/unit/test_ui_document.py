@@ -109,17 +109,6 @@ def test_another_key_in_braces_keeps_their_blanks_and_words(tmp_path: Path) -> N
     assert document.save().read_text(encoding="utf-8") == MINE
 
 
-def test_words_that_name_files_stay_in_their_folder(tmp_path: Path) -> None:
-    """From another folder they would name nothing."""
-    (tmp_path / "beside").mkdir()
-    save_ply(sphere(0.5, 80), tmp_path / "ball.ply")
-    file = tmp_path / "mine.toml"
-    file.write_text('# Mine\n[[objects]]\nmesh = "ball.ply"\nglass = "N-SF11"\n', encoding="utf-8")
-    document = Document.open(file)
-    target = document.save(tmp_path / "beside" / "mine.toml")
-    assert len(Document.open(target).scene.objects[0].mesh.triangles) == len(document.scene.objects[0].mesh.triangles)
-
-
 @pytest.mark.parametrize("name", ["gone/scene.toml", "scene.png", "scene"])
 def test_a_failed_save_leaves_the_document_unsaved_and_where_it_was(file: Path, name: str) -> None:
     document = Document.open(file)
