@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from spectrasplat.base.errors import UserError
-from spectrasplat.commands import glass_report
 from spectrasplat.model.optics import catalogue, glass
 from spectrasplat.model.optics.glass import LINE_C_NM, LINE_D_NM, LINE_F_NM
 
@@ -247,28 +246,6 @@ def test_impossible_data_are_refused_by_key(make, message: str) -> None:
         make("s.toml: materials.prism")
     assert str(caught.value).startswith("s.toml: materials.prism: ") and message in str(caught.value)
     assert "\n" not in str(caught.value)
-
-
-def test_description_holds_the_facts() -> None:
-    text = glass_report.describe(catalogue.find_entry("N-SF11"))
-    for fact in ("Schott N-SF11", "1.784720", "25.680", "-0.152878", "1.73759695", "CC0", "370-2500"):
-        assert fact in text
-    table = glass_report.list_glasses("n-sf11")
-    assert table.row_count >= 1 and next(iter(table.columns[0].cells)) == "N-SF11"
-    with pytest.raises(UserError, match="no glass resembles"):
-        glass_report.list_glasses("§§§")
-
-
-def test_plot_is_a_picture_and_refuses_other_names(tmp_path) -> None:
-    from PIL import Image
-
-    target = tmp_path / "plot.png"
-    glass_report.plot([catalogue.find_entry("N-BK7"), catalogue.find_entry("diamond")], target)
-    with Image.open(target) as picture:
-        assert picture.width > 1000 and len(picture.convert("RGB").getcolors(1 << 20)) > 500
-    with pytest.raises(UserError, match="must end in .png"):
-        glass_report.plot(catalogue.find_entry("N-BK7"), tmp_path / "plot.jpg")
-    assert [p.name for p in tmp_path.iterdir()] == ["plot.png"]
 
 
 # -- gain of the dispersion -----------------------------------------------------------------

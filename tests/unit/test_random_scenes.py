@@ -97,8 +97,8 @@ def test_all_kinds_come_up() -> None:
         (("--random", "2", "--random-seed", "-1"), "--random-seed -1 is out of range"),
         (("--random-seed", "3"), "--random N how many"),
         (("--random-kinds", "all"), "--random N how many"),
-        (("--random", "2", "--random-kinds", "some"), "--random-kinds 'some' is neither plain nor all"),
-        (("--random", "2", "--random-kinds", ""), "--random-kinds '' is neither plain nor all"),
+        (("--random", "2", "--random-kinds", "some"), "--random-kinds 'some' is unknown, known are plain, all"),
+        (("--random", "2", "--random-kinds", ""), "--random-kinds '' is unknown"),
         (("prism", "--random", "2"), "leave out prism"),
     ],
 )

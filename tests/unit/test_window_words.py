@@ -1,19 +1,24 @@
-"""What a window says instead of the command line's options, from the sentences that are really told."""
+"""What a window says instead of the command line's options, from the sentences that are really told; and that lengths
+are called what the scene's file calls them."""
 
 from __future__ import annotations
 
 import ast
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from spectrasplat.base.errors import UserError
 from spectrasplat.base.memory import check_picture_memory
+from spectrasplat.base.paths import shipped_scenes
 from spectrasplat.edit.opening import open_scene
 from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.io.scene_save import save_scene
 from spectrasplat.model.staging import Staging, opaque_note
 from spectrasplat.render.notices import loss_notices
 from spectrasplat.ui.message_box import MessageBox
+from spectrasplat.ui.panels import unit_words
 from spectrasplat.ui.window_words import in_window
 
 SOLID = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
@@ -97,3 +102,32 @@ def _texts(file: Path) -> list[str]:
         elif isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in documentation | parts:
             found.append(node.value)
     return [text for text in found if " --" in text or text.startswith("--")]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("units", "mm"),
+        ("Unit: units", "Unit: mm"),
+        ("Illuminance (lm/unit²)", "Illuminance (lm/mm²)"),
+        ("Radiance, lm/(sr unit²).", "Radiance, lm/(sr mm²)."),
+        ("x, y, z in scene units.", "x, y, z in mm."),
+        ("lux where a scene unit is a metre", "lux where a scene unit is a metre"),
+        ("communities", "communities"),
+    ],
+)
+def test_units_are_called_by_the_scene_label(text: str, said: str) -> None:
+    assert unit_words.named(text) == text
+    unit_words.use("mm")
+    assert unit_words.named(text) == said
+    unit_words.use("")
+
+
+def test_the_label_is_read_and_saved(tmp_path: Path) -> None:
+    scene = load_scene(shipped_scenes()["frosted"])
+    assert scene.units == "dm"
+    path = tmp_path / "a.toml"
+    save_scene(replace(scene, units="mm"), path)
+    assert load_scene(path).units == "mm"
+    save_scene(replace(scene, units=""), path)
+    assert "units" not in path.read_text(encoding="utf-8")
