@@ -1,4 +1,4 @@
-"""Scenes and shorthand that the tests of the camera's reference share."""
+"""Scenes and shorthand that the tests of the references share."""
 
 from __future__ import annotations
 

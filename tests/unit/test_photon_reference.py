@@ -30,7 +30,6 @@ from spectrasplat.model.scene import (
     Dielectric,
     Diffuse,
     Light,
-    Material,
     Mirror,
     Scene,
     SceneObject,
@@ -39,26 +38,16 @@ from spectrasplat.model.texture import Texture
 from spectrasplat.reference import photon_emission, photon_emit, photon_run, sampling
 from spectrasplat.reference.photon_reference import cached_reference, reference_key, render_reference
 
+from tests.unit.camera_scenes import ABOVE, place, scene_of
+
 N_SLAB = 1.5168
 SINK = Mirror((0.0, 0.0, 0.0))
 """A specular object that swallows light: what it absorbs is the flux that falls on it."""
-ABOVE = Camera((0.0, 0.0, 9.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0), kind="orthographic", vertical_extent=1.0)
 
 
 @pytest.fixture(autouse=True)
 def short_pilot(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(photon_run, "_PILOT_PHOTONS", 1 << 12)
-
-
-def place(mesh, material: Material, at=(0.0, 0.0, 0.0), rotation: np.ndarray | None = None) -> SceneObject:
-    matrix = np.eye(4)
-    matrix[:3, :3] = np.eye(3) if rotation is None else rotation
-    matrix[:3, 3] = at
-    return SceneObject(mesh.name, mesh, material, matrix)
-
-
-def scene_of(light: Light | tuple[Light, ...], *objects: SceneObject, camera: Camera = ABOVE) -> Scene:
-    return Scene("test", camera, light if isinstance(light, tuple) else (light,), objects)
 
 
 def turned(axis: int, angle_deg: float) -> np.ndarray:
@@ -257,7 +246,8 @@ def busy() -> Scene:
     tint = Absorption(np.full(401, 0.3))
     light = PointLight("lamp", constant(1.0), (0.4, -1.0, 4.0))
     return scene_of(
-        (light, DirectionalLight("sun", laser(600.0), direction=(0.3, 0.2, -0.9), angular_diameter_deg=3.0)),
+        light,
+        DirectionalLight("sun", laser(600.0), direction=(0.3, 0.2, -0.9), angular_diameter_deg=3.0),
         place(sphere(0.8, 1280), Dielectric(constant_index(1.5), None, 1), (0.0, 0.0, 1.0)),
         place(sphere(0.4, 1280), Dielectric(constant_index(1.33), tint, 2), (0.1, 0.0, 1.0)),
         place(primitives.box((0.6, 0.6, 0.6)), Dielectric(constant_index(1.7), tint, 0), (1.2, 0.0, 1.0)),
