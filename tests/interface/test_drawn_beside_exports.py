@@ -30,7 +30,7 @@ from spectrasplat.ui.session import LAYOUT_FRAMES, Session
 from spectrasplat.ui.viewer import Viewer, headless_viewer
 
 from tests.interface.fake_engine import FakeEngine
-from tests.interface.test_window import ROOT, in_a_window
+from tests.interface.test_window import ROOT, run
 
 PRISM = assets_dir() / "scenes" / "prism.toml"
 STEP_S = 0.8
@@ -230,8 +230,8 @@ with Window(visible=False) as window:
 """
 
 
-def test_what_is_exported_beside_the_window_is_the_same_to_the_bit(tmp_path: Path) -> None:
-    done = in_a_window(THE_SAME_FILES, tmp_path)
+def test_what_is_exported_beside_the_window_is_the_same_to_the_bit(tmp_path: Path, display: str) -> None:
+    done = run(tmp_path, display, "-c", THE_SAME_FILES)
     assert done.stdout.strip() == "8 True", done.stdout + done.stderr
 
 
@@ -288,9 +288,9 @@ DRAWN_WHILE_A_PICTURE_IS_RENDERED = (
 
 
 @pytest.mark.slow
-def test_the_window_is_drawn_while_a_picture_is_rendered(tmp_path: Path) -> None:
+def test_the_window_is_drawn_while_a_picture_is_rendered(tmp_path: Path, display: str) -> None:
     """A real window, driver and picture: what it computes in one piece, spectral channels above all, takes seconds."""
-    done = in_a_window(DRAWN_WHILE_A_PICTURE_IS_RENDERED, tmp_path)
+    done = run(tmp_path, display, "-c", DRAWN_WHILE_A_PICTURE_IS_RENDERED)
     assert done.returncode == 0, done.stderr
     step_s, frame_s, rate, beauty, caustic = done.stdout.split()
     assert beauty == caustic == "True"
@@ -314,8 +314,8 @@ DRAWN_WHILE_COMPARING = (
 
 
 @pytest.mark.slow
-def test_the_window_is_drawn_while_the_first_comparison_is_made(tmp_path: Path) -> None:
-    done = in_a_window(DRAWN_WHILE_COMPARING, tmp_path)
+def test_the_window_is_drawn_while_the_first_comparison_is_made(tmp_path: Path, display: str) -> None:
+    done = run(tmp_path, display, "-c", DRAWN_WHILE_COMPARING)
     assert done.returncode == 0, done.stderr
     assert max(float(word) for word in done.stdout.split()) < 1.0, done.stdout
 

@@ -21,7 +21,7 @@ from spectrasplat.ui.session import IDLE_S, LAYOUT_FRAMES, Session
 from spectrasplat.ui.viewer import Viewer, headless_viewer
 
 from tests.interface.fake_engine import FakeEngine
-from tests.interface.test_window import in_a_window
+from tests.interface.test_window import run
 
 COMPILES_S = 1.6
 
@@ -134,10 +134,12 @@ with Window(visible=False) as window:
 """
 
 
-def test_the_window_is_drawn_while_the_driver_compiles(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_window_is_drawn_while_the_driver_compiles(
+    tmp_path: Path, display: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A real driver, a program that it has never seen, and a texture that both contexts know."""
     monkeypatch.setenv("MESA_SHADER_CACHE_DIR", str(tmp_path / "cache"))
-    done = in_a_window(DRAWN_WHILE_THE_DRIVER_COMPILES, tmp_path)
+    done = run(tmp_path, display, "-c", DRAWN_WHILE_THE_DRIVER_COMPILES)
     assert done.stdout.strip() == "True True True {0.25}", done.stdout + done.stderr
 
 

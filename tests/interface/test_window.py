@@ -4,10 +4,8 @@ where there is none."""
 from __future__ import annotations
 
 import os
-import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -18,19 +16,6 @@ from spectrasplat.__main__ import main
 ROOT = Path(__file__).resolve().parents[2]
 
 
-@pytest.fixture(scope="module")
-def display() -> Iterator[str]:
-    """One virtual screen for all windows of this file."""
-    assert shutil.which("Xvfb"), "install xvfb ('apt-get install xvfb'): the window cannot be tested without"
-    reader, writer = os.pipe()
-    command = ["Xvfb", "-displayfd", str(writer), "-screen", "0", "1400x900x24", "-nolisten", "tcp"]
-    with subprocess.Popen(command, pass_fds=[writer], stderr=subprocess.DEVNULL) as server:
-        os.close(writer)
-        with os.fdopen(reader) as answer:
-            yield ":" + answer.readline().strip()
-        server.terminate()
-
-
 def run(folder: Path, display: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     """Python with `arguments` on a display, or without any."""
     environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
@@ -39,7 +24,7 @@ def run(folder: Path, display: str, *arguments: str) -> subprocess.CompletedProc
         environment["DISPLAY"] = display
     command = [sys.executable, "-P", *arguments]
     return subprocess.run(
-        command, env=environment, cwd=folder, capture_output=True, text=True, timeout=120, check=False
+        command, env=environment, cwd=folder, capture_output=True, text=True, timeout=300, check=False
     )
 
 
