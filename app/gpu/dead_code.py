@@ -2,8 +2,9 @@
 
 "What a scene does not need is absent" is only worth saying of the text that is compiled. So
 conditionals are resolved here by the defines at hand, comments go, and of what is left only
-the macros, constants, structs and functions stay that `main` and the interface can reach. A library may
-then be written without guards, and a test can look for a symbol instead of trusting an #ifdef.
+the macros, constants, structs and functions stay that `main` and the interface can reach, without
+the statements that constants decide (`glsl_folding`). A library may then be written without guards,
+and a test can look for a symbol instead of trusting an #ifdef.
 (A full preprocessor, pcpp, does the first part only, expands every macro on the way, and takes 0.1 s a
 program; a dozen programs have to start within a second.)
 
@@ -17,7 +18,8 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from .glsl_conditionals import DEFINE, Line, Unit, directive_of, resolve_conditionals
+from .glsl_conditionals import DEFINE, Line, Unit, directive_of, macros_of, resolve_conditionals
+from .glsl_folding import folded, places_of
 
 _WORD = re.compile(r"[A-Za-z_]\w*")
 _FUNCTION = re.compile(r"\s*(?:\w+\s+)*?\w+\s+(\w+)\s*\(([^)]*)\)\s*\{")
@@ -25,11 +27,12 @@ _STRUCT = re.compile(r"\s*struct\s+(\w+)")
 _CONSTANT = re.compile(r"\s*const\s+\w+\s+(\w+)[^;]*;\s*$")
 
 
-def stripped(lines: Sequence[Line]) -> list[Line]:
-    """The lines of `lines` that can run, without comments, in their order."""
-    kept, resolved = resolve_conditionals(list(_units(_without_comments(lines))))
+def stripped(lines: Sequence[Line], switches: frozenset[str] = frozenset()) -> list[Line]:
+    """The lines of `lines` that can run, without comments, in their order; `switches` are 0 where nobody defines
+    them."""
+    kept, resolved = resolve_conditionals(list(_units(_without_comments(lines))), switches=switches)
     if resolved:
-        kept = _reachable(kept)
+        kept = _reachable(kept, switches)
     return [line for unit in kept for line in unit if line.text.strip()]
 
 
@@ -78,29 +81,60 @@ class _Definition:
 
     name: str
     units: tuple[int, ...]
-    words: frozenset[str]
-    structs: frozenset[str]
+    text: str
+    is_function: bool = False
+    structs: frozenset[str] = frozenset()
     """Structs of a function's arguments: an overload for a struct that nobody uses is not called either."""
 
 
-def _reachable(units: Sequence[Unit]) -> list[Unit]:
-    """`units` without definitions that nothing uses."""
+def _reachable(units: Sequence[Unit], switches: frozenset[str]) -> list[Unit]:
+    """`units` without definitions that nothing uses; in functions what constants decide is left out."""
     definitions, roots = _definitions(units)
-    used = {word for index in roots for line in units[index] for word in words(line.text)}
-    alive = set(roots)
+    constants = _Constants(units, switches, {d.name for d in definitions})
+    kept = {index: units[index] for index in roots}
+    used = {"main"}.union(*(words(line.text) for index in roots for line in units[index]))
     waiting = definitions
     while True:
         reached = [d for d in waiting if d.name in used and d.structs <= used]
         if not reached:
-            return [unit for index, unit in enumerate(units) if index in alive]
+            break
         for definition in reached:
-            alive.update(definition.units)
-            used |= definition.words
+            text, own = definition.text, [units[index] for index in definition.units]
+            if definition.is_function and (decided := constants.decide(text)) != text:
+                text, own = decided, _with_text(own, decided)
+            kept |= dict(zip(definition.units, own, strict=True))
+            used |= words(text)
         waiting = [d for d in waiting if d not in reached]
+    zeros = [(Line(f"#define {name} 0", "<features>", 1),) for name in sorted(constants.off & used)]
+    ordered = [kept[index] for index in sorted(kept)]
+    head = next((at for at, unit in enumerate(ordered) if directive_of(unit)[0] not in ("version", "extension")), 0)
+    return ordered[:head] + zeros + ordered[head:]
+
+
+class _Constants:
+    """What is known of a text's switches and whole numbers."""
+
+    def __init__(self, units: Sequence[Unit], switches: frozenset[str], declared: set[str]) -> None:
+        defined = macros_of(units).values
+        switches -= declared - defined.keys()
+        self.off = switches - defined.keys()
+        numbers = {name: int(body) for name, body in defined.items() if body and body.isdigit()}
+        self._values = numbers | dict.fromkeys(self.off, 0)
+        self._places = places_of(self._values, switches)
+
+    def decide(self, text: str) -> str:
+        """A function without what they decide, in as many lines."""
+        return folded(text, self._values, self._places)
+
+
+def _with_text(units: list[Unit], text: str) -> list[Unit]:
+    """`units` with the lines of `text`."""
+    lines = iter(text.split("\n"))
+    return [tuple(Line(next(lines), line.file, line.number) for line in unit) for unit in units]
 
 
 def _definitions(units: Sequence[Unit]) -> tuple[list[_Definition], list[int]]:
-    """Definitions, and the units that are needed in any case: the interface, directives, `main`."""
+    """Definitions, and the units that are needed in any case: the interface and directives."""
     macros: list[_Definition] = []
     roots: list[int] = []
     statements: list[tuple[tuple[int, ...], str]] = []
@@ -111,7 +145,7 @@ def _definitions(units: Sequence[Unit]) -> tuple[list[_Definition], list[int]]:
         if name:
             found = DEFINE.match(rest) if name == "define" else None
             if found:
-                macros.append(_Definition(found.group(1), (index,), frozenset(words(rest)), frozenset()))
+                macros.append(_Definition(found.group(1), (index,), rest))
             else:
                 roots.append(index)
             continue
@@ -129,9 +163,9 @@ def _definitions(units: Sequence[Unit]) -> tuple[list[_Definition], list[int]]:
     for indices, text in statements:
         function = _FUNCTION.match(text)
         found = _STRUCT.match(text) or function or _CONSTANT.match(text)
-        if found and found.group(1) != "main":
-            needed = words(function.group(2)) & names if function else set()
-            definitions.append(_Definition(found.group(1), indices, frozenset(words(text)), frozenset(needed)))
-        else:
+        if found is None:
             roots += indices
+            continue
+        needed = words(function.group(2)) & names if function else set()
+        definitions.append(_Definition(found.group(1), indices, text, function is not None, frozenset(needed)))
     return definitions, roots

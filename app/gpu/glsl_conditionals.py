@@ -69,6 +69,8 @@ class _Macros:
     """None: a macro with arguments, which no condition here asks for."""
     doubtful: set[str] = field(default_factory=set)
     """Defined or not under a condition that only the driver can tell."""
+    switches: frozenset[str] = frozenset()
+    """Names that are 0 where nobody defines them."""
 
     def note(self, unit: Unit, certain: bool) -> None:
         """Take in a #define or #undef."""
@@ -91,15 +93,15 @@ class _Macros:
         return name in self.values
 
     def body(self, name: str) -> str:
-        body = None if name in self.doubtful else self.values.get(name)
+        body = None if name in self.doubtful else self.values.get(name, "0" if name in self.switches else None)
         if not body:
             raise _UnknownError
         return body
 
 
-def macros_of(units: Sequence[Unit]) -> _Macros:
-    """What is defined at the end of a text without conditionals."""
-    macros = _Macros()
+def macros_of(units: Sequence[Unit], switches: frozenset[str] = frozenset()) -> _Macros:
+    """What is defined at the end of a text without conditionals; `switches` are 0 where nobody defines them."""
+    macros = _Macros(switches=switches)
     for unit in units:
         macros.note(unit, certain=True)
     return macros
@@ -113,12 +115,15 @@ def value_of(expression: str, macros: _Macros) -> int | None:
         return None
 
 
-def resolve_conditionals(units: Sequence[Unit], macros: _Macros | None = None) -> tuple[list[Unit], bool]:
-    """The units whose conditions hold, and whether every condition could be told.
+def resolve_conditionals(
+    units: Sequence[Unit], macros: _Macros | None = None, switches: frozenset[str] = frozenset()
+) -> tuple[list[Unit], bool]:
+    """The units whose conditions hold, and whether every condition could be told. `switches` are 0 where nobody defines
+    them.
 
     A chain with a condition that cannot be told stays whole; what it defines is then not known either.
     """
-    macros = macros or _Macros()
+    macros = macros or _Macros(switches=switches)
     kept: list[Unit] = []
     at, resolved = 0, True
     while at < len(units):

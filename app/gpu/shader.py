@@ -15,10 +15,12 @@ from collections import Counter, OrderedDict
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from ..base import paths
+from ..features.features import all_symbols
 from .glsl_conditionals import Line
 from .schema import Struct
 from .stripped_store import stripped
@@ -64,6 +66,11 @@ class Source:
             return match.group(0)
 
         return _NVIDIA_LINE.sub(locate, _MESA_LINE.sub(locate, compiler_log))
+
+
+@cache
+def _switches() -> frozenset[str]:
+    return frozenset(all_symbols())
 
 
 _files: dict[Path, tuple[tuple[int, int], list[tuple[Line, str]]]] = {}
@@ -131,7 +138,7 @@ def load_source(
                 lines.append(line)
 
     flatten(name, "the program")
-    kept = stripped(lines)
+    kept = stripped(lines, _switches())
     source = Source(
         name, "\n".join(line.text for line in kept) + "\n", tuple((line.file, line.number) for line in kept), len(lines)
     )

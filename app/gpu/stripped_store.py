@@ -16,7 +16,7 @@ from pathlib import Path
 from ..base import files, paths
 from ..base.atomic import atomic_output
 from ..base.errors import UserError
-from . import dead_code, glsl_conditionals
+from . import dead_code, glsl_conditionals, glsl_folding
 from .glsl_conditionals import Line
 
 MOST_FILES = 512
@@ -25,13 +25,13 @@ _MOST_BYTES = 1 << 22
 _SUFFIX = ".glsl.z"
 
 
-def stripped(lines: Sequence[Line]) -> list[Line]:
+def stripped(lines: Sequence[Line], switches: frozenset[str]) -> list[Line]:
     """`dead_code.stripped`, from the disk where it was asked for before. A folder that cannot be read or written, and a
     damaged file, only cost time."""
-    path = _path_of(lines)
+    path = _path_of(lines, switches)
     kept = None if path is None else _load(path)
     if kept is None:
-        kept = dead_code.stripped(lines)
+        kept = dead_code.stripped(lines, switches)
         if path is not None:
             _save(path, kept)
     return kept
@@ -41,12 +41,12 @@ def stripped(lines: Sequence[Line]) -> list[Line]:
 def _version() -> bytes:
     """Changes with the code that strips."""
     digest = hashlib.blake2b(digest_size=16)
-    for module in (dead_code, glsl_conditionals):
+    for module in (dead_code, glsl_conditionals, glsl_folding):
         digest.update(Path(module.__file__ or "").read_bytes())
     return digest.digest()
 
 
-def _path_of(lines: Sequence[Line]) -> Path | None:
+def _path_of(lines: Sequence[Line], switches: frozenset[str]) -> Path | None:
     """Where these lines, as they came from their files, are kept; None without a folder."""
     try:
         folder = paths.cache_dir() / "shaders"
@@ -54,6 +54,7 @@ def _path_of(lines: Sequence[Line]) -> Path | None:
         digest = hashlib.blake2b(_version(), digest_size=16)
     except OSError:
         return None
+    digest.update(" ".join(sorted(switches)).encode())
     texts, names, numbers = zip(*lines, strict=True)
     digest.update("\n".join((*texts, *dict.fromkeys(names), str(numbers))).encode())
     return folder / (digest.hexdigest() + _SUFFIX)

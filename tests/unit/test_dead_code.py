@@ -15,6 +15,8 @@ from spectrasplat.gpu.schema import Field, Struct
 from spectrasplat.gpu.shader import ShaderError, load_source
 from spectrasplat.gpu.shader_watch import INTERVAL_S, ShaderWatch
 
+NO_SWITCHES: frozenset[str] = frozenset()
+
 
 def stripped_source(text: str) -> list[str]:
     return [
@@ -60,6 +62,48 @@ def test_what_only_the_driver_can_tell_stays_whole(condition: str) -> None:
         "int i;\n#endif"
     )
     assert stripped_source(text) == text.splitlines()
+
+
+@pytest.mark.parametrize(
+    ("statement", "reference"),
+    [
+        ("if (ON) { f(); }", "f();"),
+        ("if (OFF) { f(); } else { g(); }", "g();"),
+        ("if (OFF) f(); else g();", "g();"),
+        ("if (OFF) f(); g();", "g();"),
+        ("if (a) { f(); } else if (OFF) { g(); }", "if (a) { f(); }"),
+        ("if (a) { f(); } else if (ON) { g(); } else { h(); }", "if (a) { f(); } else { g(); }"),
+        ("if (OFF) { f(); } else if (a) { g(); } else { h(); }", "if (a) { g(); } else { h(); }"),
+        ("for (;;) if (OFF) f();", "for (;;) ;"),
+        ("if (ON && a) f();", "if (a) f();"),
+        ("if (a || OFF) f();", "if (a) f();"),
+        ("if (a && (OFF || b)) f();", "if (a && b) f();"),
+        ("if (a && (b || c && ON)) f();", "if (a && (b || c)) f();"),
+        ("if (!(OFF || a)) f();", "if (!a) f();"),
+        ("if (!OFF) { if (OFF) f(); g(); }", "g();"),
+        ("if (COUNT > 1 && !(COUNT == 3)) f();", "f();"),
+        ("if (f() || ON) g();", "if (f() || ON) g();"),  # f may do something
+        ("if (i < COUNT) f();", "if (i < COUNT) f();"),
+        ("x = ON ? a : b;", "x = a;"),
+        ("x = OFF ? a : b ? c : d;", "x = b ? c : d;"),
+        ("x = 2 * (ON && OFF ? a : b);", "x = 2 * (b);"),
+        ("f(a, OFF || b); x = ON && b; return OFF;", "f(a, b); x = b; return false;"),
+        ("if (ON) { int x = 1; f(x); }", "int x = 1; f(x);"),
+        ("if (ON) { int x = 1; f(x); } int x = 2;", "{ int x = 1; f(x); } int x = 2;"),
+        ("int x[1 + OFF];", "int x[1 + OFF];"),
+    ],
+)
+def test_constants_decide(statement: str, reference: str) -> None:
+    text = f"#define ON 1\n#define COUNT 2\nvoid main()\n{{\n{statement}\n}}"
+    lines = [Line(line, "t", 1) for line in text.splitlines()]
+    kept = [line.text for line in stripped(lines, frozenset({"ON", "OFF"}))]
+    assert " ".join(" ".join(kept[kept.index("{") + 1 : -1]).split()) == reference
+    assert ("#define OFF 0" in kept) == ("OFF" in reference)
+
+
+def test_a_switch_that_is_off_is_zero_to_conditionals_too() -> None:
+    lines = [Line(line, "t", 1) for line in ("#if OFF || !ON", "int a;", "#else", "int b;", "#endif")]
+    assert [line.text for line in stripped(lines, frozenset({"ON", "OFF"}))] == ["int a;"]
 
 
 def test_chains_nest_and_the_first_true_branch_wins() -> None:
@@ -182,53 +226,53 @@ def stripping(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[int]:
     counts: list[int] = []
     real = dead_code.stripped
 
-    def counted(given: Sequence[Line]) -> list[Line]:
+    def counted(given: Sequence[Line], switches: frozenset[str]) -> list[Line]:
         counts.append(len(given))
-        return real(given)
+        return real(given, switches)
 
     monkeypatch.setattr(dead_code, "stripped", counted)
     return counts
 
 
 def test_the_second_time_is_read(stripping: list[int]) -> None:
-    first, second = stripped_store.stripped(lines()), stripped_store.stripped(lines())
+    first, second = stripped_store.stripped(lines(), NO_SWITCHES), stripped_store.stripped(lines(), NO_SWITCHES)
     assert first == second == [line for line in first if "main" in line.text]
     assert len(stripping) == 1
 
 
 def test_other_places_of_the_same_text_are_another_text(stripping: list[int]) -> None:
-    assert stripped_store.stripped(lines()) != stripped_store.stripped(lines(7))
+    assert stripped_store.stripped(lines(), NO_SWITCHES) != stripped_store.stripped(lines(7), NO_SWITCHES)
     assert len(stripping) == 2
 
 
 def test_other_code_strips_anew(stripping: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
-    stripped_store.stripped(lines())
+    stripped_store.stripped(lines(), NO_SWITCHES)
     monkeypatch.setattr(stripped_store, "_version", lambda: b"newer")
-    stripped_store.stripped(lines())
+    stripped_store.stripped(lines(), NO_SWITCHES)
     assert len(stripping) == 2
 
 
 @pytest.mark.parametrize("damage", [b"", b"nothing", None])
 def test_damage_costs_time_only(stripping: list[int], tmp_path: Path, damage: bytes | None) -> None:
-    kept = stripped_store.stripped(lines())
+    kept = stripped_store.stripped(lines(), NO_SWITCHES)
     (file,) = (tmp_path / "shaders").iterdir()
     file.write_bytes(file.read_bytes()[:-5] if damage is None else damage)
-    assert stripped_store.stripped(lines()) == kept
-    assert stripped_store.stripped(lines()) == kept
+    assert stripped_store.stripped(lines(), NO_SWITCHES) == kept
+    assert stripped_store.stripped(lines(), NO_SWITCHES) == kept
     assert len(stripping) == 2
 
 
 def test_without_a_folder_it_works(stripping: list[int], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     monkeypatch.setattr(paths, "cache_dir", lambda: tmp_path / "file")
-    assert stripped_store.stripped(lines()) == stripped_store.stripped(lines())
+    assert stripped_store.stripped(lines(), NO_SWITCHES) == stripped_store.stripped(lines(), NO_SWITCHES)
     assert len(stripping) == 2
 
 
 def test_what_is_oldest_is_forgotten(stripping: list[int], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(stripped_store, "MOST_FILES", 3)
     for shift in range(6):
-        stripped_store.stripped(lines(shift))
+        stripped_store.stripped(lines(shift), NO_SWITCHES)
     assert len(list((tmp_path / "shaders").iterdir())) == 3
 
 
