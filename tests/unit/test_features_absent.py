@@ -429,7 +429,7 @@ def test_the_proof_fails_where_a_program_carries_what_it_should_not(monkeypatch:
     features = scene_features("prism")
     included = dict.fromkeys(FEATURE_SYMBOLS, False)
     # Comments and guarded code left in, as in a text whose conditions only the driver resolves.
-    monkeypatch.setattr(shader, "stripped", lambda lines: lines)
+    monkeypatch.setattr(shader, "stripped", lambda lines, switches: lines)
     monkeypatch.setattr(shader, "_kept", {})  # nor a text that an earlier test had made
     told = {p.feature: p.holds for p in prove(program_texts(sources(features)), included)}
     assert not told["triangle tree"] and not told["normal derivatives"] and not told["medium stack"]
