@@ -12,7 +12,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from ..features.features import why_no_beams
+from ..features.facts import why_no_beams
 from ..model.flat_shapes import is_flat
 from ..model.geometry.mesh import Mesh
 from ..model.optics.colorimetry import VISIBLE_NM, mirror_reflectance

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..features.features import Features
 from ..gpu import shader
 from ..gpu.records import RECEIVER, photon_record
 from ..gpu.splat_tables import SplatTables
@@ -32,25 +32,6 @@ _REACH = 3.0
 """Standard deviations from the middle of a splat to its edge."""
 
 
-@dataclass(frozen=True)
-class SplatFeatures:
-    """Which splats a program draws, where no scene decides: plain ones, a feature more at a time."""
-
-    spectral_groups: int = 1
-    band_cuts: bool = False
-    nested_windows: bool = False
-    contact_lines: bool = False
-    border_images: bool = False
-    charts: bool = False
-    targets: int = 1
-    point_spectrum: bool = False
-    local_gain: bool = False
-    reindexed: bool = False
-    hero: bool = False
-    tint_levels: int = 0
-    light_edges: bool = False
-
-
 def measure(ctx: moderngl.Context, pixels: float, count: int = 1 << 17) -> dict[str, float]:
     """Rates for splats that cover `pixels` texels each, twice as long as wide.
 
@@ -59,7 +40,7 @@ def measure(ctx: moderngl.Context, pixels: float, count: int = 1 << 17) -> dict[
     `ratio` and `draw_ratio`. On a software renderer these compare processor time, which other work on the
     machine disturbs less.
     """
-    features = SplatFeatures(band_cuts=True)
+    features = Features(spectral_groups=1, band_cuts=True)
     tiles, size = pack([(_SIDE, _SIDE)])
     rows = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]])
     atlas = MapAtlas(ctx, size, placement_rows(tiles[0], rows, 1.0))
@@ -114,7 +95,7 @@ def _photons(pixels: float, count: int, sweep: bool) -> np.ndarray:
     margin = 2.0 * np.sqrt(pixels)
     angle = rng.uniform(0.0, 2.0 * np.pi, count)
     along = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    records = photon_record(SplatFeatures.spectral_groups).zeros(count)
+    records = photon_record(Features.spectral_groups).zeros(count)
     records["position"][:, :2] = rng.uniform(margin, _SIDE - margin, (count, 2))
     records["dposition_ds"][:, :2] = along * sigma * (1.0 if sweep else 2.0)
     records["dposition_dt"][:, :2] = np.stack([-along[:, 1], along[:, 0]], axis=1) * sigma
@@ -130,7 +111,7 @@ class _Plain:
     def __init__(self, ctx: moderngl.Context, count: int, size: tuple[int, int]) -> None:
         self._ctx = ctx
         self._count = count
-        structs = (photon_record(SplatFeatures.spectral_groups),)
+        structs = (photon_record(Features.spectral_groups),)
         self._program = shader.program(ctx, "bench/plain_gaussian.vert", "bench/plain_gaussian.frag", {}, structs)
         self._program["atlas_size"] = size
         corners = np.array([0, 1, 2, 2, 1, 3], np.uint32) + 4 * np.arange(count, dtype=np.uint32)[:, None]

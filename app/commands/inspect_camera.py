@@ -6,8 +6,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import NamedTuple
 
-from ..bench.features.static_costs import picture_bytes, size_words
 from ..features.features import Features
+from ..features.receivers import picture_bytes
+from ..features.row import size_words
 from ..gpu.map_channels import tents
 from ..gpu.mip_chain import level_count
 from ..model.scene import Scene

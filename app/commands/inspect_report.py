@@ -166,21 +166,22 @@ def _lights_table(lights: tuple[Light, ...]) -> Table:
 
 
 def _compiled(scene: Scene) -> list[RenderableType]:
-    from ..bench.features.static_costs import RecordSizes, static_costs
-    from ..features.explained import explain
+    from ..bench.features.compiled import record_words, static_costs
+    from ..features.facts import Facts
     from ..features.features import Features
     from ..model.settings import RenderSettings
 
     wishes = scene.render
     settings = RenderSettings(width=wishes.width, height=wishes.height, max_depth=wishes.max_depth)
     features = Features.of(scene, settings)
-    costs = static_costs(scene, features)
+    facts = Facts(scene, settings)
+    costs = static_costs(facts, features)
     table = _table("Compiled into the programs", ("part", False), ("", False), ("why", False), ("costs", False))
-    for name, included, reason in explain(scene, features):
+    for name, included, reason in features.explain(facts):
         table.add_row(name, "in" if included else "out", reason, costs.get(name, ""))
     return [
         table,
-        f"{RecordSizes.of(features).words()} What each part costs in time: bench --features.",
+        f"{record_words(features)} What each part costs in time: bench --features.",
         _lookups_table(scene, features),
     ]
 

@@ -1,71 +1,37 @@
-"""Switches that a program adds to those of the scene (`Features`): which of its variants it is.
+"""Switches by which variants of one program differ, besides those of the scene (`Features`).
 
-Every name that shaders test, with 1 or 0, is here or in the scene's table, and nowhere twice: what is misspelt in a
-pass is found (`switched`), and what a shader tests is known to be 0 where nobody set it.
+Every name that shaders test as 1 or 0 is here or in the table of features: a name that a pass misspells is refused, and
+a name that nobody set is known to be 0.
 """
 
 from __future__ import annotations
 
-PROGRAM_SWITCHES: dict[str, str] = {
-    # emit.comp
-    "LIGHT_AREA": "the light's emission domain is of places and directions",
-    "LIGHT_PLANE": "… of places, all in one direction or in a small cone",
-    "LIGHT_PROFILE": "… of directions, by a table of intensities",
-    "THINNED_CELLS": "some cells of the domain emit only a share of their photons",
-    "RANDOM_WAVELENGTH": "wavelengths are drawn at random",
-    "EVEN_WAVELENGTHS": "random wavelengths follow a low-discrepancy sequence",
-    "LOOPS_MAY_END": "the driver ends a loop of too many rounds",
-    # environment.comp and bounce.comp
-    "FOLLOWS_SPECULAR": "directions go on beyond glass and mirrors",
-    # splats and beams
-    "ONE_COLOUR": "no wavelength moves a splat: it is a Gaussian of one colour",
-    "SMALL": "splats of about a texel",
-    "SWEPT": "splats swept along their spectrum",
-    "CUT": "splats of a band that was cut",
-    "EDGE": "splats over an edge of their window",
-    "CLIPPED": "each fragment tests the splat's rectangle",
-    "FANS": "the footprint's W changes over it",
-    "STILL": "a beam's polygon does not move over its band",
-    "FLOAT_ATOMICS": "the device adds float32 atomically",
-    "FILL": "the program that fills seams between charts",
-    # camera
-    "LAYER_BEAUTY": "the picture has direct light, and what is seen beyond glass and mirrors",
-    "CAMERA_SPECULAR": "camera rays go on beyond glass and mirrors",
-    "LISTS_SPECULAR": "what is seen directly, listing pixels that see glass or mirrors",
-    "FOLLOWED": "another program follows the listed pixels",
-    "HAS_DISPERSION": "camera rays may pass glass that disperses",
-    "SPECTRAL_SWEEP": "camera rays carry a band along spectral columns",
-    "RGB_CHANNELS": "the picture's channels are red, green and blue",
-    "MAP_BINS": "caustic maps hold a spectrum that camera rays look up",
-    "HAS_RECEIVERS": "something is neither glass nor mirror",
-    "RECEIVER_LIGHT": "textures of indirect light are looked up on receivers",
-    "VISIBLE_LIGHTS": "some light is seen itself",
-    "HALTS": "a sample halts after many rounds of its loops, and another dispatch resumes it",
-    "IN_MOTION": "pictures in motion",
-    "DISTANCES": "what is seen first is written with its distance",
-    # where data lies
-    "LIGHTS_IN_STORAGE": "lights are more than a uniform block holds",
-    "SOLIDS_IN_STORAGE": "solids are more than a uniform block holds",
-    "SCENE_IMAGE": "scene and spectra are read as images",
-    "TEXTURES_IMAGE": "pictures are read as images",
-    "HAS_IMAGES": "the scene has pictures",
-    "HAS_TEXTURES": "some surface has a texture",
-    "HAS_ENVIRONMENT_MAP": "a picture surrounds the scene",
-    # display
-    "ANTIALIAS": "the picture is shrunk with a filter",
-    "AS_IMAGE": "the picture is read as an image",
-    "SAME_SIZE": "a pixel of the picture is one of the screen",
-    "BESIDE_IS_NEXT": "the picture is not enlarged",
-    "HALO": "light that the lens scatters is added",
-    "SHOW_ERROR": "the difference from another picture is shown",
-    "TONE_ACES": "tone mapping",
-    "TONE_FALSE_COLOUR": "",
-    "TONE_REINHARD": "",
-    "TONE_SPECTRASPLAT": "",
-    # glare.comp
-    "HALVE": "stages of glare",
-    "SHRINK": "",
-    "SOFTEN": "",
-    "SPREAD": "",
-}
-"""By name: what it says of the program."""
+Defines = dict[str, int | float | str]
+PROGRAM_SWITCHES = frozenset(
+    # Emission: the light's domain, cells of it that are thinned; a driver that ends long loops.
+    ("LIGHT_AREA", "LIGHT_PLANE", "LIGHT_POINT", "LIGHT_PROFILE", "THINNED_CELLS", "LOOPS_MAY_END")
+    # Light of the environment and of other receivers, by way of glass.
+    + ("FOLLOWS_SPECULAR",)
+    # Kinds of splats, beams that no wavelength moves, sums by atomics, seams between charts.
+    + ("SMALL", "SWEPT", "CUT", "EDGE", "CLIPPED", "FANS", "CONTACT_LINES", "STILL", "FLOAT_ATOMICS", "FILL")
+    # Layers of the picture.
+    + ("LAYER_BEAUTY", "RGB_CHANNELS", "MAP_BINS", "RECEIVER_LIGHT", "VISIBLE_LIGHTS")
+    # Camera rays beyond glass, and the program for what is seen directly.
+    + ("CAMERA_SPECULAR", "HAS_DISPERSION", "SPECTRAL_SWEEP", "LENS", "HALTS", "FOLLOWED", "LISTS_SPECULAR")
+    + ("IN_MOTION", "DISTANCES")
+    # Where data lies.
+    + ("LIGHTS_IN_STORAGE", "SOLIDS_IN_STORAGE", "SCENE_IMAGE", "TEXTURES_IMAGE")
+    + ("HAS_IMAGES", "HAS_TEXTURES", "HAS_ENVIRONMENT_MAP")
+    # Display and glare.
+    + ("ANTIALIAS", "AS_IMAGE", "SAME_SIZE", "BESIDE_IS_NEXT", "HALO")
+    + ("SHOW_ERROR",)
+    + ("TONE_ACES", "TONE_FALSE_COLOUR", "TONE_REINHARD", "TONE_SPECTRASPLAT")
+    + ("HALVE", "SHRINK", "SOFTEN", "SPREAD")
+)
+
+
+def switched(**switches: object) -> Defines:
+    """Defines of those that are on. Raises KeyError for a name that is not listed."""
+    if unknown := switches.keys() - PROGRAM_SWITCHES:
+        raise KeyError(f"no switch of a program: {', '.join(sorted(unknown))}")
+    return {name: 1 for name, on in switches.items() if on}

@@ -194,8 +194,7 @@ def ray_record(
 
 def ray_record_of(features: Features) -> Struct:
     """`ray_record` as a scene's programs have it."""
-    columns = features.defines()["COLUMNS"]
-    return ray_record(columns, features.hero, features.polarised, features.flights, features.tint_levels > 0)
+    return ray_record(features.columns, features.hero, features.polarised, features.flights, features.tint_levels > 0)
 
 
 FLIGHT = Struct(

@@ -12,9 +12,7 @@ import moderngl
 import numpy as np
 
 from ..base.errors import UserError
-from ..features.features import (
-    Features,
-)
+from ..features.features import Features
 from ..model.contacts import overlapping_solids
 from ..model.flat_shapes import is_faceted
 from ..model.geometry.mesh import Mesh

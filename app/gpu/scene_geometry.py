@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..features.features import Features, half_spaces
+from ..features.facts import half_spaces
+from ..features.features import Features
 from ..model.curved_solids import Face, curved_solids
 from ..model.geometry.bvh import Bvh, build_bvh
 from ..model.geometry.mesh import Mesh

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..features.features import MAX_GROUPS, Features, dispersive_materials
+from ..features.facts import MAX_GROUPS, dispersive_materials
+from ..features.features import Features
 from ..model.optics.glass import Dispersion
 from ..model.optics.spectral_tables import SpectralAxis
 from ..model.scene import Scene

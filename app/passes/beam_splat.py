@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..beams.polygons import BeamPolygons
+from ..features.program_switches import Defines, switched
 from ..gpu import shader
 from ..gpu.context import check_device
 from ..gpu.dispatch_budget import DISPATCH_S, DispatchBudget
@@ -21,7 +22,6 @@ from ..gpu.records import NONE
 from ..gpu.schema import Field, Struct
 from .beam_records import BEAM, PackedBeams, hull_areas, hull_boxes, levels, packed, texel_hulls
 from .texel_map import TexelMap
-from .variants import beam_defines
 
 if TYPE_CHECKING:
     import moderngl
@@ -153,7 +153,8 @@ class BeamSplatter:
         """Compiled when it is first needed."""
         kind = edges, is_still, contact_lines
         if kind not in self._programs:
-            defines = beam_defines(self._targets, edges, is_still, contact_lines)
+            defines: Defines = {"TARGETS": self._targets, "EDGES": edges}
+            defines |= switched(STILL=is_still, CONTACT_LINES=contact_lines)
             self._programs[kind] = shader.program(self._ctx, "light/beam.vert", "light/beam.frag", defines, (BEAM,))
         return self._programs[kind]
 

@@ -22,7 +22,7 @@ from ..gpu.schema import Struct
 from ..gpu.texture_store import TextureStore
 from ..model.scene import Camera
 from .camera_inputs import CameraInputs
-from .camera_programs import CameraPrograms
+from .camera_programs import CameraPrograms, camera_defines, halted_bytes, halting_defines, lens_defines
 from .camera_records import camera_parameters
 from .caustic_maps import CausticMaps
 from .haze import Haze
@@ -39,12 +39,6 @@ from .sample_spread import (
     spread_survey,
 )
 from .spectrum_choice import PilotRender, Spectrum, choosing_spectrum, grid_of
-from .variants import (
-    camera_defines,
-    halted_bytes,
-    halting_defines,
-    lens_defines,
-)
 
 SPLIT_THRESHOLD = 0.0008
 """Share of a sample's power above which both parts of a split path are followed. Five times as much leaves the third

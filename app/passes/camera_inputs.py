@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import moderngl
 import numpy as np
 
+from ..features.program_switches import Defines, switched
 from ..gpu import bindings, shader
 from ..gpu.map_channels import MapChannels
 from ..gpu.records import PLACEMENT, RECEIVER
@@ -15,12 +16,7 @@ from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.scene_records import SCENE_STRUCTS
 from ..gpu.schema import Struct
 from ..gpu.texture_store import PICTURE, TextureStore
-from .camera_records import CAMERA_LIGHT, CAMERA_PARAMETERS, light_record
-from .camera_tables import CameraTables
-from .caustic_maps import CausticMaps
-from .environment_light import without_light
-from .picture_channels import Channels
-from .variants import (
+from .camera_programs import (
     BIND_CELL_CDF,
     BIND_COUNTERS,
     BIND_LIGHTS,
@@ -31,8 +27,12 @@ from .variants import (
     UNIT_EMISSION,
     UNIT_PICTURES,
     UNIT_RECEIVER_LIGHT,
-    Defines,
 )
+from .camera_records import CAMERA_LIGHT, CAMERA_PARAMETERS, light_record
+from .camera_tables import CameraTables
+from .caustic_maps import CausticMaps
+from .environment_light import without_light
+from .picture_channels import Channels
 
 FALLBACKS = ("columns_dropped", "depth_reached", "stack_full", "band_uncut", "loops_ended")
 """What the shader counts, in its order."""
@@ -76,9 +76,8 @@ class CameraInputs:
     @property
     def defines(self) -> Defines:
         """What programs must know of them."""
-        switches = {"LIGHTS_IN_STORAGE": self._lights_in_storage, "HAS_IMAGES": bool(self.pictures.structs)}
-        switched: Defines = {name: 1 for name, on in switches.items() if on}
-        return self._tables.defines | self.pictures.defines | switched
+        places = switched(LIGHTS_IN_STORAGE=self._lights_in_storage, HAS_IMAGES=self.pictures.structs)
+        return self._tables.defines | self.pictures.defines | places
 
     def _light_records(self) -> np.ndarray:
         lights = CAMERA_LIGHT.zeros(len(self.scene.scene.lights) + 1)

@@ -1,15 +1,172 @@
-"""The programs of the camera's pass, each compiled when it is first asked for: what looks at what is seen directly, and
-what follows rays beyond glass and mirrors."""
+"""What each program of the camera's pass is compiled with, and the programs, each made when it is first used.
+
+Every scene has a program for what is seen directly. In a scene that shows glass or mirrors it lists the pixels that
+meet something specular first, and another program, which holds all that is expensive, follows those. A third is for
+samples of single wavelengths.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import moderngl
 
-from ..gpu import shader
+from ..features.program_switches import Defines, switched
+from ..gpu import bindings, shader
+from ..gpu.map_channels import MapChannels
+from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.schema import Struct
-from .variants import Defines, direct_defines, lens_defines, single_defines
+from ..gpu.texture_store import place_defines
+from .camera_tables import EMISSION_CELLS
+from .picture_channels import Channels
+
+MAX_DEPTH = 48
+"""Surfaces that one camera path may meet."""
+MAX_EVENTS = 160
+"""Surfaces that all paths of a sample may meet together."""
+STACK = 6
+"""Paths of a sample that may wait while another is followed."""
+ENDS_HELD = 8
+"""Ends of a sample's paths that are evaluated together."""
+CUT_THRESHOLD = 0.004
+"""Share of a sample's power above which both parts of a cut band are followed."""
+HALT_ROUNDS = 5000
+"""Rounds of its loops after which a sample halts on a software renderer; see camera/halts.glsl. Eight side by side that
+have nothing in common then take 40,000 of the driver's 65,535, and what is left is for the surface they are at and the
+ends of paths they hold."""
+SPARE_ROUNDS = 0
+"""Rounds that must be left when it halts or ends; where they are not, it is counted."""
+TINT_STEPS = 48
+"""Stretches that the whole spectrum is cut into behind coloured glass."""
+
+(
+    BIND_LIGHTS,
+    BIND_OBJECT_COLOURS,
+    BIND_CELL_CDF,
+    BIND_RECEIVERS,
+    BIND_PLACEMENTS,
+    BIND_PICTURES,
+    BIND_COUNTERS,
+    BIND_LISTED,
+    BIND_HALTED,
+) = range(8, 17)
+UNIT_RECEIVER_LIGHT, UNIT_EMISSION, UNIT_PICTURES = 9, 10, 11
+_BEYOND_ONLY = (
+    "CAMERA_SPECULAR",
+    "HAS_DISPERSION",
+    "SPECTRAL_SWEEP",
+    "RANDOM_WAVELENGTH",
+    "EVEN_WAVELENGTHS",
+    "MAP_BINS",
+    "ABSORPTION",
+    "NORMAL_DERIVATIVES",
+    "POLARISED",
+)
+"""What only rays beyond glass and mirrors need."""
+
+
+def camera_defines(scene: SceneBuffers, channels: Channels, layer: str, maps: MapChannels) -> Defines:
+    """What the scene needs of the shader, for a picture in `channels` and `maps` of these channels; tables and pictures
+    add theirs.
+
+    `CAMERA_SPECULAR` is among them where rays go on beyond glass or mirrors: these are then for the listed pixels, and
+    `direct_defines` has the others'.
+    """
+    lights, features = scene.scene.lights, scene.features
+    beauty = layer != "caustic"
+    specular = beauty and features.camera_specular
+    disperses = specular and features.camera_disperses
+    # A method that follows single wavelengths has no columns for them; nor has a scene where nothing disperses.
+    groups = features.spectral_groups if disperses else 0
+    # The same features of the camera's own rays.
+    seen = replace(
+        features,
+        spectral_groups=groups,
+        absorption=specular and features.camera_colours,
+        normal_derivatives=features.smooth_normals or features.curved_solids or features.rough,
+        polarised=specular and features.polarised,
+        anchor_weights=False,
+    )
+    return (
+        seen.defines(of_picture=True)
+        | bindings.SCENE_DEFINES
+        | scene.defines
+        | place_defines(BIND_PICTURES, UNIT_PICTURES)
+        | {
+            "TARGETS": channels.targets,
+            "MAP_TARGETS": maps.targets,
+            "BIND_LIGHTS": BIND_LIGHTS,
+            "BIND_OBJECT_COLOURS": BIND_OBJECT_COLOURS,
+            "BIND_CELL_CDF": BIND_CELL_CDF,
+            "BIND_COUNTERS": BIND_COUNTERS,
+            "BIND_LISTED": BIND_LISTED,
+            "BIND_RECEIVERS": BIND_RECEIVERS,
+            "BIND_PLACEMENTS": BIND_PLACEMENTS,
+            "UNIT_RECEIVER_LIGHT": UNIT_RECEIVER_LIGHT,
+            "UNIT_EMISSION": UNIT_EMISSION,
+            "EMISSION_CELLS": EMISSION_CELLS,
+            "TINT_STEPS": TINT_STEPS,
+            "BIN_TARGET": maps.first_target,
+            "BIN_COUNT": maps.count,
+            "BIN_OVERLAP": 1 if maps.edges_nm is not None else 0,
+            "LIGHT_COUNT": len(lights),
+            "LIGHT_ROOM": len(lights) + 1,
+            "MAX_DEPTH": MAX_DEPTH,
+            "MAX_EVENTS": MAX_EVENTS if specular else 1,
+            "STACK": STACK,
+            "CUT_THRESHOLD": CUT_THRESHOLD,
+            "ENDS_HELD": ENDS_HELD,
+        }
+        | switched(
+            LAYER_BEAUTY=beauty,
+            CAMERA_SPECULAR=specular,
+            RECEIVER_LIGHT=beauty and (features.environment_lights or features.bounces > 0),
+            HAS_DISPERSION=disperses,
+            SPECTRAL_SWEEP=groups > 0,
+            RGB_CHANNELS=channels.edges_nm is None,
+            MAP_BINS=disperses and maps.count > 0,
+            VISIBLE_LIGHTS=beauty and any(light.has_extent for light in lights),
+        )
+    )
+
+
+def direct_defines(beyond: Defines) -> Defines:
+    """For what is seen directly, from what the listed pixels are compiled with."""
+    return {name: value for name, value in beyond.items() if name not in _BEYOND_ONLY} | {
+        **switched(LISTS_SPECULAR=True, FOLLOWED="CAMERA_SPECULAR" in beyond),
+        "SPECTRAL_GROUPS": 0,
+        "MAX_EVENTS": 1,
+    }
+
+
+def single_defines(beyond: Defines) -> Defines:
+    """For listed pixels whose samples are of one wavelength each."""
+    return {name: value for name, value in beyond.items() if name != "SPECTRAL_SWEEP"} | {
+        "SPECTRAL_GROUPS": 0,
+        "RANDOM_WAVELENGTH": 1,
+        "EVEN_WAVELENGTHS": 1,
+    }
+
+
+def halting_defines(beyond: Defines) -> Defines:
+    """For listed pixels whose samples halt when their loops have run long."""
+    numbers = {"HALT_ROUNDS": HALT_ROUNDS, "SPARE_ROUNDS": SPARE_ROUNDS, "BIND_HALTED": BIND_HALTED}
+    return beyond | switched(HALTS=True) | numbers
+
+
+def lens_defines(shown: Defines) -> Defines:
+    """For a camera with a lens."""
+    return shown | switched(LENS=True)
+
+
+def halted_bytes(beyond: Defines) -> int:
+    """Room that surely holds one halted sample: its paths, and what it knows besides."""
+    columns = int(beyond["SPECTRAL_GROUPS"]) + 2 * int("LENS" in beyond)
+    path = 312 + 40 * columns + 4 * int(beyond.get("ABSORBERS", 0)) + 64 * int("POLARISED" in beyond)
+    path += 16 * int("COATS" in beyond)
+    return (STACK + 1) * path + 16 * int(beyond["TARGETS"]) + 64
+
 
 _VARIANTS: dict[str, Callable[[Defines], Defines]] = {
     "all": lambda shown: shown,

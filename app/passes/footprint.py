@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..features.program_switches import Defines
 from ..gpu import shader
 from ..gpu.records import (
     GAIN_BOX,
@@ -20,11 +21,12 @@ from ..gpu.records import (
     photon_record,
 )
 from ..gpu.schema import Field, Struct
-from .variants import Defines, SplatFeatures, footprint_defines
+from .light_programs import footprint_defines, image_slots
 
 if TYPE_CHECKING:
     import moderngl
 
+    from ..features.features import Features
     from ..gpu.gain_buffers import GainBuffers
     from ..gpu.reindex import ReindexBuffer
     from ..gpu.splat_tables import SplatTables
@@ -146,16 +148,15 @@ class SpectralVariables:
         self.buffer.release()
 
 
-def slots_per_photon(features: SplatFeatures) -> int:
+def slots_per_photon(features: Features) -> int:
     """Splats that a photon may become."""
-    defines = footprint_defines(features)
-    return int(defines["SLOTS"]) + int(defines["IMAGE_SLOTS"])
+    return 1 + features.nested_windows + image_slots(features)
 
 
 class Footprints:
     """Owns the splat record buffer, the sum of what is drawn and the counts of what could not be drawn as asked."""
 
-    def __init__(self, ctx: moderngl.Context, features: SplatFeatures, group: int, by_compute: bool = False) -> None:
+    def __init__(self, ctx: moderngl.Context, features: Features, group: int, by_compute: bool = False) -> None:
         """`group`: the most photons one dispatch covers. `by_compute`: compute shaders add the splats, in any order."""
         self._ctx = ctx
         groups = features.spectral_groups

@@ -25,8 +25,10 @@ from .camera_records import CAMERA_PARAMETERS, camera_parameters
 from .first_surfaces import FirstSurfaces
 from .flights import MOST_EVENTS, PHOTONS, Flights, trace_flights
 from .picture_channels import Channels
-from .variants import BIND_FLIGHTS, BIND_HAZE, BIND_HAZE_COLOURS, UNIT_DISTANCES, haze_defines
 
+_BIND_FLIGHTS, _BIND_HAZE_COLOURS, _BIND_HAZE = 8, 9, 10
+"""The last is of uniform blocks."""
+_UNIT_DISTANCES = 0
 SMOOTHING = 0.6
 """Standard deviation of a footprint, lattice spacings."""
 BAND_BLUR = 0.5
@@ -62,7 +64,14 @@ class Haze:
             self._ctx,
             "camera/haze.vert",
             "camera/haze.frag",
-            haze_defines(channels.targets),
+            {
+                "TARGETS": channels.targets,
+                "BIND_PARAMETERS": bindings.PARAMETERS,
+                "BIND_FLIGHTS": _BIND_FLIGHTS,
+                "BIND_HAZE_COLOURS": _BIND_HAZE_COLOURS,
+                "BIND_HAZE": _BIND_HAZE,
+                "UNIT_DISTANCES": _UNIT_DISTANCES,
+            },
             (FLIGHT, CAMERA_PARAMETERS, HAZE_PARAMETERS),
         )
         self._draw = self._ctx.vertex_array(self._program, [])
@@ -101,10 +110,10 @@ class Haze:
         self._picture.clear((width, height))
         if count:
             self._camera.bind_to_uniform_block(bindings.PARAMETERS)
-            self._values.bind_to_uniform_block(BIND_HAZE)
-            flights.bind_to_storage_buffer(BIND_FLIGHTS)
-            colours.bind_to_storage_buffer(BIND_HAZE_COLOURS)
-            distances.use(UNIT_DISTANCES)
+            self._values.bind_to_uniform_block(_BIND_HAZE)
+            flights.bind_to_storage_buffer(_BIND_FLIGHTS)
+            colours.bind_to_storage_buffer(_BIND_HAZE_COLOURS)
+            distances.use(_UNIT_DISTANCES)
             framebuffer = self._ctx.framebuffer(self._picture.textures)
             framebuffer.use()
             blend_by_adding(self._ctx)

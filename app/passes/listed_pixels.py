@@ -13,7 +13,7 @@ import numpy as np
 
 from ..gpu.dispatch_budget import DispatchBudget
 from ..gpu.records import NONE
-from .variants import BIND_HALTED, BIND_LISTED
+from .camera_programs import BIND_HALTED, BIND_LISTED
 
 _WHOLE = 64
 """Pixels that a dispatch is given more or less by."""

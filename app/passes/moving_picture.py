@@ -14,11 +14,12 @@ from typing import TYPE_CHECKING
 import moderngl
 import numpy as np
 
+from ..features.program_switches import switched
 from ..gpu import shader
 from ..gpu.records import NONE
 from ..gpu.schema import Field, Struct
+from .camera_programs import direct_defines
 from .first_surfaces import FirstSurfaces
-from .variants import moving_defines
 
 if TYPE_CHECKING:
     from ..model.scene import Camera
@@ -63,7 +64,12 @@ class MovingPicture:
         self._view, self._surfaces = view, surfaces
         self._ctx = view.context.ctx
         shown, structs = view.source
-        defines = moving_defines(shown) | {
+        defines = direct_defines(shown) | {
+            **switched(IN_MOTION=True),
+            "THE_SAMPLE": "4u",
+            "NUMBER_BITS": 27,
+            "LATTICE_MAPS": "0xffffu",
+            "LATTICE_OBJECTS": "0x10000u",
             "BIND_MOVING": BIND_MOVING,
             "BIND_MOVING_LISTS": BIND_MOVING_LISTS,
             "IMAGE_PICTURE": IMAGE_PICTURE,

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..features.program_switches import Defines
 from ..gpu import shader
 from ..gpu.context import check_device
 from ..gpu.schema import Field, Struct
@@ -24,12 +25,13 @@ from .footprint import (
     SpectralVariables,
     slots_per_photon,
 )
+from .light_programs import draw_variants, sum_defines
 from .splat_sums import BIND_SUMS
-from .variants import Defines, SplatFeatures, add_variants, draw_variants, splat_defines, sum_defines
 
 if TYPE_CHECKING:
     import moderngl
 
+    from ..features.features import Features
     from ..gpu.gain_buffers import GainBuffers
     from ..gpu.reindex import ReindexBuffer
     from ..gpu.splat_tables import SplatTables
@@ -67,7 +69,7 @@ PARAMETERS = Struct(
 class Splatter:
     """The splat pass of one scene's features."""
 
-    def __init__(self, ctx: moderngl.Context, features: SplatFeatures, by_compute: bool | None = None) -> None:
+    def __init__(self, ctx: moderngl.Context, features: Features, by_compute: bool | None = None) -> None:
         """`by_compute`: whether compute shaders add the splats; None as the context's device likes it."""
         self._ctx = ctx
         self._features = features
@@ -87,24 +89,25 @@ class Splatter:
             self._build_draws()
         self._parameters = ctx.buffer(reserve=PARAMETERS.stride)
 
-    def _of_kind(self, kind: int) -> Defines:
-        return splat_defines(self._features) | {"FIRST_OF_KIND": f"{(kind - 1) * self._footprints.capacity}u"}
-
     def _build_draws(self) -> None:
         slots = self.group * self._footprints.slots_per_photon
         corners = np.array([0, 1, 2, 2, 1, 3], np.uint32) + 4 * np.arange(slots, dtype=np.uint32)[:, None]
         self._indices = self._ctx.buffer(corners)
         for kind, (fragment, chosen) in draw_variants(self._features).items():
-            defines = self._of_kind(kind) | chosen
+            defines = chosen | {"FIRST_OF_KIND": self._first_of(kind)}
             program = shader.program(self._ctx, "light/splat.vert", fragment, defines, (SPLAT,))
             corners_shared = VERTICES[kind - 1] == 6
             indices = self._indices if corners_shared else None
             self._draws[kind] = self._ctx.vertex_array(program, [], index_buffer=indices)
 
+    def _first_of(self, kind: int) -> str:
+        return f"{(kind - 1) * self._footprints.capacity}u"
+
     def _build_adds(self) -> None:
         way = way_of(self._ctx)
-        for kind, chosen in add_variants(self._features).items():
-            defines = self._of_kind(kind) | chosen | sum_defines(way) | {"LANES": LANES}
+        for kind, (_, chosen) in draw_variants(self._features).items():
+            numbers: Defines = {"KIND": kind, "LANES": LANES, "FIRST_OF_KIND": self._first_of(kind)}
+            defines = chosen | sum_defines(way) | numbers
             self._adds[kind] = shader.compute(self._ctx, "light/splat_add.comp", defines, (SPLAT,), way.extensions)
 
     def run(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..gpu import shader
 from ..gpu.splat_way import sums_bytes, way_of
-from .variants import sum_defines
+from .light_programs import sum_defines
 
 if TYPE_CHECKING:
     import moderngl

@@ -15,13 +15,14 @@ import moderngl
 import numpy as np
 
 from ..features.features import Features
+from ..features.program_switches import switched
 from ..gpu import bindings, records, shader
 from ..gpu.context import Context
 from ..gpu.scene_buffers import UNBOUNDED, SceneBuffers
 from ..gpu.scene_records import SCENE_STRUCTS
 from .emission_domain import EmissionDomain
 from .lattice_order import morton_order
-from .variants import emit_defines, light_defines
+from .light_programs import light_defines
 
 RAY_ROOM = 3
 """Rays in flight per lattice point of a batch: splitting rarely passes 1.5."""
@@ -479,9 +480,10 @@ class TracePass:
     def _emit_program(self, domain: EmissionDomain) -> moderngl.ComputeShader:
         variant = domain.kind, domain.thinned is not None
         if variant not in self._emit:
-            defines = self._defines | emit_defines(self._features, *variant)
+            kind, is_thinned = variant
+            own = switched(**{f"LIGHT_{kind.upper()}": True}, THINNED_CELLS=is_thinned)
             self._emit[variant] = shader.compute(
-                self.context.ctx, "light/emit.comp", defines, (*self._structs, records.EMIT_PARAMETERS)
+                self.context.ctx, "light/emit.comp", self._defines | own, (*self._structs, records.EMIT_PARAMETERS)
             )
         return self._emit[variant]
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from spectrasplat.features import features
+from spectrasplat.features import facts
 from spectrasplat.features.features import Features
 from spectrasplat.model.geometry.primitives import box, plane
 from spectrasplat.model.optics.glass import constant
@@ -18,7 +18,7 @@ from spectrasplat.render.still import render
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 from spectrasplat.stress.rigs.probe import light_pass
 from spectrasplat.stress.rigs.scene_parts import SUN, solid, stage, turn
-from spectrasplat.stress.rigs.splat_rig import Rig, SplatFeatures, photons
+from spectrasplat.stress.rigs.splat_rig import Rig, photons
 
 from tests.gpu.mutants import mutate
 
@@ -110,7 +110,7 @@ def test_where_nothing_lands_near_a_border_no_program_asks(gl, monkeypatch: pyte
         assert light.features.border_images and len(light.layout.borders[0]) == 4
     with light_pass(gl, large, SETTINGS) as (light, _):
         assert not light.features.border_images and not light.layout.borders
-    monkeypatch.setattr(features, "has_borders", lambda item: False)
+    monkeypatch.setattr(facts, "has_borders", lambda item: False)
     assert not Features.of(scene, SETTINGS).border_images
 
 
@@ -118,10 +118,10 @@ def test_where_nothing_lands_near_a_border_no_program_asks(gl, monkeypatch: pyte
 
 LOW, HIGH = 8.0, 56.0
 SQUARE = ((1.0, 0.0, 0.0, -LOW), (-1.0, 0.0, 0.0, HIGH), (0.0, 1.0, 0.0, -LOW), (0.0, -1.0, 0.0, HIGH))
-PLAIN = SplatFeatures(spectral_groups=0, border_images=True)
+PLAIN = Features(spectral_groups=0, border_images=True)
 
 
-def drawn(gl, borders: tuple[tuple[float, ...], ...], records: np.ndarray, chosen: SplatFeatures = PLAIN) -> np.ndarray:
+def drawn(gl, borders: tuple[tuple[float, ...], ...], records: np.ndarray, chosen: Features = PLAIN) -> np.ndarray:
     """What a map of 64 × 64 texels holds of a receiver with these borders."""
     rig = Rig(gl.ctx, chosen)
     rows = np.zeros((1, len(borders) + 1, 4), np.float32)
@@ -158,7 +158,7 @@ def test_a_photon_far_from_borders_has_no_image(gl) -> None:
 @pytest.mark.parametrize(("place", "lights_up"), [((10.0, 30.0), True), ((22.0, 30.0), False)])
 def test_what_lands_beyond_a_border_is_not_mirrored(gl, place: tuple[float, float], lights_up: bool) -> None:
     """A band whose ends land inside has an image. One of which a third lands outside has none: that light was lost."""
-    swept = SplatFeatures(border_images=True)
+    swept = Features(spectral_groups=1, border_images=True)
     chord = (3.0, 0.0) if lights_up else (-24.0, 0.0)
     records = photons(swept, np.array([place]), axis_s=(1.2, 0.0), axis_t=(0.0, 1.2), chord=chord, x_anchor=0.0)
     with_images, bare = drawn(gl, SQUARE, records, swept), drawn(gl, ((0.0, 0.0, 0.0, 0.0),), records, swept)

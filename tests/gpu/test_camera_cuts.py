@@ -16,7 +16,7 @@ from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.optics.colorimetry import rgb709_to_xyz
 from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.passes import variants
+from spectrasplat.passes import camera_programs
 from spectrasplat.passes.camera import CameraPass
 from spectrasplat.passes.spectrum_choice import Spectrum
 from spectrasplat.render.device_scene import spectral_axis
@@ -78,7 +78,7 @@ def test_parted_colours_go_their_own_ways(gl, edge: Scene, drawn, monkeypatch, t
 @pytest.mark.slow
 def test_a_part_chosen_by_chance_stands_for_both(gl, edge: Scene, monkeypatch) -> None:
     both = picture(gl, edge, 64)
-    monkeypatch.setattr(variants, "CUT_THRESHOLD", 2.0)
+    monkeypatch.setattr(camera_programs, "CUT_THRESHOLD", 2.0)
     chosen = np.mean([picture(gl, edge, 64, seed=seed) for seed in (1, 2)], axis=0)
     one = picture(gl, edge, 64, seed=3)
     assert error(one, chosen) > 0.0, "nothing was left to chance"

@@ -20,7 +20,7 @@ from spectrasplat.gpu.scene_buffers import SceneBuffers
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.passes import variants
+from spectrasplat.passes import camera_programs
 from spectrasplat.passes.camera import CameraPass
 from spectrasplat.passes.caustic_maps import CausticMaps
 from spectrasplat.render.device_scene import spectral_axis
@@ -102,7 +102,7 @@ def picture_halting_after(
     gl: Context, scene: Scene, rounds: int, monkeypatch: pytest.MonkeyPatch
 ) -> tuple[np.ndarray, int]:
     """And how many samples the driver cut short."""
-    monkeypatch.setattr(variants, "HALT_ROUNDS", rounds)
+    monkeypatch.setattr(camera_programs, "HALT_ROUNDS", rounds)
     camera_pass = shuffled(gl, scene)
     [picture] = pictures(camera_pass, scene, 1, 2)
     cut_short = camera_pass.fallbacks["loops_ended"]
@@ -123,7 +123,7 @@ def test_without_halts_the_driver_cuts_samples_short(gl: Context, monkeypatch: p
     if not gl.is_software:
         pytest.skip("a GPU ends no loops")
     scene = load_scene(Path("assets/scenes/wine_glass.toml"))
-    monkeypatch.setattr(variants, "HALT_ROUNDS", 1 << 30)
+    monkeypatch.setattr(camera_programs, "HALT_ROUNDS", 1 << 30)
     camera_pass = shuffled(gl, scene)
     first, other = pictures(camera_pass, scene, 2, 2)
     assert camera_pass.fallbacks["loops_ended"] > 100

@@ -5,10 +5,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from spectrasplat.features.features import Features
 from spectrasplat.gpu.records import LATTICE_BIT
 from spectrasplat.reference.emission_maps import GOLDEN, lattice_point
 from spectrasplat.stress.rigs.glsl_function import evaluate
-from spectrasplat.stress.rigs.splat_rig import Rig, SplatFeatures, photons
+from spectrasplat.stress.rigs.splat_rig import Rig, photons
 
 COVERS = {
     "lattice.glsl": ("shortest_step", "golden_step", "lattice_frequencies", "lattice_place"),
@@ -86,7 +87,7 @@ def test_splats_about_a_lattice_add_up_to_an_even_plane(gl, sweep: int) -> None:
     drawn, of 0.4. Where a sweep is as long as a spacing it is the whole spectrum's that is uneven, and half of it is
     left."""
     size, worst = 128, 0.0
-    rig = Rig(gl.ctx, SplatFeatures(), size=(size, size))
+    rig = Rig(gl.ctx, Features(spectral_groups=1), size=(size, size))
     sides = np.array([[100.0, 30.0], [-20.0, 90.0]])
     for count in (260, 420, 700):
         i = np.arange(-count, 2 * count)
@@ -94,7 +95,7 @@ def test_splats_about_a_lattice_add_up_to_an_even_plane(gl, sweep: int) -> None:
         places = np.concatenate([unit + [0.0, up] for up in (-1.0, 0.0, 1.0, 2.0)]) @ sides.T + [20.0, 30.0]
         places = places[np.all((places > -30.0) & (places < size + 30.0), axis=1)]
         spacings = sides / np.sqrt(count)
-        made = photons(SplatFeatures(), places, spacings[:, 0], spacings[:, 1], (0.8 * sweep, 0.6 * sweep))
+        made = photons(Features(spectral_groups=1), places, spacings[:, 0], spacings[:, 1], (0.8 * sweep, 0.6 * sweep))
         ripple = []
         for lattice in (0, count):
             made["flags"] = lattice << LATTICE_BIT
@@ -110,13 +111,13 @@ def test_needles_throw_no_less_light_than_none(gl) -> None:
     """Footprints ten thousand texels long: float32 does not know how wide they are, nor what waves run across them. For
     such waves more was taken off than is there: in `wine_glass` a streak of texels with minus a thousand times the
     light round them."""
-    rng, rig = np.random.default_rng(2), Rig(gl.ctx, SplatFeatures(), size=(96, 96))
+    rng, rig = np.random.default_rng(2), Rig(gl.ctx, Features(spectral_groups=1), size=(96, 96))
     for _ in range(NEEDLES):
         turn, length = rng.uniform(0.0, np.pi), 10.0 ** rng.uniform(4.0, 4.5)
         along = length * np.array([np.cos(turn), np.sin(turn)])
         aside = length * 10.0 ** rng.uniform(-5.0, -3.0) * np.array([-np.sin(turn), np.cos(turn)])
         side_s, side_t = along + rng.normal() * aside, rng.uniform(-1.0, 1.0) * along + rng.normal() * aside
-        needle = photons(SplatFeatures(), np.array([[48.0, 48.0]]), side_s, side_t)
+        needle = photons(Features(spectral_groups=1), np.array([[48.0, 48.0]]), side_s, side_t)
         needle["flags"] = int(rng.choice([50, 1000, 30_000, 200_000])) << LATTICE_BIT
         shown = rig.draw(needle, smoothing=0.45)[..., 1]
         assert shown.min() >= -1e-6 * shown.max()

@@ -12,10 +12,10 @@ import pytest
 from spectrasplat.base.errors import UserError
 from spectrasplat.bench.features import cost as features_cost
 from spectrasplat.bench.features import report as features_report
+from spectrasplat.bench.features.compiled import PROVED, compiled_sources, program_sizes, prove
 from spectrasplat.bench.features.rig import Rig, Work, map_difference
-from spectrasplat.bench.features.symbol_proof import FEATURE_SYMBOLS, compiled_sources, program_texts, prove
 from spectrasplat.bench.features.variants import DISPERSION, Trial, Variant, trials
-from spectrasplat.features.explained import explain
+from spectrasplat.features.facts import Facts
 from spectrasplat.features.features import Features
 from spectrasplat.gpu.context import Context
 from spectrasplat.gpu.scene_buffers import SceneBuffers
@@ -123,10 +123,10 @@ def test_running_programs_lack_what_the_scene_does_not_need(
         "camera/camera.comp",
     } <= {s.name for s in sources}
     light = begun(gl, scene)
-    included = {feature: inside for feature, inside, _ in explain(scene, light.features)}
+    included = {feature: inside for feature, inside, _ in light.features.explain(Facts(scene, settings_of(scene)))}
     released(light)
-    assert absent <= {feature for feature in FEATURE_SYMBOLS if not included[feature]}
-    assert [p.feature for p in prove(program_texts(sources), included) if not p.holds] == []
+    assert absent <= {feature for feature in PROVED if not included[feature]}
+    assert [p.feature for p in prove(program_sizes(sources), included) if not p.holds] == []
 
 
 QUICK = {
@@ -154,7 +154,7 @@ def compared(gl: Context, light: LightPass, trial: Trial) -> float:
 @pytest.mark.parametrize("name", QUICK)
 def test_forcing_a_feature_in_leaves_the_map_as_it_is(gl: Context, tmp_path: Path, name: str) -> None:
     light = begun(gl, scene_of(tmp_path, name))
-    by_name = {trial.feature: trial for trial in trials(light.scene, light.features)}
+    by_name = {trial.feature: trial for trial in trials(Facts(light.scene, light.settings), light.features)}
     for feature in QUICK[name]:
         assert compared(gl, light, by_name[feature]) <= features_cost.MAP_TOLERANCE, feature
     released(light)
@@ -175,7 +175,7 @@ def test_another_map_is_noticed(gl: Context, tmp_path: Path) -> None:
 def test_every_forced_feature_compiles_runs_and_keeps_the_map(gl: Context, tmp_path: Path, name: str) -> None:
     light = begun(gl, scene_of(tmp_path, name))
     differences = {}
-    for trial in trials(light.scene, light.features):
+    for trial in trials(Facts(light.scene, light.settings), light.features):
         if trial.same_map:
             differences[trial.feature] = compared(gl, light, trial)
         elif trial.carried is not None and trial.absent is not None:
@@ -200,7 +200,7 @@ def test_a_scene_without_dispersion_traces_faster_than_with_columns_forced(gl: C
     scene = load_scene(paths.assets_dir() / "scenes" / "ball_plain.toml")
     light = begun(gl, scene)
     work = Work.of(light, scene.render.photons, 1 << 14)
-    whole = next(trial for trial in trials(scene, light.features) if trial.feature == DISPERSION)
+    whole = next(trial for trial in trials(Facts(scene, light.settings), light.features) if trial.feature == DISPERSION)
     cost = features_cost.cost_of(whole, "", gl, work, repeats=17)
     none = features_cost.cost_of(replace(whole, carried=whole.absent), "", gl, work, repeats=17)
     released(light)

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from reference.splat_reference import splat_image
+from spectrasplat.features.features import Features
 from spectrasplat.gpu import splat_tables
 from spectrasplat.gpu.map_channels import MapChannels
 from spectrasplat.gpu.records import FLAG_FOOTPRINT_DROPPED, RECEIVER
@@ -18,10 +19,10 @@ from spectrasplat.model.optics import spectrum
 from spectrasplat.model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz
 from spectrasplat.passes.accumulate import SeamFold
 from spectrasplat.passes.map_atlas import MapAtlas, placement_rows
-from spectrasplat.stress.rigs.splat_rig import Rig, SplatFeatures, photons
+from spectrasplat.stress.rigs.splat_rig import Rig, photons
 
-PLAIN = SplatFeatures()
-CUTS = SplatFeatures(band_cuts=True)
+PLAIN = Features(spectral_groups=1)
+CUTS = Features(spectral_groups=1, band_cuts=True)
 TINY = np.array([1e-3, 0.0])
 
 
@@ -162,7 +163,7 @@ def test_throughput_over_the_band(rig: Rig) -> None:
 
 
 def test_bins_hold_their_own_light_and_sum_to_all(gl) -> None:
-    features = SplatFeatures(targets=2)
+    features = Features(spectral_groups=1, bins=8)
     edges = np.linspace(380.0, 780.0, 6)
     rig = Rig(gl.ctx, features, channels=MapChannels(tuple(float(e) for e in edges)))
     image = rig.draw(photons(features, [[32.0, 32.0]], [1.0, 0.0], [0.0, 1.0], [10.0, 0.0])).sum(axis=(0, 1))
@@ -185,7 +186,7 @@ def test_laser_lines_land_at_their_wavelengths(gl) -> None:
 
 
 def test_one_wavelength_a_photon_averages_to_the_spectrum(gl) -> None:
-    features = SplatFeatures(spectral_groups=0, point_spectrum=True)
+    features = Features(spectral_groups=0, point_spectrum=True)
     rig = Rig(gl.ctx, features)
     count = 4096
     records = photons(features, np.full((count, 2), 32.3), [0.8, 0.0], [0.0, 0.8])
@@ -252,14 +253,14 @@ def test_too_large_ones_are_drawn_as_large_as_can_be_and_counted(gl, far: float,
 
 
 def test_nested_windows_are_complete_where_they_are_read(gl) -> None:
-    features = SplatFeatures(nested_windows=True)
+    features = Features(spectral_groups=1, nested_windows=True)
     rows = np.array([[0.25, 0.0, 0.0, 24.0], [0.0, 0.25, 0.0, 24.0]])
     rig = Rig(gl.ctx, features, coarse=((64, 64), rows, 16.0))
     rng = np.random.default_rng(5)
     records = photons(features, rng.uniform(-60.0, 124.0, (20000, 2)), [1.2, 0.3], [-0.2, 1.0], [3.0, 1.0])
     fine = rig.draw(records)
     coarse = rig.draw(records, tile=1)
-    alone = Rig(gl.ctx, SplatFeatures(), size=(64, 64))
+    alone = Rig(gl.ctx, Features(spectral_groups=1), size=(64, 64))
     expected = alone.draw(records)
     np.testing.assert_allclose(fine, expected, rtol=2e-3, atol=2e-3 * expected.max())
     # Coarse texels 24..39 are under the fine window; those outside and their neighbours must hold everything.

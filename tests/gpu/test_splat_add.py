@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from spectrasplat.base import paths
 from spectrasplat.base.errors import UserError
+from spectrasplat.features.features import Features
 from spectrasplat.gpu import splat_way
 from spectrasplat.gpu.context import Context, create_context
 from spectrasplat.gpu.map_channels import MapChannels
@@ -23,7 +24,7 @@ from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes.footprint import MOST_GROUPS, SPLAT, VERTICES
 from spectrasplat.passes.map_atlas import MapAtlas
 from spectrasplat.render.still import render
-from spectrasplat.stress.rigs.splat_rig import Rig, SplatFeatures, photons
+from spectrasplat.stress.rigs.splat_rig import Rig, photons
 
 from tests.gpu.mutants import mutate
 
@@ -33,20 +34,20 @@ SMALL, SWEPT, CUT, EDGE = 1, 2, 3, 4
 BESIDE = {SMALL: 5, EDGE: 6, CUT: 7}
 """Kinds beside a line of contact."""
 BINS = MapChannels(tuple(np.linspace(380.0, 780.0, 7).tolist()))
-ONE_COLOUR = SplatFeatures(spectral_groups=0, point_spectrum=True)
+ONE_COLOUR = Features(spectral_groups=0, point_spectrum=True)
 CASES = {
-    "small": (SMALL, SplatFeatures()),
-    "small of cut bands": (SMALL, SplatFeatures(band_cuts=True)),
-    "small beside contacts": (5, SplatFeatures(contact_lines=True)),
-    "swept": (SWEPT, SplatFeatures()),
-    "swept in bins": (SWEPT, SplatFeatures(targets=2)),
+    "small": (SMALL, Features(spectral_groups=1)),
+    "small of cut bands": (SMALL, Features(spectral_groups=1, band_cuts=True)),
+    "small beside contacts": (5, Features(spectral_groups=1, contact_lines=True)),
+    "swept": (SWEPT, Features(spectral_groups=1)),
+    "swept in bins": (SWEPT, Features(spectral_groups=1, bins=8)),
     "swept of one colour": (SWEPT, ONE_COLOUR),
     "swept of four wavelengths": (SWEPT, replace(ONE_COLOUR, hero=True)),
-    "cut": (CUT, SplatFeatures(band_cuts=True)),
-    "cut in bins beside contacts": (7, SplatFeatures(band_cuts=True, contact_lines=True, targets=2)),
-    "fanning": (EDGE, SplatFeatures()),
-    "fanning at light edges": (EDGE, SplatFeatures(light_edges=True)),
-    "fanning beside contacts": (6, SplatFeatures(contact_lines=True, light_edges=True)),
+    "cut": (CUT, Features(spectral_groups=1, band_cuts=True)),
+    "cut in bins beside contacts": (7, Features(spectral_groups=1, band_cuts=True, contact_lines=True, bins=8)),
+    "fanning": (EDGE, Features(spectral_groups=1)),
+    "fanning at light edges": (EDGE, Features(spectral_groups=1, light_edges=True)),
+    "fanning beside contacts": (6, Features(spectral_groups=1, contact_lines=True, light_edges=True)),
     "fanning of one colour": (EDGE, ONE_COLOUR),
 }
 
@@ -112,7 +113,7 @@ def splats(rig: Rig, rng: np.random.Generator, count: int, kind: int) -> np.ndar
     return records
 
 
-def rigs(gl: Context, features: SplatFeatures) -> tuple[Rig, Rig]:
+def rigs(gl: Context, features: Features) -> tuple[Rig, Rig]:
     """Drawn by the rasteriser, and added by compute shaders."""
     channels = BINS if features.targets > 1 else MapChannels()
     made = tuple(Rig(gl.ctx, features, SIZE, channels=channels, by_compute=way) for way in (False, True))
@@ -206,7 +207,7 @@ def alone(rig: Rig, **fields: object) -> np.ndarray:
 
 def test_long_thin_diagonals_keep_their_light(gl: Context) -> None:
     """Thousands of texels long and two wide; lines of either direction."""
-    raster, compute = rigs(gl, SplatFeatures())
+    raster, compute = rigs(gl, Features(spectral_groups=1))
     for angle in np.radians([0.0, 3.0, 44.0, 45.0, 46.0, 87.0, 90.0, 133.0]):
         along = np.array([np.cos(angle), np.sin(angle)])
         record = alone(raster, along=5000.0 * along, across=1.2 * np.array([-along[1], along[0]]))
@@ -220,7 +221,7 @@ def test_long_thin_diagonals_keep_their_light(gl: Context) -> None:
 @pytest.mark.parametrize("field", ["centre", "along", "across", "rect", "fan"])
 def test_what_is_no_splat_ends_and_harms_nothing_beside_it(gl: Context, field: str, broken: float) -> None:
     """No loop depends on such numbers, and of a splat without width nothing is drawn."""
-    _, compute = rigs(gl, SplatFeatures())
+    _, compute = rigs(gl, Features(spectral_groups=1))
     good = splats(compute, np.random.default_rng(1), 1, EDGE)
     good["centre"], good["rect"], good["along"], good["across"] = 20.0, (0.0, 0.0, 40.0, 40.0), (8.0, 0.0), (0.0, 8.0)
     bad = good.copy()
@@ -235,7 +236,7 @@ def test_what_is_no_splat_ends_and_harms_nothing_beside_it(gl: Context, field: s
 
 def test_more_splats_than_groups_are_all_added(gl: Context) -> None:
     """A dispatch has no more groups than OpenGL promises: each then adds several."""
-    raster, compute = rigs(gl, SplatFeatures())
+    raster, compute = rigs(gl, Features(spectral_groups=1))
     record = splats(compute, np.random.default_rng(2), 1, SMALL)
     record["centre"], record["rect"] = 40.5, (0.0, 0.0, *SIZE)
     count = min(MOST_GROUPS + 4000, compute.splatter._footprints.capacity)
@@ -244,7 +245,7 @@ def test_more_splats_than_groups_are_all_added(gl: Context) -> None:
     np.testing.assert_allclose(all_of_them, count * one, rtol=2e-3, atol=1e-4 * count * one.max())
 
 
-def mixed(features: SplatFeatures, count: int) -> np.ndarray:
+def mixed(features: Features, count: int) -> np.ndarray:
     """Photons of all kinds of splat, over and around a map of `SIZE`."""
     rng = np.random.default_rng(7)
     along, _ = frames(rng, count)
@@ -262,7 +263,7 @@ def mixed(features: SplatFeatures, count: int) -> np.ndarray:
 @pytest.mark.usefixtures("adding")
 def test_photons_come_to_the_same_maps(gl: Context, nested: bool) -> None:
     """By their own lists, in groups and flushes of their own, into both of two windows."""
-    features = SplatFeatures(band_cuts=True, nested_windows=nested)
+    features = Features(spectral_groups=1, band_cuts=True, nested_windows=nested)
     coarse = ((64, 64), np.array([[0.25, 0.0, 0.0, 16.0], [0.0, 0.25, 0.0, 16.0]]), 16.0) if nested else None
     raster, compute = (Rig(gl.ctx, features, SIZE, coarse=coarse, by_compute=way) for way in (False, True))
     records = mixed(features, 6000)
@@ -276,7 +277,7 @@ def test_photons_come_to_the_same_maps(gl: Context, nested: bool) -> None:
 
 
 def test_an_atlas_forgets_and_gives_back_its_sums(gl: Context) -> None:
-    _, compute = rigs(gl, SplatFeatures())
+    _, compute = rigs(gl, Features(spectral_groups=1))
     atlas = compute.atlas
     textures = atlas.scratch_bytes
     drawn(compute, splats(compute, np.random.default_rng(1), 10, SMALL))
@@ -291,7 +292,7 @@ def test_an_atlas_forgets_and_gives_back_its_sums(gl: Context) -> None:
 
 
 def test_targets_without_scratch_textures_are_added_to_as_well(gl: Context) -> None:
-    features = SplatFeatures(targets=2)
+    features = Features(spectral_groups=1, bins=8)
     raster, compute = rigs(gl, features)
     records = splats(raster, np.random.default_rng(3), 100, SWEPT)
     want = drawn(raster, records)

@@ -7,14 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from spectrasplat.features.features import Features
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
-from spectrasplat.stress.rigs.splat_rig import Rig, SplatFeatures, photons
+from spectrasplat.stress.rigs.splat_rig import Rig, photons
 
 from tests.gpu.mutants import mutate
 from tests.gpu.test_splat import frame, spectrum_samples
 
 COVERS = {"swept.glsl": ("sweeps_part", "throughput_over", "mean_bend")}
-SPECTRAL, ONE_COLOUR = SplatFeatures(), SplatFeatures(spectral_groups=0)
+SPECTRAL, ONE_COLOUR = Features(spectral_groups=1), Features(spectral_groups=0)
 STRAIGHT, BENT = (0.2, 0.5, 0.8), (0.9, 0.5, 0.4)
 SPLATS = {
     "a focus": (SPECTRAL, 0.05, 0.0),

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from spectrasplat.stress.rigs.splat_rig import Rig, SplatFeatures, photons
+from spectrasplat.features.features import Features
+from spectrasplat.stress.rigs.splat_rig import Rig, photons
 
-FEATURES = SplatFeatures()
+FEATURES = Features(spectral_groups=1)
 TILES, SIDE = 15, 96
 """Splats are drawn in a grid of TILES², SIDE texels apart, and summed one by one."""
 BIAS_LIMIT = 5e-4

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from spectrasplat.features import features
+from spectrasplat.features import facts
 from spectrasplat.model import contacts
 from spectrasplat.model.contacts import _meet, _meeting
 from spectrasplat.model.geometry.primitives import box
@@ -46,6 +46,6 @@ def test_a_city_takes_no_more_than_seconds_and_memory_in_proportion() -> None:
 
 def test_many_solids_are_left_to_the_tree() -> None:
     few = stage(*(solid(f"{i}", box(), FLINT, (2.0 * i, 0.0, 1.0)) for i in range(3)), lights=[SUN])
-    assert list(features.half_spaces(few)) == [0, 1, 2]
-    many = features.MOST_PLANES // 6 + 1
-    assert not features.half_spaces(stage(*(solid(f"{i}", box(), FLINT, (2.0 * i, 0.0, 1.0)) for i in range(many))))
+    assert list(facts.half_spaces(few)) == [0, 1, 2]
+    many = facts.MOST_PLANES // 6 + 1
+    assert not facts.half_spaces(stage(*(solid(f"{i}", box(), FLINT, (2.0 * i, 0.0, 1.0)) for i in range(many))))

@@ -11,7 +11,7 @@ import pytest
 from spectrasplat.base.errors import UserError
 from spectrasplat.base.image_io import write_image
 from spectrasplat.edit import environments
-from spectrasplat.features.explained import explain
+from spectrasplat.features.facts import Facts
 from spectrasplat.features.features import Features
 from spectrasplat.model.environment import (
     SKY_TYPES,
@@ -352,7 +352,9 @@ def test_a_scene_file_says_whether_its_environment_lights(tmp_path: Path, kind: 
         scene = load_scene(path)
         assert (lighting_environment(scene) is not None) == lights
         features = Features.of(scene, RenderSettings())
-        told = {name: (included, reason) for name, included, reason in explain(scene, features)}["environment light"]
+        told = {
+            name: (included, reason) for name, included, reason in features.explain(Facts(scene, RenderSettings()))
+        }["environment light"]
         assert told[0] == features.environment_lights == lights
         save_scene(scene, tmp_path / "b.toml")
         assert (lighting_environment(load_scene(tmp_path / "b.toml")) is not None) == lights

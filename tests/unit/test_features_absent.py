@@ -6,310 +6,145 @@ does the same with every program that a rendering builds.
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 from spectrasplat.base import paths
-from spectrasplat.bench.features.static_costs import RecordSizes, static_costs
-from spectrasplat.bench.features.symbol_proof import FEATURE_SYMBOLS, occurring, program_texts, prove
-from spectrasplat.features.explained import explain
-from spectrasplat.features.features import Features
+from spectrasplat.bench.features.compiled import PROVED, occurring, program_sizes, prove, static_costs
+from spectrasplat.features.facts import Facts
+from spectrasplat.features.features import ROWS, Features, all_symbols
+from spectrasplat.features.program_switches import Defines, switched
 from spectrasplat.gpu import records, shader
+from spectrasplat.gpu.device_traits import DeviceTraits
 from spectrasplat.gpu.limits import BRUSH_STORAGE_BLOCKS, NEEDED
+from spectrasplat.gpu.map_channels import MapChannels
 from spectrasplat.gpu.program_use import use_of
 from spectrasplat.gpu.scene_records import SCENE_STRUCTS
+from spectrasplat.gpu.schema import Struct
 from spectrasplat.gpu.texture_store import PICTURE
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes import bounce_light, environment_light, gathered_light
+from spectrasplat.passes.camera_programs import camera_defines, direct_defines, lens_defines
 from spectrasplat.passes.camera_records import CAMERA_LIGHT, CAMERA_PARAMETERS
 from spectrasplat.passes.environment_places import PLACE
 from spectrasplat.passes.footprint import SPLAT
 from spectrasplat.passes.haze import HAZE_PARAMETERS
-from spectrasplat.passes.variants import direct_defines, footprint_defines, haze_defines, splat_defines
+from spectrasplat.passes.light_programs import draw_variants, footprint_defines, light_defines
+from spectrasplat.passes.picture_channels import Channels
 
-EVERYTHING = Features(
-    method="srd",
-    spectral_groups=2,
-    merged_groups=True,
-    spectral_weights=True,
-    footprints=True,
-    point_spectrum=False,
-    random_wavelength=False,
-    even_wavelengths=False,
-    band_cuts=True,
-    landing_cuts=True,
-    dielectrics=True,
-    mirrors=True,
-    gratings=True,
-    sheets=True,
-    filters=True,
-    smooth_normals=True,
-    normal_derivatives=True,
-    absorption=True,
-    tint_levels=16,
-    medium_stack=True,
-    contacts=True,
-    tree=True,
-    loose_triangles=True,
-    convex_solids=True,
-    curved_solids=True,
-    charts=True,
-    nested_windows=True,
-    targets=3,
-    local_gain=True,
-    light_profiles=True,
-    reindexed=True,
-    camera_specular=True,
-    camera_disperses=True,
-    map_tents=8,
-    beams=True,
-    environment_lights=True,
-    bounces=3,
-    lens=True,
-    contact_lines=True,
-    border_images=True,
-    coats=True,
-    rough_diffuse=True,
-    rough=True,
-    light_edges=True,
-    lamp_columns=True,
-    haze=True,
-    flights=True,
-)
-PLAIN_CAMERA = {"camera_disperses": False, "map_tents": 0}
-"""What the camera sees disperses nothing: the camera carries the spectrum in the same way as the light pass."""
-WITHOUT = {
-    "beams": {"beams": False},
-    "light profiles": {"light_profiles": False},
-    "environment light": {"environment_lights": False},
-    "bounces": {"bounces": 0},
-    "lens": {"lens": False},
-    "coats": {"coats": False},
-    "rough diffuse": {"rough_diffuse": False},
-    "spectral columns": {
-        "spectral_groups": 0,
-        "merged_groups": False,
-        "band_cuts": False,
-        "landing_cuts": False,
-        "local_gain": False,
-        "reindexed": False,
-        **PLAIN_CAMERA,
-    },
-    "shared spectral variable": {"merged_groups": False},
-    "weights over the band": {
-        "spectral_weights": False,
-        "spectral_groups": 0,
-        "merged_groups": False,
-        "band_cuts": False,
-        "landing_cuts": False,
-    },
-    "band cuts": {"band_cuts": False, "landing_cuts": False, **PLAIN_CAMERA},
-    "landing cuts": {"landing_cuts": False},
-    "spatial columns": {
-        "footprints": False,
-        "lamp_columns": False,
-        "light_edges": False,
-        "spectral_groups": 0,
-        "merged_groups": False,
-        "band_cuts": False,
-        "landing_cuts": False,
-        "normal_derivatives": False,
-    },
-    "refraction": {
-        "dielectrics": False,
-        "sheets": False,
-        "filters": False,
-        "absorption": False,
-        "band_cuts": False,
-        "landing_cuts": False,
-        "spectral_weights": False,
-        "spectral_groups": 0,
-        "merged_groups": False,
-        **PLAIN_CAMERA,
-    },
-    "polarisation": {"polarised": False},
-    "haze": {"haze": False, "flights": False},
-    "rough surfaces": {"rough": False},
-    "light edges": {"light_edges": False},
-    "lamp columns": {"lamp_columns": False},
-    "mirrors": {"mirrors": False},
-    "gratings": {"gratings": False},
-    "thin sheets": {"sheets": False},
-    "surface colours": {"filters": False},
-    "interpolated normals": {"smooth_normals": False, "normal_derivatives": False},
-    "normal derivatives": {"normal_derivatives": False},
-    "absorption": {"absorption": False},
-    "tint levels": {"tint_levels": 0},
-    "medium stack": {"medium_stack": False},
-    "contacts": {"contacts": False},
-    "triangle tree": {"tree": False},
-    "half-space solids": {"convex_solids": False},
-    "curved solids": {"curved_solids": False},
-    "charts": {"charts": False},
-    "nested windows": {"nested_windows": False},
-    "contact lines": {"contact_lines": False},
-    "border images": {"border_images": False},
-    "spectral bins": {"targets": 1, "map_tents": 0},
-    "local gain": {"local_gain": False},
-    "photons by index": {"reindexed": False},
-    "camera refraction": {"camera_specular": False, **PLAIN_CAMERA},
-    "camera spectral taps": PLAIN_CAMERA,
-    "spectral maps": {"map_tents": 0},
+NOT_OF_BANDS = ("point_spectrum", "random_wavelength", "even_wavelengths", "draws_by_power", "hero", "anchor_weights")
+SCENES = paths.assets_dir() / "scenes"
+COUNTS = {"spectral_groups": 2, "tint_levels": 16, "map_tents": 8, "bounces": 3, "bins": 0}
+EVERYTHING = Features().changed(**{name: True for name in ROWS if name not in NOT_OF_BANDS} | COUNTS)
+CAMERA_TOO = dict.fromkeys(("spectral_groups", "band_cuts", "dielectrics"), ("camera_disperses",))
+"""Where the camera's own rays use the same names, it must do without as well."""
+NUMBERS: Defines = {
+    **dict.fromkeys(("TREE_AT", "NORMALS_AT", "PIECES_AT", "INDEX_ROW"), 0),
+    **dict.fromkeys(("SLOPE_ROW", "VARIABLE_ROW", "STACK_SIZE", "SOLID_COUNT", "ABSORBERS", "FINISHES_AT"), 1),
+    **dict.fromkeys(("WHITE_ROW", "LIGHT_ROW", "ROWS_PER_LIGHT", "BIN_ROW", "BIN_SPECTRUM_ROW", "REFLECTANCE_ROW"), 1),
+    **dict.fromkeys(("BASIS_ROW", "ABSORPTION_ROW"), 1),
+    "TREE_STACK": 9,
+    "STACK_OBJECTS": "uint[](0u)",
+    "PLANE_COUNT": 6,
+    "PIECE_COUNT": 2,
+    "TRIANGLE_COUNT": 9,
 }
+"""Stand-ins for what only a scene's data give."""
 
 
 def sources(features: Features) -> list[shader.Source]:
-    """The light pass's and the camera's sources, with stand-ins for the numbers that only a scene's data give."""
-    ray = records.ray_record(
-        features.defines()["COLUMNS"],
-        polarised=features.polarised,
-        flights=features.flights,
-        tinted=features.tint_levels > 0,
-    )
+    """The light pass's and the camera's sources."""
+    return [*light_sources(features), *gathered_sources(features), *camera_sources(features)]
+
+
+def light_sources(features: Features) -> Iterator[shader.Source]:
     photon = records.photon_record(features.spectral_groups)
-    structs = (*SCENE_STRUCTS, ray, photon, records.OUTCOME, records.TRACE_PARAMETERS, records.EMIT_PARAMETERS)
-    structs += (records.FLIGHT,) if features.flights else ()
-    copies = " ".join(
-        f"photon.dposition_dvar{g} = ray.dposition[SPATIAL + {g}];" for g in range(features.spectral_groups)
-    )
-    numbers = {
-        "SPECTRAL_COPY": copies,
-        "TREE_AT": 0,
-        "TREE_STACK": 9,
-        "NORMALS_AT": 0,
-        "PIECES_AT": 0,
-        "INDEX_ROW": 0,
-        "SLOPE_ROW": 1,
-        "VARIABLE_ROW": 2,
-        "BIND_FLIGHTS": 16,
-    }
-    numbers |= {
-        "STACK_SIZE": 1,
-        "STACK_OBJECTS": "uint[](0u)",
-        "SOLID_COUNT": 1,
-        "PLANE_COUNT": 6,
-        "PIECE_COUNT": 2,
-        "TRIANGLE_COUNT": 9,
-    }
-    light = features.defines() | numbers
-    splat = splat_defines(features) | {"GROUPS": features.spectral_groups}
-    made = [
-        shader.load_source("light/trace.comp", light, structs),
-        shader.load_source("light/emit.comp", light | {"LIGHT_POINT": 1}, structs),
-    ]
-    made.append(
-        shader.load_source(
-            "light/footprint.comp",
-            footprint_defines(features),
-            (photon, records.PLACEMENT, records.RECEIVER, SPLAT, records.GAIN_BOX),
-        )
-    )
-    draws = {"light/splat_small.frag": "SMALL", "light/splat_swept.frag": "SWEPT"} | (
-        {"light/splat_cut.frag": "CUT"} if features.band_cuts else {}
-    )
-    for fragment, kind in draws.items():
-        made += [shader.load_source(name, splat | {kind: 1}, (SPLAT,)) for name in ("light/splat.vert", fragment)]
-    soft = light | {"MOST_ASKED": 24, "BIND_PLACES": 8, "BIND_ASKED": 9, "BIND_SUMS": 10}
-    if features.environment_lights:
-        structs = (*SCENE_STRUCTS, PLACE, environment_light.PARAMETERS, environment_light.ASKED, gathered_light.SUM)
-        made.append(shader.load_source("light/environment.comp", soft, structs))
-    if features.bounces:
-        structs = (*SCENE_STRUCTS, PLACE, bounce_light.PARAMETERS, bounce_light.ASKED, gathered_light.SUM)
-        made.append(shader.load_source("light/bounce.comp", soft, structs))
+    structs = (*SCENE_STRUCTS, records.ray_record_of(features), photon, records.OUTCOME)
+    structs += (records.TRACE_PARAMETERS, records.EMIT_PARAMETERS, *((records.FLIGHT,) if features.flights else ()))
+    light = light_defines(features, DeviceTraits()) | NUMBERS
+    yield shader.load_source("light/trace.comp", light, structs)
+    yield shader.load_source("light/emit.comp", light | switched(LIGHT_POINT=True), structs)
+    placed = (photon, records.PLACEMENT, records.RECEIVER, SPLAT, records.GAIN_BOX)
+    yield shader.load_source("light/footprint.comp", footprint_defines(features), placed)
+    for fragment, defines in draw_variants(features).values():
+        for name in ("light/splat.vert", fragment):
+            yield shader.load_source(name, defines, (SPLAT,))
+
+
+def gathered_sources(features: Features) -> Iterator[shader.Source]:
+    defines = features.defines() | NUMBERS | {"MOST_ASKED": 24, "BIND_PLACES": 8, "BIND_ASKED": 9, "BIND_SUMS": 10}
+    for module, name, on in (
+        (environment_light, "environment", features.environment_lights),
+        (bounce_light, "bounce", features.bounces),
+    ):
+        if on:
+            structs: tuple[Struct, ...] = (*SCENE_STRUCTS, PLACE, module.PARAMETERS, module.ASKED, gathered_light.SUM)
+            yield shader.load_source(f"light/{name}.comp", defines, structs)
     if features.haze:
         structs = (records.FLIGHT, CAMERA_PARAMETERS, HAZE_PARAMETERS)
-        made += [shader.load_source(f"camera/haze.{s}", haze_defines(1), structs) for s in ("vert", "frag")]
-    return made + camera_sources(features, light)
+        for stage in ("vert", "frag"):
+            yield shader.load_source(f"camera/haze.{stage}", {"TARGETS": 1}, structs)
 
 
-def camera_sources(
-    features: Features, light: dict[str, int | float | str], images: dict[str, int] | None = None
-) -> list[shader.Source]:
-    """The camera's one program, or two where it sees glass or mirrors; `light`: symbols of the scene, `images`: of the
-    texture store."""
-    single = features.spectral_groups if features.camera_specular and features.camera_disperses else 0
-    rows = (
-        "WHITE_ROW",
-        "LIGHT_ROW",
-        "ROWS_PER_LIGHT",
-        "BIN_ROW",
-        "BIN_SPECTRUM_ROW",
-        "REFLECTANCE_ROW",
-        "BASIS_ROW",
-        "ABSORPTION_ROW",
-    )
-    camera_pass = (
-        light
-        | dict.fromkeys(rows, 1)
-        | {
-            "TARGETS": 1,
-            "MAP_TARGETS": features.targets,
-            "SPECTRAL_GROUPS": single,
-            "ABSORBERS": 1,
-            "EMISSION_CELLS": 1023,
-            "FINISHES_AT": 1,
-        }
-    )
-    camera_pass |= {
-        "BIN_TARGET": 1,
-        "BIN_OVERLAP": 0,
-        "STACK": 6,
-        "MAX_DEPTH": 48,
-        "MAX_EVENTS": 160,
-        "LIGHT_COUNT": 1,
-        "TINT_STEPS": 48,
-        "BIN_COUNT": features.map_tents,
-    }
-    switches = {
-        "LAYER_BEAUTY": True,
-        "RGB_CHANNELS": True,
-        "HAS_RECEIVERS": True,
-        "VISIBLE_LIGHTS": True,
-        "MAP_BINS": features.map_tents > 0,
-        "CAMERA_SPECULAR": features.camera_specular,
-        "HAS_DISPERSION": features.camera_disperses,
-        "RECEIVER_LIGHT": features.environment_lights or features.bounces > 0,
-        "SPECTRAL_SWEEP": single > 0,
-        "ABSORPTION": features.absorption and features.camera_specular,
-        "NORMAL_DERIVATIVES": features.smooth_normals,
-        "LENS": features.lens,
-        "POLARISED": features.polarised and features.camera_specular,
-        "COATS": features.coats,
-        "ROUGH_DIFFUSE": features.rough_diffuse,
-        **(images or {}),
-    }
-    for name in switches:
-        camera_pass.pop(name, None)
-    camera_pass |= {name: 1 for name, on in switches.items() if on}
-    structs = (
-        *SCENE_STRUCTS,
-        CAMERA_LIGHT,
-        CAMERA_PARAMETERS,
-        records.RECEIVER,
-        records.PLACEMENT,
-        *([PICTURE] if images else []),
-    )
-    programs = [direct_defines(camera_pass), *([camera_pass] if "CAMERA_SPECULAR" in camera_pass else [])]
+def camera_sources(features: Features, images: dict[str, int] | None = None) -> list[shader.Source]:
+    """The camera's one program, or two where it sees glass or mirrors; `images`: symbols of the texture store."""
+    buffers = SimpleNamespace(scene=SimpleNamespace(lights=()), features=features, defines=NUMBERS)
+    maps = MapChannels(tents_nm=(550.0,) * features.map_tents)
+    shown = camera_defines(cast(Any, buffers), Channels(), "beauty", maps)
+    shown |= NUMBERS | switched(VISIBLE_LIGHTS=True) | (images or {})
+    shown = lens_defines(shown) if features.lens else shown
+    structs = (*SCENE_STRUCTS, CAMERA_LIGHT, CAMERA_PARAMETERS, records.RECEIVER, records.PLACEMENT)
+    structs += (PICTURE,) if images else ()
+    programs = [direct_defines(shown), *([shown] if features.camera_specular else [])]
     return [shader.load_source("camera/camera.comp", defines, structs) for defines in programs]
 
 
 def scene_features(name: str) -> Features:
-    return Features.of(load_scene(paths.assets_dir() / "scenes" / f"{name}.toml"), RenderSettings())
+    return Features.of(load_scene(SCENES / f"{name}.toml"), RenderSettings())
 
 
-@pytest.mark.parametrize("feature", FEATURE_SYMBOLS)
-def test_symbols_come_and_go_with_their_feature(feature: str) -> None:
-    """Every symbol listed is in some program with the feature in, and in none with it out."""
-    symbols = tuple(s for s in FEATURE_SYMBOLS[feature] if "1[0-9]" not in s)
+@pytest.mark.parametrize("field", [field for field, row in ROWS.items() if row.names])
+def test_names_come_and_go_with_their_feature(field: str) -> None:
+    """Every name of a row is in some program with the feature in, and in none with it out."""
+    names = ROWS[field].names
     # Polarised light has no mean reflectance of its own.
-    everything = replace(EVERYTHING, polarised=feature == "polarisation")
-    present = {s for source in sources(everything) for s in occurring(source.text, symbols)}
-    assert present == set(symbols)
-    for source in sources(replace(everything, **WITHOUT[feature])):
-        assert occurring(source.text, symbols) == (), source.name
+    everything = replace(EVERYTHING, polarised=field == "polarised")
+    assert {s for source in sources(everything) for s in occurring(source.text, names)} == set(names)
+    for source in sources(everything.without(field, *CAMERA_TOO.get(field, ()))):
+        assert occurring(source.text, names) == (), source.name
+
+
+def test_rows_name_features_and_symbols_once() -> None:
+    assert all(name in ROWS for row in ROWS.values() for name in row.requires)
+    for column in ("name", "symbol"):
+        given = [value for row in ROWS.values() if (value := getattr(row, column))]
+        assert len(given) == len(set(given))
+    assert all(row.why and row.why_not for row in ROWS.values() if row.name)
+    with pytest.raises(KeyError, match="IN_MOTOIN"):
+        switched(IN_MOTOIN=True)
+
+
+COUNTED = re.compile(r"SPECTRAL_GROUPS|TARGETS|GROUPS|COLUMNS|SLOTS|EDGES|ROWS|TAPS|\w+_(?:GLSL|TARGETS?)")
+"""Numbers, and guards of included files."""
+
+
+def test_every_switch_that_shaders_test_is_listed() -> None:
+    own = {"COUNT_ROUNDS", "HAS_NORMAL_COLUMNS", "TINT_LEVELS"}
+    tested: set[str] = set()
+    for file in paths.shaders_dir().rglob("*"):
+        if file.suffix in (".comp", ".vert", ".frag", ".glsl"):
+            text = re.sub(r"//.*", "", file.read_text())
+            for condition in re.findall(r"#\s*(?:el)?if(?:n?def)?\b(.*)", text):
+                tested |= set(re.findall(r"[A-Z][A-Z_]+", condition))
+    unknown = {name for name in tested if not COUNTED.fullmatch(name)} - {*all_symbols()} - own
+    assert not unknown, f"neither a row of the table of features nor in program_switches.py: {sorted(unknown)}"
 
 
 SHIPPED = {
@@ -341,11 +176,11 @@ SHIPPED = {
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_shipped_scenes_leave_out_what_they_do_not_need(name: str) -> None:
-    scene = load_scene(paths.assets_dir() / "scenes" / f"{name}.toml")
+    scene = load_scene(SCENES / f"{name}.toml")
     features = Features.of(scene, RenderSettings())
-    included = {feature: inside for feature, inside, _ in explain(scene, features)}
+    included = {feature: inside for feature, inside, _ in explained(scene)}
     assert not any(included[feature] for feature in SHIPPED[name])
-    proofs = prove(program_texts(sources(features)), included)
+    proofs = prove(program_sizes(sources(features)), included)
     assert [p.feature for p in proofs if not p.holds] == []
 
 
@@ -355,22 +190,28 @@ def test_a_scene_without_dispersion_has_no_spectral_code_nor_columns() -> None:
         for word in ("dposition_dvar", "variable_step", "spectral_variable", "is_cut", "texture("):
             assert word not in source.text, (source.name, word)
     forced = replace(features, spectral_groups=1, spectral_weights=True, band_cuts=True)
-    plain, carrying = RecordSizes.of(features), RecordSizes.of(forced)
-    assert (carrying.ray - plain.ray, carrying.photon - plain.photon) == (32, 16)
-    assert (plain.columns, carrying.columns) == (4, 5), "two of the lattice, two of the lamp"
+    assert costs_of(load_scene(SCENES / "ball_plain.toml"), forced)["spectral columns"] == "32 B a ray, 16 B a photon"
+    assert (features.columns, forced.columns) == (4, 5), "two of the lattice, two of the lamp"
+
+
+def explained(scene: Scene) -> list[tuple[str, bool, str]]:
+    return Features.of(scene, RenderSettings()).explain(Facts(scene, RenderSettings()))
 
 
 def _reasons(scene: Scene) -> dict[str, str]:
-    return {name: reason for name, _, reason in explain(scene, Features.of(scene, RenderSettings()))}
+    return {name: reason for name, _, reason in explained(scene)}
+
+
+def costs_of(scene: Scene, features: Features) -> dict[str, str]:
+    return static_costs(Facts(scene, RenderSettings()), features)
 
 
 def test_states_of_polarisation_cost_nothing_where_they_are_not_asked_for() -> None:
-    scene = load_scene(paths.assets_dir() / "scenes" / "prism.toml")
+    scene = load_scene(SCENES / "prism.toml")
     asked = replace(scene, render=replace(scene.render, polarisation=True))
     plain, polarised = (Features.of(each, RenderSettings()) for each in (scene, asked))
     assert not plain.polarised and replace(polarised, polarised=False) == plain
-    assert RecordSizes.of(polarised).ray - RecordSizes.of(plain).ray == 48
-    assert static_costs(asked, polarised)["polarisation"] == "48 B a ray"
+    assert costs_of(asked, polarised)["polarisation"] == "48 B a ray"
     assert "asks for it" in _reasons(asked)["polarisation"]
     without = replace(asked, objects=tuple(o for o in asked.objects if not o.material.transmits))
     assert not Features.of(without, RenderSettings()).polarised
@@ -378,7 +219,7 @@ def test_states_of_polarisation_cost_nothing_where_they_are_not_asked_for() -> N
 
 
 def test_what_surfaces_give_each_other_costs_nothing_where_it_is_not_asked_for() -> None:
-    scene = load_scene(paths.assets_dir() / "scenes" / "prism.toml")
+    scene = load_scene(SCENES / "prism.toml")
     asked = replace(scene, render=replace(scene.render, bounces=2))
     plain, bounces = (Features.of(each, RenderSettings()) for each in (scene, asked))
     assert plain.bounces == 0 and bounces.bounces == 2 and replace(bounces, bounces=0) == plain
@@ -398,40 +239,30 @@ PICTURED = {
 
 
 def test_pictures_are_looked_up_only_where_there_are_any() -> None:
-    light = EVERYTHING.defines() | {
-        "TREE_AT": 0,
-        "TREE_STACK": 9,
-        "NORMALS_AT": 0,
-        "INDEX_ROW": 0,
-        "SLOPE_ROW": 1,
-        "VARIABLE_ROW": 2,
-        "STACK_SIZE": 1,
-    }
-    light |= {"STACK_OBJECTS": "uint[](0u)", "SOLID_COUNT": 1, "PLANE_COUNT": 6, "TRIANGLE_COUNT": 9}
     names = {name for symbols in PICTURED.values() for name in symbols}
-    assert all(occurring(source.text, sorted(names)) == () for source in camera_sources(EVERYTHING, light))
+    assert all(occurring(source.text, sorted(names)) == () for source in camera_sources(EVERYTHING))
     for kind, symbols in PICTURED.items():
-        for source in camera_sources(EVERYTHING, light, IMAGES | {kind: 1}):
+        for source in camera_sources(EVERYTHING, IMAGES | {kind: 1}):
             assert set(symbols) <= set(occurring(source.text, symbols)), (kind, source.text.splitlines()[0])
             others = names - set(symbols) - {"box_of_three"}
             assert occurring(source.text, sorted(others)) == (), kind
 
 
 def test_what_is_in_tells_its_bytes_and_what_is_out_tells_none() -> None:
-    scene = load_scene(paths.assets_dir() / "scenes" / "brilliant.toml")
+    scene = load_scene(SCENES / "brilliant.toml")
     features = Features.of(scene, RenderSettings())
-    costs = static_costs(scene, features)
-    assert set(costs) == {name for name, included, _ in explain(scene, features) if included} - {"blockers"}
+    costs = costs_of(scene, features)
+    assert all(costs.values()) and set(costs) == {name for name, included, _ in explained(scene) if included}
     assert costs["spectral columns"] == "32 B a ray, 16 B a photon"
 
 
 def test_the_proof_fails_where_a_program_carries_what_it_should_not(monkeypatch: pytest.MonkeyPatch) -> None:
     features = scene_features("prism")
-    included = dict.fromkeys(FEATURE_SYMBOLS, False)
+    included = dict.fromkeys(PROVED, False)
     # Comments and guarded code left in, as in a text whose conditions only the driver resolves.
     monkeypatch.setattr(shader, "stripped", lambda lines, switches: lines)
     monkeypatch.setattr(shader, "_kept", {})  # nor a text that an earlier test had made
-    told = {p.feature: p.holds for p in prove(program_texts(sources(features)), included)}
+    told = {p.feature: p.holds for p in prove(program_sizes(sources(features)), included)}
     assert not told["triangle tree"] and not told["normal derivatives"] and not told["medium stack"]
 
 
@@ -445,14 +276,14 @@ def test_a_guard_forgotten_in_a_shader_is_noticed(monkeypatch: pytest.MonkeyPatc
     text = (mutant / "lib" / "intersect.glsl").read_text()
     (mutant / "lib" / "intersect.glsl").write_text(text.replace("#ifdef HAS_TREE", "#if 1"))
     monkeypatch.setattr(paths, "shaders_dir", lambda: mutant)
-    proofs = prove(program_texts(sources(scene_features("prism"))), dict.fromkeys(FEATURE_SYMBOLS, False))
+    proofs = prove(program_sizes(sources(scene_features("prism"))), dict.fromkeys(PROVED, False))
     assert not next(p for p in proofs if p.feature == "triangle tree").holds
 
 
 @pytest.mark.parametrize("anchored", [False, True])
 @pytest.mark.parametrize("scene", ["prism", "brilliant", "spectrometer"])
 def test_without_beams_photons_need_what_they_always_did(scene: str, anchored: bool) -> None:
-    loaded = load_scene(paths.assets_dir() / "scenes" / f"{scene}.toml")
+    loaded = load_scene(SCENES / f"{scene}.toml")
     alone, found = (
         Features.of(loaded, RenderSettings(method=method, anchor_weights=anchored)) for method in ("srd", "srd-photons")
     )

@@ -271,7 +271,8 @@ def test_an_impossible_gain_is_refused(gain: float) -> None:
 
 
 def test_distinct_gains_are_distinct_glasses_to_the_renderer() -> None:
-    from spectrasplat.features.features import Features, dispersive_materials
+    from spectrasplat.features.facts import dispersive_materials
+    from spectrasplat.features.features import Features
     from spectrasplat.gpu.spectral_groups import Groups
     from spectrasplat.model.geometry import primitives
     from spectrasplat.model.optics.spectral_tables import SpectralAxis

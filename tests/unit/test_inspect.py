@@ -9,11 +9,12 @@ from pathlib import Path
 
 import pytest
 from rich.console import Console
-from spectrasplat.bench.features.static_costs import picture_bytes, size_words
 from spectrasplat.commands.inspect_camera import Lookup, lookups
 from spectrasplat.commands.inspect_report import inspect_text, light_flux
 from spectrasplat.commands.scenes import find_scene
 from spectrasplat.features.features import Features
+from spectrasplat.features.receivers import picture_bytes
+from spectrasplat.features.row import size_words
 from spectrasplat.gpu.texture_store import _sources
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.scene import Dielectric, Diffuse, Scene

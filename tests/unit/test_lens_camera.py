@@ -13,7 +13,8 @@ from spectrasplat.commands.opened import open_scene
 from spectrasplat.commands.options import read
 from spectrasplat.commands.table import Render
 from spectrasplat.edit.parameters import Stage, apply_all
-from spectrasplat.features.features import Features, in_view
+from spectrasplat.features.facts import in_view
+from spectrasplat.features.features import Features
 from spectrasplat.model.io.gltf_write import save_gltf
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.io.scene_save import save_scene

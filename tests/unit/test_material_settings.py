@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from spectrasplat.base.errors import UserError
 from spectrasplat.base.paths import assets_dir
-from spectrasplat.bench.features.static_costs import RecordSizes, static_costs
+from spectrasplat.bench.features.compiled import static_costs
 from spectrasplat.edit import edits, objects
 from spectrasplat.edit.parameters import Stage, apply, paths, value_of
-from spectrasplat.features.explained import explain
-from spectrasplat.features.features import Features, beam_objects, camera_needs, why_no_beams
+from spectrasplat.features.facts import Facts, beam_objects, camera_needs, why_no_beams
+from spectrasplat.features.features import Features
 from spectrasplat.model.geometry.primitives import box, plane
 from spectrasplat.model.io.gltf import load_gltf
 from spectrasplat.model.io.gltf_write import save_gltf
@@ -284,10 +284,9 @@ def test_only_rough_glass_has_lobes_and_beams_leave_it_to_photons(prism: Scene) 
     assert not plain.rough and not plain.has_lobe_columns
     assert "ROUGH_SURFACES" not in plain.defines() and "LOBE_COLUMNS" not in plain.defines()
     assert rough.rough and rough.has_lobe_columns and not replace(rough, footprints=False).has_lobe_columns
-    assert RecordSizes.of(rough).ray - RecordSizes.of(replace(rough, rough=False)).ray == 64
-    assert RecordSizes.of(rough).photon == RecordSizes.of(plain).photon
-    assert static_costs(ground(prism), rough)["rough surfaces"] == "64 B a ray"
-    told = {name: (included, reason) for name, included, reason in explain(ground(prism), rough)}
+    facts = Facts(ground(prism), RenderSettings())
+    assert static_costs(facts, rough)["rough surfaces"] == "64 B a ray"
+    told = {name: (included, reason) for name, included, reason in rough.explain(facts)}
     assert told["rough surfaces"][0] and "prism" in told["rough surfaces"][1]
     assert beam_objects(prism) and not beam_objects(ground(prism)) and not rough.beams
     assert why_no_beams(ground(prism).objects[0]) == "its surface is rough"
@@ -297,7 +296,7 @@ def test_a_grating_takes_a_spectral_column_as_glass_does(spectrometer: Scene) ->
     features = Features.of(spectrometer, RenderSettings())
     assert features.gratings and features.spectral_groups == 1 and not features.dielectrics and not features.reindexed
     assert camera_needs(spectrometer, RenderSettings()) == (True, True)
-    assert ("gratings", True, "there are gratings") in explain(spectrometer, features)
+    assert ("gratings", True, "there are gratings") in features.explain(Facts(spectrometer, RenderSettings()))
     assert not Features.of(spectrometer, RenderSettings(anchor_weights=True)).reindexed
 
 

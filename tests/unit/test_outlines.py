@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from spectrasplat.features.features import has_borders
+from spectrasplat.features.facts import has_borders
 from spectrasplat.model.geometry.mesh import Mesh
 from spectrasplat.model.geometry.outline import convex_outline
 from spectrasplat.model.geometry.primitives import box, plane

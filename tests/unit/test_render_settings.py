@@ -13,7 +13,8 @@ from spectrasplat.commands.options import read
 from spectrasplat.commands.table import Render
 from spectrasplat.edit import edits
 from spectrasplat.edit.live_inputs import LiveInputs
-from spectrasplat.features.features import Features, why_no_haze
+from spectrasplat.features.facts import why_no_haze
+from spectrasplat.features.features import Features
 from spectrasplat.model.environment_light import why_no_bounces
 from spectrasplat.model.io.scene_save import save_scene
 from spectrasplat.model.scene import Black, Diffuse

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from spectrasplat.base.paths import assets_dir
-from spectrasplat.features.features import Features, dispersive_materials
+from spectrasplat.features.facts import dispersive_materials
+from spectrasplat.features.features import Features
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.scene import Black, Dielectric, Diffuse, Scene
 from spectrasplat.model.settings import RenderSettings

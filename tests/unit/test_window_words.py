@@ -68,7 +68,6 @@ OF_THE_COMMAND_LINE_ALONE = (
     "bvh.py",
     "cookie.py",
     "export_caustic.py",
-    "explained.py",
     "lit_receiver.py",
     "map_layout.py",
     "parts.py",

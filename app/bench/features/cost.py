@@ -16,16 +16,15 @@ import numpy as np
 
 from ...base.errors import UserError
 from ...base.version import __version__
-from ...features.explained import explain
+from ...features.facts import Facts
 from ...features.features import Features
 from ...model.settings import RenderSettings
 from ...render.device_scene import spectral_axis
 from ...render.light_pass import LightPass
 from . import report as report_page
-from .results import Absence, FeatureCost, FeatureReport, Percent, ProgramSize
+from .compiled import compiled_sources, program_sizes, prove, record_words, static_costs
+from .results import FeatureCost, FeatureReport, Percent
 from .rig import Rig, Work, map_difference
-from .static_costs import RecordSizes, static_costs
-from .symbol_proof import compiled_sources, program_texts, prove
 from .variants import Trial, Variant, trials
 
 if TYPE_CHECKING:
@@ -103,16 +102,19 @@ def measure(
     light = _begun(context, scene, settings, features)
     try:
         features = light.features
-        asked = trials(scene, features)
-        report.records = RecordSizes.of(features).words()
-        _prove(report, context, scene, settings, features)
+        facts = Facts(scene, settings)
+        asked = trials(facts, features)
+        report.records = record_words(features)
+        report.programs = program_sizes(compiled_sources(context, scene, settings))
+        included = {name: is_in for name, is_in, _ in features.explain(facts)}
+        report.proof = prove(report.programs, included)
         if not light.plans:
             raise UserError(
                 f"scene '{scene.name}': no light meets glass or a mirror, so no feature costs anything; name a scene "
                 "with a caustic"
             )
         work = _calibrated(report, light, seconds, context)
-        sizes = static_costs(scene, features)
+        sizes = static_costs(facts, features)
         for index, trial in enumerate(asked):
             report.costs.append(cost_of(trial, sizes.get(trial.feature, ""), context, work, repeats))
             report.complete = index + 1 == len(asked)
@@ -120,13 +122,6 @@ def measure(
     finally:
         light.release()
         light.buffers.release()
-
-
-def _prove(report: FeatureReport, context: Context, scene: Scene, settings: RenderSettings, features: Features) -> None:
-    texts = program_texts(compiled_sources(context, scene, settings))
-    report.programs = [ProgramSize(t.name, t.lines, t.flattened_lines, sorted(t.found)) for t in texts]
-    included = {name: inside for name, inside, _ in explain(scene, features)}
-    report.proof = [Absence(p.feature, p.included, p.symbols, p.programs, p.holds) for p in prove(texts, included)]
 
 
 def _begun(context: Context, scene: Scene, settings: RenderSettings, features: Features) -> LightPass:

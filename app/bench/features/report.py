@@ -86,7 +86,7 @@ def _tables(report: FeatureReport) -> list[Table]:
         (
             p.feature,
             "in" if p.included else "out",
-            ", ".join(s for s in p.symbols if " " not in s) or "more than one colour target",
+            ", ".join(s for s in p.symbols if " " not in s),
             ", ".join(p.programs) or "no program",
             "as it must be" if p.holds else "NOT as it must be",
         )

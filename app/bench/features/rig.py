@@ -95,7 +95,8 @@ class Rig:
             self._atlas.borders = border_texture(ctx, light.layout)
         self._variables = SpectralVariables.build(ctx, self._buffers.variables)
         spans = {plan.index: [(band.x_lo, band.x_hi) for band in plan.bands] for plan in light.plans}
-        edges = None if variant.bins is None else tuple(np.linspace(380.0, 780.0, variant.bins + 1).tolist())
+        bins = variant.features.bins
+        edges = tuple(np.linspace(380.0, 780.0, bins + 1).tolist()) if bins else None
         channels = (
             tents(light.buffers.axis, variant.features.map_tents)
             if edges is None and variant.features.map_tents

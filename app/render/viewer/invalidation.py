@@ -13,7 +13,7 @@ from dataclasses import fields, replace
 import numpy as np
 
 from ...edit.live_inputs import LiveInputs
-from ...features.features import is_painted
+from ...features.facts import is_painted
 from ...model.environment_light import lighting_environment
 from ...model.optics.glass import Dispersion
 from ...model.scene import (

@@ -165,7 +165,7 @@ class LiveLight:
     @property
     def _preview_features(self) -> Features:
         features = self.light_pass.features
-        return replace(features, map_tents=0, targets=1) if features.map_tents else features
+        return replace(features, map_tents=0)
 
     def fit_to(self, inputs: LiveInputs) -> None:
         """Maps laid out for the camera and picture size of `inputs`; empty, to be filled from the stored photons.

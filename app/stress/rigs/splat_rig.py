@@ -9,7 +9,7 @@ import moderngl
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...bench.splat_speed import SplatFeatures
+from ...features.features import Features
 from ...gpu.map_channels import MapChannels
 from ...gpu.records import NONE, RECEIVER, photon_record
 from ...gpu.splat_tables import SplatTables
@@ -30,7 +30,7 @@ class Rig:
     """One flat receiver of `size` texels, and what is drawn into it."""
 
     ctx: moderngl.Context
-    features: SplatFeatures = field(default_factory=SplatFeatures)
+    features: Features = field(default_factory=lambda: Features(spectral_groups=1))
     size: tuple[int, int] = (64, 64)
     light: spectrum.Spectrum = field(default_factory=lambda: spectrum.illuminant("D65"))
     bands: Sequence[tuple[float, float]] = WHOLE_BAND
@@ -71,7 +71,7 @@ class Rig:
 
 
 def photons(
-    features: SplatFeatures,
+    features: Features,
     centre: np.ndarray,
     axis_s: ArrayLike = (0.0, 0.0),
     axis_t: ArrayLike = (0.0, 0.0),

@@ -1,0 +1,228 @@
+"""Rows of the table: how photons stand for a stretch of the spectrum and of the light's emission."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..model.tint_bands import tint_curves
+from ..model.tint_levels import LEVELS, MAX_LIGHTS
+from .facts import MAX_GROUPS, Facts, names
+from .row import feature, size_words
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpectrumFeatures:
+    """Of photon records."""
+
+    point_spectrum: bool = feature("", lambda facts: facts.is_single, symbol="POINT_SPECTRUM")
+    """Each photon has one wavelength instead of a band."""
+    random_wavelength: bool = feature("", lambda facts: facts.is_random, symbol="RANDOM_WAVELENGTH")
+    """That wavelength is drawn at random …"""
+    even_wavelengths: bool = feature(
+        "", lambda facts: facts.settings.method == "stochastic-even", symbol="EVEN_WAVELENGTHS"
+    )
+    """… by a low-discrepancy sequence instead of chance …"""
+    draws_by_power: bool = feature("", lambda facts: facts.is_random and facts.settings.bins is not None)
+    """… by radiant power instead of brightness: for maps of spectral bins."""
+    hero: bool = feature("", lambda facts: facts.settings.method == "hero", symbol="HERO")
+    """Three more wavelengths share the path of the one that is followed, as long as it is theirs too."""
+    footprints: bool = feature(
+        "spatial columns",
+        lambda facts: facts.has_columns,
+        symbol="FOOTPRINTS",
+        why="footprints are anisotropic",
+        why_not="the method splats single texels",
+        names=(
+            r"ray\.dposition\[c\]\.xyz = transfer_column",
+            r"photon\.dposition_ds = ray",
+            r"ray\.ddirection\[0\]\.xyz = ",
+        ),
+        left_out="without them every splat is one texel",
+    )
+    """Photons carry spatial columns."""
+    spectral_groups: int = feature(
+        "spectral columns",
+        lambda facts: facts.groups,
+        why=lambda facts: f"{facts.groups} column(s): {names(o.material.dispersion for o in facts.dispersive)}",
+        why_not=lambda facts: "one wavelength a photon" if facts.is_single else "nothing disperses",
+        names=(
+            "variable_step",
+            "index_ratio_derivative",
+            "medium_slope",
+            "dposition_dvar0",
+            "spectral_variable",
+            "VARIABLE_ROW",
+        ),
+        requires=("footprints", "spectral_weights"),
+        forced="a column that stays zero",
+        off=0,
+    )
+    """Spectral columns carried by every photon (0: nothing disperses, or the method needs none)."""
+    merged_groups: bool = feature(
+        "shared spectral variable",
+        lambda facts: (
+            facts.groups > 0 and (facts.settings.method == "srd-lambda" or len(facts.dispersive) > MAX_GROUPS)
+        ),
+        symbol="MERGED_GROUPS",
+        why="more glasses than columns, or the λ-column was asked for",
+        why_not="each glass has a column of its own",
+        names=("SLOPE_ROW",),
+        cost=lambda facts, sizes: (
+            f"one lookup of the slope a refraction, {size_words(sizes.spectrum * facts.distinct_glasses)}"
+        ),
+        requires=("spectral_groups",),
+        not_forced="light would be drawn another way",
+    )
+    """More dispersive materials than columns (or the paper's λ-column): some columns are by a shared variable."""
+    spectral_weights: bool = feature(
+        "weights over the band",
+        lambda facts: (
+            not facts.is_single
+            and ((facts.groups > 0 and bool(facts.glass)) or bool(facts.absorbing) or facts.is_coloured)
+        ),
+        symbol="SPECTRAL_WEIGHTS",
+        why="Fresnel, absorption or mirrors differ over a band",
+        why_not="nothing differs over a band",
+        names=(r"interface_indices\(boundary, band_of",),
+        cost="Fresnel and indices at 3 wavelengths instead of 1",
+        forced="",
+    )
+    """Throughput differs within a band and is carried at three wavelengths."""
+    band_cuts: bool = feature(
+        "band cuts",
+        lambda facts: facts.groups > 0,
+        symbol="BAND_CUTS",
+        why="total internal reflection may cut a band",
+        why_not="no band to cut",
+        names=(
+            "part_of_band",
+            "total_reflection_onset",
+            "passes_x",
+            "MIN_CUT_BAND",
+            "FELL_BAND",
+            "is_cut",
+            "energy_below",
+        ),
+        cost="one program more; a cut ray becomes two",
+        requires=("spectral_groups",),
+        forced="",
+    )
+    """Total internal reflection may cut a band."""
+    landing_cuts: bool = feature(
+        "landing cuts",
+        lambda facts: (
+            facts.groups > 0
+            and facts.has_columns
+            and bool(facts.glass)
+            and len(facts.having(lambda material: not material.is_specular)) > 1
+        ),
+        symbol="LANDING_CUTS",
+        why="a band may land on several surfaces",
+        why_not="there is one surface to land on",
+        names=("meet_with_band", "lands_broadly"),
+        cost="two rays more a landing; a cut ray becomes two",
+        requires=("band_cuts",),
+        left_out="without it borders have colours",
+        forced="",
+    )
+    """Of one band some wavelengths may meet another surface than its anchor does."""
+    anchor_weights: bool = feature("", lambda facts: facts.settings.anchor_weights, symbol="ANCHOR_WEIGHTS")
+    """Fresnel weights are those at the band's anchor, so that an edited dispersion leaves the photons as they are."""
+    reindexed: bool = feature(
+        "photons by index",
+        lambda facts: facts.is_reindexed,
+        symbol="REINDEXED",
+        why="an edit or the brush may move wavelengths between paths",
+        why_not="every path keeps its wavelengths",
+        names=("traced_bands", "v_path"),
+        cost="32 B a band",
+        requires=("spectral_groups",),
+        stays="edits would move no wavelength",
+    )
+    """Photons stand for intervals of the one index that disperses, and carry whatever wavelengths an edit puts
+    there."""
+    tint_levels: int = feature(
+        "tint levels",
+        lambda facts: LEVELS if facts.has_tint_levels else 0,
+        symbol="TINT_LEVELS",
+        why="one band holds a whole tint",
+        why_not=lambda facts: _why_no_tint_levels(facts),
+        names=("tint_level", "TINT_LEVELS"),
+        cost=f"{LEVELS} tables a light and band instead of one",
+        requires=("absorption",),
+        left_out="without them a band knows three places of a tint",
+        off=0,
+    )
+    """Steps of the way through one tinted glass that photons count (`model.tint_levels`)."""
+    lamp_columns: bool = feature(
+        "lamp columns",
+        lambda facts: (
+            facts.has_columns
+            and not facts.is_random
+            and facts.is_by_photons
+            and any(light.has_extent for light in facts.scene.lights)
+        ),
+        symbol="LAMP_COLUMNS",
+        why=lambda facts: f"photons know how broad {names(lamp for lamp in facts.scene.lights if lamp.has_extent)} is",
+        why_not=lambda facts: _why_no_lamp_columns(facts),
+        names=("cover_sides", "LAMP"),
+        requires=("footprints",),
+        left_out="without it each lamp is drawn as a point",
+        forced="every light of no breadth",
+    )
+    """Some light is extended: photons carry how far the light of its other points lands beside theirs."""
+    light_edges: bool = feature(
+        "light edges",
+        lambda facts: (
+            facts.has_columns
+            and not facts.is_single
+            and facts.is_by_photons
+            and any(light.has_hard_edge for light in facts.scene.lights)
+        ),
+        symbol="LIGHT_EDGES",
+        why=lambda facts: (
+            f"footprints end where {names(lamp for lamp in facts.scene.lights if lamp.has_hard_edge)} ends"
+        ),
+        why_not="no light of photons with columns ends at a hard edge",
+        names=("packed_edge", "unpacked_edge", "cut_at_edge"),
+        cost="splats beside an edge have another program; one more number a fragment",
+        requires=("footprints",),
+        left_out="without it beams end in a comb",
+        forced="no light with an edge",
+    )
+    """Some light's emission ends at a hard edge: photons beside it carry where, and their footprints are cut off
+    there."""
+    light_profiles: bool = feature(
+        "light profiles",
+        lambda facts: any(light.profile is not None for light in facts.scene.lights),
+        symbol="LIGHT_PROFILES",
+        why=lambda facts: f"measured lamps: {names(lamp for lamp in facts.scene.lights if lamp.profile is not None)}",
+        why_not="no light comes from a photometric file",
+        names=("profile_intensity", "profile_stretch"),
+        stays="light would go elsewhere",
+    )
+    """Some light shines by a table of intensities over directions."""
+
+
+def _why_no_tint_levels(facts: Facts) -> str:
+    if not facts.absorbing:
+        return "all glass is clear"
+    if facts.is_single:
+        return "a photon has one wavelength"
+    if facts.beam_objects and not facts.groups:
+        return "beams need bands that are cut for tints"
+    if facts.no_haze is None:
+        return "haze knows tints at three wavelengths a band"
+    if facts.settings.anchor_weights:
+        return "in the viewer photons know tints at three wavelengths a band"
+    if len(facts.scene.lights) > MAX_LIGHTS:
+        return f"there are more than {MAX_LIGHTS} lights"
+    return "several tints need bands all the same" if len(tint_curves(facts.scene)) else "tints are too faint"
+
+
+def _why_no_lamp_columns(facts: Facts) -> str:
+    if not any(light.has_extent for light in facts.scene.lights):
+        return "every light is a point or parallel"
+    if facts.is_random or not facts.has_columns:
+        return "the method draws places on lights by chance"
+    return "beams carry all light"

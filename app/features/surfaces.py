@@ -1,0 +1,255 @@
+"""Rows of the table: what surfaces light meets on its way, and how they are found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..model.contacts import contacts, overlapping_solids
+from ..model.settings import has_beams
+from .facts import Facts, beam_objects, listed, names, why_no_beams
+from .row import feature, size_words
+
+MAX_LOOSE_TRIANGLES = 24
+"""Up to so many triangles a plain loop beats a tree."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SurfaceFeatures:
+    """Of transport."""
+
+    dielectrics: bool = feature(
+        "refraction",
+        lambda facts: bool(facts.glass),
+        symbol="HAS_DIELECTRIC",
+        why="there is glass",
+        why_not="there is no glass",
+        names=("refract_direction", "cross_boundary", "cross_glass"),
+        cost=lambda facts, sizes: (
+            f"{size_words(sizes.spectrum * facts.distinct_glasses)} of indices; two children a surface"
+        ),
+        stays="light would end there",
+        forced="",
+    )
+    sheets: bool = feature(
+        "thin sheets",
+        lambda facts: any(item.material.thin for item in facts.glass),
+        symbol="HAS_SHEET",
+        why=lambda facts: f"of {names(facts.having(lambda material: material.thin))}",
+        why_not="no glass is thin",
+        names=("both_faces", "KIND_SHEET"),
+        cost="one more kind of surface; indices of both sides are looked up",
+        requires=("dielectrics",),
+        stays="light would end there",
+        forced="no surface is thin",
+    )
+    """Some glass is a thin sheet, with one medium on both sides."""
+    filters: bool = feature(
+        "surface colours",
+        lambda facts: any(item.material.filters for item in facts.glass),
+        symbol="SURFACE_FILTERS",
+        why=lambda facts: f"of {names(facts.having(lambda material: material.filters))}",
+        why_not="no glass has a coloured surface",
+        names=("filter_by", "passed"),
+        cost=lambda facts, sizes: f"3 lookups a surface, {size_words(sizes.spectrum)} a colour",
+        requires=("dielectrics",),
+        left_out="without it surfaces are clear",
+        forced="no surface has a colour",
+    )
+    """Some surface of glass lets through only a share of what enters."""
+    absorption: bool = feature(
+        "absorption",
+        lambda facts: bool(facts.absorbing),
+        symbol="ABSORPTION",
+        why="some glass absorbs",
+        why_not="all glass is clear",
+        names=("medium_weight_row", r"vec3 alpha = "),
+        cost=lambda facts, sizes: f"3 lookups a flight, {size_words(sizes.spectrum * len(facts.absorbing))}",
+        requires=("dielectrics",),
+        forced="every glass with an absorption of zero",
+    )
+    rough: bool = feature(
+        "rough surfaces",
+        lambda facts: any(item.material.is_rough for item in facts.glass),
+        symbol="ROUGH_SURFACES",
+        why=lambda facts: f"of {names(facts.having(lambda material: material.is_rough))}",
+        why_not="all glass is polished",
+        names=("lobe_axes", "smith_share", "microfacet_numbers", "regained"),
+        requires=("dielectrics",),
+        left_out="without it all glass is polished",
+        forced="every surface of width zero",
+    )
+    """Some glass has a ground surface, whose microfacets turn paths by chance."""
+    polarised: bool = feature(
+        "polarisation",
+        lambda facts: facts.scene.render.polarisation and bool(facts.glass),
+        symbol="POLARISED",
+        why="the scene asks for it, and there is glass to part s and p",
+        why_not=lambda facts: (
+            "there is no glass to part s and p"
+            if facts.scene.render.polarisation
+            else "[render] polarisation is not set"
+        ),
+        names=("stokes_q", "incidence_axis", "fresnel_reflection", "behind_interface", "polarise_path"),
+        requires=("dielectrics",),
+        left_out="without it light is weighed another way",
+        not_forced="light would be weighed another way",
+    )
+    """Paths carry their light's state of polarisation from surface to surface."""
+    mirrors: bool = feature(
+        "mirrors",
+        lambda facts: bool(facts.mirrors),
+        symbol="HAS_MIRROR",
+        why="there are mirrors",
+        why_not="there are no mirrors",
+        names=(r"\(kind == KIND_MIRROR\) ",),
+        cost=lambda facts, sizes: f"{size_words(sizes.spectrum * len(facts.mirrors))} of reflectances",
+        stays="light would end there",
+        forced="",
+    )
+    gratings: bool = feature(
+        "gratings",
+        lambda facts: bool(facts.having(lambda material: material.is_grating)),
+        symbol="HAS_GRATING",
+        why="there are gratings",
+        why_not="there is no grating",
+        names=("grating_at", "diffract_direction", "GRATINGS_AT"),
+        cost=lambda facts, sizes: f"{sizes.texel} B an order; a step of the queue for each",
+        stays="light would end there",
+        forced="",
+    )
+    smooth_normals: bool = feature(
+        "interpolated normals",
+        lambda facts: bool(facts.smooth),
+        symbol="SMOOTH_NORMALS",
+        why="some specular surface is a smooth mesh",
+        why_not="no specular surface is a smooth mesh",
+        names=("corner_normal", "has_normals", "NORMALS_AT", "MIN_SHADING_COSINE"),
+        cost=lambda facts, sizes: (
+            f"{3 * sizes.texel} B a facet, {size_words(3 * sizes.texel * facts.smooth_triangles)}"
+        ),
+        stays="light would land elsewhere",
+        forced="every facet with three equal normals, where facets are triangles",
+    )
+    """Some specular surface has interpolated normals."""
+    normal_derivatives: bool = feature(
+        "normal derivatives",
+        lambda facts: bool(facts.smooth or facts.curved) and (facts.has_columns or facts.groups > 0),
+        symbol="NORMAL_DERIVATIVES",
+        why="columns bend with the normals",
+        why_not=lambda facts: "no columns" if facts.smooth or facts.curved else "all specular facets are flat",
+        names=(r"normal_columns\[c\] = normal_column\(frame, ray",),
+        cost="one more vector a column and surface",
+        requires=("footprints", "smooth_normals"),
+        left_out="without them footprints are wrong, but light goes the same ways",
+        forced="every facet with three equal normals, where facets are triangles",
+    )
+    """Interpolated normals, or those of curved solids, bend columns too."""
+    medium_stack: bool = feature(
+        "medium stack",
+        lambda facts: bool(overlapping_solids(facts.scene)),
+        symbol="MEDIUM_STACK",
+        why=lambda facts: f"{names(facts.scene.objects[i] for i in overlapping_solids(facts.scene))} nest or touch",
+        why_not="no two solids nest or touch",
+        names=("medium_of", "stack_objects", "STACK_OBJECTS", "mask_before"),
+        cost=lambda facts, sizes: f"{len(overlapping_solids(facts.scene))} bit(s) of a ray's mask",
+        requires=("dielectrics",),
+        left_out="without it nested solids refract wrongly",
+        forced="every solid on the stack",
+    )
+    """Transparent solids nest or touch, so priorities decide the medium."""
+    contacts: bool = feature(
+        "contacts",
+        lambda facts: bool(contacts(facts.scene)),
+        symbol="CONTACTS",
+        why=lambda facts: f"may touch: {_pair_names(facts)}",
+        why_not="no mirror, receiver or blocker touches another surface",
+        names=("accept_sheet", "crossed_in_contact", "comes_first", "left_normal"),
+        cost=lambda facts, sizes: f"{len(contacts(facts.scene))} pair(s) that may touch",
+        requires=("loose_triangles",),
+        left_out="without it light is lost between surfaces",
+        forced="",
+    )
+    """Other surfaces touch each other or glass: surfaces at one place are one interface."""
+    loose_triangles: bool = feature("", lambda facts: facts.loose_triangles > 0, symbol="LOOSE_TRIANGLES")
+    """There are triangles besides the convex solids."""
+    tree: bool = feature(
+        "triangle tree",
+        lambda facts: facts.loose_triangles > MAX_LOOSE_TRIANGLES,
+        symbol="HAS_TREE",
+        why=lambda facts: f"{facts.loose_triangles} triangles",
+        why_not=lambda facts: f"{facts.loose_triangles} loose triangle(s) are looped over",
+        names=("intersect_tree", "box_entry", "LEAF_BIT", "TREE_AT", "TREE_STACK"),
+        cost=lambda facts, sizes: f"about {size_words(facts.loose_triangles * sizes.triangle)}",
+        requires=("loose_triangles",),
+        left_out="against a loop",
+        forced="against a loop",
+    )
+    """Triangles are found through a tree; otherwise by a loop."""
+    convex_solids: bool = feature(
+        "half-space solids",
+        lambda facts: bool(facts.half_spaces),
+        symbol="CONVEX_SOLIDS",
+        why=lambda facts: names(facts.scene.objects[i] for i in facts.half_spaces),
+        why_not="no convex faceted solid",
+        names=("intersect_solid", "planes", "solids", "SOLID_COUNT"),
+        cost=lambda facts, sizes: _walk_words("planes", sum(map(len, facts.half_spaces.values())), sizes.texel),
+        left_out="against triangles of the same facets",
+    )
+    """Convex faceted solids are intersected as half-spaces."""
+    curved_solids: bool = feature(
+        "curved solids",
+        lambda facts: bool(facts.curved),
+        symbol="CURVED_SOLIDS",
+        why=lambda facts: f"met without triangles: {names(facts.scene.objects[i] for i in facts.curved)}",
+        why_not="no ball, ellipsoid, lens or cylinder stands by itself",
+        names=("intersect_curved", "piece_at", "PIECES_AT", "PIECE_COUNT"),
+        cost=lambda facts, sizes: _walk_words("faces", sum(map(len, facts.curved.values())), sizes.piece),
+        left_out="against a tree over triangles that stand for them",
+    )
+    """Balls, ellipsoids, lenses and cylinders are met as the quadrics they are, not as triangles."""
+    beams: bool = feature(
+        "beams",
+        lambda facts: bool(facts.beam_objects),
+        symbol="BEAMS",
+        why=lambda facts: _beam_words(facts),
+        why_not=lambda facts: _why_no_beams(facts),
+        names=("is_beam_object",),
+        cost=lambda facts, sizes: f"{len(facts.beam_objects)} object(s) searched on the processor; one bit an object",
+    )
+    """What meets certain flat-faceted objects first is left to beams (`spectrasplat.beams`): photons end there."""
+
+
+def _walk_words(what: str, count: int, size: int) -> str:
+    return f"{count} {what}, {size_words(count * size)}: each ray walks through all"
+
+
+def _pair_names(facts: Facts) -> str:
+    objects = facts.scene.objects
+    found = [f"{objects[i].name} and {objects[j].name}" for i, j in contacts(facts.scene)]
+    return listed(found)
+
+
+def _beam_words(facts: Facts) -> str:
+    carried = names(facts.scene.objects[i] for i in facts.beam_objects)
+    others = "; ".join(_not_beams(facts))
+    return f"light from {carried} goes as polygons, unless a survey finds that photons are cheaper" + (
+        f"; photons for {others}" if others else ""
+    )
+
+
+def _why_no_beams(facts: Facts) -> str:
+    if not has_beams(facts.settings.method):
+        return f"method {facts.settings.method} follows photons"
+    if not beam_objects(facts.scene):
+        return "; ".join(_not_beams(facts)) or "there is neither glass nor mirror"
+    if not facts.flat_receivers:
+        return "no receiver is flat"
+    if facts.is_painted:
+        return "the dispersion brush was used on a receiver"
+    return "no light can be followed as beams"
+
+
+def _not_beams(facts: Facts) -> list[str]:
+    """Glass and mirrors whose light photons carry, and why."""
+    specular = facts.having(lambda material: material.is_specular)
+    return [f"{item.name}: {why}" for item in specular if (why := why_no_beams(item))]
