@@ -11,7 +11,6 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -111,8 +110,6 @@ def _trace_rates(context: Context) -> tuple[float, float]:
         scene = _ball(dispersive)
         settings = RenderSettings()
         features = Features.of(scene, settings)
-        # Both carry weights over a band, so that only the column differs.
-        features = replace(features, spectral_weights=True)
         buffers = SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features))
         trace = TracePass(context, features, buffers, lattice, settings.max_depth)
         domain = emission_domain(

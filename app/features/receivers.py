@@ -37,7 +37,6 @@ class ReceiverFeatures:
     nested_windows: bool = feature(
         "nested windows",
         lambda facts: bool(facts.flat_receivers),
-        symbol="NESTED_WINDOWS",
         why="flat receivers may get a fine window inside a coarse one",
         why_not="no receiver has two windows",
         names=("is_only_fine", "outer"),
@@ -119,7 +118,7 @@ class PictureFeatures:
         lambda facts: facts.camera_needs[0],
         why="the camera may see glass, mirrors or coats",
         why_not="no glass and no mirror is in view",
-        names=("meet_surface", "reflect_path", "path_stack", "stack_size", "listed_entry"),
+        names=("meet_surface", "path_stack", "stack_size", "listed_entry"),
         cost="a second program; 4 B a pixel list what it has to do",
     )
     """The camera may see glass or a mirror: its rays go on behind them."""
@@ -128,7 +127,7 @@ class PictureFeatures:
         lambda facts: facts.camera_needs[1],
         why="the camera may see through dispersive glass",
         why_not=lambda facts: "no dispersive glass is in view" if facts.dispersive else "nothing disperses",
-        names=(r"restrict_to_band\(path, pixel_key\)", "taps_of", "onset_of"),
+        names=(r"restrict_to_band\(path, pixel_key\)", "taps_of"),
         cost=lambda facts, sizes: f"{facts.groups} column(s) a camera ray; lookups along each sweep",
         requires=("camera_specular",),
     )

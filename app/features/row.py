@@ -53,8 +53,9 @@ class Row:
     why_not: Sentence = ""
     """The reason it is out."""
     names: tuple[str, ...] = ()
-    """Identifiers that only programs with the feature may hold. One with a space is a pattern for a line: the camera,
-    whose rays always carry a pixel's columns, uses names that in the light pass belong to a feature."""
+    """Identifiers that only programs with the feature may hold. "light: NAME": among those of the light pass, where
+    the camera, whose rays always carry a pixel's columns, shares the name; any other with a space is a pattern for a
+    line."""
     cost: str | Callable[[Facts, Sizes], str] = ""
     """What it adds to tables and work; bytes of rays and photons are added up without it."""
     requires: tuple[str, ...] = ()

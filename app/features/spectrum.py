@@ -32,11 +32,7 @@ class SpectrumFeatures:
         symbol="FOOTPRINTS",
         why="footprints are anisotropic",
         why_not="the method splats single texels",
-        names=(
-            r"ray\.dposition\[c\]\.xyz = transfer_column",
-            r"photon\.dposition_ds = ray",
-            r"ray\.ddirection\[0\]\.xyz = ",
-        ),
+        names=("fan_where_it_landed", "keep_columns_within", r"ray\.ddirection\[0\]\.xyz = "),
         left_out="without them every splat is one texel",
     )
     """Photons carry spatial columns."""
@@ -53,7 +49,7 @@ class SpectrumFeatures:
             "spectral_variable",
             "VARIABLE_ROW",
         ),
-        requires=("footprints", "spectral_weights"),
+        requires=("footprints",),
         forced="a column that stays zero",
         off=0,
     )
@@ -75,19 +71,13 @@ class SpectrumFeatures:
     )
     """More dispersive materials than columns (or the paper's λ-column): some columns are by a shared variable."""
     spectral_weights: bool = feature(
-        "weights over the band",
+        "",
         lambda facts: (
             not facts.is_single
             and ((facts.groups > 0 and bool(facts.glass)) or bool(facts.absorbing) or facts.is_coloured)
         ),
-        symbol="SPECTRAL_WEIGHTS",
-        why="Fresnel, absorption or mirrors differ over a band",
-        why_not="nothing differs over a band",
-        names=(r"interface_indices\(boundary, band_of",),
-        cost="Fresnel and indices at 3 wavelengths instead of 1",
-        forced="",
     )
-    """Throughput differs within a band and is carried at three wavelengths."""
+    """What is left of light differs within a band: by Fresnel, absorption or colours."""
     band_cuts: bool = feature(
         "band cuts",
         lambda facts: facts.groups > 0,

@@ -62,7 +62,7 @@ class SurfaceFeatures:
         symbol="ABSORPTION",
         why="some glass absorbs",
         why_not="all glass is clear",
-        names=("medium_weight_row", r"vec3 alpha = "),
+        names=("medium_weight_row", "light: absorb"),
         cost=lambda facts, sizes: f"3 lookups a flight, {size_words(sizes.spectrum * len(facts.absorbing))}",
         requires=("dielectrics",),
         forced="every glass with an absorption of zero",
@@ -89,7 +89,7 @@ class SurfaceFeatures:
             if facts.scene.render.polarisation
             else "[render] polarisation is not set"
         ),
-        names=("stokes_q", "incidence_axis", "fresnel_reflection", "behind_interface", "polarise_path"),
+        names=("stokes_q", "incidence_axis", "fresnel_reflection", "behind_interface", "see_polarised"),
         requires=("dielectrics",),
         left_out="without it light is weighed another way",
         not_forced="light would be weighed another way",
@@ -137,7 +137,7 @@ class SurfaceFeatures:
         symbol="NORMAL_DERIVATIVES",
         why="columns bend with the normals",
         why_not=lambda facts: "no columns" if facts.smooth or facts.curved else "all specular facets are flat",
-        names=(r"normal_columns\[c\] = normal_column\(frame, ray",),
+        names=("light: summed_change", "light: gradient_u"),
         cost="one more vector a column and surface",
         requires=("footprints", "smooth_normals"),
         left_out="without them footprints are wrong, but light goes the same ways",

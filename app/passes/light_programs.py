@@ -36,11 +36,11 @@ def light_defines(features: Features, traits: DeviceTraits) -> Defines:
         | _FLAGS
         | switched(LOOPS_MAY_END=features.tree and traits.loops_may_end)
         | {
-            "BIND_FLIGHTS": bindings.FLIGHTS,
             "MASK_SIZE": records.MASK_SIZE,
             "CATEGORY_COUNT": f"{len(records.CATEGORIES)}u",
             "FALLBACK_COUNT": f"{len(records.FALLBACKS)}u",
             "SPECTRAL_COPY": copies,
+            "BIND_FLIGHTS": bindings.FLIGHTS,
         }
     )
 

@@ -92,7 +92,6 @@ def released(light: LightPass) -> None:
                 "camera spectral taps",
                 "spectral maps",
                 "spectral columns",
-                "weights over the band",
                 "band cuts",
                 "landing cuts",
                 "absorption",

@@ -116,9 +116,9 @@ def test_names_come_and_go_with_their_feature(field: str) -> None:
     names = ROWS[field].names
     # Polarised light has no mean reflectance of its own.
     everything = replace(EVERYTHING, polarised=field == "polarised")
-    assert {s for source in sources(everything) for s in occurring(source.text, names)} == set(names)
+    assert {s for source in sources(everything) for s in occurring(source, names)} == set(names)
     for source in sources(everything.without(field, *CAMERA_TOO.get(field, ()))):
-        assert occurring(source.text, names) == (), source.name
+        assert occurring(source, names) == (), source.name
 
 
 def test_rows_name_features_and_symbols_once() -> None:
@@ -131,12 +131,12 @@ def test_rows_name_features_and_symbols_once() -> None:
         switched(IN_MOTOIN=True)
 
 
-COUNTED = re.compile(r"SPECTRAL_GROUPS|TARGETS|GROUPS|COLUMNS|SLOTS|EDGES|ROWS|TAPS|\w+_(?:GLSL|TARGETS?)")
+COUNTED = re.compile(r"SPECTRAL_GROUPS|TARGETS|GROUPS|(?:PATH_)?COLUMNS|SLOTS|EDGES|ROWS|TAPS|\w+_(?:GLSL|TARGETS?)")
 """Numbers, and guards of included files."""
 
 
 def test_every_switch_that_shaders_test_is_listed() -> None:
-    own = {"COUNT_ROUNDS", "HAS_NORMAL_COLUMNS", "TINT_LEVELS"}
+    own = {"COUNT_ROUNDS", "HAS_NORMAL_COLUMNS", "WIDENED_BY_LOBES"}
     tested: set[str] = set()
     for file in paths.shaders_dir().rglob("*"):
         if file.suffix in (".comp", ".vert", ".frag", ".glsl"):
@@ -152,7 +152,6 @@ SHIPPED = {
         "camera spectral taps",
         "spectral maps",
         "spectral columns",
-        "weights over the band",
         "band cuts",
         "landing cuts",
         "absorption",
@@ -189,7 +188,7 @@ def test_a_scene_without_dispersion_has_no_spectral_code_nor_columns() -> None:
     for source in sources(features):
         for word in ("dposition_dvar", "variable_step", "spectral_variable", "is_cut", "texture("):
             assert word not in source.text, (source.name, word)
-    forced = replace(features, spectral_groups=1, spectral_weights=True, band_cuts=True)
+    forced = replace(features, spectral_groups=1, band_cuts=True)
     assert costs_of(load_scene(SCENES / "ball_plain.toml"), forced)["spectral columns"] == "32 B a ray, 16 B a photon"
     assert (features.columns, forced.columns) == (4, 5), "two of the lattice, two of the lamp"
 
@@ -223,8 +222,8 @@ def test_what_surfaces_give_each_other_costs_nothing_where_it_is_not_asked_for()
     asked = replace(scene, render=replace(scene.render, bounces=2))
     plain, bounces = (Features.of(each, RenderSettings()) for each in (scene, asked))
     assert plain.bounces == 0 and bounces.bounces == 2 and replace(bounces, bounces=0) == plain
-    assert all(occurring(source.text, ("receiver_light", "add_receiver_light")) == () for source in sources(plain))
-    assert any(occurring(source.text, ("add_receiver_light",)) for source in sources(bounces))
+    assert all(occurring(source, ("receiver_light", "add_receiver_light")) == () for source in sources(plain))
+    assert any(occurring(source, ("add_receiver_light",)) for source in sources(bounces))
     assert _reasons(scene)["bounces"] == "[render] bounces is 0" and "2 time(s)" in _reasons(asked)["bounces"]
     # Nothing is left for a plane to see itself in.
     alone = replace(asked, objects=tuple(o for o in asked.objects if o.material.receives))
@@ -240,12 +239,12 @@ PICTURED = {
 
 def test_pictures_are_looked_up_only_where_there_are_any() -> None:
     names = {name for symbols in PICTURED.values() for name in symbols}
-    assert all(occurring(source.text, sorted(names)) == () for source in camera_sources(EVERYTHING))
+    assert all(occurring(source, sorted(names)) == () for source in camera_sources(EVERYTHING))
     for kind, symbols in PICTURED.items():
         for source in camera_sources(EVERYTHING, IMAGES | {kind: 1}):
-            assert set(symbols) <= set(occurring(source.text, symbols)), (kind, source.text.splitlines()[0])
+            assert set(symbols) <= set(occurring(source, symbols)), (kind, source.text.splitlines()[0])
             others = names - set(symbols) - {"box_of_three"}
-            assert occurring(source.text, sorted(others)) == (), kind
+            assert occurring(source, sorted(others)) == (), kind
 
 
 def test_what_is_in_tells_its_bytes_and_what_is_out_tells_none() -> None:

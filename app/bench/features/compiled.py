@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from ...model.settings import RenderSettings
 
 _TEXEL = 16
+_LIGHT = "light: "
 _SIZES = Sizes(SAMPLES * 8, SPLAT.stride, TRIANGLE.stride + 2 * _TEXEL, PIECE.stride, _TEXEL)
 
 
@@ -81,16 +82,22 @@ def program_sizes(sources: Iterable[Source]) -> list[ProgramSize]:
             source.name,
             len(source.text.splitlines()),
             source.flattened_lines,
-            [name for name, symbols in PROVED.items() if occurring(source.text, symbols)],
+            [name for name, symbols in PROVED.items() if occurring(source, symbols)],
         )
         for source in sources
     ]
 
 
-def occurring(text: str, symbols: Sequence[str]) -> tuple[str, ...]:
-    """Those of `symbols` that occur in GLSL text."""
-    present = words(text)
-    return tuple(s for s in symbols if (re.search(s, text) if " " in s else s in present))
+def occurring(source: Source, names: Sequence[str]) -> tuple[str, ...]:
+    """Those of `names` (`Row.names`) that occur in a source."""
+    present = words(source.text)
+
+    def occurs(name: str) -> bool:
+        if name.startswith(_LIGHT):
+            return source.name.startswith("light/") and name.removeprefix(_LIGHT) in present
+        return re.search(name, source.text) is not None if " " in name else name in present
+
+    return tuple(filter(occurs, names))
 
 
 def prove(programs: Sequence[ProgramSize], included: Mapping[str, bool]) -> list[Absence]:

@@ -22,7 +22,7 @@ FORCED_BINS = 16
 MAX_LOOPED_TRIANGLES = 512
 """A loop over more is not tried: it would take minutes to say what everybody knows."""
 DISPERSION = "dispersion in all"
-"""Columns, weights and cuts together: what a scene without dispersion does not pay."""
+"""Columns and cuts together: what a scene without dispersion does not pay."""
 
 
 @dataclass(frozen=True)
@@ -79,11 +79,9 @@ _Pair = tuple[Variant, Variant, str]
 def _dispersion(scene: Scene, base: Features) -> Trial:
     included = base.spectral_groups > 0
     plain = base.without("spectral_groups")
-    if included:
-        plain = replace(plain, spectral_weights=base.absorption)
-    forced = base if included else replace(base, spectral_groups=1, band_cuts=True, spectral_weights=True)
+    forced = base if included else replace(base, spectral_groups=1, band_cuts=True)
     reason = "some glass disperses" if included else "nothing disperses"
-    note = "columns, weights over the band and band cuts together"
+    note = "columns and band cuts together"
     return Trial(DISPERSION, included, reason, Variant(scene, forced), Variant(scene, plain), not included, note)
 
 
