@@ -20,7 +20,7 @@ from ...model.scene import Absorption, Camera, Dielectric, Diffuse, Scene, Scene
 from ...model.scene_camera import camera_rays
 from ...model.texture import Environment, Texture
 from ...model.vectors import vec3
-from ...passes.variants import TINT_STEPS
+from ...passes.camera_programs import TINT_STEPS
 from ...reference.camera_reference import render_camera_reference
 from ..case import Held, Measured, case
 from ..rigs.camera_probe import (

@@ -20,7 +20,7 @@ from ...model.geometry.primitives_round import ellipsoid, sphere
 from ...model.optics.colorimetry import rgb_basis
 from ...model.optics.glass import Dispersion, constant, from_abbe
 from ...model.scene import Camera, Mirror, Scene, SceneObject
-from ...passes.variants import MAX_DEPTH
+from ...passes.camera_programs import MAX_DEPTH
 from ..case import Held, Measured, case
 from ..rigs.camera_probe import (
     ANY,

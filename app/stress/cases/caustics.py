@@ -8,6 +8,7 @@ from math import erf
 
 import numpy as np
 
+from ...features.features import Features
 from ...gpu.context import Context
 from ...model.geometry.mesh import Mesh, make_mesh
 from ...model.geometry.primitives_round import ellipsoid
@@ -16,13 +17,13 @@ from ...model.scene import Mirror
 from ...reference.glasses import D_NM, index
 from ..case import EPSILON, Held, Measured, case, length
 from ..rigs.gpu_paths import REFRACTED, Photons, glass, screen, trace_beam, traced
-from ..rigs.splat_rig import Rig, SplatFeatures, photons
+from ..rigs.splat_rig import Rig, photons
 from .splats import EDGE, FAST_ERF, SAMPLED
 
 GLASS = "N-BK7"
 N = float(index(GLASS, D_NM))
 SMOOTHING = 0.6
-COLOURLESS = SplatFeatures(spectral_groups=0)
+COLOURLESS = Features(spectral_groups=0)
 
 
 @case("perfect-focus", "triangles", (320, 1280, 5120, 20_480))

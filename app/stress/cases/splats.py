@@ -19,14 +19,15 @@ from math import erf
 
 import numpy as np
 
+from ...features.features import Features
 from ...gpu.context import Context
 from ...gpu.records import FLAG_FOOTPRINT_DROPPED
+from ...passes.light_programs import FAR_TOO_LARGE
 from ...passes.splat import CHUNK, EXTENT_LIMIT
-from ...passes.variants import FAR_TOO_LARGE
 from ..case import EPSILON, Held, Measured, Measurement, case, judged, measured, not_finite
-from ..rigs.splat_rig import Rig, SplatFeatures, photons
+from ..rigs.splat_rig import Rig, photons
 
-PLAIN = SplatFeatures()
+PLAIN = Features(spectral_groups=1)
 SIDE = 1152
 """Texels of the map's side."""
 SAMPLED = 0.2
