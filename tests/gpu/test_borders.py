@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,8 +18,6 @@ from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 from spectrasplat.stress.rigs.probe import light_pass
 from spectrasplat.stress.rigs.scene_parts import SUN, solid, stage, turn
 from spectrasplat.stress.rigs.splat_rig import Rig, photons
-
-from tests.gpu.mutants import mutate
 
 COVERS = {
     "border.glsl": (
@@ -43,7 +40,6 @@ PHOTONS = 20_000
 SETTINGS = RenderSettings(
     width=SIZE[0], height=SIZE[1], photons=PHOTONS, spp=64, layer="caustic", method="srd-photons", tally=True
 )
-IMAGES_OFF = "left = uint(MOST_IMAGES)", "left = 0u"
 
 
 def table(degrees: float) -> Scene:
@@ -94,12 +90,6 @@ def test_an_evenly_lit_table_is_even_up_to_its_borders(gl, degrees: float) -> No
 def test_few_photons_do(gl) -> None:
     scatter, excess, _ = errors(gl, 17.0, 1_000)
     assert scatter < 0.02 and abs(excess) < 3e-3
-
-
-def test_a_table_without_images_is_noticed(gl, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    mutate(monkeypatch, tmp_path, "light/footprint_images.glsl", *IMAGES_OFF)
-    scatter, excess, _ = errors(gl, 17.0)
-    assert scatter > 0.02 and excess < -5e-3
 
 
 def test_where_nothing_lands_near_a_border_no_program_asks(gl, monkeypatch: pytest.MonkeyPatch) -> None:

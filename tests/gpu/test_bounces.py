@@ -26,8 +26,6 @@ from spectrasplat.render.device_scene import scene_buffers
 from spectrasplat.render.frames import FrameRenderer
 from spectrasplat.render.viewer.engine import LiveEngine
 
-from tests.gpu.mutants import mutate
-
 CAMERA = Camera((0.0, -2.0, 0.8), (0.0, 0.5, 0.3))
 SETTINGS = RenderSettings(width=48, height=32, spp=4, photons=2000)
 LUX = 100.0
@@ -261,21 +259,6 @@ def test_the_environments_light_bounces_too(gl: Context) -> None:
     # 256 directions, the same for all places, leave 1.6 % that varies from one to the next.
     assert abs(error.mean()) < 2e-3 and np.sqrt((error**2).mean()) < 2.5e-2
     assert expected.max() > 0.3
-
-
-MUTANTS = {
-    "cosine": ("lib/bounce.glsl", "3.14159265359 * both /", "3.14159265359 * cosine_there /"),
-    "density": ("lib/bounce.glsl", "density * distance2", "density * sqrt(distance2)"),
-    "back": ("light/bounce.comp", "dot(direction, hit.normal_g) > 0.0", "dot(direction, hit.normal_g) < 0.0"),
-}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("mutant", MUTANTS)
-def test_mistakes_would_be_noticed(gl: Context, monkeypatch: pytest.MonkeyPatch, tmp_path, mutant: str) -> None:
-    mutate(monkeypatch, tmp_path, *MUTANTS[mutant])
-    with pytest.raises(AssertionError):
-        test_a_lit_floor_lights_the_wall_by_its_form_factor(gl)
 
 
 def test_the_viewer_asks_again_where_light_or_things_change(gl: Context) -> None:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -25,8 +24,6 @@ from spectrasplat.model.optics.spectrum import constant
 from spectrasplat.model.scene import Diffuse, Light, Mirror, SceneObject
 from spectrasplat.reference.optics import unit
 from spectrasplat.stress.rigs.gpu_paths import REFRACTED, extruded, glass, placed, trace_light
-
-from tests.gpu.mutants import mutate
 
 NM = 580.0
 COLUMN = 1e-4
@@ -219,83 +216,3 @@ def columns_agree(gl: Context, case: Case) -> None:
 @pytest.mark.parametrize("name", CASES)
 def test_columns_against_central_differences(gl, name: str) -> None:
     columns_agree(gl, CASES[name])
-
-
-MUTANTS = {
-    "sign of the index behind": ("lib/medium.glsl", "derivative -= n_i", "derivative += n_i", "point"),
-    "sign of the index before": (
-        "lib/medium.glsl",
-        "derivative += medium_slope",
-        "derivative -= medium_slope",
-        "point",
-    ),
-    "another glass's slope": ("lib/medium.glsl", "object_at(boundary.before).group == g", "true", "doublet"),
-    "no slope of the medium": (
-        "lib/medium.glsl",
-        "return spectral_row(uint(SLOPE_ROW) + object_at(object).medium, x);",
-        "return 1.0;",
-        "by wavelength",
-    ),
-    "flat normals": (
-        "lib/interface.glsl",
-        "return frame.interpolated != 0u ? dnormal : vec3(0.0);",
-        "return vec3(0.0);",
-        "inner reflections",
-    ),
-    "normal not turned inside": (
-        "lib/interface.glsl",
-        "return frame.interpolated != 0u ? dnormal",
-        "return frame.interpolated != 0u ? sign(dot(frame.summed, vec3(1.0))) * dnormal",
-        "beam",
-    ),
-    "mirror forgets the normal": (
-        "lib/optics.glsl",
-        "(dtheta * normal + theta * dnormal)",
-        "(dtheta * normal)",
-        "mirror ball",
-    ),
-    "position follows the shading normal": (
-        "light/trace.comp",
-        "transfer_columns(path, hit.normal_g, hit.distance)",
-        "transfer_columns(path, shading_frame(hit, facet, path.position, path.direction).normal, hit.distance)",
-        "sun",
-    ),
-    "axes swapped": (
-        "light/emit.comp",
-        "ddirection_ds = p.spacing.x * to_world(dx)",
-        "ddirection_ds = p.spacing.x * to_world(dy)",
-        "spot",
-    ),
-    "flat map": ("lib/emission.glsl", "k - q.x * q.x / (4.0 * k)", "k", "disc"),
-    "tilted sun's plane": (
-        "light/emit.comp",
-        "dposition_ds = p.spacing.x * p.tangent",
-        "dposition_ds = 1.01 * p.spacing.x * p.tangent",
-        "sun",
-    ),
-    "lowest priority": (
-        "lib/medium.glsl",
-        "stack_objects[findMSB(mask)]",
-        "stack_objects[findLSB(mask)]",
-        "overlapping",
-    ),
-}
-
-
-QUICK = (
-    "sign of the index behind",
-    "another glass's slope",
-    "flat normals",
-    "mirror forgets the normal",
-    "axes swapped",
-)
-
-
-@pytest.mark.parametrize(
-    "name", [*QUICK, *(pytest.param(name, marks=pytest.mark.slow) for name in MUTANTS if name not in QUICK)]
-)
-def test_mutants_are_caught(gl, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    file, old, new, case = MUTANTS[name]
-    mutate(monkeypatch, tmp_path, file, old, new)
-    with pytest.raises(AssertionError, match="^column|^paths differ"):
-        columns_agree(gl, CASES[case])

@@ -28,8 +28,6 @@ from spectrasplat.render.viewer.engine import LiveEngine
 from spectrasplat.render.viewer.live_camera import LiveCamera
 from spectrasplat.render.viewer.schedule import Schedule
 
-from tests.gpu.mutants import mutate
-
 CAMERA = Camera((0.0, -4.0, 2.0), (0.0, 0.0, 0.3))
 WHITE = constant((1.0, 1.0, 1.0))
 SETTINGS = RenderSettings(width=48, height=32, spp=4, photons=2000)
@@ -201,31 +199,6 @@ def test_no_halo_is_about_what_stands_on_a_wide_floor_or_just_above(gl: Context,
         expected -= form_factor(at, up, rectangle((1.0, -1.0, low), (0.0, 2.0, 0.0), (0.0, 0.0, gap + height - low)))
     np.testing.assert_allclose(shown[beside], expected, atol=0.022)
     assert abs((shown[beside] - expected)[-size // 4 :].mean()) < 4e-3  # no window's border shows
-
-
-MUTANTS = {
-    "cosine": (
-        "light/environment.comp",
-        "max(dot(toward, place.normal), 0.0)",
-        "float(dot(toward, place.normal) > 0.0)",
-    ),
-    "visibility": ("light/environment.comp", "reaches = !intersect_any", "reaches = intersect_any"),
-    "pi": ("camera/receiver_light.glsl", "seen.reflectance * INVERSE_PI", "seen.reflectance"),
-}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("mutant", MUTANTS)
-def test_mistakes_would_be_noticed(gl: Context, monkeypatch: pytest.MonkeyPatch, tmp_path, mutant: str) -> None:
-    mutate(monkeypatch, tmp_path, *MUTANTS[mutant])
-    if mutant == "pi":
-        shown = picture(gl, scene_of(floor(), environment=SKY))[24:32].mean()
-        assert shown > 1.2
-        return
-    with pytest.raises(AssertionError):
-        test_a_balls_shadow_is_one_minus_its_form_factor(
-            asked(gl, scene_of(place(sphere(0.5, 8000), Black(), (0.0, 0.0, 1.0)), floor()), 256)
-        )
 
 
 @pytest.mark.slow

@@ -19,9 +19,11 @@ import pytest
 from tests.gpu.mutants import SHADERS_VARIABLE, mutated
 
 ROOT = Path(__file__).parents[2]
+_COLUMNS = "gpu/test_columns_gpu.py::test_columns_against_central_differences"
 _BALANCE = "gpu/test_power_balance.py::test_all_that_was_emitted_is_drawn_or_accounted_for_where_reflection_is_total"
 _PATHS = "gpu/test_whole_paths_gpu.py::test_position_and_throughput_at_three_wavelengths"
 _CUTS = "gpu/test_whole_paths_gpu.py::test_cut_bands_against_exact_paths"
+_SLAB = "gpu/test_known_answers_gpu.py::test_t3_slab_leaves_direction_without_dispersion"
 _SHADOW = "gpu/test_environment_light.py::test_a_balls_shadow_is_one_minus_its_form_factor"
 
 
@@ -193,13 +195,25 @@ MUTANTS = {
         "lib/optics.glsl",
         "(dot(moved, normal_g) / dot(direction, normal_g))",
         "0.0",
-        "gpu/test_known_answers_gpu.py::test_t4_ball_lens",
+        "gpu/test_known_answers_gpu.py::test_t4_ball_lens[light]",
     ),
     "refraction without the index's own derivative": Mutant(
         "lib/optics.glsl",
         "(deta_it / omega)",
         "(0.0 / omega)",
-        "gpu/test_known_answers_gpu.py::test_t2_prism_at_minimum_deviation",
+        "gpu/test_known_answers_gpu.py::test_t2_prism_at_minimum_deviation[N-BK7-light]",
+    ),
+    "the sign of leaving glass at both faces": Mutant(
+        "lib/medium.glsl", "derivative -= n_i", "derivative += n_i", f"{_SLAB}[N-BK7-light]"
+    ),
+    "the sign of entering glass at both faces": Mutant(
+        "lib/medium.glsl", "derivative += medium_slope", "derivative -= medium_slope", f"{_SLAB}[N-BK7-light]"
+    ),
+    "a film of air between solids that touch": Mutant(
+        "lib/intersect.glsl",
+        "return facing > 0.0 ? distance + NEAR_DISTANCE : distance;",
+        "return distance;",
+        "gpu/test_known_answers_gpu.py::test_t12_amici_prism_of_three_touching_solids[light]",
     ),
     "orders of a grating to the other side": Mutant(
         "lib/grating.glsl",
@@ -234,6 +248,223 @@ MUTANTS = {
     "light of the environment through what is in the way": Mutant(
         "light/environment.comp", "reaches = !intersect_any", "reaches = intersect_any", _SHADOW
     ),
+    "columns: another glass's slope": Mutant(
+        "lib/medium.glsl", "object_at(boundary.before).group == g", "true", f"{_COLUMNS}[doublet]"
+    ),
+    "columns: no slope of the medium": Mutant(
+        "lib/medium.glsl",
+        "return spectral_row(uint(SLOPE_ROW) + object_at(object).medium, x);",
+        "return 1.0;",
+        f"{_COLUMNS}[by wavelength]",
+    ),
+    "columns: flat normals": Mutant(
+        "lib/interface.glsl",
+        "return frame.interpolated != 0u ? dnormal : vec3(0.0);",
+        "return vec3(0.0);",
+        f"{_COLUMNS}[inner reflections]",
+    ),
+    "columns: normal not turned inside": Mutant(
+        "lib/interface.glsl",
+        "return frame.interpolated != 0u ? dnormal",
+        "return frame.interpolated != 0u ? sign(dot(frame.summed, vec3(1.0))) * dnormal",
+        f"{_COLUMNS}[beam]",
+    ),
+    "columns: mirror forgets the normal": Mutant(
+        "lib/optics.glsl", "(dtheta * normal + theta * dnormal)", "(dtheta * normal)", f"{_COLUMNS}[mirror ball]"
+    ),
+    "columns: position follows the shading normal": Mutant(
+        "light/trace.comp",
+        "transfer_columns(path, hit.normal_g, hit.distance)",
+        "transfer_columns(path, shading_frame(hit, facet, path.position, path.direction).normal, hit.distance)",
+        f"{_COLUMNS}[sun]",
+    ),
+    "columns: axes swapped": Mutant(
+        "light/emit.comp",
+        "ddirection_ds = p.spacing.x * to_world(dx)",
+        "ddirection_ds = p.spacing.x * to_world(dy)",
+        f"{_COLUMNS}[spot]",
+    ),
+    "columns: flat map": Mutant("lib/emission.glsl", "k - q.x * q.x / (4.0 * k)", "k", f"{_COLUMNS}[disc]"),
+    "columns: tilted sun's plane": Mutant(
+        "light/emit.comp",
+        "dposition_ds = p.spacing.x * p.tangent",
+        "dposition_ds = 1.01 * p.spacing.x * p.tangent",
+        f"{_COLUMNS}[sun]",
+    ),
+    "polarisation: planes do not turn": Mutant(
+        "lib/polarisation.glsl",
+        "state.q = cosine * q + sine * state.u;",
+        "state.q = q;",
+        "gpu/test_polarised_paths_gpu.py::test_throughput_of_whole_paths[stone]",
+    ),
+    "polarisation: no retardance": Mutant(
+        "lib/polarisation.glsl",
+        "mix(2.0 * x * y * per, vec3(0.0), passes)",
+        "vec3(0.0)",
+        "gpu/test_polarised_paths_gpu.py::test_throughput_of_whole_paths[stone]",
+    ),
+    "polarisation: circular light keeps its sense": Mutant(
+        "lib/polarisation.glsl",
+        "vec3(-1.0), vec3(0.0));",
+        "vec3(1.0), vec3(0.0));",
+        "gpu/test_polarised_paths_gpu.py::test_throughput_of_whole_paths[panes with a mirror between]",
+    ),
+    "polarisation: unpolarised again": Mutant(
+        "light/trace_records.glsl",
+        "ray.stokes_q = path.polarisation.q;",
+        "ray.stokes_q = vec3(0.0);",
+        "gpu/test_polarised_paths_gpu.py::test_throughput_of_whole_paths[stone]",
+    ),
+    "added splats: clipped by no rectangle": Mutant(
+        "light/splat_add.comp",
+        "max(lowest + splat.centre, splat.rect.xy)",
+        "(lowest + splat.centre)",
+        "gpu/test_splat_add.py::test_every_kind_is_added_as_it_is_drawn[compare and swap-small]",
+    ),
+    "added splats: as bright where it fans out": Mutant(
+        "light/splat_add.comp",
+        "splat.ripple.xyz, w);",
+        "splat.ripple.xyz, 1.0);",
+        "gpu/test_splat_add.py::test_every_kind_is_added_as_it_is_drawn[compare and swap-fanning]",
+    ),
+    "added splats: lines beside their places": Mutant(
+        "light/splat_add.comp",
+        "float(line) - middle.y;",
+        "float(line) - middle.x;",
+        "gpu/test_splat_add.py::test_every_kind_is_added_as_it_is_drawn[compare and swap-swept]",
+    ),
+    "added splats: half of the lanes' texels": Mutant(
+        "light/splat_add.comp",
+        "t += LANES;",
+        "t += 2 * LANES;",
+        "gpu/test_splat_add.py::test_every_kind_is_added_as_it_is_drawn[compare and swap-swept]",
+    ),
+    "added splats: sums that overlap": Mutant(
+        "light/splat_sums.glsl",
+        "at.y / 2u",
+        "at.y / 3u",
+        "gpu/test_splat_add.py::test_every_kind_is_added_as_it_is_drawn[compare and swap-swept]",
+    ),
+    "bounces: cosine": Mutant(
+        "lib/bounce.glsl",
+        "3.14159265359 * both /",
+        "3.14159265359 * cosine_there /",
+        "gpu/test_bounces.py::test_a_lit_floor_lights_the_wall_by_its_form_factor",
+    ),
+    "bounces: density": Mutant(
+        "lib/bounce.glsl",
+        "density * distance2",
+        "density * sqrt(distance2)",
+        "gpu/test_bounces.py::test_a_lit_floor_lights_the_wall_by_its_form_factor",
+    ),
+    "bounces: back": Mutant(
+        "light/bounce.comp",
+        "dot(direction, hit.normal_g) > 0.0",
+        "dot(direction, hit.normal_g) < 0.0",
+        "gpu/test_bounces.py::test_a_lit_floor_lights_the_wall_by_its_form_factor",
+    ),
+    "light of the environment without 1/π": Mutant(
+        "camera/receiver_light.glsl",
+        "seen.reflectance * INVERSE_PI",
+        "seen.reflectance",
+        "gpu/test_environment_light.py::test_a_white_thing_vanishes_in_a_white_furnace",
+    ),
+    "a cut band stays where it was directed": Mutant(
+        "path/path.glsl",
+        "direction += change * path.ddirection[SPATIAL + g];",
+        "",
+        "gpu/test_whole_paths_gpu.py::test_cut_bands_against_exact_paths[unpolarised]",
+    ),
+    "a share of each event lost": Mutant(
+        "light/trace_companions.glsl",
+        "path.throughput *= share;",
+        "path.throughput *= 0.85 * share;",
+        "gpu/test_power_balance.py::test_all_that_was_emitted_is_drawn_or_accounted_for_where_reflection_is_total[prism]",
+    ),
+    "waves of a cut band turned round": Mutant(
+        "light/splat_shapes.glsl",
+        "clamp(damping(blur, k[i]), 0.0, most)",
+        "min(damping(blur, k[i]), most)",
+        "gpu/test_power_balance.py::test_bands_cut_at_total_reflection_give_back_what_their_waves_take",
+    ),
+    "all channels of a splat with one weight": Mutant(
+        "light/splat_setup.glsl",
+        "return 2.0 * band_integral[3u * (splat.layer + g) + 1u] - 1.0;",
+        "return vec4(0.0);",
+        "gpu/test_splat_throughput.py::test_channels_have_what_their_wavelengths_have[broad-throughput0]",
+    ),
+    "footprints without images beyond a border": Mutant(
+        "light/footprint_images.glsl",
+        "left = uint(MOST_IMAGES)",
+        "left = 0u",
+        "gpu/test_borders.py::test_an_evenly_lit_table_is_even_up_to_its_borders[17.0]",
+    ),
+    "images of glows a step beyond the border": Mutant(
+        "light/footprint_images.glsl",
+        "MOST_FANNED = 0.5",
+        "MOST_FANNED = 1e9",
+        "statistical/test_glows.py::test_a_glow_keeps_its_light_beside_the_tables_border",
+    ),
+    "lobes wider without bound": Mutant(
+        "light/trace_widths.glsl",
+        "FORGOTTEN 0.5",
+        "FORGOTTEN 1e9",
+        "statistical/test_glows.py::test_light_of_a_ground_diamond_stays_where_it_lands",
+    ),
+    "lobes that rise without bound": Mutant(
+        "light/trace_widths.glsl",
+        "HIGHEST_RISE 0.5",
+        "HIGHEST_RISE 1e9",
+        "statistical/test_glows.py::test_light_of_a_ground_diamond_stays_where_it_lands",
+    ),
+    "footprints wider than the surface": Mutant(
+        "light/trace_widths.glsl",
+        "p.widest_on_surface * size",
+        "1e9 * size",
+        "statistical/test_wide_footprints.py::test_light_stays_where_it_lands",
+    ),
+    "microfacets that hide nothing": Mutant(
+        "path/event.glsl",
+        "ground.regained * smith_share(cosine, ground.width)",
+        "vec3(1.0)",
+        "statistical/test_rough_glass.py::test_one_surface_reflects_what_its_microfacets_do[70.0-0.6]",
+    ),
+    "shares of microfacets as far off as derivatives say": Mutant(
+        "path/microfacet.glsl",
+        "#define MOST_CHANGE 0.3",
+        "#define MOST_CHANGE 1e6",
+        "statistical/test_rough_glass.py::test_steep_derivatives_by_wavelength_take_no_light",
+    ),
+    "camera: two per cent lost at each surface": Mutant(
+        "camera/meet.glsl",
+        "vec3(1.0) : 1.0 - event.reflectance;",
+        "vec3(1.0) : 0.98 - event.reflectance;",
+        "gpu/test_camera_furnace.py::test_clear_glass_vanishes_in_a_closed_white_room[slab-background-4]",
+    ),
+    "camera: an undispersed path cut as the whole spectrum": Mutant(
+        "camera/meet.glsl",
+        "if (start.restricted == 0u) restrict_to_band(start, pixel_key);\n        if (may_cut_near",
+        "if (may_cut_near",
+        "gpu/test_camera_furnace.py::test_nothing_is_counted_twice_from_under_water",
+    ),
+    "camera: wavelengths as a sequence of their own": Mutant(
+        "camera/path.glsl",
+        "radical_inverse(p.sample_index, hash",
+        "kronecker(p.sample_index, depth_generator(0u), hash",
+        "gpu/test_camera_furnace.py::test_single_wavelengths_hardly_colour_a_pixel",
+    ),
+    "camera: the base under a coat gets all": Mutant(
+        "camera/finish.glsl",
+        "1.0 - spectral_row(finish.row, cosine)",
+        "1.0",
+        "gpu/test_finish_gpu.py::test_a_white_finished_table_vanishes_in_a_white_room[varnish-low]",
+    ),
+    "camera: the sign of entering glass at both faces": Mutant(
+        "path/event.glsl",
+        "deta_it = index_ratio_derivative(",
+        "deta_it = abs(1.0) * -index_ratio_derivative(",
+        "gpu/test_camera_known_answers.py::test_fringe_of_an_edge_behind_a_thin_prism[N-SF11-1]",
+    ),
 }
 
 
@@ -249,23 +480,9 @@ def test_mutants_are_of_todays_shaders() -> None:
 def test_each_mistake_is_noticed(tmp_path: Path, name: str) -> None:
     mutant = MUTANTS[name]
     shaders = mutated(tmp_path, mutant.file, mutant.old, mutant.new)
-    command = [
-        sys.executable,
-        "-m",
-        "pytest",
-        "-n",
-        "0",
-        "-x",
-        "-q",
-        "-m",
-        "",
-        "-p",
-        "no:cacheprovider",
-        "-p",
-        "tests.gpu.mutants",
-    ]
+    options = ["-n", "0", "-x", "-q", "-m", "", "-p", "no:cacheprovider", "-p", "tests.gpu.mutants"]
     done = subprocess.run(
-        [*command, f"tests/{mutant.killed_by}"],
+        [sys.executable, "-m", "pytest", *options, f"tests/{mutant.killed_by}"],
         cwd=ROOT,
         env=os.environ | {SHADERS_VARIABLE: str(shaders)},
         capture_output=True,

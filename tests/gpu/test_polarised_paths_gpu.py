@@ -6,8 +6,6 @@ mirrors turn that over; every photon's throughput at three wavelengths is held a
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from spectrasplat.model.geometry.primitives import box, plane
@@ -16,7 +14,6 @@ from spectrasplat.model.placement import rotation_about
 from spectrasplat.model.scene import Mirror, SceneObject
 from spectrasplat.stress.rigs.gpu_paths import glass, placed
 
-from tests.gpu.mutants import mutate
 from tests.gpu.test_whole_paths_gpu import Case, ball, touching, weights_agree
 
 
@@ -61,28 +58,3 @@ CASES = {
 @pytest.mark.parametrize("name", CASES)
 def test_throughput_of_whole_paths(gl, name: str) -> None:
     weights_agree(gl, CASES[name])
-
-
-LIBRARY, FLIGHT = "lib/polarisation.glsl", "light/trace_records.glsl"
-MUTANTS = {
-    "planes do not turn": (LIBRARY, "state.q = cosine * q + sine * state.u;", "state.q = q;", "stone"),
-    "no retardance": (LIBRARY, "mix(2.0 * x * y * per, vec3(0.0), passes)", "vec3(0.0)", "stone"),
-    "circular light keeps its sense": (
-        LIBRARY,
-        "vec3(-1.0), vec3(0.0));",
-        "vec3(1.0), vec3(0.0));",
-        "panes with a mirror between",
-    ),
-    "unpolarised again": (FLIGHT, "ray.stokes_q = path.polarisation.q;", "ray.stokes_q = vec3(0.0);", "stone"),
-}
-QUICK = ("planes do not turn",)
-
-
-@pytest.mark.parametrize(
-    "name", [*QUICK, *(pytest.param(name, marks=pytest.mark.slow) for name in MUTANTS if name not in QUICK)]
-)
-def test_mutants_are_caught(gl, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    file, old, new, case = MUTANTS[name]
-    mutate(monkeypatch, tmp_path, file, old, new)
-    with pytest.raises(AssertionError, match="^throughput|^flux"):
-        weights_agree(gl, CASES[case])

@@ -8,7 +8,6 @@ may be one's and not the other's.
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -25,8 +24,6 @@ from spectrasplat.passes.footprint import MOST_GROUPS, SPLAT, VERTICES
 from spectrasplat.passes.map_atlas import MapAtlas
 from spectrasplat.render.still import render
 from spectrasplat.stress.rigs.splat_rig import Rig, photons
-
-from tests.gpu.mutants import mutate
 
 SIZE = 130, 101
 """No multiple of the sums' blocks."""
@@ -171,28 +168,6 @@ def agree(gl: Context, case: str, count: int = 300, most: float = 3e-4) -> None:
 @pytest.mark.usefixtures("adding")
 def test_every_kind_is_added_as_it_is_drawn(gl: Context, case: str) -> None:
     agree(gl, case)
-
-
-MISTAKES = {
-    "clipped by no rectangle": (
-        "splat_add.comp",
-        "max(lowest + splat.centre, splat.rect.xy)",
-        "(lowest + splat.centre)",
-        "small",
-    ),
-    "as bright where it fans out": ("splat_add.comp", "splat.ripple.xyz, w);", "splat.ripple.xyz, 1.0);", "fanning"),
-    "lines beside their places": ("splat_add.comp", "float(line) - middle.y;", "float(line) - middle.x;", "swept"),
-    "half of the lanes' texels": ("splat_add.comp", "t += LANES;", "t += 2 * LANES;", "swept"),
-    "sums that overlap": ("splat_sums.glsl", "at.y / 2u", "at.y / 3u", "swept"),
-}
-
-
-@pytest.mark.parametrize("mistake", MISTAKES)
-def test_mistakes_are_noticed(gl: Context, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, mistake: str) -> None:
-    file, old, new, case = MISTAKES[mistake]
-    mutate(monkeypatch, tmp_path, f"light/{file}", old, new)
-    with pytest.raises(AssertionError):
-        agree(gl, case)
 
 
 def alone(rig: Rig, **fields: object) -> np.ndarray:

@@ -3,15 +3,12 @@ a channel has what its own light lets it have. lib/swept.glsl against float64.""
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from spectrasplat.features.features import Features
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 from spectrasplat.stress.rigs.splat_rig import Rig, photons
 
-from tests.gpu.mutants import mutate
 from tests.gpu.test_splat import frame, spectrum_samples
 
 COVERS = {"swept.glsl": ("sweeps_part", "throughput_over", "mean_bend")}
@@ -51,13 +48,6 @@ def test_channels_have_what_their_wavelengths_have(gl, name: str, throughput: tu
 @pytest.mark.parametrize("name", SPLATS)
 def test_power_is_what_the_photon_carries(gl, name: str) -> None:
     assert drawn(gl, name, BENT)[3] == pytest.approx(by_wavelength(BENT)[3], rel=3e-3)
-
-
-@pytest.mark.parametrize("name", ["a focus", "broad"])
-def test_before_all_channels_had_one_weight(gl, name: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    old, new = "return 2.0 * band_integral[3u * (splat.layer + g) + 1u] - 1.0;", "return vec4(0.0);"
-    mutate(monkeypatch, tmp_path, "light/splat_setup.glsl", old, new)
-    assert np.abs(drawn(gl, name, STRAIGHT) / by_wavelength(STRAIGHT) - 1.0).max() > 0.05
 
 
 def test_a_bend_adds_its_mean_excess(gl) -> None:

@@ -23,8 +23,6 @@ from spectrasplat.passes import trace
 from spectrasplat.reference.photon_reference import render_reference
 from spectrasplat.render.still import render
 
-from tests.gpu.mutants import mutate
-
 WIDTH, HEIGHT, BLOCK = 96, 54, 6
 TABLE = """
 [[objects]]
@@ -148,13 +146,6 @@ def test_a_glow_keeps_its_light_beside_the_tables_border(gl: Context, ellipsoid:
     assert beside_borders(drawn(gl, ellipsoid, 40_000)) > BESIDE * beside_borders(truth)
 
 
-def test_images_a_step_beyond_the_border_lose_it(
-    gl: Context, ellipsoid: Scene, truth: np.ndarray, monkeypatch, tmp_path: Path
-) -> None:
-    mutate(monkeypatch, tmp_path, "light/footprint_images.glsl", "MOST_FANNED = 0.5", "MOST_FANNED = 1e9")
-    assert beside_borders(drawn(gl, ellipsoid, 40_000)) < BESIDE * beside_borders(truth)
-
-
 SPREAD = 0.0245
 
 
@@ -179,11 +170,3 @@ def test_light_of_a_ground_diamond_stays_where_it_lands(gl: Context, stone: Scen
     found = drawn(gl, stone, GROUND_PHOTONS)
     assert deviation(found, glow) < GROUND_BOUND
     assert found.sum() == pytest.approx(glow.sum(), rel=0.03)
-
-
-@pytest.mark.parametrize("believed", ["FORGOTTEN 0.5", "HIGHEST_RISE 0.5"])
-def test_lobes_without_bound_spread_it(
-    gl: Context, stone: Scene, glow: np.ndarray, monkeypatch, tmp_path: Path, believed: str
-) -> None:
-    mutate(monkeypatch, tmp_path, "light/trace_widths.glsl", believed, believed.replace("0.5", "1e9"))
-    assert deviation(drawn(gl, stone, GROUND_PHOTONS), glow) > 1.1 * GROUND_BOUND

@@ -8,7 +8,6 @@ one (root mean square). The mutants (no shadowing, another width) are several ti
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -30,7 +29,6 @@ from spectrasplat.reference.camera_reference import render_camera_reference
 from spectrasplat.reference.photon_reference import render_reference
 from spectrasplat.render.still import RenderResult, render
 
-from tests.gpu.mutants import mutate
 from tests.gpu.test_beam_tails import held, passed
 
 INDEX = 1.5
@@ -79,15 +77,6 @@ def test_one_surface_reflects_what_its_microfacets_do(gl: Context, angle_deg: fl
     assert abs(found["unaccounted"]) < 1e-5
 
 
-def test_without_shadowing_a_surface_reflects_too_much(gl: Context, monkeypatch, tmp_path: Path) -> None:
-    """The mutant: at 70° the microfacets hide a tenth of what is reflected."""
-    old, new = "ground.regained * smith_share(cosine, ground.width)", "vec3(1.0)"
-    mutate(monkeypatch, tmp_path, "path/event.glsl", old, new)
-    found = shares_of(caustic(gl, black_block(np.radians(70.0), 0.6), 40_000, (8, 8)))
-    reflected, transmitted = microfacet.shares(np.radians(70.0), 0.36, 1.0 / INDEX)
-    assert found["deposited"] > 1.05 * reflected / (reflected + transmitted)
-
-
 @pytest.mark.parametrize("roughness", [0.25, 0.6])
 def test_a_slab_lets_through_what_the_reference_does(gl: Context, roughness: float) -> None:
     """Both surfaces, all reflections between them; the microfacets keep nothing."""
@@ -125,13 +114,10 @@ def test_steep_derivatives_by_wavelength_take_no_light(gl: Context) -> None:
     assert drawn + outside == pytest.approx(1.0, abs=4e-3) and outside < 0.025
 
 
-def test_believed_they_would(gl: Context, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """The mutants: ends of bands thrown out of the scene, and their shares as far off as derivatives tell."""
+@pytest.mark.slow
+def test_ends_of_bands_believed_would_leave_the_scene(gl: Context, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(trace, "WIDEST_SWEEP", 1e6)
     assert kept_by_ring(gl)[2] > 0.025
-    monkeypatch.undo()
-    mutate(monkeypatch, tmp_path, "path/microfacet.glsl", "#define MOST_CHANGE 0.3", "#define MOST_CHANGE 1e6")
-    assert abs(kept_by_ring(gl)[0]) > 3e-3
 
 
 def lit_slab(roughness: float, radius: float = 0.05, dispersion: Dispersion = GLASS, tilt_deg: float = 0.0) -> Scene:

@@ -13,14 +13,15 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from reference import known_answers as known
+from reference.known_answers import LINES, N_BK7_D
 from reference.surfaces import Plane, sphere
 from reference.tracer import AIR, Index, Ray, make_ray, refracted, through
 from spectrasplat.reference import glasses, optics
-from spectrasplat.reference.glasses import C_NM, D_NM, F_NM
+from spectrasplat.reference.glasses import D_NM
 
 pytestmark = pytest.mark.core
 
-N_BK7_D = float(glasses.index("N-BK7", D_NM))
 BALL = sphere((0.0, 0.0, 0.0), 1.0)
 
 
@@ -76,44 +77,26 @@ def across_prism(incidence_rad: float, glass: Index, apex_rad: float = np.pi / 3
     return heading(start) - heading(out), -dheading(out)
 
 
-@pytest.mark.parametrize(
-    ("glass", "n_fdc", "abbe", "slope_per_um"),
-    [
-        ("N-BK7", (1.522376, 1.516800, 1.514322), 64.167, -0.041799),
-        ("F2", (1.632081, 1.620040, 1.615032), 36.366, -0.086493),
-        ("N-SF11", (1.806513, 1.784720, 1.775955), 25.680, -0.152878),
-        ("diamond", (2.435538, 2.417486, 2.409906), 55.301, -0.131002),
-        ("water", (1.337492, 1.333403, 1.331513), 55.760, -0.031340),
-        ("fused silica", (1.463126, 1.458464, 1.456367), 67.821, -0.035215),
-    ],
-)
-def test_t1_glasses(glass: str, n_fdc: tuple[float, ...], abbe: float, slope_per_um: float) -> None:
-    n_f, n_d, n_c = glasses.index(glass, np.array([F_NM, D_NM, C_NM]))
-    np.testing.assert_allclose((n_f, n_d, n_c), n_fdc, atol=6e-7)
-    assert (n_d - 1) / (n_f - n_c) == pytest.approx(abbe, abs=6e-4)
-    assert glasses.slope(glass, D_NM) == pytest.approx(slope_per_um, abs=6e-7)
+@pytest.mark.parametrize("glass", known.INDEX_TABLES)
+def test_t1_glasses(glass: str) -> None:
+    expected = known.INDEX_TABLES[glass]
+    n_f, n_d, n_c = glasses.index(glass, np.array(LINES))
+    np.testing.assert_allclose((n_f, n_d, n_c), expected.n_fdc, atol=6e-7)
+    assert (n_d - 1) / (n_f - n_c) == pytest.approx(expected.abbe, abs=6e-4)
+    assert glasses.slope(glass, D_NM) == pytest.approx(expected.slope_per_um, abs=6e-7)
 
 
-@pytest.mark.parametrize(
-    ("glass", "incidence_deg", "deviations_deg", "slope_rad_um"),
-    [
-        ("N-BK7", 49.32335, (39.13905, 38.64670, 38.42932), -0.064130),
-        ("F2", 54.09789, (49.38809, 48.19578, 47.70902), -0.147498),
-        ("N-SF11", 63.17131, (69.25084, 66.34263, 65.24956), -0.338731),
-    ],
-)
-def test_t2_prism_at_minimum_deviation(
-    glass: str, incidence_deg: float, deviations_deg: tuple[float, ...], slope_rad_um: float
-) -> None:
-    apex = np.pi / 3
+@pytest.mark.parametrize("glass", known.MINIMUM_DEVIATIONS)
+def test_t2_prism_at_minimum_deviation(glass: str) -> None:
+    expected, apex = known.MINIMUM_DEVIATIONS[glass], known.APEX
     incidence = float(np.arcsin(glasses.index(glass, D_NM) * np.sin(apex / 2)))
-    assert np.degrees(incidence) == pytest.approx(incidence_deg, abs=6e-6)
+    assert np.degrees(incidence) == pytest.approx(expected.incidence_deg, abs=6e-6)
     deviation, slope = across_prism(incidence, per_um(glass, D_NM))
-    assert slope == pytest.approx(slope_rad_um, abs=6e-7)
+    assert slope == pytest.approx(expected.slope_rad_um, abs=6e-7)
     closed = 2 * np.sin(apex / 2) * glasses.slope(glass, D_NM) / np.cos((apex + deviation) / 2)
     assert slope == pytest.approx(closed, rel=1e-12)
     # All lines at the d line's incidence.
-    for nm, expected_deg in zip((F_NM, D_NM, C_NM), deviations_deg, strict=True):
+    for nm, expected_deg in zip(LINES, expected.deviations_deg, strict=True):
         assert np.degrees(across_prism(incidence, per_um(glass, nm))[0]) == pytest.approx(expected_deg, abs=6e-6)
     # It is the minimum: where the path is symmetric.
     neighbours = [across_prism(incidence + e, per_um(glass, D_NM))[0] for e in (-1e-3, 1e-3)]
@@ -129,22 +112,19 @@ def through_ball(height: float, index: Index) -> Ray:
     return through(inside, BALL, index, AIR, root=1)
 
 
-@pytest.mark.parametrize(
-    ("height", "deviation_deg", "crossing", "ddeviation_dn"),
-    [(0.5, 21.505984, 1.363890, 0.460386), (0.8, 42.596776, 1.181973, 0.818556)],
-)
-def test_t4_ball_lens_off_the_axis(height: float, deviation_deg: float, crossing: float, ddeviation_dn: float) -> None:
+@pytest.mark.parametrize("height", known.BALL_RAYS)
+def test_t4_ball_lens_off_the_axis(height: float) -> None:
+    deviation_deg, crossing, ddeviation_dn = known.BALL_RAYS[height]
     ray = through_ball(height, per_index("N-BK7", D_NM))
     assert np.degrees(-heading(ray)) == pytest.approx(deviation_deg, abs=6e-7)
     assert axis_crossing(ray) == pytest.approx(crossing, abs=6e-7)
     assert -dheading(ray) == pytest.approx(ddeviation_dn, abs=6e-7)
 
 
-@pytest.mark.parametrize(
-    ("bounces", "radii_deg", "dradius_dn"),
-    [(1, (40.5674, 42.0195, 42.4405), -2.53492), (2, (53.6198, 50.9964, 50.2379), 4.57002)],
-)
-def test_t10_rainbows(bounces: int, radii_deg: tuple[float, ...], dradius_dn: float) -> None:
+@pytest.mark.parametrize("bounces", known.RAINBOWS)
+def test_t10_rainbows(bounces: int) -> None:
+    radii_deg, dradius_dn = known.RAINBOWS[bounces]
+
     def out(height: float, index: Index) -> Ray:
         index = Index(index.n, np.array([1.0, 0.0]))
         ray = through(make_ray([-2, height, 0], [1, 0, 0], [[0, 0, 0], [0, 1, 0]]), BALL, AIR, index)
@@ -152,7 +132,7 @@ def test_t10_rainbows(bounces: int, radii_deg: tuple[float, ...], dradius_dn: fl
             ray = through(ray, BALL, index, index, root=1, mirror=True)
         return through(ray, BALL, index, AIR, root=1)
 
-    for nm, expected in zip((400.0, D_NM, 700.0), radii_deg, strict=True):
+    for nm, expected in zip(known.RAINBOW_LINES, radii_deg, strict=True):
         index = Index(float(glasses.index("water", nm)))
         turning = zero_of(lambda h, index=index: dheading(out(h, index), column=1), 0.5, 0.999)
         n, k = index.n, bounces
@@ -166,7 +146,7 @@ def test_t10_rainbows(bounces: int, radii_deg: tuple[float, ...], dradius_dn: fl
 
 
 def test_t13_band_split_by_total_reflection() -> None:
-    internal = np.radians(41.10)
+    internal = np.radians(known.SPLIT_DEG)
     ray = make_ray([0, -1, 0], [np.sin(internal), np.cos(internal), 0])
 
     def passes(nm: float) -> float:
@@ -175,12 +155,12 @@ def test_t13_band_split_by_total_reflection() -> None:
         return -1.0 if out is None else 1.0
 
     split = zero_of(passes, 400.0, 700.0)
-    assert split == pytest.approx(503.239, abs=6e-4)
-    assert glasses.index("N-BK7", split) == pytest.approx(1.521201, abs=6e-7)
+    assert split == pytest.approx(known.SPLIT_NM, abs=6e-4)
+    assert glasses.index("N-BK7", split) == pytest.approx(known.SPLIT_INDEX, abs=6e-7)
     assert (passes(split - 1), passes(split + 1)) == (-1.0, 1.0)
 
 
-@pytest.mark.parametrize(("angle_deg", "reflectance"), [(0, 0.042165), (45, 0.052595), (60, 0.091958), (75, 0.256144)])
+@pytest.mark.parametrize(("angle_deg", "reflectance"), known.FRESNEL.items())
 def test_t16_fresnel(angle_deg: float, reflectance: float) -> None:
     angle = np.radians(angle_deg)
     direction = np.array([np.sin(angle), -np.cos(angle), 0])
@@ -193,7 +173,7 @@ def test_t16_fresnel(angle_deg: float, reflectance: float) -> None:
 
 def test_t16_brewster() -> None:
     brewster = np.arctan(N_BK7_D)
-    assert np.degrees(brewster) == pytest.approx(56.6038, abs=6e-5)
+    assert np.degrees(brewster) == pytest.approx(known.BREWSTER_DEG, abs=6e-5)
     direction = np.array([np.sin(brewster), -np.cos(brewster), 0])
     beyond = optics.refract(direction, np.array([0, 1.0, 0]), 1 / N_BK7_D)
     mirrored = optics.reflect(direction, np.array([0, 1.0, 0]))
