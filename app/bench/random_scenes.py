@@ -15,8 +15,18 @@ from ..base.atomic import atomic_output
 from ..model.io.scene_file import load_scene
 from ..model.io.toml_text import toml_text
 from ..model.scene import Scene
-from .random_solids import GLASSES, PLAIN, WIDER, Piece, wider_material
-from .random_values import Values, between, chance, rounded, vector
+from .random_solids import (
+    GLASSES,
+    PLAIN,
+    WIDER,
+    Piece,
+    Values,
+    between,
+    chance,
+    rounded,
+    vector,
+    wider_material,
+)
 
 SPECTRA = ("D65", "A", "E", {"blackbody": 3200}, {"lines": [[450.0, 1.0], [546.1, 2.0], [611.0, 1.5]]})
 TABLE_SIDE = 8.0

@@ -8,12 +8,30 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from .random_values import Values, between, chance, rounded, vector
-
+Values = dict[str, Any]
+"""Tables of a scene file."""
 GLASSES = ("N-BK7", "N-SF11", "N-SF66", "F2", "N-LAK33B", "water", "PMMA", "sapphire", "diamond")
+
+
+def rounded(value: float) -> float:
+    """With as many digits as a scene's file has."""
+    return round(float(value), 4)
+
+
+def between(rng: np.random.Generator, low: float, high: float) -> float:
+    return rounded(rng.uniform(low, high))
+
+
+def vector(values: np.ndarray) -> list[float]:
+    return [rounded(v) for v in values]
+
+
+def chance(rng: np.random.Generator, share: float) -> bool:
+    return bool(rng.random() < share)
 
 
 @dataclass(frozen=True)

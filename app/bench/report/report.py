@@ -10,6 +10,7 @@ A run that was stopped can be reported as well: what is missing is named where i
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 from markupsafe import Markup
@@ -19,13 +20,13 @@ from ...base.errors import UserError
 from ...base.progress import ProgressReporter
 from ..measured_passes import MEASURED_PASSES
 from ..results import BenchResult, SceneResult
-from . import fair_field, markdown
+from . import fair_field, markdown, text
 from . import scene as report_scene
 from . import style as report_style
 from .curve_plots import error_against
 from .overview import overview, small_multiples
-from .page import inlined
-from .sections import document
+from .page import inlined, render
+from .prose import PROSE
 
 
 def write_report(result: BenchResult, directory: Path) -> None:
@@ -90,3 +91,45 @@ def file_names(scenes: list[str]) -> list[str]:
             name = f"{base}_{count}"
         taken.append(name)
     return taken
+
+
+# ---- the page --------------------------------------------------------------------------------
+
+
+def document(
+    result: BenchResult, scenes: Sequence[report_scene.SceneView], glance: Markup, speed_up: Markup | None
+) -> str:
+    """The whole page; `glance`: the ratios of all scenes to `stochastic`, `speed_up`: to the best baseline, drawn."""
+    prose = PROSE[result.settings.measured_pass]
+    used = report_style.by_rank(sorted({curve.method for scene in result.scenes for curve in scene.curves}))
+    return render(
+        "bench.html",
+        result=result,
+        measured=MEASURED_PASSES[result.settings.measured_pass],
+        prose=prose,
+        headline=text.headline(result),
+        run={
+            "version": f"SpectraSplat {result.version}",
+            "date": result.date,
+            **{"OpenGL" if key == "opengl" else key: value for key, value in result.machine.items()},
+            "effort": _effort(result),
+        },
+        scenes=scenes,
+        is_judged=any(scene.claims for scene in result.scenes),
+        glance=glance,
+        speed_up=speed_up,
+        speed_ups=fair_field.summary_table(result),
+        glance_caption=text.sentence(prose.metrics["time to equal error"]),
+        methods={name: prose.methods.get(name, "Not described.") for name in used},
+        failed=[(f"{scene}, {claim.name}", text.limit_sentence(claim)) for scene, claim in text.limits(result)],
+        doubts=[(scene.scene, warning) for scene in result.scenes for warning in text.warnings_of(scene)],
+    )
+
+
+def _effort(result: BenchResult) -> str:
+    settings, count = result.settings, len(result.scenes)
+    return (
+        f"{settings.seconds:g} s of {MEASURED_PASSES[settings.measured_pass].time} for each method's longest "
+        "rendering, "
+        f"{text.seeds_text(settings.seeds)}, {count} scene{'' if count == 1 else 's'}"
+    )

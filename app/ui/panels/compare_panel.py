@@ -11,12 +11,11 @@ from imgui_bundle import imgui, implot
 from ...base.colour_maps import ERROR, sample
 from ...edit.requests import ComputeReference
 from ...edit.state import Compare, CompareMode, State
-from ...model.settings import METHODS
 from .. import item_rects, theme
 from ..compared_with import LUMINANCE
 from ..view_model import ViewModel
 from . import file_browser, rows, widgets
-from .methods import METHOD_NAMES, METHOD_TIPS
+from .methods import MENU_METHODS, METHOD_TIPS
 
 MODES: dict[CompareMode, str] = {
     "off": "Picture alone",
@@ -86,7 +85,7 @@ def _controls(state: State, view_model: ViewModel) -> State:
     compare = state.compare
     _, mode = widgets.combo("Show", MODES, compare.mode, tip=MODE_TIPS[compare.mode])
     others = {REFERENCE: "Reference", "glass": "Another glass", "file": "A picture file"} | {
-        name: METHOD_NAMES[name] for name in METHODS if name != state.method
+        method: name for method, name in MENU_METHODS.items() if method != state.method
     }
     tip = METHOD_TIPS.get(compare.method) or _TIPS[compare.method]
     _, method = widgets.combo("With", others, compare.method, tip=tip)

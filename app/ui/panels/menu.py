@@ -11,7 +11,7 @@ from .. import commands, item_rects, layout, theme
 from ..commands import Command
 from ..view_model import ViewModel
 from . import dialogs, lesson_panel, outliner, widgets
-from .methods import METHOD_NAMES, METHOD_TIPS
+from .methods import MENU_METHODS, METHOD_TIPS
 
 _SCALES = (0.8, 0.9, 1.0, 1.1, 1.25, 1.5, 1.75, 2.0)
 
@@ -120,7 +120,7 @@ def _appearance(state: State) -> State:
 def _render(state: State, view_model: ViewModel) -> State:
     state = _items(("Accumulate photons", "Trace again", "Physical picture", ""), state, view_model)
     if imgui.begin_menu("Method"):
-        for method, name in METHOD_NAMES.items():
+        for method, name in MENU_METHODS.items():
             if imgui.menu_item(name, "", state.method == method)[0]:
                 state = replace(state, method=method)
             item_rects.note(name)

@@ -31,3 +31,6 @@ METHOD_TIPS = {
     "regular-16": "Sixteen fixed wavelengths, a splat each: shows banding.",
 }
 """Method of `METHODS` -> its tooltip."""
+
+MENU_METHODS = {method: name for method, name in METHOD_NAMES.items() if method != "progressive"}
+"""Those that a menu offers. `progressive` ends with 1.0 to 1.6 times the error of `srd`: benches compare with it."""

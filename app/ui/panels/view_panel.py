@@ -13,7 +13,7 @@ from .. import view_commands
 from ..view_model import ViewModel
 from . import false_colour, spectrum_strip, widgets
 from .camera_rows import draw_camera_rows
-from .methods import METHOD_NAMES, METHOD_TIPS
+from .methods import MENU_METHODS, METHOD_NAMES, METHOD_TIPS
 
 SWEEP_NM = (400.0, 700.0)
 """What the sweep runs through: where the eye sees something."""
@@ -227,9 +227,9 @@ def _overlays(state: State) -> State:
 
 
 def _sampling(state: State) -> State:
-    _, method = widgets.combo(
-        "Method", METHOD_NAMES, state.method, tip=METHOD_TIPS.get(state.method, "How wavelengths are sampled.")
-    )
+    offered = MENU_METHODS | {state.method: METHOD_NAMES[state.method]}
+    tip = METHOD_TIPS.get(state.method, "How wavelengths are sampled.")
+    _, method = widgets.combo("Method", offered, state.method, tip=tip)
     changed, smoothing, active = widgets.slider(
         "Smoothing",
         state.smoothing,
