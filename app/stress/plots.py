@@ -90,7 +90,7 @@ def _draw(
 
 def _place(result: CaseResult, severity: float) -> float:
     if result.case.logarithmic and not severity > 0.0:
-        # A severity of zero stands a decade before the least that a logarithm can show.
+        # A severity of zero is drawn a decade before the least that a logarithm can show.
         return 0.1 * min((m.severity for m in result.measurements if m.severity > 0.0), default=1.0)
     return severity
 

@@ -1,4 +1,4 @@
-"""The stress result as one HTML page that stands alone: verdict, machine, and for each case a plot and a table."""
+"""The stress result as one HTML page without other files: verdict, machine, and for each case a plot and a table."""
 
 from __future__ import annotations
 

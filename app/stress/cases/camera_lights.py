@@ -82,7 +82,7 @@ def eye_sun(context: Context, suns: Sequence[float]) -> Measured:
 def eye_lamps(context: Context, radii: Sequence[float]) -> Measured:
     """A lamp ever smaller and brighter, through a brilliant
 
-    The same with a lamp, whose edge a path blurs by as much as it stands for."""
+    The same with a lamp, whose edge a path blurs over the solid angle that the path samples."""
     toward = np.array([-0.3, 3.6, 2.4]) / np.linalg.norm([-0.3, 3.6, 2.4])
     first = None
     for radius in radii:
@@ -146,7 +146,7 @@ def _not_grey(picture: np.ndarray) -> float:
 def eye_texels(context: Context, counts: Sequence[float]) -> Measured:
     """Checks far finer than a pixel, seen directly and through a ball
 
-    What is looked up must be averaged over what a sample stands for, or it flickers."""
+    A texture must be averaged over the area that a sample covers, or it flickers."""
     for texels in counts:
         # Through the ball and directly, before a sky as grey as the checks' mean: all is grey.
         extent = PROBE.height * texels / 1024.0

@@ -188,8 +188,8 @@ def eye_shells(context: Context, counts: Sequence[int]) -> Measured:
 # ---- where the camera stands -------------------------------------------------------------------
 
 SURE = 1e-3
-"""Nearer to a face than that the camera may be taken for inside or outside, for either is as true as float32 and a
-ray's safe distance tell."""
+"""Nearer to a face than that the camera may be taken for inside or outside, for float32 and a ray's
+safe distance cannot distinguish them."""
 
 
 @case("eye-inside", "place", (0.3, 1e-2, 1e-3, 1e-5, 1e-7, 0.0, -1e-7, -1e-5, -1e-3, -1e-2, -0.3), logarithmic=False)
@@ -243,7 +243,7 @@ def two_seeds(context: Context, scene: Scene) -> tuple[Sight, float]:
 
 
 def _glass_alone(scene: Scene) -> Scene:
-    """Without dispersion, under a sky: what is asked is which medium comes next."""
+    """Without dispersion, under a sky: the case is about which medium comes next."""
     glass = tuple(item for item in scene.objects if item.material.transmits)
     scene = replace(scene, camera=SEEN_FROM, objects=glass, lights=(), environment=slope_sky())
     return with_glass(scene, lambda dispersion: constant(dispersion.n_d, dispersion.name))
@@ -253,7 +253,7 @@ def _glass_alone(scene: Scene) -> Scene:
 def eye_contacts(context: Context, pairs: Sequence[Pair]) -> Measured:
     """Solids that nest or touch, seen through, against a simpler scene of the same look
 
-    Where faces coincide rounding decides their order; a path must go by priority."""
+    Where faces coincide rounding decides their order; a path must follow priorities."""
     for number, pair in enumerate(pairs, 1):
         base, chance = two_seeds(context, _glass_alone(pair.plain()))
         sight = render_probe(context, _glass_alone(pair.joined()), PROBE, 1)

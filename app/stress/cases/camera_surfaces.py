@@ -236,7 +236,7 @@ FOCI = (*(("wall", defocus) for defocus in (0.5, 0.1, 0.01, 0.0)), ("camera", 0.
 def eye_focus(context: Context, places: Sequence[tuple[str, float]]) -> Measured:
     """A wall through the focus of a ball, and the camera in it, against the float64 reference
 
-    The area that a pixel stands for shrinks to nothing there, and grows again turned over."""
+    The area that a pixel covers shrinks to nothing there, and grows again turned over."""
     n = 1.5
     focus, ball = n / (2.0 * (n - 1.0)), solid("ball", sphere(1.0, 5120), constant(n))
     checks = np.where((np.indices((64, 64)) // 4).sum(axis=0) % 2 == 0, 0.9, 0.1).astype(np.float32)

@@ -1,5 +1,5 @@
-"""Paths that go on and on: dozens of reflections inside a diamond, columns that outgrow every scale, and beams through
-facets that are hard to tell apart."""
+"""Very long paths: dozens of reflections inside a diamond, columns that outgrow every scale, and beams through
+facets that are hard to distinguish."""
 
 from __future__ import annotations
 
@@ -169,7 +169,7 @@ def long_chain(context: Context, counts: Sequence[int]) -> Measured:
         turned = DIAMOND * np.max(length(exact.dposition[2:4]), axis=0)
         rounding = EPSILON * events * PER_EVENT
         of_direction = rounding * DIAMOND * np.max(length(exact.ddirection[2:4]), axis=0)
-        # Another facet anywhere on the way leaves another direction, coarsely. That may happen only where a hit lies
+        # Another facet anywhere on the way leaves another direction, coarsely. That may happen only where a hit is
         # closer to an edge than float32 knows it there.
         astray = length(optics.unit(high.position - low.position) - exact.direction)
         same = exact.exists & (astray < 1e-3)
@@ -328,7 +328,7 @@ def beam_near_points(_: Context, rows: Sequence[tuple[float, float]]) -> Measure
 
     Rays of a point are affine to first order only: beams are halved until a quarter of a texel does not show it."""
     solid = block((-0.5, -0.4, 0.0), (0.5, 0.4, 0.3), "N-SF11")
-    # Polygons follow a point's brightness; what is said to escape takes that of the middle of a beam, and beams from
+    # Polygons follow a point's brightness; light that escapes is counted by the middle of its beam, and beams from
     # close by are wide.
     for distance, bound in rows:
         light = PointLight("point", constant(1.0), position=(0.1, 0.05, 0.3 + distance))

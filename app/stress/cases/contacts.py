@@ -164,7 +164,7 @@ def contacts(context: Context, pairs: Sequence[Pair]) -> Measured:
     """Solids that share faces, nest or overlap, against a simpler scene of the same light
 
     Where faces coincide, rounding decides their order: light leaks or sees a face that is not there. The medium stack
-    goes by priority, not by order."""
+    follows priorities, not the order of hits."""
 
     @cache
     def drawn(scene: Callable[[], Scene], layer: str, seed: int) -> Probe:

@@ -55,7 +55,7 @@ def _in_light_of(count: int) -> Scene:
 def many_lights(context: Context, counts: Sequence[int]) -> Measured:
     """One sun in up to 256 parts; 300 are refused
 
-    A photon tells its light in 8 bits: one light more would be told as a wavelength band."""
+    A photon stores its light in 8 bits: one light more would be read as a wavelength band."""
     whole = probe(context, _in_light_of(1))
     for count in counts:
         if count > MAX_LIGHTS:
@@ -78,7 +78,7 @@ def _with_a_city(count: int) -> Scene:
 def many_objects(context: Context, counts: Sequence[int]) -> Measured:
     """A ball in a beam, and up to 65,534 glass boxes beside it; 70,000 are refused
 
-    A photon tells the object that it met first in 16 bits; what no light meets may not change the picture."""
+    A photon stores the object that it met first in 16 bits; what no light meets may not change the picture."""
     alone = probe(context, stage(_ball()))
     for count in counts:
         if count > MAX_OBJECTS:
@@ -94,7 +94,7 @@ def many_objects(context: Context, counts: Sequence[int]) -> Measured:
 def many_stones(context: Context, counts: Sequence[int]) -> Measured:
     """Up to a thousand brilliants under one sun
 
-    Light wanders from stone to stone; every share of it must be told."""
+    Light wanders from stone to stone; every share of it must be accounted for."""
     stone = brilliant(0.9)
     for count in counts:
         side = int(np.ceil(count**0.5))
@@ -177,8 +177,8 @@ def share_behind(depth: np.ndarray, cosine: float = 1.0) -> np.ndarray:
 def absorption_lines(context: Context, widths_nm: Sequence[float]) -> Measured:
     """A slab that absorbs in eight lines ever narrower, against Beer and Lambert's law with Fresnel's
 
-    Weights are known at three places of a band and straight between them: a band must not be wider than what it is to
-    tell."""
+    Weights are known at three places of a band and straight between them: a band must not be wider than the detail it
+    has to show."""
     power = BEAM.spectral_power.density
     for width in widths_nm:
         scene = behind_the_slab(width)

@@ -211,7 +211,7 @@ def power(context: Context, factors: Sequence[float]) -> Measured:
 
     Weights, sums and colours must neither vanish nor overflow, nor thresholds know the unit."""
     base = probe(context, _prism_under(SUN))
-    # A factor is no power of two, so that it rounds; choices go by shares of power.
+    # A factor is no power of two, so that it rounds; choices are made by shares of power.
     for factor in factors:
         found = probe(context, _prism_under(replace(SUN, spectral_power=brighter(SUN.spectral_power, factor))))
         held = compared(replace(found, picture=found.picture / factor), base, SAME_PICTURE, 1e-3)

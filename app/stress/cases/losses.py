@@ -1,7 +1,7 @@
 """What used to be lost in silence: unlike surfaces in contact, beams thinner than a pixel, lights at surfaces and
 lights that give none.
 
-Each severity is held to two promises: little is lost, and what is lost is said without being asked. The second is
+Each severity is held to two promises: little is lost, and what is lost is reported by itself. The second is
 judged by the tally and the picture alone; the rendering's own notices are only searched for a word.
 """
 
@@ -84,7 +84,7 @@ def _boxed(material: Material, gap: float) -> Scene:
 
 
 def _papers(gap: float) -> Scene:
-    """Two diffuse sheets in one place, of different colours; a block throws its caustic on them."""
+    """Two diffuse sheets in one place, of different colours; a block's caustic falls on them."""
     paper = SceneObject("paper", plane(3.0, 3.0), Diffuse((0.9, 0.5, 0.2)), at(0.3, 0.0, gap))
     return stage(PLACED_BLOCK, paper)
 
@@ -128,7 +128,7 @@ CONTACTS = tuple(
 def thin_beams(context: Context, widths: Sequence[float]) -> Measured:
     """A beam of one lumen from ten pixels to a millionth of one
 
-    A window smaller than a pixel falls between camera samples; float32 cannot tell its texels apart."""
+    A window smaller than a pixel falls between camera samples; float32 cannot distinguish its texels."""
     base: np.ndarray | None = None
     for pixels in widths:
         radius = 0.5 * pixels * FROM_BELOW.vertical_extent / CAUSTIC.height

@@ -46,7 +46,7 @@ EXTREMES = (
     (1.53, "V_d -20: n rises with wavelength", from_abbe(1.5, -20.0)),
 )
 NOTED = ("n 0.9", "V_d 1e-3", "V_d -20: n rises with wavelength")
-"""Those that a user must be told about: n below 1, held at 1, or rising with wavelength."""
+"""Those that a user must be warned of: n below 1, held at 1, or rising with wavelength."""
 REFUSED: tuple[Callable[[], Dispersion], ...] = (
     lambda: constant(0.0),
     lambda: constant(-1.5),
@@ -65,7 +65,7 @@ def extreme_index(context: Context, extremes: Sequence[tuple[float, str, Dispers
     """Indices from a gas to germanium, dispersion from none to all there is, and the wrong way round
 
     V_d towards 0 sends n to a thousand or below 1, and a table of n may have anything in it. What cannot be is refused,
-    what is odd is said aloud, and what can be is traced as it is."""
+    what is odd is noted, and what can be is traced as it is."""
     block, below = slab(8.0, 8.0, 1.0), screen([0, 0, -1.5], [0, 0, 1], 10.0)
     start, direction, band, sine = [-2, 0, 2.5], [1, 0, -1], (430.0, 680.0), np.sqrt(0.5)
     for severity, label, dispersion in extremes:
@@ -233,7 +233,7 @@ def order_errors(found: Photons, direction: np.ndarray, sent: np.ndarray, nm: fl
     h = min(0.05, 0.002 * steep**2 * nm)
     slope = (landing(nm + h) - landing(nm - h)) / (2e-3 * h)
     size = float(np.maximum(length(slope).max(), 1e-12))
-    # The derivative goes with 1 / cosine: its rounding with the cosine's, whose square is the difference of ones.
+    # The derivative grows as 1 / cosine, and its rounding as the cosine's, whose square is a difference of ones.
     of_column = ROUNDINGS * EPSILON / steep**2 + 1e-5
     return {
         "landing": (length(found.position - landing(nm)), ROUNDINGS * EPSILON * (1.0 + 1.0 / steep)),

@@ -132,7 +132,7 @@ def needles(context: Context, segments: Sequence[int]) -> Measured:
             "landing": (missed, width**2 / 4.0 + 24.0 * EPSILON),
             "light that slipped through": (share(photons, "direct", "escaped"), 0.0),
         }
-        # Boxes of slanting needles all overlap, and llvmpipe stops a ray's walk after 65,535 rounds: lost, and said so.
+        # Boxes of slanting needles all overlap, and llvmpipe stops a ray's walk after 65,535 rounds: lost, and noted.
         given_up = share(photons, "lost_numeric")
         note = f"{given_up:.0%} of the light given up by the software renderer" if given_up else ""
         yield traced(2.3 / width, f"{2.3 / width:.0f} : 1", photons, held, dropped=dropped(photons), note=note)
@@ -178,7 +178,7 @@ def bad_normals(context: Context, faults: Sequence[str]) -> Measured:
 # ---- files -----------------------------------------------------------------------------------
 
 SLIVER = 1e-6
-"""Height of a sliver over its length: float32 tells its corners apart, its plane hardly."""
+"""Height of a sliver over its length: float32 distinguishes its corners, its plane hardly."""
 
 
 @dataclass(frozen=True)
@@ -272,7 +272,7 @@ def mesh_files(context: Context, faults: Sequence[Fault]) -> Measured:
     """Mesh files with slivers, zero normals, doubled vertices and holes, against the sound solid
 
     Normals of nothing are NaN; slivers leak; holes confuse inside and outside: what is lost there only has to be
-    said."""
+    counted."""
 
     def lit(mesh: Mesh) -> Scene:
         return stage(*tilted(solid("solid", mesh, FLINT)), lights=[SUN])

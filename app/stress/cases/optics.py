@@ -139,7 +139,7 @@ def tir_margin(context: Context, margins: Sequence[float]) -> Measured:
     """The edge of total internal reflection, from both sides
 
     Columns grow as 1/cos² of the refracted ray, and float32 knows cos² to about 10 roundings only. The stable forms
-    lose no more than that; where cos² lies within its own rounding the ray may go either way, but stays finite and of
+    lose no more than that; where cos² is within its own rounding the ray may take either way, but stays finite and of
     unit length, and hardly any light passes there."""
     n = np.repeat(INDICES, ROWS)
     for margin in margins:
@@ -293,7 +293,7 @@ def stokes_of(field: np.ndarray, direction: np.ndarray, axis: np.ndarray) -> np.
 def polarised_chain(context: Context, counts: Sequence[int]) -> Measured:
     """Polarised light that meets many surfaces, whose planes of incidence turn at random
 
-    A state is made 1 again after every event, so what rounding errs grows where little goes on: reflection near
+    A state is made 1 again after every event, so rounding's error grows where little light remains: reflection near
     Brewster's angle of light that swings in the plane of incidence. Rotations into planes of incidence, total
     reflection's phases and the axis that states count from must not drift over many events."""
     includes = ["lib/optics.glsl", "lib/polarisation.glsl"]

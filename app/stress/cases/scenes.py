@@ -76,7 +76,7 @@ def every_shipped(context: Context, names: Sequence[str]) -> Measured:
 # ---- the sweep ---------------------------------------------------------------------------------
 
 SWEPT = {"prism": None, "achromat": ("scale", "rotation"), "brilliant": ("depth",)}
-"""The scene whose sweep runs whole without being asked for, and parts of it on scenes that are hard in that respect:
+"""The scene whose sweep runs whole by default, and parts of it on scenes that are hard in that respect:
 smooth solids that touch; long chains."""
 
 

@@ -70,7 +70,7 @@ class Photons:
     axis: SpectralAxis
     groups: Groups
     lattice_in_disc: int
-    """Lattice points inside the disc that was asked for (all of them, without one)."""
+    """Lattice points inside the given disc (all of them, without one)."""
     flux_w: float
     """Flux of a lattice point of full weight."""
     tally: FluxTally
@@ -104,7 +104,7 @@ class Photons:
         return [table[key] for key in zip(self.band.tolist(), self.records["branch_key"].tolist(), strict=True)]
 
     def of_band(self, band: int) -> Photons:
-        """Those of one of the bands that were asked for."""
+        """Those of one of the given bands."""
         return self.where(self.band == band)
 
     def where(self, chosen: np.ndarray) -> Photons:
@@ -114,7 +114,7 @@ class Photons:
 
     @property
     def band(self) -> np.ndarray:
-        """Number of each photon's band among those asked for (N,)."""
+        """Number of each photon's band among those given (N,)."""
         return self.records["light_and_source"] >> 8 & 0xFF
 
 
@@ -169,7 +169,7 @@ def trace_light(
     features = replace(Features.of(scene, RenderSettings(method=method)), tint_levels=0)
     buffers = SceneBuffers(gl.ctx, scene, features, spectral_axis(scene, features))
     room = max(2 * count * len(bands_nm), 1024)
-    # Few rays, whose footprints are as wide as the light: columns are asked for as derivatives.
+    # Few rays, whose footprints are as wide as the light: columns are derivatives.
     trace = TracePass(gl, features, buffers, room, max_depth, split_threshold=0.0, widest_on_surface=UNBOUNDED)
     try:
         space = buffers.space
