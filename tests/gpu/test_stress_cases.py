@@ -181,9 +181,9 @@ MUTANTS = {
     ),
     "leaving taken for entering": (
         "eye-inside",
-        "camera/meet.glsl",
-        "bool entering = dot(whole.direction, hit.normal_g) < 0.0,",
-        "bool entering = true,",
+        "path/event.glsl",
+        "cross_boundary(path.medium, hit.object, dot(path.direction, hit.normal_g) < 0.0)",
+        "cross_boundary(path.medium, hit.object, true)",
         "wards",
     ),
     "a sky upside down": (
