@@ -414,7 +414,7 @@ def answer(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) 
         for name, value in (asked | {"_SPECTRASPLAT_COMPLETE": f"complete_{shell}"}).items():
             monkeypatch.setenv(name, value)
         with pytest.raises(SystemExit):
-            main(["render"])
+            main([])
         captured = capsys.readouterr()
         assert captured.err == ""
         return captured.out
