@@ -144,7 +144,7 @@ def _texts(programs: Iterable[Built]) -> Fingerprint:
     hashes: dict[str, set[str]] = {}
     for built in programs:
         hashes.setdefault(f"program {built.name}", set()).add(
-            _hash(" ".join(_TOKEN.findall(text)).encode() for text in built.texts)
+            _hash(" ".join(_TOKEN.findall(text.replace("\\\n", " "))).encode() for text in built.texts)
         )
     return {name: sorted(found) for name, found in hashes.items()}
 

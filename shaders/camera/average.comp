@@ -5,8 +5,7 @@ layout(rgba32f, binding = 0) readonly uniform image2D sums;
 layout(rgba32f, binding = 1) writeonly uniform image2D picture;
 layout(location = 0) uniform float scale;
 
-void main()
-{
+void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(pixel, imageSize(sums)))) return;
     imageStore(picture, pixel, vec4(scale * imageLoad(sums, pixel).rgb, 1.0));

@@ -1,4 +1,5 @@
-// Of each block of pixels the one that sees glass or a mirror and lies nearest to the block's middle: it will be followed for all.
+// Of each block of pixels the one that sees glass or a mirror and lies nearest to the block's middle: it will be
+// followed for all.
 layout(local_size_x = 64) in;
 
 #include "camera/moving.glsl"
@@ -6,8 +7,7 @@ layout(local_size_x = 64) in;
 
 layout(r32ui, binding = IMAGE_CHOSEN) uniform restrict uimage2D chosen;
 
-void main()
-{
+void main() {
     uint at = gl_GlobalInvocationID.x;
     if (at >= specular_count) return;
     uint number = specular_pixel(at);

@@ -1,5 +1,5 @@
-// A picture in motion, glass and mirrors: every pixel takes from the chosen ones round it what those of its own surface, facing as it does, have
-// found.
+// A picture in motion, glass and mirrors: every pixel takes from the chosen ones round it what those of its own
+// surface, facing as it does, have found.
 layout(local_size_x = 64) in;
 
 #include "camera/moving.glsl"
@@ -9,7 +9,7 @@ layout(r32ui, binding = IMAGE_CHOSEN) uniform readonly restrict uimage2D chosen;
 // Which way the chosen ones' surfaces face, and the objects that these are of.
 layout(rgba32f, binding = IMAGE_FACING) uniform readonly restrict image2D facing;
 layout(rgba32f, binding = IMAGE_FOUND) uniform readonly restrict image2D found;
-#ifdef COATS
+#if COATS
 layout(rgba32f, binding = IMAGE_PICTURE) uniform restrict image2D picture;
 #else
 layout(rgba32f, binding = IMAGE_PICTURE) uniform writeonly restrict image2D picture;
@@ -18,16 +18,14 @@ layout(rgba32f, binding = IMAGE_PICTURE) uniform writeonly restrict image2D pict
 // What a neighbour on another facet counts: it is all there is where a block shows several.
 const float OTHER_FACET = 2e-4;
 
-// A quadratic B-spline about 0, in blocks: it ends, smoothly, where the block next but one begins. A weight that ended before that would draw the
-// border of every block beside something much brighter.
-float spline(float away)
-{
+// A quadratic B-spline about 0, in blocks: it ends, smoothly, where the block next but one begins. A weight that ended
+// before that would draw the border of every block beside something much brighter.
+float spline(float away) {
     float inner = 0.75 - away * away, outer = max(1.5 - away, 0.0);
     return away < 0.5 ? inner : 0.5 * outer * outer;
 }
 
-void main()
-{
+void main() {
     uint at = gl_GlobalInvocationID.x;
     if (at >= specular_count) return;
     uvec2 pixel = pixel_of(specular_pixel(at)), first = seen_first(pixel);
@@ -41,7 +39,8 @@ void main()
         if (best != NONE) {
             uvec2 at = pixel_of(bitfieldExtract(best, 0, NUMBER_BITS));
             vec4 other = imageLoad(facing, near);
-            // From the block's middle, wherever in it the chosen pixel lies: so weights have no borders but the spline's.
+            // From the block's middle, wherever in it the chosen pixel lies: so weights have no borders but the
+            // spline's.
             vec2 away = abs((vec2(pixel) + 0.5) / float(m.glass_step) - (vec2(near) + 0.5));
             float alike = max(dot(other.xyz, normal), 0.0);
             for (int power = 2; power <= 16; power *= 2) alike *= alike;
@@ -52,7 +51,7 @@ void main()
         }
     }
     vec3 followed = sum.rgb / max(sum.w, 1e-30);
-#ifdef COATS
+#if COATS
     // A coat adds to its base.
     if (kind_of(first) == KIND_DIFFUSE) followed += imageLoad(picture, ivec2(pixel)).rgb;
 #endif

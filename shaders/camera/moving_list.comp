@@ -6,10 +6,13 @@ layout(local_size_x = 8, local_size_y = 8) in;
 layout(r32ui, binding = IMAGE_CHOSEN) uniform readonly restrict uimage2D chosen;
 layout(rgba32f, binding = IMAGE_PICTURE) uniform writeonly restrict image2D found;
 layout(rgba32f, binding = IMAGE_FACING) uniform writeonly restrict image2D facing;
-layout(std430, binding = BIND_LISTED) restrict buffer Listed { uint listed_count; uint halted_count; uint listed[]; };
+layout(std430, binding = BIND_LISTED) restrict buffer Listed {
+    uint listed_count;
+    uint halted_count;
+    uint listed[];
+};
 
-void main()
-{
+void main() {
     uvec2 block = gl_GlobalInvocationID.xy;
     if (any(greaterThanEqual(block, m.blocks))) return;
     uint best = imageLoad(chosen, ivec2(block)).x;

@@ -6,8 +6,7 @@ layout(local_size_x = 64) in;
 layout(rgba32f, binding = IMAGE_PICTURE) uniform writeonly restrict image2D picture;
 #include "camera/moving_lists.glsl"
 
-void main()
-{
+void main() {
     uint at = gl_GlobalInvocationID.x;
     if (at >= uneven_count) return;
     uvec2 pixel = pixel_of(pixels[at]), first = seen_first(pixel);
@@ -16,7 +15,7 @@ void main()
     lights_seen = look_index = 0u;
     Path path = path_from(pixel, PIXEL_MIDDLE, 1.0);
     Hit hit = hit_on(first, path);
-#if defined(LAYER_BEAUTY) && defined(VISIBLE_LIGHTS)
+#if LAYER_BEAUTY && VISIBLE_LIGHTS
     add_lights(path, met ? hit.distance : FAR_DISTANCE);
 #endif
     if (!met || kind_of(first) == KIND_DIFFUSE) add_end(path, met, hit, true, 0u);

@@ -1,93 +1,92 @@
 // Where a path ends in something that shines, it looks up along its spectral sweep what is there. A path that was never
-// bent by dispersive glass looks once; another as often as its sweep is long, and what lies between two lookups is averaged.
-#ifndef CAMERA_TAPS_GLSL
-#define CAMERA_TAPS_GLSL
-
-#ifdef SPECTRAL_SWEEP
-// Where the lookup number `tap` of so many begins: each stands for as much of what looks bright, and looks in the midst of it.
-float tap_border(Path path, vec2 brightness, float tap, int taps)
-{
-    return tap <= 0.0 ? path.band.x : (tap >= float(taps) ? path.band.z : clamp(quantile(brightness, tap / float(taps)), path.band.x, path.band.z));
+// bent by dispersive glass looks once; another as often as its sweep is long, and what lies between two lookups is
+// averaged. Where the lookup number `tap` of so many begins: each stands for as much of what looks bright, and looks in
+// the midst of it.
+float tap_border(Path path, vec2 brightness, float tap, int taps) {
+    return tap <= 0.0
+        ? path.band.x
+        : (tap >= float(taps) ? path.band.z : clamp(quantile(brightness, tap / float(taps)), path.band.x, path.band.z));
 }
 
 // A sweep shorter than this, in widths of a pixel, does not show.
 #define MIN_SWEEP 0.2
 
 // Sweep of the path over the distance ahead, in widths of a pixel.
-float sweep_pixels(Path path, float distance)
-{
-    vec3 p_lo = path.end_position[0], d_lo = path.end_direction[0], p_hi = path.end_position[1], d_hi = path.end_direction[1];
+float sweep_pixels(Path path, float distance) {
+    vec3 p_lo = path.end_position[0], d_lo = path.end_direction[0], p_hi = path.end_position[1],
+         d_hi = path.end_direction[1];
     float reach = min(distance, 1e4);
     vec3 sweep = (p_hi - p_lo) + reach * (d_hi - d_lo);
     sweep -= dot(sweep, path.direction) * path.direction;
-    vec3 side_s = path.dposition[0] + reach * path.ddirection[0], side_t = path.dposition[1] + reach * path.ddirection[1];
+    vec3 side_s = path.dposition[0] + reach * path.ddirection[0],
+         side_t = path.dposition[1] + reach * path.ddirection[1];
     float pixel = sqrt(max(length(cross(side_s, side_t)), 1e-20));
     return length(sweep) / pixel;
 }
 
-// The same in widths of what has to tell colours apart: a pixel, or of the lobe of a rough surface, which is many pixels wide, a sample's share.
-float shown_sweep(Path path, float distance)
-{
-#ifdef ROUGH_SURFACES
-    return sweep_pixels(path, distance) / (path.walk.ground != 0u ? sample_side(path) : 1.0);
-#else
-    return sweep_pixels(path, distance);
-#endif
+// The same in widths of what has to tell colours apart: a pixel, or of the lobe of a rough surface, which is many
+// pixels wide, a sample's share.
+float shown_sweep(Path path, float distance) {
+    if (ROUGH_SURFACES) {
+        return sweep_pixels(path, distance) / (path.walk.ground != 0u ? sample_side(path) : 1.0);
+    } else {
+        return sweep_pixels(path, distance);
+    }
 }
 
-// Looks that this sweep needs: where it shows at all, one for either half; the fewer, the less of the sample the path is.
-int taps_of(Path path, float distance)
-{
+// Looks that this sweep needs: where it shows at all, one for either half; the fewer, the less of the sample the path
+// is.
+int taps_of(Path path, float distance) {
     float pixels = shown_sweep(path, distance);
-    return clamp(int(min(ceil(pixels * p.taps_per_pixel), float(p.max_taps)) * sqrt(min(path.walk.branch_weight, 1.0)) + 0.99), pixels > MIN_SWEEP ? 2 : 1, int(p.max_taps));
+    return clamp(
+        int(min(ceil(pixels * p.taps_per_pixel), float(p.max_taps)) * sqrt(min(path.walk.branch_weight, 1.0)) + 0.99),
+        pixels > MIN_SWEEP ? 2 : 1, int(p.max_taps));
 }
-#endif
 
 // Radiance from infinitely far away, as coefficients of the reflectance basis.
-vec3 sky_colour(vec3 direction, vec3 ddirection[3])
-{
-#ifdef HAS_ENVIRONMENT_MAP
-    vec3 local = p.sky_x * direction.x + p.sky_y * direction.y + p.sky_z * direction.z;
-    vec3 columns[3];
-    for (int c = 0; c < 3; ++c) columns[c] = p.sky_x * ddirection[c].x + p.sky_y * ddirection[c].y + p.sky_z * ddirection[c].z;
-    // A box of the same covariance, in the plane across the ray.
-    vec3 across = normalize(cross(local, abs(local.z) < 0.9 ? vec3(0.0, 0.0, 1.0) : vec3(1.0, 0.0, 0.0)));
-    vec3 other = cross(local, across);
-    vec2 flat_columns[3];
-    for (int c = 0; c < 3; ++c) flat_columns[c] = vec2(dot(columns[c], across), dot(columns[c], other));
-    vec2 major, minor;
-    box_of_three(flat_columns[0], flat_columns[1], flat_columns[2], major, minor);
-    return environment_radiance(local, major.x * across + major.y * other, minor.x * across + minor.y * other);
-#else
-    return p.background.rgb;
-#endif
+vec3 sky_colour(vec3 direction, vec3 ddirection[3]) {
+    if (HAS_ENVIRONMENT_MAP) {
+        vec3 local = p.sky_x * direction.x + p.sky_y * direction.y + p.sky_z * direction.z;
+        vec3 columns[3];
+        for (int c = 0; c < 3; ++c)
+            columns[c] = p.sky_x * ddirection[c].x + p.sky_y * ddirection[c].y + p.sky_z * ddirection[c].z;
+        // A box of the same covariance, in the plane across the ray.
+        vec3 across = normalize(cross(local, abs(local.z) < 0.9 ? vec3(0.0, 0.0, 1.0) : vec3(1.0, 0.0, 0.0)));
+        vec3 other = cross(local, across);
+        vec2 flat_columns[3];
+        for (int c = 0; c < 3; ++c) flat_columns[c] = vec2(dot(columns[c], across), dot(columns[c], other));
+        vec2 major, minor;
+        box_of_three(flat_columns[0], flat_columns[1], flat_columns[2], major, minor);
+        return environment_radiance(local, major.x * across + major.y * other, minor.x * across + minor.y * other);
+    } else {
+        return p.background.rgb;
+    }
 }
 
-#ifdef LAYER_BEAUTY
-void add_sky(Path path, WavelengthInterval interval, vec3 direction, vec3 sweep)
-{
+void add_sky(Path path, WavelengthInterval interval, vec3 direction, vec3 sweep) {
     vec3 columns[3];
     columns[0] = sample_side(path) * path.ddirection[0];
     columns[1] = sample_side(path) * path.ddirection[1];
-#ifdef LENS
-    join_sides(path.direction, columns[0], columns[1], sample_side(path) * path.ddirection[LENS_COLUMNS], sample_side(path) * path.ddirection[LENS_COLUMNS + 1]);
-#endif
+    if (LENS) {
+        join_sides(path.direction, columns[0], columns[1], sample_side(path) * path.ddirection[LENS_COLUMNS],
+            sample_side(path) * path.ddirection[LENS_COLUMNS + 1]);
+    }
     columns[2] = sweep;
     add_colour(path, interval, uint(WHITE_ROW), sky_colour(direction, columns));
 }
 
-#ifdef VISIBLE_LIGHTS
 // Diameter of what a sample stands for: where its ray starts (GPU units), and how that grows with distance.
-vec2 sample_width(Path path)
-{
-    return sample_side(path) * sqrt(vec2(length(cross(path.dposition[0], path.dposition[1])), length(cross(path.ddirection[0], path.ddirection[1]))));
+vec2 sample_width(Path path) {
+    return sample_side(path)
+        * sqrt(vec2(length(cross(path.dposition[0], path.dposition[1])),
+            length(cross(path.ddirection[0], path.ddirection[1]))));
 }
 
-#ifdef LENS
+#if LENS
 // The same of lights infinitely far away, where a place on the lens is but a direction.
-vec2 far_width(Path path, vec2 width)
-{
-    float by_lens = sample_side(path) * sample_side(path) * length(cross(path.ddirection[LENS_COLUMNS], path.ddirection[LENS_COLUMNS + 1]));
+vec2 far_width(Path path, vec2 width) {
+    float by_lens = sample_side(path) * sample_side(path)
+        * length(cross(path.ddirection[LENS_COLUMNS], path.ddirection[LENS_COLUMNS + 1]));
     return vec2(width.x, sqrt(width.y * width.y + by_lens));
 }
 #define WIDTH_OF(light) (light.kind == LIGHT_KIND_DIRECTIONAL ? by_lens : width)
@@ -96,16 +95,16 @@ vec2 far_width(Path path, vec2 width)
 #endif
 
 // Lights that can be seen over the distance `far`; edges are as soft as what the ray stands for is wide.
-void add_lights(Path path, float far)
-{
+void add_lights(Path path, float far) {
     vec2 width = sample_width(path), sweep = vec2(0.0);
     int taps = 1;
-#ifdef LENS
+#if LENS
     vec2 by_lens = far_width(path, width);
 #endif
-#ifdef SPECTRAL_SWEEP
+#if SPECTRAL_SWEEP
     if (path.restricted != 0u) {
-        vec3 p_lo = path.end_position[0], d_lo = path.end_direction[0], p_hi = path.end_position[1], d_hi = path.end_direction[1];
+        vec3 p_lo = path.end_position[0], d_lo = path.end_direction[0], p_hi = path.end_position[1],
+             d_hi = path.end_direction[1];
         sweep = vec2(distance(p_lo, p_hi), distance(d_lo, d_hi));
         taps = taps_of(path, far);
     }
@@ -115,38 +114,31 @@ void add_lights(Path path, float far)
     bool near = false;
     for (uint i = 0u; i < uint(LIGHT_COUNT); ++i) {
         CameraLight light = lights[i];
-        near = near || (light.measure > 0.0 && light_seen(light, path.position, path.direction, far, 2.0 * (WIDTH_OF(light) + sweep)) > 0.0);
+        near = near
+            || (light.measure > 0.0
+                && light_seen(light, path.position, path.direction, far, 2.0 * (WIDTH_OF(light) + sweep)) > 0.0);
     }
-#ifdef LISTS_SPECULAR
-    saw_light = saw_light || near;
-#endif
+    if (LISTS_SPECULAR) saw_light = saw_light || near;
     for (int tap = 0; tap < taps && near; ++tap) {
         vec3 position = path.position, direction = path.direction;
         float lo = path.band.x, hi = path.band.z, part = 1.0;
-#ifdef SPECTRAL_SWEEP
-        if (taps > 1) {
+        if (SPECTRAL_SWEEP && taps > 1) {
             lo = tap_border(path, brightness, float(tap), taps);
             hi = tap_border(path, brightness, float(tap + 1), taps);
             part = (hi - lo) / (path.band.z - path.band.x);
             ray_at(path, tap_border(path, brightness, float(tap) + 0.5, taps), position, direction);
         }
-#endif
         WavelengthInterval interval = wavelength_interval(path, lo, hi);
         for (uint i = 0u; i < uint(LIGHT_COUNT); ++i) {
             CameraLight light = lights[i];
-            float seen = light.measure > 0.0 ? light_seen(light, position, direction, far, WIDTH_OF(light) + sweep * part) : 0.0;
-#ifdef COATS
-            seen *= share_of_lobe(path, light, position, direction);
-#endif
+            float seen =
+                light.measure > 0.0 ? light_seen(light, position, direction, far, WIDTH_OF(light) + sweep * part) : 0.0;
+            if (COATS) seen *= share_of_lobe(path, light, position, direction);
             if (seen > 0.0) add_spectrum(path, interval, uint(LIGHT_ROW) + i * uint(ROWS_PER_LIGHT), seen);
         }
     }
 }
-#endif
-#endif
 
-
-#ifdef SPECTRAL_SWEEP
 // Where the rays of a band arrive on one facet: a parabola with the columns' slope, through both ends.
 struct ArrivalCurve {
     vec3 middle;
@@ -154,16 +146,14 @@ struct ArrivalCurve {
     float anchors[SPECTRAL_GROUPS];  // of the groups' variables, at the middle
     vec3 lo;
     vec3 hi;
-    vec3 bends[2];                   // of both ends, off the columns
+    vec3 bends[2];  // of both ends, off the columns
 };
 
-vec3 arrival(vec3 position, vec3 direction, Hit hit, vec3 middle)
-{
+vec3 arrival(vec3 position, vec3 direction, Hit hit, vec3 middle) {
     return position + dot(hit.normal_g, middle - position) / dot(hit.normal_g, direction) * direction;
 }
 
-ArrivalCurve arrival_curve(Path path, Hit hit)
-{
+ArrivalCurve arrival_curve(Path path, Hit hit) {
     ArrivalCurve curve;
     curve.middle = path.position + hit.distance * path.direction;
     curve.lo = arrival(path.end_position[0], path.end_direction[0], hit, curve.middle);
@@ -171,7 +161,8 @@ ArrivalCurve arrival_curve(Path path, Hit hit)
     curve.bends[0] = curve.lo - curve.middle;
     curve.bends[1] = curve.hi - curve.middle;
     for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
-        curve.columns[g] = transfer_column(path.dposition[SPATIAL + g], path.ddirection[SPATIAL + g], path.direction, hit.normal_g, hit.distance);
+        curve.columns[g] = transfer_column(
+            path.dposition[SPATIAL + g], path.ddirection[SPATIAL + g], path.direction, hit.normal_g, hit.distance);
         curve.anchors[g] = spectral_row(uint(VARIABLE_ROW) + g, path.band.y);
         curve.bends[0] -= path.end_step[g].x * curve.columns[g];
         curve.bends[1] -= path.end_step[g].y * curve.columns[g];
@@ -179,62 +170,60 @@ ArrivalCurve arrival_curve(Path path, Hit hit)
     return curve;
 }
 
-vec3 arrival_at(Path path, ArrivalCurve curve, float x)
-{
+vec3 arrival_at(Path path, ArrivalCurve curve, float x) {
     bool below = x < path.band.y;
     float reach = (x - path.band.y) / max(abs((below ? path.band.x : path.band.z) - path.band.y), 1e-9);
     vec3 at = curve.middle + reach * reach * (below ? curve.bends[0] : curve.bends[1]);
-    for (int g = 0; g < SPECTRAL_GROUPS; ++g) at += (spectral_row(uint(VARIABLE_ROW) + g, x) - curve.anchors[g]) * curve.columns[g];
+    for (int g = 0; g < SPECTRAL_GROUPS; ++g)
+        at += (spectral_row(uint(VARIABLE_ROW) + g, x) - curve.anchors[g]) * curve.columns[g];
     return at;
 }
-#endif
 
-// A path that has met nothing, or a diffuse surface. Without a sweep that is one lookup. Where all of a sweep ends on the facet that the path's own
-// wavelength met (`same_hit`), its lookups are of that; else every lookup finds out for itself.
-void add_end(Path path, bool met, Hit hit, bool same_hit, uint pixel_key)
-{
+// A path that has met nothing, or a diffuse surface. Without a sweep that is one lookup. Where all of a sweep ends on
+// the facet that the path's own wavelength met (`same_hit`), its lookups are of that; else every lookup finds out for
+// itself.
+void add_end(Path path, bool met, Hit hit, bool same_hit, uint pixel_key) {
     int taps = 1;
-#ifdef SPECTRAL_SWEEP
+#if SPECTRAL_SWEEP
     if (path.restricted != 0u) taps = taps_of(path, met ? hit.distance : FAR_DISTANCE);
-#ifndef HAS_ENVIRONMENT_MAP
-    // The same all round.
-    if (same_hit && !met) taps = 1;
-#endif
+    if (!HAS_ENVIRONMENT_MAP) {
+        // The same all round.
+        if (same_hit && !met) taps = 1;
+    }
     vec2 brightness = brightness_of(path.band);
     float per_x = 1.0 / (path.band.z - path.band.x), hi = path.band.x;
-    vec3 p_lo = path.end_position[0], d_lo = path.end_direction[0], p_hi = path.end_position[1], d_hi = path.end_direction[1];
+    vec3 p_lo = path.end_position[0], d_lo = path.end_direction[0], p_hi = path.end_position[1],
+         d_hi = path.end_direction[1];
 #else
     float hi = path.band.x;
 #endif
-#ifdef HAS_RECEIVERS
+#if HAS_RECEIVERS
     SurfaceInteraction seen;
     Triangle facet;
-#ifdef HAS_TEXTURES
+#if HAS_TEXTURES
     uint texture = NONE;
     Paint paint;
 #endif
     if (met) {
         facet = triangle_at(hit.primitive);
-#ifdef LAYER_BEAUTY
+#if LAYER_BEAUTY
         vec3 at = surface_point(hit, facet, path.position, path.direction);
 #else
         vec3 at = path.position + hit.distance * path.direction;
 #endif
         seen = seen_on(path, hit, facet, at, path.direction);
-#ifdef HAS_TEXTURES
-        texture = object_at(hit.object).texture;
-        if (texture != NONE) paint = paint_of(texture, facet.source, facet);
-#endif
+        if (HAS_TEXTURES) {
+            texture = object_at(hit.object).texture;
+            if (texture != NONE) paint = paint_of(texture, facet.source, facet);
+        }
     }
     Steady steady = no_steady_lights();
-#ifdef SPECTRAL_SWEEP
+#if SPECTRAL_SWEEP
     ArrivalCurve curve;
     bool traced = taps > 1 && same_hit && met;
     if (traced) {
         curve = arrival_curve(path, hit);
-#ifdef LAYER_BEAUTY
-        steady = steady_lights(seen, curve.lo, curve.hi, pixel_key);
-#endif
+        if (LAYER_BEAUTY) steady = steady_lights(seen, curve.lo, curve.hi, pixel_key);
     }
 #endif
 #endif
@@ -244,80 +233,69 @@ void add_end(Path path, bool met, Hit hit, bool same_hit, uint pixel_key)
         vec3 direction = path.direction;
         bool ends = met;
         hi = path.band.z;
-#ifdef SPECTRAL_SWEEP
-        vec3 position = path.position;
-        float x = path.band.y;
-        if (taps > 1) {
-            x = tap_border(path, brightness, float(i) + 0.5, taps);
-            hi = tap_border(path, brightness, float(i + 1), taps);
-            part = (hi - lo) * per_x;
-        }
-#ifdef HAS_RECEIVERS
-        if (traced) {
-            seen.position = arrival_at(path, curve, x);
-            seen.dposition[2] = part * (curve.hi - curve.lo);
-        }
-#endif
-        if (taps > 1 && !(same_hit && met)) {
-            ray_at(path, x, position, direction);
-#ifdef HAS_RECEIVERS
-            if (!same_hit) {
-                Hit found;
-                ends = intersect_closest(position, direction, FAR_DISTANCE, path.origin, found);
-                uint kind = ends ? object_at(found.object).kind : NONE;
-                if (is_specular(kind)) {
-                    // This colour goes on where the middle one ended: it is given what that one sees.
-                    ends = met;
-                    found = hit;
-                    if (met) found.distance = dot(hit.normal_g, path.position + hit.distance * path.direction - position) / dot(hit.normal_g, direction);
-                }
-                if (ends) {
-                    facet = triangle_at(found.primitive);
-                    seen = seen_on(path, found, facet, position + found.distance * direction, direction);
-                    vec3 sweep = part * (p_hi - p_lo + found.distance * (d_hi - d_lo));
-                    seen.dposition[2] = sweep - (dot(sweep, found.normal_g) / dot(direction, found.normal_g)) * direction;
-#ifdef HAS_TEXTURES
-                    texture = object_at(found.object).texture;
-                    if (texture != NONE) paint = paint_of(texture, facet.source, facet);
-#endif
+        if (SPECTRAL_SWEEP) {
+            vec3 position = path.position;
+            float x = path.band.y;
+            if (taps > 1) {
+                x = tap_border(path, brightness, float(i) + 0.5, taps);
+                hi = tap_border(path, brightness, float(i + 1), taps);
+                part = (hi - lo) * per_x;
+            }
+            if (HAS_RECEIVERS && traced) {
+                seen.position = arrival_at(path, curve, x);
+                seen.dposition[2] = part * (curve.hi - curve.lo);
+            }
+            if (taps > 1 && !(same_hit && met)) {
+                ray_at(path, x, position, direction);
+                if (HAS_RECEIVERS && !same_hit) {
+                    Hit found;
+                    ends = intersect_closest(position, direction, FAR_DISTANCE, path.origin, found);
+                    uint kind = ends ? object_at(found.object).kind : NONE;
+                    if (is_specular(kind)) {
+                        // This colour goes on where the middle one ended: it is given what that one sees.
+                        ends = met;
+                        found = hit;
+                        if (met)
+                            found.distance = dot(hit.normal_g, path.position + hit.distance * path.direction - position)
+                                / dot(hit.normal_g, direction);
+                    }
+                    if (ends) {
+                        facet = triangle_at(found.primitive);
+                        seen = seen_on(path, found, facet, position + found.distance * direction, direction);
+                        vec3 sweep = part * (p_hi - p_lo + found.distance * (d_hi - d_lo));
+                        seen.dposition[2] =
+                            sweep - (dot(sweep, found.normal_g) / dot(direction, found.normal_g)) * direction;
+                        if (HAS_TEXTURES) {
+                            texture = object_at(found.object).texture;
+                            if (texture != NONE) paint = paint_of(texture, facet.source, facet);
+                        }
+                    }
                 }
             }
-#endif
         }
-#endif
         WavelengthInterval interval = wavelength_interval(path, lo, hi);
-#ifdef HAS_RECEIVERS
-        if (ends && object_at(seen.object).kind == KIND_DIFFUSE) {
-#ifdef HAS_TEXTURES
-            if (texture != NONE) seen.reflectance = object_colours[seen.object].rgb * painted(paint, seen);
-#endif
-#if defined(COATS) && defined(CAMERA_SPECULAR)
+        if (HAS_RECEIVERS && ends && object_at(seen.object).kind == KIND_DIFFUSE) {
+            if (HAS_TEXTURES) {
+                if (texture != NONE) seen.reflectance = object_colours[seen.object].rgb * painted(paint, seen);
+            }
+#if COATS && CAMERA_SPECULAR
             bool coated = is_coated(seen.object);
             if (coated) add_coat_lights(path, seen, interval, pixel_key);
             // The base of what is seen first is left to the program for what is seen directly.
             if (!coated || path.depth > 0u) {
 #endif
-            add_caustic(path, seen, interval);
-#ifdef LAYER_BEAUTY
-            add_direct(path, seen, interval, pixel_key, steady);
-#ifdef RECEIVER_LIGHT
-            add_receiver_light(path, seen, interval);
-#endif
-#endif
-#if defined(COATS) && defined(CAMERA_SPECULAR)
+                add_caustic(path, seen, interval);
+                if (LAYER_BEAUTY) {
+                    add_direct(path, seen, interval, pixel_key, steady);
+                    if (RECEIVER_LIGHT) add_receiver_light(path, seen, interval);
+                }
+#if COATS && CAMERA_SPECULAR
             }
 #endif
         }
-#endif
-#ifdef LAYER_BEAUTY
-#ifdef SPECTRAL_SWEEP
-        vec3 direction_change = part * (d_hi - d_lo);
-#else
-        vec3 direction_change = vec3(0.0);
-#endif
-        if (!ends) add_sky(path, interval, direction, direction_change);
-#endif
+        if (LAYER_BEAUTY) {
+            vec3 direction_change = SPECTRAL_SWEEP ? part * (d_hi - d_lo) : vec3(0.0);
+            if (!ends) add_sky(path, interval, direction, direction_change);
+        }
     }
 }
-
-#endif

@@ -1,26 +1,27 @@
-// The first surface of every pixel, by the rasteriser: a software renderer finds it twenty times as fast so as by a ray a pixel.
+// The first surface of every pixel, by the rasteriser: a software renderer finds it twenty times as fast so as by a ray
+// a pixel.
 layout(std140, binding = BIND_PARAMETERS) uniform Parameters { CameraParameters p; };
-layout(location = 0) in vec3 position;   // GPU space
+layout(location = 0) in vec3 position;  // GPU space
 layout(location = 1) in uint primitive;  // as rays number it
 layout(location = 2) in uint object;
 layout(location = 0) uniform vec2 depths;  // nearest and farthest that is drawn, GPU units along `forward`
-#ifdef DISTANCES
+#if DISTANCES
 out vec3 way_from_camera;
 #else
 flat out uvec2 seen;
 #endif
 
-void main()
-{
+void main() {
     vec3 way = position - p.position;
     float depth = dot(way, p.forward);
-    vec2 place = vec2(dot(way, p.half_right) / dot(p.half_right, p.half_right), dot(way, p.half_up) / dot(p.half_up, p.half_up));
+    vec2 place =
+        vec2(dot(way, p.half_right) / dot(p.half_right, p.half_right), dot(way, p.half_up) / dot(p.half_up, p.half_up));
     float span = depths.y - depths.x;
-#ifdef DISTANCES
-    way_from_camera = way;
-#else
-    seen = uvec2(primitive, object);
-#endif
+    if (DISTANCES) {
+        way_from_camera = way;
+    } else {
+        seen = uvec2(primitive, object);
+    }
     // Row 0 is the picture's top: no flip is needed where pictures are read by rows.
     gl_Position = p.orthographic != 0u
         ? vec4(place.x, -place.y, (2.0 * depth - depths.x - depths.y) / span, 1.0)

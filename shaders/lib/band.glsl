@@ -1,11 +1,11 @@
-// What differs over a band of the spectrum, known at three places of it: its lowest wavelength, the anchor that its path is traced at, its
-// highest one. And where total internal reflection sets in inside it.
+// What differs over a band of the spectrum, known at three places of it: its lowest wavelength, the anchor that its
+// path is traced at, its highest one. And where total internal reflection sets in inside it.
 #ifndef BAND_GLSL
 #define BAND_GLSL
 
 #include "lib/medium.glsl"
 #include "lib/optics.glsl"
-#ifdef POLARISED
+#if POLARISED
 #include "lib/polarisation.glsl"
 #endif
 
@@ -17,42 +17,40 @@
 #define ONSET_HALVINGS 18
 
 // Weights at the places x of a band, straight between the three known ones.
-vec3 band_weights(vec3 band, vec3 weight, vec3 x)
-{
+vec3 band_weights(vec3 band, vec3 weight, vec3 x) {
     vec3 below = clamp((x - band.x) / max(band.y - band.x, 1e-9), 0.0, 1.0);
     vec3 above = clamp((x - band.y) / max(band.z - band.y, 1e-9), 0.0, 1.0);
     return mix(mix(vec3(weight.x), vec3(weight.y), below), vec3(weight.z), above);
 }
 
-#ifdef POLARISED
-// State of polarisation at the places x of a band: Stokes parameters times weights are straight between the three known ones.
-Polarisation band_polarisation(Polarisation state, vec3 band, vec3 weight, vec3 x)
-{
+#if POLARISED
+// State of polarisation at the places x of a band: Stokes parameters times weights are straight between the three known
+// ones.
+Polarisation band_polarisation(Polarisation state, vec3 band, vec3 weight, vec3 x) {
     vec3 per_weight = 1.0 / max(band_weights(band, weight, x), 1e-30);
     return Polarisation(state.axis, band_weights(band, weight * state.q, x) * per_weight,
         band_weights(band, weight * state.u, x) * per_weight, band_weights(band, weight * state.v, x) * per_weight);
 }
 #endif
 
-// Whether both parts of a cut band may set out again from starts moved by `low` and `high` from the path's own: so far that another surface
-// may lie in between they may not. `distance`: to the surface ahead, GPU units.
-bool starts_stay_near(vec3 low, vec3 high, float distance)
-{
+// Whether both parts of a cut band may set out again from starts moved by `low` and `high` from the path's own: so far
+// that another surface may lie in between they may not. `distance`: to the surface ahead, GPU units.
+bool starts_stay_near(vec3 low, vec3 high, float distance) {
     float allowed = min(MAX_MOVED_START, 0.1 * distance);
     return max(dot(low, low), dot(high, high)) < allowed * allowed;
 }
 
 #if SPECTRAL_GROUPS > 0
 // Change of group g's variable from the anchor to x.
-float variable_step(uint g, float x, float x_anchor)
-{
+float variable_step(uint g, float x, float x_anchor) {
     return spectral_row(uint(VARIABLE_ROW) + g, x) - spectral_row(uint(VARIABLE_ROW) + g, x_anchor);
 }
 
-// The place in the band where total internal reflection sets in, in the half whose ends `passes` tells apart. The cosine of incidence is
-// `theta` at the anchor, and changes by `dtheta` a unit of each group's variable and besides by `straight`, straight in x, to either end.
-float total_reflection_onset(vec3 band, float theta, float dtheta[SPECTRAL_GROUPS], vec2 straight, MediumInterface boundary, bvec3 passes)
-{
+// The place in the band where total internal reflection sets in, in the half whose ends `passes` tells apart. The
+// cosine of incidence is `theta` at the anchor, and changes by `dtheta` a unit of each group's variable and besides by
+// `straight`, straight in x, to either end.
+float total_reflection_onset(
+    vec3 band, float theta, float dtheta[SPECTRAL_GROUPS], vec2 straight, MediumInterface boundary, bvec3 passes) {
     bool low_side = passes.x != passes.y;
     float a = low_side ? band.x : band.y, b = low_side ? band.y : band.z;
     bool passes_a = low_side ? passes.x : passes.y;
@@ -62,7 +60,8 @@ float total_reflection_onset(vec3 band, float theta, float dtheta[SPECTRAL_GROUP
     for (int i = 0; i < ONSET_HALVINGS; ++i) {
         float x = 0.5 * (a + b);
         float theta_x = theta + abs(x - band.y) * per_reach * straight_end;
-        for (int g = 0; g < SPECTRAL_GROUPS; ++g) theta_x += dtheta[g] * (spectral_row(uint(VARIABLE_ROW) + uint(g), x) - anchors[g]);
+        for (int g = 0; g < SPECTRAL_GROUPS; ++g)
+            theta_x += dtheta[g] * (spectral_row(uint(VARIABLE_ROW) + uint(g), x) - anchors[g]);
         float eta_x = medium_index(boundary.before, x) / medium_index(boundary.after, x);
         bool passes_x = transmitted_cosine2(clamp(theta_x, -1.0, -1e-6), eta_x) > 0.0;
         a = passes_x == passes_a ? x : a;

@@ -1,13 +1,9 @@
 // What hangs over a place on a receiver, found by a ray straight up.
-#ifndef COVERED_GLSL
-#define COVERED_GLSL
-
 #include "lib/receiver_light.glsl"
 
-// Whether something hangs over it nearer than `reach`, or holds it: solids may be sunk into a floor. A room that holds other things does
-// not count. `origin`: of the side of the receiver, whose unit normal is `normal`.
-bool is_covered(sampler2D map, RayOrigin origin, vec3 position, vec3 normal, float reach)
-{
+// Whether something hangs over it nearer than `reach`, or holds it: solids may be sunk into a floor. A room that holds
+// other things does not count. `origin`: of the side of the receiver, whose unit normal is `normal`.
+bool is_covered(sampler2D map, RayOrigin origin, vec3 position, vec3 normal, float reach) {
     Hit hit;
     bool covered = false;
     if (intersect_closest(position, normal, FAR_DISTANCE, origin, hit) && hit.object != origin.object) {
@@ -18,5 +14,3 @@ bool is_covered(sampler2D map, RayOrigin origin, vec3 position, vec3 normal, flo
     }
     return covered;
 }
-
-#endif

@@ -3,15 +3,11 @@
 // - point, spot, area: directions on Lambert's azimuthal equal-area plane round an axis, so that
 //   solid angle is area and a regular lattice stays regular up to the whole sphere;
 // - directional, collimated: positions on a plane across the direction.
-#ifndef EMISSION_GLSL
-#define EMISSION_GLSL
-
 #include "lib/lattice.glsl"
 
 // Direction at the point q of Lambert's azimuthal equal-area plane (|q| <= 2), local frame with z
 // the axis, and its derivatives along both axes of the plane.
-vec3 azimuthal_direction(vec2 q, out vec3 ddirection_dx, out vec3 ddirection_dy)
-{
+vec3 azimuthal_direction(vec2 q, out vec3 ddirection_dx, out vec3 ddirection_dy) {
     float r2 = dot(q, q);
     float k = sqrt(max(1.0 - 0.25 * r2, 1e-12));
     ddirection_dx = vec3(k - q.x * q.x / (4.0 * k), -q.x * q.y / (4.0 * k), -q.x);
@@ -20,8 +16,7 @@ vec3 azimuthal_direction(vec2 q, out vec3 ddirection_dx, out vec3 ddirection_dy)
 }
 
 // Uniform point of the unit disc [Shirley and Chiu 1997, concentric map].
-vec2 concentric_disc(vec2 unit)
-{
+vec2 concentric_disc(vec2 unit) {
     vec2 p = 2.0 * unit - 1.0;
     if (p.x == 0.0 && p.y == 0.0) return vec2(0.0);
     bool wide = abs(p.x) > abs(p.y);
@@ -29,5 +24,3 @@ vec2 concentric_disc(vec2 unit)
     float angle = wide ? 0.78539816 * p.y / p.x : 1.57079633 - 0.78539816 * p.x / p.y;
     return r * vec2(cos(angle), sin(angle));
 }
-
-#endif

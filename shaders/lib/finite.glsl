@@ -1,5 +1,6 @@
-// Whether a number is one, told by its bits. Compilers may take for granted that there is no NaN: isnan() is then false, and !(a < b)
-// becomes a >= b. As integers, magnitudes of floats are ordered as the floats are, with infinity and then NaN above all.
+// Whether a number is one, told by its bits. Compilers may take for granted that there is no NaN: isnan() is then
+// false, and !(a < b) becomes a >= b. As integers, magnitudes of floats are ordered as the floats are, with infinity
+// and then NaN above all.
 #define INFINITY_BITS 0x7f800000u
 
 uint magnitude_bits(float v) { return floatBitsToUint(v) & 0x7fffffffu; }
@@ -10,4 +11,6 @@ bool is_finite3(vec3 v) { return all(lessThan(floatBitsToUint(v) & 0x7fffffffu, 
 
 // |v| < limit, in every component.
 bool is_within(float v, float limit) { return magnitude_bits(v) < floatBitsToUint(limit); }
-bool is_within2(vec2 v, float limit) { return all(lessThan(floatBitsToUint(v) & 0x7fffffffu, uvec2(floatBitsToUint(limit)))); }
+bool is_within2(vec2 v, float limit) {
+    return all(lessThan(floatBitsToUint(v) & 0x7fffffffu, uvec2(floatBitsToUint(limit))));
+}

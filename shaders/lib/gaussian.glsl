@@ -7,8 +7,10 @@ const float TWO_PI = 6.2831853;
 // erf to 3e-7 without an exponential (Abramowitz and Stegun 1964, 7.1.28).
 float erf_approx(float x) {
     float a = abs(x);
-    float p = 1.0 + a * (0.0705230784 + a * (0.0422820123 + a * (0.0092705272 + a * (0.0001520143
-              + a * (0.0002765672 + a * 0.0000430638)))));
+    float p = 1.0
+        + a
+            * (0.0705230784
+                + a * (0.0422820123 + a * (0.0092705272 + a * (0.0001520143 + a * (0.0002765672 + a * 0.0000430638)))));
     p *= p;
     p *= p;
     p *= p;
@@ -16,13 +18,14 @@ float erf_approx(float x) {
     return sign(x) * (1.0 - 1.0 / p);
 }
 
-// Integral of a normal density over [y - half_width, y + half_width]; arguments in units of sqrt(2) standard deviations.
+// Integral of a normal density over [y - half_width, y + half_width]; arguments in units of sqrt(2) standard
+// deviations.
 float gaussian_box(float y, float half_width) {
     return 0.5 * (erf_approx(y + half_width) - erf_approx(y - half_width));
 }
 
-// The same to 5e-4 with one division (7.1.27). Over boxes side by side the errors cancel, so no energy is lost by it. Beyond ALL_OF_IT nothing is left; of a box
-// some hundred times as wide as the Gaussian the powers would overflow.
+// The same to 5e-4 with one division (7.1.27). Over boxes side by side the errors cancel, so no energy is lost by it.
+// Beyond ALL_OF_IT nothing is left; of a box some hundred times as wide as the Gaussian the powers would overflow.
 const float ALL_OF_IT = 6.0;
 float gaussian_box_fast(float y, float half_width) {
     vec2 x = clamp(vec2(y + half_width, y - half_width), -ALL_OF_IT, ALL_OF_IT);
@@ -34,16 +37,15 @@ float gaussian_box_fast(float y, float half_width) {
     return side.x - side.y - (side.x * p.y - side.y * p.x) / (p.x * p.y);
 }
 
-// 1 less three waves: two, `cycles` from their crests, and their sum. A cubic instead of a cosine errs by 2 % of a wave.
+// 1 less three waves: two, `cycles` from their crests, and their sum. A cubic instead of a cosine errs by 2 % of a
+// wave.
 float flatness(vec2 cycles, vec3 heights) {
     vec3 away = abs(fract(vec3(cycles, cycles.x + cycles.y)) * 2.0 - 1.0);
     return 1.0 - dot(heights, 2.0 * away * away * (3.0 - 2.0 * away) - 1.0);
 }
 
 // Mean excess E[max(Z - z, 0)] of a standard normal variable.
-float normal_excess(float z) {
-    return 0.39894228 * exp(-0.5 * z * z) - z * 0.5 * (1.0 - erf_approx(z * SQRT_HALF));
-}
+float normal_excess(float z) { return 0.39894228 * exp(-0.5 * z * z) - z * 0.5 * (1.0 - erf_approx(z * SQRT_HALF)); }
 
 // sin(pi x) / (pi x)
 float sinc_pi(float x) {

@@ -1,65 +1,51 @@
-// A diffraction grating: parallel lines on a thin sheet with one medium on both sides. Of a unit direction, the part that lies in the surface
-// changes by m λ / (Λ n) across the lines, order m, line spacing Λ; the rest follows from its length [Loewen, Popov 1997, ch. 2]. Where
-// nothing is left for it the order is evanescent. `side`: 1 where the frame's normal is the outward one, else -1, so that the orders have the
-// same sense seen from both sides.
-#ifndef GRATING_GLSL
-#define GRATING_GLSL
-
+// A diffraction grating: parallel lines on a thin sheet with one medium on both sides. Of a unit direction, the part
+// that lies in the surface changes by m λ / (Λ n) across the lines, order m, line spacing Λ; the rest follows from its
+// length [Loewen, Popov 1997, ch. 2]. Where nothing is left for it the order is evanescent. `side`: 1 where the frame's
+// normal is the outward one, else -1, so that the orders have the same sense seen from both sides.
 #include "lib/band.glsl"
 #include "lib/interface.glsl"
 #include "lib/medium.glsl"
 
-Grating grating_at(uint row)
-{
+Grating grating_at(uint row) {
     uint at = uint(GRATINGS_AT) + row;
     return Grating_FROM(scene_texel, at);
 }
 
-GratingOrder order_at(uint row, uint number)
-{
+GratingOrder order_at(uint row, uint number) {
     uint at = uint(GRATINGS_AT) + row + 1u + number;
     return GratingOrder_FROM(scene_texel, at);
 }
 
 // The steps m λ / (Λ n) of an order at three places of a band, in the medium that the ray is in.
-vec3 order_steps(GratingOrder order, uint grating, uint medium, vec3 x)
-{
+vec3 order_steps(GratingOrder order, uint grating, uint medium, vec3 x) {
     vec3 wavelength_um = vec3(medium_index(grating, x.x), medium_index(grating, x.y), medium_index(grating, x.z));
     vec3 n = vec3(medium_index(medium, x.x), medium_index(medium, x.y), medium_index(medium, x.z));
     return order.shift_per_um * wavelength_um / n;
 }
 
-#if defined(SPECTRAL_GROUPS) && SPECTRAL_GROUPS > 0
 // d(step) / d(variable of group g): of the wavelength, and of the index of the medium.
-float order_step_derivative(GratingOrder order, uint grating, uint medium, uint g, float x)
-{
+float order_step_derivative(GratingOrder order, uint grating, uint medium, uint g, float x) {
     float n = medium_index(medium, x), derivative = 0.0;
     if (object_at(grating).group == g) derivative += medium_slope(grating, x) / n;
-    if (medium != NONE && object_at(medium).group == g) derivative -= medium_index(grating, x) / (n * n) * medium_slope(medium, x);
+    if (medium != NONE && object_at(medium).group == g)
+        derivative -= medium_index(grating, x) / (n * n) * medium_slope(medium, x);
     return order.shift_per_um * derivative;
 }
-#endif
 
 // Unit vector in the surface across the lines: positive orders lean towards lines × outward normal.
-vec3 across_lines(vec3 normal, vec3 lines, float side)
-{
-    return side * normalize(cross(lines, normal));
-}
+vec3 across_lines(vec3 normal, vec3 lines, float side) { return side * normalize(cross(lines, normal)); }
 
 // Squared cosine of the angle that an order leaves at; <= 0: it is evanescent. `shift` lies in the surface.
-float diffracted_cosine2(vec3 direction, float theta, vec3 shift)
-{
+float diffracted_cosine2(vec3 direction, float theta, vec3 shift) {
     return theta * theta - dot(shift, 2.0 * direction + shift);
 }
 
-vec3 diffract_direction(vec3 direction, vec3 normal, float theta, vec3 shift, float omega, bool reflects)
-{
+vec3 diffract_direction(vec3 direction, vec3 normal, float theta, vec3 shift, float omega, bool reflects) {
     return direction + shift + ((reflects ? omega : -omega) - theta) * normal;
 }
 
 // Diffracted by the shading normal, or by the facet's where that would lead to the wrong side.
-Deflection diffract_at(ShadingFrame frame, vec3 direction, vec3 lines, float side, float step, bool reflects)
-{
+Deflection diffract_at(ShadingFrame frame, vec3 direction, vec3 lines, float side, float step, bool reflects) {
     vec3 normal = frame.normal, turned = direction;
     float theta, cosine2, omega;
     bool geometric = false;
@@ -77,35 +63,31 @@ Deflection diffract_at(ShadingFrame frame, vec3 direction, vec3 lines, float sid
     return Deflection(normalize(turned), normal, theta, omega, geometric, cosine2 > 0.0);
 }
 
-// Derivative of the diffracted direction by one column of the incident ray: the tangential part's changes are handed on, the normal part
-// follows by differentiation. `dstep`: explicit derivative of the step along this column.
-vec3 diffract_column(vec3 direction, vec3 ddirection, vec3 normal, vec3 dnormal, float theta, float omega, vec3 lines, float side, float step,
-    float dstep, bool reflects)
-{
+// Derivative of the diffracted direction by one column of the incident ray: the tangential part's changes are handed
+// on, the normal part follows by differentiation. `dstep`: explicit derivative of the step along this column.
+vec3 diffract_column(vec3 direction, vec3 ddirection, vec3 normal, vec3 dnormal, float theta, float omega, vec3 lines,
+    float side, float step, float dstep, bool reflects) {
     vec3 across = across_lines(normal, lines, side);
     vec3 shift = step * across;
     vec3 dshift = dstep * across;
-#ifdef NORMAL_DERIVATIVES
-    dshift += step * side * normalised_derivative(cross(lines, normal), cross(lines, dnormal));
-#endif
+    if (NORMAL_DERIVATIVES) dshift += step * side * normalised_derivative(cross(lines, normal), cross(lines, dnormal));
     float dtheta = dot(ddirection, normal) + dot(direction, dnormal);
     float domega = (theta * dtheta - dot(dshift, direction + shift) - dot(shift, ddirection)) / omega;
     float sense = reflects ? 1.0 : -1.0;
     return ddirection + dshift + (sense * domega - dtheta) * normal + (sense * omega - theta) * dnormal;
 }
 
-vec3 diffracted_column(Deflection turned, vec3 direction, vec3 ddirection, vec3 dnormal, vec3 lines, float side, float step, float dstep, bool reflects)
-{
+vec3 diffracted_column(Deflection turned, vec3 direction, vec3 ddirection, vec3 dnormal, vec3 lines, float side,
+    float step, float dstep, bool reflects) {
     vec3 judged = turned.geometric ? vec3(0.0) : dnormal;
-    return diffract_column(direction, ddirection, turned.normal, judged, turned.theta, turned.omega, lines, side, step, dstep, reflects);
+    return diffract_column(
+        direction, ddirection, turned.normal, judged, turned.theta, turned.omega, lines, side, step, dstep, reflects);
 }
 
-#if SPECTRAL_GROUPS > 0
-// The place in the band where an order becomes evanescent, in the half whose ends `passes` tells apart. The direction changes by `columns` a
-// unit of each group's variable; `bends`: what it is off that at either end.
-float evanescence_onset(vec3 band, vec3 direction, vec3 columns[SPECTRAL_GROUPS], vec3 bends[2], vec3 normal, vec3 lines, float side,
-    GratingOrder order, uint grating, uint medium, bvec3 passes)
-{
+// The place in the band where an order becomes evanescent, in the half whose ends `passes` tells apart. The direction
+// changes by `columns` a unit of each group's variable; `bends`: what it is off that at either end.
+float evanescence_onset(vec3 band, vec3 direction, vec3 columns[SPECTRAL_GROUPS], vec3 bends[2], vec3 normal,
+    vec3 lines, float side, GratingOrder order, uint grating, uint medium, bvec3 passes) {
     bool low_side = passes.x != passes.y;
     float a = low_side ? band.x : band.y, b = low_side ? band.y : band.z;
     bool passes_a = low_side ? passes.x : passes.y;
@@ -123,6 +105,3 @@ float evanescence_onset(vec3 band, vec3 direction, vec3 columns[SPECTRAL_GROUPS]
     }
     return 0.5 * (a + b);
 }
-#endif
-
-#endif

@@ -10,13 +10,14 @@
 layout(std430, binding = BIND_PROFILES) readonly restrict buffer Profiles { float profiles[]; };
 
 // Number of the stretch that holds `angle` in an ascending list of `count` at `first`, and how far along it.
-uint profile_stretch(uint first, uint count, float angle, out float along)
-{
+uint profile_stretch(uint first, uint count, float angle, out float along) {
     uint low = 0u, high = count - 1u;
     while (high - low > 1u) {
         uint middle = (low + high) >> 1u;
-        if (profiles[first + middle] <= angle) low = middle;
-        else high = middle;
+        if (profiles[first + middle] <= angle)
+            low = middle;
+        else
+            high = middle;
     }
     float begin = profiles[first + low];
     // Angles that float32 cannot tell apart are an edge.
@@ -27,8 +28,7 @@ uint profile_stretch(uint first, uint count, float angle, out float along)
 // Share of the peak that the table at `table` has towards the unit `direction`. `axis`, `u`, `v`: where the vertical
 // angle is 0, and where the horizontal one is 0 and 90 degrees. Beyond the last vertical angle it goes on as it is
 // there: the cone of the light ends it.
-float profile_intensity(uint table, vec3 direction, vec3 axis, vec3 u, vec3 v)
-{
+float profile_intensity(uint table, vec3 direction, vec3 axis, vec3 u, vec3 v) {
     uint verticals = uint(profiles[table]), horizontals = uint(profiles[table + 1u]);
     uint vertical = table + 2u, horizontal = vertical + verticals, values = horizontal + horizontals;
     // On the axis no horizontal angle is like another, and atan of two zeros is undefined.

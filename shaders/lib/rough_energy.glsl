@@ -1,14 +1,15 @@
-// Light that microfacets throw at each other: paths follow one microfacet only, and what the others would send on after all is given back to both
-// its parts alike [Turquin 2019], so that a surface keeps no light. Exact in all for light from any one direction; not reciprocal.
+// Light that microfacets throw at each other: paths follow one microfacet only, and what the others would send on after
+// all is given back to both its parts alike [Turquin 2019], so that a surface keeps no light. Exact in all for light
+// from any one direction; not reciprocal.
 #ifndef ROUGH_ENERGY_GLSL
 #define ROUGH_ENERGY_GLSL
 
 #include "lib/scene.glsl"
 
-// One over the share of light, coming at this cosine to the surface's normal, that one microfacet sends on, at three places of a band. `table`: the
-// surface's, whose rows are evenly spaced ratios of indices, by logarithm (app/model/optics/rough_surfaces.py).
-vec3 regained(float table, float cosine, vec3 eta_it)
-{
+// One over the share of light, coming at this cosine to the surface's normal, that one microfacet sends on, at three
+// places of a band. `table`: the surface's, whose rows are evenly spaced ratios of indices, by logarithm
+// (app/model/optics/rough_surfaces.py).
+vec3 regained(float table, float cosine, vec3 eta_it) {
     vec3 at = clamp((log(eta_it) / ROUGH_REACH + 1.0) * float(ROUGH_STEPS), 0.0, float(2 * ROUGH_STEPS) - 0.001);
     vec3 sent;
     for (int k = 0; k < 3; ++k) {

@@ -4,15 +4,11 @@
 //
 // The patch is a parallelogram with two derivative columns as sides. Its second moment is that of an ellipse, whose
 // shorter axis chooses the level and whose longer one is covered with lookups side by side [McCormack et al. 1999].
-#ifndef TEXTURES_GLSL
-#define TEXTURES_GLSL
-
-#if defined(HAS_TEXTURES) || defined(HAS_ENVIRONMENT_MAP)
 
 #include "lib/optics.glsl"
 
 layout(std430, binding = BIND_PICTURES) readonly restrict buffer Pictures { Picture pictures[]; };
-#ifdef TEXTURES_IMAGE
+#if TEXTURES_IMAGE
 layout(rgba32f, binding = UNIT_PICTURES) uniform readonly restrict image2D picture_texels;
 #else
 layout(binding = UNIT_PICTURES) uniform sampler2D picture_texels;
@@ -22,34 +18,29 @@ layout(binding = UNIT_PICTURES) uniform sampler2D picture_texels;
 const float MAX_TAPS = 8.0;
 // A patch up to this much longer than wide is one lookup, and so much of a longer one falls to each.
 const float ROUND_RATIO = 1.25;
-// Interpolation between texels widens what a texel averages, so texels are this much smaller than the patch: the second moment of what is
-// averaged is then the patch's own.
+// Interpolation between texels widens what a texel averages, so texels are this much smaller than the patch: the second
+// moment of what is averaged is then the patch's own.
 const float LEVEL_BIAS = -0.8;
-// Texels of the sky are as wide as high only near its horizon; its patches are taken as this much wider, so that none aliases near a pole.
+// Texels of the sky are as wide as high only near its horizon; its patches are taken as this much wider, so that none
+// aliases near a pole.
 const float SKY_WIDER = 1.366;
 // No column is longer than this many texels (or radians): squares must stay finite.
 const float LONGEST = 1e8;
 
-vec3 picture_texel(ivec2 at)
-{
-#ifdef TEXTURES_IMAGE
-    return imageLoad(picture_texels, at).rgb;
-#else
-    return texelFetch(picture_texels, at, 0).rgb;
-#endif
+vec3 picture_texel(ivec2 at) {
+    return TEXTURES_IMAGE ? imageLoad(picture_texels, at).rgb : texelFetch(picture_texels, at, 0).rgb;
 }
 
 // First texel of a level: 0, or one of the column to the right of it.
-ivec2 level_origin(Picture picture, int level)
-{
+ivec2 level_origin(Picture picture, int level) {
     int height = int(picture.size.y);
     ivec2 aside = ivec2(int(picture.size.x), height - (height >> max(level - 1, 0)) + level - 1);
     return ivec2(picture.origin) + (level > 0 ? aside : ivec2(0));
 }
 
-// Bilinear interpolation in one level at `place`: (0, 0) is the picture's upper left corner, (1, 1) its lower right one.
-vec3 level_bilinear(ivec2 origin, vec2 size, bvec2 repeats, vec2 place)
-{
+// Bilinear interpolation in one level at `place`: (0, 0) is the picture's upper left corner, (1, 1) its lower right
+// one.
+vec3 level_bilinear(ivec2 origin, vec2 size, bvec2 repeats, vec2 place) {
     vec2 at = mix(clamp(place, 0.0, 1.0), place - floor(place), repeats) * size - 0.5;
     vec2 low = floor(at), high = low + 1.0, last = size - 1.0;
     vec2 share = at - low;
@@ -63,8 +54,7 @@ vec3 level_bilinear(ivec2 origin, vec2 size, bvec2 repeats, vec2 place)
 
 // Axes of the ellipse that has the second moment of a parallelogram, from its sides' products s·s, s·t, t·t:
 // lengths, and the longer one as a combination of the sides.
-void patch_axes(float ss, float st, float tt, out float longer, out float shorter, out vec2 mixing)
-{
+void patch_axes(float ss, float st, float tt, out float longer, out float shorter, out vec2 mixing) {
     float half_difference = 0.5 * (ss - tt);
     float radius = sqrt(half_difference * half_difference + st * st);
     float longer2 = 0.5 * (ss + tt) + radius;
@@ -75,41 +65,33 @@ void patch_axes(float ss, float st, float tt, out float longer, out float shorte
 }
 
 // How a patch with these axes (texels of level 0) is read: from which level, with how many lookups.
-void filter_plan(float longer, float shorter, out float level, out float taps)
-{
+void filter_plan(float longer, float shorter, out float level, out float taps) {
     float width = max(max(shorter, longer / (MAX_TAPS * ROUND_RATIO)), 1.0);
     taps = clamp(ceil(longer / (ROUND_RATIO * width)), 1.0, MAX_TAPS);
     level = max(log2(width) + LEVEL_BIAS, 0.0);
 }
 
-#ifdef HAS_TEXTURES
-#ifdef TEXTURES_IMAGE
+#if HAS_TEXTURES
+#if TEXTURES_IMAGE
 layout(rgba32f, binding = UNIT_CORNERS) uniform readonly restrict image2D corner_texels;
 #else
 layout(binding = UNIT_CORNERS) uniform sampler2D corner_texels;
 #endif
 
-vec4 corner_texel(uint i)
-{
+vec4 corner_texel(uint i) {
     ivec2 at = ivec2(int(i & 4095u), int(i >> 12u));
-#ifdef TEXTURES_IMAGE
-    return imageLoad(corner_texels, at);
-#else
-    return texelFetch(corner_texels, at, 0);
-#endif
+    return TEXTURES_IMAGE ? imageLoad(corner_texels, at) : texelFetch(corner_texels, at, 0);
 }
 
 // Texture coordinates, v upwards, at barycentric weights of the second and third corner of triangle `source`.
-void hit_uv(Picture picture, uint source, vec2 bary, out vec2 uv)
-{
+void hit_uv(Picture picture, uint source, vec2 bary, out vec2 uv) {
     vec4 first = corner_texel(picture.corners + 2u * source);
     vec4 second = corner_texel(picture.corners + 2u * source + 1u);
     uv = first.xy + bary.x * first.zw + bary.y * second.xy;
 }
 
 // Gradients of the texture coordinates in the triangle's plane, for its edges as the scene's records hold them.
-void uv_gradients(Picture picture, uint source, vec3 edge1, vec3 edge2, out vec3 gradient_u, out vec3 gradient_v)
-{
+void uv_gradients(Picture picture, uint source, vec3 edge1, vec3 edge2, out vec3 gradient_u, out vec3 gradient_v) {
     vec2 along1 = corner_texel(picture.corners + 2u * source).zw;
     vec2 along2 = corner_texel(picture.corners + 2u * source + 1u).xy;
     vec3 gradient1, gradient2;
@@ -119,8 +101,7 @@ void uv_gradients(Picture picture, uint source, vec3 edge1, vec3 edge2, out vec3
 }
 
 // Mean colour about `uv` (v upwards) over the parallelogram with these sides, in texture coordinates.
-vec3 texture_filtered(Picture picture, vec2 uv, vec2 duv_ds, vec2 duv_dt)
-{
+vec3 texture_filtered(Picture picture, vec2 uv, vec2 duv_ds, vec2 duv_dt) {
     vec2 size = vec2(picture.size);
     vec2 side_s = clamp(duv_ds * size, -LONGEST, LONGEST), side_t = clamp(duv_dt * size, -LONGEST, LONGEST);
     float longer, shorter, level, taps;
@@ -153,10 +134,8 @@ vec3 texture_filtered(Picture picture, vec2 uv, vec2 duv_ds, vec2 duv_dt)
 }
 #endif
 
-#ifdef HAS_ENVIRONMENT_MAP
 // Where a direction (of any length) lies on a latitude-longitude picture, v downwards; anywhere between at a pole.
-vec2 environment_place(vec3 direction)
-{
+vec2 environment_place(vec3 direction) {
     float flat_length = length(direction.xy);
     float azimuth = flat_length > 0.0 ? atan(direction.y, direction.x) : 0.0;
     return vec2(0.5 - azimuth * 0.15915494309, atan(flat_length, direction.z) * 0.31830988618);
@@ -167,8 +146,7 @@ vec2 environment_place(vec3 direction)
 // Lookups lie side by side on the sphere, not on the picture: each finds its own place, so that seam and poles need no
 // care. Texels below level 0 are about as wide as high on the sphere (mip_chain.py), so the height of the picture
 // alone says which level is as coarse as the patch.
-vec3 environment_radiance(vec3 direction, vec3 ddirection_ds, vec3 ddirection_dt)
-{
+vec3 environment_radiance(vec3 direction, vec3 ddirection_ds, vec3 ddirection_dt) {
     Picture picture = pictures[TEXTURE_COUNT];
     float texels_per_rad = float(picture.size.y) * 0.31830988618;
     vec3 side_s = clamp(ddirection_ds, -4.0, 4.0), side_t = clamp(ddirection_dt, -4.0, 4.0);
@@ -195,7 +173,3 @@ vec3 environment_radiance(vec3 direction, vec3 ddirection_ds, vec3 ddirection_dt
     }
     return sum / taps;
 }
-#endif
-
-#endif
-#endif

@@ -1,15 +1,14 @@
-// Wavelengths drawn by brightness: a row of the spectral tables holds the running integral of a light's density of draws over
-// the spectral coordinate x (app/model/optics/spectral_tables.py, `wavelength_cdf`).
+// Wavelengths drawn by brightness: a row of the spectral tables holds the running integral of a light's density of
+// draws over the spectral coordinate x (app/model/optics/spectral_tables.py, `wavelength_cdf`).
 #ifndef WAVELENGTH_GLSL
 #define WAVELENGTH_GLSL
 
 #include "lib/scene.glsl"
 
-// The x in band.x..band.y below which the share `place` in [0, 1) of the draws lies, and one over the density of draws there. The density is
-// constant between samples, which are the borders of the cells that splats look energies up in: their ratio, a photon's
-// weight, then changes from cell to cell only.
-float drawn_wavelength(uint row, vec2 band, float place, out float per_density)
-{
+// The x in band.x..band.y below which the share `place` in [0, 1) of the draws lies, and one over the density of draws
+// there. The density is constant between samples, which are the borders of the cells that splats look energies up in:
+// their ratio, a photon's weight, then changes from cell to cell only.
+float drawn_wavelength(uint row, vec2 band, float place, out float per_density) {
     vec2 ends = vec2(spectral_row(row, band.x), spectral_row(row, band.y));
     float wanted = mix(ends.x, ends.y, place);
     int low = 0, high = SPECTRAL_SAMPLES - 1;

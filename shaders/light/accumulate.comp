@@ -1,5 +1,5 @@
-// total += scratch; what rounding kept out of the total stays in the scratch for the next time [Kahan 1965], so that the
-// number of flushes does not matter.
+// total += scratch; what rounding kept out of the total stays in the scratch for the next time [Kahan 1965], so that
+// the number of flushes does not matter.
 layout(local_size_x = SIDE, local_size_y = SIDE) in;
 layout(rgba32f, binding = 0) uniform restrict image2D scratch;
 layout(rgba32f, binding = 1) uniform restrict image2D total;

@@ -1,10 +1,12 @@
-// What a beam polygon whose edges move along the spectrum deposits in a texel: the texel's covered area, summed over the band.
+// What a beam polygon whose edges move along the spectrum deposits in a texel: the texel's covered area, summed over
+// the band.
 //
-// Where one edge comes over the texel and one leaves it, that is one difference of the running spectrum. Elsewhere (corners, polygons as small as a texel) the
-// band is `nodes` equal parts, the same for all texels of a polygon, in each of which the polygon stands still where it is in the middle of it: so whatever its
-// shape and size, its texels add up to its area.
+// Where one edge comes over the texel and one leaves it, that is one difference of the running spectrum. Elsewhere
+// (corners, polygons as small as a texel) the band is `nodes` equal parts, the same for all texels of a polygon, in
+// each of which the polygon stands still where it is in the middle of it: so whatever its shape and size, its texels
+// add up to its area.
 #include "light/beam_coverage.glsl"
-#ifdef CONTACT_LINES
+#if CONTACT_LINES
 #include "lib/contact.glsl"
 layout(binding = 2) uniform usampler2D contact_words;
 // Side of what stands for a part of a texel: about its middle, by which it is seen or not.
@@ -13,7 +15,7 @@ const float PART_WINDOW = 1.0 / 16.0;
 
 layout(location = 0) out vec4 deposited[TARGETS];
 
-#ifndef STILL
+#if !STILL
 layout(binding = 1) uniform sampler2D curves;
 
 // Parts of a texel's time that are looked at one by one, at most.
@@ -45,8 +47,9 @@ void add_curve(float t, float weight) {
     for (int g = 0; g < TARGETS; ++g) deposited[g] += weight * curve_at(g, t);
 }
 
-// Light of an interval in which all of the texel is covered, nothing where it is empty. An edge takes the times `ramps` (halves) to come and to leave: the running
-// spectrum is averaged over them (Gauss, two points). The density's slope meets the spectrum's.
+// Light of an interval in which all of the texel is covered, nothing where it is empty. An edge takes the times `ramps`
+// (halves) to come and to leave: the running spectrum is averaged over them (Gauss, two points). The density's slope
+// meets the spectrum's.
 void add_whole(vec2 interval, vec2 ramps) {
     float middle = 0.5 * (interval.x + interval.y), reach = 0.5 * (interval.y - interval.x);
     float density = density_at(middle) + density_nodes.z * reach * reach * (1.0 / 3.0);
@@ -63,36 +66,39 @@ void add_whole(vec2 interval, vec2 ramps) {
     }
 }
 
-// From a to b, slowly at both ends: where a long time is looked at in few parts, edges come and go within the first and the last.
+// From a to b, slowly at both ends: where a long time is looked at in few parts, edges come and go within the first and
+// the last.
 float eased(float s, float a, float b) { return mix(a, b, s * s * (3.0 - 2.0 * s)); }
 
 // Light of two intervals, each looked at in parts. `share` is the function that tells the covered part.
-#define ADD_PARTS(intervals, parts, share) { \
-    int first_end = parts.x > 0 ? parts.x + 1 : 0, end = first_end + (parts.y > 0 ? parts.y + 1 : 0); \
-    float before = 0.0, from = intervals.x; \
-    for (int i = 0; i < end; ++i) { \
-        bool is_second = i >= first_end; \
-        int k = is_second ? i - first_end : i, count = is_second ? parts.y : parts.x; \
-        vec2 interval = is_second ? intervals.zw : intervals.xy; \
-        from = k == 0 ? interval.x : from; \
-        float s = float(k + 1) / float(count); \
-        bool is_long = density_nodes.w < 0.0 && count > LOOKED_AT_EVENLY; \
-        float to = is_long ? eased(s, interval.x, interval.y) : mix(interval.x, interval.y, s); \
-        float t = 0.5 * (from + to); \
-        float now = k == count ? 0.0 : share(t) * density_at(t); \
-        add_curve(from, before - now); \
-        before = now; \
-        from = to; \
-    } \
-}
+#define ADD_PARTS(intervals, parts, share) \
+    { \
+        int first_end = parts.x > 0 ? parts.x + 1 : 0, end = first_end + (parts.y > 0 ? parts.y + 1 : 0); \
+        float before = 0.0, from = intervals.x; \
+        for (int i = 0; i < end; ++i) { \
+            bool is_second = i >= first_end; \
+            int k = is_second ? i - first_end : i, count = is_second ? parts.y : parts.x; \
+            vec2 interval = is_second ? intervals.zw : intervals.xy; \
+            from = k == 0 ? interval.x : from; \
+            float s = float(k + 1) / float(count); \
+            bool is_long = density_nodes.w < 0.0 && count > LOOKED_AT_EVENLY; \
+            float to = is_long ? eased(s, interval.x, interval.y) : mix(interval.x, interval.y, s); \
+            float t = 0.5 * (from + to); \
+            float now = k == count ? 0.0 : share(t) * density_at(t); \
+            add_curve(from, before - now); \
+            before = now; \
+            from = to; \
+        } \
+    }
 #endif
 
 // What falls on a texel, or the part of one, about `at`.
 void deposit() {
-    // The density is linear on the receiver; a texel's area there goes as the inverse cube of 1 / W, and nothing lies beyond the horizon.
+    // The density is linear on the receiver; a texel's area there goes as the inverse cube of 1 / W, and nothing lies
+    // beyond the horizon.
     float nearness = 1.0 + dot(perspective, at), nearness2 = nearness * nearness;
     float tilt = nearness < 1e-4 ? 0.0 : max(1.0 + dot(anchor_slope.zw, at), 0.0) / (nearness2 * nearness2);
-#ifdef STILL
+#if STILL
     bool outside = false;
     for (int e = 0; e < EDGE_COUNT; ++e) {
         vec4 line = EDGE_START(e) + 0.5 * EDGE_CHANGE(e);
@@ -142,12 +148,14 @@ void deposit() {
         intervals = vec4(touched.x, all.xy, touched.y);
         vec2 lengths = vec2(all.x - touched.x, touched.y - all.y);
         int most = int(-density_nodes.w);
-        parts = ever_whole ? 2 + min(ivec2(8.0 * lengths) + 1, ivec2(most - 2)) : ivec2(min(int(8.0 * lengths.x) + 5, most), 0);
+        parts = ever_whole ? 2 + min(ivec2(8.0 * lengths) + 1, ivec2(most - 2))
+                           : ivec2(min(int(8.0 * lengths.x) + 5, most), 0);
         parts = ivec2(mix(vec2(0.0), vec2(parts), greaterThan(lengths, vec2(0.0))));
     }
     bool is_slow = is_touched && !is_short;
     for (int g = 0; g < TARGETS; ++g) deposited[g] = is_inside ? whole_energy[g] : vec4(0.0);
-    vec2 ramps = vec2(whole.x <= 0.0 ? 0.0 : 0.5 * (touched.x + whole.x), whole.y >= 1.0 ? 1.0 : 0.5 * (touched.y + whole.y));
+    vec2 ramps =
+        vec2(whole.x <= 0.0 ? 0.0 : 0.5 * (touched.x + whole.x), whole.y >= 1.0 ? 1.0 : 0.5 * (touched.y + whole.y));
     vec2 halves = is_short ? 0.5 * max(vec2(whole.x - touched.x, touched.y - whole.y), 0.0) : vec2(0.0);
     add_whole(!is_touched ? vec2(0.0) : is_short ? ramps : intervals.yz, halves);
     // Of one edge alone the share costs little; a loop that no texel needs costs little as well.
@@ -163,7 +171,7 @@ void deposit() {
 
 void main() {
     at = gl_FragCoord.xy - anchor_slope.xy;
-#ifdef CONTACT_LINES
+#if CONTACT_LINES
     // A texel in which a line of contact lies keeps what falls on those parts that are seen.
     uint word = texelFetch(contact_words, ivec2(gl_FragCoord.xy), 0).x, seen = word & 0xffffu;
     bool is_cut = is_contact(word) && seen != 0u;

@@ -1,5 +1,6 @@
-// The hull of a beam polygon, grown to all texels it may touch, and what its fragments need to know of it. That comes from a texture, since a vertex shader
-// may have no storage blocks, and goes on as flat inputs: a software renderer reads those at no cost, and any memory at a high one.
+// The hull of a beam polygon, grown to all texels it may touch, and what its fragments need to know of it. That comes
+// from a texture, since a vertex shader may have no storage blocks, and goes on as flat inputs: a software renderer
+// reads those at no cost, and any memory at a high one.
 layout(std140, binding = 0) uniform BeamDrawParameters {
     vec2 atlas_size;
     uint texels;  // of a polygon
@@ -39,9 +40,9 @@ void main() {
     perspective = beam.perspective;
     density_nodes = vec4(beam.density, beam.nodes);
     band = vec4(beam.place, beam.curve_row, beam.edge_count);
-#if EDGES > 0
-    for (int i = 0; i < 2 * EDGES; ++i) edge[i] = uintBitsToFloat(texel(BeamRecord_TEXELS + i));
-#endif
+    if (EDGES > 0) {
+        for (int i = 0; i < 2 * EDGES; ++i) edge[i] = uintBitsToFloat(texel(BeamRecord_TEXELS + i));
+    }
     // What a texel gets that is all inside over the whole band.
     for (int g = 0; g < TARGETS; ++g) {
         int row = int(beam.curve_row) + g;

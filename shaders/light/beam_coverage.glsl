@@ -27,7 +27,7 @@ flat in vec4 edge[2 * EDGES];
 
 vec2 at;  // the texel's centre, about the anchor
 
-#ifdef CONTACT_LINES
+#if CONTACT_LINES
 // How much smaller than a texel that is which is looked at, by the squares of their sides.
 float window_less = 0.0;
 float window_of(float window) { return sqrt(max(window * window - window_less, 1.0 - window_less)); }
@@ -36,18 +36,22 @@ float window_of(float window) { return sqrt(max(window * window - window_less, 1
 #endif
 
 // A line's unit normal and distance inside, in units of its window: a texel, or a square as wide as the penumbra.
-vec3 normalized_line(vec3 line, float window) { return vec3(line.xy, line.z / window_of(window)) * inversesqrt(dot(line.xy, line.xy)); }
+vec3 normalized_line(vec3 line, float window) {
+    return vec3(line.xy, line.z / window_of(window)) * inversesqrt(dot(line.xy, line.xy));
+}
 
 // Half of what the window spans across a line.
 float reach_of(vec4 line) { return 0.5 * (abs(line.x) + abs(line.y)) * window_of(line.w); }
 
-// Part of the line `own` (a point of it is -h n + s perpendicular) within the half-plane `other`, as an interval of s. Of two lines that are the same one counts.
+// Part of the line `own` (a point of it is -h n + s perpendicular) within the half-plane `other`, as an interval of s.
+// Of two lines that are the same one counts.
 vec2 cut(vec2 interval, vec3 own, vec3 other, bool own_first) {
     float along = own.x * other.y - own.y * other.x;
     float turn = dot(own.xy, other.xy);
     float s = (own.z * turn - other.z) / along;
     bool is_parallel = abs(along) < 1e-7;
-    // Differences of the same two numbers, so that of two lines in one place exactly one counts however they are rounded.
+    // Differences of the same two numbers, so that of two lines in one place exactly one counts however they are
+    // rounded.
     float inside = turn > 0.0 ? other.z - own.z : other.z + own.z;
     bool nothing = is_parallel && (inside < 0.0 || (inside == 0.0 && !own_first && turn > 0.0));
     float low = nothing ? 1.0 : is_parallel || along < 0.0 ? interval.x : max(interval.x, s);
@@ -81,10 +85,12 @@ vec3 line_at(int e, float t) {
     return normalized_line(vec3(line.xy, dot(line.xy, at) + line.z), line.w);
 }
 
-// The edges that cross the texel at some time, four bits each; where a program takes any number of edges it looks at all again.
+// The edges that cross the texel at some time, four bits each; where a program takes any number of edges it looks at
+// all again.
 uint crossing;
 int crossings;
-// One of them: normal, distance inside, window; and their change over the band. Where none crosses, one that all of the texel lies within.
+// One of them: normal, distance inside, window; and their change over the band. Where none crosses, one that all of the
+// texel lies within.
 vec4 only_start, only_change;
 
 // Before each place that is looked at: of the last one nothing is kept, neither the list nor the one edge.
@@ -95,8 +101,8 @@ void begin_place() {
     only_change = vec4(0.0);
 }
 
-// Covered part of the texel at t: the lengths of what bounds it, times their distance from the texel's centre. Loops have short bodies, since a software renderer
-// runs a loop that no texel is in once.
+// Covered part of the texel at t: the lengths of what bounds it, times their distance from the texel's centre. Loops
+// have short bodies, since a software renderer runs a loop that no texel is in once.
 float covered_share(float t) {
     bool outside = false;
     float twice = 0.0;
@@ -135,8 +141,6 @@ float half_plane_share(float t) {
 void note_crossing(int e, bool crosses, vec4 start, vec4 change) {
     only_start = crosses ? start : only_start;
     only_change = crosses ? change : only_change;
-#if EDGES > 0
-    crossing = crosses ? crossing << 4 | uint(e) : crossing;
-#endif
+    if (EDGES > 0) crossing = crosses ? crossing << 4 | uint(e) : crossing;
     crossings += crosses ? 1 : 0;
 }

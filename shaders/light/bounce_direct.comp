@@ -1,5 +1,5 @@
-// What each light gives to places on receivers straight on, as a factor on its own quantity: what these then send on to each other. Glass is in
-// the way as everything else, for what it throws is in the caustic maps.
+// What each light gives to places on receivers straight on, as a factor on its own quantity: what these then send on to
+// each other. Glass is in the way as everything else, for what it throws is in the caustic maps.
 layout(local_size_x = 64) in;
 
 #include "lib/intersect.glsl"
@@ -13,8 +13,7 @@ layout(std430, binding = BIND_PLACES) readonly restrict buffer Places { Environm
 layout(std430, binding = BIND_LIGHTS) readonly restrict buffer Lights { CameraLight lights[]; };
 layout(std430, binding = BIND_GAINS) restrict buffer Gains { float gains[]; };
 
-void main()
-{
+void main() {
     uint id = gl_GlobalInvocationID.x;
     if (id >= p.count) return;
     EnvironmentPlace place = places[id];

@@ -7,8 +7,7 @@ layout(r32ui, binding = 0) writeonly uniform restrict uimage2D words;
 uniform ivec2 first;  // texel of the atlas
 uniform ivec2 count;
 
-void main()
-{
+void main() {
     ivec2 texel = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(texel, count))) return;
     uint word = 0u;

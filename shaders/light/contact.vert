@@ -10,8 +10,7 @@ out float height;
 out float depth;
 flat out uint is_receiver;
 
-void main()
-{
+void main() {
     height = dot(plane, vec4(position, 1.0));
     depth = dot(depth_row, vec4(position, 1.0)) + tie * float(object);
     is_receiver = object == receiver ? 1u : 0u;

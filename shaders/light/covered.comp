@@ -1,4 +1,5 @@
-// Which parts of texels on receivers something covers (app/passes/covered_places.py): those all of whose corners are covered, or none.
+// Which parts of texels on receivers something covers (app/passes/covered_places.py): those all of whose corners are
+// covered, or none.
 layout(local_size_x = 64) in;
 
 #include "lib/covered.glsl"
@@ -8,8 +9,7 @@ layout(std430, binding = BIND_PLACES) readonly restrict buffer Places { Environm
 layout(std430, binding = BIND_PARTS) writeonly restrict buffer Parts { uvec2 parts[]; };
 layout(binding = UNIT_RECORDS) uniform sampler2D records;
 
-void main()
-{
+void main() {
     uint id = gl_GlobalInvocationID.x;
     if (id >= uint(places.length())) return;
     EnvironmentPlace place = places[id];
@@ -26,8 +26,10 @@ void main()
             ivec2 part = ivec2(at) - ivec2(side & 1u, side >> 1u);
             bool exists = all(greaterThanEqual(part, ivec2(0))) && all(lessThan(part, ivec2(4)));
             uint bit = exists ? 1u << uint(part.y * 4 + part.x) : 0u;
-            if (covered) found.x &= ~bit;
-            else found.y &= ~bit;
+            if (covered)
+                found.x &= ~bit;
+            else
+                found.y &= ~bit;
         }
     }
     parts[id] = found;

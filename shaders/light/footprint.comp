@@ -7,9 +7,7 @@
 #include "lib/placement.glsl"
 #include "lib/fan.glsl"
 #include "lib/swept.glsl"
-#ifdef LIGHT_EDGES
 #include "lib/edge.glsl"
-#endif
 
 layout(local_size_x = WORKGROUP) in;
 
@@ -36,15 +34,19 @@ layout(std430, binding = 1) writeonly buffer Splats { SplatRecord splats[]; };
 layout(std430, binding = 2) readonly buffer Placements { Placement placements[]; };
 layout(std430, binding = 3) readonly buffer Receivers { Receiver receivers[]; };
 layout(std430, binding = 4) readonly buffer VarTables { float var_table[]; };
-layout(std430, binding = 5) readonly buffer Bands { vec4 table_bands[]; };  // x_lo, x_hi, mean place of the light in it (0..1), W; then W below x, by light and class
-layout(std430, binding = 6) buffer Sums { vec4 sums[]; };  // of the photons of this thread: W with the centre in no window, W drawn as one texel, how many so, W of all
+layout(std430, binding = 5) readonly buffer Bands {
+    vec4 table_bands[];
+};  // x_lo, x_hi, mean place of the light in it (0..1), W; then W below x, by light and class
+layout(std430, binding = 6) buffer Sums {
+    vec4 sums[];
+};  // of the photons of this thread: W with the centre in no window, W drawn as one texel, how many so, W of all
 
-#ifdef LOCAL_GAIN
+#if LOCAL_GAIN
 layout(std430, binding = 9) readonly buffer GainBoxes { GainBox gain_boxes[]; };
 layout(std430, binding = 10) readonly buffer Gains { float gains[]; };
 #endif
 
-#ifdef REINDEXED
+#if REINDEXED
 struct TracedBand {
     vec4 range;  // the band's ends as traced, the ends of its light's spectrum in the coordinate that is shown
     vec4 side;  // 1 for the first band, 1 for the last one
@@ -52,13 +54,13 @@ struct TracedBand {
 layout(std430, binding = 11) readonly buffer TracedBands { TracedBand traced_bands[]; };
 #endif
 
-#ifdef CONTACT_LINES
+#if CONTACT_LINES
 #include "lib/contact.glsl"
 #define PLACED_PICTURE 2u
 layout(binding = 1) uniform usampler2D contact_words;
 #endif
 
-#ifdef BORDER_IMAGES
+#if BORDER_IMAGES
 #include "lib/border.glsl"
 layout(binding = 2) uniform sampler2D borders;
 #endif
@@ -74,7 +76,8 @@ const float ACROSS_FLOOR = 0.1;
 const float SAMPLED_VARIANCE = 0.12;
 const float THIN_VARIANCE = 0.15;
 const float CUT = 3.0;
-// A footprint fans out where its width changes by more than the first over a standard deviation of its length; by the second at most.
+// A footprint fans out where its width changes by more than the first over a standard deviation of its length; by the
+// second at most.
 const float LEAST_FAN = 0.015;
 // Texels: the texel's own blur knows no perspective, and of shorter footprints it is most of what is drawn.
 const float LEAST_FANNED = 0.75;
@@ -103,7 +106,6 @@ float spectral_variable(uint group, float x) {
     return mix(var_table[base], var_table[base + 1u], at - float(i));
 }
 
-#ifdef LOCAL_GAIN
 // The brush's gain of dispersion at a place on a receiver: trilinear between voxel centres, 1 outside the box.
 float local_gain(uint receiver, vec3 position) {
     GainBox box = gain_boxes[receiver];
@@ -125,7 +127,6 @@ float local_gain(uint receiver, vec3 position) {
     }
     return gain;
 }
-#endif
 
 // The number of the photon's lattice, 0 where what is splatted is none: every so manieth photon of a lattice is none.
 uint lattice_of(PhotonRecord photon) { return stride == 1u ? photon.flags >> LATTICE_BIT : 0u; }
@@ -133,9 +134,9 @@ uint lattice_of(PhotonRecord photon) { return stride == 1u ? photon.flags >> LAT
 #include "light/splat_power.glsl"
 #include "light/splat_shapes.glsl"
 
-// Share of the smoothing that a footprint needs. What ripple it leaves with less is taken off (`flatten_lattice`), the better the less of the light at
-// a place is of many wavelengths, each with waves of its own: none need be left where the spectrum stays within a tenth of a spacing, most is beyond a half.
-// Lattices finer than texels are not flattened.
+// Share of the smoothing that a footprint needs. What ripple it leaves with less is taken off (`flatten_lattice`), the
+// better the less of the light at a place is of many wavelengths, each with waves of its own: none need be left where
+// the spectrum stays within a tenth of a spacing, most is beyond a half. Lattices finer than texels are not flattened.
 float needed_smoothing(PhotonRecord photon, vec2 step_s, vec2 step_t, vec2 chord) {
     float area = step_s.x * step_t.y - step_s.y * step_t.x;
     if (narrowed >= 1.0 || lattice_of(photon) == 0u || abs(area) < 1e-6) return 1.0;
@@ -147,7 +148,8 @@ float needed_smoothing(PhotonRecord photon, vec2 step_s, vec2 step_t, vec2 chord
 // A footprint that widens along its longer axis, by the last flight's perspective and by that of the picture's pixels.
 vec2 fan_in(Placement place, PhotonRecord photon, float w, vec2 step_s, vec2 step_t) {
     vec2 axis = longest_axis(vec3(dot(step_s, step_s), dot(step_s, step_t), dot(step_t, step_t)));
-    vec2 change = unpackHalf2x16(photon.fan) + vec2(dot(place.row_w.xyz, photon.dposition_ds), dot(place.row_w.xyz, photon.dposition_dt)) / w;
+    vec2 change = unpackHalf2x16(photon.fan)
+        + vec2(dot(place.row_w.xyz, photon.dposition_ds), dot(place.row_w.xyz, photon.dposition_dt)) / w;
     vec2 longest = axis.x * step_s + axis.y * step_t;
     return dot(change, axis) / max(dot(longest, longest), 1e-20) * longest;
 }
@@ -199,9 +201,7 @@ void choose_level(inout Placement place, inout Footprint f, PhotonRecord photon,
     f.per_spacing *= shrink;
 }
 
-#ifdef CONTACT_LINES
 #include "light/splat_contact.glsl"
-#endif
 
 SplatRecord splat_of(PhotonRecord photon, float power_w, float mean, Footprint f, uint table, vec4 band) {
     vec2 d = vec2(dot(f.axis_s, f.axis_s), dot(f.axis_t, f.axis_t));
@@ -214,9 +214,7 @@ SplatRecord splat_of(PhotonRecord photon, float power_w, float mean, Footprint f
         splat = swept_splat(photon, power_w, mean, f, table / bands, band);
     }
     splat.layer = table * uint(TARGETS);
-#ifdef HERO
-    carry_companions(splat, photon);
-#endif
+    if (HERO) carry_companions(splat, photon);
     return splat;
 }
 
@@ -231,13 +229,13 @@ vec2 half_extent(SplatRecord splat) {
     return extent;
 }
 
-// A swept splat that its rectangle or its light's edge cuts, or that fans out, is drawn by a program of its own: to ask every fragment costs a tenth of the rate.
+// A swept splat that its rectangle or its light's edge cuts, or that fans out, is drawn by a program of its own: to ask
+// every fragment costs a tenth of the rate.
 void mark_edge(inout SplatRecord splat) {
     vec2 extent = half_extent(splat);
-    bool whole = all(greaterThanEqual(splat.centre - extent, splat.rect.xy)) && all(lessThanEqual(splat.centre + extent, splat.rect.zw));
-#ifdef LIGHT_EDGES
-    whole = whole && splat.x_range == vec2(0.0);
-#endif
+    bool whole = all(greaterThanEqual(splat.centre - extent, splat.rect.xy))
+        && all(lessThanEqual(splat.centre + extent, splat.rect.zw));
+    if (LIGHT_EDGES) whole = whole && splat.x_range == vec2(0.0);
     if (splat.kind == 2u && (!whole || splat.fan != vec2(0.0))) {
         splat.kind = 4u;
     }
@@ -251,12 +249,14 @@ bool contains(vec4 rect, vec2 centre, float margin) {
     return all(greaterThanEqual(centre, rect.xy + margin)) && all(lessThan(centre, rect.zw - margin));
 }
 
-// What of a footprint's size can be drawn: beyond `extent_limit` texels no digits are left to tell how thin it is. 0: it is a numerical accident.
+// What of a footprint's size can be drawn: beyond `extent_limit` texels no digits are left to tell how thin it is. 0:
+// it is a numerical accident.
 float held_size(Placement place, PhotonRecord photon, Footprint f) {
     vec3 anchor = homogeneous_texel(place, photon.position);
     vec2 away = f.centre - anchor.xy / anchor.z;
     vec2 largest = max(max(abs(f.axis_s), abs(f.axis_t)), max(abs(f.chord), abs(away)));
-    bool is_number = is_within2(f.axis_s, FAR_TOO_LARGE) && is_within2(f.axis_t, FAR_TOO_LARGE) && is_within2(f.chord, FAR_TOO_LARGE) && is_within2(away, FAR_TOO_LARGE);
+    bool is_number = is_within2(f.axis_s, FAR_TOO_LARGE) && is_within2(f.axis_t, FAR_TOO_LARGE)
+        && is_within2(f.chord, FAR_TOO_LARGE) && is_within2(away, FAR_TOO_LARGE);
     return is_number ? min(1.0, extent_limit / max(max(largest.x, largest.y), 1e-20)) : 0.0;
 }
 
@@ -271,36 +271,37 @@ void shrink(inout PhotonRecord photon, inout vec3 middle, inout vec3 sweep, floa
 // Which of the steps whose power `step_w` holds have their middles in a window, a bit each.
 uint steps_within(vec4 rect, Footprint f, PhotonRecord photon) {
     uint within = 0u;
-    for (uint k = 0u; k < 2u * POWER_STEPS; ++k) within |= contains(rect, f.centre + step_place(k, 0.5, anchor_in_band(photon) - 0.5) * f.chord, 0.0) ? 1u << k : 0u;
+    for (uint k = 0u; k < 2u * POWER_STEPS; ++k)
+        within |=
+            contains(rect, f.centre + step_place(k, 0.5, anchor_in_band(photon) - 0.5) * f.chord, 0.0) ? 1u << k : 0u;
     return within;
 }
 
 // Share of a photon's power in those steps.
 float share_within(PhotonRecord photon, uint within) {
     vec2 power = vec2(0.0);
-#ifndef POINT_SPECTRUM
-    for (uint k = 0u; k < 2u * POWER_STEPS && photon.x_hi > photon.x_lo; ++k) {
-        float to_anchor = (float(k % POWER_STEPS) + 0.5) / float(POWER_STEPS);
-        float here = step_w[k] * (k < POWER_STEPS ? mix(photon.throughput.x, photon.throughput.y, to_anchor) : mix(photon.throughput.y, photon.throughput.z, to_anchor));
-        power += vec2((within >> k & 1u) != 0u ? here : 0.0, here);
+    if (!POINT_SPECTRUM) {
+        for (uint k = 0u; k < 2u * POWER_STEPS && photon.x_hi > photon.x_lo; ++k) {
+            float to_anchor = (float(k % POWER_STEPS) + 0.5) / float(POWER_STEPS);
+            float here = step_w[k]
+                * (k < POWER_STEPS ? mix(photon.throughput.x, photon.throughput.y, to_anchor)
+                                   : mix(photon.throughput.y, photon.throughput.z, to_anchor));
+            power += vec2((within >> k & 1u) != 0u ? here : 0.0, here);
+        }
     }
-#endif
     return power.y > 0.0 ? power.x / power.y : float(bitCount(within)) / float(2u * POWER_STEPS);
 }
 
-#if SLOTS == 2
-// Whether a splat lies so deep inside a fine window that nobody reads it in the coarse one `outer`: that is read up to the fine one's border, plus what a
-// bilinear lookup there reaches.
+// Whether a splat lies so deep inside a fine window that nobody reads it in the coarse one `outer`: that is read up to
+// the fine one's border, plus what a bilinear lookup there reaches.
 bool is_only_fine(SplatRecord splat, Placement place, Placement outer, vec3 position) {
     vec3 in_outer = homogeneous_texel(outer, position), in_fine = homogeneous_texel(place, position);
     vec2 extent = half_extent(splat) + 3.0 * texels_per_length(place, in_fine) / texels_per_length(outer, in_outer);
-    return all(greaterThan(splat.centre - extent, place.rect.xy)) && all(lessThan(splat.centre + extent, place.rect.zw));
+    return all(greaterThan(splat.centre - extent, place.rect.xy))
+        && all(lessThan(splat.centre + extent, place.rect.zw));
 }
-#endif
 
-#ifdef BORDER_IMAGES
 #include "light/footprint_images.glsl"
-#endif
 
 void main() {
     uint i = gl_GlobalInvocationID.x;
@@ -310,9 +311,7 @@ void main() {
     PhotonRecord photon = photons[first_photon + i * stride];
     Receiver receiver = receivers[photon.receiver];
     uint at = receiver.placement;
-#ifdef CHARTS
-    at += receiver.kind == RECEIVER_CHARTS ? photon.triangle - receiver.first_triangle : 0u;
-#endif
+    if (CHARTS) at += receiver.kind == RECEIVER_CHARTS ? photon.triangle - receiver.first_triangle : 0u;
     Placement place = placements[at];
 
     uint light = photon.light_and_source & 255u;
@@ -337,13 +336,13 @@ void main() {
 #endif
     // The path belongs to the glass it was traced through.
     float x_traced = photon.x_anchor;
-#ifdef REINDEXED
-    // What a path is depends on the one index only: its interval of that stays, and which wavelengths have it now depends on
-    // the glass that is shown and on the local gain. y is affine in the index.
+#if REINDEXED
+    // What a path is depends on the one index only: its interval of that stays, and which wavelengths have it now
+    // depends on the glass that is shown and on the local gain. y is affine in the index.
     float v_traced = spectral_variable(traced_row, x_traced);
     vec2 v_ends = vec2(spectral_variable(traced_row, photon.x_lo), spectral_variable(traced_row, photon.x_hi));
     float grown = 1.0;
-#ifdef LOCAL_GAIN
+#if LOCAL_GAIN
     vec3 to_reference = photon.dposition_dvar0.xyz * ((x_reference - y_offset) / y_scale - v_traced);
     grown = max(local_gain(photon.receiver, photon.position + to_reference), 1e-3);
 #endif
@@ -367,19 +366,23 @@ void main() {
     photon.x_hi = y_in.y;
     photon.x_anchor = clamp(x_reference + (y_offset + y_scale * v_traced - x_reference) / grown, y_in.x, y_in.y);
 #else
-#ifdef LOCAL_GAIN
-    // Displacements grow about where the light of the reference wavelength lands, the same place for all bands of a path.
+#if LOCAL_GAIN
+    // Displacements grow about where the light of the reference wavelength lands, the same place for all bands of a
+    // path.
     vec3 to_reference = vec3(0.0);
-#define ADD_REFERENCE(g) to_reference += photon.dposition_dvar##g.xyz * (spectral_variable(uint(g), x_reference) - spectral_variable(traced_row + uint(g), x_traced));
+#define ADD_REFERENCE(g) \
+    to_reference += photon.dposition_dvar##g.xyz \
+        * (spectral_variable(uint(g), x_reference) - spectral_variable(traced_row + uint(g), x_traced));
     ALL_GROUPS(ADD_REFERENCE)
 #endif
-#define ADD_GROUP(g) { \
+#define ADD_GROUP(g) \
+    { \
         float anchor = spectral_variable(traced_row + uint(g), x_traced); \
         to_lo += photon.dposition_dvar##g.xyz * (spectral_variable(uint(g), photon.x_lo) - anchor); \
         to_hi += photon.dposition_dvar##g.xyz * (spectral_variable(uint(g), photon.x_hi) - anchor); \
     }
     ALL_GROUPS(ADD_GROUP)
-#ifdef LOCAL_GAIN
+#if LOCAL_GAIN
     float gain = local_gain(photon.receiver, photon.position + to_reference);
     to_lo = mix(to_reference, to_lo, gain);
     to_hi = mix(to_reference, to_hi, gain);
@@ -387,9 +390,7 @@ void main() {
 #endif
 #endif
     float power_w = photon_power(photon, table / bands, table_band);
-#ifdef REINDEXED
-    power_w = carries ? power_w : 0.0;
-#endif
+    if (REINDEXED) power_w = carries ? power_w : 0.0;
     sums[i].w += power_w;
     float mean = mean_throughput(photon, power_w, table / bands, table_band);
     vec3 middle = 0.5 * (to_lo + to_hi);
@@ -412,39 +413,33 @@ void main() {
 
     uint within = shown ? steps_within(place.rect, f, photon) : 0u;
     Placement drawn_in = place;
-#ifdef CONTACT_LINES
+#if CONTACT_LINES
     float kept = 1.0, lost = 0.0;
     float thin = thin_variance(f);
     uint side = shown ? side_of_contact(place, f, photon.photon_id, kept, lost) : 0u;
     sums[i].x += lost * power_w;
     if (side == 0u)
 #endif
-    choose_level(drawn_in, f, photon, middle, sweep);
+        choose_level(drawn_in, f, photon, middle, sweep);
     SplatRecord fine = splat_of(photon, power_w, mean, f, table, table_band);
     fine.rect = drawn_in.rect;
     bool drawn = shown && touches(drawn_in.rect, fine.centre, half_extent(fine));
-#ifdef REINDEXED
-    drawn = drawn && carries;
-#endif
+    if (REINDEXED) drawn = drawn && carries;
     if (!drawn) {
         fine.kind = 0u;
     }
     mark_edge(fine);
-#ifdef CONTACT_LINES
-    keep_to_side(fine, side, kept);
-#endif
+    if (CONTACT_LINES) keep_to_side(fine, side, kept);
     uint slot = i * uint(SLOTS + IMAGE_SLOTS);
-#ifdef BORDER_IMAGES
+#if BORDER_IMAGES
     // Behind the photon's own splats, so many of them.
     Depicted depicted = Depicted(photon, middle, sweep, power_w, mean, table, table_band, 0u, 0.0);
-#ifdef CONTACT_LINES
-    depicted.side = side;
-    depicted.thin = thin;
-#endif
+    if (CONTACT_LINES) {
+        depicted.side = side;
+        depicted.thin = thin;
+    }
     fine.images = put_images(depicted, place, slot + uint(SLOTS));
-#ifdef REINDEXED
-    fine.images = carries ? fine.images : 0u;
-#endif
+    if (REINDEXED) fine.images = carries ? fine.images : 0u;
 #endif
     splats[slot] = fine;
 
@@ -467,11 +462,9 @@ void main() {
             if (!touches(outer.rect, coarse.centre, half_extent(coarse))) {
                 coarse.kind = 0u;
             }
-#ifdef REINDEXED
-            if (!carries) {
+            if (REINDEXED && !carries) {
                 coarse.kind = 0u;
             }
-#endif
         }
     }
     mark_edge(coarse);

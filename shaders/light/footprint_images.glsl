@@ -1,10 +1,11 @@
-// Images of a footprint beyond its receiver's borders (lib/border.glsl), for `footprint.comp`: each is drawn like the photon itself. What of it lies
-// inside is what footprints of photons from beyond would be there; what of it lies outside nobody reads, but for texels that the border crosses, which so
-// hold what whole ones would.
+// Images of a footprint beyond its receiver's borders (lib/border.glsl), for `footprint.comp`: each is drawn like the
+// photon itself. What of it lies inside is what footprints of photons from beyond would be there; what of it lies
+// outside nobody reads, but for texels that the border crosses, which so hold what whole ones would.
 //
-// Photons of a lattice go on beyond the border as the lattice does: the last one inside stands for the next ones outside, a step of its lattice further
-// each. Mirrored, their even lattice would have a seam at the border, with gaps from none to two spacings wide. Photons of no lattice are mirrored,
-// those of lattices much finer than texels, those whose footprints fan out, and those whose band sweeps towards the border, which blurs the seam.
+// Photons of a lattice go on beyond the border as the lattice does: the last one inside stands for the next ones
+// outside, a step of its lattice further each. Mirrored, their even lattice would have a seam at the border, with gaps
+// from none to two spacings wide. Photons of no lattice are mirrored, those of lattices much finer than texels, those
+// whose footprints fan out, and those whose band sweeps towards the border, which blurs the seam.
 
 // A photon as it is drawn.
 struct Depicted {
@@ -34,9 +35,11 @@ const float TEXELS_AT_BORDER = 1.5;
 // Steps beyond the border that a photon stands for at most; finer lattices are mirrored.
 const uint STEPS_BEYOND = 3u;
 const float LEAST_STEP = 0.375;  // texels
-// Of such a step: which photon of a lattice is the last one inside depends on the wavelength where a band sweeps further towards the border. It is mirrored.
+// Of such a step: which photon of a lattice is the last one inside depends on the wavelength where a band sweeps
+// further towards the border. It is mirrored.
 const float MOST_SWEPT = 0.1;
-// Change of a footprint's size over such a step: light that thins out so fast (glows at low angles) has no even lattice beyond the border, and what those within spread beyond it would be lost.
+// Change of a footprint's size over such a step: light that thins out so fast (glows at low angles) has no even lattice
+// beyond the border, and what those within spread beyond it would be lost.
 const float MOST_FANNED = 0.5;
 // Bit of the image across both borders, behind the steps over the one and over the other.
 const uint ACROSS_BOTH = 2u * STEPS_BEYOND;
@@ -55,8 +58,9 @@ Beside footprint_beside(Depicted of, Placement place, vec4 border, int index) {
     Beside found = Beside(border, index, border_distance(border, centre), -1.0, vec3(0.0), 0.0);
     float spread = smoothing * border_spread(border, of.photon.dposition_ds, of.photon.dposition_dt);
     if (!sweeps_inside(border, from, to, spread)) return found;
-#ifdef CONTACT_LINES
-    // A footprint that meets a line of contact (splat_contact.glsl) has its light back already: another receiver begins there.
+#if CONTACT_LINES
+    // A footprint that meets a line of contact (splat_contact.glsl) has its light back already: another receiver begins
+    // there.
     vec3 at_border = homogeneous_texel(place, centre - found.distance * border.xyz);
     if (place.kind == PLACED_PICTURE && of.thin <= CONTACT_VARIANCE && at_border.z > 0.0) {
         vec2 texel_there = at_border.xy / at_border.z, outwards_there = texels_along(place, at_border, -border.xyz);
@@ -104,13 +108,15 @@ Depicted image_of(Depicted of, Beside first, Beside second, uint bit) {
     return mirrored(mirrored(of, first.border), second.border);
 }
 
-// Write all images of a photon from `slot` on, in all windows of its receiver; returns how many splats those are. Their number is found first, so that a
-// software renderer, which runs the body of an `if` for all, goes through the loop only with photons that have any; what makes a splat stands there once.
+// Write all images of a photon from `slot` on, in all windows of its receiver; returns how many splats those are. Their
+// number is found first, so that a software renderer, which runs the body of an `if` for all, goes through the loop
+// only with photons that have any; what makes a splat stands there once.
 uint put_images(Depicted of, Placement place, uint slot) {
     Placement read_in = place;
 #if SLOTS == 2
     vec3 at = homogeneous_texel(place, of.photon.position + of.middle);
-    if (place.next != NONE && (at.z <= 0.0 || !contains(place.rect, at.xy / at.z, 0.0))) read_in = placements[place.next];
+    if (place.next != NONE && (at.z <= 0.0 || !contains(place.rect, at.xy / at.z, 0.0)))
+        read_in = placements[place.next];
 #endif
     // The two borders of those that it reaches over to which it is nearest.
     Beside first = Beside(vec4(0.0), -1, 1e30, -1.0, vec3(0.0), 0.0), second = first;
@@ -140,7 +146,8 @@ uint put_images(Depicted of, Placement place, uint slot) {
         for (uint next = 0u; next != NONE;) {
             Placement drawn_in = window;
             Footprint f = footprint_in(window, image.photon, image.middle, image.sweep);
-            bool shown = in_front(window, image.photon, image.middle, image.sweep) && held_size(window, image.photon, f) >= 1.0;
+            bool shown =
+                in_front(window, image.photon, image.middle, image.sweep) && held_size(window, image.photon, f) >= 1.0;
             if (!keeps_side) choose_level(drawn_in, f, image.photon, image.middle, image.sweep);
             SplatRecord splat = splat_of(image.photon, image.power_w, image.mean, f, image.table, image.band);
             splat.rect = drawn_in.rect;
@@ -155,7 +162,7 @@ uint put_images(Depicted of, Placement place, uint slot) {
             next = NONE;
 #endif
             mark_edge(splat);
-#ifdef CONTACT_LINES
+#if CONTACT_LINES
             if (keeps_side) keep_to_side(splat, of.side, 1.0);
 #endif
             keeps_side = false;

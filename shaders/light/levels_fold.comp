@@ -6,13 +6,9 @@ layout(rgba32f, binding = 0) uniform image2D maps;
 layout(location = 0) uniform ivec4 wide;  // tile: x0, y0, x1, y1
 layout(location = 1) uniform ivec4 fine;
 
-vec4 wide_texel(ivec2 at)
-{
-    return imageLoad(maps, wide.xy + clamp(at, ivec2(0), wide.zw - wide.xy - 1));
-}
+vec4 wide_texel(ivec2 at) { return imageLoad(maps, wide.xy + clamp(at, ivec2(0), wide.zw - wide.xy - 1)); }
 
-void main()
-{
+void main() {
     ivec2 texel = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(texel, fine.zw - fine.xy))) return;
     vec2 at = (vec2(texel) + 0.5) * 0.5 - 0.5;

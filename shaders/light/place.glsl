@@ -1,4 +1,5 @@
-// Positions within what a place on a receiver stands for: all of a texel, or those of its parts that something covers, or does not.
+// Positions within what a place on a receiver stands for: all of a texel, or those of its parts that something covers,
+// or does not.
 #ifndef LIGHT_PLACE_GLSL
 #define LIGHT_PLACE_GLSL
 
@@ -6,8 +7,7 @@
 #define ALL_PARTS 0xffffu
 
 // `within`: 0 to 1, uniform.
-vec3 position_in(EnvironmentPlace place, vec2 within)
-{
+vec3 position_in(EnvironmentPlace place, vec2 within) {
     if (place.parts != ALL_PARTS) {
         float chosen = within.x * float(bitCount(place.parts));
         uint left = place.parts;

@@ -3,8 +3,7 @@ layout(local_size_x = 64) in;
 
 #include "lib/queue.glsl"
 
-void main()
-{
+void main() {
     uint chunk = gl_GlobalInvocationID.x;
     uint first = chunk * CHUNK;
     if (first >= state.alive) return;
@@ -25,8 +24,7 @@ void main()
         total.absorbed_w += outcome.absorbed_w;
         total.roulette_w += outcome.roulette_w;
         total.emitted_w += starts ? outcome.flux_w : 0.0;
-        for (uint fall = 0u; fall < FALLBACK_COUNT; ++fall)
-            total.fallbacks[fall] += (outcome.what >> (8u + fall)) & 1u;
+        for (uint fall = 0u; fall < FALLBACK_COUNT; ++fall) total.fallbacks[fall] += (outcome.what >> (8u + fall)) & 1u;
     }
     counts[chunk] = total;
 }

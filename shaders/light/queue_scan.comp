@@ -1,5 +1,5 @@
-// Exclusive prefix sums of the chunk counts by one work group, and the next step's dispatch sizes. The children become the rays of
-// the next step: what lists them goes by `dispatched` and `next_alive`.
+// Exclusive prefix sums of the chunk counts by one work group, and the next step's dispatch sizes. The children become
+// the rays of the next step: what lists them goes by `dispatched` and `next_alive`.
 layout(local_size_x = 256) in;
 
 #include "lib/queue.glsl"
@@ -7,8 +7,7 @@ layout(local_size_x = 256) in;
 shared uint ray_sums[256];
 shared uint photon_sums[256];
 
-void main()
-{
+void main() {
     uint lane = gl_LocalInvocationID.x;
     uint chunks = (state.alive + CHUNK - 1u) / CHUNK;
     uint span = (chunks + 255u) / 256u;

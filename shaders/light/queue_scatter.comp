@@ -3,8 +3,7 @@ layout(local_size_x = 64) in;
 
 #include "lib/queue.glsl"
 
-void main()
-{
+void main() {
     uint chunk = gl_GlobalInvocationID.x;
     uint first = chunk * CHUNK;
     if (first < state.dispatched) {

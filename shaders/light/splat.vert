@@ -1,16 +1,17 @@
-// Vertex pulling, nothing instanced. SMALL, SWEPT or CUT chooses the class: a swept splat is a parallelogram (four corners through an index buffer), a small one a triangle about
-// its square, which costs a software rasteriser one set-up instead of two (it wins below about 40 texels).
+// Vertex pulling, nothing instanced. SMALL, SWEPT or CUT chooses the class: a swept splat is a parallelogram (four
+// corners through an index buffer), a small one a triangle about its square, which costs a software rasteriser one
+// set-up instead of two (it wins below about 40 texels).
 #include "light/splat_setup.glsl"
 
 flat out vec4 rect;
-#ifdef CONTACT_LINES
+#if CONTACT_LINES
 flat out uint side;
 #endif
-#ifdef SMALL
+#if SMALL
 noperspective out vec2 at;
 flat out vec2 half_texel;  // along x, y in units of sqrt(2) sigma
 #else
-#ifdef FANS
+#if FANS
 #define INTERPOLATED smooth
 #else
 #define INTERPOLATED noperspective
@@ -19,13 +20,13 @@ INTERPOLATED out vec3 at;
 flat out vec3 shape;
 INTERPOLATED out vec2 wave;  // cycles
 flat out vec3 ripple;
-#if defined(EDGE) && defined(LIGHT_EDGES)
+#if EDGE && LIGHT_EDGES
 INTERPOLATED out float lit;
 #endif
-#ifndef ONE_COLOUR
+#if !ONE_COLOUR
 flat out vec4 throughput;
 flat out vec4 band;
-#ifdef CUT
+#if CUT
 flat out float curve_row;
 #else
 flat out vec4 middles[TARGETS];
@@ -33,11 +34,10 @@ flat out vec4 bends[TARGETS];
 #endif
 #endif
 #endif
-#if defined(SMALL) || defined(ONE_COLOUR)
+#if SMALL || ONE_COLOUR
 flat out vec4 splat_colour[TARGETS];
 #endif
 
-#ifdef CLIPPED
 // Sine between a splat's sides.
 #define THINNEST_SPLAT 1e-6
 // The least and largest (xi, eta) in [-1, 1]² that the splat's rectangle holds: what is outside need not be drawn.
@@ -48,9 +48,12 @@ vec4 part_inside(SplatRecord splat) {
     if (abs(area) <= THINNEST_SPLAT * length(splat.along) * length(splat.across)) return all_of_it;
     vec4 range = vec4(vec2(1e30), vec2(-1e30));
     for (int i = 0; i < 4; ++i) {
-        vec2 to_corner = vec2((i & 1) == 0 ? splat.rect.x : splat.rect.z, (i & 2) == 0 ? splat.rect.y : splat.rect.w) - splat.centre;
-        vec2 place = vec2(to_corner.x * splat.across.y - to_corner.y * splat.across.x, splat.along.x * to_corner.y - splat.along.y * to_corner.x) / area;
-#ifdef FANS
+        vec2 to_corner =
+            vec2((i & 1) == 0 ? splat.rect.x : splat.rect.z, (i & 2) == 0 ? splat.rect.y : splat.rect.w) - splat.centre;
+        vec2 place = vec2(to_corner.x * splat.across.y - to_corner.y * splat.across.x,
+                         splat.along.x * to_corner.y - splat.along.y * to_corner.x)
+            / area;
+#if FANS
         // Back through the perspective; where that has no place for it, all is drawn.
         float w = 1.0 - dot(splat.fan, place);
         if (w < 1e-3) return all_of_it;
@@ -60,14 +63,11 @@ vec4 part_inside(SplatRecord splat) {
     }
     return vec4(max(range.xy, all_of_it.xy), min(range.zw, all_of_it.zw));
 }
-#endif
 
 void main() {
-#ifdef SMALL
+#if SMALL
     SplatRecord splat = splats[lists[FIRST_OF_KIND + uint(gl_VertexID / 3)]];
-#ifdef CONTACT_LINES
-    side = side_taken_off(splat);
-#endif
+    if (CONTACT_LINES) side = side_taken_off(splat);
     int third = gl_VertexID % 3;
     vec2 corner = vec2(third == 1 ? 3.0 : -1.0, third == 2 ? 3.0 : -1.0);
     vec2 reach = corner * splat.along;
@@ -76,48 +76,44 @@ void main() {
     half_texel = half_texel_of(splat);
 #else
     SplatRecord splat = splats[lists[FIRST_OF_KIND + uint(gl_VertexID >> 2)]];
-#ifdef CONTACT_LINES
-    side = side_taken_off(splat);
-#endif
+    if (CONTACT_LINES) side = side_taken_off(splat);
     vec2 corner = vec2(float(gl_VertexID & 1), float((gl_VertexID >> 1) & 1)) * 2.0 - 1.0;
-#ifdef CLIPPED
-    vec4 inside = part_inside(splat);
-    inside.zw = max(inside.xy, inside.zw);
-    corner = mix(inside.xy, inside.zw, 0.5 * corner + 0.5);
-#endif
+    if (CLIPPED) {
+        vec4 inside = part_inside(splat);
+        inside.zw = max(inside.xy, inside.zw);
+        corner = mix(inside.xy, inside.zw, 0.5 * corner + 0.5);
+    }
     vec2 position = splat.centre + corner.x * splat.along + corner.y * splat.across;
     at = place_at(splat, corner);
     shape = shape_of(splat);
     wave = cycles_at(splat, corner);
     ripple = splat.ripple.xyz;
-#if defined(EDGE) && defined(LIGHT_EDGES)
-    lit = lit_at(splat, corner);
-#endif
-#ifndef ONE_COLOUR
-    throughput = throughput_of(splat);
-    band = band_of(splat);
-#ifdef CUT
-    curve_row = curve_row_of(splat);
-#else
-    for (int g = 0; g < TARGETS; ++g) {
-        middles[g] = channel_middles(splat, uint(g));
-        bends[g] = channel_bends(splat, uint(g));
+    if (EDGE && LIGHT_EDGES) lit = lit_at(splat, corner);
+    if (!ONE_COLOUR) {
+        throughput = throughput_of(splat);
+        band = band_of(splat);
+        if (CUT) {
+            curve_row = curve_row_of(splat);
+        } else {
+            for (int g = 0; g < TARGETS; ++g) {
+                middles[g] = channel_middles(splat, uint(g));
+                bends[g] = channel_bends(splat, uint(g));
+            }
+        }
     }
 #endif
-#endif
-#endif
-#if defined(SMALL) || defined(ONE_COLOUR)
-    for (int g = 0; g < TARGETS; ++g) {
-        splat_colour[g] = colour_of(splat, uint(g));
+    if (SMALL || ONE_COLOUR) {
+        for (int g = 0; g < TARGETS; ++g) {
+            splat_colour[g] = colour_of(splat, uint(g));
+        }
     }
-#endif
     rect = splat.rect;
-#ifdef FANS
-    // What is linear in xi and eta stays so: the rasteriser's own perspective.
-    float w = 1.0 + dot(splat.fan, corner);
-    position = splat.centre * w + (position - splat.centre);
-    gl_Position = vec4(position / atlas_size * 2.0 - w, 0.0, w);
-#else
-    gl_Position = vec4(position / atlas_size * 2.0 - 1.0, 0.0, 1.0);
-#endif
+    if (FANS) {
+        // What is linear in xi and eta stays so: the rasteriser's own perspective.
+        float w = 1.0 + dot(splat.fan, corner);
+        position = splat.centre * w + (position - splat.centre);
+        gl_Position = vec4(position / atlas_size * 2.0 - w, 0.0, w);
+    } else {
+        gl_Position = vec4(position / atlas_size * 2.0 - 1.0, 0.0, 1.0);
+    }
 }

@@ -1,6 +1,7 @@
-// Adds splats to sums in a buffer, with atomics: for devices whose rasteriser blends slowly. A work group a splat: the lines of texels that cross it
-// are worked out LANES at a time, each one's stretch within the splat from its straight sides, and the texels of those stretches are shared out evenly,
-// so that long thin splats cost no more than what they cover. What a texel gets is said by splat_texel.glsl, as for the rasteriser.
+// Adds splats to sums in a buffer, with atomics: for devices whose rasteriser blends slowly. A work group a splat: the
+// lines of texels that cross it are worked out LANES at a time, each one's stretch within the splat from its straight
+// sides, and the texels of those stretches are shared out evenly, so that long thin splats cost no more than what they
+// cover. What a texel gets is said by splat_texel.glsl, as for the rasteriser.
 layout(local_size_x = LANES) in;
 
 #include "lib/finite.glsl"
@@ -8,23 +9,23 @@ layout(local_size_x = LANES) in;
 #include "light/splat_texel.glsl"
 #include "light/splat_sums.glsl"
 
-layout(std430, binding = 3) readonly buffer Commands { uint dispatch_words[]; };  // five a kind, the last the number of its splats
+layout(std430, binding = 3) readonly buffer Commands {
+    uint dispatch_words[];
+};  // five a kind, the last the number of its splats
 
 const int SIDES = 4;
 
 shared int first_texel[LANES];
 shared int texel_count[LANES];
-#if defined(SMALL) || defined(ONE_COLOUR)
+#if SMALL || ONE_COLOUR
 shared vec4 splat_colour[TARGETS];
-#elif defined(SWEPT)
+#elif SWEPT
 shared vec4 middles[TARGETS];
 shared vec4 bends[TARGETS];
 #endif
 
 // Nearest to a place that texels can have: what is not a number ends somewhere.
-int texel_from(float place, int limit) {
-    return clamp(int(clamp(place, -1.0, float(limit) + 1.0)), 0, limit);
-}
+int texel_from(float place, int limit) { return clamp(int(clamp(place, -1.0, float(limit) + 1.0)), 0, limit); }
 
 void main() {
     int lane = int(gl_LocalInvocationID.x);
@@ -32,22 +33,22 @@ void main() {
     ivec2 size = ivec2(atlas_size);
     for (uint index = gl_WorkGroupID.x; index < splat_count; index += gl_NumWorkGroups.x) {
         SplatRecord splat = splats[lists[FIRST_OF_KIND + index]];
-#ifdef CONTACT_LINES
+#if CONTACT_LINES
         uint side = side_taken_off(splat);
 #endif
-#if defined(SMALL) || defined(ONE_COLOUR)
-        for (int g = lane; g < TARGETS; g += LANES) splat_colour[g] = colour_of(splat, uint(g));
-#elif defined(SWEPT)
-        for (int g = lane; g < TARGETS; g += LANES) {
-            middles[g] = channel_middles(splat, uint(g));
-            bends[g] = channel_bends(splat, uint(g));
+        if (SMALL || ONE_COLOUR) {
+            for (int g = lane; g < TARGETS; g += LANES) splat_colour[g] = colour_of(splat, uint(g));
+        } else if (SWEPT) {
+            for (int g = lane; g < TARGETS; g += LANES) {
+                middles[g] = channel_middles(splat, uint(g));
+                bends[g] = channel_bends(splat, uint(g));
+            }
         }
-#endif
         // Sides in texels about the centre: normals, and how far.
         vec2 normals[SIDES];
         vec4 far;
         vec2 lowest, highest;
-#ifdef SMALL
+#if SMALL
         // The triangle that splat.vert draws.
         vec2 unit = 1.0 / splat.along;
         normals[0] = vec2(-unit.x, 0.0);
@@ -65,9 +66,7 @@ void main() {
         vec2 to_xi = vec2(splat.across.y, -splat.across.x) / area, to_eta = vec2(-splat.along.y, splat.along.x) / area;
         vec4 all_of_it = all_of_splat(splat);
         vec2 to_w = vec2(0.0);
-#ifdef FANS
-        to_w = splat.fan.x * to_xi + splat.fan.y * to_eta;
-#endif
+        if (FANS) to_w = splat.fan.x * to_xi + splat.fan.y * to_eta;
         normals[0] = -to_xi - all_of_it.x * to_w;
         normals[1] = -to_eta - all_of_it.y * to_w;
         normals[2] = to_xi + all_of_it.z * to_w;
@@ -76,11 +75,10 @@ void main() {
         lowest = vec2(1e30);
         highest = vec2(-1e30);
         for (int corner = 0; corner < 4; ++corner) {
-            vec2 at = vec2((corner & 1) == 0 ? all_of_it.x : all_of_it.z, (corner & 2) == 0 ? all_of_it.y : all_of_it.w);
+            vec2 at =
+                vec2((corner & 1) == 0 ? all_of_it.x : all_of_it.z, (corner & 2) == 0 ? all_of_it.y : all_of_it.w);
             vec2 place = at.x * splat.along + at.y * splat.across;
-#ifdef FANS
-            place /= 1.0 + dot(splat.fan, at);
-#endif
+            if (FANS) place /= 1.0 + dot(splat.fan, at);
             lowest = min(lowest, place);
             highest = max(highest, place);
         }
@@ -129,42 +127,39 @@ void main() {
                 t += LANES;
                 vec2 place = vec2(texel) + 0.5;
                 vec2 away = place - splat.centre;
-#ifdef SMALL
+#if SMALL
                 float share = small_share(away * splat.across, half_texel_of(splat));
 #else
                 vec2 at = vec2(dot(to_xi, away), dot(to_eta, away));
                 float w = 1.0;
-#ifdef FANS
-                w = 1.0 / (1.0 - dot(splat.fan, at));
-                at *= w;
-#endif
+                if (FANS) {
+                    w = 1.0 / (1.0 - dot(splat.fan, at));
+                    at *= w;
+                }
                 vec3 shape = shape_of(splat), drawn_at = place_at(splat, at);
                 float share = swept_share(drawn_at, shape, cycles_at(splat, at), splat.ripple.xyz, w);
-#if defined(EDGE) && defined(LIGHT_EDGES)
-                share *= clamp(lit_at(splat, at), 0.0, 1.0);
+                if (EDGE && LIGHT_EDGES) share *= clamp(lit_at(splat, at), 0.0, 1.0);
 #endif
-#endif
-#ifdef CONTACT_LINES
-                share *= taken_at(place, side);
-#endif
-#if defined(CUT)
+                if (CONTACT_LINES) share *= taken_at(place, side);
+#if CUT
                 vec4 band = band_of(splat);
                 vec2 x = window_at(at.x, band);
                 share *= throughput_over(vec4(0.5 * (x.x + x.y)), throughput_of(splat)).x / (2.0 * half_box_of(band));
                 float curve_row = curve_row_of(splat);
-#elif defined(SWEPT) && defined(ONE_COLOUR)
+#elif SWEPT && ONE_COLOUR
                 share *= share_along(at.x);
 #endif
                 if (share == 0.0) continue;
                 for (int g = 0; g < TARGETS; ++g) {
-#if defined(SMALL) || defined(ONE_COLOUR)
-                    add_to_sums(texel, size, g, share * splat_colour[g]);
-#elif defined(CUT)
-                    add_to_sums(texel, size, g, share * window_energy(curve_row, x, g));
-#else
-                    vec4 throughput = throughput_swept(at.x, throughput_of(splat), band_of(splat), middles[g], bends[g]);
-                    add_to_sums(texel, size, g, share * throughput * spectrum_at(drawn_at, shape, g));
-#endif
+                    if (SMALL || ONE_COLOUR) {
+                        add_to_sums(texel, size, g, share * splat_colour[g]);
+                    } else if (CUT) {
+                        add_to_sums(texel, size, g, share * window_energy(curve_row, x, g));
+                    } else {
+                        vec4 throughput =
+                            throughput_swept(at.x, throughput_of(splat), band_of(splat), middles[g], bends[g]);
+                        add_to_sums(texel, size, g, share * throughput * spectrum_at(drawn_at, shape, g));
+                    }
                 }
             }
         }

@@ -1,4 +1,5 @@
-// On which side of a line of contact a splat's light landed (lib/contact.glsl): it is drawn into texels of that side alone, all of it.
+// On which side of a line of contact a splat's light landed (lib/contact.glsl): it is drawn into texels of that side
+// alone, all of it.
 
 // Footprints of a larger standard deviation are drawn across lines of contact, in wider texels.
 const float CONTACT_VARIANCE = 256.0;
@@ -12,8 +13,9 @@ uint contact_word(Placement place, vec2 at) {
 
 uint side_at(Placement place, vec2 at) { return side_of(contact_word(place, at), fract(at)); }
 
-// The side, where the splat's texels hold such a line and all of its spectrum is on one side, else 0; and the share of its energy that texels there
-// hold, and the share that none does. Looks are points of its Gaussian, turned from photon to photon.
+// The side, where the splat's texels hold such a line and all of its spectrum is on one side, else 0; and the share of
+// its energy that texels there hold, and the share that none does. Looks are points of its Gaussian, turned from photon
+// to photon.
 uint side_of_contact(Placement place, Footprint f, uint key, out float held, out float lost) {
     held = 1.0;
     lost = 0.0;

@@ -2,7 +2,7 @@
 // the light's running integral over x at two places.
 #include "light/splat_texel.glsl"
 
-#ifdef CONTACT_LINES
+#if CONTACT_LINES
 flat in uint side;
 #endif
 flat in vec4 rect;
@@ -16,10 +16,10 @@ flat in float curve_row;
 layout(location = 0) out vec4 deposited[TARGETS];
 
 void main() {
-    float share = !inside_rect(gl_FragCoord.xy, rect) ? 0.0 : swept_share(at, shape, wave, ripple, 1.0) / (2.0 * half_box_of(band));
-#ifdef CONTACT_LINES
-    share *= taken_at(gl_FragCoord.xy, side);
-#endif
+    float share = !inside_rect(gl_FragCoord.xy, rect)
+        ? 0.0
+        : swept_share(at, shape, wave, ripple, 1.0) / (2.0 * half_box_of(band));
+    if (CONTACT_LINES) share *= taken_at(gl_FragCoord.xy, side);
     vec2 x = window_at(at.y, band);
     share *= throughput_over(vec4(0.5 * (x.x + x.y)), throughput).x;
     for (int g = 0; g < TARGETS; ++g) {

@@ -1,6 +1,6 @@
-// Lists the splats of each kind in photon order, and how many vertices each kind's draw has: draws then pull only what is theirs.
-// One work group, each thread a run of photons: counted, summed over the threads before it, listed. No atomics: the order in
-// which splats are added is a function of the photons alone.
+// Lists the splats of each kind in photon order, and how many vertices each kind's draw has: draws then pull only what
+// is theirs. One work group, each thread a run of photons: counted, summed over the threads before it, listed. No
+// atomics: the order in which splats are added is a function of the photons alone.
 layout(local_size_x = WORKGROUP) in;
 
 layout(std430, binding = 1) readonly buffer Splats { SplatRecord splats[]; };

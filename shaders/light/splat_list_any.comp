@@ -1,5 +1,5 @@
-// Lists the splats of each kind in any order, and how many work groups add them (splat_add.comp): many photons at a time, for what is summed with
-// atomics anyway. Each work group takes room in the lists for all of its own at once.
+// Lists the splats of each kind in any order, and how many work groups add them (splat_add.comp): many photons at a
+// time, for what is summed with atomics anyway. Each work group takes room in the lists for all of its own at once.
 layout(local_size_x = WORKGROUP) in;
 
 layout(std430, binding = 1) readonly buffer Splats { SplatRecord splats[]; };

@@ -7,4 +7,6 @@ layout(std140, binding = 0) uniform DrawParameters {
     uint cumulative_samples;
     uint tables;  // layers of the texture; from bit 16 on: tables that lie one below the other in each
 };
-layout(std430, binding = 7) readonly buffer Curves { vec4 curve[]; };  // by light and class: density over x, or its running integral
+layout(std430, binding = 7) readonly buffer Curves {
+    vec4 curve[];
+};  // by light and class: density over x, or its running integral

@@ -1,10 +1,10 @@
-// A footprint as the record of a splat to be drawn, for `footprint.comp`: smaller than a texel, or swept along the spectrum.
-// What is drawn of a splat, in its own frame; lengths in texels.
+// A footprint as the record of a splat to be drawn, for `footprint.comp`: smaller than a texel, or swept along the
+// spectrum. What is drawn of a splat, in its own frame; lengths in texels.
 struct Blur {
-    vec2 e;           // along the sweep
-    vec2 m;           // across
+    vec2 e;  // along the sweep
+    vec2 m;  // across
     float shear;
-    float box;        // across: a box, and a Gaussian of variance s2
+    float box;  // across: a box, and a Gaussian of variance s2
     float s2;
     float along2;
     float box_along;  // a cut band's blur along the sweep is a box, so wide; else it is Gaussian, of variance along2
@@ -15,7 +15,8 @@ struct Blur {
 float damping(Blur blur, vec2 k) {
     float ke = dot(k, blur.e);
     float km = dot(k, blur.m) + blur.shear * ke;
-    return exp(-0.5 * TWO_PI * TWO_PI * (blur.s2 * km * km + blur.along2 * ke * ke)) * sinc_pi(blur.box * km) * sinc_pi(blur.box_along * ke) * sinc_pi(blur.sweep * ke);
+    return exp(-0.5 * TWO_PI * TWO_PI * (blur.s2 * km * km + blur.along2 * ke * ke)) * sinc_pi(blur.box * km)
+        * sinc_pi(blur.box_along * ke) * sinc_pi(blur.sweep * ke);
 }
 
 // Sum over texel centres of the splat to be drawn, by Poisson's formula: 1 plus the harmonics that the texel grid sees.
@@ -29,9 +30,10 @@ float grid_sum(Blur blur, vec2 centre) {
     return clamp(total, 0.7, 1.4);
 }
 
-// By the same formula splats about the points of a lattice add up to 1 and twice their transforms' cosines at the lattice's frequencies: a ripple,
-// of 3.7 % at 0.45 spacings. Each splat takes it off, as waves about its own centre: then they add up to 1. So at every wavelength, about where that
-// lands: a fragment's light is that of the wavelengths that land about `share` of its way along the sweep (as of a Gaussian sweep).
+// By the same formula splats about the points of a lattice add up to 1 and twice their transforms' cosines at the
+// lattice's frequencies: a ripple, of 3.7 % at 0.45 spacings. Each splat takes it off, as waves about its own centre:
+// then they add up to 1. So at every wavelength, about where that lands: a fragment's light is that of the wavelengths
+// that land about `share` of its way along the sweep (as of a Gaussian sweep).
 void flatten_lattice(inout SplatRecord splat, Blur blur, Footprint f, uint lattice) {
     splat.waves = vec4(0.0);
     splat.ripple = vec4(0.0);
@@ -40,8 +42,10 @@ void flatten_lattice(inout SplatRecord splat, Blur blur, Footprint f, uint latti
     vec2 steps[3];
     lattice_frequencies(float(lattice), steps[0], steps[1]);
     steps[2] = steps[0] + steps[1];
-    vec2 along_s = f.per_spacing / area * vec2(f.axis_t.y, -f.axis_t.x), along_t = f.per_spacing / area * vec2(-f.axis_s.y, f.axis_s.x);
-    float own = blur.along2 + blur.box_along * blur.box_along * TEXEL_VARIANCE, swept = blur.sweep * blur.sweep * TEXEL_VARIANCE;
+    vec2 along_s = f.per_spacing / area * vec2(f.axis_t.y, -f.axis_t.x),
+         along_t = f.per_spacing / area * vec2(-f.axis_s.y, f.axis_s.x);
+    float own = blur.along2 + blur.box_along * blur.box_along * TEXEL_VARIANCE,
+          swept = blur.sweep * blur.sweep * TEXEL_VARIANCE;
     float share = swept / (own + swept);
     blur.sweep = 0.0;
     vec2 k[3];
@@ -50,41 +54,48 @@ void flatten_lattice(inout SplatRecord splat, Blur blur, Footprint f, uint latti
         k[i] = steps[i].x * along_s + steps[i].y * along_t;
         // A wave as short as a texel is not there: the texel has the mean of it.
         float coarse = max(abs(k[i].x), abs(k[i].y)), along = TWO_PI * dot(k[i], blur.e);
-        // As a footprint's own Gaussian damps it, or more; of a needle's width float32 knows nothing, nor of waves across it.
-        float own_cycles = f.per_spacing * length(steps[i]), most = 2.0 * exp(-0.5 * TWO_PI * TWO_PI * own_cycles * own_cycles);
+        // As a footprint's own Gaussian damps it, or more; of a needle's width float32 knows nothing, nor of waves
+        // across it.
+        float own_cycles = f.per_spacing * length(steps[i]),
+              most = 2.0 * exp(-0.5 * TWO_PI * TWO_PI * own_cycles * own_cycles);
         heights[i] = clamp(damping(blur, k[i]), 0.0, most) * clamp(5.0 - 5.0 * coarse, 0.0, 1.0);
         kept[i] = 2.0 * exp(-0.5 * along * along * share * own);
     }
-    // Each splat's own waves are summed over the lattice too: what that adds at the others' frequencies is second order.
+    // Each splat's own waves are summed over the lattice too: what that adds at the others' frequencies is second
+    // order.
     vec3 taken = heights - 2.0 * heights.yxx * heights.zzy;
     splat.ripple = vec4(taken * kept, 0.0);
-    splat.waves = vec4((1.0 - share) * dot(k[0], splat.along), dot(k[0], splat.across), (1.0 - share) * dot(k[1], splat.along), dot(k[1], splat.across));
+    splat.waves = vec4((1.0 - share) * dot(k[0], splat.along), dot(k[0], splat.across),
+        (1.0 - share) * dot(k[1], splat.along), dot(k[1], splat.across));
     splat.amplitude /= 1.0 - 2.0 * dot(heights, taken);
 }
 
-// Whether the photon has another range than its table's band: a part of it, or what a local gain put there. One of no width stands for all of it.
+// Whether the photon has another range than its table's band: a part of it, or what a local gain put there. One of no
+// width stands for all of it.
 bool is_cut(PhotonRecord photon, vec4 band) {
     return photon.x_hi > photon.x_lo && any(greaterThan(abs(vec2(photon.x_lo, photon.x_hi) - band.xy), vec2(1e-5)));
 }
 
 // Throughput averaged over the light of the band. `power_w`: `photon_power`.
 float mean_throughput(PhotonRecord photon, float power_w, uint light_and_class, vec4 band) {
-#if defined(HERO)
+#if HERO
     // Each of the four wavelengths has its own (`carry_companions`).
     return 1.0;
-#elif defined(POINT_SPECTRUM)
+#elif POINT_SPECTRUM
     return photon.throughput.y;
 #else
     float whole_w = band.w;
-#ifdef BAND_CUTS
-    if (is_cut(photon, band)) whole_w = power_until(light_and_class, photon.x_hi) - power_until(light_and_class, photon.x_lo);
+#if BAND_CUTS
+    if (is_cut(photon, band))
+        whole_w = power_until(light_and_class, photon.x_hi) - power_until(light_and_class, photon.x_lo);
 #endif
     return whole_w > 0.0 ? power_w / whole_w : photon.throughput.y;
 #endif
 }
 
-#ifdef HERO
-// Weights of the hero and its companions, and where in the tables they look up their energies: two cells a number, exact below 2^24.
+#if HERO
+// Weights of the hero and its companions, and where in the tables they look up their energies: two cells a number,
+// exact below 2^24.
 void carry_companions(inout SplatRecord splat, PhotonRecord photon) {
     splat.throughput = vec4(photon.throughput.y, photon.companion_throughput.xyz);
     vec4 x = vec4(photon.x_anchor, photon.companion_x.xyz);
@@ -93,7 +104,8 @@ void carry_companions(inout SplatRecord splat, PhotonRecord photon) {
 }
 #endif
 
-// Middle of step k of those whose power `step_w` holds, where the band ends at -half and half and its anchor is at `anchor`.
+// Middle of step k of those whose power `step_w` holds, where the band ends at -half and half and its anchor is at
+// `anchor`.
 float step_place(uint k, float half_band, float anchor) {
     float place = (float(k % POWER_STEPS) + 0.5) / float(POWER_STEPS);
     return k < POWER_STEPS ? mix(-half_band, anchor, place) : mix(anchor, half_band, place);
@@ -105,12 +117,13 @@ float anchor_in_band(PhotonRecord photon) {
     return width > 0.0 ? clamp((photon.x_anchor - photon.x_lo) / width, 0.0, 1.0) : 0.5;
 }
 
-#ifndef POINT_SPECTRUM
+#if !POINT_SPECTRUM
 // Mean place of the light's power, and its standard deviation.
 vec2 spread_of_power(float half_band, float anchor) {
     vec3 moments = vec3(0.0);
     for (uint k = 0u; k < 2u * POWER_STEPS; ++k) {
-        float place = step_place(k, half_band, anchor), width = (k < POWER_STEPS ? half_band + anchor : half_band - anchor) / float(POWER_STEPS);
+        float place = step_place(k, half_band, anchor),
+              width = (k < POWER_STEPS ? half_band + anchor : half_band - anchor) / float(POWER_STEPS);
         moments += step_w[k] * vec3(1.0, place, place * place + width * width / 12.0);
     }
     vec2 means = moments.yz / max(moments.x, 1e-30);
@@ -123,15 +136,16 @@ vec4 straight_throughput(PhotonRecord photon, vec2 ends) {
     float anchor = anchor_in_band(photon);
     float at = mix(ends.x, ends.y, anchor);
     return vec4(at, photon.throughput.y,
-                anchor > 1e-3 && width > 0.0 ? (photon.throughput.y - photon.throughput.x) / (at - ends.x) : 0.0,
-                anchor < 0.999 && width > 0.0 ? (photon.throughput.z - photon.throughput.y) / (ends.y - at) : 0.0);
+        anchor > 1e-3 && width > 0.0 ? (photon.throughput.y - photon.throughput.x) / (at - ends.x) : 0.0,
+        anchor < 0.999 && width > 0.0 ? (photon.throughput.z - photon.throughput.y) / (ends.y - at) : 0.0);
 }
 
 // Of what has one colour: over [-1, 1], such that all of its power counts `mean`.
 vec4 throughput_of_colour(PhotonRecord photon, float mean) {
     vec4 throughput = straight_throughput(photon, vec2(-1.0, 1.0));
     vec2 power = spread_of_power(1.0, throughput.x);
-    float as_drawn = throughput_over(vec4(power.x), throughput).x + mean_bend(vec4(power.x), vec4(power.y), throughput).x;
+    float as_drawn =
+        throughput_over(vec4(power.x), throughput).x + mean_bend(vec4(power.x), vec4(power.y), throughput).x;
     bool even = photon.x_hi <= photon.x_lo || as_drawn <= 0.0;
     return even ? vec4(throughput.x, mean, 0.0, 0.0) : vec4(throughput.x, mean / as_drawn * throughput.yzw);
 }
@@ -140,7 +154,7 @@ vec4 throughput_of_colour(PhotonRecord photon, float mean) {
 SplatRecord small_splat(PhotonRecord photon, float power_w, float mean, Footprint f, vec4 band) {
     SplatRecord splat;
     float cut = 0.0;
-#ifdef BAND_CUTS
+#if BAND_CUTS
     cut = is_cut(photon, band) ? 1.0 : 0.0;
 #endif
     vec2 variance = f.axis_s * f.axis_s + f.axis_t * f.axis_t + f.chord * f.chord * TEXEL_VARIANCE;
@@ -152,7 +166,7 @@ SplatRecord small_splat(PhotonRecord photon, float power_w, float mean, Footprin
     splat.table_row = 0.0;
     splat.y_edge = 0.0;
     splat.y_box = 0.0;
-#ifdef POINT_SPECTRUM
+#if POINT_SPECTRUM
     splat.throughput = vec4(photon.x_anchor, photon.throughput.y, 0.0, 0.0);
 #else
     splat.throughput = cut > 0.0 ? vec4(0.0, 1.0, 0.0, 0.0) : throughput_of_colour(photon, 1.0);
@@ -172,28 +186,32 @@ float kept_by_cut(float edge, float box, float s) {
     return 1.0 - 2.0 * s / box * (normal_excess((edge - 0.5 * box) / s) - normal_excess((edge + 0.5 * box) / s));
 }
 
-#ifndef ONE_COLOUR
-// Power that fragments (splat_swept.frag) add up to: each wavelength is blurred over places of other throughput, which is straight between the
-// low end of the band, the anchor and the high end, and even beyond. Blurred, a kink is its size times a normal variable's mean excess.
+#if !ONE_COLOUR
+// Power that fragments (splat_swept.frag) add up to: each wavelength is blurred over places of other throughput, which
+// is straight between the low end of the band, the anchor and the high end, and even beyond. Blurred, a kink is its
+// size times a normal variable's mean excess.
 float power_of_fragments(float xi_half, float inverse_sigma_xi, vec4 throughput) {
     float lowest = throughput.y - throughput.z * (xi_half + throughput.x), power = 0.0;
-    vec3 kinks = vec3(-xi_half, throughput.x, xi_half), bends = vec3(throughput.z, throughput.w - throughput.z, -throughput.w);
+    vec3 kinks = vec3(-xi_half, throughput.x, xi_half),
+         bends = vec3(throughput.z, throughput.w - throughput.z, -throughput.w);
     float part = sweeps_part(xi_half, inverse_sigma_xi), sigma = max(part * SQRT_HALF / inverse_sigma_xi, 1e-6);
     vec2 spread = spread_of_power(xi_half, throughput.x);
     float bend = (1.0 - part) * mean_bend(vec4(spread.x), vec4(spread.y), throughput).x;
     for (uint k = 0u; k < 2u * POWER_STEPS; ++k) {
         vec3 z = (kinks - mix(spread.x, step_place(k, xi_half, throughput.x), part)) / sigma;
-        power += step_w[k] * (lowest + bend + sigma * dot(bends, vec3(normal_excess(z.x), normal_excess(z.y), normal_excess(z.z))));
+        power += step_w[k]
+            * (lowest + bend + sigma * dot(bends, vec3(normal_excess(z.x), normal_excess(z.y), normal_excess(z.z))));
     }
     return power;
 }
 #endif
 
-#if defined(BAND_CUTS) && !defined(ONE_COLOUR)
+#if BAND_CUTS && !ONE_COLOUR
 const int WINDOWS = 8;
 
-// Mean throughput of what fragments (splat_cut.frag) add up to: each has the light of a window on the band, `reach` to both sides as a share of the sweep,
-// times the throughput in the window's middle. Over that of the light itself it is what they draw too much.
+// Mean throughput of what fragments (splat_cut.frag) add up to: each has the light of a window on the band, `reach` to
+// both sides as a share of the sweep, times the throughput in the window's middle. Over that of the light itself it is
+// what they draw too much.
 float throughput_of_windows(PhotonRecord photon, float reach, vec4 throughput, uint light_and_class) {
     vec2 sums = vec2(0.0);
     for (int i = 0; i < WINDOWS; ++i) {
@@ -206,8 +224,8 @@ float throughput_of_windows(PhotonRecord photon, float reach, vec4 throughput, u
 }
 #endif
 
-// Change of W per unit of xi and of eta: what the splat's half extents are divided by at its ends. Along one of both, and so little over the spectrum
-// that none of that is left out.
+// Change of W per unit of xi and of eta: what the splat's half extents are divided by at its ends. Along one of both,
+// and so little over the spectrum that none of that is left out.
 vec2 fan_of_splat(Footprint f, vec2 along, vec2 across, float xi_half) {
     float longer = sqrt(max(dot(f.axis_s, f.axis_s), dot(f.axis_t, f.axis_t))), change = length(f.fan) * longer;
     if (change < LEAST_FAN || longer < LEAST_FANNED) return vec2(0.0);
@@ -221,20 +239,24 @@ vec2 fan_of_splat(Footprint f, vec2 along, vec2 across, float xi_half) {
     return fan;
 }
 
-#ifdef LIGHT_EDGES
-// Spacings by which wavelengths and texels blur the edge at most for the splat to be cut off there, and of footprints' widths.
+#if LIGHT_EDGES
+// Spacings by which wavelengths and texels blur the edge at most for the splat to be cut off there, and of footprints'
+// widths.
 const float BLURRED_EDGE = 0.4;
 const float WIDEST_CUT = 0.5;
 
-// Where the light's emission ends the splat is cut off, as bright as if all of it were lit; the photon carries its lit share. At a fragment are the
-// wavelengths that land about `share` of its way along the sweep (as in `flatten_lattice`).
+// Where the light's emission ends the splat is cut off, as bright as if all of it were lit; the photon carries its lit
+// share. At a fragment are the wavelengths that land about `share` of its way along the sweep (as in
+// `flatten_lattice`).
 void cut_at_edge(inout SplatRecord splat, Blur blur, Footprint f, uint word) {
     vec3 edge = unpacked_edge(word);
     float area = f.axis_s.x * f.axis_t.y - f.axis_s.y * f.axis_t.x;
     if (abs(area) < 1e-6 || smoothing >= WIDEST_CUT || stride != 1u) return;
-    vec2 per_texel = f.per_spacing / area * (edge.x * vec2(f.axis_t.y, -f.axis_t.x) + edge.y * vec2(-f.axis_s.y, f.axis_s.x));
+    vec2 per_texel =
+        f.per_spacing / area * (edge.x * vec2(f.axis_t.y, -f.axis_t.x) + edge.y * vec2(-f.axis_s.y, f.axis_s.x));
     float own = blur.along2, swept = blur.sweep * blur.sweep * TEXEL_VARIANCE, share = swept / (own + swept);
-    float along = dot(per_texel, blur.e), variance = dot(per_texel, per_texel) * TEXEL_VARIANCE + along * along * share * own;
+    float along = dot(per_texel, blur.e),
+          variance = dot(per_texel, per_texel) * TEXEL_VARIANCE + along * along * share * own;
     if (variance > BLURRED_EDGE * BLURRED_EDGE) return;
     float sharpness = sqrt(TEXEL_VARIANCE / max(variance, 1e-12));
     splat.lit = 0.5 + sharpness * edge.z;
@@ -245,8 +267,9 @@ void cut_at_edge(inout SplatRecord splat, Blur blur, Footprint f, uint word) {
 
 SplatRecord swept_splat(PhotonRecord photon, float power_w, float mean, Footprint f, uint light_and_class, vec4 band) {
     SplatRecord splat;
-    vec3 cov = vec3(f.axis_s.x * f.axis_s.x + f.axis_t.x * f.axis_t.x, f.axis_s.x * f.axis_s.y + f.axis_t.x * f.axis_t.y,
-                    f.axis_s.y * f.axis_s.y + f.axis_t.y * f.axis_t.y);  // xx, xy, yy
+    vec3 cov =
+        vec3(f.axis_s.x * f.axis_s.x + f.axis_t.x * f.axis_t.x, f.axis_s.x * f.axis_s.y + f.axis_t.x * f.axis_t.y,
+            f.axis_s.y * f.axis_s.y + f.axis_t.y * f.axis_t.y);  // xx, xy, yy
 
     // The frame: along the chord. But a thin footprint must have its thin side across, where the texel's box is exact:
     // along its long axis then, if the chord leaves that by less than half a texel (blurred, its colours as one).
@@ -282,10 +305,12 @@ SplatRecord swept_splat(PhotonRecord photon, float power_w, float mean, Footprin
     float c_total = s2 + box * box * TEXEL_VARIANCE;
     float shear = b / c_total;
     // a - b²/c_total, without a difference of what may be alike.
-    float along2 = TEXEL_VARIANCE + (a * (c_total - c) + area * area) / c_total, sampled = SAMPLED_VARIANCE * (1.0 + shear * shear);
+    float along2 = TEXEL_VARIANCE + (a * (c_total - c) + area * area) / c_total,
+          sampled = SAMPLED_VARIANCE * (1.0 + shear * shear);
     bool cut = false;
-#ifdef BAND_CUTS
-    // Of what is thinner along the sweep than sampling allows, the texel's average is taken as of a cut band: no light reaches beyond its texels.
+#if BAND_CUTS
+    // Of what is thinner along the sweep than sampling allows, the texel's average is taken as of a cut band: no light
+    // reaches beyond its texels.
     cut = is_cut(photon, band) || (along2 < sampled && photon.x_hi > photon.x_lo);
 #endif
     // There it is a box that texels side by side in their rows, or along their diagonals, share out.
@@ -295,9 +320,8 @@ SplatRecord swept_splat(PhotonRecord photon, float power_w, float mean, Footprin
     if (cut) {
         sweep = max(sweep, 0.05 * sigma);
     } else {
-        // To the nearest row of the table, by changing what the picture depends on least: a blur that is small in the sweep, or a
-        // sweep that is small in the blur.
-        // Rows: 4 an octave from 2^-8, 8 an octave from 2^-4.
+        // To the nearest row of the table, by changing what the picture depends on least: a blur that is small in the
+        // sweep, or a sweep that is small in the blur. Rows: 4 an octave from 2^-8, 8 an octave from 2^-4.
         float octave = log2(clamp(sigma / max(sweep, 1e-6), MIN_SIGMA_TO_SWEEP, MAX_SIGMA_TO_SWEEP));
         row = octave < -4.0 ? round(4.0 * (octave + 8.0)) : 16.0 + round(8.0 * (octave + 4.0));
         float ratio = exp2(row < 16.0 ? 0.25 * row - 8.0 : 0.125 * (row - 16.0) - 4.0);
@@ -322,9 +346,9 @@ SplatRecord swept_splat(PhotonRecord photon, float power_w, float mean, Footprin
     splat.table_row = (row + 0.5) / float(table_rows);
     splat.y_edge = y_edge * SQRT_HALF / s;
     splat.y_box = 0.5 * box * SQRT_HALF / s;
-#if defined(POINT_SPECTRUM)
+#if POINT_SPECTRUM
     splat.throughput = vec4(photon.x_anchor, mean, 0.0, 0.0);
-#elif defined(ONE_COLOUR)
+#elif ONE_COLOUR
     splat.throughput = throughput_of_colour(photon, mean);
 #else
     // Slopes by xi, or by x for a cut band.
@@ -333,7 +357,7 @@ SplatRecord swept_splat(PhotonRecord photon, float power_w, float mean, Footprin
         float as_drawn = power_of_fragments(xi_half, SQRT_HALF * reach / sigma, splat.throughput);
         splat.amplitude *= as_drawn > 0.0 ? clamp(power_w / as_drawn, 0.5, 2.0) : 1.0;
     }
-#ifdef BAND_CUTS
+#if BAND_CUTS
     if (cut && any(notEqual(photon.throughput.xz, photon.throughput.yy))) {
         float as_drawn = throughput_of_windows(photon, sqrt(3.0) * sigma / sweep, splat.throughput, light_and_class);
         splat.amplitude *= as_drawn > 0.0 ? clamp(mean / as_drawn, 0.5, 2.0) : 1.0;
@@ -353,7 +377,7 @@ SplatRecord swept_splat(PhotonRecord photon, float power_w, float mean, Footprin
         splat.amplitude *= 2.0 * kept / (kept + kept_by_cut(end.y * y_edge, box, s));
     }
     splat.kind = cut ? 3u : 2u;
-#ifdef LIGHT_EDGES
+#if LIGHT_EDGES
     splat.x_range = cut ? splat.x_range : vec2(0.0);
     splat.lit = 1.0;
     // A software renderer runs the body of an `if` for all photons, but that of a loop only where one of them goes in.
@@ -364,5 +388,6 @@ SplatRecord swept_splat(PhotonRecord photon, float power_w, float mean, Footprin
 }
 
 SplatRecord empty_splat() {
-    return SplatRecord(vec2(0.0), vec2(0.0), vec2(0.0), 0.0, 0.0, 0.0, 0.0, 0u, 0u, vec4(0.0), vec2(0.0), 0.0, 0.0, vec4(0.0), vec4(0.0), vec4(0.0), vec2(0.0), 0u, 0.0);
+    return SplatRecord(vec2(0.0), vec2(0.0), vec2(0.0), 0.0, 0.0, 0.0, 0.0, 0u, 0u, vec4(0.0), vec2(0.0), 0.0, 0.0,
+        vec4(0.0), vec4(0.0), vec4(0.0), vec2(0.0), 0u, 0.0);
 }

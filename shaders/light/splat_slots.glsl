@@ -4,9 +4,5 @@ const uint PHOTON_SLOTS = uint(SLOTS + IMAGE_SLOTS);
 // Behind the last slot of a photon that holds anything.
 uint end_of(uint photon) {
     uint slot = photon * PHOTON_SLOTS;
-#ifdef BORDER_IMAGES
-    return slot + uint(SLOTS) + splats[slot].images;
-#else
-    return slot + uint(SLOTS);
-#endif
+    return BORDER_IMAGES ? slot + uint(SLOTS) + splats[slot].images : slot + uint(SLOTS);
 }

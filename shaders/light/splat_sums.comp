@@ -13,7 +13,8 @@ void main() {
         return;
     }
     uint place = place_in_sums(texel, size, target);
-    vec4 added = vec4(sum_at(place), sum_at(place + CHANNEL_STEP), sum_at(place + 2u * CHANNEL_STEP), sum_at(place + 3u * CHANNEL_STEP));
+    vec4 added = vec4(sum_at(place), sum_at(place + CHANNEL_STEP), sum_at(place + 2u * CHANNEL_STEP),
+        sum_at(place + 3u * CHANNEL_STEP));
     // Most of a map is dark.
     if (any(notEqual(added, vec4(0.0)))) {
         if (counts != 0u) {

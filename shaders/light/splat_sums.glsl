@@ -1,6 +1,7 @@
-// What splats are added to (splat_add.comp), and taken from into the textures of the maps (splat_sums.comp): in each target blocks of 4 by 2 texels, in
-// which each channel's eight values lie side by side, as many as a device's memory is given at once.
-#ifdef FLOAT_ATOMICS
+// What splats are added to (splat_add.comp), and taken from into the textures of the maps (splat_sums.comp): in each
+// target blocks of 4 by 2 texels, in which each channel's eight values lie side by side, as many as a device's memory
+// is given at once.
+#if FLOAT_ATOMICS
 layout(std430, binding = 2) buffer Sums { float splat_sums[]; };
 #define NOTHING 0.0
 float sum_at(uint place) { return splat_sums[place]; }
@@ -22,15 +23,15 @@ uint place_in_sums(ivec2 texel, ivec2 size, int target) {
 void add_to_sum(uint place, float value) {
     // Most channels far from a splat's middle round to nothing.
     if (value == 0.0) return;
-#ifdef FLOAT_ATOMICS
-    atomicAdd(splat_sums[place], value);
-#else
-    uint expected, found = splat_sums[place];
-    do {
-        expected = found;
-        found = atomicCompSwap(splat_sums[place], expected, floatBitsToUint(uintBitsToFloat(expected) + value));
-    } while (found != expected);
-#endif
+    if (FLOAT_ATOMICS) {
+        atomicAdd(splat_sums[place], value);
+    } else {
+        uint expected, found = splat_sums[place];
+        do {
+            expected = found;
+            found = atomicCompSwap(splat_sums[place], expected, floatBitsToUint(uintBitsToFloat(expected) + value));
+        } while (found != expected);
+    }
 }
 
 void add_to_sums(ivec2 texel, ivec2 size, int target, vec4 value) {

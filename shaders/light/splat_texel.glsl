@@ -2,7 +2,7 @@
 #include "lib/gaussian.glsl"
 #include "lib/swept.glsl"
 
-#ifdef CONTACT_LINES
+#if CONTACT_LINES
 #include "lib/contact.glsl"
 layout(binding = 1) uniform usampler2D contact_words;
 
@@ -15,14 +15,16 @@ bool inside_rect(vec2 place, vec4 rect) {
     return all(within);
 }
 
-#ifdef SMALL
+#if SMALL
 // An axis-aligned Gaussian, integrated exactly over the texel.
-float small_share(vec2 at, vec2 half_texel) { return gaussian_box(at.x, half_texel.x) * gaussian_box(at.y, half_texel.y); }
+float small_share(vec2 at, vec2 half_texel) {
+    return gaussian_box(at.x, half_texel.x) * gaussian_box(at.y, half_texel.y);
+}
 #else
-// Across, the average over the texel. A texel holds so much more of a splat that fans out where that is narrower: `w` times in
-// either direction, and a plane's perspective once more.
+// Across, the average over the texel. A texel holds so much more of a splat that fans out where that is narrower: `w`
+// times in either direction, and a plane's perspective once more.
 float swept_share(vec3 at, vec3 shape, vec2 wave, vec3 ripple, float w) {
-#ifdef FANS
+#if FANS
     float share = gaussian_box_fast(at.x, shape.x * w) * w * w * flatness(wave, ripple);
 #else
     float share = gaussian_box_fast(at.x, shape.x) * flatness(wave, ripple);
@@ -30,26 +32,27 @@ float swept_share(vec3 at, vec3 shape, vec2 wave, vec3 ripple, float w) {
     return share;
 }
 
-#ifdef ONE_COLOUR
 // No sweep: a Gaussian cut at three standard deviations, which holds 0.9973 of it.
 float share_along(float xi) { return 1.20011 * exp(-4.5 * xi * xi); }
 #endif
-#endif
 
-#if defined(SWEPT) && !defined(ONE_COLOUR)
+#if SWEPT && !ONE_COLOUR
 layout(binding = 0) uniform sampler2DArray spectra;
 
 // Along, one lookup of the band's spectrum blurred as this texel sees it.
-vec4 spectrum_at(vec3 at, vec3 shape, int g) { return textureLod(spectra, vec3(at.z, shape.y, shape.z + float(g)), 0.0); }
+vec4 spectrum_at(vec3 at, vec3 shape, int g) {
+    return textureLod(spectra, vec3(at.z, shape.y, shape.z + float(g)), 0.0);
+}
 
-// Of each channel of a target. The wavelengths that a texel at xi has of a channel lie about xi in a splat that is narrow beside its sweep, and in one that is
-// broader wherever the channel has its light: their mean place is so far on the way between both as the sweep's variance is part of all.
+// Of each channel of a target. The wavelengths that a texel at xi has of a channel lie about xi in a splat that is
+// narrow beside its sweep, and in one that is broader wherever the channel has its light: their mean place is so far on
+// the way between both as the sweep's variance is part of all.
 vec4 throughput_swept(float xi, vec4 throughput, vec4 band, vec4 middles, vec4 bends) {
     return throughput_over(clamp(mix(middles, vec4(xi), band.y), -band.x, band.x), throughput) + bends;
 }
 #endif
 
-#ifdef CUT
+#if CUT
 #include "light/splat_parameters.glsl"
 
 vec4 energy_below(uint row, float x) {

@@ -273,7 +273,7 @@ def test_a_guard_forgotten_in_a_shader_is_noticed(monkeypatch: pytest.MonkeyPatc
             copy.parent.mkdir(parents=True, exist_ok=True)
             copy.write_bytes(file.read_bytes())
     text = (mutant / "lib" / "intersect.glsl").read_text()
-    (mutant / "lib" / "intersect.glsl").write_text(text.replace("#ifdef HAS_TREE", "#if 1"))
+    (mutant / "lib" / "intersect.glsl").write_text(text.replace("if (HAS_TREE)", "if (true)"))
     monkeypatch.setattr(paths, "shaders_dir", lambda: mutant)
     proofs = prove(program_sizes(sources(scene_features("prism"))), dict.fromkeys(PROVED, False))
     assert not next(p for p in proofs if p.feature == "triangle tree").holds

@@ -1,4 +1,4 @@
-"""Formatter, linter and types are clean over the whole tree; the rules stand in pyproject.toml."""
+"""Formatters, linter and types are clean over the whole tree; the rules stand in pyproject.toml."""
 
 from __future__ import annotations
 
@@ -34,6 +34,15 @@ def test_the_tree_is_formatted() -> None:
 @needs_ruff
 def test_the_linter_is_content() -> None:
     assert complaints("ruff", "check", "--output-format", "concise", ".") == ""
+
+
+def test_shaders_are_formatted() -> None:
+    """By .clang-format, but for what .clang-format-ignore lists."""
+    clang_format = pytest.importorskip("clang_format", reason="clang-format is not installed: pip install '.[test]'")
+    files = [path for path in (ROOT / "shaders").rglob("*.*") if path.suffix != ".md"]
+    command = [clang_format.get_executable("clang-format"), "--dry-run", "-Werror", *files]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, f"run 'clang-format -i' on these\n{done.stderr}"
 
 
 @needs_mypy
