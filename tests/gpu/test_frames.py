@@ -153,7 +153,9 @@ def test_a_stop_before_the_first_camera_sample_waits_for_it(gl: Context, name: s
 
 # Ten per cent is for a machine that has nothing else to do (slow: alone, without other tests beside it).
 @pytest.mark.parametrize("within", [0.9, pytest.param(0.1, marks=pytest.mark.slow)])
-@pytest.mark.parametrize(("name", "layer"), [("ball", "beauty"), ("prism", "map:table")])
+@pytest.mark.parametrize(
+    ("name", "layer"), [pytest.param("ball", "beauty", marks=pytest.mark.slow), ("prism", "map:table")]
+)
 def test_seconds_are_those_of_the_whole_picture(gl: Context, name: str, layer: str, within: float) -> None:
     scene = load_scene(assets_dir() / "scenes" / f"{name}.toml")
     if layer != "beauty":

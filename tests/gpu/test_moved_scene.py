@@ -199,7 +199,7 @@ def test_surfaces_of_another_size_leave_no_error(gl: Context) -> None:
     gl.check("making a framebuffer after it")
 
 
-@pytest.mark.parametrize("name", ["prism", "ball"])  # beams, photons
+@pytest.mark.parametrize("name", ["prism", pytest.param("ball", marks=pytest.mark.slow)])  # beams, photons
 def test_edits_of_a_rehearsed_scene_compile_nothing(gl: Context, engine: LiveEngine, name: str) -> None:
     shader.drop_programs(gl.ctx)
     scene = shipped(name)

@@ -276,7 +276,7 @@ def test_targets_without_scratch_textures_are_added_to_as_well(gl: Context) -> N
     assert difference(want, drawn(compute, records)) < 3e-4
 
 
-@pytest.mark.parametrize("scene", ["ball", "prism"])
+@pytest.mark.parametrize("scene", ["prism", pytest.param("ball", marks=pytest.mark.slow)])
 def test_a_picture_is_the_same_either_way(monkeypatch: pytest.MonkeyPatch, scene: str) -> None:
     pictures = []
     for way in ("raster", "compute"):

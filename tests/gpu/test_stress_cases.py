@@ -229,13 +229,10 @@ MUTANTS = {
         "not linear",
     ),
 }
-SLOW_MUTANTS = ("rounding of the total lost", "facets that do not overlap")
-QUICK_MUTANTS = tuple(m for m in MUTANTS if MUTANTS[m][0] in LIGHT and m not in SLOW_MUTANTS)
 
 
-@pytest.mark.parametrize(
-    "mistake", [m if m in QUICK_MUTANTS else pytest.param(m, marks=pytest.mark.slow) for m in MUTANTS]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("mistake", MUTANTS)
 def test_case_notices_a_mistake_in_a_shader(gl, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, mistake: str) -> None:
     name, file, old, new, said = MUTANTS[mistake]
     mutate(monkeypatch, tmp_path, file, old, new)
