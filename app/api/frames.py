@@ -19,7 +19,7 @@ from ..edit.state import Display as Look
 from ..passes.display import Display
 from ..passes.sample_picture import SamplePicture
 from ..ui.auto_exposure import AutoExposure
-from ..ui.direct_light import DirectLightQuery
+from ..ui.cursor_info import DirectLightQuery
 
 if TYPE_CHECKING:
     from ..gpu.context import Context

@@ -68,7 +68,7 @@ def lesson(asked: table.Lesson) -> int:
 
 
 def _run(window: Window, scene: Path | None, asked: View, interrupted: Interruption, at: Lesson | None) -> None:
-    from ..ui import layout_memory
+    from ..ui import open_panels
     from ..ui.session import Session
     from ..ui.viewer import Viewer
 
@@ -82,7 +82,7 @@ def _run(window: Window, scene: Path | None, asked: View, interrupted: Interrupt
         session.welcome()
     viewer = Viewer(session, refresh_s=window.refresh_s)
     session.input_waits = window.input_waits
-    layout_memory.load()
+    open_panels.load_layout()
     try:
         if asked.screenshot is None:
             window.run(viewer, until=interrupted)
@@ -100,7 +100,7 @@ def _run(window: Window, scene: Path | None, asked: View, interrupted: Interrupt
         _tell(session.jobs.notes, session.release())
         return
     if asked.screenshot is None:
-        layout_memory.save()
+        open_panels.save_layout()
         session.settings = replace(session.settings, window=place)
         _tell((), session.close())
     else:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..model.optics.glass import LINE_D_NM
+from ..model.scene import Scene
 
 _BY_PHOTON = ("position", "dposition_dn", "n_anchor", "flux_w", "source", "receiver", "band_nm", "light")
 
@@ -58,3 +59,28 @@ class StoredPhotons:
             (self.dposition_dn[:, g] * float(np.subtract(*self.variables[g](line))) for g in groups),
             np.zeros_like(self.position),
         )
+
+
+def index_in(scene: Scene, shown: Scene, index: int) -> int | None:
+    """Index in `scene` of what is object `index` of the `shown` scene; None for one that is no longer there."""
+    if not 0 <= index < len(shown.objects):
+        return None
+    thing, objects = shown.objects[index], scene.objects
+    if len(objects) == len(shown.objects):  # nothing was added or taken away: it may have been edited or renamed
+        return index
+    by_identity = next((i for i, other in enumerate(objects) if other is thing), None)
+    if by_identity is not None:
+        return by_identity
+    return next((i for i, other in enumerate(objects) if other.name == thing.name), None)
+
+
+def photons_in(scene: Scene, shown: Scene, photons: StoredPhotons) -> StoredPhotons:
+    """Photons of the `shown` scene with the numbers that its objects have in `scene`; -1 for what is gone."""
+    found = [index_in(scene, shown, i) for i in range(len(shown.objects))]
+    there = np.array([-1 if i is None else i for i in found] + [-1])  # -1, no object, stays -1
+    return replace(
+        photons,
+        source=there[photons.source],
+        receiver=there[photons.receiver],
+        group_of_object={i: g for k, g in photons.group_of_object.items() if (i := found[k]) is not None},
+    )

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from ..gpu.context_thread import ContextThread
     from ..model.scene import Vec3
     from ..render.viewer.engine import LiveEngine
-    from .live_picture import Engine
+    from ..render.viewer.threaded_engine import Engine
 
 REFERENCE, GLASS, FILE = "reference", "glass", "file"
 STAND_IN = "stochastic-even"

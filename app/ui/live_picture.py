@@ -18,7 +18,7 @@ import numpy as np
 
 from ..base.not_yet import NOT_YET, NotYet
 from ..edit.state import State
-from ..edit.stored_photons import StoredPhotons
+from ..edit.stored_photons import StoredPhotons, index_in, photons_in
 from ..gpu.shader import ShaderError
 from ..passes.display import Display
 from ..passes.glare import Glare
@@ -26,18 +26,14 @@ from ..passes.sample_picture import SamplePicture
 from ..render.viewer.dirty_level import DirtyLevel
 from ..render.viewer.stats import LiveStats
 from .auto_exposure import AutoExposure
-from .shown_scene import index_in, photons_in
 
 if TYPE_CHECKING:
     import moderngl
 
     from ..gpu.context import Context
     from ..model.scene import Scene
-    from ..render.viewer.engine import LiveEngine
     from ..render.viewer.photon_queries import CausticSpectrum
-    from ..render.viewer.threaded_engine import ThreadedEngine
-
-    Engine = LiveEngine | ThreadedEngine
+    from ..render.viewer.threaded_engine import Engine
 
 
 class EngineError(RuntimeError):

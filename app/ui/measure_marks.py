@@ -13,7 +13,7 @@ from ..edit.state import State
 from ..model.scene import Vec3
 from . import item_rects, theme
 from .overlay import Canvas, box_corners, draw_outlined
-from .panels.unit_words import named
+from .panels.numbers import named
 from .view_model import ViewModel
 
 SNAP_PX = 9.0

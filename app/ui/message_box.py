@@ -1,14 +1,90 @@
-"""Sentences to the user: notices fade, errors later or with the next success, repetitions only renew."""
+"""Sentences to the user: notices fade, errors later or with the next success, repetitions only renew. Errors of the
+layers below as sentences that stand alone, options of the command line as what the window has instead, line breaks."""
 
 from __future__ import annotations
 
 import math
+import re
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from ..base.errors import UserError
 from .view_model import Message
-from .window_words import in_window
+
+_INSTEAD: tuple[tuple[str, str], ...] = (
+    (r"; --(?:flat shows facets|smooth rounds it)", ""),
+    (r"; --up y or z says it", "; the button on the picture stands it up along the other"),
+    (r"--up is for", "an upward axis is for"),
+    (r"--up '([^']*)'", r"the upward axis '\1'"),
+    (r"; --glass takes another(?:, for one part too \([^)]*\))?", "; Choose glass… in the Dispersion panel has others"),
+    (
+        r"Make it glass with --glass diamond, or one part with --glass .*?, in the window with Make glass\.",
+        "Make one part of it glass with Make glass, on the picture.",
+    ),
+    (r"--glass: ", ""),
+    (r"--glass (\S+): ", r"\1: "),
+    (r"--environment sky, or a panorama, shows another", "Environment, with World in the Inspector, shows another"),
+    (r"--environment '([^']*)'", r"the environment '\1'"),
+    (r"; --max-depth allows more", "; Longest path, with World in the Inspector, allows more"),
+    (r"choose more --spp", "choose more Samples"),
+    (r"--size (\d+x\d+)", r"a picture of \1"),
+    (r" with --bins (\d+)", r" with \1 spectral bins"),
+    (r"smaller --size", "smaller size"),
+    (r"larger --size", "larger size"),
+    (r"fewer --bins", "no spectral bins"),
+    (r"choose another folder, or replace (its frames|them) with --overwrite", "choose another folder"),
+    (r"allow it with --allow-outside \(or its folder in (\w+)\)", r"name its folder in \1 before the start"),
+)
+
+
+def in_window(text: str) -> str:
+    """`text` without options of the command line."""
+    if "--" not in text:
+        return text
+    began = text.startswith("--")
+    for option, instead in _INSTEAD:
+        text = re.sub(option, instead, text)
+    return text[:1].upper() + text[1:] if began else text
+
+
+MAX_REASON = 160
+
+
+def sentence(text: str) -> str:
+    """A `UserError`'s text as it stands on its own."""
+    text = " ".join(text.split())
+    # A file's or an object's name stays as it is written.
+    start = text[:1].upper() if text.split(" ")[0].isalpha() else text[:1]
+    return f"{start}{text[1:]}{'' if text.endswith(('.', '?', '!')) else '.'}"
+
+
+def brief(error: BaseException) -> str:
+    """What went wrong, by its cause, short enough for a message."""
+    cause = error.__cause__ or error
+    text = " ".join(str(cause).split())
+    if isinstance(cause, UserError):
+        return text
+    return f"{type(cause).__name__}: {text[:MAX_REASON]}" if text else type(cause).__name__
+
+
+def words(request: type) -> str:
+    """ "SelectAt" → "Select at"."""
+    return "".join(f" {c.lower()}" if c.isupper() else c for c in request.__name__).strip().capitalize()
+
+
+def broken(text: str, width: float, measure: Callable[[str], float], at: str = " ") -> str:
+    """`text` in as few lines of `width` as its parts, which `at` divides, fit; a part that is wider has a line of its
+    own. `measure`: width of a text, in the same unit."""
+    lines: list[str] = []
+    for part in text.split(at):
+        longer = f"{lines[-1]}{at}{part}" if lines else part
+        if lines and measure(longer) <= width:
+            lines[-1] = longer
+        else:
+            lines.append(part)
+    return "\n".join(lines)
+
 
 NOTICE_S, ERROR_S = 6.0, 20.0
 """A short notice, an error is gone after this long on the screen."""

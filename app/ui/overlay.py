@@ -15,7 +15,7 @@ from imgui_bundle import ImVec2, imgui
 
 from ..edit.projection import View
 from ..passes.ray_line import RayLine
-from .panels.spectral_colour import spectral_srgb
+from .panels.spectrum_strip import spectral_srgb
 
 Colour = tuple[float, float, float, float]
 NEAR = 1e-3

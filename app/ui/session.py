@@ -30,9 +30,8 @@ from . import layout
 from .background_jobs import BackgroundJobs, OpenThread
 from .crash_log import write_crash
 from .live_picture import EngineError, LivePicture
-from .message_box import MessageBox
+from .message_box import MessageBox, brief
 from .screenshot import write_codes
-from .sentences import brief
 
 if TYPE_CHECKING:
     import numpy as np
@@ -40,7 +39,7 @@ if TYPE_CHECKING:
     from ..edit.lessons import Lesson
     from ..gpu.context import Context
     from ..model.scene import Scene
-    from .live_picture import Engine
+    from ..render.viewer.threaded_engine import Engine
 
 FRAMES_REMEMBERED = 120
 IDLE_S = 0.5

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -14,12 +15,90 @@ from ..edit import camera_controls, requests, selecting
 from ..edit.document import Document
 from ..edit.lessons import lesson
 from ..edit.picking import PickHit, pick_in
+from ..edit.pull import begin_pull
+from ..edit.requests import BeginPull
 from ..edit.state import Selection
+from ..edit.stored_photons import index_in
+from ..model.optics.colorimetry import rgb709_to_xyz
 from ..model.scene_defaults import bounds_of
-from .caustic_source import source_at
 from .session import Session
-from .session_pull import begin_pull_at
-from .shown_scene import index_in
+
+REACH = 0.03
+"""Radius about the point from which photons are asked, share of the extent of the glass's light on that receiver."""
+MIN_BRIGHTNESS = 0.25
+"""Irradiance within that radius over the mean within the extent: fainter is stray light, not a caustic."""
+MIN_SHARE = 0.2
+"""Of the flux near the point, that must have come through one object."""
+
+
+def source_at(
+    point: np.ndarray,
+    receiver: int,
+    position: np.ndarray,
+    flux_w: np.ndarray,
+    source: np.ndarray,
+    photon_receiver: np.ndarray,
+) -> int | None:
+    """Index of the object that throws most of the light near a world `point` of object `receiver`, or None.
+
+    Photons: `position` (n, 3) world, `flux_w` (n,), `source` (n,) the object met first (negative:
+    straight from a light), `photon_receiver` (n,).
+    """
+    through_glass = (photon_receiver == receiver) & (source >= 0) & (flux_w > 0.0)
+    if not through_glass.any():
+        return None
+    places, flux, origins = position[through_glass], flux_w[through_glass], source[through_glass]
+    extent = float(np.linalg.norm(np.percentile(places, 95, axis=0) - np.percentile(places, 5, axis=0)))
+    radius = REACH * max(extent, 1e-12)
+    near = np.linalg.norm(places - np.asarray(point, float), axis=1) <= radius
+    mean = flux.sum() / max(extent, 1e-12) ** 2
+    if not near.any() or flux[near].sum() < MIN_BRIGHTNESS * mean * math.pi * radius**2:
+        return None
+    totals = np.bincount(origins[near], weights=flux[near])
+    best = int(totals.argmax())
+    return best if totals[best] >= MIN_SHARE * totals.sum() else None
+
+
+PHOTONS = 400_000
+RADIUS = 0.01
+"""Of what is taken hold of, share of the picture's height at that distance."""
+
+
+def begin_pull_at(session: Session, request: BeginPull) -> Callable[[], NotYet | None]:
+    """Find the surface at the pixel of `request`; what is returned asks for its light and takes hold of that.
+
+    Both raise `UserError` with the reason where there is nothing to pull."""
+    clicked = session.state.scene
+    hit = pick_in(session.state, request.x, request.y)
+    if hit is None or not hit.is_receiver:
+        raise UserError("there is no caustic here; take hold of a coloured part of one")
+
+    def ask() -> NotYet | None:
+        state, picture = session.state, session.picture
+        if len(state.scene.objects) != len(clicked.objects):
+            return None  # indices mean something else
+        view = state.view
+        x, y = view.project(np.asarray(hit.position))[0]
+        rgb, photons = picture.pixel((x, y)), picture.stored_photons(state.scene, PHOTONS)
+        if rgb is None or isinstance(photons, NotYet):
+            return NOT_YET
+        pull = begin_pull(
+            photons,
+            state.scene,
+            hit.position,
+            hit.normal,
+            RADIUS * view.height_at(hit.distance),
+            hit.object_index,
+            wavelength_nm=state.solo_nm,
+            xyz=rgb709_to_xyz(np.array(rgb)),
+            prefer=state.selection.index if state.selection.kind == "object" else None,
+            local=request.local,
+        )
+        session.state = replace(state, pull=pull)
+        return None
+
+    return ask
+
 
 PICK_PHOTONS = 400_000
 """Stored photons that are asked whose caustic lies at a point."""

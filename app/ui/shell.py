@@ -15,7 +15,6 @@ from . import item_rects, layout, shortcuts, theme
 from .layout import Docked, Place
 from .open_panels import set_open
 from .panels import (
-    about,
     dialogs,
     help_list,
     history_panel,
@@ -23,6 +22,7 @@ from .panels import (
     lesson_panel,
     menu,
     messages,
+    numbers,
     opened_card,
     outliner,
     rays_panel,
@@ -30,7 +30,6 @@ from .panels import (
     start_page,
     status_bar,
     timing,
-    unit_words,
     view_panel,
 )
 from .panels.abbe import draw_abbe
@@ -84,7 +83,7 @@ WINDOWS = (
     # Beside the caustic, which it is there to change.
     PanelWindow("abbe", "Abbe", "right bottom", draw_abbe, (44.0, 34.0)),
     PanelWindow("shortcuts", "Shortcuts", "floating", help_list.draw_shortcuts, (62.0, 38.0)),
-    PanelWindow("about", "About SpectraSplat", "floating", about.draw_about, (32.0, 20.0)),
+    PanelWindow("about", "About SpectraSplat", "floating", help_list.draw_about, (32.0, 20.0)),
 )
 _OVER_START_PAGE = ("shortcuts", "about")
 _CALLED_UP = frozenset(window.field for window in WINDOWS if not getattr(Panels(), window.field))
@@ -98,7 +97,7 @@ def draw_interface(state: State, view_model: ViewModel) -> State:
 
     The host applies the theme (`theme.apply`) between frames: sizes must not change within one.
     """
-    unit_words.use(state.scene.units)
+    numbers.use_units(state.scene.units)
     state = shortcuts.handle(state, view_model)
     shortcuts.focused_panel["field"] = ""
     shortcuts.floating_panels.clear()

@@ -6,6 +6,7 @@ the cursor only from `ViewModel`; wishes that need the renderer are requests.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,14 +17,119 @@ from . import item_rects, overlay, theme
 from .gizmo import Gizmo
 from .measure_marks import draw_measure
 from .overlay import Canvas
+from .panels.spectrum_strip import colour_of_nm
 from .panels.status_bar import preparing_words
-from .ray_labels import draw_ray_labels
-from .view_axes import draw_axes
+from .ray_readings import RayReading
 from .view_model import ViewModel
-from .viewport_beside import draw_beside, tag
 from .viewport_input import Mouse, ViewportInput
-from .viewport_marks import draw_lights, draw_magnifier, draw_marks, draw_wipe, own_label
+from .viewport_marks import draw_axes, draw_lights, draw_magnifier, draw_marks, draw_wipe, own_label
 from .viewport_tools import MARGIN_EM, badges, draw_badges, draw_toolbar
+
+MOST_LABELS = 5
+"""With more wavelengths only some, the first and the last among them."""
+_BORDER_EM = 0.6
+
+
+def draw_ray_labels(canvas: Canvas, readings: Sequence[RayReading]) -> None:
+    """Labels in a column next to the ends of the rays that are read, none over another; a small cross at each focus."""
+    for reading in readings:
+        if reading.focus is not None:
+            _focus_cross(canvas, canvas.pixels(np.asarray(reading.focus)), colour_of_nm(reading.wavelength_nm))
+    chosen = [readings[i] for i in labelled(len(readings))]
+    line = imgui.get_text_line_height() + theme.em(0.25)
+    places = [(_end_of(canvas, reading.path), reading) for reading in chosen]
+    lowest = -np.inf
+    for (x, y), reading in sorted((each for each in places if np.isfinite(each[0]).all()), key=lambda each: each[0][1]):
+        text = f"{reading.wavelength_nm:.0f} nm  {reading.deviation_deg:.2f}°"
+        size, border = imgui.calc_text_size(text), theme.em(_BORDER_EM)
+        left = min(max(x + border, canvas.left + border), canvas.left + canvas.width - size.x - border)
+        top = max(min(max(y - 0.5 * size.y, canvas.top + border), canvas.top + canvas.height - size.y - border), lowest)
+        lowest = top + line
+        low, high = ImVec2(left - theme.em(0.2), top), ImVec2(left + size.x + theme.em(0.2), top + size.y)
+        canvas.drawing.add_rect_filled(low, high, theme.packed((0.05, 0.05, 0.06, 0.78)), 3.0)
+        canvas.drawing.add_rect_filled(low, ImVec2(low.x + theme.em(0.12), high.y), colour_of_nm(reading.wavelength_nm))
+        canvas.drawing.add_text(ImVec2(left, top), theme.packed((0.95, 0.95, 0.95, 1.0)), text)
+
+
+def labelled(count: int) -> list[int]:
+    """Which of `count` wavelengths have a label."""
+    if count <= MOST_LABELS:
+        return list(range(count))
+    return sorted({round(i * (count - 1) / 2) for i in range(3)})
+
+
+def _end_of(canvas: Canvas, path: np.ndarray) -> np.ndarray:
+    """Where a ray ends on the screen, as far as it is in the picture; NaN where none of it is."""
+    segments = canvas.segments(path)
+    if not len(segments):
+        return np.full(2, np.nan)
+    start, way = segments[-1, 0], segments[-1, 1] - segments[-1, 0]  # which reaches beyond the picture's borders
+    low = np.array([canvas.left, canvas.top])
+    border = np.where(way > 0.0, low + [canvas.width, canvas.height], low)
+    share = (border - start) / np.where(way == 0.0, np.inf, way)
+    return np.asarray(start + float(np.min(share, where=share > 0.0, initial=1.0)) * way)
+
+
+def _focus_cross(canvas: Canvas, place: np.ndarray, colour: int) -> None:
+    if not np.isfinite(place).all():
+        return
+    x, y, reach = float(place[0]), float(place[1]), 5.0 * canvas.scale
+    for dark in (True, False):
+        tint, width = (theme.packed((0.0, 0.0, 0.0, 0.6)), 3.4) if dark else (colour, 1.6)
+        canvas.drawing.add_line(ImVec2(x - reach, y), ImVec2(x + reach, y), tint, width)
+        canvas.drawing.add_line(ImVec2(x, y - reach), ImVec2(x, y + reach), tint, width)
+
+
+_GAP_EM = 0.3
+_CROSS_EM = 0.6
+DrawOwn = Callable[[State, ViewModel, ImVec2], State]
+
+
+def draw_beside(state: State, view_model: ViewModel, room: ImVec2, draw_own: DrawOwn) -> State:
+    """Fill `room` of the present window; `draw_own` draws this picture at a size."""
+    corner, gap = imgui.get_cursor_screen_pos(), theme.em(_GAP_EM)
+    pane = ImVec2(max(0.5 * (room.x - gap), 1.0), max(0.5 * (room.y - gap), 1.0))
+    state = draw_own(state, view_model, pane)
+    middle = ImVec2(corner.x + 0.5 * (room.x - pane.x), corner.y + pane.y + gap)
+    # Another glass is no reference: what differs is no error.
+    title = "Difference" if state.compare.method in ("glass", "file") else "Error map"
+    titles = (view_model.compare_label or "The other picture", title)
+    for index, at in enumerate((ImVec2(corner.x + pane.x + gap, corner.y), middle)):
+        imgui.set_cursor_screen_pos(at)
+        if view_model.beside is None:
+            imgui.dummy(pane)
+            has_none = state.compare.method == "file" and state.compare.file is None
+            tag(at, pane, "No picture chosen yet" if has_none else f"{titles[index]}: on its way")
+            continue
+        imgui.image(imgui.ImTextureRef(view_model.beside[index]), pane)
+        item_rects.note(f"Beside: {index + 1}")
+        tag(at, pane, titles[index])
+        if state.hover is None and imgui.is_item_hovered():
+            # Whose values are asked for does not matter: all show the same place.
+            mouse = imgui.get_mouse_pos()
+            state = replace(state, hover=((mouse.x - at.x) / pane.x, (mouse.y - at.y) / pane.y))
+    if state.hover is not None:
+        crossed = (ImVec2(corner.x + pane.x + gap, corner.y), middle) if view_model.beside is not None else ()
+        for at in crossed:
+            _pointer_cross(ImVec2(at.x + state.hover[0] * pane.x, at.y + state.hover[1] * pane.y))
+    return state
+
+
+def tag(corner: ImVec2, pane: ImVec2, text: str) -> None:
+    """Words at the lower right of a pane, clear of tools and badges."""
+    drawing, size, pad = imgui.get_window_draw_list(), imgui.calc_text_size(text), theme.em(0.35)
+    x, y = corner.x + pane.x - size.x - 2.0 * pad, corner.y + pane.y - size.y - 2.0 * pad
+    low, high = ImVec2(x - pad, y - 0.5 * pad), ImVec2(x + size.x + pad, y + size.y + 0.5 * pad)
+    drawing.add_rect_filled(low, high, theme.packed(theme.palette().window, 0.88), 4.0)
+    drawing.add_text(ImVec2(x, y), theme.packed(theme.palette().text), text)
+
+
+def _pointer_cross(at: ImVec2) -> None:
+    drawing, reach = imgui.get_window_draw_list(), theme.em(_CROSS_EM)
+    for colour, thickness in ((theme.packed((0.0, 0.0, 0.0, 0.7)), 3.0), (theme.packed((1.0, 1.0, 1.0, 0.9)), 1.0)):
+        drawing.add_line(ImVec2(at.x - reach, at.y), ImVec2(at.x + reach, at.y), colour, thickness)
+        drawing.add_line(ImVec2(at.x, at.y - reach), ImVec2(at.x, at.y + reach), colour, thickness)
+
 
 MIN_SIDE = 64
 """Pixels of the picture, however small the window."""

@@ -13,7 +13,7 @@ from spectrasplat.base import paths
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.gpu import shader_watch
 from spectrasplat.gpu.context import Context
-from spectrasplat.ui.view_model_builder import view_model_of
+from spectrasplat.ui.frame import view_model_of
 
 from tests.interface.rig import Hands, viewer
 

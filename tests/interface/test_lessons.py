@@ -11,11 +11,10 @@ from spectrasplat.edit import measuring, requests
 from spectrasplat.edit.lessons import lesson
 from spectrasplat.edit.state import Selection, State
 from spectrasplat.gpu.context import Context
-from spectrasplat.ui.frame import run_frame
-from spectrasplat.ui.ray_labels import labelled
+from spectrasplat.ui.frame import run_frame, view_model_of
 from spectrasplat.ui.ray_overlay import RayOverlay
 from spectrasplat.ui.session import Session
-from spectrasplat.ui.view_model_builder import view_model_of
+from spectrasplat.ui.viewport import labelled
 
 from tests.interface.fake_engine import FakeEngine
 from tests.interface.shell_rig import ShellRig

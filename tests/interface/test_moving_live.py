@@ -16,9 +16,9 @@ from spectrasplat.edit.state import Selection
 from spectrasplat.gpu.context import Context
 from spectrasplat.ui import viewport_tools
 from spectrasplat.ui.background_jobs import RENDER_SHARE
-from spectrasplat.ui.pace import PATIENT_FRAME_S, SOFTWARE_FRAME_S
+from spectrasplat.ui.frame import view_model_of
 from spectrasplat.ui.session_requests import carry_out
-from spectrasplat.ui.view_model_builder import view_model_of
+from spectrasplat.ui.viewer import PATIENT_FRAME_S, SOFTWARE_FRAME_S
 
 from tests.interface.rig import Hands, viewer
 

@@ -16,11 +16,10 @@ from spectrasplat.gpu.context import Context
 from spectrasplat.model.io.mesh_io import save_ply
 from spectrasplat.model.scene import Dielectric, Diffuse
 from spectrasplat.model.scene_objects import make_shape
-from spectrasplat.ui.frame import run_frame
+from spectrasplat.ui.frame import run_frame, view_model_of
 from spectrasplat.ui.panels import opened_card
 from spectrasplat.ui.session import Session
 from spectrasplat.ui.view_model import ViewModel
-from spectrasplat.ui.view_model_builder import view_model_of
 
 from tests.interface.fake_engine import FakeEngine
 from tests.interface.panel_rig import scene_state

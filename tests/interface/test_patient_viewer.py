@@ -9,9 +9,8 @@ import pytest
 from spectrasplat.gpu.context import Context
 from spectrasplat.ui import viewer as viewer_module
 from spectrasplat.ui.headless import HeadlessInterface
-from spectrasplat.ui.pace import SOFTWARE_FRAME_S
 from spectrasplat.ui.session import LAYOUT_FRAMES, Session
-from spectrasplat.ui.viewer import Viewer, headless_viewer
+from spectrasplat.ui.viewer import SOFTWARE_FRAME_S, Viewer, headless_viewer
 
 from tests.interface.fake_engine import FakeEngine
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from spectrasplat.gpu.context import Context
 from spectrasplat.ui import theme
-from spectrasplat.ui.palette import DARK, LIGHT, Colour, Palette
+from spectrasplat.ui.theme import DARK, LIGHT, Colour, Palette
 
 from tests.interface.shell_rig import ShellRig
 

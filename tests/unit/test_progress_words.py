@@ -16,7 +16,7 @@ from spectrasplat.render.light_stats import LightStats
 from spectrasplat.render.time_budget import TimeBudget
 from spectrasplat.render.viewer.stats import LiveStats
 from spectrasplat.render.viewer.work_tally import WorkTally, light_counts
-from spectrasplat.ui.line_breaks import broken
+from spectrasplat.ui.message_box import broken
 from spectrasplat.ui.panels.numbers import kelvin
 from spectrasplat.ui.panels.status_bar import progress_words
 

@@ -11,15 +11,14 @@ import numpy as np
 import pytest
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.edit import requests
+from spectrasplat.edit.stored_photons import index_in, photons_in
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.render.viewer.stats import LiveStats
 from spectrasplat.ui import live_picture
 from spectrasplat.ui.crash_log import FILE_NAME, MAX_BYTES, write_crash
 from spectrasplat.ui.live_picture import LivePicture
-from spectrasplat.ui.message_box import ERROR_S, MAX_MESSAGES, NOTICE_S, READ_S, MessageBox
-from spectrasplat.ui.pace import GPU_SHARE, LIGHT_SHARE, LONGEST_PATIENT_S, MIN_SHARE, SOFTWARE_FRAME_S, Pace
-from spectrasplat.ui.sentences import brief, sentence, words
-from spectrasplat.ui.shown_scene import index_in, photons_in
+from spectrasplat.ui.message_box import ERROR_S, MAX_MESSAGES, NOTICE_S, READ_S, MessageBox, brief, sentence, words
+from spectrasplat.ui.viewer import GPU_SHARE, LIGHT_SHARE, LONGEST_PATIENT_S, MIN_SHARE, SOFTWARE_FRAME_S, Pace
 
 from tests.interface.fake_engine import dispersed
 

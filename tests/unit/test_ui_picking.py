@@ -15,9 +15,9 @@ from spectrasplat.model.geometry.mesh import make_mesh
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.optics import glass
 from spectrasplat.model.scene import Camera, Dielectric, Diffuse, Scene, SceneObject
-from spectrasplat.ui.caustic_source import source_at
 from spectrasplat.ui.overlay import Canvas, box_corners, mixed_srgb
-from spectrasplat.ui.panels.spectral_colour import spectral_srgb
+from spectrasplat.ui.panels.spectrum_strip import spectral_srgb
+from spectrasplat.ui.session_requests import source_at
 from spectrasplat.ui.viewport_marks import not_shown, outline_of
 
 PINHOLE = Camera(position=(1.0, -6.0, 3.5), target=(0.3, 0.2, 0.0), vertical_fov_deg=28.0)

@@ -17,9 +17,8 @@ from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.io.scene_save import save_scene
 from spectrasplat.model.staging import Staging, opaque_note
 from spectrasplat.render.notices import loss_notices
-from spectrasplat.ui.message_box import MessageBox
-from spectrasplat.ui.panels import unit_words
-from spectrasplat.ui.window_words import in_window
+from spectrasplat.ui.message_box import MessageBox, in_window
+from spectrasplat.ui.panels import numbers
 
 SOLID = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
 MORE = "v 3 0 0\nv 4 0 0\nv 3 1 0\nv 3 0 1\nf 5 7 6\nf 5 6 8\nf 6 7 8\nf 5 8 7\n"
@@ -116,10 +115,10 @@ def _texts(file: Path) -> list[str]:
     ],
 )
 def test_units_are_called_by_the_scene_label(text: str, said: str) -> None:
-    assert unit_words.named(text) == text
-    unit_words.use("mm")
-    assert unit_words.named(text) == said
-    unit_words.use("")
+    assert numbers.named(text) == text
+    numbers.use_units("mm")
+    assert numbers.named(text) == said
+    numbers.use_units("")
 
 
 def test_the_label_is_read_and_saved(tmp_path: Path) -> None:

@@ -203,3 +203,7 @@ class ThreadedEngine:
     def caustic_spectrum(self, receiver: int, position: np.ndarray) -> CausticSpectrum | NotYet:
         """As of a `LiveEngine`."""
         return self._asked(lambda: self._engine.caustic_spectrum(receiver, position))
+
+
+Engine = LiveEngine | ThreadedEngine
+"""What a viewer may draw with."""

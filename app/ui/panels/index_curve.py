@@ -18,7 +18,7 @@ from ..view_model import ViewModel
 from . import widgets
 from .glass_values import CONTROL_NM, as_sold, selected_glass, with_point
 from .rows import begin_row
-from .spectral_colour import colour_of_nm, draw_strip
+from .spectrum_strip import colour_of_nm, draw_strip
 
 _CURVE_NM = np.linspace(380.0, 780.0, 161)
 _LINES = {LINE_F_NM: "F", LINE_D_NM: "d", LINE_C_NM: "C"}

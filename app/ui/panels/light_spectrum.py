@@ -16,7 +16,7 @@ from ...model.optics.spectrum import Spectrum, illuminant_names
 from .. import item_rects, theme
 from . import widgets
 from .rows import begin_row
-from .spectral_colour import colour_of_nm
+from .spectrum_strip import colour_of_nm
 
 _KINDS = {
     "illuminant": "Standard illuminant",

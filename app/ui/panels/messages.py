@@ -8,7 +8,7 @@ from imgui_bundle import imgui
 from ...edit.requests import DismissMessage, ReloadShaders
 from ...edit.state import State
 from .. import item_rects, layout, theme
-from ..line_breaks import broken
+from ..message_box import broken
 from ..view_model import Message, ViewModel
 from . import opened_card, widgets
 

@@ -1,6 +1,8 @@
-"""Numbers as words of fixed width and sensible precision."""
+"""Numbers as words of fixed width and sensible precision, and the name of a scene's unit in labels."""
 
 from __future__ import annotations
+
+import re
 
 
 def count(number: float) -> str:
@@ -37,3 +39,21 @@ def percent(share: float) -> str:
 def kelvin(temperature_k: float) -> str:
     """A colour temperature: "6,504 K", "25,370 K"; to ten kelvin from 10,000 K on, as well as it can be said."""
     return f"{round(temperature_k, -1 if temperature_k >= 1e4 else 0):,.0f} K"
+
+
+_UNITS = re.compile(r"unit²|\b(?:scene )?units\b")
+_label = {"now": ""}
+
+
+def use_units(label: str) -> None:
+    """Call units so from now on; empty where the scene does not say."""
+    _label["now"] = label
+
+
+def named(text: str) -> str:
+    """`text` with the scene's label in place of "units", "scene units" and "unit²". A "scene unit" stays: what is said
+    of one is true of any."""
+    label = _label["now"]
+    if not label or "unit" not in text:
+        return text
+    return _UNITS.sub(lambda found: label + "²" * found[0].endswith("²"), text)

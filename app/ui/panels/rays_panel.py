@@ -11,7 +11,7 @@ from .. import item_rects, theme
 from ..ray_readings import RayReading
 from ..view_model import ViewModel
 from . import widgets
-from .spectral_colour import colour_of_nm
+from .spectrum_strip import colour_of_nm
 
 _COLUMNS: tuple[tuple[str, str], ...] = (
     ("nm", "Vacuum wavelength."),

@@ -8,7 +8,7 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from .. import item_rects, theme
-from .unit_words import named
+from .numbers import named
 
 _LABEL_EM, _LABEL_SHARE = 8.4, 0.42
 _MIN_FIELD_EM = 4.5

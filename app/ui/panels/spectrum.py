@@ -12,8 +12,8 @@ from ...model.optics.colorimetry import VISIBLE_NM
 from ...model.scene import Scene
 from .. import theme
 from ..view_model import CursorInfo, ViewModel
-from . import numbers, rows, spectral_colour, widgets
-from .unit_words import named
+from . import numbers, rows, spectrum_strip, widgets
+from .numbers import named
 
 _TOO_FEW = "Too few photons have landed here to tell the caustic's spectrum; wait, or point where it is brighter."
 
@@ -166,4 +166,4 @@ def _fill(edges_nm: np.ndarray, values: np.ndarray) -> None:
     heights = values[np.searchsorted(edges_nm, fine + 0.5) - 1]
     for left, height in zip(fine.tolist(), heights.tolist(), strict=True):
         low, high = implot.plot_to_pixels(left, height), implot.plot_to_pixels(left + 1.0, 0.0)
-        drawing.add_rect_filled(low, imgui.ImVec2(high.x + 1.0, high.y), spectral_colour.colour_of_nm(left + 0.5))
+        drawing.add_rect_filled(low, imgui.ImVec2(high.x + 1.0, high.y), spectrum_strip.colour_of_nm(left + 0.5))

@@ -1,11 +1,59 @@
-"""A strip of spectral colours with a handle, to pick a wavelength on."""
+"""Colours of single wavelengths, as strips and curves show them, and a strip with a handle to pick a wavelength on."""
 
 from __future__ import annotations
 
-from imgui_bundle import imgui
+from functools import cache, lru_cache
+from itertools import pairwise
 
+import numpy as np
+from imgui_bundle import ImVec2, imgui
+
+from ...model.optics.colorimetry import VISIBLE_NM, cmf_xyz, xyz_to_rgb709
 from .. import theme
-from . import rows, spectral_colour
+from . import rows
+
+_DIMMEST = 0.25
+"""Share of the brightness left at 380 and 780 nm, where the eye sees next to nothing."""
+
+
+@cache
+def spectral_srgb() -> np.ndarray:
+    """sRGB-encoded colours of 380, 381, … 780 nm: float64 (401, 3), read-only."""
+    rgb = xyz_to_rgb709(cmf_xyz())
+    rgb = np.maximum(rgb, 0.0)
+    rgb = rgb / rgb.max(axis=1, keepdims=True)
+    rise = np.clip((VISIBLE_NM - 380.0) / 40.0, 0.0, 1.0)
+    fall = np.clip((780.0 - VISIBLE_NM) / 90.0, 0.0, 1.0)
+    rgb = rgb * (_DIMMEST + (1.0 - _DIMMEST) * np.minimum(rise, fall))[:, None]
+    encoded = np.where(rgb <= 0.0031308, 12.92 * rgb, 1.055 * np.maximum(rgb, 1e-12) ** (1 / 2.4) - 0.055)
+    encoded.flags.writeable = False
+    return encoded
+
+
+def colour_of_nm(wavelength_nm: float, opacity: float = 1.0) -> int:
+    """The colour as a draw list takes it."""
+    return _packed(min(max(round(wavelength_nm) - 380, 0), 400), opacity)
+
+
+@lru_cache(maxsize=4096)
+def _packed(row: int, opacity: float) -> int:
+    # Strips ask for more than a hundred in every frame: worked out each time they took a third of all panels' time.
+    red, green, blue = spectral_srgb()[row]
+    return imgui.color_convert_float4_to_u32((red, green, blue, opacity))
+
+
+@lru_cache(maxsize=16)
+def _strip(steps: int, opacity: float) -> list[int]:
+    return [colour_of_nm(380.0 + 400.0 * i / steps, opacity) for i in range(steps + 1)]
+
+
+def draw_strip(drawing: imgui.ImDrawList, low: ImVec2, high: ImVec2, opacity: float = 1.0, steps: int = 64) -> None:
+    """A band of 380 to 780 nm, from left to right, between two corners in pixels."""
+    width = (high.x - low.x) / steps
+    for i, (left, right) in enumerate(pairwise(_strip(steps, opacity))):
+        x = low.x + i * width
+        drawing.add_rect_filled_multi_color(ImVec2(x, low.y), ImVec2(x + width, high.y), left, right, right, left)
+
 
 LOW_NM, HIGH_NM = 380.0, 780.0
 """Ends of the strip."""
@@ -22,7 +70,7 @@ def strip(label: str, wavelength_nm: float | None, *, tip: str) -> tuple[bool, f
     rows.explain(label, tip, "nm")
     active = imgui.is_item_active()
     drawing = imgui.get_window_draw_list()
-    spectral_colour.draw_strip(drawing, start, imgui.ImVec2(start.x + width, start.y + height))
+    draw_strip(drawing, start, imgui.ImVec2(start.x + width, start.y + height))
     chosen = wavelength_nm
     if active:
         share = min(max((imgui.get_mouse_pos().x - start.x) / max(width, 1.0), 0.0), 1.0)

@@ -26,6 +26,7 @@ from ...model.io.scene_table import MAX_MAGNITUDE
 from ...model.scene import Vec3
 from .. import item_rects, theme
 from . import slider_mark
+from .numbers import named
 from .rows import (
     begin_row,
     beside,
@@ -36,7 +37,6 @@ from .rows import (
     tooltip,
     words,
 )
-from .unit_words import named
 
 __all__ = [
     "FloatResult",
