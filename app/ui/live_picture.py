@@ -318,7 +318,7 @@ def _antialiases(state: State, other: Other | None) -> bool:
     return state.scene.render.antialias_highlights and not is_data and not state.interacting
 
 
-def _live_engine(context: Context) -> LiveEngine:
+def _live_engine(context: Context) -> Engine:
     from ..render.viewer.engine import LiveEngine
 
     return LiveEngine(context)
