@@ -43,6 +43,18 @@ def config_path() -> Path:
     return Path(given or platformdirs.user_config_dir("spectrasplat", appauthor=False))
 
 
+def forget_oldest(folder: Path, suffix: str, *, files: int | None = None, size: int | None = None) -> None:
+    """Keep the most recently used files of a cache folder within a number of them and of bytes, the newest in any
+    case."""
+    states = [(path, path.stat()) for path in folder.glob(f"*{suffix}")]
+    states.sort(key=lambda item: item[1].st_mtime_ns, reverse=True)
+    used = 0
+    for rank, (path, state) in enumerate(states):
+        used += state.st_size
+        if rank and ((files is not None and rank >= files) or (size is not None and used > size)):
+            path.unlink(missing_ok=True)
+
+
 def cache_dir() -> Path:
     """The user's cache folder for baked trees and tables (created on demand)."""
     path = Path(platformdirs.user_cache_dir("spectrasplat", appauthor=False))

@@ -121,7 +121,7 @@ def met_by(reference: str, scenes: dict[str, Scene]) -> dict[str, Scene]:
     """The scenes as a reference of this kind (`REFERENCES`) is to meet them; their pictures stay the same."""
     if reference == "exact":
         return scenes
-    from ..reference.exact_shapes import as_triangles
+    from ..reference.scene_surfaces import as_triangles
 
     return {name: as_triangles(scene) for name, scene in scenes.items()}
 

@@ -82,6 +82,4 @@ def _save(path: Path, kept: list[Line]) -> None:
     with suppress(OSError, UserError):
         with atomic_output(path, lasting=False) as temporary:
             temporary.write_bytes(packed)
-        by_age = sorted(path.parent.glob(f"*{_SUFFIX}"), key=lambda file: file.stat().st_mtime_ns, reverse=True)
-        for old in by_age[MOST_FILES:]:
-            old.unlink(missing_ok=True)
+        paths.forget_oldest(path.parent, _SUFFIX, files=MOST_FILES)

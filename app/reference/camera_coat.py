@@ -18,6 +18,7 @@ from ..model.scene import Scene
 from .compiling import inlined
 from .rough_albedo import masking
 from .scattering import fresnel, microfacet
+from .vectors import dot, length, moved
 
 _COSINES = 1025
 
@@ -76,12 +77,12 @@ def coat_lobe(made, thing, o, i, n):
     """The lobe for light from `i` seen from `o` (units, away from the surface of unit normal `n`), times the cosine of
     incidence."""
     alpha = made.alpha[thing]
-    to, ti = o[0] * n[0] + o[1] * n[1] + o[2] * n[2], i[0] * n[0] + i[1] * n[1] + i[2] * n[2]
+    to, ti = dot(o, n), dot(i, n)
     if alpha <= 0.0 or to <= 0.0 or ti <= 0.0:
         return 0.0
-    hx, hy, hz = o[0] + i[0], o[1] + i[1], o[2] + i[2]
-    length = math.sqrt(hx * hx + hy * hy + hz * hz)
-    facing, hn = 0.5 * length, (hx * n[0] + hy * n[1] + hz * n[2]) / length
+    h = moved(o, 1.0, i)
+    size = length(h)
+    facing, hn = 0.5 * size, dot(h, n) / size
     spread = 1.0 + hn * hn * (alpha * alpha - 1.0)
     density = alpha * alpha / (math.pi * spread * spread)
     reflected, _ = fresnel(facing, 1.0 / made.coat_index[thing])
@@ -89,23 +90,21 @@ def coat_lobe(made, thing, o, i, n):
 
 
 @inlined
-def reflected_by_coat(made, thing, dx, dy, dz, n, a, b):
-    """(direction (3), weight) of a path that comes along d and is reflected by a facet that two numbers choose; of
-    weight 0 into the surface."""
+def reflected_by_coat(made, thing, d, n, a, b):
+    """(direction, weight) of a path that comes along d and is reflected by a facet that two numbers choose; of weight 0
+    into the surface."""
     alpha = made.alpha[thing]
-    nx, ny, nz = n
-    hx, hy, hz = microfacet(nx, ny, nz, alpha, a, b)
-    hn = hx * nx + hy * ny + hz * nz
-    facing = -(dx * hx + dy * hy + dz * hz)
-    to = -(dx * nx + dy * ny + dz * nz)
-    rx, ry, rz = dx + 2.0 * facing * hx, dy + 2.0 * facing * hy, dz + 2.0 * facing * hz
-    ti = rx * nx + ry * ny + rz * nz
+    h = microfacet(n, alpha, a, b)
+    facing, to = -dot(d, h), -dot(d, n)
+    r = moved(d, 2.0 * facing, h)
+    ti = dot(r, n)
     if facing <= 0.0 or to <= 0.0 or ti <= 0.0:
-        return rx, ry, rz, 0.0
+        return r, 0.0
     reflected, _ = fresnel(facing, 1.0 / made.coat_index[thing])
     if alpha == 0.0:
-        return rx, ry, rz, reflected
-    return rx, ry, rz, reflected * facing / (to * hn * (1.0 / masking(to, alpha) + 1.0 / masking(ti, alpha) - 1.0))
+        return r, reflected
+    hidden = 1.0 / masking(to, alpha) + 1.0 / masking(ti, alpha) - 1.0
+    return r, reflected * facing / (to * dot(h, n) * hidden)
 
 
 @inlined
@@ -131,10 +130,10 @@ def base_reflectance(rgb, roughness, cosine, o, i, n):
     mean = (1.0 + (2.0 / 3.0 - 28.0 / (15.0 * math.pi)) * roughness) / loss
     multiple = rgb * rgb * mean / (1.0 - rgb * (1.0 - mean))
     single = _single(cosine, roughness)
-    if i[0] * i[0] + i[1] * i[1] + i[2] * i[2] < 0.5:
+    if dot(i, i) < 0.5:
         return rgb * single + multiple * (1.0 - single)
-    from_cosine = i[0] * n[0] + i[1] * n[1] + i[2] * n[2]
-    turned = o[0] * i[0] + o[1] * i[1] + o[2] * i[2] - cosine * from_cosine
+    from_cosine = dot(i, n)
+    turned = dot(o, i) - cosine * from_cosine
     if turned > 0.0:
         turned /= max(cosine, from_cosine)
     lost = (1.0 - single) * (1.0 - _single(from_cosine, roughness)) / (1.0 - mean)

@@ -18,17 +18,17 @@ from typing import NamedTuple
 import numpy as np
 
 from .camera_coat import base_reflectance, coat_albedo, coat_lobe, reflected_by_coat, under_coat
-from .camera_lights import light_seen, sample_light
-from .camera_rays import lens_ray
+from .camera_lights import draw_by_cosine, draw_direction, light_seen, sample_light
 from .camera_scene import beyond
 from .compiling import compiled, inlined
-from .environment_draw import draw_by_cosine, draw_direction
 from .photon_emit import search
 from .photon_intersect import blocked, nearest, normal_at
 from .photon_scene import BLACK, DIFFUSE
 from .polarised import begin_unpolarised
-from .sampling import DIMENSIONS, FIRST_CHOICE, choice, mixed, sobol_next, sobol_start, unit
+from .sampling import DIMENSIONS, FIRST_CHOICE, choice, mixed, sobol_next, sobol_start, unit, word_number
 from .scattering import AIR, scatter, side_met, transmitted
+from .vectors import dot, moved, negated
+from .viewpoint import lens_ray
 from .worn_textures import worn_at
 
 _LENS = np.uint64(0xD1B54A32D192ED03)
@@ -62,13 +62,6 @@ class CausticTables(NamedTuple):
     bins: int
 
 
-class Start(NamedTuple):
-    """What the camera stands in."""
-
-    mask: np.uint64
-    alone: int
-
-
 @inlined
 def texel_of(tables, side, window, x, y):
     """Number of the texel that holds a point of the plane, counted within its window; −1: outside."""
@@ -81,24 +74,40 @@ def texel_of(tables, side, window, x, y):
 
 
 @inlined
-def on_plane(tables, side, px, py, pz):
+def on_plane(tables, side, place):
     """Coordinates of a point on a side's plane."""
     f = tables.frame[side]
-    rx, ry, rz = px - f[0, 0], py - f[0, 1], pz - f[0, 2]
-    return rx * f[1, 0] + ry * f[1, 1] + rz * f[1, 2], rx * f[2, 0] + ry * f[2, 1] + rz * f[2, 2]
+    r = place[0] - f[0, 0], place[1] - f[0, 1], place[2] - f[0, 2]
+    return dot(r, f[1]), dot(r, f[2])
 
 
 @inlined
-def _caustic_texel(tables, side, px, py, pz):
+def _caustic_texel(tables, side, place):
     """Where the bins of the finest texel that holds the point begin; −1: none does."""
     if side < 0:
         return -1
-    x, y = on_plane(tables, side, px, py, pz)
+    x, y = on_plane(tables, side, place)
     for window in (1, 0):
         texel = texel_of(tables, side, window, x, y)
         if texel >= 0:
             return tables.first[side, window] + texel * tables.bins
     return -1
+
+
+@compiled
+def gather(tables, points, watts, ends, count, sums):
+    """Add landed photons to `sums` (as `CausticTables.irradiance`, but W a texel).
+
+    A photon counts in the finest window that holds it; returns the power beyond all windows.
+    """
+    outside = 0.0
+    for i in range(count):
+        texel = _caustic_texel(tables, ends[i, 0], points[i])
+        if texel >= 0:
+            sums[texel + ends[i, 1]] += watts[i]
+        else:
+            outside += watts[i]
+    return outside
 
 
 @inlined
@@ -111,18 +120,22 @@ def _surface(scene, pictures, triangle, u, v):
 
 
 @inlined
-def gain_of_light(scene, lights, i, triangle, side, px, py, pz, a, b, stack):
-    """Irradiance by light i, per unit of its quantity, on a facet's front (side 0) or back (1)."""
-    sign = 1.0 if side == 0 else -1.0
-    # The plastic number's fractions turn the sample's place on from light to light.
+def _at_light(lights, i, place, a, b):
+    """`sample_light` of light i: the plastic number's fractions move the sample's place on from light to light."""
     at, bt = a + i * 0.7548776662466927, b + i * 0.5698402909980532
-    tx, ty, tz, distance, gain = sample_light(lights, i, px, py, pz, at - math.floor(at), bt - math.floor(bt))
-    nx, ny, nz = normal_at(scene, triangle, px, py, pz)
-    gain *= sign * (tx * nx + ty * ny + tz * nz)
-    # A hair less than the way, so that a surface the light lies on does not hide it.
-    if gain <= 0.0 or blocked(scene, px, py, pz, tx, ty, tz, distance * (1.0 - 1e-9), triangle, stack):
-        return 0.0
-    return gain
+    return sample_light(lights, i, place, at - math.floor(at), bt - math.floor(bt))
+
+
+@inlined
+def gain_of_light(scene, lights, i, triangle, side, place, a, b, stack):
+    """(irradiance by light i, per unit of its quantity, on a facet's front (side 0) or back (1), unit direction to the
+    light)."""
+    toward, distance, gain = _at_light(lights, i, place, a, b)
+    gain *= (1.0 if side == 0 else -1.0) * dot(toward, normal_at(scene, triangle, place))
+    # A hair less than the way, so that a surface which the light touches does not hide it.
+    if gain <= 0.0 or blocked(scene, place, toward, distance * (1.0 - 1e-9), triangle, stack):
+        return 0.0, toward
+    return gain, toward
 
 
 @inlined
@@ -135,59 +148,44 @@ def _added(table, i, row, red, green, blue, factor, xyz):
 
 
 @inlined
-def _toward_light(lights, i, place, a, b):
-    """Unit direction to the point of light i that `gain_of_light` asks for."""
-    at, bt = a + i * 0.7548776662466927, b + i * 0.5698402909980532
-    tx, ty, tz, _, _ = sample_light(lights, i, place[0], place[1], place[2], at - math.floor(at), bt - math.floor(bt))
-    return tx, ty, tz
-
-
-@inlined
 def _finished(scene, pictures, spectra, atom, triangle, u, v, o, i, n):
     """Reflectance in an atom of a finished surface's base, under its coat, for light from `i` (0: from all sides)."""
     made, thing = pictures.finishes, scene.owner[triangle]
     row, red, green, blue = _surface(scene, pictures, triangle, u, v)
-    cosine = o[0] * n[0] + o[1] * n[1] + o[2] * n[2]
+    cosine = dot(o, n)
     basis, rough = spectra.basis[atom], made.roughness[thing]
     reflectance = spectra.classes[row, atom]
     if row == 0:
         reflectance = basis[0] * base_reflectance(red, rough, cosine, o, i, n)
         reflectance += basis[1] * base_reflectance(green, rough, cosine, o, i, n)
         reflectance += basis[2] * base_reflectance(blue, rough, cosine, o, i, n)
-    directed = i[0] * i[0] + i[1] * i[1] + i[2] * i[2] > 0.5
-    from_cosine = i[0] * n[0] + i[1] * n[1] + i[2] * n[2] if directed else -1.0
-    return reflectance * under_coat(made, thing, cosine, from_cosine)
+    return reflectance * under_coat(made, thing, cosine, dot(i, n) if dot(i, i) > 0.5 else -1.0)
 
 
 @inlined
 def _coat_highlights(scene, lights, spectra, pictures, atom, triangle, place, side, o, n, a, b, scratch):
     """Radiance in an atom that a coat reflects of lights without extent, which no path runs into."""
-    px, py, pz = place
     found = 0.0
     for i in range(lights.kind.shape[0]):
         if lights.measure[i] == 0.0 and spectra.lights[i, atom] > 0.0:
-            gain = gain_of_light(scene, lights, i, triangle, side, px, py, pz, a, b, scratch.stack)
+            gain, toward = gain_of_light(scene, lights, i, triangle, side, place, a, b, scratch.stack)
             if gain > 0.0:
-                toward = _toward_light(lights, i, place, a, b)
-                cosine = toward[0] * n[0] + toward[1] * n[1] + toward[2] * n[2]
                 lobe = coat_lobe(pictures.finishes, scene.owner[triangle], o, toward, n)
-                found += spectra.lights[i, atom] * gain / cosine * lobe
+                found += spectra.lights[i, atom] * gain / dot(toward, n) * lobe
     return found
 
 
 @inlined
 def _finished_base(scene, lights, spectra, pictures, tables, atom, triangle, u, v, place, side, o, n, a, b, scratch):
     """Radiance in an atom that a finished surface's base sends back."""
-    px, py, pz = place
     total = 0.0
     for i in range(lights.kind.shape[0]):
         if spectra.lights[i, atom] > 0.0:
-            gain = gain_of_light(scene, lights, i, triangle, side, px, py, pz, a, b, scratch.stack)
+            gain, toward = gain_of_light(scene, lights, i, triangle, side, place, a, b, scratch.stack)
             if gain > 0.0:
-                toward = _toward_light(lights, i, place, a, b)
                 seen = _finished(scene, pictures, spectra, atom, triangle, u, v, o, toward, n)
                 total += spectra.lights[i, atom] * gain * seen
-    texel = _caustic_texel(tables, tables.side[scene.owner[triangle], side], px, py, pz)
+    texel = _caustic_texel(tables, tables.side[scene.owner[triangle], side], place)
     if texel >= 0:
         irradiance = spectra.share[atom] * tables.irradiance[texel + spectra.bin[atom]]
         total += irradiance * _finished(scene, pictures, spectra, atom, triangle, u, v, o, (0.0, 0.0, 0.0), n)
@@ -195,22 +193,29 @@ def _finished_base(scene, lights, spectra, pictures, tables, atom, triangle, u, 
 
 
 @inlined
+def _plain(scene, pictures, spectra, atom, triangle, u, v):
+    """Reflectance in an atom of a Lambertian surface."""
+    row, red, green, blue = _surface(scene, pictures, triangle, u, v)
+    basis = spectra.basis[atom]
+    return spectra.classes[row, atom] if row > 0 else red * basis[0] + green * basis[1] + blue * basis[2]
+
+
+@inlined
 def _diffuse(scene, lights, spectra, pictures, tables, atom, triangle, u, v, place, side, a, b, scratch):
     """Radiance in an atom that a Lambertian surface sends back from a side; without atom (−1) all wavelengths go to
     `scratch.xyz`."""
-    px, py, pz = place
     xyz = scratch.xyz
     row, red, green, blue = _surface(scene, pictures, triangle, u, v)
     white = atom < 0
     total = 0.0
     for i in range(lights.kind.shape[0]):
         if white or spectra.lights[i, atom] > 0.0:
-            gain = gain_of_light(scene, lights, i, triangle, side, px, py, pz, a, b, scratch.stack)
+            gain, _ = gain_of_light(scene, lights, i, triangle, side, place, a, b, scratch.stack)
             if white and gain > 0.0:
                 _added(spectra.light_xyz, i, row, red, green, blue, gain / math.pi, xyz)
             elif gain > 0.0:
                 total += spectra.lights[i, atom] * gain
-    texel = _caustic_texel(tables, tables.side[scene.owner[triangle], side], px, py, pz)
+    texel = _caustic_texel(tables, tables.side[scene.owner[triangle], side], place)
     if white:
         if texel >= 0:
             for i in range(tables.bins):
@@ -220,9 +225,7 @@ def _diffuse(scene, lights, spectra, pictures, tables, atom, triangle, u, v, pla
         return 0.0
     if texel >= 0:
         total += spectra.share[atom] * tables.irradiance[texel + spectra.bin[atom]]
-    basis = spectra.basis[atom]
-    reflectance = spectra.classes[row, atom] if row > 0 else red * basis[0] + green * basis[1] + blue * basis[2]
-    return total * reflectance / math.pi
+    return total * _plain(scene, pictures, spectra, atom, triangle, u, v) / math.pi
 
 
 @inlined
@@ -234,9 +237,10 @@ def _wavelength(spectra, chance):
 
 
 @inlined
-def _on_lens(noise, number):
-    """The first (0) or second (1) number in [0, 1) for the place on the lens."""
-    return float(mixed(noise + np.uint64(number + 1) * _LENS) >> np.uint64(11)) * 2.0**-53
+def _start_ray(camera, column, row, noise):
+    """The ray through the picture's point, from a place on the lens that the hash `noise` chooses."""
+    first, second = noise + np.uint64(1) * _LENS, noise + np.uint64(2) * _LENS
+    return lens_ray(camera, column, row, word_number(first), word_number(second))
 
 
 @inlined
@@ -244,15 +248,14 @@ def _at_diffuse(state, shift, noise, number):
     """Two numbers in [0, 1) for the diffuse surface `number` of a path."""
     if number == 0:
         return unit(state[3] ^ shift[3]), unit(state[4] ^ shift[4])
-    a, b = mixed(noise + np.uint64(2 * number) * _BOUNCE), mixed(noise + np.uint64(2 * number + 1) * _BOUNCE)
-    return float(a >> np.uint64(11)) * 2.0**-53, float(b >> np.uint64(11)) * 2.0**-53
+    first = noise + np.uint64(2 * number) * _BOUNCE
+    return word_number(first), word_number(noise + np.uint64(2 * number + 1) * _BOUNCE)
 
 
 @inlined
 def _of_coat(noise, events, number):
     """The choice between coat and base (0) after so many events, or a number for its facet (1, 2): in [0, 1)."""
-    word = mixed(mixed(noise + np.uint64(events + 1) * _COAT) + np.uint64(number) * _LENS)
-    return float(word >> np.uint64(11)) * 2.0**-53
+    return word_number(mixed(noise + np.uint64(events + 1) * _COAT) + np.uint64(number) * _LENS)
 
 
 @inlined
@@ -262,21 +265,19 @@ def sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_dept
     Up to the first event at glass or a mirror nothing depends on a wavelength, and all are added at once;
     then one is drawn and stands for all by its probability.
     """
-    px, py, pz, dx, dy, dz = ray
+    place, d = ray
     state, shift, xyz = scratch.state, scratch.shift, scratch.xyz
-    last, last_object, within, mask, alone, events = -1, -1, False, start.mask, start.alone, 0
+    last, within, mask, alone, events = -1, False, start.mask, start.alone, 0
     atom, nm, found, weight, surfaces = -1, 0.0, 0.0, 1.0, 0
     if scene.polarised:  # by reciprocity a path loses what light that came along it would
-        begin_unpolarised(scratch.field, dx, dy, dz)
+        begin_unpolarised(scratch.field, d)
     if mask != np.uint64(0) or alone != AIR:  # in glass wavelengths part at once
         atom, nm = _wavelength(spectra, unit(state[2] ^ shift[2]))
     while True:
-        t, triangle, u, v = nearest(
-            scene, px, py, pz, dx, dy, dz, last, last_object, within, mask, scratch.stack, scratch.stack_distance
-        )
+        t, triangle, u, v = nearest(scene, place, d, last, within, mask, scratch)
         far = t if triangle >= 0 else np.inf
         for i in range(0 if surfaces > 0 else lights.kind.shape[0]):
-            seen = light_seen(lights, i, px, py, pz, dx, dy, dz, far)
+            seen = light_seen(lights, i, place, d, far)
             if seen > 0.0 and atom < 0:
                 _added(spectra.light_xyz, i, 0, 1.0, 1.0, 1.0, seen, xyz)
             elif seen > 0.0:
@@ -285,7 +286,7 @@ def sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_dept
             if mask != np.uint64(0) or alone != AIR:
                 tally[LOST_NUMERIC] += 1.0
                 break
-            red, green, blue = beyond(pictures, dx, dy, dz)
+            red, green, blue = beyond(pictures, d)
             if atom < 0:
                 _added(spectra.beyond_xyz, 0, 0, red, green, blue, 1.0, xyz)
             else:
@@ -294,19 +295,17 @@ def sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_dept
             break
         if atom >= 0:
             weight *= transmitted(scene, mask, alone, nm, t)
-        px, py, pz = px + t * dx, py + t * dy, pz + t * dz
-        place = px, py, pz
+        place = moved(place, t, d)
         thing = scene.owner[triangle]
         kind = scene.kind[thing]
         if kind == BLACK or weight <= 0.0 or (surfaces > bounces and kind == DIFFUSE):
             break
         if kind == DIFFUSE:
             a, b = _at_diffuse(state, shift, noise, surfaces)
-            side = side_met(scene, triangle, place, dx, dy, dz)
-            sign = 1.0 if side == 0 else -1.0
-            nx, ny, nz = normal_at(scene, triangle, px, py, pz)
-            nx, ny, nz = sign * nx, sign * ny, sign * nz
-            made, n, o = pictures.finishes, (nx, ny, nz), (-dx, -dy, -dz)
+            side = side_met(scene, triangle, place, d)
+            n = normal_at(scene, triangle, place)
+            n = n if side == 0 else negated(n)
+            made, o = pictures.finishes, negated(d)
             ends = surfaces == bounces and not pictures.draw.lights
             # What one surface sends to another, it sends as if it were plain.
             coated = surfaces == 0 and made.alpha[thing] >= 0.0
@@ -318,15 +317,14 @@ def sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_dept
                     scene, lights, spectra, pictures, atom, triangle, place, side, o, n, a, b, scratch
                 )
                 # To the coat or to its base, by what the coat reflects.
-                cosine = -(dx * nx + dy * ny + dz * nz)
-                by_coat = min(max(coat_albedo(made, thing, cosine), 0.3), 0.7)
+                by_coat = min(max(coat_albedo(made, thing, dot(o, n)), 0.3), 0.7)
                 if _of_coat(noise, events, 0) < by_coat:
                     facet_a, facet_b = _of_coat(noise, events, 1), _of_coat(noise, events, 2)
-                    dx, dy, dz, share = reflected_by_coat(made, thing, dx, dy, dz, n, facet_a, facet_b)
+                    d, share = reflected_by_coat(made, thing, d, n, facet_a, facet_b)
                     weight *= share / by_coat
                     if scene.polarised:  # a coat takes light as unpolarised, and leaves it so
-                        begin_unpolarised(scratch.field, dx, dy, dz)
-                    last, last_object, within, events = triangle, thing, side == 1, events + 1
+                        begin_unpolarised(scratch.field, d)
+                    last, within, events = triangle, side == 1, events + 1
                     if weight <= 0.0 or events >= max_depth:
                         break
                     continue
@@ -341,27 +339,25 @@ def sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_dept
                 )
             if ends:
                 break
-            row, red, green, blue = _surface(scene, pictures, triangle, u, v)
-            basis = spectra.basis[atom]
-            dx, dy, dz, share = draw_direction(pictures.draw, nx, ny, nz, a, b)
+            d, share = draw_direction(pictures.draw, n, a, b)
             if finished:
-                weight *= _finished(scene, pictures, spectra, atom, triangle, u, v, o, (dx, dy, dz), n)
+                weight *= _finished(scene, pictures, spectra, atom, triangle, u, v, o, d, n)
             else:
-                weight *= spectra.classes[row, atom] if row > 0 else red * basis[0] + green * basis[1] + blue * basis[2]
+                weight *= _plain(scene, pictures, spectra, atom, triangle, u, v)
             if scene.polarised:  # a diffuse surface depolarises
-                begin_unpolarised(scratch.field, dx, dy, dz)
+                begin_unpolarised(scratch.field, d)
             weight *= share
-            last, last_object, within, surfaces = triangle, thing, side == 1, surfaces + 1
+            last, within, surfaces = triangle, side == 1, surfaces + 1
             continue
         if events >= max_depth:
             tally[LOST_DEPTH] += 1.0
             break
         if atom < 0:
             atom, nm = _wavelength(spectra, unit(state[2] ^ shift[2]))
-        last, last_object = triangle, thing
+        last = triangle
         draw = choice(state, shift, FIRST_CHOICE + events, noise, events)
-        dx, dy, dz, mask, alone, within, is_event, kept, _ = scatter(
-            scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw, noise, events, scratch.field
+        d, mask, alone, within, is_event, kept, _ = scatter(
+            scene, triangle, place, u, v, d, mask, alone, nm, draw, noise, events, scratch.field
         )
         weight *= kept
         events += is_event
@@ -403,7 +399,7 @@ def trace_camera(
                     sobol_next(sequence, i, state)
                 noise = mixed(key ^ mixed(np.uint64(i)))
                 x, y = column + unit(state[0] ^ shift[0]), row + unit(state[1] ^ shift[1])
-                ray = lens_ray(camera, x, y, _on_lens(noise, 0), _on_lens(noise, 1))
+                ray = _start_ray(camera, x, y, noise)
                 sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_depth, bounces, tally, scratch)
             for c in range(3):
                 sums[row, column, c] += xyz[c]
@@ -418,53 +414,47 @@ def seen_points(scene, camera, start, sequence, count, nm, max_depth, bounces, s
     `side` (O, 2) as in `CausticTables`; fills `points` (count × (bounces + 1), 4): place, and length of the way there;
     `which` (…, 2): side, events on the way.
     """
-    stack, stack_distance, state, shift = scratch.stack, scratch.stack_distance, scratch.state, scratch.shift
+    state, shift = scratch.state, scratch.shift
     sobol_start(sequence, 0, state)
     found = 0
     for i in range(count):
         if i > 0:
             sobol_next(sequence, i, state)
         noise = mixed(sequence.key ^ mixed(np.uint64(i)))
-        x, y = unit(state[0]) * camera.width, unit(state[1]) * camera.height
-        px, py, pz, dx, dy, dz = lens_ray(camera, x, y, _on_lens(noise, 0), _on_lens(noise, 1))
-        last, last_object, within, mask, alone, events, way = -1, -1, False, start.mask, start.alone, 0, 0.0
-        surfaces = 0
+        place, d = _start_ray(camera, unit(state[0]) * camera.width, unit(state[1]) * camera.height, noise)
+        last, within, mask, alone, events, way, surfaces = -1, False, start.mask, start.alone, 0, 0.0, 0
         if scene.polarised:
-            begin_unpolarised(scratch.field, dx, dy, dz)
+            begin_unpolarised(scratch.field, d)
         while events <= max_depth:
-            t, triangle, u, v = nearest(
-                scene, px, py, pz, dx, dy, dz, last, last_object, within, mask, stack, stack_distance
-            )
+            t, triangle, u, v = nearest(scene, place, d, last, within, mask, scratch)
             if triangle < 0:
                 break
-            px, py, pz, way = px + t * dx, py + t * dy, pz + t * dz, way + t
-            place = px, py, pz
+            place, way = moved(place, t, d), way + t
             thing = scene.owner[triangle]
             kind = scene.kind[thing]
+            if kind == BLACK:
+                break
+            last = triangle
             if kind == DIFFUSE:
-                met = side_met(scene, triangle, place, dx, dy, dz)
+                met = side_met(scene, triangle, place, d)
                 at = side[thing, met]
                 if at >= 0:
-                    points[found, 0], points[found, 1], points[found, 2], points[found, 3] = px, py, pz, way
-                    which[found, 0], which[found, 1] = at, events
+                    points[found, 0], points[found, 1], points[found, 2] = place
+                    points[found, 3], which[found, 0], which[found, 1] = way, at, events
                     found += 1
                 if surfaces == bounces:
                     break
-                sign = 1.0 if met == 0 else -1.0
-                nx, ny, nz = normal_at(scene, triangle, px, py, pz)
+                n = normal_at(scene, triangle, place)
                 surfaces += 1
                 a, b = _at_diffuse(state, shift, noise, surfaces)
-                dx, dy, dz = draw_by_cosine(sign * nx, sign * ny, sign * nz, a, b)
+                d = draw_by_cosine(n if met == 0 else negated(n), a, b)
                 if scene.polarised:
-                    begin_unpolarised(scratch.field, dx, dy, dz)
-                last, last_object, within = triangle, thing, met == 1
+                    begin_unpolarised(scratch.field, d)
+                within = met == 1
                 continue
-            if kind == BLACK:
-                break
-            last, last_object = triangle, thing
             draw = choice(state, shift, FIRST_CHOICE + events, noise, events)
-            dx, dy, dz, mask, alone, within, is_event, _, _ = scatter(
-                scene, triangle, place, u, v, dx, dy, dz, mask, alone, nm, draw, noise, events, scratch.field
+            d, mask, alone, within, is_event, _, _ = scatter(
+                scene, triangle, place, u, v, d, mask, alone, nm, draw, noise, events, scratch.field
             )
             events += is_event
     return found

@@ -2,34 +2,209 @@
 
 It shares no code with the shaders, the maps or the camera pass: float64 paths of one random wavelength each through
 glass and over mirrors, exact Fresnel by chance, textures and environments looked up at random points. With a
-`SpectralCaustic` the caustic lies on what is seen, each wavelength of it where that wavelength sees it.
+`SpectralCaustic` the caustic is on what is seen, each wavelength of it where that wavelength sees it.
 
 Diffuse surfaces send back direct light, the caustic, the environment's light, and what the scene's `bounces` bring of
 other diffuse surfaces. Known bound: caustics need flat receivers.
 
-Pictures are kept by the content of their scene beside those of `photon_reference`, in the same kind of file, and grow.
+PARTS independent scramblings of one quasi-random sequence run side by side, a thread each, every pixel with a shift
+of its own: the picture converges faster than random and still knows its own error. Pictures are kept by the content of
+their scene, as those of `photon_reference`, and grow.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import astuple, replace
+from dataclasses import astuple, dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base.errors import UserError
+from ..model.optics.colorimetry import xyz_to_rgb709
 from ..model.scene import Scene
 from ..model.scene_key import picture_key
-from .camera_run import MAX_DEPTH, CameraPicture, CameraRun, summed_camera
 from .code_key import code_key
-from .exact_shapes import description
-from .kept import continue_kept, kept_path
-from .photon_run import TALLY_SIZE
-from .rounds import PARTS, Cancelled, Limits, Progress, continue_run
+from .photon_reference import TALLY_SIZE, relative_variance
+from .rounds import PARTS, Cancelled, Limits, PartsRun, Progress, continue_kept, continue_run, kept_path
+from .scene_surfaces import description
 
 if TYPE_CHECKING:
     from .spectral_caustic import CausticPlan, SpectralCaustic
+
+MAX_DEPTH = 256
+_LAST_SAMPLE = 2**31
+_BLACK_SAMPLES = 256
+
+
+@dataclass(frozen=True)
+class CameraPicture:
+    """What the camera sees and what is known of its error; row 0 on top."""
+
+    xyz: np.ndarray
+    """float64 (H, W, 3): CIE XYZ, the mean over each pixel; Y in lm/(sr unit²)."""
+    variance: np.ndarray
+    """float64 (H, W, 3): of `xyz` as an estimate, from PARTS independent pictures, or two where the caustic's halves
+    are told apart."""
+    samples: int
+    """Of each pixel."""
+    seconds: float
+    """Time spent tracing."""
+    lost: dict[str, float]
+    """Share of paths given up: "depth" (too many events) and "numeric" (nothing met inside a solid)."""
+    caustic_photons: int = 0
+    """Of the caustic that was looked up."""
+    caustic_relmse: float = 0.0
+    """What its noise adds to the picture's own error, about, where `cached_camera_reference` measured it: a part of
+    `variance`."""
+
+    @property
+    def amount(self) -> int:
+        """Samples a pixel."""
+        return self.samples
+
+    def rgb(self) -> np.ndarray:
+        """Linear Rec.709, float64 (H, W, 3)."""
+        return xyz_to_rgb709(self.xyz)
+
+    @cached_property
+    def relmse(self) -> float:
+        """The picture's own error, mean[var/(R² + ε)] as `ReferencePicture.relmse` has it; 0 for a black picture."""
+        return relative_variance(self.xyz, self.variance)
+
+    def is_within(self, target_relmse: float) -> bool:
+        """Whether the error is known to be no larger; blackness is believed after many samples only."""
+        return self.relmse <= target_relmse and (bool(self.xyz.any()) or self.samples >= _BLACK_SAMPLES)
+
+
+class CameraRun(PartsRun[CameraPicture]):
+    """Samples of one picture, added round by round; `picture()` at any time."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        width: int,
+        height: int,
+        max_depth: int = MAX_DEPTH,
+        seed: int = 1,
+        caustic: SpectralCaustic | None = None,
+        caustic_relmse: float = 0.0,
+    ) -> None:
+        """`caustic_relmse`: what the caustic's noise adds to the picture's error, to be noted with it.
+
+        Even and odd parts look up one half each of the caustic's photons, so that the picture's variance holds the
+        caustic's too. Raises UserError where numba is missing or solids nest beyond reach.
+        """
+        try:
+            from . import (
+                camera_kernel,
+                camera_lights,
+                camera_scene,
+                photon_scene,
+                sampling,
+                spectral_caustic,
+                viewpoint,
+            )
+        except ImportError as error:
+            raise UserError(
+                f"the camera's reference renderer needs numba ({error}); install it with: pip install numba"
+            ) from error
+        self._kernel, self._scratch = camera_kernel, sampling.scratch
+        photons, centre = photon_scene.photon_scene(scene)
+        self._scene = camera_scene.with_upsampled_mirrors(photons, scene)
+        self._camera = viewpoint.viewpoint(scene.camera, width, height, centre)
+        self._start = camera_scene.camera_start(scene, photons)
+        self._lights = camera_lights.camera_lights(scene.lights, centre)
+        self._pictures = camera_scene.pictures(scene, photons)
+        self._tables = (
+            [caustic.half(number).tables for number in range(2)] if caustic else [spectral_caustic.no_caustic(scene)]
+        )
+        self._spectra = camera_scene.spectra(scene, caustic.plan.bins if caustic else 1)
+        self._sequences = [sampling.scrambled(seed, part) for part in range(PARTS)]
+        self._max_depth, self._bounces = max_depth, scene.render.bounces
+        self._caustic_noted = caustic.photons if caustic else 0, caustic_relmse
+        super().__init__((height, width, 3), TALLY_SIZE)
+
+    @property
+    def samples(self) -> int:
+        """Samples of every pixel so far."""
+        return self.amount
+
+    @property
+    def amount_words(self) -> str:
+        """Samples for people."""
+        return f"{self.samples} samples a pixel"
+
+    @property
+    def exhausted(self) -> bool:
+        """Whether the sequence has no fresh points left."""
+        return int(self.units.max()) >= _LAST_SAMPLE
+
+    def picture(self) -> CameraPicture:
+        """What has been gathered; black without variance before the first round."""
+        halves = len(self._tables) > 1
+        return summed_camera(self.sums, self.units, self.tallies, self.seconds, halves, self._caustic_noted)
+
+    def kept(self) -> dict[str, object]:
+        """With what is noted of the caustic."""
+        photons, relmse = self._caustic_noted
+        return super().kept() | {"caustic_photons": photons, "caustic_relmse": relmse}
+
+    def restore(self, stored: Mapping[str, np.ndarray]) -> None:
+        """With what was noted of the caustic then: it may have grown since."""
+        super().restore(stored)
+        self._caustic_noted = int(stored["caustic_photons"]), float(stored["caustic_relmse"])
+
+    def _trace_part(self, part: int, count: int) -> None:
+        self._kernel.trace_camera(
+            self._scene,
+            self._camera,
+            self._lights,
+            self._spectra,
+            self._pictures,
+            self._tables[part % len(self._tables)],
+            self._start,
+            self._sequences[part],
+            int(self.units[part]),
+            count,
+            self._max_depth,
+            self._bounces,
+            self.sums[part],
+            self.tallies[part],
+            self._scratch(),
+        )
+        self.units[part] += count
+
+
+def summed_camera(
+    sums: np.ndarray,
+    units: np.ndarray,
+    tallies: np.ndarray,
+    seconds: float,
+    halves: bool = False,
+    caustic_noted: tuple[int, float] = (0, 0.0),
+) -> CameraPicture:
+    """The picture from the sums (PARTS, H, W, 3) and tallies (PARTS, TALLY_SIZE) of parts with `units` (PARTS,) samples
+    a pixel.
+
+    `halves`: even parts have one thing in common, the caustic they looked up, and so have odd ones: two independent
+    pictures."""
+    total = max(int(units.sum()), 1)
+    mean = sums.sum(axis=0) / total
+    variance = np.zeros_like(mean)
+    if halves:
+        sums, units = (np.stack([values[half::2].sum(axis=0) for half in range(2)]) for values in (sums, units))
+    used = np.flatnonzero(units)
+    if len(used) > 1:
+        for part in used:
+            variance += units[part] / total * (sums[part] / units[part] - mean) ** 2
+        variance /= len(used) - 1
+    lost = tallies.sum(axis=0)[:2] / (total * mean.shape[0] * mean.shape[1])
+    fates = {"depth": float(lost[0]), "numeric": float(lost[1])}
+    return CameraPicture(mean, variance, total if used.size else 0, seconds, fates, *caustic_noted)
+
 
 _SEED = 1
 _CAUSTIC_SHARE = 0.5
@@ -39,7 +214,7 @@ _CAUSTIC_SHARE = 0.5
 def camera_reference_key(scene: Scene, width: int, height: int, max_depth: int, caustic: CausticPlan | None) -> str:
     """SHA-256 over everything the picture depends on, the code that makes it included."""
     plan = None if caustic is None else astuple(caustic)
-    return picture_key(scene, code_key("camera_run"), description(scene), width, height, max_depth, plan)
+    return picture_key(scene, code_key("camera_reference"), description(scene), width, height, max_depth, plan)
 
 
 def render_camera_reference(

@@ -16,10 +16,13 @@ import numpy as np
 from ..model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz, daylight_per_lumen, rgb_basis
 from ..model.optics.spectrum import cmf_at
 from ..model.scene import Scene
+from ..model.scene_checks import contains
 from .camera_coat import Finishes, finishes
+from .camera_lights import EnvironmentDraw, environment_draw
 from .compiling import inlined
-from .environment_draw import EnvironmentDraw, environment_draw
 from .photon_scene import TABLE_NM, PhotonScene, reflectance_classes
+from .scattering import AIR
+from .vectors import dot
 from .worn_textures import blend, worn_textures
 
 _EVEN_SHARE = 0.2
@@ -185,8 +188,28 @@ def pictures(scene: Scene, photons: PhotonScene) -> Pictures:
     )
 
 
+class Start(NamedTuple):
+    """What solids the camera is in; a path begins with that."""
+
+    mask: np.uint64
+    alone: int
+
+
+def camera_start(scene: Scene, photons: PhotonScene) -> Start:
+    """The medium at the camera's position (of an orthographic camera too: its rays all begin as the middle one
+    does)."""
+    mask, alone = 0, AIR
+    for index, item in enumerate(scene.objects):
+        if item.material.is_solid and contains(item, np.array(scene.camera.position)):
+            if photons.bit[index] >= 0:
+                mask |= 1 << int(photons.bit[index])
+            else:
+                alone = index
+    return Start(np.uint64(mask), alone)
+
+
 @inlined
-def beyond(pictures, dx, dy, dz):
+def beyond(pictures, d):
     """Linear Rec.709 radiance from infinitely far along a unit direction, lm/(sr unit²): columns join, the poles end
     the picture."""
     which = pictures.size.shape[0] - 1
@@ -194,9 +217,7 @@ def beyond(pictures, dx, dy, dz):
     if width == 1 and height == 1:
         return float(pictures.rgb[first, 0]), float(pictures.rgb[first, 1]), float(pictures.rgb[first, 2])
     m = pictures.to_local
-    lx = m[0, 0] * dx + m[0, 1] * dy + m[0, 2] * dz
-    ly = m[1, 0] * dx + m[1, 1] * dy + m[1, 2] * dz
-    lz = m[2, 0] * dx + m[2, 1] * dy + m[2, 2] * dz
+    lx, ly, lz = dot(m[0], d), dot(m[1], d), dot(m[2], d)
     x = (0.5 - math.atan2(ly, lx) / (2.0 * math.pi)) * width - 0.5
     # The angle from both of its sides: acos alone loses the directions near the poles.
     y = math.atan2(math.sqrt(lx * lx + ly * ly), lz) / math.pi * height - 0.5

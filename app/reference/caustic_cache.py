@@ -13,10 +13,9 @@ import numpy as np
 
 from ..model.scene import Scene
 from ..model.scene_key import ContentKey
-from .camera_run import CameraRun
-from .kept import kept_path, load_kept, save_kept
-from .photon_run import relative_variance
-from .rounds import PARTS, Progress
+from .camera_reference import CameraRun
+from .photon_reference import relative_variance
+from .rounds import PARTS, Progress, kept_path, load_kept, save_kept
 from .spectral_caustic import CausticPlan, CausticRun, SpectralCaustic
 
 _FIRST_STEP = 1 << 22

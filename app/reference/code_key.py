@@ -16,8 +16,8 @@ _ROOMS = ("reference", "model")
 
 @cache
 def code_key(*modules: str) -> str:
-    """SHA-256 over the code of `modules` of this folder ("photon_run"), of all they import here and in the model, and
-    over the spectral tables.
+    """SHA-256 over the code of `modules` of this folder ("photon_reference"), of all that they import here and in the
+    model, and over the spectral tables.
 
     Comments, docstrings and layout do not count.
     """

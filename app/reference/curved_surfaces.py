@@ -10,72 +10,65 @@ from __future__ import annotations
 import math
 
 from .compiling import compiled, inlined
-from .exact_shapes import COEFFICIENTS, KIND, OUTWARD, RANGE, SHEET, TORUS, TURNS
+from .scene_surfaces import COEFFICIENTS, KIND, OUTWARD, RANGE, SHEET, TORUS, TURNS
+from .vectors import length, mixed_of, over
 
 _STEPS = 100
 """Of a safeguarded Newton iteration; halving alone needs about 60."""
 
 
 @inlined
-def local_point(form, x, y, z):
+def local_point(form, place):
     """A place in the surface's own frame."""
     return (
-        form[0] * x + form[1] * y + form[2] * z + form[3],
-        form[4] * x + form[5] * y + form[6] * z + form[7],
-        form[8] * x + form[9] * y + form[10] * z + form[11],
+        form[0] * place[0] + form[1] * place[1] + form[2] * place[2] + form[3],
+        form[4] * place[0] + form[5] * place[1] + form[6] * place[2] + form[7],
+        form[8] * place[0] + form[9] * place[1] + form[10] * place[2] + form[11],
     )
 
 
 @inlined
-def _local_direction(form, x, y, z):
-    return (
-        form[0] * x + form[1] * y + form[2] * z,
-        form[4] * x + form[5] * y + form[6] * z,
-        form[8] * x + form[9] * y + form[10] * z,
+def _turned_back(form, g):
+    """Unit vector along the gradient whose local components are `g`, in the reference's frame."""
+    n = (
+        form[0] * g[0] + form[4] * g[1] + form[8] * g[2],
+        form[1] * g[0] + form[5] * g[1] + form[9] * g[2],
+        form[2] * g[0] + form[6] * g[1] + form[10] * g[2],
     )
-
-
-@inlined
-def _turned_back(form, gx, gy, gz):
-    """Unit vector along the gradient whose local components are given, in the reference's frame."""
-    x = form[0] * gx + form[4] * gy + form[8] * gz
-    y = form[1] * gx + form[5] * gy + form[9] * gz
-    z = form[2] * gx + form[6] * gy + form[10] * gz
-    length = math.sqrt(x * x + y * y + z * z)
-    return (x / length, y / length, z / length) if length > 0.0 else (0.0, 0.0, 1.0)
+    size = length(n)
+    return over(n, size) if size > 0.0 else (0.0, 0.0, 1.0)
 
 
 @compiled
-def curved_normal(form, x, y, z):
+def curved_normal(form, place):
     """Unit outward normal at a place of the surface."""
-    px, py, pz = local_point(form, x, y, z)
+    px, py, pz = local_point(form, place)
     out = form[OUTWARD]
     if form[KIND] == TORUS:
         large = form[COEFFICIENTS]
         radius = math.sqrt(px * px + py * py)
         share = 1.0 - large / radius if radius > 0.0 else 0.0
-        return _turned_back(form, out * share * px, out * share * py, out * pz)
+        return _turned_back(form, (out * share * px, out * share * py, out * pz))
     a, b, c = form[COEFFICIENTS], form[COEFFICIENTS + 1], form[COEFFICIENTS + 2]
-    return _turned_back(form, out * 2.0 * a * px, out * 2.0 * a * py, out * (2.0 * b * pz + c))
+    return _turned_back(form, (out * 2.0 * a * px, out * 2.0 * a * py, out * (2.0 * b * pz + c)))
 
 
 @compiled
-def turned_normal(form, x, y, z):
+def turned_normal(form, place):
     """Unit outward normal between those of a profile's ends; the surface's own where they do not turn."""
     if form[TURNS] == 0.0:
-        return curved_normal(form, x, y, z)
-    px, py, pz = local_point(form, x, y, z)
+        return curved_normal(form, place)
+    px, py, pz = local_point(form, place)
     radius = math.sqrt(px * px + py * py)
     w = form[29] + form[30] * radius + form[31] * pz
     w = min(max(w, 0.0), 1.0)
     if radius > 0.0:
         px, py = px / radius, py / radius
-    # Unit vectors where the object stands, and then between them: as a mesh's corners have it, also of a stretched one.
-    ax, ay, az = _turned_back(form, form[25] * px, form[25] * py, form[26])
-    bx, by, bz = _turned_back(form, form[27] * px, form[27] * py, form[28])
-    x, y, z = (1.0 - w) * ax + w * bx, (1.0 - w) * ay + w * by, (1.0 - w) * az + w * bz
-    length = math.sqrt(x * x + y * y + z * z)
-    return x / length, y / length, z / length
+    # Unit vectors where the object is, and then between them: as a mesh's corners have it, also of a stretched one.
+    a = _turned_back(form, (form[25] * px, form[25] * py, form[26]))
+    b = _turned_back(form, (form[27] * px, form[27] * py, form[28]))
+    n = mixed_of(1.0 - w, a, w, b)
+    return over(n, length(n))
 
 
 @inlined
@@ -89,10 +82,12 @@ def _is_there(form, x, y, z):
 
 
 @compiled
-def crossings(form, ox, oy, oz, dx, dy, dz):
+def crossings(form, o, d):
     """(how many, their distances (4), which way each crosses (4): > 0 outwards) of a ray's whole line; in no order."""
-    px, py, pz = local_point(form, ox, oy, oz)
-    qx, qy, qz = _local_direction(form, dx, dy, dz)
+    px, py, pz = local_point(form, o)
+    qx = form[0] * d[0] + form[1] * d[1] + form[2] * d[2]
+    qy = form[4] * d[0] + form[5] * d[1] + form[6] * d[2]
+    qz = form[8] * d[0] + form[9] * d[1] + form[10] * d[2]
     if form[KIND] == TORUS:
         return _torus(form, px, py, pz, qx, qy, qz)
     return _quadric(form, px, py, pz, qx, qy, qz)
@@ -139,39 +134,20 @@ def _cubic(t, c2, c1):
 
 
 @compiled
-def _extremum(low, high, c2, c1):
-    """Where the quartic's slope vanishes between two places; `high` where it does not."""
-    at_low = _cubic(low, c2, c1)
-    if (at_low < 0.0) == (_cubic(high, c2, c1) < 0.0):
+def _bracketed(low, high, c2, c1, c0, is_slope):
+    """The one zero of the quartic, or of its slope where `is_slope`, between two places where its signs differ; `high`
+    where they do not. Newton's iteration, halved where it leaves its bracket."""
+    is_low = (_cubic(low, c2, c1) if is_slope else _quartic(low, c2, c1, c0)) < 0.0
+    if is_slope and is_low == (_cubic(high, c2, c1) < 0.0):
         return high
     left, right, t, last = low, high, 0.5 * (low + high), math.inf
     for _ in range(_STEPS):
-        value = _cubic(t, c2, c1)
-        if (value < 0.0) == (at_low < 0.0):
-            left = t
-        else:
-            right = t
-        slope = 12.0 * t * t + 2.0 * c2
-        step = t - value / slope if slope != 0.0 else left
-        step = step if left < step < right else 0.5 * (left + right)
-        if abs(step - t) <= 1e-16 or step == last:
-            break
-        t, last = step, t
-    return t
-
-
-@compiled
-def _zero(low, high, c2, c1, c0):
-    """The quartic's one zero between two places where its signs differ."""
-    is_low = _quartic(low, c2, c1, c0) < 0.0
-    left, right, t, last = low, high, 0.5 * (low + high), math.inf
-    for _ in range(_STEPS):
-        value = _quartic(t, c2, c1, c0)
+        value = _cubic(t, c2, c1) if is_slope else _quartic(t, c2, c1, c0)
         if (value < 0.0) == is_low:
             left = t
         else:
             right = t
-        slope = _cubic(t, c2, c1)
+        slope = 12.0 * t * t + 2.0 * c2 if is_slope else _cubic(t, c2, c1)
         step = t - value / slope if slope != 0.0 else left
         step = step if left < step < right else 0.5 * (left + right)
         if abs(step - t) <= 1e-16 or step == last:
@@ -202,21 +178,18 @@ def _torus(form, px, py, pz, qx, qy, qz):
         c0 = k * k - four * (px * px + py * py)
         bend = math.sqrt(-c2 / 6.0) if c2 < 0.0 else 0.0
         bend = min(bend, end)
-        e1, e2, e3 = _extremum(-end, -bend, c2, c1), _extremum(-bend, bend, c2, c1), _extremum(bend, end, c2, c1)
+        e1 = _bracketed(-end, -bend, c2, c1, c0, True)
+        e2 = _bracketed(-bend, bend, c2, c1, c0, True)
+        e3 = _bracketed(bend, end, c2, c1, c0, True)
         low = -end
         for high in (e1, e2, e3, end):
             falls = _quartic(low, c2, c1, c0) >= 0.0
             if falls != (_quartic(high, c2, c1, c0) >= 0.0):
-                t = (start + _zero(low, high, c2, c1, c0)) * size / speed
+                t = (start + _bracketed(low, high, c2, c1, c0, False)) * size / speed
                 f = -form[OUTWARD] if falls else form[OUTWARD]
-                if count == 0:
-                    t0, f0 = t, f
-                elif count == 1:
-                    t1, f1 = t, f
-                elif count == 2:
-                    t2, f2 = t, f
-                else:
-                    t3, f3 = t, f
+                # Those found before move up by one.
+                t0, t1, t2, t3 = t, t0, t1, t2
+                f0, f1, f2, f3 = f, f0, f1, f2
                 count += 1
             low = high
     return count, (t0, t1, t2, t3), (f0, f1, f2, f3)

@@ -1,6 +1,7 @@
-"""What lights give to a place straight on, past everything that is in the way: for numbers that are read off a picture.
+"""What reaches a place or the camera straight on: for numbers that are read off a picture.
 
-Glass and mirrors are in the way too, for what they hand on is the caustic.
+Glass and mirrors are in the way of direct light too, for what they pass on is the caustic; where a pixel sees a surface
+directly, and not behind glass or in a mirror, the reference's caustic layer is the whole caustic.
 """
 
 from __future__ import annotations
@@ -15,8 +16,10 @@ from .camera_kernel import gain_of_light
 from .camera_lights import CameraLights, camera_lights
 from .compiling import compiled
 from .photon_intersect import nearest, normal_at
-from .photon_scene import PhotonScene, photon_scene
+from .photon_scene import MIRROR, PhotonScene, photon_scene
 from .sampling import scratch
+from .vectors import dot, moved, negated
+from .viewpoint import camera_ray, viewpoint
 
 _SAMPLES = 256
 """Of a light of some extent."""
@@ -52,30 +55,40 @@ class DirectLight(NamedTuple):
 @compiled
 def _gather(scene, lights, start, normal, height, found, scratch):
     """Set `found` (L,) to means over places on the lights."""
-    dx, dy, dz = -normal[0], -normal[1], -normal[2]
-    distance, triangle, _, _ = nearest(
-        scene,
-        start[0],
-        start[1],
-        start[2],
-        dx,
-        dy,
-        dz,
-        -1,
-        -1,
-        False,
-        np.uint64(0),
-        scratch.stack,
-        scratch.stack_distance,
-    )
+    distance, triangle, _, _ = nearest(scene, start, negated(normal), -1, False, np.uint64(0), scratch)
     if triangle < 0 or distance > 100.0 * height:
         return
-    px, py, pz = start[0] + distance * dx, start[1] + distance * dy, start[2] + distance * dz
-    nx, ny, nz = normal_at(scene, triangle, px, py, pz)
-    side = 0 if nx * normal[0] + ny * normal[1] + nz * normal[2] > 0.0 else 1
+    place = moved(start, distance, negated(normal))
+    side = 0 if dot(normal_at(scene, triangle, place), normal) > 0.0 else 1
     for i in range(lights.kind.shape[0]):
         total = 0.0
         for j in range(_SAMPLES):
             a, b = (j + 0.5) / _SAMPLES, j * 0.6180339887498949
-            total += gain_of_light(scene, lights, i, triangle, side, px, py, pz, a, b - math.floor(b), scratch.stack)
+            gain, _ = gain_of_light(scene, lights, i, triangle, side, place, a, b - math.floor(b), scratch.stack)
+            total += gain
         found[i] = total / _SAMPLES
+
+
+def seen_directly(scene: Scene, width: int, height: int) -> np.ndarray:
+    """bool (height, width), row 0 on top: no corner of the pixel nor its middle meets glass or a mirror first.
+
+    Raises `UserError` where more solids nest than the reference can follow.
+    """
+    photons, centre = photon_scene(scene)
+    camera = viewpoint(scene.camera, width, height, centre)
+    corners = np.zeros((height + 1, width + 1), np.bool_)
+    middles = np.zeros((height, width), np.bool_)
+    _specular(photons, camera, 0.0, corners, scratch())
+    _specular(photons, camera, 0.5, middles, scratch())
+    touched = corners[:-1, :-1] | corners[1:, :-1] | corners[:-1, 1:] | corners[1:, 1:]
+    return ~(touched | middles)
+
+
+@compiled
+def _specular(scene, camera, offset, hit, scratch):
+    """Set `hit` where the camera ray at (row + offset, column + offset) pixels meets glass or a mirror first."""
+    for row in range(hit.shape[0]):
+        for column in range(hit.shape[1]):
+            place, d = camera_ray(camera, column + offset, row + offset)
+            _, triangle, _, _ = nearest(scene, place, d, -1, False, np.uint64(0), scratch)
+            hit[row, column] = triangle >= 0 and scene.kind[scene.owner[triangle]] >= MIRROR

@@ -20,9 +20,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..model.scene import Light
+from ..model.scene import Light, Scene
 from .photon_emit import AREA, DIRECTIONS, GRID, PLANE
 from .photon_intersect import compiled
+from .photon_scene import Colours, PhotonScene, colours, reflectance_classes
+from .scene_surfaces import specular_corners
 
 _WIDEST_COSINE = 0.35
 """One plane holds directions up to this from its axis; more is left to a cube's faces."""
@@ -48,26 +50,44 @@ class Domain(NamedTuple):
     """Of the whole square: unit² (PLANE), plane units (DIRECTIONS), the light's area (AREA)."""
     axis: np.ndarray
     """The light's own axis."""
-    cone: np.ndarray
+    cone: np.ndarray = np.array([4.0, 4.0])
     """float64 (2,): a spot's half angles, rad; beyond π for none."""
-    profile: np.ndarray
+    profile: np.ndarray = np.zeros(0)
     """float64: a lamp's intensities over directions, as `ies_file.Profile.packed` has them; empty without."""
-    back: float
+    back: float = 0.0
     """How far before the plane rays start (PLANE)."""
-    tilt: float
+    tilt: float = 0.0
     """Tangent of a sun's angular radius."""
-    aperture: np.ndarray
+    aperture: np.ndarray = np.zeros(4)
     """float64 (4,): a beam's middle and half size on the plane."""
-    has_aperture: bool
-    is_disc: bool
-    extended: bool
+    has_aperture: bool = False
+    is_disc: bool = False
+    extended: bool = False
     """Two more random numbers place a photon on the light."""
-    half_u: np.ndarray
-    half_v: np.ndarray
+    half_u: np.ndarray = np.zeros(3)
+    half_v: np.ndarray = np.zeros(3)
     """An area light's middle to its rim; where a profile's horizontal angle is 0 and 90°."""
-    target: np.ndarray
+    target: np.ndarray = np.zeros(3)
     """Middle of the sphere round all specular objects (AREA)."""
-    radius: float
+    radius: float = 0.0
+
+
+def scene_domains(scene: Scene, photons: PhotonScene, centre: np.ndarray) -> tuple[list[Domain], list[Colours]]:
+    """Domains of all lights that shine, and the spectrum of each; `photons`, `centre`: of `photon_scene`."""
+    specular = specular_corners(scene, centre)
+    corners = photons.corners
+    reach = float(
+        np.linalg.norm(corners[:, :3], axis=1).max() + np.linalg.norm(corners[:, 3:].reshape(-1, 3), axis=1).max()
+    )
+    classes, _ = reflectance_classes(scene)
+    found: list[Domain] = []
+    spectra: list[Colours] = []
+    for light in scene.lights:
+        if light.spectral_power.power_w() > 0.0:
+            own = domains(light, specular, centre, reach)
+            found += own
+            spectra += [colours(light.spectral_power, classes)] * len(own)
+    return found, spectra
 
 
 def domains(light: Light, triangles: np.ndarray, centre: np.ndarray, reach: float) -> list[Domain]:
@@ -115,41 +135,6 @@ def frame_of(axis: np.ndarray, tangent: ArrayLike | None) -> np.ndarray:
     return np.stack([first, np.cross(axis, first), axis])
 
 
-def _domain(
-    kind: int,
-    frame: np.ndarray,
-    origin: np.ndarray,
-    rect: np.ndarray,
-    mask: np.ndarray,
-    measure: float,
-    axis: np.ndarray,
-) -> Domain:
-    rows, columns = _distribution(mask / mask.sum())
-    none = np.zeros(3)
-    return Domain(
-        kind,
-        frame,
-        origin,
-        rect,
-        rows,
-        columns,
-        measure,
-        axis,
-        np.array([4.0, 4.0]),
-        np.zeros(0),
-        0.0,
-        0.0,
-        np.zeros(4),
-        False,
-        False,
-        False,
-        none,
-        none,
-        none,
-        0.0,
-    )
-
-
 def _distribution(probability: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     total = probability.sum(axis=1)
     rows = np.concatenate([[0.0], np.cumsum(total)])
@@ -180,7 +165,8 @@ def _plane(
     mask = _touched(low, high, rect)
     if not mask.any():
         return []
-    domain = _domain(PLANE, frame, np.zeros(3), rect, mask, float(rect[2] * rect[3]), direction)
+    even = _distribution(mask / mask.sum())
+    domain = Domain(PLANE, frame, np.zeros(3), rect, *even, float(rect[2] * rect[3]), direction)
     if light.has_place:
         aperture = np.concatenate([at, half])
         return [
@@ -250,7 +236,8 @@ def _chart(
         mask &= _within_cone(rect, axis_local, float(cone[1]))
     if not mask.any():
         return None
-    return _domain(DIRECTIONS, frame, position, rect, mask, float(rect[2] * rect[3]), direction)._replace(cone=cone)
+    even = _distribution(mask / mask.sum())
+    return Domain(DIRECTIONS, frame, position, rect, *even, float(rect[2] * rect[3]), direction, cone)
 
 
 def _cone_box(axis: np.ndarray, half_angle: float) -> tuple[np.ndarray, np.ndarray]:
@@ -286,7 +273,8 @@ def _area(light: Light, triangles: np.ndarray, position: np.ndarray, direction: 
     way = target - position
     length = np.linalg.norm(way)
     aim = frame_of(way / length if length > 0.0 else direction, None)
-    domain = _domain(AREA, aim, position, np.zeros(4), np.ones((GRID, GRID), bool), light.area, direction)
+    even = _distribution(np.full((GRID, GRID), 1.0 / GRID**2))
+    domain = Domain(AREA, aim, position, np.zeros(4), *even, light.area, direction)
     return [domain._replace(is_disc=light.is_disc, extended=True, half_u=u, half_v=v, target=target, radius=radius)]
 
 

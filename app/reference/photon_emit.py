@@ -6,6 +6,7 @@ import math
 
 from .compiling import compiled, inlined
 from .sampling import unit
+from .vectors import angle_between, combined, cross, dot, length, minus, mixed_of, moved, over, scaled
 
 GRID = 64
 """Cells a side of a domain's density."""
@@ -61,13 +62,15 @@ def _between(table, first, count, angle):
 
 
 @compiled
-def _shine(table, start, vertical, horizontal):
-    """Share of its peak that a lamp's table at `start` (`ies_file.Profile.packed`) has at these angles, rad (any turn).
+def shone(table, start, axis, u, v, d):
+    """Share of its peak that a lamp's table at `start` (`ies_file.Profile.packed`) has towards a unit direction; `u`,
+    `v`: where the horizontal angle is 0 and 90°.
 
     Bilinear: the weighted sum of the four values round the angles."""
     verticals, horizontals = int(table[start]), int(table[start + 1])
+    horizontal = math.atan2(dot(d, v), dot(d, u))
     turn = horizontal - 2.0 * math.pi * math.floor(horizontal / (2.0 * math.pi))
-    j, t = _between(table, start + 2, verticals, vertical)
+    j, t = _between(table, start + 2, verticals, angle_between(d, axis))
     i, s = _between(table, start + 2 + verticals, horizontals, turn)
     at = start + 2 + verticals + horizontals + i * verticals + j
     below = (1.0 - s) * table[at] + s * table[at + verticals]
@@ -76,18 +79,8 @@ def _shine(table, start, vertical, horizontal):
 
 
 @compiled
-def shone(table, start, axis, u, v, dx, dy, dz):
-    """The same towards a unit direction; `u`, `v`: where the horizontal angle is 0 and 90°."""
-    ax, ay, az = axis[0], axis[1], axis[2]
-    kx, ky, kz = dy * az - dz * ay, dz * ax - dx * az, dx * ay - dy * ax
-    vertical = math.atan2(math.sqrt(kx * kx + ky * ky + kz * kz), dx * ax + dy * ay + dz * az)
-    across_u, across_v = dx * u[0] + dy * u[1] + dz * u[2], dx * v[0] + dy * v[1] + dz * v[2]
-    return _shine(table, start, vertical, math.atan2(across_v, across_u))
-
-
-@compiled
 def emit(domain, a, b, c, d):
-    """A photon from four numbers of [0, 1): (px, py, pz, dx, dy, dz, weight, row, column).
+    """A photon from four numbers of [0, 1): (place, direction, weight, row, column).
 
     `weight` turns the light's own quantity (W/sr, W/unit², W/(sr unit²), each per nm) into W; 0: no photon.
     """
@@ -99,10 +92,13 @@ def emit(domain, a, b, c, d):
     a = (column + (a - domain.columns[row, column]) / width) / GRID
     b = (row + (b - domain.rows[row]) / height) / GRID
     weight = domain.measure / (height * width * GRID * GRID)
-    px, py, pz = domain.origin[0], domain.origin[1], domain.origin[2]
+    place = domain.origin[0], domain.origin[1], domain.origin[2]
+    if domain.kind == AREA:
+        place, way, factor = _from_area(domain, a, b, c, d)
+        return place, way, weight * factor, row, column
+    x = domain.rect[0] + a * domain.rect[2]
+    y = domain.rect[1] + b * domain.rect[3]
     if domain.kind == PLANE:
-        x = domain.rect[0] + a * domain.rect[2]
-        y = domain.rect[1] + b * domain.rect[3]
         if domain.has_aperture and domain.is_disc:
             u, v = (x - domain.aperture[0]) / domain.aperture[2], (y - domain.aperture[1]) / domain.aperture[3]
             if u * u + v * v > 1.0:
@@ -110,67 +106,53 @@ def emit(domain, a, b, c, d):
         tx, ty = concentric_disc(c, d)
         tx, ty = tx * domain.tilt, ty * domain.tilt
         scale = 1.0 / math.sqrt(1.0 + tx * tx + ty * ty)
-        dx = (tx * f[0, 0] + ty * f[1, 0] + f[2, 0]) * scale
-        dy = (tx * f[0, 1] + ty * f[1, 1] + f[2, 1]) * scale
-        dz = (tx * f[0, 2] + ty * f[1, 2] + f[2, 2]) * scale
-        px += x * f[0, 0] + y * f[1, 0] - domain.back * dx
-        py += x * f[0, 1] + y * f[1, 1] - domain.back * dy
-        pz += x * f[0, 2] + y * f[1, 2] - domain.back * dz
-        return px, py, pz, dx, dy, dz, weight, row, column
-    if domain.kind == DIRECTIONS:
-        x = domain.rect[0] + a * domain.rect[2]
-        y = domain.rect[1] + b * domain.rect[3]
-        scale = 1.0 / math.sqrt(1.0 + x * x + y * y)
-        dx = (x * f[0, 0] + y * f[1, 0] + f[2, 0]) * scale
-        dy = (x * f[0, 1] + y * f[1, 1] + f[2, 1]) * scale
-        dz = (x * f[0, 2] + y * f[1, 2] + f[2, 2]) * scale
-        weight *= scale * scale * scale  # solid angle of the plane's area
-        if domain.cone[1] < math.pi:
-            ax, ay, az = domain.axis[0], domain.axis[1], domain.axis[2]
-            kx, ky, kz = dy * az - dz * ay, dz * ax - dx * az, dx * ay - dy * ax
-            angle = math.atan2(math.sqrt(kx * kx + ky * ky + kz * kz), dx * ax + dy * ay + dz * az)
-            weight *= spot_falloff(domain.cone, angle)
-        if domain.profile.shape[0] > 0:
-            weight *= shone(domain.profile, 0, domain.axis, domain.half_u, domain.half_v, dx, dy, dz)
-        return px, py, pz, dx, dy, dz, weight, row, column
+        way = scaled(combined(tx, f[0], ty, f[1], 1.0, f[2]), scale)
+        start = combined(x, f[0], y, f[1], -domain.back, way)
+        return moved(place, 1.0, start), way, weight, row, column
+    scale = 1.0 / math.sqrt(1.0 + x * x + y * y)
+    way = scaled(combined(x, f[0], y, f[1], 1.0, f[2]), scale)
+    weight *= scale * scale * scale  # solid angle of the plane's area
+    if domain.cone[1] < math.pi:
+        weight *= spot_falloff(domain.cone, angle_between(way, domain.axis))
+    if domain.profile.shape[0] > 0:
+        weight *= shone(domain.profile, 0, domain.axis, domain.half_u, domain.half_v, way)
+    return place, way, weight, row, column
+
+
+@compiled
+def _from_area(domain, a, b, c, d):
+    """(place, direction, factor on the weight) of a photon of an area light: from a point of it that `c` and `d` choose
+    into the cone round the target, uniformly by `a` and `b`."""
     tx, ty = 2.0 * c - 1.0, 2.0 * d - 1.0
     if domain.is_disc:
         tx, ty = concentric_disc(c, d)
-    px += tx * domain.half_u[0] + ty * domain.half_v[0]
-    py += tx * domain.half_u[1] + ty * domain.half_v[1]
-    pz += tx * domain.half_u[2] + ty * domain.half_v[2]
-    wx, wy, wz = domain.target[0] - px, domain.target[1] - py, domain.target[2] - pz
-    distance = math.sqrt(wx * wx + wy * wy + wz * wz)
+    place = moved(domain.origin, 1.0, mixed_of(tx, domain.half_u, ty, domain.half_v))
+    w = minus(domain.target, place)
+    distance = length(w)
     sine = domain.radius / distance if distance > domain.radius else 1.0
     # 1 − cos of the cone's half angle; the whole sphere from within.
     lack = sine * sine / (1.0 + math.sqrt(1.0 - sine * sine)) if distance > domain.radius else 2.0
-    distance = max(distance, 1e-300)
-    wx, wy, wz = wx / distance, wy / distance, wz / distance
-    along = f[0, 0] * wx + f[0, 1] * wy + f[0, 2] * wz
-    k = 0 if abs(along) < 0.9 else 1
-    along = f[k, 0] * wx + f[k, 1] * wy + f[k, 2] * wz
-    ux, uy, uz = f[k, 0] - along * wx, f[k, 1] - along * wy, f[k, 2] - along * wz
-    length = math.sqrt(ux * ux + uy * uy + uz * uz)
-    ux, uy, uz = ux / length, uy / length, uz / length
-    vx, vy, vz = wy * uz - wz * uy, wz * ux - wx * uz, wx * uy - wy * ux
+    w = over(w, max(distance, 1e-300))
+    f = domain.frame
+    guide = f[0] if abs(dot(f[0], w)) < 0.9 else f[1]
+    u = moved(guide, -dot(guide, w), w)
+    u = over(u, length(u))
+    v = cross(w, u)
     fall = a * lack
-    across = math.sqrt(fall * (2.0 - fall))
+    aside = math.sqrt(fall * (2.0 - fall))
     turn = 2.0 * math.pi * b
-    cx, cy, cz = across * math.cos(turn), across * math.sin(turn), 1.0 - fall
-    dx, dy, dz = cx * ux + cy * vx + cz * wx, cx * uy + cy * vy + cz * wy, cx * uz + cy * vz + cz * wz
-    facing = dx * domain.axis[0] + dy * domain.axis[1] + dz * domain.axis[2]
-    weight *= 2.0 * math.pi * lack * max(facing, 0.0)
-    return px, py, pz, dx, dy, dz, weight, row, column
+    way = combined(aside * math.cos(turn), u, aside * math.sin(turn), v, 1.0 - fall, w)
+    return place, way, 2.0 * math.pi * lack * max(dot(way, domain.axis), 0.0)
 
 
 @inlined
 def emit_coloured(domain, colour, share, state):
     """A photon of one wavelength from a point of the sequence: (as `emit`, weight in W times `share`, …, atom, nm)."""
     c, d = (unit(state[3]), unit(state[4])) if domain.extended else (0.5, 0.5)
-    px, py, pz, dx, dy, dz, watt, row, column = emit(domain, unit(state[0]), unit(state[1]), c, d)
+    place, way, watt, row, column = emit(domain, unit(state[0]), unit(state[1]), c, d)
     chance = unit(state[2])
     atom = search(colour.cdf, chance)
     nm = colour.start_nm[atom] + colour.width_nm[atom] * (chance - colour.cdf[atom]) / (
         colour.cdf[atom + 1] - colour.cdf[atom]
     )
-    return px, py, pz, dx, dy, dz, watt * (colour.watt[atom] * share), row, column, atom, nm
+    return place, way, watt * (colour.watt[atom] * share), row, column, atom, nm

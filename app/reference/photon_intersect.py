@@ -1,6 +1,6 @@
 """Rays against triangles and curved surfaces in float64, compiled: the reference renderer's own walk through the tree.
 
-The side of a surface a photon is on decides near the place it left, not an offset: on the object
+Near the place that a photon left, the side of the surface that it is on decides, not an offset: on the object
 just left only the opposite crossing can be true, and of two touching solids the photon's own
 record of what it is inside of says which surface it has crossed already. What is no glass and touches
 something is one interface with it, and comes first: silver, black and paint are met from within glass as from outside.
@@ -13,6 +13,7 @@ import numpy as np
 from .compiling import compiled, inlined
 from .curved_surfaces import crossings, curved_normal
 from .photon_scene import DIELECTRIC, GRATING
+from .vectors import cross, dot, moved
 
 SLACK = 1e-10
 """Barycentric: facets that share an edge overlap by this much, so that no ray slips between them."""
@@ -24,20 +25,12 @@ _GRAZING = 0.1
 
 
 @compiled
-def _enter(bounds, node, ox, oy, oz, ix, iy, iz, far, behind):
+def _enter(bounds, node, o, inverse, far, behind):
     """Distance at which the ray enters a node's box, or infinity; boxes up to `behind` its start count."""
-    a = (bounds[node, 0] - ox) * ix
-    b = (bounds[node, 3] - ox) * ix
-    low = min(a, b)
-    high = max(a, b)
-    a = (bounds[node, 1] - oy) * iy
-    b = (bounds[node, 4] - oy) * iy
-    low = max(low, min(a, b))
-    high = min(high, max(a, b))
-    a = (bounds[node, 2] - oz) * iz
-    b = (bounds[node, 5] - oz) * iz
-    low = max(low, min(a, b))
-    high = min(high, max(a, b))
+    low, high = -np.inf, np.inf
+    for k in range(3):
+        a, b = (bounds[node, k] - o[k]) * inverse[k], (bounds[node, k + 3] - o[k]) * inverse[k]
+        low, high = max(low, min(a, b)), min(high, max(a, b))
     slack = 1e-14 * (abs(low) + abs(high))
     if low <= high + slack and high >= -slack - behind and low <= far + slack:
         return low
@@ -45,30 +38,36 @@ def _enter(bounds, node, ox, oy, oz, ix, iy, iz, far, behind):
 
 
 @compiled
-def _inverse(component):
+def _one_over(component):
     return 1.0 / component if abs(component) > 1e-200 else 1e200
 
 
 @inlined
-def _meets(scene, i, ox, oy, oz, dx, dy, dz):
+def _inverse(d):
+    return _one_over(d[0]), _one_over(d[1]), _one_over(d[2])
+
+
+@inlined
+def _meets(scene, i, o, d):
     """(whether the ray's line meets facet i, distance, u, v, which way it crosses: > 0 outwards); Möller and Trumbore
     1997."""
-    e1x, e1y, e1z = scene.corners[i, 3], scene.corners[i, 4], scene.corners[i, 5]
-    e2x, e2y, e2z = scene.corners[i, 6], scene.corners[i, 7], scene.corners[i, 8]
-    px, py, pz = dy * e2z - dz * e2y, dz * e2x - dx * e2z, dx * e2y - dy * e2x
-    determinant = e1x * px + e1y * py + e1z * pz
+    corners = scene.corners
+    edge = corners[i, 3], corners[i, 4], corners[i, 5]
+    other = corners[i, 6], corners[i, 7], corners[i, 8]
+    p = cross(d, other)
+    determinant = dot(edge, p)
     if determinant == 0.0:
         return False, 0.0, 0.0, 0.0, 0.0
     inverse = 1.0 / determinant
-    sx, sy, sz = ox - scene.corners[i, 0], oy - scene.corners[i, 1], oz - scene.corners[i, 2]
-    u = (sx * px + sy * py + sz * pz) * inverse
+    s = o[0] - corners[i, 0], o[1] - corners[i, 1], o[2] - corners[i, 2]
+    u = dot(s, p) * inverse
     if not -SLACK <= u <= 1.0 + SLACK:
         return False, 0.0, 0.0, 0.0, 0.0
-    qx, qy, qz = sy * e1z - sz * e1y, sz * e1x - sx * e1z, sx * e1y - sy * e1x
-    v = (dx * qx + dy * qy + dz * qz) * inverse
+    q = cross(s, edge)
+    v = dot(d, q) * inverse
     if not (v >= -SLACK and u + v <= 1.0 + SLACK):
         return False, 0.0, 0.0, 0.0, 0.0
-    return True, (e2x * qx + e2y * qy + e2z * qz) * inverse, u, v, -determinant
+    return True, dot(other, q) * inverse, u, v, -determinant
 
 
 @compiled
@@ -79,52 +78,50 @@ def _crossed_already(bit, mask, facing):
 
 
 @inlined
-def normal_at(scene, i, x, y, z):
-    """Unit outward normal of facet or curved surface i, which holds the place."""
+def normal_at(scene, i, place):
+    """Unit outward normal of facet or curved surface i at a place on it."""
     row = scene.curved[i]
     if row >= 0:
-        return curved_normal(scene.forms[row], x, y, z)
+        return curved_normal(scene.forms[row], place)
     return scene.normals[i, 0], scene.normals[i, 1], scene.normals[i, 2]
 
 
 @inlined
-def _steepness(scene, i, t, ox, oy, oz, dx, dy, dz):
+def _steepness(scene, i, t, o, d):
     """Way along the normal of surface i to each unit of the ray's, where it meets that at distance t."""
-    nx, ny, nz = normal_at(scene, i, ox + t * dx, oy + t * dy, oz + t * dz)
-    return abs(dx * nx + dy * ny + dz * nz)
+    return abs(dot(d, normal_at(scene, i, moved(o, t, d))))
 
 
 @inlined
-def _behind(scene, i, t, ox, oy, oz, dx, dy, dz, last):
+def _behind(scene, i, t, o, d, last):
     """Whether a sheet's surface i, at distance t, is one interface with surface `last`, which the ray has left."""
-    nx, ny, nz = normal_at(scene, i, ox + t * dx, oy + t * dy, oz + t * dz)
-    mx, my, mz = normal_at(scene, last, ox, oy, oz)
-    if abs(nx * mx + ny * my + nz * mz) <= _LEANING:
+    n = normal_at(scene, i, moved(o, t, d))
+    if abs(dot(n, normal_at(scene, last, o))) <= _LEANING:
         return False
-    height = t * abs(dx * nx + dy * ny + dz * nz)
+    height = t * abs(dot(d, n))
     return height <= (scene.contact if scene.kind[scene.owner[i]] >= GRATING else scene.near)
 
 
 @inlined
-def _met(scene, i, last, ox, oy, oz, dx, dy, dz):
+def _met(scene, i, last, o, d):
     """Where a ray's line crosses surface i: (how often, distances (4), which way (4): > 0 outwards, u, v). A facet that
     the ray starts on it does not cross."""
     row = scene.curved[i]
     if row >= 0:
-        count, t, facing = crossings(scene.forms[row], ox, oy, oz, dx, dy, dz)
+        count, t, facing = crossings(scene.forms[row], o, d)
         return count, t, facing, 0.0, 0.0
-    hit, t, u, v, facing = _meets(scene, i, ox, oy, oz, dx, dy, dz)
+    hit, t, u, v, facing = _meets(scene, i, o, d)
     return 1 if hit and i != last else 0, (t, 0.0, 0.0, 0.0), (facing, 0.0, 0.0, 0.0), u, v
 
 
 @compiled
-def nearest(scene, ox, oy, oz, dx, dy, dz, last, last_object, within, mask, stack, stack_distance):
-    """(distance, triangle or curved surface, u, v) of the nearest surface; −1: none.
+def nearest(scene, o, d, last, within, mask, scratch):
+    """(distance, triangle or curved surface, u, v) of the nearest surface along `d` from `o`; −1: none.
 
-    `last`, `last_object`: surface and object the ray starts on (−1: none), `within`: on its inner
-    side; `mask`: solids it is inside of; `stack`, `stack_distance`: scratch (STACK_SIZE,).
+    `last`: surface that the ray starts on (−1: none), `within`: on its inner side; `mask`: solids it is inside of.
     """
-    ix, iy, iz = _inverse(dx), _inverse(dy), _inverse(dz)
+    stack, stack_distance, inverse = scratch.stack, scratch.stack_distance, _inverse(d)
+    last_object = scene.owner[last] if last >= 0 else -1
     best_key, best, best_triangle, best_u, best_v = np.inf, np.inf, -1, 0.0, 0.0
     near, behind = scene.near, 2.0 * scene.contact / _GRAZING
     # Of two surfaces at one place the one that is entered comes first: no film of air between solids.
@@ -135,19 +132,19 @@ def nearest(scene, ox, oy, oz, dx, dy, dz, last, last_object, within, mask, stac
         if scene.node_count[node] > 0:
             first = scene.node_first[node]
             for i in range(first, first + scene.node_count[node]):
-                count, ways, facings, u, v = _met(scene, i, last, ox, oy, oz, dx, dy, dz)
+                count, ways, facings, u, v = _met(scene, i, last, o, d)
                 owner = scene.owner[i]
                 sheet = scene.kind[owner] != DIELECTRIC
                 for k in range(count):
                     t, facing = ways[k], facings[k]
                     key = t + near if nested and facing > 0.0 else t
                     if sheet:  # `contact` is meant along its normal
-                        key = t - scene.contact / max(_steepness(scene, i, t, ox, oy, oz, dx, dy, dz), _GRAZING)
-                    # Rays from a lamp or a camera that lies on a surface leave it, unless it is glass that they enter.
+                        key = t - scene.contact / max(_steepness(scene, i, t, o, d), _GRAZING)
+                    # Rays from a lamp or a camera on a surface leave it, unless it is glass that they enter.
                     if last_object < 0 and abs(t) <= near and (sheet or facing > 0.0):
                         continue
-                    beside = best_triangle >= 0 and abs(key - best_key) < near and owner != scene.owner[best_triangle]
-                    if sheet and beside:
+                    at_once = best_triangle >= 0 and abs(key - best_key) < near and owner != scene.owner[best_triangle]
+                    if sheet and at_once:
                         if owner > scene.owner[best_triangle]:
                             continue
                     elif key >= best_key:
@@ -156,11 +153,11 @@ def nearest(scene, ox, oy, oz, dx, dy, dz, last, last_object, within, mask, stac
                         if t <= -near or (t < near and (t <= 0.0 or within == (facing < 0.0))):
                             continue
                     elif sheet:
-                        if t <= -near or (last >= 0 and _behind(scene, i, t, ox, oy, oz, dx, dy, dz, last)):
+                        if t <= -near or (last >= 0 and _behind(scene, i, t, o, d, last)):
                             continue
                     elif scene.bit[owner] >= 0:
                         if t <= -behind or (
-                            (t < near or t * _steepness(scene, i, t, ox, oy, oz, dx, dy, dz) < 2.0 * scene.contact)
+                            (t < near or t * _steepness(scene, i, t, o, d) < 2.0 * scene.contact)
                             and _crossed_already(scene.bit[owner], mask, facing)
                         ):
                             continue
@@ -170,8 +167,8 @@ def nearest(scene, ox, oy, oz, dx, dy, dz, last, last_object, within, mask, stac
         else:
             left = scene.node_first[node]
             far = best_key + behind + near
-            a = _enter(scene.node_bounds, left, ox, oy, oz, ix, iy, iz, far, behind)
-            b = _enter(scene.node_bounds, left + 1, ox, oy, oz, ix, iy, iz, far, behind)
+            a = _enter(scene.node_bounds, left, o, inverse, far, behind)
+            b = _enter(scene.node_bounds, left + 1, o, inverse, far, behind)
             if a < np.inf or b < np.inf:
                 nearer = left if a <= b else left + 1
                 if a < np.inf and b < np.inf:
@@ -191,25 +188,25 @@ def nearest(scene, ox, oy, oz, dx, dy, dz, last, last_object, within, mask, stac
 
 
 @compiled
-def blocked(scene, ox, oy, oz, dx, dy, dz, far, last, stack):
-    """Whether any surface but the place on `last` lies between the start and `far`."""
-    ix, iy, iz = _inverse(dx), _inverse(dy), _inverse(dz)
+def blocked(scene, o, d, far, last, stack):
+    """Whether any surface but the place on `last` is between the start and `far`."""
+    inverse = _inverse(d)
     node = 0
     top = 0
     while True:
         if scene.node_count[node] > 0:
             first = scene.node_first[node]
             for i in range(first, first + scene.node_count[node]):
-                count, ways, _, _, _ = _met(scene, i, last, ox, oy, oz, dx, dy, dz)
+                count, ways, _, _, _ = _met(scene, i, last, o, d)
                 for k in range(count):
                     if scene.near < ways[k] < far:
                         return True
         else:
             left = scene.node_first[node]
-            if _enter(scene.node_bounds, left, ox, oy, oz, ix, iy, iz, far, 0.0) < np.inf:
+            if _enter(scene.node_bounds, left, o, inverse, far, 0.0) < np.inf:
                 stack[top] = left
                 top += 1
-            if _enter(scene.node_bounds, left + 1, ox, oy, oz, ix, iy, iz, far, 0.0) < np.inf:
+            if _enter(scene.node_bounds, left + 1, o, inverse, far, 0.0) < np.inf:
                 stack[top] = left + 1
                 top += 1
         if top == 0:

@@ -19,7 +19,6 @@ from ..model.geometry.mesh import Mesh
 from ..model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz, rgb_basis, xyz_to_rgb709_matrix
 from ..model.optics.spectrum import Spectrum, cmf_at
 from ..model.scene import (
-    Camera,
     Grating,
     Scene,
 )
@@ -102,24 +101,6 @@ class PhotonScene(NamedTuple):
     """Nearer than this, what is no glass is silver, black or paint on what it touches."""
     polarised: bool
     """Paths carry their light's polarisation."""
-
-
-class Viewpoint(NamedTuple):
-    """The camera: a pixel is found by projection, row 0 on top."""
-
-    position: np.ndarray
-    right: np.ndarray
-    up: np.ndarray
-    forward: np.ndarray
-    half_width: float
-    """Picture's middle to its right border: at distance one (pinhole) or on the film (orthographic)."""
-    half_height: float
-    orthographic: bool
-    width: int
-    height: int
-    lens_radius: float
-    focus_distance: float
-    """Of the plane of focus, along `forward`."""
 
 
 class Colours(NamedTuple):
@@ -220,33 +201,6 @@ def _gratings(scene: Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
             orders.append(np.column_stack([material.shift_per_um, material.efficiency, reflects]))
             counts[-1] = len(material.orders)
     return lines, np.cumsum(counts).astype(np.int32), np.concatenate([*orders, np.zeros((1, 3))])
-
-
-def viewpoint(camera: Camera, width: int, height: int, centre: np.ndarray) -> Viewpoint:
-    """The camera about the arrays' origin; its upright is any where it looks along `up`."""
-    position = np.asarray(camera.position, float)
-    forward = np.asarray(camera.target, float) - position
-    forward /= np.linalg.norm(forward)
-    up = np.asarray(camera.up, float)
-    right = np.cross(forward, up)
-    if np.linalg.norm(right) < 1e-9 * np.linalg.norm(up):
-        right = np.cross(forward, np.eye(3)[np.argmin(np.abs(forward))])
-    right /= np.linalg.norm(right)
-    orthographic = camera.kind == "orthographic"
-    half = 0.5 * camera.vertical_extent if orthographic else np.tan(np.radians(0.5 * camera.vertical_fov_deg))
-    return Viewpoint(
-        position - centre,
-        right,
-        np.cross(right, forward),
-        forward,
-        float(half * width / height),
-        float(half),
-        orthographic,
-        width,
-        height,
-        float(camera.lens_radius),
-        float(camera.plane_of_focus),
-    )
 
 
 def colours(spectrum: Spectrum, classes: list[np.ndarray | None]) -> Colours:

@@ -1,16 +1,30 @@
-"""How references grow: rounds of PARTS independent parts, a thread each, of about half a second, up to a limit."""
+"""How references grow and are kept: rounds of PARTS independent parts, a thread each, of about half a second.
+
+What they keep in the user's cache folder is arrays in one `.npz` a key, the least recently used forgotten. A cache may
+only save time: a damaged file is as good as none, and a folder that cannot be written costs the saving alone.
+"""
 
 from __future__ import annotations
 
 import os
+import struct
 import time
+import tokenize
+import zipfile
+import zlib
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
+
+from ..base import files, paths
+from ..base.atomic import atomic_output
+from ..base.errors import UserError
 
 PARTS = 8
 """Independent randomisations; also the most threads that are of use."""
@@ -175,3 +189,84 @@ def continue_run(run: PartsRun[EstimateT], limits: Limits, progress: Progress, c
         if done >= 1.0 or run.exhausted or cancelled():
             return run.picture()
         run.advance(None if amount is None else amount - run.amount, None if seconds is None else seconds - spent)
+
+
+_CACHE_BYTES = 2 << 30
+_DAMAGED = (
+    OSError,
+    ValueError,
+    TypeError,
+    AttributeError,
+    KeyError,
+    EOFError,
+    MemoryError,
+    RuntimeError,  # "encrypted", and compression that is not known
+    SyntaxError,
+    tokenize.TokenError,
+    struct.error,
+    zipfile.BadZipFile,
+    zlib.error,
+)
+"""What numpy and zipfile raise over damage."""
+
+
+def kept_path(key: str, folder: Path | None) -> Path | None:
+    """The file of a key in `folder` (None: the user's cache); None where no folder can be had."""
+    try:
+        folder = folder or paths.cache_dir() / "reference"
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return None
+    return folder / f"{key}.npz"
+
+
+def load_kept(path: Path | None, shapes: Mapping[str, tuple[int, ...]]) -> dict[str, np.ndarray] | None:
+    """The arrays that `shapes` names; None when the file is missing, damaged or holds other shapes."""
+    if path is None or not files.is_file(path):
+        return None
+    try:
+        with path.open("rb") as file, np.load(file) as stored:
+            values = {name: stored[name] for name in shapes}
+    except _DAMAGED:
+        return None
+    if any(values[name].shape != shape for name, shape in shapes.items()):
+        return None
+    with suppress(OSError):
+        os.utime(path)  # the cache forgets the least recently used
+    return values
+
+
+def save_kept(path: Path | None, **arrays: object) -> None:
+    """Put `arrays` in the place of what `path` held, whole or not at all."""
+    if path is None:
+        return
+    with suppress(OSError, UserError):
+        with atomic_output(path, lasting=False) as temporary:
+            np.savez(temporary, **arrays)  # type: ignore[arg-type]
+        paths.forget_oldest(path.parent, ".npz", size=_CACHE_BYTES)
+
+
+def continue_kept(
+    path: Path | None,
+    shapes: Mapping[str, tuple[int, ...]],
+    picture_of: Callable[[Mapping[str, np.ndarray]], EstimateT],
+    begin: Callable[[Mapping[str, np.ndarray] | None], PartsRun[EstimateT]],
+    limits: Limits,
+    progress: Progress,
+    cancelled: Cancelled,
+) -> EstimateT:
+    """The picture of what `path` holds, where that is good enough, otherwise of that and more, stored again.
+
+    `picture_of` makes it from the arrays that `shapes` names; `begin` gives the run that goes on from them (None: from
+    nothing). An interrupt (KeyboardInterrupt) stores what is done and goes on upwards.
+    """
+    stored = load_kept(path, shapes)
+    if stored is not None and limits.are_met_by(picture := picture_of(stored)):
+        return picture
+    run = begin(stored)
+    before = run.amount
+    try:
+        return continue_run(run, limits, progress, cancelled)
+    finally:
+        if run.amount > before:
+            save_kept(path, **run.kept())

@@ -113,6 +113,12 @@ def unit(word):
     return (float(word) + 0.5) * 2.0**-32
 
 
+@compiled
+def word_number(word):
+    """A 64-bit word, hashed, as a number in [0, 1)."""
+    return float(mixed(word) >> np.uint64(11)) * 2.0**-53
+
+
 @inlined
 def sobol_start(sequence, index, state):
     """Set `state` (DIMENSIONS,) to point `index` of the scrambled sequence."""
@@ -143,5 +149,4 @@ def choice(state, shift, dimension, noise, turn):
     """Uniform number of a Fresnel choice: of the sequence while it has dimensions, then word `turn` of a hash."""
     if dimension < DIMENSIONS:
         return unit(state[dimension] ^ shift[dimension])
-    word = mixed(noise + np.uint64(turn) * np.uint64(0x9E3779B97F4A7C15))
-    return float(word >> np.uint64(11)) * 2.0**-53
+    return word_number(noise + np.uint64(turn) * np.uint64(0x9E3779B97F4A7C15))

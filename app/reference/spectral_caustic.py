@@ -17,10 +17,9 @@ import numpy as np
 
 from ..base.errors import UserError
 from ..model.scene import Scene
-from . import camera_kernel, caustic_kernel, photon_emission, photon_scene
+from . import camera_kernel, photon_kernel, photon_scene
 from .camera_kernel import CausticTables
-from .camera_scene import line_wavelengths
-from .camera_start import camera_start
+from .camera_scene import camera_start, line_wavelengths
 from .caustic_windows import (
     TEXELS_A_PIXEL,
     Landed,
@@ -31,13 +30,13 @@ from .caustic_windows import (
     receiver_planes,
     within,
 )
-from .photon_emission import Domain
+from .photon_emission import refined, scene_domains
 from .photon_emit import GRID
-from .photon_run import RELMSE_EPSILON
+from .photon_reference import RELMSE_EPSILON, TALLY_SIZE
 from .photon_scene import Colours
 from .rounds import PARTS, Progress, trace_parts
 from .sampling import Sequence, scrambled, scratch
-from .scene_surfaces import specular_corners
+from .viewpoint import viewpoint
 
 __all__ = ["CausticPlan", "CausticRun", "SpectralCaustic", "build_caustic", "no_caustic"]
 
@@ -145,9 +144,9 @@ class CausticRun:
         """Sends the pilots, which set the windows and where photons start. Raises UserError as `build_caustic` does."""
         self.scene, self.plan = scene, plan
         self.photon_scene, centre = photon_scene.photon_scene(scene)
-        self.camera = photon_scene.viewpoint(scene.camera, width, height, centre)
+        self.camera = viewpoint(scene.camera, width, height, centre)
         self.planes = receiver_planes(scene, self.photon_scene)
-        self.domains, self.colours = self._domains(centre)
+        self.domains, self.colours = scene_domains(scene, self.photon_scene, centre)
         lines = line_wavelengths(scene)
         self.bins = plan.bins + len(lines)
         self.bands = [_band_of(plan.bins, colour, lines) for colour in self.colours]
@@ -203,7 +202,7 @@ class CausticRun:
             for landed in found:
                 self.flux[part] += (
                     float(landed.watts.sum()),
-                    caustic_kernel.gather(self.tables, *landed, len(landed.watts), self.sums[part % _HALVES]),
+                    camera_kernel.gather(self.tables, *landed, len(landed.watts), self.sums[part % _HALVES]),
                 )
             self.units[part] += units
 
@@ -223,22 +222,6 @@ class CausticRun:
         tables, wanted = fit_windows(self.planes, seen, lit, self.bins, self._texel, self.plan.max_texels)
         counts = self._aim(pilot, tables, wanted)
         return (tables, wanted, counts) if counts.any() else nothing
-
-    def _domains(self, centre: np.ndarray) -> tuple[list[Domain], list[Colours]]:
-        specular = specular_corners(self.scene, centre)
-        corners = self.photon_scene.corners
-        reach = float(
-            np.linalg.norm(corners[:, :3], axis=1).max() + np.linalg.norm(corners[:, 3:].reshape(-1, 3), axis=1).max()
-        )
-        classes, _ = photon_scene.reflectance_classes(self.scene)
-        domains: list[Domain] = []
-        colours: list[Colours] = []
-        for light in self.scene.lights:
-            if light.spectral_power.power_w() > 0.0:
-                found = photon_emission.domains(light, specular, centre, reach)
-                domains += found
-                colours += [photon_scene.colours(light.spectral_power, classes)] * len(found)
-        return domains, colours
 
     def _seen(self) -> VisiblePoints:
         bounces = self.scene.render.bounces
@@ -262,7 +245,7 @@ class CausticRun:
 
     def _land(self, d: int, sequence: Sequence, first: int, count: int, share: float) -> Landed:
         found = Landed(np.empty((count, 3)), np.empty(count), np.empty((count, 4), np.int32))
-        landed = caustic_kernel.land(
+        landed = photon_kernel.land(
             self.photon_scene,
             self.domains[d],
             self.colours[d],
@@ -273,6 +256,7 @@ class CausticRun:
             count,
             share,
             self.plan.max_depth,
+            np.zeros(TALLY_SIZE),
             *found,
             scratch(),
         )
@@ -304,7 +288,7 @@ class CausticRun:
                 useful[here[within(tables, side, self.planes.flat(side, found.points[here]))]] = True
             importance = np.zeros((GRID, GRID))
             np.add.at(importance, (found.ends[useful, 2], found.ends[useful, 3]), found.watts[useful] ** 2)
-            self.domains[d] = photon_emission.refined(self.domains[d], importance)
+            self.domains[d] = refined(self.domains[d], importance)
             weight.append(math.sqrt(float(importance.sum())))
         total = sum(weight)
         if total <= 0.0:

@@ -19,7 +19,7 @@ from ..base.errors import UserError
 
 if TYPE_CHECKING:
     from ..model.scene import Scene
-    from ..reference.photon_run import ReferencePicture
+    from ..reference.photon_reference import ReferencePicture
 
 TARGET_RELMSE = 2e-4
 MAX_SECONDS = 900.0
@@ -115,8 +115,8 @@ class ReferenceThread:
             self.problem = f"the reference renderer failed ({type(error).__name__}: {error})"
 
     def _compute(self) -> None:
-        from ..reference.direct_view import seen_directly
-        from ..reference.photon_run import ReferenceRun
+        from ..reference.direct_light import seen_directly
+        from ..reference.photon_reference import ReferenceRun
 
         width, height = self._size
         directly = seen_directly(self._scene, width, height)

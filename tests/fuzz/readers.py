@@ -421,7 +421,7 @@ SHAPES = {"sums": (3, 4), "noise": ()}
 
 
 def _kept(path: Path) -> object:
-    from spectrasplat.reference.kept import load_kept
+    from spectrasplat.reference.rounds import load_kept
 
     return load_kept(path, SHAPES)
 

@@ -10,7 +10,7 @@ import pytest
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.edit.state import Compare, State
 from spectrasplat.model.io.scene_file import load_scene
-from spectrasplat.reference.direct_view import seen_directly
+from spectrasplat.reference.direct_light import seen_directly
 from spectrasplat.render.viewer.engine import Budget, LiveEngine
 from spectrasplat.ui.compare import Comparison
 
@@ -127,12 +127,12 @@ def test_without_a_reference_another_method_stands_in(
     gl, state: State, running: LiveEngine, comparison: Comparison, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from spectrasplat.base.errors import UserError
-    from spectrasplat.reference import photon_run
+    from spectrasplat.reference import photon_reference
 
     def missing(*_args, **_kwargs) -> None:
         raise UserError("the reference renderer needs numba")
 
-    monkeypatch.setattr(photon_run, "ReferenceRun", missing)
+    monkeypatch.setattr(photon_reference, "ReferenceRun", missing)
     compared = replace(state, compare=Compare(mode="wipe"))
     until(
         lambda: comparison.picture is not None and "no reference" in comparison.text,

@@ -14,7 +14,7 @@ from spectrasplat.model.contacts import contacts, overlapping_solids
 from spectrasplat.model.geometry.primitives import box, plane
 from spectrasplat.model.optics.glass import constant
 from spectrasplat.model.scene import Black, Camera, Diffuse, Material, Mirror, Scene, SceneObject
-from spectrasplat.reference.photon_run import ReferenceRun
+from spectrasplat.reference.photon_reference import ReferenceRun
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 from spectrasplat.stress.rigs.probe import SMALL, Probe, picture_error, probe
 from spectrasplat.stress.rigs.scene_parts import BEAM, SUN, solid, stage, turn

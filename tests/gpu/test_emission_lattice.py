@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from spectrasplat.features.features import Features
 from spectrasplat.gpu.records import LATTICE_BIT
-from spectrasplat.reference.emission_maps import GOLDEN, lattice_point
+from spectrasplat.reference.emission import GOLDEN, lattice_point
 from spectrasplat.stress.rigs.glsl_function import evaluate
 from spectrasplat.stress.rigs.splat_rig import Rig, photons
 

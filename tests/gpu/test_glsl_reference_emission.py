@@ -12,7 +12,7 @@ from spectrasplat.gpu.spectral_groups import SAMPLES
 from spectrasplat.model.optics.catalogue import find
 from spectrasplat.model.optics.spectral_tables import SpectralAxis, cumulative, wavelength_cdf
 from spectrasplat.model.optics.spectrum import Spectrum, constant, illuminant
-from spectrasplat.reference import emission_maps, random_numbers
+from spectrasplat.reference import emission, random_numbers
 from spectrasplat.reference.emission import drawn_wavelengths
 from spectrasplat.reference.optics import unit
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
@@ -63,7 +63,7 @@ def test_lattice_points(gl, count: int, function: str) -> None:
     if function == "lattice_point":
         call = f"p = lattice_point(i, {count}u, s);"
     got = evaluate(gl.ctx, ["lib/emission.glsl"], call, {"i": i, "s": shift}, {"p": "vec2"})["p"]
-    want = getattr(emission_maps, function)(i, count, (shift[:, 0], shift[:, 1]))
+    want = getattr(emission, function)(i, count, (shift[:, 0], shift[:, 1]))
     # float(i) + a fraction keeps 24 bits: an eps of the whole axis.
     assert np.abs(got[:, 0] - want[:, 0]).max() < 1.5e-7
     np.testing.assert_array_equal(got[:, 1], want[:, 1])
@@ -83,13 +83,13 @@ def test_azimuthal_directions_reach_over_the_whole_sphere(gl) -> None:
     )
     # Towards the antipode a direction moves by 1/k of the plane's rounding, k the cosine of half the angle.
     k = np.sqrt(1.0 - 0.25 * np.sum(q**2, axis=-1))
-    assert (np.abs(got["d"] - emission_maps.azimuthal_direction(q)).max(axis=-1) * k).max() < 3e-7
+    assert (np.abs(got["d"] - emission.azimuthal_direction(q)).max(axis=-1) * k).max() < 3e-7
     step = 1e-5
     for axis, name in ((np.array([step, 0.0]), "dx"), (np.array([0.0, step]), "dy")):
         inner = np.linalg.norm(q, axis=-1) < 1.9
-        difference = (
-            emission_maps.azimuthal_direction(q[inner] + axis) - emission_maps.azimuthal_direction(q[inner] - axis)
-        ) / (2.0 * step)
+        difference = (emission.azimuthal_direction(q[inner] + axis) - emission.azimuthal_direction(q[inner] - axis)) / (
+            2.0 * step
+        )
         assert np.abs(got[name][inner] - difference).max() < 1e-5
 
 
@@ -100,7 +100,7 @@ def test_concentric_disc(gl) -> None:
         )
     )
     got = evaluate(gl.ctx, ["lib/emission.glsl"], "p = concentric_disc(u);", {"u": unit_square}, {"p": "vec2"})["p"]
-    assert np.abs(got - emission_maps.concentric_disc(unit_square)).max() < 1e-6
+    assert np.abs(got - emission.concentric_disc(unit_square)).max() < 1e-6
 
 
 def test_angles_keep_their_digits_however_small(gl) -> None:
@@ -113,7 +113,7 @@ def test_angles_keep_their_digits_however_small(gl) -> None:
     got = evaluate(gl.ctx, ["lib/spot.glsl"], "angle = angle_between(a, b);", {"a": a, "b": b}, {"angle": "float"})[
         "angle"
     ]
-    want = emission_maps.angle_between(unit(a), unit(b))
+    want = emission.angle_between(unit(a), unit(b))
     # Rounding of the cross product, and llvmpipe's atan (2e-5 of the angle).
     assert (np.abs(got - want) / (2.5e-7 + 3e-5 * want)).max() < 1.0
 
@@ -130,8 +130,8 @@ def test_spot_falloff(gl, inner: float, outer: float) -> None:
         {"d": direction, "a": axis, "cone": cone},
         {"f": "float"},
     )["f"]
-    want = emission_maps.spot_falloff(unit(direction), unit(axis), cone[:, 0], cone[:, 1])
-    clear = np.abs(emission_maps.angle_between(unit(direction), unit(axis)) - outer) > 2e-5
+    want = emission.spot_falloff(unit(direction), unit(axis), cone[:, 0], cone[:, 1])
+    clear = np.abs(emission.angle_between(unit(direction), unit(axis)) - outer) > 2e-5
     assert clear.mean() > 0.99
     assert np.abs(got - want)[clear].max() < 5e-5
     assert 0.0 < want.mean() <= 1.0
@@ -154,7 +154,7 @@ def test_profiles_are_looked_up(gl, tmp_path, text: str) -> None:
         {"BIND_PROFILES": 8},
         buffers={8: np.concatenate([[0.0], table]).astype("f4")},
     )
-    theta = emission_maps.angle_between(unit(direction), np.tile(axis, (COUNT, 1)))
+    theta = emission.angle_between(unit(direction), np.tile(axis, (COUNT, 1)))
     want = light.profile.at(theta, np.arctan2(direction @ v, direction @ u))
     # Beyond the last angle the cone ends the light, not the table; on the axis the turn about it is of no account.
     clear = (theta < light.profile.cone_rad - 1e-4) & (theta > 1e-5) & (theta < np.pi - 1e-5)

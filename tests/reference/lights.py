@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import numpy as np
-from spectrasplat.reference.emission_maps import concentric_disc, spot_falloff
+from spectrasplat.reference.emission import concentric_disc, spot_falloff
 from spectrasplat.reference.optics import dot, unit
 
 Array = np.ndarray

@@ -230,7 +230,7 @@ def follow(
     """
     inside = scene.holding(ray) if inside is None else inside
     field = np.zeros((2, 3), complex)
-    polarised.begin_unpolarised(field, *ray.direction)
+    polarised.begin_unpolarised(field, tuple(ray.direction))
     triangles: list[int] = []
     reflections: list[bool] = []
     factor, margin = 1.0, 1.0
@@ -292,9 +292,9 @@ def follow(
 
 def _turned(field: np.ndarray, before: Ray, after: Ray, normal: np.ndarray, a_s: complex, a_p: complex) -> float:
     """Turn electric fields with the ray by amplitudes for s and p; returns the share of their power that goes on."""
-    s = polarised.senkrecht(*before.direction, *normal)
-    share = polarised.share_of(field, *before.direction, *s, complex(a_s), complex(a_p))
-    polarised.turn_fields(field, *before.direction, *after.direction, *s, complex(a_s), complex(a_p))
+    s = polarised.senkrecht(tuple(before.direction), tuple(normal))
+    share = polarised.share_of(field, tuple(before.direction), s, complex(a_s), complex(a_p))
+    polarised.turn_fields(field, tuple(before.direction), tuple(after.direction), s, complex(a_s), complex(a_p))
     return float(share)
 
 

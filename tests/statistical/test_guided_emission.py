@@ -26,7 +26,7 @@ from spectrasplat.model.optics.spectrum import laser
 from spectrasplat.model.scene import Black, Camera, Diffuse, Scene, SceneObject
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes.emission_domain import EmissionDomain
-from spectrasplat.reference.emission_maps import lattice_point
+from spectrasplat.reference.emission import lattice_point
 from spectrasplat.reference.glasses import index
 from spectrasplat.render.device_scene import spectral_axis
 from spectrasplat.render.light_pass import LightPass

@@ -16,7 +16,7 @@ from spectrasplat.base import paths
 from spectrasplat.base.random_words import PASS_GENERATORS
 from spectrasplat.gpu.records import LATTICE_BIT, TRACE_PARAMETERS
 from spectrasplat.passes.pixel_lattice import cells_of, pixel_lattice
-from spectrasplat.reference.emission_maps import GOLDEN, PLASTIC, lattice_point, mirrored_lattice_point
+from spectrasplat.reference.emission import GOLDEN, PLASTIC, lattice_point, mirrored_lattice_point
 from spectrasplat.reference.random_numbers import hash_combine, hash_pcg, kronecker, radical_inverse, unit_float
 from spectrasplat.stress.rigs.glsl_function import evaluate
 

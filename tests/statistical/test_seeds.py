@@ -19,7 +19,7 @@ from spectrasplat.gpu.context import Context
 from spectrasplat.gpu.scene_buffers import SceneBuffers
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.reference.emission_maps import GOLDEN
+from spectrasplat.reference.emission import GOLDEN
 from spectrasplat.render import light_plan
 from spectrasplat.render.device_scene import spectral_axis
 from spectrasplat.render.light_pass import LightPass

@@ -36,11 +36,12 @@ from spectrasplat.model.scene import (
 )
 from spectrasplat.model.texture import Environment, Texture
 from spectrasplat.reference.camera_reference import (
+    CameraPicture,
+    CameraRun,
     cached_camera_reference,
     camera_reference_key,
     render_camera_reference,
 )
-from spectrasplat.reference.camera_run import CameraPicture, CameraRun
 from spectrasplat.reference.spectral_caustic import CausticPlan
 
 from tests.unit.camera_scenes import ABOVE, D65, FLINT, WHITE, place, plate, scene_of, slab_scene

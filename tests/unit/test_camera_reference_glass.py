@@ -22,10 +22,9 @@ from spectrasplat.model.optics.glass import constant as constant_index
 from spectrasplat.model.optics.spectrum import Spectrum, laser
 from spectrasplat.model.scene import Absorption, Black, Camera, Dielectric, Diffuse, Mirror, Scene, SceneObject
 from spectrasplat.model.texture import Texture
-from spectrasplat.reference import photon_run
-from spectrasplat.reference.camera_reference import render_camera_reference
-from spectrasplat.reference.camera_run import CameraPicture, CameraRun
-from spectrasplat.reference.direct_view import seen_directly
+from spectrasplat.reference import photon_reference
+from spectrasplat.reference.camera_reference import CameraPicture, CameraRun, render_camera_reference
+from spectrasplat.reference.direct_light import seen_directly
 from spectrasplat.reference.photon_reference import render_reference
 from spectrasplat.reference.spectral_caustic import CausticPlan, build_caustic
 
@@ -202,7 +201,7 @@ def caustic_scene(*more: SceneObject) -> Scene:
 
 @pytest.fixture(autouse=True)
 def short_pilot(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(photon_run, "_PILOT_PHOTONS", 1 << 14)
+    monkeypatch.setattr(photon_reference, "_PILOT_PHOTONS", 1 << 14)
 
 
 PLAN = CausticPlan(photons=1 << 18, bins=40)

@@ -137,7 +137,7 @@ def change(path: Path, old: str, new: str) -> None:
 
 
 def test_a_change_of_code_that_takes_part_gives_another_key(copy: Path) -> None:
-    keys = [key("photon_run")]
+    keys = [key("photon_reference")]
     for file, old, new in (
         ("reference/scattering.py", "1e-6", "1e-4"),
         ("reference/photon_emission.py", "def ", "def _x():\n    return 1\n\n\ndef "),
@@ -145,16 +145,16 @@ def test_a_change_of_code_that_takes_part_gives_another_key(copy: Path) -> None:
         ("model/geometry/bvh.py", "\nimport numpy", "\nimport math\nimport numpy"),
     ):
         change(copy / file, old, new)
-        keys.append(key("photon_run"))
+        keys.append(key("photon_reference"))
     assert len(set(keys)) == len(keys)
-    camera = key("camera_run")
+    camera = key("camera_reference")
     change(copy / "reference/scattering.py", '"""What happens', '# A word more.\n"""Otherwise: what happens')
     change(copy / "reference/metrics.py", "1e-", "2e-")
     change(copy / "reference/camera_kernel.py", "1.0 - 1e-9", "1.0 - 1e-8")
-    assert key("photon_run") == keys[-1]
-    assert key("camera_run") != camera
+    assert key("photon_reference") == keys[-1]
+    assert key("camera_reference") != camera
 
 
 def test_every_module_of_the_tracers_takes_part() -> None:
-    found = {path.name for path in code_key._imported([code_key._PACKAGE / "reference" / "camera_run.py"])}
-    assert {"camera_kernel.py", "scattering.py", "photon_intersect.py", "caustic_kernel.py", "colorimetry.py"} <= found
+    found = {path.name for path in code_key._imported([code_key._PACKAGE / "reference" / "camera_reference.py"])}
+    assert {"camera_kernel.py", "scattering.py", "photon_intersect.py", "photon_kernel.py", "colorimetry.py"} <= found

@@ -14,7 +14,7 @@ from spectrasplat.model.geometry import primitives
 from spectrasplat.model.geometry.mesh import Mesh, note_recipe
 from spectrasplat.model.scene import Dielectric, Diffuse, Mirror, Scene, SceneObject
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.reference.exact_shapes import as_triangles
+from spectrasplat.reference.scene_surfaces import as_triangles
 from spectrasplat.stress.rigs.scene_parts import BEAM, FLINT, FROM_BELOW, TABLE
 
 GLASS = Dielectric(FLINT)

@@ -20,14 +20,14 @@ from spectrasplat.model.optics.spectrum import constant
 from spectrasplat.model.scene import Absorption, Camera, Dielectric, Diffuse, Material, Mirror, Scene, SceneObject
 from spectrasplat.model.scene_objects import make_shape
 from spectrasplat.model.texture import Texture
-from spectrasplat.reference import photon_run
-from spectrasplat.reference.direct_view import seen_directly
-from spectrasplat.reference.exact_shapes import FORM_SIZE, TURNS, as_triangles, pieces
+from spectrasplat.reference import photon_reference
+from spectrasplat.reference.direct_light import seen_directly
 from spectrasplat.reference.photon_intersect import blocked, nearest, normal_at
 from spectrasplat.reference.photon_reference import reference_key, render_reference
 from spectrasplat.reference.photon_scene import PhotonScene, photon_scene
 from spectrasplat.reference.sampling import scratch
 from spectrasplat.reference.scattering import AIR, scatter
+from spectrasplat.reference.scene_surfaces import FORM_SIZE, TURNS, as_triangles, pieces
 
 CROWN = 1.5168
 WHITE = Diffuse((0.8, 0.8, 0.8))
@@ -87,11 +87,10 @@ def first_hits(scene: Scene, starts: np.ndarray, ways: np.ndarray) -> tuple[np.n
     memory = scratch()
     places, normals = np.full(starts.shape, np.nan), np.full(starts.shape, np.nan)
     for k, (start, way) in enumerate(zip(starts - centre, ways, strict=True)):
-        none = (-1, -1, False, np.uint64(0))
-        t, surface, _, _ = nearest(photons, *start, *way, *none, memory.stack, memory.stack_distance)
+        t, surface, _, _ = nearest(photons, tuple(start), tuple(way), -1, False, np.uint64(0), memory)
         if surface >= 0:
             places[k] = start + t * way + centre
-            normals[k] = normal_at(photons, surface, *(start + t * way))
+            normals[k] = normal_at(photons, surface, tuple(start + t * way))
     return places, normals
 
 
@@ -154,7 +153,7 @@ def test_what_is_in_the_way_is_the_surface_too() -> None:
 
     def hidden(x: float, far: float) -> bool:
         start = np.array([x, 0.0, 3.0]) - centre
-        return blocked(photons, *start, 0.0, 0.0, -1.0, far, -1, memory.stack)
+        return blocked(photons, tuple(start), (0.0, 0.0, -1.0), far, -1, memory.stack)
 
     assert hidden(0.6, 5.0) and not hidden(0.0, 5.0) and not hidden(0.6, 2.5)
     assert hidden(0.6 + 0.2499, 5.0) and not hidden(0.6 + 0.2501, 5.0)
@@ -166,16 +165,14 @@ def test_what_is_in_the_way_is_the_surface_too() -> None:
 def refracted_path(photons: PhotonScene, start: np.ndarray, way: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(place, direction) of a ray that is refracted wherever it can be, when it has left all glass."""
     memory = scratch()
-    last, thing, within, mask, alone = -1, -1, False, np.uint64(0), AIR
+    last, within, mask, alone = -1, False, np.uint64(0), AIR
     for _ in range(20):
-        t, surface, u, v = nearest(
-            photons, *start, *way, last, thing, within, mask, memory.stack, memory.stack_distance
-        )
+        t, surface, u, v = nearest(photons, tuple(start), tuple(way), last, within, mask, memory)
         if surface < 0:
             return start, way
-        start, last, thing = start + t * way, surface, int(photons.owner[surface])
-        *way, mask, alone, within, _, _, _ = scatter(
-            photons, surface, tuple(start), u, v, *way, mask, alone, 587.6, 1.0, np.uint64(1), 0, memory.field
+        start, last = start + t * way, surface
+        way, mask, alone, within, _, _, _ = scatter(
+            photons, surface, tuple(start), u, v, tuple(way), mask, alone, 587.6, 1.0, np.uint64(1), 0, memory.field
         )
         way = np.array(way)
     raise AssertionError("the ray stays inside")
@@ -227,11 +224,11 @@ def test_ellipsoid_focuses_perfectly() -> None:
     memory = scratch()
     for height in (0.1, 0.3, 0.7):
         start, way = np.array([height, 0.0, -9.0]) - centre, (0.0, 0.0, 1.0)
-        nothing = (np.uint64(0), memory.stack, memory.stack_distance)
-        t, surface, u, v = nearest(photons, *start, *way, -1, -1, False, *nothing)
+        t, surface, u, v = nearest(photons, tuple(start), tuple(way), -1, False, np.uint64(0), memory)
         place = start + t * np.array(way)
-        x, y, z, *_ = scatter(
-            photons, surface, tuple(place), u, v, *way, np.uint64(0), AIR, 587.6, 1.0, np.uint64(0), 0, memory.field
+        nothing, number = np.uint64(0), np.uint64(0)
+        (x, y, z), *_ = scatter(
+            photons, surface, tuple(place), u, v, way, nothing, AIR, 587.6, 1.0, number, 0, memory.field
         )
         place = place + centre
         assert place[2] - z * place[0] / x == pytest.approx(1.0 / CROWN, abs=1e-12) and abs(y) < 1e-15
@@ -277,7 +274,7 @@ def test_normals_of_a_smooth_profile_turn_as_the_mesh_s_do() -> None:
 
 @pytest.fixture
 def short_pilot(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(photon_run, "_PILOT_PHOTONS", 1 << 12)
+    monkeypatch.setattr(photon_reference, "_PILOT_PHOTONS", 1 << 12)
 
 
 def nested() -> Scene:

@@ -35,7 +35,7 @@ from spectrasplat.model.scene import (
     SceneObject,
 )
 from spectrasplat.model.texture import Texture
-from spectrasplat.reference import photon_emission, photon_emit, photon_run, sampling
+from spectrasplat.reference import photon_emission, photon_emit, photon_reference, sampling
 from spectrasplat.reference.photon_reference import cached_reference, reference_key, render_reference
 
 from tests.unit.camera_scenes import ABOVE, place, scene_of
@@ -47,7 +47,7 @@ SINK = Mirror((0.0, 0.0, 0.0))
 
 @pytest.fixture(autouse=True)
 def short_pilot(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(photon_run, "_PILOT_PHOTONS", 1 << 12)
+    monkeypatch.setattr(photon_reference, "_PILOT_PHOTONS", 1 << 12)
 
 
 def turned(axis: int, angle_deg: float) -> np.ndarray:
@@ -338,7 +338,7 @@ def _lamp_domain() -> photon_emission.Domain:
 
 def emitted(domain: photon_emission.Domain, count: int = 20_000) -> float:
     numbers = np.random.default_rng(2).random((count, 4))
-    return float(np.mean([photon_emit.emit(domain, *row)[6] for row in numbers]))
+    return float(np.mean([photon_emit.emit(domain, *row)[2] for row in numbers]))
 
 
 def test_an_aimed_density_leaves_the_flux_alone_and_a_wrong_one_does_not() -> None:
@@ -352,7 +352,7 @@ def test_an_aimed_density_leaves_the_flux_alone_and_a_wrong_one_does_not() -> No
     # A mutant that draws by the aimed density and weighs by the even one.
     ratio = photon_emission.density(aimed) / np.maximum(photon_emission.density(domain), 1e-300)
     photons = [photon_emit.emit(aimed, *row) for row in np.random.default_rng(2).random((20_000, 4))]
-    assert np.mean([p[6] * ratio[p[7], p[8]] for p in photons]) != pytest.approx(expected, rel=0.08)
+    assert np.mean([p[2] * ratio[p[3], p[4]] for p in photons]) != pytest.approx(expected, rel=0.08)
 
 
 # ---- limits and the cache --------------------------------------------------------------------
@@ -437,4 +437,4 @@ def test_the_key_tells_pictures_apart_and_nothing_else(small: Scene) -> None:
         ),
     ]
     assert len({key, *others}) == 8
-    assert photon_run.PARTS >= 8
+    assert photon_reference.PARTS >= 8

@@ -24,7 +24,7 @@ class Ray:
     def __init__(self, direction: np.ndarray) -> None:
         self.direction = direction / np.linalg.norm(direction)
         self.field = np.zeros((2, 3), complex)
-        begin_unpolarised(self.field, *self.direction)
+        begin_unpolarised(self.field, tuple(self.direction))
         self.power = 1.0
 
     def meets(self, normal: np.ndarray, eta: float, reflects: bool) -> None:
@@ -33,14 +33,14 @@ class Ray:
         cosine = float(-self.direction @ normal)
         r_s, r_p, t_s, t_p = amplitudes(cosine, eta)
         a_s, a_p = (r_s, r_p) if reflects else (t_s, t_p)
-        s = senkrecht(*self.direction, *normal)
-        self.power *= share_of(self.field, *self.direction, *s, a_s, a_p)
+        s = senkrecht(tuple(self.direction), tuple(normal))
+        self.power *= share_of(self.field, tuple(self.direction), s, a_s, a_p)
         if reflects:
             turned = self.direction + 2.0 * cosine * normal
         else:
             turned = eta * self.direction + (eta * cosine - np.sqrt(1.0 - eta**2 * (1.0 - cosine**2))) * normal
         turned = turned / np.linalg.norm(turned)
-        turn_fields(self.field, *self.direction, *turned, *s, complex(a_s), complex(a_p))
+        turn_fields(self.field, tuple(self.direction), tuple(turned), s, complex(a_s), complex(a_p))
         self.direction = turned
 
     @property

@@ -13,13 +13,12 @@ from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.lights import CollimatedLight
 from spectrasplat.model.optics.spectrum import Spectrum, illuminant, laser
 from spectrasplat.model.scene import Camera, Dielectric, Scene
-from spectrasplat.reference import caustic_cache, photon_run, spectral_caustic
-from spectrasplat.reference.camera_reference import cached_camera_reference, render_camera_reference
-from spectrasplat.reference.camera_run import summed_camera
+from spectrasplat.reference import caustic_cache, photon_reference, spectral_caustic
+from spectrasplat.reference.camera_reference import cached_camera_reference, render_camera_reference, summed_camera
 from spectrasplat.reference.caustic_cache import CachedCaustic, picture_noise
 from spectrasplat.reference.caustic_windows import Landed, Planes, VisiblePoints, _shared, fit_windows
 from spectrasplat.reference.direct_light import DirectLight
-from spectrasplat.reference.photon_run import TALLY_SIZE
+from spectrasplat.reference.photon_reference import TALLY_SIZE
 from spectrasplat.reference.rounds import PARTS
 from spectrasplat.reference.spectral_caustic import CausticPlan, CausticRun, build_caustic
 
@@ -31,7 +30,7 @@ PLAN = CausticPlan(photons=1 << 17, bins=12)
 
 @pytest.fixture(autouse=True)
 def short_pilots(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(photon_run, "_PILOT_PHOTONS", 1 << 12)
+    monkeypatch.setattr(photon_reference, "_PILOT_PHOTONS", 1 << 12)
     monkeypatch.setattr(spectral_caustic, "_PILOT", 1 << 14)
     monkeypatch.setattr(spectral_caustic, "_MAX_UNITS", 2)  # several rounds
     monkeypatch.setattr(caustic_cache, "_FIRST_STEP", 1 << 15)

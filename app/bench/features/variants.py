@@ -15,7 +15,7 @@ from ...features.facts import Facts
 from ...features.features import OF_PICTURES, ROWS, Features
 from ...features.surfaces import MAX_LOOSE_TRIANGLES
 from ...model.scene import Absorption, Scene, SceneObject
-from ...reference.exact_shapes import as_triangles
+from ...reference.scene_surfaces import as_triangles
 
 FORCED_BINS = 16
 """Spectral bins that a scene without any is made to pay for."""

@@ -173,18 +173,7 @@ def _save(path: Path, tree: Bvh) -> None:
     with suppress(OSError, UserError):  # an unwritable or full cache only costs time
         with atomic_output(path, lasting=False) as temporary:
             temporary.write_bytes(_CACHE_VERSION + _digest(payload) + payload)
-        _forget_oldest(path.parent)
-
-
-def _forget_oldest(folder: Path) -> None:
-    """Keep the most recently used trees within _CACHE_FILES and _CACHE_BYTES."""
-    states = [(path, path.stat()) for path in folder.glob("*.bvh")]
-    states.sort(key=lambda item: item[1].st_mtime_ns, reverse=True)
-    used = 0
-    for rank, (path, state) in enumerate(states):
-        used += state.st_size
-        if rank >= _CACHE_FILES or used > _CACHE_BYTES:
-            path.unlink(missing_ok=True)
+        paths.forget_oldest(path.parent, ".bvh", files=_CACHE_FILES, size=_CACHE_BYTES)
 
 
 def _digest(payload: bytes | memoryview) -> bytes:

@@ -6,7 +6,9 @@ anything is allocated, and against its content while reading.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -33,7 +35,7 @@ _TYPES = {
 }
 _ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": ""}
 _LARGEST = 1 << 40
-"""Number of a vertex, or of what a list holds, that no file can have."""
+"""Number of a vertex, or length of a list, that no file can have."""
 _FACE_LISTS = ("vertex_indices", "vertex_index")
 _UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 
@@ -56,7 +58,7 @@ class _Element:
 def read_ply(data: bytes, path: str) -> RawMesh:
     """Vertices, triangles and, where the file has them, normals and texture coordinates."""
     order, elements, body = _header(data, path)
-    reader = _AsciiBody(data[body:], path) if not order else _BinaryBody(data, body, order, path)
+    reader: _Body = _BinaryBody(data, body, order, path) if order else _AsciiBody(data[body:], path)
     vertex = face = None
     for element in elements:
         if not element.properties:
@@ -82,7 +84,7 @@ def read_ply(data: bytes, path: str) -> RawMesh:
     in_range = bool(((triangles >= 0) & (triangles < len(vertices))).all())
 
     def at_corners(names: tuple[str, ...]) -> np.ndarray | None:
-        # With a face out of range nothing can be looked up; make_mesh tells of it.
+        # With a face out of range nothing can be looked up; make_mesh says so.
         return _stack(vertex, names)[triangles] if in_range and all(n in vertex for n in names) else None
 
     uv = next((found for names in _UV_NAMES if (found := at_corners(names)) is not None), None)
@@ -132,21 +134,61 @@ def _header(data: bytes, path: str) -> tuple[str, list[_Element], int]:
     return order, elements, line_end + 1
 
 
-def _truncated(path: str, element: _Element, held: int) -> UserError:
-    what = f"of '{element.name}'" if element.name in ("vertex", "face") else "of something else"
-    return UserError(
-        f"{path}: the header promises {element.count} {what}, but the file ends after {held}; copy or export it again"
-    )
+Columns = dict[str, Any]
+"""By name: an array for a scalar, (sizes, values) for a list."""
 
 
-class _BinaryBody:
-    """Elements of a binary file, in order."""
+class _Body(ABC):
+    """Elements of a file's body, in order."""
 
+    def __init__(self, path: str) -> None:
+        self._path = path
+
+    @abstractmethod
+    def element(self, element: _Element) -> Columns:
+        """The columns of all its rows."""
+
+    @abstractmethod
+    def finish(self) -> None:
+        """Refuse what follows the promised elements: the header lied."""
+
+    @abstractmethod
+    def _size(self, p: _Property, element: _Element, row: int) -> int:
+        """The count before a list, read."""
+
+    @abstractmethod
+    def _values(self, p: _Property, size: int, element: _Element, row: int) -> np.ndarray:
+        """The next `size` values of a property, read."""
+
+    def _walk(self, element: _Element) -> Columns:
+        """Row by row, for lists of differing lengths."""
+        sizes: dict[str, list[int]] = {p.name: [] for p in element.properties}
+        found: dict[str, list[np.ndarray]] = {p.name: [] for p in element.properties}
+        for row in range(element.count):
+            for p in element.properties:
+                size = 1 if p.count_kind is None else self._size(p, element, row)
+                sizes[p.name].append(size)
+                found[p.name].append(self._values(p, size, element, row))
+        columns: Columns = {}
+        for p in element.properties:
+            values = np.concatenate(found[p.name]) if found[p.name] else np.zeros(0)
+            columns[p.name] = values if p.count_kind is None else (np.array(sizes[p.name], np.int64), values)
+        return columns
+
+    def _truncated(self, element: _Element, held: int) -> UserError:
+        what = f"of '{element.name}'" if element.name in ("vertex", "face") else "of something else"
+        return UserError(
+            f"{self._path}: the header promises {element.count} {what}, but the file ends after {held}; copy or export "
+            "it again"
+        )
+
+
+class _BinaryBody(_Body):
     def __init__(self, data: bytes, start: int, order: str, path: str) -> None:
-        self._data, self._at, self._order, self._path = data, start, order, path
+        super().__init__(path)
+        self._data, self._at, self._order = data, start, order
 
-    def element(self, element: _Element) -> dict:
-        """Columns by name: an array for a scalar, (sizes, values) for a list."""
+    def element(self, element: _Element) -> Columns:
         sizes = self._first_sizes(element)
         layout = np.dtype([part for p in element.properties for part in self._fields(p, sizes.get(p.name, 0))])
         room = (len(self._data) - self._at) // layout.itemsize if layout.itemsize else element.count
@@ -161,7 +203,7 @@ class _BinaryBody:
                     for p in element.properties
                 }
         elif not sizes:
-            raise _truncated(self._path, element, room)
+            raise self._truncated(element, room)
         return self._walk(element)
 
     def _fields(self, p: _Property, size: int) -> list[tuple]:
@@ -171,89 +213,57 @@ class _BinaryBody:
 
     def _first_sizes(self, element: _Element) -> dict[str, int]:
         """List lengths in the first row: in most files every row has the same."""
-        sizes: dict[str, int] = {}
-        at = self._at
+        begin = self._at
+        sizes = {}
         for p in element.properties if element.count else []:
             size = 1
             if p.count_kind is not None:
-                size = self._one(p.count_kind, at, element, 0)
-                sizes[p.name] = size
-                at += np.dtype(p.count_kind).itemsize
-            at += size * np.dtype(p.kind).itemsize
-            if at > len(self._data):
-                raise _truncated(self._path, element, 0)
+                size = sizes[p.name] = self._size(p, element, 0)
+            self._values(p, size, element, 0)
+        self._at = begin
         return sizes
 
-    def _one(self, kind: str, at: int, element: _Element, row: int) -> int:
-        if at + np.dtype(kind).itemsize > len(self._data):
-            raise _truncated(self._path, element, row)
-        return max(0, int(np.frombuffer(self._data, self._order + kind, 1, at)[0]))
+    def _size(self, p: _Property, element: _Element, row: int) -> int:
+        assert p.count_kind is not None
+        return max(0, int(self._take(p.count_kind, 1, element, row)[0]))
 
-    def _walk(self, element: _Element) -> dict:
-        """Row by row, for lists of differing lengths."""
-        lists: dict[str, tuple[list[int], list[np.ndarray]]] = {
-            p.name: ([], []) for p in element.properties if p.count_kind is not None
-        }
-        scalars: dict[str, list[float]] = {p.name: [] for p in element.properties if p.count_kind is None}
-        for row in range(element.count):
-            for p in element.properties:
-                width = np.dtype(p.kind).itemsize
-                size = 1
-                if p.count_kind is not None:
-                    size = self._one(p.count_kind, self._at, element, row)
-                    self._at += np.dtype(p.count_kind).itemsize
-                if self._at + size * width > len(self._data):
-                    raise _truncated(self._path, element, row)
-                values = np.frombuffer(self._data, self._order + p.kind, size, self._at)
-                self._at += size * width
-                if p.count_kind is None:
-                    scalars[p.name].append(values[0])
-                else:
-                    lists[p.name][0].append(size)
-                    lists[p.name][1].append(values)
-        return {name: np.array(values) for name, values in scalars.items()} | {
-            name: _joined(sizes, values) for name, (sizes, values) in lists.items()
-        }
+    def _values(self, p: _Property, size: int, element: _Element, row: int) -> np.ndarray:
+        return self._take(p.kind, size, element, row)
+
+    def _take(self, kind: str, count: int, element: _Element, row: int) -> np.ndarray:
+        end = self._at + count * np.dtype(kind).itemsize
+        if end > len(self._data):
+            raise self._truncated(element, row)
+        values = np.frombuffer(self._data, self._order + kind, count, self._at)
+        self._at = end
+        return values
 
     def finish(self) -> None:
-        """Refuse data nobody promised: the header lied."""
         rest = len(self._data) - self._at
         if self._data[self._at :].strip():
             raise UserError(f"{self._path}: {rest} bytes follow what the PLY header promises; export the mesh again")
 
 
-def _size(number: float) -> int:
-    """A list's length in an ASCII file; what is none is longer than any file."""
-    return int(number) if abs(number) < _LARGEST else _LARGEST
-
-
-def _joined(sizes: list[int], parts: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Lists of all rows one after another; an element may well have no rows."""
-    return np.array(sizes, np.int64), np.concatenate(parts) if parts else np.zeros(0)
-
-
-class _AsciiBody:
-    """Elements of an ASCII file, in order."""
-
+class _AsciiBody(_Body):
     def __init__(self, body: bytes, path: str) -> None:
-        self._path, self._at = path, 0
+        super().__init__(path)
+        self._at = 0
         try:
-            self._values = np.array(body.split(), dtype=np.float64)
+            self._numbers = np.array(body.split(), dtype=np.float64)
         except ValueError:
             raise UserError(f"{path}: the PLY body holds something that is no number; export the mesh again") from None
 
-    def element(self, element: _Element) -> dict:
-        """As `_BinaryBody.element`."""
-        rest = self._values[self._at :]
+    def element(self, element: _Element) -> Columns:
+        rest = self._numbers[self._at :]
         if all(p.count_kind is None for p in element.properties):
             width = len(element.properties)
             if element.count * width > len(rest):
-                raise _truncated(self._path, element, len(rest) // max(width, 1))
+                raise self._truncated(element, len(rest) // max(width, 1))
             self._at += element.count * width
             rows = rest[: element.count * width].reshape(element.count, width)
             return {p.name: rows[:, i] for i, p in enumerate(element.properties)}
         if len(element.properties) == 1 and element.count and len(rest):
-            size = _size(rest[0])
+            size = _list_size(rest[0])
             rows = rest[: element.count * (size + 1)]
             if size >= 0 and len(rows) == element.count * (size + 1):
                 rows = rows.reshape(element.count, size + 1)
@@ -262,35 +272,21 @@ class _AsciiBody:
                     return {element.properties[0].name: (np.full(element.count, size), rows[:, 1:].reshape(-1))}
         return self._walk(element)
 
-    def _walk(self, element: _Element) -> dict:
-        lists: dict[str, tuple[list[int], list[np.ndarray]]] = {
-            p.name: ([], []) for p in element.properties if p.count_kind is not None
-        }
-        scalars: dict[str, list[float]] = {p.name: [] for p in element.properties if p.count_kind is None}
-        values, at, end = self._values, self._at, len(self._values)
-        for row in range(element.count):
-            for p in element.properties:
-                size = 1
-                if p.count_kind is not None:
-                    if at >= end:
-                        raise _truncated(self._path, element, row)
-                    size = max(0, _size(values[at]))
-                    at += 1
-                if at + size > end:
-                    raise _truncated(self._path, element, row)
-                if p.count_kind is None:
-                    scalars[p.name].append(values[at])
-                else:
-                    lists[p.name][0].append(size)
-                    lists[p.name][1].append(values[at : at + size])
-                at += size
-        self._at = at
-        return {name: np.array(column) for name, column in scalars.items()} | {
-            name: _joined(sizes, parts) for name, (sizes, parts) in lists.items()
-        }
+    def _size(self, p: _Property, element: _Element, row: int) -> int:
+        return max(0, _list_size(self._values(p, 1, element, row)[0]))
+
+    def _values(self, p: _Property, size: int, element: _Element, row: int) -> np.ndarray:
+        if self._at + size > len(self._numbers):
+            raise self._truncated(element, row)
+        self._at += size
+        return self._numbers[self._at - size : self._at]
 
     def finish(self) -> None:
-        """Refuse numbers nobody promised: the header lied."""
-        rest = len(self._values) - self._at
+        rest = len(self._numbers) - self._at
         if rest:
             raise UserError(f"{self._path}: {rest} numbers follow what the PLY header promises; export the mesh again")
+
+
+def _list_size(number: float) -> int:
+    """A list's length in an ASCII file; what is none is longer than any file."""
+    return int(number) if abs(number) < _LARGEST else _LARGEST

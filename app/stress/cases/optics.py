@@ -265,15 +265,15 @@ def exact_polarisation(chain: np.ndarray) -> tuple[float, np.ndarray, float, flo
     and those of the plane of incidence, whose s is d × n over its length.
     """
     field = np.zeros((2, 3), complex)
-    polarised.begin_unpolarised(field, *unit(chain[0, 0, :3]))
+    polarised.begin_unpolarised(field, tuple(unit(chain[0, 0, :3])))
     left, of_state, of_share = 1.0, 0.0, 0.0
     for (*d, theta), (*n, eta), (*after, reflects) in chain:
         d, after = unit(np.array(d)), unit(np.array(after))
         r_s, r_p, t_s, t_p = polarised.amplitudes(-theta, eta)
         a_s, a_p = (complex(r_s), complex(r_p)) if reflects else (complex(t_s), complex(t_p))
-        s = polarised.senkrecht(*d, *n)
-        share = polarised.share_of(field, *d, *s, a_s, a_p)
-        polarised.turn_fields(field, *d, *after, *s, a_s, a_p)
+        s = polarised.senkrecht(tuple(d), tuple(n))
+        share = polarised.share_of(field, tuple(d), s, a_s, a_p)
+        polarised.turn_fields(field, tuple(d), tuple(after), s, a_s, a_p)
         left *= share
         sizes = abs(a_s) ** 2, abs(a_p) ** 2
         of_state += 2.0 * EPSILON / (1.0 - theta**2)
