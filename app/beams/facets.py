@@ -13,7 +13,6 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from ..features.facts import why_no_beams
-from ..model.flat_shapes import is_flat
 from ..model.geometry.mesh import Mesh
 from ..model.optics.colorimetry import VISIBLE_NM, mirror_reflectance
 from ..model.optics.spectral_tables import SpectralAxis
@@ -143,7 +142,7 @@ def beam_scene(
             if reason is not None:
                 why_not[i] = reason
                 obstacles.append(i)
-        elif (item.material.receives and not is_flat(item)) or len(item.mesh.triangles) > MAX_FACETS:
+        elif (item.material.receives and not item.mesh.is_flat) or len(item.mesh.triangles) > MAX_FACETS:
             obstacles.append(i)
         else:
             outlines[i] = _facets_kept(item.mesh, meshes[i])

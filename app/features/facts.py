@@ -12,7 +12,6 @@ import numpy as np
 from ..model.contacts import world_bounds
 from ..model.curved_solids import Face, curved_solids
 from ..model.environment_light import why_no_bounces, why_no_environment_light
-from ..model.flat_shapes import is_faceted, is_flat
 from ..model.geometry.outline import convex_outline
 from ..model.scene import Camera, Material, Scene, SceneObject
 from ..model.scene_camera import camera_frame
@@ -76,7 +75,7 @@ class Facts:
 
     @cached_property
     def flat_receivers(self) -> list[SceneObject]:
-        return [item for item in self.receivers if is_flat(item)]
+        return [item for item in self.receivers if item.mesh.is_flat]
 
     @cached_property
     def dispersive(self) -> list[SceneObject]:
@@ -235,7 +234,7 @@ def why_no_beams(item: SceneObject) -> str | None:
         return "its surface is rough"
     if len(item.mesh.triangles) > MAX_BEAM_TRIANGLES:
         return f"it has {len(item.mesh.triangles)} triangles"
-    if not is_faceted(item):
+    if not item.mesh.is_faceted:
         return "its normals are interpolated"
     return None
 
@@ -309,7 +308,7 @@ def half_spaces(scene: Scene) -> dict[int, np.ndarray]:
 
 def has_borders(item: SceneObject) -> bool:
     """Whether an object is a flat receiver of a convex outline, at whose straight borders footprints have images."""
-    if not item.material.receives or not is_flat(item):
+    if not item.material.receives or not item.mesh.is_flat:
         return False
     points = item.mesh.vertices - item.mesh.vertices.mean(axis=0)
     in_plane = points @ np.linalg.svd(points, full_matrices=False)[2][:2].T

@@ -14,7 +14,6 @@ import numpy as np
 from ..base.errors import UserError
 from ..features.features import Features
 from ..model.contacts import overlapping_solids
-from ..model.flat_shapes import is_faceted
 from ..model.geometry.mesh import Mesh
 from ..model.optics import rough_surfaces
 from ..model.optics.colorimetry import VISIBLE_NM, mirror_reflectance
@@ -89,7 +88,7 @@ class SceneBuffers:
         ]
         # Of a mesh's normals, and asked again with every move of a hand.
         self._faceted: list[bool] = (
-            [o.material.is_specular and is_faceted(o) for o in scene.objects] if like is None else like._faceted
+            [o.material.is_specular and o.mesh.is_faceted for o in scene.objects] if like is None else like._faceted
         )
         before = None if like is None else like.geometry
         self.geometry: SceneGeometry

@@ -14,9 +14,10 @@ _SLACK = 1e-4
 """Share of the specular objects' half diagonal: above what the shaders take for contact (`NEAR_DISTANCE` of
 shaders/lib/intersect.glsl)."""
 _SOLID_SLACK = 1e-5
-"""Of the glass's longest side, between two solids."""
+"""The same between two solids, as a share of the glass's longest side."""
 _STANDING_SLACK = 1e-2
-"""Of what stands: its longest side. Shipped scenes keep a thousandth between a glass and its table."""
+"""Gap up to which one object stands on another, as a share of its longest side. Shipped scenes keep a thousandth
+between a glass and its table."""
 _PAIRS_AT_ONCE = 1 << 20
 
 

@@ -15,12 +15,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .contacts import contacts, nested_pairs
-from .flat_shapes import is_flat
 from .geometry.mesh import recipe_of
 from .scene import Scene, SceneObject
 
 MOST_FACES = 24
-"""Of all curved solids of a scene: every ray asks all of them, and a tree of triangles leaves most out."""
+"""Bound for all curved solids of a scene together: every ray tests all of them, and a tree of triangles few."""
 _ROUNDING = 1e-9
 
 
@@ -70,7 +69,7 @@ def curved_solids(scene: Scene) -> dict[int, tuple[Face, ...]]:
         return {}
     for pair in contacts(scene):
         for index, other in (pair, pair[::-1]):
-            if index in found and not is_flat(scene.objects[other]):
+            if index in found and not scene.objects[other].mesh.is_flat:
                 del found[index]
     pairs = nested_pairs(scene)
     refused = True
@@ -84,7 +83,7 @@ def curved_solids(scene: Scene) -> dict[int, tuple[Face, ...]]:
 
 
 def faces_of(item: SceneObject) -> tuple[Face, ...]:
-    """Of an object that can be met as a curved solid, in its own frame; empty: it cannot."""
+    """Faces of an object that can be met as a curved solid, in its own frame; empty: it cannot."""
     material = item.material
     if material.is_grating or not (material.is_solid or material.is_mirror) or material.texture is not None:
         return ()

@@ -22,7 +22,7 @@ Vec3 = tuple[float, float, float]
 MAX_WIDTH, MAX_HEIGHT = 4096, 2048
 """Largest map kept: 128 MB on the GPU, and a texel is 0.09°."""
 BAKED_WIDTH, BAKED_HEIGHT = 512, 256
-"""Of gradients and skies. Between the rows, 0.7° apart, they are straight to 1e-3."""
+"""Size of gradients and skies. Between the rows, 0.7° apart, they are straight to 1e-3."""
 DEFAULT_SKY_TYPE = 12
 Z_UP: Vec3 = (0.0, 0.0, 1.0)
 
@@ -49,9 +49,9 @@ def from_map(
         raise UserError(f"{path}: the intensity is {intensity:g}; give a number of 0 or more")
     rgb, said = read_picture(path)
     height, width = rgb.shape[:2]
-    told = list(said)
+    assumed = list(said)
     if width != 2 * height:
-        told.append(
+        assumed.append(
             f"{path.name} is {width} × {height}; a latitude-longitude picture is twice as wide as high, so it is "
             "stretched."
         )
@@ -59,16 +59,16 @@ def from_map(
         rgb = averaged_rows(averaged_rows(rgb, min(height, MAX_HEIGHT)).swapaxes(0, 1), min(width, MAX_WIDTH)).swapaxes(
             0, 1
         )
-        told.append(f"{path.name} is {width} × {height}; it was averaged down to {rgb.shape[1]} × {rgb.shape[0]}.")
+        assumed.append(f"{path.name} is {width} × {height}; it was averaged down to {rgb.shape[1]} × {rgb.shape[0]}.")
     with np.errstate(over="ignore"):
         rgb = np.ascontiguousarray(rgb) * np.float32(intensity)
     if not np.isfinite(rgb).all():
         raise UserError(f"{path}: intensity {intensity:g} takes its brightest value out of range; give a smaller one")
     if notes is not None:
-        notes += told
+        notes += assumed
     parameters = {"intensity": float(intensity), "rotation_deg": float(rotation_deg), "up": _listed(up)}
     return Environment(
-        _frozen(rgb), world_to_local(up, rotation_deg), "map", _told(parameters, lights), str(path), lights
+        _frozen(rgb), world_to_local(up, rotation_deg), "map", _with_lights(parameters, lights), str(path), lights
     )
 
 
@@ -80,8 +80,8 @@ def gradient(
     With s the sine of the elevation, the blend is s²(3 − 2|s|): level at the horizon as at the poles.
     Raises UserError for a radiance that is negative or not finite.
     """
-    told = {"zenith": zenith, "horizon": horizon, "nadir": nadir}
-    colours = {key: intensity * np.array(value, dtype=np.float64) for key, value in told.items()}
+    radiances = {"zenith": zenith, "horizon": horizon, "nadir": nadir}
+    colours = {key: intensity * np.array(value, dtype=np.float64) for key, value in radiances.items()}
     for key, colour in colours.items():
         if not (np.isfinite(colour).all() and (colour >= 0.0).all()):
             raise UserError(f"gradient: {key} must be three radiances of 0 or more; correct it")
@@ -89,11 +89,11 @@ def gradient(
     blend = (sine**2 * (3.0 - 2.0 * np.abs(sine)))[..., None]
     pole = np.where(sine[..., None] > 0.0, colours["zenith"], colours["nadir"])
     rgb = colours["horizon"] + blend * (pole - colours["horizon"])
-    parameters = {key: _listed(value) for key, value in told.items()} | {
+    parameters = {key: _listed(value) for key, value in radiances.items()} | {
         "intensity": float(intensity),
         "up": _listed(up),
     }
-    return Environment(_frozen(rgb), world_to_local(up), "gradient", _told(parameters, lights), lights=lights)
+    return Environment(_frozen(rgb), world_to_local(up), "gradient", _with_lights(parameters, lights), lights=lights)
 
 
 def sky(
@@ -144,7 +144,7 @@ def sky(
         "ground": _listed(ground),
         "up": _listed(up),
     }
-    return Environment(_frozen(rgb), world_to_local(up), "sky", _told(parameters, lights), lights=lights)
+    return Environment(_frozen(rgb), world_to_local(up), "sky", _with_lights(parameters, lights), lights=lights)
 
 
 def constant(radiance: Vec3, lights: bool = True) -> Environment:
@@ -155,7 +155,7 @@ def constant(radiance: Vec3, lights: bool = True) -> Environment:
         raise UserError("constant: radiance must be three numbers of 0 or more; correct it")
     rgb = np.broadcast_to(colour, (8, 16, 3))
     return Environment(
-        _frozen(rgb), kind="constant", parameters=_told({"radiance": _listed(radiance)}, lights), lights=lights
+        _frozen(rgb), kind="constant", parameters=_with_lights({"radiance": _listed(radiance)}, lights), lights=lights
     )
 
 
@@ -230,7 +230,7 @@ def averaged_rows(rgb: np.ndarray, rows: int) -> np.ndarray:
     return (weights @ rgb.reshape(source, -1)).astype(np.float32).reshape(rows, *rgb.shape[1:])
 
 
-def _told(parameters: dict[str, Any], lights: bool) -> dict[str, Any]:
+def _with_lights(parameters: dict[str, Any], lights: bool) -> dict[str, Any]:
     """What a scene file says: `lights` only where it is not as usual."""
     return parameters if lights else parameters | {"lights": False}
 

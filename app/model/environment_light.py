@@ -36,7 +36,7 @@ _DIMENSION = 64
 _PLASTIC = np.array([0.7548776662466927, 0.5698402909980532])
 """Powers of the plastic number's reciprocal: a Kronecker sequence of two dimensions, for places within texels."""
 _LEAST_HEIGHT = 128
-"""Of the picture that is drawn from: smaller ones are interpolated, as the camera does."""
+"""Least height of the picture to draw from: smaller ones are interpolated, as the camera does."""
 
 
 def lighting_environment(scene: Scene) -> Environment | None:
@@ -216,11 +216,11 @@ def _blocks(values: np.ndarray, side: int) -> np.ndarray:
 
 NAME = "sun of the panorama"
 _EDGE = 0.05
-"""Of the brightest texel, above which others belong to the spot."""
+"""Share of the brightest texel above which others belong to the sun's spot."""
 _LARGEST_SR = 4e-3
 """Solid angle of a spot that is a sun: 4° across, with the glow that cameras put round it."""
 _LEAST_SHARE = 0.05
-"""Of all light of the panorama, that a sun has at least."""
+"""Least share of the panorama's light that a sun has."""
 _CONTRAST = 20.0
 """Times as bright as what is round it, a sun is at least on average."""
 

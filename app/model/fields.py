@@ -76,7 +76,7 @@ class Field(Part):
         return {self.attribute: self.value(table, self.key or self.attribute)}
 
     def value(self, table: SceneTable, key: str) -> Any:
-        """What stands under `key`, checked."""
+        """The value under `key`, checked."""
         raise NotImplementedError
 
     def write(self, value: Any, path: Path | None) -> dict[str, Any]:
@@ -192,7 +192,7 @@ def read_fields(parts: Iterable[Part], table: SceneTable) -> dict[str, Any]:
 
 def write_fields(parts: Iterable[Part], value: Any, path: Path | None = None) -> dict[str, Any]:
     """The keys of `value`, in the order of `parts`."""
-    told: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     for part in parts:
-        told |= part.write(value, path)
-    return told
+        values |= part.write(value, path)
+    return values

@@ -18,7 +18,6 @@ from typing import Any
 import numpy as np
 
 from .fields import Number, Vector, read_fields, write_fields
-from .flat_shapes import is_flat
 from .io.scene_table import SceneTable
 from .scene import Dab, Material, SceneObject
 
@@ -67,7 +66,7 @@ def _distance(offset: np.ndarray) -> np.ndarray:
 
 def plane_of(item: SceneObject) -> Plane | None:
     """The plane a flat receiver lies in, in its own space; None for a curved one."""
-    if not is_flat(item):
+    if not item.mesh.is_flat:
         return None
     centre = item.mesh.vertices.mean(axis=0)
     normal = np.linalg.svd(item.mesh.vertices - centre, full_matrices=False)[2][-1]

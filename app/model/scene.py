@@ -52,7 +52,7 @@ class Camera:
     lens_radius: float = 0.0
     """Half the lens's aperture, scene units; 0: no lens, all is in focus."""
     focus_distance: float | None = None
-    """Of the plane of focus from the lens, along the view, scene units; None: the target is in focus."""
+    """Distance of the plane of focus from the lens, along the view, scene units; None: the target is in focus."""
 
     @property
     def plane_of_focus(self) -> float:

@@ -28,7 +28,7 @@ def camera_frame(camera: Camera) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Of two vectors: numpy's own, made for arrays of them, takes ten times as long, some times in every frame."""
+    """Vector product; numpy's own, made for arrays of vectors, takes ten times as long; this runs in every frame."""
     (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
     return np.array((ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx))
 

@@ -21,9 +21,9 @@ MAX_SIZE_RATIO = 1e12
 MAX_FAR_RATIO = 1e9
 """Distance from the origin to the largest object's size: float64 then tells a millionth of it."""
 ON_SURFACE = 1e-9
-"""Of a mesh's longest side: a point so near to a facet lies on it."""
+"""Share of a mesh's longest side: a point so near to a facet is on it."""
 MIN_SIZE = 1e-12
-"""Of the largest object, and one over its greatest: areas in their inverse squares are numbers in float32 then."""
+"""Least size of the largest object, and one over its greatest: inverse squares of areas are then numbers in float32."""
 
 
 def check_scene(scene: Scene, file_name: str) -> list[str]:

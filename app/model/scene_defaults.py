@@ -27,22 +27,22 @@ from .texture import Environment
 from .vectors import Vec3, vec3
 
 KEY_DISTANCE = 9.0
-"""Of the studio's lamp from the objects' middle, in their radii: rays are then nearly parallel, caustics sharp."""
+"""Distance of the studio's lamp from the objects' middle, in their radii: rays are nearly parallel, caustics sharp."""
 _KEY_AZIMUTH_DEG, _KEY_ELEVATION_DEG = 25.0, 46.0
 _POOL = 5.0
 """Radius of the lamp's pool of light, in radii of the objects: it fades within the picture."""
 _POOL_INNER = 0.35
 _FILL_SHARE = 0.2
-"""Of the lamp's illuminance that comes from above."""
+"""Illuminance from above, as a share of the lamp's."""
 _FILL_DIAMETER_DEG = 60.0
 _STUDIO_INTENSITY = 0.15
-"""Of the panorama: its soft boxes are then some five times as bright as the table."""
+"""Factor on the panorama: its soft boxes are then some five times as bright as the table."""
 _TABLE_RGB = (0.46, 0.44, 0.42)
 _VIEW = np.array([0.20, -0.80, 0.57])
 """From the objects to the camera: from the front, looking down."""
 _FOV_DEG = 32.0
 _ASPECT = 1.5
-"""Of the frame that must hold everything: a little narrower than 16:9, for windows have panels at their sides."""
+"""Aspect ratio of the frame that must hold everything: a little narrower than 16:9, as windows have panels."""
 _FILLED = 0.86
 """Share of the frame that objects and caustic fill."""
 _FRAMED_POINTS = 20_000

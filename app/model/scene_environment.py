@@ -1,4 +1,4 @@
-"""The [environment] table of a scene file: what lies beyond everything, read and told again."""
+"""The [environment] table of a scene file: what is beyond everything, read and written."""
 
 from __future__ import annotations
 
@@ -123,13 +123,18 @@ def environment_values(environment: Environment, scene_path: Path) -> dict[str, 
 
     A picture without a file, or without a description, is written beside the scene (`scene_pictures`).
     """
-    told = dict(environment.parameters)
-    if environment.kind == "map" and told and environment.source == str(STUDIO_MAP.resolve()):
-        return {"kind": "studio"} | told
-    if environment.kind == "map" and told and environment.source and files.with_part(environment.source)[0].is_file():
-        return {"kind": "map", "file": picture_file(environment.rgb, environment.source, scene_path)} | told
-    if environment.kind != "map" and told:
-        return {"kind": environment.kind} | told
+    parameters = dict(environment.parameters)
+    if environment.kind == "map" and parameters and environment.source == str(STUDIO_MAP.resolve()):
+        return {"kind": "studio"} | parameters
+    if (
+        environment.kind == "map"
+        and parameters
+        and environment.source
+        and files.with_part(environment.source)[0].is_file()
+    ):
+        return {"kind": "map", "file": picture_file(environment.rgb, environment.source, scene_path)} | parameters
+    if environment.kind != "map" and parameters:
+        return {"kind": environment.kind} | parameters
     # The values stand as they are: an intensity was multiplied in already.
     up, rotation_deg = up_and_rotation(environment)
     name = picture_file(np.asarray(environment.rgb), None, scene_path)

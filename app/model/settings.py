@@ -19,11 +19,11 @@ METHODS = (
 )
 """Sampling methods that every comparison holds (docs/error-against-time.md)."""
 RANDOM_METHODS = ("stochastic", "stochastic-even", "stochastic-point", "progressive-stochastic", "hero")
-"""Of those, the ones whose photons have wavelengths drawn at random."""
+"""Methods whose photons have wavelengths drawn at random."""
 LIGHT_METHODS = ("progressive", "stochastic-point", "progressive-stochastic", "hero")
 """The ones that only photons may follow; camera rays then follow `srd` or `stochastic`, see `camera_method_of`."""
 CAMERA_METHODS = tuple(name for name in METHODS if name not in LIGHT_METHODS)
-"""Of those, the ones that camera rays may follow too."""
+"""Methods that camera rays may follow too."""
 
 
 def divides_spectrum(method: str) -> bool:

@@ -1,4 +1,4 @@
-"""Spectra in the words of a scene file, read and told again.
+"""Spectra in the words of a scene file, read and written.
 
 The short description is recognised from the values themselves, so nothing has to remember where a spectrum came
 from: one proportional to D65 is "D65" however it was made.
@@ -84,7 +84,7 @@ def _laser(table: SceneTable, key: str, wavelength_nm: float, power: float) -> S
     return spectra.laser(wavelength_nm, power)
 
 
-# -- telling it ---------------------------------------------------------------------------
+# -- writing it ---------------------------------------------------------------------------
 
 
 def describe_spectrum(spectrum: Spectrum) -> str | dict[str, Any]:

@@ -1,7 +1,7 @@
-"""What is asked for of a file that is opened: which axis is up, which parts are glass of which kind.
+"""What is wanted of a file that is opened: which axis is up, which parts are glass of which kind.
 
 Mesh files do not say which axis is up, and few files of the world say that something is glass; so both are guessed,
-told, and may be asked for (`--up`, `--glass`, and in the window).
+noted, and may be given (`--up`, `--glass`, and in the window).
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ Y_UP_TO_Z_UP.setflags(write=False)
 _USUAL_UP: dict[str, UpAxis] = {".obj": "y", ".stl": "z", ".ply": "z"}
 """What most programs write: OBJ comes from modellers, STL and PLY from printers and scanners."""
 _BASE_SHARE = 0.2
-"""Of the footprint that must lie flat on the ground for a mesh to be taken to stand on it."""
+"""Share of the footprint that must be flat on the ground for a mesh to be taken to stand on it."""
 _THIN = 0.7
 """A mesh this much lower along one axis than along the other lies on its broad side."""
 

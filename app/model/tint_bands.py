@@ -28,7 +28,7 @@ _PATHS = (0.5, 1.0, 2.0)
 _MIRRORS = (1, 4)
 """Reflections by a coloured mirror, or passages of a coloured surface of glass."""
 _BRIGHTENED = 0.5
-"""Of the tolerance asked for, that the light's brightness may be off by where footprints are so broad that all
+"""Share of the wanted tolerance by which the light's brightness may be off where footprints are so broad that all
 wavelengths of a band have one weight; twice `TOLERANCE` at least, for few are.
 
 Measured on `random_all_5_12` of `bench-agreement --random-kinds all` (a tinted diamond beside tinted water under three
@@ -79,8 +79,8 @@ def cut_by_tints(
     the bright."""
     power = power_by_nm(light)
     left = (curves * power).sum(axis=1, keepdims=True)
-    told = left[:, 0] > _LEAST_SHARE * power.sum()
-    curves = curves[told]
+    matters = left[:, 0] > _LEAST_SHARE * power.sum()
+    curves = curves[matters]
     if not len(curves):
         return np.linspace(*ends, least + 1)
     x = np.asarray(axis.x_of_nm(VISIBLE_NM), np.float64)
@@ -178,7 +178,7 @@ def _path(before: list[np.ndarray]) -> list[int]:
 
 
 def mean_chord(item: SceneObject) -> float:
-    """Of the solid, scene units: four volumes over the surface (Cauchy), exact where it is convex."""
+    """Mean chord of the solid, scene units: four volumes over the surface (Cauchy), exact where it is convex."""
     turn = item.object_to_world[:3, :3]
     area = np.linalg.norm(item.mesh.area_vectors() @ (np.linalg.inv(turn) * np.linalg.det(turn)), axis=1).sum()
     return 4.0 * abs(item.mesh.volume() * float(np.linalg.det(turn))) / float(area)

@@ -5,7 +5,7 @@ bands for that (`tint_bands`), every band has photons of its own, and all footpr
 far they have come through that glass, rounded to one of a few levels, up or down by a sequence over the lattice that
 makes neighbours right in the mean; the light's tables hold its spectrum behind every level, exact over all wavelengths.
 What is left halves over equal ways, so that light halfway between two levels is less than their mean: how much less,
-each level tells.
+each level knows (`halfway`).
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ MAX_BANDS = 4
 
 @dataclass(frozen=True)
 class TintLevels:
-    """The glass whose way is told."""
+    """The glass whose levels are kept, and the way that is usual in it."""
 
     coefficient: np.ndarray
     """float64 (401,), absorption on `VISIBLE_NM`, 1/scene unit."""
@@ -85,8 +85,8 @@ class TintLevels:
 
 
 def tint_levels(scene: Scene) -> TintLevels | None:
-    """Of the glass whose mean chord colours light most; None where none does, or where lights are too many or other
-    tints need many bands."""
+    """Levels of the glass whose mean chord colours light most; None where none does, or where lights are too many or
+    other tints need many bands."""
     if not 0 < len(scene.lights) <= MAX_LIGHTS:
         return None
     most, found = TOLERANCE, None

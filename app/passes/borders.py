@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..model.flat_shapes import is_flat
 from ..model.geometry.outline import convex_outline
 from .landings import Landings
 from .plane_frame import PlaneFrame
@@ -36,7 +35,7 @@ def lit_borders(
     for receiver, frame in frames.items():
         index = buffers.receivers[receiver]
         landed = landings.get(receiver)
-        if landed is None or not len(landed.positions) or not is_flat(scene.objects[index]):
+        if landed is None or not len(landed.positions) or not scene.objects[index].mesh.is_flat:
             continue
         mesh = buffers.world_meshes[index]
         points = frame.project(buffers.space.to_gpu(mesh.vertices))

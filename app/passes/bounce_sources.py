@@ -22,7 +22,6 @@ from ..gpu.scene_records import SCENE_STRUCTS
 from ..gpu.schema import Field, Struct
 from ..gpu.texture_store import TextureStore, place_defines
 from ..model.contacts import world_bounds
-from ..model.flat_shapes import is_flat
 from ..model.optics.colorimetry import VISIBLE_NM, rgb_basis, xyz_to_rgb709, xyz_to_rgb709_matrix
 from ..model.optics.spectrum import Spectrum
 from ..model.scene import Light, Scene
@@ -245,7 +244,7 @@ def _faces_specular(buffers: SceneBuffers, places: EnvironmentPlaces) -> np.ndar
         return found
     for index in buffers.receivers:
         mesh, item = buffers.world_meshes[index], scene.objects[index]
-        if is_flat(item):
+        if item.mesh.is_flat:
             points = np.concatenate([buffers.world_meshes[i].vertices for i in thrown])
             normal, size = mesh.face_normals()[int(np.argmax(mesh.areas()))], np.ptp(points, axis=0).max()
             height = (points - mesh.vertices[0]) @ normal

@@ -17,7 +17,6 @@ from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.schema import Field, Struct
 from ..gpu.tiles import pack
 from ..model.contacts import world_bounds
-from ..model.flat_shapes import is_flat
 from ..model.geometry.charts import DEFAULT_GUTTER, ChartAtlas, build_charts
 from ..model.scene_checks import contains
 from .map_layout import Window
@@ -177,7 +176,7 @@ def environment_places(buffers: SceneBuffers, finer: float = 1.0, gutter: int = 
     share = finer * min(1.0, MOST_TEXELS / (max(len(receivers), 1) * (FINE_TEXELS + COARSE_TEXELS)))
     for receiver, index in enumerate(receivers):
         item, mesh = scene.objects[index], buffers.world_meshes[index]
-        if not is_flat(item):
+        if not item.mesh.is_flat:
             atlas = build_charts(mesh, total_texels=max(256, int(share * CHART_TEXELS)), gutter=gutter)
             sides = (False,) if mesh.is_closed and not _holds_anything(buffers, index) else (False, True)
             tiles += [_Side(receiver, (atlas.width, atlas.height), back=back, atlas=atlas) for back in sides]

@@ -16,7 +16,6 @@ from ..base.errors import UserError
 from ..gpu.records import NONE, PLACEMENT, RECEIVER
 from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.tiles import Tile, pack
-from ..model.flat_shapes import is_flat
 from ..model.scene import Camera, Scene
 from ..model.scene_camera import camera_frame, camera_rays
 from .borders import lit_borders
@@ -162,7 +161,7 @@ def _layout_maps(
         item = scene.objects[object_index]
         points = buffers.space.to_gpu(buffers.world_meshes[object_index].vertices)
         landed = landings.get(receiver)
-        if is_flat(item):
+        if item.mesh.is_flat:
             frame = plane_frame(points)
             extent = _extent(frame.project(points))
             windows: list[Window | PictureWindow]

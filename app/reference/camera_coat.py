@@ -24,7 +24,7 @@ _COSINES = 1025
 
 
 class Finishes(NamedTuple):
-    """Of O objects."""
+    """Finishes of O objects."""
 
     alpha: np.ndarray
     """float64 (O,): of the coat; 0: perfectly smooth; below 0: none."""

@@ -162,7 +162,7 @@ class EnvironmentDraw(NamedTuple):
 
 
 def environment_draw(scene: Scene) -> EnvironmentDraw:
-    """Of the scene's environment; of one texel where it lights nothing."""
+    """Running sums of the scene's environment; of one texel where it lights nothing."""
     environment = scene.environment
     lights = environment is not None and environment.lights and bool(environment.rgb.any())
     rgb = np.ones((1, 1, 3)) if environment is None or not lights else np.asarray(environment.rgb, float)

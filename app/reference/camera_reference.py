@@ -46,16 +46,16 @@ class CameraPicture:
     xyz: np.ndarray
     """float64 (H, W, 3): CIE XYZ, the mean over each pixel; Y in lm/(sr unit²)."""
     variance: np.ndarray
-    """float64 (H, W, 3): of `xyz` as an estimate, from PARTS independent pictures, or two where the caustic's halves
-    are told apart."""
+    """float64 (H, W, 3): of `xyz` as an estimate, from PARTS independent pictures, or two where the caustic has
+    halves."""
     samples: int
-    """Of each pixel."""
+    """Samples of each pixel."""
     seconds: float
     """Time spent tracing."""
     lost: dict[str, float]
     """Share of paths given up: "depth" (too many events) and "numeric" (nothing met inside a solid)."""
     caustic_photons: int = 0
-    """Of the caustic that was looked up."""
+    """Photons of the caustic that was looked up."""
     caustic_relmse: float = 0.0
     """What its noise adds to the picture's own error, about, where `cached_camera_reference` measured it: a part of
     `variance`."""
@@ -208,7 +208,7 @@ def summed_camera(
 
 _SEED = 1
 _CAUSTIC_SHARE = 0.5
-"""Of the progress bar, where there is a caustic to be made."""
+"""Share of the progress bar for the caustic, where one must be made."""
 
 
 def camera_reference_key(scene: Scene, width: int, height: int, max_depth: int, caustic: CausticPlan | None) -> str:

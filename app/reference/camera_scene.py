@@ -26,7 +26,7 @@ from .vectors import dot
 from .worn_textures import blend, worn_textures
 
 _EVEN_SHARE = 0.2
-"""Of the wavelengths: drawn by power, the rest by what the eye sees."""
+"""Share of the wavelengths drawn by power; the rest by what the eye sees."""
 
 
 class Spectra(NamedTuple):
@@ -90,7 +90,7 @@ def sees_beyond(scene: Scene) -> bool:
 
 
 def line_wavelengths(scene: Scene) -> list[float]:
-    """Of the lights' lines, nm, ascending, each once."""
+    """Wavelengths of the lights' lines, nm, ascending, each once."""
     return sorted({nm for light in scene.lights for nm, power in light.spectral_power.lines if power > 0.0})
 
 
@@ -142,7 +142,7 @@ def spectra(scene: Scene, bins: int) -> Spectra:
 
 
 def _probability(sources: list[np.ndarray], seen: np.ndarray) -> np.ndarray:
-    """Of each atom (A,): every source counts alike, mostly by what the camera (A, 3) sees of it."""
+    """Probability of each atom (A,): every source counts alike, mostly by what the camera (A, 3) sees of it."""
     share = np.zeros(len(seen))
     for power in sources:
         bright = power * seen.sum(axis=1)

@@ -21,7 +21,7 @@ from .spectral_caustic import CausticPlan, CausticRun, SpectralCaustic
 _FIRST_STEP = 1 << 22
 """Photons after which the noise is measured first."""
 _NOISE_SAMPLES = 128
-"""Of each pixel, by which it is measured."""
+"""Samples of each pixel by which the noise is measured."""
 _SPARE, _MIN_STEP = 1.1, 1.25
 """Factors on the photons that should be enough, as noise falls as one over their number, about; and on those that were
 not."""

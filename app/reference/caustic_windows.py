@@ -24,7 +24,7 @@ photons more thinly."""
 _FLAT = 1e-6
 """Share of a receiver's size that its corners may leave a plane."""
 _SPREAD = 0.005
-"""Of the places seen, and of the power where these end, beyond each side of a fine window: a lens shows some of a floor
+"""Share of the places seen, and of the power where these end, beyond each side of a fine window: a lens shows a floor
 as far as it goes."""
 _MARGIN_SEEN, _MARGIN_LIT = 0.1, 0.05
 """Shares of their sizes by which windows are larger than what the pilots found."""

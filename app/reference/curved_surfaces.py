@@ -14,7 +14,7 @@ from .scene_surfaces import COEFFICIENTS, KIND, OUTWARD, RANGE, SHEET, TORUS, TU
 from .vectors import length, mixed_of, over
 
 _STEPS = 100
-"""Of a safeguarded Newton iteration; halving alone needs about 60."""
+"""Most steps of a safeguarded Newton iteration; halving alone needs about 60."""
 
 
 @inlined

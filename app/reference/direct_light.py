@@ -22,7 +22,7 @@ from .vectors import dot, moved, negated
 from .viewpoint import camera_ray, viewpoint
 
 _SAMPLES = 256
-"""Of a light of some extent."""
+"""Samples of a light with extent."""
 _HOVER = 1e-6
 """Height over a place from which its facet is looked for, of the scene's size."""
 

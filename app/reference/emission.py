@@ -158,7 +158,7 @@ class Emitter:
 
 
 def _lit_share(spacings: np.ndarray) -> np.ndarray:
-    """Of what a lattice point stands for, so many spacings inside of a hard edge; all or nothing beyond one."""
+    """Lit share of a lattice point's cell, so many spacings inside a hard edge; all or nothing beyond one spacing."""
     share = 0.5 * (1.0 + np.vectorize(erf, otypes=[float])(spacings / (np.sqrt(2.0) * EDGE_SPREAD)))
     return np.where(np.abs(spacings) < 1.0, share, spacings > 0.0)
 

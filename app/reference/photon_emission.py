@@ -47,7 +47,7 @@ class Domain(NamedTuple):
     columns: np.ndarray
     """float64 (GRID, GRID + 1): distribution within each row."""
     measure: float
-    """Of the whole square: unit² (PLANE), plane units (DIRECTIONS), the light's area (AREA)."""
+    """Measure of the whole square: unit² (PLANE), plane units (DIRECTIONS), the light's area (AREA)."""
     axis: np.ndarray
     """The light's own axis."""
     cone: np.ndarray = np.array([4.0, 4.0])

@@ -28,7 +28,7 @@ EMITTED, DEPOSITED, DIRECT, ABSORBED, ESCAPED, LOST_DEPTH, LOST_NUMERIC = range(
 COUNTED = 7
 """Places in a tally (`photon_reference.TALLY` and what follows)."""
 _LUMINANCE = (0.2126, 0.7152, 0.0722)
-"""Of linear Rec.709."""
+"""Y of linear Rec.709."""
 
 
 @inlined

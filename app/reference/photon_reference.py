@@ -78,7 +78,7 @@ class ReferencePicture:
 
     @property
     def variance(self) -> np.ndarray:
-        """Of `rgb`, float64 (H, W, 3)."""
+        """Variance of `rgb` as an estimate, float64 (H, W, 3)."""
         return np.einsum("...ii->...i", self.covariance).copy()
 
     def xyz(self) -> np.ndarray:
@@ -86,7 +86,7 @@ class ReferencePicture:
         return rgb709_to_xyz(self.rgb)
 
     def xyz_variance(self) -> np.ndarray:
-        """Of `xyz()`, float64 (H, W, 3)."""
+        """Variance of `xyz()`, float64 (H, W, 3)."""
         return self._xyz_variance
 
     @cached_property

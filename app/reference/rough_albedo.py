@@ -10,7 +10,7 @@ import numpy as np
 from .compiling import compiled
 
 RATIOS = np.exp(np.linspace(-1.2, 1.2, 65))
-"""Of indices, before the surface over behind it: rows of a table."""
+"""Ratios of indices, before the surface over behind it: rows of a table."""
 NODES = 65
 """Cosines of a row, the square of evenly spaced numbers from 0 to 1."""
 
@@ -63,8 +63,8 @@ def _fill(table, width, ratios, cosines, tilts, weights, turns):
 
 
 def albedo_tables(widths: np.ndarray) -> np.ndarray:
-    """Of each object's width (O,): float64 (O, ratios, NODES), shared by equal ones; ones where all are polished, of
-    which one is enough."""
+    """A table for each object's width (O,): float64 (O, ratios, NODES), shared by equal widths; ones where all are
+    polished, of which one is enough."""
     if not np.any(widths > 0.0):
         return np.ones((1, len(RATIOS), NODES))
     tables = np.ones((len(widths), len(RATIOS), NODES))
@@ -79,7 +79,7 @@ def albedo_tables(widths: np.ndarray) -> np.ndarray:
 
 @compiled
 def sent_on(tables, thing, cosine, eta):
-    """Of light at this cosine onto an object, straight between the table's nodes."""
+    """Share of light at this cosine that an object sends on, linear between the table's nodes."""
     rows, nodes = tables.shape[1], tables.shape[2]
     row = min(max((math.log(eta) + 1.2) * (rows - 1) / 2.4, 0.0), rows - 1.001)
     node = min(math.sqrt(max(cosine, 0.0)) * (nodes - 1), nodes - 1.001)

@@ -20,7 +20,7 @@ class Sequence(NamedTuple):
     shift: np.ndarray
     """uint32 (DIMENSIONS,): digital shift."""
     key: np.uint64
-    """Of the hash that follows."""
+    """Key of the hash that follows."""
 
 
 # Primitive polynomials (degree, coefficients) and initial numbers of dimensions 2 to 10: Joe and Kuo 2008.

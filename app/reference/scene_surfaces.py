@@ -22,7 +22,7 @@ from ..model.scene import Scene, SceneObject
 
 QUADRIC, TORUS = 0.0, 1.0
 FORM_SIZE = 32
-"""Numbers that tell a surface; these columns of them:"""
+"""Numbers of a surface; these columns of them:"""
 TO_LOCAL = 0
 """Twelve: rows of the matrix from the reference's frame into the surface's own."""
 KIND = 12
@@ -81,7 +81,7 @@ def placed(piece: Piece, object_to_world: np.ndarray, origin: np.ndarray) -> tup
 
 
 def as_triangles(scene: Scene) -> Scene:
-    """The scene with meshes that do not tell what they stand for: its reference meets the renderer's triangles."""
+    """The scene with meshes without recipes: its reference meets the renderer's triangles."""
     bare: dict[Mesh, Mesh] = {}
     for item in scene.objects:
         bare.setdefault(item.mesh, replace(item.mesh))

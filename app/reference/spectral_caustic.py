@@ -43,7 +43,7 @@ __all__ = ["CausticPlan", "CausticRun", "SpectralCaustic", "build_caustic", "no_
 _PILOT = 1 << 16
 _PILOT_NM = 550.0
 _FLOOR = 0.05
-"""Of the photons: shared evenly by all domains, whatever the pilot found."""
+"""Share of the photons that all domains share evenly, whatever the pilot found."""
 _UNIT = 1 << 11
 """Photons of a part's smallest step, over all domains, about."""
 _MAX_UNITS = 64
@@ -65,7 +65,7 @@ class CausticPlan:
     texel_size: float | None = None
     """Units, of the fine windows; None: half of what a pixel covers there."""
     max_texels: int = 1 << 18
-    """Of all fine windows together; beyond it texels grow."""
+    """Most texels of all fine windows together; beyond it texels grow."""
     max_depth: int = 64
     seed: int = 1
 
@@ -82,7 +82,7 @@ class SpectralCaustic:
     landed_w: float
     """Power on all receivers."""
     outside_w: float
-    """Of it, power where the camera's pilot saw nothing."""
+    """Power on receivers where the camera's pilot saw nothing."""
 
     def irradiance(self, side: int, window: int) -> np.ndarray:
         """W/unit² of each bin on a side's window (0 coarse, 1 fine), float32 (rows, columns, bins); row 0 at the

@@ -28,7 +28,7 @@ class Viewpoint(NamedTuple):
     height: int
     lens_radius: float
     focus_distance: float
-    """Of the plane of focus, along `forward`."""
+    """Distance of the plane of focus, along `forward`."""
 
 
 def viewpoint(camera: Camera, width: int, height: int, centre: np.ndarray) -> Viewpoint:

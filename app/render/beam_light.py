@@ -29,7 +29,6 @@ from ..beams.search import (
 from ..gpu import shader
 from ..gpu.context import Context
 from ..gpu.scene_buffers import SceneBuffers
-from ..model.flat_shapes import is_flat
 from ..model.scene import Scene
 from ..passes.landings import Landings
 from ..passes.map_atlas import KIND_PICTURE
@@ -152,7 +151,7 @@ class BeamLight:
         self.frames = {
             r: plane_frame(buffers.space.to_gpu(buffers.world_meshes[i].vertices))
             for r, i in enumerate(buffers.receivers)
-            if is_flat(scene.objects[i])
+            if scene.objects[i].mesh.is_flat
         }
         self._traced = self.finder = BeamFinder(
             scene,

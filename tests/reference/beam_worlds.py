@@ -11,7 +11,6 @@ from spectrasplat.beams.convert import pieces_of, polygons_of
 from spectrasplat.beams.facets import BeamScene, beam_scene
 from spectrasplat.beams.find import Emission, Search, search
 from spectrasplat.beams.sources import RIM, emissions, mask_at
-from spectrasplat.model.flat_shapes import is_flat
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.optics.colorimetry import VISIBLE_NM, rgb_basis
 from spectrasplat.model.optics.spectral_tables import SpectralAxis
@@ -53,7 +52,7 @@ class Rig:
         self.receivers = [i for i, o in enumerate(self.scene.objects) if o.material.receives]
         self.frames = {}
         for number, i in enumerate(self.receivers):
-            if is_flat(self.scene.objects[i]):
+            if self.scene.objects[i].mesh.is_flat:
                 corners = self.meshes[i].vertices
                 normal = self.meshes[i].face_normals()[0]
                 u = np.cross(np.eye(3)[1] if abs(normal[1]) < 0.9 else np.eye(3)[0], normal)

@@ -129,6 +129,21 @@ class Mesh:
         return bool(np.array_equal(forward, np.sort(b * count + a)))
 
     @cached_property
+    def is_flat(self) -> bool:
+        """Whether all vertices are in one plane (relative tolerance 1e-5)."""
+        singular = np.linalg.svd(self.vertices - self.vertices.mean(axis=0), compute_uv=False)
+        return bool(singular[-1] <= 1e-5 * max(singular[0], np.finfo(float).tiny))
+
+    @cached_property
+    def is_faceted(self) -> bool:
+        """Whether all facets are flat: no interpolated normals."""
+        if self.corner_normals is None:
+            return True
+        known = np.abs(self.corner_normals).sum(axis=2) > 0.0
+        cosine = np.einsum("tcj,tj->tc", self.corner_normals, self.face_normals())
+        return bool((~known | (cosine >= 1.0 - 1e-9)).all())
+
+    @cached_property
     def convex_planes(self) -> np.ndarray | None:
         """Outward half-spaces of a closed convex flat solid, float64 (P, 4): n·x <= d as rows (n, d).
 

@@ -19,7 +19,7 @@ _DEGENERATE = 1e-12
 
 
 _SEAM = 1e-5
-"""Of a mesh's longest side: corners nearer than this are one where it is asked whether anything is enclosed."""
+"""Share of a mesh's longest side: corners nearer than this are one where `forms_of` looks for what is enclosed."""
 
 
 @dataclass(frozen=True)
@@ -181,7 +181,7 @@ def repair(mesh: Mesh, health: MeshHealth | None = None, solid: bool = True) -> 
 
 
 def forms_of(meshes: Sequence[Mesh]) -> list[str]:
-    """Of each surface: "solid"; "sheet", where it encloses nothing; or "part", where all open ones together do."""
+    """What each surface is: "solid"; "sheet", which encloses nothing; or "part", where all open ones together do."""
     alone = [_is_open([mesh]) for mesh in meshes]
     together = any(alone) and _is_open([mesh for mesh, is_open in zip(meshes, alone, strict=True) if is_open])
     return ["solid" if not is_open else "sheet" if together else "part" for is_open in alone]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 _AREA_SLACK = 1e-4
-"""Of the outline's area, that triangles may leave open or cover twice."""
+"""Share of the outline's area that triangles may leave open or cover twice."""
 _STRAIGHT = 1e-7
-"""Of the outline's longest side squared: what a corner turns less by is none."""
+"""Share of the outline's longest side squared: a corner that turns by less is none."""
 
 
 def convex_outline(points: np.ndarray, triangles: np.ndarray) -> np.ndarray | None:

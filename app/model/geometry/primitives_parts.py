@@ -14,7 +14,7 @@ from ...base.errors import UserError
 from .mesh import Mesh
 
 MAX_TRIANGLES = 4_000_000
-"""Of one shape: making twice as many takes more than 2 GiB."""
+"""Most triangles of one shape: making twice as many takes more than 2 GiB."""
 
 
 def positive(shape: str, key: str, value: float) -> float:

@@ -58,7 +58,7 @@ def torus(major_radius: float = 0.5, minor_radius: float = 0.15, triangles: int 
 
 
 SEGMENTS = (128, 512)
-"""Of a solid of revolution whose file does not say: as many of these as `TRIANGLES` allow …"""
+"""Least and most segments of a solid of revolution whose file does not say: as many as `TRIANGLES` allow …"""
 TRIANGLES = 80_000
 """… since light that grazes a few large facets is striped (`in_rows`): 128 of them leave a tumbler an nRMSE of 0.024,
 512 of 0.016."""
@@ -290,10 +290,10 @@ def _icosphere(triangles: int) -> tuple[np.ndarray, np.ndarray]:
 TAPER = 0.05
 """By how much the radii of a row's two rings may differ, as a share of the smaller one."""
 MOST_ROWS = 16
-"""Of one cone; towards its tip rows taper more, and throw next to nothing."""
+"""Most rows of one cone; towards its tip rows taper more, and hardly any light passes there."""
 _TIP = 0.1
 _SHORTEST = 0.05
-"""Of a row, as a share of the largest radius: what a fine profile gives is left as it is."""
+"""Least length of a row, as a share of the largest radius: a fine profile is left as it is."""
 
 
 def in_rows(

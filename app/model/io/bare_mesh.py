@@ -52,8 +52,8 @@ def _materials(
     path: Path, parts: list[MeshPart], libraries: tuple[str, ...], is_asked: bool, notes: list[str]
 ) -> list[Material]:
     """What each part is made of; `is_asked`: the user says which glass."""
-    told = read_materials(path, libraries, notes)
-    known = [told.get(part.material or "") for part in parts]
+    by_name = read_materials(path, libraries, notes)
+    known = [by_name.get(part.material or "") for part in parts]
     names = [part.mesh.name for part in parts]
     if any(material is not None and material.transmits for material in known):
         made = [Dielectric.usual() if material is None else material.material() for material in known]
@@ -104,7 +104,7 @@ class MeshPart:
 
 
 def parts_of_mesh(mesh: Mesh, groups: Groups | None) -> list[MeshPart]:
-    """The solids of a file's `mesh`; the whole where the file tells none apart."""
+    """The solids of a file's `mesh`; the whole where the file names no parts."""
     if groups is None:
         return [MeshPart(mesh, None)]
     if len(groups.names) == 1:

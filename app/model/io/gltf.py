@@ -282,7 +282,7 @@ class _Reader:
         return "" if index is None else str(self.document.item("materials", index).get("name", ""))
 
     def _form(self, number: int, entry: dict[str, Any]) -> tuple[dict[int, str], Mesh | None]:
-        """Of the glass of mesh `number` of the document: the form of each part, and parts of one solid as one mesh."""
+        """Form of each part of glass of the document's mesh `number`, and the parts of one solid as one mesh."""
         if number not in self._forms:
             parts = {
                 i: mesh

@@ -25,7 +25,7 @@ from ...base.errors import UserError
 GLB_MAGIC = b"glTF"
 JSON_CHUNK, BIN_CHUNK = 0x4E4F534A, 0x004E4942
 MAX_ELEMENTS = 100_000_000
-"""Of all accessors that are read; many may show the same bytes."""
+"""Most elements of all accessors that are read together; many may show the same bytes."""
 MAX_UNSTORED = 1_000_000
 """Elements of an accessor that stands for zeros, which no bytes of the file hold."""
 

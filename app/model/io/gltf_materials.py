@@ -303,8 +303,8 @@ def read_node_dabs(document: GltfDocument, index: int, number: int, material: Ma
 
 def write_node_dabs(node: dict[str, Any], dabs: Mapping[int, Sequence[Dab]]) -> None:
     """Keep the dabs of a node's primitives, by number; none of them takes out what was there."""
-    told = [{"primitive": number, "dabs": describe_dabs(each)} for number, each in sorted(dabs.items()) if each]
-    _keep(node, DABS, told or None)
+    entries = [{"primitive": number, "dabs": describe_dabs(each)} for number, each in sorted(dabs.items()) if each]
+    _keep(node, DABS, entries or None)
 
 
 def read_scene_extras(document: GltfDocument, notes: list[str]) -> tuple[Vec3, Environment | None, RenderDefaults]:
@@ -321,12 +321,12 @@ def write_scene_extras(json: dict[str, Any], scene: Scene, path: Path) -> None:
     An environment's map stays in a file of its own, named relative to `path`.
     """
     usual = (0.0, 0.0, 0.0), None, RenderDefaults()
-    told: dict[str, Any] = {"render": render_values(scene.render)}
+    values: dict[str, Any] = {"render": render_values(scene.render)}
     if scene.environment is None:
-        told["background"] = list(scene.background_rgb)
+        values["background"] = list(scene.background_rgb)
     else:
-        told[ENVIRONMENT] = environment_values(scene.environment, path)
-    _keep(json, _SCENE, None if (scene.background_rgb, scene.environment, scene.render) == usual else told)
+        values[ENVIRONMENT] = environment_values(scene.environment, path)
+    _keep(json, _SCENE, None if (scene.background_rgb, scene.environment, scene.render) == usual else values)
 
 
 def _keep(entry: dict[str, Any], key: str, value: object) -> None:

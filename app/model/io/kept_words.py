@@ -33,7 +33,7 @@ _SAME = 1e-8
 def kept_light(
     raw: Mapping[str, Any], before: Light, after: Light, path: Path, index: int, around: Surroundings
 ) -> dict[str, Any]:
-    """One of [[lights]] for `after`, told by the words `raw` of `before` where these still hold."""
+    """One of [[lights]] for `after`, in the words `raw` of `before` where these still hold."""
     plain = light_values(after, path)
     if before.kind != after.kind:
         return plain
@@ -49,9 +49,9 @@ def kept_light(
         values["position"] = _tidy(after.position)
     if after.has_direction and (before.direction != after.direction or ("position" in changed and "target" in raw)):
         values = _without(values, _AIM) | {"direction": _tidy(after.direction)}
-    told = describe_spectrum(after.spectral_power)
-    if told != describe_spectrum(before.spectral_power):
-        values["spectrum"] = told
+    spectrum = describe_spectrum(after.spectral_power)
+    if spectrum != describe_spectrum(before.spectral_power):
+        values["spectrum"] = spectrum
     named = next((key for key in LIGHT_KINDS[after.kind].power_keys if key.key in raw), None)
     if named is not None and not _close(before.power(named), after.power(named)):
         values[named.key] = _rounded(after.power(named))

@@ -1,4 +1,4 @@
-"""Mesh files in and out: PLY, OBJ and STL, with every lie in a file told as one sentence.
+"""Mesh files in and out: PLY, OBJ and STL, with one sentence for everything in a file that is wrong.
 
 The readers are our own rather than trimesh's: that one takes an OBJ's face 0 for its last
 vertex, splits vertices where a normal differs (which opens solids), and costs half a
@@ -43,7 +43,7 @@ def load_mesh(path: str | os.PathLike[str], smooth: bool | float | None = None, 
 
 
 def load_grouped_mesh(path: Path, name: str | None = None) -> tuple[Mesh, Groups | None]:
-    """As `load_mesh` with the file's own normals, and the parts that the file tells apart where its format can."""
+    """As `load_mesh` with the file's own normals, and the parts that the file names where its format can."""
     raw = _read(path)
     mesh = make_mesh(name or path.stem, raw.vertices, raw.triangles, raw.corner_normals, raw.uv, str(path))
     if len(far := np.flatnonzero((np.abs(mesh.vertices) > MAX_COORDINATE).any(axis=1))):

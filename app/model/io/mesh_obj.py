@@ -20,7 +20,7 @@ _STATEMENTS = (*_WIDTHS, "f", "o", "g", "usemtl", "mtllib")
 
 
 def read_obj(data: bytes, path: str) -> RawMesh:
-    """The file's triangles, all in one; `groups` tells objects, groups and materials apart."""
+    """The file's triangles, all in one; `groups` says which object, group and material each belongs to."""
     lines = data.decode("utf-8", "replace").replace("\\\r\n", " ").replace("\\\n", " ").split("\n")
     kinds: dict[str, list[tuple[int, str]]] = {word: [] for word in _STATEMENTS}
     for number, line in enumerate(lines, start=1):
@@ -59,17 +59,17 @@ def _groups(kinds: dict[str, list[tuple[int, str]]], triangles: np.ndarray) -> G
     and its material."""
     lines = np.array([number for number, _ in kinds["f"]])
 
-    def told(word: str) -> tuple[np.ndarray, list[str]]:
+    def last_above(word: str) -> tuple[np.ndarray, list[str]]:
         """For each face the last such statement above it, 0 for none, and their texts."""
         texts = ["", *(" ".join(rest.split()) for _, rest in kinds[word])]
         distinct = {text: i for i, text in enumerate(dict.fromkeys(texts))}
         place = np.searchsorted(np.array([number for number, _ in kinds[word]], np.int64), lines)
         return np.array([distinct[text] for text in texts])[place], list(distinct)
 
-    (objects, object_names), (groups, group_names) = told("o"), told("g")
+    (objects, object_names), (groups, group_names) = last_above("o"), last_above("g")
     by_object = len(np.unique(objects)) > 1
     which, names = (objects, object_names) if by_object else (groups, group_names)
-    materials, material_names = told("usemtl")
+    materials, material_names = last_above("usemtl")
     pairs, of_face = np.unique(np.stack([which, materials], axis=1), axis=0, return_inverse=True)
     return Groups(
         np.repeat(of_face.reshape(-1), triangles),

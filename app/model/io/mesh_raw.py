@@ -13,7 +13,7 @@ from ..geometry.mesh_health import weld_map
 
 @dataclass(frozen=True)
 class Groups:
-    """Parts that a file tells apart."""
+    """Parts that a file names."""
 
     of_triangle: np.ndarray
     """int64 (T,), index into the others."""

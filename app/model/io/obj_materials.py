@@ -21,7 +21,7 @@ _REFRACTS = (4, 6, 7, 9)
 """Values of `illum` that stand for glass or refraction."""
 _LARGEST_INDEX = 4.0
 _LIKE_DEFAULT = 0.07
-"""Of n_d: programs write 1.45 or 1.5 where nobody chose an index."""
+"""Difference of n_d up to which an index is the default's: programs write 1.45 or 1.5 where nobody chose one."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class ObjMaterial:
     index: float = 1.0
     illum: int = 2
     roughness: float = 0.0
-    """Of glass."""
+    """How rough glass is, 0 to 1."""
 
     @property
     def transmits(self) -> bool:

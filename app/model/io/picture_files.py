@@ -54,8 +54,8 @@ def read_picture(path: str | os.PathLike[str]) -> tuple[np.ndarray, tuple[str, .
             is_converted = False
     if 0 in rgb.shape:
         raise UserError(f"{path}: the picture is empty ({rgb.shape[1]} × {rgb.shape[0]} pixels); export it again")
-    rgb, told = _checked(rgb, str(path), is_converted)
-    return rgb, notes + told
+    rgb, more = _checked(rgb, str(path), is_converted)
+    return rgb, notes + more
 
 
 def decode_8bit(data: bytes, where: str) -> tuple[np.ndarray, tuple[str, ...]]:

@@ -1,6 +1,6 @@
 """Writes a `Scene` as TOML, by description where there is one: loading it gives the same values.
 
-Everything is told from the scene's values alone: a spectrum that is D65 is written "D65", an
+Everything is written from the scene's values alone: a spectrum that is D65 is written "D65", an
 absorption that a colour explains is written as that colour, a mesh that came from a shape or
 a file is written as that. Only meshes nobody can name are stored as triangles. Saved over the file it came from,
 a scene keeps there what a person wrote and nobody changed.
@@ -140,18 +140,18 @@ def _kept_lights(scene: Scene, before: Scene, raw: list[dict[str, Any]], path: P
     pairs = list(zip(before.lights, raw, strict=False))
     by_name = {light.name: (light, entry) for light, entry in pairs}
     around = environment_of(scene.objects)
-    told = []
+    entries = []
     for index, light in enumerate(scene.lights):
         known = by_name.get(light.name)
         if known is None and len(scene.lights) == len(pairs):
             known = pairs[index]  # renamed
         if known is None:
-            told.append(light_values(light, path))
+            entries.append(light_values(light, path))
         elif known[0] == light:
-            told.append(known[1])
+            entries.append(known[1])
         else:
-            told.append(kept_light(known[1], known[0], light, path, index, around))
-    return told
+            entries.append(kept_light(known[1], known[0], light, path, index, around))
+    return entries
 
 
 def _kept_objects(
@@ -164,7 +164,7 @@ def _kept_objects(
         of_entry = before.objects[first : first + len(entry.get("instances", (None,)))]
         entries[of_entry[0].name] = entry, of_entry
         first += len(of_entry)
-    told: list[dict[str, Any]] = []
+    written: list[dict[str, Any]] = []
     changed: list[SceneObject] = []
     at = 0
     while at < len(scene.objects):
@@ -174,19 +174,19 @@ def _kept_objects(
             entry, old = entries.get(before.objects[at].name, ({}, ()))
         new = scene.objects[at : at + len(old)]
         if old and len(new) == len(old) and all(map(_same_object, new, old)):
-            told += [_objects(group, materials, path) for group in _groups(tuple(changed))]
-            told.append(entry)
+            written += [_objects(group, materials, path) for group in _groups(tuple(changed))]
+            written.append(entry)
             changed = []
             at += len(old)
         elif len(old) == 1 and "instances" not in entry:
-            told += [_objects(group, materials, path) for group in _groups(tuple(changed))]
-            told.append(_kept_object(entry, old[0], scene.objects[at], materials, path))
+            written += [_objects(group, materials, path) for group in _groups(tuple(changed))]
+            written.append(_kept_object(entry, old[0], scene.objects[at], materials, path))
             changed = []
             at += 1
         else:
             changed.append(scene.objects[at])
             at += 1
-    return told + [_objects(group, materials, path) for group in _groups(tuple(changed))]
+    return written + [_objects(group, materials, path) for group in _groups(tuple(changed))]
 
 
 def _kept_object(
@@ -206,8 +206,8 @@ def _kept_object(
     placed = kept_placement(entry, new.mesh, new.object_to_world, path)
     # In the order in which they were written, so that comments stay where they are.
     order = {key: i for i, key in enumerate(entry)}
-    told = values | placed | _dabs(new)
-    return dict(sorted(told.items(), key=lambda item: order.get(item[0], len(order))))
+    merged = values | placed | _dabs(new)
+    return dict(sorted(merged.items(), key=lambda item: order.get(item[0], len(order))))
 
 
 def _kept_material(
@@ -247,8 +247,8 @@ def _same_object(a: SceneObject, b: SceneObject) -> bool:
 def _same_environment(a: Environment | None, b: Environment | None) -> bool:
     if a is None or b is None:
         return a is b
-    told = [(e.kind, dict(e.parameters), e.source) for e in (a, b)]
-    return told[0] == told[1] and np.array_equal(a.world_to_local, b.world_to_local) and np.array_equal(a.rgb, b.rgb)
+    words = [(e.kind, dict(e.parameters), e.source) for e in (a, b)]
+    return words[0] == words[1] and np.array_equal(a.world_to_local, b.world_to_local) and np.array_equal(a.rgb, b.rgb)
 
 
 # -- objects ------------------------------------------------------------------------------

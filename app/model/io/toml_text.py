@@ -62,13 +62,13 @@ def _plain(known: Any) -> Any:
 
 def _braces(old: InlineTable, values: Mapping[str, Any], depth: int) -> Item:
     """An inline table with other keys than `old`, with its blanks, and its words for what did not change."""
-    told = []
+    entries = []
     for key in [*(key for key in old if key in values), *(key for key in values if key not in old)]:
         known = old.get(key)
         item = known if isinstance(known, Item) and _plain(known) == values[key] else _item(values[key], depth)
-        told.append(f"{tomlkit.key(key).as_string()} = {item.as_string().strip()}")
+        entries.append(f"{tomlkit.key(key).as_string()} = {item.as_string().strip()}")
     blank = " " if old.as_string().startswith("{ ") else ""
-    item = tomlkit.parse(f"x = {{{blank}{', '.join(told)}{blank}}}")["x"]
+    item = tomlkit.parse(f"x = {{{blank}{', '.join(entries)}{blank}}}")["x"]
     assert isinstance(item, InlineTable)
     return item
 

@@ -22,7 +22,7 @@ from ..io.scene_table import MAX_MAGNITUDE
 
 MAX_BYTES = 1 << 20
 MAX_ANGLES = 4096
-"""Of either kind: one every 0.09°."""
+"""Most vertical or horizontal angles: one every 0.09°."""
 _WHERE = "export the file again from the lamp's maker or a photometric editor"
 _Images = tuple[tuple[int, float], ...]
 _ONCE: _Images = ((1, 0.0),)
@@ -198,8 +198,8 @@ class _Numbers:
             raise self._error(f"has a number that is not finite among {what}")
         return numbers
 
-    def _error(self, told: str, remedy: str = _WHERE) -> UserError:
-        return UserError(f"{self._path} {told}; {remedy}")
+    def _error(self, problem: str, remedy: str = _WHERE) -> UserError:
+        return UserError(f"{self._path} {problem}; {remedy}")
 
 
 class _Lm63(_Numbers):
@@ -210,8 +210,8 @@ class _Lm63(_Numbers):
         lines = text.splitlines()
         at = next((i for i, line in enumerate(lines) if line.strip().upper().startswith("TILT=")), None)
         if at is None:
-            told = "has no line TILT=, so it is no LM-63 file or is cut off" if text.strip() else "is empty"
-            raise self._error(told)
+            problem = "has no line TILT=, so it is no LM-63 file or is cut off" if text.strip() else "is empty"
+            raise self._error(problem)
         self._tilt = lines[at].partition("=")[2].strip().upper()
         self._words = " ".join(lines[at + 1 :]).replace(",", " ").split()
 

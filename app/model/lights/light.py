@@ -144,7 +144,7 @@ class Light:
 
     @property
     def angular_radius(self) -> float:
-        """Of what is infinitely far away, rad."""
+        """Angular radius of a light that is infinitely far away, rad."""
         return 0.0
 
     @property

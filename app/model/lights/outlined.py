@@ -35,8 +35,8 @@ class _OutlineFile(Part):
         """The keys of its shape."""
         if value.is_disc:
             return {"shape": value.shape, "radius": value.radius}
-        told = {"shape": value.shape, "size": [value.width, value.height]}
-        return told if value.tangent is None else told | {"tangent": list(value.tangent)}
+        values = {"shape": value.shape, "size": [value.width, value.height]}
+        return values if value.tangent is None else values | {"tangent": list(value.tangent)}
 
 
 SHAPES = ("disc", "rectangle")

@@ -60,7 +60,7 @@ class Dielectric(Material):
     priority: int = 0
     """Where solids overlap, the higher priority decides; equal ones: the later object."""
     roughness: float = 0.0
-    """Of all its surface: 0 is polished, and GGX's width α the square of it."""
+    """How rough its whole surface is: 0 is polished, and GGX's width α is the square of it."""
     thin: bool = False
     """A sheet, both of whose faces are met at once: without inside, absorption and roughness."""
     transmittance_rgb: Vec3 = CLEAR
@@ -87,7 +87,7 @@ class Dielectric(Material):
 
     @classmethod
     def usual(cls) -> Self:
-        """Of the default glass."""
+        """A solid of the default glass."""
         return cls(catalogue.find(DEFAULT_GLASS))
 
     def values(self, path: Path | None = None) -> dict[str, Any]:

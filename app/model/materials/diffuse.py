@@ -22,7 +22,7 @@ from .absorption import read_curve
 from .material import Material, colour_words
 
 USUAL_ROUGHNESS = 0.25
-"""Of a coat that somebody asks for without saying more: a polished table."""
+"""Roughness of a coat that somebody adds without saying more: a polished table."""
 USUAL_COAT_INDEX = 1.5
 SMOOTH_ROUGHNESS = 0.03
 """A coat less rough than this is met as a perfectly smooth one: its lobe is narrower than a pixel."""
@@ -103,7 +103,7 @@ class Diffuse(Material):
     texture: Texture | None = None
     """Multiplies `reflectance_rgb` by the mesh's texture coordinates; never beside `reflectance`."""
     roughness: float | None = None
-    """Of a clear dielectric coat over it, 0 to 1 (GGX's alpha is its square); None: there is no coat."""
+    """Roughness of a clear dielectric coat over it, 0 to 1 (GGX's alpha is its square); None: there is no coat."""
     coat_index: float = USUAL_COAT_INDEX
     """The coat's refractive index over that of what is before it."""
     diffuse_roughness: float = 0.0
@@ -141,15 +141,15 @@ class Diffuse(Material):
         return self._colours(path) | write_fields(self.shown_numbers(), self, path)
 
     def _colours(self, path: Path | None) -> dict[str, Any]:
-        told: dict[str, Any] = {"kind": self.kind}
+        values: dict[str, Any] = {"kind": self.kind}
         if self.reflectance is not None:
-            return told | {"reflectance": {"nm": VISIBLE_NM.tolist(), "values": self.reflectance.tolist()}}
-        told["colour"] = list(self.reflectance_rgb)
+            return values | {"reflectance": {"nm": VISIBLE_NM.tolist(), "values": self.reflectance.tolist()}}
+        values["colour"] = list(self.reflectance_rgb)
         worn = self.texture
         if worn is None:
-            return told
+            return values
         name = worn.source or picture_name(worn.rgb) if path is None else picture_file(worn.rgb, worn.source, path)
-        return told | {"texture": {"file": name, "wrap": worn.wrap}}
+        return values | {"texture": {"file": name, "wrap": worn.wrap}}
 
     @property
     def has_coat(self) -> bool:
@@ -157,7 +157,7 @@ class Diffuse(Material):
         return self.roughness is not None
 
     def shown_numbers(self) -> tuple[Number, ...]:
-        """Of its finish; a coat's only where it has one."""
+        """Numbers of its finish; a coat's only where it has one."""
         rough = (DIFFUSE_ROUGHNESS,) if self.reflectance is None else ()
         return (ROUGHNESS, COAT_INDEX, *rough) if self.has_coat else rough
 

@@ -1,4 +1,4 @@
-"""A refractive index in the words of a scene file, read and told again."""
+"""A refractive index in the words of a scene file, read and written."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ class Material:
     texture = cast(Any, None)
     absorption = cast(Any, None)
     roughness = cast(Any, None)
-    """Of a coat over what is diffuse, None: there is none; of a dielectric's surface, 0: it is polished."""
+    """Roughness of the coat of a diffuse surface (None: no coat) or of a dielectric's surface (0: polished)."""
     coat_index = 1.0
     diffuse_roughness = 0.0
     dispersion = cast(Any, None)

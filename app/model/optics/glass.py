@@ -97,26 +97,26 @@ class Dispersion:
     def notes(self) -> list[str]:
         """What a user should know about these data, one sentence each (often none)."""
         clamped = self.clamps_visible()
-        told = [clamped] if clamped else []
+        notes = [clamped] if clamped else []
         label = self.name or "the index"
         n = self.index(_CHECK_NM)
         if self.gain != 1.0:
-            told.append(
+            notes.append(
                 f"{label}: its dispersion is {self.gain:g} times that of the material (dispersion_gain), which "
                 "nature does not offer."
             )
         if n.min() < 1.0:
             at = _CHECK_NM[int(n.argmin())]
-            told.append(f"{label}: the index falls below 1 (n = {n.min():.6g} at {at:g} nm), which is legal but rare.")
+            notes.append(f"{label}: the index falls below 1 (n = {n.min():.6g} at {at:g} nm), which is legal but rare.")
         if self.kind == "abbe" and self.coefficients[0] > 1.0 and n.min() == 1.0:
-            told.append(
+            notes.append(
                 f"{label}: V_d = {self.coefficients[1]:g} is so small that the index is held at 1 in part of the range."
             )
         if self.is_dispersive and np.any(np.diff(n) > 0.0):
-            told.append(
+            notes.append(
                 f"{label}: the index rises with wavelength in part of the visible range (anomalous dispersion)."
             )
-        return told
+        return notes
 
     def formula_text(self) -> str:
         """The formula with its coefficients, for people (λ in µm)."""

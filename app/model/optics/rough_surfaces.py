@@ -24,7 +24,7 @@ GLASS_INDEX_STEPS = 20
 _INDEX_REACH = float(np.log(2.8))
 """… and how far they reach, as the logarithm of the ratio of indices."""
 GLASS_ROWS = 2 * GLASS_INDEX_STEPS + 1
-"""Of the table of one width."""
+"""Rows of the table of one width."""
 _LEAST = 0.05
 """Bound of `glass_sent_on`: media that are almost alike, met at grazing incidence, would make much of little."""
 

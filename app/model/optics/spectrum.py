@@ -235,9 +235,9 @@ def from_csv(path: str | os.PathLike[str], notes: list[str] | None = None) -> Sp
 
     Linear between the rows, zero outside them. What was assumed goes to `notes`. Raises `UserError` naming the file.
     """
-    told = [] if notes is None else notes
-    curve = read_curve(path, told)
-    spectrum = from_table(curve.nm, clipped(path, curve, "power", told), where=os.fspath(path))
+    notes = [] if notes is None else notes
+    curve = read_curve(path, notes)
+    spectrum = from_table(curve.nm, clipped(path, curve, "power", notes), where=os.fspath(path))
     if spectrum.power_w() == 0.0:
         raise UserError(f"{os.fspath(path)}: the spectrum is zero from 380 to 780 nm; choose another")
     return spectrum

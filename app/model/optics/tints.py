@@ -49,7 +49,7 @@ class Tint:
 
     @property
     def dispersion(self) -> Dispersion:
-        """Of what is usually coloured so."""
+        """n(λ) of the glass that is usually coloured so."""
         return catalogue.find(self.glass)
 
 

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...edit.stored_photons import StoredPhotons
-from ...model.flat_shapes import is_flat
 from .invalidation import shown_glasses
 
 if TYPE_CHECKING:
@@ -175,4 +174,4 @@ def reach_of(light: LiveLight, receiver: int) -> float:
     area = float(
         light.light_pass.layout.placements["texel_area"][light.light_pass.layout.receivers[index]["placement"]]
     )
-    return (4.0 if is_flat(light.light_pass.scene.objects[receiver]) else 6.0) * area**0.5
+    return (4.0 if light.light_pass.scene.objects[receiver].mesh.is_flat else 6.0) * area**0.5
