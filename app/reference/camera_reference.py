@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 MAX_DEPTH = 256
 _LAST_SAMPLE = 2**31
 _BLACK_SAMPLES = 256
+_NOISE_SAMPLES = 128
+"""Samples of each pixel by which the noise is measured."""
 
 
 @dataclass(frozen=True)
@@ -302,6 +304,27 @@ def _caustic(
 
     any_number = replace(plan, photons=0, target_relmse=0.0)
     key = camera_reference_key(scene, width, height, max_depth, any_number)
-    return CachedCaustic(scene, width, height, max_depth, plan, key, folder).grown(
+
+    def noise_of(caustic: SpectralCaustic) -> float:
+        return picture_noise(scene, width, height, max_depth, caustic)
+
+    return CachedCaustic(scene, width, height, plan, key, folder, noise_of).grown(
         lambda done, text: progress(_CAUSTIC_SHARE * done, text)
     )
+
+
+def picture_noise(scene: Scene, width: int, height: int, max_depth: int, caustic: SpectralCaustic) -> float:
+    """relMSE that the caustic's noise adds to a picture, mean[var/(R² + ε)].
+
+    Both halves are looked up by the same paths, and what the parts' differences have in common is no noise of the
+    paths.
+    """
+    runs = [CameraRun(scene, width, height, max_depth, caustic=caustic.half(number)) for number in range(2)]
+    for run in runs:
+        while run.samples < _NOISE_SAMPLES:
+            run.advance(_NOISE_SAMPLES - run.samples)
+    even, odd = (run.sums / run.units[:, None, None, None] for run in runs)
+    apart = even - odd
+    variance = 0.25 * (apart.sum(axis=0) ** 2 - (apart**2).sum(axis=0)) / (PARTS * (PARTS - 1))
+    mean = 0.5 * (even + odd).mean(axis=0)
+    return max(relative_variance(mean, variance), 0.0)

@@ -7,21 +7,18 @@ of the photons. A caustic in plain view needs a hundred times the photons of one
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
 from ..model.scene import Scene
 from ..model.scene_key import ContentKey
-from .camera_reference import CameraRun
-from .photon_reference import relative_variance
-from .rounds import PARTS, Progress, kept_path, load_kept, save_kept
+from .rounds import Progress, kept_path, load_kept, save_kept
 from .spectral_caustic import CausticPlan, CausticRun, SpectralCaustic
 
 _FIRST_STEP = 1 << 22
 """Photons after which the noise is measured first."""
-_NOISE_SAMPLES = 128
-"""Samples of each pixel by which the noise is measured."""
 _SPARE, _MIN_STEP = 1.1, 1.25
 """Factors on the photons that should be enough, as noise falls as one over their number, about; and on those that were
 not."""
@@ -37,14 +34,14 @@ class CachedCaustic:
         scene: Scene,
         width: int,
         height: int,
-        max_depth: int,
         plan: CausticPlan,
         picture_key: str,
         folder: Path | None,
+        noise_of: Callable[[SpectralCaustic], float],
     ) -> None:
-        """`max_depth`: of camera paths; `picture_key`: hash of everything that a picture with this caustic depends on,
-        but for the number of photons."""
-        self._scene, self._size, self._max_depth, self._plan = scene, (width, height), max_depth, plan
+        """`picture_key`: hash of everything that a picture with this caustic depends on, but for the number of photons;
+        `noise_of`: relMSE that a caustic's noise adds to the picture."""
+        self._scene, self._size, self._plan, self._noise_of = scene, (width, height), plan, noise_of
         key = ContentKey(picture_key)
         key.add("caustic alone")
         self._path = kept_path(key.hexdigest(), folder)
@@ -62,7 +59,7 @@ class CachedCaustic:
         while run.photons < (goal := _goal(self._plan, measured, noise)):
             self._grow(run, goal, measured, noise, progress)
             caustic = run.caustic()
-            measured, noise = run.photons, picture_noise(self._scene, *self._size, self._max_depth, caustic)
+            measured, noise = run.photons, self._noise_of(caustic)
             self._save(run, measured, noise)
         return run.caustic(), noise
 
@@ -107,23 +104,6 @@ class CachedCaustic:
             noise=noise,
             measured=measured,
         )
-
-
-def picture_noise(scene: Scene, width: int, height: int, max_depth: int, caustic: SpectralCaustic) -> float:
-    """relMSE that the caustic's noise adds to a picture, mean[var/(R² + ε)].
-
-    Both halves are looked up by the same paths, and what the parts' differences have in common is no noise of the
-    paths.
-    """
-    runs = [CameraRun(scene, width, height, max_depth, caustic=caustic.half(number)) for number in range(2)]
-    for run in runs:
-        while run.samples < _NOISE_SAMPLES:
-            run.advance(_NOISE_SAMPLES - run.samples)
-    even, odd = (run.sums / run.units[:, None, None, None] for run in runs)
-    apart = even - odd
-    variance = 0.25 * (apart.sum(axis=0) ** 2 - (apart**2).sum(axis=0)) / (PARTS * (PARTS - 1))
-    mean = 0.5 * (even + odd).mean(axis=0)
-    return max(relative_variance(mean, variance), 0.0)
 
 
 def _goal(plan: CausticPlan, measured: int, noise: float) -> int:

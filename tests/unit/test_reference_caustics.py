@@ -14,8 +14,13 @@ from spectrasplat.model.lights import CollimatedLight
 from spectrasplat.model.optics.spectrum import Spectrum, illuminant, laser
 from spectrasplat.model.scene import Camera, Dielectric, Scene
 from spectrasplat.reference import caustic_cache, photon_reference, spectral_caustic
-from spectrasplat.reference.camera_reference import cached_camera_reference, render_camera_reference, summed_camera
-from spectrasplat.reference.caustic_cache import CachedCaustic, picture_noise
+from spectrasplat.reference.camera_reference import (
+    cached_camera_reference,
+    picture_noise,
+    render_camera_reference,
+    summed_camera,
+)
+from spectrasplat.reference.caustic_cache import CachedCaustic
 from spectrasplat.reference.caustic_windows import Landed, Planes, VisiblePoints, _shared, fit_windows
 from spectrasplat.reference.direct_light import DirectLight
 from spectrasplat.reference.photon_reference import TALLY_SIZE
@@ -63,7 +68,7 @@ def rounds(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 
 def kept(scene: Scene, plan: CausticPlan, folder: Path) -> CachedCaustic:
-    return CachedCaustic(scene, *SIZE, 64, plan, "key", folder)
+    return CachedCaustic(scene, *SIZE, plan, "key", folder, lambda caustic: picture_noise(scene, *SIZE, 64, caustic))
 
 
 def quiet(fraction: float, text: str) -> None:
