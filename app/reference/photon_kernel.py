@@ -32,10 +32,11 @@ _LUMINANCE = (0.2126, 0.7152, 0.0722)
 
 
 @inlined
-def _follow(scene, place, d, nm, watt, noise, dimension, max_depth, tally, scratch):
+def _follow(scene, place, d, nm, watt, noise, dimension, by_event, max_depth, tally, scratch):
     """A photon to its end: (its fate, a place in `tally`, place, direction, triangle, u, v, W left).
 
-    What is absorbed on the way is added to `tally`, and all of it where nothing is left.
+    What is absorbed on the way is added to `tally`, and all of it where nothing is left. Choices take their numbers
+    from `dimension` of the sequence on: one an event (`by_event`), or one for each event where it decides anything.
     """
     if scene.polarised:
         begin_unpolarised(scratch.field, d)
@@ -60,12 +61,13 @@ def _follow(scene, place, d, nm, watt, noise, dimension, max_depth, tally, scrat
             fate = LOST_DEPTH
             break
         last = triangle
-        draw = choice(scratch.state, scratch.shift, dimension, noise, dimension - DIMENSIONS + 1)
+        turn = depth if by_event else dimension - DIMENSIONS + 1
+        draw = choice(scratch.state, scratch.shift, dimension, noise, turn)
         d, mask, alone, within, is_event, kept, drawn = scatter(
             scene, triangle, place, u, v, d, mask, alone, nm, draw, noise, depth, scratch.field
         )
         depth += is_event
-        dimension += drawn
+        dimension += is_event if by_event else drawn
         tally[ABSORBED] += watt * (1.0 - kept)
         watt *= kept
         if watt <= 0.0:
@@ -136,7 +138,7 @@ def trace(
         noise = mixed(sequence.key ^ mixed(np.uint64(i)))
         dimension = FIRST_CHOICE if domain.extended else FIRST_CHOICE - 2
         fate, place, d, triangle, u, v, watt = _follow(
-            scene, place, d, nm, watt, noise, dimension, max_depth, tally, scratch
+            scene, place, d, nm, watt, noise, dimension, False, max_depth, tally, scratch
         )
         tally[fate] += watt
         if fate == DEPOSITED:
@@ -170,9 +172,8 @@ def land(
         if watt <= 0.0:
             continue
         noise = mixed(sequence.key ^ mixed(np.uint64(i)))
-        dimension = FIRST_CHOICE if domain.extended else FIRST_CHOICE - 2
         fate, place, d, triangle, _, _, watt = _follow(
-            scene, place, d, nm, watt, noise, dimension, max_depth, tally, scratch
+            scene, place, d, nm, watt, noise, FIRST_CHOICE, True, max_depth, tally, scratch
         )
         if fate == DEPOSITED:
             at = side[scene.owner[triangle], side_met(scene, triangle, place, d)]
