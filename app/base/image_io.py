@@ -1,4 +1,4 @@
-"""Pictures to and from files; the suffix chooses the format.
+"""Pictures to and from files; the suffix chooses the format, a row of `FORMATS`.
 
 | suffix | content |
 |---|---|
@@ -17,7 +17,7 @@ import errno
 import io
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -30,11 +30,6 @@ from .glare import with_glare
 from .primaries import REC709
 from .tone_map import auto_exposure, srgb_eotf, tone_map_8bit
 
-SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".exr", ".npy")
-SHOWN_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp")
-"""Suffixes of pictures for looking at: tone mapped, 8 bits."""
-LARGEST_WEBP_SIDE = 16383
-"""Pixels a side that the format can say."""
 MAX_PIXELS = 1 << 26
 """Of a picture that is read; 805 MB as float32: a mistake rather than a wish."""
 _HUGE = 1e30
@@ -56,6 +51,38 @@ class Picture:
     """Sentences on what was assumed."""
     is_converted: bool = False
     """From other primaries, so that colours may lie outside of Rec.709."""
+
+
+@dataclass(frozen=True)
+class Extras:
+    """What a file may hold besides its pixels; a format that has no place for it leaves it out."""
+
+    texts: Mapping[str, str] = field(default_factory=dict)
+    channels: Mapping[str, np.ndarray] = field(default_factory=dict)
+    """Spectral ones, each float32 (H, W)."""
+    bin_edges_nm: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class PictureFormat:
+    """A kind of picture file."""
+
+    suffixes: tuple[str, ...]
+    """Of its files; the first is offered."""
+    write: Callable[[Path | io.BytesIO, np.ndarray, Extras], None]
+    """Gets sRGB codes, uint8 (H, W, 3), of a picture to look at, and float32 linear Rec.709 otherwise."""
+    read: Callable[[Path, str], Picture] | None = None
+    """Gets the name of a layer as well; None: such files are not read."""
+    is_shown: bool = True
+    """Whether its pictures are for looking at: tone mapped, 8 bits."""
+    holds_spectrum: bool = False
+    largest_side: int | None = None
+    """Pixels that it can say."""
+
+
+def format_of(path: Path | str) -> PictureFormat:
+    """The format that a file's suffix names; raises `UserError` where it is none."""
+    return _BY_SUFFIX[check_suffix(path)]
 
 
 def check_suffix(path: Path | str) -> str:
@@ -106,24 +133,18 @@ def write_into(
 ) -> None:
     """As `write_image`, into a file that the caller got from `atomic_outputs`, together with others; `name`: what
     messages call it."""
-    suffix = part.suffix.lower()
     rgb = np.ascontiguousarray(rgb, np.float32)
     if rgb.ndim != 3 or rgb.shape[2] != 3 or 0 in rgb.shape:
         raise ValueError(f"a picture is (H, W, 3) and not empty, got {rgb.shape}")
     check_finite(name or part.name, rgb, spectral)
     metadata = dict(metadata or {})
-    if suffix == ".png":
-        _write_png(part, rgb, exposure_ev or 0.0, metadata, glare, antialias)
-    elif suffix in SHOWN_SUFFIXES:
-        ev = auto_exposure(rgb) + (exposure_ev or 0.0)
-        save_codes(part, tone_map_8bit(with_glare(rgb, glare), ev, antialias))
-    elif suffix == ".exr":
-        _write_exr(part, rgb, _spectral_channels(rgb, spectral, bin_edges_nm), bin_edges_nm, metadata)
+    kind = format_of(part)
+    check_side(name or part, (rgb.shape[1], rgb.shape[0]), kind.largest_side)
+    if kind.is_shown:
+        codes, texts = _developed(rgb, exposure_ev or 0.0, glare, antialias)
+        kind.write(part, codes, Extras(texts | metadata))
     else:
-        with part.open("wb") as file:
-            # Not np.save: the error of its tofile does not say that the disk is full.
-            np.lib.format.write_array_header_1_0(file, np.lib.format.header_data_from_array_1_0(rgb))
-            file.write(rgb.data)
+        kind.write(part, rgb, Extras(metadata, _spectral_channels(rgb, spectral, bin_edges_nm), bin_edges_nm))
 
 
 def check_finite(name: str, *pictures: np.ndarray | None) -> None:
@@ -141,26 +162,29 @@ def png_bytes(rgb: np.ndarray, exposure_ev: float = 0.0, glare: float = 0.0, ant
     """The .png that `write_image` would write of `rgb`, float32 (H, W, 3)."""
     check_finite("the picture", rgb)
     buffer = io.BytesIO()
-    _write_png(buffer, rgb, exposure_ev, {}, glare, antialias)
+    codes, texts = _developed(rgb, exposure_ev, glare, antialias)
+    _write_png(buffer, codes, Extras(texts))
     return buffer.getvalue()
 
 
+def _developed(rgb: np.ndarray, exposure_ev: float, glare: float, antialias: bool) -> tuple[np.ndarray, dict[str, str]]:
+    """sRGB codes of a picture to look at, and how it was exposed."""
+    ev = auto_exposure(rgb) + exposure_ev
+    return tone_map_8bit(with_glare(rgb, glare), ev, antialias), {"Exposure": f"{ev:+.3f} EV"}
+
+
 def read_image(path: Path | str, layer: str = "") -> Picture:
-    """Read a .png, .exr (of it a layer) or .npy picture; raises `UserError` when it is missing or is not one."""
+    """Read a picture, of an .exr a layer; raises `UserError` when it is missing or is not one."""
     path = Path(path)
     suffix = path.suffix.lower()
-    readers: dict[str, Callable[[], Picture]] = {
-        ".png": lambda: _read_png(path),
-        ".exr": lambda: _read_exr(path, layer),
-        ".npy": lambda: _read_npy(path),
-    }
-    if suffix not in readers:
-        raise UserError(f"cannot read {path}: '{suffix}' cannot be read; use one of {', '.join(readers)}")
+    kind = _BY_SUFFIX.get(suffix)
+    if kind is None or kind.read is None:
+        raise UserError(f"cannot read {path}: '{suffix}' cannot be read; use one of {', '.join(READ_SUFFIXES)}")
     if not os.path.exists(path):
         raise UserError(f"cannot read {path}: there is no such file; check the name")
     try:
         files.check_regular(path, files.DATA_BYTES)
-        return readers[suffix]()
+        return kind.read(path, layer)
     except (OSError, EOFError, ValueError, RuntimeError, KeyError, TypeError, SyntaxError, MemoryError) as error:
         raise UserError(
             f"cannot read {path}: it is not a whole {suffix[1:].upper()} picture ({files.reason_of(error)}); write it "
@@ -178,46 +202,55 @@ def channel_name(wavelength_nm: float) -> str:
 
 def save_codes(path: Path, codes: np.ndarray) -> None:
     """Save sRGB codes uint8 (H, W, 3) in the format of the suffix, one of `SHOWN_SUFFIXES`."""
-    from PIL import Image
-
-    suffix = path.suffix.lower()
-    if suffix == ".png":
-        _save_png(path, codes, {})
-    elif suffix == ".webp":
-        check_webp_size(path, (codes.shape[1], codes.shape[0]))
-        # Without loss: its other way halves the resolution of colours, and those of a caustic change from pixel to
-        # pixel. `quality` is how hard it tries.
-        Image.fromarray(codes).save(path, format="WEBP", lossless=True, quality=50, method=3)
-    else:
-        # Colours at full resolution: those of a caustic change from pixel to pixel.
-        Image.fromarray(codes).save(path, format="JPEG", quality=95, subsampling=0)
+    kind = format_of(path)
+    check_side(path, (codes.shape[1], codes.shape[0]), kind.largest_side)
+    kind.write(path, codes, Extras())
 
 
-def _write_png(
-    file: Path | io.BytesIO,
-    rgb: np.ndarray,
-    exposure_ev: float,
-    metadata: dict[str, str],
-    glare: float,
-    antialias: bool,
-) -> None:
-    ev = auto_exposure(rgb) + exposure_ev
-    codes = tone_map_8bit(with_glare(rgb, glare), ev, antialias)
-    _save_png(file, codes, {"Exposure": f"{ev:+.3f} EV", **metadata})
+def check_side(path: Path | str, size: tuple[int, int], largest: int | None) -> None:
+    """Raise `UserError` where a picture or film of `size` has more pixels a side than its format can say."""
+    if largest is not None and max(size) > largest:
+        raise UserError(
+            f"cannot write {path}: a {Path(path).suffix[1:].upper()} file has at most {largest} pixels a side, not "
+            f"{size[0]}×{size[1]}; choose a smaller size or another format"
+        )
 
 
-def _save_png(file: Path | io.BytesIO, codes: np.ndarray, texts: dict[str, str]) -> None:
+def _write_png(file: Path | io.BytesIO, codes: np.ndarray, extras: Extras) -> None:
     from PIL import Image, PngImagePlugin
 
-    chunks = PngImagePlugin.PngInfo()
-    for key, value in texts.items():
-        chunks.add_itxt(key, str(value))
-    chunks.add(b"sRGB", b"\x00")  # rendering intent: perceptual
+    texts = PngImagePlugin.PngInfo()
+    for key, value in extras.texts.items():
+        texts.add_itxt(key, str(value))
+    texts.add(b"sRGB", b"\x00")  # rendering intent: perceptual
     # Level 6 is three times smaller than 1 on caustics and still takes less than a tone map.
-    Image.fromarray(codes).save(file, format="PNG", pnginfo=chunks, compress_level=6)
+    Image.fromarray(codes).save(file, format="PNG", pnginfo=texts, compress_level=6)
 
 
-def _read_png(path: Path) -> Picture:
+def _write_jpeg(file: Path | io.BytesIO, codes: np.ndarray, extras: Extras) -> None:
+    from PIL import Image
+
+    # Colours at full resolution: those of a caustic change from pixel to pixel.
+    Image.fromarray(codes).save(file, format="JPEG", quality=95, subsampling=0)
+
+
+def _write_webp(file: Path | io.BytesIO, codes: np.ndarray, extras: Extras) -> None:
+    from PIL import Image
+
+    # Without loss: its other way halves the resolution of colours, and those of a caustic change from pixel to pixel.
+    # `quality` is how hard it tries.
+    Image.fromarray(codes).save(file, format="WEBP", lossless=True, quality=50, method=3)
+
+
+def _write_npy(path: Path | io.BytesIO, rgb: np.ndarray, extras: Extras) -> None:
+    assert isinstance(path, Path)
+    with path.open("wb") as file:
+        # Not np.save: the error of its tofile does not say that the disk is full.
+        np.lib.format.write_array_header_1_0(file, np.lib.format.header_data_from_array_1_0(rgb))
+        file.write(rgb.data)
+
+
+def _read_png(path: Path, layer: str) -> Picture:
     from PIL import Image
 
     with Image.open(path, formats=("PNG",)) as image:
@@ -241,24 +274,18 @@ def _spectral_channels(
     }
 
 
-def _write_exr(
-    path: Path,
-    rgb: np.ndarray,
-    spectral: dict[str, np.ndarray],
-    bin_edges_nm: np.ndarray | None,
-    metadata: dict[str, str],
-) -> None:
+def _write_exr(path: Path | io.BytesIO, rgb: np.ndarray, extras: Extras) -> None:
     import OpenEXR
 
-    header: dict[str, object] = {str(key): str(value) for key, value in metadata.items()}
+    header: dict[str, object] = {str(key): str(value) for key, value in extras.texts.items()}
     header |= {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     header["chromaticities"] = REC709
     channels = {name: np.ascontiguousarray(rgb[:, :, i]) for i, name in enumerate("RGB")}
-    if spectral:
+    if extras.channels:
         header |= {"spectralLayoutVersion": "1.0", "emissiveUnits": "W.m^-2.sr^-1"}
         # A channel's name only tells the bin's centre; the values are integrals over the bin.
-        header["spectralBinEdgesNm"] = " ".join(f"{edge:.9g}" for edge in np.asarray(bin_edges_nm))
-        channels |= spectral
+        header["spectralBinEdgesNm"] = " ".join(f"{edge:.9g}" for edge in np.asarray(extras.bin_edges_nm))
+        channels |= extras.channels
     try:
         with OpenEXR.File(header, channels) as file:
             file.write(str(path))
@@ -278,7 +305,7 @@ def _read_exr(path: Path, layer: str) -> Picture:
     return Picture(held.rgb, spectral, wavelengths if waves else None, held.texts, held.notes, held.is_converted)
 
 
-def _read_npy(path: Path) -> Picture:
+def _read_npy(path: Path, layer: str) -> Picture:
     rgb = files.read_npy(path)
     if rgb.ndim != 3 or rgb.shape[2] != 3:
         raise ValueError(f"its shape is {rgb.shape}, not (H, W, 3)")
@@ -293,10 +320,19 @@ def _check_pixels(width: int, height: int) -> None:
         raise ValueError(f"{width} × {height} pixels are more than {MAX_PIXELS >> 20} million")
 
 
-def check_webp_size(path: Path, size: tuple[int, int]) -> None:
-    """Raise `UserError` where `path` is a WebP, still or animated, that cannot be as large."""
-    if path.suffix.lower() == ".webp" and max(size) > LARGEST_WEBP_SIDE:
-        raise UserError(
-            f"cannot write {path}: a WebP has at most {LARGEST_WEBP_SIDE} pixels a side, not {size[0]}×{size[1]}; "
-            "choose a smaller size or another format"
-        )
+FORMATS = (
+    PictureFormat((".png",), _write_png, _read_png),
+    PictureFormat((".jpg", ".jpeg"), _write_jpeg),
+    PictureFormat((".webp",), _write_webp, largest_side=16383),
+    PictureFormat((".exr",), _write_exr, _read_exr, is_shown=False, holds_spectrum=True),
+    PictureFormat((".npy",), _write_npy, _read_npy, is_shown=False),
+)
+"""What pictures are written as; every list of formats that a user meets follows from it."""
+_BY_SUFFIX = {suffix: each for each in FORMATS for suffix in each.suffixes}
+SUFFIXES = tuple(_BY_SUFFIX)
+SHOWN_SUFFIXES = tuple(suffix for suffix, each in _BY_SUFFIX.items() if each.is_shown)
+"""Suffixes of pictures for looking at: tone mapped, 8 bits."""
+SPECTRAL_SUFFIXES = tuple(suffix for suffix, each in _BY_SUFFIX.items() if each.holds_spectrum)
+READ_SUFFIXES = tuple(suffix for suffix, each in _BY_SUFFIX.items() if each.read is not None)
+OFFERED_SHOWN = tuple(each.suffixes[0] for each in FORMATS if each.is_shown)
+OFFERED_LINEAR = tuple(each.suffixes[0] for each in FORMATS if not each.is_shown)

@@ -10,6 +10,7 @@ import os
 import subprocess
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
@@ -18,25 +19,49 @@ import numpy as np
 from . import files
 from .atomic import atomic_output, check_writable
 from .errors import UserError
-from .image_io import check_webp_size
+from .image_io import check_side
 from .locks import locked
 
 MANIFEST = "animation.json"
-FILM_SUFFIXES = (".mp4", ".gif", ".webp")
-"""Suffixes of animations that are one file."""
-_HIGHEST_RATE = {".gif": 50.0, ".webp": 90.0}
-"""Frames a second; browsers slow down films whose frames are shown more briefly."""
-_ENCODERS = {
+
+
+@dataclass(frozen=True)
+class FilmFormat:
+    """A kind of animation that is one file."""
+
+    title: str
+    encoder: str
+    """Arguments of ffmpeg."""
+    highest_rate: float = math.inf
+    """Frames a second; browsers slow down films whose frames are shown more briefly."""
+    largest_side: int | None = None
+    """Pixels that it can say."""
+
+
+FILMS = {
     # Players want even sides; an odd one gets a black line. The colour space is named, so that colours come out as they
     # went in.
-    ".mp4": "-vf pad=ceil(iw/2)*2:ceil(ih/2)*2,scale=out_color_matrix=bt709:out_range=tv -c:v libx264 -preset medium "
-    "-crf 16 -pix_fmt yuv420p -colorspace bt709 -color_primaries bt709 -color_trc iec61966-2-1 "
-    "-movflags +faststart -f mp4",
+    ".mp4": FilmFormat(
+        "Movie (MP4)",
+        "-vf pad=ceil(iw/2)*2:ceil(ih/2)*2,scale=out_color_matrix=bt709:out_range=tv -c:v libx264 -preset medium "
+        "-crf 16 -pix_fmt yuv420p -colorspace bt709 -color_primaries bt709 -color_trc iec61966-2-1 "
+        "-movflags +faststart -f mp4",
+    ),
     # 256 colours chosen for each frame, dithered.
-    ".gif": "-lavfi split[a][b];[a]palettegen=stats_mode=single[p];[b][p]paletteuse=new=1:dither=floyd_steinberg "
-    "-loop 0 -f gif",
-    ".webp": "-c:v libwebp_anim -quality 90 -compression_level 4 -pix_fmt yuv420p -loop 0 -f webp",
+    ".gif": FilmFormat(
+        "GIF",
+        "-lavfi split[a][b];[a]palettegen=stats_mode=single[p];[b][p]paletteuse=new=1:dither=floyd_steinberg "
+        "-loop 0 -f gif",
+        highest_rate=50.0,
+    ),
+    ".webp": FilmFormat(
+        "Animated WebP",
+        "-c:v libwebp_anim -quality 90 -compression_level 4 -pix_fmt yuv420p -loop 0 -f webp",
+        highest_rate=90.0,
+        largest_side=16383,
+    ),
 }
+"""By suffix; every list of film formats that a user meets follows from it."""
 _CLAIM = ".claim"
 _DIGITS = 4
 _PNG_BEGIN, _PNG_END = b"\x89PNG\r\n\x1a\n", b"IEND\xaeB`\x82"
@@ -277,9 +302,10 @@ def _is_whole_png(path: Path) -> bool:
 
 
 def _arguments(suffix: str, size: tuple[int, int], fps: float) -> list[str]:
-    rate = min(fps, _HIGHEST_RATE.get(suffix, fps))
+    kind = FILMS[suffix]
+    rate = min(fps, kind.highest_rate)
     source = f"-loglevel error -f rawvideo -pix_fmt rgb24 -s {size[0]}x{size[1]} -r {rate:g} -i -"
-    return [*source.split(), *_ENCODERS[suffix].split()]
+    return [*source.split(), *kind.encoder.split()]
 
 
 def _ffmpeg() -> str:
@@ -301,9 +327,9 @@ def _last_line(told: bytes) -> str:
 def open_sink(
     path: Path, size: tuple[int, int], fps: float, description: Mapping[str, object], overwrite: bool = False
 ) -> Film | Frames:
-    """The sink that `path` asks for: one of `FILM_SUFFIXES`, or a folder (a name without a suffix). Raises
+    """The sink that `path` asks for: one of `FILMS`, or a folder (a name without a suffix). Raises
     `UserError`."""
-    if path.suffix.lower() in FILM_SUFFIXES:
+    if path.suffix.lower() in FILMS:
         return Film(path, size, fps)
     check_folder(path)
     return Frames(path, description, overwrite)
@@ -313,12 +339,13 @@ def check_folder(path: Path) -> None:
     """Raise `UserError` where `path` looks like a file's name."""
     if path.suffix and not os.path.isdir(path):
         raise UserError(
-            f"cannot write {path}: the suffix '{path.suffix}' is not an animation; use {', '.join(FILM_SUFFIXES)}, or "
+            f"cannot write {path}: the suffix '{path.suffix}' is not an animation; use {', '.join(FILMS)}, or "
             "a folder for PNGs"
         )
 
 
 def check_film(path: Path, size: tuple[int, int]) -> None:
     """Raise `UserError` where the film `path` of pictures of `size` could not be written at the end."""
-    check_webp_size(path, size)
+    kind = FILMS.get(path.suffix.lower())
+    check_side(path, size, kind.largest_side if kind else None)
     check_writable(path)

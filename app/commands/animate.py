@@ -35,7 +35,7 @@ class Plan:
 
 def plan_of(asked: Animate) -> Plan:
     """Everything checked; what was assumed is noted. Raises `UserError`."""
-    from ..base.movie import FILM_SUFFIXES
+    from ..base.movie import FILMS
     from ..edit.parameters import Stage
     from ..render.animate import description
 
@@ -43,7 +43,7 @@ def plan_of(asked: Animate) -> Plan:
         raise UserError(
             "--skip-existing and --overwrite exclude each other: keep the frames there are, or replace them"
         )
-    if asked.skip_existing and asked.output.suffix.lower() in FILM_SUFFIXES:
+    if asked.skip_existing and asked.output.suffix.lower() in FILMS:
         raise UserError(
             f"--skip-existing is for a folder of frames: a film ({asked.output.suffix}) is written in one go"
         )

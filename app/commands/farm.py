@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from ..base.errors import UserError
+from ..base.image_io import check_suffix
 from ..base.interrupts import interrupt_flag
 from .animate import plan_of
 from .bench import empty_result, kept_text, scenes_of, settings_of, write_and_show
@@ -52,8 +53,6 @@ def workers_of(asked: ByWorkers) -> int | None:
 
 def render(asked: FarmRender) -> int:
     """Render to a picture file; returns the exit code. Raises `UserError`."""
-    from ..base.image_io import check_suffix
-
     check_suffix(asked.output)
     workers_of(asked)
     scene_file = check_output(asked)
@@ -101,7 +100,7 @@ def _copied(tally: Tally) -> str:
 
 def animate(asked: FarmAnimate) -> int:
     """Render an animation; returns the exit code. Raises `UserError`."""
-    from ..base.movie import FILM_SUFFIXES, Frames, check_film, check_folder, open_sink
+    from ..base.movie import FILMS, Frames, check_film, check_folder, open_sink
 
     workers_of(asked)
     plan = plan_of(asked)
@@ -111,7 +110,7 @@ def animate(asked: FarmAnimate) -> int:
     from ..farm.jobs import held
     from ..farm.kinds import FramesJob
 
-    is_movie, started = asked.output.suffix.lower() in FILM_SUFFIXES, time.perf_counter()
+    is_movie, started = asked.output.suffix.lower() in FILMS, time.perf_counter()
     folder = asked.output.with_name(asked.output.name + ".frames") if is_movie else asked.output
     if is_movie:
         check_film(asked.output, size)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..base.errors import UserError
+from ..base.image_io import SHOWN_SUFFIXES, SPECTRAL_SUFFIXES, check_suffix, write_image
 from ..base.interrupts import interrupt_flag
 from ..base.process_age import process_age_s
 from ..model.scene import Scene
@@ -29,12 +30,15 @@ ENDING_SHARE = 0.7
 WRITING_SHARE = 1.4
 """The same of writing a million pixels."""
 _USED_BY = (
-    ("bins", (".exr", ".ssp"), "--bins: a {} picture holds no spectral channels; write an .exr to keep them"),
-    ("glare", None, "--glare does not change a {} file, which is linear; it is for pictures to look at"),
-    ("antialias_highlights", None, "--antialias-highlights does not change a {} file, which is linear"),
+    (
+        "bins",
+        (*SPECTRAL_SUFFIXES, ".ssp"),
+        "--bins: a {} file holds no spectral channels; write an .exr to keep them",
+    ),
+    ("glare", SHOWN_SUFFIXES, "--glare does not change a {} file, which is linear; it is for pictures to look at"),
+    ("antialias_highlights", SHOWN_SUFFIXES, "--antialias-highlights does not change a {} file, which is linear"),
 )
-"""Options with the suffixes of the formats that have a use for them (None: pictures to look at), and what is noted
-otherwise."""
+"""Options with the suffixes of the formats that have a use for them, and what is noted otherwise."""
 
 
 def render_picture(asked: Render) -> int:
@@ -42,7 +46,6 @@ def render_picture(asked: Render) -> int:
     starting_s = process_age_s() or START_S
     starting_s = starting_s if starting_s < FRESH_S else START_S
     begun = time.perf_counter() - starting_s
-    from ..base.image_io import check_suffix
     from ..base.progress import ProgressReporter
 
     # What costs nothing to check comes before the scene is read, and that before the device.
@@ -77,8 +80,6 @@ def render_picture(asked: Render) -> int:
 
 def write_result(asked: Render, scene: Scene, settings: RenderSettings, result: RenderResult) -> None:
     """Note what is to be said of a picture, and write it. Raises `UserError`."""
-    from ..base.image_io import write_image
-
     for notice in result.stats.notices:
         note(notice)
     write_image(
@@ -157,13 +158,11 @@ def _render_part(
 
 def _unused_options(asked: Render) -> list[str]:
     """A sentence for each option that the output's format has no use for."""
-    from ..base.image_io import SHOWN_SUFFIXES
-
     suffix = asked.output.suffix.lower()
     notes = [
         sentence.format(suffix)
         for name, suffixes, sentence in _USED_BY
-        if getattr(asked, name) is not None and suffix not in (suffixes or SHOWN_SUFFIXES)
+        if getattr(asked, name) is not None and suffix not in suffixes
     ]
     if asked.exposure is not None and suffix == ".ssp":
         notes.append("--exposure does not change a part; give it to 'merge'")

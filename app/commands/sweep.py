@@ -14,6 +14,7 @@ import numpy as np
 from ..base import files
 from ..base.atomic import atomic_output
 from ..base.errors import UserError
+from ..base.image_io import SHOWN_SUFFIXES, SPECTRAL_SUFFIXES, write_image
 from ..base.interrupts import interrupt_flag
 from ..model.settings import RenderSettings
 from .farm import run, workers_of
@@ -200,8 +201,6 @@ class SweepFolder:
     @property
     def shares_exposure(self) -> bool:
         """Whether pictures are for looking at."""
-        from ..base.image_io import SHOWN_SUFFIXES
-
         return self._suffix in SHOWN_SUFFIXES
 
     @property
@@ -211,7 +210,6 @@ class SweepFolder:
 
     def put(self, drawn: Drawn) -> None:
         """Write a point's picture, and note what it says of itself, each sentence once. Raises `UserError`."""
-        from ..base.image_io import write_image
         from ..base.tone_map import auto_exposure
 
         exposure = None
@@ -231,8 +229,8 @@ class SweepFolder:
             exposure_ev=exposure,
             glare=stage.scene.render.glare,
             antialias=stage.scene.render.antialias_highlights,
-            spectral=drawn.spectral if self._suffix == ".exr" else None,
-            bin_edges_nm=drawn.bin_edges_nm if self._suffix == ".exr" else None,
+            spectral=drawn.spectral if self._suffix in SPECTRAL_SUFFIXES else None,
+            bin_edges_nm=drawn.bin_edges_nm if self._suffix in SPECTRAL_SUFFIXES else None,
         )
 
     def _pictures(self) -> list[dict[str, object]]:

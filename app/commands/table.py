@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Literal
 
 from ..base import files
 from ..base.errors import UserError
+from ..base.image_io import OFFERED_LINEAR, OFFERED_SHOWN, SPECTRAL_SUFFIXES
+from ..base.movie import FILMS
 from ..model.geometry.mesh_normals import ROUND_DEG
 from ..model.scene_camera import FOCUS_DISTANCE, LENS_RADIUS
 from ..model.scene_render import HAZE, HAZE_ANISOTROPY, MAX_ANISOTROPY, MAX_BOUNCES, MAX_GLARE, MAX_HAZE
@@ -36,6 +38,16 @@ _exposure = options.number(
 )
 _seed, _spp = options.integer(0, options.MAX_SEED), options.integer(1, options.MAX_SPP)
 _bins = options.integer(options.MIN_BINS, options.MAX_BINS)
+
+
+def _either(*words: str) -> str:
+    return f"{', '.join(words[:-1])} or {words[-1]}"
+
+
+_SHOWN, _LINEAR = ", ".join(OFFERED_SHOWN), _either(*OFFERED_LINEAR)
+_NOT_LINEAR = f"not of {' and '.join(OFFERED_LINEAR)}"
+_SPECTRAL = ", ".join(SPECTRAL_SUFFIXES)
+_FORMATS = tuple(suffix[1:] for suffix in (*OFFERED_SHOWN, *OFFERED_LINEAR))
 _A_LENGTH = " a length in the scene's unit, for example 0.05"
 
 
@@ -158,7 +170,7 @@ class ByWorkers:
 class Render(OpensScene):
     """Render a scene to a picture file."""
 
-    output: Path = target("OUT", "The picture: .png, .jpg, .webp (to look at), .exr or .npy (linear, to work on).")
+    output: Path = target("OUT", f"The picture: {_SHOWN} (to look at), {_LINEAR} (linear, to work on).")
     size: tuple[int, int] | None = setting(
         "WxH", "Pixels, for example 1920x1080; default: the scene's.", options.size, fields=("width", "height")
     )
@@ -169,14 +181,14 @@ class Render(OpensScene):
     camera_method: str | None = shared(_CAMERA_METHOD)
     layer: str | None = setting("LAYER", "beauty (default), caustic, or map:RECEIVER.", complete=completion.layers)
     bins: int | None = setting(
-        "N", f"Keep {options.MIN_BINS} to {options.MAX_BINS} spectral bins (written to .exr).", _bins
+        "N", f"Keep {options.MIN_BINS} to {options.MAX_BINS} spectral bins (written to {_SPECTRAL}).", _bins
     )
     exposure: float | None = setting(
-        "EV", "Stops brighter (or darker) than automatic; not of .exr and .npy.", _exposure, fields=("exposure_ev",)
+        "EV", f"Stops brighter (or darker) than automatic; {_NOT_LINEAR}.", _exposure, fields=("exposure_ev",)
     )
     glare: float | None = setting(
         "SHARE",
-        "Share of the light that the lens scatters, 0 to 0.5; not of .exr and .npy.",
+        f"Share of the light that the lens scatters, 0 to 0.5; {_NOT_LINEAR}.",
         options.number(
             lambda value: 0.0 <= value <= MAX_GLARE, f"a share of 0 to {MAX_GLARE:g}", " a share, for example 0.03"
         ),
@@ -205,7 +217,7 @@ class Render(OpensScene):
         default=None,
     )
     antialias_highlights: bool | None = switch(
-        "Edges of what is overexposed without steps (default: as the scene has it; not of .exr and .npy).",
+        f"Edges of what is overexposed without steps (default: as the scene has it; {_NOT_LINEAR}).",
         flags=("--antialias-highlights/--no-antialias-highlights",),
         sets="render",
         default=None,
@@ -249,9 +261,9 @@ class Merge(ReadsScenes):
     parts: tuple[Path, ...] = argument(
         "PART.ssp...", "Parts that 'render --passes' wrote, or folders of them.", repeated=True
     )
-    output: Path = target("OUT", "The picture: .png, .exr or .npy; or .ssp, a part that holds them all.")
+    output: Path = target("OUT", f"The picture: {_SHOWN}, {_LINEAR}; or .ssp, a part that holds them all.")
     scene: str | None = option("SCENE", "The scene; default: the file that the parts were traced from.")
-    exposure: float | None = option("EV", "Stops brighter (or darker) than automatic; .png only.", _exposure)
+    exposure: float | None = option("EV", f"Stops brighter (or darker) than automatic; {_NOT_LINEAR}.", _exposure)
     partial: bool = switch("Make a noisier picture of the parts there are, where some are missing.")
     stats: bool = switch(_STATS)
 
@@ -260,7 +272,7 @@ class Merge(ReadsScenes):
 class Animate(OpensScene):
     """Render an animation: a turntable, or any parameters over time."""
 
-    output: Path = target("OUT", "A movie (.mp4, .gif or .webp), or a folder for numbered PNGs, which can be resumed.")
+    output: Path = target("OUT", f"A movie ({_either(*FILMS)}), or a folder for numbered PNGs, which can be resumed.")
     turntable: bool = switch("Turn the camera once about its target; what happens when nothing else is asked for.")
     keys: Path | None = option(
         "FILE.toml", "Keys of any parameter: tables named keys with time_s, parameter, value, interpolation."
@@ -317,14 +329,14 @@ class Sweep(ByWorkers, OpensScene):
     )
     format: str = option(
         "NAME",
-        "png (default), jpg, webp, exr or npy.",
-        options.one_of("png", "jpg", "webp", "exr", "npy"),
+        f"{_either(*_FORMATS)}; default: png.",
+        options.one_of(*_FORMATS),
         default="png",
     )
     size: tuple[int, int] | None = shared(_SIZE)
     photons: int | None = setting("N", "Photons of each tracing; default: the scene's.", options.photons)
     spp: int | None = setting("N", "Camera samples a pixel; default: 32.", _spp)
-    bins: int | None = setting("N", "Keep spectral bins (written to .exr); every point is then traced.", _bins)
+    bins: int | None = setting("N", f"Keep spectral bins (written to {_SPECTRAL}); every point is then traced.", _bins)
     exposure: float | None = option(
         "EV", "Stops brighter (or darker) than is automatic in the first picture.", _exposure
     )
@@ -384,7 +396,7 @@ class Bake(BakesCaustic):
     receiver: str = argument("RECEIVER", "The diffuse object whose caustic is baked.", complete=completion.receivers)
     output: Path = target(
         "OUT",
-        "The texture: .exr or .npy (linear irradiance), .png (to look at); where it lies is written to a .json "
+        f"The texture: {_LINEAR} (linear irradiance), {_SHOWN} (to look at); where it is placed is written to a .json "
         "beside it.",
     )
 

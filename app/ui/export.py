@@ -12,7 +12,7 @@ import numpy as np
 from ..base.atomic import check_writable
 from ..base.errors import UserError
 from ..base.glare import with_glare
-from ..base.image_io import check_suffix, write_image
+from ..base.image_io import SPECTRAL_SUFFIXES, check_suffix, write_image
 from ..base.memory import MAX_SIDE_PX, check_picture_memory
 from ..edit import requests
 from ..edit.parameters import Stage
@@ -184,8 +184,8 @@ def _spectral(
 ) -> Iterator[float]:
     from ..render.frames import FrameRenderer
 
-    if check_suffix(path) != ".exr":
-        raise UserError(f"cannot write {path}: spectral channels need an .exr")
+    if check_suffix(path) not in SPECTRAL_SUFFIXES:
+        raise UserError(f"cannot write {path}: spectral channels need {' or '.join(SPECTRAL_SUFFIXES)}")
     check_writable(path)
     check_picture_memory(*state.viewport_size, SPECTRAL_BINS)
     settings = _settings(

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..base.atomic import check_writable
 from ..base.errors import UserError
-from ..base.image_io import SHOWN_SUFFIXES, check_finite, check_suffix, write_image
+from ..base.image_io import SHOWN_SUFFIXES, SPECTRAL_SUFFIXES, check_finite, check_suffix, write_image
 from ..base.memory import check_picture_memory
 from ..edit.requests import RenderPicture
 from ..model.settings import RenderSettings
@@ -61,8 +61,9 @@ def render_picture(
     """Shares of the work from 0 to 1; files are written whole at its end. `write_shown`: writes a linear picture as the
     window shows it. Raises `UserError` before the first share for what cannot be rendered or written."""
     suffix = check_suffix(request.path)
-    if request.bins is not None and suffix != ".exr":
-        raise UserError(f"cannot write spectral bins to {request.path.name}: choose a name that ends in .exr")
+    if request.bins is not None and suffix not in SPECTRAL_SUFFIXES:
+        names = " or ".join(SPECTRAL_SUFFIXES)
+        raise UserError(f"cannot write spectral bins to {request.path.name}: choose a name that ends in {names}")
     if request.caustic and request.seconds is not None:
         raise UserError("a caustic layer needs a number of photons, not a time: its samples come on top")
     targets = [request.path, *([layer_path(request.path, "caustic")] if request.caustic else [])]

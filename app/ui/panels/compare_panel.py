@@ -9,6 +9,7 @@ import numpy as np
 from imgui_bundle import imgui, implot
 
 from ...base.colour_maps import ERROR, sample
+from ...base.image_io import READ_SUFFIXES
 from ...edit.requests import ComputeReference
 from ...edit.state import Compare, CompareMode, State
 from .. import item_rects, theme
@@ -38,7 +39,6 @@ _TIPS = {
     "file": "A picture from a file, such as another program's of the same view.",
 }
 _GLASSES = ("N-BK7", "F2", "N-SF11", "N-SF66", "water", "diamond")
-FILES = (".exr", ".npy", ".png")
 _QUESTION = "compare with"
 ERROR_RANGE = 0.5
 """Relative error at the ends of the map's scale (`passes.display.ERROR_RANGE`)."""
@@ -134,7 +134,7 @@ def _file(compare: Compare, view_model: ViewModel) -> Compare:
     tip = "A picture to compare with: .exr and .npy are linear, .png is read as displayed."
     if widgets.file_field("File", name, tip=tip):
         folder = view_model.path.parent if view_model.path is not None else Path.home()
-        file_browser.ask(file_browser.Question(_QUESTION, "Compare with", FILES, compare.file or folder))
+        file_browser.ask(file_browser.Question(_QUESTION, "Compare with", READ_SUFFIXES, compare.file or folder))
     path = file_browser.take(_QUESTION)
     return compare if path is None else replace(compare, file=path)
 

@@ -8,6 +8,8 @@ from typing import Literal
 
 from imgui_bundle import imgui
 
+from ...base.image_io import OFFERED_LINEAR, OFFERED_SHOWN, SPECTRAL_SUFFIXES
+from ...base.movie import FILMS
 from ...edit.requests import Animate, Bake, CancelJob, Screenshot
 from ...edit.state import State
 from ..view_model import ViewModel
@@ -17,14 +19,7 @@ SIZES = {size: words for size, words in render_section.SIZES.items() if size != 
 MAP_SIZES = {"512x512": "512 × 512", "1024x1024": "1024 × 1024", "2048x2048": "2048 × 2048", "4096x4096": "4096 × 4096"}
 PHOTONS = render_section.PHOTONS
 _KINDS = {"turntable": "Turntable", "keys": "Keys"}
-_FORMATS = {"mp4": "Movie (MP4)", "gif": "GIF", "webp": "Animated WebP", "png": "Sequence (PNG)"}
-_FILMS = {
-    "mp4": (".mp4", ".gif", ".webp"),
-    "gif": (".gif", ".mp4", ".webp"),
-    "webp": (".webp", ".mp4", ".gif"),
-    "png": (".png",),
-}
-"""Endings by format: that of a film decides what it becomes, as those of pictures do."""
+_FORMATS = {suffix: film.title for suffix, film in FILMS.items()} | {".png": "Sequence (PNG)"}
 
 
 @dataclass
@@ -37,7 +32,7 @@ class _Choices:
     map_size: str = "1024x1024"
     map_photons: str = "4000000"
     kind: Literal["turntable", "keys"] = "turntable"
-    format: str = "mp4"
+    format: str = ".mp4"
     frames: int = 120
     fps: float = 24.0
     size: str = "viewport"
@@ -120,11 +115,11 @@ def _screenshot(view_model: ViewModel, idle: bool) -> None:
             "With interface", _choices.with_interface, tip="The whole window as it is on the screen (PNG)."
         )
     suffixes = (
-        (".exr",)
+        SPECTRAL_SUFFIXES
         if _choices.spectral
         else (".png",)
         if _choices.with_interface
-        else (".png", ".jpg", ".webp", ".exr", ".npy")
+        else (*OFFERED_SHOWN, *OFFERED_LINEAR)
     )
     tip = "PNG: as displayed. EXR and NPY: linear Rec.709 radiance, lm/(sr unit²), without tone curve."
     if widgets.button("Save screenshot…", tip=tip, enabled=idle or not _choices.spectral, width=-1):
@@ -155,7 +150,7 @@ def _bake(state: State, view_model: ViewModel, idle: bool) -> None:
         "where the texture lies in the world."
     )
     if widgets.button("Bake map…", tip=tip, enabled=idle, width=-1):
-        _ask("bake", "Bake caustic map", (".exr", ".png", ".npy"), view_model, f"_{_choices.receiver}")
+        _ask("bake", "Bake caustic map", (*OFFERED_LINEAR, *OFFERED_SHOWN), view_model, f"_{_choices.receiver}")
 
 
 def _animation(state: State, view_model: ViewModel, idle: bool) -> State:
@@ -204,11 +199,17 @@ def _animation(state: State, view_model: ViewModel, idle: bool) -> State:
         _ask(
             "animate",
             "Render animation",
-            _FILMS[_choices.format],
+            _suffixes(_choices.format),
             view_model,
             f"_{_choices.kind}",
         )
     return state
+
+
+def _suffixes(chosen: str) -> tuple[str, ...]:
+    """Endings that are offered, the chosen one first: that of a film decides what it becomes, as those of pictures
+    do."""
+    return (chosen, *(suffix for suffix in FILMS if suffix != chosen)) if chosen in FILMS else (chosen,)
 
 
 def _ask(identity: str, title: str, suffixes: tuple[str, ...], view_model: ViewModel, what: str = "") -> None:
@@ -229,7 +230,7 @@ def _answers(state: State) -> State:
     path = file_browser.take("export animate")
     if path is not None:
         # A sequence is a folder: the name that was given, without its ending.
-        target = path.with_suffix("") if _choices.format == "png" else path
+        target = path.with_suffix("") if _choices.format == ".png" else path
         frames = None if _choices.kind == "keys" else _choices.frames
         size = None if _choices.size == "viewport" else _size(_choices.size, (960, 540))
         state = state.asking(Animate(target, _choices.kind, frames, _choices.fps, size, int(_choices.photons)))

@@ -18,6 +18,7 @@ from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
 from ...base.errors import suggestion
+from ...base.image_io import SUFFIXES
 from ...base.paths import SCENE_SUFFIXES
 from .. import item_rects, theme
 from . import widgets
@@ -63,7 +64,7 @@ class _Browser:
 
 _browser = _Browser()
 _OVERWRITE = "Replace file?"
-_OWN_FORMATS = (".exr", ".npy", ".hdr", ".webp", ".json", ".ies", ".ldt", *SCENE_SUFFIXES)
+_OWN_FORMATS = (*SUFFIXES, ".hdr", ".json", ".ies", ".ldt", *SCENE_SUFFIXES)
 """Kinds of files that Python's table lacks, or has on some systems only."""
 
 

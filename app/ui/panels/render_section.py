@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from ...base.image_io import OFFERED_LINEAR, OFFERED_SHOWN, SPECTRAL_SUFFIXES
 from ...edit.requests import RenderPicture
 from ...edit.state import State
 from ..view_model import ViewModel
@@ -74,7 +75,7 @@ def draw_render(state: State, view_model: ViewModel, idle: bool) -> State:
     _, _choices.spectral = widgets.toggle(
         "Spectral bins##render", _choices.spectral, tip="Write an EXR with 20 spectral channels beside its colours."
     )
-    suffixes = (".exr",) if _choices.spectral else (".png", ".jpg", ".webp", ".exr", ".npy")
+    suffixes = SPECTRAL_SUFFIXES if _choices.spectral else (*OFFERED_SHOWN, *OFFERED_LINEAR)
     tip = "Choose a name, then render with the present view. How long it takes is shown while it works."
     if widgets.button("Render…", tip=tip, enabled=idle, width=-1):
         proposed = file_browser.beside(view_model.path, Path(view_model.title).stem, suffixes[0])
