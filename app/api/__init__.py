@@ -52,7 +52,7 @@ def load(source: str | os.PathLike[str] | Mapping[str, Any]) -> Scene:
     """The scene in a file (.toml, .glb, .gltf, or a mesh: .ply, .obj, .stl), a shipped one by its name ("prism"), or
     one from its tables in a dictionary.
 
-    Raises `UserError`, in one sentence with file, key and remedy, for anything that cannot be rendered as it stands.
+    Raises `UserError`, in one sentence with file, key and remedy, for anything that cannot be rendered.
     """
     if isinstance(source, Mapping):
         return Scene(source)

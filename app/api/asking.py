@@ -1,4 +1,4 @@
-"""What a caller asks for, checked as the command line checks it and with its sentences."""
+"""Arguments of renderings, checked as the command line checks its options and with its sentences."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ Count = int | float | str
 """A whole number; "4M" is understood as well."""
 
 
-def settings_of(scene: Scene, **asked: object) -> RenderSettings:
-    """The settings of a rendering of `scene`; `asked` by the names of `render`'s options, None for what was not said.
+def settings_of(scene: Scene, **arguments: object) -> RenderSettings:
+    """The settings of a rendering of `scene`; `arguments` by the names of `render`'s options, None: not given.
     Raises `UserError`."""
     check_scene(scene)
-    texts = {name: _text(name, value) for name, value in asked.items() if value is not None}
+    texts = {name: _text(name, value) for name, value in arguments.items() if value is not None}
     try:
         values = options.read(Render, {"scene": scene.name, "output": "", **texts})
         return picture_settings(values, scene._model, True)

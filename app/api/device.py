@@ -1,4 +1,4 @@
-"""OpenGL beside whatever the caller does with it: every rendering has a thread and a context of its own.
+"""OpenGL, whatever else the caller does with it: every rendering has a thread and a context of its own.
 
 A context is current in one thread: what is done here neither sees the caller's own moderngl context nor takes it away.
 Callbacks run in the caller's thread, between the worker's steps.
@@ -21,11 +21,11 @@ if TYPE_CHECKING:
 Progress = Callable[[float, str], object]
 """Called with the share done, 0 to 1, and what is being done."""
 Cancel = Callable[[], bool]
-"""Asked now and then; once it answers true, what was done so far is the result."""
+"""Called now and then; once it returns true, what was done so far is the result."""
 
 T = TypeVar("T")
 Work = Callable[["Context", Callable[[float, str], None], Callable[[], bool]], T]
-_ASK_EVERY_S = 0.1
+_CALL_EVERY_S = 0.1
 
 
 class Device:
@@ -43,14 +43,14 @@ class Device:
     def run(self, work: Work[T], progress: Progress | None = None, cancel: Cancel | None = None) -> T:
         """What `work(context, report, stopped)` gives, done in the thread; an exception in a callback, Ctrl-C too,
         waits for the step that runs and is raised then."""
-        told: SimpleQueue[tuple[float, str] | None] = SimpleQueue()
+        events: SimpleQueue[tuple[float, str] | None] = SimpleQueue()
         stop = Event()
-        future = self._pool.submit(work, self._context, lambda share, text: told.put((share, text)), stop.is_set)
-        future.add_done_callback(lambda _: told.put(None))
+        future = self._pool.submit(work, self._context, lambda share, text: events.put((share, text)), stop.is_set)
+        future.add_done_callback(lambda _: events.put(None))
         try:
             while True:
                 try:
-                    news = told.get(timeout=_ASK_EVERY_S)
+                    news = events.get(timeout=_CALL_EVERY_S)
                 except Empty:
                     pass
                 else:
@@ -87,7 +87,7 @@ class Device:
 
 
 def _context() -> Context:
-    """A context of our own; `moderngl.get_context()` goes on to mean the caller's."""
+    """A context of our own; `moderngl.get_context()` still returns the caller's."""
     import moderngl
 
     from ..gpu.context import create_context

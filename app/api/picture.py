@@ -23,7 +23,7 @@ class Statistics:
     """What was done for a picture."""
 
     photons: int
-    """Photons that the picture stands for."""
+    """Photons that the picture was made of."""
     photons_traced: int
     """Of those, traced for this picture; the others were kept from an earlier one (`Session`)."""
     camera_samples: int
@@ -37,7 +37,7 @@ class Statistics:
     stopped: bool = False
     """`cancel` answered true: the picture holds what was done by then."""
     notices: tuple[str, ...] = ()
-    """What the command line would say without being asked: light that was lost, lights that reached nothing."""
+    """What the command line would note: light that was lost, lights that reached nothing."""
     flux: Mapping[str, float] = field(default_factory=dict)
     """How light ended, as shares of what was emitted: "deposited", "escaped", … ; empty for a `Session`."""
 
@@ -49,7 +49,7 @@ class _Image:
     rgb: Floats
     """float32 (H, W, 3), linear Rec.709, top row first, not clipped."""
     spectral: Floats | None
-    """float32 (H, W, bins), or None where no bins were asked for."""
+    """float32 (H, W, bins), or None without `bins`."""
     bin_edges_nm: NDArray[np.float64] | None
     """float64 (bins + 1,), rising."""
     stats: Statistics
@@ -95,7 +95,7 @@ class Picture(_Image):
     """A rendered picture: `rgb` is radiance, lm/(sr unit²) for white, `spectral` W/(sr unit²) per bin."""
 
     layers: Mapping[str, Floats]
-    """float32 (H, W, 3) by name, of those that were asked for; the first of them is `rgb`."""
+    """float32 (H, W, 3) by name, of the layers that were given; the first of them is `rgb`."""
     exposure_ev: float = 0.0
     """Stops on top of the automatic exposure, as the scene has it; for `to_png` only."""
     glare: float = 0.0
@@ -139,7 +139,7 @@ class CausticMap(_Image):
     receiver: str
     """The object's name."""
     placement: Mapping[str, object]
-    """Where it lies. `kind` "rectangle": `corners_world` (`bottom_left`, `bottom_right`, `top_right`, `top_left`, three
+    """Its placement. `kind` "rectangle": `corners_world` (`bottom_left`, `bottom_right`, `top_right`, `top_left`, three
     numbers each), `normal_world`, `size_units` and `texel_size_units` (two numbers each). `kind` "charts" (curved
     receivers): `triangle_uv`, texture coordinates (0, 0 upper left) of the corners of every triangle of `mesh`."""
     _scene: Scene = field(repr=False, kw_only=True)
@@ -148,7 +148,7 @@ class CausticMap(_Image):
         self, path: str | os.PathLike[str], *, plane: bool = False, source: Sequence[float] | None = None
     ) -> Path:
         """Write it for other programs, as `spectrasplat export` does: the receiver glowing with its caustic (.glb,
-        .gltf; .usda, .usdc, .usd), or a spot light's cookie (.png, .exr), and their numbers to a .json beside it.
+        .gltf; .usda, .usdc, .usd), or a spot light's cookie (.png, .exr), and their numbers to a .json next to it.
 
         `plane`: only the rectangle that is lit, as bright as on a white receiver. `source`: where the cookie's spot
         stands (three numbers). Raises `UserError`.

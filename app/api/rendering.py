@@ -45,7 +45,7 @@ def render(
     look at. `max_depth`: specular events on a light path at most. `spp`: camera samples a pixel. `batch`: photons in
     flight at once, which never changes the picture. Pictures are those of `spectrasplat render`, to the bit.
 
-    `progress(share, text)` is called now and then; once `cancel()` answers true, the picture is what was done by then.
+    `progress(share, text)` is called now and then; once `cancel()` returns true, the picture is what was done by then.
     Raises `UserError`, in one sentence with a way out, for anything that cannot be rendered.
     """
     first, *more = _layers(layers)
@@ -142,7 +142,7 @@ def _layers(layers: str | Sequence[str]) -> list[str]:
     if not names:
         raise UserError("layers is empty: give 'beauty', 'caustic', or both")
     if len(names) > 1 and any(not isinstance(n, str) or n.startswith("map:") for n in names):
-        raise UserError("layers holds a map beside others: a map has no camera, ask for it alone, or use caustic()")
+        raise UserError("layers holds a map and others: a map has no camera, give it alone, or use caustic()")
     return names
 
 

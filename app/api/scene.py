@@ -35,7 +35,7 @@ class Scene:
     """
 
     def __init__(self, values: Mapping[str, Any] | None = None, folder: str | os.PathLike[str] | None = None) -> None:
-        """A scene from its tables, as the scene file would hold them; `folder`: where the files lie that it names
+        """A scene from its tables, as the scene file would hold them; `folder`: of the files that it names
         (default: the current one). Raises `UserError` for what cannot be rendered."""
         file = Path(folder or ".").resolve() / "scene.toml"
         tables = plain(values or {}, "scene")
@@ -112,7 +112,7 @@ class Scene:
 
     @property
     def render(self) -> Table:
-        """Size of the picture, photons, exposure, depth: what holds where `render` is not told otherwise."""
+        """Size of the picture, photons, exposure, depth: the defaults of `render`."""
         return self._table("render")
 
     @property

@@ -1,4 +1,4 @@
-"""A scene that stays on the device: photons are kept, and an edit redoes only what it asks for.
+"""A scene that stays on the device: photons are kept, and an edit redoes only what depends on it.
 
 This is the viewer's engine without its window: the same store of photons, the same decision what an edit costs.
 """
@@ -92,7 +92,7 @@ class Session:
             if rgb is None:
                 raise UserError("the rendering was stopped before there was a picture: let it go on for longer")
             self._before = _State(stats.photons, stats.rays_traced, int(stats.camera_samples))
-            told = Statistics(
+            shown = Statistics(
                 stats.photons,
                 stats.photons if stats.rays_traced > rays else 0,
                 int(stats.camera_samples),
@@ -102,7 +102,7 @@ class Session:
                 not engine.is_idle,
                 (engine.problem,) if engine.problem else (),
             )
-            return Picture(rgb, None, None, told, {"beauty": rgb}, self._settings.exposure_ev or 0.0)
+            return Picture(rgb, None, None, shown, {"beauty": rgb}, self._settings.exposure_ev or 0.0)
 
         return self._running.run(work, progress, cancel)
 
@@ -199,7 +199,7 @@ class Session:
         return engine
 
     def _wanting(self, context: Context, coarse_first: bool = False) -> LiveEngine:
-        """The engine, told what the scene is now."""
+        """The engine, with the scene as it is now."""
         from ..edit.parameters import Stage
         from ..render.frame_fit import inputs_of
         from ..render.viewer.still_engine import still_engine

@@ -117,7 +117,7 @@ def _spread(
     progress: Progress | None,
     cancel: Cancel | None,
 ) -> Generator[SweepPoint]:
-    """By a crew, which a thread looks after; callbacks run in the caller's."""
+    """By a crew, in a thread of its own; callbacks run in the caller's."""
     from ..farm.cluster import open_crew
     from ..farm.jobs import Foreman
     from ..farm.kinds import PointsJob
@@ -138,16 +138,16 @@ def _spread(
     started = time.perf_counter()
     thread.start()
     try:
-        while (told := news.get()) is not None:
-            if isinstance(told, BaseException):
-                raise told
-            if isinstance(told, tuple):
+        while (event := news.get()) is not None:
+            if isinstance(event, BaseException):
+                raise event
+            if isinstance(event, tuple):
                 if progress is not None:
-                    progress(*told)
+                    progress(*event)
                 if cancel is not None and cancel():
                     stop.set()
             else:
-                yield _point(plan, told, time.perf_counter() - started)
+                yield _point(plan, event, time.perf_counter() - started)
     finally:
         stop.set()
         thread.join()

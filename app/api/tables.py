@@ -39,7 +39,7 @@ class Owner(Protocol):
 
 
 class UnknownKeyError(UserError, AttributeError):
-    """A key that a table neither has nor is told by."""
+    """A key that a table does not have."""
 
 
 class Table:
@@ -53,17 +53,17 @@ class Table:
         object.__setattr__(self, "_where", where)
 
     def __getattr__(self, key: str) -> Any:
-        """What stands under `key`, or what it amounts to where nothing does; tables as `Table`."""
+        """The value of `key`, or its default where it is not given; tables as `Table`."""
         if key.startswith("_"):
             raise AttributeError(key)
         if key in self._values:
             return _shown(self._scene, self._values[key], f"{self._where}.{key}")
-        told = self._scene._told(self._values)
-        if key not in told:
-            known = list(dict.fromkeys((*self._values, *told)))
+        known_values = self._scene._told(self._values)
+        if key not in known_values:
+            known = list(dict.fromkeys((*self._values, *known_values)))
             hint = suggestion(key, known) or f"; there are {', '.join(known)}"
             raise UnknownKeyError(f"{self._where} has no '{key}'{hint}")
-        return told[key]
+        return known_values[key]
 
     def __setattr__(self, key: str, value: Any) -> None:
         self.update(**{key: value})
@@ -159,7 +159,7 @@ def _shown(scene: Owner, value: Any, where: str) -> Any:
 
 
 def copied(value: Any) -> Any:
-    """Tables and lists anew; what stands in them is shared."""
+    """Tables and lists anew; their values are shared."""
     if isinstance(value, dict):
         return {key: copied(inner) for key, inner in value.items()}
     return [copied(inner) for inner in value] if isinstance(value, list) else value

@@ -37,13 +37,13 @@ _UNSEEN_S = 2.0
 """A picture that the browser has not confirmed after so long is taken for lost."""
 _SPECTRUM_S = 0.12
 _NAP_S = 0.2
-"""How often a view at rest looks whether a cell has edited the scene."""
+"""How often a view at rest checks whether a cell has edited the scene."""
 _FIRST_S = 30.0
 """How long a cell waits for the picture that stays in a saved notebook."""
 
 
 class Viewed(Protocol):
-    """What a view asks of its session."""
+    """What a view needs of its session."""
 
     @property
     def scene(self) -> Scene:
@@ -77,7 +77,7 @@ class View:
     """
 
     def __init__(self, session: Viewed, front: Callable[..., Front] | None = None) -> None:
-        """Made by `Session.view`; `front`: what stands in for the browser's part."""
+        """Made by `Session.view`; `front`: what replaces the browser's part."""
         self._session = session
         self._first_camera = session.scene._model.camera
         self._why = None if front else lack_of_front_end()
@@ -106,7 +106,7 @@ class View:
     # ---- messages from the browser -----------------------------------------------------------
 
     def _handle(self, message: dict[str, Any]) -> None:
-        """Do what a message of the widget asks for; a mistake becomes a sentence below the picture."""
+        """Do what a message of the widget says; a mistake becomes a sentence below the picture."""
         kind = message.get("kind")
         try:
             if kind == "seen":
@@ -206,7 +206,7 @@ class View:
         return not self._frames.is_settling
 
     def _answer_hover(self, front: Front, engine: LiveEngine) -> bool:
-        """Whether the browser knows what lies under its cursor."""
+        """Whether the browser knows what is under its cursor."""
         assert self._frames is not None
         place, now = self._hover, time.monotonic()
         question = (place, id(engine.inputs), engine.stats.photons)

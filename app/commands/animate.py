@@ -29,46 +29,46 @@ class Plan:
     settings: RenderSettings
     fps: float
     only: range
-    """Numbers of the frames that are asked for."""
+    """Numbers of the frames to render."""
     manifest: Mapping[str, object]
 
 
-def plan_of(asked: Animate) -> Plan:
+def plan_of(options: Animate) -> Plan:
     """Everything checked; what was assumed is noted. Raises `UserError`."""
     from ..base.movie import FILMS
     from ..edit.parameters import Stage
     from ..render.animate import description
 
-    if asked.skip_existing and asked.overwrite:
+    if options.skip_existing and options.overwrite:
         raise UserError(
             "--skip-existing and --overwrite exclude each other: keep the frames there are, or replace them"
         )
-    if asked.skip_existing and asked.output.suffix.lower() in FILMS:
+    if options.skip_existing and options.output.suffix.lower() in FILMS:
         raise UserError(
-            f"--skip-existing is for a folder of frames: a film ({asked.output.suffix}) is written in one go"
+            f"--skip-existing is for a folder of frames: a film ({options.output.suffix}) is written in one go"
         )
-    scene = open_scene(asked)
-    settings = settings_for(asked, scene)
-    exposure = scene.render.exposure_ev if asked.exposure is None else asked.exposure
-    frames, only = asked.frames
-    animation = _animation(asked, Stage(scene, scene.camera, exposure), frames)
+    scene = open_scene(options)
+    settings = settings_for(options, scene)
+    exposure = scene.render.exposure_ev if options.exposure is None else options.exposure
+    frames, only = options.frames
+    animation = _animation(options, Stage(scene, scene.camera, exposure), frames)
     only = _checked_range(only, len(animation.times_s))
     note_assumptions(scene)
     photons = settings.photons or scene.render.photons
-    return Plan(animation, settings, asked.fps, only, description(animation, settings, asked.fps, photons))
+    return Plan(animation, settings, options.fps, only, description(animation, settings, options.fps, photons))
 
 
-def animate(asked: Animate) -> int:
+def animate(options: Animate) -> int:
     """Render an animation; returns the exit code. Raises `UserError`."""
     from ..base.movie import MANIFEST, open_sink
     from ..base.progress import ProgressReporter
     from ..render.animate import render_animation
     from ..render.notices import FrameNotices
 
-    plan = plan_of(asked)
+    plan = plan_of(options)
     animation, settings, fps, only = plan.animation, plan.settings, plan.fps, plan.only
     scene = animation.start.scene
-    sink = open_sink(asked.output, (settings.width, settings.height), fps, plan.manifest, asked.overwrite)
+    sink = open_sink(options.output, (settings.width, settings.height), fps, plan.manifest, options.overwrite)
 
     from ..gpu.context import create_context
     from ..gpu.shader import keep_programs
@@ -97,9 +97,9 @@ def animate(asked: Animate) -> int:
     written = int(done * count + 1e-6)
     kept = f" ({there} were there)" if there else ""
     early = ", stopped early" if stopped else ""
-    place = asked.output.resolve()
+    place = options.output.resolve()
     if not stopped and written < count:
-        early = f"; {count - written} are in the hands of other processes (the same command again sees to them)"
+        early = f"; {count - written} are being made by other processes (the same command again makes what they leave)"
     if stopped and written == 0:
         print(f"{place}: no frame was finished")
         return interrupted.exit_code
@@ -121,24 +121,24 @@ def _checked_range(only: range | None, count: int) -> range:
     return range(count) if only is None else only
 
 
-def _animation(asked: Animate, stage: Stage, frames: int | None) -> Animation:
+def _animation(options: Animate, stage: Stage, frames: int | None) -> Animation:
     """What the options describe: keys and ranges together, and the turntable with them or alone."""
     from ..edit import animation
 
-    tracks = () if asked.keys is None else animation.read_keys(asked.keys, stage)
-    if asked.ranges:
+    tracks = () if options.keys is None else animation.read_keys(options.keys, stage)
+    if options.ranges:
         last = max((track.times_s[-1] for track in tracks), default=0.0)
-        duration = last or ((frames or DEFAULT_FRAMES) - 1) / asked.fps
-        ranges = tuple(animation.parse_range(text, stage, duration) for text in asked.ranges)
+        duration = last or ((frames or DEFAULT_FRAMES) - 1) / options.fps
+        ranges = tuple(animation.parse_range(text, stage, duration) for text in options.ranges)
         twice = {track.path for track in tracks} & {track.path for track in ranges}
         if twice or len({track.path for track in ranges}) < len(ranges):
-            path = next(iter(twice), asked.ranges[-1].partition("=")[0])
+            path = next(iter(twice), options.ranges[-1].partition("=")[0])
             raise UserError(f"{path} is given twice: set each parameter once, by --keys or by --set")
         tracks += ranges
     if not tracks:
-        return animation.turntable(stage, frames or DEFAULT_FRAMES, asked.fps)
-    made = animation.keyed(stage, tracks, frames, asked.fps)
-    if not asked.turntable:
+        return animation.turntable(stage, frames or DEFAULT_FRAMES, options.fps)
+    made = animation.keyed(stage, tracks, frames, options.fps)
+    if not options.turntable:
         return made
     if animation.ORBIT in {track.path for track in tracks}:
         raise UserError(f"--turntable moves {animation.ORBIT}, which has keys of its own: leave one of them out")

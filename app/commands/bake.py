@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ..model.settings import RenderSettings
 
 
-def _checked(asked: Bake | Export, outputs: Iterable[Path]) -> tuple[Scene, RenderSettings]:
+def _checked(options: Bake | Export, outputs: Iterable[Path]) -> tuple[Scene, RenderSettings]:
     """The scene and how its map is rendered. Raises `UserError` for all that can be refused beforehand: numbers,
     memory, files that cannot be written, the scene, its receiver."""
     from ..base.atomic import check_writable
@@ -27,44 +27,44 @@ def _checked(asked: Bake | Export, outputs: Iterable[Path]) -> tuple[Scene, Rend
 
     for path in outputs:
         check_writable(path)
-    scene = open_scene(asked)
-    bake.check_receiver(scene, asked.receiver)
+    scene = open_scene(options)
+    bake.check_receiver(scene, options.receiver)
     note_assumptions(scene)
     width, height = bake.DEFAULT_SIZE
-    return scene, settings_for(asked, scene, width=width, height=height)
+    return scene, settings_for(options, scene, width=width, height=height)
 
 
-def bake_texture(asked: Bake) -> int:
+def bake_texture(options: Bake) -> int:
     """Bake to a file; returns the exit code. Raises `UserError`."""
     from ..base.progress import ProgressReporter
     from ..edit.parameters import Stage
     from ..render import bake
     from ..render.notices import FrameNotices
 
-    bake.check_output(asked.output)
-    scene, settings = _checked(asked, (asked.output, bake.placement_path(asked.output)))
+    bake.check_output(options.output)
+    scene, settings = _checked(options, (options.output, bake.placement_path(options.output)))
 
     from ..gpu.context import create_context
 
     started, notices = time.perf_counter(), FrameNotices()
     with create_context() as context, interrupt_flag() as interrupted, ProgressReporter(scene.name) as progress:
         stage = Stage(scene, scene.camera)
-        for share in bake.bake(context, stage, settings, asked.receiver, asked.output, notices):
+        for share in bake.bake(context, stage, settings, options.receiver, options.output, notices):
             progress(share, "baking")
             if interrupted() and share < 1.0:
                 print("spectrasplat: nothing was written: a map is whole or not at all", file=sys.stderr)
                 return interrupted.exit_code
     for notice in notices.lines():
         note(notice)
-    place = asked.output.resolve()
+    place = options.output.resolve()
     print(
-        f"{place}: caustic map of '{asked.receiver}' in {time.perf_counter() - started:.1f} s; where it lies is in "
+        f"{place}: caustic map of '{options.receiver}' in {time.perf_counter() - started:.1f} s; its placement is in "
         f"{bake.placement_path(place).name}"
     )
     return 0
 
 
-def export(asked: Export) -> int:
+def export(options: Export) -> int:
     """Bake and write; returns the exit code. Raises `UserError`."""
     from ..base.progress import ProgressReporter
     from ..edit.parameters import Stage
@@ -72,14 +72,14 @@ def export(asked: Export) -> int:
     from ..render.export_caustic import check_export, write_export
     from ..render.notices import FrameNotices
 
-    outputs = check_export(asked.output, asked.plane, asked.source)
-    scene, settings = _checked(asked, outputs)
+    outputs = check_export(options.output, options.plane, options.source)
+    scene, settings = _checked(options, outputs)
 
     from ..gpu.context import create_context
 
     started, notices = time.perf_counter(), FrameNotices()
     with create_context() as context, interrupt_flag() as interrupted, ProgressReporter(scene.name) as progress:
-        steps = bake.bake_map(context, Stage(scene, scene.camera), settings, asked.receiver)
+        steps = bake.bake_map(context, Stage(scene, scene.camera), settings, options.receiver)
         while True:
             try:
                 progress(next(steps), "baking")
@@ -93,10 +93,10 @@ def export(asked: Export) -> int:
     for notice in notices.lines():
         note(notice)
     rgb, where = baked.picture.rgb, baked.placement
-    write_export(scene, asked.receiver, rgb, where, asked.output, asked.plane, asked.source)
+    write_export(scene, options.receiver, rgb, where, options.output, options.plane, options.source)
     names = ", ".join(path.name for path in outputs[1:])
     print(
-        f"{asked.output.resolve()}: the caustic on '{asked.receiver}' in {time.perf_counter() - started:.1f} s; "
-        f"beside it {names}"
+        f"{options.output.resolve()}: the caustic on '{options.receiver}' in {time.perf_counter() - started:.1f} s; "
+        f"next to it {names}"
     )
     return 0

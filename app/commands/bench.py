@@ -32,19 +32,19 @@ CAMERA_SCENES = ("prism_edge", "lens_text", "brilliant_studio", "ball_caustic")
 _OF_FARMS = ("workers", "scheduler")
 
 
-def bench(asked: Bench, show: Callable[[object], None] = show) -> int:
+def bench(options: Bench, show: Callable[[object], None] = show) -> int:
     """Run the bench; returns the exit code. Raises `UserError`."""
-    if asked.features is not None:
-        if asked.camera_pass:
+    if options.features is not None:
+        if options.camera_pass:
             raise UserError("--features and --camera exclude each other: give one of them")
-        return _features(asked)
-    if asked.output is None:
+        return _features(options)
+    if options.output is None:
         raise UserError("bench needs a folder for what it finds: give one with -o DIR")
-    settings = settings_of(asked)
+    settings = settings_of(options)
     # What any process of this program spends before it has its scene: interpreter and imports, as processor time, then
     # a scene's file and the OpenGL context.
     start_s, started = time.process_time(), time.perf_counter()
-    scenes = scenes_of(asked, settings)
+    scenes = scenes_of(options, settings)
     start_s += (time.perf_counter() - started) / len(scenes)
 
     from ..base.progress import ProgressReporter
@@ -56,7 +56,7 @@ def bench(asked: Bench, show: Callable[[object], None] = show) -> int:
     started = time.perf_counter()
     with create_context() as context:
         start_s += time.perf_counter() - started
-        store = Store(asked.output, empty_result([*scenes], asked, settings, machine(context)), asked.fresh)
+        store = Store(options.output, empty_result([*scenes], options, settings, machine(context)), options.fresh)
         stopped, left_out = 0, []
 
         def leave_out(reason: str) -> None:
@@ -71,27 +71,27 @@ def bench(asked: Bench, show: Callable[[object], None] = show) -> int:
         except KeyboardInterrupt as interrupt:
             stopped = exit_code_of(interrupt)
             print(f"spectrasplat: stopped; {kept_text(store.result)}", file=sys.stderr)
-    write_and_show(store.result, asked.output, show)
+    write_and_show(store.result, options.output, show)
     # Who names scenes wants them measured.
-    return stopped or int(bool(asked.scenes and left_out))
+    return stopped or int(bool(options.scenes and left_out))
 
 
-def settings_of(asked: Bench) -> BenchSettings:
+def settings_of(options: Bench) -> BenchSettings:
     """What is measured, with defaults where nothing was said. Raises `UserError`."""
     own: dict[str, Any] = {}
-    if asked.camera_pass:
+    if options.camera_pass:
         own = {
             "measured_pass": "camera",
             "seconds": CAMERA_SECONDS,
             "methods": tuple(name for name in DEFAULT_METHODS if name in CAMERA_METHODS and name != "srd-photons"),
         }
-    own |= given_for("settings", asked)
-    if asked.methods is not None:
-        own["methods"] = _checked_methods(asked.methods, CAMERA_METHODS if asked.camera_pass else METHODS)
+    own |= given_for("settings", options)
+    if options.methods is not None:
+        own["methods"] = _checked_methods(options.methods, CAMERA_METHODS if options.camera_pass else METHODS)
     settings = BenchSettings(**own)
     if settings.size is not None:
         check_picture_memory(*settings.size, None)
-    if settings.horizon is not None and asked.camera_pass:
+    if settings.horizon is not None and options.camera_pass:
         raise UserError("--horizon is for methods of the light pass: leave it out with --camera")
     if settings.horizon is not None and settings.horizon < settings.seconds:
         raise UserError(
@@ -112,9 +112,9 @@ def _checked_methods(given: Sequence[str], known: Sequence[str]) -> tuple[str, .
     return tuple(dict.fromkeys(names))
 
 
-def scenes_of(asked: Bench, settings: BenchSettings) -> dict[str, Scene]:
+def scenes_of(options: Bench, settings: BenchSettings) -> dict[str, Scene]:
     """The scenes that are measured, as the reference is to meet them. Raises `UserError`."""
-    return met_by(settings.reference, load_scenes(asked.scenes or (CAMERA_SCENES if asked.camera_pass else ())))
+    return met_by(settings.reference, load_scenes(options.scenes or (CAMERA_SCENES if options.camera_pass else ())))
 
 
 def met_by(reference: str, scenes: dict[str, Scene]) -> dict[str, Scene]:
@@ -126,11 +126,13 @@ def met_by(reference: str, scenes: dict[str, Scene]) -> dict[str, Scene]:
     return {name: as_triangles(scene) for name, scene in scenes.items()}
 
 
-def empty_result(scenes: Sequence[str], asked: Bench, settings: BenchSettings, machine: dict[str, str]) -> BenchResult:
+def empty_result(
+    scenes: Sequence[str], options: Bench, settings: BenchSettings, machine: dict[str, str]
+) -> BenchResult:
     """What a run begins with."""
-    output = asked.output.name if asked.output else ""
-    options = words(asked, leave_out=("scenes", "output", "fresh", "camera_pass", *_OF_FARMS))
-    command = ["spectrasplat", "bench", *["--camera"] * asked.camera_pass, *scenes, "-o", output, *options]
+    output = options.output.name if options.output else ""
+    words_typed = words(options, leave_out=("scenes", "output", "fresh", "camera_pass", *_OF_FARMS))
+    command = ["spectrasplat", "bench", *["--camera"] * options.camera_pass, *scenes, "-o", output, *words_typed]
     now = datetime.now(UTC).isoformat(timespec="seconds")
     return BenchResult(__version__, now, shlex.join(command), machine, [], settings)
 
@@ -146,18 +148,18 @@ def kept_text(result: BenchResult) -> str:
     return text + "; the same command goes on from there"
 
 
-def _features(asked: Bench) -> int:
+def _features(options: Bench) -> int:
     """What each feature costs in one scene."""
-    assert asked.features is not None
-    if asked.scenes:
+    assert options.features is not None
+    if options.scenes:
         raise UserError(
-            f"--features measures one scene alone: give 'bench --features {asked.features}' without further scenes"
+            f"--features measures one scene alone: give 'bench --features {options.features}' without further scenes"
         )
-    scene = load_scenes([asked.features])
+    scene = load_scenes([options.features])
 
     from ..bench.features import cost as features_cost
 
-    return features_cost.command(next(iter(scene.values())), asked.output)
+    return features_cost.command(next(iter(scene.values())), options.output)
 
 
 def write_and_show(result: BenchResult, directory: Path, show: Callable[[object], None]) -> None:

@@ -16,7 +16,7 @@ from .printing import note
 from .scenes import load_scenes
 
 
-def bench_agreement(asked: BenchAgreement) -> int:
+def bench_agreement(options: BenchAgreement) -> int:
     """Measure and print; returns the exit code. Raises `UserError`."""
     import msgspec
 
@@ -26,14 +26,14 @@ def bench_agreement(asked: BenchAgreement) -> int:
     from ..bench.rendering import NothingToMeasure
     from ..gpu.context import create_context
 
-    _check_chance(asked)
-    settings = AgreementSettings(**given_for("settings", asked))
+    _check_chance(options)
+    settings = AgreementSettings(**given_for("settings", options))
     check_picture_memory(settings.width, settings.height, None)
-    named = load_scenes(asked.scenes) if asked.random is None else {}
-    make_output_folder(asked.output, "agreement.json")
-    if asked.random is not None:
-        seed = 1 if asked.random_seed is None else asked.random_seed
-        named = random_scenes(asked.random, seed, asked.output, asked.random_kinds or RANDOM_KINDS[0])
+    named = load_scenes(options.scenes) if options.random is None else {}
+    make_output_folder(options.output, "agreement.json")
+    if options.random is not None:
+        seed = 1 if options.random_seed is None else options.random_seed
+        named = random_scenes(options.random, seed, options.output, options.random_kinds or RANDOM_KINDS[0])
     scenes = met_by(settings.reference, named)
     found: list[agreement.SceneAgreement] = []
     print(agreement.HEAD, flush=True)
@@ -49,22 +49,22 @@ def bench_agreement(asked: BenchAgreement) -> int:
                     note(str(reason))
                     continue
                 print(agreement.line(found[-1]), flush=True)
-                with atomic_output(asked.output / "agreement.json") as temporary:
+                with atomic_output(options.output / "agreement.json") as temporary:
                     temporary.write_bytes(msgspec.json.format(msgspec.json.encode(found)))
     except KeyboardInterrupt as interrupt:
         print(f"spectrasplat: stopped; {len(found)} scenes kept", file=sys.stderr)
         return exit_code_of(interrupt)
-    print(f"wrote {asked.output / 'agreement.json'}")
+    print(f"wrote {options.output / 'agreement.json'}")
     return 0
 
 
-def _check_chance(asked: BenchAgreement) -> None:
+def _check_chance(options: BenchAgreement) -> None:
     """Raise `UserError` where options about scenes drawn by chance contradict the others."""
-    if asked.random is None:
-        for option, value in (("--random-seed", asked.random_seed), ("--random-kinds", asked.random_kinds)):
+    if options.random is None:
+        for option, value in (("--random-seed", options.random_seed), ("--random-kinds", options.random_kinds)):
             if value is not None:
                 raise UserError(f"{option} says which random scenes are compared: say with --random N how many")
-    elif asked.scenes:
+    elif options.scenes:
         raise UserError(
-            f"--random draws its own scenes: leave out {', '.join(asked.scenes)}, or compare these apart without it"
+            f"--random draws its own scenes: leave out {', '.join(options.scenes)}, or compare these apart without it"
         )

@@ -10,7 +10,7 @@ DEFAULT_SIZE = {True: (960, 540), False: (1920, 1080)}
 """Pixels of the viewport, by whether the processor draws: the sizes that the viewer promises its frame times for."""
 
 
-def bench_speed(asked: BenchSpeed) -> int:
+def bench_speed(options: BenchSpeed) -> int:
     """Measure the stages and print; returns the exit code. Raises `UserError`."""
     from ..bench import speed
 
@@ -19,28 +19,28 @@ def bench_speed(asked: BenchSpeed) -> int:
     return 0
 
 
-def bench_view(asked: BenchView) -> int:
+def bench_view(options: BenchView) -> int:
     """Measure the viewer and print; returns the exit code. Raises `UserError`."""
-    scene = find_scene(asked.scene)
+    scene = find_scene(options.scene)
 
     from ..bench import viewer_speed
     from ..gpu.context import create_context
 
     with create_context() as context:
-        size = asked.size or DEFAULT_SIZE[context.is_software]
-        for line in viewer_speed.run(context, scene, size, asked.seconds):
+        size = options.size or DEFAULT_SIZE[context.is_software]
+        for line in viewer_speed.run(context, scene, size, options.seconds):
             print(line, flush=True)
     return 0
 
 
-def bench_beams(asked: BenchBeams) -> int:
+def bench_beams(options: BenchBeams) -> int:
     """Measure the searches for beams, print them, write table and plot; returns the exit code. Raises `UserError`."""
     import msgspec
 
     from ..bench import beam_costs
     from ..gpu.context import create_context
 
-    make_output_folder(asked.output, "beam_costs.json")
+    make_output_folder(options.output, "beam_costs.json")
     costs = []
     print(beam_costs.HEAD, flush=True)
     with create_context() as context:
@@ -48,8 +48,8 @@ def bench_beams(asked: BenchBeams) -> int:
             costs.append(cost)
             print(beam_costs.line(cost), flush=True)
             # Whoever stops it keeps what is measured.
-            with atomic_output(asked.output / "beam_costs.json") as temporary:
+            with atomic_output(options.output / "beam_costs.json") as temporary:
                 temporary.write_bytes(msgspec.json.format(msgspec.json.encode(costs)))
-    beam_costs.plot(costs, asked.output / "beam_costs")
-    print(f"wrote {asked.output / 'beam_costs.json'} and beam_costs.png, .svg next to it")
+    beam_costs.plot(costs, options.output / "beam_costs")
+    print(f"wrote {options.output / 'beam_costs.json'} and beam_costs.png, .svg next to it")
     return 0

@@ -1,7 +1,7 @@
 """What the shell may complete: shipped scenes, receivers of the scene already typed, glasses, methods.
 
 Called by the shell at every press of Tab, so each imports only what it needs. Typer keeps what begins as typed; where
-nothing does, the shell goes on to names of files. Where a scene cannot be read, nothing is offered and nothing said.
+nothing does, the shell completes names of files. Where a scene cannot be read, nothing is offered, silently.
 """
 
 from __future__ import annotations

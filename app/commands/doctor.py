@@ -52,7 +52,7 @@ class Check:
         return self.state != "missing"
 
 
-def doctor(asked: Doctor) -> int:
+def doctor(options: Doctor) -> int:
     """Print the findings; returns 2 where something that is needed is missing."""
     checks = examine()
     print(report(checks))

@@ -27,50 +27,50 @@ if TYPE_CHECKING:
 FOLDER_SUFFIX = ".parts"
 
 
-def run(asked: ByWorkers, job: Job, name: str, stop: Callable[[], bool]) -> Tally | None:
-    """Have a job done by those who are asked for; None where `stop()` turned true before. Raises `UserError`."""
+def run(options: ByWorkers, job: Job, name: str, stop: Callable[[], bool]) -> Tally | None:
+    """Have a job done by the workers that are wanted; None where `stop()` turned true before. Raises `UserError`."""
     from ..base.progress import ProgressReporter
     from ..farm.cluster import open_crew
     from ..farm.jobs import Foreman
 
-    with open_crew(workers_of(asked), asked.scheduler) as crew, ProgressReporter(name) as progress:
+    with open_crew(workers_of(options), options.scheduler) as crew, ProgressReporter(name) as progress:
         if crew.workers is None and not crew.size():
             note(f"the scheduler at {crew.address} has no workers yet: waiting for some")
         return Foreman(crew, job, stop).run(progress)
 
 
-def workers_of(asked: ByWorkers) -> int | None:
+def workers_of(options: ByWorkers) -> int | None:
     """How many of this machine; None where a scheduler has its own. Raises `UserError`, also where Dask is missing."""
     from ..farm.cluster import check_installed, count_gpus
 
-    if asked.workers is not None and asked.scheduler is not None:
+    if options.workers is not None and options.scheduler is not None:
         raise UserError("--workers and --scheduler exclude each other: a running cluster has its own workers")
     check_installed()
-    if asked.scheduler is not None:
+    if options.scheduler is not None:
         return None
-    return asked.workers or count_gpus() or os.cpu_count() or 1
+    return options.workers or count_gpus() or os.cpu_count() or 1
 
 
-def render(asked: FarmRender) -> int:
+def render(options: FarmRender) -> int:
     """Render to a picture file; returns the exit code. Raises `UserError`."""
-    check_suffix(asked.output)
-    workers_of(asked)
-    scene_file = check_output(asked)
-    scene = open_scene(asked)
-    settings = picture_settings(asked, scene, asked.stats)
+    check_suffix(options.output)
+    workers_of(options)
+    scene_file = check_output(options)
+    scene = open_scene(options)
+    settings = picture_settings(options, scene, options.stats)
     note_assumptions(scene)
 
     from ..farm.jobs import held
     from ..farm.still import PREVIEW, StillJob
 
     started = time.perf_counter()
-    folder = asked.output.with_name(asked.output.name + FOLDER_SUFFIX)
-    with held(folder, asked.output), interrupt_flag() as interrupted:
+    folder = options.output.with_name(options.output.name + FOLDER_SUFFIX)
+    with held(folder, options.output), interrupt_flag() as interrupted:
         note(f"{folder / PREVIEW} shows now and then what there is")
-        job = StillJob(scene, settings, scene_file, folder, asked.parts, note)
+        job = StillJob(scene, settings, scene_file, folder, options.parts, note)
         kept = job.kept
         try:
-            tally = run(asked, job, scene.name, interrupted)
+            tally = run(options, job, scene.name, interrupted)
         except UserError as error:
             raise UserError(f"{error} ({kept.leave()})") from error
         except BaseException:
@@ -80,16 +80,16 @@ def render(asked: FarmRender) -> int:
         if tally is None or picture is None:
             print(f"spectrasplat: stopped; {kept.leave()}: the same command goes on", file=sys.stderr)
             return interrupted.exit_code
-        write_result(asked, scene, settings, picture)
-        if not asked.keep_parts:
+        write_result(options, scene, settings, picture)
+        if not options.keep_parts:
             kept.remove()
     again = f", {job.taken_up} of them from before" if job.taken_up else ""
     print(
-        f"{asked.output.resolve()}: {settings.width}×{settings.height}, {kept.count} parts{again}{_copied(tally)}, "
+        f"{options.output.resolve()}: {settings.width}×{settings.height}, {kept.count} parts{again}{_copied(tally)}, "
         f"{picture.stats.photons:,} photons in {time.perf_counter() - started:.1f} s, of which merging "
         f"{kept.size_bytes / 1e6:.1f} MB took {kept.seconds:.1f} s ({picture.stats.renderer})"
     )
-    if asked.stats:
+    if options.stats:
         print("\n".join(picture.stats.lines()))
     return 0
 
@@ -98,36 +98,36 @@ def _copied(tally: Tally) -> str:
     return f", {tally.copied} begun a second time" if tally.copied else ""
 
 
-def animate(asked: FarmAnimate) -> int:
+def animate(options: FarmAnimate) -> int:
     """Render an animation; returns the exit code. Raises `UserError`."""
     from ..base.movie import FILMS, Frames, check_film, check_folder, open_sink
 
-    workers_of(asked)
-    plan = plan_of(asked)
+    workers_of(options)
+    plan = plan_of(options)
     settings, count = plan.settings, len(plan.only)
     size = settings.width, settings.height
 
     from ..farm.jobs import held
     from ..farm.kinds import FramesJob
 
-    is_movie, started = asked.output.suffix.lower() in FILMS, time.perf_counter()
-    folder = asked.output.with_name(asked.output.name + ".frames") if is_movie else asked.output
+    is_movie, started = options.output.suffix.lower() in FILMS, time.perf_counter()
+    folder = options.output.with_name(options.output.name + ".frames") if is_movie else options.output
     if is_movie:
-        check_film(asked.output, size)
+        check_film(options.output, size)
     else:
         check_folder(folder)
-    with held(folder, asked.output), interrupt_flag() as interrupted:
-        sink = Frames(folder, plan.manifest, asked.overwrite)
+    with held(folder, options.output), interrupt_flag() as interrupted:
+        sink = Frames(folder, plan.manifest, options.overwrite)
         there = sum(sink.has(index) for index in plan.only)
         job = FramesJob(plan.animation, settings, sink, plan.only)
         try:
-            tally = run(asked, job, plan.animation.start.scene.name, interrupted)
+            tally = run(options, job, plan.animation.start.scene.name, interrupted)
         except UserError as error:
             made = sum(sink.has(index) for index in plan.only)
             raise UserError(f"{error} ({made} of {count} frames are in {folder})") from error
         finally:
-            for told in job.notices.lines(of_frames=count > 1):
-                note(told)
+            for sentence in job.notices.lines(of_frames=count > 1):
+                note(sentence)
     made = sum(sink.has(index) for index in plan.only)
     if tally is None:
         print(
@@ -136,7 +136,7 @@ def animate(asked: FarmAnimate) -> int:
         )
         return interrupted.exit_code
     if is_movie:
-        movie = open_sink(asked.output, size, plan.fps, {})
+        movie = open_sink(options.output, size, plan.fps, {})
         try:
             for index in plan.only:
                 movie.write(index, sink.read(index))
@@ -145,19 +145,19 @@ def animate(asked: FarmAnimate) -> int:
         shutil.rmtree(folder, ignore_errors=True)
     kept = f" ({there} were there)" if there else ""
     print(
-        f"{asked.output.resolve()}: {made} of {count} frames{kept}{_copied(tally)}, {size[0]}×{size[1]} at "
+        f"{options.output.resolve()}: {made} of {count} frames{kept}{_copied(tally)}, {size[0]}×{size[1]} at "
         f"{plan.fps:g} a second, in {time.perf_counter() - started:.1f} s"
     )
     return 0
 
 
-def bench(asked: FarmBench) -> int:
+def bench(options: FarmBench) -> int:
     """Measure scenes side by side; returns the exit code. Raises `UserError`."""
-    if asked.output is None:
+    if options.output is None:
         raise UserError("bench needs a folder for what it finds: give one with -o DIR")
-    settings, count = settings_of(asked), workers_of(asked)
+    settings, count = settings_of(options), workers_of(options)
     start_s, started = time.process_time(), time.perf_counter()
-    scenes = scenes_of(asked, settings)
+    scenes = scenes_of(options, settings)
     start_s += (time.perf_counter() - started) / len(scenes)
     if count is not None and count > 1:
         note("workers of one machine slow each other: times compare within this run only")
@@ -167,16 +167,16 @@ def bench(asked: FarmBench) -> int:
     from ..farm.jobs import held
     from ..farm.kinds import ScenesJob
 
-    output = asked.output
+    output = options.output
 
     def open_store(where: dict[str, str]) -> Store:
         from ..bench.store import Store
 
-        return Store(output, empty_result([*scenes], asked, settings, where), asked.fresh)
+        return Store(output, empty_result([*scenes], options, settings, where), options.fresh)
 
     with held(output, output), interrupt_flag() as interrupted:
         job = ScenesJob(scenes, settings, open_store, start_s, note)
-        tally = run(asked, job, "bench", interrupted)
+        tally = run(options, job, "bench", interrupted)
         if job.store is not None:
             if tally is None:
                 print(f"spectrasplat: stopped; {kept_text(job.store.result)}", file=sys.stderr)

@@ -12,9 +12,9 @@ MAX_PLOTTED = 6
 """Curves that can be distinguished in one plot."""
 
 
-def glass(asked: Glass) -> int:
+def glass(options: Glass) -> int:
     """Show what a query finds, and plot it where that is asked for. Raises `UserError`."""
-    hits, plot_file = _hits(asked.query), asked.plot
+    hits, plot_file = _hits(options.query), options.plot
     if plot_file is not None and len(hits) > MAX_PLOTTED:
         raise UserError(
             f"--plot shows at most {MAX_PLOTTED} glasses and {len(hits)} match: give more of the name, for example "
@@ -22,12 +22,12 @@ def glass(asked: Glass) -> int:
         )
     if plot_file is not None:
         plot(hits, plot_file)  # first, so that a refused file name is all that is said
-    if hits and is_guess(asked.query):
-        show(f"Nothing in the catalogue is called '{asked.query}'. A guess by its letters:")
+    if hits and is_guess(options.query):
+        show(f"Nothing in the catalogue is called '{options.query}'. A guess by its letters:")
     if len(hits) == 1:
         show(describe(hits[0]))
     else:
-        show(list_glasses(asked.query))
+        show(list_glasses(options.query))
     if plot_file is not None:
         show(f"plot: {plot_file.resolve()}")
     return 0

@@ -39,7 +39,7 @@ class ProgramRow:
 
     use: StageUse
     live: LiveState | None
-    """None where the tools that tell it are not installed."""
+    """None where the tools that count them are not installed."""
     seconds: float | None
     """The driver's, of the whole program; None for a program's further stages."""
 
@@ -113,5 +113,5 @@ def _live_words_told() -> str:
         return f"Live words and array words are not known: {absent}."
     return (
         "Live words: 32 bits each, held at once by an invocation where it holds most, as an optimiser of SPIR-V leaves "
-        "it (GPUs have some 255 registers for them). Array words: its own arrays, together; they lie in memory."
+        "it (GPUs have some 255 registers for them). Array words: its own arrays, together; they are in memory."
     )

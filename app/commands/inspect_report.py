@@ -23,12 +23,12 @@ if TYPE_CHECKING:
     from ..model.optics.glass import Dispersion
 
 
-def inspect(asked: Inspect) -> int:
+def inspect(options: Inspect) -> int:
     """Show a scene, or its programs. Raises `UserError`."""
     from ..model.io.scene_file import load_scene
     from .inspect_programs import programs_text
 
-    show((programs_text if asked.programs else inspect_text)(load_scene(find_scene(asked.scene))))
+    show((programs_text if options.programs else inspect_text)(load_scene(find_scene(options.scene))))
     return 0
 
 

@@ -80,8 +80,8 @@ def _usage_sentence(message: str) -> str:
     return f"{sentence[:1].lower()}{sentence[1:]}; 'spectrasplat --help' shows the usage"
 
 
-def _print_version(asked: bool) -> None:
-    if asked:
+def _print_version(wanted: bool) -> None:
+    if wanted:
         print(f"spectrasplat {__version__}")
         raise typer.Exit
 
@@ -99,10 +99,10 @@ def _command(values: type, runs: str) -> Callable[..., None]:
     module, function = runs.split(":")
 
     def command(**given: Any) -> None:
-        asked: Any = options.read(values, given)
-        if isinstance(asked, table.ReadsScenes):
-            allow_outside(asked.allow_outside)
-        raise typer.Exit(getattr(import_module(f"{__package__}.{module}"), function)(asked))
+        typed: Any = options.read(values, given)
+        if isinstance(typed, table.ReadsScenes):
+            allow_outside(typed.allow_outside)
+        raise typer.Exit(getattr(import_module(f"{__package__}.{module}"), function)(typed))
 
     parameters = [row.parameter() for row in options.rows(values)]
     command.__doc__ = values.__doc__

@@ -40,7 +40,7 @@ class Finding(msgspec.Struct, frozen=True, omit_defaults=True):
     """It should be otherwise."""
     seconds: float | None = None
     picture: str = ""
-    """A PNG in base64: drawn here beside what is stored."""
+    """A PNG in base64: what is drawn here next to what is stored."""
     rows: list[list[str]] = []
     """A table, its headings first."""
     done: float | None = None
@@ -140,7 +140,7 @@ def _compiled(path: Path) -> _Compiled:
         try:
             programs = compiled_programs(context, scene, RenderSettings(max_depth=scene.render.max_depth))
         except (shader.ShaderError, UserError) as error:
-            # The other scenes' programs may be wrong for reasons of their own: one run should tell all.
+            # The other scenes' programs may be wrong for reasons of their own: one run should report all.
             problem = " ".join(str(error).split())
         return _Compiled(programs, problem, time.perf_counter() - started)
 
@@ -158,7 +158,7 @@ def _each_compiled(scenes: dict[str, Path]) -> Iterator[tuple[str, _Compiled]]:
             try:
                 yield name, future.result()
             except BrokenProcessPool:
-                yield name, _Compiled([], "the driver ended the process that compiled it, or one beside it", 0.0)
+                yield name, _Compiled([], "the driver ended the process that compiled it, or one next to it", 0.0)
 
 
 # -- known answers, stress ----------------------------------------------------------------
@@ -272,7 +272,7 @@ def _view(size: tuple[int, int], short_size: tuple[int, int]) -> Callable[[bool,
 
 
 def _line(line: str) -> Finding:
-    """A line of a table: what stands before the first gap is its name."""
+    """A line of a table: the text before the first gap is its name."""
     name, gap, value = line.partition("  ")
     return Finding(name, " ".join(value.split())) if gap else Finding("", line)
 
@@ -290,7 +290,7 @@ def _bench(short: bool, folder: Path) -> Iterator[Finding]:
         Console(file=text, width=200).print(content)
         said.append(text.getvalue())
 
-    asked = Bench(
+    options = Bench(
         scenes=("prism",) if short else ("prism", "ball_plain"),
         output=folder / "bench",
         seconds=0.2 if short else 1.0,
@@ -301,7 +301,7 @@ def _bench(short: bool, folder: Path) -> Iterator[Finding]:
         reference_seconds=2.0 if short else 15.0,
         fresh=True,
     )
-    code = bench(asked, show)
+    code = bench(options, show)
     yield from (Finding("", text.rstrip()) for text in said)
     if code:
         raise UserError(f"bench ended with {code}")

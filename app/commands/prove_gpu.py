@@ -65,9 +65,9 @@ class Proof(msgspec.Struct):
 
     @property
     def machine(self) -> dict[str, str]:
-        """What the doctor told of it."""
-        told = {f.name: f.value for part in self.parts if part.key == "doctor" for f in part.findings}
-        return {name.removeprefix("machine "): value for name, value in told.items() if name.startswith("machine ")}
+        """What the doctor reports of it."""
+        found = {f.name: f.value for part in self.parts if part.key == "doctor" for f in part.findings}
+        return {name.removeprefix("machine "): value for name, value in found.items() if name.startswith("machine ")}
 
     @property
     def is_software(self) -> bool:
@@ -83,28 +83,28 @@ class Proof(msgspec.Struct):
         return 0 if all(part.state == "holds" for part in self.parts) else 130
 
 
-def prove_gpu(asked: ProveGpu) -> int:
+def prove_gpu(options: ProveGpu) -> int:
     """Run all parts, keep what they find; returns the exit code. Raises `UserError`."""
     from ..base.progress import ProgressReporter
 
-    chosen = chosen_parts(asked.parts)
-    make_output_folder(asked.output, JSON, HTML)
+    chosen = chosen_parts(options.parts)
+    make_output_folder(options.output, JSON, HTML)
     started = time.monotonic()
     proof = Proof(
         __version__,
         datetime.now(UTC).isoformat(timespec="seconds"),
-        asked.short,
+        options.short,
         [PartResult(part.key, part.title) for part in chosen],
     )
     with ProgressReporter("proof") as progress:
         try:
-            _run_all(proof, chosen, asked.output, progress, started)
+            _run_all(proof, chosen, options.output, progress, started)
         except KeyboardInterrupt:
             print("spectrasplat: stopped; what was found is kept", file=sys.stderr)
     proof.seconds = time.monotonic() - started
-    _keep(proof, asked.output)
+    _keep(proof, options.output)
     print(summary(proof))
-    print((asked.output / HTML).resolve())
+    print((options.output / HTML).resolve())
     return proof.exit_code
 
 
@@ -182,7 +182,7 @@ def command_of(part: Part, short: bool, findings: Path, folder: Path) -> list[st
 
 
 def _run(part: Part, result: PartResult, how: _Run) -> None:
-    """Run one part in a process of its own and take in what it finds. Ctrl-C ends the process, and goes on."""
+    """Run one part in a process of its own and take in what it finds. Ctrl-C ends the process and is raised again."""
     started = time.monotonic()
     with tempfile.TemporaryDirectory() as scratch:
         file, errors = Path(scratch) / "findings", Path(scratch) / "stderr"

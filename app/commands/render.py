@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from ..render.still import RenderResult
 
 START_S, FRESH_S = 0.3, 20.0
-"""What a process takes to start, where the system does not tell: --seconds holds that too …; an older one was not
-started for this picture."""
+"""What a process takes to start, where the system does not report it: --seconds includes that …; an older one
+was not started for this picture."""
 ENDING_SHARE = 0.7
 """… and what it takes to end, over that: on a machine that others work on both take longer."""
 WRITING_SHARE = 1.4
@@ -41,7 +41,7 @@ _USED_BY = (
 """Options with the suffixes of the formats that have a use for them, and what is noted otherwise."""
 
 
-def render_picture(asked: Render) -> int:
+def render_picture(options: Render) -> int:
     """Render to a file; returns the exit code. Raises `UserError`."""
     starting_s = process_age_s() or START_S
     starting_s = starting_s if starting_s < FRESH_S else START_S
@@ -49,19 +49,19 @@ def render_picture(asked: Render) -> int:
     from ..base.progress import ProgressReporter
 
     # What costs nothing to check comes before the scene is read, and that before the device.
-    _check_passes(asked)
-    if asked.passes is None:
-        check_suffix(asked.output)
-    scene_file = check_output(asked)
-    scene = open_scene(asked)
-    settings = picture_settings(asked, scene, asked.stats)
+    _check_passes(options)
+    if options.passes is None:
+        check_suffix(options.output)
+    scene_file = check_output(options)
+    scene = open_scene(options)
+    settings = picture_settings(options, scene, options.stats)
     begun -= starting_s * (ENDING_SHARE + WRITING_SHARE * 1e-6 * settings.width * settings.height)
     # Before the work: who waits for minutes should know what was assumed, and also if it fails.
     note_assumptions(scene)
-    for sentence in _unused_options(asked):
+    for sentence in _unused_options(options):
         note(sentence)
-    if asked.passes is not None:
-        return _render_part(asked, scene, settings, asked.passes, scene_file)
+    if options.passes is not None:
+        return _render_part(options, scene, settings, options.passes, scene_file)
 
     from ..gpu.better_device import advice
     from ..render.still import render
@@ -71,19 +71,19 @@ def render_picture(asked: Render) -> int:
         stopped = interrupted()
     if better := advice(result.stats.renderer, result.stats.is_software):
         note(better)
-    write_result(asked, scene, settings, result)
-    print(_summary(asked, settings, result.stats, stopped))
-    if asked.stats:
+    write_result(options, scene, settings, result)
+    print(_summary(options, settings, result.stats, stopped))
+    if options.stats:
         print("\n".join(result.stats.lines()))
     return interrupted.exit_code if stopped else 0
 
 
-def write_result(asked: Render, scene: Scene, settings: RenderSettings, result: RenderResult) -> None:
+def write_result(options: Render, scene: Scene, settings: RenderSettings, result: RenderResult) -> None:
     """Note what is to be said of a picture, and write it. Raises `UserError`."""
     for notice in result.stats.notices:
         note(notice)
     write_image(
-        asked.output,
+        options.output,
         result.rgb,
         exposure_ev=settings.exposure_ev,
         glare=settings.glare,
@@ -93,45 +93,47 @@ def write_result(asked: Render, scene: Scene, settings: RenderSettings, result: 
     )
 
 
-def check_output(asked: Render) -> Path:
+def check_output(options: Render) -> Path:
     """The scene's file; raises `UserError` where that is not found, or the picture cannot be written."""
     from ..base.atomic import check_writable
 
-    scene_file = find_scene(asked.scene)
+    scene_file = find_scene(options.scene)
     # os.path.exists, unlike Path.exists, is silent about a name that is too long.
-    if os.path.exists(asked.output) and asked.output.samefile(scene_file):
-        raise UserError(f"cannot write {asked.output}: it is the scene itself; choose another name")
-    check_writable(asked.output)
+    if os.path.exists(options.output) and options.output.samefile(scene_file):
+        raise UserError(f"cannot write {options.output}: it is the scene itself; choose another name")
+    check_writable(options.output)
     return scene_file
 
 
-def picture_settings(asked: Render, scene: Scene, tally: bool) -> RenderSettings:
+def picture_settings(options: Render, scene: Scene, tally: bool) -> RenderSettings:
     """Settings with the scene's own wishes where the user said nothing. Raises `UserError`."""
     wishes = scene.render
     return settings_for(
-        asked,
+        options,
         scene,
         exposure_ev=wishes.exposure_ev,
         glare=wishes.glare,
-        photons=None if asked.seconds is not None else wishes.photons,
+        photons=None if options.seconds is not None else wishes.photons,
         tally=tally,
     )
 
 
-def _check_passes(asked: Render) -> None:
+def _check_passes(options: Render) -> None:
     """Raise `UserError` unless the output is a part where one is asked for, and a picture where none is."""
-    is_part = asked.output.suffix.lower() == ".ssp"
-    if asked.passes is None:
+    is_part = options.output.suffix.lower() == ".ssp"
+    if options.passes is None:
         if is_part:
-            raise UserError(f"{asked.output} is a part of a rendering: say which by --passes, for example --passes 1/8")
+            raise UserError(
+                f"{options.output} is a part of a rendering: say which by --passes, for example --passes 1/8"
+            )
     elif not is_part:
-        raise UserError(f"--passes makes a part, not a picture: name the output .ssp, not '{asked.output.name}'")
-    elif asked.seconds is not None:
+        raise UserError(f"--passes makes a part, not a picture: name the output .ssp, not '{options.output.name}'")
+    elif options.seconds is not None:
         raise UserError("--passes and --seconds exclude each other: parts share out a number of photons")
 
 
 def _render_part(
-    asked: Render, scene: Scene, settings: RenderSettings, share: tuple[int, int], scene_file: Path
+    options: Render, scene: Scene, settings: RenderSettings, share: tuple[int, int], scene_file: Path
 ) -> int:
     """Trace a part and write it; returns the exit code. Raises `UserError`."""
     from ..base.progress import ProgressReporter
@@ -148,34 +150,34 @@ def _render_part(
     if part is None:
         print("spectrasplat: nothing was written: a part is whole or not at all", file=sys.stderr)
         return interrupted.exit_code
-    write_part(asked.output, part)
+    write_part(options.output, part)
     print(
-        f"{asked.output.resolve()}: part {share[0]} of {share[1]}, {part.header.stats['photons']:,} photons in "
-        f"{time.perf_counter() - started:.1f} s, {asked.output.stat().st_size / 1e6:.1f} MB"
+        f"{options.output.resolve()}: part {share[0]} of {share[1]}, {part.header.stats['photons']:,} photons in "
+        f"{time.perf_counter() - started:.1f} s, {options.output.stat().st_size / 1e6:.1f} MB"
     )
     return 0
 
 
-def _unused_options(asked: Render) -> list[str]:
+def _unused_options(options: Render) -> list[str]:
     """A sentence for each option that the output's format has no use for."""
-    suffix = asked.output.suffix.lower()
+    suffix = options.output.suffix.lower()
     notes = [
         sentence.format(suffix)
         for name, suffixes, sentence in _USED_BY
-        if getattr(asked, name) is not None and suffix not in suffixes
+        if getattr(options, name) is not None and suffix not in suffixes
     ]
-    if asked.exposure is not None and suffix == ".ssp":
+    if options.exposure is not None and suffix == ".ssp":
         notes.append("--exposure does not change a part; give it to 'merge'")
-    elif asked.exposure is not None and suffix not in SHOWN_SUFFIXES:
+    elif options.exposure is not None and suffix not in SHOWN_SUFFIXES:
         notes.append(f"--exposure does not change a {suffix} picture, which is linear; it is for pictures to look at")
     return notes
 
 
-def _summary(asked: Render, settings: RenderSettings, stats: Any, stopped: bool) -> str:
+def _summary(options: Render, settings: RenderSettings, stats: Any, stopped: bool) -> str:
     """Where the picture is and what was done in what time."""
     device = "software renderer" if stats.is_software else "GPU"
     early = ", stopped early" if stopped else ""
     return (
-        f"{asked.output.resolve()}: {settings.width}×{settings.height}, {stats.photons:,} photons, "
+        f"{options.output.resolve()}: {settings.width}×{settings.height}, {stats.photons:,} photons, "
         f"{stats.splats:,} splats in {stats.seconds:.1f} s{early} ({device}: {stats.renderer})"
     )

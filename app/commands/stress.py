@@ -1,4 +1,4 @@
-"""The stress command: check what is asked, measure, keep what is done, show the table; the exit code is the verdict."""
+"""The stress command: measures cases, keeps what is done, shows the table; the exit code is the verdict."""
 
 from __future__ import annotations
 
@@ -26,21 +26,21 @@ INTERRUPTED = 130
 JSON, HTML = "stress.json", "stress.html"
 
 
-def stress(asked: Stress) -> int:
+def stress(options: Stress) -> int:
     """Run the cases; returns 0 where every promise holds, 1 where one is broken, 130 after Ctrl-C. Raises
     `UserError`."""
     from ..stress.runner import choose
 
-    cases = choose(_cases(asked.scenes), asked.cases)
-    if asked.list_cases:
+    cases = choose(_cases(options.scenes), options.cases)
+    if options.list_cases:
         show("\n".join(f"{case.name:<24} {case.steps:>3}  {case.title}" for case in cases))
         return 0
-    if asked.output is not None:
-        make_output_folder(asked.output, JSON, HTML)
-    return _measure(asked, cases)
+    if options.output is not None:
+        make_output_folder(options.output, JSON, HTML)
+    return _measure(options, cases)
 
 
-def _measure(asked: Stress, cases: Sequence[Case]) -> int:
+def _measure(options: Stress, cases: Sequence[Case]) -> int:
     from ..base.progress import ProgressReporter
     from ..bench.machine import machine
     from ..gpu.context import create_context
@@ -49,18 +49,18 @@ def _measure(asked: Stress, cases: Sequence[Case]) -> int:
 
     with create_context() as context:
         date = datetime.now(UTC).isoformat(timespec="seconds")
-        result = StressResult(__version__, date, repeat_command(asked), machine(context), asked=len(cases))
+        result = StressResult(__version__, date, repeat_command(options), machine(context), asked=len(cases))
         with ProgressReporter("stress") as progress:
-            finished = run(result, cases, context, progress, lambda so_far: _keep(so_far, asked.output))
+            finished = run(result, cases, context, progress, lambda so_far: _keep(so_far, options.output))
     if not finished:
         print("spectrasplat: stopped; what was measured is shown and kept", file=sys.stderr)
-    _keep(result, asked.output)
+    _keep(result, options.output)
     show(table(result))
-    if asked.output is not None:
+    if options.output is not None:
         from ..stress.report import write_html
 
-        write_html(result, asked.output / HTML)
-        show(f"{(asked.output / HTML).resolve()}")
+        write_html(result, options.output / HTML)
+        show(f"{(options.output / HTML).resolve()}")
     show(result.summary())
     if result.broken():
         return BROKEN
@@ -86,8 +86,8 @@ def _keep(result: StressResult, folder: Path | None) -> None:
         write_json(result, folder / JSON)
 
 
-def repeat_command(asked: Stress) -> str:
+def repeat_command(options: Stress) -> str:
     """The one command that repeats this run."""
-    output = [] if asked.output is None else ["-o", asked.output.name or "."]
-    options = words(asked, leave_out=("scenes", "output", "list_cases"))
-    return shlex.join(["spectrasplat", "stress", *asked.scenes, *output, *options])
+    output = [] if options.output is None else ["-o", options.output.name or "."]
+    words_typed = words(options, leave_out=("scenes", "output", "list_cases"))
+    return shlex.join(["spectrasplat", "stress", *options.scenes, *output, *words_typed])

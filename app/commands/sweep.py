@@ -32,38 +32,38 @@ INDEX = "sweep.json"
 _DIGITS = 4
 
 
-def sweep(asked: Sweep) -> int:
+def sweep(options: Sweep) -> int:
     """Draw all points; returns the exit code. Raises `UserError`."""
     from ..base.progress import ProgressReporter
     from ..edit.parameters import Stage
 
-    if asked.output.suffix and not asked.output.is_dir():
-        raise UserError(f"cannot write {asked.output}: a sweep is a folder of pictures; --format says of which kind")
-    is_here = asked.scheduler is None and asked.workers in (None, 1)
-    workers = 1 if is_here else workers_of(asked)
-    scene = open_scene(asked)
-    settings = settings_for(asked, scene, spp=DEFAULT_SAMPLES, photons=scene.render.photons)
-    exposure = scene.render.exposure_ev if asked.exposure is None else asked.exposure
+    if options.output.suffix and not options.output.is_dir():
+        raise UserError(f"cannot write {options.output}: a sweep is a folder of pictures; --format says of which kind")
+    is_here = options.scheduler is None and options.workers in (None, 1)
+    workers = 1 if is_here else workers_of(options)
+    scene = open_scene(options)
+    settings = settings_for(options, scene, spp=DEFAULT_SAMPLES, photons=scene.render.photons)
+    exposure = scene.render.exposure_ev if options.exposure is None else options.exposure
 
     from ..farm.jobs import held
     from ..render.sweep import SweepPlan, points_of
 
     start = Stage(scene, scene.camera, exposure)
     grid: dict[str, tuple[float, ...]] = {}
-    for text in asked.ranges:
+    for text in options.ranges:
         path, values = parse_set(text, start)
         if path in grid:
             raise UserError(f"{path} is given twice: set each parameter once, all its values in one --set")
         grid[path] = values
-    plan = SweepPlan.of(points_of(start, grid), settings, asked.exact)
+    plan = SweepPlan.of(points_of(start, grid), settings, options.exact)
     note_assumptions(scene)
-    if asked.bins is not None and not asked.exact:
+    if options.bins is not None and not options.exact:
         note("--bins: photons that are kept have colours only, so every point is traced")
     note(plan_words(plan, workers))
     started = time.perf_counter()
-    with held(asked.output, asked.output), interrupt_flag() as interrupted:
+    with held(options.output, options.output), interrupt_flag() as interrupted:
         folder = SweepFolder(
-            asked.output, plan.points, _description(start, settings, plan), f".{asked.format}", asked.overwrite
+            options.output, plan.points, _description(start, settings, plan), f".{options.format}", options.overwrite
         )
         there = sum(folder.has(point.number) for point in plan.points)
         if is_here or not plan.can_spread:
@@ -73,12 +73,12 @@ def sweep(asked: Sweep) -> int:
             from ..farm.kinds import PointsJob
 
             job = PointsJob(plan, folder.put, lambda number: not folder.has(number), folder.first)
-            run(asked, job, scene.name, interrupted)
+            run(options, job, scene.name, interrupted)
         made = sum(folder.has(point.number) for point in plan.points)
     kept = f" ({there} were there)" if there else ""
     stopped = interrupted() and made < len(plan.points)
     print(
-        f"{asked.output.resolve()}: {made} of {len(plan.points)} pictures{kept}, {settings.width}×{settings.height}, "
+        f"{options.output.resolve()}: {made} of {len(plan.points)} pictures{kept}, {settings.width}×{settings.height}, "
         f"in {time.perf_counter() - started:.1f} s"
         + ("; stopped early, and the same command goes on" if stopped else "")
     )
@@ -132,7 +132,7 @@ def plan_words(plan: SweepPlan, workers: int | None) -> str:
 
 
 def _draw_here(
-    plan: SweepPlan, folder: SweepFolder, tell: Callable[[float, str], None], stop: Callable[[], bool]
+    plan: SweepPlan, folder: SweepFolder, progress: Callable[[float, str], None], stop: Callable[[], bool]
 ) -> None:
     """One point after the other in this process."""
     from ..gpu.context import create_context
@@ -144,14 +144,14 @@ def _draw_here(
         keep_programs(context.ctx)
         painter = SweepPainter(context, plan)
         try:
-            for drawn in painter.draw_all(due, tell, stop):
+            for drawn in painter.draw_all(due, progress, stop):
                 folder.put(drawn)
         finally:
             painter.release()
 
 
 def _description(start: Stage, settings: RenderSettings, plan: SweepPlan) -> Mapping[str, object]:
-    """What decides the pictures besides their values."""
+    """What decides the pictures apart from their values."""
     from ..render.parts import rendering_key
 
     return {
@@ -168,15 +168,15 @@ class SweepFolder:
     def __init__(
         self, folder: Path, points: tuple[Point, ...], description: Mapping[str, object], suffix: str, overwrite: bool
     ) -> None:
-        """`description`: what decides the pictures besides their values. The folder is there and held. Raises
+        """`description`: what decides the pictures apart from their values. The folder is there and held. Raises
         `UserError` where it holds another sweep."""
         self._folder, self._points, self._suffix = folder, points, suffix
         self._description = json.loads(json.dumps(dict(description) | {"suffix": suffix}))
         self._base_ev: float | None = None
         self._noted: set[str] = set()
         before = self._stored()
-        told = {"sweep": self._description, "pictures": self._pictures()}
-        if before is not None and {key: before.get(key) for key in told} != told:
+        wanted = {"sweep": self._description, "pictures": self._pictures()}
+        if before is not None and {key: before.get(key) for key in wanted} != wanted:
             if not overwrite:
                 raise UserError(f"{folder} holds another sweep: choose another folder, or replace it with --overwrite")
             self._empty(before)
@@ -246,9 +246,9 @@ class SweepFolder:
         return stored if isinstance(stored, dict) else {}
 
     def _save(self) -> None:
-        told = {"sweep": self._description, "pictures": self._pictures(), "base_ev": self._base_ev}
+        index = {"sweep": self._description, "pictures": self._pictures(), "base_ev": self._base_ev}
         with atomic_output(self._folder / INDEX) as temporary:
-            temporary.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
+            temporary.write_text(json.dumps(index, indent=1) + "\n", encoding="utf-8")
 
     def _empty(self, before: dict) -> None:
         """Remove the pictures of the sweep that was here, and nothing else."""

@@ -1,8 +1,8 @@
 """Every command of the program with its options: help, default, how a text is read, what it sets.
 
 A command is a frozen class: its docstring is the command's help, its fields are the options, and a value of it is what
-the command's function gets (`program` says which function). A new option is a field here and whoever honours it; with
-`sets` it reaches `RenderSettings` or the scene without further code.
+the command's function gets (`program` says which function). A new option is a field here and the code that honours it;
+with `sets` it reaches `RenderSettings` or the scene without further code.
 """
 
 from __future__ import annotations
@@ -273,7 +273,7 @@ class Animate(OpensScene):
     """Render an animation: a turntable, or any parameters over time."""
 
     output: Path = target("OUT", f"A movie ({_either(*FILMS)}), or a folder for numbered PNGs, which can be resumed.")
-    turntable: bool = switch("Turn the camera once about its target; what happens when nothing else is asked for.")
+    turntable: bool = switch("Turn the camera once about its target; the default when no parameter moves.")
     keys: Path | None = option(
         "FILE.toml", "Keys of any parameter: tables named keys with time_s, parameter, value, interpolation."
     )
@@ -397,7 +397,7 @@ class Bake(BakesCaustic):
     output: Path = target(
         "OUT",
         f"The texture: {_LINEAR} (linear irradiance), {_SHOWN} (to look at); where it is placed is written to a .json "
-        "beside it.",
+        "next to it.",
     )
 
 
@@ -409,11 +409,11 @@ class Export(BakesCaustic):
     output: Path = target(
         "OUT",
         "The receiver with its caustic as emission: .glb, .gltf, .usda, .usdc, .usd; or a spot light's cookie: "
-        ".png, .exr. Numbers are written to a .json beside it.",
+        ".png, .exr. Numbers are written to a .json next to it.",
     )
     plane: bool = switch("Only the rectangle that is lit, as bright as on a white receiver.")
     source: tuple[float, float, float] | None = option(
-        "X,Y,Z", "Where the cookie's spot stands; default: at the scene's only lamp, or straight above.", options.place
+        "X,Y,Z", "Where the cookie's spot is; default: at the scene's only lamp, or straight above.", options.place
     )
 
 
@@ -422,7 +422,7 @@ class Inspect(ReadsScenes):
     """Show what a scene holds, its glasses and mesh health, and which features its programs need."""
 
     scene: str = shared(_SCENE, default=MISSING)
-    programs: bool = switch("List instead what each of its programs asks of the driver; compiles them.")
+    programs: bool = switch("List instead what each of its programs needs of the driver; compiles them.")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -452,7 +452,7 @@ class FarmRender(ByWorkers, Render):
     parts: int | None = option(
         "N", "Into how many parts light is divided; default: four a worker.", options.integer(1, options.MAX_PARTS)
     )
-    keep_parts: bool = switch("Leave the parts beside the picture, in OUT.parts.")
+    keep_parts: bool = switch("Leave the parts next to the picture, in OUT.parts.")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -35,31 +35,31 @@ def has_display() -> bool:
     return sys.platform in ("win32", "darwin") or any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
 
 
-def view(asked: View, at: Lesson | None = None) -> int:
+def view(options: View, at: Lesson | None = None) -> int:
     """Open the viewer, `at` a lesson, until it is closed; returns the exit code. Raises `UserError`."""
-    if asked.after is not None and asked.screenshot is None:
+    if options.after is not None and options.screenshot is None:
         raise UserError("--after says when the --screenshot is taken: give that too")
-    if asked.screenshot is not None:
-        _check_screenshot(asked.screenshot)
-    scene = None if asked.scene is None else find_scene(asked.scene)
+    if options.screenshot is not None:
+        _check_screenshot(options.screenshot)
+    scene = None if options.scene is None else find_scene(options.scene)
 
     # What needs a display comes last, so that a wrong option is reported on any machine.
     from ..edit.preferences import load_settings
     from ..ui.window import Window
 
     settings, _ = load_settings()
-    place = settings.window if asked.size is None else replace(settings.window, size=asked.size, maximised=False)
+    place = settings.window if options.size is None else replace(settings.window, size=options.size, maximised=False)
     with Window(place) as window, interrupt_flag() as interrupted:
-        _run(window, scene, asked, interrupted, at)
+        _run(window, scene, options, interrupted, at)
     return interrupted.exit_code
 
 
-def lesson(asked: table.Lesson) -> int:
+def lesson(options: table.Lesson) -> int:
     """List the lessons, or open the one that is named; returns the exit code. Raises `UserError`."""
     from ..edit import lessons
 
-    if asked.name is not None:
-        return view(View(scene=None), lessons.lesson(asked.name))
+    if options.name is not None:
+        return view(View(scene=None), lessons.lesson(options.name))
     known = lessons.lessons()
     width = max(len(each.name) for each in known)
     lines = [f"{each.name:<{width}}  {each.title}" for each in known]
@@ -67,39 +67,39 @@ def lesson(asked: table.Lesson) -> int:
     return 0
 
 
-def _run(window: Window, scene: Path | None, asked: View, interrupted: Interruption, at: Lesson | None) -> None:
+def _run(window: Window, scene: Path | None, options: View, interrupted: Interruption, at: Lesson | None) -> None:
     from ..ui import open_panels
     from ..ui.session import Session
     from ..ui.viewer import Viewer
 
-    session = Session(window.context, scene, window.engine, opening=asked.opening, open_thread=window.open_thread)
-    if asked.theme is not None:
-        preferences = replace(session.state.preferences, theme=asked.theme)
+    session = Session(window.context, scene, window.engine, opening=options.opening, open_thread=window.open_thread)
+    if options.theme is not None:
+        preferences = replace(session.state.preferences, theme=options.theme)
         session.state = replace(session.state, preferences=preferences)
     if at is not None:
         session.show_lesson(at)
-    elif scene is None and asked.screenshot is None:
+    elif scene is None and options.screenshot is None:
         session.welcome()
     viewer = Viewer(session, refresh_s=window.refresh_s)
     session.input_waits = window.input_waits
     open_panels.load_layout()
     try:
-        if asked.screenshot is None:
+        if options.screenshot is None:
             window.run(viewer, until=interrupted)
         else:
-            _take_screenshot(window, viewer, session, asked.screenshot, asked.after or DEFAULT_AFTER_S, interrupted)
+            _take_screenshot(window, viewer, session, options.screenshot, options.after or DEFAULT_AFTER_S, interrupted)
     except Exception as error:
         raise _rescued(session, error) from error
     place = _place(window, session.settings.window)
     window.hide()
     if interrupted():
-        # Nobody can be asked: what is unsaved stays and is offered at the next start.
+        # Nobody can be options: what is unsaved stays and is offered at the next start.
         if session.document.unsaved:
             session.autosave.write_now(session.document.scene, session.document.title, session.document.source)
         session.jobs.finish_export()
         _tell(session.jobs.notes, session.release())
         return
-    if asked.screenshot is None:
+    if options.screenshot is None:
         open_panels.save_layout()
         session.settings = replace(session.settings, window=place)
         _tell((), session.close())

@@ -59,7 +59,7 @@ def check_installed() -> None:
 
 
 def count_gpus() -> int:
-    """How many GPUs there are to share out, those with the lowest numbers, without a gap; 0 where nothing can be told.
+    """How many GPUs there are to share out, those with the lowest numbers, without a gap; 0 where that is unknown.
 
     EGL's devices that are no software renderers, each card once, by EGL_EXT_device_enumeration and EGL_EXT_device_query
     (Khronos), in the order in which moderngl counts them."""
@@ -74,17 +74,17 @@ def count_gpus() -> int:
         return 0
     devices = (ctypes.c_void_p * _MOST_GPUS)()
     found = ctypes.c_int(0)
-    ask = ctypes.CFUNCTYPE(ctypes.c_uint, ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)(query)
-    ask_text = ctypes.CFUNCTYPE(ctypes.c_char_p, ctypes.c_void_p, ctypes.c_int)(text_of)
-    if not ask(_MOST_GPUS, devices, ctypes.byref(found)):
+    query_devices = ctypes.CFUNCTYPE(ctypes.c_uint, ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)(query)
+    query_text = ctypes.CFUNCTYPE(ctypes.c_char_p, ctypes.c_void_p, ctypes.c_int)(text_of)
+    if not query_devices(_MOST_GPUS, devices, ctypes.byref(found)):
         return 0
     files: list[bytes] = []
     for device in devices[: found.value]:
-        extensions = (ask_text(device, _EXTENSIONS) or b"").split()
+        extensions = (query_text(device, _EXTENSIONS) or b"").split()
         if b"EGL_MESA_device_software" in extensions:
             break
         has_file = b"EGL_EXT_device_drm" in extensions
-        file = (ask_text(device, _DRM_DEVICE_FILE) or b"") if has_file else b""
+        file = (query_text(device, _DRM_DEVICE_FILE) or b"") if has_file else b""
         if file and file in files:
             break  # the same card again, by another driver
         files.append(file)
@@ -103,7 +103,7 @@ class _Process:
 
 
 class LocalWorkers:
-    """A scheduler in this process and worker processes beside it; one that dies is started again."""
+    """A scheduler in this process and worker processes; one that dies is started again."""
 
     def __init__(self, count: int) -> None:
         """Raises `UserError` where they cannot be started."""
@@ -111,7 +111,7 @@ class LocalWorkers:
 
         self._security: Security = Security.temporary()
         try:
-            # Nobody else on this machine may hand work to it: what workers are sent, they run.
+            # Nobody else on this machine may give it work: workers run what they are sent.
             self._cluster: LocalCluster = LocalCluster(
                 n_workers=0, host="127.0.0.1", dashboard_address=None, security=self._security, silence_logs=False
             )
@@ -214,7 +214,7 @@ class DaskCrew:
         return time.monotonic()
 
     def size(self) -> int:
-        """Threads of all workers, asked for now and then."""
+        """Threads of all workers, queried now and then."""
         now = time.monotonic()
         if now - self._size[0] > 0.5:
             found = self.client.scheduler_info(n_workers=-1).get("workers", {})
@@ -310,7 +310,7 @@ def open_crew(workers: int | None, scheduler: str | None) -> Iterator[DaskCrew]:
     from distributed import Client
 
     for name in ("", ".client", ".scheduler", ".core", ".comm", ".batched"):
-        # What a user must know is told in sentences.
+        # What a user must know is raised as a sentence.
         logging.getLogger(f"distributed{name}").setLevel(logging.CRITICAL)
     settings = {
         "distributed.scheduler.allowed-failures": _DEATHS,
@@ -360,7 +360,7 @@ async def _work(address: str, name: str, keys: dict[str, str]) -> None:
 
 def _main() -> None:
     """Be a worker until there is no scheduler any more."""
-    # Ctrl-C is for the process that hands out the work, which then ends this one.
+    # Ctrl-C is for the process that distributes the work, which then ends this one.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     address, name = sys.argv[1:3]
     asyncio.run(_work(address, name, json.loads(sys.stdin.readline())))

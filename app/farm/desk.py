@@ -15,7 +15,7 @@ from ..base.version import __version__
 from ..gpu import shader
 from ..gpu.context import Context, create_context
 
-_TELL_EVERY_S = 0.4
+_REPORT_EVERY_S = 0.4
 _own = threading.local()
 
 
@@ -30,7 +30,7 @@ class Desk:
 
     @property
     def context(self) -> Context:
-        """Made when it is first asked for. Raises `UserError` where there is no OpenGL."""
+        """Made at its first use. Raises `UserError` where there is no OpenGL."""
         if self._context is None:
             self._context = create_context()
             shader.keep_programs(self._context.ctx)
@@ -67,13 +67,13 @@ class Report:
         from distributed import get_worker
 
         self._worker, self._topic, self._attempt, self._key = get_worker(), topic, attempt, key
-        self._told_s = 0.0
+        self._reported_s = 0.0
         self(0.0)
 
     def __call__(self, share: float, text: str = "") -> None:
         now = time.monotonic()
-        if now - self._told_s >= _TELL_EVERY_S:
-            self._told_s = now
+        if now - self._reported_s >= _REPORT_EVERY_S:
+            self._reported_s = now
             self._worker.log_event(self._topic, [self._attempt, float(share)])
 
     def unwanted(self) -> bool:

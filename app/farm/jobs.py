@@ -1,4 +1,4 @@
-"""A job and the workers that do it: its tasks are handed out from first to last, what a dead worker had is done again,
+"""A job and the workers that do it: its tasks are distributed from first to last, what a dead worker had is done again,
 what is late is begun a second time, and every result is kept once.
 
 The rule for stragglers is that of backup tasks (Dean and Ghemawat, MapReduce, OSDI 2004, section 3.6): once nothing
@@ -128,7 +128,7 @@ class Tally:
 
 
 class Foreman:
-    """Hands out the tasks of one job."""
+    """Distributes the tasks of one job."""
 
     def __init__(self, crew: Crew, job: Job, stop: Callable[[], bool] = lambda: False) -> None:
         self._crew, self._job, self._stop = crew, job, stop
@@ -139,7 +139,7 @@ class Foreman:
         self._attempts = 0
         self._shown = 0.0
 
-    def run(self, tell: Callable[[float, str], None]) -> Tally | None:
+    def run(self, progress: Callable[[float, str], None]) -> Tally | None:
         """Have everything done; None where `stop()` turned true before. Raises `UserError` where a task cannot be done,
         the crew is lost, or the job's own methods do."""
         try:
@@ -148,10 +148,10 @@ class Foreman:
             while self._due or self._running:
                 if self._stop():
                     return None
-                self._hand_out()
+                self._distribute()
                 for news in self._crew.news(_WAIT_S):
                     self._follow(news)
-                tell(*self._progress())
+                progress(*self._progress())
             return self.tally
         finally:
             for task, attempts in self._running.items():
@@ -175,7 +175,7 @@ class Foreman:
         count = self.tally.done + waiting.total()
         return self._shown, f"{self.tally.done} of {count} done, {size or 'no'} worker{'s' * (size != 1)}"
 
-    def _hand_out(self) -> None:
+    def _distribute(self) -> None:
         size = self._crew.size()
         # As many again wait at the workers, so that none is idle while a result travels.
         while self._due and self._count_running() < max(2 * size, 1):

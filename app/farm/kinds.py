@@ -36,7 +36,7 @@ from .jobs import Task
 
 _FIRST, _FRAME = "the first frame", "frame"
 _POINT, _POINTS = "point", "points"
-_MACHINE, _SCENE = "the look at the machine", "scene"
+_MACHINE, _SCENE = "the query of the machine", "scene"
 _RESULT_BYTES = 256 << 20
 """Pictures that one task brings back together, at most about."""
 _ONE_KIND = ("processor", "renderer")
@@ -117,7 +117,7 @@ class FramesJob:
 
 
 def _draw_points(desk: Desk, plan: SweepPlan, report: Report, numbers: tuple[int, ...]) -> list[Drawn]:
-    """Points, fewer than asked for where they are no longer wanted."""
+    """Points, as many as are still wanted."""
     painter = desk.keep(lambda: SweepPainter(desk.context, plan))
     return list(painter.draw_all(numbers, report, report.unwanted))
 
@@ -182,7 +182,7 @@ class _Measured:
     skipped: str = ""
 
 
-def _look(desk: Desk, settings: BenchSettings, report: Report) -> dict[str, str]:
+def _query_machine(desk: Desk, settings: BenchSettings, report: Report) -> dict[str, str]:
     """The machine of a worker."""
     with create_context() as context:
         return machine(context)
@@ -192,7 +192,7 @@ def _measure(
     desk: Desk, settings: BenchSettings, report: Report, name: str, scene: Scene, start_s: float
 ) -> _Measured | None:
     """One scene, in a folder of its own; in a context of its own too, for a program that is compiled already would
-    look quick. `start_s`: what a process takes before it has its scene, without its context."""
+    seem quick. `start_s`: what a process takes before it has its scene, without its context."""
 
     def progress(share: float, text: str) -> None:
         report(share)
@@ -235,7 +235,7 @@ class ScenesJob:
 
     def begin(self) -> Iterable[Task]:
         """See `Job`."""
-        return [Task(_MACHINE, 1, (_look,))]
+        return [Task(_MACHINE, 1, (_query_machine,))]
 
     def ahead(self) -> Mapping[str, int]:
         """See `Job`."""

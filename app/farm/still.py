@@ -184,7 +184,7 @@ class PartFolder:
         header = read_header(path)
         if (header.key, header.indices, header.share) != (self.key, (share.index,), share):
             path.unlink()
-            raise UserError("a worker traced something else than it was asked for: install one version everywhere")
+            raise UserError("a worker traced something else than was requested: install one version everywhere")
         self._add(path)
         self.seconds += time.perf_counter() - started
 

@@ -294,7 +294,7 @@ class TestProgram:
         module, function = runs.split(":")
         found = getattr(import_module(f"spectrasplat.commands.{module}"), function)
         notes = found.__annotations__
-        assert notes["asked"].split(".")[-1] == values.__name__ and notes["return"] == "int"
+        assert notes["options"].split(".")[-1] == values.__name__ and notes["return"] == "int"
 
     def test_every_part_of_the_proof_can_be_chosen(self) -> None:
         assert [part.key for part in PARTS] == ["doctor", *PROOF_PARTS]
