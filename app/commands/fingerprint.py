@@ -24,40 +24,40 @@ class FingerprintFile(msgspec.Struct, forbid_unknown_fields=True):
     """Scene → case → what was hashed → hashes."""
 
 
-def fingerprint(asked: Fingerprint) -> int:
+def fingerprint(options: Fingerprint) -> int:
     """Measure, write, compare; returns the exit code. Raises `UserError`."""
     from ..bench.fingerprint import CASES, differences, measure, scene_files
     from ..gpu.context import create_context
 
-    if asked.output is None and asked.against is None:
+    if options.output is None and options.against is None:
         raise UserError("nothing to do with the hashes: give -o FILE, --against FILE, or both")
     shipped = scene_files()
-    scenes = {name: shipped.get(name) or find_scene(name) for name in asked.scenes or shipped}
-    cases = asked.cases or tuple(CASES)
+    scenes = {name: shipped.get(name) or find_scene(name) for name in options.scenes or shipped}
+    cases = options.cases or tuple(CASES)
     for name in cases:
         if name not in CASES:
             raise UserError(f"--cases '{name}' is unknown{suggestion(name, CASES) or ','} there are {', '.join(CASES)}")
-    if asked.output is not None:
-        check_writable(asked.output)
-    before = None if asked.against is None else _read(asked.against)
+    if options.output is not None:
+        check_writable(options.output)
+    before = None if options.against is None else _read(options.against)
     with create_context() as context:
         driver = {"renderer": context.renderer, "vendor": context.vendor, "version": context.version}
-    if before is not None and before.driver != driver and not asked.texts:
+    if before is not None and before.driver != driver and not options.texts:
         there = " ".join(before.driver.values())
-        print(f"note: {asked.against} is of another driver ({there}), whose pictures differ in their last bits")
+        print(f"note: {options.against} is of another driver ({there}), whose pictures differ in their last bits")
 
     found = FingerprintFile(__version__, driver, {})
     count = 0
-    for scene, case, hashes in measure(scenes, cases, texts_only=asked.texts):
+    for scene, case, hashes in measure(scenes, cases, texts_only=options.texts):
         found.scenes.setdefault(scene, {})[case] = hashes
         if before is not None:
             known = before.scenes.get(scene, {}).get(case)
-            lines = ["not in the file"] if known is None else differences(known, hashes, texts_only=asked.texts)
+            lines = ["not in the file"] if known is None else differences(known, hashes, texts_only=options.texts)
             for what in lines:
                 print(f"{scene}, {case}: {what}", flush=True)
                 count += 1
-        if asked.output is not None:
-            with atomic_output(asked.output) as temporary:
+        if options.output is not None:
+            with atomic_output(options.output) as temporary:
                 temporary.write_bytes(msgspec.json.format(msgspec.json.encode(found)))
     cases_found = sum(map(len, found.scenes.values()))
     told = "" if before is None else f", {count} differences" if count else ", no differences"
