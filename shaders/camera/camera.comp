@@ -110,9 +110,7 @@ Path camera_path(uvec2 pixel, uint primary_sample, float gain)
 // What a camera ray meets that nothing specular is in the way of.
 void see_directly(Path path, bool met, Hit hit, uint kind, uint pixel_key)
 {
-#if defined(LAYER_BEAUTY) && defined(VISIBLE_LIGHTS)
-    add_lights(path, met ? hit.distance : FAR_DISTANCE);
-#endif
+    if (LAYER_BEAUTY && VISIBLE_LIGHTS) add_lights(path, met ? hit.distance : FAR_DISTANCE);
     if (!met || kind == KIND_DIFFUSE) add_end(path, met, hit, true, pixel_key);
 }
 #endif
@@ -145,27 +143,25 @@ void main()
 #ifdef CAMERA_SPECULAR
     Path path = camera_path(pixel, primary_sample, gain);
 #endif
-#ifdef RGB_CHANNELS
-    turn = p.counts_turns != 0u ? uint(imageLoad(picture[0], ivec2(pixel)).w) : p.sample_index;
-#else
-    turn = p.sample_index;
-#endif
+    if (RGB_CHANNELS) {
+        turn = p.counts_turns != 0u ? uint(imageLoad(picture[0], ivec2(pixel)).w) : p.sample_index;
+    } else {
+        turn = p.sample_index;
+    }
     for (int t = 0; t < TARGETS; ++t) radiance[t] = vec4(0.0);
-#ifdef CAMERA_SPECULAR
-    stack_size = 0;
-#endif
+    if (CAMERA_SPECULAR) stack_size = 0;
 #ifdef LISTS_SPECULAR
     uint number = pixel.y * p.size.x + pixel.x;
     if (p.survey == SURVEY_KEPT) {
         uint key = even_key(pixel), sees = key & KIND_BITS;
-#if defined(COATS) && defined(FOLLOWED)
-        if (sees == SEES_COATED) listed[atomicAdd(listed_count, 1u)] = listed_entry(number, THE_SAMPLE, p.primary_samples);
-        if (sees == SEES_COATED) sees = SEES_DIRECTLY;
-#endif
+        if (COATS && FOLLOWED) {
+            if (sees == SEES_COATED) listed[atomicAdd(listed_count, 1u)] = listed_entry(number, THE_SAMPLE, p.primary_samples);
+            if (sees == SEES_COATED) sees = SEES_DIRECTLY;
+        }
         if (sees == SEES_DIRECTLY) imageStore(picture[0], ivec2(pixel), imageLoad(picture[0], ivec2(pixel)) + vec4(surveyed_mean(pixel), 0.0));
-#ifdef FOLLOWED
-        if (sees == SEES_SPECULAR) listed[atomicAdd(listed_count, 1u)] = listed_entry(number, THE_SAMPLE, p.primary_samples);
-#endif
+        if (FOLLOWED) {
+            if (sees == SEES_SPECULAR) listed[atomicAdd(listed_count, 1u)] = listed_entry(number, THE_SAMPLE, p.primary_samples);
+        }
         if (key != 0u) return;
     }
     Survey survey = Survey(0u, vec3(0.0));
@@ -181,22 +177,22 @@ void main()
         bool met = intersect_closest(path.position, path.direction, FAR_DISTANCE, path.origin, hit);
         uint kind = met ? object_at(hit.object).kind : NONE;
         uint sees = is_specular(kind) ? SEES_SPECULAR : SEES_DIRECTLY;
-#if defined(COATS) && defined(FOLLOWED)
-        // The base is seen directly; a path goes on from the coat.
-        if (kind == KIND_DIFFUSE && is_coated(hit.object)) {
-            sees = SEES_COATED;
-            specular_samples += 1u;
-            draw = hash_pcg(draw);
-            if (unit_float(draw) * float(specular_samples) < 1.0) chosen = k;
+        if (COATS && FOLLOWED) {
+            // The base is seen directly; a path goes on from the coat.
+            if (kind == KIND_DIFFUSE && is_coated(hit.object)) {
+                sees = SEES_COATED;
+                specular_samples += 1u;
+                draw = hash_pcg(draw);
+                if (unit_float(draw) * float(specular_samples) < 1.0) chosen = k;
+            }
         }
-#endif
         if (is_specular(kind)) {
-#ifdef FOLLOWED
-            specular_samples += 1u;
-            // Each of them as likely: the newest of c with 1 / c.
-            draw = hash_pcg(draw);
-            if (unit_float(draw) * float(specular_samples) < 1.0) chosen = k;
-#endif
+            if (FOLLOWED) {
+                specular_samples += 1u;
+                // Each of them as likely: the newest of c with 1 / c.
+                draw = hash_pcg(draw);
+                if (unit_float(draw) * float(specular_samples) < 1.0) chosen = k;
+            }
         } else {
             see_directly(path, met, hit, kind, pixel_key);
         }
@@ -220,12 +216,12 @@ void main()
 #else
     int events = 0;
     bool goes_on = true, halts = false;
-#ifdef HALTS
-    if (resumes) {
-        resume(events);
-        goes_on = false;
+    if (HALTS) {
+        if (resumes) {
+            resume(events);
+            goes_on = false;
+        }
     }
-#endif
     while ((goes_on || stack_size > 0) && !halts) {
         int found = 0;
         for (; (goes_on || stack_size > 0) && found < ENDS_HELD && !halts; ++events) {
@@ -255,31 +251,27 @@ void main()
 #else
                 bool met_before = path.recut != 0u;
 #endif
-#ifdef COATS
-                // Before a coat that is seen first, the program for what is seen directly has added them.
-                met_before = met_before || (coated && path.depth == 0u);
-#endif
+                if (COATS) {
+                    // Before a coat that is seen first, the program for what is seen directly has added them.
+                    met_before = met_before || (coated && path.depth == 0u);
+                }
                 if (!met_before) add_lights(path, met ? hit.distance : FAR_DISTANCE);
 #endif
                 // Light that would still be caught inside is as if it left here.
                 bool specular = !ends && kind != KIND_BLACK, leaves = specular && (event_limit_reached || path.depth >= uint(MAX_DEPTH));
                 if (leaves) atomicAdd(fallbacks[FELL_DEPTH], 1u);
-#ifdef HAS_GRATING
-                if (leaves && kind == KIND_GRATING) path.throughput *= efficiency_left(path, hit.object);
-#endif
+                if (HAS_GRATING) {
+                    if (leaves && kind == KIND_GRATING) path.throughput *= efficiency_left(path, hit.object);
+                }
                 if (ends || leaves) ended[found++] = PathEnd(path, hit, uint(met && ends), uint(same_hit || leaves));
                 goes_on = specular && !leaves;
-#ifdef COATS
-                goes_on = goes_on || (coated && !event_limit_reached && path.depth < uint(MAX_DEPTH));
-#endif
+                if (COATS) goes_on = goes_on || (coated && !event_limit_reached && path.depth < uint(MAX_DEPTH));
                 if (goes_on) meet_surface(path, hit, kind, pixel_key);
-#if defined(HAS_GRATING) || defined(COATS) || defined(ROUGH_SURFACES)
-                goes_on = goes_on && path.walk.inverse_pdf > 0.0;
-#endif
+                if (HAS_GRATING || COATS || ROUGH_SURFACES) goes_on = goes_on && path.walk.inverse_pdf > 0.0;
             }
-#ifdef SPECTRAL_SWEEP
-            if (cut_at >= 0.0) cut_band(path, cut_at, pixel_key);
-#endif
+            if (SPECTRAL_SWEEP) {
+                if (cut_at >= 0.0) cut_band(path, cut_at, pixel_key);
+            }
 #ifdef HALTS
             halts = rounds >= uint(HALT_ROUNDS);
             // One place stores both what is pending and, where it halts, what is followed.
@@ -298,17 +290,15 @@ void main()
         }
         for (int e = 0; e < found; ++e) add_end(ended[e].path, ended[e].met != 0u, ended[e].hit, ended[e].same_hit != 0u, pixel_key);
     }
-#ifdef HALTS
-    if (!loops_run()) atomicAdd(fallbacks[FELL_LOOPS], 1u);
-    if (stack_size > 0) {
-        halt(entry, events);
-        return;
+    if (HALTS) {
+        if (!loops_run()) atomicAdd(fallbacks[FELL_LOOPS], 1u);
+        if (stack_size > 0) {
+            halt(entry, events);
+            return;
+        }
     }
 #endif
-#endif
-#ifdef RGB_CHANNELS
-    radiance[0].w = took_turn ? 1.0 : 0.0;
-#endif
+    if (RGB_CHANNELS) radiance[0].w = took_turn ? 1.0 : 0.0;
     for (int t = 0; t < TARGETS; ++t) {
         vec4 sum = imageLoad(picture[t], ivec2(pixel));
         imageStore(picture[t], ivec2(pixel), sum + radiance[t]);

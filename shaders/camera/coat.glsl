@@ -39,9 +39,9 @@ void meet_coat(inout Path path, Hit hit, Triangle facet, uint pixel_key)
     float weight = draws ? coat_weight(finish.alpha, finish.index, toward, away, facing) : 1.0 - share_under(finish, facing);
     vec3 turn = to_world * drawn - normal;
     event.frame.normal += turn;
-#ifdef SPECTRAL_SWEEP
-    for (int end = 0; end < 2; ++end) event.end_normal[end] = normalize(event.end_normal[end] + turn);
-#endif
+    if (SPECTRAL_SWEEP) {
+        for (int end = 0; end < 2; ++end) event.end_normal[end] = normalize(event.end_normal[end] + turn);
+    }
     bool geometric, leaves = dot(reflect_direction(path.direction, event.frame.normal, -facing), event.frame.normal_g) > 0.0;
     reflect_path(path, event, geometric);
     path.throughput *= weight;
@@ -55,9 +55,7 @@ void meet_coat(inout Path path, Hit hit, Triangle facet, uint pixel_key)
     path.walk.coat_pdf = finish.alpha > 0.0 ? coat_direction_density(finish.alpha, toward, drawn) : 1e30;
     widen_columns(path, path.walk.coat_pdf);
     leave_surface(path, hit, dot(path.direction, hit.normal_g) < 0.0);
-#ifdef POLARISED
-    path.polarisation = unpolarised(path.direction);
-#endif
+    if (POLARISED) path.polarisation = unpolarised(path.direction);
 }
 
 #endif

@@ -16,11 +16,11 @@ int emission_cell(float x)
 
 vec4 emission_until(uint row, int target, int cell)
 {
-#ifdef SCENE_IMAGE
-    return imageLoad(emission_table, ivec2(cell, int(row) * TARGETS + target));
-#else
-    return texelFetch(emission_table, ivec2(cell, int(row) * TARGETS + target), 0);
-#endif
+    if (SCENE_IMAGE) {
+        return imageLoad(emission_table, ivec2(cell, int(row) * TARGETS + target));
+    } else {
+        return texelFetch(emission_table, ivec2(cell, int(row) * TARGETS + target), 0);
+    }
 }
 
 // What a path lets through at the wavelength x.
@@ -57,11 +57,11 @@ WavelengthInterval wavelength_interval(Path path, float lo, float hi)
     interval.cell_lo = emission_cell(lo);
     interval.cell_hi = emission_cell(hi);
     interval.through = path.walk.inverse_pdf * transmitted(path, 0.5 * (lo + hi));
-#ifdef ABSORPTION
-    interval.steps = max(1, int(ceil((hi - lo) * float(TINT_STEPS))));
-#else
-    interval.steps = path.throughput.x == path.throughput.z ? 1 : max(1, int(ceil((hi - lo) * float(WEIGHT_STEPS))));
-#endif
+    if (ABSORPTION) {
+        interval.steps = max(1, int(ceil((hi - lo) * float(TINT_STEPS))));
+    } else {
+        interval.steps = path.throughput.x == path.throughput.z ? 1 : max(1, int(ceil((hi - lo) * float(WEIGHT_STEPS))));
+    }
     return interval;
 }
 

@@ -53,9 +53,9 @@ void meet_grating(inout Path path, Path whole, Hit hit, Event event, uint pixel_
     }
     // What is thrown to the side is one band; what goes straight on or back stays whole.
     Path banded = path;
-#ifdef HAS_DISPERSION
-    if (banded.restricted == 0u) restrict_to_band(banded, pixel_key);
-#endif
+    if (HAS_DISPERSION) {
+        if (banded.restricted == 0u) restrict_to_band(banded, pixel_key);
+    }
     uint end = alone ? number + 1u : orders;
     GratingOrder order;
     vec3 steps;
@@ -71,21 +71,21 @@ void meet_grating(inout Path path, Path whole, Hit hit, Event event, uint pixel_
         return;
     }
     bool more = !alone && number + 1u < end, here = passes.y, cut = false;
-#ifdef SPECTRAL_SWEEP
-    if (!all(passes) && path.recut == 0u) {
-        float at = cell_border(evanescence_in_band(banded, event, met, order, passes));
-        Path start = whole;
-        if (start.restricted == 0u) restrict_to_band(start, pixel_key);
-        cut = may_cut_near(start, at, hit.distance);
-        if (cut) {
-            // Both parts meet this surface again, each from its own start; where other orders are pending, these first.
-            path = more ? whole : start;
-            path.recut = uint(!more);
-            cut_at = more ? -1.0 : at;
+    if (SPECTRAL_SWEEP) {
+        if (!all(passes) && path.recut == 0u) {
+            float at = cell_border(evanescence_in_band(banded, event, met, order, passes));
+            Path start = whole;
+            if (start.restricted == 0u) restrict_to_band(start, pixel_key);
+            cut = may_cut_near(start, at, hit.distance);
+            if (cut) {
+                // Both parts meet this surface again, each from its own start; where other orders are pending, these first.
+                path = more ? whole : start;
+                path.recut = uint(!more);
+                cut_at = more ? -1.0 : at;
+            }
         }
+        here = here || cut;
     }
-    here = here || cut;
-#endif
     if (more) {
         pending_path = whole;
         pending_path.order = number + 1u;

@@ -35,9 +35,7 @@ void halt(uint entry, int events)
     halted[place].stack_size = stack_size;
     halted[place].events = events;
     halted[place].took_turn = took_turn;
-#ifdef SPECTRAL_SWEEP
-    halted[place].asked = asked;
-#endif
+    if (SPECTRAL_SWEEP) halted[place].asked = asked;
     for (int t = 0; t < TARGETS; ++t) halted[place].radiance[t] = radiance[t];
 }
 
@@ -46,9 +44,7 @@ void resume(out int events)
     stack_size = halted[place].stack_size;
     events = halted[place].events;
     took_turn = halted[place].took_turn;
-#ifdef SPECTRAL_SWEEP
-    asked = halted[place].asked;
-#endif
+    if (SPECTRAL_SWEEP) asked = halted[place].asked;
     for (int t = 0; t < TARGETS; ++t) radiance[t] = halted[place].radiance[t];
 }
 

@@ -45,10 +45,10 @@ bool may_cut_near(Path start, float at, float distance)
 void send_on(inout Path path, Event event, vec3 share, vec3 unhidden)
 {
     path.throughput *= share;
-#ifdef ROUGH_SURFACES
-    path.throughput *= unhidden;
-    if (unhidden.y <= 0.0) path.walk.inverse_pdf = 0.0;
-#endif
+    if (ROUGH_SURFACES) {
+        path.throughput *= unhidden;
+        if (unhidden.y <= 0.0) path.walk.inverse_pdf = 0.0;
+    }
 }
 
 // One glass surface: `path` goes on, the other part is put on the stack or, if weak, one of them is chosen.
@@ -63,18 +63,18 @@ void cross_glass(inout Path path, Path whole, Hit hit, Event event, uint pixel_k
     Path mirrored = path;
     Event mirror = event;
     bool begins = false;
-#ifdef HAS_DISPERSION
-    // What is reflected off the outside of glass knows no wavelength but in its strength: it stays whole. What goes on is one band.
-    if (path.restricted == 0u && (event.n_i.x != event.n_i.z || event.n_t.x != event.n_t.z)) {
-        begins = all(greaterThan(event.cosine2, vec3(0.0)));
-        restrict_to_band(path, pixel_key);
-        share_out(path, event);
-        if (!begins) {
-            mirrored = path;
-            mirror = event;
+    if (HAS_DISPERSION) {
+        // What is reflected off the outside of glass knows no wavelength but in its strength: it stays whole. What goes on is one band.
+        if (path.restricted == 0u && (event.n_i.x != event.n_i.z || event.n_t.x != event.n_t.z)) {
+            begins = all(greaterThan(event.cosine2, vec3(0.0)));
+            restrict_to_band(path, pixel_key);
+            share_out(path, event);
+            if (!begins) {
+                mirrored = path;
+                mirror = event;
+            }
         }
     }
-#endif
 #ifdef SPECTRAL_SWEEP
     float onset = path.restricted != 0u && path.recut == 0u ? total_reflection_in_band(path, event) : -1.0;
     if (onset >= 0.0) {
@@ -92,12 +92,12 @@ void cross_glass(inout Path path, Path whole, Hit hit, Event event, uint pixel_k
 #endif
     // A microfacet's share is its own, also where what it lets through does not leave the surface.
     bool total = !event.refracted.exists;
-#ifdef ROUGH_SURFACES
-    if (event.ground.width > 0.0) {
-        total = event.cosine2.y <= 0.0;
-        path.walk.ground = mirrored.walk.ground = 1u;
+    if (ROUGH_SURFACES) {
+        if (event.ground.width > 0.0) {
+            total = event.cosine2.y <= 0.0;
+            path.walk.ground = mirrored.walk.ground = 1u;
+        }
     }
-#endif
     bool reflects = total;
     float likely = total ? 1.0 : dot(event.reflectance, vec3(0.25, 0.5, 0.25));
     bool strong = !total && (begins || path.depth <= 1u || path.walk.branch_weight * min(likely, 1.0 - likely) > p.split_threshold);
@@ -147,20 +147,18 @@ void meet_surface(inout Path path, Hit hit, uint kind, uint pixel_key)
     if (!columns_hold(path)) atomicAdd(fallbacks[FELL_COLUMNS], 1u);
     Triangle facet = hit_triangle(hit);
     path.position = surface_point(hit, facet, whole.position, whole.direction);
-#ifdef SPECTRAL_SWEEP
-#ifdef NORMAL_DERIVATIVES
-    path.walk.planar_so_far = uint(path.walk.planar_so_far != 0u && is_planar(hit, facet));
-#endif
-    if (path.restricted != 0u) transfer_ends(path, hit.normal_g);
-#endif
-    path.depth += 1u;
-#ifdef COATS
-    path.walk.coat_pdf = 0.0;
-    if (kind == KIND_DIFFUSE) {
-        meet_coat(path, hit, facet, pixel_key);
-        return;
+    if (SPECTRAL_SWEEP) {
+        if (NORMAL_DERIVATIVES) path.walk.planar_so_far = uint(path.walk.planar_so_far != 0u && is_planar(hit, facet));
+        if (path.restricted != 0u) transfer_ends(path, hit.normal_g);
     }
-#endif
+    path.depth += 1u;
+    if (COATS) {
+        path.walk.coat_pdf = 0.0;
+        if (kind == KIND_DIFFUSE) {
+            meet_coat(path, hit, facet, pixel_key);
+            return;
+        }
+    }
     Event event = interact(path, hit, facet, object_at(hit.object), MicrofacetDraw(p.sample_index, path.depth, hash_combine(pixel_key, 80u)));
 #ifdef HAS_MIRROR
     if (kind == KIND_MIRROR) {
@@ -179,12 +177,12 @@ void meet_surface(inout Path path, Hit hit, uint kind, uint pixel_key)
         path.walk.branch_weight *= max(colour.r, max(colour.g, colour.b));
     }
 #endif
-#ifdef HAS_DIELECTRIC
-    if (IS_GLASS(kind)) cross_glass(path, whole, hit, event, pixel_key);
-#endif
-#ifdef HAS_GRATING
-    if (kind == KIND_GRATING) meet_grating(path, whole, hit, event, pixel_key);
-#endif
+    if (HAS_DIELECTRIC) {
+        if (IS_GLASS(kind)) cross_glass(path, whole, hit, event, pixel_key);
+    }
+    if (HAS_GRATING) {
+        if (kind == KIND_GRATING) meet_grating(path, whole, hit, event, pixel_key);
+    }
 }
 
 #endif

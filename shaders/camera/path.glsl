@@ -53,11 +53,11 @@ uint look_index;
 // Side of the share of its pixel that a sample of this path has, pixels.
 float sample_side(Path path)
 {
-#ifdef LISTS_SPECULAR
-    return p.sample_side * inversesqrt(float(p.primary_samples));
-#else
-    return path.restricted != 0u ? p.band_side : p.sample_side;
-#endif
+    if (LISTS_SPECULAR) {
+        return p.sample_side * inversesqrt(float(p.primary_samples));
+    } else {
+        return path.restricted != 0u ? p.band_side : p.sample_side;
+    }
 }
 
 #if defined(HAS_DISPERSION) && !defined(RANDOM_WAVELENGTH)
@@ -104,15 +104,13 @@ void restrict_to_band(inout Path path, uint pixel_key)
     band.y = clamp(quantile(brightness_of(band), 0.5), mix(band.x, band.z, 0.1), mix(band.x, band.z, 0.9));
     path.walk.inverse_pdf *= float(p.bands);
 #endif
-#ifdef POLARISED
-    path.polarisation = band_polarisation(path.polarisation, path.band, path.throughput, band);
-#endif
+    if (POLARISED) path.polarisation = band_polarisation(path.polarisation, path.band, path.throughput, band);
     path.throughput = band_weights(path.band, path.throughput, band);
     path.band = band;
-#ifdef SPECTRAL_SWEEP
-    set_steps(path);
-    gather_ends(path);
-#endif
+    if (SPECTRAL_SWEEP) {
+        set_steps(path);
+        gather_ends(path);
+    }
 }
 
 // The wavelength that a part of a band is traced at: the band's own, where that lies in it, else the part's middle. What the path lets through,

@@ -41,14 +41,14 @@ void main()
         if (!is_specular(kind)) break;
         bool entering = dot(path.direction, hit.normal_g) < 0.0, reflects = true, goes_on = true, geometric;
         Event event = interact(path, hit, facet, thing, MicrofacetDraw(0u, 0u, 0u));
-#ifdef HAS_DIELECTRIC
-        if (IS_GLASS(kind)) {
-            reflects = event.boundary.changes && (!event.refracted.exists || (path.walk.reflections > 0u && !entering && !IS_THIN(event.boundary)));
-            if (reflects && !entering) path.walk.reflections -= min(path.walk.reflections, 1u);
-            if (!event.boundary.changes) path.medium = event.boundary.behind;
-            else if (!reflects) refract_path(path, event);
+        if (HAS_DIELECTRIC) {
+            if (IS_GLASS(kind)) {
+                reflects = event.boundary.changes && (!event.refracted.exists || (path.walk.reflections > 0u && !entering && !IS_THIN(event.boundary)));
+                if (reflects && !entering) path.walk.reflections -= min(path.walk.reflections, 1u);
+                if (!event.boundary.changes) path.medium = event.boundary.behind;
+                else if (!reflects) refract_path(path, event);
+            }
         }
-#endif
 #ifdef HAS_GRATING
         if (kind == KIND_GRATING) {
             // The strongest order that leaves.

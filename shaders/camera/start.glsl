@@ -48,29 +48,19 @@ Path path_from(uvec2 pixel, vec2 within_pixel, float gain)
         path.ddirection[0] = scale * (right - dot(right, ray.direction) * ray.direction);
         path.ddirection[1] = scale * (up - dot(up, ray.direction) * ray.direction);
     }
-#ifdef LENS
-    begin_on_lens(path);
-#endif
-#ifdef POLARISED
-    path.polarisation = unpolarised(path.direction);
-#endif
-#ifdef SPECTRAL_SWEEP
-    gather_ends(path);
-#endif
+    if (LENS) begin_on_lens(path);
+    if (POLARISED) path.polarisation = unpolarised(path.direction);
+    if (SPECTRAL_SWEEP) gather_ends(path);
     path.band = vec3(0.0, 0.5, 1.0);
     path.walk.inverse_pdf = gain;
     path.walk.branch_weight = 1.0;
     path.walk.key = path.walk.cuts = 0u;
     path.walk.planar_so_far = 1u;
-#ifdef ROUGH_SURFACES
-    path.walk.ground = 0u;
-#endif
-#ifdef COATS
-    path.walk.coat_pdf = 0.0;
-#endif
-#ifdef ABSORPTION
-    for (int i = 0; i < ABSORBERS; ++i) path.walk.lengths[i] = 0.0;
-#endif
+    if (ROUGH_SURFACES) path.walk.ground = 0u;
+    if (COATS) path.walk.coat_pdf = 0.0;
+    if (ABSORPTION) {
+        for (int i = 0; i < ABSORBERS; ++i) path.walk.lengths[i] = 0.0;
+    }
     return path;
 }
 

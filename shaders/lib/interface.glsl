@@ -41,9 +41,9 @@ void curve_as_piece(Hit hit, bool entering, vec3 position, inout ShadingFrame fr
 {
     Piece piece = piece_at(hit.primitive & ~CURVED_BIT);
     frame.interpolated = 1u - piece.is_plane;
-#ifdef NORMAL_DERIVATIVES
-    curve_of_piece(piece, position, entering ? 1.0 : -1.0, frame.summed, frame.gradient_u, frame.gradient_v, frame.along_u, frame.along_v);
-#endif
+    if (NORMAL_DERIVATIVES) {
+        curve_of_piece(piece, position, entering ? 1.0 : -1.0, frame.summed, frame.gradient_u, frame.gradient_v, frame.along_u, frame.along_v);
+    }
 }
 #endif
 
@@ -54,10 +54,10 @@ ShadingFrame shading_frame(Hit hit, Triangle facet, vec3 position, vec3 directio
     bool entering = dot(direction, hit.normal_g) < 0.0;
     frame.normal = frame.normal_g = entering ? hit.normal_g : -hit.normal_g;
     frame.interpolated = frame.refused = 0u;
-#ifdef NORMAL_DERIVATIVES
-    frame.summed = frame.normal;
-    frame.gradient_u = frame.gradient_v = frame.along_u = frame.along_v = vec3(0.0);
-#endif
+    if (NORMAL_DERIVATIVES) {
+        frame.summed = frame.normal;
+        frame.gradient_u = frame.gradient_v = frame.along_u = frame.along_v = vec3(0.0);
+    }
 #ifdef SMOOTH_NORMALS
     // Without a branch: some corners' normals where the facet has none. Software renderers execute both sides anyway.
     bool has_normals = (hit.primitive & (PLANE_BIT | CURVED_BIT)) == 0u && facet.normals != NONE;
@@ -70,25 +70,25 @@ ShadingFrame shading_frame(Hit hit, Triangle facet, vec3 position, vec3 directio
     frame.interpolated = uint(has_normals && facing < -MIN_SHADING_COSINE && is_finite(facing));
     frame.refused = uint(has_normals && frame.interpolated == 0u);
     frame.normal = frame.interpolated != 0u ? normal : frame.normal_g;
-#ifdef NORMAL_DERIVATIVES
-    frame.summed = summed;
-    barycentric_gradients(facet.edge1, facet.edge2, frame.gradient_u, frame.gradient_v);
-    frame.along_u = n1 - n0;
-    frame.along_v = n2 - n0;
+    if (NORMAL_DERIVATIVES) {
+        frame.summed = summed;
+        barycentric_gradients(facet.edge1, facet.edge2, frame.gradient_u, frame.gradient_v);
+        frame.along_u = n1 - n0;
+        frame.along_v = n2 - n0;
+    }
 #endif
-#endif
-#ifdef CURVED_SOLIDS
-    if (is_curved(hit.primitive)) curve_as_piece(hit, entering, position, frame);
-#endif
+    if (CURVED_SOLIDS) {
+        if (is_curved(hit.primitive)) curve_as_piece(hit, entering, position, frame);
+    }
     return frame;
 }
 
 // Whether the surface keeps its normal round the place that was hit.
 bool is_planar(Hit hit, Triangle facet)
 {
-#ifdef CURVED_SOLIDS
-    if (is_curved(hit.primitive)) return piece_at(hit.primitive & ~CURVED_BIT).is_plane != 0u;
-#endif
+    if (CURVED_SOLIDS) {
+        if (is_curved(hit.primitive)) return piece_at(hit.primitive & ~CURVED_BIT).is_plane != 0u;
+    }
     return is_plane(hit.primitive) || facet.normals == NONE;
 }
 
@@ -160,15 +160,15 @@ vec3 surface_point(Hit hit, Triangle facet, vec3 origin, vec3 direction)
 {
     vec3 position = origin + hit.distance * direction;
     if ((hit.primitive & (PLANE_BIT | CURVED_BIT)) == 0u) position = facet.vertex + hit.bary.x * facet.edge1 + hit.bary.y * facet.edge2;
-#ifdef CONVEX_SOLIDS
-    if (is_plane(hit.primitive)) {
-        vec4 plane = planes[hit.primitive & ~PLANE_BIT];
-        position -= plane.xyz * (dot(position, plane.xyz) - plane.w);
+    if (CONVEX_SOLIDS) {
+        if (is_plane(hit.primitive)) {
+            vec4 plane = planes[hit.primitive & ~PLANE_BIT];
+            position -= plane.xyz * (dot(position, plane.xyz) - plane.w);
+        }
     }
-#endif
-#ifdef CURVED_SOLIDS
-    if (is_curved(hit.primitive)) position = on_piece(piece_at(hit.primitive & ~CURVED_BIT), position);
-#endif
+    if (CURVED_SOLIDS) {
+        if (is_curved(hit.primitive)) position = on_piece(piece_at(hit.primitive & ~CURVED_BIT), position);
+    }
     return position;
 }
 

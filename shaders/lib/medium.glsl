@@ -34,19 +34,19 @@ uint medium_of(uint mask)
 
 bool is_inside(MediumStack stack)
 {
-#ifdef MEDIUM_STACK
-    return stack.mask != 0u || stack.object != NONE;
-#else
-    return stack.object != NONE;
-#endif
+    if (MEDIUM_STACK) {
+        return stack.mask != 0u || stack.object != NONE;
+    } else {
+        return stack.object != NONE;
+    }
 }
 
 // Object whose medium fills the place, NONE: air.
 uint current_medium(MediumStack stack)
 {
-#ifdef MEDIUM_STACK
-    if (stack.mask != 0u) return medium_of(stack.mask);
-#endif
+    if (MEDIUM_STACK) {
+        if (stack.mask != 0u) return medium_of(stack.mask);
+    }
     return stack.object;
 }
 
@@ -63,15 +63,15 @@ MediumInterface cross_boundary(MediumStack stack, uint object, bool entering)
     boundary.before = entering ? NONE : object;
     boundary.after = entering ? object : NONE;
     boundary.changes = true;
-#ifdef HAS_SHEET
-    boundary.thin = object_at(object).kind == KIND_SHEET;
-    if (boundary.thin) {
-        boundary.behind = stack;
-        boundary.before = current_medium(stack);
-        boundary.after = object;
-        return boundary;
+    if (HAS_SHEET) {
+        boundary.thin = object_at(object).kind == KIND_SHEET;
+        if (boundary.thin) {
+            boundary.behind = stack;
+            boundary.before = current_medium(stack);
+            boundary.after = object;
+            return boundary;
+        }
     }
-#endif
 #ifdef MEDIUM_STACK
     uint bit_index = object_at(object).stack_bit;
     if (bit_index != NONE) {
@@ -123,11 +123,11 @@ void interface_indices(MediumInterface boundary, vec3 x, out vec3 n_i, out vec3 
 // dn/dvar of an object's glass: 1 where the variable is its own index.
 float medium_slope(uint object, float x)
 {
-#ifdef MERGED_GROUPS
-    return spectral_row(uint(SLOPE_ROW) + object_at(object).medium, x);
-#else
-    return 1.0;
-#endif
+    if (MERGED_GROUPS) {
+        return spectral_row(uint(SLOPE_ROW) + object_at(object).medium, x);
+    } else {
+        return 1.0;
+    }
 }
 
 // d(n_i / n_t) / d(variable of group g) [physics: -eta/n_t for the transmitting glass, 1/n_t for the

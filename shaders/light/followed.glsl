@@ -56,22 +56,22 @@ FollowedRay follow_specular(vec3 position, vec3 direction, RayOrigin origin, uin
             Event event = interact(path, hit, facet, thing, MicrofacetDraw(0u, number, hash_combine(key, 0x100u)));
             bool passes = false, changes = true, geometric;
             vec3 unhidden = vec3(1.0);
-#ifdef HAS_MIRROR
-            if (kind == KIND_MIRROR) path.walk.tint *= at_rgb(uint(WEIGHT_ROW) + thing.weight_row, x_of_rgb);
-#endif
-#ifdef HAS_DIELECTRIC
-            if (IS_GLASS(kind)) {
-                changes = event.boundary.changes;
-                passes = !changes || (event.cosine2.y > 0.0 && unit_float(hash_combine(key, number)) >= event.reflectance.y);
-                if (!changes) path.medium = event.boundary.behind;
-                else if (passes) {
-                    unhidden = refract_path(path, event);
-#ifdef SURFACE_FILTERS
-                    if (thing.texture != NONE) path.walk.tint *= at_rgb(uint(WEIGHT_ROW) + thing.texture, x_of_rgb);
-#endif
+            if (HAS_MIRROR) {
+                if (kind == KIND_MIRROR) path.walk.tint *= at_rgb(uint(WEIGHT_ROW) + thing.weight_row, x_of_rgb);
+            }
+            if (HAS_DIELECTRIC) {
+                if (IS_GLASS(kind)) {
+                    changes = event.boundary.changes;
+                    passes = !changes || (event.cosine2.y > 0.0 && unit_float(hash_combine(key, number)) >= event.reflectance.y);
+                    if (!changes) path.medium = event.boundary.behind;
+                    else if (passes) {
+                        unhidden = refract_path(path, event);
+                        if (SURFACE_FILTERS) {
+                            if (thing.texture != NONE) path.walk.tint *= at_rgb(uint(WEIGHT_ROW) + thing.texture, x_of_rgb);
+                        }
+                    }
                 }
             }
-#endif
             if (!passes) unhidden = reflect_path(path, event, geometric);
             path.walk.tint *= unhidden.x;
             leave_surface(path, hit, passes ? entering : !entering);

@@ -44,9 +44,7 @@ bool survives(inout Path path, inout float roulette_w, float share, uint branch,
     roulette_w -= carried_w(path) * (boost - 1.0);
     path.walk.flux_w *= boost;
     path.throughput *= boost;
-#ifdef HERO
-    path.walk.companion_throughput *= boost;
-#endif
+    if (HERO) path.walk.companion_throughput *= boost;
     path.walk.footprint_scale *= sqrt(boost);
     path.walk.survival *= boost;
     return true;

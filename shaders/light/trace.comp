@@ -128,36 +128,34 @@ void land(inout Path path, Path start, uint receiver, uint triangle, Hit hit, ui
     photon.dposition_ds = vec3(0.0);
     photon.dposition_dt = vec3(0.0);
     photon.fan = 0u;
-#ifdef FOOTPRINTS
-    photon.dposition_ds = path.dposition[0] * path.walk.footprint_scale;
-    photon.dposition_dt = path.dposition[1] * path.walk.footprint_scale;
-    photon.fan = fan_where_it_landed(path, start, hit);
-#endif
+    if (FOOTPRINTS) {
+        photon.dposition_ds = path.dposition[0] * path.walk.footprint_scale;
+        photon.dposition_dt = path.dposition[1] * path.walk.footprint_scale;
+        photon.fan = fan_where_it_landed(path, start, hit);
+    }
     uint lattice_bits = p.lattice_bits;
 #ifdef LAMP_COLUMNS
     // A footprint blurs what light from a point would draw, and an extended light has that coming: the broader of the two is drawn.
     vec2 fan = unpackHalf2x16(photon.fan);
-#ifdef LOBE_COLUMNS
-    narrow_lamp_by_lobe(path);
-#endif
+    if (LOBE_COLUMNS) narrow_lamp_by_lobe(path);
     if (cover_sides(hit.normal_g, photon.dposition_ds, photon.dposition_dt, fan, path.dposition[LAMP], path.dposition[LAMP + 1])) {
         lattice_bits = 0u;
         photon.fan = is_within2(fan, FAN_LIMIT) ? packHalf2x16(fan) : 0u;
     }
 #endif
-#ifdef LOBE_COLUMNS
-    if (widen_by_lobe(path, hit.normal_g, photon.dposition_ds, photon.dposition_dt)) {
-        lattice_bits = 0u;
-        photon.fan = 0u;
+    if (LOBE_COLUMNS) {
+        if (widen_by_lobe(path, hit.normal_g, photon.dposition_ds, photon.dposition_dt)) {
+            lattice_bits = 0u;
+            photon.fan = 0u;
+        }
     }
-#endif
     photon.x_lo = path.band.x;
     photon.x_hi = path.band.z;
     photon.throughput = path.throughput;
-#ifdef HERO
-    photon.companion_x = path.walk.companion_x;
-    photon.companion_throughput = path.walk.companion_throughput;
-#endif
+    if (HERO) {
+        photon.companion_x = path.walk.companion_x;
+        photon.companion_throughput = path.walk.companion_throughput;
+    }
     photon.x_anchor = path.band.y;
     photon.triangle = triangle;
     photon.receiver = receiver;
@@ -165,10 +163,10 @@ void land(inout Path path, Path start, uint receiver, uint triangle, Hit hit, ui
     photon.light_and_source = path.walk.light_and_source;
     photon.branch_key = path.walk.branch_key;
     photon.depth = min(path.depth, (1u << EDGE_BIT) - 1u);
-#ifdef LIGHT_EDGES
-    // The edge is told in steps of the lattice as emitted: footprints of a coarser one, or broader ones, reach over it from farther away.
-    if (lattice_bits == p.lattice_bits && path.walk.footprint_scale == 1.0) photon.depth |= uint(path.walk.dposition[0].w) << EDGE_BIT;
-#endif
+    if (LIGHT_EDGES) {
+        // The edge is told in steps of the lattice as emitted: footprints of a coarser one, or broader ones, reach over it from farther away.
+        if (lattice_bits == p.lattice_bits && path.walk.footprint_scale == 1.0) photon.depth |= uint(path.walk.dposition[0].w) << EDGE_BIT;
+    }
 #if SPECTRAL_GROUPS > 0
     SPECTRAL_COPY
 #endif
@@ -206,10 +204,10 @@ bool is_beam_object(uint object)
 Flight flight_of(inout Path path, float distance)
 {
     bool outside = !is_inside(path.medium);
-#ifdef HAS_GRATING
-    // What is left of a grating's orders has flown here before.
-    outside = outside && path.order == 0u;
-#endif
+    if (HAS_GRATING) {
+        // What is left of a grating's orders has flown here before.
+        outside = outside && path.order == 0u;
+    }
     Flight flight;
     flight.position = path.position;
     flight.direction = path.direction;
@@ -248,9 +246,7 @@ void main()
 #endif
     Path start = path;
     Outcome outcome = Outcome(0u, 0.0, 0.0, 0.0);
-#ifndef POINT_SPECTRUM
-    band_w = band_powers(power_row(path), path.band);
-#endif
+    if (!POINT_SPECTRUM) band_w = band_powers(power_row(path), path.band);
 
     Hit hit;
     float border = -1.0;
@@ -276,23 +272,23 @@ void main()
 #ifdef FLIGHTS
     Flight flight = flight_of(path, met ? hit.distance : FAR_DISTANCE);
 #endif
-#ifdef ABSORPTION
-    if (met) absorb(path, hit.distance, outcome.absorbed_w);
-#endif
+    if (ABSORPTION) {
+        if (met) absorb(path, hit.distance, outcome.absorbed_w);
+    }
     if (met) path.position = surface_point(hit, facet, path.position, path.direction);
-#ifdef FOOTPRINTS
-    if (path.depth > 0u) keep_directions_within(path);
-#endif
-#ifdef LAMP_COLUMNS
-    if (met && path.depth > 0u && p.bounded != 0u) keep_pair_above(path, LAMP, hit.normal_g);
-#endif
-#ifdef LOBE_COLUMNS
-    if (met && p.bounded != 0u) keep_pair_above(path, LOBE, hit.normal_g);
-#endif
+    if (FOOTPRINTS) {
+        if (path.depth > 0u) keep_directions_within(path);
+    }
+    if (LAMP_COLUMNS) {
+        if (met && path.depth > 0u && p.bounded != 0u) keep_pair_above(path, LAMP, hit.normal_g);
+    }
+    if (LOBE_COLUMNS) {
+        if (met && p.bounded != 0u) keep_pair_above(path, LOBE, hit.normal_g);
+    }
     transfer_columns(path, hit.normal_g, hit.distance);
-#ifdef FOOTPRINTS
-    if (IS_GLASS(kind) || kind == KIND_MIRROR) keep_columns_within(path, start, thing.kind == KIND_MIRROR ? thing.colour.w : thing.colour.z, hit.distance);
-#endif
+    if (FOOTPRINTS) {
+        if (IS_GLASS(kind) || kind == KIND_MIRROR) keep_columns_within(path, start, thing.kind == KIND_MIRROR ? thing.colour.w : thing.colour.z, hit.distance);
+    }
 
 #ifdef BEAMS
     if (met && (path.walk.light_and_source >> 16) == 0xffffu && is_beam_object(hit.object)) {
@@ -314,13 +310,13 @@ void main()
     } else {
         scatter(path, start, hit, facet, kind, thing, border, k, outcome);
     }
-#ifdef FLIGHTS
-#ifdef BAND_CUTS
-    // The parts of a band that is cut fly again.
-    if ((outcome.what & FELL_BAND) != 0u) flight.flux_w = 0.0;
-#endif
-    flight.what |= kind == KIND_DIFFUSE || kind == KIND_BLACK || kind == NONE ? 0u : 1u;
-    store_flight(state.flights - state.alive + k, flight);
-#endif
+    if (FLIGHTS) {
+        if (BAND_CUTS) {
+            // The parts of a band that is cut fly again.
+            if ((outcome.what & FELL_BAND) != 0u) flight.flux_w = 0.0;
+        }
+        flight.what |= kind == KIND_DIFFUSE || kind == KIND_BLACK || kind == NONE ? 0u : 1u;
+        store_flight(state.flights - state.alive + k, flight);
+    }
     store_outcome(k, outcome);
 }

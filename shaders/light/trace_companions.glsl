@@ -8,38 +8,36 @@ void weaken(inout Path path, vec3 share, vec3 companions)
 {
     path.walk.flux_w *= share.y;
     path.throughput *= share;
-#ifdef HERO
-    path.walk.companion_throughput.xyz *= companions;
-#endif
+    if (HERO) path.walk.companion_throughput.xyz *= companions;
 }
 
 // A spectral table's values for the companions.
 vec3 companion_row(Path path, uint row)
 {
-#ifdef HERO
-    return spectral_row(row, path.walk.companion_x.xyz);
-#else
-    return vec3(1.0);
-#endif
+    if (HERO) {
+        return spectral_row(row, path.walk.companion_x.xyz);
+    } else {
+        return vec3(1.0);
+    }
 }
 
 // The share of the hero and its companions together, by which roulette judges: whoever of them leads, the odds are the same.
 float common_share(Path path, float own, vec3 companions)
 {
-#ifdef HERO
-    if (path.walk.companion_x.w > 0.0) return 0.25 * (own + dot(companions, vec3(1.0)));
-#endif
+    if (HERO) {
+        if (path.walk.companion_x.w > 0.0) return 0.25 * (own + dot(companions, vec3(1.0)));
+    }
     return own;
 }
 
 // From here on the hero's path is not that of its companions: none of them would have led to it, and it has all of its weight.
 void leave_companions(inout Path path)
 {
-#ifdef HERO
-    path.throughput *= path.walk.companion_x.w > 0.0 ? 4.0 : 1.0;
-    path.walk.companion_x.w = 0.0;
-    path.walk.companion_throughput = vec4(0.0);
-#endif
+    if (HERO) {
+        path.throughput *= path.walk.companion_x.w > 0.0 ? 4.0 : 1.0;
+        path.walk.companion_x.w = 0.0;
+        path.walk.companion_throughput = vec4(0.0);
+    }
 }
 
 // What glass makes of the companions.
@@ -75,29 +73,27 @@ Companions companions_at(Path path, Event event, bool is_glass)
     companions.reflectance = vec3(event.reflectance.y);
     companions.stay = true;
 #ifdef HERO
-#ifdef POLARISED
-    companions.s = event.s;
-    companions.seen = in_plane(companions_of(path), path.direction, event.s);
-    companions.reflection = companions.transmission = event.reflection;
-#endif
+    if (POLARISED) {
+        companions.s = event.s;
+        companions.seen = in_plane(companions_of(path), path.direction, event.s);
+        companions.reflection = companions.transmission = event.reflection;
+    }
 #ifdef HAS_DIELECTRIC
     if (!is_glass) return companions;
     vec3 n_i, n_t;
     interface_indices(event.boundary, path.walk.companion_x.xyz, n_i, n_t);
     vec3 eta_it = n_i / n_t, theta = vec3(event.theta.y), cosine2 = transmitted_cosine2(theta, eta_it);
-#ifdef POLARISED
-    companions.reflection = fresnel_reflection(theta, eta_it, cosine2);
-    companions.reflection = OF_SHEET(event.boundary, companions.reflection);
-    companions.transmission = fresnel_transmission(companions.reflection);
-    companions.reflectance = polarised_share(companions.seen, companions.reflection);
-#else
-    companions.reflectance = fresnel_reflectance(theta, eta_it, cosine2);
-    companions.reflectance = OF_SHEET(event.boundary, companions.reflectance);
-#endif
+    if (POLARISED) {
+        companions.reflection = fresnel_reflection(theta, eta_it, cosine2);
+        companions.reflection = OF_SHEET(event.boundary, companions.reflection);
+        companions.transmission = fresnel_transmission(companions.reflection);
+        companions.reflectance = polarised_share(companions.seen, companions.reflection);
+    } else {
+        companions.reflectance = fresnel_reflectance(theta, eta_it, cosine2);
+        companions.reflectance = OF_SHEET(event.boundary, companions.reflectance);
+    }
     bool polished = true;
-#ifdef ROUGH_SURFACES
-    polished = event.ground.width <= 0.0;
-#endif
+    if (ROUGH_SURFACES) polished = event.ground.width <= 0.0;
     if (polished && !event.refracted.exists && event.cosine2.y > 0.0) companions.reflectance = vec3(1.0);
     companions.stay = IS_THIN(event.boundary) || all(lessThan(abs(eta_it - event.n_i.y / event.n_t.y), vec3(1e-7)));
 #endif
@@ -108,9 +104,9 @@ Companions companions_at(Path path, Event event, bool is_glass)
 // The companions' state behind what has turned the hero.
 void polarise_companions(inout Path child, Companions companions, bool refracts)
 {
-#if defined(HERO) && defined(POLARISED)
-    keep_companions(child, out_of_plane(behind_interface(companions.seen, refracts ? companions.transmission : companions.reflection), child.direction, companions.s));
-#endif
+    if (HERO && POLARISED) {
+        keep_companions(child, out_of_plane(behind_interface(companions.seen, refracts ? companions.transmission : companions.reflection), child.direction, companions.s));
+    }
 }
 
 #endif

@@ -42,22 +42,22 @@ bool diffract(Path path, Hit hit, Event event, uint row, out Path child, inout P
     rest.recut = 0u;
     rest.order = at >= 0.0 ? number : number + 1u;
     rest_lives = left > 0.0;
-#ifdef BAND_CUTS
-    if (at >= 0.0) {
-        outcome.what |= FELL_BAND;
-        float below = power_below(rest, at);
-        child = part_of_band(rest, rest.band.x, at, below, 5u);
-        rest = part_of_band(rest, at, rest.band.z, 1.0 - below, 6u);
-        return rest_lives;
+    if (BAND_CUTS) {
+        if (at >= 0.0) {
+            outcome.what |= FELL_BAND;
+            float below = power_below(rest, at);
+            child = part_of_band(rest, rest.band.x, at, below, 5u);
+            rest = part_of_band(rest, at, rest.band.z, 1.0 - below, 6u);
+            return rest_lives;
+        }
     }
-#endif
     if (share <= 0.0) return false;
     bool geometric;
     if (order.reflects == 0u) child.origin.inside ^= 1u;
     diffract_path(child, event, met, order, steps, geometric);
-#if defined(HERO) && defined(POLARISED)
-    keep_companions(child, behind_grating(companions_of(path), path.direction, child.direction, order.reflects != 0u));
-#endif
+    if (HERO && POLARISED) {
+        keep_companions(child, behind_grating(companions_of(path), path.direction, child.direction, order.reflects != 0u));
+    }
     weaken(child, vec3(share), vec3(share));
     if (steps.y != 0.0) leave_companions(child);
     outcome.what |= geometric ? FELL_NORMAL : 0u;

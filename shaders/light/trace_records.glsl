@@ -75,12 +75,10 @@ Path load_path(uint slot)
         path.ddirection[c] = ray.ddirection[c].xyz;
     }
 #endif
-#ifdef HAS_GRATING
-    path.order = ray.flags >> ORDER_BIT;
-#endif
-#ifdef POLARISED
-    path.polarisation = Polarisation(vec3(ray.axis_x, ray.axis_y, ray.axis_z), ray.stokes_q, ray.stokes_u, ray.stokes_v);
-#endif
+    if (HAS_GRATING) path.order = ray.flags >> ORDER_BIT;
+    if (POLARISED) {
+        path.polarisation = Polarisation(vec3(ray.axis_x, ray.axis_y, ray.axis_z), ray.stokes_q, ray.stokes_u, ray.stokes_v);
+    }
     return path;
 }
 
@@ -105,17 +103,15 @@ void store_path(uint slot, Path path)
         ray.ddirection[c].xyz = path.ddirection[c];
     }
 #endif
-#ifdef HAS_GRATING
-    ray.flags |= path.order << ORDER_BIT;
-#endif
-#ifdef POLARISED
-    ray.axis_x = path.polarisation.axis.x;
-    ray.axis_y = path.polarisation.axis.y;
-    ray.axis_z = path.polarisation.axis.z;
-    ray.stokes_q = path.polarisation.q;
-    ray.stokes_u = path.polarisation.u;
-    ray.stokes_v = path.polarisation.v;
-#endif
+    if (HAS_GRATING) ray.flags |= path.order << ORDER_BIT;
+    if (POLARISED) {
+        ray.axis_x = path.polarisation.axis.x;
+        ray.axis_y = path.polarisation.axis.y;
+        ray.axis_z = path.polarisation.axis.z;
+        ray.stokes_q = path.polarisation.q;
+        ray.stokes_u = path.polarisation.u;
+        ray.stokes_v = path.polarisation.v;
+    }
     uvec4 texels[RayRecord_TEXELS];
     to_texels(ray, texels);
     for (uint i = 0u; i < uint(RayRecord_TEXELS); ++i) rays_out[slot * uint(RayRecord_TEXELS) + i] = texels[i];

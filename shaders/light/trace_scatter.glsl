@@ -19,14 +19,14 @@ MicrofacetDraw microfacet_draw(Path path)
 void send_on(inout Path child, Event event, vec3 share_over_band, vec3 companions, vec3 unhidden, bool geometric, inout float share, inout Outcome outcome)
 {
     weaken(child, share_over_band, companions);
-#ifdef ROUGH_SURFACES
-    if (event.ground.width > 0.0) {
-        weaken(child, unhidden, vec3(unhidden.y));
-        share *= unhidden.y;
-        outcome.absorbed_w -= carried_w(child);
-        return;
+    if (ROUGH_SURFACES) {
+        if (event.ground.width > 0.0) {
+            weaken(child, unhidden, vec3(unhidden.y));
+            share *= unhidden.y;
+            outcome.absorbed_w -= carried_w(child);
+            return;
+        }
     }
-#endif
     outcome.what |= geometric ? FELL_NORMAL : 0u;
 }
 
@@ -57,17 +57,17 @@ void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object t
     Path child = child_of(path, hit, !entering);
     vec3 unhidden = reflect_path(child, event, geometric);
     Companions companions = companions_at(path, event, IS_GLASS(kind));
-#ifdef HAS_MIRROR
-    if (kind == KIND_MIRROR) {
-        vec3 kept = spectral_row(uint(WEIGHT_ROW) + thing.weight_row, path.band), of_companions = companion_row(path, uint(WEIGHT_ROW) + thing.weight_row);
-        float share = common_share(path, kept.y, of_companions);
-        outcome.what |= ABSORBED;
-        send_on(child, event, kept, of_companions, unhidden, geometric, share, outcome);
-        polarise_companions(child, companions, false);
-        outcome.flux_w = carried_w(path) - carried_w(child);
-        lives = survives(child, outcome.roulette_w, share, 3u);
+    if (HAS_MIRROR) {
+        if (kind == KIND_MIRROR) {
+            vec3 kept = spectral_row(uint(WEIGHT_ROW) + thing.weight_row, path.band), of_companions = companion_row(path, uint(WEIGHT_ROW) + thing.weight_row);
+            float share = common_share(path, kept.y, of_companions);
+            outcome.what |= ABSORBED;
+            send_on(child, event, kept, of_companions, unhidden, geometric, share, outcome);
+            polarise_companions(child, companions, false);
+            outcome.flux_w = carried_w(path) - carried_w(child);
+            lives = survives(child, outcome.roulette_w, share, 3u);
+        }
     }
-#endif
 #ifdef HAS_GRATING
     Path rest = start;
     bool rest_lives = false;
@@ -97,10 +97,10 @@ void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object t
     if (parts) part = passing_part(path, event, onset);
 #endif
     if (splits) {
-#ifdef ROUGH_SURFACES
-        // What neither of both parts has in the end, the surface keeps.
-        if (event.ground.width > 0.0) outcome.absorbed_w += carried_w(path);
-#endif
+        if (ROUGH_SURFACES) {
+            // What neither of both parts has in the end, the surface keeps.
+            if (event.ground.width > 0.0) outcome.absorbed_w += carried_w(path);
+        }
         float share = reflected_share;
         send_on(child, event, event.reflectance, companions.reflectance, unhidden, geometric, share, outcome);
         polarise_companions(child, companions, false);
@@ -122,39 +122,37 @@ void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object t
 #if defined(HAS_DIELECTRIC) || defined(HAS_GRATING)
     child = child_of(path, hit, entering);
     lives = false;
-#ifdef HAS_GRATING
-    if (rest_lives) {
-        child = rest;
-        lives = true;
+    if (HAS_GRATING) {
+        if (rest_lives) {
+            child = rest;
+            lives = true;
+        }
     }
-#endif
 #ifdef HAS_DIELECTRIC
     vec3 let_through = 1.0 - event.reflectance;
-#ifdef BAND_CUTS
-    if (at >= 0.0) {
-        child = part_of_band(start, at, start.band.z, 1.0 - below, 6u);
-        lives = true;
+    if (BAND_CUTS) {
+        if (at >= 0.0) {
+            child = part_of_band(start, at, start.band.z, 1.0 - below, 6u);
+            lives = true;
+        }
+        if (parts) {
+            vec3 power = spectral_row(power_row(path), part.band), whole = spectral_row(power_row(path), path.band);
+            child.walk.flux_w *= clamp((power.z - power.x) / max(whole.z - whole.x, 1e-30), 0.0, 1.0);
+            child.throughput = part.throughput;
+            child.band = part.band;
+            child.direction = part.direction;
+            let_through = part.let_through;
+            refracted_share = part.power_w / max(carried_w(path), 1e-30);
+            // From here on it is this part's power that counts.
+            band_w = band_powers(power_row(path), part.band);
+        }
     }
-    if (parts) {
-        vec3 power = spectral_row(power_row(path), part.band), whole = spectral_row(power_row(path), path.band);
-        child.walk.flux_w *= clamp((power.z - power.x) / max(whole.z - whole.x, 1e-30), 0.0, 1.0);
-        child.throughput = part.throughput;
-        child.band = part.band;
-        child.direction = part.direction;
-        let_through = part.let_through;
-        refracted_share = part.power_w / max(carried_w(path), 1e-30);
-        // From here on it is this part's power that counts.
-        band_w = band_powers(power_row(path), part.band);
-    }
-#endif
     if (splits && event.refracted.exists) {
         unhidden = refract_path(child, event);
         send_on(child, event, let_through, 1.0 - companions.reflectance, unhidden, event.refracted.geometric, refracted_share, outcome);
         polarise_companions(child, companions, true);
         if (!companions.stay) leave_companions(child);
-#ifdef SURFACE_FILTERS
-        filter_by(thing.texture, child, refracted_share, outcome);
-#endif
+        if (SURFACE_FILTERS) filter_by(thing.texture, child, refracted_share, outcome);
         lives = survives(child, outcome.roulette_w, refracted_share, 2u);
     }
 #endif

@@ -37,21 +37,19 @@ void keep_columns_within(inout Path path, Path start, float size, float distance
     float widest = max(p.widest_on_surface * size / max(path.walk.footprint_scale, 1e-30), longest_side(own_s, own_t));
     vec3 s = path.dposition[0], t = path.dposition[1], turn_s = path.ddirection[0], turn_t = path.ddirection[1];
     keep_within(widest, s, t, turn_s, turn_t);
-#ifdef LIGHT_EDGES
-    // Made smaller, it no longer says where its neighbours and the edge are.
-    if (s != path.dposition[0]) path.walk.dposition[0].w = 0.0;
-#endif
+    if (LIGHT_EDGES) {
+        // Made smaller, it no longer says where its neighbours and the edge are.
+        if (s != path.dposition[0]) path.walk.dposition[0].w = 0.0;
+    }
     path.dposition[0] = s;
     path.dposition[1] = t;
     path.ddirection[0] = turn_s;
     path.ddirection[1] = turn_t;
-#ifdef LAMP_COLUMNS
-    keep_pair_within(path, LAMP, p.widest_on_surface * size);
-#endif
-#ifdef LOBE_COLUMNS
-    // Light that comes from anywhere in a disc has half of its radius as standard deviation.
-    keep_pair_within(path, LOBE, 0.5 * size);
-#endif
+    if (LAMP_COLUMNS) keep_pair_within(path, LAMP, p.widest_on_surface * size);
+    if (LOBE_COLUMNS) {
+        // Light that comes from anywhere in a disc has half of its radius as standard deviation.
+        keep_pair_within(path, LOBE, 0.5 * size);
+    }
 }
 
 // Of a ray that a surface has turned: where curved surfaces turn it again and again (inside a diamond), directions grow by a factor each time too, and what leaves at last would be drawn as if it
@@ -60,9 +58,9 @@ void keep_directions_within(inout Path path)
 {
     vec3 s = path.dposition[0], t = path.dposition[1], turn_s = path.ddirection[0], turn_t = path.ddirection[1];
     keep_within(p.widest_turn / max(path.walk.footprint_scale, 1e-30), turn_s, turn_t, s, t);
-#ifdef LIGHT_EDGES
-    if (turn_s != path.ddirection[0]) path.walk.dposition[0].w = 0.0;
-#endif
+    if (LIGHT_EDGES) {
+        if (turn_s != path.ddirection[0]) path.walk.dposition[0].w = 0.0;
+    }
     path.ddirection[0] = turn_s;
     path.ddirection[1] = turn_t;
 }

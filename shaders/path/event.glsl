@@ -54,16 +54,16 @@ vec3 incidence_over_band(Path path, Event event)
     vec3 theta = vec3(dot(path.direction, event.frame.normal));
 #if SPECTRAL_GROUPS > 0
     if (path.restricted != 0u) {
-#ifdef SPECTRAL_SWEEP
-        theta.x = dot(path.end_direction[0], event.end_normal[0]);
-        theta.z = dot(path.end_direction[1], event.end_normal[1]);
-#else
-        for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
-            float dtheta = incidence_column(path, event, g);
-            theta.x += dtheta * variable_step(uint(g), path.band.x, path.band.y);
-            theta.z += dtheta * variable_step(uint(g), path.band.z, path.band.y);
+        if (SPECTRAL_SWEEP) {
+            theta.x = dot(path.end_direction[0], event.end_normal[0]);
+            theta.z = dot(path.end_direction[1], event.end_normal[1]);
+        } else {
+            for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
+                float dtheta = incidence_column(path, event, g);
+                theta.x += dtheta * variable_step(uint(g), path.band.x, path.band.y);
+                theta.z += dtheta * variable_step(uint(g), path.band.z, path.band.y);
+            }
         }
-#endif
         theta.xz = clamp(theta.xz, -1.0, -1e-6);
     }
 #endif
@@ -79,14 +79,14 @@ void planes_of_incidence(Path path, Event event, out vec3 s[3])
 #if SPECTRAL_GROUPS > 0
     if (path.restricted != 0u) {
         vec3 normals[2] = vec3[](event.frame.normal, event.frame.normal);
-#ifdef SPECTRAL_SWEEP
-        normals = event.end_normal;
-#else
-        for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
-            normals[0] += variable_step(uint(g), path.band.x, path.band.y) * NORMAL_COLUMN(event, SPATIAL + g);
-            normals[1] += variable_step(uint(g), path.band.z, path.band.y) * NORMAL_COLUMN(event, SPATIAL + g);
+        if (SPECTRAL_SWEEP) {
+            normals = event.end_normal;
+        } else {
+            for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
+                normals[0] += variable_step(uint(g), path.band.x, path.band.y) * NORMAL_COLUMN(event, SPATIAL + g);
+                normals[1] += variable_step(uint(g), path.band.z, path.band.y) * NORMAL_COLUMN(event, SPATIAL + g);
+            }
         }
-#endif
         s[0] = incidence_axis(direction_at_end(path, 0), normals[0], s[1]);
         s[2] = incidence_axis(direction_at_end(path, 1), normals[1], s[1]);
     }
@@ -100,21 +100,19 @@ Event event_at(Path path, Hit hit, Triangle facet)
     Event event;
     event.frame = shading_frame(hit, facet, path.position, path.direction);
     event.reflectance = vec3(1.0);
-#ifdef SPECTRAL_SWEEP
-    for (int end = 0; end < 2; ++end)
-        event.end_normal[end] = normal_beside(event.frame, path.restricted != 0u ? path.end_position[end] - path.position : vec3(0.0));
-#endif
+    if (SPECTRAL_SWEEP) {
+        for (int end = 0; end < 2; ++end)
+            event.end_normal[end] = normal_beside(event.frame, path.restricted != 0u ? path.end_position[end] - path.position : vec3(0.0));
+    }
 #ifdef HAS_NORMAL_COLUMNS
     for (int c = 0; c < PATH_COLUMNS; ++c) event.normal_columns[c] = normal_column(event.frame, path.dposition[c]);
 #endif
-#ifdef ROUGH_SURFACES
-    event.ground.width = event.ground.table = 0.0;
-    event.ground.normal = event.frame.normal;
-    event.ground.regained = vec3(1.0);
-#ifdef SPECTRAL_SWEEP
-    event.ground.end_normal = event.end_normal;
-#endif
-#endif
+    if (ROUGH_SURFACES) {
+        event.ground.width = event.ground.table = 0.0;
+        event.ground.normal = event.frame.normal;
+        event.ground.regained = vec3(1.0);
+        if (SPECTRAL_SWEEP) event.ground.end_normal = event.end_normal;
+    }
     return event;
 }
 
@@ -127,9 +125,9 @@ void meet_microfacet(Path path, Object thing, MicrofacetDraw draw, inout Event e
     if (event.ground.width <= 0.0) return;
     vec3 normal = event.frame.normal;
     vec3 microfacet = visible_microfacet(-path.direction, normal, event.ground.width, microfacet_numbers(draw.number, draw.depth, draw.key));
-#ifdef NORMAL_DERIVATIVES
-    for (int c = 0; c < PATH_COLUMNS; ++c) event.normal_columns[c] = turned_with(microfacet, normal, event.normal_columns[c]);
-#endif
+    if (NORMAL_DERIVATIVES) {
+        for (int c = 0; c < PATH_COLUMNS; ++c) event.normal_columns[c] = turned_with(microfacet, normal, event.normal_columns[c]);
+    }
 #ifdef WIDENED_BY_LOBES
     // To what an earlier ground surface has spread this one adds a quarter turn aside, to the left or to the right: two columns hold the sum of both
     // variances, exactly where the lobes are round, and else over many paths.
@@ -139,9 +137,9 @@ void meet_microfacet(Path path, Object thing, MicrofacetDraw draw, inout Event e
     event.normal_columns[LOBE] += turn == 0.0 ? first : turn * second;
     event.normal_columns[LOBE + 1] += turn == 0.0 ? second : -turn * first;
 #endif
-#ifdef SPECTRAL_SWEEP
-    for (int end = 0; end < 2; ++end) event.end_normal[end] = normalize(microfacet + turned_with(microfacet, normal, event.end_normal[end] - normal));
-#endif
+    if (SPECTRAL_SWEEP) {
+        for (int end = 0; end < 2; ++end) event.end_normal[end] = normalize(microfacet + turned_with(microfacet, normal, event.end_normal[end] - normal));
+    }
     event.frame.normal = microfacet;
 }
 #endif
@@ -171,21 +169,19 @@ void share_out(Path path, inout Event event)
 #else
     const bool polished = true;
 #endif
-#ifdef POLARISED
-    see_polarised(path, event);
-    event.reflection = fresnel_reflection(event.theta, eta_it, event.cosine2);
-    event.reflection = OF_SHEET(event.boundary, event.reflection);
-    event.transmission = fresnel_transmission(event.reflection);
-    event.reflectance = polarised_share(event.seen, event.reflection);
-#else
-    event.reflectance = fresnel_reflectance(event.theta, eta_it, event.cosine2);
-    event.reflectance = OF_SHEET(event.boundary, event.reflectance);
-#endif
+    if (POLARISED) {
+        see_polarised(path, event);
+        event.reflection = fresnel_reflection(event.theta, eta_it, event.cosine2);
+        event.reflection = OF_SHEET(event.boundary, event.reflection);
+        event.transmission = fresnel_transmission(event.reflection);
+        event.reflectance = polarised_share(event.seen, event.reflection);
+    } else {
+        event.reflectance = fresnel_reflectance(event.theta, eta_it, event.cosine2);
+        event.reflectance = OF_SHEET(event.boundary, event.reflectance);
+    }
     GO_STRAIGHT(event.boundary, event.theta, event.n_i, event.n_t, event.cosine2)
     event.refracted = refract_at(event.frame, path.direction, event.n_i.y / event.n_t.y);
-#ifdef ANCHOR_WEIGHTS
-    event.reflectance = vec3(event.reflectance.y);
-#endif
+    if (ANCHOR_WEIGHTS) event.reflectance = vec3(event.reflectance.y);
     // Where only the facet's normal forbids it, nothing is transmitted at any wavelength; at total reflection each has its own share. A microfacet's
     // share is its own, also where the light that it lets through does not leave the surface.
     if (polished && !event.refracted.exists && event.cosine2.y > 0.0) event.reflectance = vec3(1.0);
@@ -196,19 +192,17 @@ void share_out(Path path, inout Event event)
 Event interact(Path path, Hit hit, Triangle facet, Object thing, MicrofacetDraw draw)
 {
     Event event = event_at(path, hit, facet);
-#ifdef ROUGH_SURFACES
-    if (thing.kind == KIND_DIELECTRIC) meet_microfacet(path, thing, draw, event);
-#endif
-#ifdef HAS_DIELECTRIC
-    if (IS_GLASS(thing.kind)) {
-        event.boundary = cross_boundary(path.medium, hit.object, dot(path.direction, hit.normal_g) < 0.0);
-        share_out(path, event);
-        return event;
+    if (ROUGH_SURFACES) {
+        if (thing.kind == KIND_DIELECTRIC) meet_microfacet(path, thing, draw, event);
     }
-#endif
-#ifdef POLARISED
-    see_polarised(path, event);
-#endif
+    if (HAS_DIELECTRIC) {
+        if (IS_GLASS(thing.kind)) {
+            event.boundary = cross_boundary(path.medium, hit.object, dot(path.direction, hit.normal_g) < 0.0);
+            share_out(path, event);
+            return event;
+        }
+    }
+    if (POLARISED) see_polarised(path, event);
     return event;
 }
 
@@ -221,12 +215,12 @@ vec3 leaving_share(Event event, Path path, bool geometric, float side)
     if (ground.width <= 0.0) return vec3(1.0);
     vec3 cosine = vec3(side * dot(path.direction, ground.normal));
     bool leaves = !geometric && cosine.y > 0.0;
-#ifdef SPECTRAL_SWEEP
-    if (path.restricted != 0u) {
-        cosine.x = side * dot(path.end_direction[0], ground.end_normal[0]);
-        cosine.z = side * dot(path.end_direction[1], ground.end_normal[1]);
+    if (SPECTRAL_SWEEP) {
+        if (path.restricted != 0u) {
+            cosine.x = side * dot(path.end_direction[0], ground.end_normal[0]);
+            cosine.z = side * dot(path.end_direction[1], ground.end_normal[1]);
+        }
     }
-#endif
     vec3 kept = leaves ? ground.regained * smith_share(cosine, ground.width) : vec3(0.0);
 #if SPECTRAL_GROUPS > 0 && !defined(SPECTRAL_SWEEP)
     vec2 turn = vec2(0.0);
@@ -250,20 +244,20 @@ vec3 reflect_path(inout Path path, Event event, out bool geometric)
     for (int c = 0; c < PATH_COLUMNS; ++c)
         path.ddirection[c] = reflected_column(turned, path.direction, path.ddirection[c], NORMAL_COLUMN(event, c));
     path.direction = turned.direction;
-#ifdef SPECTRAL_SWEEP
-    for (int end = 0; end < 2; ++end) {
-        vec3 normal = turned.geometric ? turned.normal : event.end_normal[end], direction = path.end_direction[end];
-        path.end_direction[end] = normalize(reflect_direction(direction, normal, dot(direction, normal)));
+    if (SPECTRAL_SWEEP) {
+        for (int end = 0; end < 2; ++end) {
+            vec3 normal = turned.geometric ? turned.normal : event.end_normal[end], direction = path.end_direction[end];
+            path.end_direction[end] = normalize(reflect_direction(direction, normal, dot(direction, normal)));
+        }
     }
-#endif
-#ifdef POLARISED
-    path.polarisation = out_of_plane(behind_interface(event.seen, event.reflection), path.direction, event.s);
-#endif
-#ifdef ROUGH_SURFACES
-    return leaving_share(event, path, geometric, 1.0);
-#else
-    return vec3(1.0);
-#endif
+    if (POLARISED) {
+        path.polarisation = out_of_plane(behind_interface(event.seen, event.reflection), path.direction, event.s);
+    }
+    if (ROUGH_SURFACES) {
+        return leaving_share(event, path, geometric, 1.0);
+    } else {
+        return vec3(1.0);
+    }
 }
 
 #ifdef HAS_DIELECTRIC
@@ -282,24 +276,24 @@ vec3 refract_path(inout Path path, Event event)
     }
     path.direction = turned.direction;
     path.medium = event.boundary.behind;
-#ifdef SPECTRAL_SWEEP
-    for (int end = 0; end < 2; ++end) {
-        vec3 normal = turned.geometric ? turned.normal : event.end_normal[end], direction = path.end_direction[end];
-        float eta_end = (end == 0 ? event.n_i.x : event.n_i.z) / (end == 0 ? event.n_t.x : event.n_t.z), theta = dot(direction, normal);
-        float cosine2 = transmitted_cosine2(theta, eta_end);
-        vec3 position_l, direction_l;
-        linear_end(path, end, position_l, direction_l);
-        path.end_direction[end] = cosine2 > 0.0 && theta < 0.0 ? normalize(refract_direction(direction, normal, theta, eta_end, sqrt(cosine2))) : direction_l;
+    if (SPECTRAL_SWEEP) {
+        for (int end = 0; end < 2; ++end) {
+            vec3 normal = turned.geometric ? turned.normal : event.end_normal[end], direction = path.end_direction[end];
+            float eta_end = (end == 0 ? event.n_i.x : event.n_i.z) / (end == 0 ? event.n_t.x : event.n_t.z), theta = dot(direction, normal);
+            float cosine2 = transmitted_cosine2(theta, eta_end);
+            vec3 position_l, direction_l;
+            linear_end(path, end, position_l, direction_l);
+            path.end_direction[end] = cosine2 > 0.0 && theta < 0.0 ? normalize(refract_direction(direction, normal, theta, eta_end, sqrt(cosine2))) : direction_l;
+        }
     }
-#endif
-#ifdef POLARISED
-    path.polarisation = out_of_plane(behind_interface(event.seen, event.transmission), path.direction, event.s);
-#endif
-#ifdef ROUGH_SURFACES
-    return leaving_share(event, path, turned.geometric, -1.0);
-#else
-    return vec3(1.0);
-#endif
+    if (POLARISED) {
+        path.polarisation = out_of_plane(behind_interface(event.seen, event.transmission), path.direction, event.s);
+    }
+    if (ROUGH_SURFACES) {
+        return leaving_share(event, path, turned.geometric, -1.0);
+    } else {
+        return vec3(1.0);
+    }
 }
 
 #if SPECTRAL_GROUPS > 0
@@ -311,12 +305,12 @@ float total_reflection_in_band(Path path, Event event)
     if (!any(passes) || all(passes)) return -1.0;
     float dtheta[SPECTRAL_GROUPS];
     vec2 straight = vec2(0.0);
-#ifdef SPECTRAL_SWEEP
-    for (int g = 0; g < SPECTRAL_GROUPS; ++g) dtheta[g] = 0.0;
-    straight = event.theta.xz - event.theta.y;
-#else
-    for (int g = 0; g < SPECTRAL_GROUPS; ++g) dtheta[g] = incidence_column(path, event, g);
-#endif
+    if (SPECTRAL_SWEEP) {
+        for (int g = 0; g < SPECTRAL_GROUPS; ++g) dtheta[g] = 0.0;
+        straight = event.theta.xz - event.theta.y;
+    } else {
+        for (int g = 0; g < SPECTRAL_GROUPS; ++g) dtheta[g] = incidence_column(path, event, g);
+    }
     return total_reflection_onset(path.band, event.theta.y, dtheta, straight, event.boundary, passes);
 }
 #endif

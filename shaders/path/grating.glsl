@@ -47,13 +47,13 @@ float evanescence_in_band(Path path, Event event, GratingEvent met, GratingOrder
 {
     vec3 columns[SPECTRAL_GROUPS], bends[2] = vec3[](vec3(0.0), vec3(0.0));
     for (int g = 0; g < SPECTRAL_GROUPS; ++g) columns[g] = path.ddirection[SPATIAL + g];
-#ifdef SPECTRAL_SWEEP
-    for (int end = 0; end < 2; ++end) {
-        vec3 position, direction;
-        linear_end(path, end, position, direction);
-        bends[end] = path.end_direction[end] - direction;
+    if (SPECTRAL_SWEEP) {
+        for (int end = 0; end < 2; ++end) {
+            vec3 position, direction;
+            linear_end(path, end, position, direction);
+            bends[end] = path.end_direction[end] - direction;
+        }
     }
-#endif
     return evanescence_onset(path.band, path.direction, columns, bends, event.frame.normal, met.grating.lines, met.side, order, met.object, met.medium, passes);
 }
 #endif
@@ -64,14 +64,14 @@ void diffract_path(inout Path path, Event event, GratingEvent met, GratingOrder 
     bool reflects = order.reflects != 0u;
     Deflection turned = diffract_at(event.frame, path.direction, met.grating.lines, met.side, steps.y, reflects);
     geometric = turned.geometric;
-#ifdef SPECTRAL_SWEEP
-    for (int end = 0; end < 2; ++end) {
-        vec3 normal = turned.geometric ? turned.normal : event.end_normal[end], direction = path.end_direction[end];
-        vec3 shift = (end == 0 ? steps.x : steps.z) * across_lines(normal, met.grating.lines, met.side);
-        float theta = dot(direction, normal), cosine2 = diffracted_cosine2(direction, theta, shift);
-        path.end_direction[end] = normalize(diffract_direction(direction, normal, theta, shift, sqrt(max(cosine2, 1e-12)), reflects));
+    if (SPECTRAL_SWEEP) {
+        for (int end = 0; end < 2; ++end) {
+            vec3 normal = turned.geometric ? turned.normal : event.end_normal[end], direction = path.end_direction[end];
+            vec3 shift = (end == 0 ? steps.x : steps.z) * across_lines(normal, met.grating.lines, met.side);
+            float theta = dot(direction, normal), cosine2 = diffracted_cosine2(direction, theta, shift);
+            path.end_direction[end] = normalize(diffract_direction(direction, normal, theta, shift, sqrt(max(cosine2, 1e-12)), reflects));
+        }
     }
-#endif
     for (int c = 0; c < PATH_COLUMNS; ++c) {
         float dstep = 0.0;
 #if SPECTRAL_GROUPS > 0
@@ -79,9 +79,9 @@ void diffract_path(inout Path path, Event event, GratingEvent met, GratingOrder 
 #endif
         path.ddirection[c] = diffracted_column(turned, path.direction, path.ddirection[c], NORMAL_COLUMN(event, c), met.grating.lines, met.side, steps.y, dstep, reflects);
     }
-#ifdef POLARISED
-    path.polarisation = behind_grating(path.polarisation, path.direction, turned.direction, reflects);
-#endif
+    if (POLARISED) {
+        path.polarisation = behind_grating(path.polarisation, path.direction, turned.direction, reflects);
+    }
     path.direction = turned.direction;
 }
 

@@ -58,19 +58,15 @@ Path path_at(vec3 position, vec3 direction, RayOrigin origin, MediumStack medium
     path.band = vec3(x);
     path.throughput = vec3(1.0);
     path.depth = path.restricted = path.recut = 0u;
-#ifdef HAS_GRATING
-    path.order = 0u;
-#endif
-#ifdef POLARISED
-    path.polarisation = unpolarised(direction);
-#endif
-#ifdef SPECTRAL_SWEEP
-    for (int end = 0; end < 2; ++end) {
-        path.end_position[end] = position;
-        path.end_direction[end] = direction;
+    if (HAS_GRATING) path.order = 0u;
+    if (POLARISED) path.polarisation = unpolarised(direction);
+    if (SPECTRAL_SWEEP) {
+        for (int end = 0; end < 2; ++end) {
+            path.end_position[end] = position;
+            path.end_direction[end] = direction;
+        }
+        for (int g = 0; g < SPECTRAL_GROUPS; ++g) path.end_step[g] = vec2(0.0);
     }
-    for (int g = 0; g < SPECTRAL_GROUPS; ++g) path.end_step[g] = vec2(0.0);
-#endif
     return path;
 }
 
@@ -152,15 +148,15 @@ void restrict_to(inout Path path, vec3 band)
     path.throughput = band_weights(before.band, before.throughput, band);
     if (band.y != before.band.y) ray_at(before, band.y, path.position, path.direction);
     path.band = band;
-#ifdef POLARISED
-    path.polarisation = band_polarisation(before.polarisation, before.band, before.throughput, band);
-    path.polarisation.axis = normalize(path.polarisation.axis - dot(path.polarisation.axis, path.direction) * path.direction);
-#endif
-#ifdef SPECTRAL_SWEEP
-    ray_at(before, band.x, path.end_position[0], path.end_direction[0]);
-    ray_at(before, band.z, path.end_position[1], path.end_direction[1]);
-    set_steps(path);
-#endif
+    if (POLARISED) {
+        path.polarisation = band_polarisation(before.polarisation, before.band, before.throughput, band);
+        path.polarisation.axis = normalize(path.polarisation.axis - dot(path.polarisation.axis, path.direction) * path.direction);
+    }
+    if (SPECTRAL_SWEEP) {
+        ray_at(before, band.x, path.end_position[0], path.end_direction[0]);
+        ray_at(before, band.z, path.end_position[1], path.end_direction[1]);
+        set_steps(path);
+    }
 }
 
 // Whether a path's start, moved to where its rays at both wavelengths set out, stays where it is known to be clear. `distance`: to the surface ahead.
@@ -207,9 +203,7 @@ bool columns_hold(inout Path path)
     }
     if (holds) return true;
     for (int c = 0; c < PATH_COLUMNS; ++c) path.dposition[c] = path.ddirection[c] = vec3(0.0);
-#ifdef SPECTRAL_SWEEP
-    gather_ends(path);
-#endif
+    if (SPECTRAL_SWEEP) gather_ends(path);
     return false;
 }
 
@@ -218,9 +212,7 @@ void leave_surface(inout Path path, Hit hit, bool inside)
 {
     path.origin = RayOrigin(hit.primitive, hit.object, uint(inside), path.medium.mask);
     path.recut = 0u;
-#ifdef HAS_GRATING
-    path.order = 0u;
-#endif
+    if (HAS_GRATING) path.order = 0u;
 }
 
 #endif
