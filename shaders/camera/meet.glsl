@@ -4,28 +4,23 @@
 
 #include "path/event.glsl"
 
-#if defined(HAS_DIELECTRIC) || defined(HAS_GRATING) || defined(COATS)
 // A number for a choice at this depth: a Kronecker sequence over a pixel's samples.
 float choice(Path path, uint pixel_key)
 {
     return kronecker(p.sample_index, depth_generator(path.depth), hash_combine(pixel_key, path.walk.key + path.depth * 2654435769u));
 }
-#endif
 
-#ifdef ABSORPTION
 // `absorber`: below 0 for none.
 void add_length(inout Path path, int absorber, float length)
 {
     for (int i = 0; i < ABSORBERS; ++i)
         if (i == absorber) path.walk.lengths[i] += length;
 }
-#endif
 
 #ifdef COATS
 #include "camera/coat.glsl"
 #endif
 
-#ifdef SPECTRAL_SWEEP
 // Whether a path's band may be cut at `at`, from where its flight to the surface ahead started.
 bool may_cut_near(Path start, float at, float distance)
 {
@@ -34,13 +29,11 @@ bool may_cut_near(Path start, float at, float distance)
     if (!near) atomicAdd(fallbacks[FELL_CUT], 1u);
     return near;
 }
-#endif
 
 #ifdef HAS_GRATING
 #include "camera/grating.glsl"
 #endif
 
-#ifdef HAS_DIELECTRIC
 // Leaves a path a lobe's share of its light, and what microfacets do not hide of that. A path that has lost all goes nowhere.
 void send_on(inout Path path, Event event, vec3 share, vec3 unhidden)
 {
@@ -132,7 +125,6 @@ void cross_glass(inout Path path, Path whole, Hit hit, Event event, uint pixel_k
     send_on(path, event, share, unhidden);
     leave_surface(path, hit, reflects != entering);
 }
-#endif
 
 // A specular surface, or a coat.
 void meet_surface(inout Path path, Hit hit, uint kind, uint pixel_key)

@@ -60,7 +60,6 @@ float sample_side(Path path)
     }
 }
 
-#if defined(HAS_DISPERSION) && !defined(RANDOM_WAVELENGTH)
 // How much of what looks bright in the whole spectrum lies below either end of a band.
 vec2 brightness_of(vec3 band)
 {
@@ -72,7 +71,6 @@ float quantile(vec2 brightness, float share)
 {
     return spectral_row(uint(QUANTILE_ROW), mix(brightness.x, brightness.y, share));
 }
-#endif
 
 // From here on the path stands for one band only; all others have their turn in other samples.
 void restrict_to_band(inout Path path, uint pixel_key)

@@ -35,7 +35,6 @@ struct Deflection {
     bool exists;        // false: nothing is transmitted
 };
 
-#ifdef CURVED_SOLIDS
 // A curved solid's face: its own normal, which turns from place to place.
 void curve_as_piece(Hit hit, bool entering, vec3 position, inout ShadingFrame frame)
 {
@@ -45,7 +44,6 @@ void curve_as_piece(Hit hit, bool entering, vec3 position, inout ShadingFrame fr
         curve_of_piece(piece, position, entering ? 1.0 : -1.0, frame.summed, frame.gradient_u, frame.gradient_v, frame.along_u, frame.along_v);
     }
 }
-#endif
 
 // `position`: the place of the hit.
 ShadingFrame shading_frame(Hit hit, Triangle facet, vec3 position, vec3 direction)

@@ -119,7 +119,6 @@ void interface_indices(MediumInterface boundary, vec3 x, out vec3 n_i, out vec3 
 #define GO_STRAIGHT(boundary, theta, n_i, n_t, cosine2)
 #endif
 
-#if SPECTRAL_GROUPS > 0
 // dn/dvar of an object's glass: 1 where the variable is its own index.
 float medium_slope(uint object, float x)
 {
@@ -142,6 +141,5 @@ float index_ratio_derivative(MediumInterface boundary, uint g, float x, float n_
         derivative += medium_slope(boundary.before, x) / n_t;
     return derivative;
 }
-#endif
 
 #endif

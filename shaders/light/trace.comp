@@ -71,7 +71,6 @@ float carried_w(Path path)
 #include "light/roulette.glsl"
 #include "light/trace_companions.glsl"
 
-#ifdef ABSORPTION
 // What the medium on the way takes.
 void absorb(inout Path path, float distance, inout float absorbed_w)
 {
@@ -96,7 +95,6 @@ void absorb(inout Path path, float distance, inout float absorbed_w)
     absorbed_w -= carried_w(path);
     path.walk.survival *= common_share(path, kept.y, companions);
 }
-#endif
 
 #ifdef FOOTPRINTS
 #include "light/trace_widths.glsl"
@@ -104,7 +102,6 @@ void absorb(inout Path path, float distance, inout float absorbed_w)
 #include "light/trace_bands.glsl"
 #include "light/trace_landing.glsl"
 
-#ifdef FOOTPRINTS
 // Of the photon's footprint, per spacing of its own lattice.
 uint fan_where_it_landed(Path path, Path start, Hit hit)
 {
@@ -114,7 +111,6 @@ uint fan_where_it_landed(Path path, Path start, Hit hit)
     fan *= path.walk.footprint_scale;
     return is_within2(fan, FAN_LIMIT) ? packHalf2x16(fan) : 0u;
 }
-#endif
 
 // A photon on a receiver. The share that no specular event precedes the camera pass draws.
 void land(inout Path path, Path start, uint receiver, uint triangle, Hit hit, uint slot, inout Outcome outcome)
@@ -191,15 +187,12 @@ void land(inout Path path, Path start, uint receiver, uint triangle, Hit hit, ui
 
 #include "light/trace_scatter.glsl"
 
-#ifdef BEAMS
 // Whether beams carry what meets this object first.
 bool is_beam_object(uint object)
 {
     return ((p.beam_objects[object >> 7u][(object >> 5u) & 3u] >> (object & 31u)) & 1u) != 0u;
 }
-#endif
 
-#ifdef FLIGHTS
 // The ray's way to what it meets; it has come so far through haze then.
 Flight flight_of(inout Path path, float distance)
 {
@@ -234,7 +227,6 @@ Flight flight_of(inout Path path, float distance)
     path.walk.flown.x += is_inside(path.medium) ? 0.0 : distance;
     return flight;
 }
-#endif
 
 void main()
 {

@@ -51,7 +51,6 @@ struct Companions {
 #endif
 };
 
-#if defined(HERO) && defined(POLARISED)
 // Their state counts from the hero's axis.
 Polarisation companions_of(Path path)
 {
@@ -64,7 +63,6 @@ void keep_companions(inout Path path, Polarisation state)
     path.walk.companion_u.xyz = state.u;
     path.walk.companion_v.xyz = state.v;
 }
-#endif
 
 // `is_glass`: it has met glass; else what turns the hero turns them.
 Companions companions_at(Path path, Event event, bool is_glass)

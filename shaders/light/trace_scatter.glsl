@@ -30,7 +30,6 @@ void send_on(inout Path child, Event event, vec3 share_over_band, vec3 companion
     outcome.what |= geometric ? FELL_NORMAL : 0u;
 }
 
-#ifdef SURFACE_FILTERS
 // What a surface of glass lets through of what enters; the rest is absorbed.
 void filter_by(uint row, inout Path child, inout float share, inout Outcome outcome)
 {
@@ -41,7 +40,6 @@ void filter_by(uint row, inout Path child, inout float share, inout Outcome outc
     outcome.absorbed_w -= carried_w(child);
     share *= common_share(child, kept.y, companions);
 }
-#endif
 
 #include "light/trace_grating.glsl"
 

@@ -10,7 +10,6 @@ float longest_side(vec3 s, vec3 t)
     return length(axis.x * s + axis.y * t);
 }
 
-#if defined(LAMP_COLUMNS) || defined(LOBE_COLUMNS)
 // The places of columns `c` and `c + 1`, and their directions with them.
 void keep_pair_within(inout Path path, int c, float widest)
 {
@@ -21,7 +20,6 @@ void keep_pair_within(inout Path path, int c, float widest)
     path.ddirection[c] = turn_first;
     path.ddirection[c + 1] = turn_second;
 }
-#endif
 
 // Of a ray that has met a surface of an object of this size; `start`: as it set out. A lattice as wide as that stays as it is: nothing else is between its points.
 void keep_columns_within(inout Path path, Path start, float size, float distance)

@@ -41,12 +41,10 @@ struct Event {
 #endif
 
 // Derivative of the cosine of incidence by group g's variable.
-#if SPECTRAL_GROUPS > 0
 float incidence_column(Path path, Event event, int g)
 {
     return dot(path.ddirection[SPATIAL + g], event.frame.normal) + dot(path.direction, NORMAL_COLUMN(event, SPATIAL + g));
 }
-#endif
 
 // Cosines of incidence at the three places of the band: by the rays at its ends where they are carried, else by the columns.
 vec3 incidence_over_band(Path path, Event event)
@@ -70,7 +68,6 @@ vec3 incidence_over_band(Path path, Event event)
     return theta;
 }
 
-#ifdef POLARISED
 // s of the planes of incidence over the band.
 void planes_of_incidence(Path path, Event event, out vec3 s[3])
 {
@@ -92,7 +89,6 @@ void planes_of_incidence(Path path, Event event, out vec3 s[3])
     }
 #endif
 }
-#endif
 
 // The normals that a path meets. `facet`: of the hit.
 Event event_at(Path path, Hit hit, Triangle facet)
@@ -116,7 +112,6 @@ Event event_at(Path path, Hit hit, Triangle facet)
     return event;
 }
 
-#ifdef ROUGH_SURFACES
 // A ground surface: the microfacet that the path meets takes the place of the normals, and turns with them.
 void meet_microfacet(Path path, Object thing, MicrofacetDraw draw, inout Event event)
 {
@@ -142,9 +137,7 @@ void meet_microfacet(Path path, Object thing, MicrofacetDraw draw, inout Event e
     }
     event.frame.normal = microfacet;
 }
-#endif
 
-#ifdef POLARISED
 // The path's state as the surface meets it, and what a mirror makes of that.
 void see_polarised(Path path, inout Event event)
 {
@@ -153,9 +146,7 @@ void see_polarised(Path path, inout Event event)
     event.reflection = mirror_reflection();
     event.transmission = event.reflection;
 }
-#endif
 
-#ifdef HAS_DIELECTRIC
 // What glass reflects of a path over its band, by Fresnel's equations, and where the rest goes.
 void share_out(Path path, inout Event event)
 {
@@ -186,7 +177,6 @@ void share_out(Path path, inout Event event)
     // share is its own, also where the light that it lets through does not leave the surface.
     if (polished && !event.refracted.exists && event.cosine2.y > 0.0) event.reflectance = vec3(1.0);
 }
-#endif
 
 // What a path meets, as far as no chance and no walk decides it: normals, media, shares. `draw`: which microfacet of a ground surface it meets.
 Event interact(Path path, Hit hit, Triangle facet, Object thing, MicrofacetDraw draw)
@@ -206,7 +196,6 @@ Event interact(Path path, Hit hit, Triangle facet, Object thing, MicrofacetDraw 
     return event;
 }
 
-#ifdef ROUGH_SURFACES
 // Share of a path that a microfacet has turned which others do not hide or send on, over its band; nothing where it does not leave the surface.
 // `side`: 1 where it was reflected, -1 where it was refracted.
 vec3 leaving_share(Event event, Path path, bool geometric, float side)
@@ -234,7 +223,6 @@ vec3 leaving_share(Event event, Path path, bool geometric, float side)
 #endif
     return kept;
 }
-#endif
 
 // The path reflected. Returns the share of it that leaves the surface: all, but of what microfacets hide. `geometric`: the facet's normal had to judge.
 vec3 reflect_path(inout Path path, Event event, out bool geometric)
@@ -260,7 +248,6 @@ vec3 reflect_path(inout Path path, Event event, out bool geometric)
     }
 }
 
-#ifdef HAS_DIELECTRIC
 // The path refracted, in the medium behind; see `reflect_path`.
 vec3 refract_path(inout Path path, Event event)
 {
@@ -296,7 +283,6 @@ vec3 refract_path(inout Path path, Event event)
     }
 }
 
-#if SPECTRAL_GROUPS > 0
 // The wavelength within the band where total internal reflection sets in, for an event that reflects some of it totally and some not; else a negative
 // number. Where ends are carried the cosine is straight between the three that are known exactly, else it follows the columns.
 float total_reflection_in_band(Path path, Event event)
@@ -313,7 +299,5 @@ float total_reflection_in_band(Path path, Event event)
     }
     return total_reflection_onset(path.band, event.theta.y, dtheta, straight, event.boundary, passes);
 }
-#endif
-#endif
 
 #endif

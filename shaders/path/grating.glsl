@@ -41,7 +41,6 @@ bvec3 order_passes(Path path, Event event, GratingEvent met, vec3 steps)
     return passes;
 }
 
-#if SPECTRAL_GROUPS > 0
 // The wavelength within the band where an order becomes evanescent, of one that `passes` somewhere and somewhere not.
 float evanescence_in_band(Path path, Event event, GratingEvent met, GratingOrder order, bvec3 passes)
 {
@@ -56,7 +55,6 @@ float evanescence_in_band(Path path, Event event, GratingEvent met, GratingOrder
     }
     return evanescence_onset(path.band, path.direction, columns, bends, event.frame.normal, met.grating.lines, met.side, order, met.object, met.medium, passes);
 }
-#endif
 
 // The path turned into an order. `geometric`: the facet's normal had to judge.
 void diffract_path(inout Path path, Event event, GratingEvent met, GratingOrder order, vec3 steps, out bool geometric)

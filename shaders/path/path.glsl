@@ -70,7 +70,6 @@ Path path_at(vec3 position, vec3 direction, RayOrigin origin, MediumStack medium
     return path;
 }
 
-#ifdef SPECTRAL_SWEEP
 // Where the columns alone put an end's ray.
 void linear_end(Path path, int end, out vec3 position, out vec3 direction)
 {
@@ -98,7 +97,6 @@ void set_steps(inout Path path)
     for (int g = 0; g < SPECTRAL_GROUPS; ++g)
         path.end_step[g] = vec2(variable_step(uint(g), path.band.x, path.band.y), variable_step(uint(g), path.band.z, path.band.y));
 }
-#endif
 
 // The path's ray at the wavelength x: along the spectral columns, and off them by the share of an end's own deviation that a second
 // derivative would have there. So it is exact at the anchor, where it also has the columns' slope, and at ends that are carried.
@@ -175,7 +173,6 @@ void transfer_columns(inout Path path, vec3 normal_g, float distance)
         path.dposition[c] = transfer_column(path.dposition[c], path.ddirection[c], path.direction, normal_g, distance);
 }
 
-#ifdef SPECTRAL_SWEEP
 // The ends carried to the plane of a facet that the path has met at its anchor; an end that cannot get there, or only far away,
 // is where the columns say.
 void transfer_ends(inout Path path, vec3 normal_g)
@@ -191,7 +188,6 @@ void transfer_ends(inout Path path, vec3 normal_g)
         path.end_direction[end] = holds ? direction : direction_l;
     }
 }
-#endif
 
 // Columns that are not finite, or longer than anything, are dropped: the path goes on as a single ray.
 bool columns_hold(inout Path path)
