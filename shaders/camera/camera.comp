@@ -1,11 +1,12 @@
-// The camera pass: one camera sample a pixel and dispatch, added to the sums. A ray runs through glass and over mirrors with the
-// columns of its pixel (Igehy 1999) and of its spectrum (Elek et al. 2014) to the first diffuse surface, light or environment,
-// and looks up along its spectral sweep what is there. Where glass splits it, both parts are followed while they are strong; of the weak rest
-// one is chosen by chance.
+// The camera pass: one camera sample a pixel and dispatch, added to the sums. A ray runs through glass and over mirrors
+// with the columns of its pixel (Igehy 1999) and of its spectrum (Elek et al. 2014) to the first diffuse surface, light
+// or environment, and looks up along its spectral sweep what is there. Where glass splits it, both parts are followed
+// while they are strong; of the weak rest one is chosen by chance.
 //
-// This is a program for what is seen directly (LISTS_SPECULAR). Where the scene shows glass or mirrors it lists the pixels that meet something specular
-// first (FOLLOWED), and another is for those (CAMERA_SPECULAR), which holds all that is expensive.
-// NVIDIA unrolls whatever it can count, with all that it has inlined: two minutes for a scene's programs.
+// This is a program for what is seen directly (LISTS_SPECULAR). Where the scene shows glass or mirrors it lists the
+// pixels that meet something specular first (FOLLOWED), and another is for those (CAMERA_SPECULAR), which holds all
+// that is expensive. NVIDIA unrolls whatever it can count, with all that it has inlined: two minutes for a scene's
+// programs.
 #pragma optionNV(unroll none)
 #ifdef CAMERA_SPECULAR
 layout(local_size_x = PATHS_GROUP) in;
@@ -17,7 +18,11 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "camera/start.glsl"
 
 // How many pixels are listed, how many of their paths have halted, and what is to be known of the listed ones.
-layout(std430, binding = BIND_LISTED) restrict buffer Listed { uint listed_count; uint halted_count; uint listed[]; };
+layout(std430, binding = BIND_LISTED) restrict buffer Listed {
+    uint listed_count;
+    uint halted_count;
+    uint listed[];
+};
 layout(rgba32f, binding = 0) uniform image2D picture[TARGETS];
 
 #ifdef CAMERA_SPECULAR
@@ -44,8 +49,8 @@ float cut_at;
 #endif
 
 #ifdef CAMERA_SPECULAR
-// Ends of paths are looked at together, when there are that many or no path is left: a software renderer, and a GPU, looks at those of
-// neighbouring pixels side by side then.
+// Ends of paths are looked at together, when there are that many or no path is left: a software renderer, and a GPU,
+// looks at those of neighbouring pixels side by side then.
 struct PathEnd {
     Path path;
     Hit hit;
@@ -59,19 +64,18 @@ PathEnd ended[ENDS_HELD];
 #include "camera/cuts.glsl"
 #endif
 
-// Looks of one sample at what is seen directly, which costs little, have places of their own. Those that meet something specular go on as one
-// of them, chosen by chance; as the sample itself, which lies at one of them, where all do.
+// Looks of one sample at what is seen directly, which costs little, have places of their own. Those that meet something
+// specular go on as one of them, chosen by chance; as the sample itself, which lies at one of them, where all do.
 #define THE_SAMPLE 4u
 
 #ifdef LENS
-// 2^32 times the fractions of the cube roots of 2 and 4: badly approximable together, and of no other field than the plastic number's, by which
-// places on lights are drawn.
+// 2^32 times the fractions of the cube roots of 2 and 4: badly approximable together, and of no other field than the
+// plastic number's, by which places on lights are drawn.
 #define LENS_1 1116352409u
 #define LENS_2 2522868307u
 #endif
 
-vec2 primary_sample_place(uint primary_sample)
-{
+vec2 primary_sample_place(uint primary_sample) {
     if (primary_sample == THE_SAMPLE) return p.within_pixel;
     vec4 two = p.looks[primary_sample >> 1u];
     return (primary_sample & 1u) == 0u ? two.xy : two.zw;
@@ -83,17 +87,15 @@ vec2 primary_sample_place(uint primary_sample)
 
 // A listed pixel: its number, the primary sample that goes on, and of how many it is one.
 const uint LISTED_BITS = 27u;
-uint listed_entry(uint number, uint primary_sample, uint count)
-{
+uint listed_entry(uint number, uint primary_sample, uint count) {
     return number | (primary_sample << LISTED_BITS) | ((count - 1u) << (LISTED_BITS + 3u));
 }
 
-Path camera_path(uvec2 pixel, uint primary_sample, float gain)
-{
+Path camera_path(uvec2 pixel, uint primary_sample, float gain) {
     look_place = primary_sample_place(primary_sample);
 #ifdef LENS
-    // Looks are shared out over the lens as over the pixel, by a sequence any part of which is even too: samples of one band, every so many of
-    // them, see through all of the lens.
+    // Looks are shared out over the lens as over the pixel, by a sequence any part of which is even too: samples of one
+    // band, every so many of them, see through all of the lens.
     uint look = p.sample_index * p.primary_samples + (primary_sample == THE_SAMPLE ? 0u : primary_sample);
     uint key = hash_combine(hash_combine(hash_combine(p.seed, pixel.x), pixel.y), 79u);
     lens_place = vec2(kronecker(look, LENS_1, key), kronecker(look, LENS_2, hash_pcg(key)));
@@ -101,22 +103,19 @@ Path camera_path(uvec2 pixel, uint primary_sample, float gain)
     return path_from(pixel, look_place, gain);
 }
 
-
 #ifdef CAMERA_SPECULAR
 #include "camera/meet.glsl"
 #endif
 
 #ifndef CAMERA_SPECULAR
 // What a camera ray meets that nothing specular is in the way of.
-void see_directly(Path path, bool met, Hit hit, uint kind, uint pixel_key)
-{
+void see_directly(Path path, bool met, Hit hit, uint kind, uint pixel_key) {
     if (LAYER_BEAUTY && VISIBLE_LIGHTS) add_lights(path, met ? hit.distance : FAR_DISTANCE);
     if (!met || kind == KIND_DIFFUSE) add_end(path, met, hit, true, pixel_key);
 }
 #endif
 
-void main()
-{
+void main() {
 #ifdef CAMERA_SPECULAR
 #ifdef HALTS
     uint at = shared_out(gl_WorkGroupID.x, gl_NumWorkGroups.x) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
@@ -132,7 +131,8 @@ void main()
 #else
     uint entry = listed[at_listed];
 #endif
-    uint number = bitfieldExtract(entry, 0, int(LISTED_BITS)), primary_sample = bitfieldExtract(entry, int(LISTED_BITS), 3);
+    uint number = bitfieldExtract(entry, 0, int(LISTED_BITS)),
+         primary_sample = bitfieldExtract(entry, int(LISTED_BITS), 3);
     float gain = float((entry >> (LISTED_BITS + 3u)) + 1u) / float(p.primary_samples);
     uvec2 pixel = uvec2(number % p.size.x, number / p.size.x);
 #else
@@ -155,12 +155,15 @@ void main()
     if (p.survey == SURVEY_KEPT) {
         uint key = even_key(pixel), sees = key & KIND_BITS;
         if (COATS && FOLLOWED) {
-            if (sees == SEES_COATED) listed[atomicAdd(listed_count, 1u)] = listed_entry(number, THE_SAMPLE, p.primary_samples);
+            if (sees == SEES_COATED)
+                listed[atomicAdd(listed_count, 1u)] = listed_entry(number, THE_SAMPLE, p.primary_samples);
             if (sees == SEES_COATED) sees = SEES_DIRECTLY;
         }
-        if (sees == SEES_DIRECTLY) imageStore(picture[0], ivec2(pixel), imageLoad(picture[0], ivec2(pixel)) + vec4(surveyed_mean(pixel), 0.0));
+        if (sees == SEES_DIRECTLY)
+            imageStore(picture[0], ivec2(pixel), imageLoad(picture[0], ivec2(pixel)) + vec4(surveyed_mean(pixel), 0.0));
         if (FOLLOWED) {
-            if (sees == SEES_SPECULAR) listed[atomicAdd(listed_count, 1u)] = listed_entry(number, THE_SAMPLE, p.primary_samples);
+            if (sees == SEES_SPECULAR)
+                listed[atomicAdd(listed_count, 1u)] = listed_entry(number, THE_SAMPLE, p.primary_samples);
         }
         if (key != 0u) return;
     }
@@ -231,16 +234,20 @@ void main()
             Hit hit;
             bool met = intersect_closest(path.position, path.direction, FAR_DISTANCE, path.origin, hit);
             uint kind = met ? object_at(hit.object).kind : NONE;
-            bool ends = !met || kind == KIND_DIFFUSE, same_hit = true, parts = false, event_limit_reached = events >= MAX_EVENTS;
+            bool ends = !met || kind == KIND_DIFFUSE, same_hit = true, parts = false,
+                 event_limit_reached = events >= MAX_EVENTS;
             pushes_path = false;
 #ifdef COATS
             bool coated = met && kind == KIND_DIFFUSE && is_coated(hit.object);
 #endif
 #ifdef SPECTRAL_SWEEP
             cut_at = -1.0;
-            bool asks = path.restricted != 0u && !event_limit_reached && (ends || (path.walk.planar_so_far != 0u && kind != KIND_BLACK && asked < MAX_ASKED));
+            bool asks = path.restricted != 0u && !event_limit_reached
+                && (ends || (path.walk.planar_so_far != 0u && kind != KIND_BLACK && asked < MAX_ASKED));
             float ahead = met ? hit.distance : FAR_DISTANCE;
-            if (asks) asks = ends ? shown_sweep(path, ahead) > MIN_SWEEP : sweep_pixels(path, ahead) > MIN_CUT_SWEEP * sample_side(path);
+            if (asks)
+                asks = ends ? shown_sweep(path, ahead) > MIN_SWEEP
+                            : sweep_pixels(path, ahead) > MIN_CUT_SWEEP * sample_side(path);
             if (asks) cut_at = where_paths_diverge(path, met, ends, hit, same_hit);
             parts = cut_at >= 0.0;
 #endif
@@ -258,7 +265,8 @@ void main()
                 if (!met_before) add_lights(path, met ? hit.distance : FAR_DISTANCE);
 #endif
                 // Light that would still be caught inside is as if it left here.
-                bool specular = !ends && kind != KIND_BLACK, leaves = specular && (event_limit_reached || path.depth >= uint(MAX_DEPTH));
+                bool specular = !ends && kind != KIND_BLACK,
+                     leaves = specular && (event_limit_reached || path.depth >= uint(MAX_DEPTH));
                 if (leaves) atomicAdd(fallbacks[FELL_DEPTH], 1u);
                 if (HAS_GRATING) {
                     if (leaves && kind == KIND_GRATING) path.throughput *= efficiency_left(path, hit.object);
@@ -288,7 +296,8 @@ void main()
             if (pushes_path) STACKED(stack_size++) = pending_path;
 #endif
         }
-        for (int e = 0; e < found; ++e) add_end(ended[e].path, ended[e].met != 0u, ended[e].hit, ended[e].same_hit != 0u, pixel_key);
+        for (int e = 0; e < found; ++e)
+            add_end(ended[e].path, ended[e].met != 0u, ended[e].hit, ended[e].same_hit != 0u, pixel_key);
     }
     if (HALTS) {
         if (!loops_run()) atomicAdd(fallbacks[FELL_LOOPS], 1u);

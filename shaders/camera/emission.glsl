@@ -9,13 +9,9 @@ layout(rgba32f, binding = UNIT_EMISSION) uniform readonly restrict image2D emiss
 layout(binding = UNIT_EMISSION) uniform sampler2D emission_table;
 #endif
 
-int emission_cell(float x)
-{
-    return int(clamp(x, 0.0, 1.0) * float(EMISSION_CELLS) + 0.5);
-}
+int emission_cell(float x) { return int(clamp(x, 0.0, 1.0) * float(EMISSION_CELLS) + 0.5); }
 
-vec4 emission_until(uint row, int target, int cell)
-{
+vec4 emission_until(uint row, int target, int cell) {
     if (SCENE_IMAGE) {
         return imageLoad(emission_table, ivec2(cell, int(row) * TARGETS + target));
     } else {
@@ -24,8 +20,7 @@ vec4 emission_until(uint row, int target, int cell)
 }
 
 // What a path lets through at the wavelength x.
-float transmitted(Path path, float x)
-{
+float transmitted(Path path, float x) {
     float kept = band_weights(path.band, path.throughput, vec3(x)).x;
 #ifdef ABSORPTION
     float depth = 0.0;
@@ -39,18 +34,18 @@ float transmitted(Path path, float x)
 // Stretches that the whole spectrum is cut into where Fresnel's reflectance varies over it.
 #define WEIGHT_STEPS 16
 
-// A wavelength interval of a path, which a lookup stands for: its ends as cells of the table, and what the path lets through in its middle.
+// A wavelength interval of a path, which a lookup stands for: its ends as cells of the table, and what the path lets
+// through in its middle.
 struct WavelengthInterval {
     float lo;
     float hi;
     int cell_lo;
     int cell_hi;
     float through;
-    int steps;      // parts that differ in what the path lets through
+    int steps;  // parts that differ in what the path lets through
 };
 
-WavelengthInterval wavelength_interval(Path path, float lo, float hi)
-{
+WavelengthInterval wavelength_interval(Path path, float lo, float hi) {
     WavelengthInterval interval;
     interval.lo = lo;
     interval.hi = hi;
@@ -60,17 +55,18 @@ WavelengthInterval wavelength_interval(Path path, float lo, float hi)
     if (ABSORPTION) {
         interval.steps = max(1, int(ceil((hi - lo) * float(TINT_STEPS))));
     } else {
-        interval.steps = path.throughput.x == path.throughput.z ? 1 : max(1, int(ceil((hi - lo) * float(WEIGHT_STEPS))));
+        interval.steps =
+            path.throughput.x == path.throughput.z ? 1 : max(1, int(ceil((hi - lo) * float(WEIGHT_STEPS))));
     }
     return interval;
 }
 
 // Adds a light whose spectrum is that of `row`, `factor` times.
-void add_spectrum(Path path, WavelengthInterval interval, uint row, float factor)
-{
+void add_spectrum(Path path, WavelengthInterval interval, uint row, float factor) {
     if (interval.steps == 1)
         for (int t = 0; t < TARGETS; ++t)
-            radiance[t] += factor * interval.through * (emission_until(row, t, interval.cell_hi) - emission_until(row, t, interval.cell_lo));
+            radiance[t] += factor * interval.through
+                * (emission_until(row, t, interval.cell_hi) - emission_until(row, t, interval.cell_lo));
     COUNT_ROUNDS(interval.steps);
     float step_x = (interval.hi - interval.lo) / float(interval.steps);
     for (int s = 0; s < interval.steps && interval.steps > 1; ++s) {
@@ -82,17 +78,17 @@ void add_spectrum(Path path, WavelengthInterval interval, uint row, float factor
     }
 }
 
-// The same under a colour: `row` holds the light itself, the three after it the light times the functions of the reflectance basis.
-void add_colour(Path path, WavelengthInterval interval, uint row, vec3 colour)
-{
+// The same under a colour: `row` holds the light itself, the three after it the light times the functions of the
+// reflectance basis.
+void add_colour(Path path, WavelengthInterval interval, uint row, vec3 colour) {
     bool grey = colour.r == colour.g && colour.g == colour.b;
     if (grey) add_spectrum(path, interval, row, colour.r);
-    for (uint c = grey ? 3u : 0u; c < 3u; ++c) add_spectrum(path, interval, row + 1u + c, c == 0u ? colour.r : (c == 1u ? colour.g : colour.b));
+    for (uint c = grey ? 3u : 0u; c < 3u; ++c)
+        add_spectrum(path, interval, row + 1u + c, c == 0u ? colour.r : (c == 1u ? colour.g : colour.b));
 }
 
 // Factor on every channel of light whose spectrum is no longer known: that of white light along the same path.
-void channel_factors(Path path, WavelengthInterval interval, out vec4 factors[TARGETS])
-{
+void channel_factors(Path path, WavelengthInterval interval, out vec4 factors[TARGETS]) {
     bool whole = interval.steps == 1 && path.restricted == 0u;
     for (int t = 0; t < TARGETS; ++t) factors[t] = vec4(interval.through);
     if (!whole) {
@@ -102,7 +98,9 @@ void channel_factors(Path path, WavelengthInterval interval, out vec4 factors[TA
             vec4 kept = vec4(0.0);
             for (int s = 0; s < interval.steps; ++s) {
                 float a = interval.lo + float(s) * step_x, b = s + 1 == interval.steps ? interval.hi : a + step_x;
-                kept += path.walk.inverse_pdf * transmitted(path, 0.5 * (a + b)) * (emission_until(uint(WHITE_ROW), t, emission_cell(b)) - emission_until(uint(WHITE_ROW), t, emission_cell(a)));
+                kept += path.walk.inverse_pdf * transmitted(path, 0.5 * (a + b))
+                    * (emission_until(uint(WHITE_ROW), t, emission_cell(b))
+                        - emission_until(uint(WHITE_ROW), t, emission_cell(a)));
             }
             factors[t] = kept / max(emission_until(uint(WHITE_ROW), t, EMISSION_CELLS), vec4(1e-20));
         }

@@ -1,4 +1,5 @@
-// What all programs of the camera's pass have in common: parameters, lights, spectra, a path, and what is looked up where it ends.
+// What all programs of the camera's pass have in common: parameters, lights, spectra, a path, and what is looked up
+// where it ends.
 #ifndef CAMERA_GLOBALS_GLSL
 #define CAMERA_GLOBALS_GLSL
 
@@ -40,20 +41,23 @@ layout(std430, binding = BIND_COUNTERS) restrict buffer Counters { uint fallback
 #define FELL_CUT 3
 #define FELL_LOOPS 4
 
-// Which of its turns a pixel's dispersed sample takes, and whether this sample took one. A picture in colour counts them beside its sums, since
-// where glass fills a pixel in part only some samples are dispersed, and all bands must have had as many.
+// Which of its turns a pixel's dispersed sample takes, and whether this sample took one. A picture in colour counts
+// them beside its sums, since where glass fills a pixel in part only some samples are dispersed, and all bands must
+// have had as many.
 uint turn = 0u;
 bool took_turn = false;
 
 #ifdef LISTS_SPECULAR
-// What a look has met: a mark of the lights that shine on the surface there, whether it saw one itself, and whether it stepped over texels of a map.
+// What a look has met: a mark of the lights that shine on the surface there, whether it saw one itself, and whether it
+// stepped over texels of a map.
 uint lights_seen = 0u;
 bool saw_light = false, skipped_texels = false;
 #endif
 
 #include "camera/path.glsl"
 
-// What a sample has found so far. Global: an array handed from function to function is copied there and back by some drivers.
+// What a sample has found so far. Global: an array handed from function to function is copied there and back by some
+// drivers.
 vec4 radiance[TARGETS];
 // Where in its pixel what is being followed lies.
 vec2 look_place;

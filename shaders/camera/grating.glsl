@@ -1,5 +1,5 @@
-// A camera path at a grating. Every order is a path of its own: one goes on, the others meet the surface again after it; of weak ones one is chosen by
-// chance.
+// A camera path at a grating. Every order is a path of its own: one goes on, the others meet the surface again after
+// it; of weak ones one is chosen by chance.
 #ifndef CAMERA_GRATING_GLSL
 #define CAMERA_GRATING_GLSL
 
@@ -7,12 +7,12 @@
 
 // On `Path.order`: only that order is left.
 #define ONLY_ORDER 0x80000000u
-// Share of a sample's power below which orders are not all followed: many orders at several gratings would use up its events.
+// Share of a sample's power below which orders are not all followed: many orders at several gratings would use up its
+// events.
 #define MIN_ORDER_SHARE 0.02
 
 // Of the orders from `first` on one, by chance as they are strong: the path stands for all of them then.
-uint chosen_order(inout Path path, uint row, uint first, uint count, uint pixel_key)
-{
+uint chosen_order(inout Path path, uint row, uint first, uint count, uint pixel_key) {
     float all = 0.0;
     for (uint k = first; k < count; ++k) all += order_at(row, k).efficiency;
     float draw = choice(path, pixel_key) * all, below = 0.0;
@@ -26,8 +26,7 @@ uint chosen_order(inout Path path, uint row, uint first, uint count, uint pixel_
 }
 
 // What a path stands for that has not met the grating ahead yet, or not with all its orders.
-float efficiency_left(Path path, uint object)
-{
+float efficiency_left(Path path, uint object) {
     uint row = object_at(object).weight_row, first = path.order & ~ONLY_ORDER;
     uint end = (path.order & ONLY_ORDER) != 0u ? first + 1u : grating_at(row).orders;
     float left = 0.0;
@@ -36,14 +35,14 @@ float efficiency_left(Path path, uint object)
 }
 
 // `whole`: the path before its flight here. A path that ends has an inverse probability of 0.
-void meet_grating(inout Path path, Path whole, Hit hit, Event event, uint pixel_key)
-{
+void meet_grating(inout Path path, Path whole, Hit hit, Event event, uint pixel_key) {
     uint row = object_at(hit.object).weight_row;
     GratingEvent met = grating_event(path, event, hit, row);
     bool alone = (path.order & ONLY_ORDER) != 0u, geometric;
     uint number = path.order & ~ONLY_ORDER, orders = met.grating.orders;
     if (!alone && number + 1u < orders) {
-        bool strong = path.depth <= 1u || path.walk.branch_weight * order_at(row, number).efficiency > max(p.split_threshold, MIN_ORDER_SHARE);
+        bool strong = path.depth <= 1u
+            || path.walk.branch_weight * order_at(row, number).efficiency > max(p.split_threshold, MIN_ORDER_SHARE);
         if (strong && stack_size >= STACK) atomicAdd(fallbacks[FELL_STACK], 1u);
         if (!strong || stack_size >= STACK) {
             number = chosen_order(whole, row, number, orders, pixel_key);
@@ -78,7 +77,8 @@ void meet_grating(inout Path path, Path whole, Hit hit, Event event, uint pixel_
             if (start.restricted == 0u) restrict_to_band(start, pixel_key);
             cut = may_cut_near(start, at, hit.distance);
             if (cut) {
-                // Both parts meet this surface again, each from its own start; where other orders are pending, these first.
+                // Both parts meet this surface again, each from its own start; where other orders are pending, these
+                // first.
                 path = more ? whole : start;
                 path.recut = uint(!more);
                 cut_at = more ? -1.0 : at;

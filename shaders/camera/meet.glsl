@@ -5,14 +5,13 @@
 #include "path/event.glsl"
 
 // A number for a choice at this depth: a Kronecker sequence over a pixel's samples.
-float choice(Path path, uint pixel_key)
-{
-    return kronecker(p.sample_index, depth_generator(path.depth), hash_combine(pixel_key, path.walk.key + path.depth * 2654435769u));
+float choice(Path path, uint pixel_key) {
+    return kronecker(
+        p.sample_index, depth_generator(path.depth), hash_combine(pixel_key, path.walk.key + path.depth * 2654435769u));
 }
 
 // `absorber`: below 0 for none.
-void add_length(inout Path path, int absorber, float length)
-{
+void add_length(inout Path path, int absorber, float length) {
     for (int i = 0; i < ABSORBERS; ++i)
         if (i == absorber) path.walk.lengths[i] += length;
 }
@@ -22,10 +21,10 @@ void add_length(inout Path path, int absorber, float length)
 #endif
 
 // Whether a path's band may be cut at `at`, from where its flight to the surface ahead started.
-bool may_cut_near(Path start, float at, float distance)
-{
+bool may_cut_near(Path start, float at, float distance) {
     if (!may_cut_at(start, at)) return false;
-    bool near = start.walk.planar_so_far != 0u || starts_are_near(start, anchor_of(start, start.band.x, at), anchor_of(start, at, start.band.z), distance);
+    bool near = start.walk.planar_so_far != 0u
+        || starts_are_near(start, anchor_of(start, start.band.x, at), anchor_of(start, at, start.band.z), distance);
     if (!near) atomicAdd(fallbacks[FELL_CUT], 1u);
     return near;
 }
@@ -34,9 +33,9 @@ bool may_cut_near(Path start, float at, float distance)
 #include "camera/grating.glsl"
 #endif
 
-// Leaves a path a lobe's share of its light, and what microfacets do not hide of that. A path that has lost all goes nowhere.
-void send_on(inout Path path, Event event, vec3 share, vec3 unhidden)
-{
+// Leaves a path a lobe's share of its light, and what microfacets do not hide of that. A path that has lost all goes
+// nowhere.
+void send_on(inout Path path, Event event, vec3 share, vec3 unhidden) {
     path.throughput *= share;
     if (ROUGH_SURFACES) {
         path.throughput *= unhidden;
@@ -45,8 +44,7 @@ void send_on(inout Path path, Event event, vec3 share, vec3 unhidden)
 }
 
 // One glass surface: `path` goes on, the other part is put on the stack or, if weak, one of them is chosen.
-void cross_glass(inout Path path, Path whole, Hit hit, Event event, uint pixel_key)
-{
+void cross_glass(inout Path path, Path whole, Hit hit, Event event, uint pixel_key) {
     bool entering = dot(whole.direction, hit.normal_g) < 0.0, geometric;
     if (!event.boundary.changes) {
         path.medium = event.boundary.behind;
@@ -57,7 +55,8 @@ void cross_glass(inout Path path, Path whole, Hit hit, Event event, uint pixel_k
     Event mirror = event;
     bool begins = false;
     if (HAS_DISPERSION) {
-        // What is reflected off the outside of glass knows no wavelength but in its strength: it stays whole. What goes on is one band.
+        // What is reflected off the outside of glass knows no wavelength but in its strength: it stays whole. What goes
+        // on is one band.
         if (path.restricted == 0u && (event.n_i.x != event.n_i.z || event.n_t.x != event.n_t.z)) {
             begins = all(greaterThan(event.cosine2, vec3(0.0)));
             restrict_to_band(path, pixel_key);
@@ -93,7 +92,8 @@ void cross_glass(inout Path path, Path whole, Hit hit, Event event, uint pixel_k
     }
     bool reflects = total;
     float likely = total ? 1.0 : dot(event.reflectance, vec3(0.25, 0.5, 0.25));
-    bool strong = !total && (begins || path.depth <= 1u || path.walk.branch_weight * min(likely, 1.0 - likely) > p.split_threshold);
+    bool strong = !total
+        && (begins || path.depth <= 1u || path.walk.branch_weight * min(likely, 1.0 - likely) > p.split_threshold);
     bool splits = strong && stack_size < STACK;
     if (strong && !splits) atomicAdd(fallbacks[FELL_STACK], 1u);
     if (splits && mirror.reflectance.y > 0.0) {
@@ -110,9 +110,11 @@ void cross_glass(inout Path path, Path whole, Hit hit, Event event, uint pixel_k
         reflects = choice(path, pixel_key) < likely;
         share = (reflects ? event.reflectance : share) / (reflects ? likely : 1.0 - likely);
         path.walk.key = hash_combine(path.walk.key, reflects ? 3u : 4u);
-    } else path.walk.branch_weight *= total ? 1.0 : 1.0 - likely;
+    } else
+        path.walk.branch_weight *= total ? 1.0 : 1.0 - likely;
     vec3 unhidden;
-    if (reflects) unhidden = reflect_path(path, event, geometric);
+    if (reflects)
+        unhidden = reflect_path(path, event, geometric);
     else {
         unhidden = refract_path(path, event);
 #ifdef SURFACE_FILTERS
@@ -127,8 +129,7 @@ void cross_glass(inout Path path, Path whole, Hit hit, Event event, uint pixel_k
 }
 
 // A specular surface, or a coat.
-void meet_surface(inout Path path, Hit hit, uint kind, uint pixel_key)
-{
+void meet_surface(inout Path path, Hit hit, uint kind, uint pixel_key) {
     Path whole = path;
 #ifdef ABSORPTION
     uint filling = current_medium(path.medium);
@@ -151,7 +152,8 @@ void meet_surface(inout Path path, Hit hit, uint kind, uint pixel_key)
             return;
         }
     }
-    Event event = interact(path, hit, facet, object_at(hit.object), MicrofacetDraw(p.sample_index, path.depth, hash_combine(pixel_key, 80u)));
+    Event event = interact(path, hit, facet, object_at(hit.object),
+        MicrofacetDraw(p.sample_index, path.depth, hash_combine(pixel_key, 80u)));
 #ifdef HAS_MIRROR
     if (kind == KIND_MIRROR) {
         bool geometric;

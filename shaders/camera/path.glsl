@@ -1,5 +1,5 @@
-// A camera sample's path: what it carries besides (`Walk`), and how it comes to stand for one band. It stands for the whole spectrum until it is first
-// bent by glass that disperses; from there on for one band of it (`restrict_to_band`).
+// A camera sample's path: what it carries besides (`Walk`), and how it comes to stand for one band. It stands for the
+// whole spectrum until it is first bent by glass that disperses; from there on for one band of it (`restrict_to_band`).
 #ifndef CAMERA_PATH_GLSL
 #define CAMERA_PATH_GLSL
 
@@ -14,9 +14,9 @@
 #ifdef NORMAL_DERIVATIVES
 #define HAS_NORMAL_COLUMNS
 #endif
-// Microfacets widen the pixel's own columns: a box of sides LOBE_WIDTH times a lobe's standard deviations is as broad as it. Samples of a pixel share
-// out the microfacets between them as they do the pixel, and each looks up the light of its share of the lobe [Krivanek, Colbert 2008]: lamps and
-// windows seen through ground glass would be specks.
+// Microfacets widen the pixel's own columns: a box of sides LOBE_WIDTH times a lobe's standard deviations is as broad
+// as it. Samples of a pixel share out the microfacets between them as they do the pixel, and each looks up the light of
+// its share of the lobe [Krivanek, Colbert 2008]: lamps and windows seen through ground glass would be specks.
 #ifdef ROUGH_SURFACES
 #define WIDENED_BY_LOBES
 #endif
@@ -24,19 +24,20 @@
 #define LOBE_WIDTH 3.46410161514
 
 struct Walk {
-    float inverse_pdf;      // one over the probability of all choices made; 0: the path has ended
-    float branch_weight;    // throughput as far as branches are worth following
-    uint key;               // says which branch this is
-    uint planar_so_far;     // 1: its band's ends have kept to its own facets: it met flat ones only
-    uint cuts;              // of its band, where paths diverged
+    float inverse_pdf;  // one over the probability of all choices made; 0: the path has ended
+    float branch_weight;  // throughput as far as branches are worth following
+    uint key;  // says which branch this is
+    uint planar_so_far;  // 1: its band's ends have kept to its own facets: it met flat ones only
+    uint cuts;  // of its band, where paths diverged
 #ifdef ROUGH_SURFACES
-    uint ground;            // 1: a rough surface has turned it, and its pixel's columns are as broad as the lobe, which samples share out
+    uint ground;  // 1: a rough surface has turned it, and its pixel's columns are as broad as the lobe, which samples
+                  // share out
 #endif
 #ifdef COATS
-    float coat_pdf;         // of its direction, where it comes from a coat: density by steradian; else 0
+    float coat_pdf;  // of its direction, where it comes from a coat: density by steradian; else 0
 #endif
 #ifdef ABSORPTION
-    float lengths[ABSORBERS];   // way through each absorbing glass, GPU units; reflections by each coloured mirror
+    float lengths[ABSORBERS];  // way through each absorbing glass, GPU units; reflections by each coloured mirror
 #endif
 };
 
@@ -51,8 +52,7 @@ uint look_index;
 #endif
 
 // Side of the share of its pixel that a sample of this path has, pixels.
-float sample_side(Path path)
-{
+float sample_side(Path path) {
     if (LISTS_SPECULAR) {
         return p.sample_side * inversesqrt(float(p.primary_samples));
     } else {
@@ -61,25 +61,24 @@ float sample_side(Path path)
 }
 
 // How much of what looks bright in the whole spectrum lies below either end of a band.
-vec2 brightness_of(vec3 band)
-{
-    return vec2(cell_cdf[int(band.x * float(EMISSION_CELLS) + 0.5)], cell_cdf[int(band.z * float(EMISSION_CELLS) + 0.5)]);
+vec2 brightness_of(vec3 band) {
+    return vec2(
+        cell_cdf[int(band.x * float(EMISSION_CELLS) + 0.5)], cell_cdf[int(band.z * float(EMISSION_CELLS) + 0.5)]);
 }
 
 // The wavelength below which `share` of a band of this brightness lies.
-float quantile(vec2 brightness, float share)
-{
+float quantile(vec2 brightness, float share) {
     return spectral_row(uint(QUANTILE_ROW), mix(brightness.x, brightness.y, share));
 }
 
 // From here on the path stands for one band only; all others have their turn in other samples.
-void restrict_to_band(inout Path path, uint pixel_key)
-{
+void restrict_to_band(inout Path path, uint pixel_key) {
     path.restricted = 1u;
 #ifdef RANDOM_WAVELENGTH
     // One of the table's cells, by how bright it looks.
 #ifdef EVEN_WAVELENGTHS
-    // With the places in the pixel one net: each part of it that holds a few samples has wavelengths from all of the spectrum.
+    // With the places in the pixel one net: each part of it that holds a few samples has wavelengths from all of the
+    // spectrum.
     float u = radical_inverse(p.sample_index, hash_combine(pixel_key, 77u));
 #else
     float u = unit_float(hash_combine(hash_combine(pixel_key, 77u), p.sample_index));
@@ -87,8 +86,10 @@ void restrict_to_band(inout Path path, uint pixel_key)
     uint low = 0u, high = uint(EMISSION_CELLS);
     while (high - low > 1u) {
         uint middle = (low + high) / 2u;
-        if (cell_cdf[middle] <= u) low = middle;
-        else high = middle;
+        if (cell_cdf[middle] <= u)
+            low = middle;
+        else
+            high = middle;
     }
     path.walk.inverse_pdf /= max(cell_cdf[low + 1u] - cell_cdf[low], 1e-9);
     vec3 band = (float(low) + vec3(0.0, 0.5, 1.0)) / float(EMISSION_CELLS);
@@ -97,8 +98,8 @@ void restrict_to_band(inout Path path, uint pixel_key)
     uint band_number = (turn + (p.dithered != 0u ? hash_combine(pixel_key, 78u) : 0u)) % p.bands;
     took_turn = true;
     vec3 band = (float(band_number) + vec3(0.0, 0.5, 1.0)) / float(p.bands);
-    // Traced where half of what looks bright in the band lies on either side: what only this one wavelength decides, such as which facet is
-    // met, is then right for most of what is seen.
+    // Traced where half of what looks bright in the band lies on either side: what only this one wavelength decides,
+    // such as which facet is met, is then right for most of what is seen.
     band.y = clamp(quantile(brightness_of(band), 0.5), mix(band.x, band.z, 0.1), mix(band.x, band.z, 0.9));
     path.walk.inverse_pdf *= float(p.bands);
 #endif
@@ -111,10 +112,10 @@ void restrict_to_band(inout Path path, uint pixel_key)
     }
 }
 
-// The wavelength that a part of a band is traced at: the band's own, where that lies in it, else the part's middle. What the path lets through,
-// which bends at its own wavelength, is then the same function in the parts as in the whole, and all branches together stay one.
-float anchor_of(Path path, float lo, float hi)
-{
+// The wavelength that a part of a band is traced at: the band's own, where that lies in it, else the part's middle.
+// What the path lets through, which bends at its own wavelength, is then the same function in the parts as in the
+// whole, and all branches together stay one.
+float anchor_of(Path path, float lo, float hi) {
     return path.band.y > lo && path.band.y < hi ? path.band.y : 0.5 * (lo + hi);
 }
 

@@ -1,10 +1,10 @@
-// Single paths, one an invocation, each at a wavelength of its own: refracted at every glass surface (reflected within it
-// where it must be, or as often as is asked for), mirrored by mirrors, up to the first surface that is neither. For the
-// ray overlay.
+// Single paths, one an invocation, each at a wavelength of its own: refracted at every glass surface (reflected within
+// it where it must be, or as often as is asked for), mirrored by mirrors, up to the first surface that is neither. For
+// the ray overlay.
 layout(local_size_x = 32) in;
 
 struct Walk {
-    uint reflections;   // within glass, still to come
+    uint reflections;  // within glass, still to come
 };
 #define SPATIAL 0
 #define PATH_COLUMNS 0
@@ -18,12 +18,12 @@ layout(std430, binding = BIND_STARTS) readonly restrict buffer Starts { PathStar
 layout(std430, binding = BIND_PATHS) writeonly restrict buffer Paths { PathEnd paths[]; };
 layout(std430, binding = BIND_POINTS) writeonly restrict buffer Points { vec4 points[]; };
 
-void main()
-{
+void main() {
     uint id = gl_GlobalInvocationID.x;
     if (id >= p.count) return;
     RayOrigin origin = RayOrigin(NONE, NONE, 0u, p.inside_mask);
-    Path path = path_at(starts[id].position, starts[id].direction, origin, MediumStack(p.inside_mask, p.inside_object), starts[id].x);
+    Path path = path_at(
+        starts[id].position, starts[id].direction, origin, MediumStack(p.inside_mask, p.inside_object), starts[id].x);
     path.walk.reflections = p.reflections;
     PathEnd end;
     end.points = 1u;
@@ -35,7 +35,8 @@ void main()
         Triangle facet = hit_triangle(hit);
         Object thing = object_at(met ? hit.object : 0u);
         uint kind = met ? thing.kind : NONE;
-        path.position = met ? surface_point(hit, facet, path.position, path.direction) : path.position + p.escape * path.direction;
+        path.position =
+            met ? surface_point(hit, facet, path.position, path.direction) : path.position + p.escape * path.direction;
         end.points = number + 2u;
         points[at + number + 1u] = vec4(path.position, 0.0);
         if (!is_specular(kind)) break;
@@ -43,10 +44,14 @@ void main()
         Event event = interact(path, hit, facet, thing, MicrofacetDraw(0u, 0u, 0u));
         if (HAS_DIELECTRIC) {
             if (IS_GLASS(kind)) {
-                reflects = event.boundary.changes && (!event.refracted.exists || (path.walk.reflections > 0u && !entering && !IS_THIN(event.boundary)));
+                reflects = event.boundary.changes
+                    && (!event.refracted.exists
+                        || (path.walk.reflections > 0u && !entering && !IS_THIN(event.boundary)));
                 if (reflects && !entering) path.walk.reflections -= min(path.walk.reflections, 1u);
-                if (!event.boundary.changes) path.medium = event.boundary.behind;
-                else if (!reflects) refract_path(path, event);
+                if (!event.boundary.changes)
+                    path.medium = event.boundary.behind;
+                else if (!reflects)
+                    refract_path(path, event);
             }
         }
 #ifdef HAS_GRATING

@@ -1,6 +1,7 @@
-// How a specular surface turns a ray, for every pass that follows rays: the normal it shades with and that normal's derivative, the share it
-// reflects over a band, reflected and refracted directions that stay on their side of the facet. What kind of surface it is (mirror,
-// glass) the passes decide; a new kind brings its own function that returns a `Deflection`.
+// How a specular surface turns a ray, for every pass that follows rays: the normal it shades with and that normal's
+// derivative, the share it reflects over a band, reflected and refracted directions that stay on their side of the
+// facet. What kind of surface it is (mirror, glass) the passes decide; a new kind brings its own function that returns
+// a `Deflection`.
 #ifndef INTERFACE_GLSL
 #define INTERFACE_GLSL
 
@@ -12,13 +13,14 @@
 
 // The normals of the place a ray has hit, turned against the ray.
 struct ShadingFrame {
-    vec3 normal;        // unit; decides where the ray goes
-    vec3 normal_g;      // unit; the facet's, which judges
+    vec3 normal;  // unit; decides where the ray goes
+    vec3 normal_g;  // unit; the facet's, which judges
     uint interpolated;  // 1: `normal` differs from place to place
-    uint refused;       // 1: the interpolated normal sees the ray from behind, and is not used
+    uint refused;  // 1: the interpolated normal sees the ray from behind, and is not used
 #ifdef NORMAL_DERIVATIVES
-    vec3 summed;        // interpolated normal before it is made a unit vector …
-    vec3 gradient_u;    // … and its change over the facet: along dp by dot(gradient_u, dp) along_u + dot(gradient_v, dp) along_v
+    vec3 summed;  // interpolated normal before it is made a unit vector …
+    vec3 gradient_u;  // … and its change over the facet: along dp by dot(gradient_u, dp) along_u + dot(gradient_v, dp)
+                      // along_v
     vec3 gradient_v;
     vec3 along_u;
     vec3 along_v;
@@ -27,27 +29,26 @@ struct ShadingFrame {
 
 // One way a surface sends a ray on.
 struct Deflection {
-    vec3 direction;     // unit
-    vec3 normal;        // that turned it: the frame's, or the facet's where that would lead to the wrong side
-    float theta;        // dot(incident direction, normal)
-    float omega;        // cosine of the transmitted angle (refraction only)
-    bool geometric;     // the facet's normal had to judge
-    bool exists;        // false: nothing is transmitted
+    vec3 direction;  // unit
+    vec3 normal;  // that turned it: the frame's, or the facet's where that would lead to the wrong side
+    float theta;  // dot(incident direction, normal)
+    float omega;  // cosine of the transmitted angle (refraction only)
+    bool geometric;  // the facet's normal had to judge
+    bool exists;  // false: nothing is transmitted
 };
 
 // A curved solid's face: its own normal, which turns from place to place.
-void curve_as_piece(Hit hit, bool entering, vec3 position, inout ShadingFrame frame)
-{
+void curve_as_piece(Hit hit, bool entering, vec3 position, inout ShadingFrame frame) {
     Piece piece = piece_at(hit.primitive & ~CURVED_BIT);
     frame.interpolated = 1u - piece.is_plane;
     if (NORMAL_DERIVATIVES) {
-        curve_of_piece(piece, position, entering ? 1.0 : -1.0, frame.summed, frame.gradient_u, frame.gradient_v, frame.along_u, frame.along_v);
+        curve_of_piece(piece, position, entering ? 1.0 : -1.0, frame.summed, frame.gradient_u, frame.gradient_v,
+            frame.along_u, frame.along_v);
     }
 }
 
 // `position`: the place of the hit.
-ShadingFrame shading_frame(Hit hit, Triangle facet, vec3 position, vec3 direction)
-{
+ShadingFrame shading_frame(Hit hit, Triangle facet, vec3 position, vec3 direction) {
     ShadingFrame frame;
     bool entering = dot(direction, hit.normal_g) < 0.0;
     frame.normal = frame.normal_g = entering ? hit.normal_g : -hit.normal_g;
@@ -82,8 +83,7 @@ ShadingFrame shading_frame(Hit hit, Triangle facet, vec3 position, vec3 directio
 }
 
 // Whether the surface keeps its normal round the place that was hit.
-bool is_planar(Hit hit, Triangle facet)
-{
+bool is_planar(Hit hit, Triangle facet) {
     if (CURVED_SOLIDS) {
         if (is_curved(hit.primitive)) return piece_at(hit.primitive & ~CURVED_BIT).is_plane != 0u;
     }
@@ -92,21 +92,18 @@ bool is_planar(Hit hit, Triangle facet)
 
 #ifdef NORMAL_DERIVATIVES
 // Change of the sum of the corners' normals over the way `along` in the facet's plane.
-vec3 summed_change(ShadingFrame frame, vec3 along)
-{
+vec3 summed_change(ShadingFrame frame, vec3 along) {
     return dot(frame.gradient_u, along) * frame.along_u + dot(frame.gradient_v, along) * frame.along_v;
 }
 
 // Derivative of the shading normal along the position derivative `dposition`.
-vec3 normal_column(ShadingFrame frame, vec3 dposition)
-{
+vec3 normal_column(ShadingFrame frame, vec3 dposition) {
     vec3 dnormal = normalised_derivative(frame.summed, summed_change(frame, dposition));
     return frame.interpolated != 0u ? dnormal : vec3(0.0);
 }
 
 // Shading normal at the place `off` beside the one that was hit.
-vec3 normal_beside(ShadingFrame frame, vec3 off)
-{
+vec3 normal_beside(ShadingFrame frame, vec3 off) {
     vec3 summed = frame.summed + summed_change(frame, off);
     return frame.interpolated != 0u ? summed * inversesqrt(max(dot(summed, summed), 1e-12)) : frame.normal;
 }
@@ -116,8 +113,7 @@ vec3 normal_beside(ShadingFrame frame, vec3 off)
 #endif
 
 // Reflected by the shading normal, or by the facet's where that would lead into the surface.
-Deflection reflect_at(ShadingFrame frame, vec3 direction)
-{
+Deflection reflect_at(ShadingFrame frame, vec3 direction) {
     float theta = dot(direction, frame.normal);
     vec3 turned = reflect_direction(direction, frame.normal, theta);
     bool geometric = dot(turned, frame.normal_g) <= 0.0;
@@ -126,10 +122,9 @@ Deflection reflect_at(ShadingFrame frame, vec3 direction)
     return Deflection(normalize(reflect_direction(direction, normal, theta)), normal, theta, 0.0, geometric, true);
 }
 
-// Refracted by the shading normal, or by the facet's where that would lead back out of the surface. Where the normal that judges transmits
-// nothing, nothing is: the surface then reflects all.
-Deflection refract_at(ShadingFrame frame, vec3 direction, float eta_it)
-{
+// Refracted by the shading normal, or by the facet's where that would lead back out of the surface. Where the normal
+// that judges transmits nothing, nothing is: the surface then reflects all.
+Deflection refract_at(ShadingFrame frame, vec3 direction, float eta_it) {
     float theta = dot(direction, frame.normal), cosine2 = transmitted_cosine2(theta, eta_it);
     bool transmits = cosine2 > 0.0;
     vec3 turned = refract_direction(direction, frame.normal, theta, eta_it, sqrt(max(cosine2, 1e-12)));
@@ -143,21 +138,20 @@ Deflection refract_at(ShadingFrame frame, vec3 direction, float eta_it)
 }
 
 // Derivatives of the turned direction by one column of the incident ray; `dnormal` is the frame's `normal_column`.
-vec3 reflected_column(Deflection turned, vec3 direction, vec3 ddirection, vec3 dnormal)
-{
+vec3 reflected_column(Deflection turned, vec3 direction, vec3 ddirection, vec3 dnormal) {
     return reflect_column(direction, ddirection, turned.normal, turned.geometric ? vec3(0.0) : dnormal, turned.theta);
 }
 
-vec3 refracted_column(Deflection turned, vec3 direction, vec3 ddirection, vec3 dnormal, float eta_it, float deta_it)
-{
-    return refract_column(direction, ddirection, turned.normal, turned.geometric ? vec3(0.0) : dnormal, turned.theta, eta_it, turned.omega, deta_it);
+vec3 refracted_column(Deflection turned, vec3 direction, vec3 ddirection, vec3 dnormal, float eta_it, float deta_it) {
+    return refract_column(direction, ddirection, turned.normal, turned.geometric ? vec3(0.0) : dnormal, turned.theta,
+        eta_it, turned.omega, deta_it);
 }
 
 // Where a ray that starts at `origin` has hit, on the surface as exactly as the surface's own coordinates can say.
-vec3 surface_point(Hit hit, Triangle facet, vec3 origin, vec3 direction)
-{
+vec3 surface_point(Hit hit, Triangle facet, vec3 origin, vec3 direction) {
     vec3 position = origin + hit.distance * direction;
-    if ((hit.primitive & (PLANE_BIT | CURVED_BIT)) == 0u) position = facet.vertex + hit.bary.x * facet.edge1 + hit.bary.y * facet.edge2;
+    if ((hit.primitive & (PLANE_BIT | CURVED_BIT)) == 0u)
+        position = facet.vertex + hit.bary.x * facet.edge1 + hit.bary.y * facet.edge2;
     if (CONVEX_SOLIDS) {
         if (is_plane(hit.primitive)) {
             vec4 plane = planes[hit.primitive & ~PLANE_BIT];

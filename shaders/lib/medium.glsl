@@ -8,32 +8,28 @@
 
 // The solids that a ray is inside of.
 struct MediumStack {
-    uint mask;          // one bit a solid that nests or touches others
-    uint object;        // the solid that stands alone, NONE: none
+    uint mask;  // one bit a solid that nests or touches others
+    uint object;  // the solid that stands alone, NONE: none
 };
 
 // What a surface separates.
 struct MediumInterface {
-    uint before;        // object whose medium the ray comes from, NONE: air
-    uint after;         // object whose medium lies behind
-    MediumStack behind; // of a ray that goes through
-    bool changes;       // false: another solid of higher priority covers this surface
+    uint before;  // object whose medium the ray comes from, NONE: air
+    uint after;  // object whose medium lies behind
+    MediumStack behind;  // of a ray that goes through
+    bool changes;  // false: another solid of higher priority covers this surface
 #ifdef HAS_SHEET
-    bool thin;          // `after` is a sheet's glass alone: behind it is what is before it
+    bool thin;  // `after` is a sheet's glass alone: behind it is what is before it
 #endif
 };
 
 #ifdef MEDIUM_STACK
 const uint stack_objects[STACK_SIZE] = STACK_OBJECTS;
 
-uint medium_of(uint mask)
-{
-    return mask == 0u ? NONE : stack_objects[findMSB(mask)];
-}
+uint medium_of(uint mask) { return mask == 0u ? NONE : stack_objects[findMSB(mask)]; }
 #endif
 
-bool is_inside(MediumStack stack)
-{
+bool is_inside(MediumStack stack) {
     if (MEDIUM_STACK) {
         return stack.mask != 0u || stack.object != NONE;
     } else {
@@ -42,22 +38,19 @@ bool is_inside(MediumStack stack)
 }
 
 // Object whose medium fills the place, NONE: air.
-uint current_medium(MediumStack stack)
-{
+uint current_medium(MediumStack stack) {
     if (MEDIUM_STACK) {
         if (stack.mask != 0u) return medium_of(stack.mask);
     }
     return stack.object;
 }
 
-uint medium_weight_row(MediumStack stack)
-{
+uint medium_weight_row(MediumStack stack) {
     uint object = current_medium(stack);
     return object == NONE ? NONE : object_at(object).weight_row;
 }
 
-MediumInterface cross_boundary(MediumStack stack, uint object, bool entering)
-{
+MediumInterface cross_boundary(MediumStack stack, uint object, bool entering) {
     MediumInterface boundary;
     boundary.behind = MediumStack(stack.mask, entering ? object : NONE);
     boundary.before = entering ? NONE : object;
@@ -87,17 +80,16 @@ MediumInterface cross_boundary(MediumStack stack, uint object, bool entering)
 }
 
 // Refractive index at x of an object's medium (NONE: air, 1).
-float medium_index(uint object, float x)
-{
+float medium_index(uint object, float x) {
     uint medium = object_at(object == NONE ? 0u : object).medium;
     return object == NONE ? 1.0 : spectral_row(uint(INDEX_ROW) + (object == NONE ? 0u : medium), x);
 }
 
 // Indices before and behind a surface at three places of the spectrum.
-void interface_indices(MediumInterface boundary, vec3 x, out vec3 n_i, out vec3 n_t)
-{
+void interface_indices(MediumInterface boundary, vec3 x, out vec3 n_i, out vec3 n_t) {
 #if defined(MEDIUM_STACK) || defined(HAS_SHEET)
-    n_i = vec3(medium_index(boundary.before, x.x), medium_index(boundary.before, x.y), medium_index(boundary.before, x.z));
+    n_i = vec3(
+        medium_index(boundary.before, x.x), medium_index(boundary.before, x.y), medium_index(boundary.before, x.z));
     n_t = vec3(medium_index(boundary.after, x.x), medium_index(boundary.after, x.y), medium_index(boundary.after, x.z));
 #else
     // One side is air.
@@ -112,7 +104,11 @@ void interface_indices(MediumInterface boundary, vec3 x, out vec3 n_i, out vec3 
 #ifdef HAS_SHEET
 #define IS_THIN(boundary) boundary.thin
 #define OF_SHEET(boundary, reflection) (boundary.thin ? both_faces(reflection) : reflection)
-#define GO_STRAIGHT(boundary, theta, n_i, n_t, cosine2) if (boundary.thin) { n_t = n_i; cosine2 = theta * theta; }
+#define GO_STRAIGHT(boundary, theta, n_i, n_t, cosine2) \
+    if (boundary.thin) { \
+        n_t = n_i; \
+        cosine2 = theta * theta; \
+    }
 #else
 #define IS_THIN(boundary) false
 #define OF_SHEET(boundary, reflection) reflection
@@ -120,8 +116,7 @@ void interface_indices(MediumInterface boundary, vec3 x, out vec3 n_i, out vec3 
 #endif
 
 // dn/dvar of an object's glass: 1 where the variable is its own index.
-float medium_slope(uint object, float x)
-{
+float medium_slope(uint object, float x) {
     if (MERGED_GROUPS) {
         return spectral_row(uint(SLOPE_ROW) + object_at(object).medium, x);
     } else {
@@ -131,8 +126,7 @@ float medium_slope(uint object, float x)
 
 // d(n_i / n_t) / d(variable of group g) [physics: -eta/n_t for the transmitting glass, 1/n_t for the
 // incident one].
-float index_ratio_derivative(MediumInterface boundary, uint g, float x, float n_i, float n_t)
-{
+float index_ratio_derivative(MediumInterface boundary, uint g, float x, float n_i, float n_t) {
     float derivative = 0.0;
     if (IS_THIN(boundary)) return derivative;
     if (boundary.after != NONE && object_at(boundary.after).group == g)

@@ -23,8 +23,7 @@ layout(std430, binding = BIND_OUTCOMES) writeonly restrict buffer Outcomes { uve
 
 vec3 to_world(vec3 local) { return local.x * p.tangent + local.y * p.bitangent + local.z * p.axis; }
 
-void main()
-{
+void main() {
     uint k = gl_GlobalInvocationID.x;
     if (k >= p.count) return;
     // Every band, and every point on an extended light, has a regular lattice of its own, shifted
@@ -53,15 +52,19 @@ void main()
     uint place = sub / p.band_count;
     vec2 on_disc = p.light_points > 1u ? mirrored_lattice_point(place, p.light_points, p.shift_light) : p.light_place;
 
-    vec3 position, direction, dposition_ds = vec3(0.0), dposition_dt = vec3(0.0), ddirection_ds = vec3(0.0), ddirection_dt = vec3(0.0);
+    vec3 position, direction, dposition_ds = vec3(0.0), dposition_dt = vec3(0.0), ddirection_ds = vec3(0.0),
+                              ddirection_dt = vec3(0.0);
     float weight = p.weight;
     // A lattice that is cut off sharply would leave a saw-toothed edge.
     float spacings = EDGE_REACH;
     vec2 to_lit = vec2(0.0);
 #ifdef THINNED_CELLS
-    // Few points of a cell from which a pilot's light landed nowhere stand for all of them. Roulette on the way has the generators from 1 on.
+    // Few points of a cell from which a pilot's light landed nowhere stand for all of them. Roulette on the way has the
+    // generators from 1 on.
     bool is_thinned = (p.thinned[bit >> 5u] & (1u << (bit & 31u))) != 0u;
-    alive = alive && (!is_thinned || kronecker(point, depth_generator(0u), p.seed + own_lattice * 2654435769u) < p.thinned_chance);
+    alive = alive
+        && (!is_thinned
+            || kronecker(point, depth_generator(0u), p.seed + own_lattice * 2654435769u) < p.thinned_chance);
     float stands_for = is_thinned ? 1.0 / p.thinned_chance : 1.0;
     weight *= stands_for;
 #endif
@@ -99,7 +102,7 @@ void main()
     vec3 off_axis = p.origin - p.aperture_centre + across;
     vec2 at = vec2(dot(off_axis, p.light_u), dot(off_axis, p.light_v));
     mat2 at_by_step = mat2(p.spacing.x * vec2(dot(p.tangent, p.light_u), dot(p.tangent, p.light_v)),
-                           p.spacing.y * vec2(dot(p.bitangent, p.light_u), dot(p.bitangent, p.light_v)));
+        p.spacing.y * vec2(dot(p.bitangent, p.light_u), dot(p.bitangent, p.light_v)));
     if (p.light_u != vec3(0.0)) {
         float from_middle = max(length(at), 1e-20);
         vec2 outwards[2] = vec2[](p.is_disc != 0u ? at / from_middle : vec2(sign(at.x), 0.0), vec2(0.0, sign(at.y)));
@@ -139,18 +142,21 @@ void main()
         float place_in_band = unit_float(hash_combine(hash_combine(p.shift_spectral, p.light), id));
 #endif
         float per_density = 1.0;
-        if (band.y > band.x) ray.x_anchor = drawn_wavelength(uint(BRIGHTNESS_ROW) + p.light, band.xy, place_in_band, per_density);
+        if (band.y > band.x)
+            ray.x_anchor = drawn_wavelength(uint(BRIGHTNESS_ROW) + p.light, band.xy, place_in_band, per_density);
         ray.x_lo = ray.x_anchor;
         ray.x_hi = ray.x_anchor;
         ray.throughput *= per_density;
 #ifdef HERO
-        // The hero's path is shared by three wavelengths a quarter of all draws on each [Wilkie et al. 2014]. Any of the four would have led to
-        // it, so each has a quarter of its weight (balance heuristic; all that roulette asks is the same for all four).
+        // The hero's path is shared by three wavelengths a quarter of all draws on each [Wilkie et al. 2014]. Any of
+        // the four would have led to it, so each has a quarter of its weight (balance heuristic; all that roulette asks
+        // is the same for all four).
         ray.companion_x = vec4(0.0);
         ray.companion_throughput = vec4(0.0);
         if (band.y > band.x) {
             for (int i = 0; i < 3; ++i) {
-                float x = drawn_wavelength(uint(BRIGHTNESS_ROW) + p.light, band.xy, fract(place_in_band + 0.25 * float(i + 1)), per_density);
+                float x = drawn_wavelength(
+                    uint(BRIGHTNESS_ROW) + p.light, band.xy, fract(place_in_band + 0.25 * float(i + 1)), per_density);
                 ray.companion_x[i] = x;
                 ray.companion_throughput[i] = 0.25 * weight * per_density;
             }

@@ -1,5 +1,5 @@
-// A ray from a diffuse surface that meets glass or a mirror first, followed backwards to where its light comes from: which lobe it takes is chance by
-// Fresnel's reflectance, at one index; tints at three wavelengths.
+// A ray from a diffuse surface that meets glass or a mirror first, followed backwards to where its light comes from:
+// which lobe it takes is chance by Fresnel's reflectance, at one index; tints at three wavelengths.
 #ifndef LIGHT_FOLLOWED_GLSL
 #define LIGHT_FOLLOWED_GLSL
 
@@ -8,26 +8,25 @@
 #define SPATIAL 0
 #define PATH_COLUMNS 0
 struct Walk {
-    vec3 tint;      // share of the light that arrives: red, green, blue
+    vec3 tint;  // share of the light that arrives: red, green, blue
 };
 #include "path/event.glsl"
 
 struct FollowedRay {
     Path path;
     Hit hit;
-    uint events;    // of glass and mirrors; 0: it met none, or was given up
-    uint met;       // 1: `hit` is where it ends; 0: it leaves the scene
+    uint events;  // of glass and mirrors; 0: it met none, or was given up
+    uint met;  // 1: `hit` is where it ends; 0: it leaves the scene
 };
 
 // A spectral table's row for red, green and blue.
-vec3 at_rgb(uint row, vec4 x_of_rgb)
-{
+vec3 at_rgb(uint row, vec4 x_of_rgb) {
     return vec3(spectral_row(row, x_of_rgb.x), spectral_row(row, x_of_rgb.y), spectral_row(row, x_of_rgb.z));
 }
 
 // `x_of_rgb`: spectral coordinates of the tints, and of the index. `lost`: 1 where it was given up after MAX_EVENTS.
-FollowedRay follow_specular(vec3 position, vec3 direction, RayOrigin origin, uint key, vec4 x_of_rgb, inout float lost)
-{
+FollowedRay follow_specular(
+    vec3 position, vec3 direction, RayOrigin origin, uint key, vec4 x_of_rgb, inout float lost) {
     FollowedRay ray;
     ray.events = ray.met = 0u;
     Path path = path_at(position, direction, origin, MediumStack(0u, NONE), x_of_rgb.w);
@@ -42,7 +41,8 @@ FollowedRay follow_specular(vec3 position, vec3 direction, RayOrigin origin, uin
         bool entering = dot(path.direction, hit.normal_g) < 0.0;
 #ifdef ABSORPTION
         // A place in a liquid learns so where it leaves it.
-        if (number == 0u && kind == KIND_DIELECTRIC && !entering && !is_inside(path.medium)) path.medium.object = hit.object;
+        if (number == 0u && kind == KIND_DIELECTRIC && !entering && !is_inside(path.medium))
+            path.medium.object = hit.object;
         uint row = met ? medium_weight_row(path.medium) : NONE;
         if (row != NONE) path.walk.tint *= exp(-hit.distance * at_rgb(uint(WEIGHT_ROW) + row, x_of_rgb));
 #endif
@@ -62,12 +62,15 @@ FollowedRay follow_specular(vec3 position, vec3 direction, RayOrigin origin, uin
             if (HAS_DIELECTRIC) {
                 if (IS_GLASS(kind)) {
                     changes = event.boundary.changes;
-                    passes = !changes || (event.cosine2.y > 0.0 && unit_float(hash_combine(key, number)) >= event.reflectance.y);
-                    if (!changes) path.medium = event.boundary.behind;
+                    passes = !changes
+                        || (event.cosine2.y > 0.0 && unit_float(hash_combine(key, number)) >= event.reflectance.y);
+                    if (!changes)
+                        path.medium = event.boundary.behind;
                     else if (passes) {
                         unhidden = refract_path(path, event);
                         if (SURFACE_FILTERS) {
-                            if (thing.texture != NONE) path.walk.tint *= at_rgb(uint(WEIGHT_ROW) + thing.texture, x_of_rgb);
+                            if (thing.texture != NONE)
+                                path.walk.tint *= at_rgb(uint(WEIGHT_ROW) + thing.texture, x_of_rgb);
                         }
                     }
                 }
@@ -78,15 +81,17 @@ FollowedRay follow_specular(vec3 position, vec3 direction, RayOrigin origin, uin
             lost = float(number + 1u == uint(MAX_EVENTS));
         }
     }
-    if (follows) ray.events = 0u;
-    else lost = 0.0;
+    if (follows)
+        ray.events = 0u;
+    else
+        lost = 0.0;
     ray.path = path;
     return ray;
 }
 
-// A direction towards the sphere that holds all glass and mirrors, or anywhere above where that is near: its weight is cosine over probability.
-vec3 toward_specular(vec4 sphere, vec3 position, vec3 normal, vec2 place, out float weight, out bool narrow)
-{
+// A direction towards the sphere that holds all glass and mirrors, or anywhere above where that is near: its weight is
+// cosine over probability.
+vec3 toward_specular(vec4 sphere, vec3 position, vec3 normal, vec2 place, out float weight, out bool narrow) {
     vec3 way = sphere.xyz - position;
     float distance2 = dot(way, way), sine2 = sphere.w * sphere.w / max(distance2, 1e-20);
     narrow = sine2 < 0.5;

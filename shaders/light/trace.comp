@@ -20,10 +20,10 @@ layout(local_size_x = 64) in;
 // Narrower bands are not cut at total internal reflection.
 #define MIN_CUT_BAND 1e-4
 
-// What a weight at each of the three places adds to the integral of the weights, straight between them, times the density whose running integral
-// stands in `row`. Simpson's rule for the running integral's own: exact where the density is quadratic over half a band.
-vec3 band_powers(uint row, vec3 band)
-{
+// What a weight at each of the three places adds to the integral of the weights, straight between them, times the
+// density whose running integral stands in `row`. Simpson's rule for the running integral's own: exact where the
+// density is quadratic over half a band.
+vec3 band_powers(uint row, vec3 band) {
     float low = spectral_row(row, band.x), anchor = spectral_row(row, band.y), high = spectral_row(row, band.z);
     float below = spectral_row(row, 0.5 * (band.x + band.y)), above = spectral_row(row, 0.5 * (band.y + band.z));
     // Parts of the power of each half that count by its upper end.
@@ -36,11 +36,13 @@ vec3 band_powers(uint row, vec3 band)
 // Of the sequence by which levels are rounded, neither of the lattice's own.
 #define TINT_GENERATOR 3774877043u
 
-// How far a ray has come through the glass whose tint has levels: up or down to one of them, the same way all along its path.
-uint tint_level(Path path)
-{
-    float rounding = kronecker(path.walk.photon_id / p.lattices, TINT_GENERATOR, p.tint_key + path.walk.photon_id % p.lattices * 2654435769u);
-    float place = min(float(TINT_LEVELS) * path.walk.tinted.x / (1.0 + path.walk.tinted.x), float(TINT_LEVELS - 1)), level = floor(place);
+// How far a ray has come through the glass whose tint has levels: up or down to one of them, the same way all along its
+// path.
+uint tint_level(Path path) {
+    float rounding = kronecker(
+        path.walk.photon_id / p.lattices, TINT_GENERATOR, p.tint_key + path.walk.photon_id % p.lattices * 2654435769u);
+    float place = min(float(TINT_LEVELS) * path.walk.tinted.x / (1.0 + path.walk.tinted.x), float(TINT_LEVELS - 1)),
+          level = floor(place);
     // What is left falls the less the less of it there is: odds of a half lie before or behind the middle.
     float halfway = p.tint_halfway[uint(level) >> 2][uint(level) & 3u], beyond = (place - level) * halfway;
     float further = beyond / (beyond + (1.0 - (place - level)) * (1.0 - halfway));
@@ -49,8 +51,7 @@ uint tint_level(Path path)
 #endif
 
 // Row of what is left of the light's power, over the spectrum, where a ray has come to.
-uint power_row(Path path)
-{
+uint power_row(Path path) {
 #ifdef TINT_LEVELS
     return uint(p.power_row) + tint_level(path);
 #else
@@ -58,22 +59,19 @@ uint power_row(Path path)
 #endif
 }
 
-// What throughput at a band's low end, anchor and high end each add to the power a ray carries, W (`band_powers`), for the rays of this event.
+// What throughput at a band's low end, anchor and high end each add to the power a ray carries, W (`band_powers`), for
+// the rays of this event.
 vec3 band_w;
 
-// Power that a ray carries: its throughput, straight between three places, times the light's power over its band. That is what is drawn where it
-// lands, and so what is accounted for; `flux_w` is what its anchor alone would carry.
-float carried_w(Path path)
-{
-    return path.band.z > path.band.x ? dot(band_w, path.throughput) : path.walk.flux_w;
-}
+// Power that a ray carries: its throughput, straight between three places, times the light's power over its band. That
+// is what is drawn where it lands, and so what is accounted for; `flux_w` is what its anchor alone would carry.
+float carried_w(Path path) { return path.band.z > path.band.x ? dot(band_w, path.throughput) : path.walk.flux_w; }
 
 #include "light/roulette.glsl"
 #include "light/trace_companions.glsl"
 
 // What the medium on the way takes.
-void absorb(inout Path path, float distance, inout float absorbed_w)
-{
+void absorb(inout Path path, float distance, inout float absorbed_w) {
     uint row = medium_weight_row(path.medium);
     if (row == NONE) return;
 #ifdef TINT_LEVELS
@@ -103,18 +101,18 @@ void absorb(inout Path path, float distance, inout float absorbed_w)
 #include "light/trace_landing.glsl"
 
 // Of the photon's footprint, per spacing of its own lattice.
-uint fan_where_it_landed(Path path, Path start, Hit hit)
-{
+uint fan_where_it_landed(Path path, Path start, Hit hit) {
     vec2 way;
-    for (int c = 0; c < 2; ++c) way[c] = change_of_way(start.dposition[c], start.ddirection[c], path.direction, hit.normal_g, hit.distance);
-    vec2 fan = fan_of_footprint(path.dposition[0], path.dposition[1], path.ddirection[0], path.ddirection[1], way, path.direction, hit.normal_g);
+    for (int c = 0; c < 2; ++c)
+        way[c] = change_of_way(start.dposition[c], start.ddirection[c], path.direction, hit.normal_g, hit.distance);
+    vec2 fan = fan_of_footprint(path.dposition[0], path.dposition[1], path.ddirection[0], path.ddirection[1], way,
+        path.direction, hit.normal_g);
     fan *= path.walk.footprint_scale;
     return is_within2(fan, FAN_LIMIT) ? packHalf2x16(fan) : 0u;
 }
 
 // A photon on a receiver. The share that no specular event precedes the camera pass draws.
-void land(inout Path path, Path start, uint receiver, uint triangle, Hit hit, uint slot, inout Outcome outcome)
-{
+void land(inout Path path, Path start, uint receiver, uint triangle, Hit hit, uint slot, inout Outcome outcome) {
     outcome.what |= path.depth == 0u ? DIRECT : DEPOSITED;
     outcome.flux_w = carried_w(path);
     if (path.depth == 0u) return;
@@ -131,10 +129,12 @@ void land(inout Path path, Path start, uint receiver, uint triangle, Hit hit, ui
     }
     uint lattice_bits = p.lattice_bits;
 #ifdef LAMP_COLUMNS
-    // A footprint blurs what light from a point would draw, and an extended light has that coming: the broader of the two is drawn.
+    // A footprint blurs what light from a point would draw, and an extended light has that coming: the broader of the
+    // two is drawn.
     vec2 fan = unpackHalf2x16(photon.fan);
     if (LOBE_COLUMNS) narrow_lamp_by_lobe(path);
-    if (cover_sides(hit.normal_g, photon.dposition_ds, photon.dposition_dt, fan, path.dposition[LAMP], path.dposition[LAMP + 1])) {
+    if (cover_sides(hit.normal_g, photon.dposition_ds, photon.dposition_dt, fan, path.dposition[LAMP],
+            path.dposition[LAMP + 1])) {
         lattice_bits = 0u;
         photon.fan = is_within2(fan, FAN_LIMIT) ? packHalf2x16(fan) : 0u;
     }
@@ -160,8 +160,10 @@ void land(inout Path path, Path start, uint receiver, uint triangle, Hit hit, ui
     photon.branch_key = path.walk.branch_key;
     photon.depth = min(path.depth, (1u << EDGE_BIT) - 1u);
     if (LIGHT_EDGES) {
-        // The edge is told in steps of the lattice as emitted: footprints of a coarser one, or broader ones, reach over it from farther away.
-        if (lattice_bits == p.lattice_bits && path.walk.footprint_scale == 1.0) photon.depth |= uint(path.walk.dposition[0].w) << EDGE_BIT;
+        // The edge is told in steps of the lattice as emitted: footprints of a coarser one, or broader ones, reach over
+        // it from farther away.
+        if (lattice_bits == p.lattice_bits && path.walk.footprint_scale == 1.0)
+            photon.depth |= uint(path.walk.dposition[0].w) << EDGE_BIT;
     }
 #if SPECTRAL_GROUPS > 0
     SPECTRAL_COPY
@@ -188,14 +190,12 @@ void land(inout Path path, Path start, uint receiver, uint triangle, Hit hit, ui
 #include "light/trace_scatter.glsl"
 
 // Whether beams carry what meets this object first.
-bool is_beam_object(uint object)
-{
+bool is_beam_object(uint object) {
     return ((p.beam_objects[object >> 7u][(object >> 5u) & 3u] >> (object & 31u)) & 1u) != 0u;
 }
 
 // The ray's way to what it meets; it has come so far through haze then.
-Flight flight_of(inout Path path, float distance)
-{
+Flight flight_of(inout Path path, float distance) {
     bool outside = !is_inside(path.medium);
     if (HAS_GRATING) {
         // What is left of a grating's orders has flown here before.
@@ -228,8 +228,7 @@ Flight flight_of(inout Path path, float distance)
     return flight;
 }
 
-void main()
-{
+void main() {
     uint k = gl_GlobalInvocationID.x;
     if (k >= state.alive) return;
     Path path = load_path(indices[k]);
@@ -248,7 +247,8 @@ void main()
     bool met = intersect_closest(path.position, path.direction, FAR_DISTANCE, path.origin, hit);
 #endif
 #ifdef LOOPS_MAY_END
-    // llvmpipe ends every loop of an invocation once they have run 65,535 rounds together, and goes on with what there is.
+    // llvmpipe ends every loop of an invocation once they have run 65,535 rounds together, and goes on with what there
+    // is.
     uint rounds = 0u;
     while (rounds < 2u) rounds += min(p.lattices, 1u);
     if (rounds < 2u) {
@@ -279,7 +279,8 @@ void main()
     }
     transfer_columns(path, hit.normal_g, hit.distance);
     if (FOOTPRINTS) {
-        if (IS_GLASS(kind) || kind == KIND_MIRROR) keep_columns_within(path, start, thing.kind == KIND_MIRROR ? thing.colour.w : thing.colour.z, hit.distance);
+        if (IS_GLASS(kind) || kind == KIND_MIRROR)
+            keep_columns_within(path, start, thing.kind == KIND_MIRROR ? thing.colour.w : thing.colour.z, hit.distance);
     }
 
 #ifdef BEAMS
@@ -287,7 +288,7 @@ void main()
         outcome = Outcome(LEFT_TO_BEAMS, carried_w(path), 0.0, 0.0);
     } else
 #endif
-    if (kind == KIND_DIFFUSE && border < 0.0) {
+        if (kind == KIND_DIFFUSE && border < 0.0) {
         land(path, start, thing.receiver, facet.source, hit, k, outcome);
     } else if (kind == KIND_BLACK && border < 0.0) {
         outcome.what |= ABSORBED;

@@ -1,9 +1,10 @@
-// Bands of the spectrum in flight, for `trace.comp`: cut where total internal reflection sets in, or parted where they may not be.
+// Bands of the spectrum in flight, for `trace.comp`: cut where total internal reflection sets in, or parted where they
+// may not be.
 #if SPECTRAL_GROUPS > 0
-// Spectral columns are derivatives too. Grazing exits and curved surfaces, again and again inside a solid, make some of them so steep that they would
-// throw the ends of a band all over the scene, and out of it, where no light of the band goes.
-void keep_sweeps_within(inout Path path)
-{
+// Spectral columns are derivatives too. Grazing exits and curved surfaces, again and again inside a solid, make some of
+// them so steep that they would throw the ends of a band all over the scene, and out of it, where no light of the band
+// goes.
+void keep_sweeps_within(inout Path path) {
     for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
         float sweep = length(path.ddirection[SPATIAL + g]) * abs(variable_step(uint(g), path.band.z, path.band.x));
         float kept = min(1.0, p.widest_sweep / max(sweep, 1e-30));
@@ -15,22 +16,19 @@ void keep_sweeps_within(inout Path path)
 
 #ifdef BAND_CUTS
 // Whether `at` leaves a band too little on one side of it to be worth a path of its own.
-bool leaves_sliver(Path path, float at)
-{
-    return min(at - path.band.x, path.band.z - at) <= 0.01 * MIN_CUT_BAND;
-}
+bool leaves_sliver(Path path, float at) { return min(at - path.band.x, path.band.z - at) <= 0.01 * MIN_CUT_BAND; }
 
-// `at`, where the parts [lo, at] and [at, hi] of a path's band may set out again from where its flight started; else a negative number.
-float clear_cut(Path path, Path start, float at, float distance)
-{
+// `at`, where the parts [lo, at] and [at, hi] of a path's band may set out again from where its flight started; else a
+// negative number.
+float clear_cut(Path path, Path start, float at, float distance) {
     vec3 middles = 0.5 * (path.band.xyz + vec3(at, at, at));
     return !leaves_sliver(path, at) && starts_are_near(start, middles.x, middles.z, distance) ? at : -1.0;
 }
 
-// The part [lo, hi] of a path's band, with this share of its power, traced at its own middle. Roulette counts by power, also where a band was only
-// divided: or cuts would breed. It meets the surface again, and is not cut there a second time.
-Path part_of_band(Path path, float lo, float hi, float share, uint branch)
-{
+// The part [lo, hi] of a path's band, with this share of its power, traced at its own middle. Roulette counts by power,
+// also where a band was only divided: or cuts would breed. It meets the surface again, and is not cut there a second
+// time.
+Path part_of_band(Path path, float lo, float hi, float share, uint branch) {
     restrict_to(path, vec3(lo, 0.5 * (lo + hi), hi));
     path.walk.flux_w *= share;
     path.walk.survival *= share;
@@ -40,39 +38,38 @@ Path part_of_band(Path path, float lo, float hi, float share, uint branch)
 }
 
 // Share of the power of a path's band that lies below `at`.
-float power_below(Path path, float at)
-{
+float power_below(Path path, float at) {
     vec3 power = spectral_row(uint(p.power_row), vec3(path.band.x, at, path.band.z));
     return clamp((power.y - power.x) / max(power.z - power.x, 1e-30), 0.0, 1.0);
 }
 
 #ifdef HAS_DIELECTRIC
-// Where the band is cut because total internal reflection sets in inside it, at `onset`; negative: nowhere. `start`: the path before its flight, from
-// which both parts set out again.
-float cut_of_band(Path path, Path start, Event event, float distance, out float onset)
-{
+// Where the band is cut because total internal reflection sets in inside it, at `onset`; negative: nowhere. `start`:
+// the path before its flight, from which both parts set out again.
+float cut_of_band(Path path, Path start, Event event, float distance, out float onset) {
     onset = total_reflection_in_band(path, event);
     bool is_final = path.recut != 0u || path.band.z - path.band.x <= MIN_CUT_BAND;
     return onset < 0.0 || is_final ? -1.0 : clear_cut(path, start, onset, distance);
 }
 
-// The part of a path's band that goes through a surface which its anchor does not pass, where that band may not be cut: from where the path itself is,
-// at an anchor of its own.
+// The part of a path's band that goes through a surface which its anchor does not pass, where that band may not be cut:
+// from where the path itself is, at an anchor of its own.
 struct PassingPart {
-    vec3 band;          // x: lowest, anchor, highest
-    vec3 throughput;    // there, before the surface
-    vec3 let_through;   // shares there
-    vec3 direction;     // of incidence at its anchor
-    float power_w;      // behind the surface
+    vec3 band;  // x: lowest, anchor, highest
+    vec3 throughput;  // there, before the surface
+    vec3 let_through;  // shares there
+    vec3 direction;  // of incidence at its anchor
+    float power_w;  // behind the surface
 };
 
-// `event` becomes the part's where it refracts, and reflects what is left of the whole band: both together carry what the path did.
-PassingPart passing_part(Path path, inout Event event, float onset)
-{
+// `event` becomes the part's where it refracts, and reflects what is left of the whole band: both together carry what
+// the path did.
+PassingPart passing_part(Path path, inout Event event, float onset) {
     bool low = event.cosine2.x > 0.0;
     vec3 normal = event.frame.normal, reflected = event.reflectance;
     PassingPart part;
-    part.band = low ? vec3(path.band.x, 0.5 * (path.band.x + onset), onset) : vec3(onset, 0.5 * (onset + path.band.z), path.band.z);
+    part.band = low ? vec3(path.band.x, 0.5 * (path.band.x + onset), onset)
+                    : vec3(onset, 0.5 * (onset + path.band.z), path.band.z);
     part.throughput = band_weights(path.band, path.throughput, part.band);
     interface_indices(event.boundary, part.band, event.n_i, event.n_t);
     float theta = dot(path.direction, normal);
@@ -97,7 +94,9 @@ PassingPart passing_part(Path path, inout Event event, float onset)
 #else
     float anchors = 1.0 - fresnel_reflectance(theta, eta.y, transmitted_cosine2(theta, eta.y));
 #endif
-    part.let_through = event.refracted.exists ? vec3(low ? 1.0 - reflected.x : 0.0, anchors, low ? 0.0 : 1.0 - reflected.z) : vec3(0.0);
+    part.let_through = event.refracted.exists
+        ? vec3(low ? 1.0 - reflected.x : 0.0, anchors, low ? 0.0 : 1.0 - reflected.z)
+        : vec3(0.0);
     vec3 density_w = band_powers(power_row(path), part.band);
     part.power_w = dot(density_w, part.throughput * part.let_through);
     // What the path's end has: more cannot leave it.

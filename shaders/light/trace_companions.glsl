@@ -1,19 +1,17 @@
-// What a path's power is weakened by; and, of a hero wavelength's path, of the three companions that share it as long as it is theirs too
-// [Wilkie et al. 2014]. Without a hero all shares are the path's own.
+// What a path's power is weakened by; and, of a hero wavelength's path, of the three companions that share it as long
+// as it is theirs too [Wilkie et al. 2014]. Without a hero all shares are the path's own.
 #ifndef TRACE_COMPANIONS_GLSL
 #define TRACE_COMPANIONS_GLSL
 
 // Leaves a path this share of its power, over its band, and its companions theirs.
-void weaken(inout Path path, vec3 share, vec3 companions)
-{
+void weaken(inout Path path, vec3 share, vec3 companions) {
     path.walk.flux_w *= share.y;
     path.throughput *= share;
     if (HERO) path.walk.companion_throughput.xyz *= companions;
 }
 
 // A spectral table's values for the companions.
-vec3 companion_row(Path path, uint row)
-{
+vec3 companion_row(Path path, uint row) {
     if (HERO) {
         return spectral_row(row, path.walk.companion_x.xyz);
     } else {
@@ -21,18 +19,18 @@ vec3 companion_row(Path path, uint row)
     }
 }
 
-// The share of the hero and its companions together, by which roulette judges: whoever of them leads, the odds are the same.
-float common_share(Path path, float own, vec3 companions)
-{
+// The share of the hero and its companions together, by which roulette judges: whoever of them leads, the odds are the
+// same.
+float common_share(Path path, float own, vec3 companions) {
     if (HERO) {
         if (path.walk.companion_x.w > 0.0) return 0.25 * (own + dot(companions, vec3(1.0)));
     }
     return own;
 }
 
-// From here on the hero's path is not that of its companions: none of them would have led to it, and it has all of its weight.
-void leave_companions(inout Path path)
-{
+// From here on the hero's path is not that of its companions: none of them would have led to it, and it has all of its
+// weight.
+void leave_companions(inout Path path) {
     if (HERO) {
         path.throughput *= path.walk.companion_x.w > 0.0 ? 4.0 : 1.0;
         path.walk.companion_x.w = 0.0;
@@ -43,7 +41,7 @@ void leave_companions(inout Path path)
 // What glass makes of the companions.
 struct Companions {
     vec3 reflectance;
-    bool stay;          // with the hero where it is refracted: nothing disperses
+    bool stay;  // with the hero where it is refracted: nothing disperses
 #if defined(HERO) && defined(POLARISED)
     vec3 s[3];
     Polarisation seen;
@@ -52,21 +50,19 @@ struct Companions {
 };
 
 // Their state counts from the hero's axis.
-Polarisation companions_of(Path path)
-{
-    return Polarisation(path.polarisation.axis, path.walk.companion_q.xyz, path.walk.companion_u.xyz, path.walk.companion_v.xyz);
+Polarisation companions_of(Path path) {
+    return Polarisation(
+        path.polarisation.axis, path.walk.companion_q.xyz, path.walk.companion_u.xyz, path.walk.companion_v.xyz);
 }
 
-void keep_companions(inout Path path, Polarisation state)
-{
+void keep_companions(inout Path path, Polarisation state) {
     path.walk.companion_q.xyz = state.q;
     path.walk.companion_u.xyz = state.u;
     path.walk.companion_v.xyz = state.v;
 }
 
 // `is_glass`: it has met glass; else what turns the hero turns them.
-Companions companions_at(Path path, Event event, bool is_glass)
-{
+Companions companions_at(Path path, Event event, bool is_glass) {
     Companions companions;
     companions.reflectance = vec3(event.reflectance.y);
     companions.stay = true;
@@ -100,10 +96,11 @@ Companions companions_at(Path path, Event event, bool is_glass)
 }
 
 // The companions' state behind what has turned the hero.
-void polarise_companions(inout Path child, Companions companions, bool refracts)
-{
+void polarise_companions(inout Path child, Companions companions, bool refracts) {
     if (HERO && POLARISED) {
-        keep_companions(child, out_of_plane(behind_interface(companions.seen, refracts ? companions.transmission : companions.reflection), child.direction, companions.s));
+        keep_companions(child,
+            out_of_plane(behind_interface(companions.seen, refracts ? companions.transmission : companions.reflection),
+                child.direction, companions.s));
     }
 }
 

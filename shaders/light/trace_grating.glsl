@@ -5,11 +5,12 @@
 // A grating of up to so many orders sends each on as a whole lattice where it is met first.
 #define MAX_WHOLE_ORDERS 3u
 
-// A grating's orders leave one after the other. The first one that carries light goes on as `child`; for the others the path meets the surface again
-// (`rest`, the path before its flight). `rest` is also the other part of a band that is cut because this order becomes evanescent inside it. Whether
-// `child` lives.
-bool diffract(Path path, Hit hit, Event event, uint row, out Path child, inout Path rest, out bool rest_lives, inout Outcome outcome)
-{
+// A grating's orders leave one after the other. The first one that carries light goes on as `child`; for the others the
+// path meets the surface again
+// (`rest`, the path before its flight). `rest` is also the other part of a band that is cut because this order becomes
+// evanescent inside it. Whether `child` lives.
+bool diffract(Path path, Hit hit, Event event, uint row, out Path child, inout Path rest, out bool rest_lives,
+    inout Outcome outcome) {
     GratingEvent met = grating_event(path, event, hit, row);
     uint orders = met.grating.orders, first = min(path.order, orders - 1u), number = first;
     child = child_of(path, hit, dot(path.direction, hit.normal_g) >= 0.0);
@@ -29,7 +30,8 @@ bool diffract(Path path, Hit hit, Event event, uint row, out Path child, inout P
 #endif
         if (passes.y || at >= 0.0) break;
     }
-    // Of the light that is here, what the orders from `first` on have left when this one, and the next one, has its turn.
+    // Of the light that is here, what the orders from `first` on have left when this one, and the next one, has its
+    // turn.
     float per_left = 1.0 / max(order_at(row, first).left, 1e-9);
     bool found = number < orders, more = found && number + 1u < orders;
     float kept = found ? order.left * per_left : 0.0, share = found ? order.efficiency * per_left : 0.0;
@@ -56,7 +58,8 @@ bool diffract(Path path, Hit hit, Event event, uint row, out Path child, inout P
     if (order.reflects == 0u) child.origin.inside ^= 1u;
     diffract_path(child, event, met, order, steps, geometric);
     if (HERO && POLARISED) {
-        keep_companions(child, behind_grating(companions_of(path), path.direction, child.direction, order.reflects != 0u));
+        keep_companions(
+            child, behind_grating(companions_of(path), path.direction, child.direction, order.reflects != 0u));
     }
     weaken(child, vec3(share), vec3(share));
     if (steps.y != 0.0) leave_companions(child);

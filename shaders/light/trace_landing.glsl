@@ -1,5 +1,6 @@
-// Bands whose wavelengths do not all meet what their anchor meets, for `trace.comp`: over a receiver's border, or over the edge of what is in the way. Drawn
-// whole on the anchor's receiver, a band lacks those colours beside the border that its neighbour has too many of, on both sides.
+// Bands whose wavelengths do not all meet what their anchor meets, for `trace.comp`: over a receiver's border, or over
+// the edge of what is in the way. Drawn whole on the anchor's receiver, a band lacks those colours beside the border
+// that its neighbour has too many of, on both sides.
 #ifdef LANDING_CUTS
 // Spacings of the lattice, along the narrower of its steps: of shorter chords no colour shows beside a border.
 #define SHORTEST_CUT_CHORD 0.02
@@ -9,22 +10,23 @@
 #define NARROWEST_LANDING 0.0078125
 
 // Whether the ends of a ray's band land so far apart that each may meet something else than the anchor has, at `hit`.
-bool lands_broadly(Path path, Hit hit)
-{
+bool lands_broadly(Path path, Hit hit) {
     uint kind = object_at(hit.object).kind;
     bool lands = (kind == KIND_DIFFUSE || kind == KIND_BLACK) && path.depth > 0u;
     if (!lands || path.band.z - path.band.x < NARROWEST_LANDING || path.walk.flags != 0u) return false;
     vec3 column[COLUMNS];
-    for (int c = 0; c < COLUMNS; ++c) column[c] = transfer_column(path.dposition[c], path.ddirection[c], path.direction, hit.normal_g, hit.distance);
+    for (int c = 0; c < COLUMNS; ++c)
+        column[c] = transfer_column(path.dposition[c], path.ddirection[c], path.direction, hit.normal_g, hit.distance);
     vec3 chord = vec3(0.0);
-    for (int g = 0; g < SPECTRAL_GROUPS; ++g) chord += variable_step(uint(g), path.band.z, path.band.x) * column[SPATIAL + g];
+    for (int g = 0; g < SPECTRAL_GROUPS; ++g)
+        chord += variable_step(uint(g), path.band.z, path.band.x) * column[SPATIAL + g];
     float least = SHORTEST_CUT_CHORD * path.walk.footprint_scale;
     return dot(chord, chord) > least * least * min(dot(column[0], column[0]), dot(column[1], column[1]));
 }
 
-// The nearest hit of a ray's anchor. `border`: where in its band that begins to meet another object, if it may be cut there; else a negative number.
-bool meet_with_band(Path path, out Hit hit, out float border)
-{
+// The nearest hit of a ray's anchor. `border`: where in its band that begins to meet another object, if it may be cut
+// there; else a negative number.
+bool meet_with_band(Path path, out Hit hit, out float border) {
     float x = path.band.y, inside = path.band.y, outside = path.band.y;
     bool met = false;
     // The anchor, then the band's ends, then halvings between what lands with the anchor and what does not.

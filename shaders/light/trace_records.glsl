@@ -45,15 +45,15 @@ layout(std430, binding = BIND_STATE) readonly restrict buffer StateBlock { Queue
 #define HAS_NORMAL_COLUMNS
 #endif
 
-// What a photon's path carries besides is in its record (`ray_record` in app/gpu/records.py); of the flags there, FLAG_FOOTPRINT_DROPPED.
+// What a photon's path carries besides is in its record (`ray_record` in app/gpu/records.py); of the flags there,
+// FLAG_FOOTPRINT_DROPPED.
 #define Walk RayRecord
 #include "path/event.glsl"
 
 // Bits of a record's flags from which on the order of a grating stands that is to be sent on next.
 #define ORDER_BIT 8
 
-Path load_path(uint slot)
-{
+Path load_path(uint slot) {
     uvec4 texels[RayRecord_TEXELS];
     for (uint i = 0u; i < uint(RayRecord_TEXELS); ++i) texels[i] = rays_in[slot * uint(RayRecord_TEXELS) + i];
     RayRecord ray = RayRecord_of(texels);
@@ -63,7 +63,8 @@ Path load_path(uint slot)
     path.position = ray.position;
     path.direction = ray.direction;
     path.medium = MediumStack(ray.inside_mask, ray.inside_object);
-    path.origin = RayOrigin(ray.last_primitive, ray.last_object, uint((ray.flags & FLAG_INSIDE) != 0u), ray.inside_mask);
+    path.origin =
+        RayOrigin(ray.last_primitive, ray.last_object, uint((ray.flags & FLAG_INSIDE) != 0u), ray.inside_mask);
     path.band = vec3(ray.x_lo, ray.x_anchor, ray.x_hi);
     path.throughput = ray.throughput;
     path.depth = ray.depth;
@@ -77,13 +78,13 @@ Path load_path(uint slot)
 #endif
     if (HAS_GRATING) path.order = ray.flags >> ORDER_BIT;
     if (POLARISED) {
-        path.polarisation = Polarisation(vec3(ray.axis_x, ray.axis_y, ray.axis_z), ray.stokes_q, ray.stokes_u, ray.stokes_v);
+        path.polarisation =
+            Polarisation(vec3(ray.axis_x, ray.axis_y, ray.axis_z), ray.stokes_q, ray.stokes_u, ray.stokes_v);
     }
     return path;
 }
 
-void store_path(uint slot, Path path)
-{
+void store_path(uint slot, Path path) {
     RayRecord ray = path.walk;
     ray.position = path.position;
     ray.direction = path.direction;
@@ -117,18 +118,17 @@ void store_path(uint slot, Path path)
     for (uint i = 0u; i < uint(RayRecord_TEXELS); ++i) rays_out[slot * uint(RayRecord_TEXELS) + i] = texels[i];
 }
 
-void store_photon(uint slot, PhotonRecord photon)
-{
+void store_photon(uint slot, PhotonRecord photon) {
     uvec4 texels[PhotonRecord_TEXELS];
     to_texels(photon, texels);
-    for (uint i = 0u; i < uint(PhotonRecord_TEXELS); ++i) photon_slots[slot * uint(PhotonRecord_TEXELS) + i] = texels[i];
+    for (uint i = 0u; i < uint(PhotonRecord_TEXELS); ++i)
+        photon_slots[slot * uint(PhotonRecord_TEXELS) + i] = texels[i];
 }
 
 #ifdef FLIGHTS
 layout(std430, binding = BIND_FLIGHTS) writeonly restrict buffer Flights { uvec4 flights[]; };
 
-void store_flight(uint slot, Flight flight)
-{
+void store_flight(uint slot, Flight flight) {
     uvec4 texels[Flight_TEXELS];
     to_texels(flight, texels);
     if ((slot + 1u) * uint(Flight_TEXELS) > uint(flights.length())) return;  // told by their number
@@ -136,16 +136,14 @@ void store_flight(uint slot, Flight flight)
 }
 #endif
 
-void store_outcome(uint slot, Outcome outcome)
-{
+void store_outcome(uint slot, Outcome outcome) {
     uvec4 texels[Outcome_TEXELS];
     to_texels(outcome, texels);
     outcomes[slot] = texels[0];
 }
 
 // Values of a spectral table at the three places of a band.
-vec3 spectral_row(uint row, vec3 x)
-{
+vec3 spectral_row(uint row, vec3 x) {
     return vec3(spectral_row(row, x.x), spectral_row(row, x.y), spectral_row(row, x.z));
 }
 

@@ -1,23 +1,22 @@
-// Which lobes of a surface a photon's path follows, and which parts of a band that is cut before it lands, for `trace.comp`.
-// A path that goes on from what it has hit, on that object's inner side or not.
-Path child_of(Path path, Hit hit, bool inside)
-{
+// Which lobes of a surface a photon's path follows, and which parts of a band that is cut before it lands, for
+// `trace.comp`. A path that goes on from what it has hit, on that object's inner side or not.
+Path child_of(Path path, Hit hit, bool inside) {
     leave_surface(path, hit, inside);
     path.depth += 1u;
     return path;
 }
 
 // Which microfacet of a ground surface a path meets: neighbours on its lattice meet other ones.
-MicrofacetDraw microfacet_draw(Path path)
-{
+MicrofacetDraw microfacet_draw(Path path) {
     uint sub = path.walk.photon_id % p.lattices;
-    return MicrofacetDraw(path.walk.photon_id / p.lattices, path.depth, hash_combine(p.lattice_bits != 0u ? p.surface_key : path.walk.branch_key, sub));
+    return MicrofacetDraw(path.walk.photon_id / p.lattices, path.depth,
+        hash_combine(p.lattice_bits != 0u ? p.surface_key : path.walk.branch_key, sub));
 }
 
-// Leaves a path that has been turned its share of the power, over its band, and what microfacets do not hide of it; `share`: of the power, by which
-// roulette judges. A microfacet's shadow is no fall-back.
-void send_on(inout Path child, Event event, vec3 share_over_band, vec3 companions, vec3 unhidden, bool geometric, inout float share, inout Outcome outcome)
-{
+// Leaves a path that has been turned its share of the power, over its band, and what microfacets do not hide of it;
+// `share`: of the power, by which roulette judges. A microfacet's shadow is no fall-back.
+void send_on(inout Path child, Event event, vec3 share_over_band, vec3 companions, vec3 unhidden, bool geometric,
+    inout float share, inout Outcome outcome) {
     weaken(child, share_over_band, companions);
     if (ROUGH_SURFACES) {
         if (event.ground.width > 0.0) {
@@ -31,10 +30,10 @@ void send_on(inout Path child, Event event, vec3 share_over_band, vec3 companion
 }
 
 // What a surface of glass lets through of what enters; the rest is absorbed.
-void filter_by(uint row, inout Path child, inout float share, inout Outcome outcome)
-{
+void filter_by(uint row, inout Path child, inout float share, inout Outcome outcome) {
     if (row == NONE) return;
-    vec3 kept = spectral_row(uint(WEIGHT_ROW) + row, child.band), companions = companion_row(child, uint(WEIGHT_ROW) + row);
+    vec3 kept = spectral_row(uint(WEIGHT_ROW) + row, child.band),
+         companions = companion_row(child, uint(WEIGHT_ROW) + row);
     outcome.absorbed_w += carried_w(child);
     weaken(child, kept, companions);
     outcome.absorbed_w -= carried_w(child);
@@ -45,8 +44,8 @@ void filter_by(uint row, inout Path child, inout float share, inout Outcome outc
 
 // Each child is stored in one place, whichever event made it: where every branch is executed, every
 // store costs even when no path takes it. `border`: where the band is cut before it lands; negative: nowhere.
-void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object thing, float border, uint slot, inout Outcome outcome)
-{
+void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object thing, float border, uint slot,
+    inout Outcome outcome) {
     bool entering = dot(path.direction, hit.normal_g) < 0.0, lives = false, geometric;
     if ((path.walk.light_and_source >> 16) == 0xffffu)
         path.walk.light_and_source = (path.walk.light_and_source & 0xffffu) | (hit.object << 16);
@@ -57,7 +56,8 @@ void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object t
     Companions companions = companions_at(path, event, IS_GLASS(kind));
     if (HAS_MIRROR) {
         if (kind == KIND_MIRROR) {
-            vec3 kept = spectral_row(uint(WEIGHT_ROW) + thing.weight_row, path.band), of_companions = companion_row(path, uint(WEIGHT_ROW) + thing.weight_row);
+            vec3 kept = spectral_row(uint(WEIGHT_ROW) + thing.weight_row, path.band),
+                 of_companions = companion_row(path, uint(WEIGHT_ROW) + thing.weight_row);
             float share = common_share(path, kept.y, of_companions);
             outcome.what |= ABSORBED;
             send_on(child, event, kept, of_companions, unhidden, geometric, share, outcome);
@@ -75,7 +75,9 @@ void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object t
     bool splits = IS_GLASS(kind) && event.boundary.changes;
     float reflected_share = common_share(path, event.reflectance.y, companions.reflectance);
     // Refracted they stay together only where nothing disperses.
-    float refracted_share = companions.stay ? common_share(path, 1.0 - event.reflectance.y, 1.0 - companions.reflectance) : 1.0 - event.reflectance.y;
+    float refracted_share = companions.stay
+        ? common_share(path, 1.0 - event.reflectance.y, 1.0 - companions.reflectance)
+        : 1.0 - event.reflectance.y;
     float at = -1.0, below = 0.0;
 #ifdef BAND_CUTS
     float onset = -1.0;
@@ -147,7 +149,8 @@ void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object t
     }
     if (splits && event.refracted.exists) {
         unhidden = refract_path(child, event);
-        send_on(child, event, let_through, 1.0 - companions.reflectance, unhidden, event.refracted.geometric, refracted_share, outcome);
+        send_on(child, event, let_through, 1.0 - companions.reflectance, unhidden, event.refracted.geometric,
+            refracted_share, outcome);
         polarise_companions(child, companions, true);
         if (!companions.stay) leave_companions(child);
         if (SURFACE_FILTERS) filter_by(thing.texture, child, refracted_share, outcome);

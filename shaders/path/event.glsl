@@ -1,6 +1,7 @@
-// What a surface does to a path that has met it: `interact` finds the normals, media and shares of its lobes; `reflect_path`, `refract_path` and
-// `diffract_path` turn the path into one of them, with its columns, its band's ends and its polarisation. Nothing is stored and nothing chosen here:
-// which lobes are followed, and by what chance, is for the walk.
+// What a surface does to a path that has met it: `interact` finds the normals, media and shares of its lobes;
+// `reflect_path`, `refract_path` and `diffract_path` turn the path into one of them, with its columns, its band's ends
+// and its polarisation. Nothing is stored and nothing chosen here: which lobes are followed, and by what chance, is for
+// the walk.
 #ifndef EVENT_GLSL
 #define EVENT_GLSL
 
@@ -10,7 +11,7 @@
 struct Event {
     ShadingFrame frame;
 #ifdef SPECTRAL_SWEEP
-    vec3 end_normal[2];             // where the rays at the ends of the band arrive
+    vec3 end_normal[2];  // where the rays at the ends of the band arrive
 #endif
 #ifdef HAS_NORMAL_COLUMNS
     vec3 normal_columns[COLUMNS_HELD];  // derivatives of the shading normal
@@ -19,16 +20,16 @@ struct Event {
     Ground ground;
 #endif
 #ifdef HAS_DIELECTRIC
-    MediumInterface boundary;       // of glass
-    vec3 n_i, n_t;                  // before and behind it, at the three places of the band
-    vec3 cosine2;                   // squared cosines of the transmitted angles there
+    MediumInterface boundary;  // of glass
+    vec3 n_i, n_t;  // before and behind it, at the three places of the band
+    vec3 cosine2;  // squared cosines of the transmitted angles there
     Deflection refracted;
 #endif
-    vec3 theta;                     // cosines of incidence there, below 0
+    vec3 theta;  // cosines of incidence there, below 0
     vec3 reflectance;
 #ifdef POLARISED
-    vec3 s[3];                      // of the planes of incidence there
-    Polarisation seen;              // the path's state, counted from these
+    vec3 s[3];  // of the planes of incidence there
+    Polarisation seen;  // the path's state, counted from these
     FresnelPair reflection;
     FresnelPair transmission;
 #endif
@@ -41,14 +42,14 @@ struct Event {
 #endif
 
 // Derivative of the cosine of incidence by group g's variable.
-float incidence_column(Path path, Event event, int g)
-{
-    return dot(path.ddirection[SPATIAL + g], event.frame.normal) + dot(path.direction, NORMAL_COLUMN(event, SPATIAL + g));
+float incidence_column(Path path, Event event, int g) {
+    return dot(path.ddirection[SPATIAL + g], event.frame.normal)
+        + dot(path.direction, NORMAL_COLUMN(event, SPATIAL + g));
 }
 
-// Cosines of incidence at the three places of the band: by the rays at its ends where they are carried, else by the columns.
-vec3 incidence_over_band(Path path, Event event)
-{
+// Cosines of incidence at the three places of the band: by the rays at its ends where they are carried, else by the
+// columns.
+vec3 incidence_over_band(Path path, Event event) {
     vec3 theta = vec3(dot(path.direction, event.frame.normal));
 #if SPECTRAL_GROUPS > 0
     if (path.restricted != 0u) {
@@ -69,8 +70,7 @@ vec3 incidence_over_band(Path path, Event event)
 }
 
 // s of the planes of incidence over the band.
-void planes_of_incidence(Path path, Event event, out vec3 s[3])
-{
+void planes_of_incidence(Path path, Event event, out vec3 s[3]) {
     s[1] = incidence_axis(path.direction, event.frame.normal, path.polarisation.axis);
     s[0] = s[2] = s[1];
 #if SPECTRAL_GROUPS > 0
@@ -91,14 +91,14 @@ void planes_of_incidence(Path path, Event event, out vec3 s[3])
 }
 
 // The normals that a path meets. `facet`: of the hit.
-Event event_at(Path path, Hit hit, Triangle facet)
-{
+Event event_at(Path path, Hit hit, Triangle facet) {
     Event event;
     event.frame = shading_frame(hit, facet, path.position, path.direction);
     event.reflectance = vec3(1.0);
     if (SPECTRAL_SWEEP) {
         for (int end = 0; end < 2; ++end)
-            event.end_normal[end] = normal_beside(event.frame, path.restricted != 0u ? path.end_position[end] - path.position : vec3(0.0));
+            event.end_normal[end] =
+                normal_beside(event.frame, path.restricted != 0u ? path.end_position[end] - path.position : vec3(0.0));
     }
 #ifdef HAS_NORMAL_COLUMNS
     for (int c = 0; c < PATH_COLUMNS; ++c) event.normal_columns[c] = normal_column(event.frame, path.dposition[c]);
@@ -113,34 +113,38 @@ Event event_at(Path path, Hit hit, Triangle facet)
 }
 
 // A ground surface: the microfacet that the path meets takes the place of the normals, and turns with them.
-void meet_microfacet(Path path, Object thing, MicrofacetDraw draw, inout Event event)
-{
+void meet_microfacet(Path path, Object thing, MicrofacetDraw draw, inout Event event) {
     event.ground.width = thing.colour.x;
     event.ground.table = thing.colour.y;
     if (event.ground.width <= 0.0) return;
     vec3 normal = event.frame.normal;
-    vec3 microfacet = visible_microfacet(-path.direction, normal, event.ground.width, microfacet_numbers(draw.number, draw.depth, draw.key));
+    vec3 microfacet = visible_microfacet(
+        -path.direction, normal, event.ground.width, microfacet_numbers(draw.number, draw.depth, draw.key));
     if (NORMAL_DERIVATIVES) {
-        for (int c = 0; c < PATH_COLUMNS; ++c) event.normal_columns[c] = turned_with(microfacet, normal, event.normal_columns[c]);
+        for (int c = 0; c < PATH_COLUMNS; ++c)
+            event.normal_columns[c] = turned_with(microfacet, normal, event.normal_columns[c]);
     }
 #ifdef WIDENED_BY_LOBES
-    // To what an earlier ground surface has spread this one adds a quarter turn aside, to the left or to the right: two columns hold the sum of both
-    // variances, exactly where the lobes are round, and else over many paths.
+    // To what an earlier ground surface has spread this one adds a quarter turn aside, to the left or to the right: two
+    // columns hold the sum of both variances, exactly where the lobes are round, and else over many paths.
     vec3 first, second;
     lobe_axes(microfacet, normal, LOBE_WIDTH * event.ground.width, first, second);
-    float turn = dot(path.dposition[LOBE], path.dposition[LOBE]) <= 0.0 ? 0.0 : (hash_combine(draw.number, draw.key) & 1u) != 0u ? 1.0 : -1.0;
+    float turn = dot(path.dposition[LOBE], path.dposition[LOBE]) <= 0.0 ? 0.0
+        : (hash_combine(draw.number, draw.key) & 1u) != 0u              ? 1.0
+                                                                        : -1.0;
     event.normal_columns[LOBE] += turn == 0.0 ? first : turn * second;
     event.normal_columns[LOBE + 1] += turn == 0.0 ? second : -turn * first;
 #endif
     if (SPECTRAL_SWEEP) {
-        for (int end = 0; end < 2; ++end) event.end_normal[end] = normalize(microfacet + turned_with(microfacet, normal, event.end_normal[end] - normal));
+        for (int end = 0; end < 2; ++end)
+            event.end_normal[end] =
+                normalize(microfacet + turned_with(microfacet, normal, event.end_normal[end] - normal));
     }
     event.frame.normal = microfacet;
 }
 
 // The path's state as the surface meets it, and what a mirror makes of that.
-void see_polarised(Path path, inout Event event)
-{
+void see_polarised(Path path, inout Event event) {
     planes_of_incidence(path, event, event.s);
     event.seen = in_plane(path.polarisation, path.direction, event.s);
     event.reflection = mirror_reflection();
@@ -148,15 +152,15 @@ void see_polarised(Path path, inout Event event)
 }
 
 // What glass reflects of a path over its band, by Fresnel's equations, and where the rest goes.
-void share_out(Path path, inout Event event)
-{
+void share_out(Path path, inout Event event) {
     interface_indices(event.boundary, path.band, event.n_i, event.n_t);
     event.theta = incidence_over_band(path, event);
     vec3 eta_it = event.n_i / event.n_t;
     event.cosine2 = transmitted_cosine2(event.theta, eta_it);
 #ifdef ROUGH_SURFACES
     bool polished = event.ground.width <= 0.0;
-    if (!polished) event.ground.regained = regained(event.ground.table, -dot(path.direction, event.ground.normal), eta_it);
+    if (!polished)
+        event.ground.regained = regained(event.ground.table, -dot(path.direction, event.ground.normal), eta_it);
 #else
     const bool polished = true;
 #endif
@@ -173,14 +177,15 @@ void share_out(Path path, inout Event event)
     GO_STRAIGHT(event.boundary, event.theta, event.n_i, event.n_t, event.cosine2)
     event.refracted = refract_at(event.frame, path.direction, event.n_i.y / event.n_t.y);
     if (ANCHOR_WEIGHTS) event.reflectance = vec3(event.reflectance.y);
-    // Where only the facet's normal forbids it, nothing is transmitted at any wavelength; at total reflection each has its own share. A microfacet's
-    // share is its own, also where the light that it lets through does not leave the surface.
+    // Where only the facet's normal forbids it, nothing is transmitted at any wavelength; at total reflection each has
+    // its own share. A microfacet's share is its own, also where the light that it lets through does not leave the
+    // surface.
     if (polished && !event.refracted.exists && event.cosine2.y > 0.0) event.reflectance = vec3(1.0);
 }
 
-// What a path meets, as far as no chance and no walk decides it: normals, media, shares. `draw`: which microfacet of a ground surface it meets.
-Event interact(Path path, Hit hit, Triangle facet, Object thing, MicrofacetDraw draw)
-{
+// What a path meets, as far as no chance and no walk decides it: normals, media, shares. `draw`: which microfacet of a
+// ground surface it meets.
+Event interact(Path path, Hit hit, Triangle facet, Object thing, MicrofacetDraw draw) {
     Event event = event_at(path, hit, facet);
     if (ROUGH_SURFACES) {
         if (thing.kind == KIND_DIELECTRIC) meet_microfacet(path, thing, draw, event);
@@ -196,10 +201,9 @@ Event interact(Path path, Hit hit, Triangle facet, Object thing, MicrofacetDraw 
     return event;
 }
 
-// Share of a path that a microfacet has turned which others do not hide or send on, over its band; nothing where it does not leave the surface.
-// `side`: 1 where it was reflected, -1 where it was refracted.
-vec3 leaving_share(Event event, Path path, bool geometric, float side)
-{
+// Share of a path that a microfacet has turned which others do not hide or send on, over its band; nothing where it
+// does not leave the surface. `side`: 1 where it was reflected, -1 where it was refracted.
+vec3 leaving_share(Event event, Path path, bool geometric, float side) {
     Ground ground = event.ground;
     if (ground.width <= 0.0) return vec3(1.0);
     vec3 cosine = vec3(side * dot(path.direction, ground.normal));
@@ -215,7 +219,8 @@ vec3 leaving_share(Event event, Path path, bool geometric, float side)
     vec2 turn = vec2(0.0);
     for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
         float along = dot(path.ddirection[SPATIAL + g], ground.normal);
-        turn += along * vec2(variable_step(uint(g), path.band.x, path.band.y), variable_step(uint(g), path.band.z, path.band.y));
+        turn += along
+            * vec2(variable_step(uint(g), path.band.x, path.band.y), variable_step(uint(g), path.band.z, path.band.y));
     }
     vec2 change = leaves ? side * smith_slope(cosine.y, ground.width) * turn : vec2(0.0);
     float steepness = max(abs(change.x), abs(change.y)) / MOST_CHANGE;
@@ -224,9 +229,9 @@ vec3 leaving_share(Event event, Path path, bool geometric, float side)
     return kept;
 }
 
-// The path reflected. Returns the share of it that leaves the surface: all, but of what microfacets hide. `geometric`: the facet's normal had to judge.
-vec3 reflect_path(inout Path path, Event event, out bool geometric)
-{
+// The path reflected. Returns the share of it that leaves the surface: all, but of what microfacets hide. `geometric`:
+// the facet's normal had to judge.
+vec3 reflect_path(inout Path path, Event event, out bool geometric) {
     Deflection turned = reflect_at(event.frame, path.direction);
     geometric = turned.geometric;
     for (int c = 0; c < PATH_COLUMNS; ++c)
@@ -249,8 +254,7 @@ vec3 reflect_path(inout Path path, Event event, out bool geometric)
 }
 
 // The path refracted, in the medium behind; see `reflect_path`.
-vec3 refract_path(inout Path path, Event event)
-{
+vec3 refract_path(inout Path path, Event event) {
     Deflection turned = event.refracted;
     float eta_it = event.n_i.y / event.n_t.y;
     for (int c = 0; c < PATH_COLUMNS; ++c) {
@@ -259,18 +263,22 @@ vec3 refract_path(inout Path path, Event event)
         if (c >= SPATIAL && c < SPATIAL + SPECTRAL_GROUPS)
             deta_it = index_ratio_derivative(event.boundary, uint(c - SPATIAL), path.band.y, event.n_i.y, event.n_t.y);
 #endif
-        path.ddirection[c] = refracted_column(turned, path.direction, path.ddirection[c], NORMAL_COLUMN(event, c), eta_it, deta_it);
+        path.ddirection[c] =
+            refracted_column(turned, path.direction, path.ddirection[c], NORMAL_COLUMN(event, c), eta_it, deta_it);
     }
     path.direction = turned.direction;
     path.medium = event.boundary.behind;
     if (SPECTRAL_SWEEP) {
         for (int end = 0; end < 2; ++end) {
             vec3 normal = turned.geometric ? turned.normal : event.end_normal[end], direction = path.end_direction[end];
-            float eta_end = (end == 0 ? event.n_i.x : event.n_i.z) / (end == 0 ? event.n_t.x : event.n_t.z), theta = dot(direction, normal);
+            float eta_end = (end == 0 ? event.n_i.x : event.n_i.z) / (end == 0 ? event.n_t.x : event.n_t.z),
+                  theta = dot(direction, normal);
             float cosine2 = transmitted_cosine2(theta, eta_end);
             vec3 position_l, direction_l;
             linear_end(path, end, position_l, direction_l);
-            path.end_direction[end] = cosine2 > 0.0 && theta < 0.0 ? normalize(refract_direction(direction, normal, theta, eta_end, sqrt(cosine2))) : direction_l;
+            path.end_direction[end] = cosine2 > 0.0 && theta < 0.0
+                ? normalize(refract_direction(direction, normal, theta, eta_end, sqrt(cosine2)))
+                : direction_l;
         }
     }
     if (POLARISED) {
@@ -283,10 +291,10 @@ vec3 refract_path(inout Path path, Event event)
     }
 }
 
-// The wavelength within the band where total internal reflection sets in, for an event that reflects some of it totally and some not; else a negative
-// number. Where ends are carried the cosine is straight between the three that are known exactly, else it follows the columns.
-float total_reflection_in_band(Path path, Event event)
-{
+// The wavelength within the band where total internal reflection sets in, for an event that reflects some of it totally
+// and some not; else a negative number. Where ends are carried the cosine is straight between the three that are known
+// exactly, else it follows the columns.
+float total_reflection_in_band(Path path, Event event) {
     bvec3 passes = greaterThan(event.cosine2, vec3(0.0));
     if (!any(passes) || all(passes)) return -1.0;
     float dtheta[SPECTRAL_GROUPS];

@@ -1,5 +1,5 @@
-// A path at a grating: one of its orders at a time. The grating equation is the same backwards, and the directions' parts in the surface are only moved
-// by it, so that radiance and flux alike are passed on by the order's efficiency.
+// A path at a grating: one of its orders at a time. The grating equation is the same backwards, and the directions'
+// parts in the surface are only moved by it, so that radiance and flux alike are passed on by the order's efficiency.
 #ifndef PATH_GRATING_GLSL
 #define PATH_GRATING_GLSL
 
@@ -11,13 +11,12 @@ struct GratingEvent {
     Grating grating;
     uint row;
     uint object;
-    uint medium;        // that the path is in
-    float side;         // 1 where the frame's normal is the outward one, else -1
-    vec3 across;        // unit, in the surface across the lines
+    uint medium;  // that the path is in
+    float side;  // 1 where the frame's normal is the outward one, else -1
+    vec3 across;  // unit, in the surface across the lines
 };
 
-GratingEvent grating_event(Path path, Event event, Hit hit, uint row)
-{
+GratingEvent grating_event(Path path, Event event, Hit hit, uint row) {
     GratingEvent met;
     met.grating = grating_at(row);
     met.row = row;
@@ -29,8 +28,7 @@ GratingEvent grating_event(Path path, Event event, Hit hit, uint row)
 }
 
 // Where over its band a path is not evanescent in an order of these steps.
-bvec3 order_passes(Path path, Event event, GratingEvent met, vec3 steps)
-{
+bvec3 order_passes(Path path, Event event, GratingEvent met, vec3 steps) {
     vec3 normal = event.frame.normal;
     bvec3 passes = bvec3(diffracted_cosine2(path.direction, dot(path.direction, normal), steps.y * met.across) > 0.0);
 #if SPECTRAL_GROUPS > 0
@@ -42,8 +40,7 @@ bvec3 order_passes(Path path, Event event, GratingEvent met, vec3 steps)
 }
 
 // The wavelength within the band where an order becomes evanescent, of one that `passes` somewhere and somewhere not.
-float evanescence_in_band(Path path, Event event, GratingEvent met, GratingOrder order, bvec3 passes)
-{
+float evanescence_in_band(Path path, Event event, GratingEvent met, GratingOrder order, bvec3 passes) {
     vec3 columns[SPECTRAL_GROUPS], bends[2] = vec3[](vec3(0.0), vec3(0.0));
     for (int g = 0; g < SPECTRAL_GROUPS; ++g) columns[g] = path.ddirection[SPATIAL + g];
     if (SPECTRAL_SWEEP) {
@@ -53,12 +50,12 @@ float evanescence_in_band(Path path, Event event, GratingEvent met, GratingOrder
             bends[end] = path.end_direction[end] - direction;
         }
     }
-    return evanescence_onset(path.band, path.direction, columns, bends, event.frame.normal, met.grating.lines, met.side, order, met.object, met.medium, passes);
+    return evanescence_onset(path.band, path.direction, columns, bends, event.frame.normal, met.grating.lines, met.side,
+        order, met.object, met.medium, passes);
 }
 
 // The path turned into an order. `geometric`: the facet's normal had to judge.
-void diffract_path(inout Path path, Event event, GratingEvent met, GratingOrder order, vec3 steps, out bool geometric)
-{
+void diffract_path(inout Path path, Event event, GratingEvent met, GratingOrder order, vec3 steps, out bool geometric) {
     bool reflects = order.reflects != 0u;
     Deflection turned = diffract_at(event.frame, path.direction, met.grating.lines, met.side, steps.y, reflects);
     geometric = turned.geometric;
@@ -67,15 +64,18 @@ void diffract_path(inout Path path, Event event, GratingEvent met, GratingOrder 
             vec3 normal = turned.geometric ? turned.normal : event.end_normal[end], direction = path.end_direction[end];
             vec3 shift = (end == 0 ? steps.x : steps.z) * across_lines(normal, met.grating.lines, met.side);
             float theta = dot(direction, normal), cosine2 = diffracted_cosine2(direction, theta, shift);
-            path.end_direction[end] = normalize(diffract_direction(direction, normal, theta, shift, sqrt(max(cosine2, 1e-12)), reflects));
+            path.end_direction[end] =
+                normalize(diffract_direction(direction, normal, theta, shift, sqrt(max(cosine2, 1e-12)), reflects));
         }
     }
     for (int c = 0; c < PATH_COLUMNS; ++c) {
         float dstep = 0.0;
 #if SPECTRAL_GROUPS > 0
-        if (c >= SPATIAL && c < SPATIAL + SPECTRAL_GROUPS) dstep = order_step_derivative(order, met.object, met.medium, uint(c - SPATIAL), path.band.y);
+        if (c >= SPATIAL && c < SPATIAL + SPECTRAL_GROUPS)
+            dstep = order_step_derivative(order, met.object, met.medium, uint(c - SPATIAL), path.band.y);
 #endif
-        path.ddirection[c] = diffracted_column(turned, path.direction, path.ddirection[c], NORMAL_COLUMN(event, c), met.grating.lines, met.side, steps.y, dstep, reflects);
+        path.ddirection[c] = diffracted_column(turned, path.direction, path.ddirection[c], NORMAL_COLUMN(event, c),
+            met.grating.lines, met.side, steps.y, dstep, reflects);
     }
     if (POLARISED) {
         path.polarisation = behind_grating(path.polarisation, path.direction, turned.direction, reflects);
