@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, cached_property
+from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 from threading import Lock
@@ -33,6 +34,9 @@ _MOST_BYTES = 1 << 26
 """Of a file."""
 _RESULTS: dict[str, Any] = {"none": ctypes.c_void_p, "bool": ctypes.c_bool, "float64": ctypes.c_double}
 _COMPILERS = "numba", "llvmlite"
+_KNOWN = ("0.68.",)
+"""Versions of numba whose way to call functions, which it does not promise to keep, is the one of `_Native`. Others
+are called through numba itself, which only takes longer to start."""
 _SUCCESS = 0, -2
 """What functions of numba return; -2: their result is None."""
 _lock = Lock()
@@ -68,8 +72,19 @@ class Kernel:
         self._function = function
         self._native: dict[tuple[Kind, ...], _Native] = {}
 
+    @cached_property
+    def _by_numba(self) -> Callable | None:
+        """Calls it where numba is of another version than those that are known."""
+        if version("numba").startswith(_KNOWN):
+            return None
+        from numba import njit
+
+        return njit(error_model="numpy", nogil=True)(self._function)
+
     def __call__(self, *arguments: Any) -> Any:
         """Compile it for arguments of these kinds where that was never done, then call it."""
+        if self._by_numba is not None:
+            return self._by_numba(*arguments)
         kinds = tuple(_kind_of(argument) for argument in arguments)
         native = self._native.get(kinds)
         if native is None:

@@ -71,6 +71,14 @@ print("numba" in sys.modules)
 """
 
 
+def test_another_version_of_numba_calls_its_functions_itself(tmp_path: Path) -> None:
+    program = tmp_path / "program.py"
+    unknown = "from spectrasplat.beams import compiling\ncompiling._KNOWN = ()\n"
+    program.write_text(unknown + KERNEL)
+    run = subprocess.run([sys.executable, str(program)], check=True, capture_output=True, text=True)
+    assert run.stdout == "True\n"
+
+
 def test_a_kernel_is_compiled_once_and_then_needs_no_compiler(tmp_path: Path) -> None:
     """Another version's and what is damaged is compiled again."""
     program = tmp_path / "program.py"
