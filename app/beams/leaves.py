@@ -1,4 +1,4 @@
-"""What a search keeps: the outline of a beam where it ends, in the coordinates of what it ends on."""
+"""Leaves of the search for beams: outline, density and rays of a beam where it ends, in its target's coordinates."""
 
 from __future__ import annotations
 
@@ -15,41 +15,42 @@ from .search import medium
 
 @dataclass(frozen=True)
 class Leaves:
-    """Rows of finished beams: L leaves with all their E edges and H corners, in their order."""
+    """Finished beams as arrays: L leaves, their E edges and H corners. A target's coordinates are (u, v) on a receiver,
+    q of the light for a piece that photons carry on; the three places are start, middle and end of the band."""
 
     head: np.ndarray
-    """int64 (L, 10): kind, facet it ends on (-1: none), facet left last, object first met, depth, mask, edges, corners,
-    hash of its path, objects met (bit i mod 64 for object i)."""
+    """int64 (L, 10): kind (`search.LEAF_…`), facet it ends on (-1: none), facet left last, object first met, specular
+    events, solids it is inside, edges, corners, hash of its path, objects met (bit i mod 64 for object i)."""
     x: np.ndarray
-    """(L, 3)."""
+    """(L, 3): spectral coordinate of the three places."""
     density: np.ndarray
-    """(L, 3): weight with what roulette gave, per unit of the target's area."""
+    """(L, 3): flux per unit of the target's area and of the light's spectral power, roulette's gain included."""
     centre: np.ndarray
-    """(L, 2): in the target's coordinates."""
+    """(L, 2): point of the target for which `density` holds."""
     slope: np.ndarray
-    """(L, 2): relative change of the density along them."""
+    """(L, 2): relative change of the density per unit of the target's two coordinates."""
     flux: np.ndarray
-    """(L,)."""
+    """(L,): over the whole band, per unit of the light's power."""
     ray: np.ndarray
-    """(L, 2, 3, 3, 3): position and direction about q = the beam's centre; of pieces."""
+    """(L, 2, 3, 3, 3), used for pieces: [position, direction][place][value at `centre`, d/dq_u, d/dq_v][xyz]."""
     state: np.ndarray
-    """(L, 3, 6): of polarisation, at the three places (`polarised`)."""
+    """(L, 3, 6): polarisation at the three places (`polarised`)."""
     edge: np.ndarray
-    """(E, 3, 3): a_u, a_v, c at the three places; |a| = 1."""
+    """(E, 3, 3): a_u, a_v, c at the three places; |a| = 1; a . p + c >= 0 inside."""
     soft: np.ndarray
-    """(E,): half width of the penumbra, target's lengths."""
+    """(E,): half width of the penumbra in the target's lengths; negative: a mask (`BeamPolygons.edges`)."""
     corner: np.ndarray
-    """(H, 2): of the polygons at all places."""
+    """(H, 2): of a leaf's polygons at its three places, one after the other."""
 
     def where(self, keep: np.ndarray) -> Leaves:
-        """Those that `keep`, bool (L,), names, with their edges and corners."""
+        """The leaves for which `keep`, bool (L,), is true, with their edges and corners."""
         of_edge, of_corner = np.repeat(keep, self.head[:, 6]), np.repeat(keep, self.head[:, 7])
         rows = {"edge": of_edge, "soft": of_edge, "corner": of_corner}
         return Leaves(**{f.name: getattr(self, f.name)[rows.get(f.name, keep)] for f in fields(self)})
 
     @classmethod
     def joined(cls, parts: list[Leaves]) -> Leaves:
-        """All leaves of some; of none, none."""
+        """All leaves of `parts`, which may be empty."""
         parts = parts or [Store(0).leaves(np.zeros(3, np.int64))]
         return cls(**{f.name: np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(cls)})
 
@@ -70,7 +71,7 @@ EDGE = np.dtype([("line", "f8", (3, 3)), ("soft", "f8")])
 
 
 class Store:
-    """Leaves while they are being found, with room to spare."""
+    """Storage that the search writes leaves into, with unused rows at the end."""
 
     def __init__(self, leaves: int = 256) -> None:
         self.leaf = np.empty(leaves, LEAF)
@@ -78,7 +79,7 @@ class Store:
         self.corner = np.empty((24 * leaves + 512, 2))
 
     def grow(self) -> None:
-        """Twice the room."""
+        """Double the storage; what was written stays."""
         for name in ("leaf", "edge", "corner"):
             old = getattr(self, name)
             new = np.empty((2 * len(old), *old.shape[1:]), old.dtype)
@@ -86,7 +87,7 @@ class Store:
             setattr(self, name, new)
 
     def leaves(self, count: np.ndarray) -> Leaves:
-        """What was written: leaves, edges, corners by `count`."""
+        """A copy of what was written; `count`: numbers of leaves, edges and corners."""
         leaf, edge = self.leaf[: count[0]].copy(), self.edge[: count[1]].copy()
         return Leaves(
             head=leaf["head"],
@@ -105,7 +106,7 @@ class Store:
 
 @part
 def has_room(leaf, edge, corner, work):
-    """Whether one more of any size fits."""
+    """Whether one more leaf fits, however many edges and corners it has."""
     n = work.count
     return n[0] + 1 < len(leaf) and n[1] + 128 < len(edge) and n[2] + 256 < len(corner)
 
@@ -129,9 +130,8 @@ def plane_map(facet, position, direction, out, work):
 
 @part
 def lay_leaf(beam, facets, kind, leaf, edge, corner, work):
-    """Write a beam's outline behind the last leaf without counting it; returns how far its edges are from moving
-    linearly with x (in the target's lengths), and the relative deviation of its density; the first is negative where
-    nothing can be drawn."""
+    """Write a beam as the next leaf without counting it yet. Returns how far its edges are from moving linearly with x
+    (in the target's lengths; negative: no light arrives), and the density's relative deviation from linear."""
     row, first, corners = work.count[0], work.count[1], work.count[2]
     new, maps, det = leaf[row], work.map, work.det
     lo, hi = first_place(beam), last_place(beam)
@@ -210,7 +210,7 @@ def lay_leaf(beam, facets, kind, leaf, edge, corner, work):
 
 @part
 def passes(solids, tables, inside, x, distance):
-    """Share of light that goes through so much of a solid's medium; `inside` -1: air."""
+    """Transmittance over `distance` of the medium of solid `inside` (-1: air)."""
     if inside < 0 or solids[inside].tint < 0:
         return 1.0
     return np.exp(-at_x(tables, solids[inside].tint, x) * max(distance, 0.0))
@@ -218,8 +218,7 @@ def passes(solids, tables, inside, x, distance):
 
 @part
 def density_slope(beam, facets, solids, tables, source, kind, new, work):
-    """Set the slope of the leaf just laid, of a diverging light or where a medium absorbs: relative change of weight
-    and spread over the target."""
+    """Set the slope of the leaf just written, where a light diverges or a medium absorbs, by central differences."""
     if source.kind == PARALLEL and not work.absorbing:
         return
     size = 0.0
@@ -259,7 +258,7 @@ def density_slope(beam, facets, solids, tables, source, kind, new, work):
                 low = value
             else:
                 high = value
-        # In this order: what next to nothing is left of must not be divided by a product that underflows.
+        # Two divisions, since the product (low + high) * step may underflow where little light is left.
         change[w] = (high - low) / (low + high) / step if low + high > 0.0 else 0.0
     if kind == 0:
         _, det = plane_map(facets[beam.facet], beam.position[1], beam.direction[1], m, work)
@@ -274,9 +273,9 @@ def density_slope(beam, facets, solids, tables, source, kind, new, work):
 
 @part
 def anchor_density(beam, new, work):
-    """Make the densities of the leaf just laid ones for a slope about its centre in the middle of the band.
+    """Convert the densities at both ends of the band of the leaf just written from the end's centre to the middle's.
 
-    They are those at the centre of each place, which moves along the slope: what rises on the way does so once."""
+    The slope is added about the middle's centre later, and must not count the change between the centres twice."""
     if first_place(beam) > 0:
         return
     for a in (0, 2):

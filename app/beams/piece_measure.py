@@ -1,6 +1,6 @@
-"""What is lit of a piece of a beam at any place of its band, and how much light that is: compiled.
+"""Compiled: the lit polygon of a piece of a beam (`BeamPieces`) at any wavelength of its band, and the light in it.
 
-Imported late, with `piece_kernel`.
+For `piece_lattice`, whose photons carry the pieces on. t in [0, 1] is a wavelength's place in a piece's band.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from .clipping import clip
 from .compiling import jit, part
 
 STEPS = 16
-"""Places of the band at which a whole piece is measured."""
+"""Equal parts of the band over which the light of a piece is summed."""
 MOMENTS_OF_BAND, TANGENTS = 5, 16
-"""Times at which what is lit is measured for its lattice, and sides of what is laid about it."""
+"""Values of t at which the lit polygon is measured to lay its lattice; tangents laid about all of these polygons."""
 SCRATCH = np.dtype(
     [
         ("moments", "f8", 6),
@@ -28,20 +28,20 @@ SCRATCH = np.dtype(
         ("hull_cut", "f8", (4 * TANGENTS + 16, 2)),
     ]
 )
-"""What functions need besides `polygons` and `cut`: those of `room_for`."""
+"""Scratch of the compiled functions, besides the `polygons` and `cut` of `room_for`."""
 _LINE_X = 1e-9
-"""An emission line is looked for so far on both sides of its x."""
+"""An emission line's power is the change of the cumulative power from this far below its x to this far above."""
 
 
 def room_for(edge_start: np.ndarray, hull_start: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """`polygons`, `cut` and `scratch` for pieces with these starts of edges and corners."""
+    """Scratch arrays (`polygons`, `cut`, `scratch`) that suffice for pieces with these offsets of edges and corners."""
     room = int(np.diff(edge_start).max(initial=0) + np.diff(hull_start).max(initial=0)) + 8
     return np.empty((MOMENTS_OF_BAND, room, 2)), np.empty((2 * room, 2)), np.empty(1, SCRATCH)
 
 
 @part
 def _power_below(curve_x, curve_w, x):
-    """Cumulative power at x, a line there included (`CumulativeSpectrum.at`)."""
+    """Cumulative power up to x, an emission line at x included (`CumulativeSpectrum.at`)."""
     x = min(max(x, 0.0), 1.0)
     i = min(max(np.searchsorted(curve_x, x, side="right") - 1, 0), len(curve_x) - 2)
     span = curve_x[i + 1] - curve_x[i]
@@ -51,14 +51,14 @@ def _power_below(curve_x, curve_w, x):
 
 @part
 def power_between(curve_x, curve_w, x_lo, x_hi):
-    """Power between two places of the spectrum; of the line, where they are one."""
+    """Power between two x; where they are equal, the power of the emission line there."""
     widen = _LINE_X if x_hi == x_lo else 0.0
     return _power_below(curve_x, curve_w, x_hi + widen) - _power_below(curve_x, curve_w, x_lo - widen)
 
 
 @part
 def parabola(t):
-    """Weights of the values at 0, 1/2, 1."""
+    """Weights at t of the values given at 0, 1/2 and 1 (quadratic interpolation)."""
     return 2.0 * (t - 0.5) * (t - 1.0), 4.0 * t * (1.0 - t), 2.0 * t * (t - 0.5)
 
 
@@ -70,7 +70,7 @@ def weight_at(weight, t):
 
 @part
 def moments_of(polygon, count, out):
-    """Area, first moments, second moments uu, uv, vv about the origin."""
+    """Area, first moments u, v and second moments uu, uv, vv of a polygon about the origin, into `out`."""
     out[:] = 0.0
     for i in range(count):
         j = i + 1 if i + 1 < count else 0
@@ -86,7 +86,7 @@ def moments_of(polygon, count, out):
 
 @part
 def copy(hull, polygon):
-    """Lay out a polygon; its number of corners."""
+    """Copy the polygon `hull` into the larger array `polygon`; returns its number of corners."""
     for c in range(len(hull)):
         polygon[c, 0], polygon[c, 1] = hull[c, 0], hull[c, 1]
     return len(hull)
@@ -94,7 +94,7 @@ def copy(hull, polygon):
 
 @part
 def keep_lit(edges, t, u, v, polygon, count, scratch):
-    """Clip a polygon about (u, v) by all edges at t."""
+    """Clip a polygon, relative to (u, v), to the lit side of all edges at t; returns its number of corners."""
     for e in range(len(edges)):
         if count == 0:
             break
@@ -124,8 +124,8 @@ def contents(
     cut,
     scratch,
 ):
-    """What each piece holds, `out` (M,): weight · power · area, W per unit of the measure's scale; `powers` (M,) of the
-    bands, W."""
+    """Light of each piece, `out` (M,): weight · spectral power · lit area summed over its band, W per unit of what q
+    measures (scene unit² or sr); `powers` (M,): spectral power of its band, W."""
     moments, polygon = scratch[0].moments, polygons[0]
     for i in range(len(out)):
         own = edges[edge_start[i] : edge_start[i + 1]]

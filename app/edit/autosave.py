@@ -1,8 +1,8 @@
-"""Work survives a crash: every changed scene is also written to the config folder, aside from the user's file.
+"""Autosave, so that work survives a crash: a changed scene is also written to the config folder, never to its own file.
 
-One file for each running process, removed when it ends in good order. A process holds a lock on
-its note for as long as it lives, so what the next start finds unlocked is left over from a crash
-(a process number alone could have been given to somebody else since).
+Each running process has one autosave, which it removes when it ends normally. It holds a lock file next to it for as
+long as it lives, so an autosave that the next start finds unlocked is left over from a crash (the process number alone
+could since belong to another process).
 """
 
 from __future__ import annotations
@@ -35,19 +35,19 @@ _FOLDER = "autosave"
 
 @dataclass(frozen=True)
 class Note:
-    """What is known about an autosave."""
+    """What is stored next to an autosaved scene, as JSON."""
 
     pid: int
     title: str
     original: str | None
-    """The user's file, which autosaving never touches."""
+    """The user's own scene file, which autosaving never changes; None: never saved."""
     saved_at: float
     """Seconds since 1970."""
 
 
 @dataclass(frozen=True)
 class Recovery:
-    """The autosave of a process that is gone."""
+    """An autosave whose process no longer runs."""
 
     path: Path
     """The scene (.toml)."""
@@ -55,17 +55,17 @@ class Recovery:
 
     @property
     def original(self) -> Path | None:
-        """The file it was made from."""
+        """The user's own scene file, None for a scene that was never saved."""
         return None if self.note.original is None else Path(self.note.original)
 
     @property
     def written(self) -> str:
-        """When, by the clock on the wall: "22 November 2026, 14:05"."""
+        """When it was saved, in local time: "22 November 2026, 14:05"."""
         at = datetime.fromtimestamp(self.note.saved_at, UTC).astimezone()
         return f"{at.day} {at:%B %Y, %H:%M}"
 
     def load(self) -> Scene:
-        """The scene, which needs none of the autosave's files any more. Raises UserError when it cannot be read."""
+        """The scene, which no longer depends on the autosave's files. Raises UserError when it cannot be read."""
         with files.own_files():
             scene = load_scene(self.path)
         here = self.path.parent.resolve()
@@ -73,20 +73,20 @@ class Recovery:
         for mesh in {item.mesh for item in scene.objects}:
             recipe = recipe_of(mesh) or {}
             if "mesh" in recipe and Path(recipe["mesh"]).is_relative_to(here):
-                # Another value has no recipe: it is saved as triangles, not as a file that is about to go.
+                # A new Mesh has no recipe, so it is saved as triangles, not as a reference to a file soon deleted.
                 own[mesh] = replace(mesh, source=None)
         return replace(scene, objects=tuple(replace(o, mesh=own.get(o.mesh, o.mesh)) for o in scene.objects))
 
     def discard(self) -> None:
-        """Delete it."""
+        """Delete the autosave."""
         _remove(self.path)
 
 
 class Autosave:
-    """Writes the scene of this process now and then, on a thread of its own.
+    """Autosaves the scene of this process at intervals, on a thread of its own.
 
-    `update` is meant for every frame and returns at once. Nothing here raises: what goes wrong is in
-    `problem`, one sentence, since losing the safety net must not stop the work.
+    `update` is called every frame and returns at once. Nothing here raises, since a failed autosave must not stop the
+    work: `problem` says in one sentence what went wrong, or is None.
     """
 
     def __init__(
@@ -105,11 +105,11 @@ class Autosave:
 
     @property
     def path(self) -> Path:
-        """The file of this process; there only while something unsaved was written."""
+        """The autosaved scene of this process; the file exists only while the scene has unsaved changes."""
         return self._path
 
     def update(self, scene: Scene, title: str, original: Path | None, unsaved: bool) -> None:
-        """Write `scene` if it is unsaved, has changed, and the last writing is `interval_s` ago."""
+        """Write `scene` if it is unsaved, has changed, and was last written at least `interval_s` ago."""
         if self._thread is not None and self._thread.is_alive():
             return
         if not unsaved:
@@ -122,19 +122,19 @@ class Autosave:
         self._start(scene, title, original, now)
 
     def write_now(self, scene: Scene, title: str, original: Path | None) -> None:
-        """Write at once and wait for it, as when something is about to go wrong."""
+        """Write at once and wait until it is done: after an error, an interruption or a recovery."""
         self.wait()
         if scene is not self._written:
             self._start(scene, title, original, self._clock())
             self.wait()
 
     def wait(self) -> None:
-        """Until what is being written is on the disk."""
+        """Wait until the autosave that is being written, if any, is on the disk."""
         if self._thread is not None:
             self._thread.join()
 
     def close(self) -> None:
-        """The program ends in good order: nothing is left to recover."""
+        """Remove the autosave: the program ends normally, with nothing to recover."""
         self._forget()
 
     def _start(self, scene: Scene, title: str, original: Path | None, now: float) -> None:
@@ -147,7 +147,7 @@ class Autosave:
     def _write(self, scene: Scene, note: Note) -> None:
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
-            with files.own_files():  # it names what the scene uses where that lies, instead of copying it
+            with files.own_files():  # refers to the scene's meshes and pictures in place
                 save_scene(scene, self._path)
             if self._lock is None:
                 self._lock = _locked(self._path.with_suffix(".lock"))
@@ -167,8 +167,8 @@ class Autosave:
 
 
 def recoveries(folder: Path) -> tuple[Recovery, ...]:
-    """Autosaves in the config folder `folder` whose process is gone, the newest first; what is unreadable is passed
-    over."""
+    """Autosaves in the config folder `folder` whose process no longer runs, newest first; unreadable ones are left
+    out."""
     found = []
     for entry in sorted((folder / _FOLDER).glob("*.json")):
         scene = entry.with_suffix(".toml")
@@ -182,7 +182,7 @@ def recoveries(folder: Path) -> tuple[Recovery, ...]:
 
 
 def _remove(path: Path) -> None:
-    """The autosave at `path` with its note, lock, meshes and pictures."""
+    """Delete the autosave at `path` with its note, lock, meshes and pictures."""
     for each in (path.with_suffix(".json"), path, path.with_suffix(".lock")):
         with suppress(OSError):
             each.unlink()
@@ -191,19 +191,19 @@ def _remove(path: Path) -> None:
 
 
 def _locked(path: Path) -> IO[str]:
-    """The file `path`, held by this process until it ends."""
+    """The open lock file `path`, locked until it is closed or this process ends."""
     file = path.open("w", encoding="utf-8")
     _try_lock(file)
     return file
 
 
 def _is_held(path: Path) -> bool:
-    """Whether a living process holds the lock."""
+    """Whether a running process holds the lock file `path`."""
     try:
         with path.open("r+", encoding="utf-8") as file:
             return not _try_lock(file)
     except OSError:
-        return False  # no lock at all: nobody holds it
+        return False  # there is no lock file
 
 
 def _try_lock(file: IO[str]) -> bool:

@@ -1,9 +1,9 @@
-"""Where rays leave a light, in float64 and world units: the CPU reference of emit.comp.
+"""CPU reference of emit.comp, for tests and stress cases: how rays leave a light, in float64 and world units.
 
-Without derivatives: difference quotients over `Emitter.start` judge the shader's columns. Wavelengths, which no ray's
-start depends on, are drawn by `drawn_wavelengths`. The functions of shaders/lib/emission.glsl and spot.glsl (lattice,
-equal-area plane, disc, spot edge) are written from the definitions (the azimuthal equal-area map by its chord, the
-angle by chords) and not from the shaders; points of the plane or the square have shape (..., 2), directions (..., 3).
+It has no derivatives: the shader's ray differentials are checked against difference quotients of `Emitter.start`. A
+ray's start does not depend on its wavelength, which `drawn_wavelengths` samples. Lattice, equal-area map, disc and spot
+edge follow their mathematical definitions, independently of shaders/lib/emission.glsl and spot.glsl. Points of the
+plane or of the unit square have shape (..., 2), directions (..., 3).
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from .optics import unit
 from .random_numbers import kronecker, unit_float
 
 Array = np.ndarray
-GOLDEN = 2654435769
-PLASTIC = (3242174889, 2447445414)
+GOLDEN = 2654435769  # 2³² divided by the golden ratio
+PLASTIC = (3242174889, 2447445414)  # 2³² divided by the plastic number and by its square
 
 
 def lattice_point(i: Array, count: int, shift: tuple[Array | int, Array | int]) -> Array:
@@ -50,7 +50,7 @@ def azimuthal_direction(q: Array) -> Array:
 
 
 def concentric_disc(unit: Array) -> Array:
-    """The square's concentric rings become circles, a side a quarter turn (Shirley and Chiu 1997)."""
+    """Map the unit square to the unit disc: concentric squares become circles (Shirley and Chiu 1997)."""
     p = 2.0 * np.asarray(unit, np.float64) - 1.0
     x, y = p[..., 0], p[..., 1]
     wide = np.abs(x) > np.abs(y)
@@ -61,12 +61,12 @@ def concentric_disc(unit: Array) -> Array:
 
 
 def angle_between(a: Array, b: Array) -> Array:
-    """Angle between unit vectors, rad, by the chord and the chord of the supplement."""
+    """Angle between unit vectors, rad, from the lengths of difference and sum: accurate near 0 and pi as well."""
     return 2.0 * np.arctan2(np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1))
 
 
 def spot_falloff(direction: Array, axis: Array, inner: Array | float, outer: Array | float) -> Array:
-    """1 within `inner`, 0 beyond `outer` (rad), a smoothstep of the angle between; hard where they are equal."""
+    """1 within the angle `inner` (rad), 0 beyond `outer`, a smoothstep between; a hard edge where they are equal."""
     angle = angle_between(direction, axis)
     soft = outer - inner > 1e-7
     t = np.clip((outer - angle) / np.where(soft, outer - inner, 1.0), 0.0, 1.0)
@@ -74,22 +74,22 @@ def spot_falloff(direction: Array, axis: Array, inner: Array | float, outer: Arr
 
 
 EDGE_SPREAD = 0.42
-"""Standard deviation, lattice spacings."""
+"""Standard deviation, in lattice spacings, of what a lattice point represents near a hard edge (lib/edge.glsl)."""
 
 
 @dataclass(frozen=True)
 class Emitter:
-    """One light's emission domain and the place on the light that all rays come from."""
+    """One light's emission domain, with the one point of the light's extent that all rays are emitted from."""
 
     light: Light
     domain: EmissionDomain
     space: GpuSpace
     place: tuple[float, float]
-    """In the unit square; matters to lights of some extent."""
+    """That point, in the unit square: a position on an area light, a direction within a sun's disc; else unused."""
 
     @property
     def unit_length(self) -> float:
-        """Domain coordinates are this many world units (beams), or of the azimuthal plane (1)."""
+        """World units per unit of the domain's coordinates; 1 on the azimuthal plane, which has no length unit."""
         return 1.0 / self.space.scale if self.domain.kind == "plane" else 1.0
 
     def start(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -113,9 +113,9 @@ class Emitter:
         return np.broadcast_to(origin, local.shape), local @ np.vstack([frame, domain.axis])
 
     def weight(self, q: np.ndarray, count: int) -> np.ndarray:
-        """What one of `count` lattice points at `q` (..., 2) carries per unit of the light's own quantity.
+        """Weight of the lattice point at `q` (..., 2), one of `count`: its flux per unit of the light's own quantity.
 
-        At a hard edge that is the lit share of a normal distribution about the point.
+        Near a hard edge only the lit share of a normal distribution about the point counts.
         """
         light = self.light
         share: np.ndarray | float = self.domain.measure / count
@@ -158,7 +158,7 @@ class Emitter:
 
 
 def _lit_share(spacings: np.ndarray) -> np.ndarray:
-    """Lit share of a lattice point's cell, so many spacings inside a hard edge; all or nothing beyond one spacing."""
+    """Lit share of a lattice point that lies `spacings` inside a hard edge; 0 or 1 beyond one spacing."""
     share = 0.5 * (1.0 + np.vectorize(erf, otypes=[float])(spacings / (np.sqrt(2.0) * EDGE_SPREAD)))
     return np.where(np.abs(spacings) < 1.0, share, spacings > 0.0)
 
@@ -171,20 +171,20 @@ def drawn_wavelengths(
     cells: int = 1024,
     by_power: bool = False,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(x, one over the density of x) of random wavelengths within `band` of x, by `place` (...,) in [0, 1): the
-    reference of lib/wavelength.glsl.
+    """Reference of lib/wavelength.glsl: random wavelengths in `band`, as (spectral coordinate x, one over its density).
 
-    Of the draws 0.6 go by X + Y + Z, 0.2 by radiant power and 0.2 evenly over the light's support; `by_power`: 0.8
-    by power. The density is constant in each of `cells` equal cells of x."""
+    They are sampled by the random numbers `place` (...,) in [0, 1), with a density that is 0.6 of X + Y + Z, 0.2 of
+    radiant power and 0.2 uniform over the light's support; with `by_power` 0.8 of radiant power and 0.2 uniform. The
+    density is constant in each of `cells` equal cells of x."""
     borders = np.linspace(0.0, 1.0, cells + 1)
     nm = np.concatenate([[380.0], VISIBLE_NM[:-1] + 0.5, [780.0]])
     lo_nm, hi_nm = spectrum.support_nm()
     start, end = axis.x_of_nm(np.array([lo_nm - 0.5, hi_nm + 0.5]))
     even = np.maximum(np.minimum(borders[1:], end) - np.maximum(borders[:-1], start), 0.0)
 
-    def in_cells(per_nm: np.ndarray, of_lines: np.ndarray) -> np.ndarray:
+    def in_cells(per_nm: np.ndarray, line_weights: np.ndarray) -> np.ndarray:
         mass = np.diff(np.interp(borders, axis.x_of_nm(nm), np.concatenate([[0.0], np.cumsum(per_nm)])))
-        for (line_nm, power), weight in zip(spectrum.lines, of_lines, strict=True):
+        for (line_nm, power), weight in zip(spectrum.lines, line_weights, strict=True):
             at = np.clip(np.ceil(float(axis.x_of_nm(line_nm)) * cells) - 1, 0, cells - 1)
             mass[int(at)] += power * weight
         return mass / mass.sum() if mass.sum() > 0.0 else even / even.sum()
@@ -193,9 +193,9 @@ def drawn_wavelengths(
     watt = in_cells(spectrum.density, np.ones(len(line_nm)))
     seen = in_cells(spectrum.density * cmf_xyz().sum(axis=1), cmf_at(line_nm).reshape(-1, 3).sum(axis=1))
     share = (0.8 * watt if by_power else 0.6 * seen + 0.2 * watt) + 0.2 * even / even.sum()
-    running = np.concatenate([[0.0], np.cumsum(share)])
-    below, above = np.interp(band, borders, running)
+    cumulative = np.concatenate([[0.0], np.cumsum(share)])
+    below, above = np.interp(band, borders, cumulative)
     wanted = below + np.asarray(place, np.float64) * (above - below)
-    cell = np.clip(np.searchsorted(running, wanted, side="right") - 1, 0, cells - 1)
-    x = borders[cell] + (wanted - running[cell]) / (share[cell] * cells)
+    cell = np.clip(np.searchsorted(cumulative, wanted, side="right") - 1, 0, cells - 1)
+    x = borders[cell] + (wanted - cumulative[cell]) / (share[cell] * cells)
     return x, (above - below) / (share[cell] * cells)

@@ -1,4 +1,4 @@
-"""A scene on the device, with the features that it needs."""
+"""Puts a scene on the GPU for a rendering, with the features and the spectral coordinate that it needs."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from ..model.settings import RenderSettings
 
 
 def spectral_axis(scene: Scene, features: Features) -> SpectralAxis:
-    """The axis of a rendering: by the scene's glasses, or plain wavelength for methods linear in λ."""
+    """The spectral coordinate: from the scene's glasses, or λ without spectral columns or with a single shared one."""
     if not features.spectral_groups or (features.merged_groups and features.spectral_groups == 1):
         return SpectralAxis.build([])
     return SpectralAxis.build([o.material.dispersion for o in scene.objects if o.material.dispersion is not None])
 
 
 def scene_buffers(context: Context, scene: Scene, settings: RenderSettings) -> SceneBuffers:
-    """`scene` on the device, with the features that it and `settings` decide; the caller's."""
+    """GPU buffers of `scene` with the features that it and `settings` require. The caller releases them."""
     features = Features.of(scene, settings)
     return SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features))

@@ -1,17 +1,17 @@
-// A camera path at a grating. Every order is a path of its own: one goes on, the others meet the surface again after
-// it; of weak ones one is chosen by chance.
+// A camera path at a diffraction grating, for camera/meet.glsl. Each order is a path of its own: the first that exists
+// is followed, a copy on the stack meets the grating again for the rest. If they are weak, one is sampled for all.
 #ifndef CAMERA_GRATING_GLSL
 #define CAMERA_GRATING_GLSL
 
 #include "path/grating.glsl"
 
-// On `Path.order`: only that order is left.
+// Flag in `Path.order`: of all orders the path has only this one to follow.
 #define ONLY_ORDER 0x80000000u
-// Share of a sample's power below which orders are not all followed: many orders at several gratings would use up its
-// events.
+// Share of a sample's power below which one order is sampled instead: following many orders at several gratings would
+// exceed the sample's limit of events.
 #define MIN_ORDER_SHARE 0.02
 
-// Of the orders from `first` on one, by chance as they are strong: the path stands for all of them then.
+// Samples one of the orders from `first` on in proportion to efficiency; its path then represents all of them.
 uint chosen_order(inout Path path, uint row, uint first, uint count, uint pixel_key) {
     float all = 0.0;
     for (uint k = first; k < count; ++k) all += order_at(row, k).efficiency;
@@ -25,7 +25,7 @@ uint chosen_order(inout Path path, uint row, uint first, uint count, uint pixel_
     return chosen;
 }
 
-// What a path stands for that has not met the grating ahead yet, or not with all its orders.
+// Summed efficiency of the orders a path has yet to follow at the grating ahead: its share of light if it ends there.
 float efficiency_left(Path path, uint object) {
     uint row = object_at(object).weight_row, first = path.order & ~ONLY_ORDER;
     uint end = (path.order & ONLY_ORDER) != 0u ? first + 1u : grating_at(row).orders;
@@ -34,7 +34,7 @@ float efficiency_left(Path path, uint object) {
     return left;
 }
 
-// `whole`: the path before its flight here. A path that ends has an inverse probability of 0.
+// The event at a grating. `whole`: the path before its flight to here. A path that ends gets `inverse_pdf` 0.
 void meet_grating(inout Path path, Path whole, Hit hit, Event event, uint pixel_key) {
     uint row = object_at(hit.object).weight_row;
     GratingEvent met = grating_event(path, event, hit, row);
@@ -50,7 +50,7 @@ void meet_grating(inout Path path, Path whole, Hit hit, Event event, uint pixel_
             alone = true;
         }
     }
-    // What is thrown to the side is one band; what goes straight on or back stays whole.
+    // Orders that deflect by wavelength go on as one band of the spectrum; the zeroth keeps the whole spectrum.
     Path banded = path;
     if (HAS_DISPERSION) {
         if (banded.restricted == 0u) restrict_to_band(banded, pixel_key);
@@ -77,8 +77,8 @@ void meet_grating(inout Path path, Path whole, Hit hit, Event event, uint pixel_
             if (start.restricted == 0u) restrict_to_band(start, pixel_key);
             cut = may_cut_near(start, at, hit.distance);
             if (cut) {
-                // Both parts meet this surface again, each from its own start; where other orders are pending, these
-                // first.
+                // Both parts of the cut band meet this surface again, each from its own start. With orders pending,
+                // this order first meets the surface again on its own, and is cut then.
                 path = more ? whole : start;
                 path.recut = uint(!more);
                 cut_at = more ? -1.0 : at;

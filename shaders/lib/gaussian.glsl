@@ -1,5 +1,5 @@
-// Gaussians, their integrals and their averages over a texel. Pure functions, no bindings.
-// CPU reference: tests/reference/splat_reference.py.
+// The error function and integrals of Gaussians, for splats (share of a splat in a texel, soft ends of a sweep) and for
+// hard edges of lights. Pure functions, no bindings. CPU reference: tests/reference/gaussians.py.
 
 const float SQRT_HALF = 0.70710678;
 const float TWO_PI = 6.2831853;
@@ -24,8 +24,8 @@ float gaussian_box(float y, float half_width) {
     return 0.5 * (erf_approx(y + half_width) - erf_approx(y - half_width));
 }
 
-// The same to 5e-4 with one division (7.1.27). Over boxes side by side the errors cancel, so no energy is lost by it.
-// Beyond ALL_OF_IT nothing is left; of a box some hundred times as wide as the Gaussian the powers would overflow.
+// gaussian_box to 5e-4 with one division (7.1.27). Errors cancel in the sum over adjacent boxes: energy is conserved.
+// Beyond ALL_OF_IT the tail is negligible; clamping there keeps the powers of very wide boxes from overflowing.
 const float ALL_OF_IT = 6.0;
 float gaussian_box_fast(float y, float half_width) {
     vec2 x = clamp(vec2(y + half_width, y - half_width), -ALL_OF_IT, ALL_OF_IT);
@@ -37,8 +37,8 @@ float gaussian_box_fast(float y, float half_width) {
     return side.x - side.y - (side.x * p.y - side.y * p.x) / (p.x * p.y);
 }
 
-// 1 less three waves: two, `cycles` from their crests, and their sum. A cubic instead of a cosine errs by 2 % of a
-// wave.
+// 1 minus three cosine waves: it cancels the ripple of splats about a lattice. `cycles`: phases of two of the waves
+// (the third has their sum), `heights`: amplitudes. A cubic stands in for the cosine, within 2 % of the amplitude.
 float flatness(vec2 cycles, vec3 heights) {
     vec3 away = abs(fract(vec3(cycles, cycles.x + cycles.y)) * 2.0 - 1.0);
     return 1.0 - dot(heights, 2.0 * away * away * (3.0 - 2.0 * away) - 1.0);

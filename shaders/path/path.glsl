@@ -1,8 +1,8 @@
-// A path between two surfaces: a ray, its derivatives (columns), the band of the spectrum that it stands for, and what
-// is left of it there. Every walk carries this struct: photons (light/trace.comp), camera samples (camera/camera.comp),
-// light gathered from a surface (light/followed.glsl), rays that are drawn (camera/ray_paths.comp). Before it includes
-// this file a walk declares `struct Walk`, what it alone keeps with a path, and PATH_COLUMNS: SPATIAL columns of the
-// footprint, one a spectral group, then its own.
+// A path between two surfaces: a ray, its derivatives (the columns: ray differentials), the band of the spectrum that
+// it represents, and its throughput over that band. All path tracers share this struct: photons (light/trace.comp),
+// camera samples (camera/camera.comp), light gathered from a surface (light/followed.glsl), displayed rays
+// (camera/ray_paths.comp). Before including this file a tracer declares `struct Walk`, its own data of a path, and
+// PATH_COLUMNS: SPATIAL columns of the footprint, one for each spectral group, then its own.
 #ifndef PATH_GLSL
 #define PATH_GLSL
 
@@ -17,7 +17,7 @@
 #else
 #define COLUMNS_HELD 1
 #endif
-// An end of a band that arrives farther off (GPU units) is beyond the facet for good.
+// Distance (GPU units) from the path beyond which an end of the band is taken to have missed the facet.
 #define END_LIMIT 1.0
 
 struct Path {
@@ -25,24 +25,24 @@ struct Path {
     vec3 direction;  // unit, of propagation
     RayOrigin origin;
     MediumStack medium;
-    vec3 dposition[COLUMNS_HELD];  // by the two sides of a footprint, by each spectral group's variable, by the walk's
-                                   // own variables
+    vec3 dposition[COLUMNS_HELD];  // derivative by each side of the footprint, by the spectral variable of each group,
+                                   // by the variables of the path tracer
     vec3 ddirection[COLUMNS_HELD];
-    vec3 band;  // its lowest wavelength, the one it is traced at (the anchor), its highest: as x
-    vec3 throughput;  // at these
+    vec3 band;  // lowest, traced (the anchor) and highest wavelength, as spectral coordinates x
+    vec3 throughput;  // at these three wavelengths
     uint depth;  // surfaces met
-    uint restricted;  // 1: stands for one band; 0: for the whole spectrum, not dispersed yet
-    uint recut;  // 1: its band was cut before the surface ahead, and is not again
+    uint restricted;  // 1: represents one band; 0: the whole spectrum, not dispersed yet
+    uint recut;  // 1: its band was already cut at the surface ahead, and is not cut there again
 #ifdef HAS_GRATING
-    uint order;  // of the grating ahead, the next to be followed
+    uint order;  // the next order to follow at the grating ahead (camera/grating.glsl)
 #endif
 #ifdef POLARISED
-    Polarisation polarisation;  // of the camera's paths: of light that would come along backwards; by reciprocity it
-                                // loses as much
+    Polarisation polarisation;  // on a camera path: of light sent along it from the camera; by reciprocity
+                                // the throughput is the same
 #endif
 #ifdef SPECTRAL_SWEEP
-    // The rays at both ends of the band, by way of the same facets: what columns, being first derivatives, leave out of
-    // the sweep.
+    // The rays of the band's lowest and highest wavelength, traced through the same facets: they hold the nonlinear
+    // part of the dispersion, which first derivatives miss.
     vec3 end_position[2];
     vec3 end_direction[2];
     vec2 end_step[SPECTRAL_GROUPS];  // change of each group's variable from the anchor to the ends
@@ -50,7 +50,7 @@ struct Path {
     Walk walk;
 };
 
-// A path that sets out, at the wavelength x and with columns of no length; its walk is left to the walk.
+// A path at its start, at the wavelength x and with zero columns; the caller initialises `walk`.
 Path path_at(vec3 position, vec3 direction, RayOrigin origin, MediumStack medium, float x) {
     Path path;
     path.position = position;
@@ -73,7 +73,7 @@ Path path_at(vec3 position, vec3 direction, RayOrigin origin, MediumStack medium
     return path;
 }
 
-// Where the columns alone put an end's ray.
+// The ray at an end of the band (0: lowest, 1: highest) as extrapolated by the columns.
 void linear_end(Path path, int end, out vec3 position, out vec3 direction) {
     position = path.position;
     direction = path.direction;
@@ -84,7 +84,7 @@ void linear_end(Path path, int end, out vec3 position, out vec3 direction) {
     direction = normalize(direction);
 }
 
-// Both ends on the path's own ray, as where its band begins.
+// Sets the rays at both ends of the band to the path's own, as for light that is not dispersed yet.
 void gather_ends(inout Path path) {
     for (int end = 0; end < 2; ++end) {
         path.end_position[end] = path.position;
@@ -92,16 +92,16 @@ void gather_ends(inout Path path) {
     }
 }
 
-// Steps to the ends of the band.
+// Sets `end_step` from the band.
 void set_steps(inout Path path) {
     for (int g = 0; g < SPECTRAL_GROUPS; ++g)
         path.end_step[g] =
             vec2(variable_step(uint(g), path.band.x, path.band.y), variable_step(uint(g), path.band.z, path.band.y));
 }
 
-// The path's ray at the wavelength x: along the spectral columns, and off them by the share of an end's own deviation
-// that a second derivative would have there. So it is exact at the anchor, where it also has the columns' slope, and at
-// ends that are carried.
+// The path's ray at the wavelength x: the spectral columns' extrapolation, plus a quadratic correction towards the ray
+// at the nearer end of the band, if ends are traced. Exact at the anchor, there with the columns' slope, and at traced
+// ends.
 void ray_at(Path path, float x, out vec3 position, out vec3 direction) {
     position = path.position;
     direction = path.direction;
@@ -125,7 +125,7 @@ void ray_at(Path path, float x, out vec3 position, out vec3 direction) {
 #endif
 }
 
-// The direction at an end of the band.
+// The direction at an end of the band (0: lowest, 1: highest wavelength).
 vec3 direction_at_end(Path path, int end) {
 #ifdef SPECTRAL_SWEEP
     return path.end_direction[end];
@@ -141,7 +141,7 @@ vec3 direction_at_end(Path path, int end) {
 #endif
 }
 
-// The same path for a part of its band, traced at the part's own anchor.
+// Restricts a path to `band`, a part of its band, and moves its ray to the new anchor.
 void restrict_to(inout Path path, vec3 band) {
     Path before = path;
     path.throughput = band_weights(before.band, before.throughput, band);
@@ -159,7 +159,7 @@ void restrict_to(inout Path path, vec3 band) {
     }
 }
 
-// Whether a path's start, moved to where its rays at both wavelengths set out, stays where it is known to be clear.
+// Whether the origins of a path's rays at both wavelengths are so near its own that the space between counts as clear.
 // `distance`: to the surface ahead.
 bool starts_are_near(Path start, float x_low, float x_high, float distance) {
     vec3 low, high, unused;
@@ -168,14 +168,14 @@ bool starts_are_near(Path start, float x_low, float x_high, float distance) {
     return starts_stay_near(low - start.position, high - start.position, distance);
 }
 
-// Columns carried to a surface at `distance` whose geometric normal is `normal_g`.
+// Transfers the columns to a surface at `distance` whose geometric normal is `normal_g` (Igehy 1999).
 void transfer_columns(inout Path path, vec3 normal_g, float distance) {
     for (int c = 0; c < PATH_COLUMNS; ++c)
         path.dposition[c] = transfer_column(path.dposition[c], path.ddirection[c], path.direction, normal_g, distance);
 }
 
-// The ends carried to the plane of a facet that the path has met at its anchor; an end that cannot get there, or only
-// far away, is where the columns say.
+// Traces the rays at the ends of the band to the plane of the facet that the path has met. An end that misses it, or
+// arrives far away, falls back to the extrapolation by the columns.
 void transfer_ends(inout Path path, vec3 normal_g) {
     for (int end = 0; end < 2; ++end) {
         vec3 position = path.end_position[end], direction = path.end_direction[end];
@@ -190,7 +190,7 @@ void transfer_ends(inout Path path, vec3 normal_g) {
     }
 }
 
-// Columns that are not finite, or longer than anything, are dropped: the path goes on as a single ray.
+// False if a column is not finite or too long: all are set to zero then, and the path goes on as a single ray.
 bool columns_hold(inout Path path) {
     bool holds = true;
     for (int c = 0; c < PATH_COLUMNS; ++c) {
@@ -203,7 +203,7 @@ bool columns_hold(inout Path path) {
     return false;
 }
 
-// The path goes on from what it has met, on that object's inner side or not.
+// Makes the surface just hit the origin of the next ray; `inside`: it starts on the inner side of that object.
 void leave_surface(inout Path path, Hit hit, bool inside) {
     path.origin = RayOrigin(hit.primitive, hit.object, uint(inside), path.medium.mask);
     path.recut = 0u;

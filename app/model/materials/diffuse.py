@@ -1,6 +1,6 @@
-"""What receives caustics: a two-sided diffuse surface, plain, measured or with a picture on it.
+"""The diffuse material, on which caustics are seen: two-sided, with a colour, a measured spectrum or a picture.
 
-Its finish is a glossy coat over the diffuse base, and how rough that base is.
+Its finish is an optional glossy coat, and the roughness of the diffuse base under it.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from .absorption import read_curve
 from .material import Material, colour_words
 
 USUAL_ROUGHNESS = 0.25
-"""Roughness of a coat that somebody adds without saying more: a polished table."""
+"""Default roughness of a coat that is added in the panel: a polished table."""
 USUAL_COAT_INDEX = 1.5
 SMOOTH_ROUGHNESS = 0.03
-"""A coat less rough than this is met as a perfectly smooth one: its lobe is narrower than a pixel."""
+"""A coat less rough than this is treated as perfectly smooth: its lobe is narrower than a pixel."""
 
 ROUGHNESS = Number(
     "roughness",
@@ -96,18 +96,18 @@ def read_finish(table: SceneTable) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Diffuse(Material):
-    """A two-sided receiver; `reflectance` (401,) on the visible grid overrides RGB."""
+    """A two-sided receiver; `reflectance`, (401,) on the visible grid, overrides `reflectance_rgb`."""
 
     reflectance_rgb: Vec3 = (0.8, 0.8, 0.8)
     reflectance: np.ndarray | None = None
     texture: Texture | None = None
-    """Multiplies `reflectance_rgb` by the mesh's texture coordinates; never beside `reflectance`."""
+    """Multiplies `reflectance_rgb`, looked up by the mesh's texture coordinates; excludes `reflectance`."""
     roughness: float | None = None
     """Roughness of a clear dielectric coat over it, 0 to 1 (GGX's alpha is its square); None: there is no coat."""
     coat_index: float = USUAL_COAT_INDEX
-    """The coat's refractive index over that of what is before it."""
+    """Refractive index of the coat relative to the medium outside."""
     diffuse_roughness: float = 0.0
-    """0: Lambertian, up to 1 (`shaders/lib/rough_diffuse.glsl`); never beside `reflectance`."""
+    """From 0, Lambertian, to 1 (`shaders/lib/rough_diffuse.glsl`); excludes `reflectance`."""
 
     kind: ClassVar = "diffuse"
     title: ClassVar = "Diffuse"
@@ -116,14 +116,14 @@ class Diffuse(Material):
 
     @classmethod
     def read(cls, table: SceneTable, textures: TextureReader) -> Self:
-        """`colour`, with a `texture`, or `reflectance`; its finish."""
+        """From `colour`, with or without `texture`, or from `reflectance`, and the keys of the finish."""
         return cls._coloured(table, textures).changed(**read_finish(table))
 
     @classmethod
     def _coloured(cls, table: SceneTable, textures: TextureReader) -> Self:
         key = table.one_of(("colour", "reflectance"), "the colour")
         if table.one_of(("reflectance", "texture"), "the colour") == "texture":
-            # Beside a picture the colour is a factor, so that nothing given leaves the picture as it is.
+            # The colour multiplies the picture, so the default of 1 leaves the picture unchanged.
             return cls(table.colour("colour", (1.0, 1.0, 1.0)), texture=textures.read(table))
         if key != "reflectance":
             return cls(table.colour("colour", (0.8, 0.8, 0.8)))
@@ -137,7 +137,7 @@ class Diffuse(Material):
         return cls(reflectance_rgb=rgb_under_white(values), reflectance=values)
 
     def values(self, path: Path | None = None) -> dict[str, Any]:
-        """Its colour and picture, or its reflectance, and its finish."""
+        """Colour and picture, or reflectance, and finish: the keys of its table."""
         return self._colours(path) | write_fields(self.shown_numbers(), self, path)
 
     def _colours(self, path: Path | None) -> dict[str, Any]:
@@ -145,24 +145,24 @@ class Diffuse(Material):
         if self.reflectance is not None:
             return values | {"reflectance": {"nm": VISIBLE_NM.tolist(), "values": self.reflectance.tolist()}}
         values["colour"] = list(self.reflectance_rgb)
-        worn = self.texture
-        if worn is None:
+        image = self.texture
+        if image is None:
             return values
-        name = worn.source or picture_name(worn.rgb) if path is None else picture_file(worn.rgb, worn.source, path)
-        return values | {"texture": {"file": name, "wrap": worn.wrap}}
+        name = image.source or picture_name(image.rgb) if path is None else picture_file(image.rgb, image.source, path)
+        return values | {"texture": {"file": name, "wrap": image.wrap}}
 
     @property
     def has_coat(self) -> bool:
-        """It reflects besides what its base sends back."""
+        """A glossy coat covers its diffuse base."""
         return self.roughness is not None
 
     def shown_numbers(self) -> tuple[Number, ...]:
-        """Numbers of its finish; a coat's only where it has one."""
+        """The numbers of its finish that apply: those of a coat only if it has one."""
         rough = (DIFFUSE_ROUGHNESS,) if self.reflectance is None else ()
         return (ROUGHNESS, COAT_INDEX, *rough) if self.has_coat else rough
 
     def content(self) -> tuple[object, ...]:
-        """Its finish counts where it has one."""
+        """All that light depends on; the finish only where it is not the default."""
         plain = Diffuse()
         finish = (self.roughness, self.coat_index, self.diffuse_roughness)
         return super().content() + (
@@ -170,7 +170,7 @@ class Diffuse(Material):
         )
 
     def words(self) -> str:
-        """With its colour and finish."""
+        """A short description for reports, with colour and finish."""
         words = "diffuse, spectral reflectance" if self.reflectance is not None else "diffuse "
         words += colour_words(self.reflectance_rgb) if self.reflectance is None else ""
         words += "" if self.texture is None else ", wears a picture"

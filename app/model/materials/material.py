@@ -1,6 +1,6 @@
-"""What every material answers: does light go on, end, or land on it, and what is it called.
+"""The base class of materials: all that the renderer, scene files and panels need to know of one.
 
-A kind of material is one class, which overrides what differs.
+Each kind of material (glass, mirror, diffuse, …) is a subclass that overrides what differs.
 """
 
 from __future__ import annotations
@@ -23,28 +23,28 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Material:
-    """What a surface, or the inside of a solid, does with light."""
+    """How a surface, and the inside of a solid, affects light."""
 
     kind: ClassVar[str]
-    """Its word in a scene file."""
+    """Its name in a scene file, under the key `kind`."""
     title: ClassVar[str]
     gpu_code: ClassVar[int]
-    """Tells kinds apart on the GPU."""
+    """Identifies the kind on the GPU (KIND_… of shaders/lib/scene.glsl)."""
     parts: ClassVar[tuple[Part, ...]] = ()
-    """What the scene file says of it."""
+    """Its keys in a scene file, besides `kind`."""
     is_specular: ClassVar[bool] = False
-    """Paths go on from it along rays: glass and mirrors. What is not ends them."""
+    """Light paths continue from it as rays (glass, mirrors, gratings); they end on any other material."""
     transmits: ClassVar[bool] = False
-    """Light enters it: a dielectric."""
+    """Light is refracted into it: a dielectric."""
     is_mirror: ClassVar[bool] = False
     is_grating: ClassVar[bool] = False
     receives: ClassVar[bool] = False
-    """Caustics are seen on it: it is diffuse."""
-    # What a kind may have as fields of its own; without annotations, which would order those.
+    """It is diffuse, so caustics are visible on it."""
+    # Defaults of what some kinds have as fields. Unannotated: annotated, they would be fields of every kind.
     reflectance_rgb = (0.0, 0.0, 0.0)
     """Linear Rec.709."""
     reflectance = cast(Any, None)
-    """(401,) on the visible grid, instead of `reflectance_rgb`."""
+    """Spectral reflectance, (401,) on the visible grid (380 to 780 nm), which replaces `reflectance_rgb`; or None."""
     texture = cast(Any, None)
     absorption = cast(Any, None)
     roughness = cast(Any, None)
@@ -52,106 +52,106 @@ class Material:
     coat_index = 1.0
     diffuse_roughness = 0.0
     dispersion = cast(Any, None)
-    """What its deflection of light is a function of: a glass's index, a grating's wavelength."""
+    """The function of wavelength that it deflects light by: a glass's index, for a grating the wavelength itself."""
     priority = 0
     thin = False
     transmittance_rgb = (1.0, 1.0, 1.0)
-    """Linear Rec.709 share of what enters glass that its colour leaves of light on the way through all of it."""
+    """Linear Rec.709 transmittance of coloured glass, for light that enters and leaves it."""
 
     @property
     def met_as(self) -> int:
-        """KIND_… of shaders/lib/scene.glsl for its surface."""
+        """KIND_… of shaders/lib/scene.glsl that its surface is treated as: `gpu_code`, but a thin sheet has its own."""
         return self.gpu_code
 
     @property
     def is_solid(self) -> bool:
-        """It is a transparent body with an inside."""
+        """It is transparent with an inside, unlike a thin sheet."""
         return self.transmits and not self.thin
 
     @property
     def disperses(self) -> bool:
-        """It sends wavelengths different ways."""
+        """It deflects different wavelengths into different directions."""
         return self.dispersion is not None and not self.thin and bool(self.dispersion.is_dispersive)
 
     @property
     def has_coat(self) -> bool:
-        """It is diffuse, and glossy besides."""
+        """It is diffuse with a glossy coat."""
         return False
 
     @property
     def is_black(self) -> bool:
-        """It ends paths and sends nothing on."""
+        """It absorbs all light: paths end on it, and it shows no caustics."""
         return not (self.is_specular or self.receives)
 
     @property
     def is_rough(self) -> bool:
-        """Its surface is ground, so that paths go on from it by chance."""
+        """It is a solid with a rough surface (ground glass), which scatters paths at random."""
         return self.is_solid and self.roughness > 0.0
 
     @property
     def microfacet_width(self) -> float:
-        """GGX's α, the tangent of the slope that half of its microfacets exceed; 0 is polished. As in glTF, the square
-        of the roughness."""
+        """GGX's α, the square of the roughness as in glTF; 0: polished. Half of the microfacets are steeper than the
+        slope α."""
         return self.roughness**2 if self.is_rough else 0.0
 
     @property
     def is_coloured(self) -> bool:
-        """Its plain reflectance, or what a surface of it lets through, is not grey."""
+        """Its RGB reflectance or its RGB transmittance is not grey."""
         return len(set(self.reflectance_rgb)) > 1 or len(set(self.transmittance_rgb)) > 1
 
     @property
     def filters(self) -> bool:
-        """A surface of it lets through less than enters."""
+        """It is coloured or grey glass: each surface absorbs part of the light that enters or leaves."""
         return self.transmittance_rgb != (1.0, 1.0, 1.0)
 
     @property
     def surface_filter(self) -> np.ndarray:
-        """Share that one surface lets through of what enters, float64 (401,) on the visible grid: white light has the
-        colour `transmittance_rgb` behind a sheet, or a solid, which is entered and left."""
+        """Spectral transmittance of one surface, float64 (401,) on the visible grid, such that white light has the
+        colour `transmittance_rgb` behind a sheet (one surface) or a solid (two surfaces)."""
         passed: np.ndarray = rgb_basis() @ np.asarray(self.transmittance_rgb, float)
         return passed if self.thin else np.sqrt(passed)
 
     @classmethod
     def usual(cls) -> Self:
-        """What somebody gets who asks for one of this kind and nothing more."""
+        """The default of this kind, for a user who sets nothing else."""
         return cls()
 
     @classmethod
     def read(cls, table: SceneTable, textures: TextureReader) -> Self:
-        """One of this kind from its table; `textures` reads its pictures."""
+        """A material of this kind from its table in a scene file; `textures` reads its pictures."""
         return cls(**read_fields(cls.parts, table))
 
     def values(self, path: Path | None = None) -> dict[str, Any]:
-        """The keys of its table in a scene file `path`.
+        """Its table, key by key, for the scene file `path`.
 
-        Without one, files are named absolutely, and a picture without a file by its content.
+        Without a path, files are named absolutely, and a picture that has no file by its content.
         """
         return {"kind": self.kind} | write_fields(self.parts, self, path)
 
     def changed(self, **values: Any) -> Self:
-        """The same with other values of its kind's fields."""
+        """A copy in which these fields have other values."""
         return replace(self, **values)
 
     def check_on(self, mesh: Mesh, name: str, file_name: str) -> None:
-        """Raise UserError where the mesh of object `name` cannot be of this material."""
+        """Raise UserError if object `name` of this file cannot have this material on its mesh."""
 
     def shown_numbers(self) -> tuple[Number, ...]:
-        """Its plain numbers with a row in the panel."""
+        """Its numeric keys that the panel shows, each in a row."""
         return tuple(part for part in self.parts if isinstance(part, Number) and part.row is not None)
 
     def is_like(self, other: Material) -> bool:
-        """Whether programs and buffers made for the one serve the other, so that only values differ."""
+        """Whether `other` differs in values only, so that the same GPU programs and buffers serve both."""
         return False
 
     def words(self) -> str:
-        """What it is, in a few words."""
+        """A short description for reports."""
         return self.kind
 
     def content(self) -> tuple[object, ...]:
-        """What of it light depends on, as plain values and arrays: two that send light alike agree in it."""
+        """All values and arrays that light depends on: equal for two materials that act alike (`scene_key`)."""
         return (*(float(v) for v in self.reflectance_rgb), self.reflectance)
 
 
 def colour_words(rgb: Vec3) -> str:
-    """A colour in as few numbers as say it."""
+    """A colour as text: one number if it is grey, else three."""
     return f"{rgb[0]:.3g}" if len(set(rgb)) == 1 else "(" + ", ".join(f"{c:.3g}" for c in rgb) + ")"

@@ -1,7 +1,7 @@
-"""One small rendering for the stress sweep, with everything it made examined: photons, maps, picture, flux.
+"""Renders a small picture for a stress case and checks every result of it: photons, caustic maps, picture, flux.
 
-The product's own light pass and camera pass do the work. What is added only reads: every photon
-record of every batch, every texel of every map, every pixel.
+The program's own light pass and camera pass do the work. This only reads what they produce: every photon record of
+every batch, every texel of every map, every pixel.
 """
 
 from __future__ import annotations
@@ -33,27 +33,27 @@ if TYPE_CHECKING:
     from ...render.shown_spectra import PassTables, ShownSpectra
 
 SMALL = RenderSettings(width=160, height=90, photons=32_768, spp=16, method="srd-photons")
-"""What a sweep renders unless the case is about just that. Fewer than 16 samples a pixel would miss texels of a sharp
-focus. By photons: beams have cases of their own."""
+"""Settings of every stress case that is not about one of them. Fewer than 16 samples a pixel would miss texels of a
+sharp focus. The method traces photons, without beams, which have cases of their own."""
 CAUSTIC = replace(SMALL, layer="caustic")
 LOST_TO_NUMERICS = 1e-3
 """Largest share of the flux that may end for numerical reasons (cracks, overflows): a tenth of what a picture shows."""
 SAME_PICTURE = 0.01
-"""nRMSE of a picture whose photons are the same but for rounding: one photon in a thousand may choose otherwise
-(√(2·1e-3) of its own contrast of about a fifth)."""
+"""Largest nRMSE between pictures whose photons differ by rounding only, which makes one photon in a thousand choose
+another path: √(2·1e-3) of the picture's own contrast of about a fifth."""
 SAME_ENERGY = 1e-3
-"""The same, summed over the picture: one photon in a thousand."""
+"""Largest relative error of the summed picture in that case: one photon in a thousand."""
 NOISE = 3.0
-"""A picture drawn anew may differ by as much as two seeds do, times this: two seeds still share the lattice's shape and
-the texels."""
+"""A picture from other samples may differ by this times the difference of two seeds, which still share the shape of the
+lattice and the texels."""
 TEXELS = 0.05
-"""nRMSE of a picture read from maps whose texels (half a pixel) lie otherwise: where an edge crosses a pixel half a
-texel more or less of blur is a quarter of the contrast, and in so small a picture some 4 % of the pixels lie on edges:
+"""Largest nRMSE between pictures whose maps have their texels (half a pixel) in other positions. In a pixel on an edge
+half a texel of blur changes a quarter of the contrast, and some 4 % of the pixels of so small a picture are on edges:
 0.25 √0.04."""
 
 
 class WatchedRecords:
-    """`PhotonRecords` that are read after every batch."""
+    """`PhotonRecords` that checks every batch of photons for non-finite values and counts dropped footprints."""
 
     takes_tails = True
 
@@ -78,7 +78,7 @@ class WatchedRecords:
         self._forgotten.release()
 
     def keep(self, photons: moderngl.Buffer, batch: Batch, stride: int, of: RoundOf) -> None:
-        """Examine the batch."""
+        """Check the batch; nothing is kept."""
         if batch.photons:
             self._watch(np.frombuffer(photons.read(batch.photons * stride), self._dtype))
 
@@ -86,7 +86,7 @@ class WatchedRecords:
         self.watched += len(photons)
         dropped = (photons["flags"] & records.FLAG_FOOTPRINT_DROPPED) != 0
         self.dropped += int(dropped.sum())
-        # A dropped footprint's columns are never read again, everything else always is.
+        # A dropped footprint's columns (position derivatives) are never read; every other value is.
         names = photons.dtype.names or ()
         columns = [name for name in names if name.startswith("dposition")]
         floats = [name for name in names if photons.dtype[name].base == np.float32 and name not in columns]
@@ -99,7 +99,7 @@ class WatchedRecords:
 
 @dataclass(frozen=True)
 class Probe:
-    """What one rendering made."""
+    """Results of one rendering, checked."""
 
     picture: np.ndarray
     """float64 (H, W, 3), linear Rec.709."""
@@ -107,9 +107,9 @@ class Probe:
     nonfinite: int
     """Photon records, texel values and pixel values that are NaN or infinite."""
     dropped: int
-    """Photon records whose flag says that the footprint was dropped."""
+    """Photon records flagged as having lost their footprint."""
     map_flux_w: float
-    """What the maps hold where they are read, per pass weight."""
+    """Flux in the part of the maps that lookups use (`LightPass.map_flux`), per pass weight."""
 
     @property
     def shares(self) -> dict[str, float]:
@@ -119,14 +119,14 @@ class Probe:
 
     @property
     def map_error(self) -> float:
-        """|what maps hold + what lies outside all of them − deposited| / deposited."""
+        """|flux in the maps + flux outside all of them − flux deposited| / flux deposited."""
         deposited = self.stats.tally.ended["deposited"]
         return abs(self.map_flux_w + self.stats.outside_map_w - deposited) / deposited if deposited else 0.0
 
 
 @contextmanager
 def light_pass(context: Context, scene: Scene, settings: RenderSettings) -> Iterator[tuple[LightPass, WatchedRecords]]:
-    """The prepared light pass of `scene` and its photons; everything is freed afterwards."""
+    """The prepared light pass of `scene` and the checks of its photons; everything is freed afterwards."""
     buffers = scene_buffers(context, scene, settings)
     watched = WatchedRecords(buffers.features.spectral_groups)
     light = LightPass(context, scene, settings, buffers.features, buffers, photon_records=watched)
@@ -139,7 +139,7 @@ def light_pass(context: Context, scene: Scene, settings: RenderSettings) -> Iter
 
 
 def probe(context: Context, scene: Scene, settings: RenderSettings = SMALL) -> Probe:
-    """Render `scene` in one pass and examine everything."""
+    """Render `scene` in one pass and check all results."""
     photons = settings.photons or scene.render.photons
     with light_pass(context, scene, settings) as (light, photon_records):
         light.begin(photons, settings.seed)
@@ -161,7 +161,7 @@ def probe(context: Context, scene: Scene, settings: RenderSettings = SMALL) -> P
 
 
 def read_maps(light: LightPass) -> np.ndarray:
-    """All maps as they are looked up, float32 (targets, height, width, 4)."""
+    """All caustic maps as the camera pass reads them, float32 (targets, height, width, 4)."""
     width, height = light.atlas.size
     textures = light.resolved_textures()
     values = np.empty((len(textures), height, width, 4), np.float32)
@@ -183,14 +183,14 @@ def energy_error(picture: np.ndarray, expected: np.ndarray) -> float:
 
 
 def blocks(picture: np.ndarray, side: int = 10) -> np.ndarray:
-    """Means of `side` × `side` pixels; what does not fill a block is left out."""
+    """Means over blocks of `side` × `side` pixels; incomplete blocks at the borders are left out."""
     height, width = (n // side * side for n in picture.shape[:2])
     cut = picture[:height, :width]
     return cut.reshape(height // side, side, width // side, side, -1).mean(axis=(1, 3))
 
 
 def compared(found: Probe, base: Probe, picture: float, energy: float) -> Held:
-    """A rendering against another of the same light, each within its bound."""
+    """Errors of a rendering against another of the same light, with the bounds `picture` and `energy`."""
     return {
         "picture": (picture_error(found.picture, base.picture), picture),
         "energy": (energy_error(found.picture, base.picture), energy),
@@ -205,7 +205,7 @@ def rendered(
     note: str = "",
     lost: float = LOST_TO_NUMERICS,
 ) -> Measurement:
-    """A rendering's measurement: finite, flux closed, every dropped footprint counted, little lost to numerics."""
+    """The measurement of a rendering: its own promises (no uncounted drop, little flux lost) and those of `held`."""
     tally = found.stats.tally
     uncounted = max(0, found.dropped - tally.fallbacks["footprint_dropped"])
     promised = {"uncounted": (uncounted, 0.0), "lost": (found.shares.get("lost_numeric", 0.0), lost)}
@@ -219,11 +219,11 @@ def rendered(
 def against_single_wavelengths(
     context: Context, scene: Scene, severity: float, label: str, smeared: float = 0.0
 ) -> Measurement:
-    """The default method against `stochastic` (one random wavelength a photon, no spectral column) on blocks of ten
-    pixels.
+    """Compare photons with spectral derivatives to `stochastic` (one random wavelength a photon, no derivatives) on
+    blocks of ten by ten pixels.
 
-    Its bound is the difference between two seeds of `stochastic`, which is what chance alone makes, and 3 % of the
-    picture for the kernel's tails across the blocks' borders, and `smeared`; the energy's is 3 %.
+    The bound is the sum of the difference between two seeds of `stochastic` (its noise), 3 % of the picture for splats
+    that reach across the blocks' borders, and `smeared`; the bound of the energy is 3 %.
     """
     found = probe(context, scene, CAUSTIC)
     one, other = (probe(context, scene, replace(CAUSTIC, method="stochastic", seed=seed)).picture for seed in (1, 2))
