@@ -120,7 +120,8 @@ class _Constants:
         self.off = switches - defined.keys()
         numbers = {name: int(body) for name, body in defined.items() if body and body.isdigit()}
         self._values = numbers | dict.fromkeys(self.off, 0)
-        self._places = places_of(self._values, switches)
+        # A count that is also a switch (TINT_LEVELS) stands for its number.
+        self._places = places_of(self._values, frozenset(s for s in switches if self._values.get(s) in (0, 1)))
 
     def decide(self, text: str) -> str:
         """A function without what they decide, in as many lines."""

@@ -5,6 +5,7 @@
 // The patch is a parallelogram with two derivative columns as sides. Its second moment is that of an ellipse, whose
 // shorter axis chooses the level and whose longer one is covered with lookups side by side [McCormack et al. 1999].
 
+#if HAS_TEXTURES || HAS_ENVIRONMENT_MAP
 #include "lib/optics.glsl"
 
 layout(std430, binding = BIND_PICTURES) readonly restrict buffer Pictures { Picture pictures[]; };
@@ -173,3 +174,4 @@ vec3 environment_radiance(vec3 direction, vec3 ddirection_ds, vec3 ddirection_dt
     }
     return sum / taps;
 }
+#endif

@@ -56,7 +56,7 @@ def frames_until_error_is(hands: Hands, present: bool) -> str | None:
 
 def test_a_mistake_is_shown_with_file_and_line_and_the_picture_stays(hands: Hands, shaders: Path) -> None:
     before = hands.picture()
-    edit(shaders / "camera/camera.comp", "void main()\n{", "void main()\n{\n    this is no GLSL;")
+    edit(shaders / "camera/camera.comp", "void main() {", "void main() {\n    this is no GLSL;")
     line = (shaders / "camera/camera.comp").read_text().splitlines().index("    this is no GLSL;") + 1
     told = frames_until_error_is(hands, present=True)
     assert told is not None and f"camera.comp:{line}" in told
@@ -85,7 +85,7 @@ def test_a_change_on_disk_shows_in_the_picture(hands: Hands, shaders: Path) -> N
 def test_f5_compiles_from_disk(hands: Hands, shaders: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(shader_watch, "INTERVAL_S", 1e9)
     hands.session._watch = shader_watch.ShaderWatch()
-    edit(shaders / "display/display.comp", "void main()\n{", "void main()\n{\n    this is no GLSL;")
+    edit(shaders / "display/display.comp", "void main() {", "void main() {\n    this is no GLSL;")
     hands.interface.frame(5)
     assert view_model_of(hands.session).shader_error is None
     hands.interface.key(imgui.Key.f5)

@@ -203,7 +203,9 @@ float carried_w(Path path) { return path.walk.flux_w; }
 def generators() -> list[int]:
     """Roulette's irrationals, one a depth up to 63: a table for the first, hashed ones below."""
     text = (paths.shaders_dir() / "lib/random.glsl").read_text()
-    table = [int(g) for g in re.search(r"generators\[\d+\] = uint\[\]\(([^)]*)\)", text)[1].replace("u", "").split(",")]
+    table = [
+        int(g) for g in re.search(r"generators\[\d+\] =\s+uint\[\]\(([^)]*)\)", text)[1].replace("u", "").split(",")
+    ]
     return table + [int(hash_pcg(depth)) | 1 for depth in range(len(table), 64)]
 
 

@@ -92,7 +92,7 @@ def test_features_that_are_in_tell_what_they_add(tmp_path: Path) -> None:
     text = said(scene(tmp_path))
     # Two vec4 a column in a ray, one in a photon; both lists hold two glasses.
     assert "64 B a ray, 32 B a photon" in row(text, "spectral columns") and "64 B a ray" in row(text, "spatial columns")
-    assert "16 B a ray; 32 tables" in row(text, "tint levels")
+    assert "16 B a ray, 32 tables" in row(text, "tint levels")
     assert "73 planes" in row(text, "half-space solids")
     assert " B" not in row(text, "mirrors")
     # Both glasses stand before the camera: the maps hold eight spectral channels beside XYZ.

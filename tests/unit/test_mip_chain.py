@@ -76,6 +76,7 @@ def test_a_single_bright_pixel_keeps_its_light() -> None:
 
 
 def test_levels_are_kept_as_long_as_their_picture_lives() -> None:
+    gc.collect()  # of pictures of other tests
     rgb = picture(8, 8)
     before = len(mip_chain._kept)
     first = mip_chain.kept_levels(rgb, on_sphere=False)
