@@ -91,12 +91,13 @@ def test_what_only_the_driver_can_tell_stays_whole(condition: str) -> None:
         ("if (ON) { int x = 1; f(x); }", "int x = 1; f(x);"),
         ("if (ON) { int x = 1; f(x); } int x = 2;", "{ int x = 1; f(x); } int x = 2;"),
         ("int x[1 + OFF];", "int x[1 + OFF];"),
+        ("x = float(COUNT) * a;", "x = float(COUNT) * a;"),
     ],
 )
 def test_constants_decide(statement: str, reference: str) -> None:
     text = f"#define ON 1\n#define COUNT 2\nvoid main()\n{{\n{statement}\n}}"
     lines = [Line(line, "t", 1) for line in text.splitlines()]
-    kept = [line.text for line in stripped(lines, frozenset({"ON", "OFF"}))]
+    kept = [line.text for line in stripped(lines, frozenset({"ON", "OFF", "COUNT"}))]
     assert " ".join(" ".join(kept[kept.index("{") + 1 : -1]).split()) == reference
     assert ("#define OFF 0" in kept) == ("OFF" in reference)
 
