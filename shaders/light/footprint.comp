@@ -128,7 +128,7 @@ float local_gain(uint receiver, vec3 position) {
     return gain;
 }
 
-// The number of the photon's lattice, 0 where what is splatted is none: every so manieth photon of a lattice is none.
+// The number of the photon's lattice, 0 where only every `stride`-th photon is splatted: these form no lattice.
 uint lattice_of(PhotonRecord photon) { return stride == 1u ? photon.flags >> LATTICE_BIT : 0u; }
 
 #include "light/splat_power.glsl"

@@ -129,7 +129,7 @@ void land(inout Path path, Path start, uint receiver, uint triangle, Hit hit, ui
     }
     uint lattice_bits = p.lattice_bits;
 #ifdef LAMP_COLUMNS
-    // A footprint blurs what light from a point would draw, and an extended light has that coming: the broader of the
+    // A footprint blurs what light from a point would draw, which an extended light blurs anyway: the broader of the
     // two is drawn.
     vec2 fan = unpackHalf2x16(photon.fan);
     if (LOBE_COLUMNS) narrow_lamp_by_lobe(path);

@@ -50,29 +50,6 @@ struct Path {
     Walk walk;
 };
 
-// A path at its start, at the wavelength x and with zero columns; the caller initialises `walk`.
-Path path_at(vec3 position, vec3 direction, RayOrigin origin, MediumStack medium, float x) {
-    Path path;
-    path.position = position;
-    path.direction = direction;
-    path.origin = origin;
-    path.medium = medium;
-    for (int c = 0; c < COLUMNS_HELD; ++c) path.dposition[c] = path.ddirection[c] = vec3(0.0);
-    path.band = vec3(x);
-    path.throughput = vec3(1.0);
-    path.depth = path.restricted = path.recut = 0u;
-    if (HAS_GRATING) path.order = 0u;
-    if (POLARISED) path.polarisation = unpolarised(direction);
-    if (SPECTRAL_SWEEP) {
-        for (int end = 0; end < 2; ++end) {
-            path.end_position[end] = position;
-            path.end_direction[end] = direction;
-        }
-        for (int g = 0; g < SPECTRAL_GROUPS; ++g) path.end_step[g] = vec2(0.0);
-    }
-    return path;
-}
-
 // The ray at an end of the band (0: lowest, 1: highest) as extrapolated by the columns.
 void linear_end(Path path, int end, out vec3 position, out vec3 direction) {
     position = path.position;
@@ -97,6 +74,26 @@ void set_steps(inout Path path) {
     for (int g = 0; g < SPECTRAL_GROUPS; ++g)
         path.end_step[g] =
             vec2(variable_step(uint(g), path.band.x, path.band.y), variable_step(uint(g), path.band.z, path.band.y));
+}
+
+// A path at its start, at the wavelength x and with zero columns; the caller initialises `walk`.
+Path path_at(vec3 position, vec3 direction, RayOrigin origin, MediumStack medium, float x) {
+    Path path;
+    path.position = position;
+    path.direction = direction;
+    path.origin = origin;
+    path.medium = medium;
+    for (int c = 0; c < COLUMNS_HELD; ++c) path.dposition[c] = path.ddirection[c] = vec3(0.0);
+    path.band = vec3(x);
+    path.throughput = vec3(1.0);
+    path.depth = path.restricted = path.recut = 0u;
+    if (HAS_GRATING) path.order = 0u;
+    if (POLARISED) path.polarisation = unpolarised(direction);
+    if (SPECTRAL_SWEEP) {
+        gather_ends(path);
+        for (int g = 0; g < SPECTRAL_GROUPS; ++g) path.end_step[g] = vec2(0.0);
+    }
+    return path;
 }
 
 // The path's ray at the wavelength x: the spectral columns' extrapolation, plus a quadratic correction towards the ray

@@ -79,19 +79,16 @@ def _chosen(state: State, index: int, name: str, known: tuple[Tint, float] | Non
     return edits.attempt(state, f"Tint of {item.name}", set_tint, index, found, distance)
 
 
+def _depth_drag(label: str, distance: float, tip: str) -> tuple[bool, float, bool]:
+    """A row for a way through glass, in the scene's units: whether it changed, the way, whether it is held."""
+    return widgets.drag(
+        label, distance, 1e-4, 1e6, unit="units", tip=tip, reset=_FIRST_DISTANCE, format="%.3f", logarithmic=True
+    )
+
+
 def _draw_depth(state: State, index: int, present: Tint, distance: float) -> State:
     tip = "How far daylight travels inside until it is half as bright. Shorter is deeper."
-    changed, distance, active = widgets.drag(
-        "Half at a depth of",
-        distance,
-        1e-4,
-        1e6,
-        unit="units",
-        tip=tip,
-        reset=_FIRST_DISTANCE,
-        format="%.3f",
-        logarithmic=True,
-    )
+    changed, distance, active = _depth_drag("Half at a depth of", distance, tip)
     state = widgets.holding(state, active)
     label = f"Tint of {state.scene.objects[index].name}"
     return edits.attempt(state, label, set_tint, index, present, distance) if changed else state
@@ -105,17 +102,7 @@ def _draw_colour(state: State, index: int, absorption: Absorption) -> State:
     tip = "Colour of white light after the distance below."
     colour_changed, rgb, colour_active = widgets.colour("Colour", rgb, tip=tip)
     tip = "How far white light travels inside the glass until it has this colour. Shorter is deeper."
-    depth_changed, distance, depth_active = widgets.drag(
-        "At a depth of",
-        distance,
-        1e-4,
-        1e6,
-        unit="units",
-        tip=tip,
-        reset=_FIRST_DISTANCE,
-        format="%.3f",
-        logarithmic=True,
-    )
+    depth_changed, distance, depth_active = _depth_drag("At a depth of", distance, tip)
     state = widgets.holding(state, colour_active or depth_active)
     return _tinted(state, index, rgb, distance) if colour_changed or depth_changed else state
 
