@@ -1,6 +1,4 @@
 // How a path goes on from a glossy receiver: reflected by a facet of its coat, which is drawn as it is seen.
-#ifndef CAMERA_COAT_GLSL
-#define CAMERA_COAT_GLSL
 
 // 2^32 times the fractions of the cube roots of 3 and 9, badly approximable together.
 #define FACET_1 1899447441u
@@ -61,5 +59,3 @@ void meet_coat(inout Path path, Hit hit, Triangle facet, uint pixel_key) {
     leave_surface(path, hit, dot(path.direction, hit.normal_g) < 0.0);
     if (POLARISED) path.polarisation = unpolarised(path.direction);
 }
-
-#endif

@@ -1,8 +1,6 @@
 // Where the paths of a band's wavelengths diverge, its band is cut: each part then goes its own way. A band's middle
 // decides which surface a path meets, and sees for all of it; so at every surface the rays at the band's ends are asked
 // whether they meet the same.
-#ifndef CAMERA_CUTS_GLSL
-#define CAMERA_CUTS_GLSL
 
 // Cuts of the band of one path.
 #define MAX_CUTS 4u
@@ -135,5 +133,3 @@ float where_paths_diverge(Path path, bool met, bool ends, Hit hit, out bool same
     float at = cell_border(0.5 * (along + parted));
     return parts && path.walk.planar_so_far != 0u && path.walk.cuts < MAX_CUTS && may_cut_at(path, at) ? at : -1.0;
 }
-
-#endif

@@ -1,7 +1,5 @@
 // Spectra as the picture's channels see them. Row r of the table is a spectrum times the observer, summed up from
 // x = 0 on; a difference of two of its samples is the light of a wavelength interval in every channel.
-#ifndef CAMERA_EMISSION_GLSL
-#define CAMERA_EMISSION_GLSL
 
 #ifdef SCENE_IMAGE
 layout(rgba32f, binding = UNIT_EMISSION) uniform readonly restrict image2D emission_table;
@@ -106,5 +104,3 @@ void channel_factors(Path path, WavelengthInterval interval, out vec4 factors[TA
         }
     }
 }
-
-#endif

@@ -1,6 +1,4 @@
 // How a receiver's surface is finished (app/model/materials/diffuse.py): the coat over its base, and how rough that is.
-#ifndef CAMERA_FINISH_GLSL
-#define CAMERA_FINISH_GLSL
 
 #if defined(COATS) || defined(ROUGH_DIFFUSE)
 struct Finish {
@@ -58,6 +56,4 @@ float share_of_lobe(Path path, CameraLight light, vec3 position, vec3 direction)
 
 #ifdef ROUGH_DIFFUSE
 #include "lib/rough_diffuse.glsl"
-#endif
-
 #endif

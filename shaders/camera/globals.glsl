@@ -1,7 +1,5 @@
 // What all programs of the camera's pass have in common: parameters, lights, spectra, a path, and what is looked up
 // where it ends.
-#ifndef CAMERA_GLOBALS_GLSL
-#define CAMERA_GLOBALS_GLSL
 
 #ifdef HALTS
 // Rounds that this invocation's loops have run in this dispatch; see camera/halts.glsl.
@@ -70,5 +68,3 @@ vec2 look_place;
 #include "camera/receiver_light.glsl"
 #endif
 #include "camera/taps.glsl"
-
-#endif

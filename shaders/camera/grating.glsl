@@ -1,7 +1,5 @@
 // A camera path at a diffraction grating, for camera/meet.glsl. Each order is a path of its own: the first that exists
 // is followed, a copy on the stack meets the grating again for the rest. If they are weak, one is sampled for all.
-#ifndef CAMERA_GRATING_GLSL
-#define CAMERA_GRATING_GLSL
 
 #include "path/grating.glsl"
 
@@ -104,5 +102,3 @@ void meet_grating(inout Path path, Path whole, Hit hit, Event event, uint pixel_
     diffract_path(path, event, met, order, steps, geometric);
     leave_surface(path, hit, dot(path.direction, hit.normal_g) < 0.0);
 }
-
-#endif

@@ -3,8 +3,6 @@
 // rounds together: what a path found would then depend on which pixels happen to be its neighbours. Whatever a sample
 // knows goes along, and nothing is added to the picture before its end: where it halts changes no bit of it. A GPU has
 // no such limit, and no halts.
-#ifndef CAMERA_HALTS_GLSL
-#define CAMERA_HALTS_GLSL
 
 // A sample has a place of its own from its start to its end; its paths wait there.
 struct Halted {
@@ -53,5 +51,3 @@ bool loops_run() {
     for (uint i = 0u; i < wanted; ++i) ran += hash_pcg(ran + i) == 77u ? 2u : 1u;
     return ran >= wanted;
 }
-
-#endif

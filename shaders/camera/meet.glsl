@@ -1,6 +1,4 @@
 // Which lobes of a surface a camera path follows: of glass, mirrors, gratings and coats.
-#ifndef CAMERA_MEET_GLSL
-#define CAMERA_MEET_GLSL
 
 #include "path/event.glsl"
 
@@ -178,5 +176,3 @@ void meet_surface(inout Path path, Hit hit, uint kind, uint pixel_key) {
         if (kind == KIND_GRATING) meet_grating(path, whole, hit, event, pixel_key);
     }
 }
-
-#endif

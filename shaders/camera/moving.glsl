@@ -1,7 +1,5 @@
 // What the programs of a picture in motion share: which primitive every pixel sees first, as the rasteriser found it,
 // and where its ray meets that.
-#ifndef CAMERA_MOVING_GLSL
-#define CAMERA_MOVING_GLSL
 
 #include "camera/globals.glsl"
 #include "camera/start.glsl"
@@ -73,5 +71,3 @@ vec3 facing_of(uvec2 first, uvec2 pixel) {
 }
 
 uint kind_of(uvec2 first) { return first.y == NONE ? NONE : object_at(first.y).kind; }
-
-#endif

@@ -1,7 +1,5 @@
 // A camera sample's path: what it carries besides (`Walk`), and how it comes to stand for one band. It stands for the
 // whole spectrum until it is first bent by glass that disperses; from there on for one band of it (`restrict_to_band`).
-#ifndef CAMERA_PATH_GLSL
-#define CAMERA_PATH_GLSL
 
 #define SPATIAL 2
 #ifdef LENS
@@ -118,5 +116,3 @@ void restrict_to_band(inout Path path, uint pixel_key) {
 float anchor_of(Path path, float lo, float hi) {
     return path.band.y > lo && path.band.y < hi ? path.band.y : 0.5 * (lo + hi);
 }
-
-#endif

@@ -1,7 +1,5 @@
 // How a camera path begins: at a place in its pixel, with the columns of the pixel's two sides, standing for the whole
 // spectrum.
-#ifndef CAMERA_START_GLSL
-#define CAMERA_START_GLSL
 
 #ifdef LENS
 // Where on the lens the next path begins, in the unit square.
@@ -66,5 +64,3 @@ Path path_from(uvec2 pixel, vec2 within_pixel, float gain) {
     }
     return path;
 }
-
-#endif

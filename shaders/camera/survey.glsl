@@ -2,8 +2,6 @@
 // glass that is followed on its own. A few looks that share a pixel out tell; a still's samples then add what these
 // saw, and have their own looks at outlines, shadows' edges and whatever else is seen in parts. Lookups of maps and
 // textures are averaged over what a look stands for, so that few looks hold all of a pixel's detail of these.
-#ifndef CAMERA_SURVEY_GLSL
-#define CAMERA_SURVEY_GLSL
 
 const uint SURVEY_TAKES = 1u, SURVEY_KEPT = 2u;
 // What a pixel's looks have in common, in a key's lowest bits. A key of 0: nothing.
@@ -55,5 +53,3 @@ vec3 surveyed_mean(uvec2 pixel) {
     uint at = survey_place(pixel);
     return uintBitsToFloat(uvec3(listed[at + 1u], listed[at + 2u], listed[at + 3u]));
 }
-
-#endif

@@ -1,7 +1,5 @@
 // What differs over a band of the spectrum, known at three places of it: its lowest wavelength, the anchor that its
 // path is traced at, its highest one. And where total internal reflection sets in inside it.
-#ifndef BAND_GLSL
-#define BAND_GLSL
 
 #include "lib/medium.glsl"
 #include "lib/optics.glsl"
@@ -69,6 +67,4 @@ float total_reflection_onset(
     }
     return 0.5 * (a + b);
 }
-#endif
-
 #endif

@@ -1,7 +1,5 @@
 // Light that a diffuse surface gets from others: directions by the cosine, and what one of them counts beside places
 // drawn by their light.
-#ifndef BOUNCE_GLSL
-#define BOUNCE_GLSL
 
 #include "lib/emission.glsl"
 
@@ -19,5 +17,3 @@ float gathered(float cosine, float cosine_there, float distance2, float density)
     float both = cosine * cosine_there;
     return 3.14159265359 * both / max(both + 3.14159265359 * density * distance2, 1e-30);
 }
-
-#endif

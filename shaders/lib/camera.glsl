@@ -1,6 +1,4 @@
 // Pinhole and orthographic cameras: from a place in the picture to a ray. Pure functions.
-#ifndef CAMERA_GLSL
-#define CAMERA_GLSL
 
 struct CameraRay {
     vec3 position;  // GPU space
@@ -21,5 +19,3 @@ vec2 picture_point(uvec2 pixel, vec2 within_pixel, uvec2 size) {
     vec2 unit = (vec2(pixel) + within_pixel) / vec2(size);
     return vec2(2.0 * unit.x - 1.0, 1.0 - 2.0 * unit.y);
 }
-
-#endif

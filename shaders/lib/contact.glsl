@@ -2,8 +2,6 @@
 // Its low half has a bit for each of the texel's parts in which the receiver is seen, its high half one for each in
 // which something is seen that stands close before the receiver: light beneath it and beside it may have nothing in
 // common, so a texel in which both are seen keeps what falls on the seen parts.
-#ifndef CONTACT_GLSL
-#define CONTACT_GLSL
 
 #define SEEN_SIDE 1u
 #define HIDDEN_SIDE 2u
@@ -34,5 +32,3 @@ float held_share(uint word, uint side) { return side == SEEN_SIDE ? seen_share(w
 vec2 part_place(uint part) {
     return (vec2(float(part % CONTACT_PARTS), float(part / CONTACT_PARTS)) + 0.5) / float(CONTACT_PARTS) - 0.5;
 }
-
-#endif

@@ -1,8 +1,6 @@
 // Where a light's emission ends at a hard edge: how far a lattice point lies inside of it, and what its footprint
 // keeps. Footprints about the points that a border leaves of a lattice add up to a comb; about all points, each cut off
 // where the light ends, they add up to that border. Pure functions, no bindings.
-#ifndef EDGE_GLSL
-#define EDGE_GLSL
 
 #include "lib/gaussian.glsl"
 
@@ -40,5 +38,3 @@ vec3 unpacked_edge(uint word) {
     float turn = 6.2831853 * float(word >> 12u) / EDGE_STEPS;
     return vec3(cos(turn), sin(turn), EDGE_REACH * ((2.0 * float(word & 4095u) - 1.0) / (EDGE_STEPS - 1.0) - 1.0));
 }
-
-#endif

@@ -1,6 +1,4 @@
 // A beam of light in thin haze, as a ray of the camera crosses it. Pure functions.
-#ifndef HAZE_GLSL
-#define HAZE_GLSL
 
 // Half the width of `blur_1d`, standard deviations: the square root of seven.
 #define BLUR_REACH 2.6457513
@@ -41,5 +39,3 @@ BeamCrossing cross_beam(vec3 start, vec3 beam, vec3 ray) {
     found.on_beam = (found.cosine * along_ray - along_beam) / sine2;
     return found;
 }
-
-#endif

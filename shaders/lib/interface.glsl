@@ -2,8 +2,6 @@
 // derivative, the share it reflects over a band, reflected and refracted directions that stay on their side of the
 // facet. What kind of surface it is (mirror, glass) the passes decide; a new kind brings its own function that returns
 // a `Deflection`.
-#ifndef INTERFACE_GLSL
-#define INTERFACE_GLSL
 
 #include "lib/intersect.glsl"
 #include "lib/optics.glsl"
@@ -163,5 +161,3 @@ vec3 surface_point(Hit hit, Triangle facet, vec3 origin, vec3 direction) {
     }
     return position;
 }
-
-#endif

@@ -1,7 +1,5 @@
 // The emission lattice: golden-ratio Kronecker points of the unit square; which of them make a coarser lattice of the
 // same shape, and the frequencies at which it is uneven. Pure functions, no bindings.
-#ifndef LATTICE_GLSL
-#define LATTICE_GLSL
 
 #include "lib/random.glsl"
 
@@ -61,5 +59,3 @@ uvec2 lattice_place(uint i, uint count, uint shift) {
     ivec2 place = sign_k * ivec2((fibonacci - before) * n - before * w, fibonacci * w - before * n);
     return uvec2(place) + 0x10000000u;
 }
-
-#endif

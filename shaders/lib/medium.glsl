@@ -1,8 +1,6 @@
 // Which medium a ray is in, before and after a surface. Where solids nest or touch, a bit mask of
 // the solids a ray is inside of decides: the highest bit (priority) is the medium [Schmidt and
 // Budge 2002]. Otherwise the geometric normal alone says it.
-#ifndef MEDIUM_GLSL
-#define MEDIUM_GLSL
 
 #include "lib/scene.glsl"
 
@@ -135,5 +133,3 @@ float index_ratio_derivative(MediumInterface boundary, uint g, float x, float n_
         derivative += medium_slope(boundary.before, x) / n_t;
     return derivative;
 }
-
-#endif

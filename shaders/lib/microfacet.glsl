@@ -1,7 +1,5 @@
 // Microfacets whose slopes are those of GGX [Trowbridge and Reitz 1975; Walter et al. 2007] of width alpha: half of all
 // are steeper than it. Pure functions; directions and normals are unit vectors.
-#ifndef MICROFACET_GLSL
-#define MICROFACET_GLSL
 
 // Smith's Lambda at a direction whose angle to the surface's normal has this cosine: the share of microfacets that hide
 // others from it is Lambda / (1 + Lambda) [Smith 1967].
@@ -34,5 +32,3 @@ vec3 visible_microfacet(vec3 toward, vec3 normal, float width, vec2 u) {
         vec3(width * (out_of * seen.x - up * seen.y), width * across, max(out_of * seen.y + up * seen.x, 1e-7));
     return normalize(local.x * along + local.y * cross(normal, along) + local.z * normal);
 }
-
-#endif

@@ -2,8 +2,6 @@
 // three places of a band
 // (`lib/band.glsl`), and an axis that they count from; the references carry electric fields instead
 // (app/reference/polarised.py).
-#ifndef POLARISATION_GLSL
-#define POLARISATION_GLSL
 
 // Squared sine of the angle of incidence below which s is any direction: both polarisations then fare alike.
 #define UPRIGHT 1e-10
@@ -122,5 +120,3 @@ Polarisation behind_grating(Polarisation state, vec3 direction, vec3 turned, boo
     pair.real = vec3(reflects ? -1.0 : 1.0);
     return out_of_plane(behind_interface(in_plane(state, direction, s), pair), turned, s);
 }
-
-#endif

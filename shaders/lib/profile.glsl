@@ -1,7 +1,5 @@
 // Intensity of a lamp over directions, bilinear in both angles of a photometric file's table
 // (app/model/lights/ies_file.py packs it; app/gpu/scene_buffers.py uploads it).
-#ifndef PROFILE_GLSL
-#define PROFILE_GLSL
 
 #include "lib/spot.glsl"
 
@@ -40,5 +38,3 @@ float profile_intensity(uint table, vec3 direction, vec3 axis, vec3 u, vec3 v) {
     uint low = values + i * verticals + j, high = low + verticals;
     return mix(mix(profiles[low], profiles[low + 1u], t), mix(profiles[high], profiles[high + 1u], t), s);
 }
-
-#endif

@@ -1,8 +1,6 @@
 // Random numbers as a function of counters: the same (seed, pass, photon, branch, dimension) gives
 // the same number in any batch, on any machine. PCG output permutation as a hash
 // [Jarzynski and Olano 2020].
-#ifndef RANDOM_GLSL
-#define RANDOM_GLSL
 
 uint hash_pcg(uint value) {
     uint state = value * 747796405u + 2891336453u;
@@ -30,5 +28,3 @@ uint depth_generator(uint depth) {
         uint[](1779033703u, 3144134277u, 2773480763u, 1359893119u, 2600822925u, 528734635u, 1541459225u, 3418070365u);
     return depth < 8u ? generators[depth] : hash_pcg(depth) | 1u;
 }
-
-#endif

@@ -1,8 +1,6 @@
 // Light that microfacets throw at each other: paths follow one microfacet only, and what the others would send on after
 // all is given back to both its parts alike [Turquin 2019], so that a surface keeps no light. Exact in all for light
 // from any one direction; not reciprocal.
-#ifndef ROUGH_ENERGY_GLSL
-#define ROUGH_ENERGY_GLSL
 
 #include "lib/scene.glsl"
 
@@ -18,5 +16,3 @@ vec3 regained(float table, float cosine, vec3 eta_it) {
     }
     return 1.0 / sent;
 }
-
-#endif

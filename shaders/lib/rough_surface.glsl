@@ -2,8 +2,6 @@
 // of those that it can see [Heitz 2018], and is turned by that one's normal as by any other. What it loses is what
 // other microfacets hide of it on its way out [Smith 1967]: light that they throw back into the surface is not followed
 // further. Directions and normals are unit vectors, `normal` is the surface's own, turned against the ray.
-#ifndef ROUGH_SURFACE_GLSL
-#define ROUGH_SURFACE_GLSL
 
 #include "lib/microfacet.glsl"
 #include "lib/random.glsl"
@@ -51,5 +49,3 @@ void lobe_axes(vec3 microfacet, vec3 normal, float width, out vec3 first, out ve
 // number (the best there is for densities in two dimensions [Silverman 1986]). With the smoothing of splats, 0.45,
 // never more than half of the lobe itself.
 float lobe_part(float count) { return min(4.4 * pow(max(count, 1.0), -1.0 / 6.0), 1.1); }
-
-#endif

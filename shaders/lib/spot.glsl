@@ -1,6 +1,4 @@
 // The one falloff of a spot's edge, shared by photons and by shadow rays.
-#ifndef SPOT_GLSL
-#define SPOT_GLSL
 
 // Angle between unit vectors, rad. From the sine too: the cosine alone loses small angles in float32.
 float angle_between(vec3 a, vec3 b) { return atan(length(cross(a, b)), dot(a, b)); }
@@ -14,5 +12,3 @@ float spot_falloff(vec3 direction, vec3 axis, vec2 cone) {
     float soft = t * t * (3.0 - 2.0 * t);
     return cone.y - cone.x > 1e-7 ? soft : (angle <= cone.y ? 1.0 : 0.0);
 }
-
-#endif

@@ -1,7 +1,5 @@
 // Wavelengths drawn by brightness: a row of the spectral tables holds the running integral of a light's density of
 // draws over the spectral coordinate x (app/model/optics/spectral_tables.py, `wavelength_cdf`).
-#ifndef WAVELENGTH_GLSL
-#define WAVELENGTH_GLSL
 
 #include "lib/scene.glsl"
 
@@ -26,5 +24,3 @@ float drawn_wavelength(uint row, vec2 band, float place, out float per_density) 
     per_density = rise > 1e-9 ? (ends.y - ends.x) / (rise * float(SPECTRAL_SAMPLES - 1)) : 0.0;
     return clamp(x, band.x, band.y);
 }
-
-#endif

@@ -1,7 +1,5 @@
 // A ray from a diffuse surface that meets glass or a mirror first, followed backwards to where its light comes from:
 // which lobe it takes is chance by Fresnel's reflectance, at one index; tints at three wavelengths.
-#ifndef LIGHT_FOLLOWED_GLSL
-#define LIGHT_FOLLOWED_GLSL
 
 #include "lib/random.glsl"
 
@@ -105,5 +103,3 @@ vec3 toward_specular(vec4 sphere, vec3 position, vec3 normal, vec2 place, out fl
     weight = narrow ? 6.28318530718 * opening * dot(direction, normal) : 3.14159265359;
     return direction;
 }
-
-#endif

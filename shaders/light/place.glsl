@@ -1,7 +1,5 @@
 // Positions within what a place on a receiver stands for: all of a texel, or those of its parts that something covers,
 // or does not.
-#ifndef LIGHT_PLACE_GLSL
-#define LIGHT_PLACE_GLSL
 
 #define PLACE_PARTS 4u  // along a texel's side
 #define ALL_PARTS 0xffffu
@@ -17,5 +15,3 @@ vec3 position_in(EnvironmentPlace place, vec2 within) {
     }
     return place.position + (within.x - 0.5) * place.step_u + (within.y - 0.5) * place.step_v;
 }
-
-#endif

@@ -1,6 +1,4 @@
 // Roulette on weak parts of rays: what lives carries the power, and stands in the place, of those that died.
-#ifndef ROULETTE_GLSL
-#define ROULETTE_GLSL
 
 // On the emission lattice every `every`-th point in both directions lives: a lattice of the same shape, whose
 // footprints make a plane as even as those of the whole. What lives already is one that many steps coarser. Chance
@@ -54,5 +52,3 @@ bool survives(inout Path path, inout float roulette_w, float share, uint branch,
 bool survives(inout Path path, inout float roulette_w, float share, uint branch) {
     return survives(path, roulette_w, share, branch, path.depth == 1u);
 }
-
-#endif

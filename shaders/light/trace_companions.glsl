@@ -1,7 +1,5 @@
 // What a path's power is weakened by; and, of a hero wavelength's path, of the three companions that share it as long
 // as it is theirs too [Wilkie et al. 2014]. Without a hero all shares are the path's own.
-#ifndef TRACE_COMPANIONS_GLSL
-#define TRACE_COMPANIONS_GLSL
 
 // Leaves a path this share of its power, over its band, and its companions theirs.
 void weaken(inout Path path, vec3 share, vec3 companions) {
@@ -103,5 +101,3 @@ void polarise_companions(inout Path child, Companions companions, bool refracts)
                 child.direction, companions.s));
     }
 }
-
-#endif

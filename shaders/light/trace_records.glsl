@@ -1,6 +1,4 @@
 // What one step of the light pass reads and writes: rays, photons, outcomes.
-#ifndef TRACE_RECORDS_GLSL
-#define TRACE_RECORDS_GLSL
 
 layout(std140, binding = BIND_PARAMETERS) uniform Parameters { TraceParameters p; };
 layout(std430, binding = BIND_RAYS_IN) readonly restrict buffer RaysIn { uvec4 rays_in[]; };
@@ -146,5 +144,3 @@ void store_outcome(uint slot, Outcome outcome) {
 vec3 spectral_row(uint row, vec3 x) {
     return vec3(spectral_row(row, x.x), spectral_row(row, x.y), spectral_row(row, x.z));
 }
-
-#endif

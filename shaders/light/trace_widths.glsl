@@ -2,8 +2,6 @@
 // farther away than the surface is large is nothing, for no light of the footprint has met that surface there. Of flat
 // facets they say enough. Where paths are long (inside a diamond, a drop) columns grow by a factor with every surface,
 // and footprints without bound would spread light over all of a picture, whatever the number of photons.
-#ifndef TRACE_WIDTHS_GLSL
-#define TRACE_WIDTHS_GLSL
 
 float longest_side(vec3 s, vec3 t) {
     vec2 axis = longest_axis(vec3(dot(s, s), dot(s, t), dot(t, t)));
@@ -118,6 +116,4 @@ bool widen_by_lobe(Path path, vec3 normal_g, inout vec3 dposition_ds, inout vec3
     join_sides(normal_g, dposition_ds, dposition_dt, part * first, part * second);
     return true;
 }
-#endif
-
 #endif

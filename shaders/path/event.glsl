@@ -2,8 +2,6 @@
 // `reflect_path`, `refract_path` and `diffract_path` turn the path into one of them, with its columns, its band's ends
 // and its polarisation. Nothing is stored and nothing chosen here: which lobes are followed, and by what chance, is for
 // the walk.
-#ifndef EVENT_GLSL
-#define EVENT_GLSL
 
 #include "path/path.glsl"
 #include "path/microfacet.glsl"
@@ -307,5 +305,3 @@ float total_reflection_in_band(Path path, Event event) {
     }
     return total_reflection_onset(path.band, event.theta.y, dtheta, straight, event.boundary, passes);
 }
-
-#endif

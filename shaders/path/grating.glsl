@@ -1,7 +1,5 @@
 // A path at a grating: one of its orders at a time. The grating equation is the same backwards, and the directions'
 // parts in the surface are only moved by it, so that radiance and flux alike are passed on by the order's efficiency.
-#ifndef PATH_GRATING_GLSL
-#define PATH_GRATING_GLSL
 
 #include "lib/grating.glsl"
 #include "path/event.glsl"
@@ -82,5 +80,3 @@ void diffract_path(inout Path path, Event event, GratingEvent met, GratingOrder 
     }
     path.direction = turned.direction;
 }
-
-#endif

@@ -1,7 +1,5 @@
 // A ground surface: a path meets one of its microfacets, the same at all wavelengths of its band (which all meet it as
 // probably as the anchor does), and goes on as from a polished surface that is turned as this one is.
-#ifndef PATH_MICROFACET_GLSL
-#define PATH_MICROFACET_GLSL
 
 // Which microfacet a path meets: number `number` of the sequence of this key, at this depth. Parts of a band that was
 // cut here meet the surface again, and find the same one.
@@ -29,6 +27,4 @@ struct Ground {
     vec3 end_normal[2];  // where the band's ends arrive
 #endif
 };
-#endif
-
 #endif

@@ -3,8 +3,6 @@
 // camera samples (camera/camera.comp), light gathered from a surface (light/followed.glsl), displayed rays
 // (camera/ray_paths.comp). Before including this file a tracer declares `struct Walk`, its own data of a path, and
 // PATH_COLUMNS: SPATIAL columns of the footprint, one for each spectral group, then its own.
-#ifndef PATH_GLSL
-#define PATH_GLSL
 
 #include "lib/finite.glsl"
 #include "lib/medium.glsl"
@@ -206,5 +204,3 @@ void leave_surface(inout Path path, Hit hit, bool inside) {
     path.recut = 0u;
     if (HAS_GRATING) path.order = 0u;
 }
-
-#endif
