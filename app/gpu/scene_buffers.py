@@ -28,7 +28,7 @@ from ..model.optics.spectral_tables import (
 from ..model.scene import Grating, Light, Scene
 from ..model.tint_bands import tint_curves
 from ..model.tint_levels import TintLevels, tint_levels
-from . import bindings
+from . import bindings, shader
 from .gpu_space import GpuSpace
 from .records import NONE
 from .scene_geometry import SceneGeometry
@@ -134,8 +134,7 @@ class SceneBuffers:
         """Free buffers and textures."""
         self.texels.release()
         self._spectra.release()
-        for buffer in self._buffers.values():
-            buffer.release()
+        shader.release(*self._buffers.values())
         self._buffers.clear()
 
     @property

@@ -190,10 +190,12 @@ def drop_programs(ctx: moderngl.Context) -> None:
         _drop(programs.popitem(last=False)[1])
 
 
-def release(*resources: Releasable) -> None:
-    """Give programs (or any other resources) back; a program is freed when its last owner does so and its context keeps
-    it no longer."""
+def release(*resources: Releasable | None) -> None:
+    """Give programs (or any other resources) back, but for None; a program is freed when its last owner does so and its
+    context keeps it no longer."""
     for owned in resources:
+        if owned is None:
+            continue
         owners = _owners.get(id(owned))
         if owners is None:
             owned.release()

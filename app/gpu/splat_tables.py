@@ -18,6 +18,7 @@ import numpy as np
 from ..model.optics.colorimetry import VISIBLE_NM
 from ..model.optics.spectral_tables import CumulativeSpectrum, SpectralAxis, cumulative
 from ..model.optics.spectrum import Spectrum
+from . import shader
 from .map_channels import MapChannels
 
 if TYPE_CHECKING:
@@ -137,14 +138,9 @@ class SplatTables:
         return self.integral_buffer.size // (48 * self.targets)
 
     def release(self) -> None:
-        for resource in (
-            self.texture,
-            self.band_buffer,
-            self.integral_buffer,
-            self.density_buffer,
-            self.cumulative_buffer,
-        ):
-            resource.release()
+        shader.release(
+            self.texture, self.band_buffer, self.integral_buffer, self.density_buffer, self.cumulative_buffer
+        )
 
 
 def _by_target(values: np.ndarray, targets: int) -> np.ndarray:

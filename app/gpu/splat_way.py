@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ..base.errors import UserError, suggestion
+from . import shader
 from .device_traits import DeviceTraits, is_software_renderer
 from .limits import Limits
 from .parking import park
@@ -130,6 +131,5 @@ def blending_rate(ctx: moderngl.Context) -> float:
         rate = max(rate, _SIDE * _SIDE * _QUADS / (time.perf_counter() - started))
     ctx.enable_only(moderngl.NOTHING)
     park(ctx)
-    for owned in (array, program, framebuffer, texture):
-        owned.release()
+    shader.release(array, program, framebuffer, texture)
     return rate

@@ -18,6 +18,7 @@ import numpy as np
 from ..base.errors import UserError
 from ..model.scene import Scene, SceneObject
 from ..model.texture import Environment, Texture
+from . import shader
 from .device_traits import DeviceTraits
 from .mip_chain import kept_levels, level_count
 from .records import NONE
@@ -149,9 +150,7 @@ class TextureStore:
 
     def release(self) -> None:
         """Free everything."""
-        for owned in (self._pictures, self._corners, self._records):
-            if owned is not None:
-                owned.release()
+        shader.release(self._pictures, self._corners, self._records)
         self._pictures = self._corners = self._records = None
 
     @property
@@ -204,9 +203,7 @@ class TextureStore:
             records[-1]["corners"] = NONE
         texels = _in_rows(corners, self._max_side, scene.objects[textured[0]]) if textured else None
         # Nothing is refused from here on, so that a refused edit leaves the store as it was.
-        for old in (self._records, self._corners):
-            if old is not None:
-                old.release()
+        shader.release(self._records, self._corners)
         self._records = self.ctx.buffer(np.ascontiguousarray(records))
         self._corners = None if texels is None else _texture(self.ctx, texels)
         self.defines = {"TEXTURE_COUNT": len(textured)}

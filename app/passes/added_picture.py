@@ -46,8 +46,7 @@ class AddedPicture:
         framebuffer.release()
 
     def _release_textures(self) -> None:
-        for texture in self.textures:
-            texture.release()
+        shader.release(*self.textures)
         self.textures = []
 
     def release(self) -> None:

@@ -146,8 +146,7 @@ class BeamSplatter:
         array.render(moderngl.TRIANGLES)
         ctx.enable_only(moderngl.NOTHING)
         ctx.scissor = None
-        for resource in (array, vertices, indices, texture):
-            resource.release()
+        shader.release(array, vertices, indices, texture)
 
     def _program(self, edges: int, is_still: bool, contact_lines: bool) -> moderngl.Program:
         """Compiled when it is first needed."""

@@ -14,6 +14,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 import moderngl
 import numpy as np
 
+from ..gpu import shader
 from ..gpu.context import Context
 from ..gpu.dispatch_budget import DispatchBudget
 from ..gpu.map_channels import MapChannels
@@ -308,9 +309,7 @@ class CameraPass:
 
     def release(self) -> None:
         """Free every buffer, texture and program."""
-        for owned in (self._inputs, self._programs, self._sums, self._listed, self._haze):
-            if owned is not None:
-                owned.release()
+        shader.release(self._inputs, self._programs, self._sums, self._listed, self._haze)
 
     # ---- for pictures in motion ------------------------------------------------------------
 

@@ -139,7 +139,5 @@ class CameraInputs:
         shader.release(self._tables, self._lights, self._counters, self._parameters)
         if self._owns_pictures:
             self.pictures.release()
-        for owned in (self._dark, self._empty):
-            if owned is not None:
-                owned.release()
+        shader.release(self._dark, self._empty)
         self._empty = None

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import moderngl
 import numpy as np
 
+from ..gpu import shader
 from ..gpu.map_channels import MapChannels
 from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.scene_texels import spectra_texture
@@ -86,8 +87,7 @@ class CameraTables:
 
     def release(self) -> None:
         """Free everything."""
-        for owned in (self.spectra, self.emission, self.object_colours, self.cell_cdf):
-            owned.release()
+        shader.release(self.spectra, self.emission, self.object_colours, self.cell_cdf)
 
 
 def _shown_media(scene: SceneBuffers) -> dict[Dispersion, Dispersion]:

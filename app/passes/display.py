@@ -250,8 +250,7 @@ class Display:
     def _output(self, name: str, size: tuple[int, int]) -> moderngl.Texture:
         texture = self._outputs.get(name)
         if texture is None or texture.size != size:
-            if texture is not None:
-                texture.release()
+            shader.release(texture)
             texture = self._outputs[name] = self._ctx.texture(size, 4, dtype="f1")
             texture.repeat_x = texture.repeat_y = False
         return texture

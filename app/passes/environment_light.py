@@ -21,6 +21,7 @@ import moderngl
 import numpy as np
 
 from ..base.random_words import random_word
+from ..gpu import shader
 from ..gpu.context import Context
 from ..gpu.dispatch_budget import DispatchBudget
 from ..gpu.scene_buffers import SceneBuffers
@@ -102,8 +103,7 @@ class EnvironmentLightPass(GatheredLight):
         self._light = EnvironmentLight(environment, self._seed)
         self._unshadowed = self._light.unshadowed(self.places.normals) if len(self.places.places) else np.zeros((0, 3))
         packed, self._level_places = self._light.levels()
-        if self._levels is not None:
-            self._levels.release()
+        shader.release(self._levels)
         texels = np.zeros((*packed.shape[:2], 4), np.float32)
         texels[..., :3] = packed
         self._levels = self._ctx.texture(packed.shape[1::-1], 4, texels, dtype="f4")

@@ -111,9 +111,7 @@ class FirstSurfaces:
             # moderngl binds again what was bound, whenever it makes a framebuffer: that must still be there.
             self._ctx.detect_framebuffer(0).use()
             depth = self._target.depth_attachment
-            for owned in (self._target, depth, self.texture):
-                if owned is not None:
-                    owned.release()
+            shader.release(self._target, depth, self.texture)
         self._target = self.texture = None
 
     def release(self) -> None:

@@ -109,7 +109,6 @@ class Glare:
     def _texture(self, key: tuple[str, int], size: tuple[int, int]) -> moderngl.Texture:
         texture = self._textures.get(key)
         if texture is None or texture.size != size:
-            if texture is not None:
-                texture.release()
+            shader.release(texture)
             texture = self._textures[key] = self._ctx.texture(size, 4, bytes(16 * size[0] * size[1]), dtype="f4")
         return texture

@@ -139,8 +139,7 @@ class Haze:
         self._picture.release()
         self._draw.release()
         shader.release(self._program)
-        for owned in (self._camera, self._values):
-            owned.release()
+        shader.release(self._camera, self._values)
 
     # ---- private ---------------------------------------------------------------------------
 
@@ -192,8 +191,7 @@ class Haze:
         for flights, colours, _ in self._beams.values():
             flights.release()
             colours.release()
-        if self._surfaces is not None:
-            self._surfaces.release()
+        shader.release(self._surfaces)
         self._beams, self._surfaces, self._view = {}, None, None
 
 

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 import moderngl
 import numpy as np
 
+from ..gpu import shader
 from ..gpu.dispatch_budget import DispatchBudget
 from ..gpu.records import NONE
 from .camera_programs import BIND_HALTED, BIND_LISTED
@@ -117,15 +118,12 @@ class ListedPixels:
         return int(np.frombuffer(self._list.read(4, offset=at), "u4")[0])
 
     def _reserve(self) -> None:
-        if self._list is not None:
-            self._list.release()
+        shader.release(self._list)
         self._list = self._ctx.buffer(reserve=8 + 4 * self.room + SURVEYED_BYTES * self._surveyed)
 
     def release(self) -> None:
         """Free both."""
-        for buffer in (self._list, self._halted):
-            if buffer is not None:
-                buffer.release()
+        shader.release(self._list, self._halted)
 
 
 def _follow(

@@ -178,6 +178,4 @@ class MapAtlas:
         shader.release(
             self.framebuffer, self._accumulate, *self.scratch_textures, *self.total_textures, self.placements
         )
-        for texture in (self.contact_words, self.borders):
-            if texture is not None:
-                texture.release()
+        shader.release(self.contact_words, self.borders)

@@ -115,8 +115,7 @@ class MovingPicture:
         # A pixel that sees a coat may be on both lists.
         room = 8 + 4 * width * height * (2 if "COATS" in self._view.source[0] else 1)
         if self._lists is None or self._lists.size != room:
-            if self._lists is not None:
-                self._lists.release()
+            shader.release(self._lists)
             self._lists = self._ctx.buffer(reserve=room)
         self._tell(1)
         self._bind(maps, picture)
@@ -206,6 +205,4 @@ class MovingPicture:
     def release(self) -> None:
         """Free programs, buffers and textures."""
         shader.release(*self._programs.values(), self._parameters, *self._lattice)
-        for owned in (self._chosen, self._facing, self._lists):
-            if owned is not None:
-                owned.release()
+        shader.release(self._chosen, self._facing, self._lists)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import moderngl
 import numpy as np
 
+from ..gpu import shader
+
 
 class PictureSums:
     """Owns RGBA32F textures of one size, four channels each."""
@@ -59,6 +61,5 @@ class PictureSums:
 
     def release(self) -> None:
         """Free the textures."""
-        for texture in self.textures:
-            texture.release()
+        shader.release(*self.textures)
         self.textures = []

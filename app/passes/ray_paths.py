@@ -153,8 +153,7 @@ class RayPaths:
         return self._inside[1:]
 
     def _release_paths(self) -> None:
-        for buffer in (self._starts, self._paths, self._points):
-            buffer.release()
+        shader.release(self._starts, self._paths, self._points)
 
     def release(self) -> None:
         """Free program and buffers."""

@@ -222,7 +222,6 @@ class Splatter:
             shader.release(vertex_array.program)
             vertex_array.release()
         shader.release(*self._adds.values())
-        if self._indices is not None:
-            self._indices.release()
+        shader.release(self._indices)
         self._parameters.release()
         self._footprints.release()

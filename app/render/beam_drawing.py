@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
+from ..gpu import shader
 from ..gpu.beam_tables import BeamTables
 from ..gpu.map_channels import MapChannels
 from ..passes.beam_splat import BeamSplatter
@@ -55,12 +56,10 @@ class BeamDrawing:
 
     def forget_tables(self) -> None:
         """Other spectra are shown."""
-        for tables in self._tables.values():
-            tables.release()
+        shader.release(*self._tables.values())
         self._tables.clear()
 
     def release(self) -> None:
         """Free everything."""
         self.forget_tables()
-        for splatter in self.splatters.values():
-            splatter.release()
+        shader.release(*self.splatters.values())

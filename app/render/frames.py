@@ -17,6 +17,7 @@ import numpy as np
 from ..edit.live_inputs import LiveInputs
 from ..edit.parameters import Stage
 from ..features.features import Features
+from ..gpu import shader
 from ..gpu.context import Context
 from ..gpu.scene_buffers import SceneBuffers
 from ..model.environment_light import with_sun
@@ -86,9 +87,7 @@ class _Traced:
         return replace(self.light.caustic_maps(), environment=None if known is None else known.texture)
 
     def release(self) -> None:
-        for owned in (self.camera_pass, self.bounces, self.environment, self.camera_buffers, self.light, self.buffers):
-            if owned is not None:
-                owned.release()
+        shader.release(self.camera_pass, self.bounces, self.environment, self.camera_buffers, self.light, self.buffers)
 
 
 @dataclass
@@ -325,8 +324,7 @@ class FrameRenderer:
 
     def release(self) -> None:
         """Free everything but the context's programs."""
-        if self._traced is not None:
-            self._traced.release()
+        shader.release(self._traced)
         self._traced = None
 
     # ---- what frames share -------------------------------------------------------------------

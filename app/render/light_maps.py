@@ -233,5 +233,4 @@ class LightMaps:
             self._levels_fold,
             self._seam_fold,
         )
-        for resource in owned:
-            resource.release()
+        shader.release(*owned)

@@ -17,7 +17,7 @@ import moderngl
 import numpy as np
 
 from ..features.features import Features
-from ..gpu import splat_tables
+from ..gpu import shader, splat_tables
 from ..gpu.context import Context
 from ..gpu.limits import check_brush, check_splats
 from ..gpu.map_channels import MapChannels
@@ -453,6 +453,4 @@ class LightPass:
 
     def release(self) -> None:
         """Free everything."""
-        for owned in (self.batches, self.shown, self.maps, self.survey):
-            if owned is not None:
-                owned.release()
+        shader.release(self.batches, self.shown, self.maps, self.survey)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..gpu import shader
 from ..passes.emission_domain import EmissionDomain, emission_domain
 from ..passes.guided_emission import guided
 from ..passes.pilot import Pilot, landings_of, pilot_steps, split_threshold
@@ -156,5 +157,4 @@ class LightSurvey:
 
     def release(self) -> None:
         """Free everything."""
-        if self.beam_light is not None:
-            self.beam_light.release()
+        shader.release(self.beam_light)

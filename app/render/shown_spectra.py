@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import moderngl
 import numpy as np
 
+from ..gpu import shader
 from ..gpu.gain_buffers import GainBuffers
 from ..gpu.map_channels import MapChannels, tents
 from ..gpu.reindex import ReindexBuffer, Reindexing, Spans
@@ -39,8 +40,7 @@ class ShownTables:
     def release(self) -> None:
         """Free both."""
         self.tables.release()
-        if self.reindex is not None:
-            self.reindex.release()
+        shader.release(self.reindex)
 
 
 class ShownSpectra:
@@ -98,8 +98,7 @@ class ShownSpectra:
     def show_gains(self, scene: Scene | None) -> None:
         """The brush's dabs of `scene`; None for none."""
         if scene is None:
-            if self.gains is not None:
-                self.gains.release()
+            shader.release(self.gains)
             self.gains = None
         elif self.gains is None:
             b = self._buffers
@@ -176,9 +175,7 @@ class PassTables:
 
     def forget(self) -> None:
         """They show another glass or light than what is wanted now."""
-        for tables in (self._full, self._preview):
-            if tables is not None:
-                tables.release()
+        shader.release(self._full, self._preview)
         self._full = self._preview = None
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from ..gpu import shader
 from ..gpu.dispatch_budget import DISPATCH_S, DispatchBudget
 from ..passes.accumulate import ROWS, Accumulate
 from ..passes.splat import CHUNK, FLUSH_SHARE
@@ -142,5 +143,4 @@ class Splatting:
 
     def release(self) -> None:
         """Free the program."""
-        if self._accumulate is not None:
-            self._accumulate.release()
+        shader.release(self._accumulate)

@@ -10,6 +10,7 @@ import numpy as np
 from ..base.errors import UserError
 from ..base.image_io import check_finite
 from ..edit.parameters import Stage
+from ..gpu import shader
 from ..gpu.context import Context
 from .frame_fit import inputs_of
 from .frames import FrameRenderer
@@ -71,9 +72,7 @@ class SweepPainter:
 
     def release(self) -> None:
         """Free everything."""
-        for owner in (self._engine, self._renderer):
-            if owner is not None:
-                owner.release()
+        shader.release(self._engine, self._renderer)
 
     def _traced(self, number: int, report: Report, unwanted: Callable[[], bool]) -> Drawn | None:
         plan, context = self._plan, self._context

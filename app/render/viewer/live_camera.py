@@ -159,11 +159,9 @@ class LiveCamera:
 
     def _take_moving(self, buffers: SceneBuffers) -> None:
         assert self._pass is not None
-        if self._moving is not None:
-            self._moving.release()
+        shader.release(self._moving)
         if self._geometry is not buffers.texels:
-            if self._surfaces is not None:
-                self._surfaces.release()
+            shader.release(self._surfaces)
             self._surfaces, self._geometry = FirstSurfaces(self._context.ctx, buffers), buffers.texels
         assert self._surfaces is not None
         self._moving = MovingPicture(self._pass, self._surfaces)
@@ -432,8 +430,7 @@ class LiveCamera:
     def _spare_of(self, size: tuple[int, int]) -> moderngl.Texture:
         """A picture that is not shown."""
         if self._spare is None or self._spare.size != size:
-            if self._spare is not None:
-                self._spare.release()
+            shader.release(self._spare)
             self._spare = self._context.ctx.texture(size, 4, dtype="f4")
         return self._spare
 
@@ -453,8 +450,7 @@ class LiveCamera:
     def _show(self, radiance: moderngl.Texture, scale: float) -> None:
         """`scale` times this, copied, is the picture from now on."""
         if self.picture is None or self.picture.size != radiance.size:
-            if self.picture is not None:
-                self.picture.release()
+            shader.release(self.picture)
             self.picture = self._context.ctx.texture(radiance.size, 4, dtype="f4")
         radiance.bind_to_image(0, read=True, write=False)
         self.picture.bind_to_image(1, read=False, write=True)
@@ -467,9 +463,7 @@ class LiveCamera:
         shader.release(self._average)
         if self._spare is self.picture:
             self._spare = None
-        for owned in (self._moving, self._surfaces, self._pass, self._pictures, self.picture, self._spare):
-            if owned is not None:
-                owned.release()
+        shader.release(self._moving, self._surfaces, self._pass, self._pictures, self.picture, self._spare)
         self._pass = self._pictures = self.picture = self._spare = self._moving = self._surfaces = None
 
 

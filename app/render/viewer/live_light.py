@@ -436,6 +436,4 @@ class LiveLight:
             self.light_pass,
             self.buffers,
         )
-        for owned in owners:
-            if owned is not None:
-                owned.release()
+        shader.release(*owners)

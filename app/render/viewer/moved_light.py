@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...gpu import shader
 from ...model.scene import Scene, SceneObject
 from ...passes.emission_domain import EmissionDomain, emission_domain
 from ...passes.pilot import Pilot, landings_of
@@ -56,8 +57,7 @@ class MovedLight:
         slabs = self._store.of_rounds(0, self._store.rounds)
         records = self._store.read(len(slabs) and 1 << 30, light_pass.trace.photon.dtype)
         layout = light_pass.layout_about(landings_of([Pilot(1, records, [], [])]), light_pass.fit.preview)
-        if self.maps is not None:
-            self.maps.release()
+        shader.release(self.maps)
         self.maps = LightMaps(self._context.ctx, layout, self._features)
         self.maps.clear()
         assert self._tables is not None
@@ -93,8 +93,7 @@ class MovedLight:
     def release(self) -> None:
         """Free everything."""
         self._store.clear()
-        if self.maps is not None:
-            self.maps.release()
+        shader.release(self.maps)
         if self._tables is not None:
             self._tables.forget()
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from ...gpu import shader
 from ..shown_spectra import PassTables
 from .photon_store import PhotonStore
 
@@ -89,6 +90,5 @@ class StoredPasses:
 
     def release(self) -> None:
         """Free everything."""
-        for kept in self._passes:
-            kept.release()
+        shader.release(*self._passes)
         self.running = self._older = None

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from ...base.not_yet import NOT_YET, NotYet
 from ...edit.stored_photons import StoredPhotons
+from ...gpu import shader
 from ...gpu.context_thread import ContextThread, SteppedWork
 from .building import PATIENCE_S
 from .dirty_level import DirtyLevel
@@ -159,8 +160,7 @@ class ThreadedEngine:
         return self._picture
 
     def _forget_picture(self) -> None:
-        if self._picture is not None:
-            self._picture.release()  # the texture itself is the engine's
+        shader.release(self._picture)
         self._picture = self._original = None
 
     @property
