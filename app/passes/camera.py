@@ -27,12 +27,13 @@ from .camera_programs import CameraPrograms, camera_defines, halted_bytes, halti
 from .camera_records import camera_parameters
 from .caustic_maps import CausticMaps
 from .haze import Haze
-from .listed_pixels import ListedPixels
+from .listed_pixels import SURVEYED, ListedPixels
 from .picture_channels import Channels
 from .picture_sums import PictureSums
 from .pixel_lattice import LOOKS, cells_of, is_in_strips, looks_lattice, pixel_lattice
 from .sample_spread import (
     PRIMARY_SAMPLES,
+    SURVEY_KEPT,
     looks_of,
     spread_alone,
     spread_pilot,
@@ -84,6 +85,7 @@ class CameraPass:
         self._ctx = context.ctx
         self._sums = PictureSums(self._ctx, self.channels.targets)
         self._rows = DispatchBudget(1, 1, 1)
+        self._uneven_before_row = np.zeros(1, int)
         self._within_rows = False
         """Some listed pixels of a band of rows have this sample, others are still to get it."""
         self.dispatch_seconds = context.traits.dispatch_s
@@ -389,12 +391,22 @@ class CameraPass:
             rows = min(self._rows.units, height - row)
             parameters["first_row"] = row
             self._listed.clear()
-            took = self._dispatch(
-                self._programs.of("direct"), parameters, maps, -(-width // _GROUP), -(-rows // _GROUP)
-            )
-            self._rows.learn(rows, took, self.dispatch_seconds)
+            self._rows.learn(rows, self._see_rows(parameters, width, row, rows, maps), self.dispatch_seconds)
             yield row, rows
             row += rows
+
+    def _see_rows(self, parameters: np.ndarray, width: int, row: int, rows: int, maps: CausticMaps) -> float:
+        """A sample of what is seen directly in a band of rows; seconds it took."""
+        groups = -(-width // _GROUP), -(-rows // _GROUP)
+        if parameters["survey"] != SURVEY_KEPT:
+            return self._dispatch(self._programs.of("direct"), parameters, maps, *groups)
+        took = self._dispatch(self._programs.of("kept"), parameters, maps, *groups)
+        first, end = self._uneven_before_row[[row, row + rows]]
+        if first == end:
+            return took
+        uneven_at = parameters["survey_at"] + SURVEYED.itemsize // 4 * self._sums.pixels
+        parameters["first_listed"], parameters["end_listed"] = uneven_at + first, uneven_at + end
+        return took + self._dispatch(self._programs.of("direct"), parameters, maps, -(-(end - first) // _GROUP**2), 1)
 
     def _survey(self, parameters: np.ndarray, width: int, height: int, maps: CausticMaps) -> Iterator[float]:
         """Find the pixels in which, and round which, nothing but one surface in the same light is seen directly, and
@@ -404,7 +416,8 @@ class CameraPass:
         for _ in spread_survey(taken):
             for _ in self._seen_directly(taken, width, height, maps):
                 yield 0.0
-        parameters["survey"], parameters["survey_at"] = 2, taken["survey_at"]
+        parameters["survey"], parameters["survey_at"] = SURVEY_KEPT, taken["survey_at"]
+        self._uneven_before_row = self._listed.part_even(width, height)
 
     def _follow_listed(self, parameters: np.ndarray, maps: CausticMaps) -> Iterator[float]:
         """Follow what the listed pixels of a band of rows see, yielding the share done."""

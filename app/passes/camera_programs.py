@@ -172,8 +172,10 @@ _VARIANTS: dict[str, Callable[[Defines], Defines]] = {
     "all": lambda shown: shown,
     "direct": direct_defines,
     "single": single_defines,
+    "kept": direct_defines,
 }
-"""Programs: beyond glass and mirrors, for what is seen directly, and beyond glass of one wavelength."""
+"""Programs: beyond glass and mirrors, for what is seen directly, beyond glass of one wavelength, and for pixels that a
+survey has found even."""
 
 
 class CameraPrograms:
@@ -193,7 +195,8 @@ class CameraPrograms:
         if key not in self._compiled:
             shown = lens_defines(self.defines) if self.has_lens else self.defines
             variants = _VARIANTS[variant](shown)
-            self._compiled[key] = shader.compute(self._ctx, "camera/camera.comp", variants, self.structs)
+            file = "camera/kept.comp" if variant == "kept" else "camera/camera.comp"
+            self._compiled[key] = shader.compute(self._ctx, file, variants, self.structs)
         return self._compiled[key]
 
     def release(self) -> None:

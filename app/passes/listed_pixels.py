@@ -22,8 +22,10 @@ _FIRST = 1024
 _PLACES = 8192
 """Samples that may be under way, where they halt."""
 _LISTED_AT, _HALTED_AT = 0, 4
-SURVEYED_BYTES = 16
-"""What a survey keeps of a pixel (shaders/camera/survey.glsl)."""
+SURVEYED = np.dtype([("key", "u4"), ("mean", "u4", 3)])
+"""What a survey keeps of a pixel (shaders/camera/survey.glsl) …"""
+_UNEVEN_BYTES = 4
+"""… and its number, where it is not even."""
 
 Dispatch = Callable[[int], float]
 """Follows so many pixels, as `first_listed` and its neighbours in the parameters say; seconds it took."""
@@ -57,6 +59,20 @@ class ListedPixels:
             self._surveyed = pixels
             self._reserve()
         return self.room
+
+    def part_even(self, width: int, height: int) -> np.ndarray:
+        """Leave keys to even pixels only, and list the others behind the survey in the order of their rows: at the end
+        of each row, and before the first, how many there are (height + 1,)."""
+        assert self._list is not None and self._surveyed == width * height
+        begins, size = 8 + 4 * self.room, SURVEYED.itemsize * self._surveyed
+        survey = np.frombuffer(self._list.read(size, offset=begins), SURVEYED).copy()
+        even = even_keys(survey["key"].reshape(height, width))
+        survey["key"] = even.ravel()
+        self._list.write(survey, offset=begins)
+        uneven = np.flatnonzero(even == 0).astype("u4")
+        if len(uneven):
+            self._list.write(uneven, offset=begins + size)
+        return np.searchsorted(uneven, width * np.arange(height + 1))
 
     @property
     def count(self) -> int:
@@ -119,11 +135,21 @@ class ListedPixels:
 
     def _reserve(self) -> None:
         shader.release(self._list)
-        self._list = self._ctx.buffer(reserve=8 + 4 * self.room + SURVEYED_BYTES * self._surveyed)
+        bytes_of_surveyed = SURVEYED.itemsize + _UNEVEN_BYTES
+        self._list = self._ctx.buffer(reserve=8 + 4 * self.room + bytes_of_surveyed * self._surveyed)
 
     def release(self) -> None:
         """Free both."""
         shader.release(self._list, self._halted)
+
+
+def even_keys(keys: np.ndarray) -> np.ndarray:
+    """The keys of pixels (H, W) that share theirs with all their neighbours, 0 elsewhere."""
+    height, width = keys.shape
+    padded, even = np.pad(keys, 1, mode="edge"), keys.copy()
+    for row, column in np.ndindex(3, 3):
+        even[padded[row : row + height, column : column + width] != keys] = 0
+    return even
 
 
 def _follow(

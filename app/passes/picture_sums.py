@@ -29,6 +29,11 @@ class PictureSums:
         """Width and height; (0, 0) before there are any."""
         return self.textures[0].size if self.textures else (0, 0)
 
+    @property
+    def pixels(self) -> int:
+        """How many there are."""
+        return self.size[0] * self.size[1]
+
     def clear(self, width: int, height: int) -> bool:
         """Sums of 0 in a picture of this size; whether the size is new."""
         is_new = self.size != (width, height)

@@ -15,6 +15,8 @@ PRIMARY_SAMPLES = LOOKS
 """Of one sample at what is seen directly: outlines and textures there cost a tenth of what glass costs …"""
 PRIMARY_SAMPLES_UNTIL = 64
 """… and with more samples than these they are smooth as they are."""
+SURVEY_TAKES, SURVEY_KEPT = 1, 2
+"""What a sample's parameters say of it: it is one of a survey, or even pixels keep what a survey found."""
 SURVEY_SAMPLES = 2
 """Samples of so many looks each that tell, before a still's first sample, which pixels are even."""
 _SURVEY_GRID = (4, 2)
@@ -55,7 +57,7 @@ def spread_pilot(parameters: np.ndarray, look: PilotRender, samples: int, pixel_
 
 def spread_survey(parameters: np.ndarray) -> Iterator[None]:
     """For the samples of a survey, one after the other."""
-    parameters["survey"], parameters["survey_gain"] = 1, 1.0 / SURVEY_SAMPLES
+    parameters["survey"], parameters["survey_gain"] = SURVEY_TAKES, 1.0 / SURVEY_SAMPLES
     # The looks tile the pixel: what they are averaged over is then all of it, and nothing twice.
     columns, rows = _SURVEY_GRID
     parameters["sample_side"], parameters["cells"] = SURVEY_SAMPLES**-0.5, 0.0

@@ -17,12 +17,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "camera/globals.glsl"
 #include "camera/start.glsl"
 
-// How many pixels are listed, how many of their paths have halted, and what is to be known of the listed ones.
-layout(std430, binding = BIND_LISTED) restrict buffer Listed {
-    uint listed_count;
-    uint halted_count;
-    uint listed[];
-};
+#include "camera/listed.glsl"
 layout(rgba32f, binding = 0) uniform image2D picture[TARGETS];
 
 #ifdef CAMERA_SPECULAR
@@ -64,10 +59,6 @@ PathEnd ended[ENDS_HELD];
 #include "camera/cuts.glsl"
 #endif
 
-// Looks of one sample at what is seen directly, which costs little, have places of their own. Those that meet something
-// specular go on as one of them, chosen by chance; as the sample itself, which lies at one of them, where all do.
-#define THE_SAMPLE 4u
-
 #ifdef LENS
 // 2^32 times the fractions of the cube roots of 2 and 4: badly approximable together, and of no other field than the
 // plastic number's, by which places on lights are drawn.
@@ -84,12 +75,6 @@ vec2 primary_sample_place(uint primary_sample) {
 #ifdef LISTS_SPECULAR
 #include "camera/survey.glsl"
 #endif
-
-// A listed pixel: its number, the primary sample that goes on, and of how many it is one.
-const uint LISTED_BITS = 27u;
-uint listed_entry(uint number, uint primary_sample, uint count) {
-    return number | (primary_sample << LISTED_BITS) | ((count - 1u) << (LISTED_BITS + 3u));
-}
 
 Path camera_path(uvec2 pixel, uint primary_sample, float gain) {
     look_place = primary_sample_place(primary_sample);
@@ -137,6 +122,11 @@ void main() {
     uvec2 pixel = uvec2(number % p.size.x, number / p.size.x);
 #else
     uvec2 pixel = gl_GlobalInvocationID.xy + uvec2(0u, p.first_row);
+    if (p.survey == SURVEY_KEPT) {
+        uint at = p.first_listed + gl_WorkGroupID.x * 64u + gl_LocalInvocationIndex;
+        uint number = listed[min(at, p.end_listed - 1u)];
+        pixel = at < p.end_listed ? uvec2(number % p.size.x, number / p.size.x) : p.size;
+    }
     if (pixel.x >= p.size.x || pixel.y >= p.size.y) return;
 #endif
     uint pixel_key = hash_combine(hash_combine(p.seed, pixel.x), pixel.y);
@@ -152,21 +142,6 @@ void main() {
     if (CAMERA_SPECULAR) stack_size = 0;
 #ifdef LISTS_SPECULAR
     uint number = pixel.y * p.size.x + pixel.x;
-    if (p.survey == SURVEY_KEPT) {
-        uint key = even_key(pixel), sees = key & KIND_BITS;
-        if (COATS && FOLLOWED) {
-            if (sees == SEES_COATED)
-                listed[atomicAdd(listed_count, 1u)] = listed_entry(number, THE_SAMPLE, p.primary_samples);
-            if (sees == SEES_COATED) sees = SEES_DIRECTLY;
-        }
-        if (sees == SEES_DIRECTLY)
-            imageStore(picture[0], ivec2(pixel), imageLoad(picture[0], ivec2(pixel)) + vec4(surveyed_mean(pixel), 0.0));
-        if (FOLLOWED) {
-            if (sees == SEES_SPECULAR)
-                listed[atomicAdd(listed_count, 1u)] = listed_entry(number, THE_SAMPLE, p.primary_samples);
-        }
-        if (key != 0u) return;
-    }
     Survey survey = Survey(0u, vec3(0.0));
 #ifdef FOLLOWED
     uint specular_samples = 0u, chosen = THE_SAMPLE, draw = hash_combine(pixel_key, p.sample_index);
@@ -202,7 +177,7 @@ void main() {
         if (p.survey == SURVEY_TAKES) survey_look(survey, k, sees, met, hit, lights_seen);
     }
     if (p.survey == SURVEY_TAKES) {
-        keep_survey(pixel, survey.key, p.survey_gain * radiance[0].rgb);
+        keep_survey(number, survey.key, p.survey_gain * radiance[0].rgb);
         return;
     }
 #ifdef FOLLOWED
