@@ -19,7 +19,7 @@ from .base.interrupts import INTERRUPTED, exit_code_of, signals_raise
 from .base.memory import waste_little
 
 USER_ERROR = 2
-NOT_PRINTED = 1  # as typer has it for a closed pipe
+NOT_PRINTED = 1  # as click has it for a closed pipe
 _OF_PRINTING = (errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
 
 
@@ -33,7 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with signals_raise() as ended, redirect_stderr(_Patient(stderr)):
         try:
             code = _run(arguments)
-            # Typer knows of Ctrl-C only.
+            # Click knows of Ctrl-C only.
             return _printed(ended.exit_code if code == INTERRUPTED and ended() else code)
         except UserError as error:
             return _tell(str(error), error.exit_code)

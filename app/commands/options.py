@@ -8,19 +8,22 @@ from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, field
 from dataclasses import fields as dataclass_fields
 from pathlib import Path
-from typing import Annotated, Any, TypeVar, get_args, get_type_hints
+from typing import Any, TypeVar, get_args, get_type_hints
 
-import typer
+import click
+from click.shell_completion import CompletionItem
 
 from ..base.errors import UserError, suggestion
 from ..base.memory import MAX_SIDE_PX, memory_bytes
 
 Parse = Callable[[str, str], Any]
 """Reads a text: its arguments are the option's flag, for the sentence of a mistake, and the text."""
+Complete = Callable[[click.Context, str], Iterable[str]]
+"""What a shell offers: its arguments are the line so far, and the word that is being typed."""
 Values = TypeVar("Values")
 
 MAX_PHOTONS = 10**12
@@ -51,8 +54,8 @@ class Option:
     "camera" (the scene's); "" where the command uses the value itself."""
     fields: tuple[str, ...] = ()
     """What those fields are called, where not as the option; a value for several is a tuple."""
-    complete: Callable[..., list[str]] | None = None
-    """What a shell offers for it."""
+    complete: Complete | None = None
+    """None: names of files."""
     repeated: bool = False
     """Whether it may be given several times: its value is then the tuple of what is read from each text."""
     is_argument: bool = False
@@ -74,25 +77,21 @@ class Row:
         """What it is called in sentences."""
         return next((flag for flag in self.option.flags if flag.startswith("--")), f"--{self.name.replace('_', '-')}")
 
-    def parameter(self) -> inspect.Parameter:
-        """The same in typer's terms."""
+    def parameter(self) -> click.Parameter:
+        """The same in click's terms: every value is a text, and None or nothing where none was given."""
         option, is_required = self.option, self.default is MISSING
-        more: dict[str, Any] = {"metavar": option.metavar, "help": option.help, "autocompletion": option.complete}
+        more: dict[str, Any] = {"metavar": option.metavar, "help": option.help, "shell_complete": self._offered}
         if option.is_argument:
-            how = typer.Argument(**more)
-        else:
-            how = typer.Option(*(option.flags or (self.flag,)), **more)
-        base: Any = Path if Path in (self.type, *get_args(self.type)) else str
-        default: Any = None if base is str else self.default
+            return click.Argument([self.name], required=is_required, nargs=-1 if option.repeated else 1, **more)
         if self.is_switch:
-            base, default = self.type, self.default
-        elif option.repeated:
-            base, default = list[base], None
-        annotation = base if is_required or base is bool else base | None
-        default = inspect.Parameter.empty if is_required else default
-        return inspect.Parameter(
-            self.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[annotation, how]
-        )
+            return click.Option([self.name, *(option.flags or (self.flag,))], is_flag=True, default=None, **more)
+        flags = option.flags or (self.flag,)
+        return click.Option([self.name, *flags], required=is_required, multiple=option.repeated, **more)
+
+    def _offered(self, context: click.Context, _: click.Parameter, incomplete: str) -> list[CompletionItem]:
+        words = self.option.complete(context, incomplete) if self.option.complete is not None else ()
+        found = [CompletionItem(word) for word in words if word.startswith(incomplete)]
+        return found or [CompletionItem(incomplete, type="file")]
 
     @property
     def is_switch(self) -> bool:
@@ -100,11 +99,11 @@ class Row:
         return self.type in (bool, bool | None)
 
     def value(self, given: Any) -> Any:
-        """What is meant by what typer gives. Raises `UserError`."""
-        parse = self.option.parse
-        if self.option.repeated:
-            return tuple(given if parse is None else (parse(self.flag, text) for text in given))
-        return given if parse is None else parse(self.flag, given)
+        """What is meant by what click gives. Raises `UserError`."""
+        if self.is_switch:
+            return given
+        parse = self.option.parse or (_path if Path in (self.type, *get_args(self.type)) else _text)
+        return tuple(parse(self.flag, text) for text in given) if self.option.repeated else parse(self.flag, given)
 
 
 def shared(one: Option, default: Any = None) -> Any:
@@ -120,7 +119,7 @@ def option(
     flags: tuple[str, ...] = (),
     sets: str = "",
     fields: tuple[str, ...] = (),
-    complete: Callable[..., list[str]] | None = None,
+    complete: Complete | None = None,
     repeated: bool = False,
     default: Any = None,
 ) -> Any:
@@ -147,7 +146,7 @@ def argument(
     metavar: str,
     help: str,
     *,
-    complete: Callable[..., list[str]] | None = None,
+    complete: Complete | None = None,
     repeated: bool = False,
     default: Any = MISSING,
 ) -> Any:
@@ -169,7 +168,7 @@ def rows(command: type) -> tuple[Row, ...]:
 
 def read(command: type[Values], given: Mapping[str, Any]) -> Values:
     """A command's values, from what was given by the names of its options. Raises `UserError`."""
-    texts = {name: value for name, value in given.items() if value not in (None, [])}
+    texts = {name: value for name, value in given.items() if value not in (None, ())}
     return command(**{row.name: row.value(texts[row.name]) for row in rows(command) if row.name in texts})
 
 
@@ -202,6 +201,14 @@ def _text_of(value: Any) -> str:
 
 
 # ---- how texts are read: each function raises `UserError` -------------------------------------
+
+
+def _text(_: str, text: str) -> str:
+    return text
+
+
+def _path(_: str, text: str) -> Path:
+    return Path(text)
 
 
 def size(flag: str, text: str) -> tuple[int, int]:

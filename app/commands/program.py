@@ -6,18 +6,16 @@ small commands start at once.
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Iterable, Sequence
 from importlib import import_module
-from typing import Annotated, Any
+from typing import Any
 
-import typer
-from typer.core import TyperGroup
+import click
 
 from ..base.errors import UserError
 from ..base.files import allow_outside
 from ..base.version import __version__
-from . import measuring_table, options, table
+from . import completion, measuring_table, options, table
 
 COMMANDS = {
     "render": (table.Render, "render:render_picture"),
@@ -45,85 +43,82 @@ COMMANDS = {
 }
 """By name: the class of a command's values, and the function that gets them and returns the exit code, with its
 module."""
+_HELP = {"help_option_names": ["-h", "--help"], "max_content_width": 120}
 
 
 class _Interrupted(Exception):
-    """Ctrl-C, carried past typer, some of whose versions turn it silently into an exit code."""
+    """Ctrl-C, carried past click, which would print an empty line."""
 
 
-class _Program(TyperGroup):
-    def invoke(self, ctx: typer.Context) -> object:  # type: ignore[override]
+class _Commands(click.Group):
+    def invoke(self, ctx: click.Context) -> object:
         """Run the command."""
         try:
             return super().invoke(ctx)
         except KeyboardInterrupt as interrupt:
             raise _Interrupted from interrupt
 
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """In the order of the table."""
+        return list(self.commands)
+
 
 def run(arguments: Sequence[str]) -> int:
     """Run one command line; returns the exit code. Raises `UserError` for wrong usage."""
     names = [name for name in COMMANDS if [name] == list(arguments[:1])] or COMMANDS
     try:
-        code = program(names)(args=list(arguments) or ["--help"], prog_name="spectrasplat", standalone_mode=False)
-    except _Interrupted as interrupted:
+        code = program(names).main(list(arguments) or ["--help"], prog_name="spectrasplat", standalone_mode=False)
+    except (_Interrupted, click.Abort) as interrupted:
         raise (interrupted.__cause__ or KeyboardInterrupt()) from None
-    except Exception as error:
-        # click's usage errors; typer has moved click inside itself, so there is no one class to name.
-        if not hasattr(error, "format_message"):
-            raise
+    except click.ClickException as error:
         raise UserError(_usage_sentence(error.format_message())) from error
     return code if isinstance(code, int) else 0
 
 
 def _usage_sentence(message: str) -> str:
-    sentence = message.strip().rstrip(".").replace(". Did you", ", did you")
+    sentence = message.strip().rstrip(".?").replace(". Did you", ", did you")
     return f"{sentence[:1].lower()}{sentence[1:]}; 'spectrasplat --help' shows the usage"
 
 
-def _print_version(wanted: bool) -> None:
-    if wanted:
-        print(f"spectrasplat {__version__}")
-        raise typer.Exit
-
-
-def _options(
-    version: Annotated[
-        bool, typer.Option("--version", help="Print the version.", callback=_print_version, is_eager=True)
-    ] = False,
-) -> None:
-    """Dispersive caustics: light through glass, split into its colours."""
-
-
-def _command(values: type, runs: str) -> Callable[..., None]:
-    """The function whose signature tells typer which options there are."""
+def _command(name: str, values: type, runs: str) -> click.Command:
     module, function = runs.split(":")
 
-    def command(**given: Any) -> None:
+    def command(**given: Any) -> int:
         typed: Any = options.read(values, given)
         if isinstance(typed, table.ReadsScenes):
             allow_outside(typed.allow_outside)
-        raise typer.Exit(getattr(import_module(f"{__package__}.{module}"), function)(typed))
+        return getattr(import_module(f"{__package__}.{module}"), function)(typed)
 
     parameters = [row.parameter() for row in options.rows(values)]
-    command.__doc__ = values.__doc__
-    command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-    command.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
-    return command
+    return click.Command(name, callback=command, params=parameters, help=values.__doc__)
 
 
-def program(names: Iterable[str] = COMMANDS) -> typer.Typer:
-    """The program with these of its commands: typer takes a tenth of a second to learn them all."""
-    app = typer.Typer(
-        name="spectrasplat",
-        cls=_Program,
-        pretty_exceptions_enable=False,
-        no_args_is_help=False,
-        context_settings={"help_option_names": ["-h", "--help"]},
+def _ends(flag: str, help: str, does: Callable[[], None]) -> click.Option:
+    """An option of the program itself, which ends it."""
+
+    def callback(context: click.Context, _: click.Parameter, wanted: bool) -> None:
+        if wanted:
+            does()
+            context.exit()
+
+    return click.Option([flag], is_flag=True, is_eager=True, expose_value=False, help=help, callback=callback)
+
+
+def program(names: Iterable[str] = COMMANDS) -> click.Group:
+    """The program with these of its commands."""
+    app = _Commands(
+        help="Dispersive caustics: light through glass, split into its colours.",
+        context_settings=_HELP,
+        params=[
+            _ends("--version", "Print the version.", lambda: print(f"spectrasplat {__version__}")),
+            _ends("--install-completion", "Complete words in this shell from now on.", completion.install),
+            _ends("--show-completion", "Print the script that does so.", lambda: print(completion.script())),
+        ],
     )
-    app.callback()(_options)
-    farm = typer.Typer(help="Render on many workers, here or on a Dask cluster; needs the extra 'farm'.")
-    app.add_typer(farm, name="farm")
+    farm = _Commands("farm", help="Render on many workers, here or on a Dask cluster; needs the extra 'farm'.")
     for name in names:
-        group = farm if name.startswith("farm ") else app
-        group.command(name.removeprefix("farm "))(_command(*COMMANDS[name]))
+        group, own = (farm, name.removeprefix("farm ")) if name.startswith("farm ") else (app, name)
+        group.add_command(_command(own, *COMMANDS[name]))
+    if farm.commands:
+        app.add_command(farm)
     return app

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import typer
+import click
 from spectrasplat.commands import program
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "command-line.md"
@@ -15,8 +15,8 @@ MARK = "<!-- From here on written by tests/unit/command_reference.py -->\n"
 def commands() -> dict[str, Any]:
     """Every command of the program, as click has it, by name; those of a group by both words."""
     found: dict[str, Any] = {}
-    for name, command in typer.main.get_command(program.program()).commands.items():
-        inner = getattr(command, "commands", None)
+    for name, command in program.program().commands.items():
+        inner = command.commands if isinstance(command, click.Group) else None
         found |= {name: command} if inner is None else {f"{name} {word}": each for word, each in inner.items()}
     return found
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -408,16 +409,16 @@ def answer(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) 
     def ask(shell: str, line: str) -> str:
         asked = {
             "bash": {"COMP_WORDS": line, "COMP_CWORD": str(len(line.split(" ")) - 1)},
-            "zsh": {"_TYPER_COMPLETE_ARGS": line},
-            "fish": {"_TYPER_COMPLETE_ARGS": line, "_TYPER_COMPLETE_FISH_ACTION": "get-args"},
+            "zsh": {"COMP_WORDS": line, "COMP_CWORD": str(len(line.split(" ")) - 1)},
+            "fish": {"COMP_WORDS": line, "COMP_CWORD": line.split(" ")[-1]},
         }[shell]
-        for name, value in (asked | {"_SPECTRASPLAT_COMPLETE": f"complete_{shell}"}).items():
+        for name, value in (asked | {"_SPECTRASPLAT_COMPLETE": f"{shell}_complete"}).items():
             monkeypatch.setenv(name, value)
         with pytest.raises(SystemExit):
             main([])
         captured = capsys.readouterr()
         assert captured.err == ""
-        return captured.out
+        return captured.out.replace("plain,", "").replace("file,", "files: ")
 
     return ask
 
@@ -454,11 +455,27 @@ def test_a_scene_that_cannot_be_read_offers_nothing(
     (tmp_path / "broken.toml").write_text("= 3")
     (tmp_path / "folder").mkdir()
     monkeypatch.chdir(tmp_path)
-    assert answer("bash", f"spectrasplat bake {scene} ").strip() == ""
+    assert answer("bash", f"spectrasplat bake {scene} ").strip() == "files:"
 
 
-def test_the_script_of_a_shell_is_shown() -> None:
-    asked = os.environ | {"_SPECTRASPLAT_COMPLETE": "source_bash"}
-    command = [sys.executable, "-P", "-m", "spectrasplat"]
-    done = subprocess.run(command, env=asked, capture_output=True, text=True, check=False)
-    assert "_SPECTRASPLAT_COMPLETE" in done.stdout and "spectrasplat" in done.stdout
+def test_options_without_words_offer_files(answer: Callable[[str, str], str]) -> None:
+    assert answer("bash", "spectrasplat render prism -o pict").strip() == "files: pict"
+
+
+@pytest.mark.parametrize("shell", [shell for shell in SHELLS if shutil.which(shell)])
+def test_the_script_of_a_shell_is_shown_and_installed_once(
+    shell: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("SHELL", f"/bin/{shell}")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert main(["--show-completion"]) == 0
+    script = capsys.readouterr().out
+    assert "_SPECTRASPLAT_COMPLETE" in script and "spectrasplat" in script
+    assert main(["--install-completion"]) == main(["--install-completion"]) == 0
+    (file,) = (each for each in tmp_path.rglob("*") if each.is_file())
+    assert file.read_text().count(script.strip()) == 1
+
+
+def test_an_unknown_shell_has_no_script(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setenv("SHELL", "/bin/tcsh")
+    assert "known are bash, zsh, fish" in complaint(capsys, "--install-completion")

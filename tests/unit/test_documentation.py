@@ -11,9 +11,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import click
 import pytest
 import python_reference
-import typer
 from command_reference import MARK, PAGE, commands, reference
 from spectrasplat.commands import program
 
@@ -62,16 +62,16 @@ def complaint(command: str) -> str:
         return ""
     known: dict[str, Any] = commands()
     if words[0].startswith("-"):
-        options = {o for p in typer.main.get_command(program.program()).params for o in p.opts}
+        options = {o for p in program.program().params for o in p.opts}
         return "" if words[0] in options else f"no option {words[0]}"
     name = next((name for name in (" ".join(words[:2]), words[0]) if name in known), None)
     if name is None:
         return f"no command {words[0]}"
     try:
         known[name].make_context(name, words[len(name.split()) :], resilient_parsing=False)
-    except Exception as error:  # noqa: BLE001 - click's usage errors, which typer has moved
+    except click.UsageError as error:
         needs_more = {"Missing argument", "Missing option"}
-        message = getattr(error, "format_message", error.__str__)()
+        message = error.format_message()
         return "" if any(message.startswith(start) for start in needs_more) else message
     return ""
 
