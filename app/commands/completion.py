@@ -83,11 +83,9 @@ def method_lists(_: click.Context, incomplete: str) -> list[str]:
 
 def script() -> str:
     """What the user's shell has to read. Raises `UserError` for a shell that is not known."""
-    from .program import program
-
     found = get_completion_class(_shell())
     assert found is not None
-    return found(program(()), {}, "spectrasplat", "_SPECTRASPLAT_COMPLETE").source()
+    return found(click.Command("spectrasplat"), {}, "spectrasplat", "_SPECTRASPLAT_COMPLETE").source()
 
 
 def install() -> None:
