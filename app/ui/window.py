@@ -116,7 +116,7 @@ class Window:
         self._handle = _create(place, visible)
         glfw.make_context_current(self._handle)
         loader: Any = GlfwLoader()
-        self.context = Context(moderngl.create_context(require=GL_VERSION_CODE, context=loader))
+        self.context = Context(moderngl.create_context(require=GL_VERSION_CODE, context=loader), "window")
         # A GPU waits for the screen; on the processor waiting would be time taken from the photons.
         glfw.swap_interval(0 if self.context.is_software else 1)
         self._screen = self.context.ctx.detect_framebuffer(0)
@@ -453,7 +453,7 @@ def _entered(hidden: Any) -> Context:
     """The context of a hidden window, made current on the thread that asks."""
     glfw.make_context_current(hidden)
     loader: Any = GlfwLoader()
-    context = Context(moderngl.create_context(require=GL_VERSION_CODE, context=loader))
+    context = Context(moderngl.create_context(require=GL_VERSION_CODE, context=loader), "window")
     unlocked.unlock(context.ctx, loader.load)
     return context
 

@@ -142,6 +142,14 @@ def test_module_does_not_load(
     assert check.usable is usable
 
 
+def test_osmesa_is_optional(monkeypatch: pytest.MonkeyPatch) -> None:
+    def load() -> None:
+        raise OSError("none")
+
+    monkeypatch.setattr("spectrasplat.gpu.osmesa.load_library", load)
+    assert found("OSMesa").state == "optional"
+
+
 def test_cache_folder_not_writable(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     def refuse() -> Path:
         raise PermissionError(13, "Permission denied", str(tmp_path))
