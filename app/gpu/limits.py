@@ -3,97 +3,67 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 from ..base.errors import UserError
 
 
+def _limit(name: str, needed: int | tuple[int, int, int]) -> Any:
+    """A limit that OpenGL calls `name`, of which at least `needed` is there."""
+    return field(metadata={"name": name, "needed": needed})
+
+
 @dataclass(frozen=True)
 class Limits:
-    """Limits of one OpenGL context, read once."""
+    """Limits of one OpenGL context, read once.
 
-    storage_block_bytes: int
+    What is needed of each is what OpenGL 4.3 promises (core specification, tables 23.55–23.74): a driver that has less
+    is not a 4.3 driver, whatever it says. There are two exceptions: splats are drawn by vertex shaders that fetch their
+    records (5 storage blocks, where none are promised), and passes have binding points of their own, so that none is
+    bound twice in a frame (23, where 8 are promised). A test holds that no program of a shipped scene needs more."""
+
+    storage_block_bytes: int = _limit("GL_MAX_SHADER_STORAGE_BLOCK_SIZE", 1 << 24)
     """Largest shader storage block; photon batches are cut to it."""
-    storage_blocks: int
-    """Storage blocks one compute shader may see …"""
-    vertex_storage_blocks: int
-    """… a vertex shader: OpenGL promises none, and splats are drawn from one …"""
-    fragment_storage_blocks: int
-    """… and a fragment shader."""
-    storage_bindings: int
-    """Binding points of storage blocks, for all shaders together."""
-    uniform_blocks: int
-    """Of a compute shader."""
-    compute_textures: int
-    """Texture units of a compute shader, …"""
-    vertex_textures: int
+    storage_blocks: int = _limit("GL_MAX_COMPUTE_SHADER_STORAGE_BLOCKS", 8)
+    """Storage blocks of a compute shader …"""
+    vertex_storage_blocks: int = _limit("GL_MAX_VERTEX_SHADER_STORAGE_BLOCKS", 5)
     """… of a vertex shader …"""
-    fragment_textures: int
+    fragment_storage_blocks: int = _limit("GL_MAX_FRAGMENT_SHADER_STORAGE_BLOCKS", 8)
     """… and of a fragment shader."""
-    work_group_count: tuple[int, int, int]
-    """Work groups a dispatch may have; past it nothing runs and only the error flag tells."""
-    work_group_size: tuple[int, int, int]
-    work_group_invocations: int
-    draw_buffers: int
-    color_attachments: int
-    texture_px: int
+    storage_bindings: int = _limit("GL_MAX_SHADER_STORAGE_BUFFER_BINDINGS", 23)
+    """Binding points of storage blocks, for all shaders together."""
+    uniform_blocks: int = _limit("GL_MAX_COMPUTE_UNIFORM_BLOCKS", 12)
+    """Of a compute shader."""
+    compute_textures: int = _limit("GL_MAX_COMPUTE_TEXTURE_IMAGE_UNITS", 16)
+    """Texture units of a compute shader …"""
+    vertex_textures: int = _limit("GL_MAX_VERTEX_TEXTURE_IMAGE_UNITS", 16)
+    """… of a vertex shader …"""
+    fragment_textures: int = _limit("GL_MAX_TEXTURE_IMAGE_UNITS", 16)
+    """… and of a fragment shader."""
+    work_group_count: tuple[int, int, int] = _limit("GL_MAX_COMPUTE_WORK_GROUP_COUNT", (65535, 65535, 65535))
+    """Work groups a dispatch may have; past it nothing runs and only the error flag reports it."""
+    work_group_size: tuple[int, int, int] = _limit("GL_MAX_COMPUTE_WORK_GROUP_SIZE", (1024, 1024, 64))
+    work_group_invocations: int = _limit("GL_MAX_COMPUTE_WORK_GROUP_INVOCATIONS", 1024)
+    draw_buffers: int = _limit("GL_MAX_DRAW_BUFFERS", 8)
+    color_attachments: int = _limit("GL_MAX_COLOR_ATTACHMENTS", 8)
+    texture_px: int = _limit("GL_MAX_TEXTURE_SIZE", 16384)
     """Largest side of a 2D texture."""
-    uniform_block_bytes: int
+    uniform_block_bytes: int = _limit("GL_MAX_UNIFORM_BLOCK_SIZE", 16384)
 
     @classmethod
     def read(cls, info: Mapping[str, Any]) -> Limits:
-        """From `moderngl.Context.info`; a limit the driver does not tell counts as 0."""
+        """From `moderngl.Context.info`; a limit that the driver does not report counts as 0."""
 
-        def one(name: str) -> int:
+        def value(name: str, needed: int | tuple[int, ...]) -> Any:
+            if isinstance(needed, tuple):
+                return tuple(int(v) for v in info.get(name, (0,) * len(needed)))
             return int(info.get(name, 0))
 
-        def three(name: str) -> tuple[int, int, int]:
-            x, y, z = info.get(name, (0, 0, 0))
-            return int(x), int(y), int(z)
-
-        return cls(
-            storage_block_bytes=one("GL_MAX_SHADER_STORAGE_BLOCK_SIZE"),
-            storage_blocks=one("GL_MAX_COMPUTE_SHADER_STORAGE_BLOCKS"),
-            vertex_storage_blocks=one("GL_MAX_VERTEX_SHADER_STORAGE_BLOCKS"),
-            fragment_storage_blocks=one("GL_MAX_FRAGMENT_SHADER_STORAGE_BLOCKS"),
-            storage_bindings=one("GL_MAX_SHADER_STORAGE_BUFFER_BINDINGS"),
-            uniform_blocks=one("GL_MAX_COMPUTE_UNIFORM_BLOCKS"),
-            compute_textures=one("GL_MAX_COMPUTE_TEXTURE_IMAGE_UNITS"),
-            vertex_textures=one("GL_MAX_VERTEX_TEXTURE_IMAGE_UNITS"),
-            fragment_textures=one("GL_MAX_TEXTURE_IMAGE_UNITS"),
-            work_group_count=three("GL_MAX_COMPUTE_WORK_GROUP_COUNT"),
-            work_group_size=three("GL_MAX_COMPUTE_WORK_GROUP_SIZE"),
-            work_group_invocations=one("GL_MAX_COMPUTE_WORK_GROUP_INVOCATIONS"),
-            draw_buffers=one("GL_MAX_DRAW_BUFFERS"),
-            color_attachments=one("GL_MAX_COLOR_ATTACHMENTS"),
-            texture_px=one("GL_MAX_TEXTURE_SIZE"),
-            uniform_block_bytes=one("GL_MAX_UNIFORM_BLOCK_SIZE"),
-        )
+        return cls(**{limit.name: value(**limit.metadata) for limit in fields(cls)})
 
 
-# OpenGL 4.3 promises these (core specification, tables 23.55–23.74), and a driver that has less is not a 4.3 driver in
-# fact, whatever it says; but for two. Splats are drawn by vertex shaders that fetch their records: 5 storage blocks,
-# where none are promised. And the passes have binding points of their own, so that none is bound twice in a frame: 23,
-# where 8 are promised. A test holds that no program of a shipped scene asks for more.
-NEEDED = Limits(
-    storage_block_bytes=1 << 24,
-    storage_blocks=8,
-    vertex_storage_blocks=5,
-    fragment_storage_blocks=8,
-    storage_bindings=23,
-    uniform_blocks=12,
-    compute_textures=16,
-    vertex_textures=16,
-    fragment_textures=16,
-    work_group_count=(65535, 65535, 65535),
-    work_group_size=(1024, 1024, 64),
-    work_group_invocations=1024,
-    draw_buffers=8,
-    color_attachments=8,
-    texture_px=16384,
-    uniform_block_bytes=16384,
-)
+NEEDED = Limits(**{limit.name: limit.metadata["needed"] for limit in fields(Limits)})
 BRUSH_STORAGE_BLOCKS = 10
 """Storage blocks of footprint.comp where dispersion is brushed onto glass and shown by index."""
 _BEYOND_PROMISE = {
@@ -104,7 +74,7 @@ _BEYOND_PROMISE = {
 
 
 def check_splats(limits: Limits) -> None:
-    """Raise `UserError` where splats cannot be drawn, before a driver says so in words of its own."""
+    """Raise `UserError` where splats cannot be drawn, before a driver says so in its own words."""
     for name, words in _BEYOND_PROMISE.items():
         found, needed = getattr(limits, name), getattr(NEEDED, name)
         if found < needed:

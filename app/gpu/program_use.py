@@ -57,21 +57,12 @@ class StageUse:
 
     def over(self, limits: Limits) -> list[str]:
         """A sentence for each limit that it exceeds."""
-        storage_blocks = {
-            "compute": limits.storage_blocks,
-            "vertex": limits.vertex_storage_blocks,
-            "fragment": limits.fragment_storage_blocks,
-        }[self.stage]
-        textures = {
-            "compute": limits.compute_textures,
-            "vertex": limits.vertex_textures,
-            "fragment": limits.fragment_textures,
-        }[self.stage]
+        prefix = "" if self.stage == "compute" else f"{self.stage}_"
         asked = (
-            ("storage blocks", len(self.storage), storage_blocks),
+            ("storage blocks", len(self.storage), getattr(limits, f"{prefix}storage_blocks")),
             ("binding points of storage blocks", self.storage_bindings, limits.storage_bindings),
             ("uniform blocks", len(self.uniform), limits.uniform_blocks),
-            ("texture units", self.textures, textures),
+            ("texture units", self.textures, getattr(limits, f"{self.stage}_textures")),
             ("image units", self.images, PROMISED_IMAGES),
             ("bytes of shared memory", self.shared_bytes, PROMISED_SHARED_BYTES),
         )
