@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from ..base.errors import UserError
+from ..base.generators import finished
 from .asking import Count, Size, check_scene, settings_of
 from .device import Cancel, Device, Progress
 from .picture import CausticMap, Picture, Statistics
@@ -110,12 +111,7 @@ def caustic(
 
         started = time.perf_counter()
         steps = bake.bake_map(context, Stage(model, model.camera), settings, receiver, stopped)
-        while True:
-            try:
-                report(next(steps), "baking")
-            except StopIteration as finished:
-                baked: bake.BakedMap = finished.value
-                break
+        baked = finished(steps, lambda share: report(share, "baking"))
         took, count = time.perf_counter() - started, baked.photons
         notices = tuple(baked.notices)
         stats = Statistics(count, count, 0, took, context.renderer, context.is_software, stopped(), notices)

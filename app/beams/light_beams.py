@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -113,8 +113,8 @@ class BeamFinder:
         go_on: GoOn = lambda steps: True,
         *,
         hands: bool = False,
-    ) -> Iterator[float | LightBeams]:
-        """All beams, pausing with the share that is done; what comes last is the result.
+    ) -> Generator[float, None, LightBeams]:
+        """All beams, pausing with the share that is done.
 
         `threshold`: share of the light that meets facets below which a beam plays roulette, or with `hands` is left to
         photons, unless its light has both emission lines and a continuum; `depth`: most specular events; `light_parts`:
@@ -168,7 +168,7 @@ class BeamFinder:
             result.sums[i] = sums
         result.polygons = joined(polygons) if polygons else None
         result.pieces = joined(pieces) if pieces else None
-        yield result
+        return result
 
 
 _HANDED = 1.0 / 16.0

@@ -13,7 +13,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from ..beams.light_beams import LightBeams
+from ..base.generators import finished
 from ..beams.search import SUM_ENTERED, SUM_HANDED
 from ..gpu.context import Context
 from ..model.geometry.mesh import Mesh
@@ -120,10 +120,8 @@ def scene_of(mesh: Mesh) -> Scene:
 
 
 def _searched(beams: BeamLight, facets: int, threshold: float) -> BeamCost:
-    found, start = LightBeams({}), time.perf_counter()
-    for step in beams.finder.find(threshold, _DEPTH, 1, hands=True):
-        if isinstance(step, LightBeams):
-            found = step
+    start = time.perf_counter()
+    found = finished(beams.finder.find(threshold, _DEPTH, 1, hands=True))
     seconds = time.perf_counter() - start
     (sums,) = found.sums.values()
     return BeamCost(

@@ -14,6 +14,7 @@ from functools import lru_cache
 import moderngl
 import numpy as np
 
+from ..base.generators import finished
 from ..features.features import Features
 from ..features.program_switches import switched
 from ..gpu import bindings, records, shader
@@ -271,12 +272,7 @@ class TracePass:
         """Trace `piece.count` ≤ batch lattice points; their photons replace the buffer's content.
 
         `max_depth`: specular events, by default the pass's own."""
-        steps = self.steps(piece, domain, max_depth)
-        while True:
-            try:
-                next(steps)
-            except StopIteration as done:
-                return done.value
+        return finished(self.steps(piece, domain, max_depth))
 
     def steps(
         self,

@@ -8,12 +8,14 @@ photons asks and with roulette's numbers of its own, so that a pass is even when
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base.generators import finished, mapped, timed
 from ..beams.light_beams import BeamFinder, LightBeams
 from ..beams.polygons import BeamPolygons, joined
 from ..beams.search import (
@@ -100,6 +102,14 @@ class BeamStats:
     find_seconds: float = 0.0
     draw_seconds: float = 0.0
 
+    def count_finding(self, seconds: float) -> None:
+        """A search took so much more time."""
+        self.find_seconds += seconds
+
+    def count_drawing(self, seconds: float) -> None:
+        """Drawing took so much more time."""
+        self.draw_seconds += seconds
+
 
 SURVEY_PARTS = 4
 MOVING_PARTS = 1
@@ -142,12 +152,12 @@ class BeamLight:
         shown: ShownSpectra,
         depth: int,
         *,
-        beside: bool = False,
+        in_thread: bool = False,
     ) -> None:
-        """`beside`: search in a thread of its own, with pauses in which somebody draws."""
+        """`in_thread`: search in a thread of its own, with pauses in which somebody draws."""
         self._context, self._buffers = context, buffers
         self._depth = depth
-        self._worker = BeamWorker(depth, beside=beside)
+        self._worker = BeamWorker(in_thread=in_thread)
         self.frames = {
             r: plane_frame(buffers.space.to_gpu(buffers.world_meshes[i].vertices))
             for r, i in enumerate(buffers.receivers)
@@ -188,8 +198,8 @@ class BeamLight:
         light_parts = SURVEY_PARTS if moving is None else MOVING_PARTS
         if not _compiled:
             # The first search of all may have to be compiled, which says nothing about the scene.
-            for _ in self._worker.searched(self.finder, 1.0, _MOVING_WORD, 1, threads=None):
-                yield COMPILING
+            search = partial(self.finder.find, 1.0, self._depth, _MOVING_WORD, 1)
+            yield from mapped(self._worker.searched(search, threads=None), lambda share: COMPILING)
             _compiled.append(True)
             yield SEARCHING
         each, work = _STEP_FACETS + len(self.finder.scene.facets), 0
@@ -199,16 +209,14 @@ class BeamLight:
             work += each * steps
             return work < _DEAREST
 
-        found = strongest = LightBeams({})
-        for step in self._worker.searched(self.finder, threshold, _MOVING_WORD, light_parts, pays, None):
-            if isinstance(step, LightBeams):
-                found = step
-            yield None
+        def surveyed(at: float, *, hands: bool) -> Generator[None, None, LightBeams]:
+            search = partial(self.finder.find, at, self._depth, _MOVING_WORD, light_parts, hands=hands)
+            return (yield from mapped(self._worker.searched(search, pays, None), lambda share: None))
+
+        found = yield from surveyed(threshold, hands=False)
+        strongest = LightBeams({})
         if pays(0):
-            for step in self._worker.searched(self.finder, SURVEY, _MOVING_WORD, light_parts, pays, None, hands=True):
-                if isinstance(step, LightBeams):
-                    strongest = step
-                yield None
+            strongest = yield from surveyed(SURVEY, hands=True)
         if not pays(0):
             self.why_not = "the strongest beams alone are so many that photons are cheaper"
             return
@@ -261,21 +269,16 @@ class BeamLight:
         """Find beams as fine as `photons` ask and add them to `maps` times `weight`, pausing with the share done.
         `word`: roulette's seed; without `hands` all weak beams play it, and none is left to photons, which would follow
         the glass that is traced even where another is shown."""
-        stats, started = self.stats, time.perf_counter()
+        stats = self.stats
         hands = hands and self.finder is self._traced
         self.finder.set_texels(self._texels(maps.layout, photons))
-        found, surveyed = LightBeams({}), self._handing if hands else self._surveyed
+        surveyed = self._handing if hands else self._surveyed
         growth = _GROWTH_HANDED if hands else _GROWTH
         finest = _finest(SURVEY, surveyed)
         while True:
             threshold = max(self._threshold(photons, surveyed, growth), finest)
-            for step in self._worker.searched(self.finder, threshold, word, hands=hands):
-                stats.find_seconds += time.perf_counter() - started
-                if isinstance(step, LightBeams):
-                    found = step
-                else:
-                    yield 0.5 * step
-                started = time.perf_counter()
+            search = self._worker.searched(partial(self.finder.find, threshold, self._depth, word, hands=hands))
+            found = yield from mapped(timed(search, stats.count_finding), lambda share: 0.5 * share)
             # Where light leaves for good, fewer weak beams follow than thought: such are searched for again, finer.
             # What is learnt here is forgotten: a pass must not depend on those before it.
             followed = found.followed()
@@ -290,15 +293,15 @@ class BeamLight:
         self.found = found
         self._count(found)
         if found.polygons is not None:
-            drawn = 0
-            for more in self.drawing.steps(found.polygons, maps, weight):
-                drawn += more
-                stats.draw_seconds += time.perf_counter() - started
-                yield 0.5 + 0.5 * drawn / max(drawn, len(found.polygons))
-                started = time.perf_counter()
-            self._context.finish()
-        stats.draw_seconds += time.perf_counter() - started
+            yield from timed(self._drawn(found.polygons, maps, weight), stats.count_drawing)
         yield 1.0
+
+    def _drawn(self, polygons: BeamPolygons, maps: LightMaps, weight: float) -> Generator[float]:
+        drawn = 0
+        for more in self.drawing.steps(polygons, maps, weight):
+            drawn += more
+            yield 0.5 + 0.5 * drawn / max(drawn, len(polygons))
+        self._context.finish()
 
     @property
     def _photons_a_beam(self) -> float:
@@ -403,7 +406,7 @@ class BeamLight:
         self._survey_polygons = _found(self.finder, SURVEY, self._depth).polygons
 
     def pause(self) -> None:
-        """Stop the search that runs beside, for something more urgent; whoever goes on waiting for it begins again."""
+        """See `BeamWorker.pause`."""
         self._worker.pause()
 
     def _count(self, found: LightBeams) -> None:
@@ -437,9 +440,7 @@ class BeamLight:
 
 def _found(finder: BeamFinder, threshold: float, depth: int) -> LightBeams:
     """The beams of a search in motion."""
-    *_, found = finder.find(threshold, depth, _MOVING_WORD, MOVING_PARTS)
-    assert isinstance(found, LightBeams)
-    return found
+    return finished(finder.find(threshold, depth, _MOVING_WORD, MOVING_PARTS))
 
 
 def _finest(threshold: float, followed: float) -> float:

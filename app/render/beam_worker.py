@@ -1,93 +1,50 @@
-"""Searches for beams in a thread of their own, beside whoever draws."""
+"""Searches for beams in a thread of their own, while somebody draws."""
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Generator
 from concurrent.futures import ThreadPoolExecutor, wait
 
 from ..beams.find import GoOn
-from ..beams.light_beams import LIGHT_PARTS, BeamFinder, LightBeams
+from ..beams.light_beams import LightBeams
 
 _PAUSE_S = 0.003
 """How long a pause lasts while a search runs."""
+Found = Generator[float, None, LightBeams]
 
 
 class BeamWorker:
     """Searches in its thread, or where it has none in the caller's."""
 
-    def __init__(self, depth: int, *, beside: bool) -> None:
-        """`depth`: specular events; `beside`: in a thread of its own, with pauses in which somebody draws."""
-        self._depth = depth
-        self._pool = ThreadPoolExecutor(1, "beams") if beside else None
+    def __init__(self, *, in_thread: bool) -> None:
+        self._pool = ThreadPoolExecutor(1, "beams") if in_thread else None
         self._stop = threading.Event()
 
     def searched(
-        self,
-        finder: BeamFinder,
-        threshold: float,
-        word: int,
-        light_parts: int = LIGHT_PARTS,
-        go_on: GoOn = lambda steps: True,
-        threads: int | None = 1,
-        *,
-        hands: bool = False,
-    ) -> Iterator[float | LightBeams]:
-        """`BeamFinder.find`, beside whoever draws if so asked (by `threads`); stopped where nobody waits for it any
-        more."""
+        self, search: Callable[..., Found], go_on: GoOn = lambda steps: True, threads: int | None = 1
+    ) -> Found:
+        """What `search(go_on=…, threads=…)` finds (`BeamFinder.find`). In the thread it takes so many `threads`, pauses
+        while somebody draws, and is stopped where nobody waits for it any more."""
         if self._pool is None:
-            yield from finder.find(threshold, self._depth, word, light_parts, None, go_on, hands=hands)
-            return
+            return (yield from search(go_on=go_on, threads=None))
         while True:
             self.pause()  # nobody waits for the one before
             stop, done = threading.Event(), [0.0]
             self._stop = stop
-            future = self._pool.submit(
-                self._search, finder, threshold, word, light_parts, threads, go_on, stop, done, hands
-            )
+            steps = search(go_on=lambda n, stop=stop: go_on(n) and not stop.is_set(), threads=threads)
+            future = self._pool.submit(_run, steps, stop, done)
             try:
                 while not future.done():
                     wait([future], _PAUSE_S)
                     yield done[0]
                 if not stop.is_set():
-                    yield future.result()
-                    return
+                    return future.result()
             finally:
                 stop.set()
 
-    def _search(
-        self,
-        finder: BeamFinder,
-        threshold: float,
-        word: int,
-        light_parts: int,
-        threads: int | None,
-        go_on: GoOn,
-        stop: threading.Event,
-        done: list[float],
-        hands: bool,
-    ) -> LightBeams:
-        """In the thread; what is stopped returns nothing of use."""
-        found = LightBeams({})
-        for step in finder.find(
-            threshold,
-            self._depth,
-            word,
-            light_parts,
-            threads,
-            lambda steps: go_on(steps) and not stop.is_set(),
-            hands=hands,
-        ):
-            if stop.is_set():
-                break
-            if isinstance(step, LightBeams):
-                found = step
-            else:
-                done[0] = step
-        return found
-
     def pause(self) -> None:
-        """Stop the search that runs beside, for something more urgent; whoever goes on waiting for it begins again."""
+        """Stop the search that runs in the thread, for something more urgent; whoever waits for it begins it again."""
         self._stop.set()
 
     def release(self) -> None:
@@ -95,3 +52,13 @@ class BeamWorker:
         self.pause()
         if self._pool is not None:
             self._pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _run(steps: Found, stop: threading.Event, done: list[float]) -> LightBeams:
+    """In the thread; what is stopped returns nothing of use."""
+    try:
+        while not stop.is_set():
+            done[0] = next(steps)
+    except StopIteration as end:
+        return end.value
+    return LightBeams({})

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import moderngl
 import numpy as np
 
+from ..base.generators import finished
 from ..features.features import Features
 from ..gpu import shader, splat_tables
 from ..gpu.context import Context
@@ -309,15 +310,13 @@ class LightPass:
         """One shifted set of lattices with about `photons` points over all lights. `proceed(fraction)` is asked after
         every slice; returns False when it said stop, see `steps_until`."""
         goes_on, done = True, 0.0
-        steps = self.steps_until(number, photons, lambda: not goes_on)
-        while True:
-            try:
-                fraction = next(steps)
-            except StopIteration as finished:
-                return finished.value
+
+        def paused(fraction: float) -> None:
+            nonlocal goes_on, done
             if fraction > done:
-                done = fraction
-                goes_on = proceed(done)
+                done, goes_on = fraction, proceed(fraction)
+
+        return finished(self.steps_until(number, photons, lambda: not goes_on), paused)
 
     def steps_until(self, number: int, photons: int, stop: Callable[[], bool]) -> Generator[float, None, bool]:
         """A pass, pausing with the share done; returns False when `stop` left part of it undone.

@@ -82,7 +82,7 @@ class LightSurvey:
                 self.buffers,
                 self._shown,
                 self._trace.max_depth,
-                beside=self._pace.searches_beside,
+                in_thread=self._pace.searches_in_thread,
             )
             yield None
             yield from self.beam_light.surveying(self._moving)

@@ -44,7 +44,7 @@ class Pace:
     frame."""
     min_batch: int = SMALLEST_BATCH
     """Rays in flight, at least. With fewer than `SMALLEST_BATCH` the plan depends on the batch."""
-    searches_beside: bool = False
+    searches_in_thread: bool = False
     """Beams are searched for in a thread of their own."""
 
     @staticmethod

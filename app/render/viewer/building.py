@@ -4,7 +4,7 @@ pauses."""
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass, field, replace
 from itertools import chain
 from typing import TYPE_CHECKING
@@ -57,12 +57,15 @@ class Shown:
     """What is left of the accumulation."""
 
 
+BuildSteps = Generator[str | None, None, Shown]
+
+
 class Building:
     """What is being built, if anything is, and how it comes on."""
 
     def __init__(self, context: Context) -> None:
         self._context = context
-        self._steps: Iterator[Shown | str | None] | None = None
+        self._steps: BuildSteps | None = None
         self._since = 0.0
         self.at = ""
         """What it is at, or was last."""
@@ -72,7 +75,7 @@ class Building:
         """Since anything was begun."""
         return time.perf_counter() - self._since
 
-    def begin(self, steps: Iterator[Shown | str | None]) -> None:
+    def begin(self, steps: BuildSteps) -> None:
         """Build this (`build`), and nothing else any more."""
         self.at, self._since, self._steps = "setting the scene up", time.perf_counter(), steps
 
@@ -84,14 +87,15 @@ class Building:
         """Go on until about `deadline` (`time.perf_counter`); what was built, once it is."""
         assert self._steps is not None
         while time.perf_counter() < deadline:
-            built = next(self._steps, None)
+            try:
+                at = next(self._steps)
+            except StopIteration as end:
+                return end.value
             if self._context.traits.work_is_queued:
                 # What is only queued keeps no deadline.
                 self._context.finish()
-            if isinstance(built, Shown):
-                return built
-            if built is not None:
-                self.at = built
+            if at is not None:
+                self.at = at
                 if self.seconds > PATIENCE_S:
                     break  # what comes may hold the frame up for long: its name is shown before
         return None
@@ -106,7 +110,7 @@ def build(
     publish: Callable[[], None],
     moving: MovingBeams,
     as_fine: int = 0,
-) -> Iterator[Shown | str | None]:
+) -> BuildSteps:
     """Everything for a scene that photons must be traced for, up to its first picture; while it is not done, what it is
     at (None: as before).
 
@@ -158,4 +162,4 @@ def build(
         light.release()
         raise
     yield "compiling the programs that see it, once for scenes of its kind"
-    yield Shown(wanted, light, accumulation, steps)
+    return Shown(wanted, light, accumulation, steps)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...base.generators import finished
 from ...gpu import shader
 from ...model.scene import Scene, SceneObject
 from ...passes.emission_domain import EmissionDomain, emission_domain
@@ -73,13 +74,7 @@ class MovedLight:
         """Divided as at first, from where lights and glass stand now."""
         light_pass = self._light_pass
         if self._plans is None:
-            steps = light_pass.sample_plans(FIRST_PHOTONS)
-            while True:
-                try:
-                    next(steps)
-                except StopIteration as finished:
-                    self._plans = finished.value
-                    break
+            self._plans = finished(light_pass.sample_plans(FIRST_PHOTONS))
             limits = {plan.index: [(b.x_lo, b.x_hi) for b in plan.bands] for plan in self._plans}
             self._tables = PassTables(light_pass.shown, [limits.get(i, [(0.0, 1.0)]) for i in range(len(scene.lights))])
         boxes = [_box(o) for o in scene.objects if o.material.is_specular]
