@@ -128,7 +128,7 @@ class CameraRig:
         self._camera_pass.run(self._scene.camera, *self._size, samples, 0, self._light.maps, seed)
         sampled = self._finished()
         xyz = rgb709_to_xyz(self._camera_pass.read_rgb().astype(np.float64))
-        return Rendering(xyz, {"bands": chosen - started, "looks": sampled - chosen}, samples, 0)
+        return Rendering(xyz, {"bands": chosen - started, "lookups": sampled - chosen}, samples, 0)
 
     def fitting(self, budget: int) -> int:
         """The largest multiple of the bands that `budget` samples are given; the smallest where that is none."""

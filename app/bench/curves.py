@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 
 from ..reference.metrics import ReferencePicture, bias_variance
-from .results import OWN_METHODS, TARGETS, Curve, Point, Sample, SpeedUp
+from .results import BASELINE, CLOCKS, OWN_METHODS, TARGETS, Curve, Point, Sample, SpeedUp
 
 SMALLEST_ERROR = 1e-12
 """Stands for 0 in logarithms."""
@@ -138,6 +138,15 @@ def speed_up(points: Sequence[Point], baseline: Sequence[Point]) -> Reached | No
     return Reached(own.seconds / reached.seconds, reached.at_once)
 
 
+def ratios_of(curves: Sequence[Curve], measure: str = "relmse") -> dict[str, float]:
+    """Method → how many times sooner it reaches the error that `BASELINE` ends with, by any measure that falls."""
+    points = {curve.method: curve.points if measure == "relmse" else points_by(curve, measure) for curve in curves}
+    if BASELINE not in points:
+        return {}
+    found = {name: speed_up(own, points[BASELINE]) for name, own in points.items()}
+    return {name: reached.seconds for name, reached in found.items() if reached is not None}
+
+
 def whole_process(points: Sequence[Point]) -> list[Point]:
     """The points with the time of a whole process in the place of photon time."""
     return [msgspec.structs.replace(p, seconds=p.whole_seconds) for p in points]
@@ -155,7 +164,7 @@ def best_baseline(curves: Sequence[Curve]) -> Curve | None:
 def speed_ups(curves: Sequence[Curve], own: str = "srd") -> list[SpeedUp]:
     """`own` against the best baseline at every target that either reaches, by photon time and by whole-process time."""
     found = []
-    for clock in ("photon", "whole"):
+    for clock in CLOCKS:
         points = {c.method: c.points if clock == "photon" else whole_process(c.points) for c in curves if c.points}
         baselines = {name: p for name, p in points.items() if name not in OWN_METHODS}
         if own not in points or not baselines:

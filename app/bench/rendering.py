@@ -50,7 +50,7 @@ class Rendering:
     xyz: np.ndarray
     """float64 (H, W, 3), linear XYZ of the layer that is measured, row 0 on top."""
     seconds: dict[str, float]
-    """The light pass's: "plan", "trace", "splat", "resolve", "camera"; the camera pass's: "bands", "looks"."""
+    """The light pass's: "plan", "trace", "splat", "resolve", "camera"; the camera pass's: "bands", "lookups"."""
     emitted: int
     """Photons, or samples a pixel, that there really were."""
     splats: int

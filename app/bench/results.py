@@ -20,10 +20,14 @@ DEFAULT_METHODS = (
     "srd",
 )
 
+BASELINE = "stochastic"
+"""The method whose error at its end the others are timed to."""
 OWN_METHODS = ("srd", "srd-photons", "progressive")
 """The program's own, measured as they ship; all others are baselines, each at its best (`tuning`)."""
 TARGETS = (0.3, 0.1, 0.03, 0.01, 0.003, 0.001)
 """relMSE at which methods are compared."""
+CLOCKS = ("photon", "whole")
+"""By which speed-ups are given: the time of the measured pass, and that of a whole process."""
 ERROR_SOUGHT = 0.01
 """A method that is worse than this after `BenchSettings.seconds` goes on to the horizon."""
 
@@ -140,7 +144,7 @@ class SpeedUp(msgspec.Struct, frozen=True):
     target: float
     """relMSE."""
     clock: str
-    """"photon" or "whole"."""
+    """One of `CLOCKS`."""
     seconds: float | None
     """When `srd` gets there; None: it does not."""
     at_once: bool
@@ -185,6 +189,11 @@ class Curve(msgspec.Struct):
     sweep: list[Trial] = []
     """What `kernels`, and the horizon, were chosen from."""
 
+    def largest_samples(self) -> list[Sample]:
+        """All seeds of the largest budget that has a sample."""
+        most = max((sample.photons for sample in self.samples), default=0)
+        return [sample for sample in self.samples if sample.photons == most]
+
 
 class ReferenceInfo(msgspec.Struct):
     """The picture that errors are measured against."""
@@ -203,17 +212,6 @@ class ReferenceInfo(msgspec.Struct):
     """What the caustic's noise adds to the picture's relMSE, about: a part of `relmse`."""
 
 
-class Claim(msgspec.Struct):
-    """One thing that this scene must show, and what it showed."""
-
-    name: str
-    asked: str
-    measured: str
-    holds: bool
-    why: str = ""
-    """Where it does not hold: the reason as far as the numbers tell."""
-
-
 class SceneResult(msgspec.Struct):
     """One scene."""
 
@@ -225,7 +223,6 @@ class SceneResult(msgspec.Struct):
     """Photon time given to each method and seed's largest rendering."""
     reference: ReferenceInfo | None
     curves: list[Curve]
-    claims: list[Claim] = []
     time_to_equal_error: dict[str, float] = {}
     """For each method: time `stochastic` needs over time the method needs to reach `stochastic`'s final error;
     below 1 the method is slower, absent when it never gets there."""
@@ -244,8 +241,6 @@ class SceneResult(msgspec.Struct):
     picture_samples: dict[str, Sample] = {}
     """What each of `pictures` but the reference took and how far off it is, by the same name; "flip" among its
     metrics."""
-    reference_too_coarse: bool = False
-    """The reference's own error is more than a tenth of the smallest error reported."""
     measured_pass: str = "light"
     """As in the settings."""
     complete: bool = False

@@ -15,8 +15,7 @@ from ..gpu.context import Context
 from ..model.scene import Scene
 from ..reference import metrics
 from ..reference.metrics import ReferencePicture
-from .claims import claims_of, ratios_of
-from .curves import budget_at_time, complete_curve, speed_ups
+from .curves import budget_at_time, complete_curve, ratios_of, speed_ups
 from .measured_passes import MEASURED_PASSES
 from .rendering import NothingToMeasure, Rendering, Rig
 from .results import OTHER_MEASURES, BenchSettings, Curve, Sample, SceneResult
@@ -29,8 +28,6 @@ POINTS = 10
 DEFAULT_WIDTH = 480
 _REFERENCE_SHARE = 0.15
 """Of a scene's progress bar."""
-_COARSE_SHARE = 0.1
-"""The reference's own error should be at most this times the smallest error reported."""
 
 
 def run_bench(
@@ -239,10 +236,6 @@ class _SceneBench:
         result.time_to_equal_error = ratios_of(result.curves)
         result.time_to_equal_other = {measure: ratios_of(result.curves, measure) for measure in OTHER_MEASURES}
         result.speed_ups = speed_ups(result.curves)
-        result.claims = claims_of(result)
-        errors = [point.relmse for curve in result.curves for point in curve.points]
-        assert result.reference is not None
-        result.reference_too_coarse = bool(errors) and result.reference.relmse > _COARSE_SHARE * min(errors)
 
     def _make_pictures(self, method: str, rig: Rig) -> None:
         """Pictures at equal time, with FLIP."""

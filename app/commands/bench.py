@@ -165,13 +165,12 @@ def _features(options: Bench) -> int:
 def write_and_show(result: BenchResult, directory: Path, show: Callable[[object], None]) -> None:
     """Tables on the screen, then plots and pages in the folder."""
     from ..bench.report.report import write_report
-    from ..bench.screen import scene_lines, scene_table
+    from ..bench.report.tables import screen_parts
 
     measured = [scene for scene in result.scenes if any(curve.points for curve in scene.curves)]
     for scene in measured:
-        show(scene_table(scene))
-        for line in scene_lines(scene):
-            show(line)
+        for part in screen_parts(scene):
+            show(part)
     if measured:
         write_report(result, directory)
         show(

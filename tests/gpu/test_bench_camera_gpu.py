@@ -65,7 +65,7 @@ def test_a_rig_looks_as_render_does_again_and_again(gl: Any, ball: Scene) -> Non
     assert {method: r.emitted for method, r in first.items()} == {"stochastic": 16, "srd": 16, "regular-7": 21}
     assert fitting == 14 and budgets and all(n % 7 == 0 for n in budgets)
     assert (
-        all(set(r.seconds) == {"bands", "looks"} and r.seconds["looks"] > 0.0 for r in first.values())
+        all(set(r.seconds) == {"bands", "lookups"} and r.seconds["lookups"] > 0.0 for r in first.values())
         and light.seconds > 0.0
         and told
     )

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 from spectrasplat.bench.curves import speed_ups
-from spectrasplat.bench.results import BenchResult, Claim, Curve, Point, ReferenceInfo, Sample, SceneResult, Trial
+from spectrasplat.bench.results import BenchResult, Curve, Point, ReferenceInfo, Sample, SceneResult, Trial
 
 # Seconds per photon, variance at 1000 photons, its exponent, bias².
 METHODS = {
@@ -152,19 +152,7 @@ def synthetic_scene(
             "regular-16": 1.7,
         }
         scene.speed_ups = speed_ups(curves)
-        holds = gain >= 30
         scene.time_to_equal_other = {"nrmse": {"srd": 61.0, "stochastic": 1.0}, "relmse_whole": {"srd": 17.0}}
-        scene.claims = [
-            Claim(
-                "1/30 of the time",
-                "at least 30×",
-                f"{gain:.0f}×",
-                holds,
-                "" if holds else "bias² is 61 % of the remaining error",
-            ),
-            Claim("first picture", "better at 0.1 s than stochastic at 3 s", "0.002 against 0.02", True),
-            Claim("beats srd-lambda", "less error at equal time", "0.0006 against 0.015", True),
-        ]
     return scene
 
 

@@ -13,19 +13,17 @@ import pytest
 from spectrasplat.base.errors import UserError
 from spectrasplat.bench import reference_picture, runner
 from spectrasplat.bench.camera_rendering import CameraRig
-from spectrasplat.bench.claims import claims_of
 from spectrasplat.bench.measured_passes import CAMERA, MEASURED_PASSES
 from spectrasplat.bench.rendering import Rendering
 from spectrasplat.bench.report import report
-from spectrasplat.bench.report.prose import PROSE
-from spectrasplat.bench.results import BenchResult, BenchSettings, Curve, SceneResult
+from spectrasplat.bench.report.page import PROSE
+from spectrasplat.bench.results import BenchResult, BenchSettings, SceneResult
 from spectrasplat.bench.store import Store
 from spectrasplat.bench.subjects import SUBJECTS, Subject
 from spectrasplat.model.scene import Diffuse, Scene
 from spectrasplat.passes.spectrum_choice import Spectrum
 
 from tests.unit.bench_synthetic import synthetic_result, synthetic_scene
-from tests.unit.test_bench_curves import curve, law, scene
 from tests.unit.test_bench_report import assert_stands_alone
 from tests.unit.test_bench_resume import HEIGHT, MACHINE, WIDTH, Rig, Rigs, glass_scene
 from tests.unit.test_bench_resume import reference_picture as reference_pixels
@@ -44,7 +42,7 @@ class WholeRig(Rig):
 
     def render(self, photons: int, seed: int, kernel: float | None = None) -> Rendering:
         assert photons % 4 == 0
-        return replace(super().render(photons, seed), seconds={"bands": 0.02, "looks": 0.1 * photons}, splats=0)
+        return replace(super().render(photons, seed), seconds={"bands": 0.02, "lookups": 0.1 * photons}, splats=0)
 
 
 class WholeRigs(Rigs):
@@ -101,7 +99,7 @@ class CountedRig(CameraRig):
     def render(self, budget: int, seed: int) -> Rendering:
         bands, samples = self._choose(budget).bands, self._choose(budget).samples(budget)
         return Rendering(
-            np.zeros((1, 1, 3)), {"bands": 0.01 * (2 * bands - 1), "looks": self._sample_s * samples}, samples, 0
+            np.zeros((1, 1, 3)), {"bands": 0.01 * (2 * bands - 1), "lookups": self._sample_s * samples}, samples, 0
         )
 
 
@@ -116,34 +114,6 @@ def test_budgets_are_whole_multiples_of_their_bands(max_bands: int, seconds: flo
         assert sum(rig.render(budgets[-1], 1).seconds.values()) == pytest.approx(seconds, rel=0.2)
 
 
-def camera_scene(*curves: Curve, seconds: float = 20.0) -> SceneResult:
-    made = scene(*curves, seconds=seconds)
-    made.measured_pass = "camera"
-    for one in made.curves:
-        one.samples = [
-            msgspec.structs.replace(s, seconds={"bands": 0.2 * s.photon_seconds, "looks": 0.8 * s.photon_seconds})
-            for s in one.samples
-        ]
-    return made
-
-
-def test_claims_of_the_camera_ask_for_a_twentieth() -> None:
-    """25 times sooner is enough for the camera and not for the light."""
-    fast, slow = law(0.04), law(1.0)
-    claims = claims_of(camera_scene(curve("stochastic", slow), curve("srd", fast)))
-    assert [(c.name, c.holds) for c in claims] == [("time to equal error", True)] and "1/20" in claims[0].asked
-    assert not claims_of(scene(curve("stochastic", slow), curve("srd", fast)))[0].holds
-
-
-def test_reasons_of_the_camera() -> None:
-    (claim,) = claims_of(camera_scene(curve("stochastic", law(0.1, floor=0.05)), curve("srd", law(1e-4, floor=0.2))))
-    assert not claim.holds and "straight columns" in claim.why
-    assert "25 % of that bias² is found in stochastic too" in claim.why
-    assert "20 % bands, 80 % looks" in claim.why
-    (claim,) = claims_of(camera_scene(curve("stochastic", law(1.0)), curve("srd", law(0.2))))
-    assert not claim.holds and "more samples reduce" in claim.why
-
-
 def test_the_report_speaks_of_samples(tmp_path: Path) -> None:
     names = ("stochastic", "regular-7", "srd-lambda", "srd")
     made = [
@@ -156,11 +126,10 @@ def test_the_report_speaks_of_samples(tmp_path: Path) -> None:
         for each in one.curves:
             each.setup_seconds = {"light pass": 2.0, "buffers": 0.1, "compile": 1.0}
             each.samples = [
-                msgspec.structs.replace(s, seconds={"bands": 0.1, "looks": s.photon_seconds}) for s in each.samples
+                msgspec.structs.replace(s, seconds={"bands": 0.1, "lookups": s.photon_seconds}) for s in each.samples
             ]
             one.picture_samples |= {f"{each.method}{ending}": each.samples[0] for ending, _ in CAMERA.pictures}
             one.pictures[f"{each.method} first"] = one.pictures[f"{each.method} early"]
-        one.claims = claims_of(one)
     result = synthetic_result(made)
     result.settings = BenchSettings(20.0, methods=names, measured_pass="camera")
     report.write_report(result, tmp_path)
@@ -172,10 +141,8 @@ def test_the_report_speaks_of_samples(tmp_path: Path) -> None:
         "20 s of camera time",
         "0.5 s, part",
         "1 s, part",
-        "asked of srd: at most 1/20 of the time",
         "its caustic: 67 M photons",
         "Stages of camera time",
-        "choosing the bands",
         "bands s",
         "light pass s",
         *(PROSE["camera"].methods[name] for name in names),

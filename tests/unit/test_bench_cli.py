@@ -5,14 +5,14 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
+from types import ModuleType
 from typing import Any, Self
 
 import pytest
 from spectrasplat.__main__ import main
 from spectrasplat.base.errors import UserError
 from spectrasplat.base.paths import shipped_scenes
-from spectrasplat.bench import runner, screen
+from spectrasplat.bench import runner
 from spectrasplat.bench.results import BenchSettings, Curve, Point, Sample, SceneResult
 from spectrasplat.commands import scenes
 from spectrasplat.model.settings import CAMERA_METHODS, METHODS
@@ -145,7 +145,7 @@ def test_options_reach_the_runner(seen: Seen, tmp_path: Path, capsys: pytest.Cap
     assert shlex.split(seen.command) == shlex.split(repeated)
     shown = capsys.readouterr().out
     assert "prism, 64" not in shown
-    assert all(text in shown for text in ("1/40", "-1.00 ± 0.10", "20 %", "report.html"))
+    assert all(text in shown for text in ("40×", "−1.00 ± 0.10", "20 %", "report.html"))
 
 
 @pytest.fixture
@@ -187,7 +187,7 @@ def test_ctrl_c_says_what_is_kept_and_reports_it(
         f"stopped; 0 scenes done, 1 of {2 * len(METHODS)} method seeds of 'prism' kept; the same command goes on from "
         "there" in told.err
     )
-    assert seen.reported == tmp_path and "1/40" in told.out
+    assert seen.reported == tmp_path and "40×" in told.out
 
 
 def test_a_scene_without_light_costs_the_others_nothing(
@@ -218,21 +218,3 @@ def test_features_has_its_own_command(monkeypatch: pytest.MonkeyPatch, tmp_path:
     assert main(["bench", "--features", "ball_plain", "-o", str(tmp_path)]) == 0
     assert main(["bench", "--features", "prism"]) == 0
     assert asked == [("ball without dispersion", tmp_path), ("prism", None)]
-
-
-def test_notes_under_the_table() -> None:
-    sample = Sample(1, 1, 1, 1, {}, {"relmse": 0.1})
-    scene: Any = SimpleNamespace(
-        claims=[],
-        speed_ups=[],
-        time_to_equal_other={"nrmse": {"srd": 33.0}, "chroma": {}},
-        curves=[Curve("srd", {}, [])],
-        reference_too_coarse=True,
-        reference=SimpleNamespace(relmse=0.02),
-        picture_samples={"srd": sample},
-    )
-    other, coarse, flip = screen.scene_lines(scene)
-    assert "nrmse 1/33, chroma not reached" in other
-    assert "above a tenth" in coarse and "--reference-seconds" in coarse and "flip-evaluator" in flip
-    sample.metrics["flip"] = 0.1
-    assert len(screen.scene_lines(scene)) == 2

@@ -1,4 +1,4 @@
-"""Tables of a feature report for the screen, and the same as JSON and as a page."""
+"""The tables of a feature report on the screen, and the same as JSON and as a page."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from ...base.errors import UserError
 from ..report.page import Table, render
 from .results import FeatureReport, Percent
 
-_COST_HEADINGS = ("feature", "", "why", "trace", "splat", "adds", "note")
-_PROOF_HEADINGS = ("feature", "", "symbols looked for", "found in", "")
-_PROGRAM_HEADINGS = ("program", "lines", "of", "holds code of")
-_NUMBERS = ("trace", "splat", "lines", "of")
 _PAGE_ALONE = ("adds", "symbols looked for")
+_READING = (
+    "Percentages are of the time without the feature: the median over turns with and without, then the interval that "
+    "holds the true median with 95 %. An interval on both sides of 0 means that no cost was found."
+)
 
 
 def check(directory: Path) -> None:
@@ -37,69 +37,67 @@ def write(report: FeatureReport, directory: Path) -> None:
 
 
 def show(report: FeatureReport) -> None:
-    """Three tables on stdout; what would make them too wide is on the page."""
-    import rich.table
+    """The tables on stdout; what would make them too wide is on the page."""
     from rich.console import Console
 
-    console = Console()
+    console = Console(markup=False, emoji=False)
     console.print(_heading(report))
-    for made in _tables(report):
-        shown = rich.table.Table(title=made.title, title_justify="left")
-        narrow = [index for index, heading in enumerate(made.headings) if heading not in _PAGE_ALONE]
-        for index in narrow:
-            heading = made.headings[index]
-            shown.add_column(heading, justify="right" if heading in _NUMBERS else "left", overflow="fold")
-        for row in made.rows:
-            shown.add_row(*(str(row[index]) for index in narrow))
-        console.print(shown)
-    console.print(_reading())
+    for table in _tables(report):
+        console.print(table.on_screen(_PAGE_ALONE))
+    console.print(_READING)
 
 
 def page(report: FeatureReport) -> str:
     """One self-contained page."""
     return render(
-        "features.html",
-        scene=report.scene,
-        heading=_heading(report),
-        tables=_tables(report),
-        reading=_reading(),
+        "features.html", scene=report.scene, heading=_heading(report), tables=_tables(report), reading=_READING
     )
 
 
-# -- private ------------------------------------------------------------------------------
-
-
 def _tables(report: FeatureReport) -> list[Table]:
+    included = {True: "in", False: "out"}
     costs = [
         (
-            c.feature,
-            "in" if c.included else "out",
-            c.reason,
-            _percent(c.trace),
-            _percent(c.splat),
-            c.bytes,
-            _note(c.note, c.map_difference),
+            cost.feature,
+            included[cost.included],
+            cost.reason,
+            _percent(cost.trace),
+            _percent(cost.splat),
+            cost.bytes,
+            _note(cost.note, cost.map_difference),
         )
-        for c in report.costs
+        for cost in report.costs
     ]
     proof = [
         (
-            p.feature,
-            "in" if p.included else "out",
-            ", ".join(s for s in p.symbols if " " not in s),
-            ", ".join(p.programs) or "no program",
-            "as it must be" if p.holds else "NOT as it must be",
+            proved.feature,
+            included[proved.included],
+            ", ".join(s for s in proved.symbols if " " not in s),
+            ", ".join(proved.programs) or "no program",
+            "as it must be" if proved.holds else "NOT as it must be",
         )
-        for p in report.proof
+        for proved in report.proof
     ]
-    programs = [(p.name, str(p.lines), str(p.flattened_lines), ", ".join(p.features)) for p in report.programs]
+    programs = [(p.name, p.lines, p.flattened_lines, ", ".join(p.features)) for p in report.programs]
     return [
-        Table(headings, rows, title=title, numbers=_NUMBERS)
-        for title, headings, rows in (
-            ("Cost of each feature (in: what it costs; out: what leaving it out saves)", _COST_HEADINGS, costs),
-            ("Is what the scene does not need absent from every program?", _PROOF_HEADINGS, proof),
-            ("Compiled texts: lines that can run, of lines written", _PROGRAM_HEADINGS, programs),
-        )
+        Table(
+            ("feature", "", "why", "trace", "splat", "adds", "note"),
+            costs,
+            title="Cost of each feature (in: what it costs; out: what leaving it out saves)",
+            words=("", "why", "adds", "note"),
+        ),
+        Table(
+            ("feature", "", "symbols looked for", "found in", ""),
+            proof,
+            title="Is what the scene does not need absent from every program?",
+            words=("", "symbols looked for", "found in"),
+        ),
+        Table(
+            ("program", "lines", "of", "holds code of"),
+            programs,
+            title="Compiled texts: lines that can run, of lines written",
+            words=("holds code of",),
+        ),
     ]
 
 
@@ -109,14 +107,6 @@ def _heading(report: FeatureReport) -> str:
         f"Scene '{report.scene}' on {report.renderer}, by {report.clock}: about {report.photons:,} photons a run, "
         f"trace {1e3 * report.trace_seconds:.0f} ms, splat {1e3 * report.splat_seconds:.0f} ms; {report.repeats} "
         f"turns. {report.records}{rest}"
-    )
-
-
-def _reading() -> str:
-    return (
-        "Percentages are of the time without the feature: the median over turns with and without, then the interval "
-        "that holds "
-        "the true median with 95 %. An interval on both sides of 0 means that no cost was found."
     )
 
 

@@ -1,22 +1,31 @@
-"""The pictures of the bench report: one exposure for all, the part worth looking at, and where a picture errs and by
-how much.
+"""The pictures of the bench report side by side: one exposure for all, the part with most to see, and where a picture
+errs and by how much.
 
-Arrays in, `data:` addresses out; pictures are XYZ float (H, W, 3), row 0 at the top.
+Arrays are XYZ float (H, W, 3), row 0 at the top; images are `data:` addresses.
 """
 
 from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...base.tone_map import auto_exposure, tone_map_8bit
 from ...model.optics.colorimetry import xyz_to_rgb709
 from ...reference.metrics import EPSILON_SHARE, lit_mean
+from ..measured_passes import MEASURED_PASSES
+from ..results import SceneResult
+from .style import by_rank
+from .text import count, number
+
+if TYPE_CHECKING:
+    from PIL import Image as PilImage
 
 ERROR_STEPS = 65
 """Colours of an error map: odd, so that no error has a colour of its own."""
@@ -37,6 +46,95 @@ class Window:
     def of(self, picture: np.ndarray) -> np.ndarray:
         """That part of a picture (H, W, …)."""
         return picture[self.row : self.row + self.height, self.column : self.column + self.width]
+
+    def outline(self, picture: np.ndarray) -> str:
+        """CSS of a frame round that part of a picture."""
+        height, width = picture.shape[:2]
+        across = {"left": self.column / width, "width": self.width / width}
+        sides = across | {"top": self.row / height, "height": self.height / height}
+        return ";".join(f"{side}:{100 * share:.2f}%" for side, share in sides.items())
+
+
+@dataclass(frozen=True)
+class Image:
+    """A cell of the matrix of pictures."""
+
+    source: str
+    label: str
+    is_part: bool = False
+    numbers: Sequence[str] = ()
+    outline: str = ""
+    """CSS of the frame round what the parts show."""
+    marks: Sequence[str] = ()
+    """The numbers under a colour scale."""
+
+
+@dataclass(frozen=True)
+class Matrix:
+    """Pictures side by side: a column for the reference and each method, rows that can be compared across."""
+
+    names: Sequence[str]
+    rows: Sequence[tuple[str, Mapping[str, Image]]]
+    exposure_ev: float
+
+
+def matrix(scene: SceneResult, directory: Path) -> Matrix | None:
+    """None where there is no picture yet."""
+    found = load_pictures(scene.pictures, directory)
+    if not found:
+        return None
+    reference = found["reference"]
+    window = choose_window(reference)
+    exposure = auto_exposure(xyz_to_rgb709(reference).astype(np.float32))
+    methods = by_rank([curve.method for curve in scene.curves])
+    errors = {name: signed_error(found[name], reference) for name in methods if name in found}
+    limit = error_limit(list(errors.values()))
+
+    def part(name: str, numbers: Sequence[str] = ()) -> Image:
+        shown = _toned(window.of(found[name]), exposure)
+        return Image(shown, f"{scene.scene}, {name}: part of the picture", True, numbers)
+
+    rows: list[tuple[str, Mapping[str, Image]]] = []
+    for ending, share in reversed(MEASURED_PASSES[scene.measured_pass].pictures):
+        shown = {n: part(n + ending, _numbers(scene, n + ending, found)) for n in methods if n + ending in found}
+        if shown or not ending:
+            rows.append((f"{share * scene.equal_time:.2g} s, part", shown | {"reference": part("reference")}))
+    whole = {
+        name: Image(
+            _toned(halved(found[name]), exposure),
+            f"{scene.scene}, {name}: whole picture",
+            outline=window.outline(reference),
+        )
+        for name in ("reference", *errors)
+    }
+    scale = Image(error_scale(), "colour scale of the error maps", marks=(f"−{limit:g}", "0", f"+{limit:g}"))
+    maps = {
+        name: Image(error_map(error, limit), f"{scene.scene}, {name}: signed error") for name, error in errors.items()
+    }
+    rows += [(f"{scene.equal_time:.2g} s, whole", whole), ("signed error, whole", {"reference": scale} | maps)]
+    return Matrix(["reference", *methods], rows, exposure)
+
+
+def _numbers(scene: SceneResult, name: str, found: Mapping[str, np.ndarray]) -> list[str]:
+    """relMSE and HDR-FLIP of a picture, as the run measured them; relMSE from the pictures where it did not."""
+    sample = scene.picture_samples.get(name)
+    metrics = sample.metrics if sample is not None else {}
+    relmse, flip, source = metrics.get("relmse", math.nan), metrics.get("flip", math.nan), ""
+    if not math.isfinite(relmse):
+        reference = found["reference"]
+        epsilon = EPSILON_SHARE * max(lit_mean(reference), 1e-30) ** 2
+        relmse, source = float(np.mean((found[name] - reference) ** 2 / (reference**2 + epsilon))), " (raw)"
+    lines = [
+        f"relMSE {number(relmse)}{source}",
+        f"HDR-FLIP {flip:.3f}" if math.isfinite(flip) else "HDR-FLIP not measured",
+    ]
+    if sample is not None:
+        units = MEASURED_PASSES[scene.measured_pass].units
+        lines.append(f"{sample.photon_seconds:.2g} s, {count(sample.photons)} {units}")
+    return lines
+
+
+# -- arrays -------------------------------------------------------------------------------
 
 
 def load_pictures(files: Mapping[str, str], directory: Path) -> dict[str, np.ndarray]:
@@ -91,14 +189,11 @@ def choose_window(reference: np.ndarray) -> Window:
     return Window(int(row), int(column), crop_height, crop_width)
 
 
-def exposure_of(reference: np.ndarray) -> float:
-    """Stops that show the reference well, for every picture of its scene."""
-    return auto_exposure(xyz_to_rgb709(reference).astype(np.float32))
+def _toned(xyz: np.ndarray, exposure_ev: float) -> str:
+    """A tone-mapped picture."""
+    from PIL import Image as PilImage
 
-
-def toned(xyz: np.ndarray, exposure_ev: float) -> str:
-    """A tone-mapped picture as a data: address."""
-    return data_address(tone_map_8bit(xyz_to_rgb709(xyz).astype(np.float32), exposure_ev))
+    return _png(PilImage.fromarray(tone_map_8bit(xyz_to_rgb709(xyz).astype(np.float32), exposure_ev)))
 
 
 def halved(xyz: np.ndarray) -> np.ndarray:
@@ -137,23 +232,15 @@ def error_scale() -> str:
 
 def _indexed(codes: np.ndarray) -> str:
     from matplotlib import colormaps
-    from PIL import Image
+    from PIL import Image as PilImage
 
-    image = Image.fromarray(codes).convert("P")
-    image.putpalette(
-        (255 * colormaps["RdBu_r"](np.linspace(0.0, 1.0, ERROR_STEPS))[:, :3]).round().astype(np.uint8).tobytes()
-    )
+    image = PilImage.fromarray(codes).convert("P")
+    colours = colormaps["RdBu_r"](np.linspace(0.0, 1.0, ERROR_STEPS))[:, :3]
+    image.putpalette((255 * colours).round().astype(np.uint8).tobytes())
     return _png(image)
 
 
-def data_address(rgb: np.ndarray) -> str:
-    """uint8 (H, W, 3) as a PNG in a data: address."""
-    from PIL import Image
-
-    return _png(Image.fromarray(rgb))
-
-
-def _png(image: object) -> str:
+def _png(image: PilImage.Image) -> str:
     buffer = io.BytesIO()
-    image.save(buffer, format="PNG", optimize=True)  # type: ignore[attr-defined]
+    image.save(buffer, format="PNG", optimize=True)
     return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode()

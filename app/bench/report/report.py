@@ -1,10 +1,10 @@
-"""Writes what a bench run has found: plots as PNG and SVG, and one page that stands alone.
+"""Writes what a bench run has found: plots as PNG and SVG, and one page that needs no other file.
 
     DIR/plots/SCENE_error_time.png .svg    DIR/plots/SCENE_error_photons.png .svg (the camera pass: _samples)
     DIR/plots/overview.png .svg            DIR/plots/scenes.png .svg (the README's figure)
     DIR/plots/speed_up.png .svg            DIR/report.html, DIR/tables.md
 
-A run that was stopped can be reported as well: what is missing is named where it would stand.
+A run that was stopped can be reported as well: what is missing is named in its place.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
@@ -20,13 +21,13 @@ from ...base.errors import UserError
 from ...base.progress import ProgressReporter
 from ..measured_passes import MEASURED_PASSES
 from ..results import BenchResult, SceneResult
-from . import fair_field, markdown, text
-from . import scene as report_scene
-from . import style as report_style
-from .curve_plots import error_against
-from .overview import overview, small_multiples
-from .page import inlined, render
-from .prose import PROSE
+from . import curve_plots, pictures, run_plots, style, tables, text
+from .page import PROSE, inlined, render
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_EQUAL_ERROR = "time to equal error"
 
 
 def write_report(result: BenchResult, directory: Path) -> None:
@@ -41,43 +42,29 @@ def write_report(result: BenchResult, directory: Path) -> None:
         raise UserError(f"cannot make the folder {plots}: {error.strerror or error}; choose another place") from error
     names = file_names([scene.scene for scene in result.scenes])
     scenes = []
-    with report_style.plot_style(), ProgressReporter("report") as progress:
+    with style.plot_style(), ProgressReporter("report") as progress:
         for index, (scene, name) in enumerate(zip(result.scenes, names, strict=True)):
             progress(index / (len(names) + 1), scene.scene)
-            scenes.append(report_scene.view(scene, f"scene-{name}", _curve_plots(scene, name, plots), directory))
-        glance = inlined(
-            report_style.save(overview(result), plots / "overview"),
-            "overview",
-            "time to equal error of each method in each scene, as a ratio to stochastic",
-        )
-        headline = fair_field.speed_up_over_error(result)
-        curve = None
+            scenes.append(_scene(scene, name, plots))
+        label = "time to equal error of each method in each scene, as a ratio to stochastic"
+        glance = inlined(style.save(run_plots.overview(result), plots / "overview"), "overview", label)
+        headline, curve = run_plots.speed_up_over_error(result), None
         if headline is not None:
             label = "speed-up of srd over the best baseline against target error, by scene"
-            curve = inlined(report_style.save(headline, plots / "speed_up"), "speed-up", label)
+            curve = inlined(style.save(headline, plots / "speed_up"), "speed-up", label)
         readme_plot(result, plots / "scenes")
         progress(1.0, "page")
     with atomic_output(directory / "report.html") as temporary:
         temporary.write_text(document(result, scenes, glance, curve), encoding="utf-8")
     with atomic_output(directory / "tables.md") as temporary:
-        temporary.write_text(markdown.tables(result), encoding="utf-8")
+        temporary.write_text(tables.markdown(result), encoding="utf-8")
 
 
 def readme_plot(result: BenchResult, stem: Path) -> None:
     """Write the README's figure, error against time of `srd` and two baselines in each scene, to `stem`.png and
     `stem`.svg."""
-    with report_style.plot_style():
-        report_style.save(small_multiples(result), stem)
-
-
-def _curve_plots(scene: SceneResult, name: str, plots: Path) -> list[Markup]:
-    """Error over time and over photons or samples: saved, and as SVG for the page."""
-    drawn, measured = [], MEASURED_PASSES[scene.measured_pass]
-    for abscissa, ending, words in (("seconds", "time", measured.time), ("photons", measured.units, measured.unit)):
-        saved = report_style.save(error_against(scene, abscissa), plots / f"{name}_error_{ending}")
-        label = f"{scene.scene}: relMSE of each method against {words}, logarithmic axes"
-        drawn.append(inlined(saved, f"{name}-{ending}", label))
-    return drawn
+    with style.plot_style():
+        style.save(run_plots.small_multiples(result), stem)
 
 
 def file_names(scenes: list[str]) -> list[str]:
@@ -93,43 +80,86 @@ def file_names(scenes: list[str]) -> list[str]:
     return taken
 
 
-# ---- the page --------------------------------------------------------------------------------
+# -- the page -----------------------------------------------------------------------------
 
 
-def document(
-    result: BenchResult, scenes: Sequence[report_scene.SceneView], glance: Markup, speed_up: Markup | None
-) -> str:
+def document(result: BenchResult, scenes: Sequence[dict[str, object]], glance: Markup, speed_up: Markup | None) -> str:
     """The whole page; `glance`: the ratios of all scenes to `stochastic`, `speed_up`: to the best baseline, drawn."""
-    prose = PROSE[result.settings.measured_pass]
-    used = report_style.by_rank(sorted({curve.method for scene in result.scenes for curve in scene.curves}))
+    prose, settings, count = PROSE[result.settings.measured_pass], result.settings, len(result.scenes)
+    measured = MEASURED_PASSES[settings.measured_pass]
+    used = style.by_rank(sorted({curve.method for scene in result.scenes for curve in scene.curves}))
     return render(
         "bench.html",
         result=result,
-        measured=MEASURED_PASSES[result.settings.measured_pass],
+        measured=measured,
         prose=prose,
         headline=text.headline(result),
         run={
             "version": f"SpectraSplat {result.version}",
             "date": result.date,
             **{"OpenGL" if key == "opengl" else key: value for key, value in result.machine.items()},
-            "effort": _effort(result),
+            "effort": f"{settings.seconds:g} s of {measured.time} for each method's longest rendering, "
+            f"{text.seeds_text(settings.seeds)}, {count} scene{'' if count == 1 else 's'}",
         },
         scenes=scenes,
-        is_judged=any(scene.claims for scene in result.scenes),
         glance=glance,
         speed_up=speed_up,
-        speed_ups=fair_field.summary_table(result),
-        glance_caption=text.sentence(prose.metrics["time to equal error"]),
+        speed_ups=tables.summary_table(result),
+        glance_caption=text.sentence(prose.metrics[_EQUAL_ERROR]),
         methods={name: prose.methods.get(name, "Not described.") for name in used},
-        failed=[(f"{scene}, {claim.name}", text.limit_sentence(claim)) for scene, claim in text.limits(result)],
         doubts=[(scene.scene, warning) for scene in result.scenes for warning in text.warnings_of(scene)],
     )
 
 
-def _effort(result: BenchResult) -> str:
-    settings, count = result.settings, len(result.scenes)
-    return (
-        f"{settings.seconds:g} s of {MEASURED_PASSES[settings.measured_pass].time} for each method's longest "
-        "rendering, "
-        f"{text.seeds_text(settings.seeds)}, {count} scene{'' if count == 1 else 's'}"
-    )
+def _scene(scene: SceneResult, name: str, plots: Path) -> dict[str, object]:
+    """What the page shows of one scene; its curves over time and over photons or samples are saved as well."""
+    anchor, measured = f"scene-{name}", MEASURED_PASSES[scene.measured_pass]
+
+    def drawn(figure: Figure | None, part: str, label: str) -> Markup | None:
+        document = None if figure is None else style.svg_text(figure)
+        return None if document is None else inlined(document, f"{anchor}-{part}", f"{scene.scene}: {label}")
+
+    curves = []
+    for abscissa, ending, words in (("seconds", "time", measured.time), ("photons", measured.units, measured.unit)):
+        saved = style.save(curve_plots.error_against(scene, abscissa), plots / f"{name}_error_{ending}")
+        label = f"{scene.scene}: relMSE of each method against {words}, logarithmic axes"
+        curves.append(inlined(saved, f"{name}-{ending}", label))
+    bias = f"bias squared and variance of each method against {measured.time}"
+    return {
+        "name": scene.scene,
+        "title": scene.title,
+        "anchor": anchor,
+        "setting": _setting(scene),
+        "warnings": text.warnings_of(scene),
+        "curves": curves,
+        "speed_ups": tables.speed_up_table(scene),
+        "speed": tables.speed_table(scene),
+        "sweep": drawn(curve_plots.sweep_plot(scene), "sweep", "error of each baseline against its kernel"),
+        "kernels": tables.kernel_table(scene),
+        "other_measures": tables.other_measures_table(scene),
+        "bias": drawn(curve_plots.bias_and_variance(scene), "bias", bias),
+        "errors": tables.error_table(scene),
+        "pictures": pictures.matrix(scene, plots.parent),
+        "cost": tables.cost_table(scene),
+    }
+
+
+def _setting(scene: SceneResult) -> str:
+    """Size, effort, glass and reference in one sentence."""
+    measured, own = MEASURED_PASSES[scene.measured_pass], scene.reference
+    glass = f"strongest glass {scene.strongest_glass} (Abbe number {scene.strongest_abbe:.1f})"
+    parts = [
+        f"{scene.size[0]}×{scene.size[1]} pixels",
+        text.seeds_text(scene.seeds),
+        f"{scene.seconds:g} s of {measured.time}",
+        glass if scene.strongest_abbe > 0 else "no dispersion",
+    ]
+    if own is not None:
+        parts.append(f"reference: {own.method}, {text.count(own.photons)} {measured.unit} in {own.seconds:.0f} s")
+        if own.caustic_photons:
+            parts.append(
+                f"its caustic: {text.count(own.caustic_photons)} photons, whose noise is about "
+                f"{text.number(own.caustic_relmse)} of its relMSE"
+            )
+        parts.append(f"its own relMSE {text.number(own.relmse)}, its key {own.key[:12]}")
+    return "; ".join(parts) + "."

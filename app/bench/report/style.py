@@ -1,31 +1,30 @@
-"""How methods look and what they are called, in every plot and in the page: one palette, one dash, one marker each.
+"""How methods look in every plot and on the page, and what the plots have in common.
 
-`srd` is the only strong colour; the others are muted, and told apart by dash and marker as well, so that
-the plots survive grey printing and colour blindness. Every colour that a plot may use has a name here, so
-that the page can exchange it for one that suits a dark screen: `inline_svg` writes `var(--name)` for it.
+`srd` has the only strong colour; the others are muted and differ by dash and marker as well, so that plots can be
+read in grey print and by the colour-blind. Every colour that a plot may use has a name here: `inline_svg` writes
+`var(--name)` for it, and the page gives that another value on a dark screen.
 """
 
 from __future__ import annotations
 
 import io
+import math
 import re
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...base.atomic import atomic_output
+from .text import superscript
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 PAPER, INK, MUTED, GRID, WASH = "#fefefe", "#1c1e21", "#5b6068", "#e2e4e7", "#f3f4f6"
-ON_LIGHT_BAR = "#1d2023"
-STAGE_COLOURS = {"trace": "#5f7a94", "splat": "#b9c6d2", "resolve": "#e0b46a", "looks": "#6d8f80", "bands": "#d8a878"}
-
 PALETTE = {
     "paper": (PAPER, "#15171a"),
     "ink": (INK, "#e9eaec"),
@@ -46,26 +45,20 @@ PALETTE = {
     "other-1": ("#8a6d3b", "#c9a96b"),
     "other-2": ("#2f8080", "#6fc0c0"),
     "other-3": ("#7d4c4c", "#c48d8d"),
-    "trace": (STAGE_COLOURS["trace"], "#5b7690"),
-    "splat": (STAGE_COLOURS["splat"], "#93a5b6"),
-    "resolve": (STAGE_COLOURS["resolve"], "#c79a52"),
-    "looks": (STAGE_COLOURS["looks"], "#67897a"),
-    "bands": (STAGE_COLOURS["bands"], "#bd8f60"),
-    "on-light-bar": (ON_LIGHT_BAR, "#101214"),
     "good": ("#1f6f43", "#6fcf97"),
     "bad": ("#a3241b", "#ff8a80"),
 }
 """Name: (on paper, on a dark screen). Every colour on paper occurs once: it is the key for the exchange."""
 
-
+Settings = dict[str, Any]
+"""Keywords of a drawing call."""
 Dash = str | tuple[float, tuple[float, ...]]
 
 
 @dataclass(frozen=True)
 class MethodStyle:
-    """One method's drawing."""
+    """How a method is drawn."""
 
-    name: str
     colour: str
     width_pt: float
     dash: Dash
@@ -87,20 +80,23 @@ _STYLES: dict[str, tuple[float, Dash, str, int]] = {
     "srd-photons": (1.7, (0.0, (6.0, 1.5)), "p", 7),
     "srd": (2.6, "-", "o", 8),
 }
+"""Width, dash, marker and rank."""
 
 
 def method_style(name: str) -> MethodStyle:
     """The style of a method; one that is not known gets a muted colour by its name."""
     if name in _STYLES:
-        width, dash, marker, rank = _STYLES[name]
-        return MethodStyle(name, PALETTE[name][0], width, dash, marker, rank)
+        return MethodStyle(PALETTE[name][0], *_STYLES[name])
     choice = 1 + sum(name.encode()) % 3
-    return MethodStyle(name, PALETTE[f"other-{choice}"][0], 1.4, (0.0, (4.0, 1.5)), "*", 3)
+    return MethodStyle(PALETTE[f"other-{choice}"][0], 1.4, (0.0, (4.0, 1.5)), "*", 3)
 
 
-def by_rank(names: list[str]) -> list[str]:
+def by_rank(names: Sequence[str]) -> list[str]:
     """Method names, the most interesting first."""
     return sorted(names, key=lambda name: (-method_style(name).rank, name))
+
+
+# -- figures ------------------------------------------------------------------------------
 
 
 @contextmanager
@@ -129,6 +125,15 @@ def plot_style() -> Iterator[None]:
         "axes.labelsize": 9.0,
         "axes.spines.top": False,
         "axes.spines.right": False,
+        "axes.grid": True,
+        "axes.grid.which": "major",
+        "axes.axisbelow": True,
+        "grid.color": GRID,
+        "grid.linewidth": 0.7,
+        "legend.frameon": False,
+        "legend.fontsize": 8.0,
+        "legend.handlelength": 1.8,
+        "legend.columnspacing": 1.3,
         "xtick.minor.size": 0.0,
         "ytick.minor.size": 0.0,
         "xtick.major.size": 3.0,
@@ -153,32 +158,91 @@ def new_figure(width_in: float, height_in: float) -> Figure:
     return figure
 
 
-def title(axes: Axes, text: str, detail: str = "") -> None:
+def panels(
+    count: int, columns: int, panel_in: tuple[float, float], margins_in: tuple[float, float, float, float]
+) -> tuple[Figure, list[Axes]]:
+    """A figure of `count` panels that share both axes, `columns` in a row; `margins_in`: left, right, bottom, top."""
+    rows = max(math.ceil(count / columns), 1)
+    left, right, bottom, top = margins_in
+    width, height = max(panel_in[0] * columns + left + right, 4.2), panel_in[1] * rows + bottom + top
+    figure = new_figure(width, height)
+    grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    figure.subplots_adjust(left / width, bottom / height, 1 - right / width, 1 - top / height, 0.1, 0.3)
+    for axes in grid.flat[count:]:
+        axes.set_visible(False)
+    return figure, list(grid.flat[:count])
+
+
+def label_panels(drawn: Sequence[Axes], columns: int, x: str, y: str) -> None:
+    """Names the axes of `panels`: below the lowest and left of the first ones."""
+    for index, axes in enumerate(drawn):
+        lowest = index + columns >= len(drawn)
+        axes.set(xlabel=x if lowest else "", ylabel=y if index % columns == 0 else "")
+        axes.tick_params(labelbottom=lowest)
+
+
+def plain(value: float) -> str:
+    """A tick's number as people write it."""
+    return f"{value:.3g}"
+
+
+def log_axis(
+    axes: Axes,
+    name: str,
+    limits: tuple[float, float],
+    words: Callable[[float], str] = plain,
+    places: Sequence[float] = (),
+) -> None:
+    """Makes axis "x" or "y" logarithmic, without minor ticks: ticks at `places`, or at powers of ten and, where these
+    are few, at three times them."""
+    from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
+
+    axes.set(**{f"{name}scale": "log", f"{name}lim": limits})
+    axis = axes.xaxis if name == "x" else axes.yaxis
+    steps = (1.0, 3.0) if math.log10(limits[1] / limits[0]) < 3.2 else (1.0,)
+    axis.set_major_locator(FixedLocator(places) if places else LogLocator(subs=steps, numticks=30))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: words(value)))
+    axis.set_minor_locator(NullLocator())
+
+
+def error_axis(axes: Axes, limits: tuple[float, float]) -> None:
+    """A logarithmic y axis with ticks such as 3·10⁻³."""
+    log_axis(axes, "y", limits, superscript)
+
+
+def note(axes: Axes, words: str, at: tuple[float, float], rise_pt: float = 0.0, **more: Any) -> None:
+    """Small text so many points above a place, which is in data coordinates unless `xycoords` says otherwise."""
+    settings: Settings = {"textcoords": "offset points", "fontsize": 8.0, "zorder": 13, "annotation_clip": False} | more
+    axes.annotate(words, at, xytext=(0.0, rise_pt), **settings)
+
+
+def title(axes: Axes, words: str, detail: str = "") -> None:
     """A bold title, flush left, and a muted line of detail under it."""
-    rise = 20.0 if detail else 8.0
-    axes.annotate(
-        text,
-        (0, 1),
-        xycoords="axes fraction",
-        xytext=(0, rise),
-        textcoords="offset points",
-        fontsize=10.5,
-        fontweight="bold",
-        va="bottom",
-        annotation_clip=False,
-    )
-    if detail:
-        axes.annotate(
-            detail,
-            (0, 1),
-            xycoords="axes fraction",
-            xytext=(0, 7),
-            textcoords="offset points",
-            fontsize=8.5,
-            color=MUTED,
-            va="bottom",
-            annotation_clip=False,
-        )
+    place: Settings = {"xycoords": "axes fraction", "va": "bottom"}
+    note(axes, words, (0, 1), 20.0 if detail else 8.0, fontsize=10.5, fontweight="bold", **place)
+    note(axes, detail, (0, 1), 7.0, fontsize=8.5, color=MUTED, **place)
+
+
+def heading(figure: Figure, words: str, left_in: float) -> None:
+    """A bold title over panels."""
+    width, height = figure.get_size_inches()
+    figure.text(left_in / width, 1 - 0.12 / height, words, fontsize=10.5, fontweight="bold", va="top")
+
+
+def method_title(axes: Axes, name: str) -> None:
+    """A panel's method in its colour."""
+    weight = "bold" if name == "srd" else "normal"
+    axes.set_title(name, loc="left", fontsize=9.5, color=method_style(name).colour, pad=4, fontweight=weight)
+
+
+def floor_marks(axes: Axes, x: Any, colour: str) -> None:
+    """Hollow triangles on the floor of the axes: an error too small to be known."""
+    if len(x):
+        floor = [axes.get_ylim()[0]] * len(x)
+        axes.plot(x, floor, "v", ms=5.5, mfc=PAPER, mec=colour, mew=1.1, clip_on=False, zorder=12)
+
+
+# -- files --------------------------------------------------------------------------------
 
 
 def svg_text(figure: Figure) -> str:

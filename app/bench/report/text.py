@@ -1,7 +1,5 @@
-"""What the bench report says in words: numbers as people read them, warnings, findings and limits.
-
-Plain text only; the page escapes it.
-"""
+"""The bench report's numbers as people read them, and its sentences: findings and warnings. Plain text; the page
+escapes it."""
 
 from __future__ import annotations
 
@@ -10,20 +8,12 @@ import math
 import statistics
 
 from ..measured_passes import MEASURED_PASSES
-from ..results import ERROR_SOUGHT, BenchResult, Claim, Curve, SceneResult
+from ..results import ERROR_SOUGHT, BenchResult, Curve, SceneResult, SpeedUp
 
-MEASURES = {
-    "relmse_whole": "relMSE, ε of the whole picture",
-    "relmse_trimmed": "relMSE trimmed",
-    "nrmse": "nRMSE",
-    "smape": "SMAPE",
-    "chroma": "Δu'v'",
-}
-"""Names of `results.OTHER_MEASURES` as the reader sees them."""
-
+NONE = "–"
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 BUSY_SHARE = 0.9
-"""A larger budget that took less than this times the time of the one before it gives a busy machine away."""
+"""A larger budget that took less than this times the time of the one before it shows that the machine was busy."""
 REFERENCE_SHARE = 0.1
 """A reference's own error above this share of the smallest error measured calls for a warning."""
 
@@ -39,7 +29,7 @@ def superscript(value: float) -> str:
 def number(value: float | None, digits: int = 2) -> str:
     """A table's number: "–" when there is none, plain between 0.001 and 10⁵, else with a power of ten."""
     if value is None or not math.isfinite(value):
-        return "–"
+        return NONE
     if value == 0:
         return "0"
     mantissa, exponent_text = f"{abs(value):.{digits - 1}e}".split("e")
@@ -52,15 +42,58 @@ def number(value: float | None, digits: int = 2) -> str:
 def count(value: float) -> str:
     """A number of photons or samples: 16.4 M, 250 k."""
     for unit, suffix in ((1e9, " G"), (1e6, " M"), (1e3, " k")):
-        if value >= unit:
+        if value >= unit * 0.9995:
             return f"{value / unit:.3g}{suffix}"
-    return f"{value:.0f}"
+    return f"{value:.3g}"
 
 
-def ratio_text(ratio: float, lower_bound: bool = False) -> str:
-    """A time ratio: 45×, 2.3×, ≥ 120×."""
-    digits = f"{ratio:.0f}" if ratio >= 10 else f"{ratio:.2g}"
-    return f"{'≥ ' if lower_bound else ''}{digits}×"
+def percent(share: float) -> str:
+    """A share as a heading."""
+    return f"{100 * share:.3g} %"
+
+
+def times(ratio: float) -> str:
+    """45×, 2.3×."""
+    return f"{ratio:.0f}×" if ratio >= 10 else f"{ratio:.2g}×"
+
+
+def ratio_text(ratio: float | None, lower_bound: bool = False) -> str:
+    """A time ratio: 45×, ≥ 120×; "never" where there is none."""
+    if ratio is None or not (ratio > 0 and math.isfinite(ratio)):
+        return "never"
+    return f"{'≥ ' if lower_bound else ''}{times(ratio)}"
+
+
+def speed_up_text(one: SpeedUp | None) -> str:
+    """ "12×", "≥ 30×" where it is a bound, "not reached" where srd does not get there, "both at once" where it cannot
+    be known."""
+    if one is None:
+        return NONE
+    if one.ratio is None:
+        return "not reached"
+    return "both at once" if one.bound == "~" else f"{one.bound} {times(one.ratio)}".strip()
+
+
+def slope_text(curve: Curve) -> str:
+    """The exponent of the error and its confidence interval."""
+    if not curve.slope_half_width > 0.0:
+        return NONE
+    return f"{curve.slope:.2f} ± {curve.slope_half_width:.2f}".replace("-", "−")
+
+
+def clock_name(clock: str, measured_pass: str) -> str:
+    """ "photon time", "whole process"."""
+    return MEASURED_PASSES[measured_pass].time if clock == "photon" else "whole process"
+
+
+def seeds_text(seeds: int) -> str:
+    """ "one seed" or "5 seeds"."""
+    return "one seed" if seeds == 1 else f"{seeds} seeds"
+
+
+def sentence(words: str) -> str:
+    """With a capital at its start."""
+    return words[:1].upper() + words[1:]
 
 
 def smallest_error(scene: SceneResult) -> float:
@@ -71,47 +104,44 @@ def smallest_error(scene: SceneResult) -> float:
 
 def warnings_of(scene: SceneResult) -> list[str]:
     """What a reader must know before trusting a scene's numbers."""
-    said = []
-    least = smallest_error(scene)
+    found = []
+    least, measured = smallest_error(scene), MEASURED_PASSES[scene.measured_pass]
     if scene.reference is None:
-        said.append("There is no reference yet, so there are no errors.")
+        found.append("There is no reference yet, so there are no errors.")
     elif not math.isfinite(scene.reference.relmse):
-        said.append("The reference's own error is not known.")
-    elif least > 0 and scene.reference.relmse > REFERENCE_SHARE * least:
-        share = scene.reference.relmse / least
-        said.append(
-            f"The reference's own error ({number(scene.reference.relmse)}) is {share:.2g} times the smallest error "
-            "reported "
-            f"({number(least)}), above the tenth that the protocol asks for. Its variance has been taken off, yet "
-            "errors near it are less "
-            "certain than the band between seeds shows, and a ratio read there is less certain too."
+        found.append("The reference's own error is not known.")
+    elif 0 < REFERENCE_SHARE * least < scene.reference.relmse:
+        found.append(
+            f"The reference's own error ({number(scene.reference.relmse)}) is {scene.reference.relmse / least:.2g} "
+            f"times the smallest error reported ({number(least)}), above the tenth that the protocol asks for. Its "
+            "variance has been taken off, yet errors and ratios near it are less certain than the band between seeds "
+            "shows; --reference-seconds lowers it."
         )
-    elif scene.reference_too_coarse:
-        said.append("The reference's own error is above a tenth of the smallest error reported.")
     if any(p.relmse <= 0 for c in scene.curves for p in c.points):
-        said.append(
-            "Where a debiased error is zero or below, the picture cannot be told from the reference; the plots show a "
-            "hollow triangle on the floor."
+        found.append(
+            "Where a debiased error is zero or below, the picture cannot be distinguished from the reference; the "
+            "plots show a hollow triangle on the floor."
         )
-    busy = [curve.method for curve in scene.curves if _times_fall(curve)]
-    if busy:
-        measured = MEASURED_PASSES[scene.measured_pass]
-        said.append(
+    if busy := [curve.method for curve in scene.curves if _times_fall(curve)]:
+        found.append(
             f"{sentence(measured.time)} does not rise with the number of {measured.unit} for {', '.join(busy)}: the "
-            "machine was busy with other work, so times and time ratios "
-            f"here are rough. Errors against {measured.units} are not touched by that."
+            "machine was busy with other work, so times and time ratios here are rough; errors against "
+            f"{measured.units} are not affected."
         )
-    unfinished = [curve.method for curve in scene.curves if not curve.points]
-    if unfinished:
-        said.append(f"No finished point yet: {', '.join(unfinished)}.")
+    if unfinished := [curve.method for curve in scene.curves if not curve.points]:
+        found.append(f"No finished point yet: {', '.join(unfinished)}.")
     if not scene.complete:
-        said.append("The run was stopped before this scene was complete; the same command goes on where it stopped.")
+        found.append("The run was stopped before this scene was complete; the same command goes on where it stopped.")
     if scene.seeds < 5:
-        said.append(
-            f"Only {seeds_text(scene.seeds)}: the band over seeds and the parting of bias and variance are weak; the "
-            "protocol asks for five."
+        found.append(
+            f"Only {seeds_text(scene.seeds)}: the band over seeds and the split of errors into bias and variance are "
+            "weak; the protocol asks for five."
         )
-    return said
+    if scene.picture_samples and not any("flip" in sample.metrics for sample in scene.picture_samples.values()):
+        found.append(
+            "FLIP is not available; 'pip install flip-evaluator' brings it, on Pythons that it has wheels for."
+        )
+    return found
 
 
 def _times_fall(curve: Curve) -> bool:
@@ -121,92 +151,36 @@ def _times_fall(curve: Curve) -> bool:
 
 
 def headline(result: BenchResult) -> list[str]:
-    """The findings in two or three sentences."""
-    claims = [claim for scene in result.scenes for claim in scene.claims]
+    """The findings in two or three sentences: srd against the best baseline by both clocks, and against stochastic."""
+    found = []
+    for clock in ("photon", "whole"):
+        known = [one for s in result.scenes for one in s.speed_ups if one.clock == clock and one.target == ERROR_SOUGHT]
+        known = [one for one in known if one.bound != "~"]
+        ratios = [one.ratio for one in known if one.ratio is not None]
+        bounds = sum(bool(one.bound) for one in known if one.ratio is not None)
+        if known:
+            found.append(
+                f"To a relMSE of 1 % srd is, by {clock_name(clock, result.settings.measured_pass)}, faster than the "
+                f"best of all baselines, each with its best kernel, in {sum(ratio > 1.0 for ratio in ratios)} of "
+                f"{len(known)} scenes{_range_of(ratios)}{f' ({bounds} of these are bounds)' if bounds else ''}."
+            )
     compared = [
         s for s in result.scenes if {"srd", "stochastic"} <= {curve.method for curve in s.curves if curve.points}
     ]
-    ratios = sorted(r for s in compared if (r := s.time_to_equal_error.get("srd", 0.0)) > 0 and math.isfinite(r))
-    said = _against_the_best(result)
+    ratios = [r for s in compared if (r := s.time_to_equal_error.get("srd", 0.0)) > 0 and math.isfinite(r)]
     if compared:
-        asked = MEASURED_PASSES[result.settings.measured_pass].asked_ratio
-        enough = sum(ratio >= asked for ratio in ratios)
-        said.append(
-            f"srd reached the error that stochastic ends with in at most 1/{asked:.0f} of its time in {enough} of "
-            f"{len(compared)} "
-            f"scene{'' if len(compared) == 1 else 's'}{_range_of(ratios)}."
+        found.append(
+            f"srd reached the error that stochastic ends with in {len(ratios)} of {len(compared)} "
+            f"scenes{_range_of(ratios)}."
         )
-        if len(ratios) < len(compared):
-            said.append(f"In {len(compared) - len(ratios)} of them it never got there.")
-    if claims:
-        said.append(
-            f"{sum(claim.holds for claim in claims)} of {len(claims)} claims hold; what does not is listed under "
-            "Limits."
-        )
-    if not said:
-        said.append("Nothing has been compared yet: the run was stopped early or had one method only.")
-    return said
-
-
-def _against_the_best(result: BenchResult) -> list[str]:
-    """srd against the best baseline at 1 %, by both clocks; nothing where nothing was compared."""
-    said = []
-    for clock in ("photon", "whole"):
-        found = [one for s in result.scenes for one in s.speed_ups if one.clock == clock and one.target == ERROR_SOUGHT]
-        found = [one for one in found if one.bound != "~"]
-        ratios = sorted(one.ratio for one in found if one.ratio is not None)
-        if not found:
-            continue
-        time = MEASURED_PASSES[result.settings.measured_pass].time if clock == "photon" else "time of a whole process"
-        bounds = sum(bool(one.bound) for one in found if one.ratio is not None)
-        said.append(
-            f"To a relMSE of 1 % srd is, by {time}, faster than the best of all baselines, each with its best kernel, "
-            f"in {sum(ratio > 1.0 for ratio in ratios)} of {len(found)} scene{'' if len(found) == 1 else 's'}"
-            f"{_range_of(ratios)}{f' ({bounds} of these are bounds)' if bounds else ''}."
-        )
-    return said
+    return found or ["Nothing has been compared yet: the run was stopped early or had one method only."]
 
 
 def _range_of(ratios: list[float]) -> str:
-    """A clause with the least, the median and the largest of rising `ratios`."""
+    """A clause with the least, the median and the largest of `ratios`."""
     if not ratios:
         return ""
     if len(ratios) < 3:
-        return f"; it took {' and '.join(ratio_text(ratio) for ratio in ratios)} less time"
-    least, median, most = (ratio_text(ratio) for ratio in (ratios[0], statistics.median(ratios), ratios[-1]))
-    return f"; times less: {least} at least, {median} in the median, {most} at most"
-
-
-def limits(result: BenchResult) -> list[tuple[str, Claim]]:
-    """(scene, claim) for every claim that does not hold."""
-    return [(scene.scene, claim) for scene in result.scenes for claim in scene.claims if not claim.holds]
-
-
-def limit_sentence(claim: Claim) -> str:
-    """One failed claim in words."""
-    why = claim.why.strip() or "the numbers do not tell why."
-    return f"Asked: {claim.asked}. Measured: {claim.measured}. Why: {why}"
-
-
-def bias_share(curve: Curve) -> float | None:
-    """Share of bias² in bias² + variance at the largest budget, 0 to 1; None where it cannot be known."""
-    if not curve.points:
-        return None
-    last = max(curve.points, key=lambda point: point.photons)
-    bias2, variance = max(last.bias2, 0.0), max(last.variance, 0.0)
-    return bias2 / (bias2 + variance) if bias2 + variance > 0 and math.isfinite(bias2 + variance) else None
-
-
-def seeds_text(seeds: int) -> str:
-    """ "one seed" or "5 seeds"."""
-    return "one seed" if seeds == 1 else f"{seeds} seeds"
-
-
-def signed(value: float) -> str:
-    """Two decimals with a true minus sign."""
-    return f"{value:.2f}".replace("-", "−")
-
-
-def sentence(words: str) -> str:
-    """With a capital at its start."""
-    return words[:1].upper() + words[1:]
+        return f"; it took {' and '.join(map(times, sorted(ratios)))} less time"
+    median = times(statistics.median(ratios))
+    return f"; times less: {times(min(ratios))} at least, {median} in the median, {times(max(ratios))} at most"
