@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 import platformdirs
 import pytest
-from spectrasplat.gpu import stripped_store
 
 if TYPE_CHECKING:
     from spectrasplat.gpu.context import Context
@@ -33,10 +32,9 @@ if "PYTEST_XDIST_WORKER_COUNT" in os.environ:
     os.environ.setdefault("LP_NUM_THREADS", str(max(usable_cores() // int(os.environ["PYTEST_XDIST_WORKER_COUNT"]), 1)))
 
 
-# What the driver compiled and what was stripped from shaders is kept for the next run. Mesa's folder is named for tests
-# that set a cache folder of their own; all tests together build more programs than one user does.
+# What the driver compiled is kept for the next run. Mesa's folder is named for tests that set a cache folder of their
+# own.
 os.environ.setdefault("MESA_SHADER_CACHE_DIR", platformdirs.user_cache_dir())
-stripped_store.MOST_FILES = 4096
 
 
 @pytest.hookimpl(optionalhook=True)

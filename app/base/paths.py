@@ -46,7 +46,10 @@ def config_path() -> Path:
 def forget_oldest(folder: Path, suffix: str, *, files: int | None = None, size: int | None = None) -> None:
     """Keep the most recently used files of a cache folder within a number of them and of bytes, the newest in any
     case."""
-    states = [(path, path.stat()) for path in folder.glob(f"*{suffix}")]
+    found = [folder / name for name in os.listdir(folder) if name.endswith(suffix)]
+    if size is None and (files is None or len(found) <= files):
+        return
+    states = [(path, path.stat()) for path in found]
     states.sort(key=lambda item: item[1].st_mtime_ns, reverse=True)
     used = 0
     for rank, (path, state) in enumerate(states):

@@ -14,23 +14,10 @@ from spectrasplat.model.scene import Camera, Diffuse, Scene, SceneObject
 from spectrasplat.model.scene_camera import camera_frame
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.render.still import render
-from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 from spectrasplat.stress.rigs.probe import light_pass
 from spectrasplat.stress.rigs.scene_parts import SUN, solid, stage, turn
 from spectrasplat.stress.rigs.splat_rig import Rig, photons
 
-COVERS = {
-    "border.glsl": (
-        "border_distance",
-        "mirrored_step",
-        "mirrored_place",
-        "border_spread",
-        "sweeps_inside",
-        "step_over_border",
-        "needs_both",
-        "needs_corner",
-    )
-}
 NOON = replace(SUN, direction=(0.0, 0.0, -1.0))
 SIDES = 2.0, 1.6
 SIZE = 96, 64
@@ -153,65 +140,3 @@ def test_what_lands_beyond_a_border_is_not_mirrored(gl, place: tuple[float, floa
     records = photons(swept, np.array([place]), axis_s=(1.2, 0.0), axis_t=(0.0, 1.2), chord=chord, x_anchor=0.0)
     with_images, bare = drawn(gl, SQUARE, records, swept), drawn(gl, ((0.0, 0.0, 0.0, 0.0),), records, swept)
     assert (with_images[:, 8:56].sum() > 1.001 * bare[:, 8:56].sum()) == lights_up
-
-
-def test_functions_of_the_library(gl) -> None:
-    rng = np.random.default_rng(3)
-    count = 4000
-    border = rng.normal(size=(count, 4))
-    border[:, :3] /= np.linalg.norm(border[:, :3], axis=1)[:, None]
-    vectors: list[np.ndarray] = [as_f32(rng.normal(size=(count, 3))) for _ in range(4)]
-    inputs: dict[str, np.ndarray] = {"border": as_f32(border)} | dict(zip(("p", "q", "s", "t"), vectors, strict=True))
-    inputs["points"] = as_f32(np.floor(np.exp(rng.uniform(np.log(64.0), np.log(1e6), count))))
-    inputs["cosine"] = as_f32(rng.uniform(-1.0, 1.0, count))
-    body = """
-    distance = border_distance(border, p);
-    moved = mirrored_step(border, s);
-    place = mirrored_place(border, p);
-    spread = border_spread(border, s, t);
-    inside = sweeps_inside(border, p, q, border_spread(border, s, t)) ? 1u : 0u;
-    step = step_over_border(border, s, t, points);
-    both = needs_both(cosine) ? 1u : 0u;
-    corner = needs_corner(cosine) ? 1u : 0u;
-    """
-    outputs = {"distance": "float", "moved": "vec3", "place": "vec3", "spread": "float", "inside": "uint"}
-    outputs |= {"step": "vec2", "both": "uint", "corner": "uint"}
-    got: dict[str, np.ndarray] = evaluate(gl.ctx, ["lib/border.glsl"], body, inputs, outputs)
-    exact = {name: np.asarray(values, float) for name, values in inputs.items()}
-    normal, offset = exact["border"][:, :3], exact["border"][:, 3]
-
-    def dot(vectors: np.ndarray) -> np.ndarray:
-        return np.einsum("ij,ij->i", normal, vectors)
-
-    distance = dot(exact["p"]) + offset
-    np.testing.assert_allclose(got["distance"], distance, atol=2e-6)
-    np.testing.assert_allclose(got["moved"], exact["s"] - 2.0 * dot(exact["s"])[:, None] * normal, atol=4e-6)
-    np.testing.assert_allclose(got["place"], exact["p"] - 2.0 * distance[:, None] * normal, atol=8e-6)
-    spread = np.hypot(dot(exact["s"]), dot(exact["t"]))
-    np.testing.assert_allclose(got["spread"], spread, rtol=1e-5, atol=1e-6)
-    ends = np.stack([distance, dot(exact["q"]) + offset])
-    beyond = ends.min(axis=0) + 0.1 * np.ptp(ends, axis=0) + 0.25 * spread
-    sure = np.abs(beyond) > 1e-5
-    np.testing.assert_array_equal(got["inside"][sure], (beyond >= 0.0)[sure])
-    np.testing.assert_array_equal(got["both"], exact["cosine"] < 0.8)
-    np.testing.assert_array_equal(got["corner"], np.abs(exact["cosine"]) < 0.3)
-    outwards = np.empty(count)
-    for i, points in enumerate(exact["points"]):
-        outwards[i] = farthest_step(points, np.array([dot(exact["s"])[i], dot(exact["t"])[i]]))
-    step = np.asarray(got["step"], float)
-    found = -(step[:, 0] * dot(exact["s"]) + step[:, 1] * dot(exact["t"]))
-    # Where two steps are about equally short, either is the shortest.
-    assert np.mean(np.abs(found - outwards) > 3e-3) < 2e-3
-
-
-def farthest_step(points: float, inwards: np.ndarray) -> float:
-    """How far the best of a golden lattice's three shortest steps leads out, from the lattice itself: (F/N, F g mod 1)
-    for Fibonacci numbers F, in spacings."""
-    golden = 0.5 * (np.sqrt(5.0) - 1.0)
-    numbers = [1, 2]
-    while numbers[-1] < points:
-        numbers.append(numbers[-1] + numbers[-2])
-    turns = np.array(numbers) * golden
-    steps = np.sqrt(points) * np.stack([np.array(numbers) / points, turns - np.round(turns)], axis=1)
-    shortest = int(np.argmin(np.linalg.norm(steps, axis=1)))
-    return float(np.abs(steps[shortest - 1 : shortest + 2] @ inwards).max())

@@ -19,7 +19,6 @@ from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 from spectrasplat.stress.rigs.probe import SMALL, Probe, picture_error, probe
 from spectrasplat.stress.rigs.scene_parts import BEAM, SUN, solid, stage, turn
 
-COVERS = {"intersect.glsl": ("accept_sheet", "crossed_in_contact", "comes_first")}
 GAPS = (0.0, 1e-7, 1e-6, 1e-5, 1e-4, -1e-6)
 """Negative: the sheet lies in the glass."""
 CAUSTIC = replace(SMALL, layer="caustic", method="srd")

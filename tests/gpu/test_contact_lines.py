@@ -26,7 +26,6 @@ from spectrasplat.stress.rigs.glsl_function import evaluate
 from spectrasplat.stress.rigs.probe import light_pass
 from spectrasplat.stress.rigs.scene_parts import SUN, solid, stage, turn
 
-COVERS = {"contact.glsl": ("seen_share", "is_contact", "side_of", "takes_side", "held_share", "part_place")}
 OBLIQUE = Camera((1.2, -5.0, 4.0), (0.0, 0.0, 0.2), kind="orthographic", vertical_extent=3.0)
 NOON = replace(SUN, direction=(0.0, 0.0, -1.0))
 SIZE = 64, 36

@@ -14,33 +14,6 @@ from spectrasplat.edit.state import Display as Settings
 from spectrasplat.passes.display import ERROR_FLOOR, ERROR_RANGE, Display
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
-COVERS = {
-    "tone.glsl": (
-        "luminance_709",
-        "fifth_powers",
-        "p_norm",
-        "into_gamut",
-        "roll_off",
-        "tone_spectrasplat",
-        "tone_keeps",
-        "tone_aces",
-        "tone_reinhard",
-        "srgb_encode",
-        "signed_error",
-    ),
-    "highlights.glsl": (
-        "exposed_norm",
-        "seen_norm",
-        "step_flatness",
-        "find_step",
-        "step_share",
-        "step_weight",
-        "step_factor",
-        "exposed_fifths",
-        "end_of_run",
-        "glint_share",
-    ),
-}
 COUNT = 4096
 
 
@@ -86,62 +59,6 @@ def test_each_tone_function_has_its_twin(gl) -> None:
     want = tone.signed_error(rgb, other, floor_value)
     sure = np.abs(tone.luminance_709(rgb - other)) > 1e-5 * np.abs(rgb - other).max(axis=1)
     assert (np.abs(got["error"] - want)[sure] <= 1e-5 * np.abs(want[sure]) + 1e-6).all()
-
-
-def test_each_function_of_highlights_has_its_twin(gl) -> None:
-    """Five pixels on a line each; the brighter side above white and below, flat and not."""
-    rng = np.random.default_rng(6)
-    base = 2.0 ** rng.uniform(-3, 5, (5, COUNT, 1))
-    base[:, : COUNT // 2].sort(axis=0)  # half of the lines rise
-    line = as_f32(base * rng.uniform(0.6, 1.4, (5, COUNT, 3)))
-    inputs = dict(zip(("before2", "before", "pixel", "after", "after2"), line, strict=True))
-    body = """
-    PixelStep s = PixelStep(pixel, pixel, 0.0, 0.0, 0.0); find_step(s, pixel, before2, before, after, after2);
-    bright = s.bright; dark = s.dark; contrast = s.contrast; norm = exposed_norm(pixel);
-    seen = seen_norm(norm); flatness = step_flatness(after.r - before.r, pixel.r);
-    share = step_share(s, norm); weight = step_weight(s); glint = glint_share(norm, before.r);
-    around = end_of_run(before2, after2); fifths = exposed_fifths(pixel);
-    vec3 mixture = tone_spectrasplat(mix(dark, bright, share));
-    factor = step_factor(tone_spectrasplat(bright), tone_spectrasplat(dark), mixture, share, weight);
-    """
-    outputs = dict.fromkeys(
-        ("contrast", "norm", "seen", "flatness", "share", "weight", "glint", "around", "fifths"), "float"
-    )
-    outputs |= dict.fromkeys(("bright", "dark", "factor"), "vec3")
-    got = evaluate(gl.ctx, ["lib/tone.glsl", "lib/highlights.glsl"], body, inputs, outputs)
-    before2, before, pixel, after, after2 = line.astype(float)
-    assert np.abs(got["norm"] / tone.exposed_norm(pixel) - 1.0).max() < 1e-5
-    assert np.abs(got["seen"] - 1.0 + 1.0 / (1.0 + tone.exposed_norm(pixel))).max() < 1e-5
-    want = 1.0 - np.clip(4.0 * np.maximum(after - before, 0.0)[:, 0] / pixel[:, 0], 0.0, 1.0)
-    assert np.abs(got["flatness"] - want).max() < 1e-5
-    glints = [tone.glint_share(float(tone.exposed_norm(p)), b) for p, b in zip(pixel, before[:, 0], strict=True)]
-    assert got["glint"] == pytest.approx(np.array(glints), abs=1e-5) and (got["glint"] > 0.0).mean() > 0.02
-    assert np.abs(got["fifths"] / tone.exposed_norm(pixel) ** 5 - 1.0).max() < 1e-4
-    ends = np.maximum(before2, after2[:, ::-1]).min(axis=1)
-    assert got["around"] == pytest.approx(ends, rel=1e-6)
-    steps = 0
-    for i in range(COUNT):
-        step = tone.step_between(pixel[i], (before[i], before2[i]), (after[i], after2[i]))
-        if step is None or step.contrast <= 1e-4 or step.high - step.low < 1e-3:
-            assert got["contrast"][i] < 1e-3
-            continue
-        steps += 1
-        own = float(tone.exposed_norm(pixel[i]))
-        share = np.clip((own - step.low) / (step.high - step.low), 0.0, 1.0)
-        assert got["contrast"][i] == pytest.approx(step.contrast, abs=1e-5)
-        assert got["share"][i] == pytest.approx(share, abs=1e-3) and got["weight"][i] == pytest.approx(
-            step.weight, abs=1e-3
-        )
-        assert got["bright"][i] == pytest.approx(step.bright, rel=1e-3) and got["dark"][i] == pytest.approx(
-            step.dark, rel=1e-3
-        )
-        bright, dark, mixture = (
-            tone.tone_spectrasplat(c) for c in (step.bright, step.dark, share * step.bright + (1 - share) * step.dark)
-        )
-        straight = share * bright + (1 - share) * dark
-        factor = 1.0 + step.weight * (np.minimum(straight / mixture, 1.0) - 1.0)
-        assert got["factor"][i] == pytest.approx(factor, abs=3e-3)
-    assert steps > COUNT // 5
 
 
 def overexposed_edges(size: tuple[int, int] = (48, 40)) -> np.ndarray:

@@ -11,10 +11,6 @@ from spectrasplat.reference.emission import GOLDEN, lattice_point
 from spectrasplat.stress.rigs.glsl_function import evaluate
 from spectrasplat.stress.rigs.splat_rig import Rig, photons
 
-COVERS = {
-    "lattice.glsl": ("shortest_step", "golden_step", "lattice_frequencies", "lattice_place"),
-    "gaussian.glsl": ("flatness",),
-}
 COUNTS = (7, 64, 400, 1000, 1500, 2600, 33_333, 65_536, 1_000_003, 16_000_001)
 RATIO = GOLDEN / 2.0**32
 NEEDLES = 600

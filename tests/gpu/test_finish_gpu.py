@@ -22,17 +22,6 @@ from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
 from tests.gpu.camera_rig import at, horizontal
 
-COVERS = {
-    "microfacet.glsl": ("smith_lambda", "microfacet_density"),
-    "coat.glsl": (
-        "axes_across",
-        "coat_fresnel",
-        "coat_weight",
-        "coat_direction_density",
-        "coat_response",
-    ),
-    "rough_diffuse.glsl": ("rough_single_albedo", "rough_multiple_colour", "rough_albedo", "rough_response"),
-}
 COUNT = 4000
 COAT, ROUGH = ["lib/coat.glsl"], ["lib/rough_diffuse.glsl"]
 
@@ -42,13 +31,6 @@ def over_plane(rng: np.random.Generator, count: int) -> np.ndarray:
     v = finish.unit(rng.normal(size=(count, 3)))
     v[:, 2] = np.maximum(abs(v[:, 2]), 0.02)
     return as_f32(finish.unit(v))
-
-
-def test_axes_across_a_normal_are_a_frame(gl) -> None:
-    n = finish.unit(np.concatenate([np.random.default_rng(1).normal(size=(COUNT, 3)), np.eye(3), -np.eye(3)]))
-    got = evaluate(gl.ctx, COAT, "vec3 a, b; axes_across(n, a, b); x = a; y = b;", {"n": n}, {"x": "vec3", "y": "vec3"})
-    np.testing.assert_allclose(np.cross(got["x"], got["y"]), n, atol=2e-6)
-    assert abs(np.linalg.norm(got["x"], axis=1) - 1.0).max() < 2e-6
 
 
 def test_the_lobe_agrees_with_float64(gl) -> None:
@@ -107,22 +89,6 @@ def test_normals_are_drawn_as_they_are_seen(gl) -> None:
             found = np.bincount(cells(above), minlength=48) / count
             off = abs(found - expected).max()
             assert (off < 1e-3) == passes, (alpha, cosine, drawn_with, off)
-
-
-def test_the_rough_base_agrees_with_float64(gl) -> None:
-    rng = np.random.default_rng(4)
-    o, i = over_plane(rng, COUNT), over_plane(rng, COUNT)
-    rgb, roughness = as_f32(rng.uniform(0.0, 1.0, (COUNT, 3))), as_f32(rng.uniform(0.02, 1.0, COUNT))
-    body = "r = rough_response(c, s, o, i, o.z, i.z); a = rough_albedo(c, s, o.z);"
-    inputs = {"c": rgb, "s": roughness, "o": o, "i": i}
-    got = evaluate(gl.ctx, ROUGH, body, inputs, {"r": "vec3", "a": "vec3"})
-    want = np.array([finish.eon(c, s, a, b) for c, s, a, b in zip(rgb, roughness, o, i, strict=True)])
-    np.testing.assert_allclose(got["r"], want, atol=2e-5)
-    directions, weights = finish.hemisphere(100, 120)
-    for k in range(20):
-        sent = finish.eon(rgb[k], roughness[k], np.broadcast_to(o[k], directions.shape), directions)
-        mean = ((weights * directions[:, 2])[:, None] * sent).sum(axis=0) / np.pi
-        np.testing.assert_allclose(got["a"][k], mean, atol=5e-4)
 
 
 # ---- a room of one brightness ------------------------------------------------------------------

@@ -7,7 +7,6 @@ from spectrasplat.gpu import bindings
 from spectrasplat.gpu.scene_records import SCENE_STRUCTS
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
-COVERS = {"footprint.glsl": ("box_of_covariance", "box_of_three")}
 COUNT = 4096
 
 

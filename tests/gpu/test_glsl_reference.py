@@ -9,21 +9,6 @@ from spectrasplat.reference.glasses import C_NM, D_NM, F_NM, index
 from spectrasplat.reference.optics import dot, times
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
-COVERS = {
-    "optics.glsl": (
-        "transmitted_cosine2",
-        "refraction_mu",
-        "refract_direction",
-        "reflect_direction",
-        "reflect_column",
-        "refract_column",
-        "transfer_column",
-        "normalised_derivative",
-        "facet_normal",
-        "barycentric_gradients",
-        "fresnel_reflectance",
-    ),
-}
 OPTICS = ["lib/optics.glsl"]
 COUNT = 4096
 EPSILON = float(np.finfo(np.float32).eps)
@@ -294,3 +279,21 @@ def test_total_reflection_is_total(gl) -> None:
     got = evaluate(gl.ctx, OPTICS, body, {**e, "eta": eta}, {"c2": "float", "r": "float"})
     assert (got["c2"] < 0).all()
     np.testing.assert_array_equal(got["r"], 1.0)
+
+
+def test_numbers_are_told_by_their_bits(gl) -> None:
+    bits = np.array(
+        [0, 1, 0x7F7FFFFF, 0x7F800000, 0x7F800001, 0x7FC00000, 0x7FFFFFFF, 0x3F800000, 0x3F7FFFFF], np.uint32
+    )
+    bits = np.concatenate([bits, bits | np.uint32(0x80000000)])
+    body = (
+        "float v = uintBitsToFloat(b); finite = uint(is_finite(v)); three = uint(is_finite3(vec3(0.0, v, 1.0)));"
+        "within = uint(is_within(v, 1.0)); two = uint(is_within2(vec2(0.0, v), 1.0));"
+    )
+    outputs = dict.fromkeys(("finite", "three", "within", "two"), "uint")
+    got = evaluate(gl.ctx, ["lib/finite.glsl"], body, {"b": bits}, outputs)
+    with np.errstate(invalid="ignore"):
+        values = bits.view(np.float32)
+        finite, within = np.isfinite(values), np.abs(values) < 1.0
+    for name, expected in (("finite", finite), ("three", finite), ("within", within), ("two", within)):
+        np.testing.assert_array_equal(got[name], expected, name)

@@ -16,11 +16,6 @@ from spectrasplat.reference import optics
 from spectrasplat.render.device_scene import scene_buffers
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
-COVERS = {
-    "bounce.glsl": ("cosine_direction", "gathered"),
-    "receiver_light.glsl": ("receiver_record", "receiver_light"),
-    "covered.glsl": ("is_covered",),
-}
 COUNT, KNOWN = 4096, 6
 
 

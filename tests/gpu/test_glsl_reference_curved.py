@@ -12,21 +12,6 @@ from spectrasplat.model.curved_solids import Face
 from spectrasplat.reference import optics
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
-COVERS = {
-    "curved.glsl": (
-        "piece_at",
-        "stretched",
-        "piece_curvature",
-        "piece_gradient",
-        "on_piece",
-        "piece_interval",
-        "piece_chord",
-        "height_over",
-        "curve_of_piece",
-    ),
-    "intersect.glsl": ("intersect_curved", "is_curved", "is_plane"),
-    "interface.glsl": ("curve_as_piece", "is_planar"),
-}
 COUNT = 4000
 CURVED_BIT = 0x40000000
 UP = np.array([0.0, 0.0, 1.0])

@@ -6,16 +6,6 @@ import numpy as np
 from spectrasplat.reference import optics
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
-COVERS = {
-    "fan.glsl": (
-        "change_of_way",
-        "longest_axis",
-        "growth_of_side",
-        "fan_of_footprint",
-        "part_that_fans",
-        "keep_within",
-    ),
-}
 LIBRARY = ["lib/fan.glsl"]
 COUNT = 2000
 

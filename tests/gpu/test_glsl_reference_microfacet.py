@@ -12,26 +12,11 @@ from spectrasplat.gpu.scene_texels import spectra_texture
 from spectrasplat.gpu.spectral_groups import SAMPLES
 from spectrasplat.model.optics import rough_surfaces
 from spectrasplat.passes import pilot
-from spectrasplat.reference import optics, random_numbers, rough_albedo
+from spectrasplat.reference import optics, rough_albedo
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
-COVERS = {
-    "microfacet.glsl": ("visible_microfacet",),
-    "rough_surface.glsl": (
-        "microfacet_numbers",
-        "smith_share",
-        "smith_slope",
-        "turned_with",
-        "lobe_axes",
-        "lobe_part",
-    ),
-    "rough_energy.glsl": ("regained",),
-    "footprint.glsl": ("join_sides", "cover_sides"),
-    "optics.glsl": ("frame_across",),
-}
 LIBRARY = ["lib/rough_surface.glsl"]
 COUNT = 4000
-GENERATORS = tuple(int((n**0.5 % 1.0) * 2.0**32) for n in (29, 31, 37, 41, 43, 47, 53, 59))
 
 
 def surfaces(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -65,24 +50,6 @@ def test_slope_of_what_is_not_hidden(gl, width: float) -> None:
         for side in (-1, 1)
     ]
     np.testing.assert_allclose(got, (ends[1] - ends[0]) / (2.0 * step), rtol=2e-3, atol=1e-5)
-
-
-def test_visible_microfacets_are_those_of_the_listing(gl) -> None:
-    rng = np.random.default_rng(3)
-    normal, direction, width = surfaces(rng, COUNT)
-    u = as_f32(rng.uniform(0.0, 1.0 - 1e-6, (COUNT, 2)))
-    inputs = {"n": normal, "d": direction, "width": width, "u": u}
-    body = "m = visible_microfacet(d, n, width, u);"
-    got = evaluate(gl.ctx, LIBRARY, body, inputs, {"m": "vec3"})["m"]
-    wanted = microfacet.visible_normal(direction, optics.unit(normal), width, u)
-    assert np.isfinite(got).all()
-    assert np.abs(got - wanted).max() < 2e-3 and np.median(np.abs(got - wanted)) < 1e-6
-    assert optics.dot(got, normal).min() > 0.0 and optics.dot(got, direction).min() > -1e-4
-    # Straight on there is no first axis to choose; the numbers may be any.
-    same = evaluate(gl.ctx, LIBRARY, body, inputs | {"d": normal}, {"m": "vec3"})["m"]
-    slope = np.tan(np.arccos(np.clip(optics.dot(same, normal), 0.0, 1.0)))
-    steep = width > 0.01
-    np.testing.assert_allclose(slope[steep], (width * np.sqrt(u[:, 0] / (1.0 - u[:, 0])))[steep], rtol=2e-2, atol=1e-3)
 
 
 def test_what_microfacets_throw_at_each_other_is_given_back(gl) -> None:
@@ -149,20 +116,6 @@ def test_microfacets_turn_with_their_surface(gl) -> None:
         np.testing.assert_allclose(np.linalg.norm(got[one], axis=1), spread, rtol=2e-3, atol=2e-4)
     np.testing.assert_allclose(got["part"], np.minimum(4.4 * count ** (-1.0 / 6.0), 1.1), rtol=1e-4)
     np.testing.assert_allclose(got["part"], [pilot.lobe_part(paths) for paths in count], rtol=1e-4)
-
-
-def test_numbers_are_kronecker_sequences(gl) -> None:
-    rng = np.random.default_rng(6)
-    i, key = rng.integers(0, 2**32, (2, COUNT), dtype=np.uint32)
-    depth = rng.integers(0, 12, COUNT, dtype=np.uint32)
-    body = "u = microfacet_numbers(i, depth, key);"
-    got = evaluate(gl.ctx, LIBRARY, body, {"i": i, "depth": depth, "key": key}, {"u": "vec2"})["u"]
-    own = random_numbers.hash_combine(key, depth)
-    for k in range(2):
-        deep = random_numbers.hash_pcg(2 * depth.astype(np.uint64) + 0x5BD1E995 + k) | np.uint32(1)
-        generator = np.where(depth < 4, np.array(GENERATORS)[np.minimum(2 * depth + k, 7)], deep)
-        shift = own if k == 0 else random_numbers.hash_pcg(own)
-        np.testing.assert_array_equal(got[:, k], random_numbers.kronecker(i, generator, shift))
 
 
 def test_joined_sides_have_both_covariances(gl) -> None:

@@ -8,22 +8,6 @@ from reference import polarisation
 from spectrasplat.reference import optics
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
-COVERS = {
-    "polarisation.glsl": (
-        "across_direction",
-        "unpolarised",
-        "incidence_axis",
-        "counted_from",
-        "in_plane",
-        "out_of_plane",
-        "fresnel_reflection",
-        "fresnel_transmission",
-        "mirror_reflection",
-        "polarised_share",
-        "behind_interface",
-        "behind_grating",
-    ),
-}
 LIBRARY = ["lib/optics.glsl", "lib/polarisation.glsl"]
 COUNT = 2000
 ROTATE = """

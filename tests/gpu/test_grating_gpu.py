@@ -9,10 +9,7 @@ import numpy as np
 import pytest
 from reference import tracer
 from reference.grating import diffract
-from spectrasplat.features.features import Features
-from spectrasplat.gpu import bindings
 from spectrasplat.gpu.context import Context
-from spectrasplat.gpu.scene_buffers import SceneBuffers
 from spectrasplat.gpu.scene_records import SCENE_STRUCTS
 from spectrasplat.model.geometry.mesh import Mesh
 from spectrasplat.model.geometry.primitives import box, plane
@@ -23,7 +20,7 @@ from spectrasplat.model.scene import Camera, Dielectric, Diffuse, Grating, Scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes.ray_paths import RayPaths
 from spectrasplat.reference.optics import dot, times, unit
-from spectrasplat.render.device_scene import scene_buffers, spectral_axis
+from spectrasplat.render.device_scene import scene_buffers
 from spectrasplat.render.still import render
 from spectrasplat.stress.rigs.camera_probe import white_furnace
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
@@ -32,22 +29,6 @@ from spectrasplat.stress.rigs.gpu_paths import Photons, placed, screen, trace_be
 from tests.gpu.camera_rig import white_through
 from tests.gpu.test_live_light import difference, edited, inputs, into, live, maps, shipped, splat_again, trace
 
-COVERS = {
-    "grating.glsl": (
-        "across_lines",
-        "diffract_at",
-        "diffract_column",
-        "diffract_direction",
-        "diffracted_column",
-        "diffracted_cosine2",
-        "evanescence_onset",
-        "grating_at",
-        "order_at",
-        "order_step_derivative",
-        "order_steps",
-    ),
-    "scene.glsl": ("is_specular",),
-}
 MERCURY_NM = (404.66, 435.83, 546.07, 576.96, 579.07)
 COUNT = 4096
 DISTANCE = 1.0
@@ -246,86 +227,6 @@ def test_functions_against_float64(gl: Context, reflects: bool) -> None:
     slope = (8 * (exact(h) - exact(-h)) - (exact(2 * h) - exact(-2 * h))) / (12 * h)
     error = np.linalg.norm(got["out_dd"] - slope, axis=1) / np.maximum(np.linalg.norm(slope, axis=1), 1.0)
     assert error[clear].max() < 3e-5
-
-
-def test_tables_and_the_edge_against_float64(gl: Context) -> None:
-    """Steps in a medium that disperses, their derivatives by both variables, and where a slanted order ends."""
-    glass = Dielectric(catalogue.find("N-SF11"))
-    grating = Grating(2600.0, (-1, 1), (0.25, 0.5), True, (0.6, 0.8, 0.0))
-    water = placed("glass", box((3.0, 3.0, 1.0)), glass)
-    scene = Scene("tables", Camera((0, 0, 9), (0, 0, 0)), (), (water, sheet(grating)))
-    features = Features.of(scene, RenderSettings())
-    buffers = SceneBuffers(gl.ctx, scene, features, spectral_axis(scene, features))
-    assert buffers.groups.count == 2
-    rng = np.random.default_rng(5)
-    x, d = rng.uniform(0.0, 1.0, COUNT), unit(rng.normal(size=(COUNT, 3)))
-    dd0, dd1 = 0.1 * rng.normal(size=(2, COUNT, 3))
-    inputs = {name: as_f32(v) for name, v in {"x": x, "d": d, "dd0": dd0, "dd1": dd1}.items()}
-    body = """
-    uint at_row = object_at(1u).weight_row;
-    Grating found = grating_at(at_row);
-    GratingOrder order = order_at(at_row, 1u);
-    head = vec4(found.lines, float(found.orders));
-    told = vec4(order.shift_per_um, order.efficiency, order.left, float(order.reflects));
-    kinds = vec4(is_specular(object_at(0u).kind), is_specular(object_at(1u).kind),
-        is_specular(KIND_DIFFUSE), is_specular(KIND_BLACK));
-    vec3 three = order_steps(order, 1u, 0u, vec3(x, 0.5, 1.0));
-    steps = vec4(three, order_steps(order, 1u, 0xffffffffu, vec3(x)).x);
-    slopes = vec2(order_step_derivative(order, 1u, 0u, 0u, x), order_step_derivative(order, 1u, 0u, 1u, x));
-    vec3 columns[SPECTRAL_GROUPS] = vec3[](dd0, dd1);
-    vec3 bends[2] = vec3[](vec3(0.0), vec3(0.0));
-    vec3 band = vec3(0.0, 0.5, 1.0), normal = vec3(0.0, 0.0, 1.0);
-    bvec3 passes;
-    for (int i = 0; i < 3; ++i) {
-        vec3 there = d;
-        for (int g = 0; g < SPECTRAL_GROUPS; ++g) there += columns[g] * variable_step(uint(g), band[i], 0.5);
-        there = normalize(there);
-        vec3 shift = order_steps(order, 1u, 0u, band)[i] * across_lines(normal, found.lines, 1.0);
-        passes[i] = diffracted_cosine2(there, dot(there, normal), shift) > 0.0;
-    }
-    parts = any(passes) && !all(passes) ? 1.0 : 0.0;
-    edge = evanescence_onset(band, d, columns, bends, normal, found.lines, 1.0, order, 1u, 0u, passes);
-    """
-    outputs = {"head": "vec4", "told": "vec4", "kinds": "vec4", "steps": "vec4", "slopes": "vec2", "parts": "float"}
-    try:
-        got = evaluate(
-            gl.ctx,
-            ["lib/grating.glsl"],
-            body,
-            inputs,
-            outputs | {"edge": "float"},
-            features.defines() | bindings.SCENE_DEFINES | buffers.defines,
-            SCENE_STRUCTS,
-            binders=[buffers.bind],
-        )
-        axis = buffers.axis
-    finally:
-        buffers.release()
-    assert np.allclose(got["head"], [0.6, 0.8, 0.0, 2.0]) and np.allclose(got["told"], [2.6, 0.5, 0.75, 1.0])
-    assert np.array_equal(got["kinds"][0], [1.0, 1.0, 0.0, 0.0])
-
-    def step(at: np.ndarray) -> np.ndarray:
-        nm = axis.nm_of_x(at)
-        return 2.6e-3 * nm / glass.dispersion.index(nm)
-
-    places = np.column_stack([inputs["x"], np.full(COUNT, 0.5), np.ones(COUNT)])
-    assert np.abs(got["steps"][:, :3] - step(places)).max() < 2e-6
-    nm = axis.nm_of_x(inputs["x"])
-    assert np.abs(got["steps"][:, 3] - 2.6e-3 * nm).max() < 2e-6
-    n = glass.dispersion.index(nm)
-    assert np.abs(got["slopes"] - np.column_stack([-2.6e-3 * nm / n**2, 2.6 / n])).max() < 5e-6
-
-    def cosine2(at: np.ndarray) -> np.ndarray:
-        wavelengths = axis.nm_of_x(np.array([0.5]))[0], axis.nm_of_x(at)
-        n_step = glass.dispersion.index(wavelengths[1]) - glass.dispersion.index(wavelengths[0])
-        um_step = (wavelengths[1] - wavelengths[0]) * 1e-3
-        there = unit(inputs["d"] + times(n_step, inputs["dd0"]) + times(um_step, inputs["dd1"]))
-        tangential = there[:, :2] + step(at)[:, None] * np.array([0.8, -0.6])
-        return 1.0 - np.sum(tangential**2, axis=1)
-
-    parts = got["parts"] > 0.0
-    assert parts.sum() > 50
-    assert np.abs(cosine2(got["edge"]))[parts].max() < 2e-5
 
 
 def immersed(nm: float, grating: Grating, order: int, block: Mesh, tilt: np.ndarray, wall: Mesh):

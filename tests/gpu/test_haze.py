@@ -21,14 +21,10 @@ from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes.flights import PHOTONS, Flights, trace_flights
 from spectrasplat.passes.haze import Haze
 from spectrasplat.passes.picture_channels import Channels
-from spectrasplat.reference.optics import unit
 from spectrasplat.render.device_scene import scene_buffers
 from spectrasplat.render.frames import FrameRenderer
 from spectrasplat.render.viewer.engine import LiveEngine
-from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
-COVERS = {"haze.glsl": ("henyey_greenstein", "blur_1d", "cross_beam")}
-COUNT = 512
 LUX = 500.0
 WIDTH = 0.2
 SIZE = 64, 64
@@ -186,31 +182,3 @@ def test_the_viewer_shows_the_same_and_traces_once(gl: Context) -> None:
         assert PHOTONS not in calls and 1.8 < thicker.sum() / first.sum() < 2.1
     finally:
         engine.release()
-
-
-def test_the_shader_library_against_float64(gl: Context) -> None:
-    rng = np.random.default_rng(4)
-    cosine, g = as_f32(rng.uniform(-1, 1, COUNT)), as_f32(rng.uniform(-0.9, 0.9, COUNT))
-    deviation = as_f32(rng.uniform(0.1, 2.0, COUNT))
-    distance = as_f32(rng.uniform(-6, 6, COUNT))
-    start = as_f32(rng.uniform(-3, 3, (COUNT, 3)))
-    beam, ray = (as_f32(unit(rng.normal(size=(COUNT, 3)))) for _ in range(2))
-    body = """
-    phase = henyey_greenstein(cosine, g);
-    blur = blur_1d(distance, deviation);
-    BeamCrossing c = cross_beam(start, beam, ray);
-    on_beam = c.on_beam; on_ray = c.on_ray; offset = c.offset; across = c.across;
-    """
-    inputs = {"cosine": cosine, "g": g, "distance": distance, "deviation": deviation}
-    inputs |= {"start": start, "beam": beam, "ray": ray}
-    outputs = dict.fromkeys(("phase", "blur", "on_beam", "on_ray", "offset"), "float") | {"across": "vec3"}
-    got = evaluate(gl.ctx, ["lib/haze.glsl"], body, inputs, outputs)
-    assert np.allclose(got["phase"], reference.henyey_greenstein(cosine, g), rtol=2e-5)
-    assert np.allclose(got["blur"], reference.blur_1d(distance, deviation), atol=2e-6)
-    sine = np.linalg.norm(np.cross(beam, ray), axis=1)
-    clear = sine > 0.1
-    on_beam, on_ray = reference.nearest(start, beam, ray)
-    for name, wanted in (("on_beam", on_beam), ("on_ray", on_ray)):
-        assert np.abs(got[name] - wanted)[clear].max() < 3e-3
-    apart = start + on_beam[:, None] * beam - on_ray[:, None] * ray
-    assert np.abs(got["offset"][:, None] * got["across"] - apart)[clear].max() < 3e-5

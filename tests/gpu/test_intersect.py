@@ -19,8 +19,6 @@ from spectrasplat.model.geometry.primitives_round import sphere
 from spectrasplat.reference.optics import dot, unit
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
-COVERS = {"intersect.glsl": ("intersect_any",)}
-
 
 @dataclass(frozen=True)
 class Tree:

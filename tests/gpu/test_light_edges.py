@@ -13,7 +13,6 @@ from spectrasplat.model.settings import RenderSettings
 from spectrasplat.render.still import render
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
-COVERS = {"edge.glsl": ("spacings_inside", "lit_share", "packed_edge", "unpacked_edge")}
 REACH, SPREAD = 1.0, 0.42
 
 

@@ -11,7 +11,6 @@ from spectrasplat.stress.rigs.splat_rig import Rig, photons
 
 from tests.gpu.test_splat import frame, spectrum_samples
 
-COVERS = {"swept.glsl": ("sweeps_part", "throughput_over", "mean_bend")}
 SPECTRAL, ONE_COLOUR = Features(spectral_groups=1), Features(spectral_groups=0)
 STRAIGHT, BENT = (0.2, 0.5, 0.8), (0.9, 0.5, 0.4)
 SPLATS = {

@@ -34,21 +34,6 @@ from spectrasplat.model.texture import Environment, Texture
 from spectrasplat.render.device_scene import spectral_axis
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
-COVERS = {
-    "textures.glsl": (
-        "picture_texel",
-        "level_origin",
-        "level_bilinear",
-        "patch_axes",
-        "filter_plan",
-        "corner_texel",
-        "hit_uv",
-        "uv_gradients",
-        "texture_filtered",
-        "environment_place",
-        "environment_radiance",
-    ),
-}
 COUNT = 2048
 BINDING, UNIT = 9, 3
 LIB = ["lib/textures.glsl"]
@@ -170,79 +155,6 @@ def test_repeated_pictures_go_on_and_clamped_ones_end(gl) -> None:
         ]
     )
     assert np.abs(got["border"] - want).max() < 3e-5
-    store.release()
-
-
-def random_patches(rng: np.random.Generator, across: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Two sides across the rows of `across` (N, d), of all lengths from 1e-4 to 1, a third of them thin."""
-    sides = [rng.normal(size=across.shape) * 10.0 ** rng.uniform(-4, 0, (len(across), 1)) for _ in range(2)]
-    sides[1][::3] = sides[0][::3] * rng.uniform(-1, 1, (len(across[::3]), 1)) + 0.05 * sides[1][::3]
-    return as_f32(sides[0]), as_f32(sides[1])
-
-
-def test_axes_and_plan_of_a_patch(gl) -> None:
-    rng = np.random.default_rng(3)
-    side_s, side_t = random_patches(rng, np.zeros((COUNT, 2)))
-    side_s[:3], side_t[:3] = [[0, 0], [1, 0], [0.3, 0.4]], [[0, 0], [0, 1], [0, 0]]
-    body = """
-    vec2 mixing; float l, r;
-    patch_axes(dot(s, s), dot(s, t), dot(t, t), longer, shorter, mixing); axis = mixing.x * s + mixing.y * t;
-    filter_plan(longer * 500.0, shorter * 500.0, l, r); level = l; taps = r;
-    """
-    store = store_of(gl, scene_of(Texture(picture(4, 4))))
-    got = run(
-        gl,
-        store,
-        body,
-        {"s": side_s, "t": side_t},
-        {"longer": "float", "shorter": "float", "axis": "vec2", "level": "float", "taps": "float"},
-    )
-    longer, shorter, axis = cpu_reference.patch_axes(side_s, side_t)
-    assert (
-        np.abs(got["longer"] - longer).max() < 1e-6 * longer.max()
-        and (np.abs(got["longer"] - longer) <= 1e-6 * longer).all()
-    )
-    # The shorter one is a difference of squares: what is lost is far below an eighth of the longer one.
-    assert (np.abs(got["shorter"] - shorter) <= 1e-3 * longer).all()
-    clear = longer > 1.01 * shorter + 1e-9
-    same = np.minimum(np.linalg.norm(got["axis"] - axis, axis=1), np.linalg.norm(got["axis"] + axis, axis=1))
-    assert (same <= 1e-4 * longer)[clear].all() and clear.mean() > 0.9
-    assert np.isfinite(got["axis"]).all() and got["taps"][0] == 1.0 and got["level"][0] == 0.0
-    level, taps = cpu_reference.filter_plan(500.0 * got["longer"], 500.0 * got["shorter"])
-    assert np.abs(got["level"] - level).max() < 1e-4 and (got["taps"] == taps).mean() > 0.998
-    assert set(taps) == set(range(1, 9))
-    store.release()
-
-
-def test_filters_agree_with_their_twins(gl) -> None:
-    rng = np.random.default_rng(4)
-    rgb, sky = picture(60, 101), picture(48, 100, seed=1)
-    store = store_of(gl, scene_of(Texture(rgb), environment=sky))
-    uv = as_f32(rng.uniform(-2, 2, (COUNT, 2)))
-    s, t = random_patches(rng, uv)
-    direction = rng.normal(size=(COUNT, 3))
-    direction[:64] *= [1e-3, 1e-3, 1.0]
-    direction = as_f32(direction / np.linalg.norm(direction, axis=1, keepdims=True))
-    ds, dt = (np.cross(direction, side) for side in random_patches(rng, direction))
-    ds, dt = as_f32(ds), as_f32(dt)
-    body = (
-        "rgb = texture_filtered(pictures[0], uv, s, t); sky = environment_radiance(d, ds, dt); place = "
-        "environment_place(3.0 * d);"
-    )
-    inputs = {"uv": uv, "s": s, "t": t, "d": direction, "ds": ds, "dt": dt}
-    got = run(gl, store, body, inputs, {"rgb": "vec3", "sky": "vec3", "place": "vec2"})
-    place = cpu_reference.environment_place(direction)
-    off = got["place"] - place
-    off[:, 0] -= np.round(off[:, 0])  # the seam
-    assert np.abs(off).max() < 3e-6  # drivers' arcus tangent
-    for name, want in (
-        ("rgb", cpu_reference.texture_filtered(mip_chain.texture_levels(rgb), uv, s, t, True)),
-        ("sky", cpu_reference.environment_radiance(mip_chain.environment_levels(sky), direction, ds, dt)),
-    ):
-        # Where the number of lookups falls the other way by rounding, another eighth is seen: a few rows.
-        wrong = np.abs(got[name] - want).max(axis=1) > 2e-4
-        assert wrong.mean() < 3e-3, name
-        assert want.std() > 0.05
     store.release()
 
 

@@ -34,7 +34,6 @@ from spectrasplat.stress.rigs.probe import blocks
 
 from tests.gpu.camera_rig import at
 
-COVERS = {"optics.glsl": ("both_faces",), "polarisation.glsl": ("both_faces",)}
 N = 1.5
 TINT = (0.9, 0.3, 0.2)
 SHEET = Dielectric(constant(N), thin=True, transmittance_rgb=TINT)

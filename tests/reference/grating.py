@@ -42,8 +42,3 @@ def diffract_columns(
     across = unit(cross(lines, normal_out))
     moved = ddirection - (ddirection @ normal_out)[:, None] * normal_out + np.outer(dstep, across)
     return turned, moved - np.outer((moved @ turned) / (turned @ normal_out), normal_out)
-
-
-def first_order_angle_deg(nm: float, lines_per_mm: float, order: int = 1, n: float = 1.0) -> float:
-    """sin(angle) = m λ / (Λ n), at normal incidence."""
-    return float(np.degrees(np.arcsin(order * nm * 1e-6 * lines_per_mm / n)))

@@ -112,24 +112,3 @@ def lobe_on_plane(radius: np.ndarray, height: float, width: float, index: float)
 def toward_many(angle: np.ndarray) -> np.ndarray:
     """`toward` (N, 3)."""
     return np.stack([np.sin(angle), np.zeros_like(angle), np.cos(angle)], axis=-1)
-
-
-def visible_normal(direction: np.ndarray, normal: np.ndarray, width: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """Heitz 2018, listing 1, in any orthonormal frame whose first axis the surface sees of `direction` (N, 3)."""
-    along = optics.unit(direction - optics.times(optics.dot(direction, normal), normal))
-    beside = optics.cross(normal, along)
-    local = np.stack([optics.dot(direction, axis) for axis in (along, beside, normal)], axis=-1)
-    stretch = np.stack([width, width, np.ones_like(width)], axis=-1)
-    view = optics.unit(stretch * local)
-    first = np.stack([-view[:, 1], view[:, 0], np.zeros(len(view))], axis=-1)
-    length = np.linalg.norm(first, axis=1, keepdims=True)
-    first = np.where(length > 0.0, first / np.maximum(length, 1e-300), [1.0, 0.0, 0.0])
-    second = optics.cross(view, first)
-    radius, phi = np.sqrt(u[:, 0]), 2.0 * np.pi * u[:, 1]
-    t1, t2 = radius * np.cos(phi), radius * np.sin(phi)
-    s = 0.5 * (1.0 + view[:, 2])
-    t2 = (1.0 - s) * np.sqrt(1.0 - t1**2) + s * t2
-    hemisphere = optics.times(t1, first) + optics.times(t2, second)
-    hemisphere = hemisphere + optics.times(np.sqrt(np.maximum(1.0 - t1**2 - t2**2, 0.0)), view)
-    back = optics.unit(stretch * np.concatenate([hemisphere[:, :2], np.maximum(hemisphere[:, 2:], 0.0)], axis=1))
-    return sum(optics.times(back[:, i], axis) for i, axis in enumerate((along, beside, normal)))

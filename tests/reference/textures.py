@@ -1,17 +1,13 @@
-"""Float64 reference of shaders/lib/textures.glsl and of the levels it reads, and what both stand for: means over areas.
-
-The CPU reference finds the axes of a patch by a singular value decomposition and levels by summing overlaps texel by
-texel; the means by brute force know nothing of levels or lookups.
-"""
+"""Float64 reference of textures: single texels, levels by summing overlaps texel by texel, and means over areas by
+brute force, which know nothing of levels or lookups."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 
 Array = np.ndarray
-MAX_TAPS, ROUND_RATIO, LEVEL_BIAS, SKY_WIDER = 8, 1.25, -0.8, 1.366
 
 
 def level_by_overlaps(rgb: Array, level: int, on_sphere: bool = False) -> Array:
@@ -55,67 +51,10 @@ def bilinear(rgb: Array, place: Array, repeats: tuple[bool, bool]) -> Array:
     return above * (1.0 - y) + below * y
 
 
-def patch_axes(side_s: Array, side_t: Array) -> tuple[Array, Array, Array]:
-    """Longer and shorter axis (N,) of parallelograms with sides (N, d), and the longer one as a vector (N, d)."""
-    left, lengths, _ = np.linalg.svd(np.stack([side_s, side_t], axis=-1), full_matrices=False)
-    return lengths[:, 0], lengths[:, 1], left[:, :, 0] * lengths[:, :1]
-
-
-def filter_plan(longer: Array, shorter: Array) -> tuple[Array, Array]:
-    """Level and number of lookups for a patch with these axes in texels."""
-    width = np.maximum(np.maximum(shorter, longer / (MAX_TAPS * ROUND_RATIO)), 1.0)
-    taps = np.clip(np.ceil(longer / (ROUND_RATIO * width)), 1, MAX_TAPS)
-    return np.maximum(np.log2(width) + LEVEL_BIAS, 0.0), taps
-
-
-def _looked_up(
-    levels: Sequence[Array],
-    level: Array,
-    taps: Array,
-    place_of_tap: Callable[[Array], Array],
-    repeats: tuple[bool, bool],
-) -> Array:
-    """Mean over `taps` places, in (-½, ½) of the longer axis, of what lies between two levels there."""
-    total = np.zeros((len(level), levels[0].shape[2]))
-    level = np.minimum(level, len(levels) - 1)
-    for tap in range(MAX_TAPS):
-        place = place_of_tap((tap + 0.5) / taps - 0.5)
-        for k, texels in enumerate(levels):
-            weight = np.maximum(1.0 - np.abs(level - k), 0.0) * (tap < taps)
-            total += weight[:, None] * bilinear(texels, place, repeats)
-    return total / taps[:, None]
-
-
-def texture_filtered(levels: Sequence[Array], uv: Array, duv_ds: Array, duv_dt: Array, repeats: bool) -> Array:
-    """(N, channels) of a texture's levels about `uv` (N, 2), v upwards, over patches with sides (N, 2)."""
-    size = np.array(levels[0].shape[1::-1], np.float64)
-    longer, shorter, axis = patch_axes(duv_ds * size, duv_dt * size)
-    level, taps = filter_plan(longer, shorter)
-    flip = np.array([0.0, 1.0])
-
-    def place(share: Array) -> Array:
-        at = uv + share[:, None] * axis / size
-        return flip + at * (1.0 - 2.0 * flip)
-
-    return _looked_up(levels, level, taps, place, (repeats, repeats))
-
-
 def environment_place(direction: Array) -> Array:
     """Places (N, 2) on a latitude-longitude picture, v downwards, of directions (N, 3) of any length."""
     polar = np.arctan2(np.hypot(direction[:, 0], direction[:, 1]), direction[:, 2])
     return np.stack([0.5 - np.arctan2(direction[:, 1], direction[:, 0]) / (2.0 * np.pi), polar / np.pi], axis=1)
-
-
-def environment_radiance(
-    levels: Sequence[Array], direction: Array, ddirection_ds: Array, ddirection_dt: Array
-) -> Array:
-    """(N, channels) of an environment's levels about unit directions (N, 3) over patches with sides (N, 3)."""
-    longer, shorter, axis = patch_axes(ddirection_ds, ddirection_dt)
-    per_rad = levels[0].shape[0] / np.pi
-    level, taps = filter_plan(SKY_WIDER * longer * per_rad, SKY_WIDER * shorter * per_rad)
-    return _looked_up(
-        levels, level, taps, lambda share: environment_place(direction + share[:, None] * axis), (True, False)
-    )
 
 
 def mean_by_force(

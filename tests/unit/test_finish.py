@@ -1,4 +1,4 @@
-"""Tables of a coat's albedo and of a rough base against plain sums over the hemisphere."""
+"""Tables of a coat's albedo against plain sums over the hemisphere."""
 
 from __future__ import annotations
 
@@ -34,11 +34,3 @@ def test_single_scattering_alone_would_lose_much_of_a_rough_lobe() -> None:
     seen = np.array([1.0])
     for alpha, lost in ((0.0, 0.0), (0.0625, 0.005), (0.25, 0.084), (1.0, 0.693)):
         assert 1.0 - directional_albedo(alpha, np.inf, seen)[0] == pytest.approx(lost, abs=2e-3)
-
-
-def test_a_white_rough_base_loses_no_light() -> None:
-    directions, weights = finish.hemisphere(100, 100)
-    for cosine in (0.9, 0.3):
-        o = np.broadcast_to(finish.toward(cosine), directions.shape)
-        sent = finish.eon(np.array([1.0]), 0.7, o, directions)[:, 0]
-        assert (weights * directions[:, 2] * sent).sum() / np.pi == pytest.approx(1.0, abs=4e-4)
