@@ -1,5 +1,5 @@
 // The error function and integrals of Gaussians, for splats (share of a splat in a texel, soft ends of a sweep) and for
-// hard edges of lights. Pure functions, no bindings. CPU reference: tests/reference/gaussians.py.
+// hard edges of lights. Pure functions, no bindings.
 
 const float SQRT_HALF = 0.70710678;
 const float TWO_PI = 6.2831853;
