@@ -33,6 +33,11 @@ GLINT_SPREAD = 0.135
 """Of what is shown of a pixel that is overexposed alone, on those beside it: a Gaussian of half a pixel."""
 
 
+def largest_channel(rgb: np.ndarray) -> np.ndarray:
+    """The largest of three channels (…, 3), one by one: numpy takes thirty times as long over an axis of three."""
+    return np.maximum(np.maximum(rgb[..., 0], rgb[..., 1]), rgb[..., 2])
+
+
 @dataclass(frozen=True)
 class Glints:
     """Of n sides of pixels within small groups that are overexposed."""
@@ -104,7 +109,7 @@ class Steps:
 def find_steps(exposed: np.ndarray, norm: np.ndarray) -> Steps:
     """Steps at what is overexposed in a picture, float32 (H, W, 3) with display white at 1; `norm` (H, W): of each
     colour, at most its largest channel."""
-    hot = np.pad(exposed.max(axis=-1) > WHITE, 1)
+    hot = np.pad(largest_channel(exposed) > WHITE, 1)
     rows, columns = np.nonzero(hot[:-2, 1:-1] | hot[2:, 1:-1] | hot[1:-1, :-2] | hot[1:-1, 2:])
     colour, own = exposed[rows, columns], norm[rows, columns]
     best = np.zeros_like(own)

@@ -21,7 +21,7 @@ from functools import cache
 
 import numpy as np
 
-from .highlights import find_glints, find_steps
+from .highlights import find_glints, find_steps, largest_channel
 
 LUMINANCE_709 = np.array([0.2126390, 0.7151687, 0.0721923], np.float32)
 """Y of linear Rec.709 (ITU-R BT.709-6, primaries and D65 white to seven digits)."""
@@ -70,15 +70,18 @@ def to_display(rgb: np.ndarray, exposure_ev: float, antialias: bool = False) -> 
     no steps (`highlights`).
     """
     scene = np.asarray(rgb, np.float32)
-    finite = np.asarray(np.isfinite(scene).all(axis=-1))
+    finite = np.isfinite(scene[..., 0]) & np.isfinite(scene[..., 1]) & np.isfinite(scene[..., 2])
     # Products of float32 must not overflow however bright a firefly is.
     limit = np.float32(1e30)
     exposed = np.where(finite[..., None], np.clip(scene, -limit, limit), np.float32(0))
     gain = np.float32(np.clip(2.0 ** float(np.clip(exposure_ev, -60, 60)), 1e-18, 1e18))
     exposed = np.clip(exposed * gain, -limit, limit)
-    display = _roll_off(into_gamut(exposed))
+    # Most pixels of many caustics are black, and stay so.
+    lit = (exposed[..., 0] != 0) | (exposed[..., 1] != 0) | (exposed[..., 2] != 0)
+    display = np.zeros_like(exposed)
+    display[lit] = _roll_off(into_gamut(exposed[lit]))
     if antialias:
-        _antialias(display, exposed)
+        _antialias(display, exposed, lit)
     display[~finite] = NOT_FINITE_RGB
     return display
 
@@ -106,10 +109,11 @@ def tone_map_8bit(rgb: np.ndarray, exposure_ev: float, antialias: bool = False) 
     return _encoding_table()[np.rint(display * np.float32(65535)).astype(np.uint16)]
 
 
-def _antialias(display: np.ndarray, exposed: np.ndarray) -> None:
+def _antialias(display: np.ndarray, exposed: np.ndarray, lit: np.ndarray) -> None:
     """Show pixels with a step at something overexposed by what either side covers, and single overexposed ones as
     dots."""
-    norm = _p_norm(np.maximum(exposed, 0))[..., 0] * np.float32(3 ** (-1 / CORNER_POWER))
+    norm = np.zeros(lit.shape, np.float32)
+    norm[lit] = _p_norm(np.maximum(exposed[lit], 0))[..., 0] * np.float32(3 ** (-1 / CORNER_POWER))
     steps = find_steps(exposed, norm)
     bright, dark, mixed = (_roll_off(into_gamut(side)) for side in (steps.bright, steps.dark, steps.mixed))
     straight = dark + steps.share * (bright - dark)
@@ -122,9 +126,9 @@ def _antialias(display: np.ndarray, exposed: np.ndarray) -> None:
 
 def _p_norm(channels: np.ndarray) -> np.ndarray:
     """(Σ c^p)^(1/p) over the last axis of non-negative values, kept as an axis of length 1."""
-    largest = np.maximum(channels.max(axis=-1, keepdims=True), np.float32(1e-30))
-    share = channels / largest
-    return largest * (share**CORNER_POWER).sum(axis=-1, keepdims=True) ** np.float32(1 / CORNER_POWER)
+    largest = np.maximum(largest_channel(channels), np.float32(1e-30))[..., None]
+    powers = (channels / largest) ** CORNER_POWER
+    return largest * (powers[..., 0] + powers[..., 1] + powers[..., 2])[..., None] ** np.float32(1 / CORNER_POWER)
 
 
 def into_gamut(rgb: np.ndarray) -> np.ndarray:
@@ -149,4 +153,4 @@ def _roll_off(rgb: np.ndarray) -> np.ndarray:
     chroma = rgb * (shown / np.maximum(norm, np.float32(1e-30)))
     display = chroma + faded * (shown - chroma)
     # A pure primary's largest channel exceeds its norm by up to 3^(1/p).
-    return display / np.maximum(display.max(axis=-1, keepdims=True), 1)
+    return display / np.maximum(largest_channel(display), 1)[..., None]
