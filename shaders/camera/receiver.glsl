@@ -176,7 +176,7 @@ void add_direct(Path path, SurfaceInteraction seen, WavelengthInterval interval,
             if (gain > 0.0) gain = hidden_from(s, seen) ? 0.0 : gain;
             if (LISTS_SPECULAR && gain > 0.0) {
                 lights_seen ^= hash_pcg(i + 1u);
-                if (p.survey == 1u) gain = unshadowed(i, seen, even_light_point(), s);
+                if (VISIBLE_LIGHTS && p.survey == 1u) gain = unshadowed(i, seen, even_light_point(), s);
             }
             if (COATS || ROUGH_DIFFUSE) toward = s.toward;
         }
