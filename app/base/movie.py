@@ -7,7 +7,6 @@ import io
 import json
 import math
 import os
-import subprocess
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
@@ -90,6 +89,8 @@ class Film:
     def __init__(self, path: Path, size: tuple[int, int], fps: float) -> None:
         """Raises `UserError` where the place cannot be written, the format holds no such size, or there is no
         ffmpeg."""
+        import subprocess
+
         check_film(path, size)
         self._path, self._size = path, size
         self._output = atomic_output(path)

@@ -9,11 +9,10 @@ from __future__ import annotations
 import ctypes
 import json
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, cached_property
-from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 from threading import Lock
@@ -70,30 +69,19 @@ class Kernel:
 
     def __init__(self, function: Callable) -> None:
         self._function = function
-        self._native: dict[tuple[Kind, ...], _Native] = {}
-
-    @cached_property
-    def _by_numba(self) -> Callable | None:
-        """Calls it where numba is of another version than those that are known."""
-        if version("numba").startswith(_KNOWN):
-            return None
-        from numba import njit
-
-        return njit(error_model="numpy", nogil=True)(self._function)
+        self._calls: dict[tuple[Kind, ...], Callable] = {}
 
     def __call__(self, *arguments: Any) -> Any:
         """Compile it for arguments of these kinds where that was never done, then call it."""
-        if self._by_numba is not None:
-            return self._by_numba(*arguments)
         kinds = tuple(_kind_of(argument) for argument in arguments)
-        native = self._native.get(kinds)
-        if native is None:
+        call = self._calls.get(kinds)
+        if call is None:
             with _lock:
-                native = self._native.get(kinds) or _Native(self._machine_code(kinds), kinds)
-            self._native[kinds] = native
-        return native(arguments)
+                call = self._calls.get(kinds) or self._call_for(kinds)
+            self._calls[kinds] = call
+        return call(*arguments)
 
-    def _machine_code(self, kinds: tuple[Kind, ...]) -> _MachineCode:
+    def _call_for(self, kinds: tuple[Kind, ...]) -> Callable:
         """From the disk where it was compiled before; a folder that cannot be written only costs time."""
         source = Path(self._function.__code__.co_filename)
         folder = source.parent / "__pycache__"
@@ -102,11 +90,15 @@ class Kernel:
         path = folder / f"{source.stem}.{self._function.__name__}-{version_of([repr(kinds).encode()])}.machine"
         kept = _MachineCode.read(path)
         if kept is None:
+            import numba
+
+            if not numba.__version__.startswith(_KNOWN):
+                return numba.njit(error_model="numpy", nogil=True)(self._function)
             kept = _compiled(self._function, kinds)
             with suppress(OSError, UserError):
                 folder.mkdir(exist_ok=True)
                 kept.write(path)
-        return kept
+        return _Native(kept, kinds)
 
 
 @dataclass(frozen=True)
@@ -168,7 +160,7 @@ class _Native:
                 types += [pointer, pointer, number, number, pointer, *[number] * (2 * kind[1])]
         self._call = ctypes.CFUNCTYPE(ctypes.c_int32, *types)(self._engine.get_function_address(machine.symbol))
 
-    def __call__(self, arguments: Sequence[Any]) -> Any:
+    def __call__(self, *arguments: Any) -> Any:
         values: list[Any] = []
         for a in arguments:
             if isinstance(a, np.ndarray):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -139,6 +138,8 @@ def search(
                 store.grow()
         _stacks.append(stack)
         return store.leaves(work["count"][0])
+
+    from concurrent.futures import ThreadPoolExecutor
 
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         done = list(pool.map(one, jobs))

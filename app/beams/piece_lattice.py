@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -221,5 +220,7 @@ def _joined(parts: list[np.ndarray]) -> PieceRays:
 
 def _in_threads(work: Callable[[int], Any], first: int, end: int) -> list[Any]:
     """What `work` returns for every first of `_CHUNK` rows up to `end`, in order."""
+    from concurrent.futures import ThreadPoolExecutor
+
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         return list(pool.map(work, range(first, end, _CHUNK)))

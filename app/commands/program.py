@@ -15,34 +15,34 @@ import click
 from ..base.errors import UserError
 from ..base.files import allow_outside
 from ..base.version import __version__
-from . import completion, measuring_table, options, table
+from . import completion, options
 
 COMMANDS = {
-    "render": (table.Render, "render:render_picture"),
-    "merge": (table.Merge, "merge:merge"),
-    "animate": (table.Animate, "animate:animate"),
-    "sweep": (table.Sweep, "sweep:sweep"),
-    "view": (table.View, "view:view"),
-    "lesson": (table.Lesson, "view:lesson"),
-    "bake": (table.Bake, "bake:bake_texture"),
-    "export": (table.Export, "bake:export"),
-    "inspect": (table.Inspect, "inspect_report:inspect"),
-    "glass": (table.Glass, "glass:glass"),
-    "doctor": (table.Doctor, "doctor:doctor"),
-    "bench": (measuring_table.Bench, "bench:bench"),
-    "stress": (measuring_table.Stress, "stress:stress"),
-    "bench-speed": (measuring_table.BenchSpeed, "bench_parts:bench_speed"),
-    "bench-beams": (measuring_table.BenchBeams, "bench_parts:bench_beams"),
-    "bench-agreement": (measuring_table.BenchAgreement, "bench_agreement:bench_agreement"),
-    "bench-view": (measuring_table.BenchView, "bench_parts:bench_view"),
-    "fingerprint": (measuring_table.Fingerprint, "fingerprint:fingerprint"),
-    "prove-gpu": (measuring_table.ProveGpu, "prove_gpu:prove_gpu"),
-    "farm render": (table.FarmRender, "farm:render"),
-    "farm animate": (table.FarmAnimate, "farm:animate"),
-    "farm bench": (measuring_table.FarmBench, "farm:bench"),
+    "render": ("table:Render", "render:render_picture"),
+    "merge": ("table:Merge", "merge:merge"),
+    "animate": ("table:Animate", "animate:animate"),
+    "sweep": ("table:Sweep", "sweep:sweep"),
+    "view": ("table:View", "view:view"),
+    "lesson": ("table:Lesson", "view:lesson"),
+    "bake": ("table:Bake", "bake:bake_texture"),
+    "export": ("table:Export", "bake:export"),
+    "inspect": ("table:Inspect", "inspect_report:inspect"),
+    "glass": ("table:Glass", "glass:glass"),
+    "doctor": ("table:Doctor", "doctor:doctor"),
+    "bench": ("measuring_table:Bench", "bench:bench"),
+    "stress": ("measuring_table:Stress", "stress:stress"),
+    "bench-speed": ("measuring_table:BenchSpeed", "bench_parts:bench_speed"),
+    "bench-beams": ("measuring_table:BenchBeams", "bench_parts:bench_beams"),
+    "bench-agreement": ("measuring_table:BenchAgreement", "bench_agreement:bench_agreement"),
+    "bench-view": ("measuring_table:BenchView", "bench_parts:bench_view"),
+    "fingerprint": ("measuring_table:Fingerprint", "fingerprint:fingerprint"),
+    "prove-gpu": ("measuring_table:ProveGpu", "prove_gpu:prove_gpu"),
+    "farm render": ("table:FarmRender", "farm:render"),
+    "farm animate": ("table:FarmAnimate", "farm:animate"),
+    "farm bench": ("measuring_table:FarmBench", "farm:bench"),
 }
-"""By name: the class of a command's values, and the function that gets them and returns the exit code, with its
-module."""
+"""By name: the class of a command's values, and the function that gets them and returns the exit code, both with their
+modules."""
 _HELP = {"help_option_names": ["-h", "--help"], "max_content_width": 120}
 
 
@@ -80,14 +80,17 @@ def _usage_sentence(message: str) -> str:
     return f"{sentence[:1].lower()}{sentence[1:]}; 'spectrasplat --help' shows the usage"
 
 
-def _command(name: str, values: type, runs: str) -> click.Command:
-    module, function = runs.split(":")
+def named(place: str) -> Any:
+    """What "module:name" is in this package."""
+    module, name = place.split(":")
+    return getattr(import_module(f"{__package__}.{module}"), name)
 
+
+def _command(name: str, values: type, runs: str) -> click.Command:
     def command(**given: Any) -> int:
         typed: Any = options.read(values, given)
-        if isinstance(typed, table.ReadsScenes):
-            allow_outside(typed.allow_outside)
-        return getattr(import_module(f"{__package__}.{module}"), function)(typed)
+        allow_outside(getattr(typed, "allow_outside", False))
+        return named(runs)(typed)
 
     parameters = [row.parameter() for row in options.rows(values)]
     return click.Command(name, callback=command, params=parameters, help=values.__doc__)
@@ -118,7 +121,8 @@ def program(names: Iterable[str] = COMMANDS) -> click.Group:
     farm = _Commands("farm", help="Render on many workers, here or on a Dask cluster; needs the extra 'farm'.")
     for name in names:
         group, own = (farm, name.removeprefix("farm ")) if name.startswith("farm ") else (app, name)
-        group.add_command(_command(own, *COMMANDS[name]))
+        values, runs = COMMANDS[name]
+        group.add_command(_command(own, named(values), runs))
     if farm.commands:
         app.add_command(farm)
     return app

@@ -10,7 +10,6 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -23,7 +22,7 @@ from spectrasplat.__main__ import main
 from spectrasplat.base.errors import UserError
 from spectrasplat.commands import options
 from spectrasplat.commands.measuring_table import PROOF_PARTS
-from spectrasplat.commands.program import COMMANDS
+from spectrasplat.commands.program import COMMANDS, named
 from spectrasplat.commands.proof_steps import PARTS
 from spectrasplat.commands.scenes import find_scene
 from spectrasplat.model.geometry.mesh import make_mesh
@@ -292,10 +291,8 @@ class TestProgram:
     @pytest.mark.parametrize("name", COMMANDS)
     def test_every_command_has_a_function_of_its_options(self, name: str) -> None:
         values, runs = COMMANDS[name]
-        module, function = runs.split(":")
-        found = getattr(import_module(f"spectrasplat.commands.{module}"), function)
-        notes = found.__annotations__
-        assert notes["options"].split(".")[-1] == values.__name__ and notes["return"] == "int"
+        notes = named(runs).__annotations__
+        assert notes["options"].split(".")[-1] == named(values).__name__ and notes["return"] == "int"
 
     def test_every_part_of_the_proof_can_be_chosen(self) -> None:
         assert [part.key for part in PARTS] == ["doctor", *PROOF_PARTS]

@@ -14,7 +14,6 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
-from xml.etree import ElementTree
 
 import numpy as np
 
@@ -273,6 +272,8 @@ def _fail_line(path: PathLike, row: _Row) -> NoReturn:
 
 def _from_xml(text: str, path: PathLike) -> Iterator[_Table]:
     """Curves of an IES TM-27 file (.spdx); document types, and with them entities, are refused."""
+    from xml.etree import ElementTree  # most curves are tables
+
     try:
         root = ElementTree.fromstring("" if "<!DOCTYPE" in text else text)
     except (ElementTree.ParseError, ValueError) as error:
