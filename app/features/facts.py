@@ -224,14 +224,8 @@ def why_no_haze(scene: Scene) -> str | None:
 
 def why_no_beams(item: SceneObject) -> str | None:
     """Why beams cannot carry what an object of glass or a mirror does with light; None: they can."""
-    if item.material.is_grating:
-        return "a grating sends light into several orders"
-    if item.material.thin:
-        return "it is a thin sheet"
-    if item.material.filters:
-        return "its surface is coloured"
-    if item.material.is_rough:
-        return "its surface is rough"
+    if item.material.why_no_beams is not None:
+        return item.material.why_no_beams
     if len(item.mesh.triangles) > MAX_BEAM_TRIANGLES:
         return f"it has {len(item.mesh.triangles)} triangles"
     if not item.mesh.is_faceted:

@@ -85,6 +85,15 @@ class Dielectric(Material):
         """A thin sheet is met in a way of its own."""
         return SHEET_CODE if self.thin else self.gpu_code
 
+    @property
+    def why_no_beams(self) -> str | None:  # type: ignore[override]
+        """Beams know clear polished solids alone."""
+        if self.thin:
+            return "it is a thin sheet"
+        if self.filters:
+            return "its surface is coloured"
+        return "its surface is rough" if self.is_rough else None
+
     @classmethod
     def usual(cls) -> Self:
         """A solid of the default glass."""

@@ -100,6 +100,7 @@ class Grating(Material):
     parts: ClassVar = (_LINES, _Orders(), _REFLECTS, Direction("direction", (0.0, 1.0, 0.0)))
     is_specular: ClassVar = True
     is_grating: ClassVar = True
+    why_no_beams: ClassVar = "a grating sends light into several orders"
     dispersion = WAVELENGTH
 
     @property

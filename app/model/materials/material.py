@@ -40,6 +40,8 @@ class Material:
     is_grating: ClassVar[bool] = False
     receives: ClassVar[bool] = False
     """It is diffuse, so caustics are visible on it."""
+    why_no_beams: ClassVar[str | None] = None
+    """Why its light cannot go as polygons of flat facets; None: it can."""
     # Defaults of what some kinds have as fields. Unannotated: annotated, they would be fields of every kind.
     reflectance_rgb = (0.0, 0.0, 0.0)
     """Linear Rec.709."""
