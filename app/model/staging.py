@@ -24,7 +24,6 @@ from .optics.tints import Tint
 from .scene import Absorption, Dielectric, SceneObject
 
 UpAxis = Literal["y", "z"]
-UP_AXES: tuple[UpAxis, ...] = ("y", "z")
 Y_UP_TO_Z_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1.0, 0], [0, 1.0, 0, 0], [0, 0, 0, 1.0]])
 Y_UP_TO_Z_UP.setflags(write=False)
 _USUAL_UP: dict[str, UpAxis] = {".obj": "y", ".stl": "z", ".ply": "z"}

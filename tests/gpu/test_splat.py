@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from reference import chart_folds
 from reference.splat_reference import splat_image
 from spectrasplat.features.features import Features
 from spectrasplat.gpu import splat_tables
@@ -313,8 +314,10 @@ def test_charts_splat_by_triangle_and_seams_fold_home(gl) -> None:
     fold.run(atlas.total_textures, [resolved])
     image = np.frombuffer(resolved.read(), np.float32).reshape(size[1], size[0], 4)
     x0, y0, x1, y1 = tiles[1].rect
-    folded = charts.fold(total[y0:y1, x0:x1])
-    np.testing.assert_allclose(image[y0:y1, x0:x1], charts.fill(folded), rtol=1e-4, atol=1e-5 * folded.max())
+    folded = chart_folds.fold(charts, total[y0:y1, x0:x1])
+    np.testing.assert_allclose(
+        image[y0:y1, x0:x1], chart_folds.fill(charts, folded), rtol=1e-4, atol=1e-5 * folded.max()
+    )
     carried = len(records) * rig.light.power_w()
     assert folded[..., 3].sum() == pytest.approx(carried, rel=0.01)
     assert total[y0:y1, x0:x1, 3][charts.owner < 0].sum() > 0.02 * carried

@@ -1,8 +1,6 @@
 """The tree of boxes that lets a ray skip most triangles, laid out for a GPU's short stack.
 
-`python -m spectrasplat.model.geometry.bvh --warm` compiles the builder ahead of time (about 10 s once; the
-machine code is cached beside the source). Finished trees are cached on disk, so a scene seen
-before needs neither the build nor the import of numba.
+Finished trees are cached on disk, so a scene seen before needs neither the build nor the import of numba.
 
 Traversal in brief: test a node's two children `left` and `left + 1` together, go on with the
 nearer, push the farther. Every level pushes at most one, so `MAX_DEPTH` entries suffice. The
@@ -58,16 +56,6 @@ class Bvh:
     """int32 (T,): the reordered list's triangle i is triangle order[i] of the input."""
     depth: int
     """Edges from the root to the deepest leaf, at most MAX_DEPTH: the stack a traversal needs."""
-
-    def sah_cost(self, node_cost: float = 1.0, triangle_cost: float = 1.0) -> float:
-        """Expected work of a random line that meets the root (Goldsmith and Salmon 1987); 1 for a flat root."""
-        extent = self.nodes["bounds_max"].astype(np.float64) - self.nodes["bounds_min"]
-        area = extent[:, 0] * extent[:, 1] + extent[:, 1] * extent[:, 2] + extent[:, 2] * extent[:, 0]
-        if area[0] == 0.0:
-            return 1.0
-        count = self.nodes["count"]
-        work = np.where(count > 0, triangle_cost * count, node_cost)
-        return float((area * work).sum() / area[0])
 
     def refitted(self, triangles_xyz: np.ndarray) -> Bvh:
         """The same tree with boxes about float32 `triangles_xyz` (T, 3, 3), in the order of the input: some have moved.
@@ -178,32 +166,3 @@ def _save(path: Path, tree: Bvh) -> None:
 
 def _digest(payload: bytes | memoryview) -> bytes:
     return hashlib.blake2b(payload, digest_size=_DIGEST_BYTES).digest()
-
-
-def _warm() -> None:
-    """Compile the builder for this processor and say how long trees take."""
-    import time
-
-    started = time.perf_counter()
-    _build(np.zeros((9, 3, 3), np.float32))
-    ready = time.perf_counter()
-    corners = np.random.default_rng(0).random((80_000, 1, 3), dtype=np.float32)
-    triangles = corners + np.random.default_rng(1).normal(0, 0.005, (80_000, 3, 3)).astype(np.float32)
-    built_at = time.perf_counter()
-    tree = _build(triangles)
-    seconds = time.perf_counter() - built_at
-    print(
-        f"builder ready in {ready - started:.2f} s; 80000 triangles in {seconds:.3f} s:"
-        f" {len(tree.nodes)} nodes, depth {tree.depth}, expected work {tree.sah_cost():.1f}"
-    )
-
-
-if __name__ == "__main__":
-    import argparse
-
-    parser = argparse.ArgumentParser(
-        prog="python -m spectrasplat.model.geometry.bvh", description="Triangle tree builder"
-    )
-    parser.add_argument("--warm", action="store_true", required=True, help="compile ahead of time and time one tree")
-    parser.parse_args()
-    _warm()

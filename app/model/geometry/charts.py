@@ -56,19 +56,8 @@ class ChartAtlas:
         """int32 (T, 4): the rectangle that splats on each triangle may draw to."""
         return self.rects[self.chart_of]
 
-    def fold(self, energy: np.ndarray) -> np.ndarray:
-        """Move gutter energy home: (height, width, …) energy per texel -> the same, gutters empty."""
-        folded = np.array(energy, dtype=np.float64)
-        gx, gy = self.gutter_texel_xy.T
-        moved = folded[gy, gx]
-        folded[gy, gx] = 0.0
-        dx, dy = self.destination_xy.T
-        kept = dx >= 0
-        np.add.at(folded, (dy[kept], dx[kept]), moved[kept])
-        return folded
-
     def gather_lists(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The fold turned round, for a shader without float atomics: one invocation for each destination.
+        """Where the energy of gutters goes, for a shader without float atomics: one invocation for each destination.
 
         Returns destinations int32 (D, 2), offsets int32 (D + 1,) and sources int32 (S, 2):
         destination k also gets the energy of sources[offsets[k]:offsets[k + 1]].
@@ -80,19 +69,6 @@ class ChartAtlas:
         offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
         destinations = np.stack([places % self.width, places // self.width], axis=1).astype(np.int32)
         return destinations, offsets, self.gutter_texel_xy[kept][order]
-
-    def fill(self, folded: np.ndarray) -> np.ndarray:
-        """Copy energies back into the gutters after `fold`, so that interpolated lookups see no seam.
-
-        For lookups only: the sum of the picture is no longer the energy.
-        """
-        filled = np.array(folded, dtype=np.float64)
-        kept = self.destination_xy[:, 0] >= 0
-        gx, gy = self.gutter_texel_xy[kept].T
-        dx, dy = self.destination_xy[kept].T
-        ratio = self.fill_ratio[kept].reshape(-1, *[1] * (filled.ndim - 2))
-        filled[gy, gx] = filled[dy, dx] * ratio
-        return filled
 
 
 def build_charts(

@@ -209,51 +209,22 @@ def _refuse_crossing(points: np.ndarray) -> None:
         raise UserError(f"solid of revolution: the profile crosses itself at points {first} and {second}")
 
 
+_ICOSAHEDRON = """
+ 0 11  5   0  5  1   0  1  7   0  7 10   0 10 11
+ 1  5  9   5 11  4  11 10  2  10  7  6   7  1  8
+ 3  9  4   3  4  2   3  2  6   3  6  8   3  8  9
+ 4  9  5   2  4 11   6  2 10   8  6  7   9  8  1
+"""
+"""Its faces."""
+
+
 def _icosphere(triangles: int) -> tuple[np.ndarray, np.ndarray]:
     """Unit directions (V, 3) and faces (20 f², 3) of an icosahedron whose edges are cut into f parts."""
     golden = 0.5 * (1.0 + math.sqrt(5.0))
-    corners = normalised(
-        np.array(
-            [
-                (-1, golden, 0),
-                (1, golden, 0),
-                (-1, -golden, 0),
-                (1, -golden, 0),
-                (0, -1, golden),
-                (0, 1, golden),
-                (0, -1, -golden),
-                (0, 1, -golden),
-                (golden, 0, -1),
-                (golden, 0, 1),
-                (-golden, 0, -1),
-                (-golden, 0, 1),
-            ]
-        )
-    )
-    base = np.array(
-        [
-            (0, 11, 5),
-            (0, 5, 1),
-            (0, 1, 7),
-            (0, 7, 10),
-            (0, 10, 11),
-            (1, 5, 9),
-            (5, 11, 4),
-            (11, 10, 2),
-            (10, 7, 6),
-            (7, 1, 8),
-            (3, 9, 4),
-            (3, 4, 2),
-            (3, 2, 6),
-            (3, 6, 8),
-            (3, 8, 9),
-            (4, 9, 5),
-            (2, 4, 11),
-            (6, 2, 10),
-            (8, 6, 7),
-            (9, 8, 1),
-        ]
-    )
+    # Corners of three rectangles, each across the next axis.
+    across = [(-1.0, golden), (1.0, golden), (-1.0, -golden), (1.0, -golden)]
+    corners = normalised(np.array([np.roll((a, b, 0.0), k) for k in (0, 1, 2) for a, b in across]))
+    base = np.array(_ICOSAHEDRON.split(), int).reshape(20, 3)
     parts = max(1, round(math.sqrt(triangles / 20.0)))
     row, column = np.array([(i, j) for i in range(parts + 1) for j in range(parts + 1 - i)]).T
     weights = np.stack([parts - row - column, row, column], axis=1)
