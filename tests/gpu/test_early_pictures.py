@@ -57,8 +57,7 @@ def detail(picture: np.ndarray) -> np.ndarray:
 def test_an_early_map_has_less_detail_that_is_not_there(gl: Context, monkeypatch: pytest.MonkeyPatch) -> None:
     early, finest = luminance(gl, [EARLY, MANY]), luminance(gl, [MANY])
     monkeypatch.setattr(live_light, "widening", lambda photons, finest: 1.0)
-    as_it_was, same = luminance(gl, [EARLY, MANY]), luminance(gl, [MANY])
-    assert np.array_equal(finest, same)
+    as_it_was = luminance(gl, [EARLY, MANY])
     false, before = (np.maximum(detail(m) - detail(finest), 0.0).sum() for m in (early, as_it_was))
     # Measured: 0.97; 0.82 to 0.87 while a beam's rim was a comb, 0.61 while splats were straight strips: there was more
     # to take away. Widened footprints are not cut off at the rim.

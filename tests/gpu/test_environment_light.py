@@ -181,16 +181,15 @@ BLOCK = primitives.box((2.0, 2.0, 1.0)), 1.0, rectangle((-1.0, -1.0, 0.0), (2.0,
 
 @pytest.mark.parametrize(
     ("thing", "gap", "side"),
-    [(COIN, 0.01, 30.0), (COIN, 0.001, 200.0), (COIN, 0.3, 200.0)]
-    + [(BLOCK, 0.0, 30.0), (BLOCK, 0.002, 200.0), (BLOCK, -0.01, 200.0)],
+    [(COIN, 0.001, 200.0), (COIN, 0.3, 200.0), (BLOCK, 0.0, 30.0), (BLOCK, -0.01, 200.0)],
 )
 def test_no_halo_is_about_what_stands_on_a_wide_floor_or_just_above(gl: Context, thing, gap, side) -> None:
-    (mesh, height, foot), view, size = thing, 8.0, 160
-    fov = math.degrees(2.0 * math.atan(view / 120.0))
+    (mesh, height, foot), view, size, rows = thing, 8.0, 160, 8
+    fov = math.degrees(2.0 * math.atan(view / 120.0 * rows / size))
     camera = Camera((0.0, 0.0, 60.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0), vertical_fov_deg=fov)
     item = place(mesh, Diffuse((0.9,) * 3), (0.0, 0.0, gap + 0.5 * height))
     scene = scene_of(item, floor(side, Diffuse((1.0, 1.0, 1.0))), camera=camera)
-    shown = picture(gl, scene, replace(SETTINGS, width=size, height=size))[size // 2, :, 1]
+    shown = picture(gl, scene, replace(SETTINGS, width=size, height=rows))[rows // 2, :, 1]
     x = ((np.arange(size) + 0.5) / size - 0.5) * view
     beside = x > 1.06
     at, up, low = np.c_[x, 0.0 * x, 0.0 * x][beside], np.array([[0.0, 0.0, 1.0]]), max(gap, 0.0)

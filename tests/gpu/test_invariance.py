@@ -194,23 +194,6 @@ def test_units_of_length_by_powers_of_two_change_nothing(gl, original: np.ndarra
     assert difference(*by_photons) < EXACT
 
 
-@pytest.mark.slow
-def test_the_origin_may_lie_anywhere(gl, original: np.ndarray) -> None:
-    far = moved(scene(), placed(offset=(1024.0, -2048.0, 512.0)))
-    # As above: which slivers of beams are left to photons is rounding.
-    assert difference(picture(gl, far), original) < 2e-4
-    by_photons = [picture(gl, s, method="srd-photons") for s in (far, scene())]
-    assert difference(*by_photons) < EXACT
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("scale", [1e3, 1e-3])
-def test_any_unit_of_length_will_do(gl, original: np.ndarray, scale: float) -> None:
-    after = picture(gl, moved(scene(), placed(scale)))
-    assert difference(after, original) < OTHER_LATTICE
-    assert after.sum() == pytest.approx(original.sum(), rel=ENERGY)
-
-
 @pytest.mark.parametrize(
     ("axis", "degrees"),
     [((0.0, 0.0, 1.0), 90.0), pytest.param((1.0, 2.0, 0.5), 71.0, marks=SLOW)],
@@ -227,19 +210,6 @@ def test_what_does_not_move_along_is_seen(gl, original: np.ndarray) -> None:
     """Mutants: the scene turned by two degrees, or made 2 % larger, without its lights."""
     for matrix in (turned((0.0, 0.0, 1.0), 2.0), placed(1.02)):
         assert difference(picture(gl, moved(scene(), matrix, lights=False)), original) > 2.0 * OTHER_LATTICE
-
-
-@pytest.mark.slow
-def test_batches_do_not_show(gl, original: np.ndarray) -> None:
-    assert difference(picture(gl, scene(), batch=8192), original) < EXACT
-
-
-@pytest.mark.slow
-def test_batches_do_not_show_in_passes_that_grow(gl) -> None:
-    """Borders of bands, shifts and weights of `progressive`'s passes depend on the photons asked for only."""
-    whole = picture(gl, scene(), method="progressive", photons=60_000)
-    assert difference(picture(gl, scene(), method="progressive", photons=60_000, batch=8192), whole) < EXACT
-    assert difference(picture(gl, scene(), method="progressive", photons=60_000, seed=2), whole) > EXACT
 
 
 @pytest.mark.parametrize(

@@ -359,8 +359,8 @@ def test_in_motion_cells_beside_a_broad_shadow_are_even_and_those_beside_a_thin_
 ) -> None:
     """By the lattice's marks, in numpy: only of cells next to something broad does the device ask more."""
     monkeypatch.setattr("spectrasplat.render.viewer.live_camera.SCALES", (1.0,))
+    settle(engine, inputs(table))
     large = replace(inputs(table), width=480, height=270)
-    settle(engine, large)
     engine.set(
         replace(large, camera=replace(table.camera, position=tuple(np.add(table.camera.position, (0.3, 0.1, 0.0)))))
     )

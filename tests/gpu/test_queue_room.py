@@ -56,16 +56,16 @@ def test_a_slice_that_overflows_is_traced_again_in_parts(gl, crowded: Scene, mon
     # Pilots of so many orders would take most of the time.
     monkeypatch.setattr(pilot, "MAX_DEPTH", FEW)
     monkeypatch.setattr(pilot, "PHOTONS", 512)
-    with light_pass(gl, crowded, replace(SMALL, photons=5_120, batch=4_096, max_depth=FEW)) as (light, _):
-        light.begin(5_120, 1)
+    with light_pass(gl, crowded, replace(SMALL, photons=2_560, batch=2_048, max_depth=FEW)) as (light, _):
+        light.begin(2_560, 1)
         plan = light.plans[0]
-        part = plan.slice(1, 0, plan.lattice_count(5_120), 0, 1, plan.lattice_count(5_120), 5_120.0)
+        part = plan.slice(1, 0, plan.lattice_count(2_560), 0, 1, plan.lattice_count(2_560), 2_560.0)
         whole = light.trace.run(part, plan.domain)
         assert whole.overflow > 0 and whole.tally.imbalance > 0.01
-        for _ in light.pass_steps(0, 5_120):
+        for _ in light.pass_steps(0, 2_560):
             pass
         tally = light.stats.tally
-        assert tally.imbalance < 1e-5 and np.isclose(tally.emitted, whole.tally.emitted + _others(light, 5_120))
+        assert tally.imbalance < 1e-5 and np.isclose(tally.emitted, whole.tally.emitted + _others(light, 2_560))
 
 
 def _others(light, photons: int) -> float:

@@ -23,7 +23,7 @@ from spectrasplat.base.paths import assets_dir
 from spectrasplat.edit.camera_controls import orbit
 
 PATIENCE_S = 60.0
-SIZE = (320, 180)
+SIZE = (160, 90)
 
 
 class Browser:
@@ -181,7 +181,7 @@ def test_the_spectrum_under_the_cursor_is_true() -> None:
     R) with R = ((n − 1)/(n + 1))²; beside it all of it, as direct light."""
     scene = ss.load(SLAB)
     light = scene._model.lights[0].spectral_power
-    with ss.Session(scene, size=(160, 90), photons=20_000, spp=1) as session:
+    with ss.Session(scene, size=(96, 54), photons=20_000, spp=1) as session:
         view, browser = viewed(session)
         until(lambda: next((p for p in browser.pictures if p[0]["done"]), None))
         below, beside = browser.light(0.5, 0.55), browser.light(0.05, 0.55)
