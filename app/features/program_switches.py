@@ -10,6 +10,8 @@ Defines = dict[str, int | float | str]
 PROGRAM_SWITCHES = frozenset(
     # Emission: the light's domain, cells of it that are thinned; a driver that ends long loops.
     ("LIGHT_AREA", "LIGHT_PLANE", "LIGHT_POINT", "LIGHT_PROFILE", "THINNED_CELLS", "LOOPS_MAY_END")
+    # What the paths of a walk carry; the walk's own file defines them by features.
+    + ("HAS_NORMAL_COLUMNS", "WIDENED_BY_LOBES")
     # Light of the environment and of other receivers, by way of glass.
     + ("FOLLOWS_SPECULAR",)
     # Kinds of splats, beams that no wavelength moves, sums by atomics, seams between charts.

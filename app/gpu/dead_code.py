@@ -2,9 +2,9 @@
 
 "What a scene does not need is absent" is only worth saying of the text that is compiled. So
 conditionals are resolved here by the defines at hand, comments go, and of what is left only
-the macros, constants, structs and functions stay that `main` and the interface can reach, without
-the statements that constants decide (`glsl_folding`). A library may then be written without guards,
-and a test can look for a symbol instead of trusting an #ifdef.
+the macros, constants, structs, functions, global variables, bindings and blocks stay that `main` can reach, without
+the statements that constants decide (`glsl_folding`), and of a struct only the members that are mentioned. A library
+may then be written without guards, and a test can look for a symbol instead of trusting an #ifdef.
 (A full preprocessor, pcpp, does the first part only, expands every macro on the way, and takes 0.1 s a
 program; a dozen programs have to start within a second.)
 
@@ -18,13 +18,19 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from .glsl_conditionals import DEFINE, Line, Unit, directive_of, macros_of, resolve_conditionals
+from .glsl_conditionals import DEFINE, Line, Unit, directive_of, macros_of, resolve_conditionals, value_of
 from .glsl_folding import folded, places_of
 
 _WORD = re.compile(r"[A-Za-z_]\w*")
+_USE = re.compile(r"(?<![.\w])[A-Za-z_]\w*|\.[A-Za-z_]\w*")
 _FUNCTION = re.compile(r"\s*(?:\w+\s+)*?\w+\s+(\w+)\s*\(([^)]*)\)\s*\{")
 _STRUCT = re.compile(r"\s*struct\s+(\w+)")
-_CONSTANT = re.compile(r"\s*const\s+\w+\s+(\w+)[^;]*;\s*$")
+_LAYOUT = re.compile(r"layout\s*\([^)]*\)")
+_BLOCK = re.compile(r"(?:\w+\s+)*(?:buffer|uniform)\s+\w+\s*\{(.*)\}\s*(\w*)[^}]*;$", re.DOTALL)
+_MEMBER = re.compile(r"\b(\w+)\s*(?:\[[^\]]*\])*\s*[;,]")
+_MEMBER_NAME = re.compile(r"\b\w+(?=\s*(?:\[[^\]]*\])*\s*[;,])")
+_BRACKETED = re.compile(r"\([^()]*\)|\{[^{}]*\}|\[[^\[\]]*\]")
+_MADE = re.compile(r"\b([A-Z]\w*)\s*(?:\[\w*\])?\(")
 
 
 def stripped(lines: Sequence[Line], switches: frozenset[str] = frozenset()) -> list[Line]:
@@ -39,6 +45,11 @@ def stripped(lines: Sequence[Line], switches: frozenset[str] = frozenset()) -> l
 def words(text: str) -> set[str]:
     """Identifiers in GLSL text."""
     return set(_WORD.findall(text))
+
+
+def _uses(text: str) -> set[str]:
+    """Identifiers, and `.name` for what is read or written of structs."""
+    return set(_USE.findall(text))
 
 
 # -- lines --------------------------------------------------------------------------------
@@ -77,33 +88,33 @@ def _units(lines: Iterator[Line]) -> Iterator[Unit]:
 
 @dataclass(frozen=True)
 class _Definition:
-    """Something that is only needed where its name is used."""
+    """Something that is only needed where one of its names is used."""
 
-    name: str
+    names: frozenset[str]
     units: tuple[int, ...]
     text: str
-    is_function: bool = False
+    is_folded: bool = False
     structs: frozenset[str] = frozenset()
     """Structs of a function's arguments: an overload for a struct that nobody uses is not called either."""
 
 
 def _reachable(units: Sequence[Unit], switches: frozenset[str]) -> list[Unit]:
-    """`units` without definitions that nothing uses; in functions what constants decide is left out."""
+    """`units` without definitions that nothing uses; what constants decide is left out."""
     definitions, roots = _definitions(units)
-    constants = _Constants(units, switches, {d.name for d in definitions})
+    constants = _Constants(units, switches, {name for d in definitions for name in d.names})
     kept = {index: units[index] for index in roots}
-    used = {"main"}.union(*(words(line.text) for index in roots for line in units[index]))
+    used = {"main"}.union(*(_uses(line.text) for index in roots for line in units[index]))
     waiting = definitions
     while True:
-        reached = [d for d in waiting if d.name in used and d.structs <= used]
+        reached = [d for d in waiting if not d.names.isdisjoint(used) and d.structs <= used]
         if not reached:
             break
         for definition in reached:
             text, own = definition.text, [units[index] for index in definition.units]
-            if definition.is_function and (decided := constants.decide(text)) != text:
+            if definition.is_folded and (decided := constants.decide(text)) != text:
                 text, own = decided, _with_text(own, decided)
             kept |= dict(zip(definition.units, own, strict=True))
-            used |= words(text)
+            used |= _uses(text)
         waiting = [d for d in waiting if d not in reached]
     zeros = [(Line(f"#define {name} 0", "<features>", 1),) for name in sorted(constants.off & used)]
     ordered = [kept[index] for index in sorted(kept)]
@@ -115,13 +126,21 @@ class _Constants:
     """What is known of a text's switches and whole numbers."""
 
     def __init__(self, units: Sequence[Unit], switches: frozenset[str], declared: set[str]) -> None:
-        defined = macros_of(units).values
-        switches -= declared - defined.keys()
-        self.off = switches - defined.keys()
-        numbers = {name: int(body) for name, body in defined.items() if body and body.isdigit()}
-        self._values = numbers | dict.fromkeys(self.off, 0)
+        macros = macros_of(units)
+        macros.switches = switches - (declared - macros.values.keys())
+        self.off = macros.switches - macros.values.keys()
+        values = dict.fromkeys(self.off, 0)
+        ours = set(macros.switches)
+        for name, body in macros.values.items():
+            if body and body.isdigit():
+                values[name] = int(body)
+            elif body and words(body) and words(body) <= macros.switches:  # made of switches, and so one itself
+                value = value_of(body, macros)
+                values |= {} if value is None else {name: value}
+                ours.add(name)
+        self._values = values
         # A count that is also a switch (TINT_LEVELS) stands for its number.
-        self._places = places_of(self._values, frozenset(s for s in switches if self._values.get(s) in (0, 1)))
+        self._places = places_of(values, frozenset(name for name in ours if values.get(name) in (0, 1)))
 
     def decide(self, text: str) -> str:
         """A function without what they decide, in as many lines."""
@@ -135,8 +154,8 @@ def _with_text(units: list[Unit], text: str) -> list[Unit]:
 
 
 def _definitions(units: Sequence[Unit]) -> tuple[list[_Definition], list[int]]:
-    """Definitions, and the units that are needed in any case: the interface and directives."""
-    macros: list[_Definition] = []
+    """Definitions, and the units that are needed in any case: directives, and what names nothing."""
+    definitions: list[_Definition] = []
     roots: list[int] = []
     statements: list[tuple[tuple[int, ...], str]] = []
     held: list[int] = []
@@ -146,7 +165,11 @@ def _definitions(units: Sequence[Unit]) -> tuple[list[_Definition], list[int]]:
         if name:
             found = DEFINE.match(rest) if name == "define" else None
             if found:
-                macros.append(_Definition(found.group(1), (index,), rest))
+                # (A macro that is a statement is not folded: none of it may end in the macro.)
+                is_one_line = len(unit) == 1 and "if" not in words(rest)
+                names = frozenset({found.group(1), f".{found.group(1)}"})
+                text_of_it = unit[0].text if is_one_line else rest
+                definitions.append(_Definition(names, (index,), text_of_it, is_one_line))
             else:
                 roots.append(index)
             continue
@@ -159,14 +182,54 @@ def _definitions(units: Sequence[Unit]) -> tuple[list[_Definition], list[int]]:
             statements.append((tuple(held), text))
             held, text = [], ""
     roots += held
-    names = {found.group(1) for _, text in statements if (found := _STRUCT.match(text))}
-    definitions = macros
+    structs = {found.group(1) for _, text in statements if (found := _STRUCT.match(text))}
+    whole = _whole_structs(structs, units, [text for _, text in statements])
     for indices, text in statements:
-        function = _FUNCTION.match(text)
-        found = _STRUCT.match(text) or function or _CONSTANT.match(text)
-        if found is None:
+        if found := _STRUCT.match(text):
+            definitions += _struct_parts(found.group(1), indices, units, is_whole=found.group(1) in whole)
+        elif found := _FUNCTION.match(text):
+            needed = frozenset(words(found.group(2)) & structs)
+            definitions.append(_Definition(frozenset({found.group(1)}), indices, text, True, needed))
+        elif names := _declared(text):
+            definitions.append(_Definition(names, indices, text, is_folded="=" in text))
+        else:
             roots += indices
-            continue
-        needed = words(function.group(2)) & names if function else set()
-        definitions.append(_Definition(found.group(1), indices, text, function is not None, frozenset(needed)))
     return definitions, roots
+
+
+def _declared(statement: str) -> frozenset[str]:
+    """What a declaration outside of functions is used by: names of variables, of a block its members or its own."""
+    statement = _LAYOUT.sub(" ", statement).strip()
+    if block := _BLOCK.match(statement):
+        members, instance = block.groups()
+        return frozenset({instance}) if instance else frozenset(_MEMBER.findall(members))
+    if "(" in statement.partition("=")[0] or len(_WORD.findall(statement)) < 2:
+        return frozenset()
+    while (bare := _BRACKETED.sub("", statement)) != statement:
+        statement = bare
+    return frozenset(part.partition("=")[0].split()[-1] for part in statement.rstrip("; ").split(","))
+
+
+def _whole_structs(structs: set[str], units: Sequence[Unit], statements: Sequence[str]) -> set[str]:
+    """Structs that keep all their members: what lies in buffers, and what is made by listing all members."""
+    generated = {
+        found.group(1) for unit in units if unit[0].file.startswith("<") and (found := _STRUCT.match(unit[0].text))
+    }
+    in_blocks = {word for text in statements if _BLOCK.match(_LAYOUT.sub(" ", text).strip()) for word in words(text)}
+    made = {word for text in statements for word in _MADE.findall(text)}
+    made |= {word for unit in units if directive_of(unit)[0] for line in unit for word in _MADE.findall(line.text)}
+    return generated | structs & (in_blocks | made)
+
+
+def _struct_parts(name: str, indices: tuple[int, ...], units: Sequence[Unit], *, is_whole: bool) -> list[_Definition]:
+    """A struct, and apart from it its members (one a line), which stay where their names are used."""
+    lines = {index: "\n".join(line.text for line in units[index]) for index in indices}
+    members = {i: frozenset(f".{m}" for m in _MEMBER.findall(lines[i])) for i in indices[1:-1] if not is_whole}
+    members = {i: names for i, names in members.items() if names}
+    shell = [i for i in indices if i not in members]
+    itself = _Definition(frozenset({name}), tuple(shell), _MEMBER_NAME.sub("", "\n".join(lines[i] for i in shell)))
+    needed = frozenset({name})
+    return [
+        itself,
+        *(_Definition(names, (i,), _MEMBER_NAME.sub("", lines[i]), structs=needed) for i, names in members.items()),
+    ]

@@ -8,7 +8,7 @@
 // that is expensive. NVIDIA unrolls whatever it can count, with all that it has inlined: two minutes for a scene's
 // programs.
 #pragma optionNV(unroll none)
-#ifdef CAMERA_SPECULAR
+#if CAMERA_SPECULAR
 layout(local_size_x = PATHS_GROUP) in;
 #else
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -20,32 +20,19 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "camera/listed.glsl"
 layout(rgba32f, binding = 0) uniform image2D picture[TARGETS];
 
-#ifdef CAMERA_SPECULAR
 // Paths that wait while another is followed; global as `radiance` is.
 int stack_size;
-#ifdef SPECTRAL_SWEEP
+Path path_stack[STACK];
 // Rays traced to find out where paths diverge.
 int asked = 0;
-#endif
-#ifdef HALTS
-#include "camera/halts.glsl"
-#define STACKED(i) halted[place].path_stack[i]
-#else
-Path path_stack[STACK];
-#define STACKED(i) path_stack[i]
-#endif
-// What this event adds to them, put there in one place: storing a path at an index takes a compiler long.
+// What this event adds to the waiting paths, stored in one place: storing a path at an index takes a compiler long.
 Path pending_path;
 bool pushes_path;
-#ifdef SPECTRAL_SWEEP
 // Where this event cuts the path's band; negative: nowhere.
 float cut_at;
-#endif
-#endif
 
-#ifdef CAMERA_SPECULAR
-// Ends of paths are looked at together, when there are that many or no path is left: a software renderer, and a GPU,
-// looks at those of neighbouring pixels side by side then.
+// Ends of paths are looked up together, when there are that many or no path is left: a software renderer, and a GPU,
+// then looks up those of neighbouring pixels side by side.
 struct PathEnd {
     Path path;
     Hit hit;
@@ -53,18 +40,25 @@ struct PathEnd {
     uint same_hit;
 };
 PathEnd ended[ENDS_HELD];
-#endif
 
-#if defined(CAMERA_SPECULAR) && defined(SPECTRAL_SWEEP)
+#include "camera/halts.glsl"
 #include "camera/cuts.glsl"
-#endif
+#include "camera/survey.glsl"
+#include "camera/meet.glsl"
 
-#ifdef LENS
+void push(Path path) {
+    if (HALTS)
+        halted[place].path_stack[stack_size++] = path;
+    else
+        path_stack[stack_size++] = path;
+}
+
+Path pop() { return HALTS ? halted[place].path_stack[--stack_size] : path_stack[--stack_size]; }
+
 // 2^32 times the fractions of the cube roots of 2 and 4: badly approximable together, and of no other field than the
 // plastic number's, by which places on lights are drawn.
 #define LENS_1 1116352409u
 #define LENS_2 2522868307u
-#endif
 
 vec2 primary_sample_place(uint primary_sample) {
     if (primary_sample == THE_SAMPLE) return p.within_pixel;
@@ -72,55 +66,43 @@ vec2 primary_sample_place(uint primary_sample) {
     return (primary_sample & 1u) == 0u ? two.xy : two.zw;
 }
 
-#ifdef LISTS_SPECULAR
-#include "camera/survey.glsl"
-#endif
-
 Path camera_path(uvec2 pixel, uint primary_sample, float gain) {
     look_place = primary_sample_place(primary_sample);
-#ifdef LENS
-    // Looks are shared out over the lens as over the pixel, by a sequence any part of which is even too: samples of one
-    // band, every so many of them, see through all of the lens.
-    uint look = p.sample_index * p.primary_samples + (primary_sample == THE_SAMPLE ? 0u : primary_sample);
-    uint key = hash_combine(hash_combine(hash_combine(p.seed, pixel.x), pixel.y), 79u);
-    lens_place = vec2(kronecker(look, LENS_1, key), kronecker(look, LENS_2, hash_pcg(key)));
-#endif
+    if (LENS) {
+        // Looks are shared out over the lens as over the pixel, by a sequence any part of which is even too: samples of
+        // one band, every so many of them, see through all of the lens.
+        uint look = p.sample_index * p.primary_samples + (primary_sample == THE_SAMPLE ? 0u : primary_sample);
+        uint key = hash_combine(hash_combine(hash_combine(p.seed, pixel.x), pixel.y), 79u);
+        lens_place = vec2(kronecker(look, LENS_1, key), kronecker(look, LENS_2, hash_pcg(key)));
+    }
     return path_from(pixel, look_place, gain);
 }
 
-#ifdef CAMERA_SPECULAR
-#include "camera/meet.glsl"
-#endif
-
-#ifndef CAMERA_SPECULAR
 // What a camera ray meets that nothing specular is in the way of.
 void see_directly(Path path, bool met, Hit hit, uint kind, uint pixel_key) {
     if (LAYER_BEAUTY && VISIBLE_LIGHTS) add_lights(path, met ? hit.distance : FAR_DISTANCE);
     if (!met || kind == KIND_DIFFUSE) add_end(path, met, hit, true, pixel_key);
 }
-#endif
 
-void main() {
-#ifdef CAMERA_SPECULAR
-#ifdef HALTS
-    uint at = shared_out(gl_WorkGroupID.x, gl_NumWorkGroups.x) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
-#else
-    uint at = gl_GlobalInvocationID.x;
-#endif
-    uint at_listed = p.first_listed + at;
-    if (at_listed >= p.end_listed) return;
-#ifdef HALTS
-    bool resumes = p.first_place == NONE;
-    place = resumes ? halted[at_listed].queued[1u - p.queue] : p.first_place + at;
-    uint entry = resumes ? halted[place].entry : listed[at_listed];
-#else
-    uint entry = listed[at_listed];
-#endif
-    uint number = bitfieldExtract(entry, 0, int(LISTED_BITS)),
-         primary_sample = bitfieldExtract(entry, int(LISTED_BITS), 3);
-    float gain = float((entry >> (LISTED_BITS + 3u)) + 1u) / float(p.primary_samples);
-    uvec2 pixel = uvec2(number % p.size.x, number / p.size.x);
-#else
+void begin_sample(uvec2 pixel) {
+    if (RGB_CHANNELS) {
+        turn = p.counts_turns != 0u ? uint(imageLoad(picture[0], ivec2(pixel)).w) : p.sample_index;
+    } else {
+        turn = p.sample_index;
+    }
+    for (int t = 0; t < TARGETS; ++t) radiance[t] = vec4(0.0);
+}
+
+void add_to_picture(uvec2 pixel) {
+    if (RGB_CHANNELS) radiance[0].w = took_turn ? 1.0 : 0.0;
+    for (int t = 0; t < TARGETS; ++t) {
+        vec4 sum = imageLoad(picture[t], ivec2(pixel));
+        imageStore(picture[t], ivec2(pixel), sum + radiance[t]);
+    }
+}
+
+// What is seen directly in a pixel; it is listed where something specular is seen.
+void see_pixel() {
     uvec2 pixel = gl_GlobalInvocationID.xy + uvec2(0u, p.first_row);
     if (p.survey == SURVEY_KEPT) {
         uint at = p.first_listed + gl_WorkGroupID.x * 64u + gl_LocalInvocationIndex;
@@ -128,24 +110,11 @@ void main() {
         pixel = at < p.end_listed ? uvec2(number % p.size.x, number / p.size.x) : p.size;
     }
     if (pixel.x >= p.size.x || pixel.y >= p.size.y) return;
-#endif
     uint pixel_key = hash_combine(hash_combine(p.seed, pixel.x), pixel.y);
-#ifdef CAMERA_SPECULAR
-    Path path = camera_path(pixel, primary_sample, gain);
-#endif
-    if (RGB_CHANNELS) {
-        turn = p.counts_turns != 0u ? uint(imageLoad(picture[0], ivec2(pixel)).w) : p.sample_index;
-    } else {
-        turn = p.sample_index;
-    }
-    for (int t = 0; t < TARGETS; ++t) radiance[t] = vec4(0.0);
-    if (CAMERA_SPECULAR) stack_size = 0;
-#ifdef LISTS_SPECULAR
+    begin_sample(pixel);
     uint number = pixel.y * p.size.x + pixel.x;
     Survey survey = Survey(0u, vec3(0.0));
-#ifdef FOLLOWED
     uint specular_samples = 0u, chosen = THE_SAMPLE, draw = hash_combine(pixel_key, p.sample_index);
-#endif
     for (uint k = 0u; k < p.primary_samples; ++k) {
         look_index = p.sample_index * p.primary_samples + k;
         lights_seen = 0u;
@@ -155,56 +124,63 @@ void main() {
         bool met = intersect_closest(path.position, path.direction, FAR_DISTANCE, path.origin, hit);
         uint kind = met ? object_at(hit.object).kind : NONE;
         uint sees = is_specular(kind) ? SEES_SPECULAR : SEES_DIRECTLY;
-        if (COATS && FOLLOWED) {
-            // The base is seen directly; a path goes on from the coat.
-            if (kind == KIND_DIFFUSE && is_coated(hit.object)) {
-                sees = SEES_COATED;
-                specular_samples += 1u;
-                draw = hash_pcg(draw);
-                if (unit_float(draw) * float(specular_samples) < 1.0) chosen = k;
-            }
+        // The base of a coat is seen directly; a path goes on from the coat.
+        if (COATS && FOLLOWED && kind == KIND_DIFFUSE && is_coated(hit.object)) sees = SEES_COATED;
+        if (FOLLOWED && sees != SEES_DIRECTLY) {
+            specular_samples += 1u;
+            // Each of them as likely: the newest of c with 1 / c.
+            draw = hash_pcg(draw);
+            if (unit_float(draw) * float(specular_samples) < 1.0) chosen = k;
         }
-        if (is_specular(kind)) {
-            if (FOLLOWED) {
-                specular_samples += 1u;
-                // Each of them as likely: the newest of c with 1 / c.
-                draw = hash_pcg(draw);
-                if (unit_float(draw) * float(specular_samples) < 1.0) chosen = k;
-            }
-        } else {
-            see_directly(path, met, hit, kind, pixel_key);
-        }
+        if (!is_specular(kind)) see_directly(path, met, hit, kind, pixel_key);
         if (p.survey == SURVEY_TAKES) survey_look(survey, k, sees, met, hit, lights_seen);
     }
     if (p.survey == SURVEY_TAKES) {
         keep_survey(number, survey.key, p.survey_gain * radiance[0].rgb);
         return;
     }
-#ifdef FOLLOWED
-    if (specular_samples > 0u) {
-#ifdef LENS
-        // A place in the pixel goes with one on the lens: another pair may meet no glass.
-        bool is_any = p.primary_samples == 1u;
-#else
-        bool is_any = specular_samples == p.primary_samples;
-#endif
+    if (FOLLOWED && specular_samples > 0u) {
+        // A place in the pixel belongs to one on the lens: another pair may meet no glass.
+        bool is_any = LENS ? p.primary_samples == 1u : specular_samples == p.primary_samples;
         listed[atomicAdd(listed_count, 1u)] = listed_entry(number, is_any ? THE_SAMPLE : chosen, specular_samples);
     }
-#endif
-#else
+    add_to_picture(pixel);
+}
+
+// A listed pixel: its path through glass and over mirrors, and all that it splits into.
+void follow_listed_pixel() {
+    uint at = HALTS ? shared_out(gl_WorkGroupID.x, gl_NumWorkGroups.x) * gl_WorkGroupSize.x + gl_LocalInvocationID.x
+                    : gl_GlobalInvocationID.x;
+    uint at_listed = p.first_listed + at;
+    if (at_listed >= p.end_listed) return;
+    uint entry;
+    bool resumes = false;
+    if (HALTS) {
+        resumes = p.first_place == NONE;
+        place = resumes ? halted[at_listed].queued[1u - p.queue] : p.first_place + at;
+        entry = resumes ? halted[place].entry : listed[at_listed];
+    } else {
+        entry = listed[at_listed];
+    }
+    uint number = bitfieldExtract(entry, 0, int(LISTED_BITS)),
+         primary_sample = bitfieldExtract(entry, int(LISTED_BITS), 3);
+    float gain = float((entry >> (LISTED_BITS + 3u)) + 1u) / float(p.primary_samples);
+    uvec2 pixel = uvec2(number % p.size.x, number / p.size.x);
+    uint pixel_key = hash_combine(hash_combine(p.seed, pixel.x), pixel.y);
+    Path path = camera_path(pixel, primary_sample, gain);
+    begin_sample(pixel);
+    stack_size = 0;
     int events = 0;
     bool goes_on = true, halts = false;
-    if (HALTS) {
-        if (resumes) {
-            resume(events);
-            goes_on = false;
-        }
+    if (HALTS && resumes) {
+        resume(events);
+        goes_on = false;
     }
     while ((goes_on || stack_size > 0) && !halts) {
         int found = 0;
         for (; (goes_on || stack_size > 0) && found < ENDS_HELD && !halts; ++events) {
             COUNT_ROUNDS(12);
-            if (!goes_on) path = STACKED(--stack_size);
+            if (!goes_on) path = pop();
             goes_on = true;
             Hit hit;
             bool met = intersect_closest(path.position, path.direction, FAR_DISTANCE, path.origin, hit);
@@ -212,64 +188,50 @@ void main() {
             bool ends = !met || kind == KIND_DIFFUSE, same_hit = true, parts = false,
                  event_limit_reached = events >= MAX_EVENTS;
             pushes_path = false;
-#ifdef COATS
-            bool coated = met && kind == KIND_DIFFUSE && is_coated(hit.object);
-#endif
-#ifdef SPECTRAL_SWEEP
-            cut_at = -1.0;
-            bool asks = path.restricted != 0u && !event_limit_reached
-                && (ends || (path.walk.planar_so_far != 0u && kind != KIND_BLACK && asked < MAX_ASKED));
-            float ahead = met ? hit.distance : FAR_DISTANCE;
-            if (asks)
-                asks = ends ? shown_sweep(path, ahead) > MIN_SWEEP
-                            : sweep_pixels(path, ahead) > MIN_CUT_SWEEP * sample_side(path);
-            if (asks) cut_at = where_paths_diverge(path, met, ends, hit, same_hit);
-            parts = cut_at >= 0.0;
-#endif
+            bool coated = COATS && met && kind == KIND_DIFFUSE && is_coated(hit.object);
+            if (SPECTRAL_SWEEP) {
+                cut_at = -1.0;
+                bool asks = path.restricted != 0u && !event_limit_reached
+                    && (ends || (path.walk.planar_so_far != 0u && kind != KIND_BLACK && asked < MAX_ASKED));
+                float ahead = met ? hit.distance : FAR_DISTANCE;
+                if (asks)
+                    asks = ends ? shown_sweep(path, ahead) > MIN_SWEEP
+                                : sweep_pixels(path, ahead) > MIN_CUT_SWEEP * sample_side(path);
+                if (asks) cut_at = where_paths_diverge(path, met, ends, hit, same_hit);
+                parts = cut_at >= 0.0;
+            }
             if (!parts) {
-#if defined(LAYER_BEAUTY) && defined(VISIBLE_LIGHTS)
-#ifdef HAS_GRATING
-                bool met_before = path.recut != 0u || path.order != 0u;
-#else
-                bool met_before = path.recut != 0u;
-#endif
-                if (COATS) {
-                    // Before a coat that is seen first, the program for what is seen directly has added them.
-                    met_before = met_before || (coated && path.depth == 0u);
-                }
-                if (!met_before) add_lights(path, met ? hit.distance : FAR_DISTANCE);
-#endif
+                // Before a coat that is seen first, the program for what is seen directly has added lights.
+                bool met_before =
+                    path.recut != 0u || (HAS_GRATING && path.order != 0u) || (COATS && coated && path.depth == 0u);
+                if (LAYER_BEAUTY && VISIBLE_LIGHTS && !met_before) add_lights(path, met ? hit.distance : FAR_DISTANCE);
                 // Light that would still be caught inside is as if it left here.
                 bool specular = !ends && kind != KIND_BLACK,
                      leaves = specular && (event_limit_reached || path.depth >= uint(MAX_DEPTH));
                 if (leaves) atomicAdd(fallbacks[FELL_DEPTH], 1u);
-                if (HAS_GRATING) {
-                    if (leaves && kind == KIND_GRATING) path.throughput *= efficiency_left(path, hit.object);
-                }
+                if (HAS_GRATING && leaves && kind == KIND_GRATING) path.throughput *= efficiency_left(path, hit.object);
                 if (ends || leaves) ended[found++] = PathEnd(path, hit, uint(met && ends), uint(same_hit || leaves));
                 goes_on = specular && !leaves;
                 if (COATS) goes_on = goes_on || (coated && !event_limit_reached && path.depth < uint(MAX_DEPTH));
                 if (goes_on) meet_surface(path, hit, kind, pixel_key);
                 if (HAS_GRATING || COATS || ROUGH_SURFACES) goes_on = goes_on && path.walk.inverse_pdf > 0.0;
             }
-            if (SPECTRAL_SWEEP) {
-                if (cut_at >= 0.0) cut_band(path, cut_at, pixel_key);
+            if (SPECTRAL_SWEEP && cut_at >= 0.0) cut_band(path, cut_at, pixel_key);
+            if (HALTS) {
+                halts = rounds >= uint(HALT_ROUNDS);
+                // One place stores both what is pending and, where it halts, what is followed.
+                bool sets_path = halts && goes_on;
+                if (!pushes_path) pending_path = path;
+                for (bool stores = pushes_path || sets_path; stores;) {
+                    push(pending_path);
+                    stores = pushes_path && sets_path;
+                    pushes_path = false;
+                    pending_path = path;
+                }
+                goes_on = goes_on && !halts;
+            } else if (pushes_path) {
+                push(pending_path);
             }
-#ifdef HALTS
-            halts = rounds >= uint(HALT_ROUNDS);
-            // One place stores both what is pending and, where it halts, what is followed.
-            bool sets_path = halts && goes_on;
-            if (!pushes_path) pending_path = path;
-            for (bool stores = pushes_path || sets_path; stores;) {
-                STACKED(stack_size++) = pending_path;
-                stores = pushes_path && sets_path;
-                pushes_path = false;
-                pending_path = path;
-            }
-            goes_on = goes_on && !halts;
-#else
-            if (pushes_path) STACKED(stack_size++) = pending_path;
-#endif
         }
         for (int e = 0; e < found; ++e)
             add_end(ended[e].path, ended[e].met != 0u, ended[e].hit, ended[e].same_hit != 0u, pixel_key);
@@ -281,10 +243,12 @@ void main() {
             return;
         }
     }
-#endif
-    if (RGB_CHANNELS) radiance[0].w = took_turn ? 1.0 : 0.0;
-    for (int t = 0; t < TARGETS; ++t) {
-        vec4 sum = imageLoad(picture[t], ivec2(pixel));
-        imageStore(picture[t], ivec2(pixel), sum + radiance[t]);
-    }
+    add_to_picture(pixel);
+}
+
+void main() {
+    if (CAMERA_SPECULAR)
+        follow_listed_pixel();
+    else
+        see_pixel();
 }

@@ -20,12 +20,12 @@ vec4 emission_until(uint row, int target, int cell) {
 // What a path lets through at the wavelength x.
 float transmitted(Path path, float x) {
     float kept = band_weights(path.band, path.throughput, vec3(x)).x;
-#ifdef ABSORPTION
-    float depth = 0.0;
-    for (int i = 0; i < ABSORBERS; ++i)
-        if (path.walk.lengths[i] > 0.0) depth += path.walk.lengths[i] * spectral_row(uint(ABSORPTION_ROW + i), x);
-    kept *= exp(-depth);
-#endif
+    if (ABSORPTION) {
+        float depth = 0.0;
+        for (int i = 0; i < ABSORBERS; ++i)
+            if (path.walk.lengths[i] > 0.0) depth += path.walk.lengths[i] * spectral_row(uint(ABSORPTION_ROW + i), x);
+        kept *= exp(-depth);
+    }
     return kept;
 }
 

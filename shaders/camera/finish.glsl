@@ -1,6 +1,5 @@
 // How a receiver's surface is finished (app/model/materials/diffuse.py): the coat over its base, and how rough that is.
 
-#if defined(COATS) || defined(ROUGH_DIFFUSE)
 struct Finish {
     float alpha;  // of the coat's lobe; 0: perfectly smooth; below 0: there is no coat
     float index;  // of the coat
@@ -17,13 +16,11 @@ bool is_finished(uint object) {
     Finish finish = finish_of(object);
     return finish.alpha >= 0.0 || finish.roughness > 0.0;
 }
-#endif
 
 // Outside of any condition: a file is put where it is first asked for, and rough glass needs this one where nothing is
 // coated.
 #include "lib/microfacet.glsl"
 
-#ifdef COATS
 #include "lib/coat.glsl"
 
 bool is_coated(uint object) { return object_colours[uint(FINISHES_AT) + object].x >= 0.0; }
@@ -52,8 +49,5 @@ float share_of_lobe(Path path, CameraLight light, vec3 position, vec3 direction)
     }
     return path.walk.coat_pdf > 0.0 ? 1.0 - share_of_points(path.walk.coat_pdf, extent) : 1.0;
 }
-#endif
 
-#ifdef ROUGH_DIFFUSE
 #include "lib/rough_diffuse.glsl"
-#endif

@@ -24,14 +24,10 @@ layout(std140, binding = BIND_LIGHTS) uniform Lights { CameraLight lights[LIGHT_
 #endif
 // Per object: reflectance in linear Rec.709; number of its absorption row, or -1.
 layout(std430, binding = BIND_OBJECT_COLOURS) readonly restrict buffer ObjectColours { vec4 object_colours[]; };
-#ifdef HAS_DISPERSION
 layout(std430, binding = BIND_CELL_CDF) readonly restrict buffer CellCdf { float cell_cdf[]; };
-#endif
 layout(std430, binding = BIND_COUNTERS) restrict buffer Counters { uint fallbacks[5]; };
 
-#ifdef HAS_IMAGES
 #include "lib/textures.glsl"
-#endif
 
 #define FELL_COLUMNS 0
 #define FELL_DEPTH 1
@@ -45,12 +41,10 @@ layout(std430, binding = BIND_COUNTERS) restrict buffer Counters { uint fallback
 uint turn = 0u;
 bool took_turn = false;
 
-#ifdef LISTS_SPECULAR
 // What a look has met: a mark of the lights that shine on the surface there, whether it saw one itself, and whether it
 // stepped over texels of a map.
 uint lights_seen = 0u;
 bool saw_light = false, skipped_texels = false;
-#endif
 
 #include "camera/path.glsl"
 
@@ -64,7 +58,5 @@ vec2 look_place;
 #include "lib/footprint.glsl"
 #include "camera/finish.glsl"
 #include "camera/receiver.glsl"
-#ifdef RECEIVER_LIGHT
 #include "camera/receiver_light.glsl"
-#endif
 #include "camera/taps.glsl"

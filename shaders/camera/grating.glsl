@@ -50,9 +50,7 @@ void meet_grating(inout Path path, Path whole, Hit hit, Event event, uint pixel_
     }
     // Orders that deflect by wavelength go on as one band of the spectrum; the zeroth keeps the whole spectrum.
     Path banded = path;
-    if (HAS_DISPERSION) {
-        if (banded.restricted == 0u) restrict_to_band(banded, pixel_key);
-    }
+    if (HAS_DISPERSION && banded.restricted == 0u) restrict_to_band(banded, pixel_key);
     uint end = alone ? number + 1u : orders;
     GratingOrder order;
     vec3 steps;

@@ -1,5 +1,5 @@
-// A sample of the even pixels: what a survey saw there is added, or the pixel is listed for the program that follows it.
-// All others have looks of their own, in camera.comp.
+// A sample of the even pixels: what a survey saw there is added, or the pixel is listed for the program that follows
+// it. All others have looks of their own, in camera.comp.
 layout(local_size_x = 8, local_size_y = 8) in;
 
 layout(std140, binding = BIND_PARAMETERS) uniform Parameters { CameraParameters p; };
@@ -13,8 +13,6 @@ void main() {
     uint number = pixel.y * p.size.x + pixel.x, sees = listed[survey_place(number)] & KIND_BITS;
     if (sees == SEES_DIRECTLY || sees == SEES_COATED)
         imageStore(picture, ivec2(pixel), imageLoad(picture, ivec2(pixel)) + vec4(surveyed_mean(number), 0.0));
-    if (FOLLOWED) {
-        if (sees == SEES_SPECULAR || sees == SEES_COATED)
-            listed[atomicAdd(listed_count, 1u)] = listed_entry(number, THE_SAMPLE, p.primary_samples);
-    }
+    if (FOLLOWED && (sees == SEES_SPECULAR || sees == SEES_COATED))
+        listed[atomicAdd(listed_count, 1u)] = listed_entry(number, THE_SAMPLE, p.primary_samples);
 }

@@ -14,9 +14,7 @@ void add_length(inout Path path, int absorber, float length) {
         if (i == absorber) path.walk.lengths[i] += length;
 }
 
-#ifdef COATS
 #include "camera/coat.glsl"
-#endif
 
 // Whether a path's band may be cut at `at`, from where its flight to the surface ahead started.
 bool may_cut_near(Path start, float at, float distance) {
@@ -27,9 +25,7 @@ bool may_cut_near(Path start, float at, float distance) {
     return near;
 }
 
-#ifdef HAS_GRATING
 #include "camera/grating.glsl"
-#endif
 
 // Leaves a path a lobe's share of its light, and what microfacets do not hide of that. A path that has lost all goes
 // nowhere.
@@ -52,41 +48,37 @@ void cross_glass(inout Path path, Path whole, Hit hit, Event event, uint pixel_k
     Path mirrored = path;
     Event mirror = event;
     bool begins = false;
-    if (HAS_DISPERSION) {
-        // What is reflected off the outside of glass knows no wavelength but in its strength: it stays whole. What goes
-        // on is one band.
-        if (path.restricted == 0u && (event.n_i.x != event.n_i.z || event.n_t.x != event.n_t.z)) {
-            begins = all(greaterThan(event.cosine2, vec3(0.0)));
-            restrict_to_band(path, pixel_key);
-            share_out(path, event);
-            if (!begins) {
-                mirrored = path;
-                mirror = event;
+    // What is reflected off the outside of glass knows no wavelength but in its strength: it stays whole. What goes
+    // on is one band.
+    if (HAS_DISPERSION && path.restricted == 0u && (event.n_i.x != event.n_i.z || event.n_t.x != event.n_t.z)) {
+        begins = all(greaterThan(event.cosine2, vec3(0.0)));
+        restrict_to_band(path, pixel_key);
+        share_out(path, event);
+        if (!begins) {
+            mirrored = path;
+            mirror = event;
+        }
+    }
+    if (SPECTRAL_SWEEP) {
+        float onset = path.restricted != 0u && path.recut == 0u ? total_reflection_in_band(path, event) : -1.0;
+        if (onset >= 0.0) {
+            onset = cell_border(onset);
+            Path start = whole;
+            if (start.restricted == 0u) restrict_to_band(start, pixel_key);
+            if (may_cut_near(start, onset, hit.distance)) {
+                // Both parts meet this surface again, each from its own start.
+                path = start;
+                path.recut = 1u;
+                cut_at = onset;
+                return;
             }
         }
     }
-#ifdef SPECTRAL_SWEEP
-    float onset = path.restricted != 0u && path.recut == 0u ? total_reflection_in_band(path, event) : -1.0;
-    if (onset >= 0.0) {
-        onset = cell_border(onset);
-        Path start = whole;
-        if (start.restricted == 0u) restrict_to_band(start, pixel_key);
-        if (may_cut_near(start, onset, hit.distance)) {
-            // Both parts meet this surface again, each from its own start.
-            path = start;
-            path.recut = 1u;
-            cut_at = onset;
-            return;
-        }
-    }
-#endif
     // A microfacet's share is its own, also where what it lets through does not leave the surface.
     bool total = !event.refracted.exists;
-    if (ROUGH_SURFACES) {
-        if (event.ground.width > 0.0) {
-            total = event.cosine2.y <= 0.0;
-            path.walk.ground = mirrored.walk.ground = 1u;
-        }
+    if (ROUGH_SURFACES && event.ground.width > 0.0) {
+        total = event.cosine2.y <= 0.0;
+        path.walk.ground = mirrored.walk.ground = 1u;
     }
     bool reflects = total;
     float likely = total ? 1.0 : dot(event.reflectance, vec3(0.25, 0.5, 0.25));
@@ -115,12 +107,12 @@ void cross_glass(inout Path path, Path whole, Hit hit, Event event, uint pixel_k
         unhidden = reflect_path(path, event, geometric);
     else {
         unhidden = refract_path(path, event);
-#ifdef SURFACE_FILTERS
-        // What the surface lets through of what enters is counted as by coloured mirrors.
-        vec4 passed = object_colours[hit.object];
-        add_length(path, int(passed.x), 1.0);
-        path.walk.branch_weight *= passed.y;
-#endif
+        if (SURFACE_FILTERS) {
+            // What the surface lets through of what enters is counted as by coloured mirrors.
+            vec4 passed = object_colours[hit.object];
+            add_length(path, int(passed.x), 1.0);
+            path.walk.branch_weight *= passed.y;
+        }
     }
     send_on(path, event, share, unhidden);
     leave_surface(path, hit, reflects != entering);
@@ -129,11 +121,11 @@ void cross_glass(inout Path path, Path whole, Hit hit, Event event, uint pixel_k
 // A specular surface, or a coat.
 void meet_surface(inout Path path, Hit hit, uint kind, uint pixel_key) {
     Path whole = path;
-#ifdef ABSORPTION
-    uint filling = current_medium(path.medium);
-    int absorber = filling == NONE ? -1 : int(object_colours[filling].w);
-    add_length(path, absorber, hit.distance);
-#endif
+    if (ABSORPTION) {
+        uint filling = current_medium(path.medium);
+        int absorber = filling == NONE ? -1 : int(object_colours[filling].w);
+        add_length(path, absorber, hit.distance);
+    }
     transfer_columns(path, hit.normal_g, hit.distance);
     if (!columns_hold(path)) atomicAdd(fallbacks[FELL_COLUMNS], 1u);
     Triangle facet = hit_triangle(hit);
@@ -152,27 +144,21 @@ void meet_surface(inout Path path, Hit hit, uint kind, uint pixel_key) {
     }
     Event event = interact(path, hit, facet, object_at(hit.object),
         MicrofacetDraw(p.sample_index, path.depth, hash_combine(pixel_key, 80u)));
-#ifdef HAS_MIRROR
-    if (kind == KIND_MIRROR) {
+    if (HAS_MIRROR && kind == KIND_MIRROR) {
         bool geometric;
         reflect_path(path, event, geometric);
         leave_surface(path, hit, dot(path.direction, hit.normal_g) < 0.0);
         vec3 colour = object_colours[hit.object].rgb;
-#ifdef ABSORPTION
-        // A coloured mirror lets through like a glass of its own, once a reflection.
-        int mirror = int(object_colours[hit.object].w);
-        add_length(path, mirror, 1.0);
-        if (mirror < 0) path.throughput *= colour.g;
-#else
-        path.throughput *= colour.g;
-#endif
+        if (ABSORPTION) {
+            // A coloured mirror lets through like a glass of its own, once a reflection.
+            int mirror = int(object_colours[hit.object].w);
+            add_length(path, mirror, 1.0);
+            if (mirror < 0) path.throughput *= colour.g;
+        } else {
+            path.throughput *= colour.g;
+        }
         path.walk.branch_weight *= max(colour.r, max(colour.g, colour.b));
     }
-#endif
-    if (HAS_DIELECTRIC) {
-        if (IS_GLASS(kind)) cross_glass(path, whole, hit, event, pixel_key);
-    }
-    if (HAS_GRATING) {
-        if (kind == KIND_GRATING) meet_grating(path, whole, hit, event, pixel_key);
-    }
+    if (HAS_DIELECTRIC && IS_GLASS(kind)) cross_glass(path, whole, hit, event, pixel_key);
+    if (HAS_GRATING && kind == KIND_GRATING) meet_grating(path, whole, hit, event, pixel_key);
 }

@@ -25,9 +25,7 @@ vec3 normal_of(uint primitive) {
     hit.primitive = primitive;
     Triangle facet = hit_triangle(hit);
     vec3 normal = normalize(facet_normal(facet.edge1, facet.edge2));
-#if CONVEX_SOLIDS
-    if (is_plane(primitive)) normal = planes[primitive & ~PLANE_BIT].xyz;
-#endif
+    if (CONVEX_SOLIDS && is_plane(primitive)) normal = planes[primitive & ~PLANE_BIT].xyz;
     return normal;
 }
 
@@ -43,14 +41,12 @@ Hit hit_on(uvec2 first, Path path) {
     vec3 q = cross(away, path.direction);
     hit.bary = vec2(-dot(facet.edge2, q), dot(facet.edge1, q)) * inverse;
     hit.distance = -dot(away, hit.normal_g) / dot(path.direction, hit.normal_g);
-#if CONVEX_SOLIDS
-    if (is_plane(first.x))
+    if (CONVEX_SOLIDS && is_plane(first.x))
         hit.distance =
             (planes[first.x & ~PLANE_BIT].w - dot(hit.normal_g, path.position)) / dot(path.direction, hit.normal_g);
-#endif
-#if CURVED_SOLIDS
-    // Its triangles lie within it, so that a ray which meets them meets it, but for rounding and beyond a face's rim.
-    if (is_curved(first.x)) {
+    // Its triangles lie within it, so that a ray which meets them meets it, but for rounding and beyond a face's
+    // rim.
+    if (CURVED_SOLIDS && is_curved(first.x)) {
         Piece piece = piece_at(first.x & ~CURVED_BIT);
         vec2 interval = piece_interval(piece, path.position, path.direction);
         bool meets = interval.x <= interval.y;
@@ -58,15 +54,12 @@ Hit hit_on(uvec2 first, Path path) {
             meets ? (interval.x > 0.0 ? interval.x : interval.y) : dot(piece.origin - path.position, path.direction);
         hit.normal_g = normalize(piece_gradient(piece, path.position + hit.distance * path.direction));
     }
-#endif
     return hit;
 }
 
 // Unit, outward: how what a pixel sees first faces.
 vec3 facing_of(uvec2 first, uvec2 pixel) {
-#if CURVED_SOLIDS
-    if (is_curved(first.x)) return hit_on(first, path_from(pixel, PIXEL_MIDDLE, 1.0)).normal_g;
-#endif
+    if (CURVED_SOLIDS && is_curved(first.x)) return hit_on(first, path_from(pixel, PIXEL_MIDDLE, 1.0)).normal_g;
     return normal_of(first.x);
 }
 

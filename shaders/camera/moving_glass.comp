@@ -51,9 +51,7 @@ void main() {
         }
     }
     vec3 followed = sum.rgb / max(sum.w, 1e-30);
-#if COATS
     // A coat adds to its base.
-    if (kind_of(first) == KIND_DIFFUSE) followed += imageLoad(picture, ivec2(pixel)).rgb;
-#endif
+    if (COATS && kind_of(first) == KIND_DIFFUSE) followed += imageLoad(picture, ivec2(pixel)).rgb;
     imageStore(picture, ivec2(pixel), vec4(followed, 1.0));
 }

@@ -7,10 +7,10 @@ layout(std430, binding = BIND_MOVING_LISTS) restrict buffer MovingLists {
 };
 
 uint specular_pixel(uint i) {
-#if COATS
-    // A coated pixel may be on both.
-    return pixels[2u * p.size.x * p.size.y - 1u - i];
-#else
-    return pixels[p.size.x * p.size.y - 1u - i];
-#endif
+    if (COATS) {
+        // A coated pixel may be on both.
+        return pixels[2u * p.size.x * p.size.y - 1u - i];
+    } else {
+        return pixels[p.size.x * p.size.y - 1u - i];
+    }
 }

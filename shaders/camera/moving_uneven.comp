@@ -15,9 +15,7 @@ void main() {
     lights_seen = look_index = 0u;
     Path path = path_from(pixel, PIXEL_MIDDLE, 1.0);
     Hit hit = hit_on(first, path);
-#if LAYER_BEAUTY && VISIBLE_LIGHTS
-    add_lights(path, met ? hit.distance : FAR_DISTANCE);
-#endif
+    if (LAYER_BEAUTY && VISIBLE_LIGHTS) add_lights(path, met ? hit.distance : FAR_DISTANCE);
     if (!met || kind_of(first) == KIND_DIFFUSE) add_end(path, met, hit, true, 0u);
     imageStore(picture, ivec2(pixel), vec4(radiance[0].rgb, 1.0));
 }

@@ -2,22 +2,14 @@
 // whole spectrum until it is first bent by glass that disperses; from there on for one band of it (`restrict_to_band`).
 
 #define SPATIAL 2
-#ifdef LENS
 // Columns of the place on the lens come last: of the two sides of a square as large as it is.
 #define LENS_COLUMNS (SPATIAL + SPECTRAL_GROUPS)
-#define PATH_COLUMNS (LENS_COLUMNS + 2)
-#else
-#define PATH_COLUMNS (SPATIAL + SPECTRAL_GROUPS)
-#endif
-#ifdef NORMAL_DERIVATIVES
-#define HAS_NORMAL_COLUMNS
-#endif
+#define PATH_COLUMNS (LENS_COLUMNS + 2 * LENS)
+#define HAS_NORMAL_COLUMNS NORMAL_DERIVATIVES
 // Microfacets widen the pixel's own columns: a box of sides LOBE_WIDTH times a lobe's standard deviations is as broad
 // as it. Samples of a pixel share out the microfacets between them as they do the pixel, and each looks up the light of
 // its share of the lobe [Krivanek, Colbert 2008]: lamps and windows seen through ground glass would be specks.
-#ifdef ROUGH_SURFACES
-#define WIDENED_BY_LOBES
-#endif
+#define WIDENED_BY_LOBES ROUGH_SURFACES
 #define LOBE 0
 #define LOBE_WIDTH 3.46410161514
 
@@ -27,27 +19,17 @@ struct Walk {
     uint key;  // says which branch this is
     uint planar_so_far;  // 1: its band's ends have kept to its own facets: it met flat ones only
     uint cuts;  // of its band, where paths diverged
-#ifdef ROUGH_SURFACES
     uint ground;  // 1: a rough surface has turned it, and its pixel's columns are as broad as the lobe, which samples
                   // share out
-#endif
-#ifdef COATS
     float coat_pdf;  // of its direction, where it comes from a coat: density by steradian; else 0
-#endif
-#ifdef ABSORPTION
     float lengths[ABSORBERS];  // way through each absorbing glass, GPU units; reflections by each coloured mirror
-#endif
 };
 
 #include "path/path.glsl"
 
-#ifdef LISTS_SPECULAR
 // Counts the looks of a pixel: each sees another point of a light.
 uint look_index;
-#define DRAW_INDEX look_index
-#else
-#define DRAW_INDEX p.sample_index
-#endif
+#define DRAW_INDEX (LISTS_SPECULAR ? look_index : p.sample_index)
 
 // Side of the share of its pixel that a sample of this path has, pixels.
 float sample_side(Path path) {
@@ -72,35 +54,33 @@ float quantile(vec2 brightness, float share) {
 // From here on the path stands for one band only; all others have their turn in other samples.
 void restrict_to_band(inout Path path, uint pixel_key) {
     path.restricted = 1u;
-#ifdef RANDOM_WAVELENGTH
-    // One of the table's cells, by how bright it looks.
-#ifdef EVEN_WAVELENGTHS
-    // With the places in the pixel one net: each part of it that holds a few samples has wavelengths from all of the
-    // spectrum.
-    float u = radical_inverse(p.sample_index, hash_combine(pixel_key, 77u));
-#else
-    float u = unit_float(hash_combine(hash_combine(pixel_key, 77u), p.sample_index));
-#endif
-    uint low = 0u, high = uint(EMISSION_CELLS);
-    while (high - low > 1u) {
-        uint middle = (low + high) / 2u;
-        if (cell_cdf[middle] <= u)
-            low = middle;
-        else
-            high = middle;
+    vec3 band;
+    if (RANDOM_WAVELENGTH) {
+        // One of the table's cells, by how bright it looks. Even ones are one net with the places in the pixel: each
+        // part of it that holds a few samples has wavelengths from all of the spectrum.
+        float u = EVEN_WAVELENGTHS ? radical_inverse(p.sample_index, hash_combine(pixel_key, 77u))
+                                   : unit_float(hash_combine(hash_combine(pixel_key, 77u), p.sample_index));
+        uint low = 0u, high = uint(EMISSION_CELLS);
+        while (high - low > 1u) {
+            uint middle = (low + high) / 2u;
+            if (cell_cdf[middle] <= u)
+                low = middle;
+            else
+                high = middle;
+        }
+        path.walk.inverse_pdf /= max(cell_cdf[low + 1u] - cell_cdf[low], 1e-9);
+        band = (float(low) + vec3(0.0, 0.5, 1.0)) / float(EMISSION_CELLS);
+    } else {
+        // Neighbouring pixels begin with different bands, so that what is still missing shows as grain and not as a
+        // tint.
+        uint band_number = (turn + (p.dithered != 0u ? hash_combine(pixel_key, 78u) : 0u)) % p.bands;
+        took_turn = true;
+        band = (float(band_number) + vec3(0.0, 0.5, 1.0)) / float(p.bands);
+        // Traced where half of what looks bright in the band lies on either side: what only this one wavelength
+        // decides, such as which facet is met, is then right for most of what is seen.
+        band.y = clamp(quantile(brightness_of(band), 0.5), mix(band.x, band.z, 0.1), mix(band.x, band.z, 0.9));
+        path.walk.inverse_pdf *= float(p.bands);
     }
-    path.walk.inverse_pdf /= max(cell_cdf[low + 1u] - cell_cdf[low], 1e-9);
-    vec3 band = (float(low) + vec3(0.0, 0.5, 1.0)) / float(EMISSION_CELLS);
-#else
-    // Neighbouring pixels begin with different bands, so that what is still missing shows as grain and not as a tint.
-    uint band_number = (turn + (p.dithered != 0u ? hash_combine(pixel_key, 78u) : 0u)) % p.bands;
-    took_turn = true;
-    vec3 band = (float(band_number) + vec3(0.0, 0.5, 1.0)) / float(p.bands);
-    // Traced where half of what looks bright in the band lies on either side: what only this one wavelength decides,
-    // such as which facet is met, is then right for most of what is seen.
-    band.y = clamp(quantile(brightness_of(band), 0.5), mix(band.x, band.z, 0.1), mix(band.x, band.z, 0.9));
-    path.walk.inverse_pdf *= float(p.bands);
-#endif
     if (POLARISED) path.polarisation = band_polarisation(path.polarisation, path.band, path.throughput, band);
     path.throughput = band_weights(path.band, path.throughput, band);
     path.band = band;

@@ -9,9 +9,7 @@ struct Walk {
 #define SPATIAL 0
 #define PATH_COLUMNS 0
 #include "path/event.glsl"
-#ifdef HAS_GRATING
 #include "path/grating.glsl"
-#endif
 
 layout(std430, binding = BIND_PARAMETERS) readonly restrict buffer Parameters { PathParameters p; };
 layout(std430, binding = BIND_STARTS) readonly restrict buffer Starts { PathStart starts[]; };
@@ -42,38 +40,35 @@ void main() {
         if (!is_specular(kind)) break;
         bool entering = dot(path.direction, hit.normal_g) < 0.0, reflects = true, goes_on = true, geometric;
         Event event = interact(path, hit, facet, thing, MicrofacetDraw(0u, 0u, 0u));
-        if (HAS_DIELECTRIC) {
-            if (IS_GLASS(kind)) {
-                reflects = event.boundary.changes
-                    && (!event.refracted.exists
-                        || (path.walk.reflections > 0u && !entering && !IS_THIN(event.boundary)));
-                if (reflects && !entering) path.walk.reflections -= min(path.walk.reflections, 1u);
-                if (!event.boundary.changes)
-                    path.medium = event.boundary.behind;
-                else if (!reflects)
-                    refract_path(path, event);
-            }
+        if (HAS_DIELECTRIC && IS_GLASS(kind)) {
+            reflects = event.boundary.changes
+                && (!event.refracted.exists || (path.walk.reflections > 0u && !entering && !IS_THIN(event.boundary)));
+            if (reflects && !entering) path.walk.reflections -= min(path.walk.reflections, 1u);
+            if (!event.boundary.changes)
+                path.medium = event.boundary.behind;
+            else if (!reflects)
+                refract_path(path, event);
         }
-#ifdef HAS_GRATING
-        if (kind == KIND_GRATING) {
-            // The strongest order that leaves.
-            GratingEvent met_grating = grating_event(path, event, hit, thing.weight_row);
-            Path sent = path;
-            float strongest = 0.0;
-            for (uint order_number = 0u; order_number < met_grating.grating.orders; ++order_number) {
-                GratingOrder order = order_at(thing.weight_row, order_number);
-                vec3 steps = order_steps(order, hit.object, met_grating.medium, path.band);
-                if (!order_passes(path, event, met_grating, steps).y || order.efficiency <= strongest) continue;
-                strongest = order.efficiency;
-                sent = path;
-                diffract_path(sent, event, met_grating, order, steps, geometric);
-            }
-            reflects = false;
-            goes_on = strongest > 0.0;
-            path = sent;
-            leave_surface(path, hit, dot(path.direction, hit.normal_g) < 0.0);
-        } else
-#endif
+        if (HAS_GRATING) {
+            if (kind == KIND_GRATING) {
+                // The strongest order that leaves.
+                GratingEvent met_grating = grating_event(path, event, hit, thing.weight_row);
+                Path sent = path;
+                float strongest = 0.0;
+                for (uint order_number = 0u; order_number < met_grating.grating.orders; ++order_number) {
+                    GratingOrder order = order_at(thing.weight_row, order_number);
+                    vec3 steps = order_steps(order, hit.object, met_grating.medium, path.band);
+                    if (!order_passes(path, event, met_grating, steps).y || order.efficiency <= strongest) continue;
+                    strongest = order.efficiency;
+                    sent = path;
+                    diffract_path(sent, event, met_grating, order, steps, geometric);
+                }
+                reflects = false;
+                goes_on = strongest > 0.0;
+                path = sent;
+                leave_surface(path, hit, dot(path.direction, hit.normal_g) < 0.0);
+            } else
+        }
         {
             if (reflects) reflect_path(path, event, geometric);
             leave_surface(path, hit, reflects != entering);

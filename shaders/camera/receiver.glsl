@@ -12,9 +12,7 @@ struct SurfaceInteraction {
     uint object;
     uint source;  // triangle
     vec3 reflectance;  // coefficients of the reflectance basis
-#if COATS
     vec3 coat_normal;  // unit, against the ray: interpolated where the mesh is smooth
-#endif
 };
 
 SurfaceInteraction seen_on(Path path, Hit hit, Triangle facet, vec3 position, vec3 direction) {
@@ -128,10 +126,8 @@ vec3 base_response(SurfaceInteraction seen, vec3 from, bool is_plain) {
     vec3 normal = finish_normal(seen);
     float cosine = clamp(-dot(seen.direction, normal), 0.0, 1.0), from_cosine = clamp(dot(from, normal), 0.0, 1.0);
     vec3 response = is_plain ? seen.reflectance : vec3(1.0);
-    if (ROUGH_DIFFUSE) {
-        if (is_plain && finish.roughness > 0.0)
-            response = rough_response(response, finish.roughness, -seen.direction, from, cosine, from_cosine);
-    }
+    if (ROUGH_DIFFUSE && is_plain && finish.roughness > 0.0)
+        response = rough_response(response, finish.roughness, -seen.direction, from, cosine, from_cosine);
     if (COATS) response *= share_under(finish, cosine) * share_from(finish, from_cosine);
     return response;
 }
@@ -157,11 +153,9 @@ void add_direct(Path path, SurfaceInteraction seen, WavelengthInterval interval,
     for (uint i = 0u; i < uint(LIGHT_COUNT); ++i) {
         bool known = i < uint(STEADY_ROOM) && (steady.lights & (1u << (i & 31u))) != 0u;
         float gain = 0.0;
-#if COATS || ROUGH_DIFFUSE
-        // Where its light comes from counts, too.
-        known = known && !is_finished(seen.object);
         vec3 toward = vec3(0.0);
-#endif
+        // Where its light comes from counts, too.
+        if (COATS || ROUGH_DIFFUSE) known = known && !is_finished(seen.object);
         if (known) gain = mix(steady.gains[2u * i], steady.gains[2u * i + 1u], share);
         if (!known) {
             LightSample s;
@@ -286,33 +280,24 @@ void caustic_values(
     for (int t = 0; t < MAP_TARGETS; ++t) values[t] = vec4(0.0);
     for (int i = 0; i < lookups.x * lookups.y; ++i) {
         vec2 at = corner + part * vec2(i % lookups.x, i / lookups.x);
-        if (MAP_TARGETS > 0) {
-            if (0 >= first && 0 <= last) values[0] += share * caustic_energy(caustic_map[0], placement, at, part);
-        }
-        if (MAP_TARGETS > 1) {
-            if (1 >= first && 1 <= last) values[1] += share * caustic_energy(caustic_map[1], placement, at, part);
-        }
-        if (MAP_TARGETS > 2) {
-            if (2 >= first && 2 <= last) values[2] += share * caustic_energy(caustic_map[2], placement, at, part);
-        }
-        if (MAP_TARGETS > 3) {
-            if (3 >= first && 3 <= last) values[3] += share * caustic_energy(caustic_map[3], placement, at, part);
-        }
-        if (MAP_TARGETS > 4) {
-            if (4 >= first && 4 <= last) values[4] += share * caustic_energy(caustic_map[4], placement, at, part);
-        }
-        if (MAP_TARGETS > 5) {
-            if (5 >= first && 5 <= last) values[5] += share * caustic_energy(caustic_map[5], placement, at, part);
-        }
-        if (MAP_TARGETS > 6) {
-            if (6 >= first && 6 <= last) values[6] += share * caustic_energy(caustic_map[6], placement, at, part);
-        }
-        if (MAP_TARGETS > 7) {
-            if (7 >= first && 7 <= last) values[7] += share * caustic_energy(caustic_map[7], placement, at, part);
-        }
-        if (MAP_TARGETS > 8) {
-            if (8 >= first && 8 <= last) values[8] += share * caustic_energy(caustic_map[8], placement, at, part);
-        }
+        if (MAP_TARGETS > 0 && 0 >= first && 0 <= last)
+            values[0] += share * caustic_energy(caustic_map[0], placement, at, part);
+        if (MAP_TARGETS > 1 && 1 >= first && 1 <= last)
+            values[1] += share * caustic_energy(caustic_map[1], placement, at, part);
+        if (MAP_TARGETS > 2 && 2 >= first && 2 <= last)
+            values[2] += share * caustic_energy(caustic_map[2], placement, at, part);
+        if (MAP_TARGETS > 3 && 3 >= first && 3 <= last)
+            values[3] += share * caustic_energy(caustic_map[3], placement, at, part);
+        if (MAP_TARGETS > 4 && 4 >= first && 4 <= last)
+            values[4] += share * caustic_energy(caustic_map[4], placement, at, part);
+        if (MAP_TARGETS > 5 && 5 >= first && 5 <= last)
+            values[5] += share * caustic_energy(caustic_map[5], placement, at, part);
+        if (MAP_TARGETS > 6 && 6 >= first && 6 <= last)
+            values[6] += share * caustic_energy(caustic_map[6], placement, at, part);
+        if (MAP_TARGETS > 7 && 7 >= first && 7 <= last)
+            values[7] += share * caustic_energy(caustic_map[7], placement, at, part);
+        if (MAP_TARGETS > 8 && 8 >= first && 8 <= last)
+            values[8] += share * caustic_energy(caustic_map[8], placement, at, part);
     }
 }
 
@@ -347,8 +332,7 @@ void add_caustic_at(
     }
     box = sqrt(box);
     float side = sample_side(path);
-#if !CAMERA_SPECULAR
-    if (p.cells.x > 1.0 || (p.cells.x > 0.0 && window.kind == PLACED_PICTURE)) {
+    if (!CAMERA_SPECULAR && (p.cells.x > 1.0 || (p.cells.x > 0.0 && window.kind == PLACED_PICTURE))) {
         // Each look stands for its cell of the pixel. Cells fill it, so texels that fill it too are read once.
         vec2 share = side * vec2(p.pixel_width, p.pixel_height),
              aside = (floor(look_place * p.cells) + 0.5) / p.cells - look_place;
@@ -357,7 +341,6 @@ void add_caustic_at(
                 window, texel, (aside.x / share.x) * seen.dposition[0] - (aside.y / share.y) * seen.dposition[1]);
         box /= share * p.cells;
     }
-#endif
     if (box.x * box.y < WHOLE_PIXEL * side * side) box = vec2(1.0);
     bool plain = receivers[receiver].reflectance_class == 0u;
     float scale = p.map_scale * INVERSE_PI;
@@ -366,10 +349,9 @@ void add_caustic_at(
         // Of one number where the map holds the colour.
         if (!plain) scale *= seen.reflectance.r;
     }
-#if MAP_BINS
     // The caustic's own dispersion meets the camera's: every spectral channel that the interval touches is read by
     // itself.
-    if (path.restricted != 0u) {
+    if (MAP_BINS && path.restricted != 0u) {
         float x = 0.5 * (interval.lo + interval.hi);
         float first = spectral_row(uint(BIN_ROW), interval.lo), last = spectral_row(uint(BIN_ROW), interval.hi);
         int from = int(floor(first)), to = max(from, int(ceil(last)) - BIN_OVERLAP);
@@ -416,10 +398,7 @@ void add_caustic_at(
             radiance[0] +=
                 factor * interval.through * spectrum_share(interval, positive, part_sum, whole_sum) * lacking;
         }
-    }
-    if (path.restricted == 0u)
-#endif
-    {
+    } else {
         vec4 factors[TARGETS], values[MAP_TARGETS];
         channel_factors(path, interval, factors);
         caustic_values(placement, texel, box, values, 0, TARGETS - 1);

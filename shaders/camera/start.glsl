@@ -1,7 +1,6 @@
 // How a camera path begins: at a place in its pixel, with the columns of the pixel's two sides, standing for the whole
 // spectrum.
 
-#ifdef LENS
 // Where on the lens the next path begins, in the unit square.
 vec2 lens_place;
 
@@ -30,7 +29,6 @@ void begin_on_lens(inout Path path) {
     path.position += offset;
     path.direction = direction;
 }
-#endif
 
 Path path_from(uvec2 pixel, vec2 within_pixel, float gain) {
     vec2 place = picture_point(pixel, within_pixel, p.size);

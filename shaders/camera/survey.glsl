@@ -17,9 +17,7 @@ void survey_look(inout Survey survey, uint look, uint sees, bool met, Hit hit, u
     if (look == 0u) survey = Survey(key, hit.normal_g);
     bool even = key == survey.key && !saw_light && !skipped_texels
         && (sees != SEES_DIRECTLY || !met || dot(hit.normal_g, survey.normal) >= EVEN_NORMALS);
-#if COATS
-    even = even && (sees != SEES_COATED || dot(hit.normal_g, survey.normal) >= EVEN_NORMALS);
-#endif
+    even = even && (!COATS || sees != SEES_COATED || dot(hit.normal_g, survey.normal) >= EVEN_NORMALS);
     if (!even) survey.key = 0u;
 }
 

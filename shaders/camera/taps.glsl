@@ -82,34 +82,27 @@ vec2 sample_width(Path path) {
             length(cross(path.ddirection[0], path.ddirection[1]))));
 }
 
-#if LENS
 // The same of lights infinitely far away, where a place on the lens is but a direction.
 vec2 far_width(Path path, vec2 width) {
     float by_lens = sample_side(path) * sample_side(path)
         * length(cross(path.ddirection[LENS_COLUMNS], path.ddirection[LENS_COLUMNS + 1]));
     return vec2(width.x, sqrt(width.y * width.y + by_lens));
 }
-#define WIDTH_OF(light) (light.kind == LIGHT_KIND_DIRECTIONAL ? by_lens : width)
-#else
-#define WIDTH_OF(light) width
-#endif
+#define WIDTH_OF(light) (LENS && light.kind == LIGHT_KIND_DIRECTIONAL ? by_lens : width)
 
 // Lights that can be seen over the distance `far`; edges are as soft as what the ray stands for is wide.
 void add_lights(Path path, float far) {
-    vec2 width = sample_width(path), sweep = vec2(0.0);
+    vec2 width = sample_width(path), by_lens = LENS ? far_width(path, width) : width, sweep = vec2(0.0), brightness;
     int taps = 1;
-#if LENS
-    vec2 by_lens = far_width(path, width);
-#endif
-#if SPECTRAL_SWEEP
-    if (path.restricted != 0u) {
-        vec3 p_lo = path.end_position[0], d_lo = path.end_direction[0], p_hi = path.end_position[1],
-             d_hi = path.end_direction[1];
-        sweep = vec2(distance(p_lo, p_hi), distance(d_lo, d_hi));
-        taps = taps_of(path, far);
+    if (SPECTRAL_SWEEP) {
+        brightness = brightness_of(path.band);
+        if (path.restricted != 0u) {
+            vec3 p_lo = path.end_position[0], d_lo = path.end_direction[0], p_hi = path.end_position[1],
+                 d_hi = path.end_direction[1];
+            sweep = vec2(distance(p_lo, p_hi), distance(d_lo, d_hi));
+            taps = taps_of(path, far);
+        }
     }
-    vec2 brightness = brightness_of(path.band);
-#endif
     // Few rays come near a light: only they look along their sweep.
     bool near = false;
     for (uint i = 0u; i < uint(LIGHT_COUNT); ++i) {
@@ -184,19 +177,20 @@ vec3 arrival_at(Path path, ArrivalCurve curve, float x) {
 // itself.
 void add_end(Path path, bool met, Hit hit, bool same_hit, uint pixel_key) {
     int taps = 1;
-#if SPECTRAL_SWEEP
-    if (path.restricted != 0u) taps = taps_of(path, met ? hit.distance : FAR_DISTANCE);
-    if (!HAS_ENVIRONMENT_MAP) {
-        // The same all round.
-        if (same_hit && !met) taps = 1;
+    vec2 brightness;
+    float per_x, hi = path.band.x;
+    vec3 p_lo, d_lo, p_hi, d_hi;
+    if (SPECTRAL_SWEEP) {
+        if (path.restricted != 0u) taps = taps_of(path, met ? hit.distance : FAR_DISTANCE);
+        // Without a map the environment is the same all round.
+        if (!HAS_ENVIRONMENT_MAP && same_hit && !met) taps = 1;
+        brightness = brightness_of(path.band);
+        per_x = 1.0 / (path.band.z - path.band.x);
+        p_lo = path.end_position[0];
+        d_lo = path.end_direction[0];
+        p_hi = path.end_position[1];
+        d_hi = path.end_direction[1];
     }
-    vec2 brightness = brightness_of(path.band);
-    float per_x = 1.0 / (path.band.z - path.band.x), hi = path.band.x;
-    vec3 p_lo = path.end_position[0], d_lo = path.end_direction[0], p_hi = path.end_position[1],
-         d_hi = path.end_direction[1];
-#else
-    float hi = path.band.x;
-#endif
 #if HAS_RECEIVERS
     SurfaceInteraction seen;
     Triangle facet;
@@ -206,11 +200,8 @@ void add_end(Path path, bool met, Hit hit, bool same_hit, uint pixel_key) {
 #endif
     if (met) {
         facet = triangle_at(hit.primitive);
-#if LAYER_BEAUTY
-        vec3 at = surface_point(hit, facet, path.position, path.direction);
-#else
-        vec3 at = path.position + hit.distance * path.direction;
-#endif
+        vec3 at = LAYER_BEAUTY ? surface_point(hit, facet, path.position, path.direction)
+                               : path.position + hit.distance * path.direction;
         seen = seen_on(path, hit, facet, at, path.direction);
         if (HAS_TEXTURES) {
             texture = object_at(hit.object).texture;
@@ -218,9 +209,9 @@ void add_end(Path path, bool met, Hit hit, bool same_hit, uint pixel_key) {
         }
     }
     Steady steady = no_steady_lights();
+    bool traced = SPECTRAL_SWEEP && taps > 1 && same_hit && met;
 #if SPECTRAL_SWEEP
     ArrivalCurve curve;
-    bool traced = taps > 1 && same_hit && met;
     if (traced) {
         curve = arrival_curve(path, hit);
         if (LAYER_BEAUTY) steady = steady_lights(seen, curve.lo, curve.hi, pixel_key);
@@ -275,23 +266,18 @@ void add_end(Path path, bool met, Hit hit, bool same_hit, uint pixel_key) {
         }
         WavelengthInterval interval = wavelength_interval(path, lo, hi);
         if (HAS_RECEIVERS && ends && object_at(seen.object).kind == KIND_DIFFUSE) {
-            if (HAS_TEXTURES) {
-                if (texture != NONE) seen.reflectance = object_colours[seen.object].rgb * painted(paint, seen);
-            }
-#if COATS && CAMERA_SPECULAR
-            bool coated = is_coated(seen.object);
-            if (coated) add_coat_lights(path, seen, interval, pixel_key);
+            if (HAS_TEXTURES && texture != NONE)
+                seen.reflectance = object_colours[seen.object].rgb * painted(paint, seen);
+            bool coated = COATS && CAMERA_SPECULAR && is_coated(seen.object);
+            if (COATS && CAMERA_SPECULAR && coated) add_coat_lights(path, seen, interval, pixel_key);
             // The base of what is seen first is left to the program for what is seen directly.
-            if (!coated || path.depth > 0u) {
-#endif
+            if (!(COATS && CAMERA_SPECULAR) || !coated || path.depth > 0u) {
                 add_caustic(path, seen, interval);
                 if (LAYER_BEAUTY) {
                     add_direct(path, seen, interval, pixel_key, steady);
                     if (RECEIVER_LIGHT) add_receiver_light(path, seen, interval);
                 }
-#if COATS && CAMERA_SPECULAR
             }
-#endif
         }
         if (LAYER_BEAUTY) {
             vec3 direction_change = SPECTRAL_SWEEP ? part * (d_hi - d_lo) : vec3(0.0);

@@ -9,9 +9,9 @@ layout(location = 0) out uvec2 visible;
 #endif
 
 void main() {
-#if DISTANCES
-    distance_gpu = p.orthographic != 0u ? dot(way_from_camera, p.forward) : length(way_from_camera);
-#else
-    visible = seen;
-#endif
+    if (DISTANCES) {
+        distance_gpu = p.orthographic != 0u ? dot(way_from_camera, p.forward) : length(way_from_camera);
+    } else {
+        visible = seen;
+    }
 }

@@ -9,14 +9,10 @@
 layout(local_size_x = 32, local_size_y = 8) in;
 layout(binding = 0) uniform sampler2D shown;
 layout(binding = 1) uniform sampler2D other;
-#if HALO
 layout(binding = 2) uniform sampler2D halo;
 uniform float kept;
-#endif
-#if AS_IMAGE
 // `shown`, for a software renderer, whose `texelFetch` works out a mip level for every pixel.
 layout(rgba32f, binding = 1) uniform readonly restrict image2D shown_image;
-#endif
 layout(rgba8, binding = 0) uniform writeonly restrict image2D display;
 // A software renderer reads a storage buffer ray by ray, and took as long for that as for all the rest.
 layout(std140, binding = 0) uniform Parameters { DisplayParameters parameters; };

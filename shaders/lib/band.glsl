@@ -3,9 +3,7 @@
 
 #include "lib/medium.glsl"
 #include "lib/optics.glsl"
-#if POLARISED
 #include "lib/polarisation.glsl"
-#endif
 
 // GPU units that a cut may move a path's start.
 #define MAX_MOVED_START 0.01
@@ -21,7 +19,6 @@ vec3 band_weights(vec3 band, vec3 weight, vec3 x) {
     return mix(mix(vec3(weight.x), vec3(weight.y), below), vec3(weight.z), above);
 }
 
-#if POLARISED
 // State of polarisation at the places x of a band: Stokes parameters times weights are straight between the three known
 // ones.
 Polarisation band_polarisation(Polarisation state, vec3 band, vec3 weight, vec3 x) {
@@ -29,7 +26,6 @@ Polarisation band_polarisation(Polarisation state, vec3 band, vec3 weight, vec3 
     return Polarisation(state.axis, band_weights(band, weight * state.q, x) * per_weight,
         band_weights(band, weight * state.u, x) * per_weight, band_weights(band, weight * state.v, x) * per_weight);
 }
-#endif
 
 // Whether both parts of a cut band may set out again from starts moved by `low` and `high` from the path's own: so far
 // that another surface may lie in between they may not. `distance`: to the surface ahead, GPU units.
@@ -38,7 +34,6 @@ bool starts_stay_near(vec3 low, vec3 high, float distance) {
     return max(dot(low, low), dot(high, high)) < allowed * allowed;
 }
 
-#if SPECTRAL_GROUPS > 0
 // Change of group g's variable from the anchor to x.
 float variable_step(uint g, float x, float x_anchor) {
     return spectral_row(uint(VARIABLE_ROW) + g, x) - spectral_row(uint(VARIABLE_ROW) + g, x_anchor);
@@ -67,4 +62,3 @@ float total_reflection_onset(
     }
     return 0.5 * (a + b);
 }
-#endif

@@ -15,14 +15,12 @@ struct ShadingFrame {
     vec3 normal_g;  // unit; the facet's, which judges
     uint interpolated;  // 1: `normal` differs from place to place
     uint refused;  // 1: the interpolated normal sees the ray from behind, and is not used
-#ifdef NORMAL_DERIVATIVES
     vec3 summed;  // interpolated normal before it is made a unit vector …
     vec3 gradient_u;  // … and its change over the facet: along dp by dot(gradient_u, dp) along_u + dot(gradient_v, dp)
                       // along_v
     vec3 gradient_v;
     vec3 along_u;
     vec3 along_v;
-#endif
 };
 
 // One way a surface sends a ray on.
@@ -55,36 +53,34 @@ ShadingFrame shading_frame(Hit hit, Triangle facet, vec3 position, vec3 directio
         frame.summed = frame.normal;
         frame.gradient_u = frame.gradient_v = frame.along_u = frame.along_v = vec3(0.0);
     }
-#ifdef SMOOTH_NORMALS
-    // Without a branch: some corners' normals where the facet has none. Software renderers execute both sides anyway.
-    bool has_normals = (hit.primitive & (PLANE_BIT | CURVED_BIT)) == 0u && facet.normals != NONE;
-    uint first = has_normals ? facet.normals : 0u;
-    float side = entering ? 1.0 : -1.0;
-    vec3 n0 = side * corner_normal(first), n1 = side * corner_normal(first + 1u), n2 = side * corner_normal(first + 2u);
-    vec3 summed = (1.0 - hit.bary.x - hit.bary.y) * n0 + hit.bary.x * n1 + hit.bary.y * n2;
-    vec3 normal = normalize(summed);
-    float facing = dot(direction, normal);
-    frame.interpolated = uint(has_normals && facing < -MIN_SHADING_COSINE && is_finite(facing));
-    frame.refused = uint(has_normals && frame.interpolated == 0u);
-    frame.normal = frame.interpolated != 0u ? normal : frame.normal_g;
-    if (NORMAL_DERIVATIVES) {
-        frame.summed = summed;
-        barycentric_gradients(facet.edge1, facet.edge2, frame.gradient_u, frame.gradient_v);
-        frame.along_u = n1 - n0;
-        frame.along_v = n2 - n0;
+    if (SMOOTH_NORMALS) {
+        // Without a branch: some corners' normals where the facet has none. Software renderers execute both sides
+        // anyway.
+        bool has_normals = (hit.primitive & (PLANE_BIT | CURVED_BIT)) == 0u && facet.normals != NONE;
+        uint first = has_normals ? facet.normals : 0u;
+        float side = entering ? 1.0 : -1.0;
+        vec3 n0 = side * corner_normal(first), n1 = side * corner_normal(first + 1u),
+             n2 = side * corner_normal(first + 2u);
+        vec3 summed = (1.0 - hit.bary.x - hit.bary.y) * n0 + hit.bary.x * n1 + hit.bary.y * n2;
+        vec3 normal = normalize(summed);
+        float facing = dot(direction, normal);
+        frame.interpolated = uint(has_normals && facing < -MIN_SHADING_COSINE && is_finite(facing));
+        frame.refused = uint(has_normals && frame.interpolated == 0u);
+        frame.normal = frame.interpolated != 0u ? normal : frame.normal_g;
+        if (NORMAL_DERIVATIVES) {
+            frame.summed = summed;
+            barycentric_gradients(facet.edge1, facet.edge2, frame.gradient_u, frame.gradient_v);
+            frame.along_u = n1 - n0;
+            frame.along_v = n2 - n0;
+        }
     }
-#endif
-    if (CURVED_SOLIDS) {
-        if (is_curved(hit.primitive)) curve_as_piece(hit, entering, position, frame);
-    }
+    if (CURVED_SOLIDS && is_curved(hit.primitive)) curve_as_piece(hit, entering, position, frame);
     return frame;
 }
 
 // Whether the surface keeps its normal round the place that was hit.
 bool is_planar(Hit hit, Triangle facet) {
-    if (CURVED_SOLIDS) {
-        if (is_curved(hit.primitive)) return piece_at(hit.primitive & ~CURVED_BIT).is_plane != 0u;
-    }
+    if (CURVED_SOLIDS && is_curved(hit.primitive)) return piece_at(hit.primitive & ~CURVED_BIT).is_plane != 0u;
     return is_plane(hit.primitive) || facet.normals == NONE;
 }
 
@@ -150,14 +146,10 @@ vec3 surface_point(Hit hit, Triangle facet, vec3 origin, vec3 direction) {
     vec3 position = origin + hit.distance * direction;
     if ((hit.primitive & (PLANE_BIT | CURVED_BIT)) == 0u)
         position = facet.vertex + hit.bary.x * facet.edge1 + hit.bary.y * facet.edge2;
-    if (CONVEX_SOLIDS) {
-        if (is_plane(hit.primitive)) {
-            vec4 plane = planes[hit.primitive & ~PLANE_BIT];
-            position -= plane.xyz * (dot(position, plane.xyz) - plane.w);
-        }
+    if (CONVEX_SOLIDS && is_plane(hit.primitive)) {
+        vec4 plane = planes[hit.primitive & ~PLANE_BIT];
+        position -= plane.xyz * (dot(position, plane.xyz) - plane.w);
     }
-    if (CURVED_SOLIDS) {
-        if (is_curved(hit.primitive)) position = on_piece(piece_at(hit.primitive & ~CURVED_BIT), position);
-    }
+    if (CURVED_SOLIDS && is_curved(hit.primitive)) position = on_piece(piece_at(hit.primitive & ~CURVED_BIT), position);
     return position;
 }

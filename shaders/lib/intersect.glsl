@@ -63,13 +63,11 @@ bool accept_hit(float distance, float facing, uint object, RayOrigin origin) {
     // opposite crossing can be true; another object may touch at distance 0.
     bool same = object == origin.object;
     bool repeated = same && distance < NEAR_DISTANCE && ((origin.inside != 0u) == (facing < 0.0));
-    if (MEDIUM_STACK) {
-        // Of two surfaces at one place both lie near for ever; the mask knows which was crossed already.
-        if (!same && distance < NEAR_DISTANCE) {
-            uint bit = object_at(object).stack_bit;
-            bool is_inside = bit != NONE && (origin.inside_mask & (1u << (bit & 31u))) != 0u;
-            repeated = bit != NONE && is_inside == (facing < 0.0);
-        }
+    // Of two surfaces at one place both lie near for ever; the mask knows which was crossed already.
+    if (MEDIUM_STACK && !same && distance < NEAR_DISTANCE) {
+        uint bit = object_at(object).stack_bit;
+        bool is_inside = bit != NONE && (origin.inside_mask & (1u << (bit & 31u))) != 0u;
+        repeated = bit != NONE && is_inside == (facing < 0.0);
     }
     float least = same ? 0.0 : -BEHIND;
     // What is no surface, a lamp or a camera, has nothing in contact with it. No lamp stands in glass: what shines from
@@ -338,10 +336,8 @@ bool intersect(vec3 origin_p, vec3 direction, float far, RayOrigin origin, bool 
             Triangle left = triangle_at(min(origin.primitive, uint(max(TRIANGLE_COUNT, 1)) - 1u));
             left_normal = normalize(facet_normal(left.edge1, left.edge2));
             if (CONVEX_SOLIDS && is_plane(origin.primitive)) left_normal = planes[origin.primitive & ~PLANE_BIT].xyz;
-            if (CURVED_SOLIDS) {
-                if (is_curved(origin.primitive))
-                    left_normal = normalize(piece_gradient(piece_at(origin.primitive & ~CURVED_BIT), origin_p));
-            }
+            if (CURVED_SOLIDS && is_curved(origin.primitive))
+                left_normal = normalize(piece_gradient(piece_at(origin.primitive & ~CURVED_BIT), origin_p));
         }
     }
     if (CONVEX_SOLIDS) {
@@ -372,14 +368,11 @@ bool intersect_closest(vec3 origin_p, vec3 direction, float far, RayOrigin origi
         hit.object = facet.object;
         hit.normal_g = normalize(facet_normal(facet.edge1, facet.edge2));
     }
-    if (CONVEX_SOLIDS) {
-        if (met && (hit.primitive & PLANE_BIT) != 0u) hit.normal_g = planes[hit.primitive & ~PLANE_BIT].xyz;
-    }
-    if (CURVED_SOLIDS) {
-        if (is_curved(hit.primitive))
-            hit.normal_g =
-                normalize(piece_gradient(piece_at(hit.primitive & ~CURVED_BIT), origin_p + hit.distance * direction));
-    }
+    if (CONVEX_SOLIDS && met && (hit.primitive & PLANE_BIT) != 0u)
+        hit.normal_g = planes[hit.primitive & ~PLANE_BIT].xyz;
+    if (CURVED_SOLIDS && is_curved(hit.primitive))
+        hit.normal_g =
+            normalize(piece_gradient(piece_at(hit.primitive & ~CURVED_BIT), origin_p + hit.distance * direction));
     return met;
 }
 

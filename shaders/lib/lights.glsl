@@ -3,9 +3,7 @@
 // the edge that both share.
 #include "lib/emission.glsl"
 #include "lib/spot.glsl"
-#if LIGHT_PROFILES
 #include "lib/profile.glsl"
-#endif
 
 #define LIGHT_KIND_POINT 0u
 #define LIGHT_KIND_DIRECTIONAL 1u
@@ -48,10 +46,8 @@ LightSample sample_light(CameraLight light, vec3 position, vec2 unit) {
     s.gain = 1.0 / max(s.distance * s.distance, 1e-20);
     s.gain *= light.kind == LIGHT_KIND_AREA ? light.measure * max(-dot(s.toward, light.axis), 0.0)
                                             : spot_falloff(-s.toward, light.axis, light.cone);
-    if (LIGHT_PROFILES) {
-        if (light.has_profile != 0u)
-            s.gain *= profile_intensity(light.profile, -s.toward, light.axis, light.half_u, light.half_v);
-    }
+    if (LIGHT_PROFILES && light.has_profile != 0u)
+        s.gain *= profile_intensity(light.profile, -s.toward, light.axis, light.half_u, light.half_v);
     return s;
 }
 

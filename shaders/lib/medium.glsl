@@ -16,16 +16,12 @@ struct MediumInterface {
     uint after;  // object whose medium lies behind
     MediumStack behind;  // of a ray that goes through
     bool changes;  // false: another solid of higher priority covers this surface
-#ifdef HAS_SHEET
     bool thin;  // `after` is a sheet's glass alone: behind it is what is before it
-#endif
 };
 
-#ifdef MEDIUM_STACK
 const uint stack_objects[STACK_SIZE] = STACK_OBJECTS;
 
 uint medium_of(uint mask) { return mask == 0u ? NONE : stack_objects[findMSB(mask)]; }
-#endif
 
 bool is_inside(MediumStack stack) {
     if (MEDIUM_STACK) {
@@ -37,9 +33,7 @@ bool is_inside(MediumStack stack) {
 
 // Object whose medium fills the place, NONE: air.
 uint current_medium(MediumStack stack) {
-    if (MEDIUM_STACK) {
-        if (stack.mask != 0u) return medium_of(stack.mask);
-    }
+    if (MEDIUM_STACK && stack.mask != 0u) return medium_of(stack.mask);
     return stack.object;
 }
 
@@ -63,17 +57,17 @@ MediumInterface cross_boundary(MediumStack stack, uint object, bool entering) {
             return boundary;
         }
     }
-#ifdef MEDIUM_STACK
-    uint bit_index = object_at(object).stack_bit;
-    if (bit_index != NONE) {
-        uint bit = 1u << bit_index;
-        uint mask_before = entering ? stack.mask & ~bit : stack.mask | bit;
-        boundary.behind = MediumStack(entering ? stack.mask | bit : stack.mask & ~bit, stack.object);
-        boundary.before = medium_of(mask_before);
-        boundary.after = medium_of(boundary.behind.mask);
-        boundary.changes = boundary.before != boundary.after;
+    if (MEDIUM_STACK) {
+        uint bit_index = object_at(object).stack_bit;
+        if (bit_index != NONE) {
+            uint bit = 1u << bit_index;
+            uint mask_before = entering ? stack.mask & ~bit : stack.mask | bit;
+            boundary.behind = MediumStack(entering ? stack.mask | bit : stack.mask & ~bit, stack.object);
+            boundary.before = medium_of(mask_before);
+            boundary.after = medium_of(boundary.behind.mask);
+            boundary.changes = boundary.before != boundary.after;
+        }
     }
-#endif
     return boundary;
 }
 
@@ -85,18 +79,19 @@ float medium_index(uint object, float x) {
 
 // Indices before and behind a surface at three places of the spectrum.
 void interface_indices(MediumInterface boundary, vec3 x, out vec3 n_i, out vec3 n_t) {
-#if defined(MEDIUM_STACK) || defined(HAS_SHEET)
-    n_i = vec3(
-        medium_index(boundary.before, x.x), medium_index(boundary.before, x.y), medium_index(boundary.before, x.z));
-    n_t = vec3(medium_index(boundary.after, x.x), medium_index(boundary.after, x.y), medium_index(boundary.after, x.z));
-#else
-    // One side is air.
-    bool entering = boundary.before == NONE;
-    uint glass = entering ? boundary.after : boundary.before;
-    vec3 n = vec3(medium_index(glass, x.x), medium_index(glass, x.y), medium_index(glass, x.z));
-    n_i = entering ? vec3(1.0) : n;
-    n_t = entering ? n : vec3(1.0);
-#endif
+    if (MEDIUM_STACK || HAS_SHEET) {
+        n_i = vec3(
+            medium_index(boundary.before, x.x), medium_index(boundary.before, x.y), medium_index(boundary.before, x.z));
+        n_t = vec3(
+            medium_index(boundary.after, x.x), medium_index(boundary.after, x.y), medium_index(boundary.after, x.z));
+    } else {
+        // One side is air.
+        bool entering = boundary.before == NONE;
+        uint glass = entering ? boundary.after : boundary.before;
+        vec3 n = vec3(medium_index(glass, x.x), medium_index(glass, x.y), medium_index(glass, x.z));
+        n_i = entering ? vec3(1.0) : n;
+        n_t = entering ? n : vec3(1.0);
+    }
 }
 
 #ifdef HAS_SHEET

@@ -30,7 +30,6 @@ layout(rg32f, binding = IMAGE_SPECTRA) uniform readonly restrict image2D spectra
 #else
 layout(binding = UNIT_SPECTRA) uniform sampler2D spectra;
 #endif
-#if CONVEX_SOLIDS
 // Every ray walks through the same planes: constants to all, where they fit a uniform block.
 #if SOLIDS_IN_STORAGE
 layout(std430, binding = BIND_SOLIDS) readonly restrict buffer Solids { Solid solids[SOLID_COUNT]; };
@@ -38,7 +37,6 @@ layout(std430, binding = BIND_PLANES) readonly restrict buffer Planes { vec4 pla
 #else
 layout(std140, binding = BIND_SOLIDS) uniform Solids { Solid solids[SOLID_COUNT]; };
 layout(std140, binding = BIND_PLANES) uniform Planes { vec4 planes[PLANE_COUNT]; };
-#endif
 #endif
 
 uvec4 scene_texel(uint i) {

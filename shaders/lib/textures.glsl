@@ -5,7 +5,6 @@
 // The patch is a parallelogram with two derivative columns as sides. Its second moment is that of an ellipse, whose
 // shorter axis chooses the level and whose longer one is covered with lookups side by side [McCormack et al. 1999].
 
-#if HAS_TEXTURES || HAS_ENVIRONMENT_MAP
 #include "lib/optics.glsl"
 
 layout(std430, binding = BIND_PICTURES) readonly restrict buffer Pictures { Picture pictures[]; };
@@ -72,7 +71,6 @@ void filter_plan(float longer, float shorter, out float level, out float taps) {
     level = max(log2(width) + LEVEL_BIAS, 0.0);
 }
 
-#if HAS_TEXTURES
 #if TEXTURES_IMAGE
 layout(rgba32f, binding = UNIT_CORNERS) uniform readonly restrict image2D corner_texels;
 #else
@@ -133,7 +131,6 @@ vec3 texture_filtered(Picture picture, vec2 uv, vec2 duv_ds, vec2 duv_dt) {
     }
     return sum / taps;
 }
-#endif
 
 // Where a direction (of any length) lies on a latitude-longitude picture, v downwards; anywhere between at a pole.
 vec2 environment_place(vec3 direction) {
@@ -174,4 +171,3 @@ vec3 environment_radiance(vec3 direction, vec3 ddirection_ds, vec3 ddirection_dt
     }
     return sum / taps;
 }
-#endif

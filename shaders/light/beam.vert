@@ -17,9 +17,7 @@ flat out vec2 perspective;
 flat out vec4 density_nodes;
 flat out vec4 band;
 flat out vec4 whole_energy[TARGETS];
-#if EDGES > 0
 flat out vec4 edge[2 * EDGES];
-#endif
 
 const int WHOLE_PARTS = 6;
 

@@ -5,9 +5,7 @@ layout(local_size_x = 64) in;
 #include "lib/intersect.glsl"
 #include "lib/lookup.glsl"
 #include "light/place.glsl"
-#if HAS_TEXTURES
 #include "lib/textures.glsl"
-#endif
 
 layout(std140, binding = BIND_PARAMETERS) uniform Parameters { BounceCausticParameters p; };
 layout(std430, binding = BIND_PLACES) readonly restrict buffer Places { EnvironmentPlace places[]; };

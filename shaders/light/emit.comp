@@ -6,15 +6,9 @@ layout(local_size_x = 64) in;
 #include "lib/emission.glsl"
 #include "lib/spot.glsl"
 #include "lib/edge.glsl"
-#ifdef RANDOM_WAVELENGTH
 #include "lib/wavelength.glsl"
-#endif
-#ifdef LIGHT_PROFILE
 #include "lib/profile.glsl"
-#endif
-#ifdef POLARISED
 #include "lib/polarisation.glsl"
-#endif
 
 layout(std430, binding = BIND_PARAMETERS) readonly restrict buffer Parameters { EmitParameters p; };
 layout(std430, binding = BIND_RAYS_OUT) writeonly restrict buffer RaysOut { uvec4 rays[]; };
@@ -39,11 +33,7 @@ void main() {
     Outcome outcome = Outcome(0u, 0.0, 0.0, 0.0);
 
     // Where wavelengths do not part, all bands share one lattice: or its ripple would be coloured.
-#if SPECTRAL_GROUPS > 0
-    uint own_lattice = sub;
-#else
-    uint own_lattice = sub / p.band_count;
-#endif
+    uint own_lattice = SPECTRAL_GROUPS > 0 ? sub : sub / p.band_count;
     vec2 unit = lattice_point(point, p.lattice_count, p.shift + own_lattice * uvec2(PLASTIC_1, PLASTIC_2));
     uvec2 cell = uvec2(unit * float(MASK_SIZE));
     uint bit = min(cell.y, uint(MASK_SIZE - 1)) * uint(MASK_SIZE) + min(cell.x, uint(MASK_SIZE - 1));
@@ -68,56 +58,56 @@ void main() {
     float stands_for = is_thinned ? 1.0 / p.thinned_chance : 1.0;
     weight *= stands_for;
 #endif
-#ifndef LIGHT_PLANE
-    alive = alive && dot(q, q) < 4.0;
-    vec3 dx, dy;
-    direction = to_world(azimuthal_direction(q, dx, dy));
-    ddirection_ds = p.spacing.x * to_world(dx);
-    ddirection_dt = p.spacing.y * to_world(dy);
-    position = p.origin;
-#ifndef LIGHT_AREA
-    if (p.cone.y - p.cone.x > 1e-7) {
-        weight *= spot_falloff(direction, p.light_axis, p.cone);
-    } else if (p.cone.y < 3.1415926) {
-        float angle = angle_between(direction, p.light_axis);
-        to_lit = vec2(dot(ddirection_ds, p.light_axis), dot(ddirection_dt, p.light_axis)) / max(sin(angle), 1e-6);
-        spacings = spacings_inside(p.cone.y - angle, to_lit);
-    }
-#ifdef LIGHT_PROFILE
-    weight *= profile_intensity(p.profile, direction, p.light_axis, p.light_u, p.light_v);
-#endif
-#else
-    vec2 on_light = p.is_disc != 0u ? concentric_disc(on_disc) : 2.0 * on_disc - 1.0;
-    position += on_light.x * p.light_u + on_light.y * p.light_v;
-    weight *= max(dot(direction, p.light_axis), 0.0);
-#endif
-#else
-    vec2 tilt = concentric_disc(on_disc) * p.cone.x;
-    direction = normalize(p.axis + tilt.x * p.tangent + tilt.y * p.bitangent);
-    vec3 across = q.x * p.tangent + q.y * p.bitangent;
-    position = p.origin + across - p.back * direction;
-    dposition_ds = p.spacing.x * p.tangent;
-    dposition_dt = p.spacing.y * p.bitangent;
-    // A collimated beam ends at its aperture.
-    vec3 off_axis = p.origin - p.aperture_centre + across;
-    vec2 at = vec2(dot(off_axis, p.light_u), dot(off_axis, p.light_v));
-    mat2 at_by_step = mat2(p.spacing.x * vec2(dot(p.tangent, p.light_u), dot(p.tangent, p.light_v)),
-        p.spacing.y * vec2(dot(p.bitangent, p.light_u), dot(p.bitangent, p.light_v)));
-    if (p.light_u != vec3(0.0)) {
-        float from_middle = max(length(at), 1e-20);
-        vec2 outwards[2] = vec2[](p.is_disc != 0u ? at / from_middle : vec2(sign(at.x), 0.0), vec2(0.0, sign(at.y)));
-        vec2 change = -outwards[0] * at_by_step, across_change = -outwards[1] * at_by_step;
-        spacings = spacings_inside(1.0 - dot(outwards[0], at), change);
-        to_lit = change;
-        if (p.is_disc == 0u) {
-            // Beside a corner a footprint is cut by the nearer edge; the other one takes its share of all of it.
-            float other = spacings_inside(1.0 - abs(at.y), across_change), first = spacings;
-            spacings = min(first, other);
-            to_lit = first < other ? change : across_change;
-            weight *= lit_share(max(first, other));
+    if (!LIGHT_PLANE) {
+        alive = alive && dot(q, q) < 4.0;
+        vec3 dx, dy;
+        direction = to_world(azimuthal_direction(q, dx, dy));
+        ddirection_ds = p.spacing.x * to_world(dx);
+        ddirection_dt = p.spacing.y * to_world(dy);
+        position = p.origin;
+        if (!LIGHT_AREA) {
+            if (p.cone.y - p.cone.x > 1e-7) {
+                weight *= spot_falloff(direction, p.light_axis, p.cone);
+            } else if (p.cone.y < 3.1415926) {
+                float angle = angle_between(direction, p.light_axis);
+                to_lit =
+                    vec2(dot(ddirection_ds, p.light_axis), dot(ddirection_dt, p.light_axis)) / max(sin(angle), 1e-6);
+                spacings = spacings_inside(p.cone.y - angle, to_lit);
+            }
+            if (LIGHT_PROFILE) weight *= profile_intensity(p.profile, direction, p.light_axis, p.light_u, p.light_v);
+        } else {
+            vec2 on_light = p.is_disc != 0u ? concentric_disc(on_disc) : 2.0 * on_disc - 1.0;
+            position += on_light.x * p.light_u + on_light.y * p.light_v;
+            weight *= max(dot(direction, p.light_axis), 0.0);
+        }
+    } else {
+        vec2 tilt = concentric_disc(on_disc) * p.cone.x;
+        direction = normalize(p.axis + tilt.x * p.tangent + tilt.y * p.bitangent);
+        vec3 across = q.x * p.tangent + q.y * p.bitangent;
+        position = p.origin + across - p.back * direction;
+        dposition_ds = p.spacing.x * p.tangent;
+        dposition_dt = p.spacing.y * p.bitangent;
+        // A collimated beam ends at its aperture.
+        vec3 off_axis = p.origin - p.aperture_centre + across;
+        vec2 at = vec2(dot(off_axis, p.light_u), dot(off_axis, p.light_v));
+        mat2 at_by_step = mat2(p.spacing.x * vec2(dot(p.tangent, p.light_u), dot(p.tangent, p.light_v)),
+            p.spacing.y * vec2(dot(p.bitangent, p.light_u), dot(p.bitangent, p.light_v)));
+        if (p.light_u != vec3(0.0)) {
+            float from_middle = max(length(at), 1e-20);
+            vec2 outwards[2] =
+                vec2[](p.is_disc != 0u ? at / from_middle : vec2(sign(at.x), 0.0), vec2(0.0, sign(at.y)));
+            vec2 change = -outwards[0] * at_by_step, across_change = -outwards[1] * at_by_step;
+            spacings = spacings_inside(1.0 - dot(outwards[0], at), change);
+            to_lit = change;
+            if (p.is_disc == 0u) {
+                // Beside a corner a footprint is cut by the nearer edge; the other one takes its share of all of it.
+                float other = spacings_inside(1.0 - abs(at.y), across_change), first = spacings;
+                spacings = min(first, other);
+                to_lit = first < other ? change : across_change;
+                weight *= lit_share(max(first, other));
+            }
         }
     }
-#endif
     weight *= lit_share(spacings);
     alive = alive && weight > 0.0;
     if (alive) {
@@ -125,56 +115,50 @@ void main() {
         ray.position = position;
         ray.direction = direction;
         ray.flux_w = weight * band.w;
-#ifdef THINNED_CELLS
-        ray.footprint_scale = sqrt(stands_for);
-#else
-        ray.footprint_scale = 1.0;
-#endif
+        ray.footprint_scale = THINNED_CELLS ? sqrt(stands_for) : 1.0;
         ray.throughput = vec3(weight);
         ray.x_lo = band.x;
         ray.x_hi = band.y;
         ray.x_anchor = band.z;
-#ifdef RANDOM_WAVELENGTH
-        // By brightness within the band; a laser's band has no width, and its photons all have its wavelength.
+        if (RANDOM_WAVELENGTH) {
+            // By brightness within the band; a laser's band has no width, and its photons all have its wavelength.
 #ifdef EVEN_WAVELENGTHS
-        float place_in_band = kronecker(id, 3774877043u, p.shift_spectral);
+            float place_in_band = kronecker(id, 3774877043u, p.shift_spectral);
 #else
-        float place_in_band = unit_float(hash_combine(hash_combine(p.shift_spectral, p.light), id));
+            float place_in_band = unit_float(hash_combine(hash_combine(p.shift_spectral, p.light), id));
 #endif
-        float per_density = 1.0;
-        if (band.y > band.x)
-            ray.x_anchor = drawn_wavelength(uint(BRIGHTNESS_ROW) + p.light, band.xy, place_in_band, per_density);
-        ray.x_lo = ray.x_anchor;
-        ray.x_hi = ray.x_anchor;
-        ray.throughput *= per_density;
-#ifdef HERO
-        // The hero's path is shared by three wavelengths a quarter of all draws on each [Wilkie et al. 2014]. Any of
-        // the four would have led to it, so each has a quarter of its weight (balance heuristic; all that roulette asks
-        // is the same for all four).
-        ray.companion_x = vec4(0.0);
-        ray.companion_throughput = vec4(0.0);
-        if (band.y > band.x) {
-            for (int i = 0; i < 3; ++i) {
-                float x = drawn_wavelength(
-                    uint(BRIGHTNESS_ROW) + p.light, band.xy, fract(place_in_band + 0.25 * float(i + 1)), per_density);
-                ray.companion_x[i] = x;
-                ray.companion_throughput[i] = 0.25 * weight * per_density;
+            float per_density = 1.0;
+            if (band.y > band.x)
+                ray.x_anchor = drawn_wavelength(uint(BRIGHTNESS_ROW) + p.light, band.xy, place_in_band, per_density);
+            ray.x_lo = ray.x_anchor;
+            ray.x_hi = ray.x_anchor;
+            ray.throughput *= per_density;
+            if (HERO) {
+                // The hero's path is shared by three wavelengths a quarter of all draws on each [Wilkie et al. 2014].
+                // Any of the four would have led to it, so each has a quarter of its weight (balance heuristic; all
+                // that roulette asks is the same for all four).
+                ray.companion_x = vec4(0.0);
+                ray.companion_throughput = vec4(0.0);
+                if (band.y > band.x) {
+                    for (int i = 0; i < 3; ++i) {
+                        float x = drawn_wavelength(uint(BRIGHTNESS_ROW) + p.light, band.xy,
+                            fract(place_in_band + 0.25 * float(i + 1)), per_density);
+                        ray.companion_x[i] = x;
+                        ray.companion_throughput[i] = 0.25 * weight * per_density;
+                    }
+                    ray.companion_x.w = 1.0;
+                    ray.throughput *= 0.25;
+                }
             }
-            ray.companion_x.w = 1.0;
-            ray.throughput *= 0.25;
         }
-#endif
-#endif
-#ifdef POLARISED
-        vec3 axis = across_direction(direction);
-        ray.axis_x = axis.x;
-        ray.axis_y = axis.y;
-        ray.axis_z = axis.z;
-        ray.stokes_q = ray.stokes_u = ray.stokes_v = vec3(0.0);
-#ifdef HERO
-        ray.companion_q = ray.companion_u = ray.companion_v = vec4(0.0);
-#endif
-#endif
+        if (POLARISED) {
+            vec3 axis = across_direction(direction);
+            ray.axis_x = axis.x;
+            ray.axis_y = axis.y;
+            ray.axis_z = axis.z;
+            ray.stokes_q = ray.stokes_u = ray.stokes_v = vec3(0.0);
+            if (HERO) ray.companion_q = ray.companion_u = ray.companion_v = vec4(0.0);
+        }
         ray.survival = 1.0;
         ray.photon_id = id;
         ray.light_and_source = p.light | (band_index << 8u) | 0xffff0000u;
@@ -185,41 +169,38 @@ void main() {
         ray.last_object = 0xffffffffu;
         ray.inside_mask = 0u;
         ray.inside_object = 0xffffffffu;
-#ifdef FLIGHTS
-        ray.flown = vec4(0.0);
-#endif
+        if (FLIGHTS) ray.flown = vec4(0.0);
 #ifdef TINT_LEVELS
         ray.tinted = vec4(0.0);
 #endif
-#if COLUMNS > 0
-        for (int c = 0; c < COLUMNS; ++c) {
-            ray.dposition[c] = vec4(0.0);
-            ray.ddirection[c] = vec4(0.0);
+        if (COLUMNS > 0) {
+            for (int c = 0; c < COLUMNS; ++c) {
+                ray.dposition[c] = vec4(0.0);
+                ray.ddirection[c] = vec4(0.0);
+            }
         }
-#endif
-#ifdef FOOTPRINTS
-        ray.dposition[0] = vec4(dposition_ds, 0.0);
-#ifdef LIGHT_EDGES
-        ray.dposition[0].w = float(packed_edge(spacings, to_lit));
-#endif
-        ray.dposition[1].xyz = dposition_dt;
-        ray.ddirection[0].xyz = ddirection_ds;
-        ray.ddirection[1].xyz = ddirection_dt;
-#endif
-#ifdef LAMP_COLUMNS
-        // Two axes of a normal distribution with the variance of the places that this point stands for on the light.
+        if (FOOTPRINTS) {
+            ray.dposition[0] = vec4(dposition_ds, 0.0);
+            if (LIGHT_EDGES) ray.dposition[0].w = float(packed_edge(spacings, to_lit));
+            ray.dposition[1].xyz = dposition_dt;
+            ray.ddirection[0].xyz = ddirection_ds;
+            ray.ddirection[1].xyz = ddirection_dt;
+        }
+        if (LAMP_COLUMNS) {
+            // Two axes of a normal distribution with the variance of the places that this point stands for on the
+            // light.
 #ifdef LIGHT_AREA
-        float reach = p.lamp_step * (p.is_disc != 0u ? 0.5 : inversesqrt(3.0));
-        ray.dposition[COLUMNS - 2].xyz = reach * p.light_u;
-        ray.dposition[COLUMNS - 1].xyz = reach * p.light_v;
+            float reach = p.lamp_step * (p.is_disc != 0u ? 0.5 : inversesqrt(3.0));
+            ray.dposition[COLUMNS - 2].xyz = reach * p.light_u;
+            ray.dposition[COLUMNS - 1].xyz = reach * p.light_v;
 #endif
-#ifdef LIGHT_PLANE
-        float reach = 0.5 * p.lamp_step * p.cone.x;
-        ray.ddirection[COLUMNS - 2].xyz = reach * (p.tangent - dot(p.tangent, direction) * direction);
-        ray.ddirection[COLUMNS - 1].xyz = reach * (p.bitangent - dot(p.bitangent, direction) * direction);
-        for (int c = COLUMNS - 2; c < COLUMNS; ++c) ray.dposition[c].xyz = -p.back * ray.ddirection[c].xyz;
-#endif
-#endif
+            if (LIGHT_PLANE) {
+                float reach = 0.5 * p.lamp_step * p.cone.x;
+                ray.ddirection[COLUMNS - 2].xyz = reach * (p.tangent - dot(p.tangent, direction) * direction);
+                ray.ddirection[COLUMNS - 1].xyz = reach * (p.bitangent - dot(p.bitangent, direction) * direction);
+                for (int c = COLUMNS - 2; c < COLUMNS; ++c) ray.dposition[c].xyz = -p.back * ray.ddirection[c].xyz;
+            }
+        }
         uvec4 texels[RayRecord_TEXELS];
         to_texels(ray, texels);
         for (uint i = 0u; i < uint(RayRecord_TEXELS); ++i) rays[2u * k * uint(RayRecord_TEXELS) + i] = texels[i];

@@ -37,13 +37,13 @@ FollowedRay follow_specular(
         uint kind = met ? thing.kind : NONE;
         follows = kind == KIND_MIRROR || IS_GLASS(kind);
         bool entering = dot(path.direction, hit.normal_g) < 0.0;
-#ifdef ABSORPTION
-        // A place in a liquid learns so where it leaves it.
-        if (number == 0u && kind == KIND_DIELECTRIC && !entering && !is_inside(path.medium))
-            path.medium.object = hit.object;
-        uint row = met ? medium_weight_row(path.medium) : NONE;
-        if (row != NONE) path.walk.tint *= exp(-hit.distance * at_rgb(uint(WEIGHT_ROW) + row, x_of_rgb));
-#endif
+        if (ABSORPTION) {
+            // A place in a liquid learns so where it leaves it.
+            if (number == 0u && kind == KIND_DIELECTRIC && !entering && !is_inside(path.medium))
+                path.medium.object = hit.object;
+            uint row = met ? medium_weight_row(path.medium) : NONE;
+            if (row != NONE) path.walk.tint *= exp(-hit.distance * at_rgb(uint(WEIGHT_ROW) + row, x_of_rgb));
+        }
         if (!follows) {
             ray.met = uint(met);
             ray.hit = hit;
@@ -54,23 +54,18 @@ FollowedRay follow_specular(
             Event event = interact(path, hit, facet, thing, MicrofacetDraw(0u, number, hash_combine(key, 0x100u)));
             bool passes = false, changes = true, geometric;
             vec3 unhidden = vec3(1.0);
-            if (HAS_MIRROR) {
-                if (kind == KIND_MIRROR) path.walk.tint *= at_rgb(uint(WEIGHT_ROW) + thing.weight_row, x_of_rgb);
-            }
-            if (HAS_DIELECTRIC) {
-                if (IS_GLASS(kind)) {
-                    changes = event.boundary.changes;
-                    passes = !changes
-                        || (event.cosine2.y > 0.0 && unit_float(hash_combine(key, number)) >= event.reflectance.y);
-                    if (!changes)
-                        path.medium = event.boundary.behind;
-                    else if (passes) {
-                        unhidden = refract_path(path, event);
-                        if (SURFACE_FILTERS) {
-                            if (thing.texture != NONE)
-                                path.walk.tint *= at_rgb(uint(WEIGHT_ROW) + thing.texture, x_of_rgb);
-                        }
-                    }
+            if (HAS_MIRROR && kind == KIND_MIRROR)
+                path.walk.tint *= at_rgb(uint(WEIGHT_ROW) + thing.weight_row, x_of_rgb);
+            if (HAS_DIELECTRIC && IS_GLASS(kind)) {
+                changes = event.boundary.changes;
+                passes =
+                    !changes || (event.cosine2.y > 0.0 && unit_float(hash_combine(key, number)) >= event.reflectance.y);
+                if (!changes)
+                    path.medium = event.boundary.behind;
+                else if (passes) {
+                    unhidden = refract_path(path, event);
+                    if (SURFACE_FILTERS && thing.texture != NONE)
+                        path.walk.tint *= at_rgb(uint(WEIGHT_ROW) + thing.texture, x_of_rgb);
                 }
             }
             if (!passes) unhidden = reflect_path(path, event, geometric);

@@ -41,29 +41,21 @@ layout(std430, binding = 6) buffer Sums {
     vec4 sums[];
 };  // of the photons of this thread: W with the centre in no window, W drawn as one texel, how many so, W of all
 
-#if LOCAL_GAIN
 layout(std430, binding = 9) readonly buffer GainBoxes { GainBox gain_boxes[]; };
 layout(std430, binding = 10) readonly buffer Gains { float gains[]; };
-#endif
 
-#if REINDEXED
 struct TracedBand {
     vec4 range;  // the band's ends as traced, the ends of its light's spectrum in the coordinate that is shown
     vec4 side;  // 1 for the first band, 1 for the last one
 };
 layout(std430, binding = 11) readonly buffer TracedBands { TracedBand traced_bands[]; };
-#endif
 
-#if CONTACT_LINES
 #include "lib/contact.glsl"
 #define PLACED_PICTURE 2u
 layout(binding = 1) uniform usampler2D contact_words;
-#endif
 
-#if BORDER_IMAGES
 #include "lib/border.glsl"
 layout(binding = 2) uniform sampler2D borders;
-#endif
 
 #define RECEIVER_CHARTS 1u
 
@@ -443,33 +435,33 @@ void main() {
 #endif
     splats[slot] = fine;
 
-#if SLOTS == 2
-    SplatRecord coarse = empty_splat();
-    if (place.next != NONE) {
-        Placement outer = placements[place.next];
-        // Far from the camera, texels of its pixels are the larger ones.
-        Footprint g = footprint_in(outer, photon, middle, sweep);
-        float held_there = held_size(outer, photon, g);
-        if (held_there < 1.0) {
-            shrink(photon, middle, sweep, held_there);
-            g = footprint_in(outer, photon, middle, sweep);
-        }
-        within |= steps_within(outer.rect, g, photon);
-        choose_level(outer, g, photon, middle, sweep);
-        if (!shown || !is_only_fine(fine, drawn_in, outer, photon.position)) {
-            coarse = splat_of(photon, power_w, mean, g, table, table_band);
-            coarse.rect = outer.rect;
-            if (!touches(outer.rect, coarse.centre, half_extent(coarse))) {
-                coarse.kind = 0u;
+    if (SLOTS == 2) {
+        SplatRecord coarse = empty_splat();
+        if (place.next != NONE) {
+            Placement outer = placements[place.next];
+            // Far from the camera, texels of its pixels are the larger ones.
+            Footprint g = footprint_in(outer, photon, middle, sweep);
+            float held_there = held_size(outer, photon, g);
+            if (held_there < 1.0) {
+                shrink(photon, middle, sweep, held_there);
+                g = footprint_in(outer, photon, middle, sweep);
             }
-            if (REINDEXED && !carries) {
-                coarse.kind = 0u;
+            within |= steps_within(outer.rect, g, photon);
+            choose_level(outer, g, photon, middle, sweep);
+            if (!shown || !is_only_fine(fine, drawn_in, outer, photon.position)) {
+                coarse = splat_of(photon, power_w, mean, g, table, table_band);
+                coarse.rect = outer.rect;
+                if (!touches(outer.rect, coarse.centre, half_extent(coarse))) {
+                    coarse.kind = 0u;
+                }
+                if (REINDEXED && !carries) {
+                    coarse.kind = 0u;
+                }
             }
         }
+        mark_edge(coarse);
+        splats[slot + 1u] = coarse;
     }
-    mark_edge(coarse);
-    splats[slot + 1u] = coarse;
-#endif
 
     sums[i].x += power_w * (1.0 - share_within(photon, within));
 }

@@ -58,16 +58,17 @@ Beside footprint_beside(Depicted of, Placement place, vec4 border, int index) {
     Beside found = Beside(border, index, border_distance(border, centre), -1.0, vec3(0.0), 0.0);
     float spread = smoothing * border_spread(border, of.photon.dposition_ds, of.photon.dposition_dt);
     if (!sweeps_inside(border, from, to, spread)) return found;
-#if CONTACT_LINES
-    // A footprint that meets a line of contact (splat_contact.glsl) has its light back already: another receiver begins
-    // there.
-    vec3 at_border = homogeneous_texel(place, centre - found.distance * border.xyz);
-    if (place.kind == PLACED_PICTURE && of.thin <= CONTACT_VARIANCE && at_border.z > 0.0) {
-        vec2 texel_there = at_border.xy / at_border.z, outwards_there = texels_along(place, at_border, -border.xyz);
-        vec2 next_there = texel_there + outwards_there / max(length(outwards_there), 1e-20);
-        if (is_contact(contact_word(place, texel_there)) || is_contact(contact_word(place, next_there))) return found;
+    if (CONTACT_LINES) {
+        // A footprint that meets a line of contact (splat_contact.glsl) has its light back already: another receiver
+        // begins there.
+        vec3 at_border = homogeneous_texel(place, centre - found.distance * border.xyz);
+        if (place.kind == PLACED_PICTURE && of.thin <= CONTACT_VARIANCE && at_border.z > 0.0) {
+            vec2 texel_there = at_border.xy / at_border.z, outwards_there = texels_along(place, at_border, -border.xyz);
+            vec2 next_there = texel_there + outwards_there / max(length(outwards_there), 1e-20);
+            if (is_contact(contact_word(place, texel_there)) || is_contact(contact_word(place, next_there)))
+                return found;
+        }
     }
-#endif
     float texel = 1.0 / max(length(texels_along(place, homogeneous_texel(place, centre), border.xyz)), 1e-20);
     found.reach = CUT * spread + 0.5 * abs(dot(border.xyz, of.sweep)) + TEXELS_AT_BORDER * texel;
     uint lattice = lattice_of(of.photon);
@@ -113,11 +114,11 @@ Depicted image_of(Depicted of, Beside first, Beside second, uint bit) {
 // only with photons that have any; what makes a splat stands there once.
 uint put_images(Depicted of, Placement place, uint slot) {
     Placement read_in = place;
-#if SLOTS == 2
-    vec3 at = homogeneous_texel(place, of.photon.position + of.middle);
-    if (place.next != NONE && (at.z <= 0.0 || !contains(place.rect, at.xy / at.z, 0.0)))
-        read_in = placements[place.next];
-#endif
+    if (SLOTS == 2) {
+        vec3 at = homogeneous_texel(place, of.photon.position + of.middle);
+        if (place.next != NONE && (at.z <= 0.0 || !contains(place.rect, at.xy / at.z, 0.0)))
+            read_in = placements[place.next];
+    }
     // The two borders of those that it reaches over to which it is nearest.
     Beside first = Beside(vec4(0.0), -1, 1e30, -1.0, vec3(0.0), 0.0), second = first;
     int most = textureSize(borders, 0).x;
@@ -153,18 +154,16 @@ uint put_images(Depicted of, Placement place, uint slot) {
             splat.rect = drawn_in.rect;
             shown = shown && touches(drawn_in.rect, splat.centre, half_extent(splat));
             next = window.next;
-#if SLOTS == 2
-            if (next != NONE) {
-                window = placements[next];
-                next = shown && is_only_fine(splat, drawn_in, window, image.photon.position) ? NONE : next;
+            if (SLOTS == 2) {
+                if (next != NONE) {
+                    window = placements[next];
+                    next = shown && is_only_fine(splat, drawn_in, window, image.photon.position) ? NONE : next;
+                }
+            } else {
+                next = NONE;
             }
-#else
-            next = NONE;
-#endif
             mark_edge(splat);
-#if CONTACT_LINES
-            if (keeps_side) keep_to_side(splat, of.side, 1.0);
-#endif
+            if (CONTACT_LINES && keeps_side) keep_to_side(splat, of.side, 1.0);
             keeps_side = false;
             if (shown) splats[slot + count] = splat;
             count += shown ? 1u : 0u;

@@ -16,13 +16,13 @@ void main() {
         return;
     }
     uvec4 home = homes[i];
-#if FILL
-    imageStore(resolved, ivec2(home.xy), ratios[i] * imageLoad(resolved, ivec2(home.zw)));
-#else
-    vec4 sum = imageLoad(total, ivec2(home.xy));
-    for (uint k = home.z; k < home.z + home.w; ++k) {
-        sum += imageLoad(total, ivec2(gutters[k]));
+    if (FILL) {
+        imageStore(resolved, ivec2(home.xy), ratios[i] * imageLoad(resolved, ivec2(home.zw)));
+    } else {
+        vec4 sum = imageLoad(total, ivec2(home.xy));
+        for (uint k = home.z; k < home.z + home.w; ++k) {
+            sum += imageLoad(total, ivec2(gutters[k]));
+        }
+        imageStore(resolved, ivec2(home.xy), sum);
     }
-    imageStore(resolved, ivec2(home.xy), sum);
-#endif
 }

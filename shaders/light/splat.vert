@@ -4,9 +4,7 @@
 #include "light/splat_setup.glsl"
 
 flat out vec4 rect;
-#if CONTACT_LINES
 flat out uint side;
-#endif
 #if SMALL
 noperspective out vec2 at;
 flat out vec2 half_texel;  // along x, y in units of sqrt(2) sigma
@@ -34,9 +32,7 @@ flat out vec4 bends[TARGETS];
 #endif
 #endif
 #endif
-#if SMALL || ONE_COLOUR
 flat out vec4 splat_colour[TARGETS];
-#endif
 
 // Sine between a splat's sides.
 #define THINNEST_SPLAT 1e-6
@@ -53,12 +49,12 @@ vec4 part_inside(SplatRecord splat) {
         vec2 place = vec2(to_corner.x * splat.across.y - to_corner.y * splat.across.x,
                          splat.along.x * to_corner.y - splat.along.y * to_corner.x)
             / area;
-#if FANS
-        // Back through the perspective; where that has no place for it, all is drawn.
-        float w = 1.0 - dot(splat.fan, place);
-        if (w < 1e-3) return all_of_it;
-        place /= w;
-#endif
+        if (FANS) {
+            // Back through the perspective; where that has no place for it, all is drawn.
+            float w = 1.0 - dot(splat.fan, place);
+            if (w < 1e-3) return all_of_it;
+            place /= w;
+        }
         range = vec4(min(range.xy, place), max(range.zw, place));
     }
     return vec4(max(range.xy, all_of_it.xy), min(range.zw, all_of_it.zw));

@@ -78,22 +78,19 @@ bool is_cut(PhotonRecord photon, vec4 band) {
 
 // Throughput averaged over the light of the band. `power_w`: `photon_power`.
 float mean_throughput(PhotonRecord photon, float power_w, uint light_and_class, vec4 band) {
-#if HERO
-    // Each of the four wavelengths has its own (`carry_companions`).
-    return 1.0;
-#elif POINT_SPECTRUM
-    return photon.throughput.y;
-#else
-    float whole_w = band.w;
-#if BAND_CUTS
-    if (is_cut(photon, band))
-        whole_w = power_until(light_and_class, photon.x_hi) - power_until(light_and_class, photon.x_lo);
-#endif
-    return whole_w > 0.0 ? power_w / whole_w : photon.throughput.y;
-#endif
+    if (HERO) {
+        // Each of the four wavelengths has its own (`carry_companions`).
+        return 1.0;
+    } else if (POINT_SPECTRUM) {
+        return photon.throughput.y;
+    } else {
+        float whole_w = band.w;
+        if (BAND_CUTS && is_cut(photon, band))
+            whole_w = power_until(light_and_class, photon.x_hi) - power_until(light_and_class, photon.x_lo);
+        return whole_w > 0.0 ? power_w / whole_w : photon.throughput.y;
+    }
 }
 
-#if HERO
 // Weights of the hero and its companions, and where in the tables they look up their energies: two cells a number,
 // exact below 2^24.
 void carry_companions(inout SplatRecord splat, PhotonRecord photon) {
@@ -102,7 +99,6 @@ void carry_companions(inout SplatRecord splat, PhotonRecord photon) {
     vec4 cell = min(floor(x * float(DENSITY_CELLS)), float(DENSITY_CELLS - 1u));
     splat.x_range = cell.xz * float(DENSITY_CELLS) + cell.yw;
 }
-#endif
 
 // Middle of step k of those whose power `step_w` holds, where the band ends at -half and half and its anchor is at
 // `anchor`.
@@ -117,7 +113,6 @@ float anchor_in_band(PhotonRecord photon) {
     return width > 0.0 ? clamp((photon.x_anchor - photon.x_lo) / width, 0.0, 1.0) : 0.5;
 }
 
-#if !POINT_SPECTRUM
 // Mean place of the light's power, and its standard deviation.
 vec2 spread_of_power(float half_band, float anchor) {
     vec3 moments = vec3(0.0);
@@ -149,14 +144,11 @@ vec4 throughput_of_colour(PhotonRecord photon, float mean) {
     bool even = photon.x_hi <= photon.x_lo || as_drawn <= 0.0;
     return even ? vec4(throughput.x, mean, 0.0, 0.0) : vec4(throughput.x, mean / as_drawn * throughput.yzw);
 }
-#endif
 
 SplatRecord small_splat(PhotonRecord photon, float power_w, float mean, Footprint f, vec4 band) {
     SplatRecord splat;
     float cut = 0.0;
-#if BAND_CUTS
-    cut = is_cut(photon, band) ? 1.0 : 0.0;
-#endif
+    if (BAND_CUTS) cut = is_cut(photon, band) ? 1.0 : 0.0;
     vec2 variance = f.axis_s * f.axis_s + f.axis_t * f.axis_t + f.chord * f.chord * TEXEL_VARIANCE;
     vec2 sigma = sqrt(max(variance, vec2(1e-3)));
     splat.centre = f.centre + f.chord * (cut > 0.0 ? 0.0 : band.z - 0.5);
@@ -166,11 +158,11 @@ SplatRecord small_splat(PhotonRecord photon, float power_w, float mean, Footprin
     splat.table_row = 0.0;
     splat.y_edge = 0.0;
     splat.y_box = 0.0;
-#if POINT_SPECTRUM
-    splat.throughput = vec4(photon.x_anchor, photon.throughput.y, 0.0, 0.0);
-#else
-    splat.throughput = cut > 0.0 ? vec4(0.0, 1.0, 0.0, 0.0) : throughput_of_colour(photon, 1.0);
-#endif
+    if (POINT_SPECTRUM) {
+        splat.throughput = vec4(photon.x_anchor, photon.throughput.y, 0.0, 0.0);
+    } else {
+        splat.throughput = cut > 0.0 ? vec4(0.0, 1.0, 0.0, 0.0) : throughput_of_colour(photon, 1.0);
+    }
     splat.x_range = vec2(photon.x_lo, photon.x_hi);
     splat.xi_half = cut;
     splat.inverse_sigma_xi = 0.0;
@@ -186,7 +178,6 @@ float kept_by_cut(float edge, float box, float s) {
     return 1.0 - 2.0 * s / box * (normal_excess((edge - 0.5 * box) / s) - normal_excess((edge + 0.5 * box) / s));
 }
 
-#if !ONE_COLOUR
 // Power that fragments (splat_swept.frag) add up to: each wavelength is blurred over places of other throughput, which
 // is straight between the low end of the band, the anchor and the high end, and even beyond. Blurred, a kink is its
 // size times a normal variable's mean excess.
@@ -204,9 +195,7 @@ float power_of_fragments(float xi_half, float inverse_sigma_xi, vec4 throughput)
     }
     return power;
 }
-#endif
 
-#if BAND_CUTS && !ONE_COLOUR
 const int WINDOWS = 8;
 
 // Mean throughput of what fragments (splat_cut.frag) add up to: each has the light of a window on the band, `reach` to
@@ -222,7 +211,6 @@ float throughput_of_windows(PhotonRecord photon, float reach, vec4 throughput, u
     }
     return sums.x > 0.0 ? sums.y / sums.x : 0.0;
 }
-#endif
 
 // Change of W per unit of xi and of eta: what the splat's half extents are divided by at its ends. Along one of both,
 // and so little over the spectrum that none of that is left out.
@@ -239,7 +227,6 @@ vec2 fan_of_splat(Footprint f, vec2 along, vec2 across, float xi_half) {
     return fan;
 }
 
-#if LIGHT_EDGES
 // Spacings by which wavelengths and texels blur the edge at most for the splat to be cut off there, and of footprints'
 // widths.
 const float BLURRED_EDGE = 0.4;
@@ -263,7 +250,6 @@ void cut_at_edge(inout SplatRecord splat, Blur blur, Footprint f, uint word) {
     splat.x_range = sharpness * vec2((1.0 - share) * dot(per_texel, splat.along), dot(per_texel, splat.across));
     splat.amplitude /= lit_share(edge.z);
 }
-#endif
 
 SplatRecord swept_splat(PhotonRecord photon, float power_w, float mean, Footprint f, uint light_and_class, vec4 band) {
     SplatRecord splat;
@@ -308,11 +294,11 @@ SplatRecord swept_splat(PhotonRecord photon, float power_w, float mean, Footprin
     float along2 = TEXEL_VARIANCE + (a * (c_total - c) + area * area) / c_total,
           sampled = SAMPLED_VARIANCE * (1.0 + shear * shear);
     bool cut = false;
-#if BAND_CUTS
-    // Of what is thinner along the sweep than sampling allows, the texel's average is taken as of a cut band: no light
-    // reaches beyond its texels.
-    cut = is_cut(photon, band) || (along2 < sampled && photon.x_hi > photon.x_lo);
-#endif
+    if (BAND_CUTS) {
+        // Of what is thinner along the sweep than sampling allows, the texel's average is taken as of a cut band: no
+        // light reaches beyond its texels.
+        cut = is_cut(photon, band) || (along2 < sampled && photon.x_hi > photon.x_lo);
+    }
     // There it is a box that texels side by side in their rows, or along their diagonals, share out.
     along2 = max(along2, cut ? TEXEL_VARIANCE / (box * box) : sampled);
     float sigma = max(sqrt(along2), sweep * MIN_SIGMA_TO_SWEEP);
@@ -346,24 +332,23 @@ SplatRecord swept_splat(PhotonRecord photon, float power_w, float mean, Footprin
     splat.table_row = (row + 0.5) / float(table_rows);
     splat.y_edge = y_edge * SQRT_HALF / s;
     splat.y_box = 0.5 * box * SQRT_HALF / s;
-#if POINT_SPECTRUM
-    splat.throughput = vec4(photon.x_anchor, mean, 0.0, 0.0);
-#elif ONE_COLOUR
-    splat.throughput = throughput_of_colour(photon, mean);
-#else
-    // Slopes by xi, or by x for a cut band.
-    splat.throughput = straight_throughput(photon, cut ? vec2(photon.x_lo, photon.x_hi) : vec2(-xi_half, xi_half));
-    if (!cut && photon.x_hi > photon.x_lo && any(notEqual(photon.throughput.xz, photon.throughput.yy))) {
-        float as_drawn = power_of_fragments(xi_half, SQRT_HALF * reach / sigma, splat.throughput);
-        splat.amplitude *= as_drawn > 0.0 ? clamp(power_w / as_drawn, 0.5, 2.0) : 1.0;
+    if (POINT_SPECTRUM) {
+        splat.throughput = vec4(photon.x_anchor, mean, 0.0, 0.0);
+    } else if (ONE_COLOUR) {
+        splat.throughput = throughput_of_colour(photon, mean);
+    } else {
+        // Slopes by xi, or by x for a cut band.
+        splat.throughput = straight_throughput(photon, cut ? vec2(photon.x_lo, photon.x_hi) : vec2(-xi_half, xi_half));
+        if (!cut && photon.x_hi > photon.x_lo && any(notEqual(photon.throughput.xz, photon.throughput.yy))) {
+            float as_drawn = power_of_fragments(xi_half, SQRT_HALF * reach / sigma, splat.throughput);
+            splat.amplitude *= as_drawn > 0.0 ? clamp(power_w / as_drawn, 0.5, 2.0) : 1.0;
+        }
+        if (BAND_CUTS && cut && any(notEqual(photon.throughput.xz, photon.throughput.yy))) {
+            float as_drawn =
+                throughput_of_windows(photon, sqrt(3.0) * sigma / sweep, splat.throughput, light_and_class);
+            splat.amplitude *= as_drawn > 0.0 ? clamp(mean / as_drawn, 0.5, 2.0) : 1.0;
+        }
     }
-#if BAND_CUTS
-    if (cut && any(notEqual(photon.throughput.xz, photon.throughput.yy))) {
-        float as_drawn = throughput_of_windows(photon, sqrt(3.0) * sigma / sweep, splat.throughput, light_and_class);
-        splat.amplitude *= as_drawn > 0.0 ? clamp(mean / as_drawn, 0.5, 2.0) : 1.0;
-    }
-#endif
-#endif
     splat.x_range = vec2(photon.x_lo, photon.x_hi);
     splat.xi_half = xi_half;
     splat.inverse_sigma_xi = SQRT_HALF * reach / sigma;
@@ -377,12 +362,13 @@ SplatRecord swept_splat(PhotonRecord photon, float power_w, float mean, Footprin
         splat.amplitude *= 2.0 * kept / (kept + kept_by_cut(end.y * y_edge, box, s));
     }
     splat.kind = cut ? 3u : 2u;
-#if LIGHT_EDGES
-    splat.x_range = cut ? splat.x_range : vec2(0.0);
-    splat.lit = 1.0;
-    // A software renderer runs the body of an `if` for all photons, but that of a loop only where one of them goes in.
-    for (uint edge = cut ? 0u : photon.depth >> EDGE_BIT; edge != 0u; edge = 0u) cut_at_edge(splat, drawn, f, edge);
-#endif
+    if (LIGHT_EDGES) {
+        splat.x_range = cut ? splat.x_range : vec2(0.0);
+        splat.lit = 1.0;
+        // A software renderer runs the body of an `if` for all photons, but that of a loop only where one of them goes
+        // in.
+        for (uint edge = cut ? 0u : photon.depth >> EDGE_BIT; edge != 0u; edge = 0u) cut_at_edge(splat, drawn, f, edge);
+    }
     flatten_lattice(splat, drawn, f, lattice_of(photon));
     return splat;
 }

@@ -14,9 +14,7 @@ flat in vec4 rect;
 #endif
 INTERPOLATED in vec3 at;
 INTERPOLATED in vec2 wave;
-#if EDGE && LIGHT_EDGES
 INTERPOLATED in float lit;
-#endif
 flat in vec3 shape;
 flat in vec3 ripple;
 #if ONE_COLOUR

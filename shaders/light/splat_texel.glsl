@@ -2,13 +2,11 @@
 #include "lib/gaussian.glsl"
 #include "lib/swept.glsl"
 
-#if CONTACT_LINES
 #include "lib/contact.glsl"
 layout(binding = 1) uniform usampler2D contact_words;
 
 // Whether the texel about `place` takes light of this side of a line of contact.
 float taken_at(vec2 place, uint side) { return takes_side(texelFetch(contact_words, ivec2(place), 0).x, side); }
-#endif
 
 bool inside_rect(vec2 place, vec4 rect) {
     bvec4 within = bvec4(greaterThan(place, rect.xy), lessThan(place, rect.zw));
@@ -36,7 +34,6 @@ float swept_share(vec3 at, vec3 shape, vec2 wave, vec3 ripple, float w) {
 float share_along(float xi) { return 1.20011 * exp(-4.5 * xi * xi); }
 #endif
 
-#if SWEPT && !ONE_COLOUR
 layout(binding = 0) uniform sampler2DArray spectra;
 
 // Along, one lookup of the band's spectrum blurred as this texel sees it.
@@ -50,9 +47,7 @@ vec4 spectrum_at(vec3 at, vec3 shape, int g) {
 vec4 throughput_swept(float xi, vec4 throughput, vec4 band, vec4 middles, vec4 bends) {
     return throughput_over(clamp(mix(middles, vec4(xi), band.y), -band.x, band.x), throughput) + bends;
 }
-#endif
 
-#if CUT
 #include "light/splat_parameters.glsl"
 
 vec4 energy_below(uint row, float x) {
@@ -77,4 +72,3 @@ vec4 window_energy(float curve_row, vec2 x, int g) {
     uint row = uint(curve_row) + uint(g);
     return energy_below(row, x.y) - energy_below(row, x.x);
 }
-#endif

@@ -7,13 +7,9 @@ layout(local_size_x = 64) in;
 #include "lib/finite.glsl"
 #include "lib/random.glsl"
 #include "lib/lattice.glsl"
-#ifdef FOOTPRINTS
 #include "lib/fan.glsl"
-#endif
 #include "light/trace_records.glsl"
-#if defined(ROUGH_SURFACES) || defined(LAMP_COLUMNS)
 #include "lib/footprint.glsl"
-#endif
 
 // Change of W per spacing: more is no footprint.
 #define FAN_LIMIT 1e4
@@ -32,7 +28,6 @@ vec3 band_powers(uint row, vec3 band) {
     return vec3(anchor - low - upper, upper + high - anchor - uppermost, uppermost);
 }
 
-#ifdef TINT_LEVELS
 // Of the sequence by which levels are rounded, neither of the lattice's own.
 #define TINT_GENERATOR 3774877043u
 
@@ -48,16 +43,9 @@ uint tint_level(Path path) {
     float further = beyond / (beyond + (1.0 - (place - level)) * (1.0 - halfway));
     return uint(level) + (rounding >= 1.0 - further && level < float(TINT_LEVELS - 1) ? 1u : 0u);
 }
-#endif
 
 // Row of what is left of the light's power, over the spectrum, where a ray has come to.
-uint power_row(Path path) {
-#ifdef TINT_LEVELS
-    return uint(p.power_row) + tint_level(path);
-#else
-    return uint(p.power_row);
-#endif
-}
+uint power_row(Path path) { return TINT_LEVELS > 0 ? uint(p.power_row) + tint_level(path) : uint(p.power_row); }
 
 // What throughput at a band's low end, anchor and high end each add to the power a ray carries, W (`band_powers`), for
 // the rays of this event.
@@ -74,8 +62,7 @@ float carried_w(Path path) { return path.band.z > path.band.x ? dot(band_w, path
 void absorb(inout Path path, float distance, inout float absorbed_w) {
     uint row = medium_weight_row(path.medium);
     if (row == NONE) return;
-#ifdef TINT_LEVELS
-    if (row == p.tint_row && path.band.z > path.band.x) {
+    if (TINT_LEVELS > 0 && row == p.tint_row && path.band.z > path.band.x) {
         float before = carried_w(path);
         path.walk.tinted.x += p.tint_rate * distance;
         path.walk.flux_w *= exp(-spectral_row(uint(WEIGHT_ROW) + row, path.band.y) * distance);
@@ -85,7 +72,6 @@ void absorb(inout Path path, float distance, inout float absorbed_w) {
         path.walk.survival *= left / max(before, 1e-30);
         return;
     }
-#endif
     vec3 kept = exp(-spectral_row(uint(WEIGHT_ROW) + row, path.band) * distance);
     vec3 companions = exp(-companion_row(path, uint(WEIGHT_ROW) + row) * distance);
     absorbed_w += carried_w(path);
@@ -94,9 +80,7 @@ void absorb(inout Path path, float distance, inout float absorbed_w) {
     path.walk.survival *= common_share(path, kept.y, companions);
 }
 
-#ifdef FOOTPRINTS
 #include "light/trace_widths.glsl"
-#endif
 #include "light/trace_bands.glsl"
 #include "light/trace_landing.glsl"
 
@@ -128,22 +112,20 @@ void land(inout Path path, Path start, uint receiver, uint triangle, Hit hit, ui
         photon.fan = fan_where_it_landed(path, start, hit);
     }
     uint lattice_bits = p.lattice_bits;
-#ifdef LAMP_COLUMNS
-    // A footprint blurs what light from a point would draw, which an extended light blurs anyway: the broader of the
-    // two is drawn.
-    vec2 fan = unpackHalf2x16(photon.fan);
-    if (LOBE_COLUMNS) narrow_lamp_by_lobe(path);
-    if (cover_sides(hit.normal_g, photon.dposition_ds, photon.dposition_dt, fan, path.dposition[LAMP],
-            path.dposition[LAMP + 1])) {
-        lattice_bits = 0u;
-        photon.fan = is_within2(fan, FAN_LIMIT) ? packHalf2x16(fan) : 0u;
-    }
-#endif
-    if (LOBE_COLUMNS) {
-        if (widen_by_lobe(path, hit.normal_g, photon.dposition_ds, photon.dposition_dt)) {
+    if (LAMP_COLUMNS) {
+        // A footprint blurs what light from a point would draw, which an extended light blurs anyway: the broader of
+        // the two is drawn.
+        vec2 fan = unpackHalf2x16(photon.fan);
+        if (LOBE_COLUMNS) narrow_lamp_by_lobe(path);
+        if (cover_sides(hit.normal_g, photon.dposition_ds, photon.dposition_dt, fan, path.dposition[LAMP],
+                path.dposition[LAMP + 1])) {
             lattice_bits = 0u;
-            photon.fan = 0u;
+            photon.fan = is_within2(fan, FAN_LIMIT) ? packHalf2x16(fan) : 0u;
         }
+    }
+    if (LOBE_COLUMNS && widen_by_lobe(path, hit.normal_g, photon.dposition_ds, photon.dposition_dt)) {
+        lattice_bits = 0u;
+        photon.fan = 0u;
     }
     photon.x_lo = path.band.x;
     photon.x_hi = path.band.z;
@@ -159,30 +141,24 @@ void land(inout Path path, Path start, uint receiver, uint triangle, Hit hit, ui
     photon.light_and_source = path.walk.light_and_source;
     photon.branch_key = path.walk.branch_key;
     photon.depth = min(path.depth, (1u << EDGE_BIT) - 1u);
-    if (LIGHT_EDGES) {
-        // The edge is told in steps of the lattice as emitted: footprints of a coarser one, or broader ones, reach over
-        // it from farther away.
-        if (lattice_bits == p.lattice_bits && path.walk.footprint_scale == 1.0)
-            photon.depth |= uint(path.walk.dposition[0].w) << EDGE_BIT;
-    }
+    // The edge is told in steps of the lattice as emitted: footprints of a coarser one, or broader ones, reach over
+    // it from farther away.
+    if (LIGHT_EDGES && lattice_bits == p.lattice_bits && path.walk.footprint_scale == 1.0)
+        photon.depth |= uint(path.walk.dposition[0].w) << EDGE_BIT;
 #if SPECTRAL_GROUPS > 0
     SPECTRAL_COPY
 #endif
     bool holds = true;
-#if COLUMNS > 0
     for (int c = 0; c < COLUMNS; ++c) {
         float widened = c < SPATIAL ? path.walk.footprint_scale * path.walk.footprint_scale : 1.0;
         holds = holds && is_within(widened * dot(path.dposition[c], path.dposition[c]), COLUMN_LIMIT * COLUMN_LIMIT);
     }
-#endif
     if (!holds) {
         path.walk.flags = FLAG_FOOTPRINT_DROPPED;
         outcome.what |= FELL_FOOTPRINT;
     }
     photon.flags = path.walk.flags | lattice_bits;
-#ifdef TINT_LEVELS
-    photon.flags |= tint_level(path) << uint(TINT_BIT);
-#endif
+    if (TINT_LEVELS > 0) photon.flags |= tint_level(path) << uint(TINT_BIT);
     store_photon(slot, photon);
     outcome.what |= LEFT_PHOTON;
 }
@@ -217,13 +193,11 @@ Flight flight_of(inout Path path, float distance) {
     flight.ddirection_ds = path.walk.footprint_scale * path.ddirection[0];
     flight.ddirection_dt = path.walk.footprint_scale * path.ddirection[1];
     flight.dposition_dband = flight.ddirection_dband = vec3(0.0);
-#if SPECTRAL_GROUPS > 0
     for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
         float over_band = variable_step(uint(g), path.band.z, path.band.x);
         flight.dposition_dband += over_band * path.dposition[SPATIAL + g];
         flight.ddirection_dband += over_band * path.ddirection[SPATIAL + g];
     }
-#endif
     path.walk.flown.x += is_inside(path.medium) ? 0.0 : distance;
     return flight;
 }
@@ -232,63 +206,45 @@ void main() {
     uint k = gl_GlobalInvocationID.x;
     if (k >= state.alive) return;
     Path path = load_path(indices[k]);
-#if SPECTRAL_GROUPS > 0
-    keep_sweeps_within(path);
-#endif
+    if (SPECTRAL_GROUPS > 0) keep_sweeps_within(path);
     Path start = path;
     Outcome outcome = Outcome(0u, 0.0, 0.0, 0.0);
     if (!POINT_SPECTRUM) band_w = band_powers(power_row(path), path.band);
 
     Hit hit;
     float border = -1.0;
-#ifdef LANDING_CUTS
-    bool met = meet_with_band(path, hit, border);
-#else
-    bool met = intersect_closest(path.position, path.direction, FAR_DISTANCE, path.origin, hit);
-#endif
-#ifdef LOOPS_MAY_END
-    // llvmpipe ends every loop of an invocation once they have run 65,535 rounds together, and goes on with what there
-    // is.
-    uint rounds = 0u;
-    while (rounds < 2u) rounds += min(p.lattices, 1u);
-    if (rounds < 2u) {
-        outcomes[k] = uvec4(LOST_NUMERIC, floatBitsToUint(carried_w(path)), 0u, 0u);
-        return;
+    bool met = LANDING_CUTS ? meet_with_band(path, hit, border)
+                            : intersect_closest(path.position, path.direction, FAR_DISTANCE, path.origin, hit);
+    if (LOOPS_MAY_END) {
+        // llvmpipe ends every loop of an invocation once they have run 65,535 rounds together, and goes on with what
+        // there is.
+        uint rounds = 0u;
+        while (rounds < 2u) rounds += min(p.lattices, 1u);
+        if (rounds < 2u) {
+            outcomes[k] = uvec4(LOST_NUMERIC, floatBitsToUint(carried_w(path)), 0u, 0u);
+            return;
+        }
     }
-#endif
     // Looked up once for all branches; some object and facet where nothing was met.
     Object thing = object_at(met ? hit.object : 0u);
     Triangle facet = hit_triangle(hit);
     uint kind = met ? thing.kind : NONE;
 
-#ifdef FLIGHTS
+#if FLIGHTS
     Flight flight = flight_of(path, met ? hit.distance : FAR_DISTANCE);
 #endif
-    if (ABSORPTION) {
-        if (met) absorb(path, hit.distance, outcome.absorbed_w);
-    }
+    if (ABSORPTION && met) absorb(path, hit.distance, outcome.absorbed_w);
     if (met) path.position = surface_point(hit, facet, path.position, path.direction);
-    if (FOOTPRINTS) {
-        if (path.depth > 0u) keep_directions_within(path);
-    }
-    if (LAMP_COLUMNS) {
-        if (met && path.depth > 0u && p.bounded != 0u) keep_pair_above(path, LAMP, hit.normal_g);
-    }
-    if (LOBE_COLUMNS) {
-        if (met && p.bounded != 0u) keep_pair_above(path, LOBE, hit.normal_g);
-    }
+    if (FOOTPRINTS && path.depth > 0u) keep_directions_within(path);
+    if (LAMP_COLUMNS && met && path.depth > 0u && p.bounded != 0u) keep_pair_above(path, LAMP, hit.normal_g);
+    if (LOBE_COLUMNS && met && p.bounded != 0u) keep_pair_above(path, LOBE, hit.normal_g);
     transfer_columns(path, hit.normal_g, hit.distance);
-    if (FOOTPRINTS) {
-        if (IS_GLASS(kind) || kind == KIND_MIRROR)
-            keep_columns_within(path, start, thing.kind == KIND_MIRROR ? thing.colour.w : thing.colour.z, hit.distance);
-    }
+    if (FOOTPRINTS && (IS_GLASS(kind) || kind == KIND_MIRROR))
+        keep_columns_within(path, start, thing.kind == KIND_MIRROR ? thing.colour.w : thing.colour.z, hit.distance);
 
-#ifdef BEAMS
-    if (met && (path.walk.light_and_source >> 16) == 0xffffu && is_beam_object(hit.object)) {
+    if (BEAMS && met && (path.walk.light_and_source >> 16) == 0xffffu && is_beam_object(hit.object)) {
         outcome = Outcome(LEFT_TO_BEAMS, carried_w(path), 0.0, 0.0);
-    } else
-#endif
-        if (kind == KIND_DIFFUSE && border < 0.0) {
+    } else if (kind == KIND_DIFFUSE && border < 0.0) {
         land(path, start, thing.receiver, facet.source, hit, k, outcome);
     } else if (kind == KIND_BLACK && border < 0.0) {
         outcome.what |= ABSORBED;

@@ -20,9 +20,7 @@ vec3 companion_row(Path path, uint row) {
 // The share of the hero and its companions together, by which roulette judges: whoever of them leads, the odds are the
 // same.
 float common_share(Path path, float own, vec3 companions) {
-    if (HERO) {
-        if (path.walk.companion_x.w > 0.0) return 0.25 * (own + dot(companions, vec3(1.0)));
-    }
+    if (HERO && path.walk.companion_x.w > 0.0) return 0.25 * (own + dot(companions, vec3(1.0)));
     return own;
 }
 

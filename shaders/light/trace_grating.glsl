@@ -44,14 +44,12 @@ bool diffract(Path path, Hit hit, Event event, uint row, out Path child, inout P
     rest.recut = 0u;
     rest.order = at >= 0.0 ? number : number + 1u;
     rest_lives = left > 0.0;
-    if (BAND_CUTS) {
-        if (at >= 0.0) {
-            outcome.what |= FELL_BAND;
-            float below = power_below(rest, at);
-            child = part_of_band(rest, rest.band.x, at, below, 5u);
-            rest = part_of_band(rest, at, rest.band.z, 1.0 - below, 6u);
-            return rest_lives;
-        }
+    if (BAND_CUTS && at >= 0.0) {
+        outcome.what |= FELL_BAND;
+        float below = power_below(rest, at);
+        child = part_of_band(rest, rest.band.x, at, below, 5u);
+        rest = part_of_band(rest, at, rest.band.z, 1.0 - below, 6u);
+        return rest_lives;
     }
     if (share <= 0.0) return false;
     bool geometric;

@@ -25,23 +25,15 @@ layout(std430, binding = BIND_STATE) readonly restrict buffer StateBlock { Queue
 #define LEFT_SECOND 2u
 #define LEFT_PHOTON 4u
 
-#ifdef FOOTPRINTS
-#define SPATIAL 2
-#else
-#define SPATIAL 0
-#endif
+#define SPATIAL (2 * FOOTPRINTS)
 #define PATH_COLUMNS COLUMNS
 // Columns after the spectral ones: how far microfacets of ground surfaces spread light.
 #define LOBE (SPATIAL + SPECTRAL_GROUPS)
 #define LOBE_WIDTH 1.0
 // The last ones: how far the light of an extended lamp's other points lands from this one's.
 #define LAMP (COLUMNS - 2)
-#ifdef LOBE_COLUMNS
-#define WIDENED_BY_LOBES
-#endif
-#if defined(NORMAL_DERIVATIVES) || defined(LOBE_COLUMNS)
-#define HAS_NORMAL_COLUMNS
-#endif
+#define WIDENED_BY_LOBES LOBE_COLUMNS
+#define HAS_NORMAL_COLUMNS (NORMAL_DERIVATIVES || LOBE_COLUMNS)
 
 // What a photon's path carries besides is in its record (`ray_record` in app/gpu/records.py); of the flags there,
 // FLAG_FOOTPRINT_DROPPED.
@@ -68,12 +60,10 @@ Path load_path(uint slot) {
     path.depth = ray.depth;
     path.restricted = 1u;
     path.recut = uint((ray.flags & FLAG_BAND_FINAL) != 0u);
-#if COLUMNS > 0
     for (int c = 0; c < COLUMNS; ++c) {
         path.dposition[c] = ray.dposition[c].xyz;
         path.ddirection[c] = ray.ddirection[c].xyz;
     }
-#endif
     if (HAS_GRATING) path.order = ray.flags >> ORDER_BIT;
     if (POLARISED) {
         path.polarisation =
@@ -96,12 +86,10 @@ void store_path(uint slot, Path path) {
     ray.throughput = path.throughput;
     ray.depth = path.depth;
     ray.flags |= (path.origin.inside != 0u ? FLAG_INSIDE : 0u) | (path.recut != 0u ? FLAG_BAND_FINAL : 0u);
-#if COLUMNS > 0
     for (int c = 0; c < COLUMNS; ++c) {
         ray.dposition[c].xyz = path.dposition[c];
         ray.ddirection[c].xyz = path.ddirection[c];
     }
-#endif
     if (HAS_GRATING) ray.flags |= path.order << ORDER_BIT;
     if (POLARISED) {
         ray.axis_x = path.polarisation.axis.x;
@@ -123,7 +111,6 @@ void store_photon(uint slot, PhotonRecord photon) {
         photon_slots[slot * uint(PhotonRecord_TEXELS) + i] = texels[i];
 }
 
-#ifdef FLIGHTS
 layout(std430, binding = BIND_FLIGHTS) writeonly restrict buffer Flights { uvec4 flights[]; };
 
 void store_flight(uint slot, Flight flight) {
@@ -132,7 +119,6 @@ void store_flight(uint slot, Flight flight) {
     if ((slot + 1u) * uint(Flight_TEXELS) > uint(flights.length())) return;  // told by their number
     for (uint i = 0u; i < uint(Flight_TEXELS); ++i) flights[slot * uint(Flight_TEXELS) + i] = texels[i];
 }
-#endif
 
 void store_outcome(uint slot, Outcome outcome) {
     uvec4 texels[Outcome_TEXELS];

@@ -18,13 +18,11 @@ MicrofacetDraw microfacet_draw(Path path) {
 void send_on(inout Path child, Event event, vec3 share_over_band, vec3 companions, vec3 unhidden, bool geometric,
     inout float share, inout Outcome outcome) {
     weaken(child, share_over_band, companions);
-    if (ROUGH_SURFACES) {
-        if (event.ground.width > 0.0) {
-            weaken(child, unhidden, vec3(unhidden.y));
-            share *= unhidden.y;
-            outcome.absorbed_w -= carried_w(child);
-            return;
-        }
+    if (ROUGH_SURFACES && event.ground.width > 0.0) {
+        weaken(child, unhidden, vec3(unhidden.y));
+        share *= unhidden.y;
+        outcome.absorbed_w -= carried_w(child);
+        return;
     }
     outcome.what |= geometric ? FELL_NORMAL : 0u;
 }
@@ -54,17 +52,15 @@ void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object t
     Path child = child_of(path, hit, !entering);
     vec3 unhidden = reflect_path(child, event, geometric);
     Companions companions = companions_at(path, event, IS_GLASS(kind));
-    if (HAS_MIRROR) {
-        if (kind == KIND_MIRROR) {
-            vec3 kept = spectral_row(uint(WEIGHT_ROW) + thing.weight_row, path.band),
-                 of_companions = companion_row(path, uint(WEIGHT_ROW) + thing.weight_row);
-            float share = common_share(path, kept.y, of_companions);
-            outcome.what |= ABSORBED;
-            send_on(child, event, kept, of_companions, unhidden, geometric, share, outcome);
-            polarise_companions(child, companions, false);
-            outcome.flux_w = carried_w(path) - carried_w(child);
-            lives = survives(child, outcome.roulette_w, share, 3u);
-        }
+    if (HAS_MIRROR && kind == KIND_MIRROR) {
+        vec3 kept = spectral_row(uint(WEIGHT_ROW) + thing.weight_row, path.band),
+             of_companions = companion_row(path, uint(WEIGHT_ROW) + thing.weight_row);
+        float share = common_share(path, kept.y, of_companions);
+        outcome.what |= ABSORBED;
+        send_on(child, event, kept, of_companions, unhidden, geometric, share, outcome);
+        polarise_companions(child, companions, false);
+        outcome.flux_w = carried_w(path) - carried_w(child);
+        lives = survives(child, outcome.roulette_w, share, 3u);
     }
 #ifdef HAS_GRATING
     Path rest = start;
@@ -97,10 +93,8 @@ void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object t
     if (parts) part = passing_part(path, event, onset);
 #endif
     if (splits) {
-        if (ROUGH_SURFACES) {
-            // What neither of both parts has in the end, the surface keeps.
-            if (event.ground.width > 0.0) outcome.absorbed_w += carried_w(path);
-        }
+        // What neither of both parts has in the end, the surface keeps.
+        if (ROUGH_SURFACES && event.ground.width > 0.0) outcome.absorbed_w += carried_w(path);
         float share = reflected_share;
         send_on(child, event, event.reflectance, companions.reflectance, unhidden, geometric, share, outcome);
         polarise_companions(child, companions, false);
@@ -122,11 +116,9 @@ void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object t
 #if defined(HAS_DIELECTRIC) || defined(HAS_GRATING)
     child = child_of(path, hit, entering);
     lives = false;
-    if (HAS_GRATING) {
-        if (rest_lives) {
-            child = rest;
-            lives = true;
-        }
+    if (HAS_GRATING && rest_lives) {
+        child = rest;
+        lives = true;
     }
 #ifdef HAS_DIELECTRIC
     vec3 let_through = 1.0 - event.reflectance;

@@ -33,10 +33,8 @@ void keep_columns_within(inout Path path, Path start, float size, float distance
     float widest = max(p.widest_on_surface * size / max(path.walk.footprint_scale, 1e-30), longest_side(own_s, own_t));
     vec3 s = path.dposition[0], t = path.dposition[1], turn_s = path.ddirection[0], turn_t = path.ddirection[1];
     keep_within(widest, s, t, turn_s, turn_t);
-    if (LIGHT_EDGES) {
-        // Made smaller, it no longer says where its neighbours and the edge are.
-        if (s != path.dposition[0]) path.walk.dposition[0].w = 0.0;
-    }
+    // Made smaller, it no longer says where its neighbours and the edge are.
+    if (LIGHT_EDGES && s != path.dposition[0]) path.walk.dposition[0].w = 0.0;
     path.dposition[0] = s;
     path.dposition[1] = t;
     path.ddirection[0] = turn_s;
@@ -54,9 +52,7 @@ void keep_columns_within(inout Path path, Path start, float size, float distance
 void keep_directions_within(inout Path path) {
     vec3 s = path.dposition[0], t = path.dposition[1], turn_s = path.ddirection[0], turn_t = path.ddirection[1];
     keep_within(p.widest_turn / max(path.walk.footprint_scale, 1e-30), turn_s, turn_t, s, t);
-    if (LIGHT_EDGES) {
-        if (turn_s != path.ddirection[0]) path.walk.dposition[0].w = 0.0;
-    }
+    if (LIGHT_EDGES && turn_s != path.ddirection[0]) path.walk.dposition[0].w = 0.0;
     path.ddirection[0] = turn_s;
     path.ddirection[1] = turn_t;
 }

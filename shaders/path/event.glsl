@@ -8,36 +8,22 @@
 
 struct Event {
     ShadingFrame frame;
-#ifdef SPECTRAL_SWEEP
     vec3 end_normal[2];  // where the rays at the ends of the band arrive
-#endif
-#ifdef HAS_NORMAL_COLUMNS
     vec3 normal_columns[COLUMNS_HELD];  // derivatives of the shading normal
-#endif
-#ifdef ROUGH_SURFACES
     Ground ground;
-#endif
-#ifdef HAS_DIELECTRIC
     MediumInterface boundary;  // of glass
     vec3 n_i, n_t;  // before and behind it, at the three places of the band
     vec3 cosine2;  // squared cosines of the transmitted angles there
     Deflection refracted;
-#endif
     vec3 theta;  // cosines of incidence there, below 0
     vec3 reflectance;
-#ifdef POLARISED
     vec3 s[3];  // of the planes of incidence there
     Polarisation seen;  // the path's state, counted from these
     FresnelPair reflection;
     FresnelPair transmission;
-#endif
 };
 
-#ifdef HAS_NORMAL_COLUMNS
-#define NORMAL_COLUMN(event, c) event.normal_columns[c]
-#else
-#define NORMAL_COLUMN(event, c) vec3(0.0)
-#endif
+#define NORMAL_COLUMN(event, c) (HAS_NORMAL_COLUMNS ? event.normal_columns[c] : vec3(0.0))
 
 // Derivative of the cosine of incidence by group g's variable.
 float incidence_column(Path path, Event event, int g) {
@@ -49,8 +35,7 @@ float incidence_column(Path path, Event event, int g) {
 // columns.
 vec3 incidence_over_band(Path path, Event event) {
     vec3 theta = vec3(dot(path.direction, event.frame.normal));
-#if SPECTRAL_GROUPS > 0
-    if (path.restricted != 0u) {
+    if (SPECTRAL_GROUPS > 0 && path.restricted != 0u) {
         if (SPECTRAL_SWEEP) {
             theta.x = dot(path.end_direction[0], event.end_normal[0]);
             theta.z = dot(path.end_direction[1], event.end_normal[1]);
@@ -63,7 +48,6 @@ vec3 incidence_over_band(Path path, Event event) {
         }
         theta.xz = clamp(theta.xz, -1.0, -1e-6);
     }
-#endif
     return theta;
 }
 
@@ -71,8 +55,7 @@ vec3 incidence_over_band(Path path, Event event) {
 void planes_of_incidence(Path path, Event event, out vec3 s[3]) {
     s[1] = incidence_axis(path.direction, event.frame.normal, path.polarisation.axis);
     s[0] = s[2] = s[1];
-#if SPECTRAL_GROUPS > 0
-    if (path.restricted != 0u) {
+    if (SPECTRAL_GROUPS > 0 && path.restricted != 0u) {
         vec3 normals[2] = vec3[](event.frame.normal, event.frame.normal);
         if (SPECTRAL_SWEEP) {
             normals = event.end_normal;
@@ -85,7 +68,6 @@ void planes_of_incidence(Path path, Event event, out vec3 s[3]) {
         s[0] = incidence_axis(direction_at_end(path, 0), normals[0], s[1]);
         s[2] = incidence_axis(direction_at_end(path, 1), normals[1], s[1]);
     }
-#endif
 }
 
 // The normals that a path meets. `facet`: of the hit.
@@ -98,9 +80,9 @@ Event event_at(Path path, Hit hit, Triangle facet) {
             event.end_normal[end] =
                 normal_beside(event.frame, path.restricted != 0u ? path.end_position[end] - path.position : vec3(0.0));
     }
-#ifdef HAS_NORMAL_COLUMNS
-    for (int c = 0; c < PATH_COLUMNS; ++c) event.normal_columns[c] = normal_column(event.frame, path.dposition[c]);
-#endif
+    if (HAS_NORMAL_COLUMNS) {
+        for (int c = 0; c < PATH_COLUMNS; ++c) event.normal_columns[c] = normal_column(event.frame, path.dposition[c]);
+    }
     if (ROUGH_SURFACES) {
         event.ground.width = event.ground.table = 0.0;
         event.ground.normal = event.frame.normal;
@@ -122,17 +104,17 @@ void meet_microfacet(Path path, Object thing, MicrofacetDraw draw, inout Event e
         for (int c = 0; c < PATH_COLUMNS; ++c)
             event.normal_columns[c] = turned_with(microfacet, normal, event.normal_columns[c]);
     }
-#ifdef WIDENED_BY_LOBES
-    // To what an earlier ground surface has spread this one adds a quarter turn aside, to the left or to the right: two
-    // columns hold the sum of both variances, exactly where the lobes are round, and else over many paths.
-    vec3 first, second;
-    lobe_axes(microfacet, normal, LOBE_WIDTH * event.ground.width, first, second);
-    float turn = dot(path.dposition[LOBE], path.dposition[LOBE]) <= 0.0 ? 0.0
-        : (hash_combine(draw.number, draw.key) & 1u) != 0u              ? 1.0
-                                                                        : -1.0;
-    event.normal_columns[LOBE] += turn == 0.0 ? first : turn * second;
-    event.normal_columns[LOBE + 1] += turn == 0.0 ? second : -turn * first;
-#endif
+    if (WIDENED_BY_LOBES) {
+        // To what an earlier ground surface has spread this one adds a quarter turn aside, to the left or to the right:
+        // two columns hold the sum of both variances, exactly where the lobes are round, and else over many paths.
+        vec3 first, second;
+        lobe_axes(microfacet, normal, LOBE_WIDTH * event.ground.width, first, second);
+        float turn = dot(path.dposition[LOBE], path.dposition[LOBE]) <= 0.0 ? 0.0
+            : (hash_combine(draw.number, draw.key) & 1u) != 0u              ? 1.0
+                                                                            : -1.0;
+        event.normal_columns[LOBE] += turn == 0.0 ? first : turn * second;
+        event.normal_columns[LOBE + 1] += turn == 0.0 ? second : -turn * first;
+    }
     if (SPECTRAL_SWEEP) {
         for (int end = 0; end < 2; ++end)
             event.end_normal[end] =
@@ -155,13 +137,9 @@ void share_out(Path path, inout Event event) {
     event.theta = incidence_over_band(path, event);
     vec3 eta_it = event.n_i / event.n_t;
     event.cosine2 = transmitted_cosine2(event.theta, eta_it);
-#ifdef ROUGH_SURFACES
-    bool polished = event.ground.width <= 0.0;
-    if (!polished)
+    bool polished = !ROUGH_SURFACES || event.ground.width <= 0.0;
+    if (ROUGH_SURFACES && !polished)
         event.ground.regained = regained(event.ground.table, -dot(path.direction, event.ground.normal), eta_it);
-#else
-    const bool polished = true;
-#endif
     if (POLARISED) {
         see_polarised(path, event);
         event.reflection = fresnel_reflection(event.theta, eta_it, event.cosine2);
@@ -185,15 +163,11 @@ void share_out(Path path, inout Event event) {
 // ground surface it meets.
 Event interact(Path path, Hit hit, Triangle facet, Object thing, MicrofacetDraw draw) {
     Event event = event_at(path, hit, facet);
-    if (ROUGH_SURFACES) {
-        if (thing.kind == KIND_DIELECTRIC) meet_microfacet(path, thing, draw, event);
-    }
-    if (HAS_DIELECTRIC) {
-        if (IS_GLASS(thing.kind)) {
-            event.boundary = cross_boundary(path.medium, hit.object, dot(path.direction, hit.normal_g) < 0.0);
-            share_out(path, event);
-            return event;
-        }
+    if (ROUGH_SURFACES && thing.kind == KIND_DIELECTRIC) meet_microfacet(path, thing, draw, event);
+    if (HAS_DIELECTRIC && IS_GLASS(thing.kind)) {
+        event.boundary = cross_boundary(path.medium, hit.object, dot(path.direction, hit.normal_g) < 0.0);
+        share_out(path, event);
+        return event;
     }
     if (POLARISED) see_polarised(path, event);
     return event;
@@ -206,24 +180,23 @@ vec3 leaving_share(Event event, Path path, bool geometric, float side) {
     if (ground.width <= 0.0) return vec3(1.0);
     vec3 cosine = vec3(side * dot(path.direction, ground.normal));
     bool leaves = !geometric && cosine.y > 0.0;
-    if (SPECTRAL_SWEEP) {
-        if (path.restricted != 0u) {
-            cosine.x = side * dot(path.end_direction[0], ground.end_normal[0]);
-            cosine.z = side * dot(path.end_direction[1], ground.end_normal[1]);
-        }
+    if (SPECTRAL_SWEEP && path.restricted != 0u) {
+        cosine.x = side * dot(path.end_direction[0], ground.end_normal[0]);
+        cosine.z = side * dot(path.end_direction[1], ground.end_normal[1]);
     }
     vec3 kept = leaves ? ground.regained * smith_share(cosine, ground.width) : vec3(0.0);
-#if SPECTRAL_GROUPS > 0 && !defined(SPECTRAL_SWEEP)
-    vec2 turn = vec2(0.0);
-    for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
-        float along = dot(path.ddirection[SPATIAL + g], ground.normal);
-        turn += along
-            * vec2(variable_step(uint(g), path.band.x, path.band.y), variable_step(uint(g), path.band.z, path.band.y));
+    if (SPECTRAL_GROUPS > 0 && !SPECTRAL_SWEEP) {
+        vec2 turn = vec2(0.0);
+        for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
+            float along = dot(path.ddirection[SPATIAL + g], ground.normal);
+            turn += along
+                * vec2(
+                    variable_step(uint(g), path.band.x, path.band.y), variable_step(uint(g), path.band.z, path.band.y));
+        }
+        vec2 change = leaves ? side * smith_slope(cosine.y, ground.width) * turn : vec2(0.0);
+        float steepness = max(abs(change.x), abs(change.y)) / MOST_CHANGE;
+        kept.xz *= 1.0 + change / max(steepness * steepness, 1.0);
     }
-    vec2 change = leaves ? side * smith_slope(cosine.y, ground.width) * turn : vec2(0.0);
-    float steepness = max(abs(change.x), abs(change.y)) / MOST_CHANGE;
-    kept.xz *= 1.0 + change / max(steepness * steepness, 1.0);
-#endif
     return kept;
 }
 
@@ -257,10 +230,8 @@ vec3 refract_path(inout Path path, Event event) {
     float eta_it = event.n_i.y / event.n_t.y;
     for (int c = 0; c < PATH_COLUMNS; ++c) {
         float deta_it = 0.0;
-#if SPECTRAL_GROUPS > 0
-        if (c >= SPATIAL && c < SPATIAL + SPECTRAL_GROUPS)
+        if (SPECTRAL_GROUPS > 0 && c >= SPATIAL && c < SPATIAL + SPECTRAL_GROUPS)
             deta_it = index_ratio_derivative(event.boundary, uint(c - SPATIAL), path.band.y, event.n_i.y, event.n_t.y);
-#endif
         path.ddirection[c] =
             refracted_column(turned, path.direction, path.ddirection[c], NORMAL_COLUMN(event, c), eta_it, deta_it);
     }

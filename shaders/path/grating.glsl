@@ -29,11 +29,11 @@ GratingEvent grating_event(Path path, Event event, Hit hit, uint row) {
 bvec3 order_passes(Path path, Event event, GratingEvent met, vec3 steps) {
     vec3 normal = event.frame.normal;
     bvec3 passes = bvec3(diffracted_cosine2(path.direction, dot(path.direction, normal), steps.y * met.across) > 0.0);
-#if SPECTRAL_GROUPS > 0
-    vec3 low = direction_at_end(path, 0), high = direction_at_end(path, 1);
-    passes.x = diffracted_cosine2(low, dot(low, normal), steps.x * met.across) > 0.0;
-    passes.z = diffracted_cosine2(high, dot(high, normal), steps.z * met.across) > 0.0;
-#endif
+    if (SPECTRAL_GROUPS > 0) {
+        vec3 low = direction_at_end(path, 0), high = direction_at_end(path, 1);
+        passes.x = diffracted_cosine2(low, dot(low, normal), steps.x * met.across) > 0.0;
+        passes.z = diffracted_cosine2(high, dot(high, normal), steps.z * met.across) > 0.0;
+    }
     return passes;
 }
 
@@ -68,10 +68,8 @@ void diffract_path(inout Path path, Event event, GratingEvent met, GratingOrder 
     }
     for (int c = 0; c < PATH_COLUMNS; ++c) {
         float dstep = 0.0;
-#if SPECTRAL_GROUPS > 0
-        if (c >= SPATIAL && c < SPATIAL + SPECTRAL_GROUPS)
+        if (SPECTRAL_GROUPS > 0 && c >= SPATIAL && c < SPATIAL + SPECTRAL_GROUPS)
             dstep = order_step_derivative(order, met.object, met.medium, uint(c - SPATIAL), path.band.y);
-#endif
         path.ddirection[c] = diffracted_column(turned, path.direction, path.ddirection[c], NORMAL_COLUMN(event, c),
             met.grating.lines, met.side, steps.y, dstep, reflects);
     }

@@ -9,7 +9,6 @@ struct MicrofacetDraw {
     uint key;
 };
 
-#ifdef ROUGH_SURFACES
 #include "lib/rough_surface.glsl"
 #include "lib/rough_energy.glsl"
 
@@ -23,8 +22,5 @@ struct Ground {
     float table;  // of what it sends on
     vec3 normal;  // the surface's own, against the path
     vec3 regained;  // factor for what its microfacets send on after all, over the band
-#ifdef SPECTRAL_SWEEP
     vec3 end_normal[2];  // where the band's ends arrive
-#endif
 };
-#endif

@@ -31,20 +31,14 @@ struct Path {
     uint depth;  // surfaces met
     uint restricted;  // 1: represents one band; 0: the whole spectrum, not dispersed yet
     uint recut;  // 1: its band was already cut at the surface ahead, and is not cut there again
-#ifdef HAS_GRATING
     uint order;  // the next order to follow at the grating ahead (camera/grating.glsl)
-#endif
-#ifdef POLARISED
     Polarisation polarisation;  // on a camera path: of light sent along it from the camera; by reciprocity
                                 // the throughput is the same
-#endif
-#ifdef SPECTRAL_SWEEP
     // The rays of the band's lowest and highest wavelength, traced through the same facets: they hold the nonlinear
     // part of the dispersion, which first derivatives miss.
     vec3 end_position[2];
     vec3 end_direction[2];
     vec2 end_step[SPECTRAL_GROUPS];  // change of each group's variable from the anchor to the ends
-#endif
     Walk walk;
 };
 
@@ -100,40 +94,40 @@ Path path_at(vec3 position, vec3 direction, RayOrigin origin, MediumStack medium
 void ray_at(Path path, float x, out vec3 position, out vec3 direction) {
     position = path.position;
     direction = path.direction;
-#if SPECTRAL_GROUPS > 0
-    for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
-        float change = variable_step(uint(g), x, path.band.y);
-        position += change * path.dposition[SPATIAL + g];
-        direction += change * path.ddirection[SPATIAL + g];
+    if (SPECTRAL_GROUPS > 0) {
+        for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
+            float change = variable_step(uint(g), x, path.band.y);
+            position += change * path.dposition[SPATIAL + g];
+            direction += change * path.ddirection[SPATIAL + g];
+        }
+        direction = normalize(direction);
     }
-    direction = normalize(direction);
-#endif
-#ifdef SPECTRAL_SWEEP
-    int end = x < path.band.y ? 0 : 1;
-    vec3 end_position, end_direction;
-    linear_end(path, end, end_position, end_direction);
-    float reach = (x - path.band.y) / max(abs((end == 0 ? path.band.x : path.band.z) - path.band.y), 1e-9);
-    float share = reach * reach;
-    position += share * ((end == 0 ? path.end_position[0] : path.end_position[1]) - end_position);
-    direction =
-        normalize(direction + share * ((end == 0 ? path.end_direction[0] : path.end_direction[1]) - end_direction));
-#endif
+    if (SPECTRAL_SWEEP) {
+        int end = x < path.band.y ? 0 : 1;
+        vec3 end_position, end_direction;
+        linear_end(path, end, end_position, end_direction);
+        float reach = (x - path.band.y) / max(abs((end == 0 ? path.band.x : path.band.z) - path.band.y), 1e-9);
+        float share = reach * reach;
+        position += share * ((end == 0 ? path.end_position[0] : path.end_position[1]) - end_position);
+        direction =
+            normalize(direction + share * ((end == 0 ? path.end_direction[0] : path.end_direction[1]) - end_direction));
+    }
 }
 
 // The direction at an end of the band (0: lowest, 1: highest wavelength).
 vec3 direction_at_end(Path path, int end) {
-#ifdef SPECTRAL_SWEEP
-    return path.end_direction[end];
-#else
-    vec3 direction = path.direction;
-#if SPECTRAL_GROUPS > 0
-    for (int g = 0; g < SPECTRAL_GROUPS; ++g)
-        direction +=
-            variable_step(uint(g), end == 0 ? path.band.x : path.band.z, path.band.y) * path.ddirection[SPATIAL + g];
-    direction = normalize(direction);
-#endif
-    return direction;
-#endif
+    if (SPECTRAL_SWEEP) {
+        return path.end_direction[end];
+    } else {
+        vec3 direction = path.direction;
+        if (SPECTRAL_GROUPS > 0) {
+            for (int g = 0; g < SPECTRAL_GROUPS; ++g)
+                direction += variable_step(uint(g), end == 0 ? path.band.x : path.band.z, path.band.y)
+                    * path.ddirection[SPATIAL + g];
+            direction = normalize(direction);
+        }
+        return direction;
+    }
 }
 
 // Restricts a path to `band`, a part of its band, and moves its ray to the new anchor.
