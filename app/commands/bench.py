@@ -29,7 +29,6 @@ CAMERA_SECONDS = 20.0
 picture had as much."""
 CAMERA_SCENES = ("prism_edge", "lens_text", "brilliant_studio", "ball_caustic")
 """Shipped scenes that are about what is seen through glass; `bench --camera` without names measures these."""
-_OF_FARMS = ("workers", "scheduler")
 
 
 def bench(options: Bench, show: Callable[[object], None] = show) -> int:
@@ -131,7 +130,7 @@ def empty_result(
 ) -> BenchResult:
     """What a run begins with."""
     output = options.output.name if options.output else ""
-    words_typed = words(options, leave_out=("scenes", "output", "fresh", "camera_pass", *_OF_FARMS))
+    words_typed = words(options, leave_out=("scenes", "output", "fresh", "camera_pass"))
     command = ["spectrasplat", "bench", *["--camera"] * options.camera_pass, *scenes, "-o", output, *words_typed]
     now = datetime.now(UTC).isoformat(timespec="seconds")
     return BenchResult(__version__, now, shlex.join(command), machine, [], settings)

@@ -1,4 +1,4 @@
-"""The farm commands: what render, animate and bench do, by many workers; Ctrl-C keeps what is done."""
+"""The farm commands: what render and animate do, by many workers; Ctrl-C keeps what is done."""
 
 from __future__ import annotations
 
@@ -13,22 +13,19 @@ from ..base.errors import UserError
 from ..base.image_io import check_suffix
 from ..base.interrupts import interrupt_flag
 from .animate import plan_of
-from .bench import empty_result, kept_text, scenes_of, settings_of, write_and_show
-from .measuring_table import FarmBench
 from .opened import note_assumptions, open_scene
-from .printing import note, show
+from .printing import note
 from .render import check_output, picture_settings, write_result
 from .table import ByWorkers, FarmAnimate, FarmRender
 
 if TYPE_CHECKING:
-    from ..bench.store import Store
-    from ..farm.jobs import Job, Tally
+    from ..farm.jobs import Job
 
 FOLDER_SUFFIX = ".parts"
 
 
-def run(options: ByWorkers, job: Job, name: str, stop: Callable[[], bool]) -> Tally | None:
-    """Have a job done by the workers that are wanted; None where `stop()` turned true before. Raises `UserError`."""
+def run(options: ByWorkers, job: Job, name: str, stop: Callable[[], bool]) -> bool:
+    """Have a job done by the workers that are wanted; False where `stop()` turned true before. Raises `UserError`."""
     from ..base.progress import ProgressReporter
     from ..farm.cluster import open_crew
     from ..farm.jobs import Foreman
@@ -70,14 +67,14 @@ def render(options: FarmRender) -> int:
         job = StillJob(scene, settings, scene_file, folder, options.parts, note)
         kept = job.kept
         try:
-            tally = run(options, job, scene.name, interrupted)
+            done = run(options, job, scene.name, interrupted)
         except UserError as error:
             raise UserError(f"{error} ({kept.leave()})") from error
         except BaseException:
             kept.leave()
             raise
         picture = job.picture
-        if tally is None or picture is None:
+        if not done or picture is None:
             print(f"spectrasplat: stopped; {kept.leave()}: the same command goes on", file=sys.stderr)
             return interrupted.exit_code
         write_result(options, scene, settings, picture)
@@ -85,17 +82,13 @@ def render(options: FarmRender) -> int:
             kept.remove()
     again = f", {job.taken_up} of them from before" if job.taken_up else ""
     print(
-        f"{options.output.resolve()}: {settings.width}×{settings.height}, {kept.count} parts{again}{_copied(tally)}, "
+        f"{options.output.resolve()}: {settings.width}×{settings.height}, {kept.count} parts{again}, "
         f"{picture.stats.photons:,} photons in {time.perf_counter() - started:.1f} s, of which merging "
         f"{kept.size_bytes / 1e6:.1f} MB took {kept.seconds:.1f} s ({picture.stats.renderer})"
     )
     if options.stats:
         print("\n".join(picture.stats.lines()))
     return 0
-
-
-def _copied(tally: Tally) -> str:
-    return f", {tally.copied} begun a second time" if tally.copied else ""
 
 
 def animate(options: FarmAnimate) -> int:
@@ -121,7 +114,7 @@ def animate(options: FarmAnimate) -> int:
         there = sum(sink.has(index) for index in plan.only)
         job = FramesJob(plan.animation, settings, sink, plan.only)
         try:
-            tally = run(options, job, plan.animation.start.scene.name, interrupted)
+            done = run(options, job, plan.animation.start.scene.name, interrupted)
         except UserError as error:
             made = sum(sink.has(index) for index in plan.only)
             raise UserError(f"{error} ({made} of {count} frames are in {folder})") from error
@@ -129,7 +122,7 @@ def animate(options: FarmAnimate) -> int:
             for sentence in job.notices.lines(of_frames=count > 1):
                 note(sentence)
     made = sum(sink.has(index) for index in plan.only)
-    if tally is None:
+    if not done:
         print(
             f"spectrasplat: stopped; {made} of {count} frames are in {folder}: the same command goes on",
             file=sys.stderr,
@@ -145,40 +138,7 @@ def animate(options: FarmAnimate) -> int:
         shutil.rmtree(folder, ignore_errors=True)
     kept = f" ({there} were there)" if there else ""
     print(
-        f"{options.output.resolve()}: {made} of {count} frames{kept}{_copied(tally)}, {size[0]}×{size[1]} at "
+        f"{options.output.resolve()}: {made} of {count} frames{kept}, {size[0]}×{size[1]} at "
         f"{plan.fps:g} a second, in {time.perf_counter() - started:.1f} s"
     )
     return 0
-
-
-def bench(options: FarmBench) -> int:
-    """Measure scenes side by side; returns the exit code. Raises `UserError`."""
-    if options.output is None:
-        raise UserError("bench needs a folder for what it finds: give one with -o DIR")
-    settings, count = settings_of(options), workers_of(options)
-    start_s, started = time.process_time(), time.perf_counter()
-    scenes = scenes_of(options, settings)
-    start_s += (time.perf_counter() - started) / len(scenes)
-    if count is not None and count > 1:
-        note("workers of one machine slow each other: times compare within this run only")
-        if len(scenes) < count:
-            note(f"a scene is measured by one worker, so {len(scenes)} of {count} have something to do")
-
-    from ..farm.jobs import held
-    from ..farm.kinds import ScenesJob
-
-    output = options.output
-
-    def open_store(where: dict[str, str]) -> Store:
-        from ..bench.store import Store
-
-        return Store(output, empty_result([*scenes], options, settings, where), options.fresh)
-
-    with held(output, output), interrupt_flag() as interrupted:
-        job = ScenesJob(scenes, settings, open_store, start_s, note)
-        tally = run(options, job, "bench", interrupted)
-        if job.store is not None:
-            if tally is None:
-                print(f"spectrasplat: stopped; {kept_text(job.store.result)}", file=sys.stderr)
-            write_and_show(job.store.result, output, show)
-    return interrupted.exit_code if tally is None else 0

@@ -9,7 +9,7 @@ from ..bench.results import RANDOM_KINDS, REFERENCES
 from ..model.settings import METHODS
 from . import completion, options
 from .options import MAX_SEED, Option, argument, option, setting, shared, switch, target
-from .table import ByWorkers, ReadsScenes
+from .table import ReadsScenes
 
 MAX_SEEDS = 1000
 MAX_BENCH_SECONDS = 3600.0
@@ -168,10 +168,3 @@ class ProveGpu:
     parts: tuple[str, ...] | None = option(
         "A,B", f"Only these parts beside doctor: {', '.join(PROOF_PARTS)}.", options.names
     )
-
-
-@dataclass(frozen=True, kw_only=True)
-class FarmBench(ByWorkers, Bench):
-    """Measure every method's error against its run time, and write a report, on a farm."""
-
-    without = ("features",)

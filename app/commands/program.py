@@ -39,7 +39,6 @@ COMMANDS = {
     "prove-gpu": ("measuring_table:ProveGpu", "prove_gpu:prove_gpu"),
     "farm render": ("table:FarmRender", "farm:render"),
     "farm animate": ("table:FarmAnimate", "farm:animate"),
-    "farm bench": ("measuring_table:FarmBench", "farm:bench"),
 }
 """By name: the class of a command's values, and the function that gets them and returns the exit code, both with their
 modules."""

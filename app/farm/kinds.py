@@ -1,30 +1,18 @@
-"""Jobs whose tasks each bring whole results: frames of an animation, points of a sweep, scenes of a bench."""
+"""Jobs whose tasks each bring whole results: frames of an animation, points of a sweep."""
 
 from __future__ import annotations
 
-import tempfile
-import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..base.atomic import atomic_output
-from ..base.errors import UserError
 from ..base.image_io import check_finite
 from ..base.movie import Frames, frame_bytes
 from ..base.tone_map import auto_exposure
-from ..bench.machine import machine
-from ..bench.rendering import NothingToMeasure
-from ..bench.results import BenchResult, BenchSettings, SceneResult
-from ..bench.runner import run_bench
-from ..bench.store import PICTURES, Store
 from ..edit.animation import Animation
 from ..edit.parameters import Stage
-from ..gpu.context import create_context
-from ..model.scene import Scene
 from ..model.settings import RenderSettings
 from ..render.animate import developed
 from ..render.frames import FrameRenderer
@@ -36,10 +24,8 @@ from .jobs import Task
 
 _FIRST, _FRAME = "the first frame", "frame"
 _POINT, _POINTS = "point", "points"
-_MACHINE, _SCENE = "the query of the machine", "scene"
 _RESULT_BYTES = 256 << 20
 """Pictures that one task brings back together, at most about."""
-_ONE_KIND = ("processor", "renderer")
 
 # ---- frames -------------------------------------------------------------------------------------
 
@@ -163,110 +149,3 @@ class PointsJob:
             self._keep(drawn)
         rest, self._rest = self._rest, []
         return rest
-
-
-# ---- scenes of a bench --------------------------------------------------------------------------
-
-
-class _Unwanted(Exception):
-    """The measurement was dropped."""
-
-
-@dataclass(frozen=True)
-class _Measured:
-    """A scene's results, the pictures by their names, and where it was measured; or why it was not."""
-
-    result: SceneResult | None
-    pictures: Mapping[str, bytes]
-    machine: Mapping[str, str]
-    skipped: str = ""
-
-
-def _query_machine(desk: Desk, settings: BenchSettings, report: Report) -> dict[str, str]:
-    """The machine of a worker."""
-    with create_context() as context:
-        return machine(context)
-
-
-def _measure(
-    desk: Desk, settings: BenchSettings, report: Report, name: str, scene: Scene, start_s: float
-) -> _Measured | None:
-    """One scene, in a folder of its own; in a context of its own too, for a program that is compiled already would
-    seem quick. `start_s`: what a process takes before it has its scene, without its context."""
-
-    def progress(share: float, text: str) -> None:
-        report(share)
-        if report.unwanted():
-            raise _Unwanted
-
-    started = time.perf_counter()
-    with create_context() as context, tempfile.TemporaryDirectory(prefix="spectrasplat-bench-") as folder:
-        where = machine(context)
-        start_s += time.perf_counter() - started
-        store = Store(Path(folder), BenchResult("", "", "", where, [], settings))
-        try:
-            run_bench(context, {name: scene}, store, progress, start_seconds=start_s)
-        except _Unwanted:
-            return None
-        except NothingToMeasure as reason:
-            return _Measured(None, {}, where, str(reason))
-        pictures = {path.name: path.read_bytes() for path in (Path(folder) / PICTURES).glob("*")}
-        return _Measured(store.scene(name), pictures, where)
-
-
-class ScenesJob:
-    """Measures what `open_store(machine)` lacks; a scene is measured whole by one worker, so that whatever disturbs a
-    machine hits all methods of a scene alike. See `Job`."""
-
-    guesses: Mapping[str, float] = {_MACHINE: 0.01, _SCENE: 1.0}
-
-    def __init__(
-        self,
-        scenes: Mapping[str, Scene],
-        settings: BenchSettings,
-        open_store: Callable[[dict[str, str]], Store],
-        start_s: float,
-        note: Callable[[str], None],
-    ) -> None:
-        self.shared = settings
-        self.store: Store | None = None
-        """Once it is known where things are measured."""
-        self._scenes, self._open_store, self._start_s, self._note = scenes, open_store, start_s, note
-
-    def begin(self) -> Iterable[Task]:
-        """See `Job`."""
-        return [Task(_MACHINE, 1, (_query_machine,))]
-
-    def ahead(self) -> Mapping[str, int]:
-        """See `Job`."""
-        return {_SCENE: len(self._scenes)} if self.store is None else {}
-
-    def take(self, task: Task, result: Any, workers: int) -> Iterable[Task]:
-        """See `Job`."""
-        if self.store is None:
-            self.store = self._open_store(result)
-            done = {scene.scene for scene in self.store.result.scenes if scene.complete}
-            return [
-                Task(_SCENE, number, (_measure, name, scene, self._start_s))
-                for number, (name, scene) in enumerate(self._scenes.items(), 1)
-                if name not in done
-            ]
-        self._keep(self.store, task.call[1], result)
-        return ()
-
-    def _keep(self, store: Store, name: str, measured: _Measured) -> None:
-        if measured.result is None:
-            self._note(measured.skipped)
-            return
-        for key in _ONE_KIND:
-            if measured.machine[key] != store.result.machine[key]:
-                raise UserError(
-                    f"scene '{name}' was measured on another {key} ('{measured.machine[key]}') than the others "
-                    f"('{store.result.machine[key]}'), and times of two do not compare: give workers of one kind"
-                )
-        (store.directory / PICTURES).mkdir(exist_ok=True)
-        for file, data in measured.pictures.items():
-            with atomic_output(store.directory / PICTURES / file) as temporary:
-                temporary.write_bytes(data)
-        store.put_scene(measured.result)
-        store.save()

@@ -95,8 +95,8 @@ def test_what_is_stopped_is_gone_on_from_and_what_is_cut_short_done_again(
     one = whole(SMALL)
     assert np.abs(job.picture.rgb - one).max() <= 4e-6 * one.max()
     # All is there: a farm that begins again only looks at the parts.
-    job, tally = farmed(folder, 1, 3, settings=SMALL)
-    assert job.taken_up == 3 and tally.done == 1
+    job, done = farmed(folder, 1, 3, settings=SMALL)
+    assert job.taken_up == 3 and done == 1
     # Parts of another rendering are not touched.
     with pytest.raises(UserError, match="holds parts of another rendering"):
         farmed(folder, 1, 3, settings=RenderSettings(48, 27, photons=50_000, batch=4096))
@@ -170,17 +170,3 @@ def test_frames_of_a_farm_are_those_of_one_process(tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.mp4", "a.webp", "many", "one"]
     with Image.open(tmp_path / "a.webp") as image:
         assert image.n_frames == 5 and image.size == (48, 27)
-
-
-@pytest.mark.slow
-def test_a_bench_of_two_scenes_is_one_report(tmp_path: Path) -> None:
-    asked = ["--seconds", "0.1", "--seeds", "1", "--methods", "srd,stochastic", "--size", "32x18"]
-    asked += ["--horizon", "0.1", "--reference-seconds", "0.5", "-o", str(tmp_path / "bench")]
-    assert main(["farm", "bench", "prism", "lens", "--workers", "2", *asked]) == 0
-    import msgspec
-    from spectrasplat.bench.results import BenchResult
-
-    result = msgspec.json.decode((tmp_path / "bench" / "results.json").read_bytes(), type=BenchResult)
-    assert {scene.scene: scene.complete for scene in result.scenes} == {"prism": True, "lens": True}
-    assert (tmp_path / "bench" / "report.html").is_file()
-    assert all((tmp_path / "bench" / name).is_file() for scene in result.scenes for name in scene.pictures.values())

@@ -46,7 +46,6 @@ def test_without_dask_there_is_the_line_that_installs_it(
     for arguments in (
         ("farm", "render", "lens", "-o", out),
         ("farm", "animate", "lens", "-o", tmp_path / "frames"),
-        ("farm", "bench", "lens", "-o", tmp_path / "bench"),
         ("sweep", "prism", "--set", "objects.prism.n_d=1.5,1.6", "--workers", "2", "-o", tmp_path / "sweep"),
     ):
         assert PIP_LINE in refusal(capsys, *arguments)
