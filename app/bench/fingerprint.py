@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.paths import assets_dir, shipped_scenes
-from ..edit import edits
+from ..edit.glass import set_dispersion_gain
 from ..edit.live_inputs import LiveInputs
 from ..gpu.context import Context, create_context
 from ..gpu.device_traits import DeviceTraits, assumed
@@ -180,7 +180,7 @@ def _view(context: Context, scene: Scene, settings: RenderSettings) -> None:
         glass = next((i for i, item in enumerate(scene.objects) if item.material.disperses), None)
         if glass is not None:
             gain = 1.1 * scene.objects[glass].material.dispersion.gain
-            stages.append(replace(moved, scene=edits.set_dispersion_gain(scene, glass, gain)))
+            stages.append(replace(moved, scene=set_dispersion_gain(scene, glass, gain)))
         for stage in stages:
             engine.set(stage)
             finish(engine, settings.photons or 1, lambda share, words: None, lambda: False)

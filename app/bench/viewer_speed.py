@@ -19,6 +19,7 @@ import numpy as np
 
 from ..base.errors import UserError
 from ..base.process_age import process_age_s
+from ..edit.glass import set_dispersion_gain
 from ..edit.state import Selection
 from ..gpu.shader import recorded
 from ..passes.sample_picture import SamplePicture
@@ -300,14 +301,10 @@ class _Bench:
 
     def nudge_gain(self) -> None:
         """A little more dispersion."""
-        from ..edit import edits
-
         state = self.session.state
         material = state.scene.objects[self._glass].material
         gain = material.dispersion.gain
-        self.session.state = replace(
-            state, scene=edits.set_dispersion_gain(state.scene, self._glass, min(gain * 1.07, 10.0))
-        )
+        self.session.state = replace(state, scene=set_dispersion_gain(state.scene, self._glass, min(gain * 1.07, 10.0)))
 
     def latency(self, nudge: Callable[[], None]) -> Latency:
         """From single inputs to the end of the first frame whose picture shows each.

@@ -68,7 +68,7 @@ def lesson(options: table.Lesson) -> int:
 
 
 def _run(window: Window, scene: Path | None, options: View, interrupted: Interruption, at: Lesson | None) -> None:
-    from ..ui import open_panels
+    from ..ui import layout
     from ..ui.session import Session
     from ..ui.viewer import Viewer
 
@@ -82,7 +82,7 @@ def _run(window: Window, scene: Path | None, options: View, interrupted: Interru
         session.welcome()
     viewer = Viewer(session, refresh_s=window.refresh_s)
     session.input_waits = window.input_waits
-    open_panels.load_layout()
+    layout.load()
     try:
         if options.screenshot is None:
             window.run(viewer, until=interrupted)
@@ -100,7 +100,7 @@ def _run(window: Window, scene: Path | None, options: View, interrupted: Interru
         _tell(session.jobs.notes, session.release())
         return
     if options.screenshot is None:
-        open_panels.save_layout()
+        layout.save()
         session.settings = replace(session.settings, window=place)
         _tell((), session.close())
     else:

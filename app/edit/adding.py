@@ -1,4 +1,4 @@
-"""New objects: the primitives by name, put where there is room and where they can be seen."""
+"""New objects: the primitives by name, placed where there is room and where they can be seen."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ RECEIVERS = ("plane", "disc")
 def add_object(scene: Scene, shape: str) -> Scene:
     """With one of `SHAPES` at the end: glass beside the other objects, or a diffuse receiver below them.
 
-    It is as large as the rest of the scene asks for and stands upright, whichever axis is up.
+    Its size suits the rest of the scene, and it is upright, whichever axis is up.
     """
     if shape not in SHAPES:
         raise UserError(f"there is no shape '{shape}'{suggestion(shape, SHAPES) or '; known are ' + ', '.join(SHAPES)}")

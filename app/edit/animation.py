@@ -44,7 +44,7 @@ class Track:
     """From each key to the next."""
 
     def at(self, time_s: float) -> float:
-        """The value at a time; before the first key and after the last it stands still."""
+        """The value at a time; before the first key and after the last it is constant."""
         times, values = self.times_s, self.values
         if time_s <= times[0]:
             return values[0]
@@ -87,7 +87,7 @@ class Animation:
     start: Stage
     tracks: tuple[Track, ...]
     times_s: tuple[float, ...]
-    """Of the frames."""
+    """Times of the frames."""
 
     def frame(self, index: int) -> Stage:
         """The stage at a frame: a function of its time alone."""
@@ -105,7 +105,7 @@ def turntable(stage: Stage, frames: int, fps: float, turns: float = 1.0) -> Anim
 
 
 def with_turntable(animation: Animation, turns: float = 1.0) -> Animation:
-    """`animation` while the camera goes round at an even pace; all frames together are whole turns."""
+    """`animation` while the camera turns about its target at an even pace; all frames together are whole turns."""
     frames = len(animation.times_s)
     first = animation.times_s[0]
     step = animation.times_s[1] - first if frames > 1 else 1.0
@@ -140,7 +140,7 @@ def keyed(stage: Stage, tracks: Sequence[Track], frames: int | None, fps: float)
 
 
 def tracks_of(keys: Iterable[Key], interpolations: Sequence[Interpolation] = ()) -> tuple[Track, ...]:
-    """Tracks of loose keys, in the order in which parameters first appear; of two keys at one time the later stands.
+    """Tracks of loose keys, in the order in which parameters first appear; of two keys at one time the later counts.
 
     `interpolations`: one a key; without them all are smooth.
     """

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import sys
 import threading
 import time
 from collections.abc import Callable
@@ -24,6 +23,7 @@ import msgspec
 from ..base import files
 from ..base.atomic import atomic_output
 from ..base.errors import UserError
+from ..base.locks import lock
 from ..model.geometry.mesh import Mesh, recipe_of
 from ..model.io.scene_file import load_scene
 from ..model.io.scene_save import save_scene
@@ -140,7 +140,7 @@ class Autosave:
     def _start(self, scene: Scene, title: str, original: Path | None, now: float) -> None:
         self._written, self._last_s = scene, now
         note = Note(os.getpid(), title, None if original is None else str(original), time.time())
-        # Scenes are immutable, so a thread may read one while the user goes on editing.
+        # Scenes are immutable, so a thread may read one while the user edits.
         self._thread = threading.Thread(target=self._write, args=(scene, note), name="autosave", daemon=True)
         self._thread.start()
 
@@ -150,7 +150,8 @@ class Autosave:
             with files.own_files():  # refers to the scene's meshes and pictures in place
                 save_scene(scene, self._path)
             if self._lock is None:
-                self._lock = _locked(self._path.with_suffix(".lock"))
+                self._lock = self._path.with_suffix(".lock").open("w", encoding="utf-8")
+                lock(self._lock.fileno())
             with atomic_output(self._path.with_suffix(".json")) as temporary:
                 temporary.write_bytes(msgspec.json.encode(note))
             self.problem = None
@@ -190,32 +191,10 @@ def _remove(path: Path) -> None:
         shutil.rmtree(path.parent / f"{path.stem}_{what}", ignore_errors=True)
 
 
-def _locked(path: Path) -> IO[str]:
-    """The open lock file `path`, locked until it is closed or this process ends."""
-    file = path.open("w", encoding="utf-8")
-    _try_lock(file)
-    return file
-
-
 def _is_held(path: Path) -> bool:
     """Whether a running process holds the lock file `path`."""
     try:
         with path.open("r+", encoding="utf-8") as file:
-            return not _try_lock(file)
+            return lock(file.fileno()) is False
     except OSError:
         return False  # there is no lock file
-
-
-def _try_lock(file: IO[str]) -> bool:
-    try:
-        if sys.platform == "win32":
-            import msvcrt
-
-            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
-        else:
-            import fcntl
-
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        return False
-    return True

@@ -1,8 +1,8 @@
 """The dispersion brush: from the cursor's way over a receiver to dabs on it.
 
-Paint flows by time: a stroke lays `strength` doublings a second, spread evenly along the way since the last frame, so
-the result depends on how long a place was painted and not on the frame rate. Dabs stand a quarter of
-the radius apart; painting where a dab of the same stroke stands already makes that one stronger, so
+Paint flows by time: a stroke adds `strength` doublings a second, spread evenly along the way since the last frame, so
+the result depends on how long a place was painted and not on the frame rate. Dabs are a quarter of
+the radius apart; painting where a dab of the same stroke is already makes that one stronger, so
 that a stroke of many seconds stays a few dozen dabs.
 """
 
@@ -14,6 +14,7 @@ import numpy as np
 
 from ..model.local_dispersion import plane_of
 from ..model.scene import Dab, Scene, SceneObject, Vec3
+from .objects import with_dabs
 from .projection import View
 from .state import Brush
 
@@ -22,7 +23,7 @@ SPACING = 0.25
 FIRST_TOUCH_S = 0.1
 """What a mere click is worth, seconds of painting."""
 MIN_RADIUS, MAX_RADIUS = 1e-3, 0.5
-"""Of the brush, as shares of the picture's height at the cursor's distance."""
+"""Radii of the brush, as shares of the picture's height at the cursor's distance."""
 USUAL_RADIUS = 0.01
 """Likewise, to begin with."""
 RADIUS_STEP = 1.15
@@ -76,7 +77,7 @@ def begin(scene: Scene, object_index: int, brush: Brush, position: Vec3) -> Stro
 
 
 def extend(stroke: Stroke, scene: Scene, position: Vec3, dt: float) -> Stroke:
-    """The stroke after the cursor went to `position` in `dt` seconds (it may stand still)."""
+    """The stroke after the cursor moved to `position` in `dt` seconds (it may rest)."""
     item = scene.objects[stroke.object_index]
     start, end = np.asarray(stroke.last, float), np.asarray(position, float)
     steps = max(1, int(np.ceil(np.linalg.norm(end - start) / (SPACING * stroke.brush.radius))))
@@ -86,10 +87,8 @@ def extend(stroke: Stroke, scene: Scene, position: Vec3, dt: float) -> Stroke:
 
 def applied(scene: Scene, stroke: Stroke) -> Scene:
     """The scene with the stroke on its receiver."""
-    from . import edits
 
-    item = scene.objects[stroke.object_index]
-    return edits.with_object(scene, stroke.object_index, replace(item, local_dispersion=stroke.before + stroke.dabs))
+    return with_dabs(scene, stroke.object_index, stroke.before + stroke.dabs)
 
 
 def object_radius(item: SceneObject, radius: float) -> float:
@@ -115,12 +114,13 @@ def _deposited(stroke: Stroke, item: SceneObject, places: list[np.ndarray], seco
         if near is None:
             dabs.append(fresh)
         else:
-            dabs[near] = _stronger(dabs[near], fresh)
+            dab, erase = dabs[near], 1.0 - (1.0 - dabs[near].erase) * (1.0 - fresh.erase)
+            dabs[near] = replace(dab, log2_gain=dab.log2_gain + fresh.log2_gain, erase=erase)
     return replace(stroke, dabs=tuple(dabs))
 
 
 def _near(dabs: list[Dab], place: np.ndarray, spacing: float) -> int | None:
-    """The dab nearest to a place, where it lies within the spacing."""
+    """The dab nearest to a place, where it is within the spacing."""
     if not dabs:
         return None
     distance = np.linalg.norm(np.array([dab.position for dab in dabs]) - place, axis=1)
@@ -135,10 +135,6 @@ def _dab(brush: Brush, place: np.ndarray, radius: float, seconds: float) -> Dab:
         return Dab(position, radius, 0.0, brush.falloff, erase=1.0 - float((1.0 - share) ** (seconds * _ERASER_HASTE)))
     sign = 1.0 if brush.mode == "widen" else -1.0
     return Dab(position, radius, sign * brush.strength * seconds, brush.falloff)
-
-
-def _stronger(dab: Dab, more: Dab) -> Dab:
-    return replace(dab, log2_gain=dab.log2_gain + more.log2_gain, erase=1.0 - (1.0 - dab.erase) * (1.0 - more.erase))
 
 
 def ring(position: Vec3, normal: Vec3, radius: float) -> np.ndarray:

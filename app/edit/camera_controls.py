@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..model.placement import rotation_about
 from ..model.scene import Camera, Vec3
 from ..model.scene_camera import camera_frame
 from ..model.vectors import vec3
@@ -30,22 +31,15 @@ _MIN_DISTANCE = 1e-4
 """Share of the pivot's distance that a zoom may come near in one step."""
 
 
-def _turn(axis: np.ndarray, angle: float) -> np.ndarray:
-    """Rotation matrix (3, 3), right-handed, by Rodrigues."""
-    x, y, z = axis
-    k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * (k @ k)
-
-
 def _rotated(camera: Camera, pivot: np.ndarray, yaw: float, pitch: float) -> Camera:
-    """Turned by `yaw` about `up` and by `pitch` (positive looks further up) about the camera's right, both through
+    """Turned by `yaw` about `up` and by `pitch` (positive is upwards) about the camera's right, both through
     `pivot`."""
     axis = np.asarray(camera.up, float) / np.linalg.norm(camera.up)
     right, _, forward = camera_frame(camera)
     elevation = float(np.arcsin(np.clip(forward @ axis, -1.0, 1.0)))
     limit = max(STEEPEST, abs(elevation))
     pitch = float(np.clip(elevation + pitch, -limit, limit)) - elevation
-    turn = _turn(axis, yaw) @ _turn(right, pitch)
+    turn = rotation_about(vec3(axis), yaw) @ rotation_about(vec3(right), pitch)
     position, target = np.asarray(camera.position, float), np.asarray(camera.target, float)
     new_position = pivot + turn @ (position - pivot)
     # The distance is restored, so that thousands of small turns do not drift.
@@ -67,7 +61,7 @@ def look(camera: Camera, dx: float, dy: float) -> Camera:
 
 
 def pan(camera: Camera, dx: float, dy: float, depth: float | None = None) -> Camera:
-    """Move across the view so that what lies at `depth` (scene units ahead; else the target's) follows the cursor."""
+    """Move across the view so that what is at `depth` (scene units ahead; else the target's) follows the cursor."""
     view = View.of(camera, 1.0)
     height = view.height_at(depth if depth is not None and depth > 0.0 else view.target_distance)
     return _moved(camera, height * (-dx * view.right + dy * view.up))
@@ -113,7 +107,7 @@ def dolly(camera: Camera, dy: float) -> Camera:
 def fly(camera: Camera, keys: tuple[float, float, float], speed: float, dt: float) -> Camera:
     """Fly by `keys` (right, up, forward; −1 to 1 each) at `speed` scene units a second for `dt` seconds.
 
-    Up is the camera's `up`, so that E rises and Q sinks whatever it looks at. Ahead of an
+    Up is the camera's `up`, so that E rises and Q sinks whatever the view. Ahead of an
     orthographic camera nothing grows, so forward shrinks its extent.
     """
     right, _, forward = camera_frame(camera)
@@ -153,7 +147,7 @@ def frame(camera: Camera, low: Vec3 | np.ndarray, high: Vec3 | np.ndarray, aspec
 
 
 def focus_at(camera: Camera, point: Vec3 | np.ndarray) -> Camera:
-    """The lens focused on the plane through a point; where that lies behind it, as it was."""
+    """The lens focused on the plane through a point; where that is behind it, as it was."""
     depth = float(camera_frame(camera)[2] @ np.subtract(point, camera.position))
     return replace(camera, focus_distance=depth) if depth > 0.0 else camera
 

@@ -1,6 +1,6 @@
-"""What colour a spectrum has: chromaticity, dominant wavelength, purity, temperature (CIE 15:2004, sections 7 to 9).
+"""The colour of a spectrum: chromaticity, dominant wavelength, purity, temperature (CIE 15:2004, sections 7 to 9).
 
-By colour-science, which takes about a second to import: `ready` does that beside the interface.
+By colour-science, which takes about a second to import: `ready` does that on a thread.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _KELVIN = (1000.0, 1e5)
 
 @dataclass(frozen=True)
 class ColourInfo:
-    """Of one spectrum."""
+    """The colour of one spectrum."""
 
     illuminance: float
     """lm/unit², when the spectrum is an irradiance in W/unit²/nm."""
@@ -37,7 +37,7 @@ class ColourInfo:
     dominant_nm: float | None
     """Wavelength of the spectral colour on the line from D65 through (x, y), to a nanometre; None for greys."""
     is_complementary: bool
-    """A purple: `dominant_nm` then lies on the other side of white."""
+    """A purple: `dominant_nm` is then on the other side of white."""
     purity: float
     """Excitation purity: distance from white over that of the border."""
     temperature_k: float | None
@@ -45,7 +45,7 @@ class ColourInfo:
 
 
 def ready() -> bool:
-    """Whether `colour_info` answers at once; the first call begins to see to that, in a thread."""
+    """Whether `colour_info` answers at once; the first call begins the import, in a thread."""
     thread = _loading()
     return not thread.is_alive()
 
@@ -94,7 +94,7 @@ def _described(x: float, y: float) -> tuple[float | None, bool, float, float | N
 
 
 def _temperature_k(x: float, y: float) -> float | None:
-    """Of the black body nearest in CIE 1960 uv, by our own tables: D65 has 6,504 K and a black body its own."""
+    """Temperature of the black body nearest in CIE 1960 uv, by our own tables: D65 has 6,504 K."""
     kelvin, locus = _planckian_locus()
     place = np.array([4.0 * x, 6.0 * y]) / (12.0 * y - 2.0 * x + 3.0)
     start, way = locus[:-1], np.diff(locus, axis=0)

@@ -1,4 +1,4 @@
-"""The scene being worked on: where it came from, where it goes, and every step since.
+"""The scene being worked on: its file, and every step since it was opened.
 
 Saving writes a whole file or none: what was on the disk stays until the new one is complete.
 A bare mesh and the scenes that come with the program are starting points, not files to write back
@@ -37,9 +37,9 @@ class Document:
     ) -> None:
         self.history = History(scene)
         self.opening = opening
-        """What was asked for when it was opened."""
+        """How it was opened."""
         self.path = path
-        """Where saving without a name goes; None asks for one."""
+        """The file that saving without a name writes; None asks for one."""
         self.source = source
         """The file it was opened from or saved to, for the list of recent files."""
         self._original = source if source is not None and source.suffix.lower() in GLTF_SUFFIXES else None
@@ -122,7 +122,7 @@ class Document:
             save_gltf(scene, target, self._readable_original())
             self._original = target
         else:
-            # Of the file it came from, also under another name: what stands at that name is another scene's.
+            # With the comments of the file it came from, also under another name: a file there is another scene's.
             save_scene(scene, target, words_from=self.source)
         self.path = self.source = target
         self.history.mark_saved(scene)

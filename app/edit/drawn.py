@@ -17,7 +17,7 @@ _T = TypeVar("_T")
 
 
 class Drawn:
-    """Remembers the last scenes that it made: a picture that stands still must not be begun anew in every frame."""
+    """Remembers the last scenes that it made: a still picture must not be begun anew in every frame."""
 
     def __init__(self) -> None:
         self._staged = _Last()

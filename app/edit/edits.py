@@ -1,6 +1,6 @@
 """Everything a panel can do to a scene: pure functions `edit(scene, …) -> Scene`, checked like a scene file.
 
-A panel writes `return edits.attempt(state, "Move prism", edits.set_position, index, position)`: what is refused
+A panel writes `return edits.attempt(state, "Move prism", set_position, index, position)`: what is refused
 becomes a sentence on the screen and the scene stays.
 """
 
@@ -15,88 +15,8 @@ import numpy as np
 from ..base.errors import UserError
 from ..model.scene import Camera, RenderDefaults, Scene, Vec3
 from ..model.scene_render import MAX_ANISOTROPY, MAX_BOUNCES, MAX_DEPTH, MAX_GLARE, MAX_HAZE, MAX_PICTURE_SIDE
-from .adding import RECEIVERS, SHAPES, add_object
-from .glass import (
-    abbe_numbers,
-    set_absorption,
-    set_dispersion,
-    set_dispersion_gain,
-    set_priority,
-)
-from .lights import (
-    add_light,
-    delete_light,
-    duplicate_light,
-    light_power,
-    photometric_key,
-    rename_light,
-    set_light,
-    set_light_file,
-    set_light_kind,
-    set_light_power,
-    set_light_spectrum,
-    spectrum_words,
-)
-from .matrices import compose, decompose
-from .objects import (
-    add_dabs,
-    clear_dabs,
-    delete,
-    duplicate,
-    make_glass,
-    rename,
-    set_diffuse_colour,
-    set_material,
-    set_position,
-    set_rotation,
-    set_scale,
-    set_transform,
-    with_object,
-)
 from .requests import Notice
 from .state import State
-
-__all__ = [
-    "RECEIVERS",
-    "SHAPES",
-    "abbe_numbers",
-    "add_dabs",
-    "add_light",
-    "add_object",
-    "attempt",
-    "clear_dabs",
-    "compose",
-    "decompose",
-    "delete",
-    "delete_light",
-    "duplicate",
-    "duplicate_light",
-    "light_power",
-    "make_glass",
-    "photometric_key",
-    "rename",
-    "rename_light",
-    "set_absorption",
-    "set_background",
-    "set_camera",
-    "set_diffuse_colour",
-    "set_dispersion",
-    "set_dispersion_gain",
-    "set_light",
-    "set_light_file",
-    "set_light_kind",
-    "set_light_power",
-    "set_light_spectrum",
-    "set_material",
-    "set_position",
-    "set_priority",
-    "set_render_defaults",
-    "set_rotation",
-    "set_scale",
-    "set_transform",
-    "spectrum_words",
-    "with_object",
-]
 
 
 def attempt(state: State, label: str, edit: Callable[..., Scene], *args: object, **kwargs: object) -> State:
@@ -106,6 +26,12 @@ def attempt(state: State, label: str, edit: Callable[..., Scene], *args: object,
     except UserError as error:
         text = str(error)
         return state.asking(Notice(text[:1].upper() + text[1:] + ".", is_error=True))
+
+
+def render_changed(state: State, label: str, **changes: float) -> State:
+    """`state` with other defaults of its scene's rendering (`set_render_defaults`), as it is where they are those."""
+    is_same = all(getattr(state.scene.render, key) == value for key, value in changes.items())
+    return state if is_same else attempt(state, label, set_render_defaults, **changes)
 
 
 def set_background(scene: Scene, rgb: Vec3) -> Scene:
@@ -130,7 +56,7 @@ def set_render_defaults(scene: Scene, **changes: float) -> Scene:
     for key, (low, high) in limits.items():
         value = getattr(render, key)
         if not low <= value <= high:
-            raise UserError(f"{key.replace('_', ' ')} is {value:g} but must lie between {low} and {high}")
+            raise UserError(f"{key.replace('_', ' ')} is {value:g} but must be between {low} and {high}")
     return replace(scene, render=render)
 
 
@@ -139,7 +65,7 @@ def set_camera(scene: Scene, camera: Camera) -> Scene:
     turned aside."""
     forward = np.subtract(camera.target, camera.position)
     if not np.isfinite(forward).all() or np.linalg.norm(forward) < 1e-150:
-        raise UserError("the camera looks at its own position; choose another target")
+        raise UserError("the camera's target is its own position; choose another target")
     forward = forward / np.linalg.norm(forward)
     if np.linalg.norm(np.cross(forward, camera.up)) < 1e-6 * np.linalg.norm(camera.up):
         across = np.eye(3)[int(np.argmin(np.abs(forward)))]

@@ -1,8 +1,7 @@
-"""Edits of what lies behind everything, and of the pictures that surfaces wear: pure functions from a scene to the
-scene that results.
+"""Edits of the environment, and of the pictures on surfaces: pure functions from a scene to the scene that results.
 
 An environment is one picture whatever it was made of (`model.environment`), so an edit makes it anew from its
-parameters. Where only the way it hangs changes, the picture itself stays: the renderer then keeps it on the device.
+parameters. Where only its rotation changes, the picture itself stays: the renderer then keeps it on the device.
 """
 
 from __future__ import annotations
@@ -15,24 +14,24 @@ from typing import Any, Literal
 import numpy as np
 
 from ..base.errors import UserError
+from ..base.tone_map import LUMINANCE_709
 from ..model.environment import constant, from_map, gradient, sky, up_and_rotation, world_to_local
 from ..model.lights.directional import DirectionalLight
 from ..model.scene import Diffuse, Light, Scene, Vec3
 from ..model.scene_defaults import environment_of
 from ..model.texture import Environment, Texture, TextureReader
 from ..model.vectors import vec3
+from . import objects
 from .adding import up_frame
 
 ENVIRONMENT_SUFFIXES = (".hdr", ".exr", ".pic", ".npy", ".png", ".jpg", ".jpeg")
 TEXTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".exr", ".hdr", ".npy")
 _SKY_SHARE = 0.3
-"""Of the radiance of a white surface in the scene's light: a first sky is seen and outshines nothing."""
+"""Share of the radiance of a white surface in the scene's light: a first sky is seen and outshines nothing."""
 _ABSOLUTE = 10.0
 """A panorama within this factor of what suits the lights is taken to be in absolute units."""
 _SUN_DEG = 10.0
 """Apparent size beyond which a directional light is no sun."""
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-"""Of linear Rec.709."""
 _ZENITH, _HORIZON, _NADIR = (0.25, 0.45, 0.9), (0.9, 0.95, 1.0), (0.2, 0.18, 0.16)
 
 
@@ -82,7 +81,7 @@ def set_sky(scene: Scene, **changes: object) -> Scene:
 
 
 def set_environment_map(scene: Scene, path: Path) -> Scene:
-    """The panorama in `path`, hung as the present one is; a first one as bright as suits the scene's lights. Raises
+    """The panorama in `path`, turned as the present one is; a first one as bright as suits the scene's lights. Raises
     UserError where it cannot be used."""
     now, notes = scene.environment, list(scene.notes)
     if now is not None and now.kind == "map":
@@ -106,8 +105,8 @@ def set_map_rotation(scene: Scene, rotation_deg: float) -> Scene:
     if not math.isfinite(rotation_deg):
         raise UserError("the rotation of the environment must be a finite angle")
     up, _ = up_and_rotation(now)
-    told = dict(now.parameters) | {"rotation_deg": float(rotation_deg)}
-    return replace(scene, environment=replace(now, world_to_local=world_to_local(up, rotation_deg), parameters=told))
+    kept = dict(now.parameters) | {"rotation_deg": float(rotation_deg)}
+    return replace(scene, environment=replace(now, world_to_local=world_to_local(up, rotation_deg), parameters=kept))
 
 
 def set_map_intensity(scene: Scene, intensity: float) -> Scene:
@@ -128,8 +127,8 @@ def set_map_intensity(scene: Scene, intensity: float) -> Scene:
             f"an intensity of {intensity:g} takes the environment's brightest value out of range; choose a smaller one"
         )
     rgb.setflags(write=False)
-    told = {"rotation_deg": rotation_deg, "up": list(up)} | dict(now.parameters) | {"intensity": float(intensity)}
-    return replace(scene, environment=replace(now, rgb=rgb, parameters=told))
+    kept = {"rotation_deg": rotation_deg, "up": list(up)} | dict(now.parameters) | {"intensity": float(intensity)}
+    return replace(scene, environment=replace(now, rgb=rgb, parameters=kept))
 
 
 def set_constant(scene: Scene, radiance: Vec3) -> Scene:
@@ -139,13 +138,13 @@ def set_constant(scene: Scene, radiance: Vec3) -> Scene:
 
 
 def set_environment_lights(scene: Scene, lights: bool) -> Scene:
-    """Whether what lies beyond lights what is diffuse. Raises UserError where there is only a background."""
+    """Whether the environment lights what is diffuse. Raises UserError where there is only a background."""
     now = scene.environment
     if now is None:
         raise UserError("a plain background lights nothing; choose a gradient, a sky or a picture")
-    told = {key: value for key, value in now.parameters.items() if key != "lights"}
-    told |= {} if lights else {"lights": False}
-    return replace(scene, environment=replace(now, lights=lights, parameters=told))
+    kept = {key: value for key, value in now.parameters.items() if key != "lights"}
+    kept |= {} if lights else {"lights": False}
+    return replace(scene, environment=replace(now, lights=lights, parameters=kept))
 
 
 def map_intensity(environment: Environment) -> float:
@@ -157,7 +156,7 @@ def map_intensity(environment: Environment) -> float:
 
 
 def set_texture(scene: Scene, index: int, path: Path, wrap: Literal["repeat", "clamp"] = "repeat") -> Scene:
-    """Let diffuse object `index` wear the picture in `path`; a first picture is shown in its own colours, not tinted by
+    """Put the picture in `path` on diffuse object `index`; a first picture is shown in its own colours, not tinted by
     the object's.
 
     Raises UserError for an object that is not diffuse or has no texture coordinates, and for a picture that cannot be
@@ -165,25 +164,25 @@ def set_texture(scene: Scene, index: int, path: Path, wrap: Literal["repeat", "c
     item = scene.objects[index]
     material = _diffuse(scene, index)
     if item.mesh.uv is None:
-        raise UserError(f"'{item.name}': its mesh has no texture coordinates to lay a picture on; export it with them")
+        raise UserError(f"'{item.name}': its mesh has no texture coordinates for a picture; export it with them")
     reader = TextureReader()
     texture = _worn_already(scene, path, wrap) or reader.load(path, wrap)
     colour: Vec3 = material.reflectance_rgb if material.texture is not None else (1.0, 1.0, 1.0)
     worn = material.changed(reflectance_rgb=colour, reflectance=None, texture=texture)
-    return _with_material(replace(scene, notes=(*scene.notes, *reader.notes)), index, worn)
+    return objects.changed(replace(scene, notes=(*scene.notes, *reader.notes)), index, material=worn)
 
 
 def set_texture_wrap(scene: Scene, index: int, wrap: Literal["repeat", "clamp"]) -> Scene:
     """Whether the picture of object `index` repeats beyond its border."""
     material = _diffuse(scene, index)
     if material.texture is None:
-        raise UserError(f"'{scene.objects[index].name}' wears no picture; choose one first")
-    return _with_material(scene, index, replace(material, texture=replace(material.texture, wrap=wrap)))
+        raise UserError(f"'{scene.objects[index].name}' has no picture; choose one first")
+    return objects.changed(scene, index, material=replace(material, texture=replace(material.texture, wrap=wrap)))
 
 
 def clear_texture(scene: Scene, index: int) -> Scene:
     """Object `index` in its plain colour."""
-    return _with_material(scene, index, replace(_diffuse(scene, index), texture=None))
+    return objects.changed(scene, index, material=replace(_diffuse(scene, index), texture=None))
 
 
 # -- parts ----------------------------------------------------------------------------------
@@ -202,7 +201,7 @@ def _without_environment(scene: Scene) -> Scene:
 
 def _of_kind(scene: Scene, kind: str) -> Environment:
     if scene.environment is None or scene.environment.kind != kind:
-        raise UserError(f"what lies behind the scene is no {kind}; choose that kind first")
+        raise UserError(f"the environment of the scene is no {kind}; choose that kind first")
     return scene.environment
 
 
@@ -214,13 +213,8 @@ def _vectors(parameters: dict[str, Any]) -> dict[str, Any]:
 def _diffuse(scene: Scene, index: int) -> Diffuse:
     material = scene.objects[index].material
     if not isinstance(material, Diffuse):
-        raise UserError(f"'{scene.objects[index].name}' is not diffuse and wears no picture; make it diffuse first")
+        raise UserError(f"'{scene.objects[index].name}' is not diffuse and can have no picture; make it diffuse first")
     return material
-
-
-def _with_material(scene: Scene, index: int, material: Diffuse) -> Scene:
-    item = replace(scene.objects[index], material=material)
-    return replace(scene, objects=(*scene.objects[:index], item, *scene.objects[index + 1 :]))
 
 
 def _worn_already(scene: Scene, path: Path, wrap: str) -> Texture | None:
@@ -236,7 +230,7 @@ def _worn_already(scene: Scene, path: Path, wrap: str) -> Texture | None:
 def _usual_radiance(scene: Scene) -> float:
     """Radiance, lm/(sr unit²), of a background that suits the scene's lights; the present one's where there is one."""
     if max(scene.background_rgb) > 0.0:
-        return float(np.dot(scene.background_rgb, _LUMINANCE))
+        return float(np.dot(scene.background_rgb, LUMINANCE_709))
     # The faintest: a beam may be thousands of times as bright as what is round it.
     lit = min((_illuminance(light, scene) for light in scene.lights), default=0.0)
     level = _SKY_SHARE * lit / math.pi
@@ -247,7 +241,7 @@ def _mean_luminance(environment: Environment) -> float:
     """Over all directions."""
     height = len(environment.rgb)
     weight = np.sin(np.pi * (np.arange(height) + 0.5) / height)
-    return float(weight @ (environment.rgb.mean(axis=1, dtype=np.float64) @ _LUMINANCE) / weight.sum())
+    return float(weight @ (environment.rgb.mean(axis=1, dtype=np.float64) @ LUMINANCE_709) / weight.sum())
 
 
 def _illuminance(light: Light, scene: Scene) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 from ..base.errors import UserError
 from ..model.materials.absorption import MAX_ATTENUATION
@@ -13,6 +14,7 @@ from ..model.optics.glass import Dispersion
 from ..model.optics.tints import Tint
 from ..model.scene import Absorption, Dielectric, Scene, Vec3
 from ..model.scene_checks import check_lines
+from .objects import changed
 
 
 def set_dispersion(scene: Scene, index: int, dispersion: Dispersion) -> Scene:
@@ -20,16 +22,17 @@ def set_dispersion(scene: Scene, index: int, dispersion: Dispersion) -> Scene:
 
     Raises UserError where the object is not glass, or a light has a line outside the glass's data.
     """
-    changed = _with_glass(scene, index, replace(_glass(scene, index), dispersion=dispersion))
+    after = _with_glass(scene, index, dispersion=dispersion)
     if dispersion.range_nm != _glass(scene, index).dispersion.range_nm:
         for light in scene.lights:
-            check_lines(light, [changed.objects[index]], scene.name)
-    return changed
+            check_lines(light, [after.objects[index]], scene.name)
+    return after
 
 
 def set_dispersion_gain(scene: Scene, index: int, gain: float) -> Scene:
     """Factor on n(λ) − n_d of object `index`: 0 none, 1 as in nature."""
-    return set_dispersion(scene, index, glass.with_gain(_glass(scene, index).dispersion, gain, _where(scene, index)))
+    gained = glass.with_gain(_glass(scene, index).dispersion, gain, scene.objects[index].name)
+    return set_dispersion(scene, index, gained)
 
 
 def abbe_numbers(dispersion: Dispersion) -> tuple[float, float]:
@@ -50,36 +53,36 @@ def set_absorption(scene: Scene, index: int, colour: Vec3 | None, distance: floa
     """White light takes this colour (linear Rec.709, 0 to 1) after `distance` scene units of object `index`; None is
     clear."""
     if colour is None:
-        return _with_glass(scene, index, replace(_glass(scene, index), absorption=None))
+        return _with_glass(scene, index, absorption=None)
     if not (math.isfinite(distance) and distance > 0.0):
         raise UserError(
-            f"{_where(scene, index)}: the distance of the absorption is {distance:g}; give a length above 0"
+            f"{scene.objects[index].name}: the distance of the absorption is {distance:g}; give a length above 0"
         )
-    absorption = Absorption.of_colour(colour, distance, _where(scene, index))
+    absorption = Absorption.of_colour(colour, distance, scene.objects[index].name)
     if absorption.coefficient.max() > MAX_ATTENUATION:
         raise UserError(
-            f"{_where(scene, index)}: the glass would be opaque within {1.0 / MAX_ATTENUATION:g} units; choose a "
+            f"{scene.objects[index].name}: the glass would be opaque within {1.0 / MAX_ATTENUATION:g} units; choose a "
             "longer distance"
         )
-    return _with_glass(scene, index, replace(_glass(scene, index), absorption=absorption))
+    return _with_glass(scene, index, absorption=absorption)
 
 
 def set_tint(scene: Scene, index: int, tint: Tint, distance: float) -> Scene:
     """Colour object `index` so that daylight is half as bright after `distance` scene units."""
     if not (math.isfinite(distance) and distance > 0.0):
-        raise UserError(f"{_where(scene, index)}: the distance of the tint is {distance:g}; give a length above 0")
+        raise UserError(f"{scene.objects[index].name}: the distance of the tint is {distance:g}; give a length above 0")
     alpha = tint.coefficient / distance
     alpha.setflags(write=False)
-    return _with_glass(scene, index, replace(_glass(scene, index), absorption=Absorption(alpha)))
+    return _with_glass(scene, index, absorption=Absorption(alpha))
 
 
 def set_priority(scene: Scene, index: int, priority: int) -> Scene:
     """Which of overlapping solids decides the medium: the higher priority."""
     if abs(priority) > MAX_PRIORITY:
         raise UserError(
-            f"{_where(scene, index)}: the priority is {priority}; give a whole number within ±{MAX_PRIORITY}"
+            f"{scene.objects[index].name}: the priority is {priority}; give a whole number within ±{MAX_PRIORITY}"
         )
-    return _with_glass(scene, index, replace(_glass(scene, index), priority=int(priority)))
+    return _with_glass(scene, index, priority=int(priority))
 
 
 def _glass(scene: Scene, index: int) -> Dielectric:
@@ -89,10 +92,5 @@ def _glass(scene: Scene, index: int) -> Dielectric:
     return material
 
 
-def _with_glass(scene: Scene, index: int, material: Dielectric) -> Scene:
-    item = replace(scene.objects[index], material=material)
-    return replace(scene, objects=(*scene.objects[:index], item, *scene.objects[index + 1 :]))
-
-
-def _where(scene: Scene, index: int) -> str:
-    return scene.objects[index].name
+def _with_glass(scene: Scene, index: int, **changes: Any) -> Scene:
+    return changed(scene, index, material=replace(_glass(scene, index), **changes))

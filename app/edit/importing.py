@@ -1,4 +1,4 @@
-"""A mesh, a glTF file or another scene brought into the one that is open: its objects, beside those there are."""
+"""Objects of a mesh, a glTF file or another scene, added to the scene that is open."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ def import_objects(scene: Scene, path: Path) -> Scene:
     """`scene` with the objects of the file at `path` at its end, under names of their own.
 
     A bare mesh, which knows no unit, is brought to the scene's size where it is off by more than twenty times, and
-    its parts stand together beside the others; objects of scenes and glTF files stay where those have them. Lights,
-    cameras and what was added to light and to catch a bare file's caustic are left out. Raises UserError for what
-    cannot be opened.
+    its parts are placed together next to the others; objects of scenes and glTF files stay where those have them.
+    Lights, cameras and what was added to light and to catch a bare file's caustic are left out. Raises UserError for
+    what cannot be opened.
     """
     is_mesh = path.suffix.lower() in MESH_SUFFIXES
     brought = objects_of_mesh(path, AS_FOUND, []) if is_mesh else list(open_scene(path).objects)

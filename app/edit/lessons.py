@@ -33,7 +33,7 @@ class Lesson:
     steps: tuple[str, ...]
     ray_count: int = 5
     reflections: int = 0
-    """Of the rays within the object, before they leave it."""
+    """Reflections of the rays within the object, before they leave it."""
 
     @property
     def path(self) -> Path:

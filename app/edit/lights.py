@@ -101,7 +101,7 @@ def _in_view(scene: Scene, light: Light, view: View) -> Light:
 
 
 def duplicate_light(scene: Scene, index: int) -> Scene:
-    """With a copy of light `index` at the end, a little to the side so that the two can be told apart."""
+    """With a copy of light `index` at the end, a little to the side so that the two can be distinguished."""
     light = scene.lights[index]
     frame = up_frame(scene)
     copy = replace(light, name=free_name(light.name, [other.name for other in scene.lights]))

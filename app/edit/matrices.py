@@ -1,8 +1,8 @@
-"""Position, rotation and scale of a placement: the only file that speaks pyrr.
+"""Position, rotation and scale of a placement: the only file that uses pyrr.
 
 pyrr's quaternions and matrices rotate opposite ways, so quaternions are not used here at all.
 Its 3×3 rotation matrices, applied to column vectors as everywhere in this program
-(p_world = M @ p_object), turn right-handed; tests pin that. Angles are about the fixed axes
+(p_world = M @ p_object), turn right-handed; tests hold that. Angles are about the fixed axes
 x, then y, then z, as `rotation_deg` of a scene file: R = Rz Ry Rx.
 """
 
@@ -39,13 +39,13 @@ def compose(position: Vec3, rotation_deg: Vec3, scale: Vec3) -> np.ndarray:
 def decompose(matrix: np.ndarray) -> Placement:
     """Position, rotation and scale of an object-to-world matrix: the inverse of `compose`.
 
-    Angles lie in (-180, 180], that about y in [-90, 90]; at ±90 the angle about x is given as 0. A mirrored
+    Angles are in (-180, 180], that about y in [-90, 90]; at ±90 the angle about x is given as 0. A mirrored
     matrix gets a negative scale on the axis that leaves the smallest rotation. What shears cannot be expressed
     in these terms: the rotation is then that of the nearest rotation matrix.
     """
     linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
     scale = np.linalg.norm(linear, axis=0)
-    axes = _nearest_orthogonal(linear / np.where(scale > 0.0, scale, 1.0))
+    axes = nearest_orthogonal(linear / np.where(scale > 0.0, scale, 1.0))
     if np.linalg.det(axes) < 0.0:
         mirrored = int(np.argmin(np.diagonal(axes)))
         axes[:, mirrored] *= -1.0
@@ -75,7 +75,7 @@ def with_scale(matrix: np.ndarray, scale: Vec3) -> np.ndarray:
     return scaled
 
 
-def _nearest_orthogonal(axes: np.ndarray) -> np.ndarray:
+def nearest_orthogonal(axes: np.ndarray) -> np.ndarray:
     """The polar factor of `axes`: itself, to rounding, where its columns are orthonormal."""
     if np.abs(axes.T @ axes - np.eye(3)).max() < 1e-12:
         return axes.copy()

@@ -41,6 +41,6 @@ def words(points: tuple[Vec3, ...]) -> str:
         return "Click a point: a surface, a ray's bend, a focus."
     if len(points) == 1:
         return "Click the other end."
-    told = " + ".join(f"{length:.4g}" for length in lengths(points)) + " units"
+    text = " + ".join(f"{length:.4g}" for length in lengths(points)) + " units"
     angle = angle_deg(points)
-    return f"{told}. A third point measures the angle." if angle is None else f"{told}, {angle:.2f}°"
+    return f"{text}. A third point measures the angle." if angle is None else f"{text}, {angle:.2f}°"

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -26,7 +27,7 @@ from ..model.scene import (
     SceneObject,
     Vec3,
 )
-from ..model.scene_checks import check_lines, check_outside, check_scene
+from ..model.scene_checks import check_outside, check_scene
 from . import matrices
 from .adding import add_object, beside
 from .names import checked_name, free_name
@@ -35,26 +36,10 @@ MAX_LENGTH = 1e30
 """As in a scene file: float32 ends at 3e38."""
 
 
-def with_object(scene: Scene, index: int, item: SceneObject) -> Scene:
-    """`scene` with object `index` replaced; what changed is checked, live edits stay cheap."""
-    before = scene.objects[index]
-    if item.name != before.name:
-        item = replace(item, name=_free_name(scene, index, item.name))
-    changed = _replaced(scene, index, item)
-    if type(item.material) is not type(before.material):
-        _check_dabs(item)
-        check_scene(changed, scene.name)
-    elif item.local_dispersion is not before.local_dispersion:
-        _check_dabs(item, item.local_dispersion[_shared(before, item) :])
-    if item.material is not before.material and item.material.transmits:
-        for light in scene.lights:
-            check_lines(light, [item], scene.name)
-        if before.material.thin:
-            _check_lights(changed, item)
-    if item.object_to_world is not before.object_to_world:
-        _check_matrix(item)
-        _check_lights(changed, item)
-    return changed
+def changed(scene: Scene, index: int, **changes: Any) -> Scene:
+    """`scene` with other fields of object `index`, unchecked."""
+    item = replace(scene.objects[index], **changes)
+    return replace(scene, objects=(*scene.objects[:index], item, *scene.objects[index + 1 :]))
 
 
 # -- name, number, material -----------------------------------------------------------------
@@ -62,14 +47,17 @@ def with_object(scene: Scene, index: int, item: SceneObject) -> Scene:
 
 def rename(scene: Scene, index: int, name: str) -> Scene:
     """Give object `index` another name. Raises UserError for one that is empty or taken."""
-    return with_object(scene, index, replace(scene.objects[index], name=name))
+    others = [o.name for i, o in enumerate(scene.objects) if i != index]
+    return changed(scene, index, name=checked_name(name, others, "object"))
 
 
 def duplicate(scene: Scene, index: int) -> Scene:
     """With a copy of object `index` at the end, beside the original and sharing its mesh."""
     item = scene.objects[index]
     copy = replace(item, name=free_name(item.name, [o.name for o in scene.objects]))
-    return _appended(scene, beside(scene, [copy])[0])
+    after = replace(scene, objects=(*scene.objects, *beside(scene, [copy])))
+    check_scene(after, scene.name)
+    return after
 
 
 def delete(scene: Scene, index: int) -> Scene:
@@ -89,17 +77,17 @@ def delete(scene: Scene, index: int) -> Scene:
 
 
 def set_material(scene: Scene, index: int, material: Material) -> Scene:
-    """Give object `index` another material; what the dispersion brush painted goes with a diffuse one."""
+    """Give object `index` another material; without a diffuse one, what the dispersion brush painted is lost."""
     item = scene.objects[index]
     dabs = item.local_dispersion if material.receives else ()
-    changed = _replaced(scene, index, replace(item, material=material, local_dispersion=dabs))
-    if _shows_nothing(changed):
+    after = changed(scene, index, material=material, local_dispersion=dabs)
+    if _shows_nothing(after):
         raise UserError(
             f"'{item.name}' is the only surface that receives light; make another object diffuse or add an "
             "environment before changing it"
         )
-    check_scene(changed, scene.name)
-    return changed
+    check_scene(after, scene.name)
+    return after
 
 
 def make_glass(scene: Scene, index: int, glass: str) -> Scene:
@@ -117,7 +105,7 @@ def set_diffuse_colour(scene: Scene, index: int, rgb: Vec3) -> Scene:
     texture is tinted by it."""
     item = scene.objects[index]
     if not all(math.isfinite(c) and 0.0 <= c <= 1.0 for c in rgb):
-        raise UserError(f"'{item.name}': every channel of a reflectance must lie between 0 and 1")
+        raise UserError(f"'{item.name}': every channel of a reflectance must be between 0 and 1")
     colour = (float(rgb[0]), float(rgb[1]), float(rgb[2]))
     match item.material:
         case Diffuse():
@@ -126,7 +114,7 @@ def set_diffuse_colour(scene: Scene, index: int, rgb: Vec3) -> Scene:
             material = Mirror(colour)
         case _:
             raise UserError(f"'{item.name}' is neither diffuse nor a mirror and has no colour")
-    return _replaced(scene, index, replace(item, material=material))
+    return changed(scene, index, material=material)
 
 
 # -- place ----------------------------------------------------------------------------------
@@ -139,14 +127,13 @@ def set_transform(scene: Scene, index: int, matrix: np.ndarray) -> Scene:
     """
     placed = np.array(matrix, dtype=np.float64)
     placed.setflags(write=False)
-    item = replace(scene.objects[index], object_to_world=placed)
-    _check_matrix(item)
-    changed = _replaced(scene, index, item)
-    _check_lights(changed, item)
+    after = changed(scene, index, object_to_world=placed)
+    _check_matrix(after.objects[index])
+    _check_lights(after, after.objects[index])
     before = scene.objects[index].object_to_world
     if not np.allclose(np.linalg.norm(before[:3, :3]), np.linalg.norm(placed[:3, :3]), rtol=1e-9):
-        check_scene(changed, scene.name)  # another size may be too different from the others
-    return changed
+        check_scene(after, scene.name)  # another size may be too different from the others
+    return after
 
 
 def set_position(scene: Scene, index: int, position: Vec3) -> Scene:
@@ -169,10 +156,31 @@ def set_scale(scene: Scene, index: int, scale: Vec3) -> Scene:
 # -- the dispersion brush -------------------------------------------------------------------
 
 
+def with_dabs(scene: Scene, index: int, dabs: tuple[Dab, ...]) -> Scene:
+    """With these dabs of the dispersion brush on receiver `index`. Raises UserError where it receives no light, and for
+    dabs that no scene file could hold."""
+    item, shared = scene.objects[index], 0
+    # A growing stroke is not checked from its start each time.
+    while shared < min(len(dabs), len(item.local_dispersion)) and dabs[shared] is item.local_dispersion[shared]:
+        shared += 1
+    if not item.material.receives:
+        raise UserError(f"'{item.name}' is not diffuse: the dispersion brush paints on what receives the caustic")
+    for dab in dabs[shared:]:
+        if not all(map(math.isfinite, (*dab.position, dab.radius, dab.log2_gain, dab.falloff, dab.erase))):
+            raise UserError(f"'{item.name}': a touch of the brush holds a number that is not finite")
+        if not (0.0 < dab.radius <= MAX_LENGTH and abs(dab.log2_gain) <= MAX_DAB_LOG2):
+            raise UserError(
+                f"'{item.name}': a touch of the brush needs a radius above 0 and a gain within ±{MAX_DAB_LOG2:g} "
+                "doublings"
+            )
+        if not (0.0 <= dab.falloff <= 1.0 and 0.0 <= dab.erase <= 1.0):
+            raise UserError(f"'{item.name}': falloff and eraser of the brush must be between 0 and 1")
+    return changed(scene, index, local_dispersion=dabs)
+
+
 def add_dabs(scene: Scene, index: int, dabs: Sequence[Dab]) -> Scene:
-    """Lay dabs of the dispersion brush on receiver `index`, on top of what is there."""
-    item = scene.objects[index]
-    return with_object(scene, index, replace(item, local_dispersion=item.local_dispersion + tuple(dabs)))
+    """Put dabs of the dispersion brush on receiver `index`, on top of what is there."""
+    return with_dabs(scene, index, (*scene.objects[index].local_dispersion, *dabs))
 
 
 def clear_dabs(scene: Scene, index: int | None = None) -> Scene:
@@ -188,23 +196,9 @@ def clear_dabs(scene: Scene, index: int | None = None) -> Scene:
 # -- checks ---------------------------------------------------------------------------------
 
 
-def _free_name(scene: Scene, index: int, name: str) -> str:
-    return checked_name(name, [o.name for i, o in enumerate(scene.objects) if i != index], "object")
-
-
 def _shows_nothing(scene: Scene) -> bool:
     """Nothing receives light, and there is no environment to be seen (as `check_scene` has it)."""
     return scene.environment is None and not any(o.material.receives for o in scene.objects)
-
-
-def _replaced(scene: Scene, index: int, item: SceneObject) -> Scene:
-    return replace(scene, objects=(*scene.objects[:index], item, *scene.objects[index + 1 :]))
-
-
-def _appended(scene: Scene, item: SceneObject) -> Scene:
-    changed = replace(scene, objects=(*scene.objects, item))
-    check_scene(changed, scene.name)
-    return changed
 
 
 def _check_matrix(item: SceneObject) -> None:
@@ -223,29 +217,3 @@ def _check_lights(scene: Scene, item: SceneObject) -> None:
         for light in scene.lights:
             if light.has_place:
                 check_outside(light, [item], scene.name)
-
-
-def _shared(before: SceneObject, after: SceneObject) -> int:
-    """How many dabs at the beginning are the same ones: a growing stroke is not checked from its start each time."""
-    shared = 0
-    for old, new in zip(before.local_dispersion, after.local_dispersion, strict=False):
-        if old is not new:
-            break
-        shared += 1
-    return shared
-
-
-def _check_dabs(item: SceneObject, dabs: Sequence[Dab] | None = None) -> None:
-    """Raise UserError where dabs (all the object's, if not given) are not what a scene file could hold."""
-    if item.local_dispersion and not item.material.receives:
-        raise UserError(f"'{item.name}' is not diffuse: the dispersion brush paints on what receives the caustic")
-    for dab in item.local_dispersion if dabs is None else dabs:
-        if not all(map(math.isfinite, (*dab.position, dab.radius, dab.log2_gain, dab.falloff, dab.erase))):
-            raise UserError(f"'{item.name}': a touch of the brush holds a number that is not finite")
-        if not (0.0 < dab.radius <= MAX_LENGTH and abs(dab.log2_gain) <= MAX_DAB_LOG2):
-            raise UserError(
-                f"'{item.name}': a touch of the brush needs a radius above 0 and a gain within ±{MAX_DAB_LOG2:g} "
-                "doublings"
-            )
-        if not (0.0 <= dab.falloff <= 1.0 and 0.0 <= dab.erase <= 1.0):
-            raise UserError(f"'{item.name}': falloff and eraser of the brush lie between 0 and 1")

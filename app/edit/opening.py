@@ -1,4 +1,4 @@
-"""A file as it is opened for somebody: the scene in it, with what they asked for beyond what it says."""
+"""The scene in a file, with what the user wants in addition to what it says."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ STUDIO, SKY = "studio", "sky"
 
 @dataclass(frozen=True)
 class Opening:
-    """Wishes for a file: of its objects, and of what lies behind them ("studio", "sky" or a panorama's file)."""
+    """What is wanted of a file: of its objects, and the environment ("studio", "sky" or a panorama's file)."""
 
     staging: Staging = field(default_factory=Staging)
     environment: str | None = None
@@ -27,20 +27,17 @@ AS_FOUND = Opening()
 
 
 def open_scene(path: Path, opening: Opening = AS_FOUND) -> Scene:
-    """The scene in `path` as wished. Raises UserError for what cannot be opened or cannot be had."""
+    """The scene in `path` as wanted. Raises UserError for what cannot be opened or cannot be fulfilled."""
     scene = load_scene(path, opening.staging)
     wish = opening.environment
-    if wish is None or (wish == STUDIO and _shows_studio(scene)):
+    source = None if scene.environment is None else scene.environment.source
+    if wish is None or (wish == STUDIO and source == str(STUDIO_MAP.resolve())):
         return scene
     # Anew, so that its brightness is fitted to the lights.
     plain = replace(scene, environment=None)
     if wish == SKY:
         return set_environment_kind(plain, "sky")
     return set_environment_map(plain, STUDIO_MAP if wish == STUDIO else _panorama(wish))
-
-
-def _shows_studio(scene: Scene) -> bool:
-    return scene.environment is not None and scene.environment.source == str(STUDIO_MAP.resolve())
 
 
 def _panorama(name: str) -> Path:

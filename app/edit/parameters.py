@@ -2,7 +2,7 @@
 
 A `Stage` is what an animation changes. `apply` sets one parameter, always starting from the stage as it was
 drawn up, so a frame depends on its time alone. Angles called `rotation` and `orbit_deg`, and the light's `power`, are
-relative to the stage as it stands (0 and 1 leave it); all other parameters are the values themselves.
+relative to the stage as it is (0 and 1 leave it); all other parameters are the values themselves.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class Stage:
 
 @dataclass(frozen=True)
 class Parameter:
-    """What a path stands for."""
+    """One number."""
 
     meaning: str
     unit: str
@@ -69,6 +69,12 @@ _ORBIT = {
     "extent": Parameter("Height of the picture of an orthographic camera", "units", 1e-9, _FAR),
     "lens_radius": Parameter("Half the aperture of the camera's lens; 0: all is in focus", "units", 0.0, 1e6),
     "focus_distance": Parameter("Distance from the lens to the plane of focus", "units", 1e-6, 1e9),
+}
+_CAMERA_FIELDS = {
+    "fov_deg": "vertical_fov_deg",
+    "extent": "vertical_extent",
+    "lens_radius": "lens_radius",
+    "focus_distance": "focus_distance",
 }
 _PLACE = {f"position.{axis}": Parameter(f"Position along {axis}", "units", -_FAR, _FAR) for axis in _AXES}
 _TARGET = {f"target.{axis}": Parameter(f"Point looked at, along {axis}", "units", -_FAR, _FAR) for axis in _AXES}
@@ -100,12 +106,14 @@ def paths(scene: Scene, camera: Camera) -> dict[str, Parameter]:
         parts = {**_PLACE, **_TURN} | (_GLASS if item.material.transmits else {}) | _of_numbers(item.material)
         found |= {f"objects.{item.name}.{name}": parameter for name, parameter in parts.items()}
     for light in scene.lights:
-        found |= {f"lights.{light.name}.{name}": parameter for name, parameter in _of_light(light).items()}
+        parts = {"power": _POWER} | _of_numbers(light)
+        parts |= (_PLACE if light.has_place else {}) | (_TURN if light.has_direction else {})
+        found |= {f"lights.{light.name}.{name}": parameter for name, parameter in parts.items()}
     return found
 
 
 def parameter(stage: Stage, path: str, where: str = "") -> Parameter:
-    """What `path` stands for; raises `UserError` naming the nearest paths there are."""
+    """The parameter at `path`; raises `UserError` naming the nearest paths there are."""
     known = paths(stage.scene, stage.camera)
     if path not in known:
         # A name that is right and a parameter that is not deserves the parameters of that name.
@@ -131,7 +139,7 @@ def check_value(stage: Stage, path: str, value: float, where: str = "") -> float
 
 
 def value_of(stage: Stage, path: str) -> float:
-    """The parameter's present value: relative ones stand at 0 (turns) or 1 (power)."""
+    """The parameter's present value: relative ones are 0 (turns) or 1 (power)."""
     parameter(stage, path)
     head, name, field = parts(stage.scene, path)
     if head == "camera":
@@ -179,34 +187,22 @@ def parts(scene: Scene, path: str) -> tuple[str, str, str]:
 
 
 def _camera_value(camera: Camera, name: str) -> float:
-    match name.split("."):
-        case ["position" | "target" as field, axis]:
-            return getattr(camera, field)["xyz".index(axis)]
-        case ["distance"]:
-            return float(np.linalg.norm(np.subtract(camera.position, camera.target)))
-        case ["fov_deg"]:
-            return camera.vertical_fov_deg
-        case ["extent"]:
-            return camera.vertical_extent
-        case ["lens_radius"]:
-            return camera.lens_radius
-        case ["focus_distance"]:
-            return camera.plane_of_focus
-    return 0.0
+    field, _, axis = name.partition(".")
+    if axis:
+        return getattr(camera, field)["xyz".index(axis)]
+    if name == "distance":
+        return math.dist(camera.position, camera.target)
+    if name == "focus_distance":
+        return camera.plane_of_focus
+    return getattr(camera, _CAMERA_FIELDS[name]) if name in _CAMERA_FIELDS else 0.0
 
 
 def _with_camera(camera: Camera, name: str, value: float) -> Camera:
-    match name.split("."):
-        case ["position" | "target" as field, axis]:
-            return _changed(camera, field, _with_axis(getattr(camera, field), axis, value))
-        case ["fov_deg"]:
-            return replace(camera, vertical_fov_deg=value)
-        case ["extent"]:
-            return replace(camera, vertical_extent=value)
-        case ["lens_radius"]:
-            return replace(camera, lens_radius=value)
-        case ["focus_distance"]:
-            return replace(camera, focus_distance=value)
+    field, _, axis = name.partition(".")
+    if axis:
+        return _changed(camera, field, _with_axis(getattr(camera, field), axis, value))
+    if name in _CAMERA_FIELDS:
+        return _changed(camera, _CAMERA_FIELDS[name], value)
     target, arm = np.asarray(camera.target), np.subtract(camera.position, camera.target)
     up = np.asarray(camera.up, float) / np.linalg.norm(camera.up)
     if name == "distance":
@@ -242,7 +238,7 @@ def _object_value(item: SceneObject, name: str) -> float:
         return float(item.object_to_world["xyz".index(axis), 3])
     if field == "rotation":
         return 0.0
-    numbers = _turned_by(item.material)
+    numbers = _animated_numbers(item.material)
     if field in numbers:
         return getattr(item.material, numbers[field].attribute)
     dispersion = item.material.dispersion
@@ -259,7 +255,7 @@ def _with_object(item: SceneObject, name: str, value: float) -> SceneObject:
         else:
             matrix[:3, :3] = rotation_about(_AXES[axis], math.radians(value)) @ matrix[:3, :3]
         return replace(item, object_to_world=matrix)
-    numbers = _turned_by(item.material)
+    numbers = _animated_numbers(item.material)
     if field in numbers:
         return replace(item, material=replace(item.material, **{numbers[field].attribute: value}))
     dispersion = _with_glass(item.material.dispersion, name, value)
@@ -274,21 +270,16 @@ def _with_glass(dispersion: Dispersion, name: str, value: float) -> Dispersion:
     return glass.with_gain(glass.from_abbe(n_d, v_d, dispersion.name), dispersion.gain)
 
 
-def _of_light(light: Light) -> dict[str, Parameter]:
-    found = {"power": _POWER} | _of_numbers(light)
-    return found | (_PLACE if light.has_place else {}) | (_TURN if light.has_direction else {})
-
-
 def _of_numbers(thing: Light | Material) -> dict[str, Parameter]:
     found = {}
-    for name, number in _turned_by(thing).items():
-        told = number.animated
-        assert told is not None
-        found[name] = Parameter(told.meaning, number.unit, told.low, told.high)
+    for name, number in _animated_numbers(thing).items():
+        animated = number.animated
+        assert animated is not None
+        found[name] = Parameter(animated.meaning, number.unit, animated.low, animated.high)
     return found
 
 
-def _turned_by(thing: Light | Material) -> dict[str, Number]:
+def _animated_numbers(thing: Light | Material) -> dict[str, Number]:
     """The numbers of a light's shape, or of a material, by their names in an animation."""
     return {n.animated.name or n.attribute: n for n in thing.shown_numbers() if n.animated is not None}
 
@@ -298,7 +289,7 @@ def _light_value(light: Light, name: str) -> float:
     if field == "position":
         return light.position["xyz".index(axis)]
     relative = {"power": 1.0, "rotation": 0.0}
-    return relative[field] if field in relative else getattr(light, _turned_by(light)[field].attribute)
+    return relative[field] if field in relative else getattr(light, _animated_numbers(light)[field].attribute)
 
 
 def _with_light(light: Light, name: str, value: float) -> Light:
@@ -316,7 +307,7 @@ def _with_light(light: Light, name: str, value: float) -> Light:
         spectrum = light.spectral_power
         lines = tuple((nm, power * value) for nm, power in spectrum.lines)
         return replace(light, spectral_power=Spectrum(spectrum.density * value, lines))
-    return light.changed(**{_turned_by(light)[field].attribute: value}).fitted()
+    return light.changed(**{_animated_numbers(light)[field].attribute: value}).fitted()
 
 
 def _changed(thing: Any, name: str, value: object) -> Any:

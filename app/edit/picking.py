@@ -1,4 +1,4 @@
-"""What lies under a point of the picture, found at once on the processor: the scene's own triangles in float64.
+"""What is under a point of the picture, found at once on the processor: the scene's own triangles in float64.
 
 A mesh has its triangles in blocks of neighbours with boxes about them, made at its first ray and kept as long as it is.
 """
@@ -61,7 +61,7 @@ def pick_in(state: State, x: float, y: float) -> PickHit | None:
 def pick(
     scene: Scene, view: View, x: float, y: float, hidden: frozenset[tuple[str, str]] = frozenset()
 ) -> PickHit | None:
-    """The first surface of `scene` at (x, y) of `view`'s picture; glass is not looked through. `hidden`: what is left
+    """The first surface of `scene` at (x, y) of `view`'s picture; glass is opaque to it. `hidden`: what is left
     out, unless nothing else is there."""
     objects = [i for i, item in enumerate(scene.objects) if ("object", item.name) not in hidden]
     objects = objects or list(range(len(scene.objects)))

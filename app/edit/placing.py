@@ -1,4 +1,4 @@
-"""What a gizmo turns a thing by: its frame in the world, and the thing after that frame was moved, turned or scaled.
+"""How a gizmo moves a thing: its frame in the world, and the thing after that frame was moved, turned or scaled.
 
 Pure functions over objects and lights. A frame is a right-handed orthonormal (4, 4) matrix at the thing's middle. The
 change is worked out in float64 from where the drag began, so nothing drifts and sheared placements stay sheared.
@@ -15,10 +15,11 @@ from ..model.contacts import world_bounds
 from ..model.scene import (
     Light,
     Scene,
-    SceneObject,
 )
 from ..model.vectors import vec3
-from . import edits
+from .lights import set_light
+from .matrices import nearest_orthogonal
+from .objects import set_transform
 from .state import Selection
 
 Operation = Literal["move", "rotate", "scale"]
@@ -85,10 +86,10 @@ def change(before: np.ndarray, after: np.ndarray, operation: Operation) -> np.nd
 def changed(scene: Scene, selection: Selection, delta: np.ndarray) -> Scene:
     """`scene` with the selection moved by a world matrix. Raises `UserError` where the scene may not be so."""
     if selection.kind == "object":
-        return edits.set_transform(scene, selection.index, delta @ scene.objects[selection.index].object_to_world)
+        return set_transform(scene, selection.index, delta @ scene.objects[selection.index].object_to_world)
     if selection.kind != "light":
         raise UserError("nothing is selected")
-    return edits.set_light(scene, selection.index, moved_light(scene.lights[selection.index], delta))
+    return set_light(scene, selection.index, moved_light(scene.lights[selection.index], delta))
 
 
 def moved_light(light: Light, delta: np.ndarray) -> Light:
@@ -107,15 +108,8 @@ def moved_light(light: Light, delta: np.ndarray) -> Light:
     return moved.resized(float(across), float(stretched[0]), float(stretched[1]))
 
 
-def name_of(scene: Scene, selection: Selection) -> str:
-    """What the selection is called."""
-    things: tuple[SceneObject, ...] | tuple[Light, ...] = scene.objects if selection.kind == "object" else scene.lights
-    return things[selection.index].name
-
-
 def _nearest_rotation(linear: np.ndarray) -> np.ndarray:
-    left, _, right = np.linalg.svd(linear)
-    rotation = left @ right
+    rotation = nearest_orthogonal(linear)
     if np.linalg.det(rotation) < 0.0:
         rotation[:, 2] *= -1.0
     return rotation

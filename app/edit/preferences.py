@@ -106,8 +106,8 @@ def load_settings() -> tuple[Settings, str | None]:
     try:
         settings = msgspec.json.decode(data, type=Settings, dec_hook=_decode_path)
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
-        told = set_aside(path, "The settings", error)
-        return Settings(), f"{told}; those of a new installation are used."
+        where = set_aside(path, "The settings", error)
+        return Settings(), f"{where}; those of a new installation are used."
     return _sound(settings), None
 
 

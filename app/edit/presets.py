@@ -1,4 +1,4 @@
-"""Ready-made glasses and lights: what a user reaches for first, as data. A preset of a light changes its spectrum and
+"""Ready-made glasses and lights: what is most often wanted, as data. A preset of a light changes its spectrum and
 keeps place, kind and brightness."""
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ class MaterialPreset:
 
 @dataclass(frozen=True)
 class LightPreset:
-    """A spectrum by name, as `edits.set_light_spectrum` takes it."""
+    """A spectrum by name, as `set_light_spectrum` takes it."""
 
     name: str
     kind: SpectrumKind
     value: str | float | Path | tuple[tuple[float, float], ...]
     remark: str = ""
     angular_diameter_deg: float | None = None
-    """Of directional lights; None keeps it."""
+    """What directional lights get; None keeps theirs."""
 
 
 _GLASSES = (
@@ -64,19 +64,29 @@ _GLASSES = (
     ("Moissanite", "moissanite (ordinary)", "More than twice the fire of diamond: n_d 2.648, V_d 26"),
 )
 
+_SUN_REMARK = "A black body of 5772 K; a directional light becomes as wide as the sun, 0.53°"
 _MERCURY = ((404.656, 11.0), (435.833, 20.2), (546.074, 24.5), (576.960, 10.0), (579.066, 10.0))
 """Watts by line of a medium-pressure lamp, after Calvert and Pitts, Photochemistry, Wiley 1966; the yellow pair shared
 evenly."""
+_SODIUM = ((588.995, 2.0), (589.592, 1.0))
+_HYDROGEN = ((410.174, 0.05), (434.047, 0.09), (486.135, 0.36), (656.279, 1.0))
+_HELIUM = (
+    (447.148, 0.4),
+    (471.314, 0.06),
+    (492.193, 0.04),
+    (501.568, 0.2),
+    (587.562, 1.0),
+    (667.815, 0.2),
+    (706.519, 0.4),
+)
+_CADMIUM = ((467.815, 0.6), (479.991, 0.9), (508.582, 1.0), (643.847, 0.7))
+"""Lines in air, nm (NIST Atomic Spectra Database), with relative powers as low-pressure lamps roughly have them."""
+_FRAUNHOFER = ((486.1327, 1.0), (587.5618, 1.0), (656.2725, 1.0))
+_LASERS = ((450.0, 1.0), (532.0, 1.0), (638.0, 1.0))
 
 _LIGHTS = (
     LightPreset("Daylight", "illuminant", "D65", "CIE D65, average daylight of 6500 K"),
-    LightPreset(
-        "Sun",
-        "blackbody",
-        5772.0,
-        "A black body of 5772 K; a directional light becomes as wide as the sun, 0.53°",
-        SUN_DIAMETER_DEG,
-    ),
+    LightPreset("Sun", "blackbody", 5772.0, _SUN_REMARK, SUN_DIAMETER_DEG),
     LightPreset("Equal energy", "illuminant", "E", "As much power at every wavelength"),
     LightPreset("Candle", "blackbody", 1900.0, "A black body of 1900 K"),
     LightPreset("Tungsten", "illuminant", "A", "CIE A, a bulb of 2856 K"),
@@ -86,21 +96,12 @@ _LIGHTS = (
     LightPreset("Fluorescent tube", "illuminant", "FL11", "CIE F11, narrow bands of 4000 K"),
     LightPreset("Sodium street lamp", "illuminant", "HP1", "CIE HP1, high-pressure sodium"),
     LightPreset("Mercury lamp", "lines", _MERCURY, "Lines at 405, 436, 546, 577 and 579 nm"),
-    LightPreset(
-        "Sodium lamp", "lines", ((588.995, 2.0), (589.592, 1.0)), "The yellow pair at 589.0 and 589.6 nm, low pressure"
-    ),
-    LightPreset(
-        "Fraunhofer F, d, C",
-        "lines",
-        ((486.1327, 1.0), (587.5618, 1.0), (656.2725, 1.0)),
-        "The three lines that define V_d, equally strong",
-    ),
-    LightPreset(
-        "RGB lasers",
-        "lines",
-        ((450.0, 1.0), (532.0, 1.0), (638.0, 1.0)),
-        "Lines at 450, 532 and 638 nm, equally strong",
-    ),
+    LightPreset("Sodium lamp", "lines", _SODIUM, "The yellow pair at 589.0 and 589.6 nm, low pressure"),
+    LightPreset("Hydrogen lamp", "lines", _HYDROGEN, "Lines at 410, 434, 486 and 656 nm, low pressure"),
+    LightPreset("Helium lamp", "lines", _HELIUM, "Seven lines, the strongest at 588 nm, low pressure"),
+    LightPreset("Cadmium lamp", "lines", _CADMIUM, "Lines at 468, 480, 509 and 644 nm, low pressure"),
+    LightPreset("Fraunhofer F, d, C", "lines", _FRAUNHOFER, "The three lines that define V_d, equally strong"),
+    LightPreset("RGB lasers", "lines", _LASERS, "Lines at 450, 532 and 638 nm, equally strong"),
     LightPreset("Blue laser", "laser", 450.0, "One line at 450 nm"),
     LightPreset("Green laser", "laser", 532.0, "One line at 532 nm"),
     LightPreset("Red laser", "laser", 632.8, "Helium and neon, one line at 632.8 nm"),
@@ -111,12 +112,12 @@ _LIGHTS = (
 def material_presets() -> tuple[MaterialPreset, ...]:
     """Glasses from the catalogue, by what people call them, least refracting families first; then tinted ones."""
     clear = (MaterialPreset(name, Dielectric(catalogue.find(glass)), remark) for name, glass, remark in _GLASSES)
-    return (*clear, *(_tinted_preset(tint) for tint in tints()))
-
-
-def _tinted_preset(tint: Tint) -> MaterialPreset:
-    remark = f"Approximated by its bands; {tint.colourant}"
-    return MaterialPreset(tint.name.capitalize(), Dielectric(tint.dispersion), remark, tint)
+    by_bands = "Approximated by its bands; {}".format
+    coloured = (
+        MaterialPreset(tint.name.capitalize(), Dielectric(tint.dispersion), by_bands(tint.colourant), tint)
+        for tint in tints()
+    )
+    return (*clear, *coloured)
 
 
 def light_presets() -> tuple[LightPreset, ...]:

@@ -63,7 +63,7 @@ class View:
 
     @property
     def target_distance(self) -> float:
-        """From the camera to what it looks at, scene units."""
+        """From the camera to its target, scene units."""
         return float(np.linalg.norm(np.asarray(self.camera.target, float) - self.position))
 
     def depth(self, points: np.ndarray) -> np.ndarray:
@@ -93,7 +93,7 @@ class View:
         return self.position, direction / np.linalg.norm(direction)
 
     def on_plane(self, x: float, y: float, point: np.ndarray, normal: np.ndarray) -> np.ndarray | None:
-        """Where the ray through (x, y) meets a plane; None where it runs along it or the plane lies behind."""
+        """Where the ray through (x, y) meets a plane; None where it is parallel to it or the plane is behind."""
         origin, direction = self.ray(x, y)
         facing = float(direction @ normal)
         if abs(facing) < 1e-6:

@@ -1,5 +1,4 @@
-"""Pull a colour: a point of the caustic is taken hold of and dragged, and the dispersion that puts it there is solved
-for.
+"""Pull a colour: a point of the caustic is dragged, and the dispersion that puts it there is solved for.
 
 To first order light of wavelength λ lands at p(λ) = p(d) + Σ_g D_g (n_g(λ) − n_g(d)), where D_g is the stored
 derivative of the landing point by the index of glass g. A glass with gain k has n(λ) − n(d) k times as
@@ -17,13 +16,16 @@ from ..model.local_dispersion import MAX_LOG2_GAIN, MIN_LOG2_GAIN, gain_at
 from ..model.optics.colorimetry import VISIBLE_NM, cmf_xyz, illuminant_table
 from ..model.scene import Dab, Scene, SceneObject, Vec3
 from ..model.vectors import vec3
-from .requests import Pull
+from .brush import object_radius
+from .glass import set_dispersion_gain
+from .objects import with_dabs
+from .state import Pull
 from .stored_photons import StoredPhotons
 
 MAX_GAIN = 10.0
 _GRID_NM = np.arange(380.0, 781.0, 4.0)
 _AROUND_NM = 12.0
-"""How far from the wavelength asked for light still counts as it."""
+"""How far from the wanted wavelength light still counts as it."""
 _MAX_CANDIDATES = 2000
 _PREFERRED_SHARE = 0.05
 """Share of the light at the point above which the preferred glass is taken."""
@@ -60,7 +62,7 @@ def begin_pull(
     prefer: int | None = None,
     local: bool = False,
 ) -> Pull:
-    """Take hold of the light within `radius` of a world `point` of a receiver.
+    """Begin to drag the light within `radius` of a world `point` of a receiver.
 
     The wavelength is the given one, else the dominant one of the colour `xyz` there, else the mean of what lands.
     `prefer` is the selected object: it is taken where a share of the light comes through it. Raises `UserError`
@@ -174,7 +176,7 @@ def nearest_on_line(pull: Pull, origin: np.ndarray, direction: np.ndarray) -> np
 
 
 def solve(pull: Pull, point: Vec3 | np.ndarray) -> float:
-    """The gain, 0 to 10, with which the held colour lands where `point` (world) stands along the pull's direction."""
+    """The gain, 0 to 10, with which the held colour lands where `point` (world) is along the pull's direction."""
     direction, reference = np.asarray(pull.direction), np.asarray(pull.reference)
     held = float((np.asarray(pull.start) - reference) @ direction)
     return float(
@@ -185,27 +187,20 @@ def solve(pull: Pull, point: Vec3 | np.ndarray) -> float:
 def apply(scene: Scene, pull: Pull, point: Vec3 | np.ndarray, radius: float, falloff: float) -> tuple[Scene, str]:
     """The scene with the colour pulled to `point`, and the edit's name.
 
-    A local pull lays one dab of `radius` (world) where the held light's d line lands, or changes the one it laid
+    A local pull paints one dab of `radius` (world) where the held light's d line lands, or changes the one it painted
     before.
     """
-    from . import edits
-
     gain = solve(pull, point)
     if not pull.local:
-        return edits.set_dispersion_gain(
-            scene, pull.object_index, gain
-        ), f"Pull colour of {scene.objects[pull.object_index].name}"
+        label = f"Pull colour of {scene.objects[pull.object_index].name}"
+        return set_dispersion_gain(scene, pull.object_index, gain), label
     receiver = scene.objects[pull.receiver_index]
     dabs = local_dabs(receiver, pull, gain, radius, falloff)
-    return edits.with_object(
-        scene, pull.receiver_index, replace(receiver, local_dispersion=dabs)
-    ), "Pull colour locally"
+    return with_dabs(scene, pull.receiver_index, dabs), "Pull colour locally"
 
 
 def local_dabs(receiver: SceneObject, pull: Pull, gain: float, radius: float, falloff: float) -> tuple[Dab, ...]:
     """A receiver's dabs with one at the pull's reference that makes the gain there `gain`."""
-    from .brush import object_radius
-
     reference = np.asarray(pull.reference)
     place = _to_object(receiver, reference)
     rest = receiver.local_dispersion

@@ -1,7 +1,7 @@
-"""What a panel asks the host to do that a change of values cannot say: files, pictures, questions to the renderer.
+"""What a panel wants of the host that a change of values cannot say: files, pictures, questions to the renderer.
 
-A panel appends a request to the state it returns; the host (`session.py`) carries requests out in
-order and clears them. Nothing here does anything.
+A panel appends a request to the state it returns; the host (`ui/session_requests.py`) carries requests out in
+order and clears them.
 """
 
 from __future__ import annotations
@@ -10,62 +10,65 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from ..model.scene import Vec3
 from ..model.staging import UpAxis
 
 
+class Request:
+    """One wish; its class says what."""
+
+
 @dataclass(frozen=True)
-class NewScene:
+class NewScene(Request):
     """Start from the default scene."""
 
 
 @dataclass(frozen=True)
-class Open:
+class Open(Request):
     """Load a scene, a GLB or a bare mesh (which gets a glass, a light and a table)."""
 
     path: Path
 
 
 @dataclass(frozen=True)
-class OpenLesson:
+class OpenLesson(Request):
     """Open a lesson's scene, with what the lesson is about selected."""
 
     name: str
 
 
 @dataclass(frozen=True)
-class StandUp:
+class StandUp(Request):
     """Take another axis of the opened mesh or glTF file to be up, and remember it for that file."""
 
     up: UpAxis
 
 
 @dataclass(frozen=True)
-class Save:
+class Save(Request):
     """Save to `path` (.toml or .glb); None saves where the scene came from."""
 
     path: Path | None = None
 
 
 @dataclass(frozen=True)
-class Undo:
+class Undo(Request):
     """One step back."""
 
 
 @dataclass(frozen=True)
-class Redo:
+class Redo(Request):
     """One step forward again."""
 
 
 @dataclass(frozen=True)
-class GoTo:
+class GoTo(Request):
     """To entry `index` of the history."""
 
     index: int
 
 
 @dataclass(frozen=True)
-class Quit:
+class Quit(Request):
     """Close; asks first where changes are unsaved (`ViewModel.asks_to_quit`)."""
 
     discard: bool = False
@@ -73,18 +76,18 @@ class Quit:
 
 
 @dataclass(frozen=True)
-class FullScreen:
+class FullScreen(Request):
     """The window over the whole screen, or back to where it was."""
 
 
 @dataclass(frozen=True)
-class CancelQuit:
+class CancelQuit(Request):
     """The answer "Cancel" to that question, and "Save" before it saves: stay open, ask no more. Likewise to the
     question about an export that is not finished."""
 
 
 @dataclass(frozen=True)
-class QuitAfterExport:
+class QuitAfterExport(Request):
     """Close once the running export is finished."""
 
     stop: bool = False
@@ -92,17 +95,17 @@ class QuitAfterExport:
 
 
 @dataclass(frozen=True)
-class Recover:
+class Recover(Request):
     """Load the autosave of a session that crashed; `discard` deletes it instead."""
 
     discard: bool = False
 
 
 @dataclass(frozen=True)
-class SelectAt:
+class SelectAt(Request):
     """Select what made the picture at a pixel of the viewport: glass, or the object whose caustic it is.
 
-    `itself` selects the surface hit, even when a caustic lies on it."""
+    `itself` selects the surface hit, even when a caustic is on it."""
 
     x: float
     y: float
@@ -112,8 +115,8 @@ class SelectAt:
 
 
 @dataclass(frozen=True)
-class BeginPull:
-    """Take hold of the caustic's colour at a pixel: the host fills `State.pull`."""
+class BeginPull(Request):
+    """Begin to drag the caustic's colour at a pixel: the host fills `State.pull`."""
 
     x: float
     y: float
@@ -122,31 +125,31 @@ class BeginPull:
 
 
 @dataclass(frozen=True)
-class FrameSelection:
+class FrameSelection(Request):
     """Move the camera so that the selection (or everything) fills the view."""
 
 
 @dataclass(frozen=True)
-class Retrace:
+class Retrace(Request):
     """Trace anew with the present glass, where the picture followed an edit to first order only."""
 
 
 @dataclass(frozen=True)
-class ReloadShaders:
+class ReloadShaders(Request):
     """Compile the shaders from disk again, keeping the last good programs."""
 
 
 @dataclass(frozen=True)
-class Screenshot:
-    """Write the picture to `path`: .png as displayed, .exr or .npy linear, .exr with spectral bins when `spectral`."""
+class Screenshot(Request):
+    """Write the picture to `path`: .png as displayed, .exr or .npy linear."""
 
     path: Path
-    spectral: bool = False
     with_interface: bool = False
+    """The whole window, .png only."""
 
 
 @dataclass(frozen=True)
-class RenderPicture:
+class RenderPicture(Request):
     """Render a finished picture to `path`: .png, .jpg and .webp as displayed, .exr and .npy linear."""
 
     path: Path
@@ -154,7 +157,7 @@ class RenderPicture:
     """Pixels."""
     photons: int | None = 4_000_000
     seconds: float | None = None
-    """Of the whole picture, instead of `photons`."""
+    """Time of the whole picture, instead of `photons`."""
     samples: int | None = None
     """Camera samples a pixel; None takes as many as the scene needs."""
     caustic: bool = False
@@ -164,7 +167,7 @@ class RenderPicture:
 
 
 @dataclass(frozen=True)
-class Bake:
+class Bake(Request):
     """Write a receiver's caustic map with its placement (`.json` beside it): .exr or .png."""
 
     path: Path
@@ -175,7 +178,7 @@ class Bake:
 
 
 @dataclass(frozen=True)
-class Animate:
+class Animate(Request):
     """Render an animation to `path` (.mp4, .gif, .webp, or a folder for PNGs): a turntable, or the keys of
     `State.animation`."""
 
@@ -184,33 +187,33 @@ class Animate:
     frames: int | None = 120
     """None takes as many as the keys last."""
     fps: float = 24.0
-    size: tuple[int, int] | None = None
-    """Pixels; None takes those of the viewport."""
+    size: tuple[int, int] = (960, 540)
+    """Pixels."""
     photons: int = 1_000_000
-    """Of each traced frame."""
+    """Photons of each traced frame."""
     samples: int = 16
     """Camera samples a pixel."""
 
 
 @dataclass(frozen=True)
-class CancelJob:
+class CancelJob(Request):
     """Stop the running export; what is finished stays."""
 
 
 @dataclass(frozen=True)
-class ComputeReference:
+class ComputeReference(Request):
     """Start (again) the reference that compare modes show."""
 
 
 @dataclass(frozen=True)
-class CopyMaterial:
-    """Of object `index` to the material clipboard."""
+class CopyMaterial(Request):
+    """The material of object `index` to the clipboard."""
 
     index: int
 
 
 @dataclass(frozen=True)
-class Notice:
+class Notice(Request):
     """Show one sentence for a few seconds."""
 
     text: str
@@ -218,58 +221,11 @@ class Notice:
 
 
 @dataclass(frozen=True)
-class DismissMessage:
+class DismissMessage(Request):
     """Take a message away (errors stay until then)."""
 
     text: str
 
 
-Export = Screenshot | RenderPicture | Bake | Animate
-Request = (
-    NewScene
-    | Open
-    | OpenLesson
-    | StandUp
-    | Save
-    | Undo
-    | Redo
-    | GoTo
-    | Quit
-    | CancelQuit
-    | QuitAfterExport
-    | FullScreen
-    | Recover
-    | SelectAt
-    | BeginPull
-    | FrameSelection
-    | Retrace
-    | ReloadShaders
-    | Screenshot
-    | RenderPicture
-    | Bake
-    | Animate
-    | CancelJob
-    | ComputeReference
-    | CopyMaterial
-    | Notice
-    | DismissMessage
-)
-
-
-@dataclass(frozen=True)
-class Pull:
-    """A colour held by the cursor (`BeginPull`): what `pull.py` needs to solve for a dispersion while it is dragged."""
-
-    object_index: int
-    """The glass whose dispersion is solved for."""
-    receiver_index: int
-    start: Vec3
-    """World position taken hold of."""
-    reference: Vec3
-    """World position where the same light lands at the d line: the point that stays."""
-    direction: Vec3
-    """Unit world direction along which this colour moves as the dispersion grows."""
-    wavelength_nm: float
-    gain_at_start: float
-    """The material's dispersion gain, or the local gain there, when it was taken."""
-    local: bool = False
+LongExport = RenderPicture | Bake | Animate
+Export = Screenshot | LongExport

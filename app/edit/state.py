@@ -14,10 +14,10 @@ from typing import Any, Literal
 from ..model.scene import Camera, Material, Scene, Vec3
 from .live_inputs import LiveInputs
 from .projection import View, fitted
-from .requests import Pull, Request
+from .requests import Request
 
 Tool = Literal["select", "move", "rotate", "scale", "brush", "pull", "measure"]
-CompareMode = Literal["off", "hold", "wipe", "beside", "error"]
+CompareMode = Literal["off", "hold", "wipe", "error"]
 Theme = Literal["dark", "light"]
 ToneCurve = Literal["spectrasplat", "aces", "reinhard", "linear"]
 
@@ -121,6 +121,25 @@ class Preferences:
 
 
 @dataclass(frozen=True)
+class Pull:
+    """A colour that is dragged (`requests.BeginPull`): what `pull.py` needs to solve for a dispersion."""
+
+    object_index: int
+    """The glass whose dispersion is solved for."""
+    receiver_index: int
+    start: Vec3
+    """World position where the drag began."""
+    reference: Vec3
+    """World position where the same light lands at the d line: the point that stays."""
+    direction: Vec3
+    """Unit world direction along which this colour moves as the dispersion grows."""
+    wavelength_nm: float
+    gain_at_start: float
+    """The material's dispersion gain, or the local gain there, when it was taken."""
+    local: bool = False
+
+
+@dataclass(frozen=True)
 class Key:
     """One key of the animation: parameter `path` (see `animation.py`) has `value` at `time_s`."""
 
@@ -143,7 +162,7 @@ class State:
     hidden: frozenset[tuple[str, str]] = frozenset()
     """What the picture leaves out: ("object" or "light", name). Not saved."""
     locked: frozenset[tuple[str, str]] = frozenset()
-    """What the hand in the picture cannot take, likewise."""
+    """What cannot be selected and moved in the picture, likewise."""
     tool: Tool = "select"
     display: Display = Display()
     brush: Brush = Brush()
@@ -187,6 +206,15 @@ class State:
     def with_panels(self, **changes: bool) -> State:
         """With windows opened or closed."""
         return replace(self, preferences=replace(self.preferences, panels=replace(self.preferences.panels, **changes)))
+
+    def opened(self, field: str, is_open: bool) -> State:
+        """With the panel `Panels.<field>` opened or closed by the user. Opening Compare begins a wipe, closing it ends
+        that; hiding all panels (H) does neither."""
+        state = self.with_panels(**{field: is_open})
+        if field != "compare":
+            return state
+        mode: CompareMode = "off" if not is_open else "wipe" if self.compare.mode == "off" else self.compare.mode
+        return replace(state, compare=replace(self.compare, mode=mode))
 
     def with_display(self, **changes: Any) -> State:
         """With something else of `Display`."""

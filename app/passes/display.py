@@ -118,16 +118,15 @@ class Display:
         other: moderngl.Texture | None = None,
         compare: Compare | None = None,
         antialias: bool = False,
-        output: str = "picture",
         halo: Halo | None = None,
     ) -> moderngl.Texture:
         """`picture` (RGBA32F, linear Rec.709, row 0 on top) as an RGBA8 texture of `size` (width, height), sRGB codes,
         row 0 on top.
 
         `exposure_ev` is absolute (as `tone_map.to_display` takes it). `other` is what `compare` shows beside it, over
-        it or takes the error against; without it the picture alone is shown. `antialias`: see
-        `base.highlights`; of a picture that is shown alone. `output`: another name, another texture.
-        `halo`: glare, of a picture that is shown alone, pixel for pixel and not antialiased.
+        it or takes the error against; without it the picture alone is shown. `antialias`: see `base.highlights`; of a
+        picture that is shown alone. `halo`: glare, of a picture that is shown alone, pixel for pixel and not
+        antialiased.
         """
         parameters = self._develop(settings, exposure_ev)
         parameters["step_uv"] = 1.0 / size[0], 1.0 / size[1]
@@ -149,7 +148,7 @@ class Display:
         variant = _Variant(_tone(settings), shows, taps, antialias, *sizes, halo is not None, as_image)
         # Pixel for pixel nothing is blended, so that one broken pixel stays one.
         nearest = enlarged > NEAREST_FROM or same_size
-        return self._dispatch(output, variant, parameters, (picture, other or picture), size, nearest, halo)
+        return self._dispatch("picture", variant, parameters, (picture, other or picture), size, nearest, halo)
 
     def magnify(
         self,
@@ -264,7 +263,7 @@ def _shown(compare: Compare) -> Shows:
     if compare.holding:
         return "other"
     match compare.mode:
-        case "off" | "hold" | "beside":
+        case "off" | "hold":
             return "picture"
         case mode:
             return mode

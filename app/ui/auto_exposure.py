@@ -1,4 +1,4 @@
-"""An exposure that follows the picture without flicker, and stands still once it has arrived."""
+"""An exposure that follows the picture without flicker, and stays once it has arrived."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ARRIVED_EV = 0.01
 
 
 class AutoExposure:
-    """`measure` gives the picture's pixels (…, 3) when they are wanted."""
+    """The exposure in use and the one that it approaches."""
 
     def __init__(self) -> None:
         self._ev: float | None = None
@@ -41,7 +41,7 @@ class AutoExposure:
         self._next_s = 0.0
 
     def follow(self, measure: Callable[[], np.ndarray], now_s: float, delta_s: float) -> float:
-        """The exposure at `now_s`, `delta_s` after the last call."""
+        """The exposure at `now_s`, `delta_s` after the last call. `measure` gives the picture's pixels (…, 3)."""
         if now_s >= self._next_s:
             self._next_s = now_s + MEASURE_S
             self._aim(measure())

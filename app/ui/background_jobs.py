@@ -1,5 +1,5 @@
-"""What works beside the engine in a frame: comparison, exports, ray overlay, cursor, thumbnails. Each has its share of
-the time."""
+"""What works in a frame in addition to the engine, each with its share of the time: comparison, exports, ray overlay,
+cursor."""
 
 from __future__ import annotations
 
@@ -18,8 +18,6 @@ from .gallery import Gallery, best_first
 from .ray_overlay import RayOverlay
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from ..edit import requests
     from ..edit.state import State
     from ..gpu.context import Context
@@ -27,25 +25,24 @@ if TYPE_CHECKING:
     from .live_picture import LivePicture
 
 JOB_SHARE = 0.6
-"""Of a frame's budget that a running export gets."""
+"""Share of a frame's budget that a running export gets."""
 RENDER_SHARE = 0.95
-"""Likewise a finished picture that somebody waits for."""
+"""The share of a finished picture, for which somebody waits."""
 OpenThread = Callable[[str], "ContextThread | None"]
 
-HISTOGRAM_S = 1.0
-"""Shortest time between two histograms: each reads two pictures."""
+COMPARE_SHARE = 0.4
+"""The share of what is compared with."""
 FIRST_COMPARE_SHARE = 0.8
 """The same until there is something to compare with."""
 REFERENCE_WAIT_S = 0.06
-"""Of every frame, for the reference until it shows something: it is compiled in Python, whose lock drawing holds."""
-COMPARE_SHARE = 0.4
-"""Likewise what is compared with."""
+"""Left free in every frame for the reference until it shows something: it is compiled in Python, whose lock drawing
+holds."""
 
 
 class BackgroundJobs:
-    """Owns them. `notes` collects sentences about what was finished, for the host to show."""
+    """Owns them, and their threads."""
 
-    def __init__(self, context: Context, config: Path, open_thread: OpenThread = no_thread) -> None:
+    def __init__(self, context: Context, open_thread: OpenThread = no_thread) -> None:
         """`open_thread`: opens a thread of that name, which has a context that shares `context`'s objects."""
         self._open_thread = open_thread
         self._threads: dict[str, ContextThread | None] = {}
@@ -58,12 +55,11 @@ class BackgroundJobs:
         self._rehearsals = Rehearsals(lambda: self._thread("rehearsal"))
         self.overlay = RayOverlay(context)
         self.cursor = Cursor()
-        self.gallery = Gallery(context, config, best_first(shipped_scenes()))
-        self._histogram_s = -1e9
+        self.gallery = Gallery(context, best_first(shipped_scenes()))
         self.engine_rests = False
         """In the last frame it left all time to an export."""
         self.notes: list[tuple[str, bool]] = []
-        """Sentence, whether it is an error."""
+        """What was finished or failed: a sentence, and whether it is an error."""
 
     @property
     def is_busy(self) -> bool:
@@ -100,24 +96,22 @@ class BackgroundJobs:
         return max(budget_s - (time.perf_counter() - started), 0.2 * budget_s)
 
     def export_on(self, budget_s: float) -> None:
-        """Let exports work, and hear what became of them."""
+        """Let exports work, and note what became of them."""
         if not self.exports.is_busy:
             return
         try:
-            note = self.exports.step((RENDER_SHARE if self.exports.is_rendering else JOB_SHARE) * budget_s)
+            self._note(self.exports.step((RENDER_SHARE if self.exports.is_rendering else JOB_SHARE) * budget_s))
         except UserError as error:
             self.notes.append((str(error), True))
-        else:
-            if note is not None:
-                self.notes.append((note, False))
+
+    def _note(self, sentence: str | None) -> None:
+        if sentence is not None:
+            self.notes.append((sentence, False))
 
     def follow(self, state: State, drawn: State, picture: LivePicture, now_s: float) -> None:
-        """After the picture is made: what lies under the cursor, where rays go. `drawn`: the state as
-        the picture shows it. Raises `UserError`."""
+        """After the picture is made: what is under the cursor, and the paths of rays. `drawn`: the state as the picture
+        shows it. Raises `UserError`."""
         self.cursor.update(state, picture, now_s)
-        if state.preferences.panels.compare and now_s - self._histogram_s > HISTOGRAM_S:
-            self._histogram_s = now_s
-            self.comparison.count(picture.radiance, picture.exposure_ev)
         self.overlay.update(drawn)
 
     def export(self, request: requests.Export, state: State, picture: LivePicture) -> None:
@@ -128,7 +122,7 @@ class BackgroundJobs:
         self.exports.begin(request, state, shown)
 
     def finish_export(self) -> None:
-        """End the running export with what is done by now, and wait for that; `notes` tell."""
+        """End the running export with what is done by now, and wait for that."""
         if not self.exports.is_stopped:
             self.cancel_export()
         while self.exports.job is not None:
@@ -136,9 +130,7 @@ class BackgroundJobs:
 
     def cancel_export(self) -> None:
         """Stop the running export; what is finished stays."""
-        note = self.exports.stop()
-        if note is not None:
-            self.notes.append((note, False))
+        self._note(self.exports.stop())
 
     def release(self) -> list[str]:
         """End and free everything, before the engine is released; sentences about what could not be written."""

@@ -15,13 +15,13 @@ import numpy as np
 
 from ..base.errors import UserError
 from ..edit.live_inputs import LiveInputs
-from ..edit.state import Selection
+from ..edit.state import Compare, Selection
 from ..gpu.context_thread import no_thread
 from ..model.environment_light import with_sun
 from ..render.solo import scene_seen
 from ..render.viewer.dirty_level import DirtyLevel
 from ..render.viewer.invalidation import dirty_level
-from .compared_with import FilePicture, GlassSwap, Histogram, Histograms
+from .compared_with import FilePicture, GlassSwap
 from .direct_picture import SAMPLES, DirectPicture
 from .panels.methods import METHOD_NAMES
 from .reference_thread import ReferenceThread, Snapshot
@@ -29,7 +29,7 @@ from .reference_thread import ReferenceThread, Snapshot
 if TYPE_CHECKING:
     import moderngl
 
-    from ..edit.state import Compare, State
+    from ..edit.state import State
     from ..gpu.context import Context
     from ..gpu.context_thread import ContextThread
     from ..model.scene import Vec3
@@ -53,7 +53,7 @@ class Comparison:
         make_engine: Callable[[Context], Engine] | None = None,
         thread: Callable[[], ContextThread | None] = no_thread,
     ) -> None:
-        """`thread`: where the reference's direct light is computed, asked when it is first wanted; None for the
+        """`thread`: where the reference's direct light is computed, called when it is first wanted; None for the
         caller's own, with `context`."""
         self._context, self._find_thread = context, thread
         self._make_engine = make_engine or _engine
@@ -64,20 +64,19 @@ class Comparison:
         self._direct: DirectPicture | None = None
         self._composed: moderngl.Texture | None = None
         self._composed_from = _NOTHING
-        self._compare: Compare | None = None
+        self._compare = Compare()
         self.is_stale = False
         self._swap = GlassSwap()
         self._file = FilePicture(context)
-        self._histograms = Histograms()
         self._glass_problem: str | None = None
         self._wish: tuple[str, str] | None = None
         """Method and glass that are wanted of the engine …"""
         self._given: tuple[str, str] | None = None
         """… and those that it was last given."""
         self._version_before: int | None = None
-        """Of the engine's picture when it was given them."""
+        """Version of the engine's picture when it was given them."""
         self._size = (0, 0)
-        """Of the picture that is compared."""
+        """Size of the picture that is compared."""
         self._selection: Selection | None = None
         """What was selected when it was begun: the solid whose glass is another."""
 
@@ -91,7 +90,7 @@ class Comparison:
 
     @property
     def _picture(self) -> moderngl.Texture | None:
-        if self._compare is None or not self._compare.is_active:
+        if not self._compare.is_active:
             return None
         if self._shows_reference:
             return self._composed
@@ -111,8 +110,6 @@ class Comparison:
     @property
     def label(self) -> str:
         """What `picture` is, in a few words."""
-        if self._compare is None:
-            return ""
         match self._compare.method:
             case "file":
                 return "" if self._compare.file is None else self._compare.file.name
@@ -126,32 +123,32 @@ class Comparison:
     @property
     def progress(self) -> float | None:
         """How far the other picture is, 0 to 1."""
-        if self._compare is None or not self._compare.is_active or self._begun is None:
+        if not self._compare.is_active or self._begun is None:
             return None
         if self._shows_reference:
             return None if self._thread is None else self._thread.fraction
-        return (
-            None if self._engine is None else min(self._engine.stats.photons / max(self._engine.target_photons, 1), 1.0)
-        )
+        if self._engine is None:
+            return None
+        return min(self._engine.stats.photons / max(self._engine.target_photons, 1), 1.0)
 
     @property
     def text(self) -> str:
         """What the other picture is."""
-        if self._compare is None or not self._compare.is_active or self._begun is None:
+        if not self._compare.is_active or self._begun is None:
             return ""
         if self._compare.method == FILE:
             return self._file_text
+        if self._shows_reference:
+            return self._reference_text(self._begun)
+        photons = f"{(0 if self._engine is None else self._engine.stats.photons) / 1e6:.2f} million photons"
         if self._compare.method == GLASS:
             if self._glass_problem is not None:
                 return f"There is nothing to compare with: {self._glass_problem}."
-            photons = 0 if self._engine is None else self._engine.stats.photons
-            return f"The same scene in {self._compare.glass}: {photons / 1e6:.2f} million photons."
-        if not self._shows_reference:
-            photons = 0 if self._engine is None else self._engine.stats.photons
-            note = f"{METHOD_NAMES.get(self._method, self._method)}: {photons / 1e6:.2f} million photons."
-            return (
-                note if self._compare.method != REFERENCE else f"There is no reference: {self._thread_problem}. {note}"
-            )
+            return f"The same scene in {self._compare.glass}: {photons}."
+        note = f"{METHOD_NAMES.get(self._method, self._method)}: {photons}."
+        return note if self._compare.method != REFERENCE else f"There is no reference: {self._thread_problem}. {note}"
+
+    def _reference_text(self, begun: LiveInputs) -> str:
         snapshot = self._thread.snapshot if self._thread is not None else None
         if snapshot is None:
             return "Reference: the first photons are on their way; the first time, its code is compiled before."
@@ -161,18 +158,24 @@ class Comparison:
         )
         if not snapshot.directly.all():
             note += " Striped: what is seen behind glass or in mirrors, which is not compared."
-        if self._begun.scene.render.bounces:
+        if begun.scene.render.bounces:
             note += " What surfaces give to each other is not in it."
-        if self._begun.local_gain and any(item.local_dispersion for item in self._begun.scene.objects):
+        if begun.local_gain and any(item.local_dispersion for item in begun.scene.objects):
             note += " The brush's local gain is not in it: it is not physical."
         return note
 
     @property
+    def _file_text(self) -> str:
+        if self._compare.file is None:
+            return "Choose a picture, or drop one on the window while this panel is open."
+        return f"There is nothing to compare with: {self._file.problem}." if self._file.problem else self._file.words
+
+    @property
     def is_busy(self) -> bool:
         """It would use more time (the window must not sleep)."""
-        if self._compare is None or not self._compare.is_active or self.is_stale:
+        if not self._compare.is_active or self.is_stale:
             return False
-        thread = self._thread if self._needs_reference else None
+        thread = self._thread if self._compare.method == REFERENCE else None
         refers = thread is not None and not thread.is_done and thread.problem is None
         return refers or (self._engine is not None and self._needs_engine and not self._engine.is_idle)
 
@@ -192,17 +195,6 @@ class Comparison:
         framebuffer.release()
         red, green, blue = (float(v) for v in np.frombuffer(data, np.float32))
         return red, green, blue
-
-    @property
-    def histogram(self) -> Histogram | None:
-        """Of the picture and of what it is compared with, as last counted."""
-        return self._histograms.last if self.picture is not None else None
-
-    def count(self, own: moderngl.Texture | None, exposure_ev: float) -> None:
-        """Have the histogram counted anew, beside the window; both pictures are read from the device now."""
-        other = self.picture
-        if own is not None and other is not None and not self._histograms.is_counting:
-            self._histograms.ask(_read(own), _read(other), exposure_ev)
 
     # ---- work --------------------------------------------------------------------------------
 
@@ -234,7 +226,7 @@ class Comparison:
         if self.is_stale:
             self._pause()
             return
-        if self._needs_reference:
+        if self._compare.method == REFERENCE:
             if self._thread is None:
                 self._start_reference(self._begun)
             elif budget_s > 0.0 or self._thread.snapshot is None:
@@ -254,18 +246,10 @@ class Comparison:
             self._engine.release()
             self._engine = None
         self._file.release()
-        self._histograms.release()
-
-    @property
-    def _file_text(self) -> str:
-        if self._compare is None or self._compare.file is None:
-            return "Choose a picture, or drop one on the window while this panel is open."
-        return f"There is nothing to compare with: {self._file.problem}." if self._file.problem else self._file.words
 
     @property
     def _method(self) -> str:
-        """The other method; of the reference, what stands in for it."""
-        assert self._compare is not None
+        """The other method; of the reference, its substitute."""
         if self._compare.method == GLASS and self._begun is not None:
             return self._begun.method
         return STAND_IN if self._compare.method == REFERENCE else self._compare.method
@@ -276,16 +260,11 @@ class Comparison:
 
     @property
     def _shows_reference(self) -> bool:
-        return self._compare is not None and self._compare.method == REFERENCE and self._thread_problem is None
-
-    @property
-    def _needs_reference(self) -> bool:
-        assert self._compare is not None
-        return self._compare.method == REFERENCE
+        return self._compare.method == REFERENCE and self._thread_problem is None
 
     @property
     def _needs_engine(self) -> bool:
-        return not self._shows_reference and self._compare is not None and self._compare.method != FILE
+        return not self._shows_reference and self._compare.method != FILE
 
     def _start_reference(self, begun: LiveInputs) -> None:
         scene = scene_seen(with_sun(begun.scene), begun.camera, begun.solo_nm)
@@ -311,7 +290,6 @@ class Comparison:
         if self._engine is None:
             self._engine = self._make_engine(self._context)
         self._engine.target_photons = target_photons
-        assert self._compare is not None
         scene = self._begun.scene
         if self._compare.method == GLASS:
             self._glass_problem = None
@@ -324,9 +302,8 @@ class Comparison:
         if self._wish != self._given and not self._engine.is_busy:
             self._given, self._version_before = self._wish, self._engine.picture_version
         self._engine.set(replace(self._begun, method=self._method, scene=scene))
-        if budget_s <= 0.0:
-            return
-        self._engine.advance(budget_s, False)
+        if budget_s > 0.0:
+            self._engine.advance(budget_s, False)
 
     def _compose(self, running: Engine, budget_s: float) -> None:
         """The reference's caustics on the picture without caustics. Behind glass there is no reference: stripes over

@@ -1,10 +1,8 @@
 """What a picture may be compared with besides methods and the reference: the same scene in another glass, a picture
-file; and what two pictures say of each other, pixel by pixel and as histograms."""
+file."""
 
 from __future__ import annotations
 
-from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,7 +10,7 @@ import numpy as np
 
 from ..base.errors import UserError
 from ..base.image_io import read_image
-from ..edit import edits
+from ..edit.glass import set_dispersion
 from ..model.optics import catalogue
 
 if TYPE_CHECKING:
@@ -21,22 +19,6 @@ if TYPE_CHECKING:
     from ..edit.state import Selection
     from ..gpu.context import Context
     from ..model.scene import Scene
-
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
-"""Of linear Rec.709."""
-HISTOGRAM_STOPS = (-12.0, 8.0)
-HISTOGRAM_BINS = 60
-
-
-@dataclass(frozen=True)
-class Histogram:
-    """Of two pictures' luminances."""
-
-    stops: np.ndarray
-    """Middles of the bins, stops about display white."""
-    own: np.ndarray
-    """Share of the pixels in each bin."""
-    other: np.ndarray
 
 
 class GlassSwap:
@@ -53,7 +35,7 @@ class GlassSwap:
             raise UserError("nothing in this scene is glass, so there is no other glass to compare with")
         key = (scene, index, glass)
         if self._scene is None or self._key[0] is not scene or self._key[1:] != key[1:]:
-            self._scene = edits.set_dispersion(scene, index, catalogue.find(glass))
+            self._scene = set_dispersion(scene, index, catalogue.find(glass))
             self._key = key
         return self._scene
 
@@ -121,48 +103,3 @@ def resized(rgb: np.ndarray, size: tuple[int, int]) -> np.ndarray:
     resample = Image.Resampling.BILINEAR
     channels = [Image.fromarray(np.ascontiguousarray(rgb[..., i], np.float32)) for i in range(3)]
     return np.stack([np.asarray(channel.resize(size, resample)) for channel in channels], axis=-1)
-
-
-class Histograms:
-    """Of the picture and of what it is compared with, counted beside the window."""
-
-    def __init__(self) -> None:
-        self._pool: ThreadPoolExecutor | None = None
-        self._asked: Future[Histogram] | None = None
-        self._last: Histogram | None = None
-
-    @property
-    def is_counting(self) -> bool:
-        """The last question has no answer yet."""
-        return self._asked is not None and not self._asked.done()
-
-    @property
-    def last(self) -> Histogram | None:
-        """The answer to the last question that has one."""
-        if self._asked is not None and self._asked.done():
-            self._last, self._asked = self._asked.result(), None
-        return self._last
-
-    def ask(self, own: np.ndarray, other: np.ndarray, exposure_ev: float) -> None:
-        """As of `histogram_of`."""
-        self._pool = self._pool or ThreadPoolExecutor(1, thread_name_prefix="histogram")
-        self._asked = self._pool.submit(histogram_of, own, other, exposure_ev)
-
-    def release(self) -> None:
-        """End the thread and forget what it counted."""
-        if self._pool is not None:
-            self._pool.shutdown()
-        self._pool = self._asked = self._last = None
-
-
-def histogram_of(own: np.ndarray, other: np.ndarray, exposure_ev: float) -> Histogram:
-    """Of two linear pictures (h, w, 3) as exposed; black pixels are in no bin."""
-    edges = np.linspace(*HISTOGRAM_STOPS, HISTOGRAM_BINS + 1)
-    shares = []
-    for rgb in (own, other):
-        # Not a product of matrices: those of several threads wait for each other, and the reference has long ones.
-        luminance = sum(weight * rgb[..., i].ravel() for i, weight in enumerate(LUMINANCE))
-        lit = luminance[luminance > 0.0]
-        stops = np.log2(np.maximum(lit, 1e-30)) + exposure_ev
-        shares.append(np.histogram(np.clip(stops, *HISTOGRAM_STOPS), edges)[0] / max(len(luminance), 1))
-    return Histogram(0.5 * (edges[:-1] + edges[1:]), *shares)

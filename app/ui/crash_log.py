@@ -1,4 +1,4 @@
-"""What went wrong unexpectedly, written down for a bug report; the interface goes on.
+"""What went wrong unexpectedly, written down for a bug report; the interface continues.
 
 One file in the config folder, appended to, and cut to its newest part when it grows.
 """

@@ -1,30 +1,29 @@
-"""What lies under the cursor: its surface, found at once, and the light there, which the engine is asked for."""
+"""What is under the cursor: its surface, found at once, and the light there, which the engine looks up."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base.errors import UserError
 from ..base.not_yet import NotYet
 from ..edit.picking import PickHit, pick_in
 from ..edit.state import State
 from .live_picture import LivePicture, pixel_of
-from .view_model import CursorInfo
+from .view_model import CursorInfo, LightHere
 
 if TYPE_CHECKING:
     from ..model.lights import Light
-    from ..render.viewer.photon_queries import CausticSpectrum
-from concurrent.futures import Future, ThreadPoolExecutor
-from typing import TYPE_CHECKING
-
-from ..base.errors import UserError
-
-if TYPE_CHECKING:
     from ..model.scene import Scene
     from ..reference.direct_light import DirectLight
+    from ..render.viewer.photon_queries import CausticSpectrum
+
+SPECTRUM_S = 0.1
+"""Shortest time between two spectra: each reads stored photons."""
 
 
 class DirectLightQuery:
@@ -69,10 +68,6 @@ class DirectLightQuery:
         self._pool = self._future = None
 
 
-SPECTRUM_S = 0.1
-"""Shortest time between two spectra: each reads stored photons."""
-
-
 class Cursor:
     """What was found at the last cursor position."""
 
@@ -83,7 +78,7 @@ class Cursor:
         self._direct = DirectLightQuery()
 
     def update(self, state: State, picture: LivePicture, now_s: float) -> None:
-        """Find what is under `state.hover`: surfaces at once, light as soon as the engine tells."""
+        """Find what is under `state.hover`: surfaces at once, light as soon as the engine has an answer."""
         if state.hover is None:
             self.view_model = None
             return
@@ -104,7 +99,7 @@ class Cursor:
         """A spectrum of the same object stays until the next is whole: no flicker while the cursor moves."""
         assert self.view_model is not None
         if before is not None:
-            self.view_model = replace(self.view_model, **{name: getattr(before, name) for name in _SPECTRUM_FIELDS})
+            self.view_model = replace(self.view_model, light=before.light)
         key = (id(picture.shown_scene), hit, picture.stats.photons, state.physical, state.smoothing)
         if key == self._spectrum_key or now_s - self._spectrum_s < SPECTRUM_S:
             return
@@ -114,30 +109,25 @@ class Cursor:
         gains = self._direct.gains(scene, place, normal)
         self._spectrum_s = now_s
         is_awaited = isinstance(found, NotYet) or (gains is None and not self._direct.is_hopeless)
-        # An answer that is still awaited is asked for again.
+        # While an answer is awaited the question is repeated.
         self._spectrum_key = () if is_awaited else key
-        if not isinstance(found, NotYet) and (not is_awaited or self.view_model.spectrum is None):
-            self.view_model = replace(self.view_model, **_told(found, scene.lights, gains))
+        if not isinstance(found, NotYet) and (not is_awaited or self.view_model.light is None):
+            self.view_model = replace(self.view_model, light=_light_here(found, scene.lights, gains))
 
     def release(self) -> None:
         """End what works beside the interface."""
         self._direct.release()
 
 
-_SPECTRUM_FIELDS = ("spectrum_nm", "spectrum", "spectrum_error", "too_few_photons", "direct_illuminance")
-
-
-def _told(caustic: CausticSpectrum, lights: Sequence[Light], gains: np.ndarray | None) -> dict[str, Any]:
-    """Fields of `CursorInfo`: a caustic with the direct light of `lights`, each `gains` times its quantity."""
+def _light_here(caustic: CausticSpectrum, lights: Sequence[Light], gains: np.ndarray | None) -> LightHere:
+    """A caustic with the direct light of `lights`, each `gains` times its quantity; None where they are not known."""
     width = caustic.resolution_nm
-    direct = np.zeros(len(caustic.wavelength_nm))
+    total, luminous = np.zeros(len(caustic.wavelength_nm)), None
     if gains is not None:
         edges = np.append(caustic.wavelength_nm - 0.5 * width, caustic.wavelength_nm[-1] + 0.5 * width)
-        for light, gain in zip(lights, gains, strict=True):
-            direct += gain * light.spectral_power.binned(edges)
-    total = direct if caustic.irradiance is None else direct + caustic.irradiance
-    luminous = None
-    if gains is not None:
-        luminous = float(sum(g * light.spectral_power.luminous() for g, light in zip(gains, lights, strict=True)))
-    values = (caustic.wavelength_nm, total, caustic.error, caustic.irradiance is None, luminous)
-    return dict(zip(_SPECTRUM_FIELDS, values, strict=True))
+        shining = [(gain, light.spectral_power) for gain, light in zip(gains, lights, strict=True)]
+        total = sum((gain * power.binned(edges) for gain, power in shining), total)
+        luminous = float(sum(gain * power.luminous() for gain, power in shining))
+    if caustic.irradiance is not None:
+        total = total + caustic.irradiance
+    return LightHere(caustic.wavelength_nm, total, caustic.error, caustic.irradiance is None, luminous)

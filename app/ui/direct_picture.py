@@ -55,7 +55,7 @@ class DirectPicture:
 
     @property
     def samples(self) -> int:
-        """Of a pixel of `rgb`; 0 while there is none."""
+        """Samples in each pixel of `rgb`; 0 while there is none."""
         return SAMPLES[self.version - 1] if self.version else 0
 
     @property
@@ -65,7 +65,7 @@ class DirectPicture:
         return self._rgb
 
     def advance(self, budget_s: float) -> None:
-        """Work for about `budget_s`, one dispatch at least; what takes longer goes on beside the window."""
+        """Work for about `budget_s`, one dispatch at least; what takes longer continues on the thread."""
         self._stepped.step(lambda: self._advance(budget_s), budget_s)
 
     def _advance(self, budget_s: float) -> None:

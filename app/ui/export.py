@@ -1,8 +1,9 @@
-"""Screenshots, which are only written; finished pictures, spectral ones, baked maps and animations as one job that
-works beside the window."""
+"""Screenshots, which are only written; finished pictures, baked maps and animations as one job that works while the
+window is drawn."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +13,7 @@ import numpy as np
 from ..base.atomic import check_writable
 from ..base.errors import UserError
 from ..base.glare import with_glare
-from ..base.image_io import SPECTRAL_SUFFIXES, check_suffix, write_image
+from ..base.image_io import SHOWN_SUFFIXES, SPECTRAL_SUFFIXES, check_finite, check_suffix, write_image
 from ..base.memory import MAX_SIDE_PX, check_picture_memory
 from ..edit import requests
 from ..edit.parameters import Stage
@@ -23,9 +24,8 @@ from ..model.scene import RenderDefaults
 from ..model.settings import RenderSettings
 from ..passes.display import Display
 from ..render.notices import FrameNotices, frame_notices
-from .export_job import ExportJob, Words
+from .export_job import Course, ExportJob, Words
 from .file_writer import FileWriter
-from .render_job import Course
 from .screenshot import Shown, screenshot, texture_codes, write_codes
 from .view_model import JobInfo
 
@@ -33,17 +33,17 @@ if TYPE_CHECKING:
     from ..gpu.context import Context
     from ..gpu.context_thread import ContextThread
 
-SPECTRAL_BINS = 20
-MIN_PHOTONS = 1_000_000
-MAX_PHOTONS = 64_000_000
+_CAUSTIC_SHARE = 0.2
+"""Share of the time for the layer of the caustics alone: light is traced once, and their camera samples are cheap."""
+_NOTHING = "Nothing was written: {} is whole or not at all."
 
 
 class Exports:
-    """Writes screenshots, as many as are asked for, and runs one longer job at a time. Both work beside the window;
-    what became of them `step` returns."""
+    """Writes screenshots, as many as are asked for, and runs one longer job at a time, both on other threads; `step`
+    returns what became of them."""
 
     def __init__(self, context: Context, thread: Callable[[], ContextThread | None] = no_thread) -> None:
-        """`thread`: where jobs work, asked when the first begins; None for the caller's own, with `context`."""
+        """`thread`: where jobs work, called when the first begins; None for the caller's own, with `context`."""
         self._context, self._find_thread = context, thread
         self._writer = FileWriter()
         self._job: ExportJob | None = None
@@ -75,17 +75,17 @@ class Exports:
 
     def begin(self, request: requests.Export, state: State, shown: Shown) -> None:
         """Begin what `request` asks for. Raises `UserError`; a running job is not disturbed."""
-        if isinstance(request, requests.Screenshot) and not request.spectral:
+        if isinstance(request, requests.Screenshot):
             check_suffix(request.path)
             check_writable(request.path)
             self.write(request.path, screenshot(request.path, shown))
             return
         if self._job is not None:
             raise UserError("an export is running already: wait for it, or cancel it first")
-        self._job = self._made(request, state, shown)
+        self._job = self._made(request, state, shown.exposure_ev)
 
     def write(self, path: Path, work: Callable[[], None]) -> None:
-        """Let `work`, which needs no OpenGL, write `path` beside the window."""
+        """Let `work`, which needs no OpenGL, write `path` on a thread."""
         self._writer.write(path, work, f"Saved {path.name} in {path.parent}.")
 
     def step(self, budget_s: float) -> str | None:
@@ -104,7 +104,7 @@ class Exports:
         return note
 
     def cancel(self) -> str | None:
-        """End the job; what is finished stays. None where that takes a moment: `step` tells then."""
+        """End the job; what is finished stays. None where that takes a moment: `step` returns the sentence then."""
         note = None if self._job is None else self._job.cancel()
         if note is not None:
             self._job = None
@@ -112,10 +112,8 @@ class Exports:
 
     def stop(self) -> str | None:
         """End the job as soon as it can keep what is done: a picture is written with the light that it has by then.
-        Asked again, or of what has no such middle, `cancel`."""
-        if self._job is not None and self._job.stop():
-            return None
-        return self.cancel()
+        Called again, or of what has no such middle, `cancel`."""
+        return None if self._job is not None and self._job.stop() else self.cancel()
 
     def release(self) -> list[str]:
         """End the job, and wait for what is being written; sentences about what could not be."""
@@ -124,53 +122,49 @@ class Exports:
             self._job = None
         return self._writer.release()
 
-    def _made(self, request: requests.Export, state: State, shown: Shown) -> ExportJob:
-        is_map = isinstance(request, requests.Bake)
-        size = (not is_map and getattr(request, "size", None)) or state.viewport_size
-        stage = Stage(state.scene, state.camera_for(size), shown.exposure_ev, state.solo_nm)
-        name, notices = request.path.name, FrameNotices()
+    def _made(self, request: requests.LongExport, state: State, exposure_ev: float) -> ExportJob:
         thread = self._find_thread()
         context = self._context if thread is None else thread.context
-        nothing = "Nothing was written: {} is whole or not at all.".format
-        if isinstance(request, requests.Screenshot):
-            work = _spectral(context, request.path, stage, state, shown.photons, notices)
-            words = Words(f"Spectral picture: {name}", f"Saved {name}.", nothing("a picture"))
-            return ExportJob(words, work, notices, thread)
-        if isinstance(request, requests.Bake):
-            work = _bake(context, request, stage, state, notices)
-            place = request.path.with_suffix(".json").name
-            words = Words(f"Caustic map: {name}", f"Baked {name}; its place is in {place}.", nothing("a map"))
-            return ExportJob(words, work, notices, thread)
-        if isinstance(request, requests.RenderPicture):
-            course = Course()
-            work = _render(context, request, stage, state, notices, course)
-            words = Words(
-                f"Rendering {name}",
-                f"Rendered {name}.",
-                nothing("a picture"),
-                "it is written with the light that it has by then",
-            )
-            return ExportJob(words, work, notices, thread, seconds=request.seconds, course=course)
-        work, frames = _animate(context, request, stage, state, notices)
+        size, name, notices = request.size, request.path.name, FrameNotices()
+        shown_size = state.viewport_size if isinstance(request, requests.Bake) else size
+        stage = Stage(state.scene, state.camera_for(shown_size), exposure_ev, state.solo_nm)
+        match request:
+            case requests.Bake():
+                settings = _settings(state, size, photons=request.photons)
+                work = _bake(context, request, stage, settings, notices)
+                saved = f"Baked {name}; its place is in {request.path.with_suffix('.json').name}."
+                words = Words(f"Caustic map: {name}", saved, _NOTHING.format("a map"))
+                return ExportJob(words, work, notices, thread)
+            case requests.RenderPicture():
+                course = Course()
+                settings = _settings(
+                    state,
+                    size,
+                    photons=None if request.seconds is not None else request.photons,
+                    seconds=request.seconds,
+                    spp=request.samples,
+                    bins=request.bins,
+                )
+                work = _render(context, request, stage, settings, state.display, notices, course)
+                kept = "it is written with the light that it has by then"
+                words = Words(f"Rendering {name}", f"Rendered {name}.", _NOTHING.format("a picture"), kept)
+                return ExportJob(words, work, notices, thread, seconds=request.seconds, course=course)
+        settings = _settings(state, size, photons=request.photons, spp=request.samples)
+        work, frames = _animate(context, request, stage, settings, state, notices)
         title = "Turntable" if request.kind == "turntable" else "Animation"
-        words = Words(
-            f"{title}: {name}",
-            f"Saved {name}, {frames} frames.",
-            f"Stopped {name}; the frames that are done stay.",
-            "the frames that are done stay",
-        )
+        saved, kept = f"Saved {name}, {frames} frames.", "the frames that are done stay"
+        words = Words(f"{title}: {name}", saved, f"Stopped {name}; {kept}.", kept)
         return ExportJob(words, work, notices, thread, frames)
 
 
-def _settings(state: State, size: tuple[int, int], photons: int, **changes: Any) -> RenderSettings:
-    """What is shown, in another size and with so many photons."""
+def _settings(state: State, size: tuple[int, int], **changes: Any) -> RenderSettings:
+    """What is shown, in another size and with `changes`."""
     width, height = size
     if not (1 <= width <= MAX_SIDE_PX and 1 <= height <= MAX_SIDE_PX):
         raise UserError(f"a size of {width} × {height} pixels is out of range: no side may exceed {MAX_SIDE_PX}")
     return RenderSettings(
         width=width,
         height=height,
-        photons=photons,
         method=state.method,
         smoothing=state.smoothing,
         max_depth=state.scene.render.max_depth,
@@ -179,51 +173,64 @@ def _settings(state: State, size: tuple[int, int], photons: int, **changes: Any)
     )
 
 
-def _spectral(
-    context: Context, path: Path, stage: Stage, state: State, photons: int, notices: FrameNotices
+def _render(
+    context: Context,
+    request: requests.RenderPicture,
+    stage: Stage,
+    settings: RenderSettings,
+    display: DisplaySettings,
+    notices: FrameNotices,
+    course: Course,
 ) -> Iterator[float]:
-    from ..render.frames import FrameRenderer
-
-    if check_suffix(path) not in SPECTRAL_SUFFIXES:
-        raise UserError(f"cannot write {path}: spectral channels need {' or '.join(SPECTRAL_SUFFIXES)}")
-    check_writable(path)
-    check_picture_memory(*state.viewport_size, SPECTRAL_BINS)
-    settings = _settings(
-        state, state.viewport_size, int(np.clip(photons, MIN_PHOTONS, MAX_PHOTONS)), bins=SPECTRAL_BINS
-    )
+    """Shares of the work from 0 to 1; files are written whole at its end. Raises `UserError` before the first share for
+    what cannot be rendered or written."""
+    path = request.path
+    if check_suffix(path) not in SPECTRAL_SUFFIXES and request.bins is not None:
+        names = " or ".join(SPECTRAL_SUFFIXES)
+        raise UserError(f"cannot write spectral bins to {path.name}: choose a name that ends in {names}")
+    if request.caustic and request.seconds is not None:
+        raise UserError("a caustic layer needs a number of photons, not a time: its samples come on top")
+    targets = [path, path.with_name(f"{path.stem}_caustic{path.suffix}")] if request.caustic else [path]
+    for target in targets:
+        check_writable(target)
+    check_picture_memory(settings.width, settings.height, settings.bins)
 
     def work() -> Iterator[float]:
-        renderer = FrameRenderer(context, settings, [stage])
+        from ..render.frames import FrameRenderer
+
+        # From the first dispatch on: who asks for a minute waits for a minute.
+        renderer = FrameRenderer(context, settings, [stage], time.perf_counter())
         try:
-            for share in renderer.steps(stage):
-                yield 0.98 * share
-            picture = renderer.picture
-            notices.take(frame_notices(renderer.light, stage.camera, settings, picture.rgb))
-            write_image(path, picture.rgb, spectral=picture.spectral, bin_edges_nm=picture.bin_edges_nm)
+            own = 0.98 - (_CAUSTIC_SHARE if request.caustic else 0.0)
+            for share in renderer.steps(stage, course.stops):
+                course.phase = renderer.phase
+                yield own * share
+            pictures = [renderer.picture]
+            notices.take(frame_notices(renderer.light, stage.camera, settings, pictures[0].rgb))
+            if request.caustic:
+                for share in renderer.steps_of_layer("caustic", stage, course.stops):
+                    yield own + _CAUSTIC_SHARE * share
+                pictures.append(renderer.picture)
         finally:
             renderer.release()
+        course.phase = "writing the picture"
+        yield 0.98
+        develop = _Developer(context, display)
+        try:
+            for target, picture in zip(targets, pictures, strict=True):
+                if target.suffix.lower() in SHOWN_SUFFIXES:
+                    check_finite(target.name, picture.rgb)
+                    write_codes(target, develop(picture.rgb, stage.exposure_ev, stage.scene.render))
+                else:
+                    write_image(target, picture.rgb, spectral=picture.spectral, bin_edges_nm=picture.bin_edges_nm)
+        finally:
+            develop.release()
 
     return work()
 
 
-def _render(
-    context: Context, request: requests.RenderPicture, stage: Stage, state: State, notices: FrameNotices, course: Course
-) -> Iterator[float]:
-    from .render_job import render_picture
-
-    def write_shown(path: Path, rgb: np.ndarray) -> None:
-        develop = _Developer(context, state.display)
-        try:
-            write_codes(path, develop(rgb, stage.exposure_ev, stage.scene.render))
-        finally:
-            develop.release()
-
-    settings = _settings(state, request.size, request.photons or MIN_PHOTONS)
-    return render_picture(context, request, stage, settings, write_shown, notices, course)
-
-
 def _bake(
-    context: Context, request: requests.Bake, stage: Stage, state: State, notices: FrameNotices
+    context: Context, request: requests.Bake, stage: Stage, settings: RenderSettings, notices: FrameNotices
 ) -> Iterator[float]:
     from ..render import bake
 
@@ -231,13 +238,18 @@ def _bake(
     bake.check_receiver(stage.scene, request.receiver)
     check_writable(request.path)
     check_writable(bake.placement_path(request.path))
-    settings = _settings(state, request.size, request.photons)
     return bake.bake(context, stage, settings, request.receiver, request.path, notices)
 
 
 def _animate(
-    context: Context, request: requests.Animate, stage: Stage, state: State, notices: FrameNotices
+    context: Context,
+    request: requests.Animate,
+    stage: Stage,
+    settings: RenderSettings,
+    state: State,
+    notices: FrameNotices,
 ) -> tuple[Iterator[float], int]:
+    """The work, and how many frames it has."""
     from ..base.movie import open_sink
     from ..edit import animation
     from ..render.animate import description, render_animation
@@ -246,14 +258,10 @@ def _animate(
         made = animation.turntable(stage, request.frames or 1, request.fps)
     else:
         made = animation.keyed(stage, animation.tracks_of(state.animation), request.frames, request.fps)
-    size = request.size or state.viewport_size
-    settings = _settings(state, size, request.photons, spp=request.samples)
-    check_picture_memory(*size, None)
-    description_ = dict(description(made, settings, request.fps, request.photons)) | {
-        "display": repr(state.display),
-        "smoothing": state.smoothing,
-    }
-    sink = open_sink(request.path, size, request.fps, description_)
+    check_picture_memory(*request.size, None)
+    shown = {"display": repr(state.display), "smoothing": state.smoothing}
+    described = dict(description(made, settings, request.fps, request.photons)) | shown
+    sink = open_sink(request.path, request.size, request.fps, described)
     develop = _Developer(context, state.display)
 
     def work() -> Iterator[float]:

@@ -1,4 +1,5 @@
-"""One export that takes long: a generator of shares, driven in steps beside the window, and what is told of it."""
+"""One export that takes long: a generator of shares, driven in steps while the window is drawn, and what is said of
+it."""
 
 from __future__ import annotations
 
@@ -14,7 +15,19 @@ from .view_model import JobInfo
 
 if TYPE_CHECKING:
     from ..gpu.context_thread import ContextThread
-    from .render_job import Course
+
+
+@dataclass
+class Course:
+    """What a finished picture reports while it is made, and whether it is to end."""
+
+    phase: str = "preparing"
+    is_stopped: bool = False
+    """Somebody waited long enough: what is done by then becomes the picture."""
+
+    def stops(self) -> bool:
+        """`is_stopped`, to be called."""
+        return self.is_stopped
 
 
 @dataclass(frozen=True)
@@ -29,7 +42,7 @@ class Words:
 
 
 class ExportJob:
-    """A generator of shares on the thread that exports have, with a note about it."""
+    """A generator of shares on the thread of exports, with a sentence about it at its end."""
 
     def __init__(
         self,
@@ -41,8 +54,8 @@ class ExportJob:
         seconds: float | None = None,
         course: Course | None = None,
     ) -> None:
-        """`seconds`: that it takes, where that is known; `course`: of a finished picture; `thread`: where all of `work`
-        happens, None for here."""
+        """`seconds`: what it takes, where that is known; `course`: of a finished picture; `thread`: where all of `work`
+        is done, None for the caller's own."""
         self._course = course
         self._words, self._work, self._notices = words, work, notices
         self._stepped: SteppedWork[bool] = SteppedWork(thread)
@@ -53,7 +66,7 @@ class ExportJob:
 
     @property
     def is_picture(self) -> bool:
-        """A finished picture, in which everything goes into one file."""
+        """A finished picture, all of which is written to one file."""
         return self._course is not None
 
     @property
@@ -72,13 +85,13 @@ class ExportJob:
         return True
 
     def step(self, budget_s: float) -> str | None:
-        """Work for about `budget_s`; the note once it is over. What takes longer goes on beside the window."""
+        """Work for about `budget_s`; the sentence once it is over. What takes longer continues on the thread."""
         is_over = self._stepped.step(lambda: self._advance(budget_s), budget_s)
         if is_over is None:
             return None
         if is_over:
             early = " It was stopped early, and is what was done until then." if self.is_stopped else ""
-            return self._told(self._words.finished + early)
+            return self._noted(self._words.finished + early)
         return self.cancel() if self._is_cancelled else None
 
     def _advance(self, budget_s: float) -> bool:
@@ -97,7 +110,7 @@ class ExportJob:
             self._is_cancelled = True
             return None
         self._stepped.end(self._close, waits=True)
-        return self._told(self._words.cancelled)
+        return self._noted(self._words.cancelled)
 
     def release(self) -> None:
         """End it now, and wait for that."""
@@ -108,8 +121,8 @@ class ExportJob:
         if close is not None:
             close()
 
-    def _told(self, sentence: str) -> str:
-        """With what the pictures say of themselves."""
+    def _noted(self, sentence: str) -> str:
+        """With the notices of its pictures."""
         notices = self._notices.lines(of_frames=self._frames > 1)
         return " ".join([sentence, *(f"Note: {notice}." for notice in notices)])
 

@@ -1,4 +1,4 @@
-"""Files that are encoded and written beside the window: nothing of them needs OpenGL, and the largest take seconds."""
+"""Files that are encoded and written on a thread: none of that needs OpenGL, and the largest take seconds."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class _File:
 
 
 class FileWriter:
-    """One file after another, in the order asked for; each is whole or not there, by those who write it."""
+    """Writes one file after another, in the order requested."""
 
     def __init__(self) -> None:
         self._pool: ThreadPoolExecutor | None = None
@@ -33,7 +33,7 @@ class FileWriter:
 
     @property
     def is_busy(self) -> bool:
-        """Something is being written, or was and nobody has asked how it went."""
+        """Something is being written, or was and `finished` has not returned its sentence."""
         return bool(self._files)
 
     @property
@@ -45,7 +45,7 @@ class FileWriter:
         return f"Writing {self._files[0].name} …" + (f" and {more} more" if more else "")
 
     def write(self, path: Path, work: Callable[[], None], sentence: str) -> None:
-        """Let `work` write `path`; `sentence` is what `finished` tells then."""
+        """Let `work` write `path`; `finished` returns `sentence` then."""
         self._pool = self._pool or ThreadPoolExecutor(1, thread_name_prefix="writer")
         self._files.append(_File(path.name, self._pool.submit(work), time.monotonic(), sentence))
 
@@ -59,10 +59,10 @@ class FileWriter:
         return file.sentence
 
     def release(self) -> list[str]:
-        """Wait until all that was asked for is written; what could not be, in sentences."""
+        """Wait until everything is written; sentences about what could not be."""
         problems = []
         while self._files:
-            with suppress(Exception):  # a fault of the program: the next file may be sound
+            with suppress(Exception):  # a fault of the program: the next file may succeed
                 self._files[0].future.exception()
             try:
                 self.finished()

@@ -35,7 +35,6 @@ def view_model_of(session: Session) -> ViewModel:
         stats=stats,
         shown=picture.seen,
         picture=None if shown is None or picture.awaits_scene else shown.glo,
-        beside=None if picture.beside is None else (picture.beside[0].glo, picture.beside[1].glo),
         picture_size=(0, 0) if shown is None else shown.size,
         frame_ms=tuple(session.frame_ms),
         pass_ms=_pass_ms(session),
@@ -52,16 +51,13 @@ def view_model_of(session: Session) -> ViewModel:
         scenes=session.jobs.gallery.entries,
         messages=session.messages.messages(),
         shader_error=picture.shader_error,
-        recovery=None if session.recovery is None else session.recovery.path,
-        recovery_title="" if session.recovery is None else session.recovery.note.title,
-        recovery_time="" if session.recovery is None else session.recovery.written,
+        recovery=session.recovery,
         asks_to_quit=session.asks_to_quit,
         asks_about_export=session.asks_about_export,
         reference_progress=comparison.progress,
         compare_text=comparison.text,
         compare_label=comparison.label,
         compared_rgb=None if session.state.hover is None else comparison.pixel(session.state.hover),
-        histogram=comparison.histogram,
         compare_ready=comparison.picture is not None,
         compare_stale=comparison.is_stale,
         rays=session.jobs.overlay.rays,
@@ -91,7 +87,7 @@ def _pass_ms(session: Session) -> dict[str, float]:
 Draw = Callable[[State, ViewModel], State]
 DEFAULT_BUDGET_S = 0.03
 _MINOR = (requests.Notice, requests.DismissMessage, requests.SelectAt, requests.FrameSelection, requests.CancelQuit)
-"""Requests that mend nothing which an error said."""
+"""Requests after which errors stay on the screen."""
 
 
 def run_frame(session: Session, draw: Draw, budget_s: float = DEFAULT_BUDGET_S, slice_s: float = math.inf) -> None:
@@ -135,16 +131,16 @@ def _accept(session: Session, before: State, after: State) -> None:
 
 
 def _carry_out(session: Session, kind: type, work: Callable[[], None]) -> None:
-    """What a request of that kind asks for; whatever goes wrong becomes a sentence."""
+    """Do the work of a request of that kind; whatever fails becomes a sentence."""
     try:
         work()
         if not issubclass(kind, _MINOR) and kind not in session.awaited:
             _succeeded(session)
     except UserError as error:
-        session.messages.tell(sentence(str(error)), is_error=True)
+        session.messages.show(sentence(str(error)), is_error=True)
     except Exception as error:  # noqa: BLE001 - a bug: the work and the window outlive it
         session.save_from_crash(kind.__name__, error)
-        session.messages.tell(
+        session.messages.show(
             f"{words(kind)} failed by a fault of the program ({brief(error)}); your work is kept.", is_error=True
         )
 
@@ -176,15 +172,15 @@ def _work(session: Session, budget_s: float, slice_s: float) -> None:
         session.engine_s = session.clock() - started
     problem = session.picture.problem
     if problem is not None and problem != session.problem_said and session.picture.shader_error is None:
-        session.messages.tell(sentence(problem), is_error=True)
+        session.messages.show(sentence(problem), is_error=True)
     session.problem_said = problem
     now = session.clock()
     try:
         session.picture.show(session.state, now, session.delta_s, session.jobs.comparison)
         session.jobs.follow(session.state, drawn, session.picture, now)
-        session.tell_losses()
+        session.show_losses()
     except UserError as error:
-        session.messages.tell(sentence(str(error)), is_error=True)
+        session.messages.show(sentence(str(error)), is_error=True)
     except Exception as error:  # noqa: BLE001 - a bug, or the device is lost
         session.picture.give_up()
         session.renderer_stopped(error)
@@ -201,7 +197,7 @@ def _work_beside(session: Session, budget_s: float, only_exports: bool = False) 
     except Exception as error:  # noqa: BLE001 - a bug in a side line must not stop the picture
         session.jobs.exports.cancel()
         session.save_from_crash("exporting or comparing", error)
-        session.messages.tell(
+        session.messages.show(
             f"Comparing or exporting failed by a fault of the program ({brief(error)}).", is_error=True
         )
         session.state = replace(session.state, compare=replace(session.state.compare, mode="off"))
@@ -210,7 +206,7 @@ def _work_beside(session: Session, budget_s: float, only_exports: bool = False) 
         session.jobs_s = session.clock() - started
         for text, is_error in session.jobs.notes:
             session.quits_after_export &= not is_error
-            session.messages.tell(sentence(text), is_error)
+            session.messages.show(sentence(text), is_error)
         session.jobs.notes.clear()
 
 

@@ -1,6 +1,6 @@
 """The gizmo that moves, turns and scales the selected object or light: ImGuizmo between two of our own matrices.
 
-ImGuizmo works in float32 on row vectors (its arrays are the transposes of ours, read row by row). It is handed a frame
+ImGuizmo works in float32 on row vectors (its arrays are the transposes of ours, read row by row). It is given a frame
 whose origin is where the drag began, so that a scene ten kilometres off the origin moves as finely as any.
 """
 
@@ -27,12 +27,12 @@ _LABELS = {"move": "Move", "rotate": "Turn", "scale": "Scale"}
 ROTATION_SNAP_DEG = 15.0
 SCALE_SNAP = 0.1
 _SIZE = 0.14
-"""Of the gizmo in clip space."""
+"""Size of the gizmo in clip space."""
 
 
 @dataclass
 class _Drag:
-    """What was taken hold of."""
+    """What is dragged."""
 
     scene: Scene
     """When it began."""
@@ -45,8 +45,8 @@ class _Drag:
     now: np.ndarray
     """The same frame as ImGuizmo moved it."""
 
-    def goes_on(self, state: State) -> bool:
-        """Whether nobody else has changed the scene, the selection or the tool meanwhile."""
+    def continues(self, state: State) -> bool:
+        """Whether scene, selection and tool are still those of the drag."""
         return state.scene is self.shown and (state.selection, state.tool) == (self.selection, self.operation)
 
 
@@ -68,7 +68,7 @@ class Gizmo:
 
     def is_in_the_way(self) -> bool:
         """The mouse belongs to the gizmo: it is over a handle or holds one."""
-        # ImGuizmo goes on saying what it said when it was last drawn.
+        # ImGuizmo keeps the answer of the frame in which it was last drawn.
         return self.is_held or (self._is_drawn and bool(_IM.is_over()))
 
     def draw(self, state: State, view: View, rect: tuple[float, float, float, float]) -> State:
@@ -82,7 +82,7 @@ class Gizmo:
             self._drag, self._is_drawn = None, False
             return state
         self._is_drawn = True
-        if self._drag is not None and not self._drag.goes_on(state):
+        if self._drag is not None and not self._drag.continues(state):
             self._drag = None
         _IM.begin_frame()
         _IM.set_drawlist(imgui.get_window_draw_list())
@@ -140,13 +140,13 @@ class Gizmo:
                 shown = placing.changed(shown, each, delta)
             drag.shown = shown
         except UserError:
-            return state  # a place where it may not be, such as a light inside glass: it waits at the border
-        name = placing.name_of(drag.scene, drag.selection)
+            return state  # a place where it may not be, such as a light inside glass: it stays at the border
+        name = selecting.name_of(drag.scene, drag.selection)
         more = f" and {len(others)} more" if others else ""
         return state.edited(drag.shown, f"{_LABELS[drag.operation]} {name}{more}")
 
     def _note(self, view: View, frame: np.ndarray, rect: tuple[float, float, float, float]) -> None:
-        """Tell tests where the gizmo is: its middle, as an item without size."""
+        """Record for tests where the gizmo is: its middle, as an item without size."""
         (x, y), _ = view.project(frame[:3, 3])
         if np.isfinite(x) and 0.0 < x < 1.0 and 0.0 < y < 1.0:
             at = imgui.get_cursor_screen_pos()

@@ -24,14 +24,6 @@ FRAME_S = 1 / 60
 """Time that passes on the interface's clock in a frame: fixed, so that runs repeat."""
 
 
-def _nothing() -> None:
-    pass
-
-
-def _not_finished(_take_picture: Callable[[], np.ndarray]) -> None:
-    pass
-
-
 class HeadlessInterface:
     """An interface of `size` pixels whose frame is `draw()`.
 
@@ -44,9 +36,9 @@ class HeadlessInterface:
         context: Context,
         draw: Callable[[], None],
         size: tuple[int, int] = (1280, 720),
-        prepare: Callable[[], None] = _nothing,
-        rendered: Callable[[], None] = _nothing,
-        finished: Callable[[Callable[[], np.ndarray]], None] = _not_finished,
+        prepare: Callable[[], None] = lambda: None,
+        rendered: Callable[[], None] = lambda: None,
+        finished: Callable[[Callable[[], np.ndarray]], None] = lambda _take_picture: None,
         preferences: Callable[[], Preferences] = Preferences,
     ) -> None:
         self.size = size
@@ -209,5 +201,5 @@ class HeadlessInterface:
     def type(self, text: str) -> None:
         """Type into the field that has the focus."""
         imgui.get_io().add_input_characters_utf8(text)
-        # imgui hands out one character event a frame while keys change.
+        # imgui processes one character event a frame while keys change.
         self.frame(2)

@@ -42,7 +42,7 @@ class ImguiHost:
     def frame(self) -> Iterator[None]:
         """imgui calls belong into this block.
 
-        An exception in it ends the frame in good order (open windows are closed), then goes on.
+        An exception in it ends the frame in good order (open windows are closed) and is raised again.
         """
         imgui.backends.opengl3_new_frame()
         imgui.new_frame()
@@ -60,12 +60,12 @@ class ImguiHost:
         imgui.render()
 
     def keep_for_next_frame(self) -> None:
-        """What is put in from here on waits for the frame after the next.
+        """Input from here on waits for the frame after the next.
 
-        For frames that take longer than somebody's fingers. Before a modifier is let go: Ctrl would else be up again in
-        the very frame in which the letter goes down, and Ctrl+R would be R. Before a mouse button is pressed that has
-        just come: some controls must be hovered first. imgui handles a key's second change in a frame of its own, so
-        a key that no keyboard has goes down and up.
+        For frames that take longer than a keystroke. Before a modifier is released: Ctrl would else be up again in the
+        very frame in which the letter is pressed, and Ctrl+R would be R. Before a mouse button is pressed where the
+        mouse has just arrived: some controls must be hovered first. imgui handles a key's second change in a frame of
+        its own, so a key that no keyboard has is pressed and released.
         """
         self.make_current()
         io = imgui.get_io()

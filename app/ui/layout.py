@@ -6,11 +6,16 @@ where that text holds none, and again after `reset`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import Literal, Protocol
 
 from imgui_bundle import imgui
 
+from ..base import files
+from ..base.atomic import atomic_output
+from ..base.errors import UserError
+from ..edit.preferences import layout_file
 from . import theme
 
 VIEWPORT = "Viewport"
@@ -25,29 +30,30 @@ _SETTLED_AFTER = 4
 Place = Literal["left top", "left bottom", "right top", "right bottom", "right bottom if tall", "bottom", "floating"]
 
 
-@dataclass(frozen=True)
-class Docked:
+class Docked(Protocol):
     """A window's title and where the default layout puts it; those of one place share tabs, first in front.
 
     "if tall": floating in a low window, whose one row of tabs is full.
     """
 
-    title: str
-    place: Place
+    @property
+    def title(self) -> str: ...
+    @property
+    def place(self) -> Place: ...
 
 
 _raised: dict[str, int] = {}
-"""Fields of the panels that somebody wants to see in front, and for how many frames: a panel that is opened has its tab
-only in the second."""
+"""Fields of the panels to be shown in front, and for how many frames: a panel that is opened has its tab only in the
+second."""
 
 floating: list[str] = []
 """Titles of the panels that floated in this frame."""
 
 behind: set[str] = set()
-"""Fields of the panels that lay behind another one's tab in the last frame."""
+"""Fields of the panels that were behind another one's tab in the last frame."""
 
 
-def dockspace(windows: tuple[Docked, ...], bottom_margin: float) -> None:
+def dockspace(windows: Sequence[Docked], bottom_margin: float) -> None:
     """Submit the dock space below the menu bar, `bottom_margin` pixels above the lower edge; before every docked
     window."""
     viewport = imgui.get_main_viewport()
@@ -90,7 +96,7 @@ _BARE = (
 )
 
 
-def _build(dock: int, size: imgui.ImVec2, windows: tuple[Docked, ...]) -> None:
+def _build(dock: int, size: imgui.ImVec2, windows: Sequence[Docked]) -> None:
     builder = imgui.internal
     builder.dock_builder_add_node(dock, imgui.internal.DockNodeFlagsPrivate_.dock_space)
     builder.dock_builder_set_node_size(dock, size)
@@ -113,20 +119,20 @@ def _build(dock: int, size: imgui.ImVec2, windows: tuple[Docked, ...]) -> None:
     builder.dock_builder_finish(dock)
 
 
-def lies_on_ground(title: str) -> bool:
-    """Whether this window lay in the dock space in the last frame: its ground is what the frame was cleared to."""
+def is_in_dock_space(title: str) -> bool:
+    """Whether this window was in the dock space in the last frame: its ground is what the frame was cleared to."""
     window = imgui.internal.find_window_by_name(title)
     node = None if window is None else window.dock_node
     return node is not None and imgui.internal.dock_node_get_root_node(node).is_dock_space()
 
 
 def raise_panel(field: str) -> None:
-    """Show this panel before the tabs beside it in the next frame."""
+    """Show this panel in front of the other tabs in the next frame."""
     _raised[field] = 3
 
 
 def is_raised(field: str) -> bool:
-    """Whether somebody asked for it since the last time; not before a new window's tabs are in their order."""
+    """Whether it was raised since the last call; not before a new window's tabs are in their order."""
     if imgui.get_frame_count() <= _SETTLED_AFTER + 2:
         return False
     frames = _raised.pop(field, 0)
@@ -135,7 +141,7 @@ def is_raised(field: str) -> bool:
     return frames > 0
 
 
-def _bring_to_front(windows: tuple[Docked, ...]) -> None:
+def _bring_to_front(windows: Sequence[Docked]) -> None:
     """Show the tab that matters of each place: all of them came to the front in turn as they appeared."""
     done: set[int] = set()
     for listed in windows:
@@ -160,3 +166,15 @@ def _hide_tab_of_picture() -> None:
     node = None if window is None else window.dock_node
     if node is not None:
         node.set_local_flags(node.local_flags | imgui.internal.DockNodeFlagsPrivate_.no_tab_bar)
+
+
+def load() -> None:
+    """Give imgui the remembered layout, before the first frame; nothing remembered leaves the default."""
+    with suppress(OSError, UserError, UnicodeDecodeError):
+        imgui.load_ini_settings_from_memory(files.read_text(layout_file(), files.SETTINGS_BYTES))
+
+
+def save() -> None:
+    """Remember the layout. A folder that cannot be written costs only that."""
+    with suppress(OSError, UserError), atomic_output(layout_file()) as temporary:
+        temporary.write_text(imgui.save_ini_settings_to_memory(), encoding="utf-8")

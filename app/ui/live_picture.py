@@ -9,10 +9,10 @@ from __future__ import annotations
 import math
 import re
 import time
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import replace
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -34,27 +34,14 @@ if TYPE_CHECKING:
     from ..model.scene import Scene
     from ..render.viewer.photon_queries import CausticSpectrum
     from ..render.viewer.threaded_engine import Engine
+    from .compare import Comparison
 
 
 class EngineError(RuntimeError):
     """The engine stopped: a bug, or the device is lost. `__cause__` is what happened."""
 
 
-class Other(Protocol):
-    """What the picture is compared with."""
-
-    @property
-    def picture(self) -> moderngl.Texture | None:
-        """Radiance, as the engine's."""
-
-
 Stops = Callable[[], bool]
-
-
-def _never() -> bool:
-    return False
-
-
 _SHADER_FILE = re.compile(r"\.(comp|vert|frag|glsl)\b")
 
 
@@ -75,16 +62,14 @@ class LivePicture:
         """The engine's, as of the last frame."""
         self._developed: tuple[object, ...] | None = None
         """What `shown` was made of."""
-        self.beside: tuple[moderngl.Texture, moderngl.Texture] | None = None
-        """The other picture and the error, while they are shown side by side."""
         self.shown: moderngl.Texture | None = None
         """RGBA8, sRGB codes, row 0 on top."""
         self.magnified: moderngl.Texture | None = None
         self.seen: Scene | None = None
         """The scene that the picture really shows."""
         self.awaits_scene = False
-        """Another document was opened and nothing of it has been drawn: its objects' outlines, rays and marks would lie
-        on the picture of what was there before."""
+        """Another document was opened and nothing of it has been drawn: its objects' outlines, rays and marks would be
+        drawn on the picture of what was there before."""
         self.exposure_ev = 0.0
         self.display_s = 0.0
 
@@ -116,7 +101,7 @@ class LivePicture:
         problem = self._reload_error or self.problem
         return problem if problem is not None and _SHADER_FILE.search(problem) else None
 
-    def resize(self, state: State, other: Other | None = None) -> None:
+    def resize(self, state: State, other: Comparison | None = None) -> None:
         """Give the shown texture the size of `state`'s viewport, for the frame that begins.
 
         Only between frames: a texture that imgui is about to draw must not be made anew. While the engine is busy the
@@ -160,11 +145,11 @@ class LivePicture:
         self._exposure.restart()
         self.awaits_scene = True
 
-    def advance(self, state: State, budget_s: float, slice_s: float = math.inf, stops: Stops = _never) -> None:
+    def advance(self, state: State, budget_s: float, slice_s: float = math.inf, stops: Stops = lambda: False) -> None:
         """Let the engine follow `state`. Raises `EngineError`.
 
-        It works in slices of `slice_s`: not beyond the one in which another picture is made, or after which `stops()`,
-        or which it had little to do in. Without a budget it works only on what has changed."""
+        It works in slices of `slice_s`, the last of which is one that made another picture, had little to do, or after
+        which `stops()` is true. Without a budget it works only on what has changed."""
         if self.engine is None:
             return
         with self._guarded():
@@ -172,7 +157,7 @@ class LivePicture:
             self.engine.target_photons = state.preferences.target_photons
             self.engine.refine_when_still = state.preferences.refine_when_still
             if self.engine.set(state.live_inputs) != DirtyLevel.NOTHING:
-                budget_s = min(budget_s or slice_s, slice_s)  # what is under way now has to be told
+                budget_s = min(budget_s or slice_s, slice_s)  # what is under way has to learn of it
             elif budget_s <= 0.0:
                 return
             self.stats = self._advance(self.engine, state.interacting, budget_s, slice_s, stops)
@@ -197,7 +182,7 @@ class LivePicture:
             if ends or stops():
                 return replace(stats, trace_s=trace_s, splat_s=splat_s, camera_s=camera_s)
 
-    def show(self, state: State, now_s: float, delta_s: float, other: Other | None = None) -> None:
+    def show(self, state: State, now_s: float, delta_s: float, other: Comparison | None = None) -> None:
         """Develop the engine's picture for the screen."""
         radiance = self.radiance
         if radiance is None or min(self._size) < 1:
@@ -213,7 +198,7 @@ class LivePicture:
             )
         self.display_s = time.perf_counter() - started
 
-    def _develop(self, state: State, radiance: moderngl.Texture, other: Other | None) -> None:
+    def _develop(self, state: State, radiance: moderngl.Texture, other: Comparison | None) -> None:
         texture = other.picture if other is not None else None
         version = self.engine.picture_version if self.engine is not None else -1
         # What is compared or measured is data.
@@ -230,13 +215,6 @@ class LivePicture:
         radiance = radiance if joins else self._glare.run(radiance, glare, in_motion=state.interacting)
         look = state.display, self.exposure_ev, self._size
         self.shown = self._display.run(radiance, *look, texture, state.compare, antialias, halo=scattered)
-        self.beside = None
-        if texture is not None and state.compare.mode == "beside":
-            errors = replace(state.compare, mode="error", holding=False)
-            self.beside = (
-                self._display.run(texture, *look, output="other"),
-                self._display.run(radiance, *look, texture, errors, output="error"),
-            )
 
     def _expose(self, state: State, radiance: moderngl.Texture, now_s: float, delta_s: float) -> None:
         if not state.display.auto_exposure:
@@ -288,22 +266,15 @@ class LivePicture:
         self._glare.release()
         self._sampler.release()
 
-    def _guarded(self) -> _Guard:
-        return _Guard(self)
-
-
-class _Guard:
-    """Turns what an engine should never raise into `EngineError`, and gives the engine up."""
-
-    def __init__(self, owner: LivePicture) -> None:
-        self._owner = owner
-
-    def __enter__(self) -> None:
-        pass
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _trace: object) -> None:
-        if isinstance(error, Exception) and not isinstance(error, ShaderError):
-            self._owner.give_up()
+    @contextmanager
+    def _guarded(self) -> Iterator[None]:
+        """Turns what an engine should never raise into `EngineError`, and gives the engine up."""
+        try:
+            yield
+        except ShaderError:
+            raise
+        except Exception as error:
+            self.give_up()
             raise EngineError(str(error) or type(error).__name__) from error
 
 
@@ -312,7 +283,7 @@ def pixel_of(place: tuple[float, float], size: tuple[int, int]) -> tuple[int, in
     return min(max(int(place[0] * size[0]), 0), size[0] - 1), min(max(int(place[1] * size[1]), 0), size[1] - 1)
 
 
-def _antialiases(state: State, other: Other | None) -> bool:
+def _antialiases(state: State, other: Comparison | None) -> bool:
     """What is compared or measured is data; while something is dragged a picture is better soon than fine."""
     is_data = state.display.false_colour or (other is not None and other.picture is not None)
     return state.scene.render.antialias_highlights and not is_data and not state.interacting

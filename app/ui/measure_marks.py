@@ -12,7 +12,7 @@ from ..edit.picking import pick_in
 from ..edit.state import State
 from ..model.scene import Vec3
 from . import item_rects, theme
-from .overlay import Canvas, box_corners, draw_outlined
+from .overlay import Canvas, box_corners, draw_label, draw_outlined
 from .panels.numbers import named
 from .view_model import ViewModel
 
@@ -64,7 +64,7 @@ def draw_measure(canvas: Canvas, state: State, view_model: ViewModel, mouse: tup
             _dot(canvas, canvas.pixels(np.asarray(taken)), 5.5, filled=False)
     text = named(measuring.words(state.measured))
     size = imgui.calc_text_size(text)
-    _plate(canvas, canvas.left + 0.5 * (canvas.width - size.x), canvas.top + theme.em(0.8), text)
+    draw_label(canvas, canvas.left + 0.5 * (canvas.width - size.x), canvas.top + theme.em(0.8), text)
     item_rects.note("Measured")
 
 
@@ -113,15 +113,4 @@ def _dot(canvas: Canvas, place: np.ndarray, radius: float, filled: bool) -> None
 def _label(canvas: Canvas, x: float, y: float, text: str) -> None:
     if np.isfinite([x, y]).all():
         size = imgui.calc_text_size(text)
-        _plate(canvas, x - 0.5 * size.x, y - 0.5 * size.y, text)
-
-
-def _plate(canvas: Canvas, x: float, y: float, text: str) -> None:
-    size, pad = imgui.calc_text_size(text), theme.em(0.3)
-    canvas.drawing.add_rect_filled(
-        ImVec2(x - pad, y - 0.4 * pad),
-        ImVec2(x + size.x + pad, y + size.y + 0.4 * pad),
-        theme.packed(theme.palette().window, 0.88),
-        4.0,
-    )
-    canvas.drawing.add_text(ImVec2(x, y), theme.packed(theme.palette().text), text)
+        draw_label(canvas, x - 0.5 * size.x, y - 0.5 * size.y, text)

@@ -1,5 +1,5 @@
 """Sentences to the user: notices fade, errors later or with the next success, repetitions only renew. Errors of the
-layers below as sentences that stand alone, options of the command line as what the window has instead, line breaks."""
+layers below become whole sentences, options of the command line what the window has instead."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ MAX_REASON = 160
 
 
 def sentence(text: str) -> str:
-    """A `UserError`'s text as it stands on its own."""
+    """A `UserError`'s text as a whole sentence."""
     text = " ".join(text.split())
     # A file's or an object's name stays as it is written.
     start = text[:1].upper() if text.split(" ")[0].isalpha() else text[:1]
@@ -91,18 +91,18 @@ NOTICE_S, ERROR_S = 6.0, 20.0
 READ_S = 2.0
 """Shortest time that an error is on the screen, whatever succeeds meanwhile."""
 CHARACTERS_S = 15.0
-"""Of a longer one that are read in a second."""
+"""Characters of a longer one that are read in a second."""
 MAX_MESSAGES = 6
 
 
 @dataclass
-class _Said:
+class _Shown:
     text: str
     is_error: bool
     stays: bool = False
     """Until a success."""
     shown_s: float | None = None
-    """When it came on the screen: preparing a scene may hold the frame after that in which it was told."""
+    """When it came on the screen: preparing a scene may delay the next frame."""
 
     @property
     def stays_s(self) -> float:
@@ -114,36 +114,38 @@ class MessageBox:
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
-        self._said: list[_Said] = []
+        self._shown: list[_Shown] = []
 
-    def tell(self, text: str, is_error: bool = False, stays: bool = False) -> None:
+    def show(self, text: str, is_error: bool = False, stays: bool = False) -> None:
         """Show one sentence; one that `stays` does so until the next success."""
         sentence = in_window(" ".join(text.split()))
-        self._said = [said for said in self._said if said.text != sentence]
-        self._said.append(_Said(sentence, is_error, stays))
-        del self._said[:-MAX_MESSAGES]
+        self._shown = [shown for shown in self._shown if shown.text != sentence]
+        self._shown.append(_Shown(sentence, is_error, stays))
+        del self._shown[:-MAX_MESSAGES]
 
     def close(self, text: str) -> None:
         """Take a message away."""
-        self._said = [said for said in self._said if said.text != text]
+        self._shown = [shown for shown in self._shown if shown.text != text]
 
     def succeed(self) -> None:
         """Something that the user wanted was done: errors that could be read go."""
         now = self._clock()
-        self._said = [
-            said for said in self._said if not said.is_error or said.shown_s is None or now - said.shown_s < READ_S
+        self._shown = [
+            shown
+            for shown in self._shown
+            if not shown.is_error or shown.shown_s is None or now - shown.shown_s < READ_S
         ]
 
     def messages(self) -> tuple[Message, ...]:
         """What to show."""
         now, ages = self._clock(), {}
-        for said in self._said:
-            said.shown_s = now if said.shown_s is None else said.shown_s
-            ages[id(said)] = now - said.shown_s
-        self._said = [said for said in self._said if said.stays or ages[id(said)] < said.stays_s]
+        for shown in self._shown:
+            shown.shown_s = now if shown.shown_s is None else shown.shown_s
+            ages[id(shown)] = now - shown.shown_s
+        self._shown = [shown for shown in self._shown if shown.stays or ages[id(shown)] < shown.stays_s]
         return tuple(
-            Message(said.text, said.is_error, math.inf if said.stays else said.stays_s - ages[id(said)])
-            for said in self._said
+            Message(shown.text, shown.is_error, math.inf if shown.stays else shown.stays_s - ages[id(shown)])
+            for shown in self._shown
         )
 
     @property

@@ -1,5 +1,4 @@
-"""What is drawn over the picture in scene coordinates: rays, the brush's ring, the held colour, lights, the selection's
-box.
+"""What is drawn over the picture in scene coordinates: rays, lines, boxes, labels.
 
 Drawn with imgui's draw list, so it costs the renderer nothing and is no part of the picture.
 """
@@ -15,6 +14,7 @@ from imgui_bundle import ImVec2, imgui
 
 from ..edit.projection import View
 from ..passes.ray_line import RayLine
+from . import theme
 from .panels.spectrum_strip import spectral_srgb
 
 Colour = tuple[float, float, float, float]
@@ -64,7 +64,7 @@ class Canvas:
 
 
 def _cut_near(pairs: np.ndarray, depth: np.ndarray, near: float) -> tuple[np.ndarray, np.ndarray]:
-    """Segments (n, 2, 3) without what lies nearer than `near`, and which are left."""
+    """Segments (n, 2, 3) without what is nearer than `near`, and which are left."""
     ahead = depth > near
     kept = np.asarray(ahead.any(axis=1))
     pairs, depth, ahead = pairs[kept], depth[kept], ahead[kept]
@@ -139,9 +139,27 @@ def _outlined(canvas: Canvas, segments: np.ndarray, colour: Colour, width: float
     lines(canvas, segments, imgui.color_convert_float4_to_u32(colour), width)
 
 
+def draw_label(canvas: Canvas, x: float, y: float, text: str, is_kept: bool = False) -> None:
+    """Text on a plate, its upper left corner at a place of the screen; `is_kept`: within the picture."""
+    size, pad = imgui.calc_text_size(text), theme.em(0.35)
+    if is_kept:
+        x = min(max(x, canvas.left + pad), canvas.left + canvas.width - size.x - pad)
+        y = min(max(y, canvas.top + pad), canvas.top + canvas.height - size.y - pad)
+    low, high = ImVec2(x - pad, y - 0.5 * pad), ImVec2(x + size.x + pad, y + size.y + 0.5 * pad)
+    canvas.drawing.add_rect_filled(low, high, theme.packed(theme.palette().window, 0.88), 4.0)
+    canvas.drawing.add_text(ImVec2(x, y), theme.packed(theme.palette().text), text)
+
+
+def draw_cross(canvas: Canvas, at: ImVec2, reach: float, colour: int, width: float) -> None:
+    """A cross with a dark seam, seen over any picture."""
+    for tint, thickness in ((theme.packed((0.0, 0.0, 0.0, 0.65)), width + 2.0), (colour, width)):
+        canvas.drawing.add_line(ImVec2(at.x - reach, at.y), ImVec2(at.x + reach, at.y), tint, thickness)
+        canvas.drawing.add_line(ImVec2(at.x, at.y - reach), ImVec2(at.x, at.y + reach), tint, thickness)
+
+
 _EDGES = ((0, 1), (0, 2), (0, 4), (1, 3), (1, 5), (2, 3), (2, 6), (3, 7), (4, 5), (4, 6), (5, 7), (6, 7))
 _CORNER_SHARE = 0.18
-"""Of every edge of a selection's box, drawn from both of its ends."""
+"""Share of every edge of a selection's box that is drawn from each of its ends."""
 
 
 def draw_box(canvas: Canvas, corners: np.ndarray, colour: Colour) -> None:

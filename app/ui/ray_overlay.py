@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
 FIRST_NM, LAST_NM = 400.0, 700.0
 BUNDLE_SHARE = 0.02
-"""Of the object's extent: the thin bundle that focal points are measured with."""
+"""Width of the thin bundle that focal points are measured with, share of the object's extent."""
 DENSE_RAYS = 401
-"""Of the fan in which the ray that turns least is looked for."""
+"""Rays of the fan in which the one that turns least is found."""
 
 
 class RayOverlay:

@@ -1,4 +1,4 @@
-"""What a fan of rays says in numbers: deviations, the least deviation of a prism, focal points.
+"""A fan of rays in numbers: deviations, the least deviation of a prism, focal points.
 
 Everything is measured on the traced paths themselves; `least_deviation_deg` alone is a formula. Angles are in degrees,
 lengths in scene units.
@@ -39,7 +39,7 @@ class RayReading:
     focus: Vec3 | None = None
     """Where a thin bundle about the middle ray crosses; None where it leaves parallel."""
     focal_length: float | None = None
-    """Of parallel light, h / sin u' of that bundle; negative where the focus is virtual."""
+    """Focal length of parallel light, h / sin u' of that bundle; negative where the focus is virtual."""
     focus_distance: float | None = None
     """From the last surface to the focus, along the ray; negative where it is virtual."""
 

@@ -24,12 +24,12 @@ if TYPE_CHECKING:
 TARGET_RELMSE = 2e-4
 MAX_SECONDS = 900.0
 MEASURED_FROM = 6.0
-"""Photons a pixel from which on its error is known: before, most lit pixels have not one, which looks like
-certainty."""
+"""Photons a pixel from which on its error is known: before, most lit pixels have none, which would count as
+certain."""
 _GROWTH = 1.4
 """Photons from one snapshot to the next."""
 _NICENESS = 4
-"""Drawing goes first, but on a busy processor a third as much is left for the reference."""
+"""Drawing has priority; on a busy processor the reference gets a third as much time."""
 
 
 @dataclass(frozen=True)
@@ -39,13 +39,11 @@ class Snapshot:
     number: int
     caustic_rgb: np.ndarray
     """float32 (H, W, 3), linear Rec.709 radiance: caustics on what is seen directly."""
-    variance_xyz: np.ndarray
-    """float32 (H, W, 3), of its XYZ as an estimate."""
     directly: np.ndarray
     """bool (H, W): pixels for which that is all there is of caustics."""
     photons: int
     relmse: float
-    """Of itself as an estimate; too small while it is not known."""
+    """Its own error as an estimate; too small while it is not known."""
 
     @property
     def known(self) -> float:
@@ -140,7 +138,6 @@ class ReferenceThread:
         self.snapshot = Snapshot(
             number,
             picture.rgb.astype(np.float32),
-            picture.xyz_variance().astype(np.float32),
             directly,
             picture.photons,
             picture.relmse,

@@ -1,6 +1,6 @@
 """What the interface holds between frames: one document, one engine's picture, messages, settings, and side jobs.
 
-`frame` goes round between the panels and this; `session_requests` carries out what they ask for.
+`frame` passes it to the panels and back; `session_requests` carries out what they request.
 """
 
 from __future__ import annotations
@@ -31,11 +31,8 @@ from .background_jobs import BackgroundJobs, OpenThread
 from .crash_log import write_crash
 from .live_picture import EngineError, LivePicture
 from .message_box import MessageBox, brief
-from .screenshot import write_codes
 
 if TYPE_CHECKING:
-    import numpy as np
-
     from ..edit.lessons import Lesson
     from ..gpu.context import Context
     from ..model.scene import Scene
@@ -46,12 +43,10 @@ IDLE_S = 0.5
 """How long the window may sleep when nothing moves: shaders on disk are checked then."""
 LAYOUT_FRAMES = 3
 """Frames until docked windows have their sizes: maps fitted to another view would have to be made anew."""
-THUMBNAIL_S = 0.1
-"""How long it may sleep while thumbnails are made."""
 
 
 class Session:
-    """Everything but the window. Raises `UserError` when `path` cannot be opened."""
+    """All of the interface but its window. Raises `UserError` when `path` cannot be opened."""
 
     def __init__(
         self,
@@ -67,24 +62,24 @@ class Session:
         self.settings, notice = load_settings()
         self._kept_settings = self.settings
         """As they are on the disk."""
-        self.document = Document.new() if path is None else Document.open(path, opening or self.opening_of(path))
+        self.document = Document.new() if path is None else self.opened(path, opening)
         self.messages = MessageBox(clock)
-        self._told_losses: tuple[str, ...] = ()
+        self._shown_losses: tuple[str, ...] = ()
         self.autosave = Autosave(config_dir())
         self.recovery: Recovery | None = next(iter(recoveries(config_dir())), None)
         self.picture = LivePicture(context, make_engine)
         self.drawn = Drawn()
-        self.jobs = BackgroundJobs(context, config_dir(), open_thread)
+        self.jobs = BackgroundJobs(context, open_thread)
         self.window_picture: Path | None = None
         """Where a picture of the whole window is to be written once this frame is drawn."""
         self.interface_scale = self.framebuffer_scale = 1.0
         self.asks_to_quit = self.asks_about_export = False
         self.quits_after_export = False
-        """Somebody wants to quit, and waits for what is being exported."""
+        """The user wants to quit once the running export is finished."""
         self._panels_before = self.settings.preferences.panels
         """Open before the lesson that is shown."""
         self._discarded: Scene | None = None
-        """What may be lost, as somebody has said."""
+        """The scene whose changes the user agreed to lose."""
         self.is_full_screen = False
         """Wanted of the window."""
         self.wants_to_close = False
@@ -96,7 +91,7 @@ class Session:
         """Whether there is input that the next frame will see."""
         self._watch = ShaderWatch(clock=clock)
         self.awaited: dict[type, Callable[[], object]] = {}
-        """By its type, what a request asks the renderer once more: `NOT_YET` until there is an answer."""
+        """Questions of requests to the renderer, by the type of the request: `NOT_YET` until there is an answer."""
         self.dropped: list[Path] = []
         """Files to be opened in the next frame."""
         self.was_interacting = False
@@ -111,11 +106,11 @@ class Session:
             self.document.scene, self.settings, welcome=path is None and self.recovery is not None
         )
         if notice:
-            self.messages.tell(notice, is_error=True)
+            self.messages.show(notice, is_error=True)
         if path is not None and self.recovery is not None:
-            self.messages.tell("Work of a session that ended badly can be recovered: File, Start page.")
-        if path is not None:  # of the scene to begin with nobody has asked anything
-            self.tell_notes()
+            self.messages.show("Work of a session that ended badly can be recovered: File, Start page.")
+        if path is not None:  # the scene to begin with has no notes that matter
+            self.show_notes()
         self._remember_file(path)
 
     # The frame
@@ -128,10 +123,8 @@ class Session:
         self.picture.resize(self.state, self.jobs.comparison)
         if not self.was_interacting and self._watch.changed():  # looking takes some of a frame, and can wait
             self.reload_shaders()
-        if self.may_make_thumbnails():
+        if self.state.preferences.panels.start_page:
             self.jobs.gallery.step()
-        else:
-            self.jobs.gallery.pause()
 
     def wait_for_layout(self) -> None:
         """The window's size has changed before anything was made for it: leave the engine alone for some frames
@@ -149,10 +142,9 @@ class Session:
     def wait_s(self) -> float:
         """Seconds the window may sleep when no event comes; 0 while anything moves."""
         state = self.state
-        if self.jobs.gallery.is_busy and self.may_make_thumbnails():
-            return THUMBNAIL_S
         moves = (
             state.interacting
+            or (state.preferences.panels.start_page and self.jobs.gallery.is_busy)
             or self.jobs.is_busy
             or self.messages.is_fading
             or self.picture.is_busy
@@ -162,14 +154,10 @@ class Session:
         )
         return 0.0 if moves else IDLE_S
 
-    def may_make_thumbnails(self) -> bool:
-        """While files are searched, or when there is nothing else to do."""
-        return self.state.preferences.panels.start_page or self.picture.stats.converged
-
     def renderer_stopped(self, error: Exception) -> None:
         """The picture cannot go on: keep the work and say so."""
         self.save_from_crash("rendering", error)
-        self.messages.tell(
+        self.messages.show(
             f"The renderer stopped ({brief(error)}). Your work is kept; press F5 to try again.",
             is_error=True,
             stays=True,
@@ -177,9 +165,13 @@ class Session:
 
     # What requests use
 
-    def opening_of(self, path: Path) -> Opening:
-        """What the user said before of the file at `path`."""
-        return Opening(Staging(up=self.settings.up_of(path)))
+    def opened(self, path: Path, opening: Opening | None = None) -> Document:
+        """The document in the file at `path`, with what its user said of it before. Raises `UserError`."""
+        return Document.open(path, opening or Opening(Staging(up=self.settings.up_of(path))))
+
+    def toggle_full_screen(self) -> None:
+        """The window over the whole screen, or back."""
+        self.is_full_screen = not self.is_full_screen
 
     def show_scene(self, scene: Scene) -> None:
         """Another scene of the same document, as after undo; what was selected stays if it is still there."""
@@ -187,7 +179,7 @@ class Session:
         things = {"object": scene.objects, "light": scene.lights, "camera": (scene.camera,), None: ()}[selection.kind]
         if selection.index >= len(things):
             selection = Selection()
-        # Who looked through the scene's camera does so still.
+        # A view through the scene's camera stays one.
         camera = scene.camera if self.state.camera == self.state.scene.camera else self.state.camera
         self.state = replace(self.state, scene=scene, camera=camera, selection=selection, pull=None)
 
@@ -200,39 +192,31 @@ class Session:
     def show_document(self, document: Document) -> None:
         """Take up another document. Preferences stay as they are, and of the display what belongs to no scene."""
         self.document = document
-        kept, before = self.state, self.state.display
-        display = Display(
-            tone=before.tone,
-            false_colour_stops=before.false_colour_stops,
-            ray_wavelengths=before.ray_wavelengths,
-            ray_labels=before.ray_labels,
-        )
+        kept, display = self.state, self.state.display
         if kept.lesson:  # the panels that were opened for it close with it
             preferences = replace(kept.preferences, panels=self._panels_before)
             kept = replace(kept, preferences=preferences, compare=replace(kept.compare, mode="off"))
-        self.state = replace(
-            kept,
-            scene=document.scene,
-            camera=document.scene.camera,
-            views=State(document.scene, document.scene.camera).views,
-            selection=Selection(),
-            tool="select",
-            display=display,
-            physical=False,
-            pull=None,
-            animation=(),
-            preview_s=None,
-            also=(),
-            hidden=frozenset(),
-            locked=frozenset(),
-            measured=(),
-            lesson="",
-            solo_nm=None,
-            edit_label="",
+        self.state = State(
+            document.scene,
+            document.scene.camera,
+            display=Display(
+                tone=display.tone,
+                false_colour_stops=display.false_colour_stops,
+                ray_wavelengths=display.ray_wavelengths,
+                ray_labels=display.ray_labels,
+            ),
+            brush=kept.brush,
+            compare=kept.compare,
+            preferences=kept.preferences,
+            method=kept.method,
+            smoothing=kept.smoothing,
+            playing=kept.playing,
+            viewport_size=kept.viewport_size,
+            clipboard=kept.clipboard,
         ).with_panels(start_page=False)
         self.awaited.clear()
         self.picture.new_scene()
-        self.tell_notes()
+        self.show_notes()
         self._remember_file(document.source)
 
     def show_lesson(self, lesson: Lesson) -> None:
@@ -248,20 +232,20 @@ class Session:
         )
         self.state = state.with_panels(lesson=True, rays=lesson.rays or self._panels_before.rays)
 
-    def tell_losses(self) -> None:
-        """Once a picture is whole: what of its light was lost."""
+    def show_losses(self) -> None:
+        """Once a picture is whole, show what of its light was lost."""
         stats = self.picture.stats
         if stats.converged and stats.photons:
             lost = tuple(loss_notices(stats.lost))
             for notice in lost:
-                if notice not in self._told_losses:
-                    self.messages.tell(notice)
-            self._told_losses = lost
+                if notice not in self._shown_losses:
+                    self.messages.show(notice)
+            self._shown_losses = lost
 
-    def tell_notes(self) -> None:
-        """What was assumed while loading."""
+    def show_notes(self) -> None:
+        """Show what was assumed while loading."""
         for note in self.document.scene.notes:
-            self.messages.tell(note)
+            self.messages.show(note)
 
     def reload_shaders(self) -> None:
         """Compile the shaders from disk; the last good programs stay when that fails."""
@@ -279,10 +263,6 @@ class Session:
     def drop(self, paths: list[Path]) -> None:
         """Files were dropped on the window: the first one is opened in the next frame."""
         self.dropped = paths[:1]
-
-    def ask_to_close(self) -> None:
-        """The window's close button was pressed."""
-        self.quit()
 
     def quit(self, discard: bool = False) -> None:
         """Close, or ask first where work is unsaved and not to be discarded, or an export is not finished."""
@@ -304,10 +284,6 @@ class Session:
         if path is not None:
             self.settings = self.settings.opened(path)
 
-    def write_window_picture(self, path: Path, codes: np.ndarray) -> None:
-        """Write the whole window, uint8 (h, w, 3), as a PNG, beside it."""
-        self.jobs.exports.write(path, lambda: write_codes(path, codes))
-
     def close(self) -> list[str]:
         """The end in good order: settings are remembered, nothing is left to recover. As `release`."""
         self.autosave.close()
@@ -323,7 +299,7 @@ class Session:
                 save_settings(self.settings)
 
     def release(self) -> list[str]:
-        """Free what the device holds, once what was asked for is written; sentences about what could not be."""
+        """Free what the device holds, once exports are written; sentences about what could not be."""
         problems = self.jobs.release()
         self.picture.release()
         return problems
@@ -333,5 +309,5 @@ def _first_state(scene: Scene, settings: Settings, welcome: bool) -> State:
     view = View.of(scene.camera, 1.0)
     brush = Brush(radius=USUAL_RADIUS * view.height_at(view.target_distance))
     state = State(scene=scene, camera=scene.camera, preferences=settings.preferences, brush=brush)
-    # Opening Compare begins a second picture, which nobody asked for at a start.
+    # Opening Compare begins a second picture, which is not wanted at a start.
     return state.with_panels(start_page=welcome, compare=False)

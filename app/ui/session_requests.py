@@ -1,10 +1,11 @@
-"""What the host does for each request: one short function a request, found by its type."""
+"""What the host does for each request: a table by its type."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -16,19 +17,23 @@ from ..edit.document import Document
 from ..edit.lessons import lesson
 from ..edit.picking import PickHit, pick_in
 from ..edit.pull import begin_pull
-from ..edit.requests import BeginPull
 from ..edit.state import Selection
 from ..edit.stored_photons import index_in
 from ..model.optics.colorimetry import rgb709_to_xyz
 from ..model.scene_defaults import bounds_of
+from ..model.vectors import vec3
 from .session import Session
 
+Answer = Callable[[], NotYet | None]
+"""What asks the renderer; called in every frame until it is not `NOT_YET`."""
+PHOTONS = 400_000
+"""Stored photons that are read for whose caustic is at a point, and for a colour."""
 REACH = 0.03
-"""Radius about the point from which photons are asked, share of the extent of the glass's light on that receiver."""
+"""Radius about the point within which photons count, share of the extent of the glass's light on that receiver."""
 MIN_BRIGHTNESS = 0.25
 """Irradiance within that radius over the mean within the extent: fainter is stray light, not a caustic."""
 MIN_SHARE = 0.2
-"""Of the flux near the point, that must have come through one object."""
+"""Share of the flux near the point that must have come through one object."""
 
 
 def source_at(
@@ -39,7 +44,7 @@ def source_at(
     source: np.ndarray,
     photon_receiver: np.ndarray,
 ) -> int | None:
-    """Index of the object that throws most of the light near a world `point` of object `receiver`, or None.
+    """Index of the object that most of the light came through near a world `point` of object `receiver`, or None.
 
     Photons: `position` (n, 3) world, `flux_w` (n,), `source` (n,) the object met first (negative:
     straight from a light), `photon_receiver` (n,).
@@ -59,13 +64,12 @@ def source_at(
     return best if totals[best] >= MIN_SHARE * totals.sum() else None
 
 
-PHOTONS = 400_000
 RADIUS = 0.01
-"""Of what is taken hold of, share of the picture's height at that distance."""
+"""Radius of the light whose colour is dragged, share of the picture's height at that distance."""
 
 
-def begin_pull_at(session: Session, request: BeginPull) -> Callable[[], NotYet | None]:
-    """Find the surface at the pixel of `request`; what is returned asks for its light and takes hold of that.
+def begin_pull_at(session: Session, request: requests.BeginPull) -> Answer:
+    """Find the surface at the pixel of `request`; what is returned finds its light and begins the drag.
 
     Both raise `UserError` with the reason where there is nothing to pull."""
     clicked = session.state.scene
@@ -100,22 +104,18 @@ def begin_pull_at(session: Session, request: BeginPull) -> Callable[[], NotYet |
     return ask
 
 
-PICK_PHOTONS = 400_000
-"""Stored photons that are asked whose caustic lies at a point."""
-
-
 def carry_out(session: Session, request: requests.Request) -> None:
-    """Do what `request` says; what the renderer cannot answer yet is asked again in later frames (`ask_again`). Raises
+    """Do what `request` says; what the renderer cannot answer yet is repeated in later frames (`ask_again`). Raises
     `UserError`, and NotImplementedError for one that is unknown."""
     kind = type(request)
     handler = _HANDLERS.get(kind)
     if handler is None:
         raise NotImplementedError(f"unknown request {kind.__name__}")
-    session.awaited.pop(kind, None)  # nobody waits for the one before any more
+    session.awaited.pop(kind, None)  # the one before is no longer wanted
     ask = handler(session, request)
     if ask is not None and ask() is NOT_YET:
         session.awaited[kind] = ask
-        session.messages.tell(f"{_AWAITED[kind]} is {NOT_YET.value} …")
+        session.messages.show(f"{_AWAITED[kind]} is {NOT_YET.value} …")
 
 
 def ask_again(session: Session, kind: type) -> None:
@@ -123,18 +123,6 @@ def ask_again(session: Session, kind: type) -> None:
     ask = session.awaited.pop(kind)
     if ask() is NOT_YET:
         session.awaited[kind] = ask
-
-
-def _new_scene(session: Session, _request: requests.NewScene) -> None:
-    session.show_document(Document.new())
-
-
-def _open(session: Session, request: requests.Open) -> None:
-    session.show_document(Document.open(request.path, session.opening_of(request.path)))
-
-
-def _open_lesson(session: Session, request: requests.OpenLesson) -> None:
-    session.show_lesson(lesson(request.name))
 
 
 def _stand_up(session: Session, request: requests.StandUp) -> None:
@@ -147,31 +135,7 @@ def _stand_up(session: Session, request: requests.StandUp) -> None:
 def _save(session: Session, request: requests.Save) -> None:
     path = session.document.save(request.path)
     session.settings = session.settings.opened(path)
-    session.messages.tell(f"Saved {path.name} in {path.parent}.")
-
-
-def _undo(session: Session, _request: requests.Undo) -> None:
-    session.show_scene(session.document.history.undo())
-
-
-def _redo(session: Session, _request: requests.Redo) -> None:
-    session.show_scene(session.document.history.redo())
-
-
-def _go_to(session: Session, request: requests.GoTo) -> None:
-    session.show_scene(session.document.history.go_to(request.index))
-
-
-def _quit(session: Session, request: requests.Quit) -> None:
-    session.quit(request.discard)
-
-
-def _full_screen(session: Session, _request: requests.FullScreen) -> None:
-    session.is_full_screen = not session.is_full_screen
-
-
-def _cancel_quit(session: Session, _request: requests.CancelQuit) -> None:
-    session.stay()
+    session.messages.show(f"Saved {path.name} in {path.parent}.")
 
 
 def _quit_after_export(session: Session, request: requests.QuitAfterExport) -> None:
@@ -193,10 +157,10 @@ def _recover(session: Session, request: requests.Recover) -> None:
     session.autosave.write_now(session.document.scene, session.document.title, session.document.source)
     recovery.discard()
     session.recovery = None
-    session.messages.tell(f"Recovered {recovery.note.title}. Save it to keep it.")
+    session.messages.show(f"Recovered {recovery.note.title}. Save it to keep it.")
 
 
-def _select_at(session: Session, request: requests.SelectAt) -> Callable[[], NotYet | None] | None:
+def _select_at(session: Session, request: requests.SelectAt) -> Answer | None:
     hit = pick_in(session.state, request.x, request.y)
     if hit is None:
         session.state = replace(session.state, selection=Selection(), also=())
@@ -211,13 +175,13 @@ def _select(session: Session, index: int, add: bool) -> None:
     chosen = Selection("object", index)
     if selecting.is_locked(session.state, chosen):
         name = session.state.scene.objects[index].name
-        session.messages.tell(f"{name} is locked: unlock it in the outliner to select it here.")
+        session.messages.show(f"{name} is locked: unlock it in the outliner to select it here.")
     else:
         session.state = selecting.chosen(session.state, chosen, add)
 
 
-def _select_source(session: Session, hit: PickHit, add: bool) -> Callable[[], NotYet | None]:
-    """Select the receiver at `hit`; what is returned asks whose caustic lies there, and selects that instead."""
+def _select_source(session: Session, hit: PickHit, add: bool) -> Answer:
+    """Select the receiver at `hit`; what is returned finds whose caustic is there, and selects that instead."""
     clicked, receiver = session.state, Selection("object", hit.object_index)
     if not selecting.is_locked(clicked, receiver):
         _select(session, receiver.index, add)
@@ -228,7 +192,7 @@ def _select_source(session: Session, hit: PickHit, add: bool) -> Callable[[], No
         index = index_in(state.scene, clicked.scene, hit.object_index)
         if index is None or (state.selection, state.also) != meanwhile:
             return None
-        photons = session.picture.stored_photons(state.scene, PICK_PHOTONS)
+        photons = session.picture.stored_photons(state.scene, PHOTONS)
         if isinstance(photons, NotYet):
             return photons
         landed = photons.position, photons.flux_w, photons.source, photons.receiver
@@ -248,8 +212,8 @@ def _frame_selection(session: Session, _request: requests.FrameSelection) -> Non
     if state.selection.kind == "object":
         chosen = [state.scene.objects[state.selection.index]]
     elif state.selection.kind == "light":
-        position = np.asarray(state.scene.lights[state.selection.index].position, float)
-        session.state = replace(state, camera=_looking_at(state.camera, position))
+        target = vec3(state.scene.lights[state.selection.index].position)
+        session.state = replace(state, camera=replace(state.camera, target=target))
         return
     if not chosen:
         raise UserError("the scene is empty: there is nothing to frame")
@@ -261,13 +225,8 @@ def _frame_selection(session: Session, _request: requests.FrameSelection) -> Non
     session.state = replace(state, camera=camera_controls.frame(state.camera, low, high, aspect))
 
 
-def _looking_at(camera: camera_controls.Camera, position: np.ndarray) -> camera_controls.Camera:
-    x, y, z = (float(v) for v in position)
-    return replace(camera, target=(x, y, z))
-
-
 def _without_endless_receivers(session: Session, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The box of what is worth seeing: a table forty times as wide as the prism on it would make that a dot."""
+    """The box without what is large and of little interest: a table forty times as wide as the prism on it."""
     interesting = [o for o in session.state.scene.objects if not o.material.receives]
     if not interesting:
         return low, high
@@ -283,12 +242,8 @@ def _retrace(session: Session, _request: requests.Retrace) -> None:
         session.picture.engine.retrace()
 
 
-def _reload_shaders(session: Session, _request: requests.ReloadShaders) -> None:
-    session.reload_shaders()
-
-
 def _export(session: Session, request: requests.Export) -> None:
-    if isinstance(request, requests.Screenshot) and request.with_interface and not request.spectral:
+    if isinstance(request, requests.Screenshot) and request.with_interface:
         if request.path.suffix.lower() != ".png":
             raise UserError(f"cannot write {request.path.name}: a picture of the whole window is a .png")
         check_writable(request.path)
@@ -297,56 +252,40 @@ def _export(session: Session, request: requests.Export) -> None:
     session.jobs.export(request, session.drawn.visible(session.state), session.picture)
 
 
-def _cancel_job(session: Session, _request: requests.CancelJob) -> None:
-    session.jobs.cancel_export()
-
-
-def _compute_reference(session: Session, _request: requests.ComputeReference) -> None:
-    session.jobs.comparison.restart()
-
-
 def _copy_material(session: Session, request: requests.CopyMaterial) -> None:
     thing = session.state.scene.objects[request.index]
     session.state = replace(session.state, clipboard=thing.material)
-    session.messages.tell(f"Copied the material of {thing.name}.")
-
-
-def _notice(session: Session, request: requests.Notice) -> None:
-    session.messages.tell(request.text, request.is_error)
-
-
-def _dismiss(session: Session, request: requests.DismissMessage) -> None:
-    session.messages.close(request.text)
+    session.messages.show(f"Copied the material of {thing.name}.")
 
 
 _AWAITED = {requests.SelectAt: "What made this light", requests.BeginPull: "The glass of this colour"}
 """What a request asks the renderer."""
-_HANDLERS: dict[type, Callable] = {
-    requests.NewScene: _new_scene,
-    requests.Open: _open,
-    requests.OpenLesson: _open_lesson,
+_HANDLERS: dict[type, Callable[[Session, Any], Answer | None]] = {
+    requests.NewScene: lambda session, _: session.show_document(Document.new()),
+    requests.Open: lambda session, request: session.show_document(session.opened(request.path)),
+    requests.OpenLesson: lambda session, request: session.show_lesson(lesson(request.name)),
     requests.StandUp: _stand_up,
     requests.Save: _save,
-    requests.Undo: _undo,
-    requests.Redo: _redo,
-    requests.GoTo: _go_to,
-    requests.Quit: _quit,
-    requests.CancelQuit: _cancel_quit,
+    requests.Undo: lambda session, _: session.show_scene(session.document.history.undo()),
+    requests.Redo: lambda session, _: session.show_scene(session.document.history.redo()),
+    requests.GoTo: lambda session, request: session.show_scene(session.document.history.go_to(request.index)),
+    requests.Quit: lambda session, request: session.quit(request.discard),
+    requests.CancelQuit: lambda session, _: session.stay(),
     requests.QuitAfterExport: _quit_after_export,
-    requests.FullScreen: _full_screen,
+    requests.FullScreen: lambda session, _: session.toggle_full_screen(),
     requests.Recover: _recover,
     requests.SelectAt: _select_at,
     requests.BeginPull: begin_pull_at,
     requests.FrameSelection: _frame_selection,
     requests.Retrace: _retrace,
-    requests.ReloadShaders: _reload_shaders,
+    requests.ReloadShaders: lambda session, _: session.reload_shaders(),
     requests.Screenshot: _export,
     requests.RenderPicture: _export,
     requests.Bake: _export,
     requests.Animate: _export,
-    requests.CancelJob: _cancel_job,
-    requests.ComputeReference: _compute_reference,
+    requests.CancelJob: lambda session, _: session.jobs.cancel_export(),
+    requests.ComputeReference: lambda session, _: session.jobs.comparison.restart(),
     requests.CopyMaterial: _copy_material,
-    requests.Notice: _notice,
-    requests.DismissMessage: _dismiss,
+    requests.Notice: lambda session, request: session.messages.show(request.text, request.is_error),
+    requests.DismissMessage: lambda session, request: session.messages.close(request.text),
 }

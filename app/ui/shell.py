@@ -6,14 +6,13 @@ Every panel draws its own contents; the windows around them, with their close bu
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from imgui_bundle import imgui
 
 from ..edit.state import Panels, State
 from . import item_rects, layout, shortcuts, theme
-from .layout import Docked, Place
-from .open_panels import set_open
+from .layout import Place
 from .panels import (
     dialogs,
     help_list,
@@ -26,6 +25,7 @@ from .panels import (
     opened_card,
     outliner,
     rays_panel,
+    rows,
     spectrum,
     start_page,
     status_bar,
@@ -34,24 +34,13 @@ from .panels import (
 )
 from .panels.abbe import draw_abbe
 from .panels.brush_panel import draw_brush
+from .panels.compare_panel import draw_compare
 from .panels.dispersion import draw_dispersion
+from .panels.export_panel import draw_export
 from .view_model import ViewModel
 from .viewport import draw_viewport
 
 Draw = Callable[[State, ViewModel], State]
-
-
-def _draw_compare(state: State, view_model: ViewModel) -> State:
-    # Panels that are seldom open are loaded when they are: the window comes up sooner.
-    from .panels.compare_panel import draw_compare
-
-    return draw_compare(state, view_model)
-
-
-def _draw_export(state: State, view_model: ViewModel) -> State:
-    from .panels.export_panel import draw_export
-
-    return draw_export(state, view_model)
 
 
 @dataclass(frozen=True)
@@ -59,7 +48,7 @@ class PanelWindow:
     """A panel's window."""
 
     field: str
-    """Of `Panels`."""
+    """Its field of `Panels`."""
     title: str
     place: Place
     draw: Draw
@@ -75,12 +64,12 @@ WINDOWS = (
     PanelWindow("inspector", "Inspector", "right top", inspector.draw_inspector),
     PanelWindow("view", "View", "right top", view_panel.draw_view),
     PanelWindow("brush", "Brush", "right bottom", draw_brush),
-    PanelWindow("export", "Export", "right bottom if tall", _draw_export, (26.0, 30.0)),
+    PanelWindow("export", "Export", "right bottom if tall", draw_export, (26.0, 30.0)),
     PanelWindow("rays", "Rays", "bottom", rays_panel.draw_rays_panel),
     PanelWindow("timing", "Timing", "bottom", timing.draw_timing),
     PanelWindow("spectrum", "Spectrum", "bottom", spectrum.draw_spectrum),
-    PanelWindow("compare", "Compare", "bottom", _draw_compare),
-    # Beside the caustic, which it is there to change.
+    PanelWindow("compare", "Compare", "bottom", draw_compare),
+    # Next to the caustic, which it is there to change.
     PanelWindow("abbe", "Abbe", "right bottom", draw_abbe, (44.0, 34.0)),
     PanelWindow("shortcuts", "Shortcuts", "floating", help_list.draw_shortcuts, (62.0, 38.0)),
     PanelWindow("about", "About SpectraSplat", "floating", help_list.draw_about, (32.0, 20.0)),
@@ -89,7 +78,6 @@ _OVER_START_PAGE = ("shortcuts", "about")
 _CALLED_UP = frozenset(window.field for window in WINDOWS if not getattr(Panels(), window.field))
 """Panels that somebody opened: Esc closes them, docked or floating, while they have the keyboard and no tool is to be
 left first."""
-_DOCKED = tuple(Docked(window.title, window.place) for window in WINDOWS)
 
 
 def draw_interface(state: State, view_model: ViewModel) -> State:
@@ -111,11 +99,13 @@ def draw_interface(state: State, view_model: ViewModel) -> State:
     else:
         state = _draw_windows(state, view_model)
     state = dialogs.draw_dialogs(state, view_model)
+    if rows.take_held():
+        state = replace(state, interacting=True)
     return messages.draw_messages(state, view_model)
 
 
 def _draw_windows(state: State, view_model: ViewModel) -> State:
-    layout.dockspace(_DOCKED, status_bar.height())
+    layout.dockspace(WINDOWS, status_bar.height())
     state = status_bar.draw_status_bar(state, view_model)
     state = _draw_picture(state, view_model)
     for window in WINDOWS:
@@ -126,7 +116,7 @@ def _draw_windows(state: State, view_model: ViewModel) -> State:
 
 def _draw_picture(state: State, view_model: ViewModel) -> State:
     flags = imgui.WindowFlags_.no_scrollbar | imgui.WindowFlags_.no_scroll_with_mouse | imgui.WindowFlags_.no_collapse
-    if view_model.picture is not None and state.compare.mode != "beside":
+    if view_model.picture is not None:
         # The picture covers all of it: a software renderer need not fill it twice.
         flags |= imgui.WindowFlags_.no_background
     imgui.push_style_var(imgui.StyleVar_.window_padding, imgui.ImVec2(0, 0))
@@ -150,7 +140,7 @@ def _draw_panel(window: PanelWindow, state: State, view_model: ViewModel) -> Sta
     if layout.is_raised(window.field):
         imgui.set_next_window_focus()
     # A software renderer takes as long to fill panels as to draw the picture.
-    flags = imgui.WindowFlags_.no_background if layout.lies_on_ground(window.title) else imgui.WindowFlags_.none
+    flags = imgui.WindowFlags_.no_background if layout.is_in_dock_space(window.title) else imgui.WindowFlags_.none
     shown, stays = imgui.begin(window.title, True, flags)
     item_rects.note(f"Window: {window.title}")
     is_floating = not imgui.is_window_docked()
@@ -164,4 +154,4 @@ def _draw_panel(window: PanelWindow, state: State, view_model: ViewModel) -> Sta
     if shown:
         state = window.draw(state, view_model)
     imgui.end()
-    return state if stays else set_open(state, window.field, False)
+    return state if stays else state.opened(window.field, False)

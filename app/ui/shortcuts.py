@@ -9,14 +9,13 @@ from imgui_bundle import imgui
 
 from ..edit.state import State
 from .commands import COMMANDS, PANELS, VIEWS, Command
-from .open_panels import set_open
 from .view_model import ViewModel
 
 COMPARE_KEY = imgui.Key.c
 """Held down, the viewport shows the reference."""
 
 _REPEATING = ("Undo", "Redo", "Brighter", "Darker")
-"""A held key goes on."""
+"""Commands that a held key repeats."""
 
 _ON_START_PAGE = ("File", "Help")
 _ALWAYS = ("Shortcuts", "Quit", "Full screen")
@@ -40,7 +39,7 @@ _MODIFIERS = {"Ctrl": imgui.Key.mod_ctrl, "Shift": imgui.Key.mod_shift, "Alt": i
 
 @dataclass(frozen=True)
 class Gesture:
-    """A line of the list that no command stands for: what the viewport does with mouse and keys."""
+    """A line of the list that is no command: what the viewport does with mouse and keys."""
 
     keys: str
     group: str
@@ -83,7 +82,7 @@ def handle(state: State, view_model: ViewModel) -> State:
     for command in _all():
         if command.name in _ALWAYS and _is_pressed(command) and (command.name == "Quit" or not is_modal):
             return command.act(state, view_model)
-    # The Esc that closes a menu closes nothing more: what it hung from would go with it.
+    # The Esc that closes a menu closes nothing more: the panel below it would be closed as well.
     is_free = (
         not has_closed_menu and not io.want_text_input and not imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
     )
@@ -93,7 +92,7 @@ def handle(state: State, view_model: ViewModel) -> State:
     on_start_page = state.preferences.panels.start_page
     closing = focused_panel["field"] or (floating_panels[-1] if floating_panels and state.tool == "select" else "")
     if closing and imgui.is_key_pressed(imgui.Key.escape):
-        return set_open(state, closing, False)
+        return state.opened(closing, False)
     if on_start_page and imgui.is_key_pressed(imgui.Key.escape):
         return state.with_panels(start_page=False)
     for command in _all():

@@ -7,35 +7,43 @@ from pathlib import Path
 
 import numpy as np
 
+from ..edit.autosave import Recovery
 from ..edit.history import HistoryEntry
 from ..edit.picking import PickHit
 from ..model.scene import Scene, Vec3
 from ..model.staging import UpAxis
 from ..passes.ray_line import RayLine
 from ..render.viewer.stats import LiveStats
-from .compared_with import Histogram
 from .ray_readings import RayReading
 
 
 @dataclass(frozen=True)
+class LightHere:
+    """What falls on the receiver under the cursor."""
+
+    wavelength_nm: np.ndarray
+    """Bin centres."""
+    irradiance: np.ndarray
+    """W/(unit² nm), mean of each bin: caustic, and direct light where that is known."""
+    error: float
+    """Standard error of a bin of the caustic, relative."""
+    too_few_photons: bool
+    """The caustic has too few photons for a spectrum: `irradiance` lacks it."""
+    direct_illuminance: float | None
+    """Part of it that came straight from lights, lm/unit²; None where that is not known, and missing."""
+
+
+@dataclass(frozen=True)
 class CursorInfo:
-    """What lies under the cursor in the viewport, as of the last frame."""
+    """What is under the cursor in the viewport, as of the last frame."""
 
     pixel: tuple[int, int]
     rgb: Vec3 | None
     """Linear Rec.709 radiance, lm/(sr unit²); None while the picture is being drawn."""
     hit: PickHit | None = None
     """First surface; None for the background."""
-    spectrum_nm: np.ndarray | None = None
-    """Bin centres, when a spectrum was asked for (`Panels.spectrum`); None where the light is not known yet."""
-    spectrum: np.ndarray | None = None
-    """Spectral irradiance there, W/(unit² nm), mean of each bin: caustic, and direct light where that is known."""
-    spectrum_error: float = 0.0
-    """Standard error of a bin of the caustic, relative."""
-    too_few_photons: bool = False
-    """Of the caustic only that it is there is known: `spectrum` lacks it."""
-    direct_illuminance: float | None = None
-    """Of `spectrum`, lm/unit² that came straight from lights; None where that is not known, and lacks."""
+    light: LightHere | None = None
+    """While the spectrum panel is open; None where the light is not known yet."""
     magnified: int | None = None
     """Texture id of the magnifier's picture."""
 
@@ -48,8 +56,7 @@ class SceneEntry:
     title: str
     description: str
     thumbnail: int | None
-    """Texture id."""
-    thumbnail_size: tuple[int, int] = (0, 0)
+    """Texture id; None until it is read."""
 
 
 @dataclass(frozen=True)
@@ -77,20 +84,18 @@ class JobInfo:
 
 @dataclass(frozen=True)
 class ViewModel:
-    """One frame's."""
+    """What panels show in one frame."""
 
     stats: LiveStats = LiveStats()
     shown: Scene | None = None
     """What the picture shows; another one than the state's until that is drawn."""
     picture: int | None = None
     """Texture id of the displayed picture, top row first."""
-    beside: tuple[int, int] | None = None
-    """Texture ids of the picture that it is compared with and of the error, for side by side."""
     picture_size: tuple[int, int] = (0, 0)
     frame_ms: tuple[float, ...] = ()
     """Durations of the last frames, newest last."""
     pass_ms: dict[str, float] = field(default_factory=dict)
-    """Of the last frame, by pass: trace, splat, resolve, camera, display, interface."""
+    """Times of the last frame, by pass: trace, splat, camera, display, interface."""
     process_bytes: int = 0
     """Resident memory of this process while a panel shows it; 0 where the system does not say."""
     cursor: CursorInfo | None = None
@@ -98,7 +103,7 @@ class ViewModel:
     path: Path | None = None
     unsaved: bool = False
     up: UpAxis | None = None
-    """The axis taken to be up of a file that was just opened and may lie on its side."""
+    """The axis taken to be up of a file that was just opened and may be on its side."""
     undo: str | None = None
     """Label of what undo would take back."""
     redo: str | None = None
@@ -107,15 +112,12 @@ class ViewModel:
     scenes: tuple[SceneEntry, ...] = ()
     messages: tuple[Message, ...] = ()
     shader_error: str | None = None
-    recovery: Path | None = None
+    recovery: Recovery | None = None
     """An autosave found at the start."""
-    recovery_title: str = ""
-    recovery_time: str = ""
-    """Whose it is, and when it was written."""
     asks_to_quit: bool = False
     """Unsaved changes: the dialogue with Save, Discard and Cancel is open."""
     asks_about_export: bool = False
-    """Somebody wants to quit while an export runs: the dialogue with Finish, Stop and Cancel is open."""
+    """An export runs at quitting: the dialogue with Finish, Stop and Cancel is open."""
     reference_progress: float | None = None
     """How far the picture that compare modes show is, 0 to 1; None where none was begun."""
     compare_text: str = ""
@@ -124,8 +126,6 @@ class ViewModel:
     """What that picture is, for its side of the wipe."""
     compared_rgb: Vec3 | None = None
     """Linear Rec.709 of that picture under the cursor."""
-    histogram: Histogram | None = None
-    """Of both pictures, while the compare panel is open."""
     compare_ready: bool = False
     """There is a picture to compare with."""
     compare_stale: bool = False
@@ -135,7 +135,7 @@ class ViewModel:
     """What those rays say in numbers."""
     job: JobInfo | None = None
     engine_rests: bool = False
-    """All time is the job's: somebody waits for it."""
+    """The job has all of the time: it is waited for."""
     writing: str = ""
     """Which screenshot takes long to be written."""
     exposure_ev: float = 0.0

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 from imgui_bundle import imgui
 
-from ..edit.state import Preferences
 from .frame import Draw, run_frame
 from .headless import HeadlessInterface
+from .screenshot import write_codes
 from .session import Session
 from .shell import draw_interface
 
@@ -19,21 +18,21 @@ SOFTWARE_FRAME_S = 0.04
 """A frame on the software renderer: with the batch that runs over its end, within the 50 ms in which input must
 have its effect."""
 PATIENT_FRAME_S = 0.15
-"""While nobody touches anything: what the interface costs, on two cores more than half of a frame, is then spent less
+"""While nothing is touched: what the interface costs, on two cores more than half of a frame, is then spent less
 often. Input and a new picture end it, or else half of the interface's frames would show what the last one did."""
 LIGHT_SHARE = 3.0
-"""Of what the interface costs that the engine gets at least then, on a machine with other things to do as well …"""
+"""Time of the engine over what the interface costs, at least, while nothing is touched …"""
 LONGEST_PATIENT_S = 0.3
 """… but no longer: what is written in the window changes meanwhile."""
 GPU_SHARE = 0.75
-"""Of the time between two pictures of the screen; the rest is the driver's and the window system's."""
+"""Share of the time between two pictures of the screen; the rest is the driver's and the window system's."""
 MIN_SHARE = 0.25
-"""Of a frame that the engine always gets: a slow interface must not stop the light."""
+"""Share of a frame that the engine always gets: a slow interface must not stop the light."""
 _SMOOTHING = 0.2
 
 
 class Pace:
-    """`budget_s` for the next frame, from what the last ones cost beside the engine."""
+    """`budget_s` for the next frame, from what the last ones cost without the engine."""
 
     def __init__(self, is_software: bool, refresh_s: float = 1 / 60) -> None:
         self._is_software = is_software
@@ -47,7 +46,7 @@ class Pace:
 
     @property
     def patient_budget_s(self) -> float:
-        """The same while nobody touches anything."""
+        """The same while nothing is touched."""
         if not self._is_software:
             return self.budget_s
         least = min(LIGHT_SHARE * self._patient_besides_s, LONGEST_PATIENT_S)
@@ -57,14 +56,14 @@ class Pace:
         return max(frame_s - self._besides_s, MIN_SHARE * frame_s)
 
     def note(self, besides_s: float) -> None:
-        """A frame took `besides_s` seconds beside the engine's work (without waiting for the screen)."""
+        """A frame took `besides_s` seconds in addition to the engine's work (without waiting for the screen)."""
         # One long frame (a file was read) says nothing about the next.
         self._besides_s += _SMOOTHING * (min(besides_s, self.frame_s) - self._besides_s)
         self._patient_besides_s += _SMOOTHING * (min(besides_s, PATIENT_FRAME_S) - self._patient_besides_s)
 
 
 class Viewer:
-    """What a `Window` asks of its guest, answered by a `Session` (see `window.Guest`)."""
+    """A session with the function that draws it and the pace of its frames."""
 
     def __init__(self, session: Session, draw: Draw = draw_interface, refresh_s: float = 1 / 60) -> None:
         self.session = session
@@ -94,40 +93,14 @@ class Viewer:
         self.session.finished()
         if self.session.window_picture is not None:
             path, self.session.window_picture = self.session.window_picture, None
-            self.session.write_window_picture(path, take_picture())
-
-    def wait_s(self) -> float:
-        """Seconds the window may sleep."""
-        return self.session.wait_s()
-
-    def drop(self, paths: list[Path]) -> None:
-        """Files were dropped."""
-        self.session.drop(paths)
-
-    def ask_to_close(self) -> None:
-        """The close button."""
-        self.session.ask_to_close()
-
-    @property
-    def preferences(self) -> Preferences:
-        """Theme and scale."""
-        return self.session.state.preferences
+            codes = take_picture()
+            self.session.jobs.exports.write(path, lambda: write_codes(path, codes))
 
     @property
     def title(self) -> str:
         """ "prism.toml* – SpectraSplat"."""
         document = self.session.document
         return f"{document.title}{'*' if document.unsaved else ''} – SpectraSplat"
-
-    @property
-    def is_full_screen(self) -> bool:
-        """Whether the window should cover the screen."""
-        return self.session.is_full_screen
-
-    @property
-    def wants_to_close(self) -> bool:
-        """The window may close."""
-        return self.session.wants_to_close
 
 
 def _is_touched() -> bool:
@@ -151,5 +124,5 @@ def headless_viewer(viewer: Viewer, size: tuple[int, int] = (1280, 720)) -> Head
         prepare=viewer.prepare,
         rendered=viewer.rendered,
         finished=viewer.finished,
-        preferences=lambda: viewer.preferences,
+        preferences=lambda: viewer.session.state.preferences,
     )

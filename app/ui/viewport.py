@@ -1,12 +1,12 @@
 """The picture with everything that is done in it: tools, camera, gizmo, brush, pulling, overlays.
 
-`draw_viewport` fills the window it is drawn in. It knows the picture only as a texture number and what lies under
+`draw_viewport` fills the window it is drawn in. It knows the picture only as a texture number and what is under
 the cursor only from `ViewModel`; wishes that need the renderer are requests.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +22,7 @@ from .panels.status_bar import preparing_words
 from .ray_readings import RayReading
 from .view_model import ViewModel
 from .viewport_input import Mouse, ViewportInput
-from .viewport_marks import draw_axes, draw_lights, draw_magnifier, draw_marks, draw_wipe, own_label
+from .viewport_marks import draw_axes, draw_lights, draw_magnifier, draw_marks, draw_wipe
 from .viewport_tools import MARGIN_EM, badges, draw_badges, draw_toolbar
 
 MOST_LABELS = 5
@@ -33,8 +33,10 @@ _BORDER_EM = 0.6
 def draw_ray_labels(canvas: Canvas, readings: Sequence[RayReading]) -> None:
     """Labels in a column next to the ends of the rays that are read, none over another; a small cross at each focus."""
     for reading in readings:
-        if reading.focus is not None:
-            _focus_cross(canvas, canvas.pixels(np.asarray(reading.focus)), colour_of_nm(reading.wavelength_nm))
+        place = np.full(2, np.nan) if reading.focus is None else canvas.pixels(np.asarray(reading.focus))
+        if np.isfinite(place).all():
+            at, reach = ImVec2(float(place[0]), float(place[1])), 5.0 * canvas.scale
+            overlay.draw_cross(canvas, at, reach, colour_of_nm(reading.wavelength_nm), 1.6)
     chosen = [readings[i] for i in labelled(len(readings))]
     line = imgui.get_text_line_height() + theme.em(0.25)
     places = [(_end_of(canvas, reading.path), reading) for reading in chosen]
@@ -70,67 +72,6 @@ def _end_of(canvas: Canvas, path: np.ndarray) -> np.ndarray:
     return np.asarray(start + float(np.min(share, where=share > 0.0, initial=1.0)) * way)
 
 
-def _focus_cross(canvas: Canvas, place: np.ndarray, colour: int) -> None:
-    if not np.isfinite(place).all():
-        return
-    x, y, reach = float(place[0]), float(place[1]), 5.0 * canvas.scale
-    for dark in (True, False):
-        tint, width = (theme.packed((0.0, 0.0, 0.0, 0.6)), 3.4) if dark else (colour, 1.6)
-        canvas.drawing.add_line(ImVec2(x - reach, y), ImVec2(x + reach, y), tint, width)
-        canvas.drawing.add_line(ImVec2(x, y - reach), ImVec2(x, y + reach), tint, width)
-
-
-_GAP_EM = 0.3
-_CROSS_EM = 0.6
-DrawOwn = Callable[[State, ViewModel, ImVec2], State]
-
-
-def draw_beside(state: State, view_model: ViewModel, room: ImVec2, draw_own: DrawOwn) -> State:
-    """Fill `room` of the present window; `draw_own` draws this picture at a size."""
-    corner, gap = imgui.get_cursor_screen_pos(), theme.em(_GAP_EM)
-    pane = ImVec2(max(0.5 * (room.x - gap), 1.0), max(0.5 * (room.y - gap), 1.0))
-    state = draw_own(state, view_model, pane)
-    middle = ImVec2(corner.x + 0.5 * (room.x - pane.x), corner.y + pane.y + gap)
-    # Another glass is no reference: what differs is no error.
-    title = "Difference" if state.compare.method in ("glass", "file") else "Error map"
-    titles = (view_model.compare_label or "The other picture", title)
-    for index, at in enumerate((ImVec2(corner.x + pane.x + gap, corner.y), middle)):
-        imgui.set_cursor_screen_pos(at)
-        if view_model.beside is None:
-            imgui.dummy(pane)
-            has_none = state.compare.method == "file" and state.compare.file is None
-            tag(at, pane, "No picture chosen yet" if has_none else f"{titles[index]}: on its way")
-            continue
-        imgui.image(imgui.ImTextureRef(view_model.beside[index]), pane)
-        item_rects.note(f"Beside: {index + 1}")
-        tag(at, pane, titles[index])
-        if state.hover is None and imgui.is_item_hovered():
-            # Whose values are asked for does not matter: all show the same place.
-            mouse = imgui.get_mouse_pos()
-            state = replace(state, hover=((mouse.x - at.x) / pane.x, (mouse.y - at.y) / pane.y))
-    if state.hover is not None:
-        crossed = (ImVec2(corner.x + pane.x + gap, corner.y), middle) if view_model.beside is not None else ()
-        for at in crossed:
-            _pointer_cross(ImVec2(at.x + state.hover[0] * pane.x, at.y + state.hover[1] * pane.y))
-    return state
-
-
-def tag(corner: ImVec2, pane: ImVec2, text: str) -> None:
-    """Words at the lower right of a pane, clear of tools and badges."""
-    drawing, size, pad = imgui.get_window_draw_list(), imgui.calc_text_size(text), theme.em(0.35)
-    x, y = corner.x + pane.x - size.x - 2.0 * pad, corner.y + pane.y - size.y - 2.0 * pad
-    low, high = ImVec2(x - pad, y - 0.5 * pad), ImVec2(x + size.x + pad, y + size.y + 0.5 * pad)
-    drawing.add_rect_filled(low, high, theme.packed(theme.palette().window, 0.88), 4.0)
-    drawing.add_text(ImVec2(x, y), theme.packed(theme.palette().text), text)
-
-
-def _pointer_cross(at: ImVec2) -> None:
-    drawing, reach = imgui.get_window_draw_list(), theme.em(_CROSS_EM)
-    for colour, thickness in ((theme.packed((0.0, 0.0, 0.0, 0.7)), 3.0), (theme.packed((1.0, 1.0, 1.0, 0.9)), 1.0)):
-        drawing.add_line(ImVec2(at.x - reach, at.y), ImVec2(at.x + reach, at.y), colour, thickness)
-        drawing.add_line(ImVec2(at.x, at.y - reach), ImVec2(at.x, at.y + reach), colour, thickness)
-
-
 MIN_SIDE = 64
 """Pixels of the picture, however small the window."""
 _FLAGS = (
@@ -146,27 +87,18 @@ gizmo = Gizmo()
 
 
 def reset() -> None:
-    """Let go of everything: another interface begins."""
+    """Forget every drag: another interface begins."""
     global viewport_input, gizmo
     viewport_input, gizmo = ViewportInput(), Gizmo()
 
 
 def draw_viewport(state: State, view_model: ViewModel) -> State:
     """Draw the picture into the present window and carry out what is done in it."""
-    room = imgui.get_content_region_avail()
-    if state.compare.mode == "beside":
-        return draw_beside(state, view_model, room, _draw_own)
-    return _draw_own(state, view_model, room)
-
-
-def _draw_own(state: State, view_model: ViewModel, size: ImVec2) -> State:
+    size = imgui.get_content_region_avail()
     imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(0, 0))
     imgui.begin_child("picture", ImVec2(max(size.x, 1.0), max(size.y, 1.0)), 0, _FLAGS)
     imgui.pop_style_var()
-    corner = imgui.get_cursor_screen_pos()
     state = _draw_inside(state, view_model)
-    if state.compare.mode == "beside":
-        tag(corner, size, own_label(state))  # in this window, which lies over the one round it
     imgui.end_child()
     return state
 
@@ -182,8 +114,8 @@ def _draw_inside(state: State, view_model: ViewModel) -> State:
     width, height = max(size.x, 1.0), max(size.y, 1.0)
     state = replace(state, viewport_size=picture_size(width, height, view_model.framebuffer_scale))
     _draw_picture(state, view_model, corner, ImVec2(width, height))
-    canvas = _canvas(state, corner, width, height)
-    drawing = imgui.get_window_draw_list()
+    drawing, scale = imgui.get_window_draw_list(), theme.em(1.0) / theme.FONT_SIZE
+    canvas = Canvas(drawing, state.view, corner.x, corner.y, width, height, scale)
     drawing.push_clip_rect(corner, ImVec2(corner.x + width, corner.y + height), True)
     if state.display.ray_overlay:
         overlay.draw_rays(canvas, view_model.rays)
@@ -222,11 +154,6 @@ def _draw_picture(state: State, view_model: ViewModel, corner: ImVec2, size: ImV
     imgui.get_window_draw_list().add_text(at, theme.packed(theme.palette().muted), text)
 
 
-def _canvas(state: State, corner: ImVec2, width: float, height: float) -> Canvas:
-    scale = theme.em(1.0) / theme.FONT_SIZE
-    return Canvas(imgui.get_window_draw_list(), state.view, corner.x, corner.y, width, height, scale)
-
-
 def _mouse(canvas: Canvas) -> Mouse:
     io = imgui.get_io()
     position, delta = io.mouse_pos, io.mouse_delta
@@ -243,7 +170,7 @@ def _mouse(canvas: Canvas) -> Mouse:
 
 
 def _with_hover(state: State, mouse: Mouse) -> State:
-    """The host looks at what lies there; while the camera is dragged nobody needs to know."""
+    """With the place that the host looks up; while the camera is dragged that is not needed."""
     dragging = viewport_input.grip in ("brush", "pull", "click", "measure", "wipe")
     inside = 0.0 <= mouse.x < 1.0 and 0.0 <= mouse.y < 1.0
     hovers = (mouse.is_over and viewport_input.is_free) or (dragging and inside)

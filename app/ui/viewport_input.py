@@ -32,9 +32,9 @@ CLICK_PX = 4.0
 """A press that moved no farther is a click, logical pixels."""
 WIPE_REACH_PX = 6.0
 FLY_SPEED = 0.6
-"""Of the target's distance, a second."""
+"""Shares of the target's distance a second."""
 FLY_STEP = 1.25
-"""Of the flying speed, by a notch of the wheel."""
+"""Factor on the flying speed by a notch of the wheel."""
 _Key = imgui.Key
 
 
@@ -44,7 +44,7 @@ class Mouse:
 
     x: float
     y: float
-    """Of the picture, 0..1 from its top left; outside of that while a drag leaves it."""
+    """Place in the picture, 0..1 from its top left; outside of that while a drag leaves it."""
     is_over: bool
     """Over the picture itself: not over another window, a button or a handle."""
     dx: float
@@ -53,7 +53,7 @@ class Mouse:
 
 
 class ViewportInput:
-    """What is held."""
+    """Carries out drags, wheel and keys."""
 
     def __init__(self) -> None:
         self.grip: Grip | None = None
@@ -64,7 +64,7 @@ class ViewportInput:
         self._pivot: np.ndarray | None = None
         self._stroke: brushes.Stroke | None = None
         self._pulled_to: tuple[np.ndarray, np.ndarray] | None = None
-        """The ray on which the button was let go before the renderer told what colour was taken."""
+        """The ray on which the button was released before the renderer had found the colour."""
 
     @property
     def is_free(self) -> bool:
@@ -149,7 +149,8 @@ class ViewportInput:
                 return replace(state, compare=replace(state.compare, wipe=float(np.clip(mouse.x, 0.0, 1.0))))
             case "brush":
                 return self._paint(state, view_model, mouse)
-        return self._pull(state, canvas, mouse)
+        moved = self._travelled_px > CLICK_PX
+        return _pulled(state, *canvas.view.ray(mouse.x, mouse.y)) if moved else state
 
     def _flown(self, camera: controls.Camera, dt: float) -> controls.Camera:
         io, down = imgui.get_io(), imgui.is_key_down
@@ -180,9 +181,6 @@ class ViewportInput:
             stroke = brushes.extend(stroke, state.scene, hit.position, view_model.delta_s)
         self._stroke = stroke
         return _edited(state, lambda: (brushes.applied(state.scene, stroke), brushes.LABEL))
-
-    def _pull(self, state: State, canvas: Canvas, mouse: Mouse) -> State:
-        return state if self._travelled_px <= CLICK_PX else _pulled(state, *canvas.view.ray(mouse.x, mouse.y))
 
     # ---- wheel and keys ---------------------------------------------------------------------
 

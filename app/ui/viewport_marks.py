@@ -19,21 +19,21 @@ from ..model.scene import Camera, Scene, SceneObject
 from . import item_rects, theme
 from .compared_with import glass_object
 from .message_box import broken
-from .overlay import Canvas, box_corners, draw_box, draw_outlined, lines
+from .overlay import Canvas, box_corners, draw_box, draw_cross, draw_label, draw_outlined, lines
 from .panels.methods import METHOD_NAMES
 from .panels.rows import tooltip
 from .panels.spectrum_strip import colour_of_nm
 from .view_model import ViewModel
 
 RADIUS_EM = 2.7
-"""Of the whole ornament, text heights."""
+"""Radius of the axes in the corner, text heights."""
 _BALL_EM = 0.56
 _COLOURS = ((0.88, 0.36, 0.36, 1.0), (0.50, 0.74, 0.32, 1.0), (0.36, 0.56, 0.90, 1.0))
 _NAMES = "XYZ"
 
 
 def draw_axes(state: State, view: View, right: float, top: float) -> State:
-    """Draw it with its upper right corner at (right, top), pixels."""
+    """Draw the axes of the world with their upper right corner at (right, top), pixels."""
     radius, ball = theme.em(RADIUS_EM), theme.em(_BALL_EM)
     centre = np.array([right - radius, top + radius])
     ends = []
@@ -95,7 +95,7 @@ _ARROW_EM = 3.2
 
 
 def draw_marks(canvas: Canvas, state: State, view_model: ViewModel, is_painting: bool) -> None:
-    """What lies in the scene: selection, the ring of the brush, a colour being pulled."""
+    """Marks in the scene: selection, the ring of the brush, a colour being pulled."""
     if state.preview_s is None:
         seen = None if view_model.picture is None else view_model.shown
         for item in state.scene.objects if seen is None else not_shown(state.scene, seen):
@@ -109,7 +109,7 @@ def draw_marks(canvas: Canvas, state: State, view_model: ViewModel, is_painting:
 
 
 def not_shown(scene: Scene, shown: Scene) -> list[SceneObject]:
-    """Objects that `scene` has and a picture of `shown` lacks: added, or standing elsewhere."""
+    """Objects that `scene` has and a picture of `shown` lacks: added, or placed elsewhere."""
     there = {(id(item.mesh), item.object_to_world.tobytes()) for item in shown.objects}
     return [item for item in scene.objects if (id(item.mesh), item.object_to_world.tobytes()) not in there]
 
@@ -128,7 +128,7 @@ def _draw_proxy(canvas: Canvas, item: SceneObject) -> None:
 
 
 def outline_of(places: np.ndarray) -> np.ndarray:
-    """Corners of the convex hull of `places` (n, 2), in order, as far as 48 directions tell."""
+    """Corners of the convex hull of `places` (n, 2), in order, by 48 directions."""
     if not len(places):
         return places
     angles = np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
@@ -179,7 +179,7 @@ def _draw_ring(canvas: Canvas, state: State, hit: PickHit, is_painting: bool) ->
 
 
 def _draw_pull(canvas: Canvas, state: State) -> None:
-    """From the d line's landing point, which stays, to where the held colour stands now."""
+    """From the d line's landing point, which stays, to where the held colour is now."""
     held = state.pull
     assert held is not None
     gain = _present_gain(state)
@@ -195,7 +195,8 @@ def _draw_pull(canvas: Canvas, state: State) -> None:
     x, y = canvas.pixels(now)
     if np.isfinite(x):
         what = f"local gain × {gain:.2f}" if held.local else f"gain × {gain:.2f}"
-        _label(canvas, x + theme.em(0.9), y - theme.em(1.6), f"{held.wavelength_nm:.0f} nm   {what}")
+        text = f"{held.wavelength_nm:.0f} nm   {what}"
+        draw_label(canvas, x + theme.em(0.9), y - theme.em(1.6), text, is_kept=True)
 
 
 def _present_gain(state: State) -> float:
@@ -207,21 +208,8 @@ def _present_gain(state: State) -> float:
     return float(getattr(getattr(material, "dispersion", None), "gain", held.gain_at_start))
 
 
-def _label(canvas: Canvas, x: float, y: float, text: str) -> None:
-    palette, size, pad = theme.palette(), imgui.calc_text_size(text), theme.em(0.35)
-    x = min(max(x, canvas.left + pad), canvas.left + canvas.width - size.x - pad)
-    y = min(max(y, canvas.top + pad), canvas.top + canvas.height - size.y - pad)
-    canvas.drawing.add_rect_filled(
-        ImVec2(x - pad, y - 0.5 * pad),
-        ImVec2(x + size.x + pad, y + size.y + 0.5 * pad),
-        theme.packed(palette.window, 0.88),
-        4.0,
-    )
-    canvas.drawing.add_text(ImVec2(x, y), theme.packed(palette.text), text)
-
-
 def draw_lights(canvas: Canvas, state: State) -> State:
-    """A small lamp where each light stands: faint, so that the picture shines, and clickable."""
+    """A small lamp where each light is: faint, and clickable."""
     if state.tool in ("brush", "pull"):
         return state
     for index, light in enumerate(state.scene.lights):
@@ -229,7 +217,7 @@ def draw_lights(canvas: Canvas, state: State) -> State:
         if (not light.has_place and not chosen) or selecting.key_of(
             state.scene, Selection("light", index)
         ) in state.hidden:
-            continue  # it stands nowhere
+            continue  # it has no place
         place = placing.light_place(state.scene, light)
         x, y = canvas.pixels(place)
         inside = (
@@ -295,10 +283,10 @@ def draw_wipe(canvas: Canvas, state: State, view_model: ViewModel) -> None:
     missing = "No picture chosen: this is the same one" if lacks_file else "On its way: this is the same picture"
     right = view_model.compare_label if view_model.compare_ready else missing
     gap, end = theme.em(1.0), canvas.left + canvas.width - theme.em(2.0 * RADIUS_EM + 2.0)
-    _label(canvas, x - gap - imgui.calc_text_size(left).x, y, left)
-    # Not under the axes in the corner: its parts stand below each other where they have no room beside each other.
+    draw_label(canvas, x - gap - imgui.calc_text_size(left).x, y, left, is_kept=True)
+    # Not under the axes in the corner: its parts are below each other where there is no room in a line.
     right = broken(right, end - x - gap, lambda text: imgui.calc_text_size(text).x, at=", ")
-    _label(canvas, min(x + gap, end - imgui.calc_text_size(right).x), y, right)
+    draw_label(canvas, min(x + gap, end - imgui.calc_text_size(right).x), y, right, is_kept=True)
 
 
 def own_label(state: State) -> str:
@@ -327,11 +315,5 @@ def draw_magnifier(canvas: Canvas, view_model: ViewModel) -> None:
     canvas.drawing.add_image(imgui.ImTextureRef(cursor.magnified), ImVec2(left, y), ImVec2(left + side, y + side))
     canvas.drawing.add_rect(low, high, theme.packed(palette.border), 4.0)
     middle, reach = ImVec2(left + 0.5 * side, y + 0.5 * side), theme.em(0.45)
-    for colour, thickness in ((theme.packed((0, 0, 0, 0.7)), 3.0), (theme.packed((1, 1, 1, 0.9)), 1.0)):
-        canvas.drawing.add_line(
-            ImVec2(middle.x - reach, middle.y), ImVec2(middle.x + reach, middle.y), colour, thickness
-        )
-        canvas.drawing.add_line(
-            ImVec2(middle.x, middle.y - reach), ImVec2(middle.x, middle.y + reach), colour, thickness
-        )
+    draw_cross(canvas, middle, reach, theme.packed((1, 1, 1, 0.9)), 1.0)
     canvas.drawing.add_text(ImVec2(x + theme.em(0.4), y + side + theme.em(0.2)), theme.packed(palette.text), text)

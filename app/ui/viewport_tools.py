@@ -1,4 +1,4 @@
-"""What lies over the picture and is clicked: the tools, play and pause, the physical switch, badges that say what one
+"""What is drawn over the picture and clicked: the tools, play and pause, the physical switch, badges that say what one
 sees."""
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _TOOLS: tuple[tuple[Tool, str, str], ...] = (
 
 @dataclass(frozen=True)
 class Badge:
-    """A few words on what the picture is not."""
+    """A few words on how the picture differs from the scene."""
 
     text: str
     tip: str
@@ -43,7 +43,6 @@ class Badge:
 def draw_toolbar(state: State, gizmo: Gizmo, left: float, top: float) -> State:
     """The column of tools with its upper left corner at (left, top), pixels."""
     size, gap = theme.em(_BUTTON_EM), theme.em(_GAP_EM)
-    has_axes = state.tool in ("move", "rotate")
     y = top + theme.em(MARGIN_EM)
     x = left + theme.em(MARGIN_EM)
     _ground(x, y, size, len(_TOOLS))
@@ -53,13 +52,11 @@ def draw_toolbar(state: State, gizmo: Gizmo, left: float, top: float) -> State:
             state = replace(state, tool=tool)
         y += size
     y += gap
-    if has_axes:
+    if state.tool in ("move", "rotate"):
         _ground(x, y, size, 1)
-        name, icon = ("Object's axes", icons.ICON_FA_CUBE) if gizmo.is_local else ("World's axes", icons.ICON_FA_GLOBE)
-        tip = (
-            f"The gizmo shows the {name[:1].lower()}{name[1:]}; click for the "
-            f"{'world' if gizmo.is_local else 'object'}'s."
-        )
+        shown, other = ("object", "world") if gizmo.is_local else ("world", "object")
+        icon, tip = icons.ICON_FA_CUBE if gizmo.is_local else icons.ICON_FA_GLOBE, f"The gizmo shows the {shown}'s axes"
+        tip = f"{tip}; click for the {other}'s."
         if _button("Gizmo axes", icon, x, y, gizmo.is_local, tip, ()):
             gizmo.is_local = not gizmo.is_local
         y += size + gap
@@ -71,12 +68,10 @@ def draw_toolbar(state: State, gizmo: Gizmo, left: float, top: float) -> State:
         y += size + gap
     _ground(x, y, size, 2)
     what = command("Accumulate photons")
-    icon, tip = (
-        (icons.ICON_FA_PAUSE, "Pause: keep the picture as it is.")
-        if state.playing
-        else (icons.ICON_FA_PLAY, "Go on accumulating photons.")
-    )
-    if _button("Pause" if state.playing else "Play", icon, x, y, not state.playing, tip, what.keys):
+    name, icon, tip = ("Play", icons.ICON_FA_PLAY, "Continue accumulating photons.")
+    if state.playing:
+        name, icon, tip = ("Pause", icons.ICON_FA_PAUSE, "Pause: keep the picture as it is.")
+    if _button(name, icon, x, y, not state.playing, tip, what.keys):
         state = replace(state, playing=not state.playing)
     what = command("Physical picture")
     if _button("Physical picture", icons.ICON_FA_FLASK, x, y + size, state.physical, what.tip, what.keys):
@@ -109,75 +104,50 @@ def _button(name: str, icon: str, x: float, y: float, is_on: bool, tip: str, key
 
 def badges(state: State, view_model: ViewModel) -> list[Badge]:
     """What must be said of the present picture."""
-    badges = []
-    painted = any(item.local_dispersion for item in state.scene.objects)
-    if painted and not state.physical:
-        badges.append(
-            Badge(
-                NOT_PHYSICAL,
-                "The dispersion brush has changed how far colours spread on a receiver. V shows the physical picture.",
-            )
+    stats, compare, found = view_model.stats, state.compare, []
+
+    def say(text: str, tip: str, is_warning: bool = True) -> None:
+        found.append(Badge(text, tip, is_warning))
+
+    if any(item.local_dispersion for item in state.scene.objects):
+        if state.physical:
+            tip = "What the dispersion brush painted is kept but not shown. V brings it back."
+            say("Physical: local gain left out", tip, False)
+        else:
+            tip = "The dispersion brush has changed how far colours spread on a receiver. V shows the physical picture."
+            say(NOT_PHYSICAL, tip)
+    if stats.differs == "moved":
+        tip = (
+            "Light follows what is held by a few photons; let go, and it is traced properly. Soft light of an "
+            "environment stays where it was until then."
         )
-    elif painted:
-        badges.append(
-            Badge(
-                "Physical: local gain left out",
-                "What the dispersion brush painted is kept but not shown. V brings it back.",
-                False,
-            )
+        say("A few photons while it moves", tip, False)
+    elif stats.differs and view_model.picture is not None:  # its place says so, too
+        tip = (
+            "The picture shows what was there before the last change, until the first light of the new scene has been "
+            "traced."
         )
-    if view_model.stats.differs == "moved":
-        badges.append(
-            Badge(
-                "A few photons while it moves",
-                "Light follows what is held by a few photons; let go, and it is traced properly. Soft light of an "
-                "environment stays where it was until then.",
-                False,
-            )
+        say(preparing_words(stats) if stats.differs == "scene" else "Light is being traced …", tip)
+    if stats.first_order:
+        tip = (
+            "Photons were traced through a glass of another dispersion; the picture follows the edit to first order "
+            "until they are traced again (Ctrl+R)."
         )
-    elif view_model.stats.differs and view_model.picture is not None:  # its place says so, too
-        badges.append(
-            Badge(
-                preparing_words(view_model.stats) if view_model.stats.differs == "scene" else "Light is being traced …",
-                "The picture shows what was there before the last change, until the first light of the new scene has "
-                "been traced.",
-            )
-        )
-    if view_model.stats.first_order:
-        badges.append(
-            Badge(
-                "First order",
-                "Photons were traced through a glass of another dispersion; the picture follows the edit to first "
-                "order until they are traced again (Ctrl+R).",
-            )
-        )
+        say("First order", tip)
     if state.preview_s is not None:
-        badges.append(
-            Badge(
-                f"Preview at {state.preview_s:.2f} s",
-                "The animation at that time; the Export panel ends the preview. Edits change the scene itself.",
-            )
-        )
+        tip = "The animation at that time; the Export panel ends the preview. Edits change the scene itself."
+        say(f"Preview at {state.preview_s:.2f} s", tip)
     if state.solo_nm is not None:
-        badges.append(
-            Badge(
-                f"Only {state.solo_nm:.0f} nm",
-                "The light of a single wavelength is shown. L goes back to all of it.",
-                False,
-            )
-        )
-    if (state.compare.mode in ("wipe", "error", "beside") or state.compare.holding) and not view_model.compare_ready:
-        badges.append(
-            Badge(
-                "Nothing to compare with yet",
-                "The other picture is being computed; the compare panel shows how far it is.",
-            )
-        )
-    elif state.compare.holding:
-        badges.append(Badge(view_model.compare_label or "The other picture", "Shown while C is held down.", False))
+        tip = "The light of a single wavelength is shown. L shows all of it again."
+        say(f"Only {state.solo_nm:.0f} nm", tip, False)
+    if (compare.mode in ("wipe", "error") or compare.holding) and not view_model.compare_ready:
+        tip = "The other picture is being computed; the compare panel shows how far it is."
+        say("Nothing to compare with yet", tip)
+    elif compare.holding:
+        say(view_model.compare_label or "The other picture", "Shown while C is held down.", False)
     if not state.playing:
-        badges.append(Badge("Paused", "No photons are added. Space goes on.", False))
-    return badges
+        say("Paused", "No photons are added. Space continues.", False)
+    return found
 
 
 def draw_badges(shown: list[Badge], left: float, bottom: float) -> None:

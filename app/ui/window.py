@@ -1,7 +1,7 @@
 """The interface in a glfw window: events in, frames out, and nothing at all while nothing changes.
 
-The window knows a `Guest` (the session) that draws one frame within imgui and says how long
-it can wait for the next; everything else here is glfw.
+The window knows a `Viewer`, which draws one frame within imgui and says how long it can wait for the next; everything
+else here is glfw.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, Self, cast
+from typing import TYPE_CHECKING, Any, Self, cast
 
 import moderngl
 import numpy as np
@@ -22,7 +22,6 @@ import glfw  # isort: skip
 
 from ..base.errors import UserError
 from ..edit.preferences import WindowPlace
-from ..edit.state import Preferences
 from ..gpu import unlocked
 from ..gpu.context import GL_VERSION, GL_VERSION_CODE, Context
 from ..gpu.context_thread import ContextThread
@@ -32,6 +31,7 @@ from .imgui_host import ImguiHost
 if TYPE_CHECKING:
     from ..render.viewer.engine import LiveEngine
     from ..render.viewer.threaded_engine import ThreadedEngine
+    from .viewer import Viewer
 
 SETTLE_FRAMES = 3
 """Frames drawn after an event before waiting again: imgui's layout and hovering need two."""
@@ -44,47 +44,6 @@ COMMANDS = glfw.MOD_CONTROL | glfw.MOD_ALT | glfw.MOD_SUPER
 ANSWER_FRAMES, DIALOGUE_FRAMES = 3, 5
 """From a command or a click until a dialogue that it opens is there, and until that one's field takes what is typed."""
 NO_DISPLAY = "there is no display to open a window on: 'spectrasplat render SCENE -o OUT.png' needs none"
-
-
-class Guest(Protocol):
-    """What the window shows."""
-
-    def prepare(self, interface_scale: float, framebuffer_scale: float) -> None:
-        """Before a frame, outside of imgui's; scales as in `ViewModel`."""
-
-    def draw(self) -> None:
-        """One frame, within imgui's."""
-
-    def rendered(self) -> None:
-        """The frame is drawn, and not yet on the screen."""
-
-    def finished(self, take_picture: Callable[[], np.ndarray]) -> None:
-        """After the frame is on the screen; `take_picture` is `Window.screenshot`."""
-
-    def wait_s(self) -> float:
-        """Seconds that the window may sleep when no event comes; 0 for the next frame at once."""
-
-    def drop(self, paths: list[Path]) -> None:
-        """Files were dropped on the window."""
-
-    def ask_to_close(self) -> None:
-        """The window's close button was pressed."""
-
-    @property
-    def is_full_screen(self) -> bool:
-        """Whether the window should cover the screen."""
-
-    @property
-    def preferences(self) -> Preferences:
-        """Theme and scale."""
-
-    @property
-    def title(self) -> str:
-        """Of the window."""
-
-    @property
-    def wants_to_close(self) -> bool:
-        """The window may close now."""
 
 
 class GlfwLoader:
@@ -234,14 +193,14 @@ class Window:
         mode = glfw.get_video_mode(monitor) if monitor else None
         return 1.0 / mode.refresh_rate if mode and mode.refresh_rate else 1 / 60
 
-    def run(self, guest: Guest, until: Callable[[], bool] = lambda: False) -> None:
-        """Show `guest` until it wants to close, or until `until()`."""
-        while not guest.wants_to_close and not until():
-            self._take_events(guest)
+    def run(self, viewer: Viewer, until: Callable[[], bool] = lambda: False) -> None:
+        """Show `viewer` until it wants to close, or until `until()`."""
+        while not viewer.session.wants_to_close and not until():
+            self._take_events(viewer)
             if glfw.get_window_attrib(self._handle, glfw.ICONIFIED):
                 # Nothing to be seen: the picture waits, files and jobs go on.
                 time.sleep(0.05)
-            self.frame(guest)
+            self.frame(viewer)
 
     def input_waits(self) -> bool:
         """Whether anything has happened that the frame which is being drawn does not know of: imgui keeps it for the
@@ -249,7 +208,7 @@ class Window:
         glfw.poll_events()
         return self._has_event
 
-    def frame(self, guest: Guest) -> None:
+    def frame(self, viewer: Viewer) -> None:
         """Draw one frame and show it."""
         self._host.make_current()
         self._has_moved = self._has_event = False
@@ -258,24 +217,24 @@ class Window:
         for typed in waiting:
             self._type(typed)
         width = max(glfw.get_window_size(self._handle)[0], 1)
-        guest.prepare(self.interface_scale, self.framebuffer_size[0] / width)
-        theme.apply(guest.preferences, self.interface_scale)
-        self._cover_screen(guest.is_full_screen)
-        if guest.title != self._title:
-            self._title = guest.title
+        viewer.prepare(self.interface_scale, self.framebuffer_size[0] / width)
+        theme.apply(viewer.session.state.preferences, self.interface_scale)
+        self._cover_screen(viewer.session.is_full_screen)
+        if viewer.title != self._title:
+            self._title = viewer.title
             glfw.set_window_title(self._handle, self._title)
         imgui.backends.glfw_new_frame()
         with self._host.frame():
-            guest.draw()
+            viewer.draw()
         self._screen.use()
         self._screen.viewport = (0, 0, *self.framebuffer_size)
         self._screen.clear(*theme.ground())
         self._host.render()
         if self.context.is_software:
             self.context.finish()
-        guest.rendered()
+        viewer.rendered()
         glfw.swap_buffers(self._handle)
-        guest.finished(self.screenshot)
+        viewer.finished(self.screenshot)
 
     def _cover_screen(self, wanted: bool) -> None:
         """Take the whole of the screen that the window is on, or go back to where it was."""
@@ -314,22 +273,22 @@ class Window:
         """Draw some frames even if no event comes."""
         self._settling = SETTLE_FRAMES
 
-    def _take_events(self, guest: Guest) -> None:
-        wait = 0.0 if self._settling > 0 else guest.wait_s()
+    def _take_events(self, viewer: Viewer) -> None:
+        wait = 0.0 if self._settling > 0 else viewer.session.wait_s()
         self._settling = max(self._settling - 1, 0)
         if wait > 0:
             glfw.wait_events_timeout(wait)
         else:
             glfw.poll_events()
         if self._dropped:
-            guest.drop(self._dropped)
+            viewer.session.drop(self._dropped)
             self._dropped = []
         if self._close_pressed:
             self._close_pressed = False
-            guest.ask_to_close()
+            viewer.session.quit()
 
     def _listen(self) -> None:
-        """Any event wakes the loop, and goes on to imgui."""
+        """Any event wakes the loop, and is passed on to imgui."""
         backend = imgui.backends
 
         def wake(*_event: object) -> None:
@@ -383,7 +342,7 @@ class Window:
             self._close_pressed = True
             wake()
 
-        glfw.set_drop_callback(self._handle, cast(Any, dropped))  # glfw hands a list over, whatever its types say
+        glfw.set_drop_callback(self._handle, cast(Any, dropped))  # glfw passes a list, whatever its types say
         glfw.set_window_close_callback(self._handle, closing)
 
     def _type(self, typed: Callable[[], None]) -> None:
@@ -414,7 +373,8 @@ def _create(place: WindowPlace, visible: bool) -> Any:
         lambda _code, text: problems.append(text.decode("utf-8", "replace") if isinstance(text, bytes) else str(text))
     )
     if not glfw.init():
-        raise UserError(NO_DISPLAY if not _has_display() else f"{NO_DISPLAY} ({_first(problems)})")
+        has_display = os.name != "posix" or any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
+        raise UserError(f"{NO_DISPLAY} ({_first(problems)})" if has_display else NO_DISPLAY)
     glfw.window_hint(glfw.CONTEXT_VERSION_MAJOR, GL_VERSION[0])
     glfw.window_hint(glfw.CONTEXT_VERSION_MINOR, GL_VERSION[1])
     glfw.window_hint(glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE)
@@ -441,8 +401,8 @@ def _create(place: WindowPlace, visible: bool) -> Any:
 
 
 def _beside(window: Any) -> Any | None:
-    """A hidden window whose context shares the objects of `window`'s, which stays current; None where it cannot be
-    had. The hints are those of `window`."""
+    """A hidden window whose context shares the objects of `window`'s, which stays current; None where there cannot be
+    one. The hints are those of `window`."""
     glfw.window_hint(glfw.VISIBLE, False)
     glfw.window_hint(glfw.MAXIMIZED, False)
     no_monitor: Any = None
@@ -478,10 +438,6 @@ def _is_on_a_screen(position: tuple[int, int], window_width: int) -> bool:
         if left <= x + window_width - 80 and x + 80 <= left + width and top <= y <= top + height - 40:
             return True
     return False
-
-
-def _has_display() -> bool:
-    return os.name != "posix" or any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
 
 
 def _first(problems: list[str]) -> str:

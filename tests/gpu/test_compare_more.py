@@ -1,4 +1,4 @@
-"""The reference's first sample, another glass beside this one, a picture file, values and histograms."""
+"""The reference's first sample, another glass beside this one, a picture file, values."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from spectrasplat.edit.state import Compare, Selection, State
 from spectrasplat.model.environment_light import with_sun
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.ui.compare import Comparison
-from spectrasplat.ui.compared_with import GlassSwap, histogram_of, of_height, resized
+from spectrasplat.ui.compared_with import GlassSwap, of_height, resized
 from spectrasplat.ui.direct_picture import DirectPicture
 from spectrasplat.ui.reference_thread import Snapshot
 
@@ -56,7 +56,7 @@ def test_the_first_sample_is_shown_with_its_noise(state, running, comparison, mo
     directly = np.ones(shape, bool)
     directly[:, :20] = False
     caustic = np.full((*shape, 3), 7.0, np.float32)
-    first = Snapshot(1, caustic, np.ones((*shape, 3), np.float32), directly, 500, 0.8)
+    first = Snapshot(1, caustic, directly, 500, 0.8)
     monkeypatch.setattr("spectrasplat.ui.compare.ReferenceThread", lambda *_more: idle_thread(first))
     compared = replace(state, compare=Compare(mode="wipe"))
     until(lambda: comparison.picture is not None, lambda: comparison.advance(compared, running, 0.05))
@@ -118,14 +118,6 @@ def test_a_picture_file_has_its_values_under_the_cursor(state, running, comparis
     assert comparison.picture is None and "no such file" in comparison.text
 
 
-def test_a_histogram_counts_stops_about_display_white() -> None:
-    grey = np.full((4, 8, 3), 0.25, np.float32)
-    black = np.zeros((4, 8, 3), np.float32)
-    found = histogram_of(grey, black, 1.0)
-    assert found.own.sum() == pytest.approx(1.0) and found.other.sum() == 0.0
-    assert found.stops[found.own.argmax()] == pytest.approx(-1.0, abs=0.35)
-
-
 def test_a_picture_of_another_size_is_not_shown_and_begun_anew(state, running, comparison, monkeypatch) -> None:
     begun: list[tuple[int, int]] = []
 
@@ -133,7 +125,7 @@ def test_a_picture_of_another_size_is_not_shown_and_begun_anew(state, running, c
         begun.append((width, height))
         shape = (height, width)
         picture = np.ones((*shape, 3), np.float32)
-        return idle_thread(Snapshot(1, picture, picture, np.ones(shape, bool), 500, 0.8))
+        return idle_thread(Snapshot(1, picture, np.ones(shape, bool), 500, 0.8))
 
     monkeypatch.setattr("spectrasplat.ui.compare.ReferenceThread", begin)
     compared = replace(state, compare=Compare(mode="wipe"))
@@ -210,6 +202,6 @@ def test_without_time_the_processor_is_left_to_the_picture(state, running, compa
     assert set(asked) == {"resume"} and comparison._direct.version == version
     height, width = SIZE[::-1]
     dark = np.zeros((height, width, 3), np.float32)
-    comparison._thread.snapshot = Snapshot(1, dark, dark, np.ones((height, width), bool), 10, 0.5)
+    comparison._thread.snapshot = Snapshot(1, dark, np.ones((height, width), bool), 10, 0.5)
     comparison.advance(compared, running, 0.0)
     assert asked[-1] == "pause"

@@ -1,4 +1,4 @@
-"""Screenshots, spectral pictures, maps and animations as the viewer's jobs: in small steps, cancelled, refused."""
+"""Screenshots, maps and animations as the viewer's jobs: in small steps, cancelled, refused."""
 
 from __future__ import annotations
 
@@ -77,22 +77,6 @@ def test_a_png_is_what_is_on_the_screen_and_an_exr_what_is_behind_it(
         exports.begin(Screenshot(tmp_path / "a.gif"), state, shown)
 
 
-@pytest.mark.slow
-def test_a_spectral_screenshot_adds_up_to_its_colours(
-    exports: Exports, state: State, shown: Shown, tmp_path: Path, monkeypatch
-) -> None:
-    from spectrasplat.ui import export
-
-    monkeypatch.setattr(export, "MIN_PHOTONS", 20_000)
-    exports.begin(Screenshot(tmp_path / "s.exr", spectral=True), state, shown)
-    told, shares = finished(exports)
-    assert told == "Saved s.exr." and exports.job is None
-    assert len(shares) > 3 and shares == sorted(shares)
-    picture = read_image(tmp_path / "s.exr")
-    assert picture.spectral is not None and picture.spectral.shape == (SIZE[1], SIZE[0], 20)
-    assert (picture.spectral > 0).any(axis=-1).mean() > 0.9
-
-
 def test_a_map_and_its_place(exports: Exports, state: State, shown: Shown, tmp_path: Path) -> None:
     exports.begin(Bake(tmp_path / "m.exr", "table", (48, 32), 20_000), state, shown)
     assert "m.json" in finished(exports)[0]
@@ -146,7 +130,7 @@ def test_what_cannot_be_done_is_said_at_once(exports: Exports, state: State, sho
         (Animate(tmp_path / "a.avi"), "use .mp4"),
         (Animate(tmp_path / "a.mp4", size=(99_999, 9)), "out of range"),
         (Bake(tmp_path / "a.exr", "nobody"), "no receiver"),
-        (Screenshot(tmp_path / "gone" / "a.exr", spectral=True), "does not exist"),
+        (Screenshot(tmp_path / "gone" / "a.exr"), "does not exist"),
     ):
         with pytest.raises(UserError, match=told):
             exports.begin(request, state, shown)

@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from spectrasplat.edit import edits
 from spectrasplat.edit.live_inputs import LiveInputs
+from spectrasplat.edit.objects import set_material
 from spectrasplat.gpu.context import Context
 from spectrasplat.model.environment import gradient
 from spectrasplat.model.geometry import primitives
@@ -91,7 +91,7 @@ def test_a_coat_is_seen_in_motion_as_at_rest(engine: LiveEngine, monkeypatch: py
 def test_another_roughness_is_only_looked_at_and_a_coat_is_built() -> None:
     def level(old: Diffuse, new: Diffuse) -> DirtyLevel:
         before = scene_of(old)
-        after = edits.set_material(before, 1, new)
+        after = set_material(before, 1, new)
         a, b = LiveInputs(before, CAMERA, *SIZE), LiveInputs(after, CAMERA, *SIZE)
         return dirty_level(a, a, b)
 
@@ -107,7 +107,7 @@ def test_another_roughness_is_only_looked_at_and_a_coat_is_built() -> None:
 def test_an_edited_roughness_is_seen(gl: Context, engine: LiveEngine) -> None:
     wanted = LiveInputs(scene_of(COATED), CAMERA, *SIZE)
     before = settled(engine, wanted)
-    polished = LiveInputs(edits.set_material(wanted.scene, 1, replace(COATED, roughness=0.05)), CAMERA, *SIZE)
+    polished = LiveInputs(set_material(wanted.scene, 1, replace(COATED, roughness=0.05)), CAMERA, *SIZE)
     after = settled(engine, polished)
     fresh = LiveEngine(gl, Budget(8192, 1 << 12, 1 << 13, 1 << 24))
     fresh.target_photons, fresh.refine_when_still = 1 << 12, False

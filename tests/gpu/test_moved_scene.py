@@ -11,8 +11,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from spectrasplat.base.paths import assets_dir
-from spectrasplat.edit import edits
+from spectrasplat.edit.glass import set_dispersion_gain
 from spectrasplat.edit.live_inputs import LiveInputs
+from spectrasplat.edit.objects import add_dabs
 from spectrasplat.edit.projection import View
 from spectrasplat.gpu import shader
 from spectrasplat.gpu.context import Context
@@ -210,7 +211,7 @@ def test_edits_of_a_rehearsed_scene_compile_nothing(gl: Context, engine: LiveEng
     assert "light/footprint.comp" in {program.name for program in rehearsed if program.seconds}
     glass, floor = glass_of(scene), next(i for i, o in enumerate(scene.objects) if o.material.receives)
     stroke = [Dab((0.1, 0.2, 0.0), 0.5, 1.5)]
-    made = edits.set_dispersion_gain(scene, glass, 1.7), moved(scene, 0.1, 15.0), edits.add_dabs(scene, floor, stroke)
+    made = set_dispersion_gain(scene, glass, 1.7), moved(scene, 0.1, 15.0), add_dabs(scene, floor, stroke)
     with shader.recorded() as needed:
         for edited in made:
             version = engine.picture_version

@@ -12,6 +12,7 @@ from spectrasplat.gpu.context import Context
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.scene import Dielectric, Diffuse
 from spectrasplat.ui.headless import HeadlessInterface
+from spectrasplat.ui.panels import rows
 from spectrasplat.ui.view_model import ViewModel
 
 Draw = Callable[[State, ViewModel], State]
@@ -60,6 +61,8 @@ class PanelRig(HeadlessInterface):
         imgui.begin("Panel")
         before = replace(self.state, interacting=False)
         self.state = self._panel(before, self.view_model)
+        if rows.take_held():
+            self.state = replace(self.state, interacting=True)
         if self.state.scene is not before.scene and self.state.edit_label not in self.labels:
             self.labels.append(self.state.edit_label)
         self.was_held |= self.state.interacting

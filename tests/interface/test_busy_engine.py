@@ -137,4 +137,4 @@ def test_the_spectrum_of_a_table_is_still_being_found(gl: Context, busy: Busy, m
     busy.interface.move(busy.at(SPOT))
     busy.interface.frame(2)
     cursor = busy.session.jobs.cursor.view_model
-    assert cursor is not None and cursor.spectrum is not None and cursor.rgb is not None
+    assert cursor is not None and cursor.light is not None and cursor.rgb is not None

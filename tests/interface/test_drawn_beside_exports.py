@@ -175,13 +175,13 @@ def test_who_quits_while_something_is_exported_is_asked(session: Session, thread
     with headless_viewer(Viewer(session)) as interface:
         interface.frame(LAYOUT_FRAMES + 3)
         session.jobs.exports._job = slow_job(thread, steps=5)
-        session.ask_to_close()
+        session.quit()
         interface.frame(3)
         assert not session.wants_to_close and session.asks_about_export
         interface.click("Unfinished export/Cancel")
         interface.frame(2)
         assert not session.asks_about_export and session.jobs.exports.job is not None
-        session.ask_to_close()
+        session.quit()
         interface.frame(3)
         interface.click("Finish, then quit")
         assert not session.wants_to_close

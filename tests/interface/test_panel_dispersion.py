@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from imgui_bundle import imgui
-from spectrasplat.edit import edits
+from spectrasplat.edit.lights import set_light_spectrum
 from spectrasplat.edit.state import Selection
 from spectrasplat.gpu.context import Context
 from spectrasplat.model.optics import catalogue, glass
@@ -263,7 +263,7 @@ def test_editing_the_same_numbers_does_not_creep() -> None:
 
 def test_laser_outside_a_glasses_data_refuses_the_glass_with_a_notice() -> None:
     state = scene_state()
-    lit = edits.set_light_spectrum(state.scene, 0, "laser", 775.0)
+    lit = set_light_spectrum(state.scene, 0, "laser", 775.0)
     ice = next(e for e in catalogue.entries() if e.dispersion.range_nm[1] < 770.0)
     after = glass_picker.apply_glass(replace(state, scene=lit), ice)
     assert after.scene is lit

@@ -86,7 +86,7 @@ def test_a_sky_has_a_type_and_a_sun_that_is_dragged(panel: PanelRig) -> None:
 def test_a_picture_all_round_asks_for_its_file(panel: PanelRig) -> None:
     panel.view_model = ViewModel(path=STUDIO.parent / "scene.toml")
     choose(panel, "Kind", "Picture all round")
-    assert panel.state.scene.environment is None and file_browser.is_open("environment")
+    assert panel.state.scene.environment is None and file_browser.is_open("Choose environment")
     open_file(panel, STUDIO)
     made = panel.state.scene.environment
     assert made.kind == "map" and made.source == str(STUDIO.resolve())
@@ -99,10 +99,9 @@ def test_a_picture_all_round_asks_for_its_file(panel: PanelRig) -> None:
 def test_a_file_that_is_no_picture_is_refused_in_words(panel: PanelRig, tmp_path: Path) -> None:
     broken = tmp_path / "broken.hdr"
     broken.write_bytes(b"no picture")
-    file_browser._browser.answers["environment"] = broken
-    panel.frame(1)
-    assert panel.state.scene.environment is None
-    notices = [request for request in panel.state.requests if isinstance(request, Notice)]
+    state = dialogs.open_path(panel.state, panel.view_model, broken)
+    assert state.scene.environment is None
+    notices = [request for request in state.requests if isinstance(request, Notice)]
     assert notices and notices[-1].is_error and "broken.hdr" in notices[-1].text
 
 
@@ -113,11 +112,11 @@ def test_a_surface_wears_a_picture_and_takes_it_off(gl: Context, picture: Path) 
     with PanelRig(gl, draw, replace(state, selection=Selection("object", table))) as rig:
         rig.view_model = ViewModel(path=picture.parent / "scene.toml")
         rig.click("Picture")
-        assert file_browser.is_open("texture")
+        assert file_browser.is_open("Picture for table")
         open_file(rig, picture)
         texture = rig.state.scene.objects[table].material.texture
         assert texture is not None and texture.rgb.shape == (4, 4, 3)
-        choose(rig, "Beyond its edge", "Its border goes on")
+        choose(rig, "Beyond its edge", "Its border continues")
         assert rig.state.scene.objects[table].material.texture.wrap == "clamp"
         rig.click("Clear Picture")
         assert rig.state.scene.objects[table].material.texture is None

@@ -20,8 +20,7 @@ from tests.interface.panel_rig import PanelRig, scene_state
 def with_browser(state: State, view_model: ViewModel) -> State:
     """The panel with the file dialogue, as the shell draws them."""
     state = draw_export(state, view_model)
-    file_browser.draw()
-    return state
+    return file_browser.draw(state, view_model)
 
 
 @pytest.fixture
@@ -45,11 +44,10 @@ def test_a_screenshot_goes_where_the_dialogue_says(rig: PanelRig, tmp_path: Path
     rig.click("Save")
     assert rig.state.requests == (requests.Screenshot(tmp_path / "scene.png"),)
     rig.state = replace(rig.state, requests=())
-    rig.click("Spectral bins")
-    assert "With interface" not in rig.items.items
+    rig.click("With interface")
     rig.click("Save screenshot…")
     rig.click("Save")
-    assert rig.state.requests == (requests.Screenshot(tmp_path / "scene.exr", spectral=True),)
+    assert rig.state.requests == (requests.Screenshot(tmp_path / "scene.png", with_interface=True),)
 
 
 def test_a_baked_map(rig: PanelRig, tmp_path: Path) -> None:
@@ -89,7 +87,7 @@ def test_the_ending_of_a_film_decides_what_it_becomes(rig: PanelRig, tmp_path: P
 def test_keys_are_added_changed_and_deleted(rig: PanelRig, tmp_path: Path) -> None:
     choose(rig, "Kind", "Keys")
     rig.click("Render animation…")
-    assert not file_browser.is_open("export animate")  # nothing to render yet
+    assert not file_browser.is_open("Render animation")  # nothing to render yet
     rig.click("Add key")
     rig.click("Add key")
     assert rig.state.animation == (
@@ -121,7 +119,7 @@ def test_while_an_export_runs_it_can_only_be_cancelled(rig: PanelRig) -> None:
     rig.click("Cancel export")
     assert rig.state.requests == (requests.CancelJob(),)
     rig.click("Save screenshot…")  # which is only written, and waits for nothing
-    assert file_browser.is_open("export screenshot")
+    assert file_browser.is_open("Save screenshot")
 
 
 def test_a_starting_export_moves_no_control_under_the_mouse(rig: PanelRig) -> None:
@@ -155,7 +153,7 @@ def test_comparing(gl) -> None:
 
 def test_a_picture_file_has_no_progress(gl) -> None:
     """It is read at once; there is nothing to start again."""
-    state = replace(scene_state(), compare=Compare(mode="beside", method="file"))
+    state = replace(scene_state(), compare=Compare(mode="wipe", method="file"))
     with PanelRig(gl, draw_compare, state, (900, 320)) as rig:
         rig.frame(2)
         assert "File" in rig.items.items

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from reference.lamps import isotropic
-from spectrasplat.edit import edits
 from spectrasplat.edit.brush import USUAL_RADIUS
+from spectrasplat.edit.lights import light_power, spectrum_words
+from spectrasplat.edit.objects import add_dabs
 from spectrasplat.edit.state import Selection
 from spectrasplat.gpu.context import Context
 from spectrasplat.model.lights import IesLight
@@ -18,7 +19,7 @@ from spectrasplat.model.scene import Dab
 from spectrasplat.ui.panels import file_browser, light_panel, light_spectrum, picture_choice
 from spectrasplat.ui.panels.brush_panel import draw_brush
 from spectrasplat.ui.panels.light_panel import angles_of, direction_of, draw_light
-from spectrasplat.ui.panels.light_spectrum import LAMPS
+from spectrasplat.ui.panels.light_spectrum import _LAMPS
 
 from tests.interface.panel_rig import PanelRig, receiver_of, scene_state
 
@@ -69,11 +70,11 @@ def test_another_kind_keeps_the_name_and_shows_its_own_rows(panel: PanelRig) -> 
 def test_spectrum_keeps_the_photometric_power(panel: PanelRig) -> None:
     lumens = panel.light.spectral_power.luminous()
     choose(panel, "Spectrum", "Black body")
-    assert edits.spectrum_words(panel.light.spectral_power) == ("blackbody", pytest.approx(3200.0))
+    assert spectrum_words(panel.light.spectral_power) == ("blackbody", pytest.approx(3200.0))
     panel.type_into("Temperature", "5800")
-    assert edits.spectrum_words(panel.light.spectral_power)[1] == pytest.approx(5800.0, rel=1e-5)
+    assert spectrum_words(panel.light.spectral_power)[1] == pytest.approx(5800.0, rel=1e-5)
     choose(panel, "Spectrum", "Spectral lines")
-    assert [nm for nm, _ in panel.light.spectral_power.lines] == [nm for nm, _ in LAMPS["Mercury lamp"]]
+    assert [nm for nm, _ in panel.light.spectral_power.lines] == [nm for nm, _ in _LAMPS["Mercury lamp"]]
     choose(panel, "Lines", "Sodium lamp")
     assert len(panel.light.spectral_power.lines) == 2
     assert panel.light.spectral_power.luminous() == pytest.approx(lumens, rel=1e-9)
@@ -91,7 +92,7 @@ def test_laser_slider_is_dragged_live(panel: PanelRig) -> None:
     choose(panel, "Spectrum", "Laser line")
     panel.was_held = False
     panel.drag_slider("Wavelength", 0.4, 0.75)
-    kind, nm = edits.spectrum_words(panel.light.spectral_power)
+    kind, nm = spectrum_words(panel.light.spectral_power)
     assert kind == "laser"
     assert nm == pytest.approx(680.0, abs=8.0)
     assert panel.was_held
@@ -148,7 +149,7 @@ def test_a_lamp_is_made_turned_and_given_lumens(panel: PanelRig) -> None:
     panel.type_into("Rotation", "45")
     assert panel.light.rotation_deg == 45.0
     panel.type_into("Power", "800")
-    assert edits.light_power(panel.light, "lumens") == pytest.approx(800.0)
+    assert light_power(panel.light, "lumens") == pytest.approx(800.0)
 
 
 def test_a_lamp_is_chosen_from_a_file(panel: PanelRig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -159,8 +160,7 @@ def test_a_lamp_is_chosen_from_a_file(panel: PanelRig, tmp_path: Path, monkeypat
     assert [question.suffixes for question in asked] == [(".ies", ".ldt")]
     chosen = tmp_path / "mine.ies"
     chosen.write_text(isotropic(), encoding="ascii")
-    monkeypatch.setattr(file_browser, "take", lambda name: chosen if name == "lamp" else None)
-    panel.state = picture_choice.answers(panel.state)
+    panel.state = asked[0].then(panel.state, panel.view_model, chosen)
     assert Path(panel.light.profile.source) == chosen
     assert panel.light.spectral_power.luminous() == pytest.approx(100.0)
 
@@ -186,7 +186,7 @@ def test_a_dropped_lamp_file(panel: PanelRig, tmp_path: Path) -> None:
 def painted(gl: Context) -> Iterator[PanelRig]:
     state = scene_state()
     dabs = [Dab((0.1 * i, 0.0, 0.0), 0.2, 1.0) for i in range(3)]
-    state = replace(state, scene=edits.add_dabs(state.scene, receiver_of(state), dabs))
+    state = replace(state, scene=add_dabs(state.scene, receiver_of(state), dabs))
     with PanelRig(gl, draw_brush, state) as rig:
         yield rig
 

@@ -29,8 +29,7 @@ GAIN = "objects.prism.dispersion_gain"
 
 def with_browser(state: State, view_model: ViewModel) -> State:
     state = draw_export(state, view_model)
-    file_browser.draw()
-    return state
+    return file_browser.draw(state, view_model)
 
 
 @pytest.fixture
@@ -78,7 +77,7 @@ def test_a_bad_name_is_told_before_anything_is_rendered(rig: PanelRig, typed: st
     rig.click("Save")
     rig.frame(2)
     assert rig.state.requests == () and said in file_browser._browser.error
-    assert file_browser.is_open("export render")
+    assert file_browser.is_open("Render")
 
 
 def test_a_point_in_a_name_is_no_ending(rig: PanelRig, tmp_path: Path) -> None:

@@ -9,14 +9,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from imgui_bundle import imgui
-from spectrasplat.edit import edits, requests
+from spectrasplat.edit import requests
+from spectrasplat.edit.autosave import Note, Recovery
+from spectrasplat.edit.matrices import decompose
 from spectrasplat.edit.picking import PickHit
 from spectrasplat.edit.state import Panels, Preferences, Selection
 from spectrasplat.gpu.context import Context
 from spectrasplat.model.scene import Diffuse
 from spectrasplat.render.viewer.stats import LiveStats
 from spectrasplat.ui.panels.view_panel import SWEEP_NM_PER_S
-from spectrasplat.ui.view_model import CursorInfo, HistoryEntry, JobInfo, Message, SceneEntry, ViewModel
+from spectrasplat.ui.view_model import CursorInfo, HistoryEntry, JobInfo, LightHere, Message, SceneEntry, ViewModel
 
 from tests.interface.panel_rig import scene_state
 from tests.interface.shell_rig import ShellRig
@@ -48,8 +50,7 @@ def full_view_model() -> ViewModel:
             (10, 10),
             (0.8, 0.4, 0.0),
             PickHit(1, (0, 0, 0), (0, 0, 1), 1.0, True),
-            NM,
-            1e-3 * np.exp(-(((NM - 560) / 60) ** 2)),
+            LightHere(NM, 1e-3 * np.exp(-(((NM - 560) / 60) ** 2)), 0.0, False, None),
         ),
         title="prism",
         history=tuple(HistoryEntry(label, i == 1) for i, label in enumerate(("Open", "Move prism", "Brush"))),
@@ -96,7 +97,7 @@ def test_scale_keeps_proportions(rig: ShellRig) -> None:
     rig.show_tab("Inspector")
     field = rig.find("Scale")
     rig.drag(field.at(0.15), (field.at(0.15)[0] + 40, field.centre[1]))
-    scale = edits.decompose(rig.state.scene.objects[0].object_to_world)[2]
+    scale = decompose(rig.state.scene.objects[0].object_to_world)[2]
     assert scale[0] > 1.1
     np.testing.assert_allclose(scale, scale[0], rtol=1e-6)
 
@@ -195,7 +196,7 @@ def test_status_bar_pauses(rig: ShellRig) -> None:
 
 
 def test_start_page_offers_the_recovery(rig: ShellRig) -> None:
-    rig.view_model = replace(rig.view_model, recovery=Path("autosave.toml"))
+    rig.view_model = replace(rig.view_model, recovery=Recovery(Path("autosave.toml"), Note(1, "prism", None, 0.0)))
     rig.open_panel(start_page=True)
     rig.click("Recover")
     assert rig.asked == [requests.Recover()]

@@ -94,8 +94,8 @@ def test_what_is_remembered_is_written_at_once(gl: Context, tmp_path: Path, monk
 
 def test_saving_never_begins_in_the_programs_own_folder(tmp_path: Path) -> None:
     shipped, own = assets_dir() / "scenes" / "prism.toml", tmp_path / "own.toml"
-    assert dialogs._recent_folder(ViewModel(recent=(shipped,))) == Path.home()
-    assert dialogs._recent_folder(ViewModel(recent=(shipped, own))) == tmp_path
+    assert dialogs._folder(ViewModel(recent=(shipped,))) == Path.home()
+    assert dialogs._folder(ViewModel(recent=(shipped, own))) == tmp_path
 
 
 @pytest.mark.parametrize("suffix", [".jpg", ".jpeg", ".webp"])
@@ -113,9 +113,9 @@ def test_opening_compare_begins_to_compare_and_closing_it_ends_it(gl: Context) -
     rig.state = command("Panel: Compare").act(rig.state, rig.view_model)
     rig.frame(3)
     assert rig.state.preferences.panels.compare and rig.state.compare.mode == "wipe"
-    rig.state = replace(rig.state, compare=replace(rig.state.compare, mode="beside"))
+    rig.state = replace(rig.state, compare=replace(rig.state.compare, mode="error"))
     rig.key(imgui.Key.h)  # panels out of the way: the pictures stay
-    assert rig.state.compare.mode == "beside"
+    assert rig.state.compare.mode == "error"
     rig.key(imgui.Key.h)
     rig.frame(3)
     rig.show_tab("Compare")

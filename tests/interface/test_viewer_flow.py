@@ -164,11 +164,11 @@ def test_saving_and_opening_again_keeps_what_was_edited(hands: Hands, scene_file
 def test_the_button_that_closes_the_window_asks(hands: Hands) -> None:
     select_glass(hands)
     hands.interface.drag_slider("Dispersion gain", 0.1, 0.2)
-    hands.session.ask_to_close()
+    hands.session.quit()
     hands.interface.frame(3)
     hands.interface.click("Cancel")
     assert not hands.session.wants_to_close and not hands.session.asks_to_quit
-    hands.session.ask_to_close()
+    hands.session.quit()
     hands.interface.frame(3)
     hands.interface.click("Discard")
     assert hands.session.wants_to_close

@@ -11,8 +11,8 @@ import pytest
 from imgui_bundle import imgui
 from spectrasplat.edit import camera_controls
 from spectrasplat.edit.picking import PickHit, pick_in
-from spectrasplat.edit.requests import BeginPull, Notice, Pull, SelectAt
-from spectrasplat.edit.state import Brush, Compare, Selection, State
+from spectrasplat.edit.requests import BeginPull, Notice, SelectAt
+from spectrasplat.edit.state import Brush, Compare, Pull, Selection, State
 from spectrasplat.gpu.context import Context
 from spectrasplat.model.scene import Diffuse
 from spectrasplat.passes.ray_line import RayLine
@@ -422,21 +422,3 @@ def test_a_badge_says_that_picture_and_scene_differ() -> None:
     assert not {"Preparing …", "Light is being traced …"} & {
         badge.text for badge in viewport_tools.badges(state, ViewModel(stats=LiveStats()))
     }
-
-
-def test_pictures_of_the_same_view_stand_side_by_side(gl: Context) -> None:
-    with ViewportRig(gl, replace(scene_state(), compare=Compare(mode="beside"))) as rig:
-        own = rig.find("Picture")
-        assert own.right < 0.51 * SIZE[0] and own.bottom < 0.51 * SIZE[1]
-        assert "Beside: 1" not in rig.items.items
-        rig.view_model = replace(rig.view_model, beside=(rig._colour.glo, rig._colour.glo))
-        rig.frame(2)
-        other, errors = rig.find("Beside: 1"), rig.find("Beside: 2")
-        assert other.left > own.right and errors.top > own.bottom
-        assert other.right - other.left == pytest.approx(own.right - own.left, abs=1.0)
-        wide, high = rig.state.viewport_size
-        assert wide / high == pytest.approx(SIZE[0] / SIZE[1], rel=0.03)
-        # The cursor over any of them asks for the values of that place in all of them.
-        rig.move((0.25 * other.left + 0.75 * other.right, 0.5 * (other.top + other.bottom)))
-        rig.frame(2)
-        assert rig.state.hover == pytest.approx((0.75, 0.5), abs=0.02)

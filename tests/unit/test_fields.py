@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from spectrasplat.base.errors import UserError
 from spectrasplat.base.paths import assets_dir
-from spectrasplat.edit import edits, parameters
+from spectrasplat.edit import parameters
+from spectrasplat.edit.lights import add_light, light_power, set_light_kind
 from spectrasplat.model.fields import Animated, Number, Row
 from spectrasplat.model.io.gltf import load_gltf
 from spectrasplat.model.io.gltf_write import save_gltf
@@ -277,7 +278,7 @@ def test_a_new_kind_of_light_needs_its_class_and_its_name(tmp_path: Path, monkey
     scene = load_scene(path)
     light = scene.lights[0]
     assert isinstance(light, Torch) and light.candles == 3.0
-    assert edits.light_power(light, "flux_lm") == pytest.approx(100)
+    assert light_power(light, "flux_lm") == pytest.approx(100)
     save_scene(scene, tmp_path / "again.toml")
     assert load_scene(tmp_path / "again.toml").lights[0].given().keys() == light.given().keys()
     save_gltf(scene, tmp_path / "again.glb")
@@ -285,8 +286,8 @@ def test_a_new_kind_of_light_needs_its_class_and_its_name(tmp_path: Path, monkey
     assert isinstance(again, Torch) and again.candles == 3.0 and again.position == light.position
     stage = parameters.Stage(scene, scene.camera)
     assert parameters.apply(stage, "lights.left.candles", 5.0).scene.lights[0] == replace(light, candles=5.0)
-    made_so = edits.set_light_kind(scene, 1, "torch").lights[1]
-    assert isinstance(made_so, Torch) and edits.add_light(scene, "torch").lights[-1].kind == "torch"
+    made_so = set_light_kind(scene, 1, "torch").lights[1]
+    assert isinstance(made_so, Torch) and add_light(scene, "torch").lights[-1].kind == "torch"
     with pytest.raises(UserError, match=r"lights\[0\].candles is -1 but must be above 0"):
         path.write_text(path.read_text(encoding="utf-8").replace("candles = 3", "candles = -1"), encoding="utf-8")
         load_scene(path)

@@ -12,7 +12,8 @@ from reference.lamps import cosine, ies_text, isotropic, lamp, ldt_text, lopside
 from spectrasplat.base import files
 from spectrasplat.base.errors import UserError
 from spectrasplat.base.paths import assets_dir
-from spectrasplat.edit import edits, parameters
+from spectrasplat.edit import parameters
+from spectrasplat.edit.lights import add_light, light_power, set_light_file, set_light_kind
 from spectrasplat.edit.placing import moved_light
 from spectrasplat.model.io.gltf import load_gltf
 from spectrasplat.model.io.gltf_write import save_gltf
@@ -227,7 +228,7 @@ def test_its_power_is_the_files_own_or_what_lumens_says(tmp_path: Path) -> None:
     assert isinstance(own, IesLight) and own.spectral_power.luminous() == pytest.approx(own.profile.peak_cd)
     lumens = scene(tmp_path, "lumens = 800").lights[0]
     assert lumens.spectral_power.luminous() * lumens.profile.integral_sr == pytest.approx(800.0)
-    assert edits.light_power(lumens) == pytest.approx(800.0) and lumens.power_keys[0].key == "lumens"
+    assert light_power(lumens) == pytest.approx(800.0) and lumens.power_keys[0].key == "lumens"
 
 
 @pytest.mark.parametrize(
@@ -331,17 +332,17 @@ def test_a_file_makes_a_lamp_of_any_light(tmp_path: Path) -> None:
     path = tmp_path / "other.ies"
     path.write_text(lopsided(), encoding="ascii")
     for start in ("point", "directional", "area", "ies"):
-        lit = edits.set_light_file(edits.set_light_kind(before, 0, start), 0, path).lights[0]
+        lit = set_light_file(set_light_kind(before, 0, start), 0, path).lights[0]
         assert isinstance(lit, IesLight) and lit.profile.source == str(path)
         assert lit.spectral_power.luminous() == pytest.approx(lit.profile.peak_cd)
-    more = edits.set_light_file(before, None, path)
+    more = set_light_file(before, None, path)
     assert [light.name for light in more.lights] == ["lamp", "ies light"]
     with pytest.raises(UserError, match="not a file"):
-        edits.set_light_file(before, 0, tmp_path / "none.ies")
+        set_light_file(before, 0, tmp_path / "none.ies")
 
 
 def test_a_new_one_begins_with_the_shipped_lamp(tmp_path: Path) -> None:
-    lit = edits.add_light(scene(tmp_path), "ies").lights[1]
+    lit = add_light(scene(tmp_path), "ies").lights[1]
     assert isinstance(lit, IesLight) and Path(lit.profile.source).name == "downlight.ies"
 
 

@@ -13,7 +13,8 @@ import pytest
 from spectrasplat.base.errors import UserError
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.bench.features.compiled import static_costs
-from spectrasplat.edit import edits, objects
+from spectrasplat.edit import objects
+from spectrasplat.edit.objects import set_diffuse_colour, set_material
 from spectrasplat.edit.parameters import Stage, apply, paths, value_of
 from spectrasplat.features.facts import Facts, beam_objects, camera_needs, why_no_beams
 from spectrasplat.features.features import Features
@@ -48,7 +49,7 @@ def shipped(name: str) -> Scene:
 
 
 def with_material(scene: Scene, index: int, **changed: object) -> Scene:
-    return edits.set_material(scene, index, scene.objects[index].material.changed(**changed))
+    return set_material(scene, index, scene.objects[index].material.changed(**changed))
 
 
 def ground(scene: Scene, roughness: float = 0.3) -> Scene:
@@ -58,7 +59,7 @@ def ground(scene: Scene, roughness: float = 0.3) -> Scene:
 
 def finished(scene: Scene, **finish: float) -> Scene:
     """Its second object, which is the table, with a finish."""
-    return edits.set_material(scene, 1, Diffuse(**finish))
+    return set_material(scene, 1, Diffuse(**finish))
 
 
 @pytest.fixture(scope="module")
@@ -229,7 +230,7 @@ def test_numbers_are_animated(prism: Scene, spectrometer: Scene) -> None:
 
 
 def test_an_edit_of_the_colour_keeps_the_finish(prism: Scene) -> None:
-    scene = edits.set_diffuse_colour(finished(prism, roughness=0.25, diffuse_roughness=0.5), 1, (0.1, 0.2, 0.3))
+    scene = set_diffuse_colour(finished(prism, roughness=0.25, diffuse_roughness=0.5), 1, (0.1, 0.2, 0.3))
     assert scene.objects[1].material == Diffuse((0.1, 0.2, 0.3), roughness=0.25, diffuse_roughness=0.5)
 
 
@@ -238,7 +239,7 @@ def test_a_grating_is_a_sheet_whose_lines_lie_in_it(spectrometer: Scene) -> None
     solid = replace(spectrometer.objects[0], mesh=box((1.0, 1.0, 1.0)))
     painted = replace(spectrometer, objects=(replace(solid, material=screen.material), *spectrometer.objects[1:]))
     with pytest.raises(UserError, match="closed solid and a grating a thin sheet"):
-        objects.with_object(painted, 0, solid)
+        objects.set_material(painted, 0, solid.material)
     with pytest.raises(UserError, match="along the normal"):
         objects.set_material(spectrometer, 0, Grating(direction=(0.0, 0.0, 1.0)))
     turn = np.diag([1.0, 1.0, 1.0, 1.0])

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from spectrasplat.base.errors import UserError
 from spectrasplat.base.paths import assets_dir
-from spectrasplat.edit import edits, presets
-from spectrasplat.edit.glass import set_tint
+from spectrasplat.edit import presets
+from spectrasplat.edit.glass import set_priority, set_tint
+from spectrasplat.edit.lights import light_power, set_light_kind, spectrum_words
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.io.scene_save import save_scene
 from spectrasplat.model.optics.colorimetry import cmf_xyz, daylight_per_lumen, xyz_to_rgb709
@@ -100,7 +101,7 @@ def glass_index(scene: Scene) -> int:
 @pytest.mark.parametrize("preset", presets.material_presets(), ids=lambda p: p.name)
 def test_every_glass_applies_and_its_remark_is_true(scene: Scene, preset: presets.MaterialPreset) -> None:
     index = glass_index(scene)
-    changed = presets.apply_material(edits.set_priority(scene, index, 7), index, preset)
+    changed = presets.apply_material(set_priority(scene, index, 7), index, preset)
     material = changed.objects[index].material
     assert isinstance(material, Dielectric) and material.priority == 7
     if preset.tint is not None:  # tells its colourant instead, and absorbs
@@ -121,15 +122,15 @@ def test_every_light_applies_and_keeps_place_kind_and_brightness(scene: Scene, p
         before.position,
         before.direction,
     )
-    assert edits.light_power(after) == pytest.approx(edits.light_power(before))
-    assert edits.spectrum_words(after.spectral_power)[0] == preset.kind
+    assert light_power(after) == pytest.approx(light_power(before))
+    assert spectrum_words(after.spectral_power)[0] == preset.kind
     for value in re.findall(r"(\d+) K", preset.remark):
         assert preset.kind == "illuminant" or float(value) == preset.value
 
 
 def test_the_sun_widens_a_directional_light_only(scene: Scene) -> None:
     sun = next(p for p in presets.light_presets() if p.name == "Sun")
-    point = edits.set_light_kind(scene, 0, "point")
+    point = set_light_kind(scene, 0, "point")
     assert presets.apply_light(point, 0, sun).lights[0].kind == "point"
-    wide = edits.set_light_kind(scene, 0, "directional")
+    wide = set_light_kind(scene, 0, "directional")
     assert presets.apply_light(wide, 0, sun).lights[0].angular_diameter_deg == 0.53

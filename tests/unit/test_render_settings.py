@@ -104,7 +104,7 @@ def test_haze_scatters_neither_all_forward_nor_all_back(tmp_path: Path, value: s
 
 @pytest.mark.parametrize(("key", "value", "bounds"), [("bounces", 4, "0 and 3"), ("haze", -1.0, "")])
 def test_an_edit_has_the_bounds_of_the_file(tmp_path: Path, key: str, value: float, bounds: str) -> None:
-    with pytest.raises(UserError, match=f"{key} is {value:g} but must lie between {bounds}"):
+    with pytest.raises(UserError, match=f"{key} is {value:g} but must be between {bounds}"):
         edits.set_render_defaults(load(tmp_path, TEXT), **{key: value})
 
 

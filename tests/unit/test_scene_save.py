@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 from spectrasplat.base.files import own_files
 from spectrasplat.base.paths import assets_dir
-from spectrasplat.edit import edits
 from spectrasplat.edit.document import Document
+from spectrasplat.edit.glass import set_dispersion_gain
+from spectrasplat.edit.lights import set_light, set_light_power
+from spectrasplat.edit.objects import rename, set_diffuse_colour, set_position, set_rotation, set_scale
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.io.scene_save import save_scene
 from spectrasplat.model.scene import Dab, Dielectric, Scene
@@ -273,26 +275,26 @@ Edit = Callable[[Scene], Scene]
 
 
 def moved(position: tuple[float, float, float]) -> Edit:
-    return lambda scene: edits.set_light(scene, 0, scene.lights[0].changed(position=position))
+    return lambda scene: set_light(scene, 0, scene.lights[0].changed(position=position))
 
 
 CASES: dict[str, tuple[Edit, list[str]]] = {
-    "gain": (lambda s: edits.set_dispersion_gain(s, 0, 2.0), ["+dispersion_gain = 2.0"]),
+    "gain": (lambda s: set_dispersion_gain(s, 0, 2.0), ["+dispersion_gain = 2.0"]),
     "turn": (
-        lambda s: edits.set_rotation(s, 0, (-90.0, 0.0, 30.0)),
+        lambda s: set_rotation(s, 0, (-90.0, 0.0, 30.0)),
         [
             "-rotation_deg = [-90.0, 0.0, 0.0]      # stands upright, its refracting edge towards +y",
             "+rotation_deg = [-90.0, 0.0, 30.0]      # stands upright, its refracting edge towards +y",
         ],
     ),
-    "move": (lambda s: edits.set_position(s, 0, (0.2, 0.0, 0.601)), ["+position = [0.2, 0.0, 0.601]"]),
+    "move": (lambda s: set_position(s, 0, (0.2, 0.0, 0.601)), ["+position = [0.2, 0.0, 0.601]"]),
     "lift": (
-        lambda s: edits.set_position(s, 0, (0.0, 0.0, 0.9)),
+        lambda s: set_position(s, 0, (0.0, 0.0, 0.9)),
         ["-rests_at_z = 0.001", "+position = [0.0, 0.0, 0.9]"],
     ),
-    "name": (lambda s: edits.rename(s, 0, "flint"), ['-name = "prism"', '+name = "flint"']),
+    "name": (lambda s: rename(s, 0, "flint"), ['-name = "prism"', '+name = "flint"']),
     "power": (
-        lambda s: edits.set_light_power(s, 0, 10_000.0, "illuminance_lx"),
+        lambda s: set_light_power(s, 0, 10_000.0, "illuminance_lx"),
         ["-illuminance_lx = 20_000", "+illuminance_lx = 10000.0"],
     ),
     "lamp": (moved((-4.0, -2.0, 1.0)), ["-position = [-4.404, -2.570, 0.909]", "+position = [-4.0, -2.0, 1.0]"]),
@@ -301,7 +303,7 @@ CASES: dict[str, tuple[Edit, list[str]]] = {
         ["-vertical_fov_deg = 30.0", "+vertical_fov_deg = 25.0"],
     ),
     "colour": (
-        lambda s: edits.set_diffuse_colour(s, 1, (0.8, 0.5, 0.5)),
+        lambda s: set_diffuse_colour(s, 1, (0.8, 0.5, 0.5)),
         [
             '-material = { kind = "diffuse", colour = 0.8 }',
             '+material = { kind = "diffuse", colour = [0.8, 0.5, 0.5] }',
@@ -333,11 +335,11 @@ def test_whatever_is_edited_reads_back(scene: str, tmp_path: Path) -> None:
     document = Document.open(path)
     changed = document.scene
     for index, item in enumerate(changed.objects):
-        changed = edits.set_rotation(changed, index, (10.0 + index, 20.0, 30.0))
-        changed = edits.set_scale(changed, index, (1.0, 2.0, 0.5 + index))
-        changed = edits.rename(changed, index, f"{item.name} moved")
+        changed = set_rotation(changed, index, (10.0 + index, 20.0, 30.0))
+        changed = set_scale(changed, index, (1.0, 2.0, 0.5 + index))
+        changed = rename(changed, index, f"{item.name} moved")
     for index, light in enumerate(changed.lights):
-        changed = edits.set_light(changed, index, light.changed(direction=(0.6, 0.0, -0.8)))
+        changed = set_light(changed, index, light.changed(direction=(0.6, 0.0, -0.8)))
     document.history.push("all", changed)
     document.save()
     _assert_alike(load_scene(path), changed)
@@ -368,7 +370,7 @@ def test_saved_into_another_folder_only_names_of_files_differ(tmp_path: Path) ->
     text = (scenes / "prism_case.toml").read_text(encoding="utf-8").replace('name = "slit"', 'name = "prism_case"')
     (here / "case.toml").write_text(text, encoding="utf-8")
     document = Document.open(here / "case.toml")
-    document.history.push("Rename", edits.rename(document.scene, 2, "ground"))
+    document.history.push("Rename", rename(document.scene, 2, "ground"))
     document.save(there / "case.toml")
     saved = (there / "case.toml").read_text(encoding="utf-8")
     differing = _changed_lines(text, saved)

@@ -11,9 +11,10 @@ import pytest
 from PIL import Image
 from spectrasplat.base.errors import UserError
 from spectrasplat.base.paths import assets_dir
-from spectrasplat.edit import edits
 from spectrasplat.edit import environments as environment
+from spectrasplat.edit.lights import delete_light
 from spectrasplat.edit.live_inputs import LiveInputs
+from spectrasplat.edit.objects import delete, set_diffuse_colour, set_material
 from spectrasplat.model.environment import direction_of
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.io.scene_save import save_scene
@@ -54,9 +55,9 @@ def cost(before: Scene, after: Scene) -> DirtyLevel:
 def test_where_an_environment_is_seen_neither_receiver_nor_light_is_needed(scene: Scene, tmp_path: Path) -> None:
     """Every way to do without them gives a scene that can be saved and opened again; without the environment all are
     refused."""
-    scene = edits.delete_light(scene, 1)
+    scene = delete_light(scene, 1)
     sky, table = environment.set_environment_kind(scene, "sky"), table_of(scene)
-    for edit, arguments in ((edits.delete, [table]), (edits.set_material, [table, Black()]), (edits.delete_light, [0])):
+    for edit, arguments in ((delete, [table]), (set_material, [table, Black()]), (delete_light, [0])):
         with pytest.raises(UserError, match="only .* environment"):
             edit(scene, *arguments)
         bare = edit(sky, *arguments)
@@ -160,7 +161,7 @@ def test_a_picture_is_worn_tinted_shared_and_taken_off(scene: Scene, picture: Pa
     table = table_of(scene)
     worn = environment.set_texture(scene, table, picture)
     assert worn.objects[table].material.reflectance_rgb == (1.0, 1.0, 1.0)
-    tinted = edits.set_diffuse_colour(worn, table, (1.0, 0.5, 0.5))
+    tinted = set_diffuse_colour(worn, table, (1.0, 0.5, 0.5))
     assert tinted.objects[table].material.texture is worn.objects[table].material.texture
     double = replace(worn, objects=(*worn.objects, replace(scene.objects[table], name="twin")))
     cpu_reference = environment.set_texture(double, len(double.objects) - 1, picture)

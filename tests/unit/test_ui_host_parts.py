@@ -67,18 +67,18 @@ def test_a_gpu_keeps_to_the_screen() -> None:
 def test_notices_fade_errors_later_or_with_a_success_once_read() -> None:
     clock = Clock()
     box = MessageBox(clock)
-    box.tell("Saved\nmine.toml.")
-    box.tell("No.", is_error=True)
+    box.show("Saved\nmine.toml.")
+    box.show("No.", is_error=True)
     assert [m.text for m in box.messages()] == ["Saved mine.toml.", "No."]
     assert box.is_fading
     clock.now = NOTICE_S + 1
     assert [m.text for m in box.messages()] == ["No."]
-    box.tell("Stopped.", is_error=True, stays=True)
+    box.show("Stopped.", is_error=True, stays=True)
     box.messages()
     clock.now += ERROR_S
     assert [m.text for m in box.messages()] == ["Stopped."]
     assert not box.is_fading
-    box.tell("Not saved.", is_error=True)
+    box.show("Not saved.", is_error=True)
     box.messages()
     box.succeed()
     assert [m.text for m in box.messages()] == ["Not saved."]  # nobody can have read it yet
@@ -91,7 +91,7 @@ def test_a_notice_stays_until_it_can_be_read() -> None:
     """Of a file that takes long to prepare, notes were gone before the first frame; four long ones had six seconds."""
     clock = Clock()
     box = MessageBox(clock)
-    box.tell("word " * 60)
+    box.show("word " * 60)
     clock.now = 100.0  # nothing was drawn meanwhile
     assert len(box.messages()) == 1
     clock.now += 300 / 15 - 1
@@ -103,8 +103,8 @@ def test_a_notice_stays_until_it_can_be_read() -> None:
 def test_a_message_that_is_said_again_is_shown_once_and_too_many_push_out_the_oldest() -> None:
     box = MessageBox(Clock())
     for number in range(MAX_MESSAGES + 3):
-        box.tell(f"Message {number}", is_error=True)
-        box.tell(f"Message {number}", is_error=True)
+        box.show(f"Message {number}", is_error=True)
+        box.show(f"Message {number}", is_error=True)
     texts = [m.text for m in box.messages()]
     assert texts == [f"Message {n}" for n in range(3, MAX_MESSAGES + 3)]
 

@@ -32,7 +32,7 @@ def test_notes_of_a_mesh_name_what_the_window_has(tmp_path: Path, text: str) -> 
     assert any("--glass" in note for note in notes) and any("--up" in note for note in notes)
     box = MessageBox(clock=lambda: 0.0)
     for note in notes:
-        box.tell(note)
+        box.show(note)
     told = " ".join(message.text for message in box.messages())
     assert "--" not in told and "Dispersion panel" in told and "button on the picture" in told
     assert ("it holds 'one', 'two'" in told) == ("o two" in text)

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...edit import edits
+from ...edit.glass import set_dispersion_gain
 from ...edit.live_inputs import LiveInputs
+from ...edit.objects import add_dabs, set_transform
 from ...features.features import Features
 from ...model.scene import Dab, Scene
 from ...model.settings import RenderSettings
@@ -49,12 +50,12 @@ def _edited(scene: Scene) -> Iterator[Scene]:
     yield scene
     materials = dict(enumerate(item.material for item in scene.objects))
     for i in [i for i, m in materials.items() if m.transmits and m.dispersion.is_dispersive][:1]:
-        yield edits.set_dispersion_gain(scene, i, 0.99 * materials[i].dispersion.gain)
+        yield set_dispersion_gain(scene, i, 0.99 * materials[i].dispersion.gain)
     for i in [i for i, m in materials.items() if m.is_specular][:1]:
-        yield edits.set_transform(scene, i, scene.objects[i].object_to_world @ np.diag((0.99, 0.99, 0.99, 1.0)))
+        yield set_transform(scene, i, scene.objects[i].object_to_world @ np.diag((0.99, 0.99, 0.99, 1.0)))
     for i in [i for i, m in materials.items() if m.receives][:1]:
         x, y, z = scene.objects[i].mesh.vertices[0].tolist()
-        yield edits.add_dabs(scene, i, [Dab((x, y, z), 1.0, 1.0)])
+        yield add_dabs(scene, i, [Dab((x, y, z), 1.0, 1.0)])
 
 
 class Rehearsals:

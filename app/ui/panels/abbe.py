@@ -1,4 +1,4 @@
-"""The n_d–V_d diagram that glass makers print, to click in: every glass of the catalogue and where the scene's stand.
+"""The n_d–V_d diagram that glass makers print, to click in: every glass of the catalogue, and those of the scene.
 
 A click gives the selected object the glass under the cursor; Ctrl and drag makes it a model
 glass of any n_d and Abbe number, live. Wheel zooms, dragging moves the view.
@@ -12,8 +12,6 @@ from functools import cache
 import numpy as np
 from imgui_bundle import ImVec2, ImVec4, imgui, implot
 
-from ...base.errors import UserError
-from ...edit import edits
 from ...edit.state import State
 from ...model.optics import catalogue
 from ...model.optics.catalogue import MAKER_ORDER, Entry
@@ -21,13 +19,13 @@ from .. import item_rects, theme
 from ..view_model import ViewModel
 from . import widgets
 from .glass_picker import apply_glass, remark
-from .glass_values import abbe_text, glasses_of, own_numbers, selected_glass, with_abbe
+from .glass_values import abbe_text, attempted, glasses_of, own_numbers, selected_glass, with_abbe
 
 V_D_RANGE, N_D_RANGE = (15.0, 100.0), (1.4, 2.1)
 """What is shown at first: nearly all glasses."""
 
 _CROWN_FLINT = ((55.0, 0.0), (55.0, 1.6), (50.0, 1.6), (50.0, 9.0))
-"""Crown lies left of this line: V_d above 55, or above 50 where n_d exceeds 1.6."""
+"""Crown is left of this line: V_d above 55, or above 50 where n_d exceeds 1.6."""
 
 _NEAR_EM = 0.7
 
@@ -200,7 +198,7 @@ def _draw_objects(state: State) -> None:
         is_selected = state.selection.kind == "object" and state.selection.index == index
         tint = theme.packed(colours.accent if is_selected else colours.text)
         drawing.add_circle(at, theme.em(0.42), tint, 0, 2.0)
-        # Names of objects of one glass stand below each other.
+        # Names of objects of one glass are below each other.
         line = sum(abs(at.x - other.x) < theme.em(2.0) and abs(at.y - other.y) < theme.em(1.0) for other in taken)
         taken.append(at)
         x = place_of_name(at.x, imgui.calc_text_size(item.name).x, theme.em(0.65), right)
@@ -234,7 +232,8 @@ def _answer_mouse(state: State, shown: np.ndarray) -> State:
     if _memory.is_setting and not imgui.is_mouse_down(0):
         _memory.is_setting = False
     if _memory.is_setting:
-        return _set_freely(widgets.holding(state, True))
+        widgets.hold()
+        return _set_freely(state)
     near = nearest_entry(shown) if is_hovered else None
     if near is None:
         return state
@@ -258,12 +257,8 @@ def _set_freely(state: State) -> State:
     imgui.set_tooltip(f"n_d = {n_d:.4f}\nV_d = {v_d:.2f}")
     if own_numbers(material.dispersion) == (n_d, v_d):
         return state
-    try:
-        scene = edits.set_dispersion(state.scene, index, with_abbe(material.dispersion, n_d, v_d))
-    except UserError as refusal:
-        _memory.refused = str(refusal)
-        return state
-    return state.edited(scene, f"n_d and V_d of {item.name}")
+    label = f"n_d and V_d of {item.name}"
+    return attempted(state, index, label, lambda: with_abbe(material.dispersion, n_d, v_d), _memory)
 
 
 def nearest_entry(shown: np.ndarray) -> Entry | None:

@@ -11,6 +11,7 @@ from imgui_bundle import ImVec2, imgui
 
 from ...edit import edits
 from ...edit.brush import USUAL_RADIUS
+from ...edit.objects import clear_dabs
 from ...edit.state import Brush, State, Tool
 from ...model.local_dispersion import dab_weight
 from ...model.scene import Dab
@@ -57,52 +58,31 @@ def _draw_tools(state: State) -> State:
     return state
 
 
-def _usual_radius(state: State) -> float:
-    return USUAL_RADIUS * state.view.height_at(state.view.target_distance)
-
-
 def _draw_settings(state: State) -> State:
     brush = state.brush
     tip = "What a stroke does. While painting, Shift erases and Ctrl does the opposite of widening or narrowing."
-    _, mode = widgets.combo("Mode", _MODES, brush.mode, tip=tip)
+    mode = widgets.combo("Mode", _MODES, brush.mode, tip=tip)
     tip = "Radius on the receiver. Shift+wheel over the picture, or [ and ], change it too."
-    _, radius, radius_held = widgets.drag(
-        "Radius",
-        brush.radius,
-        1e-4,
-        1e4,
-        unit="units",
-        tip=tip,
-        reset=_usual_radius(state),
-        format="%.4g",
-        logarithmic=True,
+    usual = USUAL_RADIUS * state.view.height_at(state.view.target_distance)
+    radius = widgets.drag(
+        "Radius", brush.radius, 1e-4, 1e4, unit="units", tip=tip, reset=usual, format="%.4g", logarithmic=True
     )
     if mode == "erase":
-        tip = "Share of what was painted that goes in a quarter of a second under a still cursor."
+        tip = "Share of what was painted that is erased in a quarter of a second under a still cursor."
         top, unit = 1.0, ""
     else:
         tip = "How fast paint builds up under a still cursor: 1 doubles (or halves) the spread of colours every second."
         top, unit = 8.0, "doublings/s"
-    moved, strength, strength_held = widgets.slider(
-        "Strength",
-        min(brush.strength, top),
-        0.01,
-        top,
-        unit=unit,
-        tip=tip,
-        reset=_DEFAULT.strength,
-        format="%.2f",
-        logarithmic=True,
+    before, usual = min(brush.strength, top), _DEFAULT.strength
+    strength = widgets.slider(
+        "Strength", before, 0.01, top, unit=unit, tip=tip, reset=usual, format="%.2f", logarithmic=True
     )
     tip = "Share of the radius over which the brush fades out: 0 is a hard edge, 1 fades from the centre on."
-    _, falloff, falloff_held = widgets.slider(
-        "Falloff", brush.falloff, 0.0, 1.0, unit="", tip=tip, reset=_DEFAULT.falloff, format="%.2f"
-    )
+    usual = _DEFAULT.falloff
+    falloff = widgets.slider("Falloff", brush.falloff, 0.0, 1.0, unit="", tip=tip, reset=usual, format="%.2f")
     _draw_profile(falloff)
-    strength = strength if moved else brush.strength  # what the eraser cannot show is kept for the others
-    changed = Brush(mode, radius, strength, falloff)  # type: ignore[arg-type]
-    state = widgets.holding(state, radius_held or strength_held or falloff_held)
-    return state if changed == brush else replace(state, brush=changed)
+    strength = strength if strength != before else brush.strength  # what the eraser cannot show is kept for the others
+    return replace(state, brush=Brush(mode, radius, strength, falloff))  # type: ignore[arg-type]
 
 
 def _draw_profile(falloff: float) -> None:
@@ -136,16 +116,14 @@ def _draw_painted(state: State) -> State:
     else:
         widgets.note(f"{NOT_PHYSICAL}. Colours spread as painted, not as light does.")
     tip = "Leave the painted gain out, to compare with what nature would show. Nothing painted is lost."
-    changed, physical = widgets.toggle("Physical picture", state.physical, tip=tip)
-    if changed:
-        state = replace(state, physical=physical)
+    state = replace(state, physical=widgets.toggle("Physical picture", state.physical, tip=tip))
     for index, item in painted:
         count = len(item.local_dispersion)
         begin_row(item.name)
         tip = f"Take every dab off {item.name}. Undo brings them back."
         words = f"Clear {count} dab{'s' if count > 1 else ''}"
         if widgets.button(f"{words}##{item.name}", tip=tip, width=-1.0):
-            state = edits.attempt(state, f"Clear dabs of {item.name}", edits.clear_dabs, index)
+            state = edits.attempt(state, f"Clear dabs of {item.name}", clear_dabs, index)
     return state
 
 

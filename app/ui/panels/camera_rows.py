@@ -11,72 +11,53 @@ from . import widgets
 _KINDS = {"pinhole": "Perspective", "orthographic": "Orthographic"}
 
 
-def draw_camera_rows(camera: Camera) -> tuple[Camera, bool]:
-    """The camera as it was left, and whether a field of it is held."""
-    _, kind = widgets.combo("Projection", _KINDS, camera.kind, tip="Perspective, or orthographic for measuring.")
+def draw_camera_rows(camera: Camera) -> Camera:
+    """The camera as the user left it."""
+    kind = widgets.combo("Projection", _KINDS, camera.kind, tip="Perspective, or orthographic for measuring.")
     if kind != camera.kind:
         camera = _converted(camera, kind)
     if camera.kind == "pinhole":
-        _, fov, active = widgets.slider(
-            "Field of view",
-            camera.vertical_fov_deg,
-            2.0,
-            120.0,
-            unit="°",
-            format="%.1f",
-            reset=35.0,
-            tip="Vertical angle of view.",
-        )
+        tip, before = "Vertical angle of view.", camera.vertical_fov_deg
+        fov = widgets.slider("Field of view", before, 2.0, 120.0, unit="°", format="%.1f", reset=35.0, tip=tip)
         camera = replace(camera, vertical_fov_deg=fov)
     else:
-        _, extent, active = widgets.drag(
-            "Height", camera.vertical_extent, 1e-4, 1e6, unit="units", tip="Height of what is seen, in scene units."
-        )
+        tip = "Height of what is seen, in scene units."
+        extent = widgets.drag("Height", camera.vertical_extent, 1e-4, 1e6, unit="units", tip=tip)
         camera = replace(camera, vertical_extent=extent)
-    _, position, moving = widgets.vec3(
-        "Position", camera.position, unit="units", tip="Where the camera stands: x, y, z.", speed=0.02
-    )
-    _, target, aiming = widgets.vec3(
-        "Target", camera.target, unit="units", tip="The point in the middle of the picture: x, y, z.", speed=0.02
-    )
-    camera, focusing = _lens_rows(camera)
+    tip = "Where the camera is: x, y, z."
+    position = widgets.vec3("Position", camera.position, unit="units", tip=tip, speed=0.02)
+    tip = "The point in the middle of the picture: x, y, z."
+    target = widgets.vec3("Target", camera.target, unit="units", tip=tip, speed=0.02)
     if position != target:  # a camera's target is not its own position
         camera = replace(camera, position=position, target=target)
-    return camera, active or moving or aiming or focusing
+    return _lens_rows(camera)
 
 
-def _lens_rows(camera: Camera) -> tuple[Camera, bool]:
+def _lens_rows(camera: Camera) -> Camera:
     """How wide the lens is open and what is in focus."""
     distance = camera.plane_of_focus
-    _, radius, opening = widgets.slider(
+    tip = "Half the lens's aperture: the larger, the more blurred is what is out of focus. 0: all is in focus."
+    radius = widgets.slider(
         "Lens radius",
         camera.lens_radius,
         0.0,
         0.1 * distance,
         unit="units",
-        format="%.4f",
+        tip=tip,
         reset=0.0,
+        format="%.4f",
         clamp=False,
-        tip="Half the lens's aperture: the larger, the more blurred is what is out of focus. 0: all is in focus.",
     )
     camera = replace(camera, lens_radius=max(radius, 0.0))
-    focusing = False
     if camera.lens_radius > 0.0:
-        _, distance, focusing = widgets.drag(
-            "Focus distance",
-            distance,
-            1e-6,
-            1e9,
-            unit="units",
-            tip="From the lens to the plane of focus.",
-        )
-        if distance != camera.plane_of_focus:
-            camera = replace(camera, focus_distance=distance)
-        if camera.focus_distance is not None and widgets.button(
-            "Focus on the target", tip="Keep the target in focus, wherever the camera goes."
-        ):
+        tip = "From the lens to the plane of focus."
+        wanted = widgets.drag("Focus distance", distance, 1e-6, 1e9, unit="units", tip=tip)
+        if wanted != distance:
+            camera = replace(camera, focus_distance=wanted)
+        tip = "Keep the target in focus, wherever the camera moves."
+        if camera.focus_distance is not None and widgets.button("Focus on the target", tip=tip):
             camera = replace(camera, focus_distance=None)
-    return camera, opening or focusing
+    return camera
 
 
 def _converted(camera: Camera, kind: str) -> Camera:

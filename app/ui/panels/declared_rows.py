@@ -13,25 +13,24 @@ from . import widgets
 T = TypeVar("T", Light, Material)
 
 
-def draw_numbers(thing: T, numbers: Sequence[Number]) -> tuple[T, bool]:
-    """A row for each number: `thing` as the user left it, and whether a control is held."""
-    held = False
+def draw_numbers(thing: T, numbers: Sequence[Number]) -> T:
+    """A row for each number: `thing` as the user left it."""
     for number in numbers:
-        thing, active = _number(thing, number)
-        held = held or active
-    return thing, held
+        thing = _number(thing, number)
+    return thing
 
 
 def draw_flags(thing: T, parts: Sequence[Part]) -> T:
     """A switch for each part that is one."""
     for part in parts:
         if isinstance(part, Flag) and part.row is not None:
-            changed, on = widgets.toggle(part.row.label, getattr(thing, part.attribute), tip=part.row.tip)
-            thing = thing.changed(**{part.attribute: on}) if changed else thing
+            before = getattr(thing, part.attribute)
+            on = widgets.toggle(part.row.label, before, tip=part.row.tip)
+            thing = thing.changed(**{part.attribute: on}) if on != before else thing
     return thing
 
 
-def _number(thing: T, number: Number) -> tuple[T, bool]:
+def _number(thing: T, number: Number) -> T:
     row, value = number.row, getattr(thing, number.attribute)
     assert row is not None
     high = getattr(thing, row.bounded_by) if row.bounded_by else row.high
@@ -39,7 +38,7 @@ def _number(thing: T, number: Number) -> tuple[T, bool]:
     if row.bounded_by:
         value, shown["reset"] = min(value, high), high
     if row.is_slider:
-        changed, new, active = widgets.slider(row.label, value, row.low, high, **shown)
+        new = widgets.slider(row.label, value, row.low, high, **shown)
     else:
-        changed, new, active = widgets.drag(row.label, value, row.low, high, logarithmic=True, **shown)
-    return thing.changed(**{number.attribute: new}) if changed else thing, active
+        new = widgets.drag(row.label, value, row.low, high, logarithmic=True, **shown)
+    return thing.changed(**{number.attribute: new}) if new != value else thing

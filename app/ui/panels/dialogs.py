@@ -1,10 +1,11 @@
-"""The dialogues that stand between the user and lost work: open, save as, unsaved changes, quit.
+"""The dialogues that keep the user from losing work: open, save as, unsaved changes, quit.
 
 Which question is open is memory of the interface; the host gets only the final requests.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -21,9 +22,8 @@ from . import file_browser, picture_choice, widgets
 OPENABLE = (".toml", ".glb", ".gltf", ".obj", ".ply", ".stl")
 COMPARABLE = (".exr", ".npy")
 """Dropped while the compare panel is open, these are compared with."""
+_SAVE_AS = "Save as"
 SAVEABLE = (".toml", ".glb")
-_UNSAVED = "Unsaved changes"
-_UNFINISHED = "Unfinished export"
 
 
 @dataclass
@@ -31,7 +31,7 @@ class _Memory:
     pending: list[requests.Request] = field(default_factory=list)
     """What waits for the answer to "save first?"."""
     is_saving: bool = False
-    """Save was chosen: `pending` goes on once nothing is unsaved."""
+    """Save was chosen: `pending` is requested once nothing is unsaved."""
 
 
 _memory = _Memory()
@@ -46,15 +46,15 @@ def reset() -> None:
 
 def open_file(state: State, view_model: ViewModel) -> State:
     """Ask which file to open."""
-    start = view_model.path.parent if view_model.path is not None else _recent_folder(view_model)
-    file_browser.ask(file_browser.Question("open", "Open", OPENABLE, start, known=shipped_scenes()))
+    start = _folder(view_model)
+    file_browser.ask(file_browser.Question("Open", OPENABLE, start, open_path, known=shipped_scenes()))
     return state
 
 
 def import_file(state: State, view_model: ViewModel) -> State:
     """Ask which file's objects are to join the scene."""
-    start = view_model.path.parent if view_model.path is not None else _recent_folder(view_model)
-    file_browser.ask(file_browser.Question("import", "Import into this scene", OPENABLE, start, known=shipped_scenes()))
+    title, start = "Import into this scene", _folder(view_model)
+    file_browser.ask(file_browser.Question(title, OPENABLE, start, _imported, known=shipped_scenes()))
     return state
 
 
@@ -78,28 +78,25 @@ NO_FILE = "'{}' has no file of its own yet: what comes with SpectraSplat, and a 
 
 def save_as(state: State, view_model: ViewModel) -> State:
     """Ask where to save."""
-    folder = view_model.path.parent if view_model.path is not None else _recent_folder(view_model)
-    name = view_model.path.name if view_model.path is not None else f"{_file_stem(view_model.title)}.toml"
-    # Else Ctrl+S on a scene that comes with the program would ask this without a word why.
-    hint = "" if view_model.path is not None else NO_FILE.format(view_model.title)
-    file_browser.ask(file_browser.Question("save", "Save as", SAVEABLE, folder / name, saving=True, hint=hint))
+    path, hint = view_model.path, ""
+    if path is None:
+        kept = "".join(c if c.isalnum() or c in "-_ " else "_" for c in view_model.title).strip()
+        path = _folder(view_model) / f"{kept or 'scene'}.toml"
+        # Else Ctrl+S on a scene that comes with the program would open this dialogue without a reason.
+        hint = NO_FILE.format(view_model.title)
+    file_browser.ask(file_browser.Question(_SAVE_AS, SAVEABLE, path, _saved, saving=True, hint=hint))
     return state
+
+
+def _saved(state: State, _view_model: ViewModel, path: Path) -> State:
+    return state.asking(requests.Save(path))
 
 
 def draw_dialogs(state: State, view_model: ViewModel) -> State:
     """Draw what is open and carry its answers on."""
-    file_browser.draw()
-    state = picture_choice.answers(state)
-    chosen = file_browser.take("open")
-    if chosen is not None:
-        state = open_path(state, view_model, chosen)
-    brought = file_browser.take("import")
-    if brought is not None:
-        state = _imported(state, brought)
-    target = file_browser.take("save")
-    if target is not None:
-        state = state.asking(requests.Save(target))
-    elif _memory.is_saving and not file_browser.is_open("save"):
+    was_saving = file_browser.is_open(_SAVE_AS)
+    state = file_browser.draw(state, view_model)
+    if _memory.is_saving and not was_saving:
         state = _after_saving(state, view_model)
     if (_memory.pending and not _memory.is_saving) or view_model.asks_to_quit:
         state = _unsaved_question(state, view_model)
@@ -110,7 +107,7 @@ def draw_dialogs(state: State, view_model: ViewModel) -> State:
     return state
 
 
-def _imported(state: State, path: Path) -> State:
+def _imported(state: State, _view_model: ViewModel, path: Path) -> State:
     """With the file's objects, the first of them selected."""
     first = len(state.scene.objects)
     after = edits.attempt(state, f"Import {path.name}", import_objects, path)
@@ -134,93 +131,81 @@ def _after_saving(state: State, view_model: ViewModel) -> State:
     return state.asking(*pending).with_panels(start_page=False)
 
 
-def _begin_question(title: str) -> bool:
+def _asked(title: str, words: str, hint: str, buttons: Mapping[str, str]) -> str:
+    """The button of a question that was pressed, the last one by Esc too; empty while none was. `buttons`: labels, and
+    what their tooltips say."""
     if not imgui.is_popup_open(title):
         imgui.open_popup(title)
-    centre = imgui.get_main_viewport().get_center()
     # Always: its height is known only once its words are wrapped.
-    imgui.set_next_window_pos(centre, imgui.Cond_.always, imgui.ImVec2(0.5, 0.5))
-    return imgui.begin_popup_modal(title, None, imgui.WindowFlags_.always_auto_resize)[0]
+    imgui.set_next_window_pos(imgui.get_main_viewport().get_center(), imgui.Cond_.always, imgui.ImVec2(0.5, 0.5))
+    if not imgui.begin_popup_modal(title, None, imgui.WindowFlags_.always_auto_resize)[0]:
+        return ""
+    imgui.text_unformatted(words)
+    widgets.hint(hint)
+    imgui.dummy(imgui.ImVec2(theme.em(26), theme.em(0.4)))
+    pressed = ""
+    for label, tip in buttons.items():
+        width = max(theme.em(7), imgui.calc_text_size(label.split("##")[0]).x + theme.em(1))
+        if widgets.button(label, tip=tip, width=width):
+            pressed = label
+        imgui.same_line()
+    imgui.new_line()
+    if imgui.is_key_pressed(imgui.Key.escape):
+        pressed = list(buttons)[-1]
+    if pressed:
+        imgui.close_current_popup()
+    imgui.end_popup()
+    return pressed.split("##")[0]
 
 
 def _export_question(state: State, job: JobInfo) -> State:
-    if not _begin_question(_UNFINISHED):
+    pressed = _asked(
+        "Unfinished export",
+        f"{job.title} is not finished ({job.fraction:.0%}).",
+        f"Wait for it before quitting? Stopped now, {job.when_stopped}.",
+        {
+            "Finish, then quit": "Quit once it is there.",
+            "Stop, then quit": f"{job.when_stopped[:1].upper()}{job.when_stopped[1:]}.",
+            "Cancel##export": "Stay, and let it continue.",
+        },
+    )
+    if not pressed:
         return state
-    imgui.text_unformatted(f"{job.title} is not finished ({job.fraction:.0%}).")
-    widgets.hint(f"Wait for it before quitting? Stopped now, {job.when_stopped}.")
-    imgui.dummy(imgui.ImVec2(theme.em(26), theme.em(0.4)))
-    width = theme.em(7)
-    asked: requests.Request | None = None
-    if widgets.button("Finish, then quit", tip="Quit once it is there.", width=width + theme.em(2)):
-        asked = requests.QuitAfterExport()
-    imgui.same_line()
-    if widgets.button("Stop, then quit", tip=f"{job.when_stopped[:1].upper()}{job.when_stopped[1:]}.", width=width):
-        asked = requests.QuitAfterExport(stop=True)
-    imgui.same_line()
-    if widgets.button("Cancel##export", tip="Stay, and let it go on.", width=width) or imgui.is_key_pressed(
-        imgui.Key.escape
-    ):
-        asked = requests.CancelQuit()
-    if asked is not None:
-        imgui.close_current_popup()
-        state = state.asking(asked)
-    imgui.end_popup()
-    return state
+    stop = pressed == "Stop, then quit"
+    return state.asking(requests.CancelQuit() if pressed == "Cancel" else requests.QuitAfterExport(stop))
 
 
 def _unsaved_question(state: State, view_model: ViewModel) -> State:
-    if not _begin_question(_UNSAVED):
-        return state
     is_quitting = view_model.asks_to_quit
-    imgui.text_unformatted(f"{view_model.title} has changes that are not saved.")
-    widgets.hint("Save them before quitting?" if is_quitting else "Save them before another scene takes its place?")
-    imgui.dummy(imgui.ImVec2(theme.em(26), theme.em(0.4)))
-    width = theme.em(7)
-    if widgets.button("Save##unsaved", tip="Save, then go on.", width=width):
-        state = _save_first(state, view_model)
-    imgui.same_line()
-    if widgets.button("Discard", tip="Go on; the changes are lost.", width=width):
-        state = _go_on(state, view_model)
-    imgui.same_line()
-    if widgets.button("Cancel##unsaved", tip="Stay, with everything as it is.", width=width) or imgui.is_key_pressed(
-        imgui.Key.escape
-    ):
-        state = _stay(state, view_model)
-    imgui.end_popup()
-    return state
-
-
-def _go_on(state: State, view_model: ViewModel) -> State:
-    """Without saving."""
-    imgui.close_current_popup()
-    if view_model.asks_to_quit:
-        return state.asking(requests.Quit(discard=True))
-    pending, _memory.pending = tuple(_memory.pending), []
-    return state.asking(*pending).with_panels(start_page=False)
-
-
-def _stay(state: State, view_model: ViewModel) -> State:
-    imgui.close_current_popup()
-    _memory.pending, _memory.is_saving = [], False
-    return state.asking(requests.CancelQuit()) if view_model.asks_to_quit else state
-
-
-def _save_first(state: State, view_model: ViewModel) -> State:
-    imgui.close_current_popup()
-    if view_model.asks_to_quit:
-        state = _stay(state, view_model)
-        _memory.pending = [requests.Quit()]
-    _memory.is_saving = True
+    pressed = _asked(
+        "Unsaved changes",
+        f"{view_model.title} has changes that are not saved.",
+        "Save them before quitting?" if is_quitting else "Save them before another scene takes its place?",
+        {
+            "Save##unsaved": "Save, then continue.",
+            "Discard": "Continue; the changes are lost.",
+            "Cancel##unsaved": "Stay, with everything as it is.",
+        },
+    )
+    if not pressed:
+        return state
+    pending, _memory.pending, _memory.is_saving = tuple(_memory.pending), [], False
+    if pressed == "Discard":
+        if is_quitting:
+            return state.asking(requests.Quit(discard=True))
+        return state.asking(*pending).with_panels(start_page=False)
+    if is_quitting:
+        state = state.asking(requests.CancelQuit())
+    if pressed == "Cancel":
+        return state
+    _memory.pending, _memory.is_saving = [requests.Quit()] if is_quitting else list(pending), True
     return state.asking(requests.Save()) if view_model.path is not None else save_as(state, view_model)
 
 
-def _recent_folder(view_model: ViewModel) -> Path:
-    """Where the user last worked; never the folder of the scenes that come with the program."""
+def _folder(view_model: ViewModel) -> Path:
+    """The scene's, else where the user last worked; never the folder of the scenes that come with the program."""
+    if view_model.path is not None:
+        return view_model.path.parent
     shipped = assets_dir().resolve()
     folders = [path.parent for path in view_model.recent if not path.resolve().is_relative_to(shipped)]
     return folders[0] if folders else Path.home()
-
-
-def _file_stem(title: str) -> str:
-    kept = "".join(c if c.isalnum() or c in "-_ " else "_" for c in title).strip()
-    return kept or "scene"

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from imgui_bundle import ImVec2, imgui
 
-from ...base.errors import UserError
 from ...edit import edits, presets
-from ...edit.glass import set_tint
+from ...edit.glass import set_absorption, set_dispersion, set_priority, set_tint
+from ...edit.objects import set_material
 from ...edit.state import State
 from ...model.materials.dielectric import MAX_PRIORITY
 from ...model.optics import glass
@@ -25,6 +24,7 @@ from .glass_picker import POPUP, draw_glass_picker
 from .glass_values import (
     abbe_text,
     as_sold,
+    attempted,
     base_name,
     is_as_sold,
     lines_of,
@@ -48,9 +48,9 @@ def draw_absorption(state: State, index: int) -> State:
     if not material.is_solid:
         return state
     tip = "Let the glass absorb light on the way through it (Beer–Lambert). Off: perfectly clear."
-    changed, tinted = widgets.toggle("Tinted", material.absorption is not None, tip=tip)
-    if changed:
-        return _tinted(state, index, _FIRST_COLOUR if tinted else None, _FIRST_DISTANCE)
+    is_tinted = widgets.toggle("Tinted", material.absorption is not None, tip=tip)
+    if is_tinted != (material.absorption is not None):
+        return _tinted(state, index, _FIRST_COLOUR if is_tinted else None, _FIRST_DISTANCE)
     if material.absorption is None:
         return state
     known = tint_of(material.absorption.coefficient)
@@ -59,7 +59,7 @@ def draw_absorption(state: State, index: int) -> State:
     tip = "What colours the glass. " + (
         "Tints are approximated by the bands of their colourants." if known is None else f"{known[0].colourant}."
     )
-    _, chosen = widgets.combo("Tint", choices, present, tip=tip)
+    chosen = widgets.combo("Tint", choices, present, tip=tip)
     if chosen != present:
         return _chosen(state, index, chosen, known)
     if known is not None:
@@ -79,8 +79,8 @@ def _chosen(state: State, index: int, name: str, known: tuple[Tint, float] | Non
     return edits.attempt(state, f"Tint of {item.name}", set_tint, index, found, distance)
 
 
-def _depth_drag(label: str, distance: float, tip: str) -> tuple[bool, float, bool]:
-    """A row for a way through glass, in the scene's units: whether it changed, the way, whether it is held."""
+def _depth_drag(label: str, distance: float, tip: str) -> float:
+    """A row for a depth of glass, in the scene's units."""
     return widgets.drag(
         label, distance, 1e-4, 1e6, unit="units", tip=tip, reset=_FIRST_DISTANCE, format="%.3f", logarithmic=True
     )
@@ -88,30 +88,26 @@ def _depth_drag(label: str, distance: float, tip: str) -> tuple[bool, float, boo
 
 def _draw_depth(state: State, index: int, present: Tint, distance: float) -> State:
     tip = "How far daylight travels inside until it is half as bright. Shorter is deeper."
-    changed, distance, active = _depth_drag("Half at a depth of", distance, tip)
-    state = widgets.holding(state, active)
-    label = f"Tint of {state.scene.objects[index].name}"
-    return edits.attempt(state, label, set_tint, index, present, distance) if changed else state
+    wanted, label = _depth_drag("Half at a depth of", distance, tip), f"Tint of {state.scene.objects[index].name}"
+    return state if wanted == distance else edits.attempt(state, label, set_tint, index, present, wanted)
 
 
 def _draw_colour(state: State, index: int, absorption: Absorption) -> State:
     if absorption.colour is None:
         widgets.hint("The absorption is a measured curve, which no colour describes.")
         return state
-    rgb, distance = absorption.colour
-    tip = "Colour of white light after the distance below."
-    colour_changed, rgb, colour_active = widgets.colour("Colour", rgb, tip=tip)
+    rgb = widgets.colour(
+        "Colour", absorption.colour[0], tip="Colour of white light after the distance below.", highest=1.0
+    )
     tip = "How far white light travels inside the glass until it has this colour. Shorter is deeper."
-    depth_changed, distance, depth_active = _depth_drag("At a depth of", distance, tip)
-    state = widgets.holding(state, colour_active or depth_active)
-    return _tinted(state, index, rgb, distance) if colour_changed or depth_changed else state
+    distance = _depth_drag("At a depth of", absorption.colour[1], tip)
+    return state if (rgb, distance) == absorption.colour else _tinted(state, index, rgb, distance)
 
 
 def _tinted(state: State, index: int, rgb: Vec3 | None, distance: float) -> State:
     """Object `index` with that absorption; `rgb` None: clear."""
     label = f"Tint of {state.scene.objects[index].name}"
-    colour = rgb and (min(max(rgb[0], 0.0), 1.0), min(max(rgb[1], 0.0), 1.0), min(max(rgb[2], 0.0), 1.0))
-    return edits.attempt(state, label, edits.set_absorption, index, colour, distance)
+    return edits.attempt(state, label, set_absorption, index, rgb, distance)
 
 
 MAX_GAIN = 10.0
@@ -193,7 +189,7 @@ def _draw_buttons(state: State, view_model: ViewModel, index: int) -> State:
         else "This glass is not from the catalogue."
     )
     if widgets.button("As sold", tip=tip, enabled=sold is not None and not is_as_sold(dispersion)) and sold:
-        state = edits.attempt(state, f"{sold.name} as sold", edits.set_dispersion, index, sold)
+        state = edits.attempt(state, f"{sold.name} as sold", set_dispersion, index, sold)
     state = _draw_clipboard(state, index)
     if imgui.begin_popup(POPUP):
         imgui.begin_child("picker", ImVec2(theme.em(46.0), theme.em(30.0)))
@@ -214,7 +210,7 @@ def _draw_clipboard(state: State, index: int) -> State:
     else:
         tip = "Copy the material of an object of glass first."
     if widgets.button("Paste material", tip=tip, enabled=held is not None and held.transmits) and held:
-        state = edits.attempt(state, f"Paste material on {item.name}", edits.set_material, index, held)
+        state = edits.attempt(state, f"Paste material on {item.name}", set_material, index, held)
     widgets.beside("Presets…")
     ready = {p.name: p for p in presets.material_presets()}
     chosen = widgets.menu_button(
@@ -235,48 +231,37 @@ def _draw_numbers(state: State, view_model: ViewModel, index: int) -> State:
     tip = (
         "How many times stronger than in nature colours spread. 1 is the glass itself, 0 does not disperse; n_d stays."
     )
-    changed, gain, active = widgets.slider(
+    gain = widgets.slider(
         "Dispersion gain", dispersion.gain, 0.0, MAX_GAIN, unit="×", tip=tip, reset=1.0, format="%.2f", mark=1.0
     )
-    state = widgets.holding(state, active)
-    if changed:
-        state = _attempt(state, index, f"Dispersion gain of {item.name}", lambda: glass.with_gain(dispersion, gain))
+    if gain != dispersion.gain:
+        state = attempted(
+            state, index, f"Dispersion gain of {item.name}", lambda: glass.with_gain(dispersion, gain), _memory
+        )
     n_d, v_d = own_numbers(dispersion)
     tip = "Refractive index at the helium d line, 587.56 nm: how strongly light is bent. The Abbe number stays."
-    changed, new_n_d, active = widgets.slider(
+    new_n_d = widgets.slider(
         "Index n_d", n_d, 1.0, 2.8, unit="", tip=tip, reset=sold.n_d if sold else None, format="%.5f", clamp=False
     )
-    state = widgets.holding(state, active)
-    if changed:
-        state = _attempt(state, index, f"n_d of {item.name}", lambda: with_abbe(dispersion, new_n_d, v_d))
+    if new_n_d != n_d:
+        state = attempted(state, index, f"n_d of {item.name}", lambda: with_abbe(dispersion, new_n_d, v_d), _memory)
     tip = (
         "Abbe number (n_d − 1)/(n_F − n_C) of the glass before its gain: small is dispersive, 20 to 90 for glass. "
         "The slider is even in 1/V_d, so equal ways spread colours by equal amounts. Negative numbers (anomalous "
         "dispersion) can be typed."
     )
-    changed, new_v_d, active = widgets.reciprocal_slider(
-        "Abbe number V_d", v_d, 8.0, unit="", tip=tip, reset=sold.V_d if sold else None
-    )
-    state = widgets.holding(state, active)
-    if changed:
-        state = _attempt(state, index, f"Abbe number of {item.name}", lambda: with_abbe(dispersion, n_d, new_v_d))
+    reset = sold.V_d if sold else None
+    new_v_d = widgets.reciprocal_slider("Abbe number V_d", v_d, 8.0, unit="", tip=tip, reset=reset)
+    if new_v_d != v_d:
+        state = attempted(
+            state, index, f"Abbe number of {item.name}", lambda: with_abbe(dispersion, n_d, new_v_d), _memory
+        )
     if _memory.refused:
         widgets.error(_memory.refused)
     _draw_lines(state.scene.objects[index].material.dispersion)
     if view_model.stats.first_order:
         widgets.hint("The caustic follows this edit to first order until it is traced again.")
     return state
-
-
-def _attempt(state: State, index: int, label: str, make: Callable[[], Dispersion]) -> State:
-    """The state with the glass that `make()` gives; a refusal is kept to be shown."""
-    try:
-        scene = edits.set_dispersion(state.scene, index, make())
-    except UserError as refusal:
-        _memory.refused = str(refusal)
-        return state
-    _memory.refused = ""
-    return state.edited(scene, label)
 
 
 def _draw_lines(dispersion: Dispersion) -> None:
@@ -321,19 +306,9 @@ def _draw_priority(state: State, index: int) -> State:
         "Where solids overlap, the one of higher priority fills the place (a liquid in its vessel: lower than the "
         "glass)."
     )
-    changed, priority, active = widgets.drag(
-        "Priority",
-        float(material.priority),
-        -MAX_PRIORITY,
-        MAX_PRIORITY,
-        unit="",
-        tip=tip,
-        reset=0.0,
-        format="%.0f",
-        speed=0.05,
-    )
-    state = widgets.holding(state, active)
+    before, most = float(material.priority), MAX_PRIORITY
+    priority = widgets.drag("Priority", before, -most, most, unit="", tip=tip, reset=0.0, format="%.0f", speed=0.05)
     rounded = math.floor(priority + 0.5)
-    if not changed or rounded == material.priority:
+    if rounded == material.priority:
         return state
-    return edits.attempt(state, f"Priority of {item.name}", edits.set_priority, index, rounded)
+    return edits.attempt(state, f"Priority of {item.name}", set_priority, index, rounded)

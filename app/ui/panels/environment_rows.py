@@ -1,18 +1,21 @@
-"""Rows for what lies behind everything: its kind, and what belongs to that kind."""
+"""Rows for the environment: its kind, and what belongs to that kind."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from ...edit import edits, environments
 from ...edit.state import State
 from ...model.environment import up_and_rotation
-from ...model.scene import Vec3
+from ...model.scene import Scene, Vec3
 from ...model.texture import Environment
 from ..view_model import ViewModel
 from . import picture_choice, widgets
 
+Edit = Callable[..., Scene]
 _KINDS = {"constant": "Plain colour", "gradient": "Gradient", "sky": "Sky", "map": "Picture all round"}
 _RADIANCE = "cd/unit²"
 _SKIES = {
@@ -37,41 +40,30 @@ _SKIES = {
 
 def draw_environment(state: State, view_model: ViewModel) -> State:
     """Draw the rows."""
-    scene = state.scene
+    environment, present = state.scene.environment, environments.environment_kind(state.scene)
     tip = "What is seen behind everything, in mirrors and through glass. All but a plain colour lights what is diffuse."
-    changed, kind = widgets.combo("Kind##environment", _KINDS, environments.environment_kind(scene), tip=tip)
-    if changed and kind == "map":
+    kind = widgets.combo("Kind##environment", _KINDS, present, tip=tip)
+    if kind != present and kind == "map":
         picture_choice.ask_environment(state, view_model)
         return state
-    if changed:
+    if kind != present:
         return edits.attempt(state, f"Environment: {_KINDS[kind].lower()}", environments.set_environment_kind, kind)
-    if scene.environment is None:
-        return _constant(state)
+    if environment is None:
+        tip, before = f"Radiance behind everything, {_RADIANCE}.", state.scene.background_rgb
+        return _colour(state, "Background", before, tip, "Background", edits.set_background)
     tip = "Whether it lights what is diffuse, besides being seen."
-    changed, lights = widgets.toggle("Lights surfaces", scene.environment.lights, tip=tip)
-    if changed:
+    lights = widgets.toggle("Lights surfaces", environment.lights, tip=tip)
+    if lights != environment.lights:
         return edits.attempt(state, "Light of the environment", environments.set_environment_lights, lights)
-    rows = {"gradient": _gradient, "sky": _sky, "constant": _radiance}
-    if scene.environment.kind == "map":
-        return _map(state, view_model, scene.environment)
-    return rows[scene.environment.kind](state, scene.environment)
-
-
-def _constant(state: State) -> State:
-    changed, rgb, active = widgets.colour(
-        "Background", state.scene.background_rgb, tip=f"Radiance behind everything, {_RADIANCE}."
-    )
-    if changed:
-        state = edits.attempt(state, "Background", edits.set_background, rgb)
-    return widgets.holding(state, active)
-
-
-def _radiance(state: State, environment: Environment) -> State:
-    rgb = _vector(environment.parameters["radiance"])
-    changed, rgb, active = widgets.colour("Radiance", rgb, tip=f"From everywhere, {_RADIANCE}.")
-    if changed:
-        state = edits.attempt(state, "Radiance", environments.set_constant, tuple(max(c, 0.0) for c in rgb))
-    return widgets.holding(state, active)
+    match environment.kind:
+        case "gradient":
+            return _gradient(state, environment)
+        case "sky":
+            return _sky(state, environment)
+        case "map":
+            return _map(state, view_model, environment)
+    tip, before = f"From everywhere, {_RADIANCE}.", _vector(environment.parameters["radiance"])
+    return _colour(state, "Radiance", before, tip, "Radiance", environments.set_constant)
 
 
 def _gradient(state: State, environment: Environment) -> State:
@@ -81,14 +73,8 @@ def _gradient(state: State, environment: Environment) -> State:
         ("horizon", "Horizon", "all round"),
         ("nadir", "Below", "straight down"),
     ):
-        changed, rgb, active = widgets.colour(
-            label, _vector(parameters[key]), tip=f"Colour seen {where}; the intensity below makes it a radiance."
-        )
-        if changed:
-            state = edits.attempt(
-                state, f"{label} of the gradient", environments.set_gradient, **{key: tuple(max(c, 0.0) for c in rgb)}
-            )
-        state = widgets.holding(state, active)
+        tip, before = f"Colour seen {where}; the intensity below makes it a radiance.", _vector(parameters[key])
+        state = _colour(state, label, before, tip, f"{label} of the gradient", environments.set_gradient, key)
     return _intensity(state, float(parameters.get("intensity", 1.0)), environments.set_gradient)
 
 
@@ -99,42 +85,27 @@ def _sky(state: State, environment: Environment) -> State:
         "The CIE's fifteen types of sky: how bright it is towards the horizon and about the sun. Its disc is not "
         "drawn: a light shows it."
     )
-    changed, number = widgets.combo("Sky", skies, str(parameters["type"]), tip=tip)
-    if changed:
+    number = widgets.combo("Sky", skies, str(parameters["type"]), tip=tip)
+    if number != str(parameters["type"]):
         return edits.attempt(state, "Type of sky", environments.set_sky, type=int(number))
-    rows = (
-        ("sun_elevation_deg", "Sun's height", 0.0, 90.0, "How high the sun stands above the horizon."),
-        (
-            "sun_azimuth_deg",
-            "Sun's azimuth",
-            -180.0,
-            180.0,
-            "Compass bearing of the sun, about the up direction from x.",
-        ),
+    above, bearing = (
+        "How high the sun is above the horizon.",
+        "Compass bearing of the sun, about the up direction from x.",
     )
-    for key, label, low, high, tip in rows:
-        changed, value, active = widgets.slider(
-            label, float(parameters[key]), low, high, unit="°", tip=tip, format="%.1f"
-        )
-        if changed:
+    for key, label, low, high, tip in (
+        ("sun_elevation_deg", "Sun's height", 0.0, 90.0, above),
+        ("sun_azimuth_deg", "Sun's azimuth", -180.0, 180.0, bearing),
+    ):
+        before = float(parameters[key])
+        value = widgets.slider(label, before, low, high, unit="°", tip=tip, format="%.1f")
+        if value != before:
             state = edits.attempt(state, label, environments.set_sky, **{key: value})
-        state = widgets.holding(state, active)
-    tip = "Luminance straight above."
-    changed, value, active = widgets.drag(
-        "Luminance", float(parameters["luminance"]), 0.0, 1e9, unit=_RADIANCE, tip=tip, format="%.4g", logarithmic=True
-    )
-    if changed:
+    tip, before = "Luminance straight above.", float(parameters["luminance"])
+    value = widgets.drag("Luminance", before, 0.0, 1e9, unit=_RADIANCE, tip=tip, format="%.4g", logarithmic=True)
+    if value != before:
         state = edits.attempt(state, "Luminance of the sky", environments.set_sky, luminance=value)
-    state = widgets.holding(state, active)
-    changed, rgb, active = widgets.colour(
-        "Ground",
-        _vector(parameters["ground"]),
-        tip="Reflectance of the ground below the horizon, which the sky lights.",
-    )
-    if changed:
-        clipped = tuple(min(max(c, 0.0), 1.0) for c in rgb)
-        state = edits.attempt(state, "Ground of the sky", environments.set_sky, ground=clipped)
-    return widgets.holding(state, active)
+    tip, ground = "Reflectance of the ground below the horizon, which the sky lights.", _vector(parameters["ground"])
+    return _colour(state, "Ground", ground, tip, "Ground of the sky", environments.set_sky, "ground", highest=1.0)
 
 
 def _map(state: State, view_model: ViewModel, environment: Environment) -> State:
@@ -147,31 +118,27 @@ def _map(state: State, view_model: ViewModel, environment: Environment) -> State
     if widgets.file_field("Picture", name, tip=tip):
         picture_choice.ask_environment(state, view_model)
     widgets.read_out("Size", f"{width} × {height}", tip="Pixels across and down.")
-    _, rotation_deg = up_and_rotation(environment)
-    changed, angle, active = widgets.slider(
-        "Rotation",
-        round(rotation_deg, 4),
-        -180.0,
-        180.0,
-        unit="°",
-        format="%.1f",
-        reset=0.0,
-        tip="Turns it about the up direction.",
-    )
-    if changed:
+    tip, before = "Turns it about the up direction.", round(up_and_rotation(environment)[1], 4)
+    angle = widgets.slider("Rotation", before, -180.0, 180.0, unit="°", format="%.1f", reset=0.0, tip=tip)
+    if angle != before:
         state = edits.attempt(state, "Rotation of the environment", environments.set_map_rotation, angle)
-    state = widgets.holding(state, active)
     return _intensity(state, environments.map_intensity(environment), environments.set_map_intensity)
 
 
-def _intensity(state: State, value: float, edit: Any) -> State:
-    tip = "Factor on all of it."
-    changed, value, active = widgets.drag(
-        "Intensity", value, 0.0, 1e9, unit="×", tip=tip, reset=1.0, format="%.4g", logarithmic=True
-    )
-    if changed:
-        state = edits.attempt(state, "Intensity of the environment", edit, intensity=value)
-    return widgets.holding(state, active)
+def _intensity(state: State, before: float, edit: Edit) -> State:
+    how: dict[str, Any] = {"unit": "×", "reset": 1.0, "format": "%.4g", "logarithmic": True}
+    value = widgets.drag("Intensity", before, 0.0, 1e9, tip="Factor on all of it.", **how)
+    return state if value == before else edits.attempt(state, "Intensity of the environment", edit, intensity=value)
+
+
+def _colour(
+    state: State, label: str, before: Vec3, tip: str, undo: str, edit: Edit, key: str = "", highest: float = math.inf
+) -> State:
+    """A row for a colour that `edit` sets, by the name `key` or alone."""
+    rgb = widgets.colour(label, before, tip=tip, highest=highest)
+    if rgb == before:
+        return state
+    return edits.attempt(state, undo, edit, **{key: rgb}) if key else edits.attempt(state, undo, edit, rgb)
 
 
 def _vector(value: Any) -> Vec3:

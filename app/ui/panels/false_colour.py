@@ -7,9 +7,9 @@ from functools import cache
 import numpy as np
 from imgui_bundle import imgui
 
-from ...base.colour_maps import FALSE_COLOUR
+from ...base.colour_maps import FALSE_COLOUR, sample
 from .. import theme
-from . import rows
+from . import rows, spectrum_strip
 
 _STEPS = 48
 
@@ -25,12 +25,8 @@ def legend(stops: tuple[float, float], exposure_ev: float) -> None:
     stop = low + min(max(share, 0.0), 1.0) * (high - low)
     luminance = 2.0 ** float(np.clip(stop - exposure_ev, -60.0, 60.0))
     rows.explain("False colour bar", f"{stop:+.1f} stops about display white: {luminance:.4g} lm/(sr unit²).")
-    drawing = imgui.get_window_draw_list()
-    colours = _packed()
-    for i in range(_STEPS):
-        left, right = start.x + width * i / _STEPS, start.x + width * (i + 1) / _STEPS
-        corner, opposite = imgui.ImVec2(left, start.y), imgui.ImVec2(right, start.y + height)
-        drawing.add_rect_filled_multi_color(corner, opposite, colours[i], colours[i + 1], colours[i + 1], colours[i])
+    corner = imgui.ImVec2(start.x + width, start.y + height)
+    spectrum_strip.draw_gradient(imgui.get_window_draw_list(), start, corner, _packed())
     _labels(low, high, width)
 
 
@@ -51,7 +47,5 @@ def _at(left: float, width: float, share: float, text: str) -> None:
 
 @cache
 def _packed() -> tuple[int, ...]:
-    table = np.asarray(FALSE_COLOUR, float)
-    at = np.linspace(0.0, len(table) - 1.0, _STEPS + 1)
-    columns = [np.interp(at, np.arange(len(table)), table[:, channel]) for channel in range(3)]
-    return tuple(theme.packed((float(rgb[0]), float(rgb[1]), float(rgb[2]), 1.0)) for rgb in zip(*columns, strict=True))
+    scale = sample(FALSE_COLOUR, np.linspace(0.0, 1.0, _STEPS + 1)).astype(float)
+    return tuple(theme.packed((r, g, b, 1.0)) for r, g, b in scale.tolist())

@@ -1,7 +1,7 @@
 """Choosing a file to open or a place to save, drawn with imgui so that it works everywhere, without a window system
 too.
 
-Whoever needs a file calls `ask(Question(…))` once, and `take(id)` in every frame until it answers.
+Whoever needs a file calls `ask(Question(…))`; what is done with the chosen one is part of the question.
 One question is open at a time; a new one replaces it.
 """
 
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import mimetypes
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
@@ -20,25 +20,28 @@ from imgui_bundle import imgui
 from ...base.errors import suggestion
 from ...base.image_io import SUFFIXES
 from ...base.paths import SCENE_SUFFIXES
+from ...edit.state import State
 from .. import item_rects, theme
+from ..view_model import ViewModel
 from . import widgets
 
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked for."""
+    """What file is wanted."""
 
-    id: str
     title: str
     suffixes: tuple[str, ...]
     """Lower case with the dot; the first is the default of a file to save."""
     start: Path
     """Folder to begin in, or a file whose name is proposed."""
+    then: Callable[[State, ViewModel, Path], State]
+    """What is done with the chosen file."""
     saving: bool = False
     known: Mapping[str, Path] = field(default_factory=dict)
     """Files that are found by a bare name from any folder."""
     hint: str = ""
-    """Why it is asked, where that is not plain."""
+    """Why, where that is not plain."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +62,7 @@ class _Browser:
     confirming: Path | None = None
     """An existing file that is about to be replaced."""
     wants_focus: bool = True
-    answers: dict[str, Path] = field(default_factory=dict)
+    chosen: Path | None = None
 
 
 _browser = _Browser()
@@ -77,32 +80,26 @@ def ask(question: Question) -> None:
 
 
 def beside(path: Path | None, name: str, suffix: str) -> Path:
-    """A file to propose, in the folder of the scene's file or at home; other signs than letters and digits become _."""
+    """A file to propose, in the folder of the scene's file or at home; only letters, digits, - and _ are kept."""
     stem = "".join(c if c.isalnum() or c in "-_" else "_" for c in name)
     return (Path.home() if path is None else path.parent) / f"{stem}{suffix}"
 
 
-def take(identity: str) -> Path | None:
-    """The file chosen for question `identity`, once; None while nothing is chosen."""
-    return _browser.answers.pop(identity, None)
-
-
-def is_open(identity: str) -> bool:
+def is_open(title: str) -> bool:
     """Whether that question is still on the screen."""
-    return _browser.question is not None and _browser.question.id == identity
+    return _browser.question is not None and _browser.question.title == title
 
 
 def close() -> None:
-    """Forget the question and its answers."""
+    """Forget the question."""
     _browser.question = None
-    _browser.answers.clear()
 
 
-def draw() -> None:
-    """Draw the dialogue, when a question is open."""
+def draw(state: State, view_model: ViewModel) -> State:
+    """Draw the dialogue, when a question is open; the state with what is done with the chosen file."""
     question = _browser.question
     if question is None:
-        return
+        return state
     title = f"{question.title}##file browser"
     if not imgui.is_popup_open(title):
         imgui.open_popup(title)
@@ -114,10 +111,12 @@ def draw() -> None:
     if shown:
         _contents(question)
         if _browser.question is None:
-            imgui.close_current_popup()  # one that is merely not drawn any more eats the next click
+            imgui.close_current_popup()  # one that is merely not drawn any more takes the next click
         imgui.end_popup()
     if not stays or (imgui.is_key_pressed(imgui.Key.escape) and _browser.confirming is None):
         _browser.question = None
+    path, _browser.chosen = _browser.chosen, None
+    return state if path is None else question.then(state, view_model, path)
 
 
 def _contents(question: Question) -> None:
@@ -133,7 +132,7 @@ def _contents(question: Question) -> None:
     if _browser.error:
         widgets.error(_browser.error)
     _footer(question)
-    _confirm_overwrite(question)
+    _confirm_overwrite()
 
 
 def _places(question: Question) -> None:
@@ -243,11 +242,11 @@ def _choose(question: Question) -> None:
         elif path.exists():
             _browser.confirming = path
         else:
-            _answer(question, path)
+            _answer(path)
     elif path.is_dir():
         _enter(path)
     elif not path.is_file() and _browser.name.strip() in question.known:
-        _answer(question, question.known[_browser.name.strip()])
+        _answer(question.known[_browser.name.strip()])
     elif not path.is_file():
         is_here = path.parent == _browser.folder
         near = suggestion(
@@ -256,7 +255,7 @@ def _choose(question: Question) -> None:
         where = "here" if is_here else f"in {path.parent}"
         _browser.error = f"There is no file {path.name} {where}{near.rstrip('?')}{'?' if near else '.'}"
     else:
-        _answer(question, path)
+        _answer(path)
 
 
 def _either(question: Question) -> str:
@@ -271,12 +270,11 @@ def _is_format(suffix: str) -> bool:
     return suffix.lower() in _OWN_FORMATS or kind.partition("/")[0] in ("image", "video", "model")
 
 
-def _answer(question: Question, path: Path) -> None:
-    _browser.answers[question.id] = path
-    _browser.question, _browser.confirming = None, None
+def _answer(path: Path) -> None:
+    _browser.chosen, _browser.question, _browser.confirming = path, None, None
 
 
-def _confirm_overwrite(question: Question) -> None:
+def _confirm_overwrite() -> None:
     path = _browser.confirming
     if path is None:
         return
@@ -288,7 +286,7 @@ def _confirm_overwrite(question: Question) -> None:
     imgui.text_unformatted(f"{path.name} exists already. Replace it?")
     imgui.dummy(imgui.ImVec2(theme.em(20), theme.em(0.3)))
     if widgets.button("Replace", tip="Write over the old file.", width=theme.em(6.5)):
-        _answer(question, path)
+        _answer(path)
         imgui.close_current_popup()
     imgui.same_line()
     if widgets.button("Keep old file", tip="Choose another name.", width=theme.em(8)):

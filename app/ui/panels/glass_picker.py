@@ -12,6 +12,7 @@ from functools import lru_cache
 from imgui_bundle import ImVec2, imgui
 
 from ...edit import edits
+from ...edit.glass import set_dispersion
 from ...edit.state import State
 from ...model.optics import catalogue
 from ...model.optics.catalogue import Entry
@@ -67,7 +68,7 @@ def apply_glass(state: State, entry: Entry) -> State:
     if selected is None:
         return state
     index, item, _ = selected
-    return edits.attempt(state, f"Glass of {item.name}: {entry.name}", edits.set_dispersion, index, entry.dispersion)
+    return edits.attempt(state, f"Glass of {item.name}: {entry.name}", set_dispersion, index, entry.dispersion)
 
 
 @lru_cache(maxsize=64)

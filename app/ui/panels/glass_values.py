@@ -6,13 +6,15 @@ Pure functions of `Dispersion`; nothing here draws.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Protocol
 
 import numpy as np
 
 from ...base.errors import UserError
-from ...edit import edits
+from ...edit.glass import abbe_numbers, set_dispersion
 from ...edit.state import State
 from ...model.optics import catalogue, glass
 from ...model.optics.glass import LINE_C_NM, LINE_D_NM, LINE_F_NM, Dispersion
@@ -74,7 +76,7 @@ def glasses_of(scene: Scene) -> list[tuple[int, SceneObject, Dielectric]]:
 
 def own_numbers(dispersion: Dispersion) -> tuple[float, float]:
     """n_d and V_d of the material before its gain, such that `with_abbe` of them changes nothing."""
-    return edits.abbe_numbers(dispersion.natural)
+    return abbe_numbers(dispersion.natural)
 
 
 def base_name(dispersion: Dispersion) -> str:
@@ -129,6 +131,24 @@ def with_point(dispersion: Dispersion, at: int, n: float, keep_n_d: bool) -> Dis
         values[at] = n
     name = (base_name(dispersion) or "Glass") + _SHAPED
     return glass.table(CONTROL_NM, values.tolist(), name)
+
+
+class Refusing(Protocol):
+    """Memory of a panel that edits a glass."""
+
+    refused: str
+    """Why the last edit was refused; empty once one succeeds."""
+
+
+def attempted(state: State, index: int, label: str, make: Callable[[], Dispersion], memory: Refusing) -> State:
+    """`state` with the glass that `make()` gives for object `index`; a refusal is kept in `memory`, to be shown."""
+    try:
+        scene = set_dispersion(state.scene, index, make())
+    except UserError as refusal:
+        memory.refused = str(refusal)
+        return state
+    memory.refused = ""
+    return state.edited(scene, label)
 
 
 def abbe_text(v_d: float) -> str:

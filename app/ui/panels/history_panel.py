@@ -1,4 +1,4 @@
-"""Every step that can be undone, by name; a click goes there."""
+"""Every step that can be undone, by name; a click returns to it."""
 
 from __future__ import annotations
 

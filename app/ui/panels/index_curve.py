@@ -8,15 +8,15 @@ from functools import lru_cache
 import numpy as np
 from imgui_bundle import ImVec2, ImVec4, imgui, implot
 
-from ...base.errors import UserError
 from ...edit import edits
+from ...edit.glass import set_dispersion
 from ...edit.state import State
 from ...model.optics import glass
 from ...model.optics.glass import LINE_C_NM, LINE_D_NM, LINE_F_NM, Dispersion
 from .. import item_rects, theme
 from ..view_model import ViewModel
 from . import widgets
-from .glass_values import CONTROL_NM, as_sold, selected_glass, with_point
+from .glass_values import CONTROL_NM, as_sold, attempted, selected_glass, with_point
 from .rows import begin_row
 from .spectrum_strip import colour_of_nm, draw_strip
 
@@ -33,7 +33,7 @@ class _Memory:
     keep_n_d: bool = True
     slope: bool = False
     limits: tuple[float, float] = (1.0, 2.0)
-    """Ends of the n axis; they stand still while a point is dragged."""
+    """Ends of the n axis; they stay while a point is dragged."""
     of: Dispersion | None = None
     held: bool = False
     refused: str = ""
@@ -58,7 +58,7 @@ def _curves(dispersion: Dispersion) -> tuple[np.ndarray, np.ndarray]:
 
 
 def draw_index_curve(state: State, view_model: ViewModel) -> State:
-    """The plot, its switches and the way back; the state with the curve as it was dragged."""
+    """The plot, its switches and the reset; the state with the curve as it was dragged."""
     selected = selected_glass(state)
     if selected is None:
         return state
@@ -72,9 +72,9 @@ def draw_index_curve(state: State, view_model: ViewModel) -> State:
         "Hold the point of the d line, so that only the colours move: light that is stored is splatted again and "
         "nothing is traced."
     )
-    _, _memory.keep_n_d = widgets.toggle("Keep n_d", _memory.keep_n_d, tip=tip)
+    _memory.keep_n_d = widgets.toggle("Keep n_d", _memory.keep_n_d, tip=tip)
     tip = "Draw the slope dn/dλ, 1/µm, on the right-hand axis: the steeper, the wider colours spread."
-    _, _memory.slope = widgets.toggle("Show dn/dλ", _memory.slope, tip=tip)
+    _memory.slope = widgets.toggle("Show dn/dλ", _memory.slope, tip=tip)
     if _memory.refused:
         widgets.error(_memory.refused)
     return _draw_reset(state, index, dispersion)
@@ -93,7 +93,7 @@ def _draw_reset(state: State, index: int, dispersion: Dispersion) -> State:
         _memory.refused = ""
         name = state.scene.objects[index].name
         natural_curve = glass.with_gain(sold, dispersion.gain)
-        return edits.attempt(state, f"Reset n(λ) of {name}", edits.set_dispersion, index, natural_curve)
+        return edits.attempt(state, f"Reset n(λ) of {name}", set_dispersion, index, natural_curve)
     return state
 
 
@@ -181,30 +181,25 @@ def _draw_points(state: State, index: int, dispersion: Dispersion, area: _Area) 
         item_rects.note(f"n at {nm:.0f} nm")
         _draw_handle(pixel, nm, radius, is_fixed, is_held or is_hovered)
         if is_held or is_hovered:
-            _tell(nm, float(dispersion.index(nm)), is_fixed)
+            _explain(nm, float(dispersion.index(nm)), is_fixed)
         if is_held and not is_fixed:
             _memory.held = True
-            state = _moved(widgets.holding(state, True), index, dispersion, at, area)
+            widgets.hold()
+            state = _moved(state, index, dispersion, at, area)
     imgui.set_cursor_screen_pos(after)
     imgui.dummy(ImVec2(0.0, 0.0))
     return state
 
 
 def _moved(state: State, index: int, dispersion: Dispersion, at: int, area: _Area) -> State:
-    """The curve after the mouse's way in this frame; a tenth of it with Shift."""
+    """The curve after the mouse's movement in this frame; a tenth of it with Shift."""
     io = imgui.get_io()
     step = -io.mouse_delta.y * area.n_per_pixel * (0.1 if io.key_shift else 1.0)
     if step == 0.0:
         return state
-    try:
-        n = float(dispersion.index(CONTROL_NM[at])) + step
-        shaped = with_point(dispersion, at, n, _memory.keep_n_d)
-        scene = edits.set_dispersion(state.scene, index, shaped)
-    except UserError as refusal:
-        _memory.refused = str(refusal)
-        return state
-    _memory.refused = ""
-    return state.edited(scene, f"Shape n(λ) of {state.scene.objects[index].name}")
+    n = float(dispersion.index(CONTROL_NM[at])) + step
+    label = f"Shape n(λ) of {state.scene.objects[index].name}"
+    return attempted(state, index, label, lambda: with_point(dispersion, at, n, _memory.keep_n_d), _memory)
 
 
 def _draw_handle(pixel: ImVec2, nm: float, radius: float, is_fixed: bool, is_lit: bool) -> None:
@@ -221,7 +216,7 @@ def _draw_handle(pixel: ImVec2, nm: float, radius: float, is_fixed: bool, is_lit
     drawing.add_circle(pixel, radius, ring, 0, 1.5)
 
 
-def _tell(nm: float, n: float, is_fixed: bool) -> None:
+def _explain(nm: float, n: float, is_fixed: bool) -> None:
     line = f" ({_LINES[nm]} line)" if nm in _LINES else ""
     way = "Held by “Keep n_d”." if is_fixed else "Drag up or down; Shift drags finely."
     imgui.set_tooltip(f"{nm:.2f} nm{line}: n = {n:.5f}\n{way}")

@@ -9,6 +9,8 @@ import numpy as np
 from imgui_bundle import imgui
 
 from ...edit import edits, environments
+from ...edit.matrices import decompose
+from ...edit.objects import rename, set_diffuse_colour, set_material, set_position, set_rotation, set_scale
 from ...edit.state import Selection, State
 from ...model.materials import MATERIAL_KINDS
 from ...model.materials.diffuse import USUAL_COAT_INDEX, USUAL_ROUGHNESS
@@ -20,7 +22,6 @@ from ...model.scene import (
     Vec3,
 )
 from ...model.scene_render import MAX_ANISOTROPY, MAX_BOUNCES
-from ...model.vectors import vec3
 from .. import theme
 from ..view_model import ViewModel
 from . import outliner, picture_choice, widgets
@@ -33,7 +34,7 @@ _KINDS = {cls.title: cls for cls in MATERIAL_KINDS.values()}
 _UNITS = "units"
 _MOST_HAZE = 1.0
 """On the slider: thicker haze is not thin."""
-_WRAPS = {"repeat": "Repeats", "clamp": "Its border goes on"}
+_WRAPS = {"repeat": "Repeats", "clamp": "Its border continues"}
 
 _keeps_proportions = {"on": True}
 """Whether the three scales move together: memory of the interface."""
@@ -58,26 +59,26 @@ def _scene_camera(state: State) -> State:
     with theme.heading():
         imgui.text_unformatted("Camera")
     widgets.hint("The view that the scene is saved with.")
-    camera, active = draw_camera_rows(state.scene.camera)
+    camera = draw_camera_rows(state.scene.camera)
     if camera != state.scene.camera:
         looks_through = state.camera == state.scene.camera
         state = edits.attempt(state, "Camera", edits.set_camera, camera)
-        if looks_through:  # who looks through it sees what is done to it
+        if looks_through:  # a view through it follows
             state = replace(state, camera=state.scene.camera)
     if widgets.button("Look through it", tip="Take its view (0).", width=-1):
         state = replace(state, camera=state.scene.camera)
     if widgets.button("Put it here", tip="Save the present view with the scene (Ctrl+0).", width=-1):
         state = edits.attempt(state, "Camera", edits.set_camera, state.camera)
-    return widgets.holding(state, active)
+    return state
 
 
 def _object(state: State, view_model: ViewModel, index: int) -> State:
     thing = state.scene.objects[index]
     with theme.heading():
         imgui.text_unformatted(f"{outliner.icon_of(thing)}  {thing.name}")
-    changed, name = widgets.text_field("Name", thing.name, tip="Name of the object; no two objects share one.")
-    if changed:
-        state = edits.attempt(state, f"Rename {thing.name}", edits.rename, index, name)
+    name = widgets.text_field("Name", thing.name, tip="Name of the object; no two objects share one.")
+    if name != thing.name:
+        state = edits.attempt(state, f"Rename {thing.name}", rename, index, name)
     if widgets.section("Placement"):
         state = widgets.unless_locked(state, Selection("object", index), lambda state: _place(state, index))
     if widgets.section("Material"):
@@ -89,38 +90,23 @@ def _object(state: State, view_model: ViewModel, index: int) -> State:
 
 def _place(state: State, index: int) -> State:
     thing = state.scene.objects[index]
-    position, rotation, scale = edits.decompose(thing.object_to_world)
-    moved, position, active = widgets.vec3(
-        "Position", position, unit=_UNITS, tip="Where the object's origin stands: x, y, z.", speed=_speed(thing)
-    )
-    if moved:
-        state = edits.attempt(state, f"Move {thing.name}", edits.set_position, index, position)
-    turned, rotation, turning = widgets.vec3(
-        "Rotation",
-        rotation,
-        unit="°",
-        format="%.2f",
-        speed=0.25,
-        reset=(0.0, 0.0, 0.0),
-        tip="Angles about the world's x, then y, then z axis.",
-    )
-    if turned:
-        state = edits.attempt(state, f"Rotate {thing.name}", edits.set_rotation, index, rotation)
-    scaled, wanted, scaling = widgets.vec3(
-        "Scale",
-        scale,
-        unit="×",
-        speed=0.005,
-        reset=(1.0, 1.0, 1.0),
-        tip="Factors along the object's own axes; a negative one mirrors.",
-    )
-    if scaled:
+    position, rotation, scale = decompose(thing.object_to_world)
+    tip = "Where the object's origin is: x, y, z."
+    wanted = widgets.vec3("Position", position, unit=_UNITS, tip=tip, speed=_speed(thing))
+    if wanted != position:
+        state = edits.attempt(state, f"Move {thing.name}", set_position, index, wanted)
+    tip, still = "Angles about the world's x, then y, then z axis.", (0.0, 0.0, 0.0)
+    wanted = widgets.vec3("Rotation", rotation, unit="°", format="%.2f", speed=0.25, reset=still, tip=tip)
+    if wanted != rotation:
+        state = edits.attempt(state, f"Rotate {thing.name}", set_rotation, index, wanted)
+    tip, whole = "Factors along the object's own axes; a negative one mirrors.", (1.0, 1.0, 1.0)
+    wanted = widgets.vec3("Scale", scale, unit="×", speed=0.005, reset=whole, tip=tip)
+    if wanted != scale:
         factors = _in_proportion(scale, wanted) if _keeps_proportions["on"] else wanted
-        state = edits.attempt(state, f"Scale {thing.name}", edits.set_scale, index, factors)
-    _, _keeps_proportions["on"] = widgets.toggle(
-        "Keep proportions", _keeps_proportions["on"], tip="Changing one scale changes the other two by the same factor."
-    )
-    return widgets.holding(state, active or turning or scaling)
+        state = edits.attempt(state, f"Scale {thing.name}", set_scale, index, factors)
+    tip = "Changing one scale changes the other two by the same factor."
+    _keeps_proportions["on"] = widgets.toggle("Keep proportions", _keeps_proportions["on"], tip=tip)
+    return state
 
 
 def _speed(thing: SceneObject) -> float:
@@ -142,14 +128,11 @@ def _in_proportion(before: Vec3, after: Vec3) -> Vec3:
 def _material(state: State, view_model: ViewModel, index: int) -> State:
     thing = state.scene.objects[index]
     material = thing.material
-    changed, wanted = widgets.combo(
-        "Kind",
-        tuple(_KINDS),
-        material.title,
-        tip="Glass refracts, diffuse surfaces receive caustics, mirrors reflect, black absorbs.",
-    )
-    if changed:
-        return edits.attempt(state, f"Make {thing.name} {wanted.lower()}", edits.set_material, index, _fresh(wanted))
+    tip = "Glass refracts, diffuse surfaces receive caustics, mirrors reflect, black absorbs."
+    wanted = widgets.combo("Kind", tuple(_KINDS), material.title, tip=tip)
+    if wanted != material.title:
+        usual = _KINDS[wanted].usual()
+        return edits.attempt(state, f"Make {thing.name} {wanted.lower()}", set_material, index, usual)
     if material.transmits:
         return _surface_colour(_glass(_declared(state, index, material), material), index)
     if material.is_black:
@@ -166,57 +149,41 @@ def _material(state: State, view_model: ViewModel, index: int) -> State:
     return _colour(state, index, material) if material.receives or material.is_mirror else state
 
 
-def _fresh(kind: str) -> Material:
-    return _KINDS[kind].usual()
-
-
 def _glass(state: State, material: Material) -> State:
     dispersion = material.dispersion
-    widgets.read_out(
-        "Glass",
-        dispersion.name or "unnamed",
-        tip="Name of the glass. Its dispersion is edited in the Dispersion panel.",
-    )
-    widgets.read_out(
-        "n_d, V_d",
-        f"{dispersion.n_d:.5f}, {abbe_text(own_numbers(dispersion)[1])}",
-        tip="Index at 587.56 nm and Abbe number of the glass, before its gain. No unit.",
-    )
-    if not state.preferences.panels.dispersion and widgets.button(
-        "Edit dispersion", tip="Open the Dispersion panel.", width=-1
-    ):
+    tip = "Name of the glass. Its dispersion is edited in the Dispersion panel."
+    widgets.read_out("Glass", dispersion.name or "unnamed", tip=tip)
+    tip = "Index at 587.56 nm and Abbe number of the glass, before its gain. No unit."
+    widgets.read_out("n_d, V_d", f"{dispersion.n_d:.5f}, {abbe_text(own_numbers(dispersion)[1])}", tip=tip)
+    tip = "Open the Dispersion panel."
+    if not state.preferences.panels.dispersion and widgets.button("Edit dispersion", tip=tip, width=-1):
         state = state.with_panels(dispersion=True)
     return state
 
 
 def _declared(state: State, index: int, material: Material) -> State:
     """What the kind declares with a row."""
-    changed, active = draw_numbers(material, material.shown_numbers())
-    changed = draw_flags(changed, material.parts)
-    state = widgets.holding(state, active)
+    changed = draw_flags(draw_numbers(material, material.shown_numbers()), material.parts)
     if changed is material:
         return state
     label = f"{material.title} of {state.scene.objects[index].name}"
-    return edits.attempt(state, label, edits.set_material, index, changed)
+    return edits.attempt(state, label, set_material, index, changed)
 
 
 def _coat(state: State, index: int, material: Diffuse) -> State:
     """Whether it is glossy."""
-    changed, on = widgets.toggle(
-        "Coat",
-        material.has_coat,
-        tip="A clear coat like varnish: the surface reflects what is round it, besides its colour.",
-    )
-    if not changed:
+    tip = "A clear coat like varnish: the surface reflects what is round it, besides its colour."
+    on = widgets.toggle("Coat", material.has_coat, tip=tip)
+    if on == material.has_coat:
         return state
     coated = material.changed(roughness=USUAL_ROUGHNESS if on else None, coat_index=USUAL_COAT_INDEX)
     label = f"Coat of {state.scene.objects[index].name}"
-    return edits.attempt(state, label, edits.set_material, index, coated)
+    return edits.attempt(state, label, set_material, index, coated)
 
 
 def _orders(material: Grating) -> None:
-    told = ", ".join(f"{m:+d}: {e:.0%}" for m, e in zip(material.orders, material.efficiency, strict=True))
-    widgets.read_out("Orders", told, tip="Orders that light is sent on in, and the share of it that each gets.")
+    orders = ", ".join(f"{m:+d}: {e:.0%}" for m, e in zip(material.orders, material.efficiency, strict=True))
+    widgets.read_out("Orders", orders, tip="Orders that light is sent on in, and the share of it that each gets.")
 
 
 def _texture(state: State, view_model: ViewModel, index: int, material: Material) -> State:
@@ -226,9 +193,9 @@ def _texture(state: State, view_model: ViewModel, index: int, material: Material
     can = thing.mesh.uv is not None
     name = "None" if worn is None else Path(worn.source).name if worn.source else "From the scene's file"
     tip = (
-        "A picture laid on the surface (.png, .jpg, .exr). Click to choose one."
+        "A picture on the surface (.png, .jpg, .exr). Click to choose one."
         if can
-        else "This mesh has no texture coordinates to lay a picture on."
+        else "This mesh has no texture coordinates for a picture."
     )
     pressed = widgets.file_field(
         "Picture", name, tip=tip, enabled=can, clear_tip="" if worn is None else "Back to the plain colour."
@@ -238,8 +205,8 @@ def _texture(state: State, view_model: ViewModel, index: int, material: Material
     if pressed:
         picture_choice.ask_texture(state, view_model, index)
     if worn is not None:
-        changed, wrap = widgets.combo("Beyond its edge", _WRAPS, worn.wrap, tip="What lies where the picture ends.")
-        if changed:
+        wrap = widgets.combo("Beyond its edge", _WRAPS, worn.wrap, tip="What is shown where the picture ends.")
+        if wrap != worn.wrap:
             state = edits.attempt(state, f"Picture of {thing.name}", environments.set_texture_wrap, index, wrap)
     return state
 
@@ -249,26 +216,25 @@ def _colour(state: State, index: int, material: Material) -> State:
     tip = "Share of light reflected, linear Rec.709, 0 to 1."
     if material.texture is not None:
         tip += " The picture is multiplied by it."
-    changed, rgb, active = widgets.colour("Reflectance", material.reflectance_rgb, tip=tip)
+    rgb = widgets.colour("Reflectance", material.reflectance_rgb, tip=tip, highest=1.0)
     if material.reflectance is not None:
         widgets.hint("A measured spectral reflectance is in use; choosing a colour replaces it.")
-    if changed:
-        clipped = (min(max(rgb[0], 0.0), 1.0), min(max(rgb[1], 0.0), 1.0), min(max(rgb[2], 0.0), 1.0))
-        state = edits.attempt(state, f"Colour of {thing.name}", edits.set_diffuse_colour, index, clipped)
+    if rgb != material.reflectance_rgb:
+        state = edits.attempt(state, f"Colour of {thing.name}", set_diffuse_colour, index, rgb)
     if thing.local_dispersion:
-        widgets.note(f"{len(thing.local_dispersion)} dabs of the dispersion brush lie here. Not physical.")
-    return widgets.holding(state, active)
+        widgets.note(f"{len(thing.local_dispersion)} dabs of the dispersion brush are painted here. Not physical.")
+    return state
 
 
 def _surface_colour(state: State, index: int) -> State:
     """What glass lets through by its surface."""
     thing = state.scene.objects[index]
     tip = "What of light its surface lets through it, linear Rec.709, 0 to 1; white is clear. Once in a thin sheet."
-    changed, rgb, active = widgets.colour("Surface colour", thing.material.transmittance_rgb, tip=tip)
-    if changed:
-        coloured = thing.material.changed(transmittance_rgb=vec3(min(max(c, 0.0), 1.0) for c in rgb))
-        state = edits.attempt(state, f"Colour of {thing.name}", edits.set_material, index, coloured)
-    return widgets.holding(state, active)
+    rgb = widgets.colour("Surface colour", thing.material.transmittance_rgb, tip=tip, highest=1.0)
+    if rgb != thing.material.transmittance_rgb:
+        coloured = thing.material.changed(transmittance_rgb=rgb)
+        state = edits.attempt(state, f"Colour of {thing.name}", set_material, index, coloured)
+    return state
 
 
 def _mesh(thing: SceneObject) -> None:
@@ -278,12 +244,10 @@ def _mesh(thing: SceneObject) -> None:
     widgets.read_out("Shape", mesh.name or "mesh", tip="Shape, or the name in the file it came from.")
     widgets.read_out("Triangles", f"{len(mesh.triangles):,}", tip="Number of triangles.")
     widgets.read_out("Vertices", f"{len(mesh.vertices):,}", tip="Number of vertices, welded.")
-    widgets.read_out(
-        "Size", " × ".join(f"{s:.3g}" for s in size) + " units", tip="Extent along its own axes, scene units."
-    )
-    widgets.read_out(
-        "Closed", "yes" if mesh.is_closed else "no", tip="Glass must be closed, or thin: light needs an inside."
-    )
+    extent = " × ".join(f"{s:.3g}" for s in size)
+    widgets.read_out("Size", f"{extent} units", tip="Extent along its own axes, scene units.")
+    tip = "Glass must be closed, or thin: light needs an inside."
+    widgets.read_out("Closed", "yes" if mesh.is_closed else "no", tip=tip)
 
 
 def _scene(state: State, view_model: ViewModel) -> State:
@@ -296,40 +260,7 @@ def _scene(state: State, view_model: ViewModel) -> State:
         widgets.read_out("Objects", str(len(scene.objects)), tip="Number of objects.")
         widgets.read_out("Lights", str(len(scene.lights)), tip="Number of lights.")
         widgets.read_out("Triangles", f"{triangles:,}", tip="Triangles of all objects.")
-        depth_changed, depth, active = widgets.slider(
-            "Longest path",
-            scene.render.max_depth,
-            1,
-            64,
-            unit="events",
-            format="%.0f",
-            reset=64,
-            tip="Refractions and reflections after which a photon is given up.",
-        )
-        if depth_changed and round(depth) != scene.render.max_depth:
-            state = edits.attempt(state, "Longest path", edits.set_render_defaults, max_depth=round(depth))
-        state = widgets.holding(state, active)
-        toggled, polarisation = widgets.toggle(
-            "Polarisation",
-            scene.render.polarisation,
-            tip="Light keeps its polarisation from surface to surface; else every surface meets unpolarised light.",
-        )
-        if toggled:
-            state = edits.attempt(state, "Polarisation", edits.set_render_defaults, polarisation=polarisation)
-        bounces_changed, bounces, active = widgets.slider(
-            "Bounces",
-            scene.render.bounces,
-            0,
-            MAX_BOUNCES,
-            unit="",
-            format="%.0f",
-            reset=0,
-            tip="How often light goes on from one diffuse surface to another; 0: they do not light each other.",
-        )
-        if bounces_changed and round(bounces) != scene.render.bounces:
-            state = edits.attempt(state, "Bounces", edits.set_render_defaults, bounces=round(bounces))
-        state = widgets.holding(state, active)
-        state = _draw_haze(state)
+        state = _light_path_rows(state)
     if widgets.section("Environment"):
         state = draw_environment(state, view_model)
     if scene.notes and widgets.section("Notes"):
@@ -338,35 +269,25 @@ def _scene(state: State, view_model: ViewModel) -> State:
     return state
 
 
-def _draw_haze(state: State) -> State:
-    """What the air is like round all objects."""
-    render = state.scene.render
-    changed, haze, active = widgets.slider(
-        "Haze",
-        render.haze,
-        0.0,
-        _MOST_HAZE,
-        unit="",
-        format="%.4f",
-        logarithmic=True,
-        reset=0.0,
-        clamp=False,
-        tip="Share of light that thin haze scatters on the way of one scene unit; 0: light is not seen on its way.",
+def _light_path_rows(state: State) -> State:
+    """What the scene asks of light on its way."""
+    render, changed = state.scene.render, edits.render_changed
+    tip = "Refractions and reflections after which a photon is given up."
+    depth = widgets.whole("Longest path", render.max_depth, 1, 64, unit="events", reset=64, tip=tip)
+    state = changed(state, "Longest path", max_depth=depth)
+    tip = "Light keeps its polarisation from surface to surface; else every surface meets unpolarised light."
+    state = changed(state, "Polarisation", polarisation=widgets.toggle("Polarisation", render.polarisation, tip=tip))
+    tip = "How often light is passed on from one diffuse surface to another; 0: they do not light each other."
+    state = changed(
+        state, "Bounces", bounces=widgets.whole("Bounces", render.bounces, 0, MAX_BOUNCES, reset=0, tip=tip)
     )
-    if changed:
-        state = edits.attempt(state, "Haze", edits.set_render_defaults, haze=haze)
-    state = widgets.holding(state, active)
+    tip = "Share of light that thin haze scatters over a path of one scene unit; 0: light is not seen on its way."
+    haze = widgets.slider(
+        "Haze", render.haze, 0.0, _MOST_HAZE, unit="", format="%.4f", logarithmic=True, reset=0.0, clamp=False, tip=tip
+    )
+    state = changed(state, "Haze", haze=haze)
     if not render.haze:
         return state
-    changed, anisotropy, active = widgets.slider(
-        "Haze anisotropy",
-        render.haze_anisotropy,
-        -MAX_ANISOTROPY,
-        MAX_ANISOTROPY,
-        unit="",
-        reset=0.0,
-        tip="Mean cosine of the angle by which haze scatters; above 0: mostly onwards.",
-    )
-    if changed:
-        state = edits.attempt(state, "Haze anisotropy", edits.set_render_defaults, haze_anisotropy=anisotropy)
-    return widgets.holding(state, active)
+    tip, most = "Mean cosine of the angle by which haze scatters; above 0: mostly onwards.", MAX_ANISOTROPY
+    anisotropy = widgets.slider("Haze anisotropy", render.haze_anisotropy, -most, most, unit="", reset=0.0, tip=tip)
+    return changed(state, "Haze anisotropy", haze_anisotropy=anisotropy)

@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
@@ -39,20 +40,10 @@ def draw_keys(state: State, view_model: ViewModel) -> State:
     known = paths(stage.scene, stage.camera)
     if _memory.path not in known:
         _memory.path = next((path for path in known if path.endswith(".dispersion_gain")), next(iter(known)))
-    _, _memory.path = widgets.combo(
-        "Parameter", _names(state.scene, known), _memory.path, tip=known[_memory.path].meaning + "."
-    )
-    _, _memory.time_s, _ = widgets.drag(
-        "At",
-        _memory.time_s,
-        0.0,
-        MAX_TIME_S,
-        unit="s",
-        format="%.2f",
-        reset=0.0,
-        speed=0.02,
-        tip="Time of the next key.",
-    )
+    tip = f"{known[_memory.path].meaning}."
+    _memory.path = widgets.combo("Parameter", _names(state.scene, known), _memory.path, tip=tip)
+    how: dict[str, Any] = {"unit": "s", "format": "%.2f", "reset": 0.0, "speed": 0.02}
+    _memory.time_s = widgets.drag("At", _memory.time_s, 0.0, MAX_TIME_S, tip="Time of the next key.", **how)
     half = 0.5 * (imgui.get_content_region_avail().x - imgui.get_style().item_spacing.x)
     tip = "Add a key with the parameter's present value (turns: 0, power: 1)."
     if widgets.button("Add key", tip=tip, width=half):
@@ -72,21 +63,15 @@ def _scrub(state: State) -> State:
     times = [key.time_s for key in state.animation]
     if len(times) < 2 or max(times) <= min(times):
         return replace(state, preview_s=None) if state.preview_s is not None else state
-    now = min(times) if state.preview_s is None else state.preview_s
-    changed, time_s, active = widgets.slider(
-        "Preview",
-        min(max(now, min(times)), max(times)),
-        min(times),
-        max(times),
-        unit="s",
-        format="%.2f",
-        tip="Drag to see the animation at that time. The scene itself stays as it is.",
-    )
-    if changed:
+    first, last = min(times), max(times)
+    now = first if state.preview_s is None else min(max(state.preview_s, first), last)
+    tip = "Drag to see the animation at that time. The scene itself stays as it is."
+    time_s = widgets.slider("Preview", now, first, last, unit="s", format="%.2f", tip=tip)
+    if time_s != now:
         state = scrubbed(state, time_s)
     if state.preview_s is not None and widgets.button("End preview", tip="Show the scene itself again.", width=-1):
         state = replace(state, preview_s=None)
-    return widgets.holding(state, active)
+    return state
 
 
 def frame_count(keys: Sequence[Key], fps: float) -> int:
@@ -131,9 +116,8 @@ def _table(state: State, known: dict[str, Parameter]) -> State:
     keys: list[Key] = []
     for index, key in enumerate(state.animation):
         imgui.push_id(index)
-        changed, active = _row(index, key, names, known)
+        changed = _row(index, key, names, known)
         imgui.pop_id()
-        state = widgets.holding(state, active)
         if changed is not None:
             keys.append(changed)
     imgui.end_table()
@@ -143,8 +127,8 @@ def _table(state: State, known: dict[str, Parameter]) -> State:
     return replace(state, animation=tuple(keys)) if tuple(keys) != state.animation else state
 
 
-def _row(index: int, key: Key, names: dict[str, str], known: dict[str, Parameter]) -> tuple[Key | None, bool]:
-    """The key as it was left (None: deleted), and whether a field of it is held."""
+def _row(index: int, key: Key, names: dict[str, str], known: dict[str, Parameter]) -> Key | None:
+    """The key as it was left; None: deleted."""
     parameter = known.get(key.path)
     imgui.table_next_row()
     imgui.table_next_column()
@@ -159,7 +143,7 @@ def _row(index: int, key: Key, names: dict[str, str], known: dict[str, Parameter
     moved, time_s = imgui.drag_float(
         "##time", key.time_s, 0.02, 0.0, MAX_TIME_S, "%.2f s", imgui.SliderFlags_.always_clamp
     )
-    active = imgui.is_item_active()
+    widgets.hold(imgui.is_item_active())
     item_rects.note(f"Key {index} time")
     widgets.tooltip("Time of this key.", "Unit: s", "Ctrl+click: type")
     imgui.table_next_column()
@@ -174,7 +158,7 @@ def _row(index: int, key: Key, names: dict[str, str], known: dict[str, Parameter
         "%.4g",
         imgui.SliderFlags_.always_clamp | imgui.SliderFlags_.no_round_to_format,
     )
-    active |= imgui.is_item_active()
+    widgets.hold(imgui.is_item_active())
     item_rects.note(f"Key {index} value")
     unit = parameter.unit if parameter else ""
     widgets.tooltip("Value of the parameter at that time.", f"Unit: {unit}" if unit else "", "Ctrl+click: type")
@@ -183,11 +167,10 @@ def _row(index: int, key: Key, names: dict[str, str], known: dict[str, Parameter
     item_rects.note(f"Key {index} delete")
     widgets.tooltip("Delete this key.")
     if deleted:
-        return None, False
+        return None
     moved, changed = moved and math.isfinite(time_s), changed and math.isfinite(value)  # "nan" can be typed
-    after = replace(
+    return replace(
         key,
         time_s=float(f"{time_s:.7g}") if moved else key.time_s,
         value=float(f"{value:.7g}") if changed else key.value,
     )
-    return after, active

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ...edit import edits
+from ...edit.lights import light_power, photometric_key, rename_light, set_light, set_light_kind, set_light_power
 from ...edit.state import Selection, State
 from ...model.fields import FileName
 from ...model.lights import LIGHT_KINDS
 from ...model.scene import Light, Vec3
 from ...model.scene_defaults import environment_of
+from ...model.vectors import vec3
 from ..view_model import ViewModel
 from . import picture_choice, widgets
 from .declared_rows import draw_numbers
@@ -32,7 +35,8 @@ def draw_light(state: State, view_model: ViewModel) -> State:
         return state
     state = _draw_name(state, index)
     if widgets.section("Placement##light"):
-        state = _draw_place(state, index)
+        selected = Selection("light", index)
+        state = widgets.unless_locked(state, selected, lambda state: _draw_place(state, index))
     if widgets.section("Size##light"):
         state = _draw_file(state, view_model, index)
         state = _draw_size(state, index)
@@ -44,57 +48,49 @@ def draw_light(state: State, view_model: ViewModel) -> State:
 
 def _draw_name(state: State, index: int) -> State:
     light = state.scene.lights[index]
-    changed, name = widgets.text_field("Name", light.name, tip="Name of the light; each has its own.")
-    if changed:
-        state = edits.attempt(state, f"Rename {light.name}", edits.rename_light, index, name)
+    name = widgets.text_field("Name", light.name, tip="Name of the light; each has its own.")
+    if name != light.name:
+        state = edits.attempt(state, f"Rename {light.name}", rename_light, index, name)
     tip = "How the light leaves it. Another kind aims at the same place and lights it as brightly."
-    changed, kind = widgets.combo("Kind", {k: cls.title for k, cls in LIGHT_KINDS.items()}, light.kind, tip=tip)
-    if changed:
-        state = edits.attempt(state, f"Kind of {light.name}", edits.set_light_kind, index, kind)
+    kind = widgets.combo("Kind", {k: cls.title for k, cls in LIGHT_KINDS.items()}, light.kind, tip=tip)
+    if kind != light.kind:
+        state = edits.attempt(state, f"Kind of {light.name}", set_light_kind, index, kind)
     return state
 
 
 def _edit(state: State, index: int, light: Light, what: str) -> State:
-    return edits.attempt(state, f"{what} {state.scene.lights[index].name}", edits.set_light, index, light)
+    return edits.attempt(state, f"{what} {state.scene.lights[index].name}", set_light, index, light)
 
 
 # ---- place --------------------------------------------------------------------------------
 
 
 def _draw_place(state: State, index: int) -> State:
-    return widgets.unless_locked(state, Selection("light", index), lambda state: _draw_place_rows(state, index))
-
-
-def _draw_place_rows(state: State, index: int) -> State:
     light = state.scene.lights[index]
     if light.has_place:
         speed = 0.005 * environment_of(state.scene.objects).radius
-        tip = "Where the light stands: x, y, z in scene units."
-        changed, position, active = widgets.vec3("Position", light.position, unit="units", tip=tip, speed=speed)
-        state = widgets.holding(state, active)
-        if changed:
+        tip = "Where the light is: x, y, z in scene units."
+        position = widgets.vec3("Position", light.position, unit="units", tip=tip, speed=speed)
+        if position != light.position:
             state = _edit(state, index, light.changed(position=position), "Move")
     return _draw_direction(state, index) if light.has_direction else state
 
 
 def _draw_direction(state: State, index: int) -> State:
     light = state.scene.lights[index]
-    azimuth, elevation = angles_of(light.direction)
+    before = angles_of(light.direction)
     tip = "Compass bearing that the light travels towards, about z from x."
-    turned, azimuth, held_a = widgets.slider("Azimuth", azimuth, -180.0, 180.0, unit="°", tip=tip, format="%.1f")
-    tip = "Slope of the way the light travels: −90° straight down, 0° level, 90° straight up."
-    tilted, elevation, held_e = widgets.slider("Elevation", elevation, -90.0, 90.0, unit="°", tip=tip, format="%.1f")
-    state = widgets.holding(state, held_a or held_e)
-    if turned or tilted:
-        aimed = light.changed(direction=direction_of(azimuth, elevation))
-        return _edit(state, index, aimed, "Turn")
+    azimuth = widgets.slider("Azimuth", before[0], -180.0, 180.0, unit="°", tip=tip, format="%.1f")
+    tip = "Slope of the light's path: −90° straight down, 0° level, 90° straight up."
+    elevation = widgets.slider("Elevation", before[1], -90.0, 90.0, unit="°", tip=tip, format="%.1f")
+    if (azimuth, elevation) != before:
+        return _edit(state, index, light.changed(direction=direction_of(azimuth, elevation)), "Turn")
     if not light.has_place:
         return state
     tip = "Turn the light towards the middle of the objects that are not receivers."
     if widgets.button("Aim at the objects", tip=tip):
         toward = environment_of(state.scene.objects).centre - np.array(light.position)
-        x, y, z = (float(v) for v in toward)
-        return _edit(state, index, light.changed(direction=(x, y, z)), "Aim")
+        return _edit(state, index, light.changed(direction=vec3(toward)), "Aim")
     return state
 
 
@@ -136,10 +132,9 @@ def _draw_size(state: State, index: int) -> State:
         return state
     changed = light
     if light.has_outline:
-        _, shape = widgets.combo("Shape", _SHAPES, light.shape, tip="Outline of the beam or of the glowing surface.")
+        shape = widgets.combo("Shape", _SHAPES, light.shape, tip="Outline of the beam or of the glowing surface.")
         changed = changed.changed(shape=shape)
-    changed, active = draw_numbers(changed, changed.shown_numbers())
-    state = widgets.holding(state, active)
+    changed = draw_numbers(changed, changed.shown_numbers())
     return state if changed == light else _edit(state, index, changed.fitted(), "Size of")
 
 
@@ -149,22 +144,13 @@ def _draw_size(state: State, index: int) -> State:
 def _draw_power(state: State, index: int) -> State:
     light = state.scene.lights[index]
     keys = {key.key: key for key in light.power_keys}
-    key = _power_key.get(light.kind, edits.photometric_key(light))
+    key = _power_key.get(light.kind, photometric_key(light))
     tip = "In which quantity the power is shown and typed. Photometric ones weigh each colour as the eye does."
-    _, key = widgets.combo("Quantity", {k: each.label for k, each in keys.items()}, key, tip=tip)
+    key = widgets.combo("Quantity", {k: each.label for k, each in keys.items()}, key, tip=tip)
     _power_key[light.kind] = key
-    power = edits.light_power(light, key)
-    changed, power, active = widgets.drag(
-        "Power",
-        power,
-        0.0,
-        1e12,
-        unit=keys[key].unit,
-        tip=keys[key].tip,
-        format="%.6g",
-        logarithmic=True,
-    )
-    state = widgets.holding(state, active)
-    return (
-        edits.attempt(state, f"Power of {light.name}", edits.set_light_power, index, power, key) if changed else state
-    )
+    before = light_power(light, key)
+    shown: dict[str, Any] = {"unit": keys[key].unit, "tip": keys[key].tip, "format": "%.6g", "logarithmic": True}
+    power = widgets.drag("Power", before, 0.0, 1e12, **shown)
+    if power == before:
+        return state
+    return edits.attempt(state, f"Power of {light.name}", set_light_power, index, power, key)

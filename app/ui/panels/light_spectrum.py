@@ -10,6 +10,7 @@ import numpy as np
 from imgui_bundle import ImVec2, imgui
 
 from ...edit import edits, presets
+from ...edit.lights import set_light_spectrum, spectrum_words
 from ...edit.state import State
 from ...model.optics.colorimetry import VISIBLE_NM
 from ...model.optics.spectrum import Spectrum, illuminant_names
@@ -26,21 +27,9 @@ _KINDS = {
     "csv": "Measured, from file",
 }
 
-LAMPS: dict[str, tuple[tuple[float, float], ...]] = {
-    **{preset.name: preset.value for preset in presets.light_presets() if isinstance(preset.value, tuple)},
-    "Hydrogen lamp": ((410.174, 0.05), (434.047, 0.09), (486.135, 0.36), (656.279, 1.0)),
-    "Helium lamp": (
-        (447.148, 0.4),
-        (471.314, 0.06),
-        (492.193, 0.04),
-        (501.568, 0.2),
-        (587.562, 1.0),
-        (667.815, 0.2),
-        (706.519, 0.4),
-    ),
-    "Cadmium lamp": ((467.815, 0.6), (479.991, 0.9), (508.582, 1.0), (643.847, 0.7)),
-}
-"""Lines in air, nm (NIST Atomic Spectra Database), with relative powers as low-pressure lamps roughly have them."""
+_LAMPS = {preset.name: preset.value for preset in presets.light_presets() if isinstance(preset.value, tuple)}
+_FIRST = {"illuminant": "D65", "blackbody": 3200.0, "laser": 532.0, "lines": _LAMPS["Mercury lamp"]}
+"""What another kind of spectrum begins with."""
 
 _COMMON = ("D65", "D50", "A", "E", "LED-B1", "LED-B3", "LED-RGB1", "FL2", "FL11", "HP1")
 _ABOUT = {
@@ -75,23 +64,17 @@ _memory = _Memory()
 def draw_spectrum_choice(state: State, index: int) -> State:
     """Rows that choose the spectrum of light `index`, and its plot. Its photometric power stays."""
     light = state.scene.lights[index]
-    kind, value = edits.spectrum_words(light.spectral_power)
+    kind, value = spectrum_words(light.spectral_power)
     shown = "csv" if light.name in _memory.wants_file else kind
     kinds = _KINDS if kind != "table" else {**_KINDS, "table": "Measured"}
     tip = "Where the light's colours come from. Its power in the unit above stays the same."
-    changed, chosen = widgets.combo("Spectrum", kinds, shown, tip=tip)
-    if changed:
+    chosen = widgets.combo("Spectrum", kinds, shown, tip=tip)
+    if chosen != shown:
         _memory.wants_file.discard(light.name)
         if chosen == "csv":
             _memory.wants_file.add(light.name)
             return state
-        first: dict[str, object] = {
-            "illuminant": "D65",
-            "blackbody": 3200.0,
-            "laser": 532.0,
-            "lines": LAMPS["Mercury lamp"],
-        }
-        return _set(state, index, chosen, first[chosen]) if chosen in first else state
+        return _set(state, index, chosen, _FIRST[chosen]) if chosen in _FIRST else state
     if shown == "csv":
         state = _draw_file(state, index)
     elif kind == "illuminant":
@@ -119,39 +102,35 @@ def _draw_presets(state: State, index: int) -> State:
 
 def _set(state: State, index: int, kind: str, value: object) -> State:
     label = f"Spectrum of {state.scene.lights[index].name}"
-    return edits.attempt(state, label, edits.set_light_spectrum, index, kind, value)
+    return edits.attempt(state, label, set_light_spectrum, index, kind, value)
 
 
 def _draw_illuminant(state: State, index: int, name: str) -> State:
     names = [*_COMMON, *(n for n in illuminant_names() if n not in _COMMON)]
     options = {n: _ABOUT.get(n, n) for n in names}
-    changed, chosen = widgets.combo("Illuminant", options, name, tip="CIE standard illuminants: daylight, lamps, LEDs.")
-    return _set(state, index, "illuminant", chosen) if changed else state
+    chosen = widgets.combo("Illuminant", options, name, tip="CIE standard illuminants: daylight, lamps, LEDs.")
+    return state if chosen == name else _set(state, index, "illuminant", chosen)
 
 
-def _draw_temperature(state: State, index: int, kelvin: float) -> State:
+def _draw_temperature(state: State, index: int, before: float) -> State:
     tip = "Temperature of the black body: a candle has 1,900 K, a halogen lamp 3,200 K, the sun 5,800 K."
-    changed, kelvin, active = widgets.slider(
-        "Temperature", kelvin, 1000.0, 20000.0, unit="K", tip=tip, reset=3200.0, format="%.0f", logarithmic=True
+    kelvin = widgets.slider(
+        "Temperature", before, 1000.0, 20000.0, unit="K", tip=tip, reset=3200.0, format="%.0f", logarithmic=True
     )
-    state = widgets.holding(state, active)
-    return _set(state, index, "blackbody", max(kelvin, 500.0)) if changed else state
+    return state if kelvin == before else _set(state, index, "blackbody", max(kelvin, 500.0))
 
 
-def _draw_laser(state: State, index: int, wavelength_nm: float) -> State:
+def _draw_laser(state: State, index: int, before: float) -> State:
     tip = "The only wavelength that the light has. Helium–neon 632.8, frequency-doubled Nd:YAG 532, blue diode 450."
-    changed, wavelength_nm, active = widgets.slider(
-        "Wavelength", wavelength_nm, 380.0, 780.0, unit="nm", tip=tip, reset=532.0, format="%.1f"
-    )
-    state = widgets.holding(state, active)
-    return _set(state, index, "laser", wavelength_nm) if changed else state
+    wavelength_nm = widgets.slider("Wavelength", before, 380.0, 780.0, unit="nm", tip=tip, reset=532.0, format="%.1f")
+    return state if wavelength_nm == before else _set(state, index, "laser", wavelength_nm)
 
 
 def _draw_lamp(state: State, index: int, lines: tuple[tuple[float, float], ...]) -> State:
-    current = next((name for name, rows in LAMPS.items() if _same_lines(rows, lines)), f"{len(lines)} lines")
+    current = next((name for name, rows in _LAMPS.items() if _same_lines(rows, lines)), f"{len(lines)} lines")
     tip = "Emission lines of a gas, or laser lines: each makes a caustic of its own, side by side."
-    changed, chosen = widgets.combo("Lines", list(LAMPS), current, tip=tip)
-    return _set(state, index, "lines", LAMPS[chosen]) if changed else state
+    chosen = widgets.combo("Lines", list(_LAMPS), current, tip=tip)
+    return state if chosen == current else _set(state, index, "lines", _LAMPS[chosen])
 
 
 def _same_lines(rows: tuple[tuple[float, float], ...], lines: tuple[tuple[float, float], ...]) -> bool:
@@ -187,7 +166,7 @@ def _draw_plot(spectrum: Spectrum) -> None:
     item_rects.note("Light spectrum")
     mouse = imgui.get_mouse_pos()
     if imgui.is_item_hovered():
-        _tell(spectrum, 380.0 + 400.0 * (mouse.x - corner.x) / size.x)
+        _explain(spectrum, 380.0 + 400.0 * (mouse.x - corner.x) / size.x)
     drawing, colours = imgui.get_window_draw_list(), theme.palette()
     low, high = ImVec2(corner.x, corner.y), ImVec2(corner.x + size.x, corner.y + size.y - theme.em(1.3))
     drawing.add_rect_filled(low, high, theme.packed(colours.canvas if colours.is_dark else (1.0, 1.0, 1.0, 1.0)), 2.0)
@@ -227,7 +206,7 @@ def _draw_lines(drawing: imgui.ImDrawList, lines: tuple[tuple[float, float], ...
         drawing.add_line(ImVec2(x, high.y), ImVec2(x, top), colour_of_nm(nm), 2.5)
 
 
-def _tell(spectrum: Spectrum, nm: float) -> None:
+def _explain(spectrum: Spectrum, nm: float) -> None:
     near = min(spectrum.lines, key=lambda line: abs(line[0] - nm), default=None)
     if near is not None and abs(near[0] - nm) < 6.0:
         imgui.set_tooltip(

@@ -14,7 +14,7 @@ from . import opened_card, widgets
 
 _FADE_S = 1.5
 _WIDTH_EM, _TOOLS_EM, _BADGES_EM = 28.0, 3.2, 2.6
-"""Of a message; what the tools at the picture's left and the badges at its lower border take."""
+"""Widths of a message and of the tools at the picture's left, height of the badges at its lower border."""
 _BARE = (
     imgui.WindowFlags_.no_decoration
     | imgui.WindowFlags_.always_auto_resize

@@ -1,10 +1,11 @@
-"""What a freshly opened file leaves open, asked on the picture: which way is up, and what of it is glass."""
+"""Questions about a file that was just opened, on the picture: which way is up, and what of it is glass."""
 
 from __future__ import annotations
 
 from imgui_bundle import imgui
 
 from ...edit import edits
+from ...edit.objects import make_glass
 from ...edit.requests import StandUp
 from ...edit.state import State
 from ...model.materials.dielectric import DEFAULT_GLASS
@@ -34,7 +35,7 @@ def draw_opened_card(state: State, view_model: ViewModel, middle_x: float, botto
     """This file's questions on the picture, whose lower border has its middle at `middle_x`, `bottom`; nothing where
     there are none or they were closed."""
     parts = [item.name for item in state.scene.objects]
-    # What mirrors or diffracts throws caustics too.
+    # What mirrors or diffracts makes caustics too.
     nothing_is_glass = bool(parts) and not any(item.material.is_specular for item in state.scene.objects)
     if view_model.up is None and not nothing_is_glass:
         return state
@@ -42,7 +43,7 @@ def draw_opened_card(state: State, view_model: ViewModel, middle_x: float, botto
         return state
     imgui.set_next_window_size((theme.em(_WIDTH_EM), 0.0))
     imgui.set_next_window_pos((middle_x, bottom - theme.em(_BORDER_EM)), imgui.Cond_.always, imgui.ImVec2(0.5, 1.0))
-    # Darker than fields and buttons, which must stand out on it whatever the picture.
+    # Darker than fields and buttons, which must be seen on it whatever the picture.
     imgui.push_style_color(imgui.Col_.window_bg, (*theme.palette().window[:3], 0.97))
     imgui.begin(WINDOW, None, _FLAGS)
     item_rects.note("Window: opened")
@@ -74,12 +75,12 @@ def _glass(state: State, parts: list[str]) -> State:
     part = str(min(_asked_part(state), len(parts) - 1))
     shown = {str(i): name for i, name in enumerate(parts) if i < _MOST_PARTS or str(i) == part}
     tip = "What is to be glass; a click on it in the picture chooses it too."
-    _, part = widgets.combo("Part", shown, part, tip=tip)
-    _, glass = widgets.combo("Glass", _GLASSES, _memory["glass"], tip="Others are in the dispersion panel.")
+    part = widgets.combo("Part", shown, part, tip=tip)
+    glass = widgets.combo("Glass", _GLASSES, _memory["glass"], tip="Others are in the dispersion panel.")
     _memory["part"], _memory["glass"] = part, glass
     if widgets.button("Make glass", tip="Make this part glass; it can be undone."):
         index = int(part)
-        state = edits.attempt(state, f"Make {parts[index]} glass", edits.make_glass, index, glass)
+        state = edits.attempt(state, f"Make {parts[index]} glass", make_glass, index, glass)
     imgui.same_line()
     return state
 

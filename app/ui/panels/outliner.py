@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
-from ...edit import edits, selecting
+from ...edit import selecting
+from ...edit.adding import RECEIVERS, SHAPES, add_object
+from ...edit.lights import add_light
 from ...edit.requests import CopyMaterial, FrameSelection
 from ...edit.state import Selection, State
 from ...model.lights import LIGHT_KINDS
-from ...model.scene import (
-    Light,
-    Material,
-    Scene,
-    SceneObject,
-)
+from ...model.scene import Light, Material, SceneObject
 from .. import item_rects, theme
 from ..view_model import ViewModel
 from . import widgets
@@ -25,6 +22,7 @@ from . import widgets
 _SEARCH_FROM = 12
 """A scene of more things than this gets a search field."""
 
+_EYES, _LOCKS = (icons.ICON_FA_EYE_SLASH, icons.ICON_FA_EYE), (icons.ICON_FA_LOCK, icons.ICON_FA_LOCK_OPEN)
 _memory: dict[str, object] = {"renaming": None, "text": "", "search": ""}
 """What is being typed: memory of the interface, no part of the state."""
 
@@ -38,7 +36,7 @@ def draw_outliner(state: State, _view_model: ViewModel) -> State:
     state = _group(state, "Objects", "object", state.scene.objects, wanted)
     if imgui.is_window_hovered() and imgui.is_mouse_clicked(0) and not imgui.is_any_item_hovered():
         state = replace(state, selection=Selection())
-    if _wants_rename(state):
+    if state.selection.kind is not None and imgui.is_window_focused() and imgui.is_key_pressed(imgui.Key.f2):
         _start_renaming(state, state.selection)
     return state
 
@@ -66,19 +64,12 @@ def draw_add_items(state: State) -> State:
             item_rects.note(f"Add {kind} light")
             widgets.tooltip(cls.remark)
             if pressed:
-                state = _added(
-                    state,
-                    Selection("light", len(state.scene.lights)),
-                    f"Add {kind} light",
-                    edits.add_light,
-                    kind,
-                    state.view,
-                )
+                state = selecting.added(state, "light", f"Add {kind} light", add_light, kind, state.view)
         imgui.end_menu()
     item_rects.note("Add light")
     for title, shapes in (
-        ("Glass", [s for s in edits.SHAPES if s not in edits.RECEIVERS]),
-        ("Receiver", list(edits.RECEIVERS)),
+        ("Glass", [s for s in SHAPES if s not in RECEIVERS]),
+        ("Receiver", list(RECEIVERS)),
     ):
         icon = icons.ICON_FA_GEM if title == "Glass" else icons.ICON_FA_SQUARE
         if imgui.begin_menu(f"{icon}  {title}"):
@@ -86,59 +77,16 @@ def draw_add_items(state: State) -> State:
                 words = shape.replace("_", " ")
                 pressed, _ = imgui.menu_item(f"{words.capitalize()}##shape", "", False)
                 item_rects.note(f"Add {words}")
-                widgets.tooltip(f"A {words} beside the other objects; lengths follow the scene.")
+                widgets.tooltip(f"A {words} next to the other objects; lengths follow the scene.")
                 if pressed:
-                    state = _added(
-                        state, Selection("object", len(state.scene.objects)), f"Add {words}", edits.add_object, shape
-                    )
+                    state = selecting.added(state, "object", f"Add {words}", add_object, shape)
             imgui.end_menu()
         item_rects.note(f"Add {title.lower()}")
     return state
 
 
-def duplicate_all(state: State) -> State:
-    """Copy everything that is selected, in one step."""
-    copies: list[Selection] = []
-    for each in selecting.everything(state):
-        state = duplicate(state, each)
-        copies.append(state.selection)
-    label = state.edit_label if len(copies) == 1 else f"Duplicate {len(copies)} things"
-    return replace(state, selection=copies[0], also=tuple(copies[1:]), edit_label=label) if copies else state
-
-
-def delete_all(state: State) -> State:
-    """Remove everything that is selected, in one step."""
-    chosen = sorted(selecting.everything(state), key=lambda each: -each.index)
-    for each in chosen:
-        state = delete(state, each)
-    return state if len(chosen) < 2 else replace(state, also=(), edit_label=f"Delete {len(chosen)} things")
-
-
-def duplicate(state: State, selection: Selection) -> State:
-    """Copy an object or a light, and select the copy."""
-    name = _name(state, selection)
-    if selection.kind == "light":
-        copy = Selection("light", len(state.scene.lights))
-        return _added(state, copy, f"Duplicate {name}", edits.duplicate_light, selection.index)
-    copy = Selection("object", len(state.scene.objects))
-    return _added(state, copy, f"Duplicate {name}", edits.duplicate, selection.index)
-
-
-def delete(state: State, selection: Selection) -> State:
-    """Remove an object or a light; the last one is refused with a notice."""
-    edit = edits.delete_light if selection.kind == "light" else edits.delete
-    after = edits.attempt(state, f"Delete {_name(state, selection)}", edit, selection.index)
-    return after if after.scene is state.scene else replace(after, selection=Selection())
-
-
-def paste_material(state: State, selection: Selection) -> State:
-    """Give an object the material on the clipboard."""
-    label = f"Paste material on {_name(state, selection)}"
-    return edits.attempt(state, label, edits.set_material, selection.index, state.clipboard)
-
-
 def icon_of(thing: SceneObject | Light) -> str:
-    """What stands before a name: by material, or a lamp."""
+    """The icon before a name: by material, or a lamp."""
     if isinstance(thing, Light):
         return icons.ICON_FA_SUN if not thing.has_place else icons.ICON_FA_LIGHTBULB
     return _material_icon(thing.material)
@@ -150,16 +98,6 @@ def _material_icon(material: Material) -> str:
     if material.receives:
         return icons.ICON_FA_SQUARE
     return icons.ICON_FA_CIRCLE if material.is_black else icons.ICON_FA_CIRCLE_HALF_STROKE
-
-
-def _added(state: State, selection: Selection, label: str, edit: Callable[..., Scene], *args: object) -> State:
-    after = edits.attempt(state, label, edit, *args)
-    return after if after.scene is state.scene else replace(after, selection=selection)
-
-
-def _name(state: State, selection: Selection) -> str:
-    things = state.scene.lights if selection.kind == "light" else state.scene.objects
-    return things[selection.index].name
 
 
 def _toolbar(state: State) -> State:
@@ -222,22 +160,10 @@ def _switches(
         low, imgui.ImVec2(imgui.get_window_pos().x + imgui.get_window_width(), high.y)
     )
     side = high.y - low.y
-    for position, (name, is_set, on, off, tip) in enumerate(
+    for position, (name, is_set, (on, off), tip) in enumerate(
         (
-            (
-                "Hide",
-                is_hidden,
-                icons.ICON_FA_EYE_SLASH,
-                icons.ICON_FA_EYE,
-                "Leave it out of the picture, or show it again.",
-            ),
-            (
-                "Lock",
-                is_locked,
-                icons.ICON_FA_LOCK,
-                icons.ICON_FA_LOCK_OPEN,
-                "Keep it from being taken in the picture.",
-            ),
+            ("Hide", is_hidden, _EYES, "Leave it out of the picture, or show it again."),
+            ("Lock", is_locked, _LOCKS, "Keep it from being selected and moved in the picture."),
         )
     ):
         if not (hovered or is_set):
@@ -252,9 +178,9 @@ def _switches(
         middle = low.y + 0.5 * (side - imgui.get_font_size())
         imgui.get_window_draw_list().add_text(imgui.ImVec2(corner.x, middle), theme.packed(tint), on if is_set else off)
         if pressed and name == "Hide":
-            state = replace(state, hidden=selecting.toggled(state.hidden, key))
+            state = replace(state, hidden=state.hidden ^ {key})
         elif pressed:
-            state = replace(state, locked=selecting.toggled(state.locked, key))
+            state = replace(state, locked=state.locked ^ {key})
     if not (hovered or is_hidden or is_locked):
         _aside(thing, low, high)
     return state
@@ -294,25 +220,21 @@ def _context_menu(state: State, selection: Selection) -> State:
     if item("Rename", "Give it another name (F2)."):
         _start_renaming(state, selection)
     if item("Duplicate", "Copy it (Ctrl+D)."):
-        return duplicate(state, selection)
+        return selecting.duplicated(state, (selection,))
     if selection.kind == "object":
         imgui.separator()
         if item("Copy material", "Copy its material (Ctrl+C)."):
             state = state.asking(CopyMaterial(selection.index))
         if item("Paste material", "Give it the copied material (Ctrl+V).", state.clipboard is not None):
-            return paste_material(state, selection)
+            return selecting.with_pasted_material(state)
     imgui.separator()
     if item("Delete", "Remove it (Delete)."):
-        return delete(state, selection)
+        return selecting.deleted(state, (selection,))
     return state
 
 
-def _wants_rename(state: State) -> bool:
-    return state.selection.kind is not None and imgui.is_window_focused() and imgui.is_key_pressed(imgui.Key.f2)
-
-
 def _start_renaming(state: State, selection: Selection) -> None:
-    _memory.update(renaming=selection, text=_name(state, selection), focus=True)
+    _memory.update(renaming=selection, text=selecting.name_of(state.scene, selection), focus=True)
 
 
 def _rename_field(state: State, selection: Selection, thing: SceneObject | Light) -> State:
@@ -330,5 +252,4 @@ def _rename_field(state: State, selection: Selection, thing: SceneObject | Light
     text = str(_memory["text"]).strip()
     if imgui.is_key_pressed(imgui.Key.escape) or text == thing.name:
         return state
-    edit = edits.rename_light if selection.kind == "light" else edits.rename
-    return edits.attempt(state, f"Rename {thing.name}", edit, selection.index, text)
+    return selecting.renamed(state, selection, text)

@@ -35,18 +35,9 @@ def draw_rays_panel(state: State, view_model: ViewModel) -> State:
         if widgets.button("Draw rays", tip="Draw a fan of rays through the selected object (R)."):
             state = state.with_display(ray_overlay=True)
         return state
-    changed, reflections, _ = widgets.slider(
-        "Inner reflections",
-        state.display.ray_reflections,
-        0,
-        4,
-        unit="",
-        format="%.0f",
-        reset=0,
-        tip="How often rays are reflected within the glass before they leave it: 1 and 2 in a drop make the rainbows.",
-    )
-    if changed:
-        state = state.with_display(ray_reflections=round(reflections))
+    tip = "How often rays are reflected within the glass before they leave it: 1 and 2 in a drop make the rainbows."
+    reflections = widgets.whole("Inner reflections", state.display.ray_reflections, 0, 4, reset=0, tip=tip)
+    state = state.with_display(ray_reflections=reflections)
     if not view_model.readings:
         widgets.hint("No ray of this light meets the selected object. Select an object of glass, or another light.")
         return state
@@ -94,7 +85,7 @@ def _row(reading: RayReading) -> None:
 
 
 def texts(reading: RayReading) -> tuple[str, ...]:
-    """What stands behind the wavelength; a dash where there is no such number."""
+    """The columns after the wavelength; a dash where there is no such number."""
     return (
         _or_dash(reading.index, "{:.5f}"),
         f"{reading.deviation_deg:.3f}°",

@@ -1,6 +1,6 @@
-"""What controls share: the row they stand in, the tooltip that explains them, the words between them.
+"""What controls share: their row, the tooltip that explains them, the text between them.
 
-`widgets.py` is made of this and hands on what panels need of it.
+`widgets.py` is made of this and exports what panels need of it.
 """
 
 from __future__ import annotations
@@ -14,7 +14,21 @@ _LABEL_EM, _LABEL_SHARE = 8.4, 0.42
 _MIN_FIELD_EM = 4.5
 _TIP_EM = 26.0
 _TIP_HOVERS = imgui.HoveredFlags_.for_tooltip.value | imgui.HoveredFlags_.allow_when_disabled.value
-"""Put together once: a hundred items ask in every frame."""
+"""Combined once: it is used a hundred times a frame."""
+
+
+_frame = {"is_held": False}
+
+
+def hold(is_held: bool = True) -> None:
+    """Note whether a control is held with the mouse or being typed in."""
+    _frame["is_held"] |= is_held
+
+
+def take_held() -> bool:
+    """Whether any control was held since the last call."""
+    is_held, _frame["is_held"] = _frame["is_held"], False
+    return is_held
 
 
 def begin_row(label: str, needs: float = 0.0) -> bool:
@@ -54,7 +68,7 @@ def beside(label: str) -> None:
 
 
 def explain(label: str, tip: str, unit: str = "", how: str = "") -> None:
-    """Tell the last item to `item_rects` and give it its tooltip: what it does, its unit, how to handle it."""
+    """Record the last item in `item_rects` and give it its tooltip: what it does, its unit, how to handle it."""
     item_rects.note(label)
     tooltip(tip, f"Unit: {unit}" if unit else "", how)
 

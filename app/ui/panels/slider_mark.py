@@ -1,7 +1,7 @@
-"""Where a slider stands, drawn along its lower edge so that nothing covers its digits.
+"""The value of a slider, drawn along its lower edge so that nothing covers its digits.
 
-Dear ImGui draws a block as tall as the field, and the number in the field's middle: wherever the block stands behind
-the number, a digit is hard to read. Here the block is left out and a line with a short handle stands below the digits.
+Dear ImGui draws a block as tall as the field, and the number in the field's middle: wherever the block is behind
+the number, a digit is hard to read. Here the block is left out and a line with a short handle is below the digits.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .. import theme
 _INSET_PX = 2.0
 """Dear ImGui keeps this free at both ends of a slider."""
 _LINE_SHARE, _HANDLE_SHARE = 0.09, 0.22
-"""Of the field's height."""
+"""Heights, shares of the field's."""
 _CLEAR = imgui.ImVec4(0.0, 0.0, 0.0, 0.0)
 
 
@@ -32,7 +32,7 @@ def hidden_grab() -> Iterator[None]:
 
 
 def share_of(value: float, low: float, high: float, smallest: float | None = None) -> float:
-    """How far from `low` (0) to `high` (1) a value stands, as Dear ImGui places it; ends may be in either order.
+    """How far from `low` (0) to `high` (1) a value is, as Dear ImGui places it; ends may be in either order.
 
     `smallest`, of a logarithmic slider, whose ends are not negative: what counts as zero.
     """
@@ -42,7 +42,7 @@ def share_of(value: float, low: float, high: float, smallest: float | None = Non
 
 
 def smallest_shown(format: str) -> float:
-    """The smallest number that printf's `format` tells from zero: Dear ImGui's zero of a logarithmic slider."""
+    """The smallest number that printf's `format` distinguishes from zero: Dear ImGui's zero of a logarithmic slider."""
     decimals = re.search(r"%\.(\d+)", format)
     return 0.1 ** int(decimals[1]) if decimals else 1e-3
 
@@ -64,7 +64,7 @@ def draw(share: float) -> None:
 
 
 def notch(share: float) -> None:
-    """A short mark above the place where the last item's handle stands for a value."""
+    """A short mark above the place of the last item's handle for a value."""
     low, high, x = imgui.get_item_rect_min(), imgui.get_item_rect_max(), _place(share)
     tint = theme.packed(theme.palette().text, 0.6)
     imgui.get_window_draw_list().add_line(ImVec2(x, low.y), ImVec2(x, low.y + 0.2 * (high.y - low.y)), tint, 1.5)

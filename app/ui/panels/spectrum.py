@@ -15,7 +15,7 @@ from ..view_model import CursorInfo, ViewModel
 from . import numbers, rows, spectrum_strip, widgets
 from .numbers import named
 
-_TOO_FEW = "Too few photons have landed here to tell the caustic's spectrum; wait, or point where it is brighter."
+_TOO_FEW = "Too few photons have landed here for the caustic's spectrum; wait, or point where it is brighter."
 
 
 def draw_spectrum(state: State, view_model: ViewModel) -> State:
@@ -24,22 +24,23 @@ def draw_spectrum(state: State, view_model: ViewModel) -> State:
     if cursor is None:
         widgets.hint("Point at a receiver in the picture to see the spectrum of the light that falls there.")
         return state
-    colour, is_ready = None, ready()
-    if is_ready and cursor.spectrum is not None and cursor.spectrum_nm is not None:
-        colour = colour_info(cursor.spectrum_nm, cursor.spectrum, _source(state.scene))
-    _told(state, cursor, colour)
+    light, is_ready = cursor.light, ready()
+    colour = None
+    if is_ready and light is not None:
+        colour = colour_info(light.wavelength_nm, light.irradiance, _source(state.scene))
+    _draw_numbers(state, cursor, colour)
     if cursor.hit is None:
         widgets.hint("Nothing but background is under the cursor.")
     elif not cursor.hit.is_receiver:
         widgets.hint("The surface under the cursor is no receiver: caustics are recorded on diffuse objects only.")
-    elif cursor.spectrum is None or cursor.spectrum_nm is None:
+    elif light is None:
         widgets.hint(f"The light here is {NOT_YET.value} …")
-    elif colour is None and (is_ready or not cursor.spectrum.any()):
-        widgets.hint(_TOO_FEW if cursor.too_few_photons else "No light falls here.")
+    elif colour is None and (is_ready or not light.irradiance.any()):
+        widgets.hint(_TOO_FEW if light.too_few_photons else "No light falls here.")
     else:
-        if cursor.too_few_photons:
+        if light.too_few_photons:
             widgets.hint(_TOO_FEW)
-        _plot(cursor.spectrum_nm, cursor.spectrum)
+        _plot(light.wavelength_nm, light.irradiance)
     return state
 
 
@@ -49,44 +50,36 @@ def _source(scene: Scene) -> np.ndarray:
     return np.sum([light.spectral_power.binned(edges) for light in scene.lights], axis=0)
 
 
-def _told(state: State, cursor: CursorInfo, colour: ColourInfo | None) -> None:
+def _numbers_of(cursor: CursorInfo, colour: ColourInfo | None) -> list[tuple[str, str, str]]:
+    """Names, values and what they mean."""
+    light = cursor.light
     radiance = "…" if cursor.rgb is None else "  ".join(f"{c:.3g}" for c in cursor.rgb)
     parts = [("Radiance", radiance, "Linear Rec.709 radiance of the pixel, lm/(sr unit²).")]
     if colour is not None:
-        parts += [
-            (
-                "Illuminance",
-                f"{colour.illuminance:.4g} lm/unit²",
-                "Luminous flux per area of the receiver: caustic and direct light."
-                if cursor.direct_illuminance is not None
-                else "Luminous flux of the caustic per area of the receiver; direct light is still being found.",
-            ),
-            ("x, y", f"{colour.x:.4f}, {colour.y:.4f}", "CIE 1931 chromaticity of the caustic's light."),
-            (
-                "Dominant",
-                _dominant_text(colour),
-                "Wavelength of the spectral colour of the same hue, from D65; c: of the opposite hue.",
-            ),
-            ("Purity", numbers.percent(colour.purity), "Excitation purity: 100 % is a spectral colour, 0 % is white."),
-            (
-                "Temperature",
-                "–" if colour.temperature_k is None else numbers.kelvin(colour.temperature_k),
-                "Correlated colour temperature: of the black body that looks most alike; none for strong colours.",
-            ),
-        ]
-    if cursor.direct_illuminance is not None:
-        parts.append(
-            ("Direct", f"{cursor.direct_illuminance:.4g} lm/unit²", "Of the illuminance, straight from lights.")
-        )
-    if cursor.spectrum_nm is not None and not cursor.too_few_photons and cursor.spectrum_error > 0.0:
-        width = cursor.spectrum_nm[1] - cursor.spectrum_nm[0]
-        parts.append(
-            (
-                "Resolution",
-                f"{width:.0f} nm, ±{numbers.percent(cursor.spectrum_error)}",
-                "Width of a bin, by the number of photons, and the standard error of the caustic in one.",
-            )
-        )
+        tip = "Luminous flux per area of the receiver: caustic and direct light."
+        if light is not None and light.direct_illuminance is None:
+            tip = "Luminous flux of the caustic per area of the receiver; direct light is still being found."
+        parts.append(("Illuminance", f"{colour.illuminance:.4g} lm/unit²", tip))
+        parts.append(("x, y", f"{colour.x:.4f}, {colour.y:.4f}", "CIE 1931 chromaticity of the caustic's light."))
+        tip = "Wavelength of the spectral colour of the same hue, from D65; c: of the opposite hue."
+        parts.append(("Dominant", _dominant_text(colour), tip))
+        tip = "Excitation purity: 100 % is a spectral colour, 0 % is white."
+        parts.append(("Purity", numbers.percent(colour.purity), tip))
+        kelvin = "–" if colour.temperature_k is None else numbers.kelvin(colour.temperature_k)
+        tip = "Correlated colour temperature: of the black body that is most alike; none for strong colours."
+        parts.append(("Temperature", kelvin, tip))
+    if light is not None and light.direct_illuminance is not None:
+        text = f"{light.direct_illuminance:.4g} lm/unit²"
+        parts.append(("Direct", text, "Of the illuminance, straight from lights."))
+    if light is not None and not light.too_few_photons and light.error > 0.0:
+        text = f"{light.wavelength_nm[1] - light.wavelength_nm[0]:.0f} nm, ±{numbers.percent(light.error)}"
+        tip = "Width of a bin, by the number of photons, and the standard error of the caustic in one."
+        parts.append(("Resolution", text, tip))
+    return parts
+
+
+def _draw_numbers(state: State, cursor: CursorInfo, colour: ColourInfo | None) -> None:
+    parts = _numbers_of(cursor, colour)
     if cursor.hit is not None and cursor.hit.object_index < len(state.scene.objects):
         name = state.scene.objects[cursor.hit.object_index].name
         parts.insert(0, ("On", name, "The first surface under the cursor."))
@@ -141,8 +134,8 @@ def _plot(wavelengths_nm: np.ndarray, spectrum: np.ndarray) -> None:
 
 
 def axis_labels(unit: str, height: float) -> tuple[str, str]:
-    """Of wavelength and irradiance, in a plot of `height` pixels: where the upright one is too long to stand beside the
-    axis, it would lie over what is above the plot, and the other one has the unit."""
+    """Labels of wavelength and irradiance, in a plot of `height` pixels: where the upright one is longer than the axis,
+    the other one has the unit."""
     upward = f"E ({unit})"
     if imgui.calc_text_size(upward).x > height - theme.em(3.5):
         return f"λ (nm), upward E ({unit})", ""

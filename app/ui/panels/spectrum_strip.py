@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache, lru_cache
 from itertools import pairwise
 
@@ -49,8 +50,14 @@ def _strip(steps: int, opacity: float) -> list[int]:
 
 def draw_strip(drawing: imgui.ImDrawList, low: ImVec2, high: ImVec2, opacity: float = 1.0, steps: int = 64) -> None:
     """A band of 380 to 780 nm, from left to right, between two corners in pixels."""
-    width = (high.x - low.x) / steps
-    for i, (left, right) in enumerate(pairwise(_strip(steps, opacity))):
+    draw_gradient(drawing, low, high, _strip(steps, opacity))
+
+
+def draw_gradient(drawing: imgui.ImDrawList, low: ImVec2, high: ImVec2, colours: Sequence[int]) -> None:
+    """Packed colours at even distances from left to right between two corners in pixels, blended from each to the
+    next."""
+    width = (high.x - low.x) / (len(colours) - 1)
+    for i, (left, right) in enumerate(pairwise(colours)):
         x = low.x + i * width
         drawing.add_rect_filled_multi_color(ImVec2(x, low.y), ImVec2(x + width, high.y), left, right, right, left)
 
@@ -59,33 +66,22 @@ LOW_NM, HIGH_NM = 380.0, 780.0
 """Ends of the strip."""
 
 
-def strip(label: str, wavelength_nm: float | None, *, tip: str) -> tuple[bool, float, bool]:
-    """A strip as wide as the window, its handle at `wavelength_nm` (none when None).
-
-    Returns (changed, wavelength in nm, whether it is being dragged).
-    """
+def strip(label: str, wavelength_nm: float | None, *, tip: str) -> float | None:
+    """A strip as wide as the window, its handle at `wavelength_nm` (none when None); the wavelength chosen on it."""
     width, height = imgui.get_content_region_avail().x, imgui.get_frame_height()
     start = imgui.get_cursor_screen_pos()
     imgui.invisible_button(f"##{label}", imgui.ImVec2(width, height))
     rows.explain(label, tip, "nm")
-    active = imgui.is_item_active()
     drawing = imgui.get_window_draw_list()
     draw_strip(drawing, start, imgui.ImVec2(start.x + width, start.y + height))
-    chosen = wavelength_nm
-    if active:
+    if imgui.is_item_active():
+        rows.hold()
         share = min(max((imgui.get_mouse_pos().x - start.x) / max(width, 1.0), 0.0), 1.0)
-        chosen = round(LOW_NM + share * (HIGH_NM - LOW_NM), 1)
-    if chosen is None:
-        return False, LOW_NM, active
-    _draw_handle(drawing, start, width, height, chosen)
-    return chosen != wavelength_nm, chosen, active
-
-
-def _draw_handle(
-    drawing: imgui.ImDrawList, start: imgui.ImVec2, width: float, height: float, wavelength_nm: float
-) -> None:
-    share = min(max((wavelength_nm - LOW_NM) / (HIGH_NM - LOW_NM), 0.0), 1.0)
-    x, half = start.x + share * width, theme.em(0.16)
-    low, high = imgui.ImVec2(x - half, start.y - half), imgui.ImVec2(x + half, start.y + height + half)
-    drawing.add_rect_filled(low, high, theme.packed((1.0, 1.0, 1.0, 1.0)), half)
-    drawing.add_rect(low, high, theme.packed((0.0, 0.0, 0.0, 0.8)), half)
+        wavelength_nm = round(LOW_NM + share * (HIGH_NM - LOW_NM), 1)
+    if wavelength_nm is not None:
+        share = min(max((wavelength_nm - LOW_NM) / (HIGH_NM - LOW_NM), 0.0), 1.0)
+        x, half = start.x + share * width, theme.em(0.16)
+        low, high = imgui.ImVec2(x - half, start.y - half), imgui.ImVec2(x + half, start.y + height + half)
+        drawing.add_rect_filled(low, high, theme.packed((1.0, 1.0, 1.0, 1.0)), half)
+        drawing.add_rect(low, high, theme.packed((0.0, 0.0, 0.0, 0.8)), half)
+    return wavelength_nm

@@ -5,6 +5,7 @@ from __future__ import annotations
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
+from ...edit.autosave import Recovery
 from ...edit.requests import Recover
 from ...edit.state import State
 from .. import item_rects, theme
@@ -34,7 +35,7 @@ def draw_start_page(state: State, view_model: ViewModel) -> State:
     imgui.pop_style_var(3)
     _title(view_model)
     if view_model.recovery is not None:
-        state = _recovery(state, view_model)
+        state = _recovery(state, view_model.recovery)
     imgui.dummy(imgui.ImVec2(0, max(theme.em(0.4), messages.end_on_start_page["y"] - imgui.get_cursor_screen_pos().y)))
     imgui.begin_child("##side", imgui.ImVec2(theme.em(15), 0))
     state = _side(state, view_model)
@@ -51,14 +52,14 @@ def _title(view_model: ViewModel) -> None:
     with theme.heading(1.9):
         imgui.text_unformatted("SpectraSplat")
     widgets.hint(
-        "See the coloured light that glass throws, and change the glass while you look. Click a scene or a lesson to "
+        "See the coloured light that glass makes, and change the glass while you look. Click a scene or a lesson to "
         "begin; drop a scene, a GLB or a mesh of your own on the window."
     )
     if view_model.stats.renderer:
         widgets.hint(f"Draws with {view_model.stats.renderer}")
 
 
-def _recovery(state: State, view_model: ViewModel) -> State:
+def _recovery(state: State, recovery: Recovery) -> State:
     chosen = theme.palette()
     imgui.dummy(imgui.ImVec2(0, theme.em(0.3)))
     imgui.push_style_color(imgui.Col_.child_bg, chosen.raised)
@@ -67,8 +68,8 @@ def _recovery(state: State, view_model: ViewModel) -> State:
     imgui.begin_child("##recovery", imgui.ImVec2(min(theme.em(44), imgui.get_content_region_avail().x), 0), flags)
     with theme.coloured(chosen.warning), theme.heading():
         imgui.text_unformatted(f"{icons.ICON_FA_TRIANGLE_EXCLAMATION}  Unsaved work was found")
-    whose = f"{view_model.recovery_title}, as of {view_model.recovery_time}. " if view_model.recovery_title else ""
-    widgets.hint(f"{whose}That session ended without saving. Recover it, or discard it for good.")
+    whose = f"{recovery.note.title}, as of {recovery.written}."
+    widgets.hint(f"{whose} That session ended without saving. Recover it, or discard it for good.")
     if widgets.button(
         "Recover", tip="Open the work as it was last written, at most 30 s before the end.", width=theme.em(7)
     ):
@@ -162,10 +163,6 @@ def _picture(
 ) -> None:
     if entry.thumbnail is None:
         drawing.add_rect_filled(low, high, theme.packed(theme.palette().canvas), rounding, imgui.ImDrawFlags_.round_top)
-        word = "Drawing…"
-        size = imgui.calc_text_size(word)
-        middle = imgui.ImVec2((low.x + high.x - size.x) / 2, (low.y + high.y - size.y) / 2)
-        drawing.add_text(middle, theme.packed(theme.palette().muted), word)
         return
     texture = imgui.ImTextureRef(entry.thumbnail)
     white = theme.packed((1.0, 1.0, 1.0, 1.0))

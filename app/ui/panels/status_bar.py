@@ -83,7 +83,7 @@ def _progress(state: State, view_model: ViewModel) -> State:
 
 
 def progress_words(stats: LiveStats, is_playing: bool, rests: bool = False) -> str:
-    """What goes on, and how far it is: by polygons, by photons, or where nothing throws a caustic by camera samples.
+    """What is done, and how far it is: by polygons, by photons, or where nothing makes a caustic by camera samples.
     `rests`: an export has all the time."""
     if stats.differs == "scene" or stats.preparing:
         return preparing_words(stats)
@@ -131,16 +131,12 @@ def _job(state: State, view_model: ViewModel) -> State:
     label, tip = ("Discard", "Write nothing at all.") if job.is_stopped else ("Cancel", f"Stop; {job.when_stopped}.")
     if widgets.button(f"{label}##job", tip=tip):
         state = state.asking(CancelJob())
-    # Behind the button: it would wander with the words.
-    if job.text and _room_right() > imgui.calc_text_size(job.text).x + theme.em(_RATES_EM):
+    # After the button, which would else move with the words.
+    room = imgui.get_window_pos().x + imgui.get_window_width() - imgui.get_item_rect_max().x
+    if job.text and room > imgui.calc_text_size(job.text).x + theme.em(_RATES_EM):
         imgui.same_line()
         imgui.text_disabled(job.text)
     return state
-
-
-def _room_right() -> float:
-    """From the last item to the window's edge, pixels."""
-    return imgui.get_window_pos().x + imgui.get_window_width() - imgui.get_item_rect_max().x
 
 
 def _right_end(view_model: ViewModel) -> None:

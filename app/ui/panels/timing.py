@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from typing import Any
+
 import numpy as np
 from imgui_bundle import imgui, implot
 
@@ -15,16 +18,15 @@ from . import numbers, rows, widgets
 PASSES = {
     "trace": "Photons through the glass, to the receivers.",
     "splat": "Stored photons into the caustic maps.",
-    "resolve": "Levels and seams of the maps put together.",
     "camera": "Camera samples: what the picture shows, through glass and mirrors.",
     "display": "Exposure, tone curve and comparison.",
     "interface": "Panels and plots.",
 }
-"""Pass -> what it does; in the order of the frame."""
+"""Pass -> what it does."""
 
 
 _COUNTERS = {
-    "deposited": ("In the caustic", "Reached a receiver through glass or by a mirror, and lies in the caustic maps."),
+    "deposited": ("In the caustic", "Reached a receiver through glass or by a mirror, and is in the caustic maps."),
     "direct": ("Direct light", "Reached a receiver straight from the light; the picture adds it by itself."),
     "absorbed": ("Absorbed", "Ended in coloured glass, a mirror or a black surface."),
     "escaped": ("Left the scene", "Met nothing any more."),
@@ -43,7 +45,7 @@ _COUNTERS = {
         "Spectrum split",
         "Part of a photon's spectrum is totally reflected: the photon was split in two there.",
     ),
-    "columns_dropped": ("Derivatives dropped", "They overflowed on a camera ray's path: it goes on as a single ray."),
+    "columns_dropped": ("Derivatives dropped", "They overflowed on a camera ray's path: it continues as a single ray."),
     "depth_reached": ("Path too long", "Camera rays caught inside glass: what is left of them sees the environment."),
     "stack_full": (
         "No room to split",
@@ -62,22 +64,16 @@ _COUNTERS = {
 def draw_timing(state: State, view_model: ViewModel) -> State:
     """Draw the panel's contents."""
     state = _first_order(state, view_model.stats)
-    wide = imgui.get_content_region_avail().x > theme.em(34)
-    if wide and imgui.begin_table("##columns", 3, imgui.TableFlags_.sizing_stretch_prop):
-        for name, weight in (("frame", 1.15), ("passes", 1.0), ("numbers", 1.1)):
-            imgui.table_setup_column(name, imgui.TableColumnFlags_.width_stretch, weight)
-        imgui.table_next_row()
+    is_wide = imgui.get_content_region_avail().x > theme.em(34)
+    height = max(imgui.get_content_region_avail().y, theme.em(7)) if is_wide else theme.em(7)
+    if imgui.begin_table("##columns", 3 if is_wide else 1, imgui.TableFlags_.sizing_stretch_same):
         imgui.table_next_column()
-        _frame_plot(view_model, max(imgui.get_content_region_avail().y, theme.em(7)))
+        _frame_plot(view_model, height)
         imgui.table_next_column()
         _passes(view_model)
         imgui.table_next_column()
         _numbers(state, view_model)
         imgui.end_table()
-    elif not wide:
-        _frame_plot(view_model, theme.em(7))
-        _passes(view_model)
-        _numbers(state, view_model)
     return state
 
 
@@ -128,14 +124,12 @@ def _frame_plot(view_model: ViewModel, height: float) -> None:
 
 
 def _passes(view_model: ViewModel) -> None:
-    known = [name for name in PASSES if name in view_model.pass_ms]
-    names = known + [name for name in view_model.pass_ms if name not in PASSES]
     imgui.text_unformatted("By pass")
     rows.explain(
         "By pass",
         "Time of each pass in the last frame, milliseconds: GPU timers, or the wall clock on a software renderer.",
     )
-    if not names:
+    if not view_model.pass_ms:
         widgets.hint("Nothing was computed in the last frame.")
         return
     longest = max(max(view_model.pass_ms.values()), 1e-6)
@@ -144,12 +138,11 @@ def _passes(view_model: ViewModel) -> None:
     imgui.table_setup_column("pass")
     imgui.table_setup_column("bar", imgui.TableColumnFlags_.width_stretch)
     imgui.table_setup_column("ms")
-    for name in names:
-        spent = view_model.pass_ms[name]
+    for name, spent in view_model.pass_ms.items():
         imgui.table_next_row()
         imgui.table_next_column()
         imgui.text_unformatted(name.capitalize())
-        rows.explain(name.capitalize(), PASSES.get(name, "Time of this pass, milliseconds."))
+        rows.explain(name.capitalize(), PASSES[name])
         imgui.table_next_column()
         _bar(spent / longest)
         imgui.table_next_column()
@@ -191,7 +184,7 @@ def counts_of(state: State, view_model: ViewModel) -> list[tuple[str, str, str]]
                 "only say how finely they are followed."
             ),
         ),
-        ("Polygons", numbers.count(stats.polygons), "What the beams threw on flat receivers."),
+        ("Polygons", numbers.count(stats.polygons), "What the beams lit on flat receivers."),
         (
             "Stored",
             numbers.count(stats.photons_stored),
@@ -229,14 +222,12 @@ def counts_of(state: State, view_model: ViewModel) -> list[tuple[str, str, str]]
 def _numbers(state: State, view_model: ViewModel) -> None:
     stats = view_model.stats
     _table("##numbers", counts_of(state, view_model))
-    dropped = [(_named(k), numbers.count(v), _tip(k)) for k, v in stats.fallbacks.items() if v]
-    lost = [(_named(k), numbers.percent(v), _tip(k)) for k, v in stats.lost.items() if v]
-    camera_rows = [(_named(k), numbers.count(v), _tip(k)) for k, v in stats.camera_fallbacks.items() if v]
     bands = [(name, f"{n} bands", "Spectral bands of this light.") for name, n in sorted(stats.bands.items())]
+    of_camera = "Camera rays that were simplified, since the scene was last made."
     for title, tip, rows_ in (
-        ("Fall-backs", "Photons that took a simpler way.", dropped),
-        ("Camera rays' fall-backs", "Camera rays that took a simpler way, since the scene was last made.", camera_rows),
-        ("Where light ended", "Shares of the emitted flux.", lost),
+        ("Fall-backs", "Photons that were simplified.", _counted(stats.fallbacks, numbers.count)),
+        ("Camera rays' fall-backs", of_camera, _counted(stats.camera_fallbacks, numbers.count)),
+        ("Where light ended", "Shares of the emitted flux.", _counted(stats.lost, numbers.percent)),
         ("Spectral bands", "How finely each light's spectrum is divided.", bands),
     ):
         if rows_:
@@ -270,9 +261,8 @@ def _table(identity: str, lines: list[tuple[str, str, str]]) -> None:
     imgui.end_table()
 
 
-def _named(key: str) -> str:
-    return _COUNTERS[key][0] if key in _COUNTERS else key.replace("_", " ").capitalize()
-
-
-def _tip(key: str) -> str:
-    return _COUNTERS[key][1] if key in _COUNTERS else "Counted, never hidden."
+def _counted(counters: Mapping[str, Any], text: Callable[[Any], str]) -> list[tuple[str, str, str]]:
+    """Rows for the counters that are not 0."""
+    unknown = [(key.replace("_", " ").capitalize(), "Counted, never hidden.") for key in counters]
+    shown = [_COUNTERS.get(key, other) for key, other in zip(counters, unknown, strict=True)]
+    return [(name, text(n), tip) for (name, tip), n in zip(shown, counters.values(), strict=True) if n]

@@ -1,19 +1,18 @@
 """The controls every panel is made of, so that they look, align, explain and reset alike.
 
 A row is a label in a column of fixed width and a field that fills the rest. Everywhere: hover
-explains (with the unit), Ctrl+click types a value, a double click on field or label goes back
-to the default where there is one. Values come back as Python floats with seven digits, because
+explains (with the unit), Ctrl+click types a value, a double click on field or label brings
+back the default where there is one. Values come back as Python floats with seven digits, because
 Dear ImGui itself works in float32. Each item is noted in `item_rects` by its label.
 
-Values that are dragged return `active`: pass it to `holding` so that the state knows that
-something is being dragged. The host lowers that flag before every frame.
+A control returns its value, as it was unless the user changed it. That something is held with the mouse or being typed
+in is noted (`hold`) for the whole frame: the shell makes `State.interacting` of it.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
@@ -27,43 +26,9 @@ from ...model.scene import Vec3
 from .. import item_rects, theme
 from . import slider_mark
 from .numbers import named
-from .rows import (
-    begin_row,
-    beside,
-    double_clicked,
-    explain,
-    how_to,
-    is_typed_in,
-    tooltip,
-    words,
-)
-
-__all__ = [
-    "FloatResult",
-    "beside",
-    "button",
-    "colour",
-    "combo",
-    "drag",
-    "error",
-    "file_field",
-    "hint",
-    "holding",
-    "menu_button",
-    "note",
-    "read_out",
-    "reciprocal_slider",
-    "section",
-    "slider",
-    "text_field",
-    "toggle",
-    "tooltip",
-    "unless_locked",
-    "vec3",
-]
-
-FloatResult = tuple[bool, float, bool]
-"""Whether it changed, the value, whether it is being dragged or typed in."""
+from .rows import begin_row, double_clicked, explain, hold, how_to, is_typed_in, words
+from .rows import beside as beside
+from .rows import tooltip as tooltip
 
 Choice = TypeVar("Choice", bound=str)
 
@@ -85,10 +50,10 @@ def slider(
     logarithmic: bool = False,
     mark: float | None = None,
     clamp: bool = True,
-) -> FloatResult:
+) -> float:
     """A slider from `low` to `high`.
 
-    `unit` stands behind the number ("" for none), `reset` is what a double click brings, `mark`
+    `unit` is shown after the number ("" for none), `reset` is what a double click brings, `mark`
     puts a notch on a linear slider, `clamp=False` lets typed values leave the range.
     """
     label_hit = begin_row(label)
@@ -103,9 +68,24 @@ def slider(
     return _settled(changed, value, _tidy(moved), reset, label_hit)
 
 
+def whole(
+    label: str,
+    value: int,
+    low: int,
+    high: int,
+    *,
+    tip: str,
+    reset: int | None = None,
+    unit: str = "",
+    clamp: bool = True,
+) -> int:
+    """A slider over whole numbers."""
+    return round(slider(label, value, low, high, unit=unit, tip=tip, reset=reset, format="%.0f", clamp=clamp))
+
+
 def reciprocal_slider(
     label: str, value: float, low: float, *, unit: str, tip: str, reset: float | None = None, format: str = "%.2f"
-) -> FloatResult:
+) -> float:
     """A slider over `low` to infinity that is even in 1/value, as an Abbe number feels even.
 
     Any number can be typed, negative ones too; the caller judges it. Infinity is shown as "none".
@@ -137,7 +117,7 @@ def drag(
     format: str = "%.3f",
     logarithmic: bool = False,
     speed: float | None = None,
-) -> FloatResult:
+) -> float:
     """A number changed by dragging across it, for ranges without natural ends.
 
     `speed` is the change a pixel; None takes half a percent of the value. `low` and `high` may be infinite.
@@ -161,8 +141,8 @@ def vec3(
     speed: float = 0.01,
     format: str = "%.3f",
     reset: Vec3 | None = None,
-) -> tuple[bool, Vec3, bool]:
-    """Three numbers x, y, z in one row, marked red, green and blue. Other units than degrees stand in the tooltip."""
+) -> Vec3:
+    """Three numbers x, y, z in one row, marked red, green and blue. Other units than degrees are in the tooltip."""
     label_hit = begin_row(label)
     before = [float(v) for v in value]
     flags = imgui.SliderFlags_.color_markers.value | _no_typing_by_double_click()
@@ -171,16 +151,15 @@ def vec3(
     explain(label, tip, unit, how_to(None if reset is None else ", ".join(f"{v:g}" for v in reset)))
     if reset is not None and (label_hit or double_clicked()):
         imgui.internal.clear_active_id()
-        return reset != value, reset, False
+        return reset
+    hold(imgui.is_item_active())
     changed = changed and all(abs(number) <= _LARGEST for number in after)
     # Only what moved is rounded to float32: the other two keep their digits.
     x, y, z = (_tidy(b) if np.float32(b) != np.float32(a) else a for a, b in zip(before, after, strict=True))
-    return changed, (x, y, z) if changed else value, imgui.is_item_active()
+    return (x, y, z) if changed else value
 
 
-def combo(
-    label: str, options: Sequence[Choice] | Mapping[Choice, str], current: Choice, *, tip: str
-) -> tuple[bool, Choice]:
+def combo(label: str, options: Sequence[Choice] | Mapping[Choice, str], current: Choice, *, tip: str) -> Choice:
     """A choice. A mapping shows its values and returns its keys; `current` need not be among the options."""
     shown: Mapping[Choice, str] = options if isinstance(options, Mapping) else {option: option for option in options}
     preview = named(shown.get(current, current))
@@ -196,15 +175,15 @@ def combo(
                 imgui.set_item_default_focus()
         imgui.end_combo()
     explain(label, "" if opened else tip)
-    return chosen != current, chosen
+    return chosen
 
 
-def toggle(label: str, value: bool, *, tip: str) -> tuple[bool, bool]:
+def toggle(label: str, value: bool, *, tip: str) -> bool:
     """A box to tick, in the column of the fields, its words behind it."""
     begin_row("", _boxed(label))
-    changed, ticked = imgui.checkbox(label, value)
+    _, ticked = imgui.checkbox(label, value)
     explain(label, tip)
-    return changed, ticked
+    return ticked
 
 
 def _boxed(text: str) -> float:
@@ -236,9 +215,9 @@ def menu_button(label: str, options: Mapping[str, str], *, tip: str) -> str | No
     return chosen
 
 
-def colour(label: str, rgb: Vec3, *, tip: str) -> tuple[bool, Vec3, bool]:
+def colour(label: str, rgb: Vec3, *, tip: str, highest: float = math.inf) -> Vec3:
     """A linear Rec.709 colour: its numbers, linear as in scene files or with sRGB's encoding, as the button behind them
-    says, and a swatch that opens a picker."""
+    says, and a swatch that opens a picker. None is negative, or above `highest`."""
     row = imgui.get_cursor_screen_pos()
     begin_row(label)
     is_linear = _colour_numbers["linear"]
@@ -252,7 +231,7 @@ def colour(label: str, rgb: Vec3, *, tip: str) -> tuple[bool, Vec3, bool]:
     changed, numbers = imgui.color_edit3(
         f"##{label}", shown, flags.float.value | flags.no_small_preview.value | flags.no_options.value
     )
-    active = imgui.is_item_active()
+    hold(imgui.is_item_active())
     explain(label, f"{tip} These numbers are {word}.")
     found = tuple(numbers[:3]) if is_linear else tuple(_decode(c) for c in numbers[:3])
     imgui.same_line(0.0, gap)
@@ -270,7 +249,7 @@ def colour(label: str, rgb: Vec3, *, tip: str) -> tuple[bool, Vec3, bool]:
     if imgui.begin_popup(f"picker of {label}"):
         imgui.set_next_item_width(theme.em(_PICKER_EM))
         picked, by_eye = imgui.color_picker3(f"##picker {label}", encoded, flags.no_inputs.value)
-        active = active or imgui.is_item_active()
+        hold(imgui.is_item_active())
         item_rects.note(f"{label}: picker")
         if picked:
             changed, found = True, tuple(_decode(c) for c in by_eye[:3])
@@ -280,14 +259,14 @@ def colour(label: str, rgb: Vec3, *, tip: str) -> tuple[bool, Vec3, bool]:
         _colour_numbers["linear"] = not is_linear
     explain(f"{label}: numbers", "Linear: the numbers of scene files. sRGB: encoded, as in pictures and on the web.")
     if not changed or not all(map(math.isfinite, found)) or min(found) < 0.0:
-        return False, rgb, active
-    r, g, b = (_tidy(c) for c in found)
-    return True, (r, g, b), active
+        return rgb
+    r, g, b = (min(_tidy(c), highest) for c in found)
+    return r, g, b
 
 
 def _place_beside_row(row: ImVec2) -> None:
-    """The next window goes where it does not hide the row, whose numbers follow it: to the left of the panel's rows, to
-    their right, or below where neither side has room."""
+    """Place the next window where it does not hide the row, whose numbers follow it: left of the panel's rows, right of
+    them, or below where neither side has room."""
     view, gap, side = imgui.get_main_viewport(), theme.em(0.6), theme.em(_PICKER_EM + 2.0)
     left, top = view.work_pos
     right, bottom = left + view.work_size.x, top + view.work_size.y
@@ -309,13 +288,13 @@ _colour_numbers = {"linear": True}
 """How colours' numbers are shown: memory of the interface, like a scroll position."""
 
 
-def text_field(label: str, value: str, *, tip: str) -> tuple[bool, str]:
-    """A line of text; changed when it is left or Enter is pressed, not with each letter."""
+def text_field(label: str, value: str, *, tip: str) -> str:
+    """A line of text; it changes when it is left or Enter is pressed, not with each letter."""
     begin_row(label)
     _, text = imgui.input_text(f"##{label}", value)
     done = imgui.is_item_deactivated_after_edit()
     explain(label, tip)
-    return done and text != value, text
+    return text if done else value
 
 
 def file_field(label: str, name: str, *, tip: str, enabled: bool = True, clear_tip: str = "") -> bool | None:
@@ -354,7 +333,7 @@ def read_out(label: str, text: str, *, tip: str) -> None:
 
 
 def section(title: str, *, is_open: bool = True) -> bool:
-    """A heading that folds; True when what stands below it is to be drawn."""
+    """A heading that folds; True when what is below it is to be drawn."""
     flags = imgui.TreeNodeFlags_.default_open.value if is_open else 0
     shown = imgui.collapsing_header(title, flags)
     item_rects.note(title)
@@ -388,24 +367,20 @@ def unless_locked(state: State, selection: Selection, draw: Callable[[State], St
     return state
 
 
-def holding(state: State, active: bool) -> State:
-    """The state, marked as being dragged when `active`; never lowers the flag."""
-    return replace(state, interacting=True) if active and not state.interacting else state
-
-
 # ---- parts --------------------------------------------------------------------------------
 
 
 def _settled(
     changed: bool, before: float, after: float, reset: float | None, label_hit: bool, infinite: bool = False
-) -> FloatResult:
-    """What the last item and a double click on it or its label come to."""
+) -> float:
+    """The value after the last item and a double click on it or its label."""
     if reset is not None and (label_hit or double_clicked()):
         imgui.internal.clear_active_id()  # else the slider, still held, takes the value back in the next frame
-        return reset != before, reset, False
+        return reset
+    hold(imgui.is_item_active())
     # "nan", "inf" and what float32 does not hold can be typed, and are no numbers; infinity where it has a meaning.
     changed = changed and (abs(after) <= _LARGEST or (infinite and math.isinf(after)))
-    return changed, after if changed else before, imgui.is_item_active()
+    return after if changed else before
 
 
 def _flags(logarithmic: bool, clamp: bool) -> int:
