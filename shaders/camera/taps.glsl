@@ -88,11 +88,11 @@ vec2 far_width(Path path, vec2 width) {
         * length(cross(path.ddirection[LENS_COLUMNS], path.ddirection[LENS_COLUMNS + 1]));
     return vec2(width.x, sqrt(width.y * width.y + by_lens));
 }
-#define WIDTH_OF(light) (LENS && light.kind == LIGHT_KIND_DIRECTIONAL ? by_lens : width)
+#define WIDTH_OF(light) (LENS && light.kind == LIGHT_KIND_DIRECTIONAL ? far_width(path, width) : width)
 
 // Lights that can be seen over the distance `far`; edges are as soft as what the ray stands for is wide.
 void add_lights(Path path, float far) {
-    vec2 width = sample_width(path), by_lens = LENS ? far_width(path, width) : width, sweep = vec2(0.0), brightness;
+    vec2 width = sample_width(path), sweep = vec2(0.0), brightness;
     int taps = 1;
     if (SPECTRAL_SWEEP) {
         brightness = brightness_of(path.band);

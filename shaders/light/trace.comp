@@ -193,10 +193,12 @@ Flight flight_of(inout Path path, float distance) {
     flight.ddirection_ds = path.walk.footprint_scale * path.ddirection[0];
     flight.ddirection_dt = path.walk.footprint_scale * path.ddirection[1];
     flight.dposition_dband = flight.ddirection_dband = vec3(0.0);
-    for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
-        float over_band = variable_step(uint(g), path.band.z, path.band.x);
-        flight.dposition_dband += over_band * path.dposition[SPATIAL + g];
-        flight.ddirection_dband += over_band * path.ddirection[SPATIAL + g];
+    if (SPECTRAL_GROUPS > 0) {
+        for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
+            float over_band = variable_step(uint(g), path.band.z, path.band.x);
+            flight.dposition_dband += over_band * path.dposition[SPATIAL + g];
+            flight.ddirection_dband += over_band * path.ddirection[SPATIAL + g];
+        }
     }
     path.walk.flown.x += is_inside(path.medium) ? 0.0 : distance;
     return flight;

@@ -135,8 +135,8 @@ MUTANTS = {
     ),
     "an edge of a beam forgotten": Mutant(
         "light/beam.frag",
-        "        note_crossing(e, covers.x",
-        "        if (e == 0) continue;\n        note_crossing(e, covers.x",
+        "            note_crossing(\n                e, covers.x",
+        "            if (e == 0) continue;\n            note_crossing(\n                e, covers.x",
         "gpu/test_beam_splat.py::test_energy_at_every_size_and_place",
     ),
     "a beam's sweep reversed": Mutant(
@@ -443,7 +443,7 @@ MUTANTS = {
     ),
     "camera: an undispersed path cut as the whole spectrum": Mutant(
         "camera/meet.glsl",
-        "if (start.restricted == 0u) restrict_to_band(start, pixel_key);\n        if (may_cut_near",
+        "if (start.restricted == 0u) restrict_to_band(start, pixel_key);\n            if (may_cut_near",
         "if (may_cut_near",
         "gpu/test_camera_furnace.py::test_nothing_is_counted_twice_from_under_water",
     ),
