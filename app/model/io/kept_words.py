@@ -13,14 +13,11 @@ from typing import Any
 import numpy as np
 
 from ...base.errors import UserError
-from ..fields import write_fields
 from ..geometry.mesh import Mesh
-from ..lights import LIGHT_KINDS
 from ..lights.light import Light
 from ..lights.light_file import light_values, read_light
 from ..placement import PLACEMENT_KEYS, Surroundings, read_placement
 from ..scene_objects import rested
-from ..spectrum_file import describe_spectrum
 from .scene_table import SceneTable
 
 _REST = "rests_at_z"
@@ -30,40 +27,31 @@ _SAME = 1e-8
 """Relative difference up to which words read back as what is meant."""
 
 
+def merged(
+    raw: Mapping[str, Any], old: Mapping[str, Any], new: Mapping[str, Any], rounded: Iterable[str] = ()
+) -> dict[str, Any]:
+    """The table `raw`, whose plain keys were `old`, with those that differ in `new`; `rounded`: which of these numbers
+    need no more than `_DIGITS` digits."""
+    changed = {key: value for key, value in new.items() if not _alike(old.get(key), value)}
+    changed |= {key: _tidy(changed[key]) for key in rounded if key in changed}
+    return _without(raw, old.keys() - new.keys()) | changed
+
+
 def kept_light(
     raw: Mapping[str, Any], before: Light, after: Light, path: Path, index: int, around: Surroundings
 ) -> dict[str, Any]:
     """One of [[lights]] for `after`, in the words `raw` of `before` where these still hold."""
-    plain = light_values(after, path)
     if before.kind != after.kind:
-        return plain
-    values = dict(raw)
-    old, new = (write_fields(each.parts, each, path) for each in (before, after))
-    changed = {key: value for key, value in new.items() if not _alike(old.get(key), value)}
-    for key in old.keys() - new.keys():
-        values.pop(key, None)
-    values |= changed
-    if before.name != after.name:
-        values["name"] = after.name
-    if after.has_place and before.position != after.position:
-        values["position"] = _tidy(after.position)
-    if after.has_direction and (before.direction != after.direction or ("position" in changed and "target" in raw)):
-        values = _without(values, _AIM) | {"direction": _tidy(after.direction)}
-    spectrum = describe_spectrum(after.spectral_power)
-    if spectrum != describe_spectrum(before.spectral_power):
-        values["spectrum"] = spectrum
-    named = next((key for key in LIGHT_KINDS[after.kind].power_keys if key.key in raw), None)
-    if named is not None and not _close(before.power(named), after.power(named)):
-        values[named.key] = _rounded(after.power(named))
+        return light_values(after, path)
+    power = next((key for key in after.power_keys if key.key in raw), None)
+    old, new = (light_values(each, path, power) for each in (before, after))
+    values = merged(raw, old, new, ("position", "direction", *(() if power is None else (power.key,))))
     # A target says where a light is aimed only as long as it stands where it stood.
-    candidates = (
-        values,
-        _without(values, _AIM) | ({"direction": list(after.direction)} if after.has_direction else {}),
+    aimed = _without(values, _AIM) | {key: new[key] for key in ("direction",) if key in new}
+    candidates = (values, aimed)
+    return next(
+        (each for each in candidates if _reads_as_light(each, after, path, index, around)), light_values(after, path)
     )
-    for candidate in candidates:
-        if _reads_as_light(candidate, after, path, index, around):
-            return candidate
-    return plain
 
 
 def kept_placement(raw: Mapping[str, Any], mesh: Mesh, wanted: np.ndarray, path: Path) -> dict[str, Any]:
@@ -150,8 +138,10 @@ def _rounded(value: float) -> float:
     return float(f"{float(value):.{_DIGITS}g}")
 
 
-def _tidy(values: Iterable[float]) -> list[float]:
-    """As many digits as somebody might read; what is next to nothing is 0."""
+def _tidy(values: Any) -> Any:
+    """Numbers, or one, of as many digits as somebody might read; what is next to nothing beside the others is 0."""
+    if isinstance(values, float):
+        return _rounded(values)
     found = [_rounded(v) for v in values]
     largest = max(map(abs, found), default=0.0)
     return [0.0 if abs(v) < 1e-12 * max(largest, 1.0) else v for v in found]

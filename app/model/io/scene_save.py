@@ -30,7 +30,7 @@ from ..scene_environment import ENVIRONMENT, environment_values
 from ..scene_objects import INLINE
 from ..scene_render import render_values
 from ..texture import Environment
-from .kept_words import kept_light, kept_placement
+from .kept_words import kept_light, kept_placement, merged
 from .scene_file import load_scene
 from .scene_pictures import folder_beside, kept_name, relative_name
 from .toml_text import toml_text
@@ -108,10 +108,10 @@ def _kept(scene: Scene, path: Path, raw: dict[str, Any], written: Path) -> dict[
     values = dict(raw)
     if scene.name != before.name:
         values["name"] = scene.name
-    if scene.camera != before.camera:
-        values["camera"] = _changed(raw.get("camera"), camera_values(before.camera), camera_values(scene.camera))
-    if scene.render != before.render:
-        values["render"] = _changed(raw.get("render"), render_values(before.render), render_values(scene.render))
+    for key, describe in (("camera", camera_values), ("render", render_values)):
+        old, new = (describe(getattr(each, key)) for each in (before, scene))
+        if old != new:
+            values[key] = merged(raw[key], old, new) if key in raw else new
     if scene.background_rgb != before.background_rgb or not _same_environment(scene.environment, before.environment):
         for key in ("background", ENVIRONMENT):
             values.pop(key, None)
@@ -126,13 +126,6 @@ def _kept(scene: Scene, path: Path, raw: dict[str, Any], written: Path) -> dict[
     if materials:
         values["materials"] = materials
     return values
-
-
-def _changed(raw: dict[str, Any] | None, old: dict[str, Any], new: dict[str, Any]) -> dict[str, Any]:
-    """A table as it was written, with what differs; whole where there was none, or of another kind."""
-    if raw is None or old.keys() != new.keys():
-        return new
-    return raw | {key: value for key, value in new.items() if old[key] != value}
 
 
 def _kept_lights(scene: Scene, before: Scene, raw: list[dict[str, Any]], path: Path) -> list[dict[str, Any]]:
@@ -206,8 +199,8 @@ def _kept_object(
     placed = kept_placement(entry, new.mesh, new.object_to_world, path)
     # In the order in which they were written, so that comments stay where they are.
     order = {key: i for i, key in enumerate(entry)}
-    merged = values | placed | _dabs(new)
-    return dict(sorted(merged.items(), key=lambda item: order.get(item[0], len(order))))
+    table = values | placed | _dabs(new)
+    return dict(sorted(table.items(), key=lambda item: order.get(item[0], len(order))))
 
 
 def _kept_material(

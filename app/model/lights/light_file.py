@@ -33,8 +33,9 @@ def read_light(table: SceneTable, index: int, around: Surroundings) -> Light:
     return light
 
 
-def light_values(light: Light, path: Path | None = None) -> dict[str, Any]:
-    """One of the [[lights]] of a scene file; files are named as the scene file `path` would, absolutely without one."""
+def light_values(light: Light, path: Path | None = None, power: PowerKey | None = None) -> dict[str, Any]:
+    """One of the [[lights]] of a scene file; files are named as the scene file `path` would, absolutely without one.
+    `power`: what its power is given in, the watts of its own quantity if None."""
     values: dict[str, Any] = {"name": light.name, "kind": light.kind}
     if light.has_place:
         values["position"] = list(light.position)
@@ -42,7 +43,8 @@ def light_values(light: Light, path: Path | None = None) -> dict[str, Any]:
         values["direction"] = list(light.direction)
     values |= write_fields(light.parts, light, path)
     values["spectrum"] = describe_spectrum(light.spectral_power)
-    return values | {light.own_keys[1].key: light.spectral_power.power_w()}
+    power = power or light.own_keys[1]
+    return values | {power.key: light.power(power)}
 
 
 def _read_placement(table: SceneTable, cls: type[Light], around: Surroundings) -> tuple[dict[str, Any], float]:
