@@ -9,15 +9,14 @@ from __future__ import annotations
 import math
 import os
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from ..base.errors import UserError
 from .placement import frame_from_z, rotation_about
 from .texture import Environment
-
-Vec3 = tuple[float, float, float]
+from .vectors import Vec3
 
 MAX_WIDTH, MAX_HEIGHT = 4096, 2048
 """Largest map kept: 128 MB on the GPU, and a texel is 0.09°."""
@@ -66,21 +65,20 @@ def from_map(
         raise UserError(f"{path}: intensity {intensity:g} takes its brightest value out of range; give a smaller one")
     if notes is not None:
         notes += assumed
-    parameters = {"intensity": float(intensity), "rotation_deg": float(rotation_deg), "up": _listed(up)}
-    return Environment(
-        _frozen(rgb), world_to_local(up, rotation_deg), "map", _with_lights(parameters, lights), str(path), lights
-    )
+    told = {"intensity": intensity, "rotation_deg": rotation_deg, "up": up}
+    return _made("map", rgb, told, lights, str(path))
 
 
 def gradient(
-    zenith: Vec3, horizon: Vec3, nadir: Vec3, up: Vec3 = Z_UP, intensity: float = 1.0, lights: bool = True
+    zenith: Vec3, horizon: Vec3, nadir: Vec3 | None = None, up: Vec3 = Z_UP, intensity: float = 1.0, lights: bool = True
 ) -> Environment:
-    """Radiances, linear Rec.709 in lm/(sr unit²), straight up, all round and straight down, and smoothly between.
+    """Radiances, linear Rec.709 in lm/(sr unit²), straight up, all round and straight down (None: as all round), and
+    smoothly between.
 
     With s the sine of the elevation, the blend is s²(3 − 2|s|): level at the horizon as at the poles.
     Raises UserError for a radiance that is negative or not finite.
     """
-    radiances = {"zenith": zenith, "horizon": horizon, "nadir": nadir}
+    radiances = {"zenith": zenith, "horizon": horizon, "nadir": horizon if nadir is None else nadir}
     colours = {key: intensity * np.array(value, dtype=np.float64) for key, value in radiances.items()}
     for key, colour in colours.items():
         if not (np.isfinite(colour).all() and (colour >= 0.0).all()):
@@ -89,11 +87,7 @@ def gradient(
     blend = (sine**2 * (3.0 - 2.0 * np.abs(sine)))[..., None]
     pole = np.where(sine[..., None] > 0.0, colours["zenith"], colours["nadir"])
     rgb = colours["horizon"] + blend * (pole - colours["horizon"])
-    parameters = {key: _listed(value) for key, value in radiances.items()} | {
-        "intensity": float(intensity),
-        "up": _listed(up),
-    }
-    return Environment(_frozen(rgb), world_to_local(up), "gradient", _with_lights(parameters, lights), lights=lights)
+    return _made("gradient", rgb, radiances | {"intensity": intensity, "up": up}, lights)
 
 
 def sky(
@@ -136,15 +130,15 @@ def sky(
     rgb = np.empty((BAKED_HEIGHT, BAKED_WIDTH, 3))
     rgb[:half] = upper[..., None]  # D65 is white in Rec.709
     rgb[half:] = reflectance * horizontal_illuminance(upper) / math.pi
-    parameters = {
+    told = {
         "type": int(sky_type),
-        "sun_elevation_deg": float(sun_elevation_deg),
-        "sun_azimuth_deg": float(sun_azimuth_deg),
-        "luminance": float(luminance),
-        "ground": _listed(ground),
-        "up": _listed(up),
+        "sun_elevation_deg": sun_elevation_deg,
+        "sun_azimuth_deg": sun_azimuth_deg,
+        "luminance": luminance,
+        "ground": ground,
+        "up": up,
     }
-    return Environment(_frozen(rgb), world_to_local(up), "sky", _with_lights(parameters, lights), lights=lights)
+    return _made("sky", rgb, told, lights)
 
 
 def constant(radiance: Vec3, lights: bool = True) -> Environment:
@@ -153,10 +147,7 @@ def constant(radiance: Vec3, lights: bool = True) -> Environment:
     colour = np.array(radiance, dtype=np.float64)
     if not (np.isfinite(colour).all() and (colour >= 0.0).all()):
         raise UserError("constant: radiance must be three numbers of 0 or more; correct it")
-    rgb = np.broadcast_to(colour, (8, 16, 3))
-    return Environment(
-        _frozen(rgb), kind="constant", parameters=_with_lights({"radiance": _listed(radiance)}, lights), lights=lights
-    )
+    return _made("constant", np.broadcast_to(colour, (8, 16, 3)), {"radiance": radiance}, lights)
 
 
 def horizontal_illuminance(upper: np.ndarray) -> float:
@@ -230,19 +221,24 @@ def averaged_rows(rgb: np.ndarray, rows: int) -> np.ndarray:
     return (weights @ rgb.reshape(source, -1)).astype(np.float32).reshape(rows, *rgb.shape[1:])
 
 
-def _with_lights(parameters: dict[str, Any], lights: bool) -> dict[str, Any]:
-    """What a scene file says: `lights` only where it is not as usual."""
-    return parameters if lights else parameters | {"lights": False}
-
-
-def _listed(vector: Vec3) -> list[float]:
-    return [float(v) for v in vector]
-
-
-def _frozen(rgb: np.ndarray) -> np.ndarray:
+def _made(
+    kind: Literal["map", "gradient", "sky", "constant"],
+    rgb: np.ndarray,
+    told: dict[str, Any],
+    lights: bool,
+    source: str | None = None,
+) -> Environment:
+    """Of a picture, and what a scene file says to make it: `lights` only where it is not as usual."""
     rgb = np.ascontiguousarray(rgb, dtype=np.float32)
     rgb.setflags(write=False)
-    return rgb
+    parameters = {key: value if isinstance(value, int) else _plain(value) for key, value in told.items()}
+    parameters |= {} if lights else {"lights": False}
+    turned = world_to_local(told.get("up", Z_UP), told.get("rotation_deg", 0.0))
+    return Environment(rgb, turned, kind, parameters, source, lights)
+
+
+def _plain(value: Any) -> float | list[float]:
+    return [float(v) for v in value] if np.ndim(value) else float(value)
 
 
 SKY_TYPES: dict[int, tuple[float, float, float, float, float]] = {

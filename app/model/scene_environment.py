@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +22,7 @@ from .environment import (
     sky,
     up_and_rotation,
 )
+from .fields import Colour, Direction, Field, Integer, Number, Part, read_fields
 from .io.scene_pictures import picture_file
 from .io.scene_table import SceneTable
 from .scene_render import read_background
@@ -26,10 +30,69 @@ from .texture import Environment
 from .vectors import Vec3
 
 ENVIRONMENT = "environment"
-KINDS = ("map", "studio", "gradient", "sky", "constant")
 STUDIO_MAP = assets_dir() / "environments" / "studio.hdr"
 """The shipped panorama, which has a word of its own so that saved scenes name no file of this installation."""
 _BLACK = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class _Radiance(Field):
+    """Linear Rec.709 in lm/(sr unit²), 0 or more: three numbers, one for a grey, or an sRGB "#rrggbb"."""
+
+    def value(self, table: SceneTable, key: str) -> Any:
+        """The three channels."""
+        value = table.raw(key, self.default)
+        if isinstance(value, str):
+            return table.colour(key)
+        if not isinstance(value, list):
+            return self.default if value is self.default else (table.number(key, at_least=0.0),) * 3
+        r, g, b = table.vector(key)
+        if min(r, g, b) < 0.0:
+            table.fail(key, "must be three radiances of 0 or more")
+        return r, g, b
+
+
+class _Constant(Part):
+    """`colour` (0 to 1) or `radiance`, times `intensity`."""
+
+    def read(self, table: SceneTable) -> dict[str, Any]:
+        """The radiance."""
+        key = table.one_of(("colour", "radiance"), "the radiance")
+        if key is None:
+            table.raw("colour")  # blames a misspelt key, or says that this one is missing
+        r, g, b = table.colour("colour") if key == "colour" else _Radiance("radiance").value(table, "radiance")
+        intensity = _INTENSITY.value(table, "intensity")
+        return {"radiance": (intensity * r, intensity * g, intensity * b)}
+
+
+class _MapFile(Part):
+    """The panorama's file."""
+
+    def read(self, table: SceneTable) -> dict[str, Any]:
+        """Its path, and where notes on it go."""
+        return {"path": table.existing_file("file", or_part=True), "notes": table.notes}
+
+
+_INTENSITY = Number("intensity", 1.0, at_least=0.0)
+_ROTATION, _UP = Number("rotation_deg", 0.0), Direction("up", Z_UP)
+_KINDS: dict[str, tuple[Callable[..., Environment], tuple[Part, ...]]] = {
+    "map": (from_map, (_MapFile(), _INTENSITY, _ROTATION, _UP)),
+    "studio": (partial(from_map, STUDIO_MAP), (_INTENSITY, _ROTATION, _UP)),
+    "gradient": (gradient, (_Radiance("zenith"), _Radiance("horizon"), _Radiance("nadir", None), _UP, _INTENSITY)),
+    "sky": (
+        sky,
+        (
+            Number("sun_elevation_deg", 45.0, at_least=0.0, at_most=90.0),
+            Number("sun_azimuth_deg", 0.0),
+            Number("luminance", 1.0, at_least=0.0),
+            Integer("sky_type", DEFAULT_SKY_TYPE, "type", at_least=1, at_most=15),
+            Colour("ground", (0.2, 0.2, 0.2)),
+            _UP,
+        ),
+    ),
+    "constant": (constant, (_Constant(),)),
+}
+"""What makes each kind, and its keys."""
 
 
 def read_environment(table: SceneTable) -> tuple[Vec3, Environment | None]:
@@ -41,81 +104,15 @@ def read_environment(table: SceneTable) -> tuple[Vec3, Environment | None]:
         return read_background(table), None
     inner = table.table(ENVIRONMENT)
     assert inner is not None
-    kind = inner.choice("kind", KINDS)
-    lights = inner.boolean("lights", True)
-    background, environment = _BLACK, None
-    if kind == "constant":
-        background = _read_constant(inner)
-        environment = constant(background, lights)
-    elif kind == "map":
-        environment = _read_map(inner, lights)
-    elif kind == "studio":
-        rotation_deg = inner.number("rotation_deg", 0.0)
-        environment = from_map(STUDIO_MAP, _intensity(inner), rotation_deg, _up(inner), lights=lights)
-    elif kind == "gradient":
-        environment = _read_gradient(inner, lights)
-    else:
-        environment = _read_sky(inner, lights)
-    inner.finish(f"an environment of kind '{kind}'")
-    return background, environment
-
-
-def _read_constant(table: SceneTable) -> Vec3:
-    """`colour` (0 to 1) or `radiance`, times `intensity`."""
-    key = table.one_of(("colour", "radiance"), "the radiance")
-    if key is None:
-        table.raw("colour")  # blames a misspelt key, or says that this one is missing
-    r, g, b = table.colour("colour") if key == "colour" else _radiance(table, "radiance")
-    intensity = _intensity(table)
-    return intensity * r, intensity * g, intensity * b
-
-
-def _read_map(table: SceneTable, lights: bool) -> Environment:
-    path = table.existing_file("file", or_part=True)
-    rotation_deg = table.number("rotation_deg", 0.0)
+    kind = inner.choice("kind", tuple(_KINDS))
+    make, parts = _KINDS[kind]
+    values = {"lights": inner.boolean("lights", True)} | read_fields(parts, inner)
     try:
-        return from_map(path, _intensity(table), rotation_deg, _up(table), table.notes, lights)
+        environment = make(**values)
     except UserError as error:
-        table.fail("file", f"cannot be used: {error}")
-
-
-def _read_gradient(table: SceneTable, lights: bool) -> Environment:
-    zenith, horizon = _radiance(table, "zenith"), _radiance(table, "horizon")
-    nadir = _radiance(table, "nadir") if table.has("nadir") else horizon
-    return gradient(zenith, horizon, nadir, _up(table), _intensity(table), lights)
-
-
-def _read_sky(table: SceneTable, lights: bool) -> Environment:
-    return sky(
-        sun_elevation_deg=table.number("sun_elevation_deg", 45.0, at_least=0.0, at_most=90.0),
-        sun_azimuth_deg=table.number("sun_azimuth_deg", 0.0),
-        luminance=table.number("luminance", 1.0, at_least=0.0),
-        sky_type=table.integer("type", DEFAULT_SKY_TYPE, at_least=1, at_most=15),
-        ground=table.colour("ground", (0.2, 0.2, 0.2)),
-        up=_up(table),
-        lights=lights,
-    )
-
-
-def _intensity(table: SceneTable) -> float:
-    return table.number("intensity", 1.0, at_least=0.0)
-
-
-def _up(table: SceneTable) -> Vec3:
-    return table.unit_vector("up", Z_UP)
-
-
-def _radiance(table: SceneTable, key: str) -> Vec3:
-    """Linear Rec.709 in lm/(sr unit²), 0 or more: three numbers, one for a grey, or an sRGB "#rrggbb"."""
-    value = table.raw(key)
-    if isinstance(value, str):
-        return table.colour(key)
-    if not isinstance(value, list):
-        return (table.number(key, at_least=0.0),) * 3
-    r, g, b = table.vector(key)
-    if min(r, g, b) < 0.0:
-        table.fail(key, "must be three radiances of 0 or more")
-    return r, g, b
+        inner.fail("file" if kind == "map" else "kind", f"cannot be used: {error}")
+    inner.finish(f"an environment of kind '{kind}'")
+    return values.get("radiance", _BLACK), environment
 
 
 def environment_values(environment: Environment, scene_path: Path) -> dict[str, Any]:
