@@ -6,7 +6,6 @@ anything is allocated, and against its content while reading.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -34,6 +33,7 @@ _TYPES = {
     "float64": "f8",
 }
 _ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": ""}
+_NUMBER = "f8"
 _LARGEST = 1 << 40
 """Number of a vertex, or length of a list, that no file can have."""
 _FACE_LISTS = ("vertex_indices", "vertex_index")
@@ -58,7 +58,15 @@ class _Element:
 def read_ply(data: bytes, path: str) -> RawMesh:
     """Vertices, triangles and, where the file has them, normals and texture coordinates."""
     order, elements, body = _header(data, path)
-    reader: _Body = _BinaryBody(data, body, order, path) if order else _AsciiBody(data[body:], path)
+    if not order:
+        # Words become numbers of one kind: then it is a binary file.
+        for p in (p for element in elements for p in element.properties):
+            p.kind, p.count_kind = _NUMBER, p.count_kind and _NUMBER
+        try:
+            data = np.array(data[body:].split(), dtype=f"<{_NUMBER}").tobytes()
+        except ValueError:
+            raise UserError(f"{path}: the PLY body holds something that is no number; export the mesh again") from None
+    reader = _Body(data, body, order, path) if order else _Body(data, 0, "<", path)
     vertex = face = None
     for element in elements:
         if not element.properties:
@@ -68,7 +76,7 @@ def read_ply(data: bytes, path: str) -> RawMesh:
             vertex = columns
         elif element.name == "face":
             face = columns
-    reader.finish()
+    reader.finish(*(("bytes", 1) if order else ("numbers", np.dtype(_NUMBER).itemsize)))
     if vertex is None or any(axis not in vertex for axis in "xyz"):
         raise UserError(f"{path}: the PLY header has no vertices with x, y, z; export the mesh again")
     corners = next((face[name] for name in _FACE_LISTS if face and name in face), None)
@@ -138,57 +146,14 @@ Columns = dict[str, Any]
 """By name: an array for a scalar, (sizes, values) for a list."""
 
 
-class _Body(ABC):
+class _Body:
     """Elements of a file's body, in order."""
 
-    def __init__(self, path: str) -> None:
-        self._path = path
-
-    @abstractmethod
-    def element(self, element: _Element) -> Columns:
-        """The columns of all its rows."""
-
-    @abstractmethod
-    def finish(self) -> None:
-        """Refuse what follows the promised elements: the header lied."""
-
-    @abstractmethod
-    def _size(self, p: _Property, element: _Element, row: int) -> int:
-        """The count before a list, read."""
-
-    @abstractmethod
-    def _values(self, p: _Property, size: int, element: _Element, row: int) -> np.ndarray:
-        """The next `size` values of a property, read."""
-
-    def _walk(self, element: _Element) -> Columns:
-        """Row by row, for lists of differing lengths."""
-        sizes: dict[str, list[int]] = {p.name: [] for p in element.properties}
-        found: dict[str, list[np.ndarray]] = {p.name: [] for p in element.properties}
-        for row in range(element.count):
-            for p in element.properties:
-                size = 1 if p.count_kind is None else self._size(p, element, row)
-                sizes[p.name].append(size)
-                found[p.name].append(self._values(p, size, element, row))
-        columns: Columns = {}
-        for p in element.properties:
-            values = np.concatenate(found[p.name]) if found[p.name] else np.zeros(0)
-            columns[p.name] = values if p.count_kind is None else (np.array(sizes[p.name], np.int64), values)
-        return columns
-
-    def _truncated(self, element: _Element, held: int) -> UserError:
-        what = f"of '{element.name}'" if element.name in ("vertex", "face") else "of something else"
-        return UserError(
-            f"{self._path}: the header promises {element.count} {what}, but the file ends after {held}; copy or export "
-            "it again"
-        )
-
-
-class _BinaryBody(_Body):
-    def __init__(self, data: bytes, start: int, order: str, path: str) -> None:
-        super().__init__(path)
-        self._data, self._at, self._order = data, start, order
+    def __init__(self, data: bytes, at: int, order: str, path: str) -> None:
+        self._path, self._data, self._at, self._order = path, data, at, order
 
     def element(self, element: _Element) -> Columns:
+        """The columns of all its rows: at once where all lists are as long as in the first row, as in most files."""
         sizes = self._first_sizes(element)
         layout = np.dtype([part for p in element.properties for part in self._fields(p, sizes.get(p.name, 0))])
         room = (len(self._data) - self._at) // layout.itemsize if layout.itemsize else element.count
@@ -206,29 +171,52 @@ class _BinaryBody(_Body):
             raise self._truncated(element, room)
         return self._walk(element)
 
+    def finish(self, unit: str, size: int) -> None:
+        """Refuse what follows the promised elements: the header lied. `unit`: what of `size` bytes is counted."""
+        rest = self._data[self._at :]
+        if rest.strip():
+            raise UserError(
+                f"{self._path}: {len(rest) // size} {unit} follow what the PLY header promises; export the mesh again"
+            )
+
+    def _walk(self, element: _Element) -> Columns:
+        """Row by row, for lists of differing lengths."""
+        sizes: dict[str, list[int]] = {p.name: [] for p in element.properties}
+        found: dict[str, list[np.ndarray]] = {p.name: [] for p in element.properties}
+        for row in range(element.count):
+            for p in element.properties:
+                size = self._size(p, element, row)
+                sizes[p.name].append(size)
+                found[p.name].append(self._take(p.kind, size, element, row))
+        columns: Columns = {}
+        for p in element.properties:
+            values = np.concatenate(found[p.name]) if found[p.name] else np.zeros(0)
+            columns[p.name] = values if p.count_kind is None else (np.array(sizes[p.name], np.int64), values)
+        return columns
+
     def _fields(self, p: _Property, size: int) -> list[tuple]:
         if p.count_kind is None:
             return [(p.name, self._order + p.kind)]
         return [(f"{p.name} count", self._order + p.count_kind), (p.name, self._order + p.kind, (size,))]
 
     def _first_sizes(self, element: _Element) -> dict[str, int]:
-        """List lengths in the first row: in most files every row has the same."""
+        """Lengths of the lists in the first row."""
         begin = self._at
         sizes = {}
         for p in element.properties if element.count else []:
-            size = 1
+            size = self._size(p, element, 0)
             if p.count_kind is not None:
-                size = sizes[p.name] = self._size(p, element, 0)
-            self._values(p, size, element, 0)
+                sizes[p.name] = size
+            self._take(p.kind, size, element, 0)
         self._at = begin
         return sizes
 
     def _size(self, p: _Property, element: _Element, row: int) -> int:
-        assert p.count_kind is not None
-        return max(0, int(self._take(p.count_kind, 1, element, row)[0]))
-
-    def _values(self, p: _Property, size: int, element: _Element, row: int) -> np.ndarray:
-        return self._take(p.kind, size, element, row)
+        """How many values of a property follow: the count before a list, read; what is none is longer than any file."""
+        if p.count_kind is None:
+            return 1
+        count = float(self._take(p.count_kind, 1, element, row)[0])
+        return max(0, int(count)) if abs(count) < _LARGEST else _LARGEST
 
     def _take(self, kind: str, count: int, element: _Element, row: int) -> np.ndarray:
         end = self._at + count * np.dtype(kind).itemsize
@@ -238,55 +226,9 @@ class _BinaryBody(_Body):
         self._at = end
         return values
 
-    def finish(self) -> None:
-        rest = len(self._data) - self._at
-        if self._data[self._at :].strip():
-            raise UserError(f"{self._path}: {rest} bytes follow what the PLY header promises; export the mesh again")
-
-
-class _AsciiBody(_Body):
-    def __init__(self, body: bytes, path: str) -> None:
-        super().__init__(path)
-        self._at = 0
-        try:
-            self._numbers = np.array(body.split(), dtype=np.float64)
-        except ValueError:
-            raise UserError(f"{path}: the PLY body holds something that is no number; export the mesh again") from None
-
-    def element(self, element: _Element) -> Columns:
-        rest = self._numbers[self._at :]
-        if all(p.count_kind is None for p in element.properties):
-            width = len(element.properties)
-            if element.count * width > len(rest):
-                raise self._truncated(element, len(rest) // max(width, 1))
-            self._at += element.count * width
-            rows = rest[: element.count * width].reshape(element.count, width)
-            return {p.name: rows[:, i] for i, p in enumerate(element.properties)}
-        if len(element.properties) == 1 and element.count and len(rest):
-            size = _list_size(rest[0])
-            rows = rest[: element.count * (size + 1)]
-            if size >= 0 and len(rows) == element.count * (size + 1):
-                rows = rows.reshape(element.count, size + 1)
-                if (rows[:, 0] == size).all():
-                    self._at += rows.size
-                    return {element.properties[0].name: (np.full(element.count, size), rows[:, 1:].reshape(-1))}
-        return self._walk(element)
-
-    def _size(self, p: _Property, element: _Element, row: int) -> int:
-        return max(0, _list_size(self._values(p, 1, element, row)[0]))
-
-    def _values(self, p: _Property, size: int, element: _Element, row: int) -> np.ndarray:
-        if self._at + size > len(self._numbers):
-            raise self._truncated(element, row)
-        self._at += size
-        return self._numbers[self._at - size : self._at]
-
-    def finish(self) -> None:
-        rest = len(self._numbers) - self._at
-        if rest:
-            raise UserError(f"{self._path}: {rest} numbers follow what the PLY header promises; export the mesh again")
-
-
-def _list_size(number: float) -> int:
-    """A list's length in an ASCII file; what is none is longer than any file."""
-    return int(number) if abs(number) < _LARGEST else _LARGEST
+    def _truncated(self, element: _Element, held: int) -> UserError:
+        what = f"of '{element.name}'" if element.name in ("vertex", "face") else "of something else"
+        return UserError(
+            f"{self._path}: the header promises {element.count} {what}, but the file ends after {held}; copy or export "
+            "it again"
+        )
