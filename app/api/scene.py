@@ -18,7 +18,6 @@ from typing import Any
 from ..base.errors import UserError
 from ..commands.scenes import find_scene
 from ..model import scene as values_of
-from ..model.geometry.mesh import recipe_of
 from ..model.io.scene_file import Kept, load_scene, read_toml, scene_of
 from ..model.lights import Light
 from ..model.lights.light_file import light_values
@@ -248,7 +247,7 @@ def _split(
 
 def _object_table(item: values_of.SceneObject) -> dict[str, Any]:
     """An object as a table; mesh and material as they are where no words say them."""
-    recipe = recipe_of(item.mesh)
+    recipe = item.mesh.recipe
     table: dict[str, Any] = {"name": item.name} | (dict(recipe) if recipe is not None else {"mesh": item.mesh})
     return table | {"material": item.material, "matrix": [float(v) for v in item.object_to_world.ravel()]}
 

@@ -24,7 +24,7 @@ from ..base import files
 from ..base.atomic import atomic_output
 from ..base.errors import UserError
 from ..base.locks import lock
-from ..model.geometry.mesh import Mesh, recipe_of
+from ..model.geometry.mesh import Mesh
 from ..model.io.scene_file import load_scene
 from ..model.io.scene_save import save_scene
 from ..model.scene import Scene
@@ -71,7 +71,7 @@ class Recovery:
         here = self.path.parent.resolve()
         own: dict[Mesh, Mesh] = {}
         for mesh in {item.mesh for item in scene.objects}:
-            recipe = recipe_of(mesh) or {}
+            recipe = mesh.recipe or {}
             if "mesh" in recipe and Path(recipe["mesh"]).is_relative_to(here):
                 # A new Mesh has no recipe, so it is saved as triangles, not as a reference to a file soon deleted.
                 own[mesh] = replace(mesh, source=None)

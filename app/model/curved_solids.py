@@ -15,7 +15,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .contacts import contacts, nested_pairs
-from .geometry.mesh import recipe_of
 from .scene import Scene, SceneObject
 
 MOST_FACES = 24
@@ -87,7 +86,7 @@ def faces_of(item: SceneObject) -> tuple[Face, ...]:
     material = item.material
     if material.is_grating or not (material.is_solid or material.is_mirror) or material.texture is not None:
         return ()
-    recipe = recipe_of(item.mesh)
+    recipe = item.mesh.recipe
     make = None if recipe is None else _FACES.get(recipe.get("shape", ""))
     return () if make is None or recipe is None else tuple(make(recipe))
 

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..model.geometry import primitives
-from ..model.geometry.mesh import Mesh, recipe_of
+from ..model.geometry.mesh import Mesh
 from ..model.geometry.primitives_round import in_rows, profile_with_normals
 from ..model.scene import Scene, SceneObject
 
@@ -53,7 +53,7 @@ class Piece(NamedTuple):
 
 def pieces(item: SceneObject) -> list[Piece]:
     """The smooth parts that make up the object's true surface; none where only its triangles are known."""
-    recipe = recipe_of(item.mesh)
+    recipe = item.mesh.recipe
     if recipe is None or item.material.texture is not None:
         return []
     make = _SHAPES.get(recipe.get("shape", ""))
@@ -90,7 +90,7 @@ def as_triangles(scene: Scene) -> Scene:
 
 def description(scene: Scene) -> str:
     """What a reference of the scene depends on beside its triangles."""
-    exact = {i: dict(recipe_of(item.mesh) or {}) for i, item in enumerate(scene.objects) if pieces(item)}
+    exact = {i: dict(item.mesh.recipe or {}) for i, item in enumerate(scene.objects) if pieces(item)}
     return repr({i: sorted(recipe.items()) for i, recipe in exact.items()})
 
 

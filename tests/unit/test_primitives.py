@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from spectrasplat.base.errors import UserError
 from spectrasplat.model.geometry import primitives, primitives_round
-from spectrasplat.model.geometry.mesh import Mesh, make_mesh, recipe_of
+from spectrasplat.model.geometry.mesh import Mesh, make_mesh
 from spectrasplat.model.geometry.primitives import solid_of_revolution
 from spectrasplat.model.scene_objects import make_shape
 
@@ -219,7 +219,7 @@ def test_impossible_dimensions_are_one_sentence(make, says: str) -> None:
 def test_everyday_names_are_other_shapes(shape: str, volume: float) -> None:
     mesh = make_shape(shape)
     assert mesh.is_closed and mesh.volume() == pytest.approx(volume, rel=1e-3)
-    assert np.abs(mesh.bounds()).max() <= 0.5 + 1e-12 and recipe_of(mesh)["shape"] in ("revolution", "lens")
+    assert np.abs(mesh.bounds()).max() <= 0.5 + 1e-12 and mesh.recipe["shape"] in ("revolution", "lens")
 
 
 def test_half_spaces_only_for_closed_convex_flat_solids() -> None:

@@ -6,20 +6,15 @@ splitting a vertex. A closed convex flat mesh also knows its half-spaces, since 
 an intersection of half-spaces without any tree.
 
 A *recipe* is the description that a mesh was made from, so that a scene can be saved by it instead of by triangles.
-Meshes are compared by identity and never changed, so a recipe stays true for exactly the mesh it was noted for; a mesh
-that was edited is another value, has no recipe, and is saved as triangles. Recipes go with their meshes to another
-process.
+A mesh that was edited is another value, has no recipe (`replace` leaves it out), and is saved as triangles.
 """
 
 from __future__ import annotations
 
-import copyreg
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from types import MappingProxyType
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -50,6 +45,9 @@ class Mesh:
     uv_unwraps: bool = True
     """Whether `uv` may lay out the charts of a caustic map; not where it was made for pictures and stretches or
     repeats."""
+    recipe: Mapping[str, Any] | None = field(default=None, init=False, repr=False)
+    """The scene-file keys that make exactly this mesh: `shape` with its sizes, or `mesh` (absolute path) with
+    `smooth`; None where no words do."""
 
     def corners(self) -> np.ndarray:
         """Corner positions, float64 (T, 3, 3)."""
@@ -274,31 +272,6 @@ def _convex_planes(mesh: Mesh) -> np.ndarray | None:
     return _frozen(np.array(planes))
 
 
-_RECIPES: WeakKeyDictionary[Mesh, Mapping[str, Any]] = WeakKeyDictionary()
-
-
 def note_recipe(mesh: Mesh, recipe: Mapping[str, Any]) -> None:
-    """Remember the scene-file keys that make `mesh`: `shape` with its sizes, or `mesh` (absolute path) with
-    `smooth`."""
-    _RECIPES[mesh] = MappingProxyType(dict(recipe))
-
-
-def recipe_of(mesh: Mesh) -> Mapping[str, Any] | None:
-    """The scene-file keys that make exactly this mesh, or None."""
-    return _RECIPES.get(mesh)
-
-
-def _carried(mesh: Mesh) -> tuple[Callable[..., Mesh], tuple[Any, ...]]:
-    recipe = recipe_of(mesh)
-    return _arrived, (dict(vars(mesh)), None if recipe is None else dict(recipe))
-
-
-def _arrived(state: dict[str, Any], recipe: dict[str, Any] | None) -> Mesh:
-    mesh = object.__new__(Mesh)
-    vars(mesh).update(state)
-    if recipe is not None:
-        note_recipe(mesh, recipe)
-    return mesh
-
-
-copyreg.pickle(Mesh, _carried)
+    """Remember the scene-file keys that make `mesh`."""
+    object.__setattr__(mesh, "recipe", dict(recipe))

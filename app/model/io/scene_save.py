@@ -19,7 +19,7 @@ import numpy as np
 from ...base import files
 from ...base.atomic import atomic_output, check_writable
 from ...base.errors import UserError
-from ..geometry.mesh import Mesh, recipe_of
+from ..geometry.mesh import Mesh
 from ..lights.light_file import light_values
 from ..local_dispersion import DABS, describe_dabs
 from ..placement import PLACEMENT_KEYS
@@ -190,7 +190,7 @@ def _kept_object(
     if old.name != new.name:
         values["name"] = new.name
     if not _same_mesh(old.mesh, new.mesh):
-        for key in (*(recipe_of(old.mesh) or ("vertices", "triangles", "uv", "mesh")), "shape", "radius", "length"):
+        for key in (*(old.mesh.recipe or ("vertices", "triangles", "uv", "mesh")), "shape", "radius", "length"):
             values.pop(key, None)  # radius and length: of one of `primitives.SPECIAL`
         values |= _mesh(new.mesh, path)
     if old.material.values() != new.material.values():
@@ -223,8 +223,8 @@ def _kept_material(
 
 
 def _same_mesh(a: Mesh, b: Mesh) -> bool:
-    recipe = recipe_of(a)
-    return recipe == recipe_of(b) and (recipe is not None or np.array_equal(a.vertices, b.vertices))
+    recipe = a.recipe
+    return recipe == b.recipe and (recipe is not None or np.array_equal(a.vertices, b.vertices))
 
 
 def _same_object(a: SceneObject, b: SceneObject) -> bool:
@@ -296,7 +296,7 @@ def _material(item: SceneObject, materials: dict[str, dict[str, Any]], path: Pat
 
 
 def _mesh(mesh: Mesh, path: Path) -> dict[str, Any]:
-    recipe = recipe_of(mesh)
+    recipe = mesh.recipe
     if recipe is not None:
         values = dict(recipe)
         for key in ("mesh", "heights"):
