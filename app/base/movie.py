@@ -18,7 +18,7 @@ import numpy as np
 from . import files
 from .atomic import atomic_output, check_writable
 from .errors import UserError
-from .image_io import check_side
+from .image_io import SHOWN_SUFFIXES, SUFFIXES, check_side
 from .locks import locked
 
 MANIFEST = "animation.json"
@@ -148,25 +148,33 @@ class Film:
 
 
 class Frames:
-    """A folder of `0000.png`, …; frames that are there are kept when the same animation goes on, and several processes
-    may fill it together: each frame is made by one of them, and all share one exposure.
+    """A folder of `0000.png`, …: of an animation's frames, or of a sweep's pictures. Those that are there are kept when
+    the same work goes on, and several processes may fill it together: each frame is made by one of them, and all that
+    are for looking at share one exposure.
 
     Who makes a frame holds a lock on it, which ends with the process, however that ends. Where there are no locks a
     frame may be made twice, to the same picture."""
 
-    def __init__(self, folder: Path, description: Mapping[str, object], overwrite: bool = False) -> None:
-        """`description` says what is drawn: a folder with frames of anything else is refused, or emptied of them by
-        `overwrite`."""
+    def __init__(
+        self,
+        folder: Path,
+        description: Mapping[str, object],
+        overwrite: bool = False,
+        manifest: str = MANIFEST,
+        suffix: str = ".png",
+    ) -> None:
+        """`description` says what is drawn and is kept in the file `manifest`: a folder with frames of anything else is
+        refused, or emptied of them by `overwrite`."""
         if folder.exists() and not folder.is_dir():
             raise UserError(f"cannot write {folder}: it is a file; give a folder, or a name that ends in .mp4")
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise UserError(f"cannot write {folder}: {error.strerror}; choose another place") from error
-        check_writable(folder / "frame.png")
-        self._folder = folder
-        self._manifest = folder / MANIFEST
-        self.description = dict(description)
+        check_writable(folder / f"frame{suffix}")
+        self._folder, self._manifest, self._suffix = folder, folder / manifest, suffix
+        self.shares_exposure = suffix in SHOWN_SUFFIXES
+        self.description = json.loads(json.dumps(dict(description)))
         self.base_ev: float | None = None
         with locked(folder):
             self._begin(overwrite)
@@ -176,17 +184,17 @@ class Frames:
         if overwrite:
             self._empty()
         stored = self._stored()
-        if stored is None and any(folder.glob("*.png")):
+        if stored is None and any(folder.glob(f"*{self._suffix}")):
             raise UserError(
                 f"{folder} holds pictures of something else: choose another folder, or replace its frames with "
                 "--overwrite"
             )
         if stored is not None:
             self.base_ev = _exposure(stored.pop("base_ev", None))
-            if stored != json.loads(json.dumps(self.description)):
+            if stored != self.description:
                 raise UserError(
-                    f"{folder} holds frames of another animation: choose another folder, or replace them with "
-                    "--overwrite"
+                    f"{folder} holds frames of another {self._manifest.stem}: choose another folder, or replace them "
+                    "with --overwrite"
                 )
         self._save()
 
@@ -208,7 +216,7 @@ class Frames:
 
     def has(self, index: int) -> bool:
         """Whether the frame is there."""
-        return self.exposure() is not None and _is_whole_png(self.path(index))
+        return (self.exposure() is not None or not self.shares_exposure) and _is_whole(self.path(index))
 
     @contextmanager
     def claimed(self, index: int) -> Iterator[bool]:
@@ -225,7 +233,7 @@ class Frames:
 
     def path(self, index: int) -> Path:
         """Of a frame."""
-        return self._folder / f"{index:0{_DIGITS}}.png"
+        return self._folder / frame_name(index, self._suffix)
 
     def write(self, index: int, codes: np.ndarray) -> None:
         """Write a frame, whole or not at all."""
@@ -255,7 +263,7 @@ class Frames:
 
     def _stored(self) -> dict | None:
         try:
-            stored = json.loads(files.read_text(self._manifest, files.SETTINGS_BYTES))
+            stored = json.loads(files.read_text(self._manifest, files.TABLE_BYTES))
         except (OSError, ValueError, RecursionError):
             return None
         return stored if isinstance(stored, dict) else None
@@ -267,12 +275,17 @@ class Frames:
             )
 
     def _empty(self) -> None:
-        """Remove the frames of an earlier animation and nothing else."""
+        """Remove the frames that were made here before, and nothing else."""
         if self._stored() is not None:
-            for frame in self._folder.glob("*.png"):
-                if frame.stem.isdigit():
+            for frame in self._folder.iterdir():
+                if frame.stem.isdigit() and frame.suffix in SUFFIXES:
                     frame.unlink()
         self._manifest.unlink(missing_ok=True)
+
+
+def frame_name(index: int, suffix: str) -> str:
+    """Of a frame's file."""
+    return f"{index:0{_DIGITS}}{suffix}"
 
 
 def frame_bytes(codes: np.ndarray) -> bytes:
@@ -290,10 +303,13 @@ def _exposure(value: object) -> float | None:
     return float(value) if is_number and math.isfinite(value) else None  # type: ignore[arg-type]
 
 
-def _is_whole_png(path: Path) -> bool:
-    """Whether the file begins and ends as a PNG does: a power cut may leave one that is empty or cut."""
+def _is_whole(path: Path) -> bool:
+    """Whether the file is there and, where it is a PNG, begins and ends as one: a power cut may leave it empty or
+    cut."""
     try:
         files.check_regular(path, files.DATA_BYTES)
+        if path.suffix != ".png":
+            return path.stat().st_size > 0
         with path.open("rb") as file:
             begins = file.read(len(_PNG_BEGIN)) == _PNG_BEGIN
             file.seek(-len(_PNG_END), os.SEEK_END)

@@ -16,7 +16,7 @@ from click.shell_completion import get_completion_class
 from ..base.errors import UserError
 from ..base.paths import shipped_scenes
 from ..model.settings import CAMERA_METHODS, METHODS
-from .scenes import find_scene, receivers_of
+from .scenes import find_scene
 
 _STARTS = {
     "bash": ".bashrc",
@@ -45,7 +45,7 @@ def receivers(context: click.Context, incomplete: str) -> list[str]:
     # Where the option to complete lacks its value, click keeps the arguments apart.
     scene = context.params.get("scene") or next(iter(context.args), "")
     try:
-        return receivers_of(load_scene(find_scene(scene)))
+        return load_scene(find_scene(scene)).receiver_names
     except (UserError, OSError):
         return []
 

@@ -53,15 +53,10 @@ def check_layer(text: str, scene: Scene) -> None:
     if kind != "map":
         hint = suggestion(text, ("beauty", "caustic", "map"))
         raise UserError(f"--layer '{text}' is unknown{hint or ','} known are beauty, caustic and map:RECEIVER")
-    receivers = receivers_of(scene)
+    receivers = scene.receiver_names
     if name not in receivers:
         listed = ", ".join(f"'map:{receiver}'" for receiver in receivers) or "none, for nothing in it is diffuse"
         raise UserError(f"--layer '{text}' names no receiver of scene '{scene.name}'; it has {listed}")
-
-
-def receivers_of(scene: Scene) -> list[str]:
-    """Names of the diffuse objects, in the scene's order."""
-    return list(dict.fromkeys(item.name for item in scene.objects if item.material.receives))
 
 
 def load_scenes(names: Sequence[str]) -> dict[str, Scene]:

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import json
-import os
 import time
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base import files
-from ..base.atomic import atomic_output
 from ..base.errors import UserError
-from ..base.image_io import SHOWN_SUFFIXES, SPECTRAL_SUFFIXES, write_image
+from ..base.image_io import SPECTRAL_SUFFIXES, write_image
 from ..base.interrupts import interrupt_flag
+from ..base.movie import Frames, frame_name
 from ..model.settings import RenderSettings
 from .farm import run, workers_of
 from .opened import note_assumptions, open_scene, settings_for
@@ -24,12 +20,11 @@ from .table import Sweep
 
 if TYPE_CHECKING:
     from ..edit.parameters import Stage
-    from ..render.sweep import Point, SweepPlan
+    from ..render.sweep import SweepPlan
     from ..render.sweep_points import Drawn
 
 DEFAULT_SAMPLES = 32
 INDEX = "sweep.json"
-_DIGITS = 4
 
 
 def sweep(options: Sweep) -> int:
@@ -62,19 +57,19 @@ def sweep(options: Sweep) -> int:
     note(plan_words(plan, workers))
     started = time.perf_counter()
     with held(options.output, options.output), interrupt_flag() as interrupted:
-        folder = SweepFolder(
-            options.output, plan.points, _description(start, settings, plan), f".{options.format}", options.overwrite
-        )
-        there = sum(folder.has(point.number) for point in plan.points)
+        suffix = f".{options.format}"
+        frames = Frames(options.output, _description(start, settings, plan, suffix), options.overwrite, INDEX, suffix)
+        pictures = _Pictures(frames, plan)
+        there = sum(frames.has(point.number) for point in plan.points)
         if is_here or not plan.can_spread:
             with ProgressReporter(scene.name) as progress:
-                _draw_here(plan, folder, progress, interrupted)
+                _draw_here(plan, frames, pictures, progress, interrupted)
         else:
             from ..farm.kinds import PointsJob
 
-            job = PointsJob(plan, folder.put, lambda number: not folder.has(number), folder.first)
+            job = PointsJob(plan, pictures.put, lambda number: not frames.has(number), pictures.first)
             run(options, job, scene.name, interrupted)
-        made = sum(folder.has(point.number) for point in plan.points)
+        made = sum(frames.has(point.number) for point in plan.points)
     kept = f" ({there} were there)" if there else ""
     stopped = interrupted() and made < len(plan.points)
     print(
@@ -132,128 +127,77 @@ def plan_words(plan: SweepPlan, workers: int | None) -> str:
 
 
 def _draw_here(
-    plan: SweepPlan, folder: SweepFolder, progress: Callable[[float, str], None], stop: Callable[[], bool]
+    plan: SweepPlan,
+    frames: Frames,
+    pictures: _Pictures,
+    progress: Callable[[float, str], None],
+    stop: Callable[[], bool],
 ) -> None:
     """One point after the other in this process."""
     from ..gpu.context import create_context
     from ..gpu.shader import keep_programs
     from ..render.sweep_points import SweepPainter
 
-    due = [point.number for group in plan.groups for point in group.points if not folder.has(point.number)]
+    due = [point.number for group in plan.groups for point in group.points if not frames.has(point.number)]
     with create_context() as context:
         keep_programs(context.ctx)
         painter = SweepPainter(context, plan)
         try:
             for drawn in painter.draw_all(due, progress, stop):
-                folder.put(drawn)
+                pictures.put(drawn)
         finally:
             painter.release()
 
 
-def _description(start: Stage, settings: RenderSettings, plan: SweepPlan) -> Mapping[str, object]:
-    """What decides the pictures apart from their values."""
+def _description(start: Stage, settings: RenderSettings, plan: SweepPlan, suffix: str) -> Mapping[str, object]:
+    """What decides the pictures: their values, and all else."""
     from ..render.parts import rendering_key
 
-    return {
+    shared = {
         "scene": start.scene.name,
         "rendering": rendering_key(start.scene, settings),
         "exposure_ev": start.exposure_ev,
         "keeps_photons": plan.keeps_photons,
+        "suffix": suffix,
+    }
+    return {
+        "sweep": shared,
+        "pictures": [{"file": frame_name(point.number, suffix), **point.values} for point in plan.points],
     }
 
 
-class SweepFolder:
-    """Pictures of `points`; those to look at share the exposure of the first point."""
+class _Pictures:
+    """Writes the points of a sweep into their folder, and notes what each says of itself, each sentence once."""
 
-    def __init__(
-        self, folder: Path, points: tuple[Point, ...], description: Mapping[str, object], suffix: str, overwrite: bool
-    ) -> None:
-        """`description`: what decides the pictures apart from their values. The folder is there and held. Raises
-        `UserError` where it holds another sweep."""
-        self._folder, self._points, self._suffix = folder, points, suffix
-        self._description = json.loads(json.dumps(dict(description) | {"suffix": suffix}))
-        self._base_ev: float | None = None
+    def __init__(self, frames: Frames, plan: SweepPlan) -> None:
+        self._frames, self._plan = frames, plan
         self._noted: set[str] = set()
-        before = self._stored()
-        wanted = {"sweep": self._description, "pictures": self._pictures()}
-        if before is not None and {key: before.get(key) for key in wanted} != wanted:
-            if not overwrite:
-                raise UserError(f"{folder} holds another sweep: choose another folder, or replace it with --overwrite")
-            self._empty(before)
-            before = None
-        elif before is not None and overwrite:
-            self._empty(before)
-            before = None
-        if before is not None:
-            found = before.get("base_ev")
-            self._base_ev = float(found) if isinstance(found, int | float) else None
-        self._save()
-
-    def path(self, number: int) -> Path:
-        """Of a point's picture."""
-        return self._folder / f"{number:0{_DIGITS}}{self._suffix}"
-
-    def has(self, number: int) -> bool:
-        """Whether it is there: files appear whole or not at all."""
-        is_settled = self._base_ev is not None or not self.shares_exposure
-        return is_settled and os.path.isfile(self.path(number)) and self.path(number).stat().st_size > 0
-
-    @property
-    def shares_exposure(self) -> bool:
-        """Whether pictures are for looking at."""
-        return self._suffix in SHOWN_SUFFIXES
 
     @property
     def first(self) -> int | None:
         """The point that must be drawn before the others can be written; None where that is settled."""
-        return 0 if self.shares_exposure and self._base_ev is None else None
+        return 0 if self._frames.shares_exposure and self._frames.exposure() is None else None
 
     def put(self, drawn: Drawn) -> None:
-        """Write a point's picture, and note what it says of itself, each sentence once. Raises `UserError`."""
+        """Write one. Raises `UserError`."""
         from ..base.tone_map import auto_exposure
 
+        path, stage = self._frames.path(drawn.number), self._plan.points[drawn.number].stage
         exposure = None
-        if self.shares_exposure:
-            if self._base_ev is None:
-                self._base_ev = auto_exposure(drawn.rgb)
-                self._save()
-            exposure = self._base_ev - auto_exposure(drawn.rgb) + self._points[drawn.number].stage.exposure_ev
+        if self._frames.shares_exposure:
+            own_ev = auto_exposure(drawn.rgb)
+            exposure = self._frames.fix_exposure(own_ev) - own_ev + stage.exposure_ev
         for sentence in drawn.notices:
             if sentence not in self._noted:
                 self._noted.add(sentence)
                 note(f"picture {drawn.number}: {sentence}")
-        stage = self._points[drawn.number].stage
+        keeps_bins = path.suffix in SPECTRAL_SUFFIXES
         write_image(
-            self.path(drawn.number),
+            path,
             drawn.rgb,
             exposure_ev=exposure,
             glare=stage.scene.render.glare,
             antialias=stage.scene.render.antialias_highlights,
-            spectral=drawn.spectral if self._suffix in SPECTRAL_SUFFIXES else None,
-            bin_edges_nm=drawn.bin_edges_nm if self._suffix in SPECTRAL_SUFFIXES else None,
+            spectral=drawn.spectral if keeps_bins else None,
+            bin_edges_nm=drawn.bin_edges_nm if keeps_bins else None,
         )
-
-    def _pictures(self) -> list[dict[str, object]]:
-        return [{"file": self.path(point.number).name, **point.values} for point in self._points]
-
-    def _stored(self) -> dict | None:
-        try:
-            stored = json.loads(files.read_text(self._folder / INDEX, files.TABLE_BYTES))
-        except FileNotFoundError:
-            return None
-        except (OSError, ValueError, RecursionError) as error:
-            raise UserError(f"{self._folder / INDEX} cannot be read: remove it, or choose another folder") from error
-        return stored if isinstance(stored, dict) else {}
-
-    def _save(self) -> None:
-        index = {"sweep": self._description, "pictures": self._pictures(), "base_ev": self._base_ev}
-        with atomic_output(self._folder / INDEX) as temporary:
-            temporary.write_text(json.dumps(index, indent=1) + "\n", encoding="utf-8")
-
-    def _empty(self, before: dict) -> None:
-        """Remove the pictures of the sweep that was here, and nothing else."""
-        for picture in before.get("pictures", ()):
-            name = picture.get("file", "") if isinstance(picture, dict) else ""
-            path = self._folder / str(name)
-            if path.parent == self._folder and path.stem.isdigit():
-                path.unlink(missing_ok=True)

@@ -130,3 +130,8 @@ class Scene:
     """What was assumed while loading, one sentence each; shown to the user."""
     units: str = ""
     """What people call the unit of length ("mm"); converts nothing. Empty where nobody said."""
+
+    @property
+    def receiver_names(self) -> list[str]:
+        """Names of the diffuse objects, in their order."""
+        return list(dict.fromkeys(item.name for item in self.objects if item.material.receives))

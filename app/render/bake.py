@@ -37,24 +37,12 @@ def placement_path(path: Path) -> Path:
     return path.with_suffix(".json")
 
 
-def receivers(scene: Scene) -> list[str]:
-    """Names of what can be baked."""
-    return list(dict.fromkeys(item.name for item in scene.objects if item.material.receives))
-
-
-def check_receiver(scene: Scene, name: str) -> str:
-    """`name`, where it is a receiver of `scene`; raises `UserError` naming those there are."""
-    known = receivers(scene)
+def check_receiver(scene: Scene, name: str) -> None:
+    """Raise `UserError`, naming those there are, where this is no receiver of `scene`."""
+    known = scene.receiver_names
     if name not in known:
         listed = ", ".join(f"'{receiver}'" for receiver in known) or "none, for nothing in it is diffuse"
         raise UserError(f"'{name}' is no receiver of scene '{scene.name}'{suggestion(name, known)}; it has {listed}")
-    return name
-
-
-def check_output(path: Path) -> Path:
-    """`path`, where it can hold a map: .exr, .png or .npy; raises `UserError`."""
-    check_suffix(path)
-    return path
 
 
 @dataclass(frozen=True)
@@ -103,19 +91,24 @@ def bake(
 
     `settings.width`, `height`: texels. What the light pass says of itself goes to `notices`. Raises `UserError`.
     """
-    check_output(path)
+    check_suffix(path)
     baked = yield from bake_map(context, stage, settings, receiver)
-    rgb, where = baked.picture.rgb, baked.placement
     if notices is not None:
         notices.take(baked.notices)
+    write_map(baked, stage.scene, receiver, path)
+    yield 1.0
+
+
+def write_map(baked: BakedMap, scene: Scene, receiver: str, path: Path) -> None:
+    """Write a map and its placement, or neither. Raises `UserError`."""
+    rgb = baked.picture.rgb
     check_finite(path.name, rgb)
-    told = {**where, "receiver": receiver, "scene": stage.scene.name, "file": path.name, "units": UNITS}
+    told = {**baked.placement, "receiver": receiver, "scene": scene.name, "file": path.name, "units": UNITS}
     if path.suffix.lower() == ".png":
         told["exposure_ev"] = auto_exposure(rgb)
     with atomic_outputs(path, placement_path(path)) as (picture, note):
         write_into(picture, rgb, antialias=False)  # a texture: a pixel stays what it is
         note.write_text(json.dumps(told, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-    yield 1.0
 
 
 def placement(light: LightPass) -> Mapping[str, object]:

@@ -234,7 +234,7 @@ def _bake(
 ) -> Iterator[float]:
     from ..render import bake
 
-    bake.check_output(request.path)
+    check_suffix(request.path)
     bake.check_receiver(stage.scene, request.receiver)
     check_writable(request.path)
     check_writable(bake.placement_path(request.path))

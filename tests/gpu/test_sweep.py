@@ -46,7 +46,7 @@ def test_a_dispersion_sweep_traces_once(tmp_path: Path, capsys: pytest.CaptureFi
     assert main(command) == 0
     assert "(2 were there)" in capsys.readouterr().out and (folder / "0002.npy").stat().st_mtime_ns == before
     assert main([*command[:3], f"{GAIN}=0,2", *command[4:]]) == 2
-    assert "holds another sweep" in capsys.readouterr().err
+    assert "holds frames of another sweep" in capsys.readouterr().err
 
 
 @pytest.mark.slow
