@@ -77,7 +77,7 @@ def render(options: FarmRender) -> int:
         if not done or picture is None:
             print(f"spectrasplat: stopped; {kept.leave()}: the same command goes on", file=sys.stderr)
             return interrupted.exit_code
-        write_result(options, scene, settings, picture)
+        write_result(options.output, scene, settings, picture)
         if not options.keep_parts:
             kept.remove()
     again = f", {job.taken_up} of them from before" if job.taken_up else ""

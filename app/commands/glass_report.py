@@ -16,6 +16,7 @@ from ..base.atomic import atomic_output
 from ..base.errors import UserError
 from ..model.optics.catalogue import Entry, entries, is_guess, search
 from ..model.optics.glass import LINE_C_NM, LINE_D_NM, LINE_F_NM
+from .printing import table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,22 +30,17 @@ def list_glasses(query: str = "", limit: int | None = None) -> Table:
 
     Raises `UserError` when nothing resembles the query.
     """
-    from rich.table import Table
-
     found = search(query, limit)
     if not found:
         raise UserError(f"no glass resembles '{query}'; 'spectrasplat glass' without a name lists all")
     what = "similar names among" if is_guess(query) else "of"
-    table = Table(title=f"{len(found)} {what} {len(entries())} glasses and materials", title_justify="left")
-    for heading in ("name", "maker", "n_d", "V_d", "range nm", "also"):
-        is_number = heading in ("n_d", "V_d", "range nm")
-        table.add_column(heading, justify="right" if is_number else "left", no_wrap=heading != "also")
+    rows = []
     for entry in found:
         glass = entry.dispersion
-        table.add_row(
-            entry.name, entry.maker, f"{glass.n_d:.5f}", _abbe(glass.V_d), _range(entry), ", ".join(entry.aliases)
-        )
-    return table
+        also = ", ".join(entry.aliases)
+        rows.append((entry.name, entry.maker, f"{glass.n_d:.5f}", _abbe(glass.V_d), _range(entry), also))
+    title = f"{len(found)} {what} {len(entries())} glasses and materials"
+    return table(title, ("name", "maker", ">n_d", ">V_d", ">range nm", "also"), rows)
 
 
 def describe(entry: Entry) -> str:
@@ -52,7 +48,7 @@ def describe(entry: Entry) -> str:
     glass = entry.dispersion
     n_f, n_c = float(glass.index(LINE_F_NM)), float(glass.index(LINE_C_NM))
     lines = [entry.qualified_name]
-    view_model = {
+    facts = {
         "maker": entry.maker if entry.maker != "Materials" else "",
         "also called": ", ".join(entry.aliases),
         "status": entry.status,
@@ -67,7 +63,7 @@ def describe(entry: Entry) -> str:
         "source": entry.source,
         "licence": entry.licence,
     }
-    lines += [f"  {label:<17}{value}" for label, value in view_model.items() if value]
+    lines += [f"  {label:<17}{value}" for label, value in facts.items() if value]
     lines.append("  formula (λ in µm)")
     lines += [f"    {row}" for row in glass.formula_text().splitlines()]
     lines += [f"  note: {note}" for note in glass.notes()]

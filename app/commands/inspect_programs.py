@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from ..gpu import strict_compilers
 from ..gpu.limits import NEEDED
 from ..gpu.program_use import StageUse, uses
+from .printing import table
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -84,7 +85,6 @@ def beyond_promises(programs: Sequence[Built]) -> list[str]:
 def programs_text(scene: Scene) -> RenderableType:
     """The table of all programs that a small rendering of `scene` builds. Raises `UserError` without OpenGL."""
     from rich.console import Group
-    from rich.table import Table
 
     from ..bench.programs import compiled_programs
     from ..gpu.context import create_context
@@ -93,14 +93,11 @@ def programs_text(scene: Scene) -> RenderableType:
     with create_context() as context:
         programs = compiled_programs(context, scene, RenderSettings(max_depth=scene.render.max_depth))
         renderer = context.renderer
-    table = Table(title=f"Programs, as compiled by {renderer}", title_justify="left")
-    for at, heading in enumerate(HEADINGS):
-        table.add_column(heading, justify="right" if at else "left", overflow="fold")
-    for row in program_rows(programs):
-        table.add_row(*row.cells())
+    headings = (HEADINGS[0], *(f">{heading}" for heading in HEADINGS[1:]))
+    rows = [row.cells() for row in program_rows(programs)]
     seconds = sum(built.seconds for built in programs)
     return Group(
-        table,
+        table(f"Programs, as compiled by {renderer}", headings, rows),
         f"{len(programs)} programs, {seconds:.1f} s in the driver; some drivers compile the rest when a program first "
         "runs.",
         _live_words_told(),

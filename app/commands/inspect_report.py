@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..model.scene import Camera, Light, Scene, SceneObject
-from .printing import show
+from ..model.scene_defaults import bounds_of
+from .printing import show, table
 from .scenes import find_scene
 from .table import Inspect
 
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
     from rich.table import Table
 
-    from ..features.features import Features
     from ..model.optics.glass import Dispersion
 
 
@@ -37,7 +37,7 @@ def inspect_text(scene: Scene) -> RenderableType:
     from rich.console import Group
 
     parts: list[RenderableType] = [
-        f"Scene '{scene.name}', bounds {_box(*_bounds(scene.objects))}",
+        f"Scene '{scene.name}', bounds {_box(*bounds_of(scene.objects))}",
         _objects_table(scene.objects),
         _lights_table(scene.lights),
         camera_line(scene),
@@ -77,92 +77,59 @@ def light_flux(light: Light) -> tuple[float, float] | None:
 # -- tables -------------------------------------------------------------------------------
 
 
-def _table(title: str, *columns: tuple[str, bool]) -> Table:
-    """An empty table; a column is (heading, right-aligned)."""
-    from rich.table import Table
-
-    table = Table(title=title, title_justify="left")
-    for heading, right in columns:
-        table.add_column(heading, justify="right" if right else "left", overflow="fold")
-    return table
-
-
 def _objects_table(objects: tuple[SceneObject, ...]) -> Table:
     from ..model.geometry.mesh_health import examine
 
-    table = _table(
-        "Objects",
-        ("name", False),
-        ("triangles", True),
-        ("bounds", False),
-        ("material", False),
-        ("shading", False),
-        ("mesh", False),
-    )
-    health: dict[int, str] = {}
-    for item in objects:
-        mesh = item.mesh
-        if id(mesh) not in health:
-            health[id(mesh)] = examine(mesh).summary()
-        table.add_row(
+    meshes = {id(item.mesh): item.mesh for item in objects}
+    health = {key: examine(mesh).summary() for key, mesh in meshes.items()}
+    rows = [
+        (
             item.name,
-            f"{len(mesh.triangles):,}",
-            _box(*_bounds((item,))),
+            f"{len(item.mesh.triangles):,}",
+            _box(*bounds_of((item,))),
             item.material.words(),
-            "flat" if mesh.corner_normals is None else "smooth",
-            health[id(mesh)],
+            "flat" if item.mesh.corner_normals is None else "smooth",
+            health[id(item.mesh)],
         )
-    return table
+        for item in objects
+    ]
+    return table("Objects", ("name", ">triangles", "bounds", "material", "shading", "mesh"), rows)
 
 
-def _glasses_table(glasses: list) -> Table:
-    table = _table(
-        "Glasses",
-        ("name", False),
-        ("n_d", True),
-        ("V_d", True),
-        ("n at 400 nm", True),
-        ("n at 700 nm", True),
-        ("data", False),
-    )
+def _glasses_table(glasses: list[Dispersion]) -> Table:
+    rows = []
     for glass in glasses:
         low, high = glass.range_nm
-        reach = "any wavelength" if math.isinf(high) else f"{low:g}–{high:g} nm"
-        v_d = "∞ (no dispersion)" if math.isinf(glass.natural.V_d) else f"{glass.natural.V_d:.2f}"
-        table.add_row(
-            (glass.name or "(unnamed)") + _gain_words(glass),
-            f"{glass.n_d:.6f}",
-            v_d,
-            f"{float(glass.index(400.0)):.6f}",
-            f"{float(glass.index(700.0)):.6f}",
-            reach,
+        gain = "" if glass.gain == 1.0 else f", {glass.gain:g} times as dispersive"
+        rows.append(
+            (
+                (glass.name or "(unnamed)") + gain,
+                f"{glass.n_d:.6f}",
+                "∞ (no dispersion)" if math.isinf(glass.natural.V_d) else f"{glass.natural.V_d:.2f}",
+                f"{float(glass.index(400.0)):.6f}",
+                f"{float(glass.index(700.0)):.6f}",
+                "any wavelength" if math.isinf(high) else f"{low:g}–{high:g} nm",
+            )
         )
-    return table
+    return table("Glasses", ("name", ">n_d", ">V_d", ">n at 400 nm", ">n at 700 nm", "data"), rows)
 
 
 def _lights_table(lights: tuple[Light, ...]) -> Table:
-    table = _table(
-        "Lights",
-        ("name", False),
-        ("kind", False),
-        ("spectrum", False),
-        ("photometric", True),
-        ("radiometric", True),
-        ("in all", False),
-    )
+    rows = []
     for light in lights:
         lumen, watt = (key.unit for key in light.own_keys)
-        flux = light_flux(light)
-        power = light.spectral_power
-        table.add_row(
-            light.name,
-            light.words(),
-            spectrum_words(light),
-            f"{power.luminous():.5g} {lumen}",
-            f"{power.power_w():.5g} {watt}",
-            "per unit² only" if flux is None else f"{flux[0]:.5g} lm, {flux[1]:.5g} W",
+        flux, power = light_flux(light), light.spectral_power
+        rows.append(
+            (
+                light.name,
+                light.words(),
+                spectrum_words(light),
+                f"{power.luminous():.5g} {lumen}",
+                f"{power.power_w():.5g} {watt}",
+                "per unit² only" if flux is None else f"{flux[0]:.5g} lm, {flux[1]:.5g} W",
+            )
         )
-    return table
+    return table("Lights", ("name", "kind", "spectrum", ">photometric", ">radiometric", "in all"), rows)
 
 
 def _compiled(scene: Scene) -> list[RenderableType]:
@@ -170,33 +137,21 @@ def _compiled(scene: Scene) -> list[RenderableType]:
     from ..features.facts import Facts
     from ..features.features import Features
     from ..model.settings import RenderSettings
+    from .inspect_camera import lookups
 
     wishes = scene.render
     settings = RenderSettings(width=wishes.width, height=wishes.height, max_depth=wishes.max_depth)
-    features = Features.of(scene, settings)
-    facts = Facts(scene, settings)
+    features, facts = Features.of(scene, settings), Facts(scene, settings)
     costs = static_costs(facts, features)
-    table = _table("Compiled into the programs", ("part", False), ("", False), ("why", False), ("costs", False))
-    for name, included, reason in features.explain(facts):
-        table.add_row(name, "in" if included else "out", reason, costs.get(name, ""))
-    return [
-        table,
-        f"{record_words(features)} What each part costs in time: bench --features.",
-        _lookups_table(scene, features),
+    rows = [
+        (name, "in" if included else "out", reason, costs.get(name, ""))
+        for name, included, reason in features.explain(facts)
     ]
-
-
-def _lookups_table(scene: Scene, features: Features) -> Table:
-    from .inspect_camera import lookups
-
-    table = _table("Looked up by camera rays", ("what", False), ("content", False), ("how", False), ("memory", False))
-    for row in lookups(scene, features):
-        table.add_row(*row)
-    return table
-
-
-def _gain_words(glass: Dispersion) -> str:
-    return "" if glass.gain == 1.0 else f", {glass.gain:g} times as dispersive"
+    return [
+        table("Compiled into the programs", ("part", " ", "why", "costs"), rows),
+        f"{record_words(features)} What each part costs in time: bench --features.",
+        table("Looked up by camera rays", ("what", "content", "how", "memory"), lookups(scene, features)),
+    ]
 
 
 # -- words --------------------------------------------------------------------------------
@@ -218,12 +173,6 @@ def spectrum_words(light: Light) -> str:
         return "lines at " + ", ".join(f"{wavelength:g}" for wavelength, _ in lines) + " nm"
     low, high = light.spectral_power.support_nm()
     return f"table {math.ceil(low)}–{math.floor(high)} nm" + (f" and {len(lines)} line(s)" if lines else "")
-
-
-def _bounds(objects: tuple[SceneObject, ...]) -> tuple[np.ndarray, np.ndarray]:
-    from ..model.scene_defaults import bounds_of
-
-    return bounds_of(objects)
 
 
 def _box(low: np.ndarray, high: np.ndarray) -> str:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import time
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..base.errors import UserError
 from ..base.interrupts import interrupt_flag
 from .printing import note
+from .render import write_result
 from .scenes import find_scene
 from .table import Merge
 
@@ -20,7 +22,7 @@ if TYPE_CHECKING:
 def merge(options: Merge) -> int:
     """Merge to a picture file; returns the exit code. Raises `UserError`."""
     from ..base.atomic import check_writable
-    from ..base.image_io import check_suffix, write_image
+    from ..base.image_io import check_suffix
     from ..base.progress import ProgressReporter
 
     if options.output.suffix.lower() == ".ssp":
@@ -53,17 +55,8 @@ def merge(options: Merge) -> int:
     with interrupt_flag() as interrupted, ProgressReporter(scene.name) as progress:
         result = render(scene, settings, progress, interrupted, fill=fill)
         stopped = interrupted()
-    for notice in result.stats.notices:
-        note(notice)
-    write_image(
-        options.output,
-        result.rgb,
-        exposure_ev=scene.render.exposure_ev if options.exposure is None else options.exposure,
-        glare=scene.render.glare,
-        antialias=scene.render.antialias_highlights,
-        spectral=result.spectral,
-        bin_edges_nm=result.bin_edges_nm,
-    )
+    exposure_ev = scene.render.exposure_ev if options.exposure is None else options.exposure
+    write_result(options.output, scene, replace(settings, exposure_ev=exposure_ev, glare=scene.render.glare), result)
     print(
         f"{options.output.resolve()}: {settings.width}×{settings.height}, "
         f"{sum(len(headers[path].indices) for path in chosen)} of {first.share.count} parts, "

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from ..base.errors import plain, visible
 
 if TYPE_CHECKING:
+    from rich.table import Table
     from rich.text import Text as RichText
 
 PIPE_WIDTH = 200
@@ -17,6 +19,18 @@ PIPE_WIDTH = 200
 def note(sentence: str) -> None:
     """Report on stderr what was assumed or met."""
     print(f"note: {plain(sentence)}", file=sys.stderr)
+
+
+def table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
+    """A table to `show`; a heading that begins with ">" is that of a column of numbers."""
+    from rich.table import Table
+
+    made = Table(title=title, title_justify="left")
+    for heading in headings:
+        made.add_column(heading.lstrip(">"), justify="right" if heading[0] == ">" else "left", overflow="fold")
+    for row in rows:
+        made.add_row(*row)
+    return made
 
 
 def show(content: object) -> None:

@@ -55,17 +55,15 @@ class Part:
     title: str
     run: Callable[[bool, Path], Iterator[Finding]]
     """(short, folder for files) → what is found."""
-    seconds: tuple[float, float]
-    """Expected on a GPU, and of the short form on two cores: weights of the progress bar …"""
     limit_s: tuple[float, float]
-    """… and when it is ended."""
+    """When it is ended; of the short form."""
 
 
 # -- doctor -------------------------------------------------------------------------------
 
 
 def _doctor(_short: bool, _folder: Path) -> Iterator[Finding]:
-    from ..bench.machine import machine
+    from ..bench.machine import clocks, machine
     from ..gpu.context import create_context
     from .doctor import examine
 
@@ -74,13 +72,6 @@ def _doctor(_short: bool, _folder: Path) -> Iterator[Finding]:
     with create_context() as context:
         yield from (Finding(f"machine {name}", value) for name, value in machine(context).items())
         yield Finding("is software", "yes" if context.is_software else "no")
-    yield from _clocks()
-
-
-def _clocks() -> Iterator[Finding]:
-    """What NVIDIA's own tool says, where it is there."""
-    from ..bench.machine import clocks
-
     if said := clocks():
         yield Finding("nvidia-smi", said)
 
@@ -308,16 +299,16 @@ def _bench(short: bool, folder: Path) -> Iterator[Finding]:
 
 
 PARTS = (
-    Part("doctor", "Machine, driver, limits", _doctor, (5, 3), (60, 60)),
-    Part("programs", "Every program compiles, and is GLSL by the book", _programs, (90, 25), (240, 240)),
-    Part("answers", "Known answers", _answers, (35, 6), (90, 120)),
-    Part("pictures", "Pictures against stored ones", _pictures, (110, 15), (240, 240)),
-    Part("stress", "Stress", _stress, (40, 16), (120, 240)),
-    Part("frames", "Frames of a million photons", _frames, (25, 8), (60, 120)),
-    Part("speed", "Stages", _speed, (40, 10), (90, 240)),
-    Part("view-small", "Viewer, 960×540", _view((960, 540), (160, 90)), (35, 15), (90, 240)),
-    Part("view-large", "Viewer, 1920×1080", _view((1920, 1080), (320, 180)), (40, 18), (90, 240)),
-    Part("bench", "Error against run time", _bench, (120, 20), (180, 240)),
+    Part("doctor", "Machine, driver, limits", _doctor, (60, 60)),
+    Part("programs", "Every program compiles, and is GLSL by the book", _programs, (240, 240)),
+    Part("answers", "Known answers", _answers, (90, 120)),
+    Part("pictures", "Pictures against stored ones", _pictures, (240, 240)),
+    Part("stress", "Stress", _stress, (120, 240)),
+    Part("frames", "Frames of a million photons", _frames, (60, 120)),
+    Part("speed", "Stages", _speed, (90, 240)),
+    Part("view-small", "Viewer, 960×540", _view((960, 540), (160, 90)), (90, 240)),
+    Part("view-large", "Viewer, 1920×1080", _view((1920, 1080), (320, 180)), (90, 240)),
+    Part("bench", "Error against run time", _bench, (180, 240)),
 )
 """In this order: what must hold first, what is only measured last."""
 

@@ -135,31 +135,23 @@ def summary(proof: Proof) -> str:
 def _run_all(
     proof: Proof, parts: Sequence[Part], folder: Path, progress: Callable[[float, str], None], started: float
 ) -> None:
-    done_s = 0.0
-    for part, result in zip(parts, proof.parts, strict=True):
-        form = 1 if proof.short else 0
-        weights = [p.seconds[form] for p in parts]
-        all_s, own_s = sum(weights), part.seconds[form]
-
-        def tell(
-            share: float, before: float = done_s, own: float = own_s, all_s: float = all_s, name: str = part.title
-        ) -> None:
-            progress((before + own * share) / all_s, name)
-
+    for at, (part, result) in enumerate(zip(parts, proof.parts, strict=True)):
         left = WHOLE_S - (time.monotonic() - started)
         if left <= 0.0:
             return
+
+        def tell(share: float, at: int = at, name: str = part.title) -> None:
+            progress((at + share) / len(parts), name)
+
         tell(0.0)
         try:
-            _run(part, result, _Run(proof.short, folder, part.limit_s[form], left, tell))
+            _run(part, result, _Run(proof.short, folder, part.limit_s[proof.short], left, tell))
         finally:
             _keep(proof, folder)
-        done_s += own_s
         if part.key == "doctor":
             if result.is_wrong:  # nothing else can run
                 return
             proof.short |= proof.is_software
-            done_s = part.seconds[1 if proof.short else 0]
 
 
 @dataclass(frozen=True)

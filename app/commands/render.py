@@ -71,19 +71,19 @@ def render_picture(options: Render) -> int:
         stopped = interrupted()
     if better := advice(result.stats.renderer, result.stats.is_software):
         note(better)
-    write_result(options, scene, settings, result)
+    write_result(options.output, scene, settings, result)
     print(_summary(options, settings, result.stats, stopped))
     if options.stats:
         print("\n".join(result.stats.lines()))
     return interrupted.exit_code if stopped else 0
 
 
-def write_result(options: Render, scene: Scene, settings: RenderSettings, result: RenderResult) -> None:
+def write_result(output: Path, scene: Scene, settings: RenderSettings, result: RenderResult) -> None:
     """Note what is to be said of a picture, and write it. Raises `UserError`."""
     for notice in result.stats.notices:
         note(notice)
     write_image(
-        options.output,
+        output,
         result.rgb,
         exposure_ev=settings.exposure_ev,
         glare=settings.glare,
