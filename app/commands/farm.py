@@ -19,13 +19,13 @@ from .render import check_output, picture_settings, write_result
 from .table import ByWorkers, FarmAnimate, FarmRender
 
 if TYPE_CHECKING:
-    from ..farm.jobs import Job
+    from ..farm.jobs import Job, Tally
 
 FOLDER_SUFFIX = ".parts"
 
 
-def run(options: ByWorkers, job: Job, name: str, stop: Callable[[], bool]) -> bool:
-    """Have a job done by the workers that are wanted; False where `stop()` turned true before. Raises `UserError`."""
+def run(options: ByWorkers, job: Job, name: str, stop: Callable[[], bool]) -> Tally | None:
+    """Have a job done by the workers that are wanted; None where `stop()` turned true before. Raises `UserError`."""
     from ..base.progress import ProgressReporter
     from ..farm.cluster import open_crew
     from ..farm.jobs import Foreman
@@ -67,14 +67,14 @@ def render(options: FarmRender) -> int:
         job = StillJob(scene, settings, scene_file, folder, options.parts, note)
         kept = job.kept
         try:
-            done = run(options, job, scene.name, interrupted)
+            tally = run(options, job, scene.name, interrupted)
         except UserError as error:
             raise UserError(f"{error} ({kept.leave()})") from error
         except BaseException:
             kept.leave()
             raise
         picture = job.picture
-        if not done or picture is None:
+        if tally is None or picture is None:
             print(f"spectrasplat: stopped; {kept.leave()}: the same command goes on", file=sys.stderr)
             return interrupted.exit_code
         write_result(options.output, scene, settings, picture)
@@ -82,13 +82,17 @@ def render(options: FarmRender) -> int:
             kept.remove()
     again = f", {job.taken_up} of them from before" if job.taken_up else ""
     print(
-        f"{options.output.resolve()}: {settings.width}×{settings.height}, {kept.count} parts{again}, "
+        f"{options.output.resolve()}: {settings.width}×{settings.height}, {kept.count} parts{again}{_copied(tally)}, "
         f"{picture.stats.photons:,} photons in {time.perf_counter() - started:.1f} s, of which merging "
         f"{kept.size_bytes / 1e6:.1f} MB took {kept.seconds:.1f} s ({picture.stats.renderer})"
     )
     if options.stats:
         print("\n".join(picture.stats.lines()))
     return 0
+
+
+def _copied(tally: Tally) -> str:
+    return f", {tally.copied} begun a second time" if tally.copied else ""
 
 
 def animate(options: FarmAnimate) -> int:
@@ -114,7 +118,7 @@ def animate(options: FarmAnimate) -> int:
         there = sum(sink.has(index) for index in plan.only)
         job = FramesJob(plan.animation, settings, sink, plan.only)
         try:
-            done = run(options, job, plan.animation.start.scene.name, interrupted)
+            tally = run(options, job, plan.animation.start.scene.name, interrupted)
         except UserError as error:
             made = sum(sink.has(index) for index in plan.only)
             raise UserError(f"{error} ({made} of {count} frames are in {folder})") from error
@@ -122,7 +126,7 @@ def animate(options: FarmAnimate) -> int:
             for sentence in job.notices.lines(of_frames=count > 1):
                 note(sentence)
     made = sum(sink.has(index) for index in plan.only)
-    if not done:
+    if tally is None:
         print(
             f"spectrasplat: stopped; {made} of {count} frames are in {folder}: the same command goes on",
             file=sys.stderr,
@@ -138,7 +142,7 @@ def animate(options: FarmAnimate) -> int:
         shutil.rmtree(folder, ignore_errors=True)
     kept = f" ({there} were there)" if there else ""
     print(
-        f"{options.output.resolve()}: {made} of {count} frames{kept}, {size[0]}×{size[1]} at "
+        f"{options.output.resolve()}: {made} of {count} frames{kept}{_copied(tally)}, {size[0]}×{size[1]} at "
         f"{plan.fps:g} a second, in {time.perf_counter() - started:.1f} s"
     )
     return 0

@@ -23,7 +23,6 @@ import uuid
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
-from itertools import count
 from queue import Empty, SimpleQueue
 from types import TracebackType
 from typing import IO, TYPE_CHECKING, Any, Self
@@ -193,7 +192,7 @@ class LocalWorkers:
 
 @dataclass
 class DaskCrew:
-    """See `Crew`: each attempt at a task is one of Dask's tasks, with a key of its own."""
+    """See `Crew`: attempts are Dask's tasks, each with a key of its own."""
 
     client: Client
     address: str
@@ -201,8 +200,7 @@ class DaskCrew:
     _topic: str = field(default_factory=lambda: f"spectrasplat-{uuid.uuid4().hex}")
     _shared: Future | None = None
     _submitted: dict[int, tuple[Task, Future]] = field(default_factory=dict)
-    """By the number of the attempt, which is never used twice."""
-    _attempts: Iterator[int] = field(default_factory=count)
+    """By the attempt, whose numbers are never used twice."""
     _news: SimpleQueue[News] = field(default_factory=SimpleQueue)
     _size: tuple[float, int] = (-1.0, 0)
 
@@ -210,6 +208,10 @@ class DaskCrew:
         """See `Crew`."""
         self._shared = self.client.submit(desk.same, pickle.dumps(value, 5), pure=False)
         self.client.subscribe_topic(self._topic, self._heard)
+
+    def clock(self) -> float:
+        """Of this process."""
+        return time.monotonic()
 
     def size(self) -> int:
         """Threads of all workers, queried now and then."""
@@ -219,10 +221,9 @@ class DaskCrew:
             self._size = now, sum(worker["nthreads"] for worker in found.values())
         return self._size[1]
 
-    def submit(self, task: Task) -> None:
+    def submit(self, task: Task, attempt: int) -> None:
         """See `Crew`."""
         function, *arguments = task.call
-        attempt = next(self._attempts)
         key = f"{self._topic}-{attempt}"
         report = (self._topic, attempt, key)
         priority = 10 if task.urgent else 0
@@ -230,15 +231,14 @@ class DaskCrew:
             desk.do, function, self._shared, __version__, report, *arguments, key=key, pure=False, priority=priority
         )
         self._submitted[attempt] = task, future
-        future.add_done_callback(lambda done: self._news.put(News(task, is_done=True, result=(attempt, done))))
+        future.add_done_callback(lambda done: self._news.put(News(task, attempt, is_done=True, result=done)))
 
-    def drop(self, task: Task) -> None:
+    def drop(self, task: Task, attempt: int) -> None:
         """See `Crew`."""
-        for attempt in [number for number, (held, _) in self._submitted.items() if held is task]:
-            _, future = self._submitted.pop(attempt)
-            if self.client.status == "running":
-                with suppress(Exception):  # the scheduler may go at any moment, and takes it along
-                    future.cancel()
+        _, future = self._submitted.pop(attempt, (task, None))
+        if future is not None and self.client.status == "running":
+            with suppress(Exception):  # the scheduler may go at any moment, and takes it along
+                future.cancel()
 
     def news(self, timeout_s: float) -> list[News]:
         """See `Crew`."""
@@ -257,16 +257,16 @@ class DaskCrew:
     def _heard(self, event: tuple[float, Any]) -> None:
         attempt, share = event[1]
         if attempt in self._submitted:
-            self._news.put(News(self._submitted[attempt][0], share))
+            self._news.put(News(self._submitted[attempt][0], attempt, share))
 
     def _opened(self, news: News) -> News:
         """What a future that is done holds."""
         from distributed.scheduler import KilledWorker
 
-        task, (attempt, future) = news.task, news.result
+        task, attempt, future = news.task, news.attempt, news.result
         self._submitted.pop(attempt, None)
         try:
-            return News(task, 1.0, future.result(timeout=600), is_done=True)
+            return News(task, attempt, 1.0, future.result(timeout=600), is_done=True)
         except UserError as error:
             failed: Exception = error
         except KilledWorker as error:
@@ -281,7 +281,7 @@ class DaskCrew:
         except Exception as error:  # noqa: BLE001 - whatever a worker meets
             self._check_scheduler()
             failed = error
-        return News(task, is_done=True, error=failed)
+        return News(task, attempt, is_done=True, error=failed)
 
     def _check_scheduler(self) -> None:
         """Raise `UserError` where the scheduler is gone, or was for a moment: it has forgotten all then."""
@@ -295,8 +295,8 @@ class DaskCrew:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        for task, _ in [*self._submitted.values()]:
-            self.drop(task)
+        for attempt, (task, _) in [*self._submitted.items()]:
+            self.drop(task, attempt)
         self.client.close(timeout=2)
         if self.workers is not None:
             self.workers.close()

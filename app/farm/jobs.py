@@ -1,5 +1,9 @@
 """A job and the workers that do it: its tasks are distributed from first to last, what a dead worker had is done again,
-and every result is kept once."""
+what is late is begun a second time, and every result is kept once.
+
+The rule for stragglers is that of backup tasks (Dean and Ghemawat, MapReduce, OSDI 2004, section 3.6): once nothing
+waits any more and a worker is free, the task that is latest gets another copy, and the first result counts.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +14,7 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -20,6 +24,14 @@ from ..base.locks import locked
 
 TRIES = 3
 """Of a task that fails with what is no sentence to the user."""
+LATE = 2.0
+"""A task is late that has run so many times as long as half of its kind did."""
+COPIES = 3
+"""Of one task at once, at most: a copy may be late too."""
+ENOUGH = 3
+"""Tasks of a kind that must be done before one is called late."""
+_WORTH_S = 3.0
+"""What is left of a task, at least, that is begun a second time."""
 _WAIT_S = 0.2
 _LOCK = ".farm"
 
@@ -63,9 +75,10 @@ class Job(Protocol):
 
 @dataclass(frozen=True)
 class News:
-    """What a crew says of a task: its share done, or that it has ended, in one of two ways."""
+    """What a crew says of an attempt at a task: its share done, or that it has ended, in one of two ways."""
 
     task: Task
+    attempt: int
     share: float = 0.0
     result: Any = None
     is_done: bool = False
@@ -78,26 +91,40 @@ class Crew(Protocol):
     def share(self, value: Any) -> None:
         """What all tasks from now on are about."""
 
+    def clock(self) -> float:
+        """Seconds."""
+
     def size(self) -> int:
         """How many can work at once at present."""
 
-    def submit(self, task: Task) -> None:
+    def submit(self, task: Task, attempt: int) -> None:
         """Have a task done; what comes of it is reported by `news`."""
 
-    def drop(self, task: Task) -> None:
-        """Forget a task; nothing more is reported of it."""
+    def drop(self, task: Task, attempt: int) -> None:
+        """Forget an attempt; nothing more is reported of it."""
 
     def news(self, timeout_s: float) -> list[News]:
         """What has happened, waiting no longer than that. Raises `UserError` where there is no crew any more."""
 
 
 @dataclass
-class _Running:
-    """A task that a worker has, or that waits at one."""
+class _Attempt:
+    """One that runs, or waits at a worker."""
 
     began_s: float | None = None
     """When a worker began with it."""
     share: float = 0.0
+
+
+@dataclass
+class Tally:
+    """What came to pass."""
+
+    done: int = 0
+    copied: int = 0
+    """Further copies that were begun."""
+    seconds: dict[str, list[float]] = field(default_factory=dict)
+    """Of every task that was done, by its kind."""
 
 
 class Foreman:
@@ -105,36 +132,31 @@ class Foreman:
 
     def __init__(self, crew: Crew, job: Job, stop: Callable[[], bool] = lambda: False) -> None:
         self._crew, self._job, self._stop = crew, job, stop
-        self.done = 0
-        """Tasks that have been done."""
-        self._seconds: dict[str, list[float]] = {}
-        """That they took, by their kind."""
+        self.tally = Tally()
         self._due: deque[Task] = deque()
-        self._running: dict[Task, _Running] = {}
+        self._running: dict[Task, dict[int, _Attempt]] = {}
         self._tried: Counter[Task] = Counter()
+        self._attempts = 0
         self._shown = 0.0
 
-    def run(self, progress: Callable[[float, str], None]) -> bool:
-        """Have everything done; False where `stop()` turned true before. Raises `UserError` where a task cannot be
-        done, the crew is lost, or the job's own methods do."""
+    def run(self, progress: Callable[[float, str], None]) -> Tally | None:
+        """Have everything done; None where `stop()` turned true before. Raises `UserError` where a task cannot be done,
+        the crew is lost, or the job's own methods do."""
         try:
             self._add(self._job.begin())
             self._crew.share(self._job.shared)
             while self._due or self._running:
                 if self._stop():
-                    return False
-                # As many again wait at the workers, so that none is idle while a result travels.
-                while self._due and len(self._running) < max(2 * self._crew.size(), 1):
-                    task = self._due.popleft()
-                    self._running[task] = _Running()
-                    self._crew.submit(task)
+                    return None
+                self._distribute()
                 for news in self._crew.news(_WAIT_S):
                     self._follow(news)
                 progress(*self._progress())
-            return True
+            return self.tally
         finally:
-            for task in self._running:
-                self._crew.drop(task)
+            for task, attempts in self._running.items():
+                for attempt in attempts:
+                    self._crew.drop(task, attempt)
             self._running = {}
 
     def _add(self, tasks: Iterable[Task]) -> None:
@@ -147,35 +169,76 @@ class Foreman:
     def _progress(self) -> tuple[float, str]:
         """The share that is done, which never goes back, and words."""
         waiting = Counter(self._job.ahead()) + Counter(task.kind for task in (*self._due, *self._running))
-        running = [(task.kind, each.share) for task, each in self._running.items()]
-        self._shown = max(self._shown, share_done(self._job.guesses, self._seconds, waiting, running))
+        running = [(task.kind, max(each.share for each in of.values())) for task, of in self._running.items()]
+        self._shown = max(self._shown, share_done(self._job.guesses, self.tally.seconds, waiting, running))
         size = self._crew.size()
-        count = self.done + waiting.total()
-        return self._shown, f"{self.done} of {count} done, {size or 'no'} worker{'s' * (size != 1)}"
+        count = self.tally.done + waiting.total()
+        return self._shown, f"{self.tally.done} of {count} done, {size or 'no'} worker{'s' * (size != 1)}"
+
+    def _distribute(self) -> None:
+        size = self._crew.size()
+        # As many again wait at the workers, so that none is idle while a result travels.
+        while self._due and self._count_running() < max(2 * size, 1):
+            self._begin(self._due.popleft())
+        if not self._due:
+            free = size - self._count_running()
+            for task in self._late()[: max(free, 0)]:
+                self.tally.copied += 1
+                self._begin(task)
+
+    def _count_running(self) -> int:
+        return sum(map(len, self._running.values()))
+
+    def _begin(self, task: Task) -> None:
+        self._attempts += 1
+        self._running.setdefault(task, {})[self._attempts] = _Attempt()
+        self._crew.submit(task, self._attempts)
+
+    def _late(self) -> list[Task]:
+        """Tasks that one copy more would end earlier, the latest first."""
+        now, found = self._crew.clock(), []
+        usual = {kind: statistics.median(of) for kind, of in self.tally.seconds.items() if len(of) >= ENOUGH}
+        for task, attempts in self._running.items():
+            begun = [(now - a.began_s, a.share) for a in attempts.values() if a.began_s is not None]
+            if task.kind not in usual or len(begun) < len(attempts) or len(begun) == COPIES:
+                continue
+            spent = min(spent for spent, _ in begun)
+            left = min(spent * (1.0 - share) / share if share > 0.0 else float("inf") for spent, share in begun)
+            if spent > LATE * usual[task.kind] and left > max(usual[task.kind], _WORTH_S):
+                found.append((left, task))
+        return [task for _, task in sorted(found, key=lambda pair: -pair[0])]
 
     def _follow(self, news: News) -> None:
-        task, now = news.task, time.monotonic()
-        running = self._running.get(task)
-        if running is None:
-            return
+        task = news.task
+        attempt = self._running.get(task, {}).get(news.attempt)
+        if attempt is None:
+            return  # of a copy that came second
         if not news.is_done:
             # A worker that was killed left its task to another, which begins anew.
-            if running.began_s is None or news.share < running.share:
-                running.began_s = now
-            running.share = news.share
+            if attempt.began_s is None or news.share < attempt.share:
+                attempt.began_s = self._crew.clock()
+            attempt.share = news.share
             return
-        del self._running[task]
         if news.error is not None:
-            self._failed(task, news.error)
+            self._failed(task, news.attempt, news.error)
             return
-        self._seconds.setdefault(task.kind, []).append(now - (running.began_s or now))
-        self.done += 1
+        for other in self._running.pop(task):
+            if other != news.attempt:
+                self._crew.drop(task, other)
+        now = self._crew.clock()
+        seconds = now - (attempt.began_s if attempt.began_s is not None else now)
+        self.tally.seconds.setdefault(task.kind, []).append(seconds)
+        self.tally.done += 1
         self._add(self._job.take(task, news.result, self._crew.size()))
 
-    def _failed(self, task: Task, error: Exception) -> None:
+    def _failed(self, task: Task, attempt: int, error: Exception) -> None:
         self._tried[task] += 1
+        del self._running[task][attempt]
+        if self._running[task]:
+            return  # its other copy goes on
+        del self._running[task]
         if task.optional:
-            self.done += 1
+            self.tally.done += 1
         elif isinstance(error, UserError):
             raise error
         elif self._tried[task] < TRIES:

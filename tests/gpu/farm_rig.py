@@ -9,7 +9,7 @@ from pathlib import Path
 
 from spectrasplat.commands.scenes import find_scene
 from spectrasplat.farm.cluster import open_crew
-from spectrasplat.farm.jobs import Foreman
+from spectrasplat.farm.jobs import Foreman, Tally
 from spectrasplat.farm.still import StillJob
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.settings import RenderSettings
@@ -25,9 +25,8 @@ def farmed(
     meddle: Callable[[StillJob, list[int]], None] = lambda job, process_ids: None,
     notes: list[str] | None = None,
     settings: RenderSettings = SETTINGS,
-) -> tuple[StillJob, int]:
-    """A picture by so many workers, and how many tasks were done; `meddle` is called again and again with the job and
-    the workers' processes."""
+) -> tuple[StillJob, Tally]:
+    """A picture by so many workers; `meddle` is called again and again with the job and the workers' processes."""
     folder.mkdir(exist_ok=True)
     scene = load_scene(find_scene(SCENE))
     with open_crew(workers, None) as crew:
@@ -35,9 +34,9 @@ def farmed(
         job = StillJob(scene, settings, find_scene(SCENE), folder, parts, told.append)
         assert crew.workers is not None
         local = crew.workers
-        foreman = Foreman(crew, job)
-        assert foreman.run(lambda share, text: meddle(job, local.process_ids))
-        return job, foreman.done
+        tally = Foreman(crew, job).run(lambda share, text: meddle(job, local.process_ids))
+        assert tally is not None
+        return job, tally
 
 
 def kill(process_id: int) -> None:

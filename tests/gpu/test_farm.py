@@ -95,8 +95,8 @@ def test_what_is_stopped_is_gone_on_from_and_what_is_cut_short_done_again(
     one = whole(SMALL)
     assert np.abs(job.picture.rgb - one).max() <= 4e-6 * one.max()
     # All is there: a farm that begins again only looks at the parts.
-    job, done = farmed(folder, 1, 3, settings=SMALL)
-    assert job.taken_up == 3 and done == 1
+    job, tally = farmed(folder, 1, 3, settings=SMALL)
+    assert job.taken_up == 3 and tally.done == 1
     # Parts of another rendering are not touched.
     with pytest.raises(UserError, match="holds parts of another rendering"):
         farmed(folder, 1, 3, settings=RenderSettings(48, 27, photons=50_000, batch=4096))
