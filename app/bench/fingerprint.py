@@ -79,7 +79,7 @@ CASES: dict[str, Case] = {
     **{f"camera {method}": Case({"camera_method": method}) for method in CAMERA_METHODS if method != "srd"},
     "caustic": Case({"layer": "caustic"}),
     "bins": Case({"bins": 8}),
-    "any view": Case({"any_view": True, "anchor_weights": True}),
+    "any view": Case({"any_view": True, "editable": True}),
     "polarised": Case(scene=partial(_rendered, polarisation=True)),
     "bounces": Case(scene=partial(_rendered, bounces=1)),
     "haze": Case(scene=partial(_rendered, haze=0.02)),

@@ -180,7 +180,7 @@ class Facts:
         """Photons count how far they have come through the glass that tints most. What haze shows of photons, and what
         the viewer reads of them, knows weights at three wavelengths alone; where no band is cut, photons carry what
         beams leave in bands of the same tables."""
-        plain = self.is_single or self.no_haze is None or self.settings.anchor_weights
+        plain = self.is_single or self.no_haze is None or self.settings.editable
         plain |= bool(self.beam_objects) and not self.groups
         return bool(self.absorbing) and not plain and tint_levels(self.scene) is not None
 
@@ -190,7 +190,7 @@ class Facts:
         what a path is and what it weighs."""
         from ..model.optics.spectral_tables import SpectralAxis
 
-        if not (self.settings.anchor_weights or self.is_painted) or not divides_spectrum(self.settings.method):
+        if not (self.settings.editable or self.is_painted) or not divides_spectrum(self.settings.method):
             return False
         if self.groups != 1 or self.absorbing or self.is_coloured or self.having(lambda m: m.is_grating):
             return False

@@ -116,8 +116,6 @@ class SpectrumFeatures:
         forced="",
     )
     """Of one band some wavelengths may meet another surface than its anchor does."""
-    anchor_weights: bool = feature("", lambda facts: facts.settings.anchor_weights, symbol="ANCHOR_WEIGHTS")
-    """Fresnel weights are those at the band's anchor, so that an edited dispersion leaves the photons as they are."""
     reindexed: bool = feature(
         "photons by index",
         lambda facts: facts.is_reindexed,
@@ -203,7 +201,7 @@ def _why_no_tint_levels(facts: Facts) -> str:
         return "beams need bands that are cut for tints"
     if facts.no_haze is None:
         return "haze knows tints at three wavelengths a band"
-    if facts.settings.anchor_weights:
+    if facts.settings.editable:
         return "in the viewer photons know tints at three wavelengths a band"
     if len(facts.scene.lights) > MAX_LIGHTS:
         return f"there are more than {MAX_LIGHTS} lights"

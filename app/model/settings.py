@@ -73,9 +73,8 @@ class RenderSettings:
     off themselves (`shaders/light/splat_shapes.glsl`)."""
     local_gain: bool = True
     """Whether the dispersion brush's dabs count; False is the physical picture."""
-    anchor_weights: bool = False
-    """Take Fresnel's weights at a band's anchor for the whole band (the viewer: an edit of the dispersion then leaves
-    every photon's weight). The weights of a band's ends differ from it by less than a thousandth."""
+    editable: bool = False
+    """Photons are kept and drawn again when dispersion and lights are edited: in the viewer."""
     any_view: bool = False
     """The camera may go anywhere (viewer, animation): what a scene needs is not judged by what its camera sees."""
     tally: bool = False

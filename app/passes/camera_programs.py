@@ -86,7 +86,6 @@ def camera_defines(scene: SceneBuffers, channels: Channels, layer: str, maps: Ma
         absorption=specular and features.camera_colours,
         normal_derivatives=features.smooth_normals or features.curved_solids or features.rough,
         polarised=specular and features.polarised,
-        anchor_weights=False,
     )
     return (
         seen.defines(of_picture=True)

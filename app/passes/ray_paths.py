@@ -66,7 +66,7 @@ class RayPaths:
         self._context = context
         defines = scene.features.defines() | bindings.SCENE_DEFINES | scene.defines
         # Rays of one wavelength carry no columns, and meet ground glass as if it were polished.
-        for carried in ("NORMAL_DERIVATIVES", "LOBE_COLUMNS", "ROUGH_SURFACES", "POLARISED", "ANCHOR_WEIGHTS"):
+        for carried in ("NORMAL_DERIVATIVES", "LOBE_COLUMNS", "ROUGH_SURFACES", "POLARISED"):
             defines.pop(carried, None)
         defines |= {
             "SPECTRAL_GROUPS": 0,

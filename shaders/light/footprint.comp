@@ -356,7 +356,11 @@ void main() {
     to_hi = photon.dposition_dvar0.xyz * (v_path.y - v_traced);
     photon.x_lo = y_in.x;
     photon.x_hi = y_in.y;
-    photon.x_anchor = clamp(x_reference + (y_offset + y_scale * v_traced - x_reference) / grown, y_in.x, y_in.y);
+    float y_anchor = x_reference + (y_offset + y_scale * v_traced - x_reference) / grown;
+    // Throughput depends on the index alone, straight on both sides of the anchor.
+    vec2 reach = (y_in - y_anchor) / mix(y - y_anchor, vec2(1.0), lessThan(abs(y - y_anchor), vec2(1e-6)));
+    photon.throughput.xz = max(mix(photon.throughput.yy, photon.throughput.xz, reach), 0.0);
+    photon.x_anchor = clamp(y_anchor, y_in.x, y_in.y);
 #else
 #if LOCAL_GAIN
     // Displacements grow about where the light of the reference wavelength lands, the same place for all bands of a

@@ -152,7 +152,6 @@ void share_out(Path path, inout Event event) {
     }
     GO_STRAIGHT(event.boundary, event.theta, event.n_i, event.n_t, event.cosine2)
     event.refracted = refract_at(event.frame, path.direction, event.n_i.y / event.n_t.y);
-    if (ANCHOR_WEIGHTS) event.reflectance = vec3(event.reflectance.y);
     // Where only the facet's normal forbids it, nothing is transmitted at any wavelength; at total reflection each has
     // its own share. A microfacet's share is its own, also where the light that it lets through does not leave the
     // surface.

@@ -41,7 +41,7 @@ def traced(gl: Context, tmp_path_factory: pytest.TempPathFactory, request: pytes
     path.write_text(PANE)
     scene = load_scene(path)
     inputs = LiveInputs(scene, scene.camera, 160, 90)
-    settings = RenderSettings(width=160, height=90, batch=8192, method=request.param, anchor_weights=True)
+    settings = RenderSettings(width=160, height=90, batch=8192, method=request.param, editable=True)
     light = LiveLight(gl, scene, settings, 64 << 20)
     light.light_pass.prepare()
     light.light_pass.begin(PHOTONS, 1)

@@ -14,7 +14,7 @@ from spectrasplat.render.viewer.accumulation import Accumulation
 from spectrasplat.render.viewer.live_light import LiveLight
 from spectrasplat.render.viewer.widening import KNOWN_PHOTONS, needs_widening, widening
 
-SETTINGS = RenderSettings(width=160, height=90, batch=8192, any_view=True, anchor_weights=True)
+SETTINGS = RenderSettings(width=160, height=90, batch=8192, any_view=True, editable=True)
 EARLY, MANY = 1 << 12, 1 << 17
 
 

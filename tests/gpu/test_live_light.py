@@ -24,7 +24,7 @@ from spectrasplat.render.viewer.live_light import LiveLight
 
 SIZE = (160, 90)
 PHOTONS = 20_000
-SETTINGS = RenderSettings(width=SIZE[0], height=SIZE[1], batch=8192, method="srd-photons", anchor_weights=True)
+SETTINGS = RenderSettings(width=SIZE[0], height=SIZE[1], batch=8192, method="srd-photons", editable=True)
 """What beams do instead: `test_live_beams`."""
 
 

@@ -30,7 +30,7 @@ from spectrasplat.render.viewer.invalidation import only_moves
 from spectrasplat.render.viewer.live_light import LiveLight
 
 SIZE = (120, 68)
-SETTINGS = RenderSettings(width=SIZE[0], height=SIZE[1], batch=8192, any_view=True, anchor_weights=True)
+SETTINGS = RenderSettings(width=SIZE[0], height=SIZE[1], batch=8192, any_view=True, editable=True)
 
 
 def shipped(name: str) -> Scene:

@@ -108,6 +108,12 @@ MUTANTS = {
         "send_on(child, event, kept.yyy, of_companions",
         f"{_PATHS}[coloured mirror]",
     ),
+    "an edited interval of the index keeps the weights of its ends": Mutant(
+        "light/footprint.comp",
+        "photon.throughput.xz = max(mix(photon.throughput.yy, photon.throughput.xz, reach), 0.0);",
+        "",
+        "gpu/test_live_light.py::test_edited_dispersion_equals_a_fresh_trace_at_the_same_indices[rod-1.2]",
+    ),
     "sweep centred on the anchor": Mutant(
         "light/footprint.comp",
         "vec3 middle = 0.5 * (to_lo + to_hi);",

@@ -39,7 +39,7 @@ from spectrasplat.passes.haze import HAZE_PARAMETERS
 from spectrasplat.passes.light_programs import draw_variants, footprint_defines, light_defines
 from spectrasplat.passes.picture_channels import Channels
 
-NOT_OF_BANDS = ("point_spectrum", "random_wavelength", "even_wavelengths", "draws_by_power", "hero", "anchor_weights")
+NOT_OF_BANDS = ("point_spectrum", "random_wavelength", "even_wavelengths", "draws_by_power", "hero")
 SCENES = paths.assets_dir() / "scenes"
 COUNTS = {"spectral_groups": 2, "tint_levels": 16, "map_tents": 8, "bounces": 3, "bins": 0}
 EVERYTHING = Features().changed(**{name: True for name in ROWS if name not in NOT_OF_BANDS} | COUNTS)
@@ -279,17 +279,17 @@ def test_a_guard_forgotten_in_a_shader_is_noticed(monkeypatch: pytest.MonkeyPatc
     assert not next(p for p in proofs if p.feature == "triangle tree").holds
 
 
-@pytest.mark.parametrize("anchored", [False, True])
+@pytest.mark.parametrize("editable", [False, True])
 @pytest.mark.parametrize("scene", ["prism", "brilliant", "spectrometer"])
-def test_without_beams_photons_need_what_they_always_did(scene: str, anchored: bool) -> None:
+def test_without_beams_photons_need_what_they_always_did(scene: str, editable: bool) -> None:
     loaded = load_scene(SCENES / f"{scene}.toml")
     alone, found = (
-        Features.of(loaded, RenderSettings(method=method, anchor_weights=anchored)) for method in ("srd", "srd-photons")
+        Features.of(loaded, RenderSettings(method=method, editable=editable)) for method in ("srd", "srd-photons")
     )
     # Nothing is left to photons that would have to know how broad a lamp is, or where a beam ends.
     known = {"lamp_columns": found.lamp_columns, "light_edges": found.light_edges}
     assert replace(alone, beams=False, **known) == replace(found, method="srd")
-    assert scene != "prism" or alone.reindexed == anchored
+    assert scene != "prism" or alone.reindexed == editable
 
 
 def test_storage_blocks_are_as_many_as_the_doctor_asks_for() -> None:

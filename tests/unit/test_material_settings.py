@@ -298,7 +298,7 @@ def test_a_grating_takes_a_spectral_column_as_glass_does(spectrometer: Scene) ->
     assert features.gratings and features.spectral_groups == 1 and not features.dielectrics and not features.reindexed
     assert camera_needs(spectrometer, RenderSettings()) == (True, True)
     assert ("gratings", True, "there are gratings") in features.explain(Facts(spectrometer, RenderSettings()))
-    assert not Features.of(spectrometer, RenderSettings(anchor_weights=True)).reindexed
+    assert not Features.of(spectrometer, RenderSettings(editable=True)).reindexed
 
 
 def test_only_a_finish_has_its_features(prism: Scene) -> None:

@@ -129,7 +129,7 @@ def build(
         max_depth=wanted.scene.render.max_depth,
         batch=budget.batch,
         local_gain=wanted.local_gain,
-        anchor_weights=True,
+        editable=True,
         any_view=True,
     )
     scene = replace(wanted.scene, camera=wanted.camera)

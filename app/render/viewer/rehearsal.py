@@ -77,7 +77,7 @@ class Rehearsals:
             if inputs.scene is self._scene:
                 return
             self._scene = inputs.scene
-            settings = RenderSettings(method=inputs.method, local_gain=False, anchor_weights=True)
+            settings = RenderSettings(method=inputs.method, local_gain=False, editable=True)
             kind = Features.of(inputs.scene, settings), frozenset(light.variant for light in inputs.scene.lights)
             if kind in self._known or sum(len(o.mesh.triangles) for o in inputs.scene.objects) > MOST_TRIANGLES:
                 return
