@@ -14,9 +14,9 @@ import numpy as np
 from ..gpu.context import Context
 from ..model.scene import Scene
 from ..reference.metrics import ReferencePicture
-from .reference_picture import Progress, make_reference
 from .rendering import MethodRig
 from .results import AgreementSettings
+from .subjects import Progress, make_reference
 
 BLOCK = 8
 """Pixels on a side of a block."""

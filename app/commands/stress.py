@@ -44,7 +44,8 @@ def _measure(options: Stress, cases: Sequence[Case]) -> int:
     from ..base.progress import ProgressReporter
     from ..bench.machine import machine
     from ..gpu.context import create_context
-    from ..stress.results import StressResult, table
+    from ..stress.report import case_table, write_html
+    from ..stress.results import StressResult
     from ..stress.runner import run
 
     with create_context() as context:
@@ -55,10 +56,9 @@ def _measure(options: Stress, cases: Sequence[Case]) -> int:
     if not finished:
         print("spectrasplat: stopped; what was measured is shown and kept", file=sys.stderr)
     _keep(result, options.output)
-    show(table(result))
+    for found in result.cases:
+        show(case_table(found).on_screen(("note",)))
     if options.output is not None:
-        from ..stress.report import write_html
-
         write_html(result, options.output / HTML)
         show(f"{(options.output / HTML).resolve()}")
     show(result.summary())

@@ -1,8 +1,8 @@
-"""Finishes of receivers as the camera's reference meets them, compiled in float64: a coat's lobe, and a rough base.
+"""Finishes of receivers in the camera's reference, compiled in float64: a coat's lobe, and a rough base.
 
-Half vectors are drawn by the microfacets' own density, not as they are seen as the shaders draw them, and lights of
-some extent are found by the path that goes on alone. Of the coat's directional albedo both take the one table, which
-has a test of its own.
+Half vectors are sampled by the microfacets' own density, not by the visible ones as in the shaders, and lights of some
+extent are found by the continued path alone. The coat's directional albedo comes from the table that the shaders use
+too, which has a test of its own.
 """
 
 from __future__ import annotations

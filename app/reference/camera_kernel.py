@@ -1,13 +1,13 @@
 """The camera's reference, compiled: one camera path of one wavelength, to the first diffuse surface.
 
-Reflection or refraction is drawn with Fresnel's probability, so that a path's weight changes by
-absorption and mirrors only; lights are seen along the way, the environment at its end. At a diffuse surface one
-random point of every light is asked for (anything between hides it, glass too: what comes through glass is the
-caustic's), and the spectral caustic is looked up. Where the environment lights it, or other diffuse surfaces do, the
-path goes on from there, in a direction by the cosine or towards what is bright, until it leaves the scene or has met
-as many diffuse surfaces as light may bounce between, and one.
+Reflection or refraction is drawn with Fresnel's probability, so that a path's weight changes by absorption and mirrors
+only; lights are seen along the way, the environment at its end. At a diffuse surface one random point of every light
+is sampled (anything between hides it, glass too: light through glass belongs to the caustic), and the spectral caustic
+is looked up. Where the environment or other diffuse surfaces light it, the path continues from there, in a direction
+by the cosine or towards what is bright, until it leaves the scene or has met one diffuse surface more than light may
+bounce between.
 
-Numbers: a scrambled Sobol sequence a part, shifted from pixel to pixel.
+Random numbers: a scrambled Sobol sequence for each part, shifted from pixel to pixel.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ from .viewpoint import lens_ray
 from .worn_textures import worn_at
 
 _LENS = np.uint64(0xD1B54A32D192ED03)
-"""Sets the numbers for the place on the lens apart from those of Fresnel choices."""
+"""Makes the numbers for the place on the lens independent of those of Fresnel choices."""
 _BOUNCE = np.uint64(0x8CB92BA72F3D8DD7)
 """Likewise those at the second diffuse surface of a path and later ones."""
 _COAT = np.uint64(0x2545F4914F6CDD1D)
-"""Sets those for coats apart."""
+"""Likewise those for coats."""
 LOST_DEPTH, LOST_NUMERIC = range(2)
 """Places in a tally of paths that were given up: too many events, or nothing met inside a solid."""
 
@@ -177,7 +177,7 @@ def _coat_highlights(scene, lights, spectra, pictures, atom, triangle, place, si
 
 @inlined
 def _finished_base(scene, lights, spectra, pictures, tables, atom, triangle, u, v, place, side, o, n, a, b, scratch):
-    """Radiance in an atom that a finished surface's base sends back."""
+    """Radiance in an atom that a finished surface's base scatters."""
     total = 0.0
     for i in range(lights.kind.shape[0]):
         if spectra.lights[i, atom] > 0.0:
@@ -202,8 +202,8 @@ def _plain(scene, pictures, spectra, atom, triangle, u, v):
 
 @inlined
 def _diffuse(scene, lights, spectra, pictures, tables, atom, triangle, u, v, place, side, a, b, scratch):
-    """Radiance in an atom that a Lambertian surface sends back from a side; without atom (−1) all wavelengths go to
-    `scratch.xyz`."""
+    """Radiance in an atom that a side of a Lambertian surface scatters; without atom (−1) that of all wavelengths is
+    added to `scratch.xyz`."""
     xyz = scratch.xyz
     row, red, green, blue = _surface(scene, pictures, triangle, u, v)
     white = atom < 0
@@ -263,7 +263,7 @@ def sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_dept
     """Add what a camera ray sees to `scratch.xyz`; diffuse surfaces light each other `bounces` times over.
 
     Up to the first event at glass or a mirror nothing depends on a wavelength, and all are added at once;
-    then one is drawn and stands for all by its probability.
+    then one is drawn, and its probability divides its contribution.
     """
     place, d = ray
     state, shift, xyz = scratch.state, scratch.shift, scratch.xyz
@@ -307,7 +307,7 @@ def sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_dept
             n = n if side == 0 else negated(n)
             made, o = pictures.finishes, negated(d)
             ends = surfaces == bounces and not pictures.draw.lights
-            # What one surface sends to another, it sends as if it were plain.
+            # Finishes count at the first surface alone: light between surfaces is scattered as by plain ones.
             coated = surfaces == 0 and made.alpha[thing] >= 0.0
             finished = coated or (surfaces == 0 and made.roughness[thing] > 0.0)
             if atom < 0 and (finished or not ends):

@@ -14,21 +14,27 @@ their scene, as those of `photon_reference`, and grow.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import astuple, dataclass, replace
-from functools import cached_property
+from dataclasses import astuple, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from ..base.errors import UserError
-from ..model.optics.colorimetry import xyz_to_rgb709
 from ..model.scene import Scene
 from ..model.scene_key import picture_key
 from .code_key import code_key
-from .photon_reference import TALLY_SIZE, relative_variance
-from .rounds import PARTS, Cancelled, Limits, PartsRun, Progress, continue_kept, continue_run, kept_path
+from .rounds import (
+    PARTS,
+    Cancelled,
+    Kind,
+    Limits,
+    PartsRun,
+    Picture,
+    Progress,
+    continue_kept,
+    continue_run,
+    kept_path,
+    relative_variance,
+)
 from .scene_surfaces import description
 
 if TYPE_CHECKING:
@@ -36,53 +42,18 @@ if TYPE_CHECKING:
 
 MAX_DEPTH = 256
 _LAST_SAMPLE = 2**31
-_BLACK_SAMPLES = 256
 _NOISE_SAMPLES = 128
 """Samples of each pixel by which the noise is measured."""
 
 
-@dataclass(frozen=True)
-class CameraPicture:
-    """What the camera sees and what is known of its error; row 0 on top."""
-
-    xyz: np.ndarray
-    """float64 (H, W, 3): CIE XYZ, the mean over each pixel; Y in lm/(sr unit²)."""
-    variance: np.ndarray
-    """float64 (H, W, 3): of `xyz` as an estimate, from PARTS independent pictures, or two where the caustic has
-    halves."""
-    samples: int
-    """Samples of each pixel."""
-    seconds: float
-    """Time spent tracing."""
-    lost: dict[str, float]
-    """Share of paths given up: "depth" (too many events) and "numeric" (nothing met inside a solid)."""
-    caustic_photons: int = 0
-    """Photons of the caustic that was looked up."""
-    caustic_relmse: float = 0.0
-    """What its noise adds to the picture's own error, about, where `cached_camera_reference` measured it: a part of
-    `variance`."""
-
-    @property
-    def amount(self) -> int:
-        """Samples a pixel."""
-        return self.samples
-
-    def rgb(self) -> np.ndarray:
-        """Linear Rec.709, float64 (H, W, 3)."""
-        return xyz_to_rgb709(self.xyz)
-
-    @cached_property
-    def relmse(self) -> float:
-        """The picture's own error, mean[var/(R² + ε)] as `ReferencePicture.relmse` has it; 0 for a black picture."""
-        return relative_variance(self.xyz, self.variance)
-
-    def is_within(self, target_relmse: float) -> bool:
-        """Whether the error is known to be no larger; blackness is believed after many samples only."""
-        return self.relmse <= target_relmse and (bool(self.xyz.any()) or self.samples >= _BLACK_SAMPLES)
+KIND = Kind(("depth", "numeric"), per_pixel=True, is_rgb=False, black_amount=256)
+"""Fates are shares of paths given up: too many events, nothing met inside a solid."""
 
 
-class CameraRun(PartsRun[CameraPicture]):
+class CameraRun(PartsRun):
     """Samples of one picture, added round by round; `picture()` at any time."""
+
+    unit_words = 1.0, "samples a pixel"
 
     def __init__(
         self,
@@ -126,38 +97,14 @@ class CameraRun(PartsRun[CameraPicture]):
         self._spectra = camera_scene.spectra(scene, caustic.plan.bins if caustic else 1)
         self._sequences = [sampling.scrambled(seed, part) for part in range(PARTS)]
         self._max_depth, self._bounces = max_depth, scene.render.bounces
-        self._caustic_noted = caustic.photons if caustic else 0, caustic_relmse
-        super().__init__((height, width, 3), TALLY_SIZE)
-
-    @property
-    def samples(self) -> int:
-        """Samples of every pixel so far."""
-        return self.amount
-
-    @property
-    def amount_words(self) -> str:
-        """Samples for people."""
-        return f"{self.samples} samples a pixel"
+        self.kind = replace(KIND, has_halves=caustic is not None)
+        super().__init__(width, height)
+        self.caustic_noted = caustic.photons if caustic else 0, caustic_relmse
 
     @property
     def exhausted(self) -> bool:
         """Whether the sequence has no fresh points left."""
         return int(self.units.max()) >= _LAST_SAMPLE
-
-    def picture(self) -> CameraPicture:
-        """What has been gathered; black without variance before the first round."""
-        halves = len(self._tables) > 1
-        return summed_camera(self.sums, self.units, self.tallies, self.seconds, halves, self._caustic_noted)
-
-    def kept(self) -> dict[str, object]:
-        """With what is noted of the caustic."""
-        photons, relmse = self._caustic_noted
-        return super().kept() | {"caustic_photons": photons, "caustic_relmse": relmse}
-
-    def restore(self, stored: Mapping[str, np.ndarray]) -> None:
-        """With what was noted of the caustic then: it may have grown since."""
-        super().restore(stored)
-        self._caustic_noted = int(stored["caustic_photons"]), float(stored["caustic_relmse"])
 
     def _trace_part(self, part: int, count: int) -> None:
         self._kernel.trace_camera(
@@ -178,34 +125,6 @@ class CameraRun(PartsRun[CameraPicture]):
             self._scratch(),
         )
         self.units[part] += count
-
-
-def summed_camera(
-    sums: np.ndarray,
-    units: np.ndarray,
-    tallies: np.ndarray,
-    seconds: float,
-    halves: bool = False,
-    caustic_noted: tuple[int, float] = (0, 0.0),
-) -> CameraPicture:
-    """The picture from the sums (PARTS, H, W, 3) and tallies (PARTS, TALLY_SIZE) of parts with `units` (PARTS,) samples
-    a pixel.
-
-    `halves`: even parts have one thing in common, the caustic they looked up, and so have odd ones: two independent
-    pictures."""
-    total = max(int(units.sum()), 1)
-    mean = sums.sum(axis=0) / total
-    variance = np.zeros_like(mean)
-    if halves:
-        sums, units = (np.stack([values[half::2].sum(axis=0) for half in range(2)]) for values in (sums, units))
-    used = np.flatnonzero(units)
-    if len(used) > 1:
-        for part in used:
-            variance += units[part] / total * (sums[part] / units[part] - mean) ** 2
-        variance /= len(used) - 1
-    lost = tallies.sum(axis=0)[:2] / (total * mean.shape[0] * mean.shape[1])
-    fates = {"depth": float(lost[0]), "numeric": float(lost[1])}
-    return CameraPicture(mean, variance, total if used.size else 0, seconds, fates, *caustic_noted)
 
 
 _SEED = 1
@@ -232,7 +151,7 @@ def render_camera_reference(
     caustic: SpectralCaustic | None = None,
     progress: Progress = lambda fraction, text: None,
     cancelled: Cancelled = lambda: False,
-) -> CameraPicture:
+) -> Picture:
     """What the camera of `scene` sees, until `samples` a pixel, `seconds` or `target_relmse` is reached, whichever
     comes first.
 
@@ -258,7 +177,7 @@ def cached_camera_reference(
     progress: Progress = lambda fraction, text: None,
     cancelled: Cancelled = lambda: False,
     folder: Path | None = None,
-) -> CameraPicture:
+) -> Picture:
     """The stored picture where it is good enough, otherwise what is stored and more samples, stored again.
 
     Limits as in `render_camera_reference`; `samples` counts those that are stored, `seconds` only the time spent now,
@@ -266,29 +185,19 @@ def cached_camera_reference(
     is ignored; a folder that cannot be written costs only the saving; an interrupt stores what is done.
     """
 
-    def picture_of(stored: Mapping[str, np.ndarray]) -> CameraPicture:
-        values = stored["sums"], stored["units"], stored["tallies"], float(stored["seconds"])
-        noted = int(stored["caustic_photons"]), float(stored["caustic_relmse"])
-        return summed_camera(*values, caustic is not None, noted)
-
-    def begin(stored: Mapping[str, np.ndarray] | None) -> CameraRun:
+    def begin() -> CameraRun:
         progress(0.0, "preparing")
         tables, noise = None, 0.0
         if caustic is not None:
             tables, noise = _caustic(scene, width, height, max_depth, caustic, folder, progress)
-        run = CameraRun(scene, width, height, max_depth, _SEED, tables, noise)
-        if stored is not None:
-            run.restore(stored)
-        return run
+        return CameraRun(scene, width, height, max_depth, _SEED, tables, noise)
 
     path = kept_path(camera_reference_key(scene, width, height, max_depth, caustic), folder)
-    shapes = {"sums": (PARTS, height, width, 3), "units": (PARTS,), "tallies": (PARTS, TALLY_SIZE)}
-    shapes |= {"seconds": (), "caustic_photons": (), "caustic_relmse": ()}
     first = 0.0 if caustic is None else _CAUSTIC_SHARE
     return continue_kept(
         path,
-        shapes,
-        picture_of,
+        replace(KIND, has_halves=caustic is not None),
+        (width, height),
         begin,
         Limits(samples, seconds, target_relmse),
         lambda done, text: progress(first + (1.0 - first) * done, text),
@@ -321,8 +230,8 @@ def picture_noise(scene: Scene, width: int, height: int, max_depth: int, caustic
     """
     runs = [CameraRun(scene, width, height, max_depth, caustic=caustic.half(number)) for number in range(2)]
     for run in runs:
-        while run.samples < _NOISE_SAMPLES:
-            run.advance(_NOISE_SAMPLES - run.samples)
+        while run.amount < _NOISE_SAMPLES:
+            run.advance(_NOISE_SAMPLES - run.amount)
     even, odd = (run.sums / run.units[:, None, None, None] for run in runs)
     apart = even - odd
     variance = 0.25 * (apart.sum(axis=0) ** 2 - (apart**2).sum(axis=0)) / (PARTS * (PARTS - 1))

@@ -27,7 +27,7 @@ _SAVE_SECONDS = 120.0
 
 
 class CachedCaustic:
-    """A caustic on disk that grows as far as its plan asks for."""
+    """A caustic on disk that grows as far as its plan says."""
 
     def __init__(
         self,
@@ -50,7 +50,7 @@ class CachedCaustic:
         """The caustic, and the noise it leaves in the picture as relMSE; traced as far as the disk has less than
         planned, and stored.
 
-        An interrupt stores what is done and goes on upwards. Raises UserError as `build_caustic` does.
+        An interrupt stores what is done and is raised again. Raises UserError as `build_caustic` does.
         """
         run = CausticRun(self._scene, *self._size, self._plan)
         if run.exhausted:

@@ -19,13 +19,13 @@ from .photon_emission import frame_of
 from .photon_scene import PhotonScene
 
 TEXELS_A_PIXEL = 2.0
-"""Side of a pixel in texels of a fine window, where the plan says nothing else: more would blur less, and share out the
-photons more thinly."""
+"""Side of a pixel in texels of a fine window, where the plan says nothing else: more would blur less, and leave fewer
+photons a texel."""
 _FLAT = 1e-6
 """Share of a receiver's size that its corners may leave a plane."""
 _SPREAD = 0.005
 """Share of the places seen, and of the power where these end, beyond each side of a fine window: a lens shows a floor
-as far as it goes."""
+to its end."""
 _MARGIN_SEEN, _MARGIN_LIT = 0.1, 0.05
 """Shares of their sizes by which windows are larger than what the pilots found."""
 _COARSE = 0.05
@@ -166,8 +166,8 @@ def fit_windows(
         texel[side] = texel_at(float(np.median(distance[near] if near.any() else distance)))
         views[side] = max(int(near.sum()), 1)
     span = np.maximum(high - low, 1e-300)
-    asked = np.where(wanted, np.prod(span[:, 1], axis=1) / texel**2, 0.0)
-    texel *= np.sqrt(np.divide(asked, _shared(asked, views, max_texels), out=np.ones(count), where=wanted))
+    wants = np.where(wanted, np.prod(span[:, 1], axis=1) / texel**2, 0.0)
+    texel *= np.sqrt(np.divide(wants, _shared(wants, views, max_texels), out=np.ones(count), where=wanted))
     size = np.zeros((count, 2, 2), np.int64)
     for side in np.flatnonzero(wanted).tolist():
         size[side, 1] = np.maximum(np.ceil(span[side, 1] / texel[side] - 1e-9), 1)
@@ -217,17 +217,17 @@ def _tables(
     )
 
 
-def _shared(asked: np.ndarray, weight: np.ndarray, most: float) -> np.ndarray:
-    """What each gets of `most` in all: as much as `asked` for, or a share by `weight` of what those leave that ask for
-    less than theirs."""
-    if asked.sum() <= most:
-        return asked
-    content = asked <= 0.0
+def _shared(wants: np.ndarray, weight: np.ndarray, most: float) -> np.ndarray:
+    """What each gets of `most` in all: as much as `wants` says, or a share by `weight` of what is left by those that
+    want less than their share."""
+    if wants.sum() <= most:
+        return wants
+    content = wants <= 0.0
     while True:
-        fair = (most - asked[content].sum()) * weight / weight[~content].sum()
-        less = ~content & (asked <= fair)
+        fair = (most - wants[content].sum()) * weight / weight[~content].sum()
+        less = ~content & (wants <= fair)
         if not less.any():
-            return np.where(content, asked, fair)
+            return np.where(content, wants, fair)
         content |= less
 
 

@@ -1,4 +1,4 @@
-"""Which code makes a reference: what is kept on disk goes with exactly that, and no number is kept by hand."""
+"""Which code makes a reference: a stored picture belongs to exactly that code, and no version is kept by hand."""
 
 from __future__ import annotations
 

@@ -22,5 +22,5 @@ def compiled(function: Callable, **more: Any) -> Callable:
 
 
 def inlined(function: Callable) -> Callable:
-    """`compiled`, and put into its callers: arrays are not handed over at every call."""
+    """`compiled`, and inlined into its callers: arrays are not passed at every call."""
     return compiled(function, forceinline=True)

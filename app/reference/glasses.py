@@ -21,7 +21,6 @@ _SELLMEIER = {
     ),
     "fused silica": ([0.6961663, 0.4079426, 0.8974794], [0.0684043**2, 0.1162414**2, 9.896161**2]),
 }
-NAMES = tuple(_SELLMEIER)
 
 
 def sellmeier_terms(glass: str) -> tuple[list[float], list[float]]:

@@ -3,7 +3,7 @@
 Arrays of 3-vectors have shape (..., 3), scalars (...); everything broadcasts. As in the
 shaders `normal` faces the incoming ray (direction · normal < 0) and eta_it = n_incident /
 n_transmitted. Where a function exists in a stable and a textbook form both are here: they are
-derived differently and agree to rounding, which is what makes either a witness.
+derived differently and agree to rounding, so that each checks the other.
 """
 
 from __future__ import annotations

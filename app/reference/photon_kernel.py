@@ -1,10 +1,10 @@
 """The reference's photons, compiled: one photon, one wavelength, one path, to where it ends.
 
-Reflection or refraction is drawn with Fresnel's probability, absorption is Beer's law on the
-weight, and nothing is cut off but what exceeds the depth. A photon that comes to a diffuse surface by way of glass or
-mirrors goes to the one pixel that sees the place (`trace`), or is noted there (`land`), so that camera paths may look
-it up, through glass too. Numbers come from a scrambled Sobol sequence (place, wavelength, place on the light, then one
-a Fresnel choice) and, when its dimensions are used up, from a hash.
+Reflection or refraction is drawn with Fresnel's probability, absorption is Beer's law on the weight, and only what
+exceeds the depth is cut off. A photon that reaches a diffuse surface by glass or mirrors is added to the one pixel
+that sees the place (`trace`), or recorded there (`land`), so that camera paths can look it up, through glass too.
+Random numbers are a scrambled Sobol sequence (place, wavelength, place on the light, then one a Fresnel choice) and,
+when its dimensions are used up, a hash.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from .worn_textures import worn_at
 
 EMITTED, DEPOSITED, DIRECT, ABSORBED, ESCAPED, LOST_DEPTH, LOST_NUMERIC = range(7)
 COUNTED = 7
-"""Places in a tally (`photon_reference.TALLY` and what follows)."""
+"""Places in a tally (`photon_reference.KIND` and what follows)."""
 _LUMINANCE = (0.2126, 0.7152, 0.0722)
 """Y of linear Rec.709."""
 

@@ -14,32 +14,44 @@ the same sequences.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..base.errors import UserError
-from ..model.optics.colorimetry import rgb709_to_xyz, rgb709_to_xyz_matrix
 from ..model.scene import Scene
 from ..model.scene_key import scene_key
 from .code_key import code_key
-from .rounds import PARTS, Cancelled, Limits, Pace, PartsRun, Progress, continue_kept, continue_run, kept_path
+from .rounds import (
+    PARTS,
+    RELMSE_EPSILON,
+    TALLY_SIZE,
+    Cancelled,
+    Kind,
+    Limits,
+    Pace,
+    PartsRun,
+    Picture,
+    Progress,
+    continue_kept,
+    continue_run,
+    kept_path,
+)
 from .scene_surfaces import description
 
 if TYPE_CHECKING:
     from .photon_emission import Domain
+    from .sampling import Sequence
 
 
-TALLY = ("emitted", "deposited", "direct", "absorbed", "escaped", "lost_depth", "lost_numeric")
-"""What the first numbers of a tally are, W."""
-TALLY_SIZE = 9
-"""Then the photons that left their light, and those that came to the picture."""
-RELMSE_EPSILON = 1e-2
-"""ε of relMSE = mean[(I − R)²/(R² + ε)] as a share of mean(R)², on XYZ over all pixels and channels."""
+KIND = Kind(
+    fates=("emitted", "deposited", "direct", "absorbed", "escaped", "lost_depth", "lost_numeric"),
+    per_pixel=False,
+    is_rgb=True,
+    black_amount=1 << 20,
+)
+"""Fates are W. A tally ends with the photons that left their light and those that came to the picture."""
 
 _PILOT_PHOTONS = 1 << 16
 _PILOT_BLOCK = 8
@@ -47,70 +59,17 @@ _PILOT_BLOCK = 8
 _MAX_A_UNIT = 16
 """Points of the most important domain in a unit; every domain has at least one."""
 _LAST_POINT = 2**31
-_BLACK_PHOTONS = 1 << 20
+_SEED = 1
 
 
-def relative_variance(values: np.ndarray, variance: np.ndarray) -> float:
-    """mean[variance / (values² + ε)], as relMSE weighs errors; 0 where all is black."""
-    epsilon = RELMSE_EPSILON * float(values.mean()) ** 2 if values.size else 0.0
-    return float(np.mean(variance / (values**2 + epsilon))) if epsilon > 0.0 else 0.0
-
-
-@dataclass(frozen=True)
-class ReferencePicture:
-    """A converged picture and what is known of its error; row 0 on top."""
-
-    rgb: np.ndarray
-    """float64 (H, W, 3): linear Rec.709, lm/(sr unit²) for white, as `render(… layer="caustic").rgb`: the mean over
-    each pixel."""
-    covariance: np.ndarray
-    """float64 (H, W, 3, 3): of a pixel's channels as estimates, from PARTS independent pictures."""
-    photons: int
-    seconds: float
-    """Time spent tracing."""
-    balance: dict[str, float]
-    """Flux by fate, W: emitted = deposited + direct + absorbed + escaped + lost_depth + lost_numeric."""
-
-    @property
-    def amount(self) -> int:
-        """Photons."""
-        return self.photons
-
-    @property
-    def variance(self) -> np.ndarray:
-        """Variance of `rgb` as an estimate, float64 (H, W, 3)."""
-        return np.einsum("...ii->...i", self.covariance).copy()
-
-    def xyz(self) -> np.ndarray:
-        """The picture in CIE XYZ (Y: lm/(sr unit²)), float64 (H, W, 3)."""
-        return rgb709_to_xyz(self.rgb)
-
-    def xyz_variance(self) -> np.ndarray:
-        """Variance of `xyz()`, float64 (H, W, 3)."""
-        return self._xyz_variance
-
-    @cached_property
-    def _xyz_variance(self) -> np.ndarray:
-        matrix = rgb709_to_xyz_matrix()
-        # One product of (H · W, 9) and (9, 3): a fourth of the time of one with matrices in it.
-        products = np.einsum("ij,ik->jki", matrix, matrix).reshape(9, 3)
-        return (self.covariance.reshape(-1, 9) @ products).reshape(*self.covariance.shape[:-2], 3)
-
-    @cached_property
-    def relmse(self) -> float:
-        """The picture's own error: mean[var/(R² + ε)] on XYZ; 0 for a black picture without photons in it."""
-        return relative_variance(self.xyz(), self.xyz_variance())
-
-    def is_within(self, target_relmse: float) -> bool:
-        """Whether the error is known to be no larger; blackness is believed after many photons only."""
-        return self.relmse <= target_relmse and (bool(self.rgb.any()) or self.photons >= _BLACK_PHOTONS)
-
-
-class ReferenceRun(PartsRun[ReferencePicture]):
+class ReferenceRun(PartsRun):
     """Photons of one picture, added round by round; `picture()` at any time."""
 
+    kind = KIND
+    unit_words = 1e6, "M photons"
+
     def __init__(self, scene: Scene, width: int, height: int, max_depth: int = 64, seed: int = 1) -> None:
-        """Reads the scene and sends a pilot, which sets where photons start and how many each light has.
+        """Reads the scene and traces a pilot, which sets where photons start and how many each light has.
 
         Raises UserError where numba is missing, solids nest beyond reach or the camera has a lens.
         """
@@ -127,11 +86,11 @@ class ReferenceRun(PartsRun[ReferencePicture]):
             ) from error
         self._kernel, self._sampling = photon_kernel, sampling
         self._scene, centre = photon_scene.photon_scene(scene)
-        self._camera_pass = viewpoint.viewpoint(scene.camera, width, height, centre)
+        self._camera = viewpoint.viewpoint(scene.camera, width, height, centre)
         self._worn = worn_textures.worn_textures(scene, self._scene)
         self._max_depth, self._seed = max_depth, seed
         domains, self._colours = photon_emission.scene_domains(scene, self._scene, centre)
-        super().__init__((height, width, 3), TALLY_SIZE)
+        super().__init__(width, height)
         self._domains, self._points = self._aimed(domains)
         self._sequences = [[sampling.scrambled(seed, part, d) for d in range(len(domains))] for part in range(PARTS)]
         self._pace = Pace(max(1, 1024 // max(self.unit, 1)))
@@ -142,16 +101,6 @@ class ReferenceRun(PartsRun[ReferencePicture]):
         return sum(self._points)
 
     @property
-    def photons(self) -> int:
-        """Photons so far."""
-        return self.amount
-
-    @property
-    def amount_words(self) -> str:
-        """Photons for people."""
-        return f"{self.amount / 1e6:.1f} M photons"
-
-    @property
     def exhausted(self) -> bool:
         """Whether the sequence has no fresh points left, or there is nothing to trace."""
         return not self._points or int(self.units.max()) * max(self._points) >= _LAST_POINT
@@ -159,37 +108,29 @@ class ReferenceRun(PartsRun[ReferencePicture]):
     def _most_units(self) -> int:
         return _LAST_POINT // max(self._points)
 
-    def kept(self) -> dict[str, object]:
-        """With the size of a unit, which a pilot has found."""
-        return super().kept() | {"unit": self.unit}
-
-    def picture(self) -> ReferencePicture:
-        """What has been gathered; black without variance before the first round."""
-        return summed(self.sums, self.units, self.tallies, self.unit, self.seconds)
-
     def _trace_part(self, part: int, units: int) -> None:
         none = np.zeros((0, 0))
-        for domain, colour, points, sequence in zip(
-            self._domains, self._colours, self._points, self._sequences[part], strict=True
-        ):
-            self._kernel.trace(
-                self._scene,
-                self._camera_pass,
-                self._worn,
-                domain,
-                colour,
-                sequence,
-                int(self.units[part]) * points,
-                units * points,
-                1.0 / points,
-                self._max_depth,
-                self.sums[part],
-                self.tallies[part],
-                none,
-                none,
-                self._sampling.scratch(),
-            )
+        for d, points in enumerate(self._points):
+            span = int(self.units[part]) * points, units * points, 1.0 / points
+            self._trace(d, self._domains[d], self._sequences[part][d], span, self.sums[part], part, none, none)
         self.units[part] += units
+
+    def _trace(
+        self,
+        d: int,
+        domain: Domain,
+        sequence: Sequence,
+        span: tuple[int, int, float],
+        picture: np.ndarray,
+        part: int | None,
+        weight: np.ndarray,
+        importance: np.ndarray,
+    ) -> None:
+        """Photons of domain number `d`; `span`: the first, how many, and the share that each has."""
+        tally = np.zeros(TALLY_SIZE) if part is None else self.tallies[part]
+        limits = *span, self._max_depth
+        target = picture, tally, weight, importance, self._sampling.scratch()
+        self._kernel.trace(self._scene, self._camera, self._worn, domain, self._colours[d], sequence, *limits, *target)
 
     def _aimed(self, domains: list[Domain]) -> tuple[list[Domain], list[int]]:
         """Densities and points a unit by a pilot that is not part of the picture.
@@ -217,43 +158,11 @@ class ReferenceRun(PartsRun[ReferencePicture]):
         from .photon_emit import GRID
 
         picture, importance = np.zeros(self.sums.shape[1:]), [np.zeros((GRID, GRID)) for _ in domains]
-        for d, (domain, colour) in enumerate(zip(domains, self._colours, strict=True)):
+        span = 0, _PILOT_PHOTONS, 1.0 / _PILOT_PHOTONS
+        for d, domain in enumerate(domains):
             sequence = self._sampling.scrambled(self._seed, PARTS + number, d)
-            self._kernel.trace(
-                self._scene,
-                self._camera_pass,
-                self._worn,
-                domain,
-                colour,
-                sequence,
-                0,
-                _PILOT_PHOTONS,
-                1.0 / _PILOT_PHOTONS,
-                self._max_depth,
-                picture,
-                np.zeros(TALLY_SIZE),
-                weight,
-                importance[d],
-                self._sampling.scratch(),
-            )
+            self._trace(d, domain, sequence, span, picture, None, weight, importance[d])
         return picture, importance
-
-
-def summed(sums: np.ndarray, units: np.ndarray, tallies: np.ndarray, unit: int, seconds: float) -> ReferencePicture:
-    """The picture from the sums (PARTS, H, W, 3) and tallies (PARTS, TALLY_SIZE) of parts that traced `units` (PARTS,)
-    of `unit` photons."""
-    total = max(int(units.sum()), 1)
-    flux = tallies.sum(axis=0) / total
-    balance = {name: float(value) for name, value in zip(TALLY, flux, strict=False)}
-    mean = sums.sum(axis=0) / total
-    covariance = np.zeros((*mean.shape, 3))
-    used = np.flatnonzero(units)
-    if len(used) > 1:
-        for part in used:
-            apart = sums[part] / units[part] - mean
-            covariance += units[part] / total * apart[..., :, None] * apart[..., None, :]
-        covariance /= len(used) - 1
-    return ReferencePicture(mean, covariance, int(units.sum()) * unit, seconds, balance)
 
 
 def _error_weight(luminance: np.ndarray) -> np.ndarray:
@@ -267,9 +176,6 @@ def _error_weight(luminance: np.ndarray) -> np.ndarray:
     smooth = np.maximum(block, 0.0)[index]
     epsilon = RELMSE_EPSILON * float(luminance.mean()) ** 2
     return 1.0 / (smooth**2 + epsilon) if epsilon > 0.0 else np.ones_like(smooth)
-
-
-_SEED = 1
 
 
 def reference_key(scene: Scene, width: int, height: int, max_depth: int) -> str:
@@ -289,7 +195,7 @@ def render_reference(
     seed: int = 1,
     progress: Progress = lambda fraction, text: None,
     cancelled: Cancelled = lambda: False,
-) -> ReferencePicture:
+) -> Picture:
     """The caustic layer of `scene`, until `photons`, `seconds` or `target_relmse` is reached, whichever comes first.
 
     What was done when `cancelled()` turned true is kept. Raises ValueError without any limit, UserError
@@ -312,27 +218,18 @@ def cached_reference(
     progress: Progress = lambda fraction, text: None,
     cancelled: Cancelled = lambda: False,
     folder: Path | None = None,
-) -> ReferencePicture:
+) -> Picture:
     """The stored picture where it is good enough, otherwise what is stored and more photons, stored again.
 
     Limits as in `render_reference`; `photons` counts those that are stored, `seconds` only the time spent
     now: with `seconds` alone every call adds. A damaged file is ignored; a folder that cannot be written
-    costs only the saving. An interrupt (KeyboardInterrupt) stores what is done and goes on upwards.
+    costs only the saving. An interrupt (KeyboardInterrupt) stores what is done and is raised again.
     """
 
-    def picture_of(stored: Mapping[str, np.ndarray]) -> ReferencePicture:
-        values = stored["sums"], stored["units"], stored["tallies"]
-        return summed(*values, int(stored["unit"]), float(stored["seconds"]))
-
-    def begin(stored: Mapping[str, np.ndarray] | None) -> ReferenceRun:
+    def begin() -> ReferenceRun:
         progress(0.0, "preparing")
-        run = ReferenceRun(scene, width, height, max_depth, _SEED)
-        if stored is not None and int(stored["unit"]) == run.unit:
-            run.restore(stored)
-        return run
+        return ReferenceRun(scene, width, height, max_depth, _SEED)
 
     path = kept_path(reference_key(scene, width, height, max_depth), folder)
-    shapes = {"sums": (PARTS, height, width, 3), "units": (PARTS,), "tallies": (PARTS, TALLY_SIZE)}
-    shapes |= {"seconds": (), "unit": ()}
     limits = Limits(photons, seconds, target_relmse)
-    return continue_kept(path, shapes, picture_of, begin, limits, progress, cancelled)
+    return continue_kept(path, KIND, (width, height), begin, limits, progress, cancelled)

@@ -18,10 +18,7 @@ from ..model.geometry.bvh import Bvh, build_bvh
 from ..model.geometry.mesh import Mesh
 from ..model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz, rgb_basis, xyz_to_rgb709_matrix
 from ..model.optics.spectrum import Spectrum, cmf_at
-from ..model.scene import (
-    Grating,
-    Scene,
-)
+from ..model.scene import Grating, Scene
 from .rough_albedo import albedo_tables
 from .scene_surfaces import Surfaces
 
@@ -29,7 +26,6 @@ BLACK, DIFFUSE, MIRROR, DIELECTRIC, GRATING, SHEET = range(6)
 OUTSIDE = -1
 """In place of an object: air."""
 
-_STEP_NM = 0.05
 TABLE_NM = np.linspace(380.0, 780.0, 8001)
 """Grid of index and weight tables; linear between them n errs below 1e-8 for every catalogue glass."""
 _NEAR = 1e-9
@@ -94,7 +90,7 @@ class PhotonScene(NamedTuple):
     microfacet_width: np.ndarray
     """float64 (O,): GGX's α of an object's surface; 0: it is polished."""
     albedo: np.ndarray
-    """float64 (O or 1, ratios, nodes): what one microfacet of it sends on (`rough_albedo`)."""
+    """float64 (O or 1, ratios, nodes): share that leaves after one microfacet (`rough_albedo`)."""
     near: float
     """Distances below this are the same place."""
     contact: float
@@ -204,7 +200,7 @@ def _gratings(scene: Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def colours(spectrum: Spectrum, classes: list[np.ndarray | None]) -> Colours:
-    """Atoms of a spectrum: most of the probability goes where the eye sees most, some where power is.
+    """Atoms of a spectrum: drawn mostly by what the eye sees, partly by power.
 
     A cell has the colour of its nanometre, as everywhere in the program; a line that of its own wavelength.
     """

@@ -3,7 +3,7 @@
 Unpolarised light is two perpendicular fields that do not interfere, so a path carries both, complex (2, 3), and no
 frame: where it meets a surface each is split along s and p of that plane of incidence. Together their squares are
 1; what an event lets pass becomes the probability of the choice, and the fields are made 1 again. The shaders know
-Stokes parameters instead (`shaders/lib/polarisation.glsl`), so both ways witness for each other.
+Stokes parameters instead (`shaders/lib/polarisation.glsl`), so each way checks the other.
 """
 
 from __future__ import annotations

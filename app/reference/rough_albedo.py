@@ -1,5 +1,7 @@
-"""What a rough surface sends on after one microfacet, compiled in float64: by quadrature over microfacets as
-`scattering.scatter` draws them, by the area that GGX gives them, which is not how the shaders' tables are made."""
+"""The share of light that leaves a rough surface after one microfacet, compiled in float64.
+
+A quadrature over microfacets as `scattering.scatter` draws them, by the area that GGX gives them, which is not how
+the shaders' tables are made."""
 
 from __future__ import annotations
 
@@ -79,7 +81,7 @@ def albedo_tables(widths: np.ndarray) -> np.ndarray:
 
 @compiled
 def sent_on(tables, thing, cosine, eta):
-    """Share of light at this cosine that an object sends on, linear between the table's nodes."""
+    """Share of light at this cosine that leaves an object, linear between the table's nodes."""
     rows, nodes = tables.shape[1], tables.shape[2]
     row = min(max((math.log(eta) + 1.2) * (rows - 1) / 2.4, 0.0), rows - 1.001)
     node = min(math.sqrt(max(cosine, 0.0)) * (nodes - 1), nodes - 1.001)

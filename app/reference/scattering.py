@@ -4,7 +4,7 @@ The tracers of photons (`photon_kernel`) and of camera rays (`camera_kernel`) ca
 reflectance decides by chance, nested solids follow their rank, an interpolated normal that would send a ray through its
 own facet gives way to the facet's, Beer's law thins what passes. Rough glass has microfacets drawn by their area
 (Walter et al. 2007, eq. 35, 36, 41), whether the ray sees them or not: another way than the shaders', with the same
-mean; light that one microfacet sends to another is shared out as the rest is (Turquin 2019).
+mean; light that goes from one microfacet to another leaves like the rest (Turquin 2019).
 """
 
 from __future__ import annotations
@@ -143,7 +143,7 @@ def _diffract(scene, triangle, place, u, v, d, mask, alone, nm, draw, field):
 
 
 _TILT, _TURN = np.uint64(0xA24BAED4963EE407), np.uint64(0x9FB21C651E98DF25)
-"""Set the numbers for a microfacet apart from those of Fresnel choices."""
+"""Make the numbers for a microfacet independent of those of Fresnel choices."""
 
 
 @compiled

@@ -32,9 +32,8 @@ from .caustic_windows import (
 )
 from .photon_emission import refined, scene_domains
 from .photon_emit import GRID
-from .photon_reference import RELMSE_EPSILON, TALLY_SIZE
 from .photon_scene import Colours
-from .rounds import PARTS, Progress, trace_parts
+from .rounds import PARTS, RELMSE_EPSILON, TALLY_SIZE, Progress, trace_parts
 from .sampling import Sequence, scrambled, scratch
 from .viewpoint import viewpoint
 
@@ -267,8 +266,8 @@ class CausticRun:
             if not self.planes.is_flat[side]:
                 name = self.scene.objects[self.planes.owner[side]].name
                 raise UserError(
-                    f"scene '{self.scene.name}': glass throws light on '{name}', which is not flat, and the camera's "
-                    "reference looks caustics up on flat receivers only; make it flat, or black"
+                    f"scene '{self.scene.name}': light from glass falls on '{name}', which is not flat, and the "
+                    "camera's reference looks caustics up on flat receivers only; make it flat, or black"
                 )
 
     def _texel(self, distance: float) -> float:
@@ -278,8 +277,8 @@ class CausticRun:
         return (pixel if self.camera.orthographic else pixel * distance) / TEXELS_A_PIXEL
 
     def _aim(self, pilot: list[Landed], tables: CausticTables, wanted: np.ndarray) -> np.ndarray:
-        """Sets the domains' densities by what the pilot brought to the windows; photons of each domain in a unit, none
-        where it brought nothing."""
+        """Sets the domains' densities by the pilot's photons in the windows; photons of each domain in a unit, none
+        where it had none there."""
         weight = []
         for d, found in enumerate(pilot):
             useful = np.zeros(len(found.watts), bool)

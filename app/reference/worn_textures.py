@@ -1,5 +1,4 @@
-"""The pictures that receivers wear, for all references: texels, where on them each triangle lies, and a look at a
-point."""
+"""The textures of receivers, for all references: texels, texture coordinates of each triangle, and lookups."""
 
 from __future__ import annotations
 

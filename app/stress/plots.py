@@ -11,18 +11,17 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from ..bench.report.style import PALETTE, new_figure
+from ..bench.report.style import PALETTE, error_axis, log_axis, new_figure
 from ..bench.report.text import superscript
 from .results import CaseResult
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 KEYS = ("srd", "srd-lambda", "progressive", "regular-16", "other-1", "other-2", "stochastic")
 COLOURS = [PALETTE[name][0] for name in KEYS]
-BAD, MUTED, GRID, PAPER = (PALETTE[name][0] for name in ("bad", "muted", "grid", "paper"))
+BAD, MUTED, PAPER = (PALETTE[name][0] for name in ("bad", "muted", "paper"))
 MARKERS = "osD^vPp"
 SMALLEST, LARGEST = 1e-12, 1e6
 """Range within which errors and bounds set the axis."""
@@ -96,30 +95,19 @@ def _place(result: CaseResult, severity: float) -> float:
 
 
 def _frame(axes: Axes, result: CaseResult, named: bool, limits: tuple[float, float]) -> None:
-    low, high, count = 0.8 * limits[0], 1.25 * limits[1], len(result.measurements)
+    errors, count = (0.8 * limits[0], 1.25 * limits[1]), len(result.measurements)
     if named:
         labels = [m.label if len(m.label) <= LONGEST else m.label[: LONGEST - 1] + "…" for m in result.measurements]
-        axes.set(xscale="log", xlim=(low, high), xlabel="error", ylim=(count - 0.4, -0.6))
+        axes.set(xlabel="error", ylim=(count - 0.4, -0.6))
         axes.set_yticks(range(count), labels)
         axes.tick_params(axis="y", length=0)
-        _powers(axes.xaxis)
-    else:
-        axes.set(yscale="log", ylim=(low, high), ylabel="error", xlabel=result.case.severity_name)
-        _powers(axes.yaxis)
-        if result.case.logarithmic:
-            axes.set_xscale("log")
-            _powers(axes.xaxis)
-    axes.grid(color=GRID, lw=0.7)
-    axes.set_axisbelow(True)
-
-
-def _powers(axis: Axis) -> None:
-    """Powers of ten as ticks, at most eight, without matplotlib's mathematics."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
-    axis.set_major_locator(LogLocator(numticks=8))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: superscript(value) if value > 0.0 else ""))
-    axis.set_minor_formatter(NullFormatter())
+        log_axis(axes, "x", errors, superscript)
+        return
+    axes.set(ylabel="error", xlabel=result.case.severity_name)
+    error_axis(axes, errors)
+    if result.case.logarithmic:
+        axes.set_xscale("log")
+        log_axis(axes, "x", axes.get_xlim(), superscript)
 
 
 def _legend(figure: Figure, axes: Axes) -> None:
@@ -130,4 +118,4 @@ def _legend(figure: Figure, axes: Axes) -> None:
     handles.append(Line2D([], [], color=MUTED, ls=(0, (4, 2)), lw=1.0))
     handles.append(Line2D([], [], color=BAD, ls="none", marker="x", ms=8.0, mew=2.0))
     labels += ["bound, same colour", "beyond its bound"]
-    figure.legend(handles, labels, loc="outside right upper", frameon=False, fontsize=8.0, handlelength=1.8)
+    figure.legend(handles, labels, loc="outside right upper")

@@ -1,12 +1,15 @@
-"""The stress result as one HTML page without other files: verdict, machine, and for each case a plot and a table."""
+"""The stress result for readers: a table for each case, on the screen and on one HTML page with verdict, machine and a
+plot."""
 
 from __future__ import annotations
 
 import math
 from pathlib import Path
 
+from markupsafe import Markup
+
 from ..base.atomic import atomic_output
-from ..bench.report.page import inlined, render
+from ..bench.report.page import Table, inlined, render
 from ..bench.report.style import plot_style, svg_text
 from .case import FLUX_CLOSURE, Measurement
 from .plots import case_plot
@@ -21,8 +24,19 @@ def write_html(result: StressResult, path: Path) -> None:
 
 def html_text(result: StressResult) -> str:
     """The page. It holds no script and fetches nothing."""
+    cases = []
     with plot_style():
-        cases = [_shown(number, case) for number, case in enumerate(result.cases)]
+        for number, found in enumerate(result.cases):
+            drawn = case_plot(found)
+            label = f"{found.case.name}: errors and bounds against {found.case.severity_name}"
+            cases.append(
+                {
+                    "case": found.case,
+                    "stops": _stops(found),
+                    "plot": None if drawn is None else inlined(svg_text(drawn), f"case-{number}", label),
+                    "table": case_table(found),
+                }
+            )
     return render(
         "stress.html",
         result=result,
@@ -30,70 +44,78 @@ def html_text(result: StressResult) -> str:
         summary=result.summary(),
         closure=f"{FLUX_CLOSURE:.0e}",
         run={"version": result.version, "date": result.date, **result.machine},
+        overview=_overview(result),
         cases=cases,
     )
 
 
-def _shown(number: int, result: CaseResult) -> dict[str, object]:
-    """What the page says of a case."""
-    case, measured = result.case, result.measurements
-    drawn, stops = case_plot(result), []
-    if result.failure:
-        stops = [f"Stopped by an error: {result.failure}"]
-    elif not result.complete:
-        stops = [f"Stopped after {len(measured)} of {case.steps} severities."]
-    label = f"{case.name}: errors and bounds against {case.severity_name}"
-    imbalances = [m.flux_imbalance for m in measured if m.flux_imbalance is not None]
-    return {
-        "name": case.name,
-        "title": case.title,
-        "why": case.why,
-        "severity_name": case.severity_name,
-        "broken": result.broken(),
-        "stops": stops,
-        "plot": None if drawn is None else inlined(svg_text(drawn), f"case-{number}", label),
-        "numbers": (
-            len(measured),
-            sum(m.nonfinite for m in measured),
-            _power(max(imbalances, default=None)),
-            sum(sum(m.fallbacks.values()) for m in measured),
-            _tightest(result),
-            f"{result.seconds:.1f}",
-        ),
-        "rows": [
-            {
-                "label": m.label,
-                "cells": (m.nonfinite, _power(m.flux_imbalance), _fallbacks(m)),
-                "errors": _errors(m),
-                "note": m.note,
-                "broken": m.broken(),
-            }
-            for m in measured
-        ],
-    }
-
-
-def _errors(m: Measurement) -> list[tuple[str, bool]]:
-    """(error and bound, whether it is kept) of each that is worth the room."""
-    return [
-        (
-            f"{name} {_power(error)}" + (f" / {_power(m.bounds[name])}" if name in m.bounds else ""),
-            name not in m.bounds or error <= m.bounds[name],
-        )
-        for name, error in m.errors.items()
-        if error or name not in m.bounds
+def case_table(found: CaseResult) -> Table:
+    """What a case measured, a row a severity."""
+    rows = [
+        [m.label, m.nonfinite, _power(m.flux_imbalance), _fallbacks(m), _errors(m), m.note, _verdict(m.broken())]
+        for m in found.measurements
     ]
+    if found.failure:
+        rows.append(["", "", "", "", "", "", _verdict([found.failure])])
+    headings = (found.case.severity_name, "not finite", "flux off", "fall-backs", "errors / bounds", "note", "verdict")
+    return Table(headings, rows, title=found.case.name, words=headings[3:])
+
+
+def _overview(result: StressResult) -> Table:
+    """A row a case."""
+    rows = []
+    for number, found in enumerate(result.cases):
+        measured, name = found.measurements, Markup('<a href="#case-{}">{}</a>').format(number, found.case.name)
+        imbalances = [m.flux_imbalance for m in measured if m.flux_imbalance is not None]
+        fallbacks = sum(sum(m.fallbacks.values()) for m in measured)
+        worst = _power(max(imbalances, default=None)), fallbacks, _tightest(found), f"{found.seconds:.1f}"
+        bad = sum(m.nonfinite for m in measured)
+        rows.append([name, len(measured), bad, *worst, _verdict(found.broken())])
+    headings = (
+        "case",
+        "severities",
+        "not finite",
+        "flux off, at most",
+        "fall-backs",
+        "nearest to its bound",
+        "seconds",
+    )
+    return Table((*headings, "verdict"), rows, words=("verdict",))
+
+
+def _stops(found: CaseResult) -> list[str]:
+    """Why a case was not measured to its end."""
+    if found.failure:
+        return [f"Stopped by an error: {found.failure}"]
+    steps = f"{len(found.measurements)} of {found.case.steps} severities"
+    return [] if found.complete else [f"Stopped after {steps}."]
+
+
+def _verdict(broken: list[str]) -> str:
+    return f"BROKEN: {'; '.join(broken)}" if broken else "holds"
+
+
+def _errors(m: Measurement) -> str:
+    """Error and bound of each that is not zero, those beyond their bound marked."""
+    parts = []
+    for name, error in m.errors.items():
+        bound = m.bounds.get(name)
+        if error or bound is None:
+            kept = bound is None or error <= bound
+            of_bound = "" if bound is None else f" / {_power(bound)}"
+            parts.append(f"{'' if kept else '! '}{name} {_power(error)}{of_bound}")
+    return ", ".join(parts)
 
 
 def _fallbacks(m: Measurement) -> str:
     return ", ".join(f"{name.replace('_', ' ')} {count:,}" for name, count in m.fallbacks.items() if count) or "none"
 
 
-def _tightest(case: CaseResult) -> str:
+def _tightest(found: CaseResult) -> str:
     """The error that comes nearest to its bound (or exceeds it most), as a share of it."""
     shares = [
         (m.errors[name] / bound if math.isfinite(m.errors[name]) else math.inf, name)
-        for m in case.measurements
+        for m in found.measurements
         for name, bound in m.bounds.items()
         if bound > 0.0
     ]

@@ -1,22 +1,18 @@
-"""What a stress run measured: on the screen a line a severity, and as JSON, which has no word for NaN."""
+"""What a stress run measured, and the same as JSON, which has no word for NaN."""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..base.atomic import atomic_output
 from .case import FLUX_CLOSURE, Case, Measurement
-
-if TYPE_CHECKING:
-    from rich.table import Table
-    from rich.text import Text
 
 
 @dataclass
@@ -128,61 +124,3 @@ def _plain(value: Any) -> Any:
     if math.isfinite(value):
         return value
     return "NaN" if math.isnan(value) else ("Infinity" if value > 0.0 else "-Infinity")
-
-
-# ---- the screen ------------------------------------------------------------------------------
-
-
-def table(result: StressResult) -> Table:
-    """All measurements."""
-    from rich.table import Table
-    from rich.text import Text
-
-    shown = Table(title="stress", title_justify="left", header_style="bold", pad_edge=False)
-    for name, options in (
-        ("case", {"no_wrap": True}),
-        ("severity", {"overflow": "fold", "max_width": 34}),
-        ("not finite", {"justify": "right"}),
-        ("flux off", {"justify": "right"}),
-        ("fall-backs", {"overflow": "fold", "max_width": 28}),
-        ("errors / bounds", {"overflow": "fold"}),
-        ("verdict", {"overflow": "fold"}),
-    ):
-        shown.add_column(name, **options)
-    for found in result.cases:
-        for number, m in enumerate(found.measurements):
-            shown.add_row(
-                found.case.name if number == 0 else "",
-                Text(m.label),
-                str(m.nonfinite),
-                "" if m.flux_imbalance is None else f"{m.flux_imbalance:.0e}",
-                Text(", ".join(f"{name} {count}" for name, count in m.fallbacks.items() if count)),
-                _errors(m),
-                _verdict(m.broken()),
-            )
-        if found.failure:
-            name = "" if found.measurements else found.case.name
-            shown.add_row(name, "", "", "", "", "", _verdict([found.failure]))
-        shown.add_section()
-    return shown
-
-
-def _errors(m: Measurement) -> Text:
-    """ "energy 3e-04 / 1e-03", those beyond their bound in red; a bounded error of exactly zero is not worth the
-    room."""
-    from rich.text import Text
-
-    text = Text()
-    for name, error in m.errors.items():
-        bound = m.bounds.get(name)
-        if error == 0.0 and bound is not None:
-            continue
-        part = f"{name} {error:.1e}" + ("" if bound is None else f" / {bound:.0e}")
-        text.append((", " if text else "") + part, style=None if bound is None or error <= bound else "bold red")
-    return text
-
-
-def _verdict(broken: Sequence[str]) -> Text:
-    from rich.text import Text
-
-    return Text("ok", style="green") if not broken else Text("BROKEN: " + "; ".join(broken), style="bold red")

@@ -19,7 +19,7 @@ from ..base.errors import UserError
 
 if TYPE_CHECKING:
     from ..model.scene import Scene
-    from ..reference.photon_reference import ReferencePicture
+    from ..reference.rounds import Picture
 
 TARGET_RELMSE = 2e-4
 MAX_SECONDS = 900.0
@@ -125,20 +125,20 @@ class ReferenceThread:
             if not run.exhausted:
                 run.advance()
             over = run.exhausted or run.seconds > MAX_SECONDS
-            if run.photons >= _GROWTH * reported or over:
-                reported = run.photons
+            if run.amount >= _GROWTH * reported or over:
+                reported = run.amount
                 picture = run.picture()
                 self._publish(picture, directly)
                 if over or picture.is_within(TARGET_RELMSE):
                     self.is_done = True
                     return
 
-    def _publish(self, picture: ReferencePicture, directly: np.ndarray) -> None:
+    def _publish(self, picture: Picture, directly: np.ndarray) -> None:
         number = 1 if self.snapshot is None else self.snapshot.number + 1
         self.snapshot = Snapshot(
             number,
             picture.rgb.astype(np.float32),
             directly,
-            picture.photons,
+            picture.amount,
             picture.relmse,
         )

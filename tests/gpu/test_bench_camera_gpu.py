@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 import pytest
 from spectrasplat.__main__ import main
-from spectrasplat.bench import camera_rendering, reference_picture, runner
+from spectrasplat.bench import camera_rendering, runner, subjects
 from spectrasplat.bench.camera_rendering import CameraRig, SharedLight
 from spectrasplat.bench.rendering import NothingToMeasure
 from spectrasplat.bench.results import BenchResult
@@ -85,7 +85,7 @@ def test_a_tiny_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pyt
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.setattr(runner, "POINTS", 3)
     monkeypatch.setattr(camera_rendering, "LIGHT_PHOTONS", PHOTONS)
-    monkeypatch.setattr(reference_picture, "caustic_plan", lambda _: CausticPlan(1 << 16))
+    monkeypatch.setattr(subjects, "caustic_plan", lambda _: CausticPlan(1 << 16))
     monkeypatch.setattr("spectrasplat.bench.machine.program_hash", lambda: "as it is")  # an editor may be at work
     out = tmp_path / "out"
     arguments = [

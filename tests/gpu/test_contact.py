@@ -61,7 +61,7 @@ def test_a_coat_on_glass_loses_nothing_and_is_what_the_reference_says(gl, materi
         assert found["lost_depth"] + found["lost_numeric"] < ROUNDING, (gap, found)
         run = ReferenceRun(coated(material, gap), 16, 9)
         run.advance(200_000)
-        flux = run.picture().balance
+        flux = run.picture().fates
         assert flux["lost_depth"] + flux["lost_numeric"] < ROUNDING * flux["emitted"], (gap, flux)
         for name, share in found.items():
             # The reference sends a little less light past the glass: 0.4 % of it.

@@ -50,7 +50,7 @@ def relative(picture: np.ndarray, expected: np.ndarray) -> float:
 
 def reference(camera: Camera, objects: tuple[SceneObject, ...], samples: int) -> np.ndarray:
     scene = Scene("lens", camera, (SUN,), objects)
-    return render_camera_reference(scene, *SIZE, samples=samples).rgb()
+    return render_camera_reference(scene, *SIZE, samples=samples).rgb
 
 
 @pytest.mark.slow

@@ -205,7 +205,7 @@ def lit_panes(polarisation: bool, v_d: float = 20.0) -> Scene:
 
 def known_share(polarisation: bool, v_d: float = 20.0) -> float:
     """Of that light, by electric fields (2^16 photons: to 2e-3), or by the mean of s and p."""
-    balance = render_reference(lit_panes(polarisation, v_d), 4, 4, photons=1 << 16).balance
+    balance = render_reference(lit_panes(polarisation, v_d), 4, 4, photons=1 << 16).fates
     return balance["deposited"] / balance["emitted"]
 
 

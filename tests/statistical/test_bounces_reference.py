@@ -105,12 +105,12 @@ def test_surfaces_light_each_other_as_in_the_reference(gl: Context, make) -> Non
     finally:
         renderer.release()
     caustic = build_caustic(scene, *SIZE, CausticPlan(photons=1 << 18, bins=8, texel_size=texel)) if texel else None
-    expected = blocks(render_camera_reference(scene, *SIZE, samples=1024, caustic=caustic).rgb())
+    expected = blocks(render_camera_reference(scene, *SIZE, samples=1024, caustic=caustic).rgb)
     found = (shown - expected) / (expected + 0.05 * expected.mean())
     print(make.__name__, "rms", np.sqrt((found**2).mean()), "max", abs(found).max(), "mean", found.mean())
     assert abs(found.mean()) < 5e-3
     assert np.sqrt((found**2).mean()) < BOUNDS[make][0] and abs(found).max() < BOUNDS[make][1]
     # What is bounded is a small part of what bounces bring.
     without = Scene(**{**vars(scene), "render": RenderDefaults()})
-    dark = blocks(render_camera_reference(without, *SIZE, samples=64, caustic=caustic).rgb())
+    dark = blocks(render_camera_reference(without, *SIZE, samples=64, caustic=caustic).rgb)
     assert (expected - dark).mean() > 0.1 * expected.mean()

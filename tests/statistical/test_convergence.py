@@ -32,7 +32,7 @@ pytestmark = pytest.mark.slow
 def reference() -> ReferencePicture:
     scene = load_scene(shipped_scenes()["prism_case"])
     picture = render_reference(scene, *SIZE, photons=REFERENCE_PHOTONS, max_depth=scene.render.max_depth)
-    return ReferencePicture(picture.xyz(), picture.xyz_variance())
+    return ReferencePicture(picture.xyz, picture.variance)
 
 
 def squared_errors(gl: Context, reference: ReferencePicture, method: str = "srd-photons") -> np.ndarray:

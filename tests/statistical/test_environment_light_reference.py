@@ -98,7 +98,7 @@ def error(gl: Context, scene: Scene) -> np.ndarray:
         shown = blocks(renderer.run(stage).astype(float))
     finally:
         renderer.release()
-    expected = blocks(render_camera_reference(scene, *SIZE, samples=2048).rgb())
+    expected = blocks(render_camera_reference(scene, *SIZE, samples=2048).rgb)
     return (shown - expected) / (expected + 0.05 * expected.mean())
 
 

@@ -102,7 +102,7 @@ def blocks(picture: np.ndarray) -> np.ndarray:
 
 
 def reference(scene: Scene, photons: int) -> np.ndarray:
-    return blocks(render_reference(scene, WIDTH, HEIGHT, photons=photons).xyz()[..., 1])
+    return blocks(render_reference(scene, WIDTH, HEIGHT, photons=photons).xyz[..., 1])
 
 
 def drawn(gl: Context, scene: Scene, photons: int) -> np.ndarray:

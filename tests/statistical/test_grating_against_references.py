@@ -79,7 +79,7 @@ SETTINGS = RenderSettings(width=WIDTH, height=HEIGHT, photons=120_000, spp=96)
 
 @pytest.mark.slow
 def test_the_camera_sees_the_slits_spectra() -> None:
-    reference = render_camera_reference(slit_seen_through(), WIDTH, HEIGHT, samples=1500).rgb()
+    reference = render_camera_reference(slit_seen_through(), WIDTH, HEIGHT, samples=1500).rgb
     found = {m: render(slit_seen_through(), replace(SETTINGS, method=m)).rgb for m in ("srd", "stochastic-even")}
     for method, picture in found.items():
         assert picture.sum(axis=(0, 1)) == pytest.approx(reference.sum(axis=(0, 1)), rel=0.02), method

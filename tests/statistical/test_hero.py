@@ -108,14 +108,14 @@ def test_hero_shows_the_reference(gl, scene) -> None:
     made = scene()
     shown = pictures(gl, made, "hero")
     reference = render_reference(made, WIDTH, HEIGHT, photons=REFERENCE_PHOTONS)
-    ours, theirs = blocks(shown.mean(axis=0)), blocks(reference.xyz())
+    ours, theirs = blocks(shown.mean(axis=0)), blocks(reference.xyz)
     error = ours.sum(axis=(0, 1)) / theirs.sum(axis=(0, 1)) - 1.0
     totals = np.array([blocks(p).sum(axis=(0, 1)) for p in shown]) / theirs.sum(axis=(0, 1))
     doubt = 2.0 * totals.std(axis=0, ddof=1) / np.sqrt(SEEDS)
     assert doubt.max() < 0.03 and (np.abs(error) < TOTAL_TOLERANCE + doubt).all(), (error, doubt)
     # Block by block: within 4 % of the brightest and three standard errors.
     scatter = np.sqrt(np.var([blocks(p) for p in shown], axis=0, ddof=1) / SEEDS)
-    noise = 3.0 * np.hypot(scatter, np.sqrt(np.maximum(blocks(reference.xyz_variance()), 0.0) / 64.0))
+    noise = 3.0 * np.hypot(scatter, np.sqrt(np.maximum(blocks(reference.variance), 0.0) / 64.0))
     excess = np.abs(ours - theirs) - noise - 0.04 * theirs.max(axis=(0, 1))
     assert (excess > 0.0).mean() < 0.01, float(excess.max())
 

@@ -42,7 +42,7 @@ def test_more_photons_are_never_worse(gl: Context, tmp_path: Path, name: str) ->
         path.write_text(SCENE.format(**keys), encoding="utf-8")
     scene = load_scene(path)
     picture = render_reference(scene, *SIZE, photons=REFERENCE_PHOTONS, max_depth=scene.render.max_depth)
-    reference = ReferencePicture(picture.xyz(), picture.xyz_variance())
+    reference = ReferencePicture(picture.xyz, picture.variance)
     rig = MethodRig(gl, scene, "srd-photons", *SIZE)
     errors = np.array([measure(rig.render(n, 1).xyz, reference)["nrmse"] for n in PHOTONS])
     rig.release()

@@ -178,14 +178,12 @@ class Comparison:
             blocks(rgb709_to_xyz(render(scene, replace(settings, seed=seed), context=context).rgb.astype(float)))
             for seed in range(1, SEEDS + 1)
         ]
-        self.reference = blocks(reference.xyz())
+        self.reference = blocks(reference.xyz)
         self.product = np.mean(pictures, axis=0)
         scatter = np.var(pictures, axis=0, ddof=1) / SEEDS
         # Three degrees of freedom a block are too few: neighbours and all blocks of like brightness share theirs.
         relative = (scatter.sum(axis=(0, 1)) / np.abs(self.product).sum(axis=(0, 1)))[None, None]
-        self.variance = (
-            np.maximum(scatter, relative * np.abs(self.product)) + blocks(reference.xyz_variance()) / BLOCK**2
-        )
+        self.variance = np.maximum(scatter, relative * np.abs(self.product)) + blocks(reference.variance) / BLOCK**2
 
     def total_error(self, reference: np.ndarray | None = None) -> np.ndarray:
         """(product − reference)/reference of each channel's sum."""
@@ -238,9 +236,9 @@ def test_the_measured_case_agrees_with_a_third_program() -> None:
     picture = render_reference(scene, 512, 512, photons=1_500_000)
     np.testing.assert_allclose(picture.rgb.sum(axis=(0, 1)), other.sum(axis=(0, 1)), rtol=4e-3)
     ours, theirs = blocks(picture.rgb, 4), blocks(other, 4)
-    norm = np.sum(theirs**2)
+    norm, own = np.sum(theirs**2), blocks(picture.variance, 4).sum() / 16 / np.sum(blocks(picture.xyz, 4) ** 2)
     # Pixels of a quasi-random picture make up for each other, so blocks scatter less than their pixels say.
-    bound = np.hypot(np.sqrt(blocks(picture.variance, 4).sum() / 16 / norm), 0.013)
+    bound = np.hypot(np.sqrt(own), 0.013)
     error = np.sqrt(np.sum((ours - theirs) ** 2) / norm)
     assert error < bound
     # Two pixels of shift stand out even in this noise.

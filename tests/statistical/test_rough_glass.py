@@ -18,7 +18,7 @@ from spectrasplat.model.geometry import primitives
 from spectrasplat.model.lights import AreaLight, CollimatedLight
 from spectrasplat.model.materials import Absorption
 from spectrasplat.model.optics.catalogue import find
-from spectrasplat.model.optics.colorimetry import VISIBLE_NM
+from spectrasplat.model.optics.colorimetry import VISIBLE_NM, rgb709_to_xyz
 from spectrasplat.model.optics.glass import Dispersion, from_abbe
 from spectrasplat.model.optics.spectrum import constant, laser
 from spectrasplat.model.placement import rotation_about
@@ -82,7 +82,7 @@ def test_a_slab_lets_through_what_the_reference_does(gl: Context, roughness: flo
     """Both surfaces, all reflections between them; the microfacets keep nothing."""
     scene = lit_slab(roughness)
     found = shares_of(caustic(gl, scene, 60_000, (8, 8)))
-    balance = render_reference(scene, 4, 4, photons=400_000).balance
+    balance = render_reference(scene, 4, 4, photons=400_000).fates
     emitted = balance["emitted"]
     assert found["deposited"] == pytest.approx(balance["deposited"] / emitted, rel=4e-3)
     assert found["absorbed"] == pytest.approx(balance["absorbed"] / emitted, abs=4e-3)
@@ -189,9 +189,9 @@ def test_the_pattern_behind_a_slab_is_the_references(gl: Context) -> None:
     scene = lit_slab(0.4)
     reference = render_reference(scene, 64, 64, photons=1_000_000)
     found = caustic(gl, scene, 60_000).rgb
-    known, sigma = blocks(reference.rgb)[..., 1], np.sqrt(blocks(reference.variance)[..., 1]) / 8.0
+    known, sigma = blocks(reference.xyz)[..., 1], np.sqrt(blocks(reference.variance)[..., 1]) / 8.0
     allowed = np.hypot(sigma, 0.02 * known + 2e-3 * known.max())
-    z = (blocks(found)[..., 1] - known) / allowed
+    z = (blocks(rgb709_to_xyz(found))[..., 1] - known) / allowed
     assert abs(z).max() < 5.0 and np.sqrt((z**2).mean()) < 1.5
     assert error(found, reference.rgb) < 0.025
     assert error(caustic(gl, lit_slab(0.43), 60_000).rgb, reference.rgb) > 0.025
@@ -254,7 +254,7 @@ def seen_through(roughness: float, dispersion: Dispersion, smooth: bool) -> Scen
 @pytest.mark.parametrize("dispersion", [GLASS, find("N-SF11")], ids=["one index", "dispersive"])
 def test_the_camera_sees_through_rough_glass(gl: Context, dispersion: Dispersion, smooth: bool) -> None:
     scene = seen_through(0.4, dispersion, smooth)
-    reference = render_camera_reference(scene, 48, 32, samples=1500).rgb()
+    reference = render_camera_reference(scene, 48, 32, samples=1500).rgb
     found = render(scene, RenderSettings(48, 32, photons=1000, spp=64), context=gl).rgb
     assert found.sum(axis=(0, 1)) == pytest.approx(reference.sum(axis=(0, 1)), rel=0.01)
     assert error(found, reference) < 0.03
@@ -270,6 +270,6 @@ def test_the_environment_lights_through_rough_glass(gl: Context) -> None:
     sky = gradient((2.0, 2.0, 2.0), (0.1, 0.1, 0.1), (0.0, 0.0, 0.0))
     camera = Camera((0.0, 0.0, 0.8), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0), vertical_fov_deg=60.0)
     scene = Scene("pane", camera, (), (pane, floor), environment=sky)
-    reference = render_camera_reference(scene, 16, 16, samples=6000).rgb().mean()
+    reference = render_camera_reference(scene, 16, 16, samples=6000).rgb.mean()
     found = render(scene, RenderSettings(16, 16, photons=1000, spp=4), context=gl).rgb.mean()
     assert found == pytest.approx(reference, rel=0.01)

@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 import pytest
 from spectrasplat.base.errors import UserError
-from spectrasplat.bench import reference_picture, runner
+from spectrasplat.bench import runner, subjects
 from spectrasplat.bench.camera_rendering import CameraRig
 from spectrasplat.bench.measured_passes import CAMERA, MEASURED_PASSES
 from spectrasplat.bench.rendering import Rendering
@@ -174,8 +174,8 @@ def test_a_caustic_is_planned_where_light_may_fall() -> None:
     from spectrasplat.model.io.scene_file import load_scene
 
     ball = load_scene(find_scene("ball_plain"))
-    plan = reference_picture.caustic_plan(ball)
+    plan = subjects.caustic_plan(ball)
     assert plan is not None and plan.max_depth == ball.render.max_depth and 0.0 < plan.target_relmse <= 1e-4
-    assert reference_picture.caustic_plan(replace(ball, lights=())) is None
+    assert subjects.caustic_plan(replace(ball, lights=())) is None
     bare = replace(ball, objects=tuple(o for o in ball.objects if not isinstance(o.material, Diffuse)))
-    assert isinstance(bare, Scene) and reference_picture.caustic_plan(bare) is None
+    assert isinstance(bare, Scene) and subjects.caustic_plan(bare) is None

@@ -36,18 +36,18 @@ from spectrasplat.model.scene import (
 )
 from spectrasplat.model.texture import Environment, Texture
 from spectrasplat.reference.camera_reference import (
-    CameraPicture,
     CameraRun,
     cached_camera_reference,
     camera_reference_key,
     render_camera_reference,
 )
+from spectrasplat.reference.rounds import Picture
 from spectrasplat.reference.spectral_caustic import CausticPlan
 
 from tests.unit.camera_scenes import ABOVE, D65, FLINT, WHITE, place, plate, scene_of, slab_scene
 
 
-def z_squared(picture: CameraPicture, expected: np.ndarray) -> float:
+def z_squared(picture: Picture, expected: np.ndarray) -> float:
     """Mean of z² on Y where the picture has noise."""
     noisy = picture.variance[..., 1] > 0.0
     return float(np.mean((picture.xyz[..., 1] - expected[..., 1])[noisy] ** 2 / picture.variance[..., 1][noisy]))
@@ -62,8 +62,8 @@ def test_a_plate_under_a_point_light_is_lamberts_law() -> None:
     middle = (np.arange(33) + 0.5) / 33 - 0.5
     x, y = np.meshgrid(middle, -middle)
     lux = 5.0 * 1.5 / ((x - 0.3) ** 2 + (y + 0.2) ** 2 + 1.5**2) ** 1.5
-    np.testing.assert_allclose(picture.rgb(), lux[..., None] * np.array([0.8, 0.4, 0.1]) / math.pi, rtol=2e-3)
-    assert picture.lost == {"depth": 0.0, "numeric": 0.0}
+    np.testing.assert_allclose(picture.rgb, lux[..., None] * np.array([0.8, 0.4, 0.1]) / math.pi, rtol=2e-3)
+    assert picture.fates == {"depth": 0.0, "numeric": 0.0}
 
 
 def test_a_spectral_reflectance_meets_the_lights_spectrum() -> None:
@@ -178,7 +178,7 @@ def test_a_texture_lies_upright_and_is_interpolated() -> None:
                             (1 - abs(y - math.floor(y) - dy)) * (1 - abs(x - math.floor(x) - dx)) * rgb[r, c]
                         )
         # The mean over a pixel of a bilinear patch is its middle; 32 samples leave a little of the slope.
-        np.testing.assert_allclose(picture.rgb() * math.pi, expected * [1.0, 0.5, 1.0], atol=0.012)
+        np.testing.assert_allclose(picture.rgb * math.pi, expected * [1.0, 0.5, 1.0], atol=0.012)
 
 
 def test_the_environment_is_seen_the_way_its_picture_lies() -> None:
@@ -191,7 +191,7 @@ def test_the_environment_is_seen_the_way_its_picture_lies() -> None:
 
     def looks(direction: tuple[float, float, float], up=(0.0, 0.0, 1.0)) -> np.ndarray:
         camera = Camera((0.0, 0.0, 0.0), direction, up=up, vertical_fov_deg=0.01)
-        return render_camera_reference(scene_of(thing, camera=camera, environment=env), 1, 1, samples=8).rgb()[0, 0, :2]
+        return render_camera_reference(scene_of(thing, camera=camera, environment=env), 1, 1, samples=8).rgb[0, 0, :2]
 
     np.testing.assert_allclose(looks((0.0, 1.0, 0.0)), [63.5, 31.5], atol=0.01)  # the middle
     np.testing.assert_allclose(looks((1.0, 0.0, 0.0)), [95.5, 31.5], atol=0.01)  # to the right of local x is −local y
@@ -241,10 +241,10 @@ def test_glass_in_a_white_room_is_white_path_by_path(scene: Scene) -> None:
     run = unit_run(scene)
     run.advance()
     picture = run.picture()
-    lost = picture.lost["depth"] + picture.lost["numeric"]
+    lost = picture.fates["depth"] + picture.fates["numeric"]
     assert lost < 1e-5
     assert np.abs(picture.xyz - 1.0).max() < 1e-12 or (
-        lost > 0.0 and np.mean(np.abs(picture.xyz - 1.0) > 1e-12) <= lost * picture.samples * 3
+        lost > 0.0 and np.mean(np.abs(picture.xyz - 1.0) > 1e-12) <= lost * picture.amount * 3
     )
 
 
@@ -273,7 +273,7 @@ def test_a_camera_inside_an_absorbing_ball_sees_the_room_by_way_of_its_radius() 
 def test_a_mirrors_tint_is_its_colour() -> None:
     mirror = place(primitives.plane(9.0, 9.0), Mirror((0.9, 0.5, 0.2)))
     picture = render_camera_reference(scene_of(mirror, background_rgb=(2.0, 2.0, 2.0)), 16, 16, samples=512)
-    np.testing.assert_allclose(picture.rgb().mean(axis=(0, 1)), [1.8, 1.0, 0.4], rtol=2e-3)
+    np.testing.assert_allclose(picture.rgb.mean(axis=(0, 1)), [1.8, 1.0, 0.4], rtol=2e-3)
 
 
 # ---- its own error, limits, the cache --------------------------------------------------------
@@ -292,15 +292,15 @@ def test_the_picture_grows_in_the_cache(tmp_path: Path) -> None:
     scene = slab_scene(FLINT)
     first = cached_camera_reference(scene, 8, 12, samples=16, folder=tmp_path)
     again = cached_camera_reference(scene, 8, 12, samples=8, folder=tmp_path)
-    assert first.samples == again.samples == 16 and np.array_equal(first.xyz, again.xyz)
+    assert first.amount == again.amount == 16 and np.array_equal(first.xyz, again.xyz)
     more = cached_camera_reference(scene, 8, 12, samples=64, folder=tmp_path)
     at_once = render_camera_reference(scene, 8, 12, samples=64)
     np.testing.assert_allclose(more.xyz, at_once.xyz, rtol=1e-9, atol=1e-15)
     good_enough = cached_camera_reference(scene, 8, 12, target_relmse=more.relmse * 1.01, folder=tmp_path)
-    assert good_enough.samples == 64
+    assert good_enough.amount == 64
     (stored,) = tmp_path.glob("*.npz")
     stored.write_bytes(stored.read_bytes()[:500])
-    assert cached_camera_reference(scene, 8, 12, samples=16, folder=tmp_path).samples == 16
+    assert cached_camera_reference(scene, 8, 12, samples=16, folder=tmp_path).amount == 16
 
 
 def test_limits() -> None:
@@ -308,9 +308,9 @@ def test_limits() -> None:
         render_camera_reference(slab_scene(FLINT), 4, 4)
     rough = render_camera_reference(slab_scene(FLINT), 8, 12, target_relmse=0.01)
     assert 0.0 < rough.relmse <= 0.01
-    assert render_camera_reference(slab_scene(FLINT), 8, 12, seconds=0.05).samples > 0
+    assert render_camera_reference(slab_scene(FLINT), 8, 12, seconds=0.05).amount > 0
     stopped = render_camera_reference(slab_scene(FLINT), 8, 12, samples=10**9, cancelled=iter([False, True]).__next__)
-    assert 0 < stopped.samples < 10**9
+    assert 0 < stopped.amount < 10**9
 
 
 def test_the_key_knows_textures_and_what_lies_beyond() -> None:

@@ -23,9 +23,10 @@ from spectrasplat.model.optics.spectrum import Spectrum, laser
 from spectrasplat.model.scene import Absorption, Black, Camera, Dielectric, Diffuse, Mirror, Scene, SceneObject
 from spectrasplat.model.texture import Texture
 from spectrasplat.reference import photon_reference
-from spectrasplat.reference.camera_reference import CameraPicture, CameraRun, render_camera_reference
+from spectrasplat.reference.camera_reference import CameraRun, render_camera_reference
 from spectrasplat.reference.direct_light import seen_directly
 from spectrasplat.reference.photon_reference import render_reference
+from spectrasplat.reference.rounds import Picture
 from spectrasplat.reference.spectral_caustic import CausticPlan, build_caustic
 
 from tests.unit.camera_scenes import D65, FLINT, THICKNESS, TILT, place, plate, scene_of, slab_scene
@@ -60,18 +61,18 @@ def slab_column(glass: Dispersion, rows: int, fresnel: str = "exact", sign: floa
 
 
 @pytest.fixture(scope="module")
-def slab_picture() -> CameraPicture:
+def slab_picture() -> Picture:
     return render_camera_reference(slab_scene(FLINT), 12, 48, samples=1024)
 
 
-def slab_z_squared(picture: CameraPicture, expected: np.ndarray) -> float:
+def slab_z_squared(picture: Picture, expected: np.ndarray) -> float:
     """Mean of z² over rows and channels; a row's twelve variances together have 84 degrees of freedom, so that 1.02 is
     right."""
     variance = picture.variance.sum(axis=1) / 144
     return float(np.mean((picture.xyz.mean(axis=1) - expected) ** 2 / variance))
 
 
-def test_an_edge_behind_a_slab_has_the_fringe_of_snells_law(slab_picture: CameraPicture) -> None:
+def test_an_edge_behind_a_slab_has_the_fringe_of_snells_law(slab_picture: Picture) -> None:
     """48 rows of three channels that go together: the mean of z² scatters by √(2/48) = 0.2."""
     expected = slab_column(FLINT, 48)
     assert slab_z_squared(slab_picture, expected) < 1.02 + 4 * 0.2
@@ -79,7 +80,7 @@ def test_an_edge_behind_a_slab_has_the_fringe_of_snells_law(slab_picture: Camera
 
 
 @pytest.mark.parametrize("mutant", [{"fresnel": "schlick"}, {"sign": -1.0}], ids=str)
-def test_wrong_optics_would_show_in_the_fringe(slab_picture: CameraPicture, mutant: dict) -> None:
+def test_wrong_optics_would_show_in_the_fringe(slab_picture: Picture, mutant: dict) -> None:
     assert slab_z_squared(slab_picture, slab_column(FLINT, 48, **mutant)) > 4.0
 
 
@@ -219,7 +220,7 @@ def test_the_caustic_is_that_of_the_light_reference() -> None:
     seen = seen_directly(scene, 36, 24)
     blocks = [
         (np.where(seen[..., None], p, 0.0)).reshape(12, 2, 18, 2, 3).mean(axis=(1, 3))
-        for p in (lit.xyz - dark.xyz, light.xyz())
+        for p in (lit.xyz - dark.xyz, light.xyz)
     ]
     assert blocks[1].max() > 0.1
     np.testing.assert_allclose(blocks[0], blocks[1], atol=0.03 * blocks[1].max())
@@ -253,7 +254,7 @@ def test_nested_and_smooth_glass_throws_the_light_references_light() -> None:
     caustic = build_caustic(scene, 36, 24, replace(PLAN, photons=1 << 18, texel_size=0.02))
     lit, dark = (render_camera_reference(scene, 36, 24, samples=256, caustic=c).xyz for c in (caustic, None))
     seen = seen_directly(scene, 36, 24)[..., None]
-    light = render_reference(scene, 36, 24, photons=1 << 19).xyz() * seen
+    light = render_reference(scene, 36, 24, photons=1 << 19).xyz * seen
     mine = (lit - dark) * seen
     np.testing.assert_allclose(mine.sum(axis=(0, 1)), light.sum(axis=(0, 1)), rtol=0.02)
     blocks = [p.reshape(6, 4, 9, 4, 3).mean(axis=(1, 3)) for p in (mine, light)]
@@ -274,7 +275,7 @@ def test_a_caustic_behind_a_pane_of_air_is_the_same() -> None:
             caustic, tables=caustic.tables._replace(side=np.vstack([caustic.tables.side, [[-1, -1]]]).astype(np.int32))
         ),
     )
-    while through.samples < 1024:
+    while through.amount < 1024:
         through.advance()
     picture = through.picture()
     # The pane is below the camera and above the beam, so it hides nothing that is lit.

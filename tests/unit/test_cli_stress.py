@@ -53,7 +53,7 @@ def test_without_a_folder_nothing_is_written(monkeypatch, capsys, tmp_path: Path
     monkeypatch.setattr(runner, "all_cases", lambda: made_up(GOOD))
     monkeypatch.chdir(tmp_path)
     assert main(["stress"]) == 0
-    assert "energy 1.0e-04 / 1e-03" in capsys.readouterr().out
+    assert "energy 1.0e−4 / 1.0e−3" in capsys.readouterr().out
     assert list(tmp_path.iterdir()) == []
 
 

@@ -381,7 +381,7 @@ def seen_from_above(*objects: SceneObject, at: float) -> float:
     floor = SceneObject("floor", primitives.plane(20.0, 20.0), Diffuse((1.0, 1.0, 1.0)))
     camera = Camera((at, 0.0, 0.2), (at, 0.0, 0.0), up=(0.0, 1.0, 0.0), vertical_fov_deg=0.5)
     scene = Scene("s", camera, (), (floor, *objects), environment=constant((1.0, 1.0, 1.0)))
-    return float(render_camera_reference(scene, 4, 4, samples=2048).rgb()[..., 1].mean())
+    return float(render_camera_reference(scene, 4, 4, samples=2048).rgb[..., 1].mean())
 
 
 def test_the_reference_knows_a_balls_shadow_in_closed_form() -> None:

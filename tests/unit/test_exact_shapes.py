@@ -298,7 +298,7 @@ def nested() -> Scene:
 
 
 def test_energy_closes_where_exact_solids_nest_and_touch(short_pilot: None) -> None:
-    balance = render_reference(nested(), 8, 8, photons=40_000).balance
+    balance = render_reference(nested(), 8, 8, photons=40_000).fates
     assert balance["lost_numeric"] == 0.0
     fates = sum(value for name, value in balance.items() if name != "emitted")
     assert fates == pytest.approx(balance["emitted"], rel=1e-9) and balance["absorbed"] > 0.0
@@ -312,7 +312,7 @@ def test_fine_triangles_give_the_same_picture_and_coarse_ones_do_not(short_pilot
         ball = make_shape("sphere", radius=0.5, triangles=triangles)
         scene = replace(scene_of((ball, GLASS, at(0, 0, 1.2)), (primitives.plane(9.0, 9.0), WHITE, at())), camera=view)
         scene = replace(scene, camera=replace(view, position=(0.0, 0.0, 0.6)))
-        return render_reference(scene if exact else as_triangles(scene), 2, 2, photons=40_000).xyz()[..., 1]
+        return render_reference(scene if exact else as_triangles(scene), 2, 2, photons=40_000).xyz[..., 1]
 
     exact = picture(20, True)
     np.testing.assert_allclose(picture(20_480, False), exact, rtol=0.025)

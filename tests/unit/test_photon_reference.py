@@ -20,7 +20,7 @@ from spectrasplat.model.geometry.primitives_round import sphere
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.lights import AreaLight, CollimatedLight, DirectionalLight, PointLight, SpotLight
 from spectrasplat.model.lights.point import spot_solid_angle_sr
-from spectrasplat.model.optics.colorimetry import K_M, xyz_to_rgb709
+from spectrasplat.model.optics.colorimetry import K_M, rgb709_to_xyz, xyz_to_rgb709
 from spectrasplat.model.optics.glass import constant as constant_index
 from spectrasplat.model.optics.spectrum import cmf_at, constant, laser
 from spectrasplat.model.scene import (
@@ -83,7 +83,7 @@ def slab_scene(absorption: Absorption | None = None) -> tuple[Scene, float, floa
 
 def through_slab(absorption: Absorption | None = None) -> tuple[np.ndarray, float, float]:
     scene, area, way = slab_scene(absorption)
-    return render_reference(scene, 11, 11, photons=1 << 17).xyz(), area, way
+    return render_reference(scene, 11, 11, photons=1 << 17).xyz, area, way
 
 
 def test_a_pencil_lands_where_the_slab_sends_it_with_fresnels_share() -> None:
@@ -127,7 +127,7 @@ def test_a_texture_counts_where_the_photon_lands() -> None:
 def flux_on_sink(light: Light, *objects: SceneObject) -> float:
     """W, for a light of 1 W (per quantity) in the visible."""
     picture = render_reference(scene_of(light, *objects), 4, 4, photons=1 << 17)
-    return picture.balance["absorbed"]
+    return picture.fates["absorbed"]
 
 
 ONE = constant(1.0 / 401.0)
@@ -194,7 +194,7 @@ def test_a_point_among_mirrors_shines_all_round() -> None:
 def test_light_that_nothing_specular_can_meet_is_none() -> None:
     scene = scene_of(CollimatedLight("away", ONE, (0.0, 0.0, 5.0), (1.0, 0.0, 0.0), radius=0.5), PLATE)
     picture = render_reference(scene, 4, 4, photons=1000)
-    assert picture.photons == 0 and not picture.rgb.any() and picture.relmse == 0.0
+    assert picture.amount == 0 and not picture.rgb.any() and picture.relmse == 0.0
 
 
 # ---- the pixel's measure -----------------------------------------------------------------
@@ -210,8 +210,8 @@ def test_an_evenly_lit_floor_is_even_in_a_slanted_picture(kind: str) -> None:
     camera = Camera((1.0, -6.0, 2.0), (0.0, 0.0, 0.0), kind=kind, vertical_fov_deg=50.0, vertical_extent=3.0)  # type: ignore[arg-type]
     picture = render_reference(scene_of(light, mirror, floor, camera=camera), 16, 12, photons=400_000, seed=3)
     white = ONE.scaled_to_luminous(100.0).xyz()
-    expected = xyz_to_rgb709(white) * (0.5, 0.25, 0.75) / math.pi
-    lower = picture.rgb[4:]  # below the horizon
+    expected = rgb709_to_xyz(xyz_to_rgb709(white) * (0.5, 0.25, 0.75) / math.pi)
+    lower = picture.xyz[4:]  # below the horizon
     assert lower.mean(axis=(0, 1)) == pytest.approx(expected, rel=3e-3)
     z = (lower - expected) / np.sqrt(picture.variance[4:])
     assert np.sqrt(np.mean(z**2)) < 1.6  # 8 parts: Student's t of 7 degrees has 1.18
@@ -227,7 +227,7 @@ def test_light_on_the_far_side_of_a_sheet_is_not_seen() -> None:
     below = render_reference(
         scene_of(light, pane, sheet, camera=replace(ABOVE, position=(0.0, 0.0, -0.5))), 8, 8, photons=20_000
     )
-    assert above.balance["deposited"] > 0.1 and not above.rgb.any() and below.rgb.any()
+    assert above.fates["deposited"] > 0.1 and not above.rgb.any() and below.rgb.any()
 
 
 def test_glass_hides_what_lies_behind_it() -> None:
@@ -260,7 +260,7 @@ def busy() -> Scene:
 
 
 def test_flux_closes_and_none_slips_through_cracks(busy: Scene) -> None:
-    balance = render_reference(busy, 32, 24, photons=60_000).balance
+    balance = render_reference(busy, 32, 24, photons=60_000).fates
     fates = [name for name in balance if name != "emitted"]
     assert sum(balance[name] for name in fates) == pytest.approx(balance["emitted"], rel=1e-10)
     assert all(balance[name] > 0.0 for name in ("deposited", "direct", "absorbed", "escaped"))
@@ -272,7 +272,7 @@ def test_depth_counts_as_the_program_counts_it(busy: Scene) -> None:
     light = CollimatedLight("beam", ONE, (0.0, 0.0, 5.0), (0.0, 0.0, -1.0), radius=0.3)
     pane = place(primitives.box((1.0, 1.0, 0.2)), Dielectric(constant_index(1.5)), (0.0, 0.0, 1.0))
     scene = scene_of(light, pane, place(primitives.plane(4.0, 4.0), Diffuse()))
-    one, two = (render_reference(scene, 4, 4, photons=20_000, max_depth=depth).balance for depth in (1, 2))
+    one, two = (render_reference(scene, 4, 4, photons=20_000, max_depth=depth).fates for depth in (1, 2))
     assert one["lost_depth"] == pytest.approx(0.96 * one["emitted"], rel=5e-3) and one["deposited"] == 0.0
     assert two["deposited"] == pytest.approx(0.96**2 * two["emitted"], rel=5e-3)
 
@@ -284,7 +284,7 @@ def test_touching_blocks_of_one_glass_are_one_block() -> None:
     measured_passes = [place(primitives.box((1.0, 1.0, 0.5)), glass, (0.0, 0.0, z)) for z in (1.0, 1.5)]
     balance = render_reference(
         scene_of(light, *measured_passes, place(primitives.plane(4.0, 4.0), Diffuse())), 4, 4, photons=20_000
-    ).balance
+    ).fates
     rest = 0.04
     assert balance["deposited"] / balance["emitted"] == pytest.approx((1 - rest) ** 2 / (1 - rest**2), rel=3e-3)
 
@@ -295,7 +295,7 @@ def test_a_lamp_on_a_face_stands_outside_of_the_glass() -> None:
     landed = []
     for z in (1.0 + 1e-6, 1.0):
         lamp = PointLight("lamp", ONE, (0.1, 0.1, z))
-        balance = render_reference(scene_of(lamp, block, table), 4, 4, photons=20_000).balance
+        balance = render_reference(scene_of(lamp, block, table), 4, 4, photons=20_000).fates
         landed.append(balance["deposited"])
         assert balance["lost_numeric"] < 1e-3 * balance["emitted"]
     assert landed[1] == pytest.approx(landed[0], rel=0.02)
@@ -305,7 +305,7 @@ def test_its_own_error_is_true(busy: Scene) -> None:
     """The scatter of eight whole runs is the variance they claim: the ratio's 4 σ is 25 % over 768 pixels and three
     seeds' noise."""
     runs = [render_reference(busy, 32, 24, photons=16_000, seed=seed) for seed in range(8)]
-    observed = np.var([run.rgb[..., 1] for run in runs], axis=0, ddof=1).sum()
+    observed = np.var([run.xyz[..., 1] for run in runs], axis=0, ddof=1).sum()
     claimed = np.mean([run.variance[..., 1] for run in runs], axis=0).sum()
     assert observed / claimed == pytest.approx(1.0, abs=0.3)
 
@@ -366,13 +366,13 @@ def small(busy: Scene) -> Scene:
 def test_a_stored_reference_is_reused_and_grows(small: Scene, tmp_path: Path) -> None:
     first = cached_reference(small, 16, 12, photons=16_000, folder=tmp_path)
     again = cached_reference(small, 16, 12, photons=10_000, folder=tmp_path)
-    assert again.photons == first.photons and np.array_equal(again.rgb, first.rgb)
+    assert again.amount == first.amount and np.array_equal(again.rgb, first.rgb)
     more = cached_reference(small, 16, 12, photons=64_000, folder=tmp_path)
-    at_once = render_reference(small, 16, 12, photons=more.photons)
-    assert more.photons == at_once.photons > first.photons and more.relmse < first.relmse
+    at_once = render_reference(small, 16, 12, photons=more.amount)
+    assert more.amount == at_once.amount > first.amount and more.relmse < first.relmse
     np.testing.assert_allclose(more.rgb, at_once.rgb, rtol=1e-9, atol=1e-12)
     good_enough = cached_reference(small, 16, 12, target_relmse=more.relmse * 1.01, folder=tmp_path)
-    assert good_enough.photons == more.photons
+    assert good_enough.amount == more.amount
 
 
 def test_a_damaged_store_is_ignored(small: Scene, tmp_path: Path) -> None:
@@ -393,9 +393,9 @@ def test_an_interrupt_keeps_what_is_done(small: Scene, tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         cached_reference(small, 16, 12, photons=10**9, progress=interrupt, folder=tmp_path)
     kept = cached_reference(small, 16, 12, photons=1, folder=tmp_path)
-    assert kept.photons > 0 and kept.rgb.any()
+    assert kept.amount > 0 and kept.rgb.any()
     stopped = render_reference(small, 16, 12, photons=10**9, cancelled=iter([False, False, True]).__next__)
-    assert 0 < stopped.photons < 10**9
+    assert 0 < stopped.amount < 10**9
 
 
 def test_limits() -> None:

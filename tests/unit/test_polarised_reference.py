@@ -194,7 +194,7 @@ def test_a_slab_with_all_reflections_inside_it():
     for polarisation, each in ((True, t), (False, t.mean())):
         picture = render_reference(slab_scene(n, angle, polarisation), 4, 4, photons=1 << 15)
         wanted = np.mean(each / (2.0 - each))
-        assert picture.balance["deposited"] / picture.balance["emitted"] == pytest.approx(wanted, rel=8e-3)
+        assert picture.fates["deposited"] / picture.fates["emitted"] == pytest.approx(wanted, rel=8e-3)
     assert np.mean(t / (2.0 - t)) / (t.mean() / (2.0 - t.mean())) > 1.04
 
 

@@ -15,16 +15,15 @@ from spectrasplat.model.optics.spectrum import Spectrum, illuminant, laser
 from spectrasplat.model.scene import Camera, Dielectric, Scene
 from spectrasplat.reference import caustic_cache, photon_reference, spectral_caustic
 from spectrasplat.reference.camera_reference import (
+    KIND,
     cached_camera_reference,
     picture_noise,
     render_camera_reference,
-    summed_camera,
 )
 from spectrasplat.reference.caustic_cache import CachedCaustic
 from spectrasplat.reference.caustic_windows import Landed, Planes, VisiblePoints, _shared, fit_windows
 from spectrasplat.reference.direct_light import DirectLight
-from spectrasplat.reference.photon_reference import TALLY_SIZE
-from spectrasplat.reference.rounds import PARTS
+from spectrasplat.reference.rounds import PARTS, TALLY_SIZE, summed
 from spectrasplat.reference.spectral_caustic import CausticPlan, CausticRun, build_caustic
 
 from tests.unit.camera_scenes import D65, FLINT, place, plate, scene_of
@@ -91,7 +90,7 @@ def test_more_samples_look_up_the_stored_caustic(scene: Scene, tmp_path: Path, r
     assert rounds
     rounds.clear()
     more = cached_camera_reference(scene, *SIZE, samples=64, caustic=PLAN, folder=tmp_path)
-    assert rounds == [] and more.samples == 64
+    assert rounds == [] and more.amount == 64
     at_once = render_camera_reference(scene, *SIZE, samples=64, caustic=build_caustic(scene, *SIZE, PLAN))
     np.testing.assert_allclose(more.xyz, at_once.xyz, rtol=1e-6, atol=1e-9 * at_once.xyz.max())
 
@@ -164,12 +163,13 @@ def test_what_halves_of_the_caustic_have_apart_is_in_the_variance() -> None:
     not 8."""
     error = np.array([0.3, -0.3])
     sums = np.stack([np.full((1, 1, 3), 4.0 * (1.0 + error[part % 2])) for part in range(PARTS)])
-    units, tallies = np.full(PARTS, 4), np.zeros((PARTS, TALLY_SIZE))
-    picture = summed_camera(sums, units, tallies, 1.0, halves=True)
-    assert picture.samples == 4 * PARTS
+    kept = {"sums": sums, "units": np.full(PARTS, 4), "tallies": np.zeros((PARTS, TALLY_SIZE)), "seconds": 1.0}
+    kept |= {"unit": 1, "caustic_photons": 0, "caustic_relmse": 0.0}
+    picture = summed(kept, replace(KIND, has_halves=True))
+    assert picture.amount == 4 * PARTS
     np.testing.assert_allclose(picture.xyz, 1.0)
     np.testing.assert_allclose(picture.variance, 0.3**2)  # of a mean of two that are 0.6 apart
-    apart = summed_camera(sums, units, tallies, 1.0)
+    apart = summed(kept, KIND)
     np.testing.assert_allclose(apart.variance, 0.3**2 / (PARTS - 1))
 
 

@@ -14,8 +14,8 @@ import pytest
 from spectrasplat.base.errors import UserError
 from spectrasplat.stress.case import Case, Measurement
 from spectrasplat.stress.plots import case_plot, drawn_names
-from spectrasplat.stress.report import html_text
-from spectrasplat.stress.results import StressResult, table, write_json
+from spectrasplat.stress.report import case_table, html_text
+from spectrasplat.stress.results import StressResult, write_json
 from spectrasplat.stress.runner import all_cases, choose, run
 
 
@@ -197,10 +197,11 @@ def test_the_table_shows_every_severity_and_verdict() -> None:
     from rich.console import Console
 
     console = Console(width=200, record=True, file=io.StringIO())
-    console.print(table(ran(case("one", GOOD, BAD), case("failed", fails=RuntimeError("oh"), steps=1))))
+    for found in ran(case("one", GOOD, BAD), case("failed", fails=RuntimeError("oh"), steps=1)).cases:
+        console.print(case_table(found).on_screen())
     text = console.export_text()
-    assert "1e-3 rad" in text and "1e-4 rad" in text and "band_cut 7" in text
-    assert text.count("BROKEN") == 2 and text.count(" ok ") == 1
+    assert "1e-3 rad" in text and "1e-4 rad" in text and "band cut 7" in text
+    assert text.count("BROKEN") == 2 and text.count(" holds ") == 1 and "! energy 0.02" in text
 
 
 def test_cases_have_names_of_their_own_and_are_chosen_by_them() -> None:

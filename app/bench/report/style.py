@@ -199,8 +199,9 @@ def log_axis(
 
     axes.set(**{f"{name}scale": "log", f"{name}lim": limits})
     axis = axes.xaxis if name == "x" else axes.yaxis
-    steps = (1.0, 3.0) if math.log10(limits[1] / limits[0]) < 3.2 else (1.0,)
-    axis.set_major_locator(FixedLocator(places) if places else LogLocator(subs=steps, numticks=30))
+    decades = math.log10(limits[1] / limits[0])
+    locator = LogLocator(subs=(1.0, 3.0) if decades < 3.2 else (1.0,), numticks=30 if decades < 15.0 else 9)
+    axis.set_major_locator(FixedLocator(places) if places else locator)
     axis.set_major_formatter(FuncFormatter(lambda value, _: words(value)))
     axis.set_minor_locator(NullLocator())
 

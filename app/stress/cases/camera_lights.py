@@ -63,7 +63,7 @@ def eye_sun(context: Context, suns: Sequence[float]) -> Measured:
     # nothing seen in glass is brighter than what shines.
     without, hundred = (render_probe(context, _under_a_sun(sun), PROBE, 4).picture for sun in (0.0, FAINTEST))
     known = render_camera_reference(_under_a_sun(FAINTEST), PROBE.width, PROBE.height, samples=256)
-    want = known.rgb().sum() - without.sum()
+    want = known.rgb.sum() - without.sum()
     chance = CHANCE * np.sqrt(known.variance.sum()) / want
     for sun in suns:
         sight = render_probe(context, _under_a_sun(sun), PROBE, 4)

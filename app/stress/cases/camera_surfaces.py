@@ -181,7 +181,7 @@ def against_reference(scene: Scene, sight: Sight, bias: float) -> Held:
     differ by is chance."""
     height, width = sight.picture.shape[:2]
     one, other = (
-        blocks(render_camera_reference(scene, width, height, samples=REFERENCE_SAMPLES, seed=seed).rgb(), 3)
+        blocks(render_camera_reference(scene, width, height, samples=REFERENCE_SAMPLES, seed=seed).rgb, 3)
         for seed in (1, 2)
     )
     want, apart = 0.5 * (one + other), 0.5 * (one - other)
