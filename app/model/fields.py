@@ -13,7 +13,7 @@ from typing import Any
 
 from ..base.errors import UserError
 from .io.scene_pictures import kept_name
-from .io.scene_table import REQUIRED, SceneTable
+from .io.scene_table import REQUIRED, SceneTable, broken_limit
 
 
 class Part:
@@ -101,14 +101,13 @@ class Number(Field):
         limits = {"above": self.above, "at_least": self.at_least, "below": self.below, "at_most": self.at_most}
         return table.number(key, self.default, **limits)  # type: ignore[arg-type]
 
+    def broken_limit(self, number: float) -> str | None:
+        """What `number` must be that it is not, such as "above 0"; None where it lies within the bounds."""
+        return broken_limit(number, self.above, self.at_least, self.below, self.at_most)
+
     def holds(self, number: float) -> bool:
         """Whether `number` lies within the bounds."""
-        return (
-            (self.above is None or number > self.above)
-            and (self.at_least is None or number >= self.at_least)
-            and (self.below is None or number < self.below)
-            and (self.at_most is None or number <= self.at_most)
-        )
+        return self.broken_limit(number) is None
 
 
 @dataclass(frozen=True)

@@ -108,14 +108,8 @@ class SceneTable:
         if value is default and not self.has(key):
             return value
         number = self._as_number(key, value, infinite)
-        for bound, holds, words in (
-            (above, above is None or number > above, "above"),
-            (at_least, at_least is None or number >= at_least, "at least"),
-            (below, below is None or number < below, "below"),
-            (at_most, at_most is None or number <= at_most, "at most"),
-        ):
-            if not holds:
-                self.fail(key, f"is {number:g} but must be {words} {bound:g}")
+        if limit := broken_limit(number, above, at_least, below, at_most):
+            self.fail(key, f"is {number:g} but must be {limit}")
         return number
 
     def integer(self, key: str, default: Any = REQUIRED, *, at_least: int, at_most: int) -> int:
@@ -270,6 +264,21 @@ class SceneTable:
         if not files.is_file(file):
             self.fail(key, f"names {path}, which is not a file")
         return path
+
+
+def broken_limit(
+    number: float, above: float | None, at_least: float | None, below: float | None, at_most: float | None
+) -> str | None:
+    """What a number must be that it is not, such as "above 0"; None where it lies within the limits."""
+    if above is not None and not number > above:
+        return f"above {above:g}"
+    if at_least is not None and not number >= at_least:
+        return f"at least {at_least:g}"
+    if below is not None and not number < below:
+        return f"below {below:g}"
+    if at_most is not None and not number <= at_most:
+        return f"at most {at_most:g}"
+    return None
 
 
 def _show(value: Any) -> str:

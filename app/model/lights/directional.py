@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from ...base.errors import UserError
 from ..fields import Animated, Number, Row
 from ..vectors import Vec3
 from .light import IRRADIANCE_KEYS, Light
@@ -78,9 +77,3 @@ class DirectionalLight(Light):
     def words(self) -> str:
         """Kind and width."""
         return f"directional, {self.angular_diameter_deg:.4g}° wide"
-
-    def check(self) -> None:
-        """Also of its diameter."""
-        super().check()
-        if not _DIAMETER.holds(self.angular_diameter_deg):
-            raise UserError(f"light '{self.name}': its angular diameter must lie between 0 and 90°")

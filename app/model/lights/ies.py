@@ -9,7 +9,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from ...base.errors import UserError
 from ..fields import Animated, Direction, FileName, Number, Row
 from ..vectors import Vec3
 from .ies_file import Profile, default_profile, read_ies
@@ -95,9 +94,3 @@ class IesLight(Light):
     def words(self) -> str:
         """Kind and file."""
         return f"ies, {Path(self.profile.source).name}, {self.profile.peak_cd:.4g} cd at most in the file"
-
-    def check(self) -> None:
-        """Also of its rotation."""
-        super().check()
-        if not math.isfinite(self.rotation_deg):
-            raise UserError(f"light '{self.name}': its rotation is not a finite angle; give degrees")

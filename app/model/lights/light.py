@@ -215,9 +215,13 @@ class Light:
 
     def check(self) -> None:
         """Raise UserError for a place, size or angle that no scene file could hold."""
-        sizes = [getattr(self, number.attribute) for number in self.numbers]
-        if not all(math.isfinite(v) and abs(v) <= MAX_MAGNITUDE for v in (*self.position, *sizes)):
+        values = {number: float(getattr(self, number.attribute)) for number in self.numbers}
+        if not all(math.isfinite(v) and abs(v) <= MAX_MAGNITUDE for v in (*self.position, *values.values())):
             raise UserError(f"light '{self.name}': its place or size is not finite or too large; choose another")
+        for number, value in values.items():
+            if limit := number.broken_limit(value):
+                what = number.attribute.removesuffix("_deg").replace("_", " ")
+                raise UserError(f"light '{self.name}': its {what} is {value:g} but must be {limit}")
 
     def power(self, key: PowerKey) -> float:
         """Its power as `key` states it."""

@@ -8,7 +8,6 @@ from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 
-from ...base.errors import UserError
 from ..fields import Animated, Number, Part, Row
 from ..io.scene_table import SceneTable
 from ..vectors import Vec3
@@ -104,12 +103,6 @@ class OutlinedLight(Light):
     def shown_numbers(self) -> tuple[Number, ...]:
         """Its radius, or its sides."""
         return (RADIUS,) if self.is_disc else (_WIDTH, _HEIGHT)
-
-    def check(self) -> None:
-        """Also of its size."""
-        super().check()
-        if min(self.radius, self.width, self.height) <= 0.0:
-            raise UserError(f"light '{self.name}': its size must be above 0")
 
     def words(self) -> str:
         """Kind and size."""

@@ -137,13 +137,10 @@ class SpotLight(Light):
         return replace(self, inner_half_angle_deg=min(self.inner_half_angle_deg, self.outer_half_angle_deg))
 
     def check(self) -> None:
-        """Also of its half angles."""
+        """Also that one half angle lies within the other."""
         super().check()
-        inner, outer = self.inner_half_angle_deg, self.outer_half_angle_deg
-        if not 0.0 <= inner <= outer <= 90.0 or outer == 0.0:
-            raise UserError(
-                f"light '{self.name}': its half angles must lie above 0 and up to 90°, the inner one within the outer"
-            )
+        if self.inner_half_angle_deg > self.outer_half_angle_deg:
+            raise UserError(f"light '{self.name}': its inner half angle must lie within the outer one; make it smaller")
 
 
 def spot_solid_angle_sr(inner_half_angle_deg: float, outer_half_angle_deg: float) -> float:
