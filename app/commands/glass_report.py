@@ -134,7 +134,7 @@ def _draw_dispersion(axes: Axes, shown: Sequence[Entry], colours: Sequence[str])
 
 def _draw_rainbow(axes: Axes) -> None:
     """A strip of the spectrum's colours under the wavelength axis."""
-    from ..model.optics.spectrum import VISIBLE_NM, cmf_xyz, xyz_to_rgb709
+    from ..model.optics.colorimetry import VISIBLE_NM, cmf_xyz, xyz_to_rgb709
 
     rgb = np.clip(xyz_to_rgb709(cmf_xyz()), 0.0, None)
     rgb = (rgb / rgb.max(axis=0)) ** (1.0 / 2.2)

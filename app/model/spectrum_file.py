@@ -78,7 +78,7 @@ def _named(table: SceneTable, key: str, name: str) -> Spectrum:
 
 
 def _laser(table: SceneTable, key: str, wavelength_nm: float, power: float) -> Spectrum:
-    low, high = spectra.VISIBLE_NM[0], spectra.VISIBLE_NM[-1]
+    low, high = VISIBLE_NM[0], VISIBLE_NM[-1]
     if not low <= wavelength_nm <= high:
         table.fail(key, f"is at {wavelength_nm:g} nm, outside the visible {low:g} to {high:g} nm that is computed")
     return spectra.laser(wavelength_nm, power)

@@ -11,6 +11,7 @@ from spectrasplat.gpu.records import NONE, PLACEMENT, RECEIVER
 from spectrasplat.model.geometry import primitives
 from spectrasplat.model.lights import AreaLight, PointLight
 from spectrasplat.model.optics import glass, spectrum
+from spectrasplat.model.optics.colorimetry import xyz_to_rgb709
 from spectrasplat.model.scene import Dielectric, Diffuse, SceneObject
 
 from tests.gpu.camera_rig import (
@@ -217,6 +218,6 @@ def test_spectral_reflectance_class_acts_on_direct_light(gl):
     receivers["reflectance_class"] = 1
     maps.receivers.write(receivers.tobytes())
     camera_pass.run(ABOVE, 17, 17, 1, maps=maps)
-    expected = spectrum.xyz_to_rgb709(spectrum.Spectrum(WHITE.density * red_only).xyz()) / np.pi / 1.5**2
+    expected = xyz_to_rgb709(spectrum.Spectrum(WHITE.density * red_only).xyz()) / np.pi / 1.5**2
     assert expected[0] > 20 * expected[2] > 0 or expected[2] <= 0
     assert camera_pass.read_rgb()[8, 8] == pytest.approx(expected, rel=1e-3)

@@ -89,7 +89,7 @@ def synthetic_curve(method: str, difficulty: float, seeds: int, longest_s: float
 
 def synthetic_pictures(directory: Path, scene: str, methods: Sequence[str], rng: np.random.Generator) -> dict[str, str]:
     """A curved spectrum on black, with noise and blur that suit each method; XYZ float32 files."""
-    from spectrasplat.model.optics.spectrum import cmf_xyz
+    from spectrasplat.model.optics.colorimetry import cmf_xyz
 
     (directory / "pictures").mkdir(parents=True, exist_ok=True)
     y, x = np.mgrid[0 : SIZE[1], 0 : SIZE[0]] / SIZE[1]

@@ -13,7 +13,7 @@ from spectrasplat.base.errors import UserError
 from spectrasplat.model.io.gltf import load_gltf
 from spectrasplat.model.io.gltf_document import open_document
 from spectrasplat.model.optics import catalogue, glass
-from spectrasplat.model.optics.spectrum import xyz_to_rgb709
+from spectrasplat.model.optics.colorimetry import xyz_to_rgb709
 from spectrasplat.model.scene import Absorption, Dielectric, Diffuse, Mirror
 
 from tests.unit.gltf_builder import FACES, POSITIONS, Builder, glass_material

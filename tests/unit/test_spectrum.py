@@ -9,9 +9,10 @@ import pytest
 from spectrasplat.base.errors import UserError
 from spectrasplat.model.optics import catalogue, glass
 from spectrasplat.model.optics import spectrum as sp
+from spectrasplat.model.optics.colorimetry import K_M, VISIBLE_NM
 from spectrasplat.model.optics.glass import Dispersion
 from spectrasplat.model.optics.spectral_tables import SpectralAxis, cumulative, index_table
-from spectrasplat.model.optics.spectrum import K_M, VISIBLE_NM, Spectrum
+from spectrasplat.model.optics.spectrum import Spectrum
 
 
 def _xy(spectrum: Spectrum) -> np.ndarray:

@@ -251,7 +251,7 @@ class _Writer:
 
     def _light_entry(self, light: Light, entry: dict[str, Any]) -> int:
         """Append a punctual light: what others can show, with the exact one in its extras."""
-        from ..optics.spectrum import xyz_to_rgb709
+        from ..optics.colorimetry import xyz_to_rgb709
 
         xyz = light.spectral_power.xyz()
         rgb = np.maximum(xyz_to_rgb709(xyz), 0.0)

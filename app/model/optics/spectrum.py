@@ -15,38 +15,7 @@ import numpy as np
 
 from ...base.errors import UserError, suggestion
 from ..io.curve_file import clipped, read_curve
-from .colorimetry import (
-    K_M,
-    VISIBLE_NM,
-    attenuation_from_colour,
-    cmf_xyz,
-    illuminant_table,
-    rgb709_to_xyz,
-    rgb709_to_xyz_matrix,
-    xyz_to_rgb709,
-    xyz_to_rgb709_matrix,
-)
-
-__all__ = [
-    "K_M",
-    "VISIBLE_NM",
-    "Spectrum",
-    "attenuation_from_colour",
-    "blackbody",
-    "cmf_at",
-    "cmf_xyz",
-    "constant",
-    "from_csv",
-    "from_table",
-    "illuminant",
-    "illuminant_names",
-    "laser",
-    "rgb709_to_xyz",
-    "rgb709_to_xyz_matrix",
-    "rgb_under_white",
-    "xyz_to_rgb709",
-    "xyz_to_rgb709_matrix",
-]
+from .colorimetry import K_M, VISIBLE_NM, cmf_xyz, illuminant_table, xyz_to_rgb709
 
 _PLANCK_2HC2 = 1.191042972e-16
 """First radiation constant for radiance, 2hc², W m² (CODATA 2018)."""
