@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from .compiling import part
+from .current import ALL, CURRENT, LAY, SOME, UNKNOWN, distance_at, faint_share, halve, push_both
 from .facets import MAX_CORNERS
-from .hand import ALL, HAND, LAY, SOME, UNKNOWN, distance_at, faint_share, halve, push_both
 from .leaves import passes
 from .nodes import (
     LEVELS,
@@ -49,8 +49,8 @@ _DRIFTING = 0.03
 
 @part
 def at_facet(nodes, facets, solids, tables, sources, work):
-    """Process the current beam, row HAND of `nodes`, at its facet: cut it in two if necessary, or push its children."""
-    beam, source, is_parallel = nodes[HAND], sources[0], sources[0].kind == PARALLEL
+    """Process the current beam at its facet: cut it in two if necessary, or push its children."""
+    beam, source, is_parallel = nodes[CURRENT], sources[0], sources[0].kind == PARALLEL
     facet = facets[beam.facet]
     if beam.total == LAY:
         recentre(beam)
@@ -127,7 +127,7 @@ def onset(beam, facets, solids, tables, source, before, after, low, high, work):
 def total_from(nodes, before, after, facets, solids, tables, sources, work):
     """Set `total`, whether the current beam is totally reflected at its facet. Where that changes within its band or
     its outline, cut the beam there instead, leave both parts on the stack and return True."""
-    beam, source = nodes[HAND], sources[0]
+    beam, source = nodes[CURRENT], sources[0]
     facet = facets[beam.facet]
     last, most, side = 0.0, -1e300, 0
     for a in range(first_place(beam), last_place(beam)):
@@ -160,7 +160,7 @@ def total_from(nodes, before, after, facets, solids, tables, sources, work):
     number = beam.facet
     low, high, onset_edge, way = number < 0, number < 0, np.int64(TOTAL), np.int64(1)
     for turn in range(2):
-        half = nodes[HAND if turn == 0 else work.top]
+        half = nodes[CURRENT if turn == 0 else work.top]
         exists = cut(half, lines, 1.0 - 2.0 * turn, flight, number, onset_edge, way, work)
         forget_idle_lines(half, work)
         recentre(half)
@@ -178,7 +178,7 @@ def total_from(nodes, before, after, facets, solids, tables, sources, work):
 @part
 def child(nodes, action, before, after, mask, facets, solids, tables, work):
     """Push the current beam's child that takes `action` at the facet, unless it is too deep or roulette ends it."""
-    beam, new = nodes[HAND], nodes[work.top]
+    beam, new = nodes[CURRENT], nodes[work.top]
     flight = beam.flight
     depth = beam.depth + (0 if action == PASS else 1)
     copy_head(beam, new)

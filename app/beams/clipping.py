@@ -1,4 +1,4 @@
-"""A convex polygon cut by a straight edge: compiled."""
+"""A convex polygon cut by a straight line: compiled [Sutherland, Hodgman 1974]."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from .compiling import part
 
 @part
 def clip(polygon, count, scratch, a_u, a_v, c):
-    """Keep a . p + c >= 0 of a convex polygon, in place; the number of corners left [Sutherland, Hodgman 1974]."""
+    """Keep a . p + c >= 0 of a convex polygon, in place; the number of corners left."""
     kept = 0
     for i in range(count):
         j = i + 1 if i + 1 < count else 0
@@ -23,4 +23,24 @@ def clip(polygon, count, scratch, a_u, a_v, c):
             kept += 1
     for i in range(kept):
         polygon[i, 0], polygon[i, 1] = scratch[i, 0], scratch[i, 1]
+    return kept
+
+
+@part
+def clip_labelled(corner, side, count, height, label, spare, spare_side):
+    """The part of a convex polygon whose `height`, given at its corners, is not negative, into `spare`; returns its
+    corners. `side` names the line of the side that starts at each corner, `label` that of the cut."""
+    kept, room = 0, len(spare_side) - 1
+    for i in range(count):
+        j = i + 1 if i + 1 < count else 0
+        here, there = height[i], height[j]
+        if here >= 0.0 and kept < room:
+            spare[kept, 0], spare[kept, 1], spare_side[kept] = corner[i, 0], corner[i, 1], side[i]
+            kept += 1
+        if (here >= 0.0) != (there >= 0.0) and kept < room:
+            at = here / (here - there)
+            spare[kept, 0] = corner[i, 0] + at * (corner[j, 0] - corner[i, 0])
+            spare[kept, 1] = corner[i, 1] + at * (corner[j, 1] - corner[i, 1])
+            spare_side[kept] = label if here >= 0.0 else side[i]
+            kept += 1
     return kept

@@ -11,9 +11,9 @@ import numpy as np
 
 from ..model.optics.spectral_tables import CumulativeSpectrum
 from .convert import hulls_of
+from .current import FIRST
 from .facets import FACET, SAMPLES, SOLID
 from .find import take_stack
-from .hand import FIRST
 from .leaves import Store
 from .lifetimes import lifetimes_of
 from .piece_lattice import PieceLattice

@@ -8,7 +8,6 @@ from .compiling import jit
 from .facets import BeamScene
 from .leaves import Leaves
 from .lifetimes import lifetimes_of
-from .polarised_arrays import from_one_axis
 from .polygons import BeamPieces, BeamPolygons, parabola_at
 from .search import LEAF_PIECE, LEAF_RECEIVER, LEAF_TAIL
 
@@ -62,37 +61,39 @@ def hulls_of(corners, starts, grow, points, chain, ends, out):
 def polygons_of(leaves: list[Leaves], scene: BeamScene, light: int, unit: float) -> BeamPolygons:
     """What lies on receivers, each in the part of its band in which it exists. `unit`: GPU units a scene unit."""
     chosen = of_kind(leaves, LEAF_RECEIVER)
-    starts = np.append(0, np.cumsum(chosen.head[:, 6]))
-    corner_starts = np.append(0, np.cumsum(chosen.head[:, 7]))
-    edges = np.zeros((len(chosen.edge), 8))
-    edges[:, 0:3], edges[:, 4:7] = chosen.edge[:, 0], chosen.edge[:, 2]
-    edges[:, 3] = edges[:, 7] = chosen.soft
+    leaf, line = chosen.leaf, chosen.edge["line"]
+    starts = np.append(0, np.cumsum(leaf["edges"]))
+    corner_starts = np.append(0, np.cumsum(leaf["corners"]))
+    edges = np.zeros((len(line), 8))
+    edges[:, 0:3], edges[:, 4:7] = line[:, 0], line[:, 2]
+    edges[:, 3] = edges[:, 7] = chosen.edge["soft"]
     lives = lifetimes_of(edges, starts, chosen.corner, corner_starts)
     exists = lives.bands[:, 1] > lives.bands[:, 0]
     t = lives.bands[exists]
     own = np.repeat(np.cumsum(exists) - 1, np.diff(starts))
-    bounds = (lives.bounds | (chosen.soft < 0.0)) & np.repeat(exists, np.diff(starts))
+    bounds = (lives.bounds | (chosen.edge["soft"] < 0.0)) & np.repeat(exists, np.diff(starts))
     kept, own = edges[bounds], own[bounds]
     counts = np.bincount(own, minlength=len(t))
     change = kept[:, 4:] - kept[:, :4]
     hull_counts = np.diff(lives.starts)[exists]
     softest = np.maximum.reduceat(kept[:, 3], np.cumsum(counts) - counts) if len(kept) else np.zeros(0)
     hull_start, hulls = hulls_around(lives.corners, hull_counts, softest)
-    head, x = chosen.head[exists], chosen.x[exists]
+    leaf = leaf[exists]
+    x = leaf["x"]
     places = t[:, 0], 0.5 * t.sum(axis=1), t[:, 1]
-    density = np.stack([parabola_at(chosen.density[exists], place) for place in places], axis=1)
+    density = np.stack([parabola_at(leaf["density"], place) for place in places], axis=1)
     return BeamPolygons(
         np.full(len(t), light, np.int32),
-        scene.facets["receiver"][head[:, 1]].astype(np.int32),
-        head[:, 3].astype(np.int32),
-        head[:, 4].astype(np.int32),
-        head[:, 9],
+        scene.facets["receiver"][leaf["facet"]].astype(np.int32),
+        leaf["source"].astype(np.int32),
+        leaf["depth"].astype(np.int32),
+        leaf["met"],
         x[:, 0] + t[:, 0] * (x[:, 2] - x[:, 0]),
         x[:, 0] + t[:, 1] * (x[:, 2] - x[:, 0]),
         np.maximum(density, 0.0) * unit * unit,
-        chosen.slope[exists],
-        chosen.centre[exists],
-        chosen.flux[exists],
+        leaf["slope"],
+        leaf["centre"],
+        leaf["flux"],
         np.append(0, np.cumsum(counts)).astype(np.int32),
         np.concatenate([kept[:, :4] + t[own, k, None] * change for k in range(2)], axis=1),
         hull_start,
@@ -104,35 +105,34 @@ def polygons_of(leaves: list[Leaves], scene: BeamScene, light: int, unit: float)
 def pieces_of(leaves: list[Leaves], scene: BeamScene, light: int, measure: float) -> BeamPieces:
     """What photons have to carry on. `measure`: as many units of `Emission.density` make one of `BeamPieces.weight`."""
     chosen = of_kind(leaves, LEAF_PIECE, LEAF_TAIL)
-    head = chosen.head
-    edges = np.concatenate([chosen.edge[:, 0], chosen.edge[:, 2]], axis=1)
-    counts = head[:, 6]
-    of_edge = np.repeat(np.arange(len(head)), counts)
+    leaf, line = chosen.leaf, chosen.edge["line"]
+    edges = np.concatenate([line[:, 0], line[:, 2]], axis=1)
+    of_edge = np.repeat(np.arange(len(leaf)), leaf["edges"])
     for first in (0, 3):
-        edges[:, first + 2] += np.einsum("ek,ek->e", edges[:, first : first + 2], chosen.centre[of_edge])
-    hull_start, hulls = hulls_around(chosen.corner, head[:, 7], np.zeros(len(head)))
-    hulls = hulls - chosen.centre[np.repeat(np.arange(len(head)), np.diff(hull_start))]
-    last = np.maximum(head[:, 2], 0)
-    towards = np.einsum("mk,mk->m", chosen.ray[:, 1, 1, 0], scene.facets["plane"][last, :3])
+        edges[:, first + 2] += np.einsum("ek,ek->e", edges[:, first : first + 2], leaf["centre"][of_edge])
+    hull_start, hulls = hulls_around(chosen.corner, leaf["corners"], np.zeros(len(leaf)))
+    hulls = hulls - leaf["centre"][np.repeat(np.arange(len(leaf)), np.diff(hull_start))]
+    last = np.maximum(leaf["last"], 0)
+    chief = leaf["ray"][:, 1, 1, 0]
     return BeamPieces(
-        np.full(len(head), light, np.int32),
-        head[:, 3].astype(np.int32),
-        head[:, 4].astype(np.int32),
-        chosen.x[:, 0],
-        chosen.x[:, 2],
-        chosen.centre,
-        chosen.ray[:, 0],
-        chosen.ray[:, 1],
-        chosen.density * measure,
+        np.full(len(leaf), light, np.int32),
+        leaf["source"].astype(np.int32),
+        leaf["depth"].astype(np.int32),
+        leaf["x"][:, 0],
+        leaf["x"][:, 2],
+        leaf["centre"],
+        leaf["ray"][:, 0],
+        leaf["ray"][:, 1],
+        leaf["density"] * measure,
         scene.facets["triangle"][last].astype(np.int32),
         scene.facets["owner"][last].astype(np.int32),
-        towards < 0.0,
-        objects_of(head[:, 5], scene),
-        head[:, 8],
-        head[:, 0] == LEAF_TAIL,
-        chosen.flux,
-        from_one_axis(chosen.state, chosen.ray[:, 1, 1, 0]),
-        np.concatenate([[0], np.cumsum(counts)]).astype(np.int32),
+        np.einsum("mk,mk->m", chief, scene.facets["plane"][last, :3]) < 0.0,
+        objects_of(leaf["inside"], scene),
+        leaf["key"],
+        leaf["kind"] == LEAF_TAIL,
+        leaf["flux"],
+        from_one_axis(leaf["state"], chief),
+        np.append(0, np.cumsum(leaf["edges"])).astype(np.int32),
         edges,
         hull_start,
         hulls,
@@ -141,7 +141,7 @@ def pieces_of(leaves: list[Leaves], scene: BeamScene, light: int, measure: float
 
 def of_kind(leaves: list[Leaves], *kinds: int) -> Leaves:
     """Leaves of some kinds (`search.LEAF_…`)."""
-    return Leaves.joined([part.where(np.isin(part.head[:, 0], kinds)) for part in leaves])
+    return Leaves.joined([part.where(np.isin(part.leaf["kind"], kinds)) for part in leaves])
 
 
 def hulls_around(corners: np.ndarray, counts: np.ndarray, grow: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -162,3 +162,15 @@ def objects_of(mask: np.ndarray, scene: BeamScene) -> np.ndarray:
         if bit >= 0:
             result |= np.where((mask >> bit) & 1, np.uint64(1) << np.uint64(i), np.uint64(0))
     return result
+
+
+def from_one_axis(state: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """States (M, 3, 6) counted from the axis at the middle of the band, whose rays run along `direction` (M, 3): so
+    that they may be interpolated."""
+    axis = state[:, 1, None, 3:]
+    along = np.einsum("mak,mbk->ma", state[..., 3:], axis)
+    across_axis = np.einsum("mak,mbk->ma", np.cross(direction[:, None], state[..., 3:]), axis)
+    size = np.maximum(along**2 + across_axis**2, 1e-30)
+    cosine, sine = (along**2 - across_axis**2) / size, 2.0 * along * across_axis / size
+    q, u = cosine * state[..., 0] + sine * state[..., 1], cosine * state[..., 1] - sine * state[..., 0]
+    return np.concatenate([q[..., None], u[..., None], state[..., 2:3], np.broadcast_to(axis, (*q.shape, 3))], axis=-1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .compiling import part
-from .hand import HAND, SPARE, faint_share, halve, push_both
+from .current import CURRENT, SPARE, faint_share, halve, push_both
 from .leaves import anchor_density, density_slope, lay_leaf, passes, plane_map
 from .nodes import HALF, LINES, STATIC, area_of, copy, first_place, last_place, lay_out
 from .rays import PARALLEL, REFLECT
@@ -14,8 +14,8 @@ from .search import (
     LEAF_TAIL,
     NARROWEST,
     SUM_DEPOSITED,
-    SUM_HANDED,
     SUM_LEAVES,
+    SUM_LEFT,
     band_power,
     flux_of,
     halve_space,
@@ -85,7 +85,7 @@ def stand_still(beam, new, edge, corner, tables, work):
     held = most * band_power(beam, tables, work)
     if held <= 0.0:
         return
-    for ln in range(new.head[6]):
+    for ln in range(new.edges):
         line = edge[work.count[1] + ln].line
         for k in range(3):
             line[0, k] = line[1, k] = line[2, k] = line[chosen, k]
@@ -93,7 +93,7 @@ def stand_still(beam, new, edge, corner, tables, work):
     for c in range(beam.corners[chosen]):
         for k in range(2):
             corner[work.count[2] + c, k] = corner[begin + c, k]
-    new.head[7] = beam.corners[chosen]
+    new.corners = beam.corners[chosen]
     density = new.density[chosen] * flux_of(beam, tables, work) / held
     for a in range(3):
         new.density[a] = density
@@ -101,70 +101,70 @@ def stand_still(beam, new, edge, corner, tables, work):
 
 @part
 def end(nodes, facets, solids, tables, sources, leaf, edge, corner, work):
-    """Write the beam in hand as a leaf, or halve it where it is not straight enough."""
-    hand, source, kind = nodes[HAND], sources[0], nodes[HAND].ends
-    if hand.depth == 0:
+    """Write the current beam as a leaf, or halve it where it is not straight enough."""
+    beam, source, kind = nodes[CURRENT], sources[0], nodes[CURRENT].ends
+    if beam.depth == 0:
         return
     is_parallel = source.kind == PARALLEL
-    recentre(hand)
-    if (not is_parallel or work.absorbing) and not lay_out(hand, facets, solids, tables, source, work):
+    recentre(beam)
+    if (not is_parallel or work.absorbing) and not lay_out(beam, facets, solids, tables, source, work):
         return
     # Where rays graze, and where a cone fades away, there is no end to halving: what is faint is straight enough.
     faint = work.threshold if kind == LEAF_TAIL else faint_share(work) * work.threshold
-    room = work.top + 2 < len(nodes) and power_as(hand, hand, tables, work) > faint
-    tolerance = facets[hand.facet].texel if kind == LEAF_RECEIVER else work.tolerance
+    room = work.top + 2 < len(nodes) and power_as(beam, beam, tables, work) > faint
+    tolerance = facets[beam.facet].texel if kind == LEAF_RECEIVER else work.tolerance
     bend = 0.0
     if room and not is_parallel and kind == LEAF_RECEIVER:
-        bend = is_curved(hand, facets, solids, tables, source, tolerance, work)
+        bend = is_curved(beam, facets, solids, tables, source, tolerance, work)
     if bend > 1.0:
-        low, high = halve_space(hand, nodes[work.top], work)
+        low, high = halve_space(beam, nodes[work.top], work)
         push_both(nodes, low, high, work)
         return
     if kind == LEAF_RECEIVER and work.absorbing:
-        absorb(hand, facets, solids, tables, work)
-    bent, uneven = lay_leaf(hand, facets, kind, leaf, edge, corner, work)
+        absorb(beam, facets, solids, tables, work)
+    bent, uneven = lay_leaf(beam, facets, kind, leaf, edge, corner, work)
     if bent < 0.0:
         return
     most = _COLOURED if work.coloured else _UNEVEN
     # What photons carry on where nothing disperses, they carry over their own bands (`passes.beam_emission`).
     uneven = uneven if work.disperses or kind == LEAF_RECEIVER else 0.0
     bent = bent if work.disperses else 0.0
-    if room and hand.x[2] - hand.x[0] > NARROWEST and (bent > tolerance or uneven > most):
-        halve(nodes, 0.5 * (hand.x[0] + hand.x[2]), facets, solids, tables, sources, work)
+    if room and beam.x[2] - beam.x[0] > NARROWEST and (bent > tolerance or uneven > most):
+        halve(nodes, 0.5 * (beam.x[0] + beam.x[2]), facets, solids, tables, sources, work)
         return
     row, first = work.count[0], work.count[2]
     new = leaf[row]
-    density_slope(hand, facets, solids, tables, source, kind, new, work)
+    density_slope(beam, facets, solids, tables, source, kind, new, work)
     steepest = 0.0
-    for c in range(first, first + new.head[7]):
+    for c in range(first, first + new.corners):
         u, v = corner[c, 0] - new.centre[0], corner[c, 1] - new.centre[1]
         steepest = max(steepest, abs(new.slope[0] * u + new.slope[1] * v))
-    if room and steepest > _STEEP and hand.corners[1] > 0:
-        low, high = halve_space(hand, nodes[work.top], work)
+    if room and steepest > _STEEP and beam.corners[1] > 0:
+        low, high = halve_space(beam, nodes[work.top], work)
         push_both(nodes, low, high, work)
         return
     if work.sources > 1:
-        own_lines = hand.lines
+        own_lines = beam.lines
         if kind == LEAF_RECEIVER:
-            hold_in(hand, facets, solids, tables, source, work)
+            hold_in(beam, facets, solids, tables, source, work)
         soften(nodes, kind, facets, solids, tables, sources, leaf, edge, corner, work)
         if kind == LEAF_RECEIVER:
-            mask_edges(hand, own_lines, new, edge, corner, work)
-    anchor_density(hand, new, work)
+            mask_edges(beam, own_lines, new, edge, corner, work)
+    anchor_density(beam, new, work)
     # What is too faint to be halved and yet neither straight nor even must hold its own flux at least.
     if kind == LEAF_RECEIVER:
-        crooked = bent > tolerance and is_crooked(hand, bent, corner, work)
+        crooked = bent > tolerance and is_crooked(beam, bent, corner, work)
         if crooked or steepest > 1.0:
-            even_out(hand, new, corner, work)
+            even_out(beam, new, corner, work)
         if crooked:
-            stand_still(hand, new, edge, corner, tables, work)
-    flux = flux_of(hand, tables, work)
+            stand_still(beam, new, edge, corner, tables, work)
+    flux = flux_of(beam, tables, work)
     new.flux = flux
     work.count[0] += 1
-    work.count[1] += new.head[6]
-    work.count[2] += new.head[7]
+    work.count[1] += new.edges
+    work.count[2] += new.corners
     work.sums[SUM_LEAVES] += 1.0
-    work.sums[SUM_DEPOSITED if kind == LEAF_RECEIVER else SUM_HANDED] += flux
+    work.sums[SUM_DEPOSITED if kind == LEAF_RECEIVER else SUM_LEFT] += flux
 
 
 @part
@@ -177,47 +177,47 @@ def absorb(beam, facets, solids, tables, work):
 
 
 @part
-def hold_in(hand, facets, solids, tables, source, work):
+def hold_in(beam, facets, solids, tables, source, work):
     """Give a beam the half-planes of all edges of the facet that it left last. Its outline may lie within them, but
     penumbrae are as wide as others ask for, and none reaches out from under a facet that stands on the receiver."""
-    last = hand.flight - 1
+    last = beam.flight - 1
     if last < 0:
         return
-    number = np.int64(hand.path[last, 0])
-    facet, normal, towards = facets[number], facets[number].plane, hand.direction[1]
+    number = np.int64(beam.path[last, 0])
+    facet, normal, towards = facets[number], facets[number].plane, beam.direction[1]
     along = normal[0] * towards[0, 0] + normal[1] * towards[0, 1] + normal[2] * towards[0, 2]
-    way = 1 if (along > 0.0) == (hand.path[last, 1] != REFLECT) else 2
-    before = hand.lines
+    way = 1 if (along > 0.0) == (beam.path[last, 1] != REFLECT) else 2
+    before = beam.lines
     for e in range(facet.corners):
-        is_known = hand.lines >= LINES - 1
+        is_known = beam.lines >= LINES - 1
         for ln in range(before):
-            made = hand.made[ln]
+            made = beam.made[ln]
             is_known = is_known or (made[0] == last and made[1] == number and made[2] == e and made[3] > 0)
         if not is_known:
-            made = hand.made[hand.lines]
+            made = beam.made[beam.lines]
             made[0], made[1], made[2], made[3] = last, number, e, way
-            hand.lines += 1
-    if hand.lines > before:
-        lay_out(hand, facets, solids, tables, source, work)
+            beam.lines += 1
+    if beam.lines > before:
+        lay_out(beam, facets, solids, tables, source, work)
 
 
 @part
-def mask_edges(hand, own_lines, new, edge, corner, work):
+def mask_edges(beam, own_lines, new, edge, corner, work):
     """Turn those half-planes of the facet left last that penumbrae reach, and that are sharper than these, into masks
     (negative softness): behind the first `own_lines`, which stay what they are. The others of `hold_in` are dropped."""
-    first, last, lines = work.count[1], hand.flight - 1, hand.lines
+    first, last, lines = work.count[1], beam.flight - 1, beam.lines
     widest = 0.0
     for ln in range(own_lines):
         widest = max(widest, edge[first + ln].soft)
     kept = lines
     for ln in range(lines):
-        if hand.made[ln, 0] != last or hand.made[ln, 2] < 0 or not edge[first + ln].soft < _SHARP * widest:
+        if beam.made[ln, 0] != last or beam.made[ln, 2] < 0 or not edge[first + ln].soft < _SHARP * widest:
             continue
         line, nearest, begin = edge[first + ln].line, 1e300, work.count[2]
-        for a in range(first_place(hand), last_place(hand)):
-            for c in range(begin, begin + hand.corners[a]):
+        for a in range(first_place(beam), last_place(beam)):
+            for c in range(begin, begin + beam.corners[a]):
                 nearest = min(nearest, line[a, 0] * corner[c, 0] + line[a, 1] * corner[c, 1] + line[a, 2])
-            begin += hand.corners[a]
+            begin += beam.corners[a]
         if nearest < widest:
             mask = edge[first + kept]
             for a in range(3):
@@ -229,7 +229,7 @@ def mask_edges(hand, own_lines, new, edge, corner, work):
             kept += 1
     for ln in range(lines, kept):
         edge[first + own_lines + ln - lines] = edge[first + ln]
-    new.head[6] = own_lines + kept - lines
+    new.edges = own_lines + kept - lines
 
 
 @part
@@ -254,23 +254,23 @@ def direction_through(beam, point, facet, out):
 
 
 @part
-def moves(hand, spare, ln, facets, work):
+def moves(beam, spare, ln, facets, work):
     """How far an edge of the facet that a beam left last moves on the receiver where another point of the lamp throws
     it: as high as it is there, times the change of direction through it. Not at all where it stands on the receiver,
     and to be told so from the edge itself: half-planes in q are straight about one ray only."""
-    facet, ground = facets[hand.made[ln, 1]], facets[hand.facet]
-    e, number = hand.made[ln, 2], facet.corners
+    facet, ground = facets[beam.made[ln, 1]], facets[beam.facet]
+    e, number = beam.made[ln, 2], facet.corners
     begin, end_of = facet.corner[e], facet.corner[e + 1 if e + 1 < number else 0]
     foot, old, new = work.rays[0, 0], work.rays[0, 1], work.rays[0, 2]
     along = size = height = 0.0
     for k in range(3):
         side = end_of[k] - begin[k]
-        along += (hand.position[1, 0, k] - begin[k]) * side
+        along += (beam.position[1, 0, k] - begin[k]) * side
         size += side * side
     along = min(max(along / size, 0.0), 1.0)
     for k in range(3):
         foot[k] = begin[k] + along * (end_of[k] - begin[k])
-    direction_through(hand, foot, facet, old)
+    direction_through(beam, foot, facet, old)
     direction_through(spare, foot, facet, new)
     here = there = 0.0
     for k in range(3):
@@ -303,14 +303,14 @@ def soften(nodes, kind, facets, solids, tables, sources, leaf, edge, corner, wor
     The light's part is a disc whose radius is the way to those points. An edge's cover over it rises as the disc's
     cumulative profile; a ramp of the same variance is sqrt(3)/2 of the disc's projected radius wide to each side.
     Where a beam was cut in halves nothing ends: of every point's light either half has what lands on its side."""
-    hand, spare = nodes[HAND], nodes[SPARE]
-    first, n = work.count[1], nodes[HAND].lines
+    beam, spare = nodes[CURRENT], nodes[SPARE]
+    first, n = work.count[1], nodes[CURRENT].lines
     soft, own = work.soft, work.own
     new = leaf[work.count[0]]
     cu, cv, slope_u, slope_v = new.centre[0], new.centre[1], new.slope[0], new.slope[1]
     for turn in range(work.sources):
         if turn > 0:
-            copy(hand, spare)
+            copy(beam, spare)
             lay_out(spare, facets, solids, tables, sources[turn], work)
             lay_leaf(spare, facets, kind, leaf, edge, corner, work)
         for ln in range(n):
@@ -318,12 +318,12 @@ def soften(nodes, kind, facets, solids, tables, sources, leaf, edge, corner, wor
             at = e[1, 0] * cu + e[1, 1] * cv + e[1, 2]
             if turn == 0:
                 own[ln], soft[ln] = at, 0.0
-            elif kind == LEAF_RECEIVER and hand.made[ln, 0] == hand.flight - 1 and hand.made[ln, 2] >= 0:
-                moved = moves(hand, spare, ln, facets, work)
+            elif kind == LEAF_RECEIVER and beam.made[ln, 0] == beam.flight - 1 and beam.made[ln, 2] >= 0:
+                moved = moves(beam, spare, ln, facets, work)
                 soft[ln] += moved * moved
-            elif hand.made[ln, 2] != HALF and (hand.made[ln, 2] != STATIC or kind == LEAF_RECEIVER):
+            elif beam.made[ln, 2] != HALF and (beam.made[ln, 2] != STATIC or kind == LEAF_RECEIVER):
                 soft[ln] += (at - own[ln]) * (at - own[ln])
-    lay_leaf(hand, facets, kind, leaf, edge, corner, work)
+    lay_leaf(beam, facets, kind, leaf, edge, corner, work)
     new.slope[0], new.slope[1] = slope_u, slope_v
     for ln in range(n):
         edge[first + ln].soft = 0.8660254 * np.sqrt(soft[ln])

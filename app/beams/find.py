@@ -10,8 +10,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from .current import FIRST, START
 from .facets import DIELECTRIC, MIRROR, BeamScene
-from .hand import FIRST, START
 from .leaves import Leaves, Store
 from .nodes import HALF, NODE, STATIC
 from .rays import PARALLEL, intensities

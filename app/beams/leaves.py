@@ -12,62 +12,70 @@ from .polarised import STATE
 from .rays import PARALLEL, advance, at_x, follow
 from .search import medium
 
+LEAF = np.dtype(
+    [
+        # `search.LEAF_…`; facet it ends on (-1: none), facet left last, object first met, specular events, mask of the
+        # solids it is inside of.
+        ("kind", "i8"),
+        ("facet", "i8"),
+        ("last", "i8"),
+        ("source", "i8"),
+        ("depth", "i8"),
+        ("inside", "i8"),
+        # Numbers of its edges, and of corners of its polygons at its three places, one after the other.
+        ("edges", "i8"),
+        ("corners", "i8"),
+        # Hash of its path; objects met (bit i mod 64 for object i).
+        ("key", "i8"),
+        ("met", "i8"),
+        # Spectral coordinate of the three places: start, middle and end of the band.
+        ("x", "f8", 3),
+        # Flux per unit of the target's area and of the light's spectral power, roulette's gain included, there.
+        ("density", "f8", 3),
+        # Point of the target for which `density` holds; relative change of that per unit of the target's coordinates.
+        ("centre", "f8", 2),
+        ("slope", "f8", 2),
+        # Over the whole band, per unit of the light's power.
+        ("flux", "f8"),
+        # Used for pieces: [position, direction][place][value at `centre`, d/dq_u, d/dq_v][xyz].
+        ("ray", "f8", (2, 3, 3, 3)),
+        # Polarisation at the three places (`polarised`).
+        ("state", "f8", (3, STATE)),
+    ]
+)
+"""A finished beam. Its target's coordinates are (u, v) on a receiver, q of the light for a piece that photons carry
+on."""
+EDGE = np.dtype(
+    [
+        # a_u, a_v, c at the three places; |a| = 1; a . p + c >= 0 inside.
+        ("line", "f8", (3, 3)),
+        # Half width of the penumbra in the target's lengths; negative: a mask (`BeamPolygons.edges`).
+        ("soft", "f8"),
+    ]
+)
+
 
 @dataclass(frozen=True)
 class Leaves:
-    """Finished beams as arrays: L leaves, their E edges and H corners. A target's coordinates are (u, v) on a receiver,
-    q of the light for a piece that photons carry on; the three places are start, middle and end of the band."""
+    """L finished beams, with their edges and corners one after the other."""
 
-    head: np.ndarray
-    """int64 (L, 10): kind (`search.LEAF_…`), facet it ends on (-1: none), facet left last, object first met, specular
-    events, solids it is inside, edges, corners, hash of its path, objects met (bit i mod 64 for object i)."""
-    x: np.ndarray
-    """(L, 3): spectral coordinate of the three places."""
-    density: np.ndarray
-    """(L, 3): flux per unit of the target's area and of the light's spectral power, roulette's gain included."""
-    centre: np.ndarray
-    """(L, 2): point of the target for which `density` holds."""
-    slope: np.ndarray
-    """(L, 2): relative change of the density per unit of the target's two coordinates."""
-    flux: np.ndarray
-    """(L,): over the whole band, per unit of the light's power."""
-    ray: np.ndarray
-    """(L, 2, 3, 3, 3), used for pieces: [position, direction][place][value at `centre`, d/dq_u, d/dq_v][xyz]."""
-    state: np.ndarray
-    """(L, 3, 6): polarisation at the three places (`polarised`)."""
+    leaf: np.ndarray
+    """LEAF (L,)."""
     edge: np.ndarray
-    """(E, 3, 3): a_u, a_v, c at the three places; |a| = 1; a . p + c >= 0 inside."""
-    soft: np.ndarray
-    """(E,): half width of the penumbra in the target's lengths; negative: a mask (`BeamPolygons.edges`)."""
+    """EDGE (E,)."""
     corner: np.ndarray
-    """(H, 2): of a leaf's polygons at its three places, one after the other."""
+    """(H, 2)."""
 
     def where(self, keep: np.ndarray) -> Leaves:
         """The leaves for which `keep`, bool (L,), is true, with their edges and corners."""
-        of_edge, of_corner = np.repeat(keep, self.head[:, 6]), np.repeat(keep, self.head[:, 7])
-        rows = {"edge": of_edge, "soft": of_edge, "corner": of_corner}
-        return Leaves(**{f.name: getattr(self, f.name)[rows.get(f.name, keep)] for f in fields(self)})
+        of_edge, of_corner = np.repeat(keep, self.leaf["edges"]), np.repeat(keep, self.leaf["corners"])
+        return Leaves(self.leaf[keep], self.edge[of_edge], self.corner[of_corner])
 
     @classmethod
     def joined(cls, parts: list[Leaves]) -> Leaves:
         """All leaves of `parts`, which may be empty."""
         parts = parts or [Store(0).leaves(np.zeros(3, np.int64))]
-        return cls(**{f.name: np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(cls)})
-
-
-LEAF = np.dtype(
-    [
-        ("head", "i8", 10),
-        ("x", "f8", 3),
-        ("density", "f8", 3),
-        ("centre", "f8", 2),
-        ("slope", "f8", 2),
-        ("flux", "f8"),
-        ("ray", "f8", (2, 3, 3, 3)),
-        ("state", "f8", (3, STATE)),
-    ]
-)
-EDGE = np.dtype([("line", "f8", (3, 3)), ("soft", "f8")])
+        return cls(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(cls)))
 
 
 class Store:
@@ -88,20 +96,8 @@ class Store:
 
     def leaves(self, count: np.ndarray) -> Leaves:
         """A copy of what was written; `count`: numbers of leaves, edges and corners."""
-        leaf, edge = self.leaf[: count[0]].copy(), self.edge[: count[1]].copy()
-        return Leaves(
-            head=leaf["head"],
-            x=leaf["x"],
-            density=leaf["density"],
-            centre=leaf["centre"],
-            slope=leaf["slope"],
-            flux=leaf["flux"],
-            ray=leaf["ray"],
-            state=leaf["state"],
-            edge=edge["line"],
-            soft=edge["soft"],
-            corner=self.corner[: count[2]].copy(),
-        )
+        leaves, edges, corners = count
+        return Leaves(self.leaf[:leaves].copy(), self.edge[:edges].copy(), self.corner[:corners].copy())
 
 
 @part
@@ -187,15 +183,16 @@ def lay_leaf(beam, facets, kind, leaf, edge, corner, work):
         return -1.0, 0.0
     if beam.corners[1] == 0:
         bent = 1e300
-    head, flight = new.head, beam.flight
-    head[0], head[1], head[6], head[7] = kind, beam.facet if kind == 0 else -1, n, corners - work.count[2]
-    head[2] = beam.path[flight - 1, 0] if flight > 0 else -1
-    head[3] = facets[beam.path[0, 0]].owner if flight > 0 else -1
-    head[4], head[5] = beam.depth, beam.mask
-    head[8] = np.int64(beam.key >> np.uint64(33))
-    head[9] = 0
+    flight = beam.flight
+    new.kind, new.facet = kind, beam.facet if kind == 0 else -1
+    new.edges, new.corners = n, corners - work.count[2]
+    new.last = beam.path[flight - 1, 0] if flight > 0 else -1
+    new.source = facets[beam.path[0, 0]].owner if flight > 0 else -1
+    new.depth, new.inside = beam.depth, beam.mask
+    new.key = np.int64(beam.key >> np.uint64(33))
+    new.met = 0
     for k in range(flight):
-        head[9] |= np.int64(1) << np.int64(facets[beam.path[k, 0]].owner & 63)
+        new.met |= np.int64(1) << np.int64(facets[beam.path[k, 0]].owner & 63)
     for a in range(3):
         b = a if lo == 0 else 1
         new.x[a] = beam.x[a]

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .clipping import clip_labelled
 from .compiling import jit, part
 from .nodes import area_of
 
@@ -24,34 +25,35 @@ ROOM = 128
 """Corners of an outline."""
 
 
+SCRATCH = np.dtype(
+    [
+        ("corner", "f8", (ROOM, 2)),
+        ("spare", "f8", (ROOM, 2)),
+        ("side", "i8", ROOM),
+        ("spare_side", "i8", ROOM),
+        ("height", "f8", ROOM),
+        ("box", "f8", 4),
+    ]
+)
+
+
 @part
-def outline_at(edges, first, last, box, t, corner, spare, side, spare_side):
+def outline_at(edges, first, last, t, scratch):
     """The polygon at t in [0, 1] of its band: corners of the rectangle `box` (u0, v0, u1, v1) cut by all its lines, and
     the line of the side from each to the next (-1: the rectangle's); returns how many."""
+    corner, side, spare, spare_side = scratch.corner, scratch.side, scratch.spare, scratch.spare_side
     for c in range(4):
         side[c] = -1
-        corner[c, 0] = box[2] if c == 1 or c == 2 else box[0]
-        corner[c, 1] = box[3] if c > 1 else box[1]
+        corner[c, 0] = scratch.box[2] if c == 1 or c == 2 else scratch.box[0]
+        corner[c, 1] = scratch.box[3] if c > 1 else scratch.box[1]
     n = 4
     for e in range(first, last):
         line = edges[e]
         a, b = line[0] + t * (line[4] - line[0]), line[1] + t * (line[5] - line[1])
         c = line[2] + t * (line[6] - line[2])
-        kept = 0
         for i in range(n):
-            j = i + 1 if i + 1 < n else 0
-            here = a * corner[i, 0] + b * corner[i, 1] + c
-            there = a * corner[j, 0] + b * corner[j, 1] + c
-            if here >= 0.0 and kept < ROOM - 1:
-                spare[kept, 0], spare[kept, 1], spare_side[kept] = corner[i, 0], corner[i, 1], side[i]
-                kept += 1
-            if (here >= 0.0) != (there >= 0.0) and kept < ROOM - 1:
-                at = here / (here - there)
-                spare[kept, 0] = corner[i, 0] + at * (corner[j, 0] - corner[i, 0])
-                spare[kept, 1] = corner[i, 1] + at * (corner[j, 1] - corner[i, 1])
-                spare_side[kept] = e if here >= 0.0 else side[i]
-                kept += 1
-        n = kept
+            scratch.height[i] = a * corner[i, 0] + b * corner[i, 1] + c
+        n = clip_labelled(corner, side, n, scratch.height, e, spare, spare_side)
         for i in range(n):
             corner[i, 0], corner[i, 1], side[i] = spare[i, 0], spare[i, 1], spare_side[i]
         if n < 3:
@@ -60,12 +62,12 @@ def outline_at(edges, first, last, box, t, corner, spare, side, spare_side):
 
 
 @part
-def border(edges, first, last, box, alive, dead, corner, spare, side, spare_side):
+def border(edges, first, last, alive, dead, scratch):
     """Place between one where there is a polygon and one where there is none, on the side of the latter."""
     for _ in range(_HALVINGS):
         t = 0.5 * (alive + dead)
-        n = outline_at(edges, first, last, box, t, corner, spare, side, spare_side)
-        if n > 0 and area_of(corner, n) > 0.0:
+        n = outline_at(edges, first, last, t, scratch)
+        if n > 0 and area_of(scratch.corner, n) > 0.0:
             alive = t
         else:
             dead = t
@@ -82,13 +84,13 @@ def is_same(one, other):
 
 
 @jit
-def lifetimes(
-    edges, starts, corners, corner_starts, corner, spare, side, spare_side, box, lives, areas, bounds, kept, kept_ends
-):
+def lifetimes(edges, starts, corners, corner_starts, lives, areas, bounds, kept, kept_ends, scratches):
     """For every polygon the part of its band in which it exists, into `lives` (N, 2) (both 0 where it never does), and
     its area in the middle of that, into `areas` (N,); `bounds` (E,) becomes True for lines that bound something.
     `corners` are those of each polygon at its places; those of what exists go to `kept`, up to `kept_ends` (N + 1,).
-    `corner`, `spare` (`ROOM`, 2), `side`, `spare_side` (`ROOM`,) and `box` (4,): scratch."""
+    `scratches`: SCRATCH (1,)."""
+    scratch = scratches[0]
+    box = scratch.box
     step, count = 1.0 / (PLACES - 1), 0
     for i in range(len(starts) - 1):
         first, last = starts[i], starts[i + 1]
@@ -104,34 +106,28 @@ def lifetimes(
         low = high = -1.0
         for k in range(PLACES):
             t = k * step
-            if outline_at(edges, first, last, box, t, corner, spare, side, spare_side) > 0:
+            if outline_at(edges, first, last, t, scratch) > 0:
                 low = t if low < 0.0 else low
                 high = t
                 # Most exist everywhere.
-                if k == 0 and outline_at(edges, first, last, box, 1.0, corner, spare, side, spare_side) > 0:
+                if k == 0 and outline_at(edges, first, last, 1.0, scratch) > 0:
                     high = 1.0
                     break
         lives[i, 0] = lives[i, 1] = areas[i] = 0.0
         if low >= 0.0:
-            lives[i, 0] = (
-                0.0 if low <= 0.0 else border(edges, first, last, box, low, low - step, corner, spare, side, spare_side)
-            )
-            lives[i, 1] = (
-                1.0
-                if high >= 1.0
-                else border(edges, first, last, box, high, high + step, corner, spare, side, spare_side)
-            )
+            lives[i, 0] = 0.0 if low <= 0.0 else border(edges, first, last, low, low - step, scratch)
+            lives[i, 1] = 1.0 if high >= 1.0 else border(edges, first, last, high, high + step, scratch)
             is_whole = lives[i, 0] <= 0.0 and lives[i, 1] >= 1.0
             for turn in range(LOOKS):
                 t = lives[i, 0] + turn / (LOOKS - 1) * (lives[i, 1] - lives[i, 0])
-                n = outline_at(edges, first, last, box, t, corner, spare, side, spare_side)
+                n = outline_at(edges, first, last, t, scratch)
                 if 2 * turn == LOOKS - 1:
-                    areas[i] = area_of(corner, n)
+                    areas[i] = area_of(scratch.corner, n)
                 for c in range(n):
-                    if side[c] >= 0:
-                        bounds[side[c]] = True
+                    if scratch.side[c] >= 0:
+                        bounds[scratch.side[c]] = True
                 for c in range(0 if is_whole else n):
-                    kept[count, 0], kept[count, 1] = corner[c, 0], corner[c, 1]
+                    kept[count, 0], kept[count, 1] = scratch.corner[c, 0], scratch.corner[c, 1]
                     count += 1
             for e in range(first, last):
                 for f in range(first, e if bounds[e] else first):
@@ -166,21 +162,5 @@ def lifetimes_of(edges: np.ndarray, starts: np.ndarray, corners: np.ndarray, cor
     bands, areas, ends = np.zeros((n, 2)), np.zeros(n), np.zeros(n + 1, np.int64)
     bounds = np.zeros(len(edges), bool)
     kept = np.empty((LOOKS * (len(edges) + 4 * n) + len(corners), 2))
-    (corner, spare), (side, spare_side) = np.empty((2, ROOM, 2)), np.empty((2, ROOM), np.int64)
-    lifetimes(
-        edges,
-        starts,
-        corners,
-        corner_starts,
-        corner,
-        spare,
-        side,
-        spare_side,
-        np.zeros(4),
-        bands,
-        areas,
-        bounds,
-        kept,
-        ends,
-    )
+    lifetimes(edges, starts, corners, corner_starts, bands, areas, bounds, kept, ends, np.empty(1, SCRATCH))
     return Lifetimes(bands, areas, bounds, ends, kept[: ends[-1]])

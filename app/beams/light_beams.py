@@ -112,11 +112,11 @@ class BeamFinder:
         threads: int | None = None,
         go_on: GoOn = lambda steps: True,
         *,
-        hands: bool = False,
+        tails: bool = False,
     ) -> Generator[float, None, LightBeams]:
         """All beams, pausing with the share that is done.
 
-        `threshold`: share of the light that meets facets below which a beam plays roulette, or with `hands` is left to
+        `threshold`: share of the light that meets facets below which a beam plays roulette, or with `tails` is left to
         photons, unless its light has both emission lines and a continuum; `depth`: most specular events; `light_parts`:
         points of an extended light."""
         beams, scene, texel = self.scene, self._scene, self._texel
@@ -134,7 +134,7 @@ class BeamFinder:
         reach = {i: sum(_reach(part) for part in parts) * watts[i] for i, parts in todo}
         total, steps = sum(reach.values()), sum(len(parts) for _, parts in todo)
         # Pieces of a spectrum's continuum would hold what lines within their bands have, which are followed apart.
-        plays = frozenset(i for i, parts in todo if not hands or (parts[0].lines and parts[0].is_continuous))
+        plays = frozenset(i for i, parts in todo if not tails or (parts[0].lines and parts[0].is_continuous))
         result, done = LightBeams({}, plays=plays), 0
         polygons, pieces = [], []
         for i, parts in todo:
@@ -149,7 +149,7 @@ class BeamFinder:
                     depth,
                     _TOLERANCE * texel,
                     power=total / watts[i] if watts[i] > 0.0 else None,
-                    faint=0.0 if i in plays else _HANDED * threshold,
+                    faint=0.0 if i in plays else _TAILS_PLAY * threshold,
                 )
                 leaves, part_sums, part_blocked = search(beams, part, how, threads, go_on)
                 thrown.append(polygons_of(leaves, beams, i, self._unit))
@@ -171,7 +171,7 @@ class BeamFinder:
         return result
 
 
-_HANDED = 1.0 / 16.0
+_TAILS_PLAY = 1.0 / 16.0
 """Share of the threshold below which what is left to photons plays roulette. A quarter: 1.5 times the variance."""
 _TOLERANCE = 0.25
 """Texels."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .clipping import clip_labelled
 from .compiling import part
 from .polarised import STATE, begin
 from .rays import PARALLEL, edge_line, emit, emit_straight, emitted, meet, moments, total_line
@@ -88,22 +89,10 @@ def exists_throughout(beam):
 
 @part
 def clip(corner, side, count, label, work):
-    """Keep the part of a convex polygon where `work.height`, given at its corners, is not negative [Sutherland,
-    Hodgman 1974]; returns its corners."""
-    height, spare, spare_side = work.height, work.spare_corner, work.spare_side
-    kept = 0
-    for i in range(count):
-        j = i + 1 if i + 1 < count else 0
-        here, there = height[i], height[j]
-        if here >= 0.0 and kept < CORNERS - 1:
-            spare[kept, 0], spare[kept, 1], spare_side[kept] = corner[i, 0], corner[i, 1], side[i]
-            kept += 1
-        if (here >= 0.0) != (there >= 0.0) and kept < CORNERS - 1:
-            at = here / (here - there)
-            spare[kept, 0] = corner[i, 0] + at * (corner[j, 0] - corner[i, 0])
-            spare[kept, 1] = corner[i, 1] + at * (corner[j, 1] - corner[i, 1])
-            spare_side[kept] = label if here >= 0.0 else side[i]
-            kept += 1
+    """Keep the part of a convex polygon where `work.height`, given at its corners, is not negative; returns its
+    corners."""
+    spare, spare_side = work.spare_corner, work.spare_side
+    kept = clip_labelled(corner, side, count, work.height, label, spare, spare_side)
     if kept < 3:
         return 0
     longest = twice = 0.0

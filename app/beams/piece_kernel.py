@@ -113,20 +113,12 @@ def _divide(frame, points):
 
 @jit
 def rays(
+    pieces,
     chosen,
     points,
     boost,
-    path,
-    x_lo,
-    x_hi,
-    position,
-    direction,
-    weight,
-    edge_start,
     edges,
-    hull_start,
     hulls,
-    content,
     curve_x,
     curve_w,
     shift_u,
@@ -145,7 +137,7 @@ def rays(
     where that is full, or where `bodies` are fewer than the cells of a piece: `done[2]` is 1 then.
 
     Piece chosen[k] has about points[k] >= 1 lattice points and is to carry boost[k] times its `content`. Of the cells
-    those of sub-lattice `first` of `stride`. `path`: hashes by piece.
+    those of sub-lattice `first` of `stride`.
     """
     scratch = scratches[0]
     frame, cell, polygon = scratch.frame, scratch.cell, polygons[0]
@@ -155,28 +147,30 @@ def rays(
         row_step += 1
     for k in range(done[0], len(chosen)):
         done[0], i = k, chosen[k]
-        own = edges[edge_start[i] : edge_start[i + 1]]
-        if not _frame(own, hulls[hull_start[i] : hull_start[i + 1]], x_hi[i] > x_lo[i], polygons, cut, scratch, frame):
+        piece = pieces[i]
+        own, hull = edges[piece.edges[0] : piece.edges[1]], hulls[piece.hull[0] : piece.hull[1]]
+        x_lo, x_hi, weight = piece.x_lo, piece.x_hi, piece.weight
+        if not _frame(own, hull, x_hi > x_lo, polygons, cut, scratch, frame):
             continue
         along_it, across_it = _divide(frame, points[k])
         length, width = (frame[7] - frame[6]) / along_it, (frame[9] - frame[8]) / across_it
         columns, rows = int(np.ceil((frame[3] - frame[2]) / length)) + 1, int(np.ceil((frame[5] - frame[4]) / width))
-        u0 = frame[2] - length * ((_random(0, path[i], 0) + shift_u) % 1.0)
-        v0 = frame[4] - width * ((_random(0, path[i], 1) + shift_v) % 1.0)
+        u0 = frame[2] - length * ((_random(0, piece.key, 0) + shift_u) % 1.0)
+        v0 = frame[4] - width * ((_random(0, piece.key, 1) + shift_v) % 1.0)
         cell[2], cell[3] = 0.5 * length * frame[0], 0.5 * length * frame[1]
         cell[4], cell[5] = -0.5 * width * frame[1], 0.5 * width * frame[0]
         band_content = 0.0
-        steps = STEPS if x_hi[i] > x_lo[i] else 1
+        steps = STEPS if x_hi > x_lo else 1
         for step in range(steps):
-            lo = x_lo[i] + (x_hi[i] - x_lo[i]) * step / steps
-            hi = x_lo[i] + (x_hi[i] - x_lo[i]) * (step + 1) / steps
+            lo = x_lo + (x_hi - x_lo) * step / steps
+            hi = x_lo + (x_hi - x_lo) * (step + 1) / steps
             t = (step + 0.5) / steps if steps > 1 else 0.0
-            band_content += power_between(curve_x, curve_w, lo, hi) * weight_at(weight[i], t)
+            band_content += power_between(curve_x, curve_w, lo, hi) * weight_at(weight, t)
 
         # Lit cells that hold less than `least` are chosen by chance, in order along the lattice.
-        least = content[i] / points[k] / min(across_it, 4.0)
+        least = piece.content / points[k] / min(across_it, 4.0)
         lit, small = 0, 0.0
-        offset = int(_random(key, path[i], 2) * stride)
+        offset = int(_random(key, piece.key, 2) * stride)
         for row in range(rows + 1):
             column = (first + offset + row * row_step) % stride
             while column <= columns:
@@ -188,9 +182,9 @@ def rays(
                 cell[0], cell[1] = frame[0] * along - frame[1] * across, frame[1] * along + frame[0] * across
                 if cell_body(
                     own,
-                    weight[i],
-                    x_lo[i],
-                    x_hi[i],
+                    weight,
+                    x_lo,
+                    x_hi,
                     curve_x,
                     curve_w,
                     cell,
@@ -212,8 +206,8 @@ def rays(
         parts = max(1.0, np.rint(small / least))
         part = small / parts
         if stride > 1 and small < least:
-            parts, part = (1.0 if _random(key, path[i], 3 + first) * least < small else 0.0), least
-        running, at = 0.0, _random(key, path[i], 3 + stride + first)
+            parts, part = (1.0 if _random(key, piece.key, 3 + first) * least < small else 0.0), least
+        running, at = 0.0, _random(key, piece.key, 3 + stride + first)
         for body in range(lit):
             carried = bodies[body, 0]
             if carried < least:
@@ -223,11 +217,11 @@ def rays(
             if carried <= 0.0:
                 continue
             if ray_of(
-                position[i],
-                direction[i],
-                weight[i],
-                x_lo[i],
-                x_hi[i],
+                piece.position,
+                piece.direction,
+                weight,
+                x_lo,
+                x_hi,
                 curve_x,
                 curve_w,
                 bodies[body],

@@ -17,7 +17,7 @@ import numpy as np
 from ..model.optics.spectral_tables import CumulativeSpectrum
 from . import piece_kernel
 from .piece_cells import BODY, COLUMNS
-from .piece_measure import contents, room_for
+from .piece_measure import PIECE, contents, room_for
 from .polygons import BeamPieces
 
 _WORD = float(1 << 32)
@@ -66,43 +66,23 @@ class PieceLattice:
         curve_x = np.concatenate([x for x, _ in self._curves])
         curve_w = np.concatenate([w for _, w in self._curves])
         self._measures = np.array(measures, float)
-        self._edges = (
-            pieces.edge_start.astype(np.int64),
-            np.ascontiguousarray(pieces.edges, float),
-            pieces.hull_start.astype(np.int64),
-            np.ascontiguousarray(pieces.hulls, float),
-        )
-        self._bands = np.ascontiguousarray(pieces.x_lo, float), np.ascontiguousarray(pieces.x_hi, float)
-        self._weight = np.ascontiguousarray(pieces.weight, float)
-        self._content, self._power = np.zeros(len(pieces)), np.zeros(len(pieces))
-        light = pieces.light.astype(np.int64)
-        edge_start, edges, hull_start, hulls = self._edges
+        self._outlines = np.ascontiguousarray(pieces.edges, float), np.ascontiguousarray(pieces.hulls, float)
+        self._records = np.zeros(len(pieces), PIECE)
+        for name in ("light", "x_lo", "x_hi", "position", "direction", "weight", "key"):
+            self._records[name] = getattr(pieces, name)
+        for name, rows in (("edges", pieces.edge_start), ("hull", pieces.hull_start)):
+            self._records[name] = np.stack([rows[:-1], rows[1:]], axis=1)
 
         def measure(first: int) -> None:
-            part, ends = slice(first, first + _CHUNK), slice(first, first + _CHUNK + 1)
-            contents(
-                self._bands[0][part],
-                self._bands[1][part],
-                self._weight[part],
-                edge_start[ends],
-                edges,
-                hull_start[ends],
-                hulls,
-                light[part],
-                starts,
-                curve_x,
-                curve_w,
-                self._content[part],
-                self._power[part],
-                *room_for(edge_start[ends], hull_start[ends]),
-            )
+            part = self._records[first : first + _CHUNK]
+            contents(part, *self._outlines, starts, curve_x, curve_w, *room_for(part))
 
         _in_threads(measure, 0, len(pieces))
 
     @property
     def flux_w(self) -> np.ndarray:
         """(M,), W of each piece over its band."""
-        return self._content * self._measures[self.pieces.light]
+        return self._records["content"] * self._measures[self.pieces.light]
 
     def rays(
         self, light: int, count: int, shift: tuple[int, int], key: int, first: int = 0, stride: int = 1
@@ -125,27 +105,19 @@ class PieceLattice:
         mine, points = self._drawn(light, count, key)
         boost = self._measures[light] / np.minimum(points, 1.0)
         points = np.maximum(points, 1.0)
-        running, path = np.cumsum(points), np.ascontiguousarray(self.pieces.key, np.int64)
-        position, direction = (
-            np.ascontiguousarray(rays, float) for rays in (self.pieces.position, self.pieces.direction)
-        )
+        running = np.cumsum(points)
 
         def lay(start: int) -> np.ndarray:
             part = slice(start, start + _CHUNK)
             bodies, found, done = np.empty((_ROOM, BODY)), np.empty((_ROOM, COLUMNS)), np.zeros(3, np.int64)
-            room = room_for(self._edges[0], self._edges[2])
+            room = room_for(self._records)
             while True:
                 piece_kernel.rays(
+                    self._records,
                     mine[part],
                     points[part],
                     boost[part],
-                    path,
-                    *self._bands,
-                    position,
-                    direction,
-                    self._weight,
-                    *self._edges,
-                    self._content,
+                    *self._outlines,
                     *self._curves[light],
                     shift[0] / _WORD,
                     shift[1] / _WORD,
@@ -174,9 +146,9 @@ class PieceLattice:
 
     def _drawn(self, light: int, count: int, key: int) -> tuple[np.ndarray, np.ndarray]:
         """Pieces that have rays, and how many points each would have by rights."""
-        pieces = self.pieces
-        mine = np.flatnonzero((pieces.light == light) & (self._content > 0.0))
-        share = self._content[mine] / self._power[mine]
+        pieces, records = self.pieces, self._records
+        mine = np.flatnonzero((pieces.light == light) & (records["content"] > 0.0))
+        share = records["content"][mine] / records["power"][mine]
         share *= np.where(pieces.x_hi[mine] > pieces.x_lo[mine], pieces.x_hi[mine] - pieces.x_lo[mine], 1.0)
         if len(mine) and pieces.is_tail[mine].all():
             # What does not change from frame to frame shall keep its rays while other pieces do: each piece for itself,

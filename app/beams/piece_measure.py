@@ -29,13 +29,32 @@ SCRATCH = np.dtype(
     ]
 )
 """Scratch of the compiled functions, besides the `polygons` and `cut` of `room_for`."""
+PIECE = np.dtype(
+    [
+        ("light", "i8"),
+        ("x_lo", "f8"),
+        ("x_hi", "f8"),
+        ("position", "f8", (3, 3, 3)),
+        ("direction", "f8", (3, 3, 3)),
+        ("weight", "f8", 3),
+        # Rows of the edges and of the hull's corners, first and one behind the last.
+        ("edges", "i8", 2),
+        ("hull", "i8", 2),
+        # Hash of its path.
+        ("key", "i8"),
+        # Its light and its band's spectral power, see `contents`.
+        ("content", "f8"),
+        ("power", "f8"),
+    ]
+)
+"""A piece (`BeamPieces`) as compiled functions read it."""
 _LINE_X = 1e-9
 """An emission line's power is the change of the cumulative power from this far below its x to this far above."""
 
 
-def room_for(edge_start: np.ndarray, hull_start: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Scratch arrays (`polygons`, `cut`, `scratch`) that suffice for pieces with these offsets of edges and corners."""
-    room = int(np.diff(edge_start).max(initial=0) + np.diff(hull_start).max(initial=0)) + 8
+def room_for(pieces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Scratch arrays (`polygons`, `cut`, `scratch`) that suffice for PIECE records."""
+    room = sum(int((pieces[name][:, 1] - pieces[name][:, 0]).max(initial=0)) for name in ("edges", "hull")) + 8
     return np.empty((MOMENTS_OF_BAND, room, 2)), np.empty((2 * room, 2)), np.empty(1, SCRATCH)
 
 
@@ -106,39 +125,24 @@ def keep_lit(edges, t, u, v, polygon, count, scratch):
 
 
 @jit
-def contents(
-    x_lo,
-    x_hi,
-    weight,
-    edge_start,
-    edges,
-    hull_start,
-    hulls,
-    light,
-    curve_start,
-    curve_x,
-    curve_w,
-    out,
-    powers,
-    polygons,
-    cut,
-    scratch,
-):
-    """Light of each piece, `out` (M,): weight · spectral power · lit area summed over its band, W per unit of what q
-    measures (scene unit² or sr); `powers` (M,): spectral power of its band, W."""
+def contents(pieces, edges, hulls, curve_start, curve_x, curve_w, polygons, cut, scratch):
+    """Set the `content` of each piece: weight · spectral power · lit area summed over its band, W per unit of what q
+    measures (scene unit² or sr); and `power`: spectral power of its band, W."""
     moments, polygon = scratch[0].moments, polygons[0]
-    for i in range(len(out)):
-        own = edges[edge_start[i] : edge_start[i + 1]]
-        hull = hulls[hull_start[i] : hull_start[i + 1]]
-        first, end = curve_start[light[i]], curve_start[light[i] + 1]
-        steps = STEPS if x_hi[i] > x_lo[i] else 1
-        total = 0.0
+    for i in range(len(pieces)):
+        piece = pieces[i]
+        own = edges[piece.edges[0] : piece.edges[1]]
+        hull = hulls[piece.hull[0] : piece.hull[1]]
+        first, end = curve_start[piece.light], curve_start[piece.light + 1]
+        x_lo, x_hi = piece.x_lo, piece.x_hi
+        steps = STEPS if x_hi > x_lo else 1
+        total = band = 0.0
         for k in range(steps):
             t = (k + 0.5) / steps if steps > 1 else 0.0
-            lo = x_lo[i] + (x_hi[i] - x_lo[i]) * k / steps
-            hi = x_lo[i] + (x_hi[i] - x_lo[i]) * (k + 1) / steps
+            lo = x_lo + (x_hi - x_lo) * k / steps
+            hi = x_lo + (x_hi - x_lo) * (k + 1) / steps
             power = power_between(curve_x[first:end], curve_w[first:end], lo, hi)
             moments_of(polygon, keep_lit(own, t, 0.0, 0.0, polygon, copy(hull, polygon), cut), moments)
-            total += moments[0] * power * weight_at(weight[i], t)
-            powers[i] += power
-        out[i] = total
+            total += moments[0] * power * weight_at(piece.weight, t)
+            band += power
+        piece.content, piece.power = total, band

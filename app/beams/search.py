@@ -39,7 +39,7 @@ FRAGMENTS = 192
 """Most facets that a beam is cut by in one flight."""
 (
     SUM_DEPOSITED,
-    SUM_HANDED,
+    SUM_LEFT,
     SUM_ABSORBED,
     SUM_ESCAPED,
     SUM_DEPTH,
@@ -59,7 +59,7 @@ WORK = np.dtype(
         ("power", "i8"),
         # Power (flux per unit of spectral power) below which a beam plays roulette.
         ("threshold", "f8"),
-        # Above 0: weaker ones are handed over as tails, and only below this they play roulette.
+        # Above 0: weaker ones are left to photons as tails, and only those below this play roulette.
         ("faint", "f8"),
         ("seed", "u8"),
         # Most specular events.

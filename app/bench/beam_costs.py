@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 
 from ..base.generators import finished
-from ..beams.search import SUM_ENTERED, SUM_HANDED
+from ..beams.search import SUM_ENTERED, SUM_LEFT
 from ..gpu.context import Context
 from ..model.geometry.mesh import Mesh
 from ..model.geometry.primitives import box, plane
@@ -121,7 +121,7 @@ def scene_of(mesh: Mesh) -> Scene:
 
 def _searched(beams: BeamLight, facets: int, threshold: float) -> BeamCost:
     start = time.perf_counter()
-    found = finished(beams.finder.find(threshold, _DEPTH, 1, hands=True))
+    found = finished(beams.finder.find(threshold, _DEPTH, 1, tails=True))
     seconds = time.perf_counter() - start
     (sums,) = found.sums.values()
     return BeamCost(
@@ -131,7 +131,7 @@ def _searched(beams: BeamLight, facets: int, threshold: float) -> BeamCost:
         int(found.followed()),
         0 if found.polygons is None else len(found.polygons),
         0 if found.pieces is None else len(found.pieces),
-        float(sums[SUM_HANDED] / sums[SUM_ENTERED]),
+        float(sums[SUM_LEFT] / sums[SUM_ENTERED]),
         bool(beams.carried),
         beams.why_not,
     )

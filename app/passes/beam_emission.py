@@ -13,7 +13,6 @@ from dataclasses import replace
 import numpy as np
 
 from ..beams.piece_lattice import PieceLattice, PieceRays
-from ..beams.polarised_arrays import across, stokes_over_band
 from ..beams.polygons import BeamPieces, parabola_at
 from ..gpu.records import FLAG_INSIDE
 from ..gpu.reindex import Spans
@@ -115,8 +114,9 @@ class BeamEmission:
         pieces = self.pieces
         width = (pieces.x_hi - pieces.x_lo)[own]
         t = np.where(width[:, None] > 0.0, (band - pieces.x_lo[own, None]) / np.maximum(width, 1e-300)[:, None], 0.5)
-        stokes = stokes_over_band(pieces.state[own], t)
-        axis = across(pieces.state[own, 1, 3:], records["direction"].astype(float))
+        stokes = np.stack([parabola_at(pieces.state[own][..., :3], t[:, k]) for k in range(3)], axis=1)
+        stokes /= np.maximum(np.linalg.norm(stokes, axis=-1, keepdims=True), 1.0)  # at most wholly polarised
+        axis = _across(pieces.state[own, 1, 3:], records["direction"].astype(float))
         for k, name in enumerate("quv"):
             records[f"stokes_{name}"] = stokes[..., k]
             records[f"axis_{'xyz'[k]}"] = axis[:, k]
@@ -219,3 +219,9 @@ def _hashed(value: np.ndarray) -> np.ndarray:
     state = value * np.uint32(747796405) + np.uint32(2891336453)
     word = ((state >> ((state >> np.uint32(28)) + np.uint32(4))) ^ state) * np.uint32(277803737)
     return (word >> np.uint32(22)) ^ word
+
+
+def _across(axis: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """Axes (n, 3) made unit vectors across directions (n, 3) near those they belong to."""
+    axis = axis - np.einsum("ni,ni->n", axis, direction)[:, None] * direction
+    return axis / np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-30)

@@ -56,8 +56,8 @@ class FluxTally:
 
     emitted: float = 0.0
     handed: float = 0.0
-    """What photons took over from beams on their way (`beam_emission`), besides what lights emitted; less what beams
-    handed to them, where both are counted."""
+    """What photons carried on that beams had left (`beam_emission`), besides what lights emitted; less what beams left,
+    where both are counted."""
     left_to_beams: float = 0.0
     """What photons of the emission lattice left to beams (`without_beams`)."""
     ended: dict[str, float] = field(default_factory=lambda: dict.fromkeys(records.CATEGORIES, 0.0))
@@ -88,7 +88,7 @@ class FluxTally:
 
     @property
     def imbalance(self) -> float:
-        """|emitted + handed − all that ended − roulette's balance|, as a share of emitted + handed."""
+        """|emitted + carried on − all that ended − roulette's balance|, as a share of emitted + carried on."""
         started = self.emitted + self.handed
         return abs(started - sum(self.ended.values()) - self.roulette) / started if started else 0.0
 
@@ -164,8 +164,8 @@ WIDEST_TURN = 1.4
 directions of a footprint may differ behind a surface. Diamond ellipsoids under wide lamps (`random_3_3`, `random_1_1`,
 `random_1_8` of `bench-agreement --random`, 96×54, a million photons), nRMSE without and with it: 0.074, 0.056; 0.082,
 0.078; 0.0168, 0.0144. With 100,000: 0.099, 0.092; 0.110, 0.106; 0.028 both. Shipped scenes are as they were."""
-HANDED_POINTS = 2e4
-"""What rays that beams handed on, whose number is not known where they are traced, count as."""
+CARRIED_ON_POINTS = 2e4
+"""What rays count as that carry on what beams left, whose number is not known where they are traced."""
 WIDEST_SWEEP = 1.0
 """Radians over a band. A ground torus of sapphire (`random_all_5_8`) lost 1 % of its light without a bound; 0.03, 0.2
 and 1 all lead to 0.1 %. With 0.5 the prism of `stress` whose V_d is 1 lacks 3 % of its light, with 1 and 2 nothing."""
@@ -302,7 +302,7 @@ class TracePass:
 
     def carry_on(self, rays: np.ndarray, light: int, max_depth: int | None = None) -> Generator[None, None, Batch]:
         """`steps` for `rays` of one light that are on their way already: records (n,) of `ray` with n ≤ `batch`. Their
-        flux counts as handed."""
+        flux counts as carried on."""
         max_depth = self.max_depth if max_depth is None else min(max_depth, self.max_depth)
         count = len(rays)
         if count > self.batch:
@@ -417,7 +417,7 @@ class TracePass:
         p = records.TRACE_PARAMETERS.zeros(1)
         p["max_depth"], p["split_threshold"], p["lattices"] = max_depth, self.split_threshold, lattices
         p["lattices_together"], p["widest_on_surface"] = 1, self.widest_on_surface
-        p["paths"], p["widest_turn"] = HANDED_POINTS, self._widest_turn(HANDED_POINTS)
+        p["paths"], p["widest_turn"] = CARRIED_ON_POINTS, self._widest_turn(CARRIED_ON_POINTS)
         p["bounded"] = self.widest_on_surface < UNBOUNDED
         p["widest_sweep"] = WIDEST_SWEEP if p["bounded"] else UNBOUNDED
         p["power_row"] = self.scene.layout.power_row + light * max(1, self._features.tint_levels)

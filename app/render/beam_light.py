@@ -1,5 +1,5 @@
 """The part of a light pass that beams carry: found on the processor, drawn into the maps as polygons, and what is not
-flat or too weak handed to photons.
+flat or too weak left to photons.
 
 Where photons are traced besides, every round of a pass has beams of its own, found as coarsely as its share of the
 photons asks and with roulette's numbers of its own, so that a pass is even whenever it is left.
@@ -24,7 +24,7 @@ from ..beams.search import (
     SUM_DEPTH,
     SUM_ENTERED,
     SUM_ESCAPED,
-    SUM_HANDED,
+    SUM_LEFT,
     SUM_NUMERIC,
     SUM_ROULETTE,
 )
@@ -55,10 +55,10 @@ _FACETS_A_BEAM = 350.0
 _FINER = 32.0
 """A search that followed n beams tells of thresholds down to this times root n finer."""
 COARSEST, FINEST = 1e-2, 1e-9
-"""Thresholds: the share of the light below which a beam is handed to photons, or plays roulette."""
-_GROWTH, _GROWTH_HANDED = 0.8, 1.0
+"""Thresholds: the share of the light below which a beam is left to photons, or plays roulette."""
+_GROWTH, _GROWTH_WITH_TAILS = 0.8, 1.0
 """The number of beams goes about as this power of one over the threshold, where a stone throws light to and fro; where
-weak beams play roulette, and where they are handed over."""
+weak beams play roulette, and where they are left to photons."""
 _ENOUGH = 4.0
 """A search that followed this many times fewer beams than there is time for is done again."""
 _DEAREST = 1e8
@@ -97,7 +97,7 @@ class BeamStats:
     entered_w: float = 0.0
     """W of lights that met flat facets first; mean over the searches."""
     deposited_w: float = 0.0
-    handed_w: float = 0.0
+    left_w: float = 0.0
     """W that photons carry on."""
     find_seconds: float = 0.0
     draw_seconds: float = 0.0
@@ -180,8 +180,8 @@ class BeamLight:
         self.why_not = ""
         """Why there are none after all."""
         self.stats = BeamStats()
-        self._surveyed = self._handing = 1.0
-        """Beams that are followed at `SURVEY`: where weak ones play roulette, and where they are handed over."""
+        self._surveyed = self._with_tails = 1.0
+        """Beams that are followed at `SURVEY`: where weak ones play roulette, and where they are left to photons."""
         self._survey_polygons: BeamPolygons | None = None
         """What maps are fitted to."""
         self.found: LightBeams | None = None
@@ -209,14 +209,14 @@ class BeamLight:
             work += each * steps
             return work < _DEAREST
 
-        def surveyed(at: float, *, hands: bool) -> Generator[None, None, LightBeams]:
-            search = partial(self.finder.find, at, self._depth, _MOVING_WORD, light_parts, hands=hands)
+        def surveyed(at: float, *, tails: bool) -> Generator[None, None, LightBeams]:
+            search = partial(self.finder.find, at, self._depth, _MOVING_WORD, light_parts, tails=tails)
             return (yield from mapped(self._worker.searched(search, pays, None), lambda share: None))
 
-        found = yield from surveyed(threshold, hands=False)
+        found = yield from surveyed(threshold, tails=False)
         strongest = LightBeams({})
         if pays(0):
-            strongest = yield from surveyed(SURVEY, hands=True)
+            strongest = yield from surveyed(SURVEY, tails=True)
         if not pays(0):
             self.why_not = "the strongest beams alone are so many that photons are cheaper"
             return
@@ -229,7 +229,7 @@ class BeamLight:
             return
         self.found, self._survey_polygons = found, found.polygons
         self.carried = {light: objects for light, objects in found.carried.items() if objects}
-        self._surveyed, self._handing = max(1.0, found.followed() * to_survey), max(1.0, strongest.followed())
+        self._surveyed, self._with_tails = max(1.0, found.followed() * to_survey), max(1.0, strongest.followed())
 
     def show(self, scene: Scene) -> None:
         """Follow `scene` from now on: other glass and spectra, which `shown` has too."""
@@ -264,20 +264,20 @@ class BeamLight:
         self.stats = BeamStats()
 
     def steps(
-        self, photons: float, weight: float, word: int, maps: LightMaps, *, hands: bool = True
+        self, photons: float, weight: float, word: int, maps: LightMaps, *, tails: bool = True
     ) -> Iterator[float]:
         """Find beams as fine as `photons` ask and add them to `maps` times `weight`, pausing with the share done.
-        `word`: roulette's seed; without `hands` all weak beams play it, and none is left to photons, which would follow
+        `word`: roulette's seed; without `tails` all weak beams play it, and none is left to photons, which would follow
         the glass that is traced even where another is shown."""
         stats = self.stats
-        hands = hands and self.finder is self._traced
+        tails = tails and self.finder is self._traced
         self.finder.set_texels(self._texels(maps.layout, photons))
-        surveyed = self._handing if hands else self._surveyed
-        growth = _GROWTH_HANDED if hands else _GROWTH
+        surveyed = self._with_tails if tails else self._surveyed
+        growth = _GROWTH_WITH_TAILS if tails else _GROWTH
         finest = _finest(SURVEY, surveyed)
         while True:
             threshold = max(self._threshold(photons, surveyed, growth), finest)
-            search = self._worker.searched(partial(self.finder.find, threshold, self._depth, word, hands=hands))
+            search = self._worker.searched(partial(self.finder.find, threshold, self._depth, word, tails=tails))
             found = yield from mapped(timed(search, stats.count_finding), lambda share: 0.5 * share)
             # Where light leaves for good, fewer weak beams follow than thought: such are searched for again, finer.
             # What is learnt here is forgotten: a pass must not depend on those before it.
@@ -286,9 +286,9 @@ class BeamLight:
             enough = _ENOUGH * followed * self._photons_a_beam >= photons
             if enough or self._threshold(photons, surveyed, growth) >= threshold:
                 break
-        if hands and found.polygons is not None and threshold <= self._finest[0]:
+        if tails and found.polygons is not None and threshold <= self._finest[0]:
             self._finest = threshold, found
-        if not hands and (kept := self._kept(threshold)) is not None:
+        if not tails and (kept := self._kept(threshold)) is not None:
             found, _ = kept.joined(found)
         self.found = found
         self._count(found)
@@ -417,7 +417,7 @@ class BeamLight:
         tally = self.tally(1.0)
         stats.entered_w += (tally.emitted - stats.entered_w) / stats.searches
         stats.deposited_w += (tally.ended["deposited"] - stats.deposited_w) / stats.searches
-        stats.handed_w += (-tally.handed - stats.handed_w) / stats.searches
+        stats.left_w += (-tally.handed - stats.left_w) / stats.searches
 
     def tally(self, weight: float) -> FluxTally:
         """Where the light of the last search went, W times `weight`."""
@@ -425,7 +425,7 @@ class BeamLight:
         for light, sums in self.found.sums.items() if self.found is not None else ():
             watts = weight * float(self._buffers.light_power[light].band(0.0, 1.0)[3])
             tally.emitted += watts * float(sums[SUM_ENTERED])
-            tally.handed -= watts * float(sums[SUM_HANDED])
+            tally.handed -= watts * float(sums[SUM_LEFT])
             tally.roulette += watts * float(sums[SUM_ROULETTE])
             for name, index in _ENDS.items():
                 tally.ended[name] += watts * float(sums[index])

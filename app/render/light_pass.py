@@ -360,7 +360,7 @@ class LightPass:
 
     @property
     def only_beams(self) -> bool:
-        """No light needs photons but for what beams hand to them."""
+        """No light needs photons but for what beams leave to them."""
         return self.survey.only_beams
 
     @property
@@ -374,10 +374,10 @@ class LightPass:
         return self.beams.stats if self.beams is not None else None
 
     def beam_steps_again(self, photons: float) -> Iterator[None]:
-        """Add what beams of a pass of so many photons throw to the maps, as they are shown now; nothing is handed to
+        """Add what beams of a pass of so many photons throw to the maps, as they are shown now; nothing is left to
         photons."""
         if self.beams is not None and photons > 0.0:
-            for _ in self.beams.steps(photons, photons, roulette_word(self.seed, 0), self._maps, hands=False):
+            for _ in self.beams.steps(photons, photons, roulette_word(self.seed, 0), self._maps, tails=False):
                 yield
 
     def splat_steps(

@@ -145,7 +145,7 @@ class LightSurvey:
 
     @property
     def only_beams(self) -> bool:
-        """No light needs photons but for what beams hand to them."""
+        """No light needs photons but for what beams leave to them."""
         return self.has_beams and all(self.is_carried(i) for i in self.domains)
 
     def is_carried(self, light: int) -> bool:

@@ -123,10 +123,10 @@ class PassRounds:
         stats.tally.merge(tally)
         stats.polygons_w += tally.ended["deposited"]
         for tails in (False, True):
-            for _ in self._handed(of, share, weight, tails):
+            for _ in self._carried_on(of, share, weight, tails):
                 yield PassStep(done, False)
 
-    def _handed(self, of: RoundOf, share: float, weight: float, tails: bool) -> Iterator[None]:
+    def _carried_on(self, of: RoundOf, share: float, weight: float, tails: bool) -> Iterator[None]:
         """Photons that carry on what beams of `share` photons left: weak beams (`tails`), or all else."""
         beams, batches = self.survey.beams, self.batches
         if beams is None or beams.found is None or beams.found.pieces is None:
@@ -139,7 +139,7 @@ class PassRounds:
         most, entered_w = batches.budget.units, beams.stats.entered_w
         for light, rays in _continuing_rays(emission, entered_w, share, weight, most, self.seed, self._nth(of)):
             self.into.stats.trace_seconds += time.perf_counter() - started
-            yield from batches.handed(rays, light, of, self.into, of_tails=tails)
+            yield from batches.carry_on(rays, light, of, self.into, of_tails=tails)
             started = time.perf_counter()
 
     @staticmethod

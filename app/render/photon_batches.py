@@ -93,7 +93,7 @@ class PhotonBatches:
             first, left = first + points * part.stride, left - points
             yield from self._landed(batch, replace(of, is_last_light=of.is_last_light and not left), into)
 
-    def handed(
+    def carry_on(
         self, rays: np.ndarray, light: int, of: RoundOf, into: Deposit, *, of_tails: bool = False
     ) -> Iterator[None]:
         """The same for `rays` that are on their way already (`TracePass.carry_on`). `of_tails`: photons that carry on

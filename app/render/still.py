@@ -75,7 +75,11 @@ class RenderStats:
             f"emitted             {tally.emitted:.6e} W of scene flux per pass weight",
             *(f"  {name:<17} {flux / total:10.6f}" for name, flux in tally.ended.items()),
             f"  {'roulette':<17} {tally.roulette / total:10.6f}",
-            *([f"  {'handed':<17} {-tally.handed / total:10.6f}   (beams left it to photons)"] if tally.handed else []),
+            *(
+                [f"  {'carried on':<17} {-tally.handed / total:10.6f}   (beams left it to photons)"]
+                if tally.handed
+                else []
+            ),
             f"  {'unaccounted':<17} {tally.imbalance:10.2e}   (emitted − all of the above)",
             (
                 f"map holds           {self.map_flux_w / drawn:10.6f} of what was drawn; "
@@ -113,7 +117,7 @@ class RenderStats:
                 f"{beams.find_seconds:.2f} s, drawn in {beams.draw_seconds:.2f} s"
             ),
             (
-                f"carried             {beams.entered_w:.6e} W by beams, of which they left {beams.handed_w:.3e} W to "
+                f"carried             {beams.entered_w:.6e} W by beams, of which they left {beams.left_w:.3e} W to "
                 f"photons on the way; {max(emitted - beams.entered_w, 0.0):.6e} W by photons from the lights on"
             ),
         ]

@@ -38,7 +38,7 @@ def stone() -> tuple[BeamScene, Emission]:
 def fluxes(stone: tuple[BeamScene, Emission], seed: int, threads: int) -> tuple[np.ndarray, np.ndarray]:
     leaves, sums, blocked = search(*stone, Search(1e-3, seed, 96, 1e-3), threads)
     assert not blocked
-    return np.concatenate([part.flux for part in leaves]), sums
+    return np.concatenate([part.leaf["flux"] for part in leaves]), sums
 
 
 def test_what_enters_ends_somewhere(stone: tuple[BeamScene, Emission]) -> None:
@@ -90,9 +90,9 @@ def test_light_that_is_caught_in_a_tinted_pane_ends_finite(tmp_path: Path, kind:
     beams = beam_scene(scene, meshes, {0: (np.zeros(3), np.eye(3)[:2])}, axis, 1.0)
     beams.facets["texel"] = 1e-3
     for emission in emissions(scene.lights[0], beams, lambda p: np.asarray(p, float), 1.0, axis, 1):
-        found = Leaves.joined(search(beams, emission, Search(1e-5, 1, 96, 1e-3))[0])
-        assert len(found.flux) and (found.density[:, 1] < 1e-300).any()
-        assert np.isfinite(found.slope).all() and np.isfinite(found.density).all()
+        found = Leaves.joined(search(beams, emission, Search(1e-5, 1, 96, 1e-3))[0]).leaf
+        assert len(found) and (found["density"][:, 1] < 1e-300).any()
+        assert np.isfinite(found["slope"]).all() and np.isfinite(found["density"]).all()
 
 
 def test_threads_do_not_matter(stone: tuple[BeamScene, Emission]) -> None:
@@ -111,15 +111,15 @@ def test_seeds_next_to_each_other_play_other_roulettes(stone: tuple[BeamScene, E
 
 def test_leaves_keep_their_own_edges_and_corners(stone: tuple[BeamScene, Emission]) -> None:
     every = Leaves.joined(search(*stone, Search(1e-3, 1, 96, 1e-3), 1)[0])
-    keep = np.arange(len(every.head)) % 3 == 1
+    keep = np.arange(len(every.leaf)) % 3 == 1
     some = every.where(keep)
-    for column, rows, kept in ((6, every.edge, some.edge), (7, every.corner, some.corner)):
-        by_leaf = np.split(rows, np.cumsum(every.head[:, column])[:-1])
+    for name, rows, kept in (("edges", every.edge, some.edge), ("corners", every.corner, some.corner)):
+        by_leaf = np.split(rows, np.cumsum(every.leaf[name])[:-1])
         np.testing.assert_array_equal(kept, np.concatenate([by_leaf[i] for i in np.flatnonzero(keep)]))
-    assert len(every.head) > 3 and len(some.soft) == len(some.edge) and len(some.x) == keep.sum()
+    assert len(every.leaf) > 3 and len(some.leaf) == keep.sum()
     parts = [every.where(keep), every.where(~keep)]
-    assert Leaves.joined(parts).flux.sum() == pytest.approx(every.flux.sum())
-    assert len(Leaves.joined([]).head) == len(Leaves.joined([]).corner) == 0
+    assert Leaves.joined(parts).leaf["flux"].sum() == pytest.approx(every.leaf["flux"].sum())
+    assert len(Leaves.joined([]).leaf) == len(Leaves.joined([]).corner) == 0
 
 
 @pytest.mark.parametrize("count", [4, 16, 64])

@@ -1,4 +1,4 @@
-"""The beam in hand, row HAND of the stack; what becomes of it goes on top."""
+"""The current beam, row CURRENT of the stack; what becomes of it is put on top."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from .compiling import part
 from .nodes import copy
 from .search import halve_spectrum, place_of
 
-HAND, SPARE = 0, 1
-"""Rows of the stack that are the beam in hand, and room to try a cut."""
+CURRENT, SPARE = 0, 1
+"""Rows of the stack: the current beam, and room to try a cut."""
 FIRST = 2
 DEAD = -3
 """Facet of an outline that is no longer."""
@@ -15,40 +15,40 @@ START = -3
 LAY, UNKNOWN, SOME, ALL = -2, -1, 0, 1
 """States of a beam's `total`, whether its facet reflects everything; START: a source's whole light; LAY: rays are those
 of a larger outline."""
-_FAINT, _FAINT_HANDED = 0.02, 0.25
-"""Share of the threshold below which a beam is not halved; where all that comes of it is handed over."""
+_FAINT, _FAINT_WITH_TAILS = 0.02, 0.25
+"""Share of the threshold below which a beam is not halved; where what is weak is left to photons."""
 
 
 @part
 def faint_share(work):
     """Share of the threshold below which a beam is not halved."""
-    return _FAINT_HANDED if work.faint > 0.0 else _FAINT
+    return _FAINT_WITH_TAILS if work.faint > 0.0 else _FAINT
 
 
 @part
 def push_both(nodes, low, high, work):
-    """Leave on the stack what is left of the beam in hand and of that at the top."""
+    """Leave on the stack what is left of the current beam and of that at the top."""
     if high:
         work.top += 1
     if low:
-        copy(nodes[HAND], nodes[work.top])
+        copy(nodes[CURRENT], nodes[work.top])
         work.top += 1
 
 
 @part
 def halve(nodes, x, facets, solids, tables, sources, work):
-    """Cut the beam in hand at x and leave both on the stack."""
-    low, high = halve_spectrum(nodes[HAND], nodes[work.top], x, facets, solids, tables, sources[0], work)
+    """Cut the current beam at x and leave both on the stack."""
+    low, high = halve_spectrum(nodes[CURRENT], nodes[work.top], x, facets, solids, tables, sources[0], work)
     push_both(nodes, low, high, work)
 
 
 @part
-def distance_at(hand, beam, facet):
-    """Distance from the beam in hand's ray of an outline's centre to a facet's plane, at the place where the outline
+def distance_at(current, beam, facet):
+    """Distance along the current beam's ray of an outline's centre to a facet's plane, at the place where the outline
     exists; and its cosine."""
     a = place_of(beam)
-    u, v = beam.centre[0] - hand.centre[0], beam.centre[1] - hand.centre[1]
-    n, p, d = facet.plane, hand.position, hand.direction
+    u, v = beam.centre[0] - current.centre[0], beam.centre[1] - current.centre[1]
+    n, p, d = facet.plane, current.position, current.direction
     at = towards = 0.0
     for k in range(3):
         at += n[k] * (p[a, 0, k] + u * p[a, 1, k] + v * p[a, 2, k])
