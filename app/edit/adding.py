@@ -81,7 +81,7 @@ def _standing(scene: Scene, item: SceneObject, below: bool) -> SceneObject:
         float(corner @ up)
         for corner in bounds_of([o for o in scene.objects if not o.material.receives] or scene.objects)
     )
-    lowest = float((item.mesh.vertices @ item.object_to_world[:3, :3].T + item.object_to_world[:3, 3]).dot(up).min())
+    lowest = float(item.world_vertices.dot(up).min())
     # As for the default table: two surfaces must not coincide.
     hair = -1e-3 if below else 1e-3
     return _moved(item, (floor + hair * around.radius - lowest) * up)

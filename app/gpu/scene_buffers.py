@@ -26,6 +26,7 @@ from ..model.optics.spectral_tables import (
     wavelength_cdf,
 )
 from ..model.scene import Grating, Light, Scene
+from ..model.scene_checks import contains
 from ..model.tint_bands import tint_curves
 from ..model.tint_levels import TintLevels, tint_levels
 from . import bindings, shader
@@ -118,6 +119,17 @@ class SceneBuffers:
                 mask[is_inside] |= np.uint32(1 << bits[index])
             else:
                 other[is_inside] = index
+        return mask, other
+
+    def media_at(self, point: np.ndarray) -> tuple[int, int]:
+        """Medium stack, and the solid outside it or NONE, of a place in the world."""
+        mask, other = 0, NONE
+        for index, item in enumerate(self.scene.objects):
+            if item.material.is_solid and contains(item, point):
+                if index in self.stack_objects:
+                    mask |= 1 << self.stack_objects.index(index)
+                else:
+                    other = index
         return mask, other
 
     def bind(self) -> None:

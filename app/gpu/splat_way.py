@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING
 from ..base.errors import UserError, suggestion
 from . import shader
 from .device_traits import DeviceTraits, is_software_renderer
+from .framebuffers import adding, park
 from .limits import Limits
-from .parking import park
 
 if TYPE_CHECKING:
     import moderngl
@@ -118,18 +118,15 @@ def blending_rate(ctx: moderngl.Context) -> float:
     array = ctx.vertex_array(program, [])
     framebuffer.use()
     framebuffer.clear()
-    ctx.enable_only(moderngl.BLEND)
-    ctx.blend_equation = moderngl.FUNC_ADD, moderngl.FUNC_ADD
-    ctx.blend_func = moderngl.ONE, moderngl.ONE
-    array.render(moderngl.TRIANGLES, vertices=3)
-    ctx.finish()
-    rate, until = 0.0, time.perf_counter() + _PATIENCE_S
-    while rate < SLOW_BLENDING and time.perf_counter() < until:
-        started = time.perf_counter()
-        array.render(moderngl.TRIANGLES, vertices=3 * _QUADS)
+    with adding(ctx):
+        array.render(moderngl.TRIANGLES, vertices=3)
         ctx.finish()
-        rate = max(rate, _SIDE * _SIDE * _QUADS / (time.perf_counter() - started))
-    ctx.enable_only(moderngl.NOTHING)
+        rate, until = 0.0, time.perf_counter() + _PATIENCE_S
+        while rate < SLOW_BLENDING and time.perf_counter() < until:
+            started = time.perf_counter()
+            array.render(moderngl.TRIANGLES, vertices=3 * _QUADS)
+            ctx.finish()
+            rate = max(rate, _SIDE * _SIDE * _QUADS / (time.perf_counter() - started))
     park(ctx)
     shader.release(array, program, framebuffer, texture)
     return rate

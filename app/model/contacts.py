@@ -23,7 +23,7 @@ _PAIRS_AT_ONCE = 1 << 20
 
 def world_bounds(item: SceneObject) -> np.ndarray:
     """World axis-aligned bounds, float64 (2, 3)."""
-    points = item.mesh.vertices @ item.object_to_world[:3, :3].T + item.object_to_world[:3, 3]
+    points = item.world_vertices
     return np.stack([points.min(axis=0), points.max(axis=0)])
 
 

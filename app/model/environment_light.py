@@ -315,9 +315,7 @@ def why_no_bounces(scene: Scene) -> str | None:
         return "nothing shines"
     if any(o.material.is_specular for o in scene.objects):
         return None  # a floor sees itself in glass that stands on it
-    points = np.concatenate(
-        [o.mesh.vertices @ o.object_to_world[:3, :3].T + o.object_to_world[:3, 3] for o in receivers]
-    )
+    points = np.concatenate([o.world_vertices for o in receivers])
     singular = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     if singular[-1] <= _FLAT * max(singular[0], np.finfo(float).tiny):
         return "all diffuse surfaces lie in one plane: none sees another"

@@ -89,6 +89,11 @@ class SceneObject:
     local_dispersion: tuple[Dab, ...] = ()
     """Touches of the dispersion brush on this receiver, oldest first."""
 
+    @property
+    def world_vertices(self) -> np.ndarray:
+        """float64 (n, 3)."""
+        return self.mesh.vertices @ self.object_to_world[:3, :3].T + self.object_to_world[:3, 3]
+
 
 @dataclass(frozen=True)
 class RenderDefaults:

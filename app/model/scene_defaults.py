@@ -58,7 +58,7 @@ def bounds_of(objects: Sequence[SceneObject]) -> tuple[np.ndarray, np.ndarray]:
 
 def _bounds_of_each(objects: Sequence[SceneObject]) -> tuple[np.ndarray, np.ndarray]:
     """Lowest and highest corners in the world, float64 (n, 3) each."""
-    points = [o.mesh.vertices @ o.object_to_world[:3, :3].T + o.object_to_world[:3, 3] for o in objects]
+    points = [o.world_vertices for o in objects]
     return np.array([p.min(axis=0) for p in points]), np.array([p.max(axis=0) for p in points])
 
 

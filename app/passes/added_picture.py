@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import moderngl
 
 from ..gpu import shader
-from ..gpu.parking import park
+from ..gpu.framebuffers import adding, park
 
 
 class AddedPicture:
@@ -39,9 +39,8 @@ class AddedPicture:
         framebuffer.scissor = 0, first_row, framebuffer.size[0], rows
         for unit, texture in enumerate(self.textures):
             texture.use(unit)
-        blend_by_adding(self._ctx)
-        self._triangle.render(moderngl.TRIANGLES, 3)
-        self._ctx.enable_only(moderngl.NOTHING)
+        with adding(self._ctx):
+            self._triangle.render(moderngl.TRIANGLES, 3)
         park(self._ctx)
         framebuffer.release()
 
@@ -54,10 +53,3 @@ class AddedPicture:
         self._triangle.release()
         shader.release(self._program)
         self._release_textures()
-
-
-def blend_by_adding(ctx: moderngl.Context) -> None:
-    """What is drawn next is added to what there is."""
-    ctx.enable_only(moderngl.BLEND)
-    ctx.blend_equation = moderngl.FUNC_ADD, moderngl.FUNC_ADD
-    ctx.blend_func = moderngl.ONE, moderngl.ONE

@@ -18,6 +18,7 @@ from ..features.program_switches import Defines, switched
 from ..gpu import shader
 from ..gpu.context import check_device
 from ..gpu.dispatch_budget import DISPATCH_S, DispatchBudget
+from ..gpu.framebuffers import adding
 from ..gpu.records import NONE
 from ..gpu.schema import Field, Struct
 from .beam_records import BEAM, PackedBeams, hull_areas, hull_boxes, levels, packed, texel_hulls
@@ -140,11 +141,8 @@ class BeamSplatter:
         x0, y0, x1, y1 = (int(v) for v in rect)
         atlas.framebuffer.use()
         ctx.scissor = x0, y0, x1 - x0, y1 - y0
-        ctx.enable_only(moderngl.BLEND)
-        ctx.blend_equation = moderngl.FUNC_ADD, moderngl.FUNC_ADD
-        ctx.blend_func = moderngl.ONE, moderngl.ONE
-        array.render(moderngl.TRIANGLES)
-        ctx.enable_only(moderngl.NOTHING)
+        with adding(ctx):
+            array.render(moderngl.TRIANGLES)
         ctx.scissor = None
         shader.release(array, vertices, indices, texture)
 

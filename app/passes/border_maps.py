@@ -11,7 +11,6 @@ if TYPE_CHECKING:
     import moderngl
 
     from .map_layout import MapLayout
-    from .plane_frame import PlaneFrame
 
 
 def border_texture(ctx: moderngl.Context, layout: MapLayout) -> moderngl.Texture:
@@ -20,11 +19,6 @@ def border_texture(ctx: moderngl.Context, layout: MapLayout) -> moderngl.Texture
     for receiver, borders in layout.borders.items():
         rows[receiver, : len(borders)] = borders
     return ctx.texture(rows.shape[1::-1], 4, rows, dtype="f4")
-
-
-def _on_plane(rows: np.ndarray, frame: PlaneFrame) -> np.ndarray:
-    """Rows (n, 4) that act on places, for plane coordinates (s, t, 1): (n, 3)."""
-    return np.concatenate([rows[:, :3] @ frame.axes.T, (rows[:, :3] @ frame.origin + rows[:, 3])[:, None]], axis=1)
 
 
 def inside_share(layout: MapLayout, receiver: int, level: int) -> Callable[[int, int], np.ndarray]:
@@ -37,7 +31,7 @@ def inside_share(layout: MapLayout, receiver: int, level: int) -> Callable[[int,
     place = layout.placements[index]
     rows = np.stack([place["row_u"], place["row_v"], place["row_w"]]).astype(float)
     rows -= np.outer([tile.x, tile.y, 0.0], rows[2])
-    lines = _on_plane(layout.borders[receiver], frame) @ np.linalg.inv(_on_plane(rows, frame))
+    lines = frame.on_plane(layout.borders[receiver]) @ np.linalg.inv(frame.on_plane(rows))
     lines /= np.abs(lines[:, :2]).sum(axis=1)[:, None]
     x = np.arange(tile.width) + 0.5
 

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..gpu.records import NONE
 from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.schema import Field, Struct
 from ..model.optics.colorimetry import xyz_to_rgb709_matrix
 from ..model.scene import Camera, Light
 from ..model.scene_camera import camera_frame
-from ..model.scene_checks import contains
 
 CAMERA_LIGHT = Struct(
     "CameraLight",
@@ -129,11 +127,5 @@ def camera_parameters(scene: SceneBuffers, camera: Camera, width: int, height: i
         columns = np.asarray(environment.world_to_local, float).T
         for name, column in zip(("sky_x", "sky_y", "sky_z"), columns, strict=True):
             parameters[name] = column
-    parameters["inside_object"] = NONE
-    for index, item in enumerate(scene.scene.objects):
-        if item.material.is_solid and contains(item, np.array(camera.position)):
-            if index in scene.stack_objects:
-                parameters["inside_mask"] |= np.uint32(1 << scene.stack_objects.index(index))
-            else:
-                parameters["inside_object"] = index
+    parameters["inside_mask"], parameters["inside_object"] = scene.media_at(np.array(camera.position))
     return parameters

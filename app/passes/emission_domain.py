@@ -134,7 +134,7 @@ def _plane_domain(
         box_low, box_high = np.maximum(box_low, -half - rim), np.minimum(box_high, half + rim)
         back = float((middle - position) @ direction)
     else:
-        ends = np.concatenate([space.to_gpu(_world_corners(item)) for item in scene.objects])
+        ends = np.concatenate([space.to_gpu(item.world_vertices) for item in scene.objects])
         back = float(np.max((middle - ends) @ direction)) + 1.0
     if np.any(box_high <= box_low):
         return None
@@ -251,10 +251,6 @@ def _bounds(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     slowly."""
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
-
-
-def _world_corners(item) -> np.ndarray:
-    return item.mesh.vertices @ item.object_to_world[:3, :3].T + item.object_to_world[:3, 3]
 
 
 def _rect_and_mask(

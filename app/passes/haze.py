@@ -15,12 +15,12 @@ import numpy as np
 
 from ..gpu import bindings, shader
 from ..gpu.context import Context
-from ..gpu.parking import park
+from ..gpu.framebuffers import adding, park
 from ..gpu.records import FLIGHT
 from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.schema import Field, Struct
 from ..model.scene import Camera, Scene
-from .added_picture import AddedPicture, blend_by_adding
+from .added_picture import AddedPicture
 from .camera_records import CAMERA_PARAMETERS, camera_parameters
 from .first_surfaces import FirstSurfaces
 from .flights import MOST_EVENTS, PHOTONS, Flights, trace_flights
@@ -116,9 +116,8 @@ class Haze:
             distances.use(_UNIT_DISTANCES)
             framebuffer = self._ctx.framebuffer(self._picture.textures)
             framebuffer.use()
-            blend_by_adding(self._ctx)
-            self._draw.render(moderngl.TRIANGLES, 6 * count)
-            self._ctx.enable_only(moderngl.NOTHING)
+            with adding(self._ctx):
+                self._draw.render(moderngl.TRIANGLES, 6 * count)
             park(self._ctx)
             framebuffer.release()
         self._context.check("drawing haze")

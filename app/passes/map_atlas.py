@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..gpu import shader
-from ..gpu.parking import park
+from ..gpu.framebuffers import park
 from ..gpu.records import NONE, PLACEMENT
 from .splat_sums import SplatSums
 

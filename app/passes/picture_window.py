@@ -57,14 +57,14 @@ class PictureWindow:
 
     def texel_area(self, frame: PlaneFrame, step: int) -> float:
         """GPU units² of a texel where the weight is 1."""
-        return 1.0 / float(np.linalg.det(_on_plane(self.texel_rows(step), frame)))
+        return 1.0 / float(np.linalg.det(frame.on_plane(self.texel_rows(step))))
 
     def holds_grid(self, frame: PlaneFrame, u: np.ndarray, v: np.ndarray) -> np.ndarray:
         """bool (m, n): which places of the plane lie in it, `u` (n,) and `v` (m,) along its axes.
 
         Homogeneous pixels are a sum of what goes with u and what goes with v; a border p ≥ low is p_h − low w ≥ 0, so
         nothing is divided."""
-        rows = _on_plane(self.rows, frame)
+        rows = frame.on_plane(self.rows)
         along, across = rows[:, 0, None] * u, rows[:, 1, None] * v + rows[:, 2, None]
         held = np.add.outer(across[2], along[2]) > 0.0
         for i in (0, 1):
@@ -96,7 +96,7 @@ def picture_window(
     if not seen.any() or weights[seen].sum() < _LEAST_SHARE * weights.sum():
         return None
     rows = rows / np.median(found[seen, 2])
-    if np.linalg.det(_on_plane(rows, frame)) < 0.0:
+    if np.linalg.det(frame.on_plane(rows)) < 0.0:
         rows = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, size[1]], [0.0, 0.0, 1.0]]) @ rows
         pixels[:, 1] = size[1] - pixels[:, 1]
     low, high = pixels[seen].min(axis=0), pixels[seen].max(axis=0)
@@ -109,11 +109,6 @@ def picture_window(
             is_aslant = _cosine(camera, space.to_world(middle), np.cross(*frame.axes)) < _LEAST_COSINE
             return None if is_aslant else PictureWindow(low, high, count, rows, bool(seen.all()))
     return None
-
-
-def _on_plane(rows: np.ndarray, frame: PlaneFrame) -> np.ndarray:
-    """(3, 3): rows (3, 4) for plane coordinates (s, t, 1)."""
-    return np.concatenate([rows[:, :3] @ frame.axes.T, (rows[:, :3] @ frame.origin + rows[:, 3])[:, None]], axis=1)
 
 
 def _pixel_rows(camera: Camera, space: GpuSpace, picture: tuple[int, int]) -> np.ndarray:

@@ -22,6 +22,10 @@ class PlaneFrame:
         """GPU-space points (..., 3) of plane coordinates (..., 2)."""
         return self.origin + places @ self.axes
 
+    def on_plane(self, rows: np.ndarray) -> np.ndarray:
+        """Rows (n, 4) that act on GPU-space points, for plane coordinates (s, t, 1): (n, 3)."""
+        return np.concatenate([rows[:, :3] @ self.axes.T, (rows[:, :3] @ self.origin + rows[:, 3])[:, None]], axis=1)
+
 
 def plane_frame(points: np.ndarray) -> PlaneFrame:
     """The frame of coplanar `points`; its axes follow the coordinate axes where they can."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..model.contacts import world_bounds
 from ..model.optics.glass import LINE_D_NM
-from ..model.scene import Light, SceneObject
+from ..model.scene import Light
 from .emission_domain import orthonormal_frame
 from .ray_line import RayLine
 from .ray_paths import Path, RayPaths
@@ -44,7 +44,7 @@ class RayFan:
     def __init__(self, paths: RayPaths) -> None:
         self._scene, self._paths = paths.scene.scene, paths
         bounds = np.stack([world_bounds(item) for item in self._scene.objects])
-        self._points = [_world_points(item) for item in self._scene.objects]
+        self._points = [item.world_vertices for item in self._scene.objects]
         self._low, self._high = bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
 
     def trace(
@@ -217,10 +217,6 @@ def _chord(aperture: np.ndarray, is_disc: bool, middle: np.ndarray, across: np.n
         return (-b - root) / a, (-b + root) / a
     limits = [((-1.0 - s) / d, (1.0 - s) / d) for s, d in zip(start, step, strict=True) if abs(d) > 1e-12]
     return max(min(pair) for pair in limits), min(max(pair) for pair in limits)
-
-
-def _world_points(item: SceneObject) -> np.ndarray:
-    return item.mesh.vertices @ item.object_to_world[:3, :3].T + item.object_to_world[:3, 3]
 
 
 def _unit(vector: np.ndarray) -> np.ndarray:

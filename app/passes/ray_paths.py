@@ -13,11 +13,9 @@ import numpy as np
 
 from ..gpu import bindings, shader
 from ..gpu.context import Context
-from ..gpu.records import NONE
 from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.scene_records import SCENE_STRUCTS
 from ..gpu.schema import Field, Struct
-from ..model.scene_checks import contains
 
 MAX_SEGMENTS = 24
 _MAX_POINTS = MAX_SEGMENTS + 1
@@ -138,18 +136,10 @@ class RayPaths:
         return [Path(world[i, : int(end["points"])]) for i, end in enumerate(ends)]
 
     def _media_at(self, point: np.ndarray) -> tuple[int, int]:
-        """Bits of the medium stack and the solid outside of it that hold a world point; the last answer is
-        remembered."""
+        """`SceneBuffers.media_at`; the last answer is remembered."""
         key = point.tobytes()
         if self._inside is None or self._inside[0] != key:
-            mask, alone = 0, NONE
-            for index, item in enumerate(self.scene.scene.objects):
-                if item.material.is_solid and contains(item, point):
-                    if index in self.scene.stack_objects:
-                        mask |= 1 << self.scene.stack_objects.index(index)
-                    else:
-                        alone = index
-            self._inside = key, mask, alone
+            self._inside = key, *self.scene.media_at(point)
         return self._inside[1:]
 
     def _release_paths(self) -> None:

@@ -15,6 +15,7 @@ import numpy as np
 from ..features.program_switches import Defines
 from ..gpu import shader
 from ..gpu.context import check_device
+from ..gpu.framebuffers import adding
 from ..gpu.schema import Field, Struct
 from ..gpu.splat_way import way_of
 from .footprint import (
@@ -195,15 +196,11 @@ class Splatter:
     def _draw(self, atlas: MapAtlas) -> None:
         import moderngl
 
-        ctx = self._ctx
         atlas.framebuffer.use()
-        ctx.enable_only(moderngl.BLEND)
-        ctx.blend_equation = moderngl.FUNC_ADD, moderngl.FUNC_ADD
-        ctx.blend_func = moderngl.ONE, moderngl.ONE
         # A kind that no splat of the group is of has no vertices.
-        for kind, vertex_array in self._draws.items():
-            vertex_array.render_indirect(self._footprints.commands, moderngl.TRIANGLES, 1, first=kind - 1)
-        ctx.enable_only(moderngl.NOTHING)
+        with adding(self._ctx):
+            for kind, vertex_array in self._draws.items():
+                vertex_array.render_indirect(self._footprints.commands, moderngl.TRIANGLES, 1, first=kind - 1)
 
     def counts(self) -> dict[str, float]:
         """Of `Footprints`, since the last reset."""

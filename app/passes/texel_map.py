@@ -26,10 +26,7 @@ class TexelMap:
     def of(cls, placement: np.void, frame: PlaneFrame) -> TexelMap:
         """Of one PLACEMENT record."""
         rows = np.stack([placement[name] for name in ("row_u", "row_v", "row_w")]).astype(np.float64)
-        matrix = np.concatenate(
-            [rows[:, :3] @ frame.axes.T, (rows[:, :3] @ frame.origin + rows[:, 3])[:, None]], axis=1
-        )
-        return cls(matrix, placement["rect"].astype(np.float64))
+        return cls(frame.on_plane(rows), placement["rect"].astype(np.float64))
 
     @property
     def is_affine(self) -> bool:

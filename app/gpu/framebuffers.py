@@ -1,0 +1,33 @@
+"""Framebuffers: how what is drawn is added up, and one to leave bound when others are released."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import moderngl
+
+
+def park(ctx: moderngl.Context) -> None:
+    """Bind a framebuffer that lives as long as the context.
+
+    moderngl binds the last used framebuffer again after every clear; were it released meanwhile,
+    that is GL_INVALID_OPERATION, and a context without a window has no screen to fall back on.
+    """
+    if ctx.extra is None:
+        ctx.extra = ctx.simple_framebuffer((1, 1))
+    ctx.extra.use()
+
+
+@contextmanager
+def adding(ctx: moderngl.Context) -> Iterator[None]:
+    """Within the block what is drawn is added to what there is."""
+    import moderngl
+
+    ctx.enable_only(moderngl.BLEND)
+    ctx.blend_equation = moderngl.FUNC_ADD, moderngl.FUNC_ADD
+    ctx.blend_func = moderngl.ONE, moderngl.ONE
+    yield
+    ctx.enable_only(moderngl.NOTHING)
