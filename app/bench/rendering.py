@@ -192,7 +192,7 @@ class MethodRig:
         light.begin(sizes[0], seed)
         for number, size in enumerate(sizes):
             light.plan(size, number)
-            _ = light.tables  # made when they are first asked for
+            _ = light.batches.tables  # made when they are first asked for
             planned = self._finished()
             light.run_pass(number, size, self._wait)
             filled = self._finished()

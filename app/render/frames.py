@@ -44,10 +44,10 @@ from .traced_light import traced_light
 _ENVIRONMENT_SHARE = 0.25
 """Of a timed rendering, at most, for the light of the environment."""
 _BOUNCES_SHARE = 0.15
-"""Likewise for what receivers give to each other."""
+"""Of a timed rendering, at most, for what receivers give to each other."""
 _PREPARING, _TRACING, _SEEING = "preparing", "tracing photons", "taking camera samples"
-_ASKING = "asking for the environment's light"
-_BOUNCING = "asking what surfaces give to each other"
+_GATHERING = "gathering the environment's light"
+_BOUNCING = "gathering what surfaces give to each other"
 
 Stop = Callable[[], bool]
 Fill = Callable[[LightPass, LightSampling, Stop], Iterator[float]]
@@ -109,11 +109,10 @@ class FrameRenderer:
         stages: Sequence[Stage],
         begun: float | None = None,
         fill: Fill | None = None,
-        only_light: bool = False,
     ) -> None:
-        """`stages`: what will be asked for; maps and lattices are fitted to some of them. `begun`: the
+        """`stages`: what will be rendered; maps and lattices are fitted to some of them. `begun`: the
         `time.perf_counter()` from which `settings.seconds` count, which are those of one picture. `fill`: where light
-        comes from, instead of `traced_light`. `only_light`: nothing looks at it, so the environment is not asked.
+        comes from, instead of `traced_light`.
 
         Where light changes, `shader.keep_programs` on the context spares compiling every frame's programs."""
         self._context = context
@@ -128,7 +127,6 @@ class FrameRenderer:
         if settings.seconds is not None:
             self._budget = TimeBudget(settings.seconds, time.perf_counter() if begun is None else begun)
         self._fill = fill or traced_light
-        self._only_light = only_light
         self.phase = _PREPARING
         """What `steps` is at."""
         self.seconds = FrameSeconds()
@@ -147,25 +145,33 @@ class FrameRenderer:
         self.seconds, self.phase, self._progress = FrameSeconds(), _PREPARING, self._progress_of_camera()
         yield from self._survey()
         stage = _with_sun(stage)
-        inputs = inputs_of(stage, self._settings)
-        if self._traced is None or not share_light(self._traced.inputs, inputs):
-            yield from self._trace(stage, inputs, stop)
+        if self._traced is None or not share_light(self._traced.inputs, inputs_of(stage, self._settings)):
+            yield from self._trace(stage, stop)
         if not self._shows_map:
             yield from self._see(stage, stop)
 
-    def _trace(self, stage: Stage, inputs: LiveInputs, stop: Stop) -> Iterator[float]:
-        """The light pass of `stage`, and the camera pass that sees it."""
+    def preparing(self, stage: Stage) -> Iterator[float]:
+        """Make the light pass of `stage` ready, for whoever traces it: `light`, whose maps are empty."""
+        yield from self._survey()
         self.release()
-        traced = self._made(stage, inputs)
+        stage = _with_sun(stage)
+        self._traced = self._made(stage, inputs_of(stage, self._settings))
+        for _ in self._traced.light.preparing():
+            yield 0.0
+        self.seconds.prepare = time.perf_counter() - self.seconds.started
+
+    def _trace(self, stage: Stage, stop: Stop) -> Iterator[float]:
+        """The light pass of `stage`, and the camera pass that sees it."""
         try:
-            light = traced.light
-            for _ in light.preparing():
-                yield 0.0
-            self.seconds.prepare = time.perf_counter() - self.seconds.started
+            yield from self.preparing(stage)
+            assert self._traced is not None
+            traced, light = self._traced, self._traced.light
             sampling, budget = LightSampling.of(stage.scene, self._settings), self._budget
             if light.survey.domains:
                 self._progress.expect_photons(sampling.photons)
-            yield from self._ask_environment(traced, stop)
+            if traced.buffers.features.environment_lights:
+                traced.environment = EnvironmentLightPass(self._context, traced.buffers, self._settings.seed)
+                yield from self._gather(traced.environment, _GATHERING, _ENVIRONMENT_SHARE, LEAST_DIRECTIONS, stop)
             if budget is not None:
                 if not self._shows_map:
                     self._add_camera_pass(traced)
@@ -178,14 +184,32 @@ class FrameRenderer:
                 yield self._share(self._progress.light(share))
             light.finish()
             light.settle()
-            yield from self._ask_bounces(traced, stop)
+            if traced.buffers.features.bounces:
+                traced.bounces = bounces = BounceLightPass(
+                    self._context, traced.buffers, traced.environment, self._settings.seed
+                )
+                bounces.take(light.scene, light.caustic_maps(), light.map_channels)
+                yield from self._gather(bounces, _BOUNCING, _BOUNCES_SHARE, LEAST_OF_BOUNCES, stop)
             if traced.camera_pass is None and not self._shows_map:
                 self._add_camera_pass(traced)
         except BaseException:
-            traced.release()
+            self.release()
             raise
-        self._traced = traced
         self.traces += 1
+
+    def _gather(
+        self, light: EnvironmentLightPass | BounceLightPass, phase: str, most: float, least: int, stop: Stop
+    ) -> Iterator[float]:
+        """Light of what lies beyond everything, or of other receivers; a timed rendering (for `most` of its time) and
+        one that is stopped take fewer directions, `least` at least."""
+        self.phase = phase
+        longest = float("inf") if self._settings.seconds is None else most * self._settings.seconds
+        for share in light.steps():
+            done = self._progress.light(1.0) if phase == _BOUNCING else self._progress.environment(share, light.seconds)
+            yield self._share(done)
+            if light.asked >= least and (light.seconds >= longest or stop()):
+                break
+        light.show()
 
     def _add_camera_pass(self, traced: _Traced) -> None:
         """The camera pass of `traced`."""
@@ -357,36 +381,6 @@ class FrameRenderer:
 
         light.before_maps = look_at_memory
         return _Traced(inputs, buffers, light)
-
-    def _ask_environment(self, traced: _Traced, stop: Stop) -> Iterator[float]:
-        """Light of what lies beyond everything; a timed rendering and one that is stopped ask fewer directions."""
-        if self._only_light or not traced.buffers.features.environment_lights:
-            return
-        self.phase = _ASKING
-        traced.environment = light = EnvironmentLightPass(self._context, traced.buffers, self._settings.seed)
-        longest = float("inf") if self._settings.seconds is None else _ENVIRONMENT_SHARE * self._settings.seconds
-        for share in light.steps():
-            yield self._share(self._progress.environment(share, light.seconds))
-            if light.asked >= LEAST_DIRECTIONS and (light.seconds >= longest or stop()):
-                break
-        light.show()
-
-    def _ask_bounces(self, traced: _Traced, stop: Stop) -> Iterator[float]:
-        """What receivers give to each other, of the light that they have got by now."""
-        if self._only_light or not traced.buffers.features.bounces:
-            return
-        self.phase = _BOUNCING
-        light = traced.light
-        traced.bounces = bounces = BounceLightPass(
-            self._context, traced.buffers, traced.environment, self._settings.seed
-        )
-        bounces.take(light.scene, light.caustic_maps(), light.map_channels)
-        longest = float("inf") if self._settings.seconds is None else _BOUNCES_SHARE * self._settings.seconds
-        for _ in bounces.steps():
-            yield self._share(self._progress.light(1.0))
-            if bounces.asked >= LEAST_OF_BOUNCES and (bounces.seconds >= longest or stop()):
-                break
-        bounces.show()
 
     def _axis(self, scene: Scene, features: Features) -> SpectralAxis:
         """One axis for all frames: bands of equal places on it are then the same wavelengths in all."""

@@ -31,7 +31,6 @@ from ..passes.landings import Landings
 from ..passes.map_atlas import MapAtlas
 from ..passes.map_layout import MapLayout, check_map_receiver, layout_maps
 from ..passes.pilot import Pilot
-from ..passes.splat import Splatter
 from ..passes.trace import TracePass
 from .light_maps import LightMaps
 from .light_plan import Division, LightPlan, Planner
@@ -47,7 +46,7 @@ from .shown_spectra import ShownSpectra, ShownTables
 from .splatting import Pace
 
 if TYPE_CHECKING:
-    from .beam_light import BeamLight, BeamStats
+    from .beam_light import BeamLight
 
 
 class LightPass:
@@ -99,7 +98,7 @@ class LightPass:
         """Standard deviation of a footprint in lattice spacings; where passes shrink it, of the first one's."""
         self.widening = 1.0
         """Footprints of what is traced are so many times wider still, in pictures on the way to a better one."""
-        self.maps: LightMaps | None = None
+        self._made: LightMaps | None = None
         self.before_maps: Callable[[MapLayout], None] = lambda layout: None
         """Asked before maps are made, which take the most memory; may refuse them."""
         self._planned: tuple[int, tuple[int, int] | None] | None = None
@@ -132,14 +131,14 @@ class LightPass:
         words = None
         if self._has_contacts:
             words = contact_words(self.context.ctx, self.buffers, layout, fit.view)
-        self.maps = LightMaps(self.context.ctx, layout, self.features, words)
+        self._made = LightMaps(self.context.ctx, layout, self.features, words)
         self.features = self.maps.features
         if self.survey.beam_light is not None:
             self.survey.beam_light.lay_out(self.maps.layout)
 
     def give_maps(self) -> LightMaps | None:
         """The maps that there are become the caller's, to show them until others are filled."""
-        given, self.maps = self.maps, None
+        given, self._made = self._made, None
         return given
 
     def layout_for(self, fit: MapFit) -> MapLayout:
@@ -153,7 +152,7 @@ class LightPass:
             self.buffers,
             landings,
             (fit.width, fit.height),
-            self.reflectance_class,
+            self.shown.reflectance_class,
             self.map_receiver,
             fineness=fit.fineness_for(self.features.targets),
         )
@@ -175,65 +174,46 @@ class LightPass:
         return self.shown.reflectances
 
     @property
-    def reflectance_class(self) -> dict[int, int]:
-        """Each receiver's of `reflectances`."""
-        return self.shown.reflectance_class
-
-    @property
     def bin_edges_nm(self) -> np.ndarray | None:
         """Edges of the bins that a spectral picture asks for."""
         return None if self.map_channels.edges_nm is None else np.array(self.map_channels.edges_nm)
 
     @property
-    def _maps(self) -> LightMaps:
-        assert self.maps is not None, "prepare() comes first"
-        return self.maps
+    def maps(self) -> LightMaps:
+        """What light is added to."""
+        assert self._made is not None, "prepare() comes first"
+        return self._made
 
     @property
     def layout(self) -> MapLayout:
         """Where the maps lie."""
-        return self._maps.layout
+        return self.maps.layout
 
     @property
     def atlas(self) -> MapAtlas:
         """What splats are added to."""
-        return self._maps.atlas
-
-    @property
-    def receivers(self) -> moderngl.Buffer:
-        """RECEIVER records."""
-        return self._maps.receivers
-
-    @property
-    def splatter(self) -> Splatter:
-        """The splat pass of the maps."""
-        return self._maps.splatter
+        return self.maps.atlas
 
     @property
     def map_scale(self) -> float:
         """Factor from what the maps have summed to energy per texel."""
-        return self._maps.scale
+        return self.maps.scale
 
     def caustic_maps(self, textures: Sequence[moderngl.Texture] | None = None) -> CausticMaps:
         """The summed maps as the camera reads them; `textures` where they are not `resolved_textures`."""
-        return self._maps.caustic_maps(textures)
+        return self.maps.caustic_maps(textures)
 
     def resolved_textures(self) -> list[moderngl.Texture]:
         """The summed maps for lookups: wide texels added to fine ones, charts' seams folded home."""
-        return self._maps.resolved_textures()
+        return self.maps.resolved_textures()
 
     def resolved_map(self, receiver: int) -> np.ndarray:
         """A receiver's finest map: float32 (height, width, channels), row 0 at texel y = 0."""
-        return self._maps.receiver(receiver)
+        return self.maps.receiver(receiver)
 
     def map_flux(self) -> float:
         """What the maps hold where they are read: the sum of XYZ maps' last channel (W), or of all bins."""
-        return self._maps.flux(self.bin_edges_nm is None)
-
-    @property
-    def tables(self) -> ShownTables:
-        """The spectral tables of the plan that was begun."""
-        return self.batches.tables
+        return self.maps.flux(self.bin_edges_nm is None)
 
     def forget_tables(self) -> None:
         """Make spectral tables anew when they are next asked for, as a process that renders once does."""
@@ -248,7 +228,7 @@ class LightPass:
         Afterwards `plans` and `tables` exist. Pilots and maps stay, so a rendering may be begun again and again."""
         self.seed = seed
         self.stats, self._elsewhere = LightStats(), LightStats()
-        self._maps.clear()
+        self.maps.clear()
         self.batches.begin()
         if self.survey.beam_light is not None:
             self.survey.beam_light.begin()
@@ -346,12 +326,7 @@ class LightPass:
     def deposit(self, number: int) -> Deposit:
         """Where photons of pass `number` go."""
         coarsening = self.widening * (kernel_scale(number) if self._shrinks else 1.0)
-        return Deposit(self._maps, self.stats, self.smoothing * coarsening)
-
-    @property
-    def has_work(self) -> bool:
-        """A pass throws some light."""
-        return bool(self.plans) or self.has_beams
+        return Deposit(self.maps, self.stats, self.smoothing * coarsening)
 
     @property
     def has_beams(self) -> bool:
@@ -368,16 +343,11 @@ class LightPass:
         """What finds and draws them; None where there are none."""
         return self.survey.beams
 
-    @property
-    def beam_stats(self) -> BeamStats | None:
-        """What beams did; None without any."""
-        return self.beams.stats if self.beams is not None else None
-
     def beam_steps_again(self, photons: float) -> Iterator[None]:
         """Add what beams of a pass of so many photons throw to the maps, as they are shown now; nothing is left to
         photons."""
         if self.beams is not None and photons > 0.0:
-            for _ in self.beams.steps(photons, photons, roulette_word(self.seed, 0), self._maps, tails=False):
+            for _ in self.beams.steps(photons, photons, roulette_word(self.seed, 0), self.maps, tails=False):
                 yield
 
     def splat_steps(
@@ -392,7 +362,7 @@ class LightPass:
         """Add every `stride`-th photon record to the maps, with footprints `coarsening` times as wide, see
         `Splatting.steps`. `tables` of another plan than the one begun, `maps` of another layout than the light pass's
         own."""
-        into = Deposit(maps or self._maps, self.stats, self.smoothing * coarsening)
+        into = Deposit(maps or self.maps, self.stats, self.smoothing * coarsening)
         yield from self.batches.splat(photons, count, into, tables, stride)
 
     def settling(self) -> Iterator[None]:
@@ -410,7 +380,7 @@ class LightPass:
             check_brush(self.context.limits)
         if (scene is not None) != self.features.local_gain:
             self.features = replace(self.features, local_gain=scene is not None)
-            self._maps.take(self.features)
+            self.maps.take(self.features)
         self.shown.show_gains(scene)
 
     def finish(self) -> None:
@@ -419,11 +389,11 @@ class LightPass:
         self.stats.buffers = {
             "scene": self.buffers.bytes,
             "photon queue": self.trace.bytes,
-            "splats": self.splatter.bytes,
+            "splats": self.maps.splatter.bytes,
             "map sums": 16 * len(self.atlas.total_textures) * self.atlas.size[0] * self.atlas.size[1],
             "map scratch": self.atlas.scratch_bytes,
         }
-        counts = self.splatter.counts()
+        counts = self.maps.splatter.counts()
         elsewhere = self._elsewhere
         self.stats.splats_w = counts["splats_w"] + elsewhere.splats_w
         self.stats.outside_map_w = counts["outside_map_w"] + elsewhere.outside_map_w
@@ -436,20 +406,15 @@ class LightPass:
         `sums`: for every texture of the atlas in turn, float32 (height, width, 4); `stats`: what they counted."""
         for texture, values in zip(self.atlas.total_textures, sums, strict=True):
             texture.write(np.ascontiguousarray(values, np.float32))
-        self._maps.photon_weight = photon_weight
+        self.maps.photon_weight = photon_weight
         self._elsewhere = stats
         self.stats = replace(stats, bands=self.stats.bands, light_points=self.stats.light_points)
-
-    @property
-    def photon_weight(self) -> float:
-        """What was deposited is energy times this."""
-        return self._maps.photon_weight
 
     def settle(self) -> None:
         """After `finish`, where nothing is traced any more: what remains is what is read."""
         self.trace.release_buffers()
-        self._maps.settle()
+        self.maps.settle()
 
     def release(self) -> None:
         """Free everything."""
-        shader.release(self.batches, self.shown, self.maps, self.survey)
+        shader.release(self.batches, self.shown, self._made, self.survey)

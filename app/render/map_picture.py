@@ -13,7 +13,7 @@ from .light_pass import LightPass
 def map_picture(light: LightPass) -> tuple[np.ndarray, np.ndarray | None]:
     """Irradiance (or reflected light, where the reflectance is spectral) on the receiver of the settings' layer, row 0
     on top: linear Rec.709 float32 (H, W, 3), lm/unit² for white, and W/unit² a bin (H, W, bins), or None."""
-    assert light.map_receiver is not None and light.maps is not None
+    assert light.map_receiver is not None
     tile, areas = light.layout.tiles[light.map_receiver][0], texel_areas(light, light.map_receiver)
     edges_nm = light.bin_edges_nm
     is_xyz = edges_nm is None

@@ -190,7 +190,6 @@ def _pixels_of(
 def _brightest(light: LightPass, tile: Tile) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Rows, columns and luminance, as summed, of the brightest texels of a map: (n,) each. Read in portions, for a map
     takes more memory than all else."""
-    assert light.maps is not None
     places, values = np.zeros(0, np.int64), np.zeros(0)
     for first, texels in light.maps.portions(tile):
         luminous = texels[..., 1].ravel()

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
@@ -121,10 +122,10 @@ def trace_part(
 
     Raises `UserError` where the rendering has fewer rounds than parts.
     """
-    settings = replace(settings, photons=settings.photons or scene.render.photons)
-    made: list[Part] = []
-
-    def fill(light: LightPass, sampling: LightSampling, stopped: Stop) -> Iterator[float]:
+    with _prepared(context, scene, settings, stop) as (light, settings):
+        if light is None:
+            return None
+        sampling = LightSampling.of(scene, settings)
         sizes = pass_sizes(light.features.method, sampling.photons)
         rounds, groups = _rounds_and_groups(light, sampling)
         if sum(groups) < share.count:
@@ -135,8 +136,7 @@ def trace_part(
                 f"{share.count} parts: this rendering is traced in {sum(groups)} rounds, which are not enough to "
                 f"share out; {way_out}"
             )
-        mine = len(range(share.index - 1, sum(groups), share.count))
-        done = 0
+        mine, done = len(range(share.index - 1, sum(groups), share.count)), 0
         light.begin(sizes[0], sampling.seed)
         for number, photons in enumerate(sizes):
             light.plan(photons, number)
@@ -144,9 +144,8 @@ def trace_part(
             for step in light.pass_steps(number, photons, 0, first, share.count):
                 done += step.round_done
                 progress(done / mine)
-                yield done / mine
-                if stopped():
-                    return
+                if stop():
+                    return None
         light.finish()
         header = PartHeader(
             scene.name,
@@ -158,46 +157,34 @@ def trace_part(
             layout_key(light),
             light.atlas.size,
             light.atlas.targets,
-            light.photon_weight,
+            light.maps.photon_weight,
             _plain(light.stats),
             context.renderer,
         )
-        made.append(Part(header, [_texels(light, target) for target in range(light.atlas.targets)]))
-        yield 1.0
-
-    stage = Stage(scene, scene.camera)
-    renderer = FrameRenderer(context, settings, [stage], fill=fill, only_light=True)
-    steps = renderer.steps(stage, stop)
-    try:
-        for _ in steps:
-            if made or stop():
-                break
-    finally:
-        steps.close()  # type: ignore[attr-defined]
-        renderer.release()
-    return made[0] if made else None
+        return Part(header, [_texels(light, target) for target in range(light.atlas.targets)])
 
 
 def parts_at_most(context: Context, scene: Scene, settings: RenderSettings) -> int:
     """Into how many parts a rendering can be divided; traces nothing but its pilots."""
+    with _prepared(context, scene, settings) as (light, settings):
+        assert light is not None
+        return max(sum(_rounds_and_groups(light, LightSampling.of(scene, settings))[1]), 1)
+
+
+@contextmanager
+def _prepared(
+    context: Context, scene: Scene, settings: RenderSettings, stop: Stop = lambda: False
+) -> Iterator[tuple[LightPass | None, RenderSettings]]:
+    """The light pass of a rendering, ready to be traced (None where `stop()` turned true before that), and its settings
+    with the number of photons."""
     settings = replace(settings, photons=settings.photons or scene.render.photons)
-    found: list[int] = []
-
-    def fill(light: LightPass, sampling: LightSampling, stopped: Stop) -> Iterator[float]:
-        found.append(sum(_rounds_and_groups(light, sampling)[1]))
-        yield 1.0
-
     stage = Stage(scene, scene.camera)
-    renderer = FrameRenderer(context, settings, [stage], fill=fill, only_light=True)
-    steps = renderer.steps(stage)
+    renderer = FrameRenderer(context, settings, [stage])
     try:
-        for _ in steps:
-            if found:
-                break
+        stopped = any(stop() for _ in renderer.preparing(stage))
+        yield None if stopped else renderer.light, settings
     finally:
-        steps.close()  # type: ignore[attr-defined]
         renderer.release()
-    return max(found[0], 1)
 
 
 def _rounds_and_groups(light: LightPass, sampling: LightSampling) -> tuple[int, list[int]]:

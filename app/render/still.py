@@ -190,6 +190,6 @@ def _stats(context: Context, frames: FrameRenderer, settings: RenderSettings) ->
         light.layout.size,
         light.map_flux() if settings.tally else 0.0,
         camera,
-        light.beam_stats,
+        None if light.beams is None else light.beams.stats,
         frames.memory.peak if frames.memory is not None else 0,
     )

@@ -189,7 +189,7 @@ def test_rounds_of_photons_have_their_beams_together(gl, tmp_path: Path, monkeyp
     with passed(gl, scene) as light:
         assert light.has_beams and not light.only_beams
         steps = [step for step in light.pass_steps(1, PHOTONS) if step.round_done]
-        stats = light.beam_stats
+        stats = light.beams.stats
         assert stats is not None
         searches = stats.searches / 2
         assert searches == len(steps) and 2 <= searches <= 4 and steps[-1].fraction == 1.0

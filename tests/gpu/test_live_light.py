@@ -128,7 +128,7 @@ def anchored_alike(fresh: LiveLight, light: LiveLight) -> list[LightPlan]:
 def into(light: LiveLight, fresh: LiveLight) -> np.ndarray:
     """Another light pass's photons in the maps of `light`; `fresh` splats them with its own tables and variables."""
     running, into_maps = fresh.stored.running, light.light_pass.maps
-    assert running is not None and into_maps is not None
+    assert running is not None
     into_maps.clear()
     for slab in running.store.slabs:
         for _ in fresh.light_pass.splat_steps(slab.buffer, slab.count, maps=into_maps):

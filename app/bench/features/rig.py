@@ -127,7 +127,7 @@ class Rig:
                 self._variables,
                 self._tables,
                 self._atlas,
-                self._work.light.receivers,
+                self._work.light.maps.receivers,
                 self._work.light.settings.smoothing,
             )
             self._context.finish()

@@ -239,7 +239,7 @@ class LiveEngine(EngineAnswers):
             case Action.REFINE_PICTURE:
                 self._restart_camera(same_view=True)
             case ShowMaps(same_view, finer_maps):
-                assert self._shown is not None and self._shown.light.light_pass.maps is not None
+                assert self._shown is not None
                 self._set_maps(self._shown.light.light_pass.maps)
                 self._restart_camera(same_view=same_view, finer_maps=finer_maps)
 
@@ -268,7 +268,6 @@ class LiveEngine(EngineAnswers):
             self._take_scene(wanted, shown.light)
         if shown.light.holds_shown:
             shown.accumulation.bring_back()
-            assert shown.light.light_pass.maps is not None
             self._show_for_now(shown.light.light_pass.maps)
         elif self.schedule.interacting or lights_differ(before, wanted):
             self._show_preview(seconds)

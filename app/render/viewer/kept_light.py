@@ -47,7 +47,7 @@ class KeptLight:
     def keep(self, light_pass: LightPass, shown: LiveInputs, photons: int, number: int) -> None:
         """Remember what the maps hold after `number` passes of `photons`, where all wavelengths are shown."""
         maps, kept = light_pass.maps, self._kept
-        if maps is None or shown.solo_nm is not None:
+        if shown.solo_nm is not None:
             return
         if kept is not None and kept.maps is maps and number * photons < kept.number * kept.photons:
             return  # what an edit may be undone to is finer

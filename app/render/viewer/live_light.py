@@ -243,7 +243,6 @@ class LiveLight:
         they are, so that it can go on. Nothing is shown where nothing is stored.
         """
         kept, maps = self.stored.running if of_running else self.stored.fullest, self.light_pass.maps
-        assert maps is not None
         maps.clear()
         if kept is None:
             return
@@ -378,9 +377,8 @@ class LiveLight:
 
     def show_survey(self) -> None:
         """The beams that were found first, in the light pass's maps."""
-        beams, maps = self.light_pass.beams, self.light_pass.maps
-        assert beams is not None and maps is not None
-        beams.draw_found(maps, self.moving.threshold)
+        assert self.light_pass.beams is not None
+        self.light_pass.beams.draw_found(self.light_pass.maps, self.moving.threshold)
 
     def sample(self, photons: int) -> Iterator[None]:
         """Trace photons that answer questions (`stored_records`) about what beams carry; nothing where there are
