@@ -89,7 +89,7 @@ def search(
     tables = np.vstack([scene.tables, emission.power, emission.watts])
     bands = [(x, x, share) for x, share in zip(emission.lines, emission.line_shares, strict=True)]
     if emission.is_continuous:
-        # In one piece where nothing is coloured: for the same time that is half the error of four bands in a cut stone.
+        # In one piece where nothing is coloured.
         bands += [(lo, hi, 1.0) for lo, hi in pairwise(emission.edges)]
     sources = np.concatenate([emission.source, *emission.beside])
     sources["polarised"] = scene.polarised

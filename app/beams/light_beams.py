@@ -172,7 +172,7 @@ class BeamFinder:
 
 
 _TAILS_PLAY = 1.0 / 16.0
-"""Share of the threshold below which what is left to photons plays roulette. A quarter: 1.5 times the variance."""
+"""Share of the threshold below which what is left to photons plays roulette."""
 _TOLERANCE = 0.25
 """Texels."""
 _THINNEST = 1e-3

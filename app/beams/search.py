@@ -33,8 +33,8 @@ LEAF_RECEIVER, LEAF_PIECE, LEAF_TAIL = 0, 1, 2
 NARROWEST = 1.0 / 256.0
 """Bands are not halved below this."""
 _STEADY = 3.0
-"""Widths of itself that an outline of the threshold's power may move over a band, for a `drift` of 1. A beam that moves
-past a facet between the three places of its band loses what that facet takes: at 100 widths 1 % of a brilliant's."""
+"""Widths of itself that an outline of the threshold's power may move over a band, for a `drift` of 1: a beam that moves
+past a facet between the three places of its band loses what that facet takes."""
 FRAGMENTS = 192
 """Most facets that a beam is cut by in one flight."""
 (

@@ -22,8 +22,8 @@ the radius inside of the circle, its corners 0.08 % outside."""
 _WIDEST = math.tan(math.radians(75.0))
 """Half side of a gnomonic plane up to which one is enough; else the six sides of a cube are taken."""
 _NEAREST = 1.65
-"""Of an extended lamp's half extent: from nearer facets penumbrae are wider than what casts them. A disc 1.3 radii
-above a block draws 1.9 % more than lands, one 1.5 radii above it 0.8 %, 1.7 radii 0.1 %."""
+"""Of an extended lamp's half extent: from nearer facets penumbrae are wider than what casts them, and more would be
+drawn than lands."""
 _MOST_BANDS = 32
 """Into which a light's spectrum is cut where something is coloured."""
 _ON_FACET = 2e-7

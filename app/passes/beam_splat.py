@@ -37,9 +37,8 @@ GROUP = 1 << 11
 """Polygons that are uploaded and drawn at a time: a software renderer sorts all of them into tiles before it draws."""
 _SMALLEST_GROUP = 16
 TEXELS = 1 << 19
-"""That the polygons drawn at a time cover in all: 0.1 s of llvmpipe, for which a window may stand still. Large ones
-swept over half a picture took up to 3 s, 2,048 at a time. Counted, not timed: sums must not depend on the machine's
-load."""
+"""That the polygons drawn at a time cover in all, so that a window on a software renderer waits for a tenth of a second
+at most. Counted, not timed: sums must not depend on the machine's load."""
 UNIT_CONTACT = 2
 """Texture unit of the words of `contact_lines`."""
 FLUSH = 1 << 14

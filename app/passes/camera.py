@@ -43,9 +43,8 @@ from .sample_spread import (
 from .spectrum_choice import PilotRender, Spectrum, choosing_spectrum, grid_of
 
 SPLIT_THRESHOLD = 0.0008
-"""Share of a sample's power above which both parts of a split path are followed. Five times as much leaves the third
-reflection in a ball to chance, which shows as grain where it meets what is bright: twice the error of `ball`, for an
-eighth less time."""
+"""Share of a sample's power above which both parts of a split path are followed: small enough for the third reflection
+in a ball, whose choice by chance would show as grain."""
 MAX_TAPS = 24
 """Looks along one sweep."""
 SURVEY_FROM = 4

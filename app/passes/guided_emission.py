@@ -21,8 +21,7 @@ from .pilot import Pilot
 _REACH = 2
 """Cells round one that threw light which keep all their points: a pilot has about one point a cell."""
 _DARK_SHARE = 0.1
-"""Photons of thinned cells, over those of the others. `ball`, 10,000 and 200,000 photons (480×270): nRMSE 0.073 and
-0.025 with a quarter, which left its stop unthinned, 0.063 and 0.024 with a tenth."""
+"""Photons of thinned cells, over those of the others."""
 _LEAST_CHANCE = 1.0 / 16.0
 """Of a point to be emitted: what a missed cell throws is never more than 16 times a photon."""
 _LEAST_GAIN = 1.25

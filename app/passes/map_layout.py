@@ -72,8 +72,7 @@ class Fineness:
 LIVE = Fineness(2.0, 2048, 768)
 """Of a picture that somebody waits for."""
 STILL = Fineness(4.0, 3072, 1024, 4)
-"""Of one that is kept. `brilliant` at 240×135, beams alone: nRMSE 0.129 with 2 texels a pixel, 0.072 with 3, 0.046 with
-4, 0.036 with 6, at the same time but for the memory."""
+"""Of one that is kept."""
 _SHRINK = 0.85
 """Where maps do not fit a texture, they are made so much coarser until they do …"""
 _LEAST_TEXELS_PER_PIXEL = 0.5

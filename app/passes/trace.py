@@ -161,18 +161,15 @@ class LatticeSlice:
 
 WIDEST_TURN = 1.4
 """Radians times the sixth root of the photons, the bandwidth of a density in the plane [Silverman 1986]: how far the
-directions of a footprint may differ behind a surface. Diamond ellipsoids under wide lamps (`random_3_3`, `random_1_1`,
-`random_1_8` of `bench-agreement --random`, 96×54, a million photons), nRMSE without and with it: 0.074, 0.056; 0.082,
-0.078; 0.0168, 0.0144. With 100,000: 0.099, 0.092; 0.110, 0.106; 0.028 both. Shipped scenes are as they were."""
+directions of a footprint may differ behind a surface."""
 CARRIED_ON_POINTS = 2e4
 """What rays count as that carry on what beams left, whose number is not known where they are traced."""
 WIDEST_SWEEP = 1.0
-"""Radians over a band. A ground torus of sapphire (`random_all_5_8`) lost 1 % of its light without a bound; 0.03, 0.2
-and 1 all lead to 0.1 %. With 0.5 the prism of `stress` whose V_d is 1 lacks 3 % of its light, with 1 and 2 nothing."""
+"""How far a ray's direction may change over its band, radians: without a bound some light misses all maps, with a
+narrower one that of a strongly dispersing prism does."""
 WIDEST_ON_SURFACE = 0.06
 """Of an object's size (half of its bounds' diagonal): the longest side of a footprint on it, and of what a lamp's other
-points add, where the lattice's own spacing is not longer. Of 0.03, 0.06, 0.12 and no bound the best one in scenes of
-chance; in shipped ones all are alike."""
+points add, where the lattice's own spacing is not longer."""
 
 
 class TracePass:

@@ -1,5 +1,5 @@
-"""The part of a light pass that beams carry: found on the processor, drawn into the maps as polygons, and what is not
-flat or too weak left to photons.
+"""The part of a light pass that beams carry: found on the processor and drawn into the maps as polygons. What meets
+something that is not flat, and what is too weak, is left to photons.
 
 Where photons are traced besides, every round of a pass has beams of its own, found as coarsely as its share of the
 photons asks and with roulette's numbers of its own, so that a pass is even whenever it is left.
@@ -47,13 +47,11 @@ if TYPE_CHECKING:
     import moderngl
 
 PHOTONS_A_BEAM = 2.0
-"""Photons there are for a beam, half of them for what it leaves; a beam takes the time of two to four. `brilliant`,
-240×135, relMSE after 10 s of processor time: 0.024 with 8 a beam, 0.015 with 3, 0.012 with 1.5, …"""
+"""Photons for each beam, half of them for what it leaves …"""
 _FACETS_A_BEAM = 350.0
-"""… and as much again for so many facets of the scene: 14 µs a beam in a brilliant, 45 with 1,000 facets, 150 with
-4,000."""
+"""… and as many again for so many facets of the scene."""
 _FINER = 32.0
-"""A search that followed n beams tells of thresholds down to this times root n finer."""
+"""A search that followed n beams says how many there are at thresholds down to this times root n finer."""
 COARSEST, FINEST = 1e-2, 1e-9
 """Thresholds: the share of the light below which a beam is left to photons, or plays roulette."""
 _GROWTH, _GROWTH_WITH_TAILS = 0.8, 1.0
@@ -62,20 +60,17 @@ weak beams play roulette, and where they are left to photons."""
 _ENOUGH = 4.0
 """A search that followed this many times fewer beams than there is time for is done again."""
 _DEAREST = 1e8
-"""Steps of a survey, each times `_STEP_FACETS` and the scene's facets, after which photons are thought cheaper: about
-four seconds of a core. Counted, not timed: the same scene must go the same way on every machine."""
+"""Steps of a survey, each times `_STEP_FACETS` and the scene's facets, after which photons are taken to be cheaper.
+Counted, not timed: a scene is rendered alike on every machine."""
 MANY = 800.0
 """Beams of a survey above which photons carry all where weak beams play roulette, which is noisier: the tail of a cut
-stone holds much of its picture. Surveys: brilliant 3000, default 1400, step_cut 860; amici 620, prism 120."""
+stone holds much of its picture."""
 _STEP_FACETS = 60
-"""A step costs as much as it takes to look at so many facets, besides those of the scene."""
+"""A step costs as much as it takes to test so many facets, besides those of the scene."""
 _PICTURE_SHARE = 0.5
-"""Of a texel that is half a pixel, for which bands are as narrow as for others: what a sweep's chord misses is all that
-is left in such maps …"""
+"""Share of a texel that is half a pixel to which the sweep's chord keeps, for up to `_SHARE_PHOTONS`: with more photons
+it falls as their number rises, down to `_LEAST_SHARE`. What the chord misses is all that is left in such maps."""
 _SHARE_PHOTONS = 1e5
-"""… and is inversely proportional to the photons beyond so many, so that it vanishes with them. `step_cut` at 500 k,
-240×135: nRMSE 0.0046 with a share of 0.5, 0.0020 with 0.1 for a twentieth more of the processor's time, 0.0016 with
-0.03 for a fifth more."""
 _LEAST_SHARE = 1.0 / 64.0
 _ENDS = {
     "deposited": SUM_DEPOSITED,
@@ -192,12 +187,12 @@ class BeamLight:
         """Maps, what they hold while something is dragged, and a copy of that."""
 
     def surveying(self, moving: MovingBeams | None = None) -> Iterator[str | None]:
-        """Find out which objects' light beams carry, and whether that pays, with pauses that tell what it is at (None:
-        as before); afterwards `found` holds the strongest beams, or those of `moving`."""
+        """Find out which objects' light beams carry, and whether that pays, pausing with the name of what is done now
+        (None: as before); afterwards `found` holds the strongest beams, or those of `moving`."""
         threshold = SURVEY if moving is None else moving.threshold
         light_parts = SURVEY_PARTS if moving is None else MOVING_PARTS
         if not _compiled:
-            # The first search of all may have to be compiled, which says nothing about the scene.
+            # The first search of a process may have to be compiled, which says nothing about the scene.
             search = partial(self.finder.find, 1.0, self._depth, _MOVING_WORD, 1)
             yield from mapped(self._worker.searched(search, threads=None), lambda share: COMPILING)
             _compiled.append(True)
@@ -266,7 +261,7 @@ class BeamLight:
     def steps(
         self, photons: float, weight: float, word: int, maps: LightMaps, *, tails: bool = True
     ) -> Iterator[float]:
-        """Find beams as fine as `photons` ask and add them to `maps` times `weight`, pausing with the share done.
+        """Find beams as fine as `photons` allow and add them to `maps` times `weight`, pausing with the share done.
         `word`: roulette's seed; without `tails` all weak beams play it, and none is left to photons, which would follow
         the glass that is traced even where another is shown."""
         stats = self.stats
@@ -279,8 +274,8 @@ class BeamLight:
             threshold = max(self._threshold(photons, surveyed, growth), finest)
             search = self._worker.searched(partial(self.finder.find, threshold, self._depth, word, tails=tails))
             found = yield from mapped(timed(search, stats.count_finding), lambda share: 0.5 * share)
-            # Where light leaves for good, fewer weak beams follow than thought: such are searched for again, finer.
-            # What is learnt here is forgotten: a pass must not depend on those before it.
+            # Where light leaves the scene soon, fewer weak beams follow than expected: the search is done again, finer.
+            # No later pass uses what is learnt here: a pass must not depend on those before it.
             followed = found.followed()
             surveyed, finest = max(followed, 1.0) * (threshold / SURVEY) ** growth, _finest(threshold, followed)
             enough = _ENOUGH * followed * self._photons_a_beam >= photons
@@ -316,7 +311,7 @@ class BeamLight:
         self, maps: LightMaps, weight: float, moving: MovingBeams, seconds: float, *, alone: bool = False
     ) -> None:
         """Find beams at once, as fine as `seconds` allow, and add them to `maps` of any layout times `weight`. `alone`:
-        nothing else is in the maps; then light that meets nothing edited is drawn once and stays."""
+        nothing else is in the maps; light that meets nothing edited is then drawn once and kept."""
         self.pause()
         if self._coarse is None or self._coarse[0] is not maps.layout:
             finder = self.finder.shown_as(self.finder.shown)
@@ -334,8 +329,8 @@ class BeamLight:
         moving.learn(time.perf_counter() - started, seconds)
 
     def _kept(self, threshold: float) -> _KeptBeams | None:
-        """Light of the finest search that met nothing which is another than what was traced; None where that search was
-        no finer than `threshold`. What it left to photons is missing."""
+        """Light of the finest search that met nothing that differs from what was traced; None where that search was no
+        finer than `threshold`. What it left to photons is missing."""
         (finer, finest), before, shown = self._finest, self._traced.shown, self.finder.shown
         lights = zip(before.lights, shown.lights, strict=True)
         if threshold <= finer or any(a.spectral_power is not b.spectral_power for a, b in lights):
@@ -384,8 +379,8 @@ class BeamLight:
                 self.draw(self.found.polygons, maps, maps.photon_weight)
 
     def landings(self) -> dict[int, Landings]:
-        """Where beams arrive, by receiver, for maps to be fitted to: corners of their hulls, weighed by their flux (W),
-        and without weight the receiver's own: weak beams go anywhere."""
+        """Where beams land, by receiver, for maps to be fitted to: corners of their hulls, weighted by their flux (W),
+        and the receiver's own with weight 0, since weak beams may land anywhere."""
         polygons = self._survey_polygons
         result = {}
         for r, frame in self.frames.items():
@@ -402,7 +397,7 @@ class BeamLight:
         return result
 
     def survey_again(self) -> None:
-        """Know better where light lands: with the glass that is shown, and as finely as for a still."""
+        """Find anew where light lands: with the glass that is shown, and as finely as for a still."""
         self._survey_polygons = _found(self.finder, SURVEY, self._depth).polygons
 
     def pause(self) -> None:

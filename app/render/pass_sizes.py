@@ -1,4 +1,4 @@
-"""Of how many photons the passes of a rendering are, and what each counts in the sum of all.
+"""How many photons the passes of a rendering have, and with what weight each enters the sum of all.
 
 A lattice of N photons errs less than two of N/2 each: footprints are narrower, bands too, and neighbours are evenly
 spaced. So a rendering of a given number of photons is one pass, and one without end (`progressive`) takes passes that
@@ -22,11 +22,10 @@ from itertools import pairwise
 
 PROGRESSIVE, SHRINKING = "progressive", "progressive-stochastic"
 FIRST_PHOTONS = 1 << 13
-"""Of the first pass without end: a picture within a tenth of a second, and set-up is not all of it."""
+"""Of the first pass of a rendering without end: few enough for an early picture, enough that setting up is not all."""
 GROWTH = 4
-"""Photons of a pass over those of the one before it. What has been traced by the
-end of a pass errs GROWTH / (GROWTH - 1) times as much as one pass of all of it, and GROWTH times that just before the
-next has ended: 1.3 to 5.3 with four, 2 to 4 with two."""
+"""Photons of a pass over those of the one before it. What has been traced by the end of a pass errs GROWTH / (GROWTH -
+1) times as much as one pass of all of it, and GROWTH times that just before the next has ended."""
 LARGEST_PHOTONS = 1 << 28
 """Passes grow no further: points of a lattice are counted in 32 bits, and bands are as many as there may be."""
 WEIGHT_POWER = 3.0

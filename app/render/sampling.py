@@ -16,16 +16,16 @@ from ..passes.spectrum_choice import MAX_BANDS, MIN_SAMPLES, SAMPLES_A_BAND, Spe
 DEFAULT_SAMPLES = 16
 """Camera samples a pixel."""
 CAUSTIC_SAMPLES = 64
-"""Of a picture of the caustic alone: only outlines are looked at more than twice, and what hides a part of a focus is
-half of the error there is (`ball`, 160×90, 400,000 photons: nRMSE 0.025 with 16, 0.015 with 64, no slower)."""
+"""Of a picture of the caustic alone, where outlines in front of a focus make half of the error and only they take more
+than two lookups."""
 LIVE_BANDS_FOR = 16
-"""Samples whose error the viewer's number of bands is fitted to: a still picture shall be whole within seconds, so not
-to all that it gets in the end."""
+"""Samples whose error the viewer's number of bands is fitted to: not all that a still picture gets in the end, since it
+should be complete within seconds."""
 
 SURVEY = 1e-3
-"""Threshold of the search that finds out which objects beams carry, and what they cost."""
+"""Threshold of the search that finds which objects beams carry, and what they cost."""
 MOVING_COARSEST, MOVING_FINEST = 2e-3, 1e-5
-"""Of thresholds in motion; a coarser search takes hardly less time."""
+"""Largest and smallest threshold in motion; a coarser search takes hardly less time."""
 
 
 @dataclass
@@ -36,7 +36,8 @@ class MovingBeams:
     threshold: float = SURVEY
 
     def learn(self, took: float, seconds: float) -> None:
-        """A search and its drawing `took` so long. Small changes are left out: other beams would play roulette."""
+        """A search and its drawing took `took` seconds. The threshold keeps its value where they are nearly as wanted:
+        at another one other beams would survive roulette."""
         if not 0.5 * seconds <= took <= 1.2 * seconds:
             self.threshold = float(
                 np.clip(self.threshold * np.clip(took / seconds, 0.5, 2.0), MOVING_FINEST, MOVING_COARSEST)
