@@ -29,13 +29,13 @@ from .search import (
 _UNEVEN = 0.15
 """A density that leaves the straight line by more is not a parabola for certain."""
 _COLOURED = 0.02
-"""The same where absorption has a colour."""
+"""The largest such deviation where absorption has a colour."""
 _STEEP = 0.3
 """A relative change of the density over a leaf that is no longer linear."""
 _CROOKED = 0.25
-"""Of a polygon's width: what its edges miss where it cannot be halved and yet keeps its area nearly."""
+"""Share of its width that a polygon's edges may miss where it cannot be halved: it still has nearly its own area."""
 _SHARP = 0.05
-"""Of the widest penumbra of a polygon: an edge of the facet left last that is sharper masks what is drawn."""
+"""Share of a polygon's widest penumbra: an edge of the facet left last that is sharper masks what is drawn."""
 _BESIDE = 1e-7
 """GPU units."""
 
@@ -76,8 +76,8 @@ def even_out(beam, new, corner, work):
 
 @part
 def stand_still(beam, new, edge, corner, tables, work):
-    """Let the leaf just laid lie, with all of its flux, where the strongest of its three places does: what grazes lands
-    at the horizon for some of its wavelengths, and lines mixed from such ends would hold any area."""
+    """Put the leaf just laid, with all of its flux, where the strongest of its three places is: what grazes lands at
+    the horizon for some of its wavelengths, and lines mixed from such ends would hold any area."""
     chosen, most = 1, 0.0
     for a in range(3):
         if passes_at(beam, beam, a) > most:
@@ -178,8 +178,8 @@ def absorb(beam, facets, solids, tables, work):
 
 @part
 def hold_in(beam, facets, solids, tables, source, work):
-    """Give a beam the half-planes of all edges of the facet that it left last. Its outline may lie within them, but
-    penumbrae are as wide as others ask for, and none reaches out from under a facet that stands on the receiver."""
+    """Give a beam the half-planes of all edges of the facet that it left last. Its outline may be within them, but
+    penumbrae are as wide as other edges make them, and none may reach beyond a facet that touches the receiver."""
     last = beam.flight - 1
     if last < 0:
         return
@@ -255,9 +255,9 @@ def direction_through(beam, point, facet, out):
 
 @part
 def moves(beam, spare, ln, facets, work):
-    """How far an edge of the facet that a beam left last moves on the receiver where another point of the lamp throws
-    it: as high as it is there, times the change of direction through it. Not at all where it stands on the receiver,
-    and to be told so from the edge itself: half-planes in q are straight about one ray only."""
+    """How far an edge of the facet that a beam left last moves on the receiver for another point of the lamp: its
+    height above the receiver times the change of direction through it, so 0 where it touches the receiver. Taken from
+    the edge itself, since half-planes in q are straight about one ray only."""
     facet, ground = facets[beam.made[ln, 1]], facets[beam.facet]
     e, number = beam.made[ln, 2], facet.corners
     begin, end_of = facet.corner[e], facet.corner[e + 1 if e + 1 < number else 0]
@@ -298,7 +298,7 @@ def moves(beam, spare, ln, facets, work):
 
 @part
 def soften(nodes, kind, facets, solids, tables, sources, leaf, edge, corner, work):
-    """Set the penumbra of the leaf just laid from where its edges lie for two other points of an extended light.
+    """Set the penumbra of the leaf just laid from where its edges are for two other points of an extended light.
 
     The light's part is a disc whose radius is the way to those points. An edge's cover over it rises as the disc's
     cumulative profile; a ramp of the same variance is sqrt(3)/2 of the disc's projected radius wide to each side.

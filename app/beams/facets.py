@@ -1,7 +1,7 @@
-"""A scene as beams see it: convex flat facets with what lies on their two sides, and boxes round all that is not flat.
+"""A scene as beams see it: convex flat facets with what is on their two sides, and boxes round all that is not flat.
 
 Beams carry flat-faceted glass and flat mirrors. Flat receivers and blockers end them; what is neither is an obstacle,
-and a beam that may meet one goes on as photons.
+and a beam that may meet one is carried on by photons.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ MAX_FACETS = 4096
 MAX_CORNERS = 10
 """A facet of more corners is cut into pieces."""
 SAMPLES = 2049
-"""Of every spectral table, equally spaced in x."""
+"""Samples of every spectral table, equally spaced in x."""
 _COPLANAR = 2e-6
-"""Of an object's size: float32 coordinates know a plane to a few times 1e-7."""
+"""How far from a plane corners may be, as a share of an object's size: float32 coordinates resolve a few times 1e-7."""
 _NO_ROW = -1
 
 
@@ -174,7 +174,8 @@ def beam_scene(
 
 
 def shown_as(beams: BeamScene, scene: Scene, axis: SpectralAxis, unit: float) -> BeamScene:
-    """The same facets with the glass, tints and mirrors of `scene`, whose objects stand where those of `beams` do."""
+    """The same facets with the glass, tints and mirrors of `scene`, whose objects have the places of those of
+    `beams`."""
     tables, glass, tint = _tables(scene, axis, unit)
     solids = beams.solids.copy()
     solids["glass"][: len(glass)], solids["tint"][: len(tint)] = glass, tint
@@ -340,7 +341,7 @@ def _cut_by(corners: np.ndarray, other: np.ndarray) -> list[np.ndarray]:
 
 
 def _plane_and_side(corners: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Normal of a polygon's plane, and how far before it points lie."""
+    """Normal of a polygon's plane, and how far in front of it points are."""
     middle = corners.mean(axis=0)
     normal = np.cross(corners - middle, np.roll(corners, -1, axis=0) - middle).sum(axis=0)
     normal /= np.linalg.norm(normal)
@@ -348,7 +349,7 @@ def _plane_and_side(corners: np.ndarray, points: np.ndarray) -> tuple[np.ndarray
 
 
 def _on_plane(corners: np.ndarray, apart: np.ndarray) -> np.ndarray:
-    """Where a polygon's outline meets a plane that its corners lie so far before."""
+    """Where a polygon's outline meets a plane that its corners are so far in front of."""
     after, there = np.roll(corners, -1, axis=0), np.roll(apart, -1)
     across = (apart > 0.0) != (there > 0.0)
     part = (apart / np.where(across, apart - there, 1.0))[across, None]

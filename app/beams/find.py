@@ -1,4 +1,4 @@
-"""Beams of a scene's lights: what they throw on flat receivers, and what photons have to carry on."""
+"""Beams of a scene's lights: what they cast on flat receivers, and what photons have to carry on."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from .steps import run
 
 _STACK = 1800
 _STEPS = 20_000
-"""Beams followed before `go_on` is asked again."""
+"""Beams followed between two calls of `go_on`."""
 GoOn = Callable[[int], bool]
-"""Told how many steps were taken since it was last asked; False ends a search."""
+"""Gets the number of steps since its last call; False ends a search."""
 _FINE = 16
 """Steps along a side in which the mean intensity over a facet is taken."""
 
@@ -52,9 +52,9 @@ class Emission:
     density: float
     """Flux per unit of q (parallel: GPU unit²; point: sr) and of spectral power."""
     mask: int = 0
-    """Solids that it stands in."""
-    beside: tuple[np.ndarray, ...] = ()
-    """SOURCE (1,) each: two that lie a part of an extended light away, along its two axes."""
+    """Mask of the solids that it is inside of."""
+    shifted: tuple[np.ndarray, ...] = ()
+    """SOURCE (1,) each: two that are shifted by a part of an extended light along its two axes."""
 
 
 @dataclass(frozen=True)
@@ -83,15 +83,16 @@ def search(
     go_on: GoOn = lambda steps: True,
 ) -> tuple[list[Leaves], np.ndarray, set[int]]:
     """Follow one source's beams. Returns the leaves, in an order that depends on the scene alone, sums over all of
-    them (`search.SUM_…`), and objects that something not flat may stand before, so that photons carry what this source
-    throws on them. `go_on` ends it early, for what is thrown away: it is told of every step once, in any order."""
+    them (`search.SUM_…`), and objects that something not flat may hide, so that photons carry what this source
+    casts on them. `go_on` may end it early, where the result is not needed: every step is reported to it once, in any
+    order."""
     sums = np.zeros(SUMS)
     tables = np.vstack([scene.tables, emission.power, emission.watts])
     bands = [(x, x, share) for x, share in zip(emission.lines, emission.line_shares, strict=True)]
     if emission.is_continuous:
         # In one piece where nothing is coloured.
         bands += [(lo, hi, 1.0) for lo, hi in pairwise(emission.edges)]
-    sources = np.concatenate([emission.source, *emission.beside])
+    sources = np.concatenate([emission.source, *emission.shifted])
     sources["polarised"] = scene.polarised
     args = scene.facets, scene.solids, tables, sources
     starts: list[tuple[int, np.ndarray, np.ndarray]] = []
@@ -175,7 +176,7 @@ def _work(scene: BeamScene, emission: Emission, how: Search, share: float, sourc
 
 
 def _mean_weight(root: np.ndarray, source: np.ndarray) -> float:
-    """Mean of a diverging source's intensity (SOURCE (1,)) over the outline of what it throws on one facet."""
+    """Mean of a diverging source's intensity (SOURCE (1,)) over the outline of what it casts on one facet."""
     place = int(np.argmax(root["corners"] > 0))
     corners = root["corner"][place, : root["corners"][place]]
     middles = (np.arange(_FINE) + 0.5) / _FINE

@@ -110,7 +110,7 @@ def is_nearer(facets, solids, current, one, other, t_one, t_other, cosine):
 @part
 def rank(facets, solids, current, facet):
     """Order of surfaces in contact: of several solids that are entered the one that wins comes first, of several that
-    are left it comes last, so that light meets one interface. The facet's number tells equals apart."""
+    are left it comes last, so that light meets one interface. Equal ones are ordered by the facet's number."""
     first = facets[facet].kind
     if first == 0:
         bit = solids[facets[facet].owner].bit
@@ -120,7 +120,7 @@ def rank(facets, solids, current, facet):
 
 @part
 def fly(nodes, facets, solids, tables, source, obstacles, work):
-    """Cut the current beam by the facets ahead; the fragments lie on the stack afterwards."""
+    """Cut the current beam by the facets ahead; the fragments are on the stack afterwards."""
     first = top = work.top
     current, spread, flight = nodes[CURRENT], work.spread, nodes[CURRENT].flight
     spread_of(current, spread)
@@ -210,7 +210,7 @@ def hide(nodes, first, top, facets, solids, tables, work):
     for h in range(count):
         one = facets[facet_of(hits[h])]
         if current.depth == 0 and one.kind > 1:
-            # What a light throws on it directly is no beam; it only hides others.
+            # What a light casts on it directly is no beam; it only hides others.
             nodes[first + h].facet = DEAD
             continue
         some = False

@@ -1,6 +1,6 @@
 """The part of its band in which a polygon exists.
 
-A beam whose outline is empty at an end of its band throws a polygon that appears, or vanishes, in between. Its lines
+A beam whose outline is empty at an end of its band casts a polygon that appears, or vanishes, in between. Its lines
 are known for all of the band, so the band can be cut to where something is left, exactly: the polygon then moves less,
 covers fewer texels, and a few places of its band show it as it is. Lines that bound it nowhere are left out.
 """
@@ -16,11 +16,11 @@ from .compiling import jit, part
 from .nodes import area_of
 
 PLACES = 17
-"""At which a polygon that is empty at an end is looked for."""
+"""Places of the band at which a polygon is sought that is empty at an end."""
 LOOKS = 5
-"""Places of what exists at which lines are looked at, odd."""
+"""Places of what exists at which lines are tested, odd."""
 _HALVINGS = 8
-"""Of a place, to find where it appears or vanishes."""
+"""Bisections to find where a polygon appears or vanishes."""
 ROOM = 128
 """Corners of an outline."""
 
@@ -141,7 +141,7 @@ def lifetimes(edges, starts, corners, corner_starts, lives, areas, bounds, kept,
 
 @dataclass(frozen=True)
 class Lifetimes:
-    """Of N polygons."""
+    """The parts of their bands in which N polygons exist."""
 
     bands: np.ndarray
     """(N, 2): first and last place t in [0, 1] of the band; the same where there never is anything."""
@@ -156,8 +156,8 @@ class Lifetimes:
 
 
 def lifetimes_of(edges: np.ndarray, starts: np.ndarray, corners: np.ndarray, corner_starts: np.ndarray) -> Lifetimes:
-    """Of polygons by their `edges` (E, 8) (`BeamPolygons`), and `corners` (H, 2) that hold them at all places; both
-    with starts (N + 1,)."""
+    """Lifetimes of polygons by their `edges` (E, 8) (`BeamPolygons`), and `corners` (H, 2) that hold them at all
+    places; both with starts (N + 1,)."""
     n = len(starts) - 1
     bands, areas, ends = np.zeros((n, 2)), np.zeros(n), np.zeros(n + 1, np.int64)
     bounds = np.zeros(len(edges), bool)

@@ -1,4 +1,4 @@
-"""Everything that a scene's lights throw by way of flat facets, in one call."""
+"""Everything that a scene's lights cast by way of flat facets, in one call."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from .facets import beam_scene, in_gpu_space, shown_as
 from .find import Emission, GoOn, Search, search
 from .polygons import BeamPieces, BeamPolygons, joined
 from .search import SUM_BEAMS, SUMS
-from .sources import emissions, is_beside_facets, mask_at, why_no_beams
+from .sources import emissions, is_near_facets, mask_at, why_no_beams
 
 LIGHT_PARTS = 16
-"""Points that stand for an extended light; penumbrae blur each into the next."""
+"""Points that represent an extended light; penumbrae blur each into the next."""
 
 
 @dataclass
@@ -62,12 +62,12 @@ class BeamFinder:
         self.scene = beam_scene(scene, self.meshes, frames, axis, unit)
         self._scene, self._axis, self._to_gpu, self._unit, self._bins = scene, axis, to_gpu, unit, bins
         lights = enumerate(scene.lights)
-        self._beside = frozenset(i for i, light in lights if is_beside_facets(light, self.scene, to_gpu, unit))
+        self._near = frozenset(i for i, light in lights if is_near_facets(light, self.scene, to_gpu, unit))
         """Lamps too near to facets."""
         self.set_texels(texels)
 
     def set_texels(self, texels: dict[int, float]) -> None:
-        """Other maps: sides of receivers' finest texels, GPU units. A search that runs goes on with those before."""
+        """Other maps: sides of receivers' finest texels, GPU units. A search that is running keeps the former ones."""
         facets = self.scene.facets.copy()
         self._texel = min(texels.values(), default=1e-3)
         facets["texel"] = [_TOLERANCE * texels.get(int(r), self._texel) for r in facets["receiver"]]
@@ -94,13 +94,11 @@ class BeamFinder:
         return [
             i
             for i, light in enumerate(self._scene.lights)
-            if why_no_beams(light) is None
-            and not (light.is_parallel and self._is_thin(light))
-            and i not in self._beside
+            if why_no_beams(light) is None and not (light.is_parallel and self._is_thin(light)) and i not in self._near
         ]
 
     def _is_thin(self, light: Light) -> bool:
-        """Whether a parallel light is too thin for float32 to draw what its beams throw: photons carry it."""
+        """Whether a parallel light is too thin for float32 to draw what its beams cast: photons carry it."""
         return light.has_place and min(light.half_extent) * self._unit < _THINNEST
 
     def find(
@@ -139,7 +137,7 @@ class BeamFinder:
         polygons, pieces = [], []
         for i, parts in todo:
             sums, blocked = np.zeros(SUMS), set()
-            thrown: list[BeamPolygons] = []
+            cast: list[BeamPolygons] = []
             left: list[BeamPieces] = []
             measure = self._unit**2 if scene.lights[i].is_parallel else 1.0
             for number, part in enumerate(parts):
@@ -152,17 +150,17 @@ class BeamFinder:
                     faint=0.0 if i in plays else _TAILS_PLAY * threshold,
                 )
                 leaves, part_sums, part_blocked = search(beams, part, how, threads, go_on)
-                thrown.append(polygons_of(leaves, beams, i, self._unit))
+                cast.append(polygons_of(leaves, beams, i, self._unit))
                 left.append(pieces_of(leaves, beams, i, measure))
                 sums += part_sums
                 blocked |= part_blocked
                 done += 1
                 yield done / steps
             if blocked:
-                # Photons carry what these objects throw: all of it, whichever point of the light it comes from.
-                thrown = [some.where(~np.isin(some.source, list(blocked))) for some in thrown]
+                # Photons carry what these objects cast: all of it, whichever point of the light it comes from.
+                cast = [some.where(~np.isin(some.source, list(blocked))) for some in cast]
                 left = [some.where(~np.isin(some.source, list(blocked))) for some in left]
-            polygons += thrown
+            polygons += cast
             pieces += left
             result.carried[i] = tuple(o for o in beams.beam_objects if o not in blocked)
             result.sums[i] = sums

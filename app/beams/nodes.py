@@ -52,7 +52,7 @@ NODE = np.dtype(
         # The facet that the whole outline meets next, -1: not yet known; whether it reflects everything (`grow`).
         ("facet", "i8"),
         ("total", "i8"),
-        # The kind of leaf that it is to end as, -1: it goes on.
+        # The kind of leaf that it is to end as, -1: it is followed further.
         ("ends", "i8"),
         # Solids that it is inside of.
         ("mask", "i8"),

@@ -1,4 +1,4 @@
-"""A cell of the lattice over a piece of a beam, and the ray that stands for it: compiled.
+"""A cell of the lattice over a piece of a beam, and the ray that represents it: compiled.
 
 A cell and the piece's edges, which move with t, cut a body out of (q_u, q_v, t). Its ray has the body's content (so
 that the cells of a piece add up to the piece), its mean place and interval, its spread about them, and the slope of
@@ -15,9 +15,9 @@ from .piece_measure import keep_lit, moments_of, parabola, power_between, weight
 CELL_STEPS = 2
 """Places of each of three parts of the time that a cell is lit at which it is measured, where an edge crosses it."""
 _LEAST_HELD = 1e-12
-"""Share of a light's power below which a ray stands for nothing."""
+"""Share of a light's power below which there is no ray."""
 COLUMNS = 33
-"""Of a ray: position, direction, their derivatives by the cell's two axes (dp dp dd dd) and by x (dp dd), x_lo,
+"""Numbers of a ray: position, direction, their derivatives by the cell's two axes (dp dp dd dd) and by x (dp dd), x_lo,
 x_anchor, x_hi, throughput there, flux; its piece, and its number on the piece's lattice."""
 BODY = 11
 """Numbers that `cell_body` gives, and which cell of the lattice it is."""
@@ -102,7 +102,7 @@ def cell_body(edges, weight, x_lo, x_hi, curve_x, curve_w, cell, band_content, p
     half = math.sqrt(3.0 * (between + within))
     body[3], body[4] = max(mean_t - half, first), min(mean_t + half, last)
     if power_between(curve_x, curve_w, x_lo + (x_hi - x_lo) * body[3], x_lo + (x_hi - x_lo) * body[4]) <= 0.0:
-        body[3], body[4] = first, last  # a line of the spectrum lies in the rest
+        body[3], body[4] = first, last  # a line of the spectrum is in the rest
     middle = 0.5 * (body[3] + body[4])
     body[0] = sums[0]
     body[1] = u + mean_u + slope_u * (middle - mean_t)

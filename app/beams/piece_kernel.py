@@ -72,7 +72,7 @@ def _frame(own, hull, moves, polygons, cut, scratch, out):
 
 @part
 def _moves(edges):
-    """Whether an edge lies elsewhere at the end of the band than at its start."""
+    """Whether an edge moves over the band."""
     for e in range(len(edges)):
         for j in range(3):
             if edges[e, j] != edges[e, 3 + j]:

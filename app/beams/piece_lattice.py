@@ -1,7 +1,7 @@
 """Lattices over what beams leave to photons: where each ray starts, how it changes, what it carries.
 
 The rays of a piece are what photons of the emission lattice would be after the same events, with the same derivatives;
-only that the lattice lies over the piece alone, and that its cells end at the piece's edges. A ray carries what its
+only that the lattice covers the piece alone, and that its cells end at the piece's edges. A ray carries what its
 part of the piece holds, so no light is lost at an edge, and its footprint is as wide as that part.
 """
 
@@ -100,7 +100,7 @@ class PieceLattice:
         Points are shared out by flux per unit of spectral power, and by the bands' widths: no colour is coarser than
         another, as on the emission lattices. Where all are tails, points go by the root of that (where it is dim, the
         weakest are all that there is), and `count` is met within the fourth root of two. Of pieces that would have less
-        than one, some are drawn to stand for all. `shift` of the lattices modulo 2³², and `key` of what is drawn: of
+        than one, some are drawn to represent all. `shift` of the lattices modulo 2³², and `key` of what is drawn: of
         one pass."""
         mine, points = self._drawn(light, count, key)
         boost = self._measures[light] / np.minimum(points, 1.0)

@@ -82,8 +82,8 @@ def behind_mirror(state):
 
 @part
 def behind_glass(state, cosine_i, eta, cosine2_t, reflects):
-    """Reflection or refraction by glass: puts a state, counted from s, behind it and returns the share that goes this
-    way. [Born and Wolf, 1.5]"""
+    """Reflection or refraction by glass: puts a state, counted from s, behind it and returns the share that is sent
+    this way. [Born and Wolf, 1.5]"""
     if cosine2_t <= 0.0:
         if not reflects:
             return 0.0

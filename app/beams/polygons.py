@@ -45,7 +45,7 @@ class Outlines:
 
 @dataclass(frozen=True)
 class BeamPolygons(Outlines):
-    """Polygons that bands of beams throw on flat receivers; N polygons, E edges, H corners of hulls.
+    """Polygons that bands of beams cast on flat receivers; N polygons, E edges, H corners of hulls.
 
     Place p on a receiver is (u, v) of its plane's frame (`PlaneFrame`, by receiver). At t in [0, 1], where
     x = x_lo + t (x_hi - x_lo), p is lit where for every edge  a(t) . p + c(t) >= 0, with (a, c) linear in t.
@@ -80,7 +80,7 @@ class BeamPolygons(Outlines):
     edges: np.ndarray
     """(E, 8): a_u, a_v, c, softness at x_lo, the same at x_hi. |a| = 1; a . p + c is the distance inside, GPU units;
     softness: half width of the penumbra of an extended light there, GPU units, 0: sharp. Where it is negative the line
-    is a mask, of that width: it bounds no light, but what other edges' penumbrae throw beyond it stays inside."""
+    is a mask, of that width: it bounds no light, but what other edges' penumbrae cast beyond it stays inside."""
     hull_start: np.ndarray
     """int32 (N + 1,), likewise into `hulls`."""
     hulls: np.ndarray

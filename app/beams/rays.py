@@ -85,7 +85,7 @@ def emit(source, u, v, position, direction):
 
 @part
 def emit_straight(source, u, v, position, direction):
-    """The same for a source that diverges, its directions not made unit vectors: exactly affine."""
+    """`emit` for a source that diverges, its directions not made unit vectors: exactly affine."""
     for k in range(3):
         position[0, k] = source.origin[k]
         position[1, k] = position[2, k] = 0.0
@@ -174,8 +174,8 @@ def reflect(direction, plane):
 
 @part
 def refract(direction, plane, eta):
-    """The same by refraction; grazing where it would be totally reflected. Derivatives: physics of `optics.glsl`,
-    written for a flat facet."""
+    """Turn a bundle's directions by refraction at a facet; grazing where it would be totally reflected. Derivatives:
+    physics of `optics.glsl`, written for a flat facet."""
     theta = plane[0] * direction[0, 0] + plane[1] * direction[0, 1] + plane[2] * direction[0, 2]
     sign = -1.0 if theta > 0.0 else 1.0
     theta = -abs(theta)
@@ -203,7 +203,7 @@ def index_of(tables, glass, x):
 @part
 def meet(facets, solids, tables, path, k, x, position, direction, state):
     """End flight k of a bundle, whose chief ray has a state of polarisation, at its facet and send it on as the path
-    says; returns the share of its power that goes this way, what the medium absorbed on the flight included."""
+    says; returns the share of its power that is sent this way, what the medium absorbed on the flight included."""
     facet = path[k, FACET]
     plane = facets[facet].plane
     distance = advance(position, direction, plane)

@@ -2,7 +2,7 @@
 
 Depth first over an explicit stack. A beam flies (`flight.fly`): the facets ahead cut it into fragments, each of which
 meets one facet. A fragment is halved in the spectrum where its outline moves too far, in space where rays are too far
-from affine; then it ends on a receiver, or goes on reflected and refracted. Weak children play Russian roulette, whose
+from affine; then it ends on a receiver, or is reflected and refracted. Weak children play Russian roulette, whose
 number is a hash of the path, so that the same beams live from frame to frame.
 """
 
@@ -29,7 +29,8 @@ from .polarised import STATE
 from .rays import advance, at_x, edge_line, follow
 
 LEAF_RECEIVER, LEAF_PIECE, LEAF_TAIL = 0, 1, 2
-"""What reaches a receiver; what photons carry on; what is too weak to be followed as a beam, and goes on as photons."""
+"""What reaches a receiver; what photons carry on; what is too weak to be followed as a beam, and is carried on by
+photons."""
 NARROWEST = 1.0 / 256.0
 """Bands are not halved below this."""
 _STEADY = 3.0
@@ -66,7 +67,7 @@ WORK = np.dtype(
         ("depth", "i8"),
         # Flux per unit of q and of spectral power.
         ("density", "f8"),
-        # Error of places on what goes on, GPU units.
+        # Error of places on what is followed further, GPU units.
         ("tolerance", "f8"),
         # How far outlines may move over a band (`drifts`).
         ("drift", "f8"),
@@ -80,7 +81,7 @@ WORK = np.dtype(
         ("absorbing", "?"),
         # Something may take steps over the spectrum that three places do not see.
         ("coloured", "?"),
-        # Objects of the scene; sources (more than one: parts of an extended light beside the first).
+        # Objects of the scene; sources (more than one: shifted parts of an extended light).
         ("objects", "i8"),
         ("sources", "i8"),
         # How far it is: end of the stack, steps to go; leaves, edges, corners written; sums.
@@ -255,7 +256,7 @@ def drifts(beam, power, work):
 
 @part
 def halve_spectrum(beam, other, at, facets, solids, tables, source, work):
-    """Cut a beam's band at x = `at`: the lower part stays, the upper one goes to `other`. Returns (is it left, is the
+    """Cut a beam's band at x = `at`: the lower part stays, the upper one becomes `other`. Returns (is it left, is the
     other)."""
     forget_idle_lines(beam, work)
     copy(beam, other)
@@ -294,7 +295,7 @@ def is_curved(beam, facets, solids, tables, source, tolerance, work):
 
 @part
 def halve_space(beam, other, work):
-    """Cut a beam across its longer side: one half stays, the other goes to `other`. Returns (is it left, is the
+    """Cut a beam across its longer side: one half stays, the other becomes `other`. Returns (is it left, is the
     other)."""
     low_u = low_v = 1e300
     high_u = high_v = -1e300
@@ -323,7 +324,7 @@ def halve_space(beam, other, work):
 
 @part
 def medium(solids, mask):
-    """Object whose medium a mask stands for, -1: air."""
+    """Object whose medium a mask denotes, -1: air."""
     if mask == 0:
         return -1
     bit = 0
@@ -421,7 +422,7 @@ def may_touch(nodes, i, length, obstacles, works):
 @part
 def lay_edges(beam, flown, facet, hit, work):
     """Whether a facet, met as `hit` says (`flight.facet_of`) on the flight of beam `flown`, may leave anything of
-    an outline. If so its edges lie in `work.lines`, and `work.cuts` says which of them cut. `work.moment` holds the
+    an outline. If so its edges are in `work.lines`, and `work.cuts` says which of them cut. `work.moment` holds the
     flight's rays."""
     lo, hi, sign = first_place(flown), last_place(flown), 1.0 if hit >= 0 else -1.0
     for e in range(facet.corners):

@@ -17,7 +17,7 @@ from .find import Emission
 from .rays import PARALLEL, POINT, SOURCE
 
 RIM = 64
-"""Corners of the polygon that stands for a round aperture or a cone, of the same area: its sides lie at most 0.04 % of
+"""Corners of the polygon that represents a round aperture or a cone, of the same area: its sides are at most 0.04 % of
 the radius inside of the circle, its corners 0.08 % outside."""
 _WIDEST = math.tan(math.radians(75.0))
 """Half side of a gnomonic plane up to which one is enough; else the six sides of a cube are taken."""
@@ -38,7 +38,7 @@ def why_no_beams(light: Light) -> str | None:
     return None
 
 
-def is_beside_facets(light: Light, scene: BeamScene, to_gpu: Callable[[np.ndarray], np.ndarray], unit: float) -> bool:
+def is_near_facets(light: Light, scene: BeamScene, to_gpu: Callable[[np.ndarray], np.ndarray], unit: float) -> bool:
     """Whether an extended lamp is so near to the facets of beams that penumbrae, or the seams of a cube about it, would
     draw more than lands: photons carry its light. Arguments as of `emissions`."""
     if light.is_parallel or not light.has_outline:
@@ -74,7 +74,7 @@ def emissions(
     bins: int | None = None,
 ) -> list[Emission]:
     """`light` as sources; an extended one as about `parts` of equal power. `to_gpu`: scene to GPU space, `unit`: GPU
-    units a scene unit; `inside`: mask of the solids that the light stands in; `bins`: spectral bins that are kept."""
+    units a scene unit; `inside`: mask of the solids that the light is in; `bins`: spectral bins that are kept."""
     corners = _specular_corners(scene)
     if not len(corners):
         return []
@@ -132,15 +132,15 @@ def _parallel(light, corners, to_gpu, unit, parts, common) -> list[Emission]:
         tilted /= np.linalg.norm(tilted)
         spread = tangent / math.sqrt(len(places)) if tangent > 0.0 else 0.0
         source = _source(PARALLEL, middle - back * tilted, tilted, right, up)
-        beside = tuple(
+        neighbours = tuple(
             _source(PARALLEL, middle - back * _unit(tilted + w), _unit(tilted + w), right, up)
             for w in (spread * right, spread * up)
         )
         grow = 1.0 + math.hypot(u, v)
         room = np.array([0.0, 0.0, 1.05 * reach * grow])
         density = 1.0 / unit**2 / len(places)
-        shifted = beside if spread else ()
-        result.append(Emission(source, limits, room, density=density, beside=shifted, **common))
+        shifted = neighbours if spread else ()
+        result.append(Emission(source, limits, room, density=density, shifted=shifted, **common))
     return result
 
 
@@ -169,8 +169,8 @@ def _diverging(light, corners, to_gpu, unit, parts, common) -> list[Emission]:
                 limits = np.concatenate([limits, [_line_of(direction, forward, right, up)]])
             args = (forward, right, up, direction, light.cone, is_area)
             source = _source(POINT, place, *args)
-            beside = tuple(_source(POINT, place + s, *args) for s in spread)
-            result.append(Emission(source, limits, room, density=measure, beside=beside, **common))
+            shifted = tuple(_source(POINT, place + s, *args) for s in spread)
+            result.append(Emission(source, limits, room, density=measure, shifted=shifted, **common))
     return result
 
 
@@ -268,15 +268,15 @@ def _unit(vector: np.ndarray) -> np.ndarray:
 
 
 def _is_within(facet: np.ndarray, point: np.ndarray) -> bool:
-    """Whether a point (3,) of a facet's plane lies within its edges."""
+    """Whether a point (3,) of a facet's plane is within its edges."""
     corners = facet["corner"][: facet["corners"]]
     along = np.roll(corners, -1, axis=0) - corners
     return bool((np.cross(along, point - corners) @ facet["plane"][:3] >= 0.0).all())
 
 
 def mask_at(point: np.ndarray, scene: BeamScene, meshes: list[Mesh]) -> int:
-    """Solids that a point in GPU space lies in: those whose facets some line from it crosses an odd number of times.
-    What lies on a facet is outside: from there light enters."""
+    """Solids that a point in GPU space is in: those whose facets some line from it crosses an odd number of times.
+    What is on a facet is outside: from there light enters."""
     mask = 0
     towards = _unit(np.array([0.3713, 0.5471, 0.7502]))
     for solid in scene.solids[: len(meshes)]:

@@ -100,7 +100,7 @@ def test_maps_hold_what_lands_of_a_lamp_near_a_face(gl, height: float, radius: f
 def test_the_tail_of_glass_without_dispersion_stays_in_the_bands_of_photons(gl, monkeypatch) -> None:
     """Beams from an area light close to a face end with corners that rounding decides; a band halved for that had no
     photons to carry it."""
-    monkeypatch.setattr(light_beams, "is_beside_facets", lambda *_: False)
+    monkeypatch.setattr(light_beams, "is_near_facets", lambda *_: False)
     scene = on_block(AreaLight("panel", WHITE, (0.0, 0.0, TOP + 1e-3), (0.0, 0.0, -1.0), radius=0.3))
     result = render(scene, replace(SETTINGS, photons=1024), context=gl)
     assert np.isfinite(result.rgb).all() and result.stats.light.tally.handed > 0.0
