@@ -1,4 +1,4 @@
-"""An animation, frame after frame, into a sink; can be driven in small steps beside a window."""
+"""An animation, frame after frame, into a sink; can be driven in small steps while a window is drawn."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Develop = Callable[[np.ndarray, float, RenderDefaults], np.ndarray]
 
 
 def developed(rgb: np.ndarray, exposure_ev: float, look: RenderDefaults) -> np.ndarray:
-    """A picture to look at, with the glare of its lens."""
+    """A display-ready picture, with the glare of its lens."""
     return tone_map_8bit(with_glare(rgb, look.glare), exposure_ev, look.antialias_highlights)
 
 
@@ -42,7 +42,7 @@ def render_animation(
 ) -> Generator[float]:
     """Render all frames that `sink` lacks (`only` those numbers), pausing with the share done; the sink is closed
     however it ends. Frames that another process is making are left to it, and made where it gives them up.
-    What frames say of themselves goes to `notices`. Raises `BrokenPictureError` at a frame that is not finite.
+    What is noticed about frames is added to `notices`. Raises `BrokenPictureError` at a frame that is not finite.
 
     All frames share one exposure: `base_ev` plus the stage's own; `base_ev` None takes the automatic one of the first
     frame. Leaving the iteration early (`close()`) keeps the frames that are done.
@@ -56,14 +56,14 @@ def render_animation(
             fixed = shared.exposure() if base_ev is None else shared.fix_exposure(base_ev)
             base_ev = base_ev if fixed is None else fixed
         done, due, came = 0, deque(frames), 0
-        while due and came < len(due):  # as long as somebody else's frame may be given up
+        while due and came < len(due):  # as long as another process may give up its frame
             index = due.popleft()
             with sink.claimed(index) as is_ours:
                 if is_ours:
                     if base_ev is None and shared is not None:
                         base_ev = shared.exposure()
                     if base_ev is None and index > 0:
-                        # All share the first frame's exposure, whoever makes that.
+                        # All share the first frame's exposure, whichever process makes that.
                         for _ in renderer.steps(stages[0]):
                             yield done / len(frames)
                         base_ev = _agreed(shared, auto_exposure(renderer.picture.rgb))
@@ -94,7 +94,7 @@ def _agreed(shared: Frames | None, base_ev: float) -> float:
 
 
 def description(animation: Animation, settings: RenderSettings, fps: float, photons: int) -> Mapping[str, object]:
-    """All that decides how the frames look, as plain values: what a resumed folder must agree on."""
+    """All that decides how the frames look, as plain values: what must be the same in a resumed folder."""
     start = animation.start
     return {
         "scene": start.scene.name,

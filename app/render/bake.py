@@ -1,6 +1,6 @@
-"""A receiver's caustic map as a texture, with the place where it belongs in a `.json` beside it.
+"""A receiver's caustic map as a texture, with its place on the receiver in a `.json` next to it.
 
-What is written is irradiance: the light that glass and mirrors throw on the receiver, before its own reflectance,
+What is written is irradiance: the light that glass and mirrors cast on the receiver, before its own reflectance,
 linear Rec.709 in lm/unit² for white. A flat receiver gets the rectangle on which its light lands; a curved one its
 charts, with the texture coordinates of every triangle.
 """
@@ -89,7 +89,7 @@ def bake(
     """Bake in steps, pausing with the share done; writes `path` and its placement at the end, or nothing if it is left
     before.
 
-    `settings.width`, `height`: texels. What the light pass says of itself goes to `notices`. Raises `UserError`.
+    `settings.width`, `height`: texels. What is noticed about the light pass is added to `notices`. Raises `UserError`.
     """
     check_suffix(path)
     baked = yield from bake_map(context, stage, settings, receiver)
@@ -103,16 +103,16 @@ def write_map(baked: BakedMap, scene: Scene, receiver: str, path: Path) -> None:
     """Write a map and its placement, or neither. Raises `UserError`."""
     rgb = baked.picture.rgb
     check_finite(path.name, rgb)
-    told = {**baked.placement, "receiver": receiver, "scene": scene.name, "file": path.name, "units": UNITS}
+    numbers = {**baked.placement, "receiver": receiver, "scene": scene.name, "file": path.name, "units": UNITS}
     if path.suffix.lower() == ".png":
-        told["exposure_ev"] = auto_exposure(rgb)
+        numbers["exposure_ev"] = auto_exposure(rgb)
     with atomic_outputs(path, placement_path(path)) as (picture, note):
         write_into(picture, rgb, antialias=False)  # a texture: a pixel stays what it is
-        note.write_text(json.dumps(told, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+        note.write_text(json.dumps(numbers, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
 def placement(light: LightPass) -> Mapping[str, object]:
-    """Where the map lies that the settings' layer names."""
+    """The place of the map that the settings' layer names."""
     receiver = light.map_receiver
     assert receiver is not None
     x0, y0, x1, y1 = light.layout.tiles[receiver][0].rect

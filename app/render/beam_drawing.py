@@ -25,7 +25,7 @@ class BeamDrawing:
     def __init__(
         self, context: Context, buffers: SceneBuffers, shown: ShownSpectra, frames: Mapping[int, PlaneFrame]
     ) -> None:
-        """`frames`: of the receivers that polygons lie on."""
+        """`frames`: planes of the receivers that polygons are on."""
         self._context, self._buffers, self._shown, self._frames = context, buffers, shown, frames
         self.splatters: dict[int, BeamSplatter] = {}
         """By the number of textures."""

@@ -55,7 +55,7 @@ _FINER = 32.0
 COARSEST, FINEST = 1e-2, 1e-9
 """Thresholds: the share of the light below which a beam is left to photons, or plays roulette."""
 _GROWTH, _GROWTH_WITH_TAILS = 0.8, 1.0
-"""The number of beams goes about as this power of one over the threshold, where a stone throws light to and fro; where
+"""The number of beams is about proportional to this power of one over the threshold, in a cut stone; where
 weak beams play roulette, and where they are left to photons."""
 _ENOUGH = 4.0
 """A search that followed this many times fewer beams than there is time for is done again."""
@@ -108,7 +108,7 @@ class BeamStats:
 
 SURVEY_PARTS = 4
 MOVING_PARTS = 1
-"""Points that stand for an extended light in motion."""
+"""Points that represent an extended light in motion."""
 _MOVING_WORD = 1
 """Roulette's seed in motion: the same beams from frame to frame."""
 
@@ -149,7 +149,7 @@ class BeamLight:
         *,
         in_thread: bool = False,
     ) -> None:
-        """`in_thread`: search in a thread of its own, with pauses in which somebody draws."""
+        """`in_thread`: search in a thread of its own, with pauses in which others may draw."""
         self._context, self._buffers = context, buffers
         self._depth = depth
         self._worker = BeamWorker(in_thread=in_thread)
@@ -237,7 +237,7 @@ class BeamLight:
         self.drawing.forget_tables()
 
     def lay_out(self, layout: MapLayout) -> None:
-        """Polygons will be drawn into maps that lie so."""
+        """Polygons will be drawn into maps laid out so."""
         texels = self._texels(layout)
         self.finder.set_texels(texels)
         self._traced.set_texels(texels)

@@ -1,4 +1,4 @@
-"""Searches for beams in a thread of their own, while somebody draws."""
+"""Searches for beams in a thread of their own, while the caller draws."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ class BeamWorker:
     def searched(
         self, search: Callable[..., Found], go_on: GoOn = lambda steps: True, threads: int | None = 1
     ) -> Found:
-        """What `search(go_on=…, threads=…)` finds (`BeamFinder.find`). In the thread it takes so many `threads`, pauses
-        while somebody draws, and is stopped where nobody waits for it any more."""
+        """What `search(go_on=…, threads=…)` finds (`BeamFinder.find`). In the thread it takes so many `threads`, and is
+        stopped when the caller drops the generator."""
         if self._pool is None:
             return (yield from search(go_on=go_on, threads=None))
         while True:
-            self.pause()  # nobody waits for the one before
+            self.pause()  # the one before is no longer needed
             stop, done = threading.Event(), [0.0]
             self._stop = stop
             steps = search(go_on=lambda n, stop=stop: go_on(n) and not stop.is_set(), threads=threads)
@@ -44,7 +44,8 @@ class BeamWorker:
                 stop.set()
 
     def pause(self) -> None:
-        """Stop the search that runs in the thread, for something more urgent; whoever waits for it begins it again."""
+        """Stop the search that runs in the thread, for something more urgent; a generator that waits for it begins it
+        again."""
         self._stop.set()
 
     def release(self) -> None:

@@ -1,7 +1,7 @@
-"""A caustic as a spot light's cookie: the picture that a projector would need to throw it onto its receiver.
+"""A caustic as a spot light's cookie: the picture that a projector would need to cast it onto its receiver.
 
 A game engine lights a point at distance r, whose normal is turned by θ from the spot, with I cos θ/r² times the cookie.
-So the cookie holds E r²/cos θ over its largest value I, for the map's irradiance E; both are told.
+So the cookie holds E r²/cos θ over its largest value I, for the map's irradiance E; both are reported.
 """
 
 from __future__ import annotations
@@ -30,17 +30,17 @@ class Cookie:
     rgb: np.ndarray
     """float32 (n, n, 3), linear Rec.709, 0 to 1; row 0 is `up`."""
     intensity_cd: float
-    """Luminous intensity that 1 stands for."""
+    """Luminous intensity of a value of 1."""
     position: np.ndarray
     direction: np.ndarray
     up: np.ndarray
     """Of the picture, world; unit, right-angled to `direction`."""
     half_angle_deg: float
-    """From the axis to the middle of the picture's sides; all that is lit lies within this cone."""
+    """From the axis to the middle of the picture's sides; all that is lit is within this cone."""
     seen_from: str
     flux_lm: float
 
-    def told(self) -> dict[str, object]:
+    def numbers(self) -> dict[str, object]:
         """Its numbers for a file."""
         right = np.cross(self.direction, self.up)
         return {

@@ -1,5 +1,5 @@
-"""A baked caustic as files that other programs open: glTF, USD, or a spot light's cookie; numbers in a `.json` beside
-it."""
+"""A baked caustic as files that other programs open: glTF, USD, or a spot light's cookie; numbers in a `.json` next
+to it."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ SUFFIXES = GLTF_SUFFIXES + USD_SUFFIXES + COOKIE_SUFFIXES
 
 
 def check_export(path: Path, plane: bool = False, source: Sequence[float] | None = None) -> list[Path]:
-    """All files that will be written. Raises `UserError` for a suffix that none of them has, for wishes that do not go
-    with it, and where usd-core is absent."""
+    """All files that will be written. Raises `UserError` for a suffix that none of them has, for options that do not
+    fit it, and where usd-core is absent."""
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
         raise UserError(
@@ -53,32 +53,32 @@ def write_export(
     plane: bool = False,
     source: Sequence[float] | None = None,
 ) -> None:
-    """Write the map `rgb` (h, w, 3), irradiance in lm/unit², by the suffix of `path`, with its numbers beside it.
+    """Write the map `rgb` (h, w, 3), irradiance in lm/unit², by the suffix of `path`, with its numbers next to it.
 
     Raises `UserError`.
     """
     check_export(path, plane, source)
     check_finite(path.name, rgb)
-    told: dict[str, Any] = {"scene": scene.name, "receiver": receiver, "file": path.name, "up_axis": up_of(scene)}
+    numbers: dict[str, Any] = {"scene": scene.name, "receiver": receiver, "file": path.name, "up_axis": up_of(scene)}
     if path.suffix.lower() in COOKIE_SUFFIXES:
-        _write_cookie(scene, receiver, rgb, placement, path, source, told)
+        _write_cookie(scene, receiver, rgb, placement, path, source, numbers)
         return
     lit = lit_receiver(scene, receiver, rgb, placement, plane)
     light = "a white receiver" if plane else "the receiver's own reflectance"
-    told |= {
+    numbers |= {
         "emission": f"radiance, cd/unit² (linear Rec.709), with {light}",
         "largest_emission": lit.strength,
         "placement": dict(placement),
     }
     is_gltf = path.suffix.lower() in GLTF_SUFFIXES
     white = "8-bit sRGB; white is largest_emission (KHR_materials_emissive_strength)"
-    told["texture"] = white if is_gltf else f"{texture_path(path).name}, linear (raw)"
+    numbers["texture"] = white if is_gltf else f"{texture_path(path).name}, linear (raw)"
     with atomic_outputs(*check_export(path, plane, source)) as (file, *texture, note):
         if is_gltf:
             write_lit_gltf(lit, path, file)
         else:
             write_lit_usd(lit, path, file, *texture)
-        note.write_text(_text(told), encoding="utf-8")
+        note.write_text(_text(numbers), encoding="utf-8")
 
 
 def _write_cookie(
@@ -88,18 +88,18 @@ def _write_cookie(
     placement: Mapping[str, Any],
     path: Path,
     source: Sequence[float] | None,
-    told: dict[str, Any],
+    numbers: dict[str, Any],
 ) -> None:
     made = cookie(scene, receiver, rgb, placement, max(rgb.shape[:2]), source)
     is_png = path.suffix.lower() == ".png"
-    told |= made.told() | {"encoding": "8-bit sRGB" if is_png else "linear Rec.709", "white_is": "intensity_cd"}
+    numbers |= made.numbers() | {"encoding": "8-bit sRGB" if is_png else "linear Rec.709", "white_is": "intensity_cd"}
     with atomic_outputs(path, placement_path(path)) as (picture, note):
         if is_png:
             save_codes(picture, np.rint(255.0 * srgb_oetf(np.clip(made.rgb, 0.0, 1.0))).astype(np.uint8))
         else:
             write_into(picture, made.rgb)
-        note.write_text(_text(told), encoding="utf-8")
+        note.write_text(_text(numbers), encoding="utf-8")
 
 
-def _text(told: Mapping[str, Any]) -> str:
-    return json.dumps(told, indent=1, ensure_ascii=False) + "\n"
+def _text(numbers: Mapping[str, Any]) -> str:
+    return json.dumps(numbers, indent=1, ensure_ascii=False) + "\n"

@@ -1,5 +1,5 @@
-"""What the frames of an animation share, so that what stands still in the scene stands still in the pictures: the view
-and the landings that maps are fitted to, one spectral axis, the finest division that any frame asks for."""
+"""What the frames of an animation share, so that what does not move in the scene does not move in the pictures: the
+view and the landings that maps are fitted to, one spectral axis, the finest division that any frame needs."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from .viewer.dirty_level import DirtyLevel
 from .viewer.invalidation import dirty_level
 
 _SURVEYED = 5
-"""Frames whose pilots tell where maps are needed."""
+"""Frames whose pilots say where maps are needed."""
 _WIDE_DEG = 150.0
 
 
@@ -85,7 +85,7 @@ class FrameFit:
 
     @property
     def division(self) -> Division:
-        """The finest that a surveyed frame asks for."""
+        """The finest that a surveyed frame needs."""
         return Division.finest(survey.counts for survey in self.surveys)
 
     def maps(self, camera: Camera) -> MapFit:
@@ -96,7 +96,7 @@ class FrameFit:
 
 
 def inputs_of(stage: Stage, settings: RenderSettings) -> LiveInputs:
-    """All that decides what `stage` looks like."""
+    """All that decides the picture of `stage`."""
     s = settings
     return LiveInputs(
         stage.scene, stage.camera, s.width, s.height, s.method, s.smoothing, stage.solo_nm, s.local_gain, s.seed

@@ -17,7 +17,7 @@ class FrameProgress:
         self._environment_s = self._light_s = self._camera_s = 0.0
         self._share = 0.0
         self.ends = 0.0
-        """The frame's share when the part that was asked about last is done."""
+        """The frame's share when the part that was reported last is done."""
 
     def expect_photons(self, photons: int) -> None:
         """So many will be traced."""

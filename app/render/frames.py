@@ -3,7 +3,7 @@ and exports drive it; the scene comes from its file, or is what a window shows.
 
 What one frame has in common with the next is kept. Where only the camera moves, photons are traced once: caustic maps
 do not depend on it. Where light changes, every frame is traced anew with the same counters, and maps are fitted once to
-all frames (`FrameFit`), so that what stands still in the scene stands still in the pictures, to the bit.
+all frames (`FrameFit`), so that what does not move in the scene does not move in the pictures, to the bit.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ class _Traced:
     buffers: SceneBuffers
     light: LightPass
     environment: EnvironmentLightPass | None = None
-    """Where its scene's features have it …"""
+    """Where its scene's features include it …"""
     bounces: BounceLightPass | None = None
     """… and likewise."""
     camera_buffers: SceneBuffers | None = None
@@ -151,7 +151,7 @@ class FrameRenderer:
             yield from self._see(stage, stop)
 
     def preparing(self, stage: Stage) -> Iterator[float]:
-        """Make the light pass of `stage` ready, for whoever traces it: `light`, whose maps are empty."""
+        """Make the light pass of `stage` ready to be traced by the caller: `light`, whose maps are empty."""
         yield from self._survey()
         self.release()
         stage = _with_sun(stage)
@@ -200,7 +200,7 @@ class FrameRenderer:
     def _gather(
         self, light: EnvironmentLightPass | BounceLightPass, phase: str, most: float, least: int, stop: Stop
     ) -> Iterator[float]:
-        """Light of what lies beyond everything, or of other receivers; a timed rendering (for `most` of its time) and
+        """Light of what is beyond everything, or of other receivers; a timed rendering (for `most` of its time) and
         one that is stopped take fewer directions, `least` at least."""
         self.phase = phase
         longest = float("inf") if self._settings.seconds is None else most * self._settings.seconds
@@ -294,7 +294,7 @@ class FrameRenderer:
 
     def steps_of_layer(self, layer: str, stage: Stage, stop: Stop = lambda: False) -> Iterator[float]:
         """Another layer ("beauty", "caustic") of the frame that `steps` rendered, from the same photons; `picture` is
-        it then. The last to be asked of a renderer: frames to come would show this layer too."""
+        it then. To be called last: later frames would show this layer too."""
         traced = self._traced
         assert traced is not None and traced.camera_pass is not None, "steps() comes first, and not of a map"
         light = traced.light

@@ -40,7 +40,7 @@ class LightMaps:
         """`contact_words` (`passes.contact_lines`) becomes the maps' own."""
         self._ctx = ctx
         self.layout = layout
-        # Only the layout tells whether a fine window pays: without one no splat is drawn twice.
+        # Only the layout says whether a fine window pays: without one no splat is drawn twice.
         self.features = replace(
             features,
             nested_windows=any(len(windows) > 1 for windows in layout.windows.values()),
@@ -198,14 +198,14 @@ class LightMaps:
         """How much of each texel of a coarse window's rows finer windows are read for: rows `first` to `end`."""
         coarse = self.layout.windows[receiver][level]
         assert isinstance(coarse, Window)
-        # Nearly all of a finer window lies in the next one.
+        # Nearly all of a finer window is in the next one.
         shares = [self._share_in(fine, receiver, coarse, tile) for fine in self.layout.windows[receiver][:level]]
         return lambda first, end: np.maximum.reduce([share(first, end) for share in shares])
 
     def _share_in(
         self, fine: Window | PictureWindow, receiver: int, coarse: Window, tile: Tile
     ) -> Callable[[int, int], np.ndarray]:
-        """Likewise, how much of it lies in one of them."""
+        """How much of each texel of a coarse window's rows is in one of the finer windows."""
         x, y = (np.linspace(coarse.low[i], coarse.high[i], n + 1) for i, n in enumerate((tile.width, tile.height)))
         if isinstance(fine, Window):
             columns, rows = (
@@ -216,7 +216,7 @@ class LightMaps:
         return lambda first, end: self._seen_share(fine, receiver, x, y[first : end + 1])
 
     def _seen_share(self, fine: PictureWindow, receiver: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Share of every texel between borders `x` and `y` of a receiver's plane that lies in `fine`, in sixteenths."""
+        """Share of every texel between borders `x` and `y` of a receiver's plane that is in `fine`, in sixteenths."""
         frame = self.layout.frames[receiver]
         parts = (np.arange(4) + 0.5) / 4.0
         u, v = (np.add.outer(at[:-1], parts * (at[1] - at[0])).ravel() for at in (x, y))

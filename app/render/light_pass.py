@@ -1,9 +1,9 @@
 """The light pass of a rendering: survey, maps, then passes in rounds of emit → trace → splat.
 
 What a survey finds (`LightSurvey`: pilots, beams) says where maps must lie and how a pass divides its photons
-(`Planner`). A pass (`PassRounds`) throws beams and batches of photons (`PhotonBatches`) into the maps (`LightMaps`).
+(`Planner`). A pass (`PassRounds`) adds beams and batches of photons (`PhotonBatches`) to the maps (`LightMaps`).
 
-What varies from one kind of rendering to another is handed in: what maps are fitted to (`MapFit`), how finely
+What varies from one kind of rendering to another is an argument: what maps are fitted to (`MapFit`), how finely
 lattices are divided (`Division`), where photons are kept (`PhotonRecords`), how work is cut (`Pace`).
 """
 
@@ -77,7 +77,7 @@ class LightPass:
         self.settings = settings
         self.features = features
         self._has_contacts = features.contact_lines
-        """Before maps tell whether they hold any."""
+        """Contact lines are possible; maps say whether they hold any."""
         self.buffers = buffers
         self.fit = fit or MapFit(scene.camera, settings.width, settings.height)
         """What `maps` are fitted to."""
@@ -100,7 +100,7 @@ class LightPass:
         """Footprints of what is traced are so many times wider still, in pictures on the way to a better one."""
         self._made: LightMaps | None = None
         self.before_maps: Callable[[MapLayout], None] = lambda layout: None
-        """Asked before maps are made, which take the most memory; may refuse them."""
+        """Called before maps are made, which take the most memory; may refuse them."""
         self._planned: tuple[int, tuple[int, int] | None] | None = None
         """Photons and anchors of the plan."""
 
@@ -113,8 +113,8 @@ class LightPass:
             pass
 
     def preparing(self) -> Iterator[str | None]:
-        """`prepare`, pausing often with what it is at (None: as before): whoever draws meanwhile may bind what it
-        likes."""
+        """`prepare`, pausing often with the name of what is done now (None: as before); a caller that draws meanwhile
+        may bind what it likes."""
         yield from self.survey.steps()
         yield None
         shows_map = self.settings.layer.startswith("map:")
@@ -142,11 +142,11 @@ class LightPass:
         return given
 
     def layout_for(self, fit: MapFit) -> MapLayout:
-        """Where maps fitted to `fit` lie."""
+        """The layout of maps fitted to `fit`."""
         return self.layout_about(self.survey.landings(fit), fit)
 
     def layout_about(self, landings: dict[int, Landings], fit: MapFit) -> MapLayout:
-        """Where maps fitted to `fit` lie, if light lands so."""
+        """The layout of maps fitted to `fit` and to such landings."""
         layout = layout_maps(
             replace(self.scene, camera=fit.view),
             self.buffers,
@@ -165,7 +165,7 @@ class LightPass:
 
     @property
     def map_channels(self) -> MapChannels:
-        """What the maps' channels stand for."""
+        """What the maps' channels mean."""
         return self.shown.channels
 
     @property
@@ -175,7 +175,7 @@ class LightPass:
 
     @property
     def bin_edges_nm(self) -> np.ndarray | None:
-        """Edges of the bins that a spectral picture asks for."""
+        """Edges of a spectral picture's bins."""
         return None if self.map_channels.edges_nm is None else np.array(self.map_channels.edges_nm)
 
     @property
@@ -186,7 +186,7 @@ class LightPass:
 
     @property
     def layout(self) -> MapLayout:
-        """Where the maps lie."""
+        """Places of the maps in the atlas."""
         return self.maps.layout
 
     @property
@@ -216,7 +216,7 @@ class LightPass:
         return self.maps.flux(self.bin_edges_nm is None)
 
     def forget_tables(self) -> None:
-        """Make spectral tables anew when they are next asked for, as a process that renders once does."""
+        """Make spectral tables anew when they are next needed, as a process that renders once does."""
         self.batches.records.release()
         splat_tables.forget_blurred()
 
@@ -277,7 +277,7 @@ class LightPass:
         )
 
     def sample_steps(self, photons: int, keep: Keep) -> Iterator[str | None]:
-        """Trace about `photons` as if there were no beams and hand them to `keep`; the maps stay as they are."""
+        """Trace about `photons` as if there were no beams and pass them to `keep`; the maps stay as they are."""
         plans = yield from self.sample_plans(photons)
         yield from traced_besides(self.trace, self.settings.seed, plans, photons, keep)
 
@@ -287,8 +287,8 @@ class LightPass:
         return self._planner(pilots).plans(photons, self._texel_size())
 
     def run_pass(self, number: int, photons: int, proceed: Callable[[float], bool]) -> bool:
-        """One shifted set of lattices with about `photons` points over all lights. `proceed(fraction)` is asked after
-        every slice; returns False when it said stop, see `steps_until`."""
+        """One shifted set of lattices with about `photons` points over all lights. `proceed(fraction)` is called after
+        every slice; returns False when that returned False, see `steps_until`."""
         goes_on, done = True, 0.0
 
         def paused(fraction: float) -> None:
@@ -319,8 +319,8 @@ class LightPass:
     def pass_steps(
         self, number: int, photons: int, first_round: int = 0, first_group: int = 0, stride: int = 1
     ) -> Iterator[PassStep]:
-        """A whole pass, pausing after every event of the rays and after every splatting: whoever draws meanwhile may
-        bind what it likes. See `PassRounds.steps`."""
+        """A whole pass, pausing after every event of the rays and after every splatting; a caller that draws meanwhile
+        may bind what it likes. See `PassRounds.steps`."""
         yield from self.pass_of(number, photons).steps(first_round, first_group, stride)
 
     def deposit(self, number: int) -> Deposit:
@@ -344,7 +344,7 @@ class LightPass:
         return self.survey.beams
 
     def beam_steps_again(self, photons: float) -> Iterator[None]:
-        """Add what beams of a pass of so many photons throw to the maps, as they are shown now; nothing is left to
+        """Add what beams of a pass of so many photons add to the maps, as they are shown now; nothing is left to
         photons."""
         if self.beams is not None and photons > 0.0:
             for _ in self.beams.steps(photons, photons, roulette_word(self.seed, 0), self.maps, tails=False):
@@ -370,7 +370,7 @@ class LightPass:
         yield from self.batches.settling(self.atlas, self.stats)
 
     def _texel_size(self) -> np.ndarray:
-        """What each receiver's finest window tells apart, GPU units."""
+        """What each receiver's finest window resolves, GPU units."""
         receivers = range(len(self.layout.receivers))
         return np.array([self.layout.width_told(r) for r in receivers]) * self.buffers.space.scale
 

@@ -76,7 +76,7 @@ class LightPlan:
 
 @dataclass(frozen=True)
 class Division:
-    """How finely sub-lattices are divided at least, whatever a plan asks for by itself: for frames whose lattices shall
+    """How finely sub-lattices are divided at least, whatever a plan needs by itself: for frames whose lattices shall
     be the same."""
 
     counts: Mapping[int, tuple[int, int]] = field(default_factory=dict)
@@ -84,7 +84,7 @@ class Division:
 
     @staticmethod
     def finest(needs: Iterable[Mapping[int, tuple[int, int]]]) -> Division:
-        """The finest that any of several frames asks for."""
+        """The finest that any of several frames needs."""
         counts: dict[int, tuple[int, int]] = {}
         for need in needs:
             for light, (bands, points) in need.items():
@@ -204,7 +204,7 @@ class Planner:
 
     @property
     def _tinted(self) -> bool:
-        """Something on the way changes a spectrum's shape, and photons stand for more than one wavelength of it."""
+        """Something on the way changes a spectrum's shape, and photons represent more than one wavelength of it."""
         return (not self.features.random_wavelength and self.features.absorption) or (
             (self.features.mirrors or self.features.filters) and self.features.spectral_weights
         )

@@ -32,7 +32,7 @@ class LightStats:
 
     @property
     def drawn_w(self) -> float:
-        """What maps should hold, but for what lies outside of them."""
+        """What maps should hold, but for what is outside of them."""
         return self.splats_w + self.polygons_w
 
 

@@ -57,7 +57,7 @@ class LightSurvey:
         self.beam_light: BeamLight | None = None
         """Also where it has found that beams do not pay."""
         self._sample_pilots: dict[int, Pilot] = {}
-        """Where nothing else asks for them."""
+        """Pilots that only `sample_pilots` needs."""
         self._context = context
         self._scene = scene
         self._features = features

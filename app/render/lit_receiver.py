@@ -35,7 +35,7 @@ def lit_receiver(scene: Scene, receiver: str, rgb: np.ndarray, placement: Mappin
     item = next(o for o in scene.objects if o.name == receiver and o.material.receives)
     is_flat = placement["kind"] == "rectangle"
     if plane and not is_flat:
-        raise UserError(f"'{receiver}' is curved and has no plane that its light lies in: leave --plane out")
+        raise UserError(f"'{receiver}' is curved and has no plane that its light is in: leave --plane out")
     if not plane and item.material.texture is not None:
         raise UserError(
             f"'{receiver}' wears a picture, so its light is no single multiple of the map: with --plane you get the "
@@ -59,7 +59,7 @@ def lit_receiver(scene: Scene, receiver: str, rgb: np.ndarray, placement: Mappin
 
 
 def rectangle_uv(placement: Mapping[str, Any], points: np.ndarray) -> np.ndarray:
-    """Where world `points` (…, 3) lie in a map, (…, 2): (0, 0) its upper left corner, (1, 1) its lower right."""
+    """Coordinates of world `points` (…, 3) in a map, (…, 2): (0, 0) its upper left corner, (1, 1) its lower right."""
     corner = {name: np.asarray(place, float) for name, place in placement["corners_world"].items()}
     across, down = corner["top_right"] - corner["top_left"], corner["bottom_left"] - corner["top_left"]
     sides = np.stack([across / (across @ across), down / (down @ down)], axis=1)

@@ -34,7 +34,7 @@ class MapFit:
     """Other views see the same maps: no window is laid out on this one's pixels."""
     avoids_powers_of_two: bool = False
     """Mesa's software renderer compiles what reads a texture once more, for seconds, where a side becomes a power of
-    two: for maps that are made while somebody waits."""
+    two: for maps that are made while a user waits."""
 
     @property
     def preview(self) -> MapFit:

@@ -40,7 +40,7 @@ def texel_areas(light: LightPass, receiver: int) -> np.ndarray:
     charts = light.layout.charts.get(receiver)
     if charts is None:
         return light.layout.placements["texel_area"][light.layout.receivers[receiver]["placement"]].reshape(1, 1, 1)
-    # Gutters hold what lies across their seam, measured in texels of their own chart's edge.
+    # Gutters hold what is across their seam, measured in texels of their own chart's edge.
     return charts.texel_area[np.maximum(_nearest_owner(charts), 0)][..., None]
 
 

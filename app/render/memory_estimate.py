@@ -1,5 +1,5 @@
-"""What a rendering will take, by its buffers: told before they are made, so that what does not fit is refused in a
-sentence and not by a driver that gives up or a kernel that kills."""
+"""The memory that a rendering will take, estimated before its buffers are made, so that what does not fit is refused in
+a sentence and not by a driver that fails or a kernel that kills."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from .pass_rounds import BEAM_ROUND
 
 _MIB = 1 << 20
 _SPLAT_PROGRAMS = 130 * _MIB
-"""Programs that splat, compiled on the processor, with their tables and lists: 65 to 200 MiB were measured."""
+"""Programs that splat, compiled on the processor, with their tables and lists …"""
 _ALL_PROGRAMS = 170 * _MIB
-"""With the camera's."""
+"""… and with the camera's."""
 _BEAMS = 80 * _MIB
-"""Half a million photons' worth of beams, with what they leave: 70 MiB were measured in `brilliant`."""
+"""Half a million photons' worth of beams, with what they leave."""
 _TEXEL_BYTES = 16
 _SPARE = 0.02
 
@@ -32,8 +32,8 @@ class MemoryEstimate:
     light: int
     """More while photons are traced: maps, their scratch textures, programs."""
     camera: int
-    """More while the camera looks: maps, the picture's sums, what is read of them. Mesa holds released scratch textures
-    until it is closed."""
+    """More while the camera's samples are taken: maps, the picture's sums, what is read of them. Mesa holds released
+    scratch textures until it is closed."""
 
     @property
     def peak(self) -> int:

@@ -1,4 +1,4 @@
-"""What a rendering says without being asked: light that was lost, lights that reached nothing, maps and pictures that
+"""What a rendering reports in any case: light that was lost, lights that reached nothing, maps and pictures that
 do not hold what they should. One line each; a picture that needs none is right as far as the program knows."""
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ from .light_pass import LightPass
 from .light_stats import LightStats
 
 LOST_SHARE = 0.01
-"""Of the light that meets glass or mirrors, beyond which its loss is told."""
+"""Of the light that meets glass or mirrors, beyond which its loss is reported."""
 HELD_SHARE = 0.5
 """Of the light that a map puts into pixels which see it, below which a picture does not hold its map: where a pixel is
 a slanting patch, 16 samples weigh a spot within it to a quarter."""
 _BRIGHTEST = 4096
-"""Texels that are looked for in the picture."""
+"""Texels that are compared with the picture."""
 
 
 class FrameNotices:
-    """What the frames of a job say, each kind once, however its shares change from frame to frame."""
+    """Notices about the frames of a job, each kind once, however its shares change from frame to frame."""
 
     def __init__(self) -> None:
         self._found: dict[str, tuple[str, int, int]] = {}
@@ -62,14 +62,14 @@ def frame_notices(light: LightPass, camera: Camera, settings: RenderSettings, rg
 
 def loss_notices(lost: dict[str, float], max_depth: int | None = None) -> list[str]:
     """`lost`: shares of the light by how it ended."""
-    words = {
+    fates = {
         "lost_depth": "was given up after the largest number of refractions and reflections"
         + (f" ({max_depth}; --max-depth allows more)" if max_depth is not None else ""),
         "lost_numeric": "was lost to numerics, for instance where a mesh is open",
     }
     return [
-        f"{100.0 * lost.get(fate, 0.0):.1f} % of the light that meets glass or mirrors {told}: it lacks in the picture"
-        for fate, told in words.items()
+        f"{100.0 * lost.get(fate, 0.0):.1f} % of the light that meets glass or mirrors {words}: the picture lacks it"
+        for fate, words in fates.items()
         if lost.get(fate, 0.0) > LOST_SHARE
     ]
 
@@ -81,7 +81,7 @@ def environment_notices(environment: EnvironmentLightPass | None, bounces: Bounc
         lost["what diffuse surfaces send out"] = bounces.lost
     return [
         f"{100.0 * share:.1f} % of what glass and mirrors bring of {source} was given up after {MAX_EVENTS} surfaces: "
-        "it lacks on what is diffuse"
+        "diffuse surfaces lack it"
         for source, share in lost.items()
         if share > LOST_SHARE
     ]
@@ -103,7 +103,7 @@ def light_notices(light: LightPass) -> list[str]:
     outside = light.stats.outside_map_w
     drawn = light.stats.drawn_w
     if drawn and outside > LOST_SHARE * drawn:
-        found.append(f"{100.0 * outside / drawn:.1f} % of the caustics lies beside all maps and lacks in the picture")
+        found.append(f"{100.0 * outside / drawn:.1f} % of the caustics misses all maps and the picture")
     if light.map_receiver is not None:  # its texels are the picture's
         return found
     for receiver, windows in light.layout.windows.items():
@@ -144,8 +144,8 @@ def picture_notices(light: LightPass, camera: Camera, settings: RenderSettings, 
     if held >= HELD_SHARE * expected:
         return []
     share = 100.0 * held / expected
-    told = f"the picture holds only {share:.0f} % of the light that its brightest caustics have in the maps"
-    return [f"{told}; choose more --spp"]
+    words = f"the picture holds only {share:.0f} % of the light that its brightest caustics have in the maps"
+    return [f"{words}; choose more --spp"]
 
 
 def _pixels_of(

@@ -1,4 +1,4 @@
-"""A part of a rendering as a file (.ssp): a zip archive with what it says of itself and the sums of its maps."""
+"""A part of a rendering as a file (.ssp): a zip archive of its header and the sums of its maps."""
 
 from __future__ import annotations
 
@@ -52,12 +52,12 @@ def _write(into: Path | io.BytesIO, part: Part) -> None:
 
 
 def read_header(path: Path) -> PartHeader:
-    """What a part says of itself. Raises `UserError` where it is none, or not whole."""
+    """The header of a part. Raises `UserError` where it is none, or not whole."""
     try:
         files.check_regular(path, files.DATA_BYTES)
         with zipfile.ZipFile(path) as archive:
             if archive.getinfo(_HEADER).file_size > _HEADER_BYTES:
-                raise ValueError("what it says of itself is too long")
+                raise ValueError("its header is too long")
             told = json.loads(archive.read(_HEADER))
             if told.pop("format") != FORMAT:
                 raise ValueError("it is of another version of this program")

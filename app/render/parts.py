@@ -55,7 +55,7 @@ class Share:
 
 @dataclass(frozen=True)
 class PartHeader:
-    """What a part says of itself; plain values."""
+    """What a part is; plain values."""
 
     name: str
     """The scene's."""
@@ -68,7 +68,7 @@ class PartHeader:
     rounds: int
     """Of the whole rendering, over all parts."""
     layout: str
-    """Of where the maps lie."""
+    """Hash of the maps' places (`layout_key`)."""
     size: tuple[int, int]
     targets: int
     """Textures, each float32 (height, width, 4)."""
@@ -129,9 +129,9 @@ def trace_part(
         sizes = pass_sizes(light.features.method, sampling.photons)
         rounds, groups = _rounds_and_groups(light, sampling)
         if sum(groups) < share.count:
-            way_out = "ask for fewer parts, more photons or a smaller --batch"
+            way_out = "give fewer parts, more photons or a smaller --batch"
             if light.only_beams:
-                way_out = "its light goes as beams, in rounds of a million photons: --method srd-photons has more"
+                way_out = "beams carry its light, in rounds of a million photons: --method srd-photons has more"
             raise UserError(
                 f"{share.count} parts: this rendering is traced in {sum(groups)} rounds, which are not enough to "
                 f"share out; {way_out}"
@@ -202,7 +202,7 @@ def _rounds_and_groups(light: LightPass, sampling: LightSampling) -> tuple[int, 
 
 
 def layout_key(light: LightPass) -> str:
-    """Where the maps lie, and what their channels are."""
+    """Hash of the maps' places and of what their channels are."""
     digest = hashlib.sha256(repr((light.layout.size, light.atlas.targets, light.bin_edges_nm)).encode())
     digest.update(np.ascontiguousarray(light.layout.placements).tobytes())
     return digest.hexdigest()
@@ -212,7 +212,7 @@ def check_maps(light: LightPass, header: PartHeader, name: str) -> None:
     """Raise `UserError` where a part, called `name`, was traced for other maps than those of `light`."""
     if (layout_key(light), light.atlas.size, light.atlas.targets) != (header.layout, header.size, header.targets):
         raise UserError(
-            f"{name} was traced by '{header.renderer}', whose maps lie elsewhere than those of "
+            f"{name} was traced by '{header.renderer}', whose maps have other places than those of "
             f"'{light.context.renderer}': merge where the parts were traced"
         )
 

@@ -20,11 +20,11 @@ from .photon_batches import Deposit, PhotonBatches
 from .photon_records import RoundOf
 
 BEAM_ROUND = 1 << 19
-"""Photons' worth of beams, where they carry everything, after which a pass may be left."""
+"""Photons' worth of beams, where they carry everything, after which a pass may be stopped."""
 MIN_BEAM_PHOTONS = 1 << 17
 """Photons, at least, whose beams are found at once, where photons are traced besides."""
 _TAIL_SHARE = 1.0
-"""Photons that carry on weak beams, over those that a round asks for."""
+"""Photons that carry on weak beams, over those of a round."""
 _TAIL_DENSITY = 64.0
 """As many times more of them than an even lattice would have there, at most."""
 _FEWEST = 256
@@ -68,8 +68,8 @@ class PassRounds:
     def steps(self, first_round: int = 0, first_group: int = 0, stride: int = 1) -> Iterator[PassStep]:
         """The whole pass, pausing after every event of the rays and after every splatting.
 
-        `first_round`: where a pass goes on that was left before. `first_group`, `stride`: of the groups of rounds that
-        have their beams together, this one and every `stride`-th after it, where others trace the rest."""
+        `first_round`: where a pass continues that was stopped before. `first_group`, `stride`: of the groups of rounds
+        that have their beams together, this one and every `stride`-th after it, where others trace the rest."""
         if not self.plans:
             yield from self._only_beams(range(first_round + first_group, self.count, stride))
             return

@@ -32,7 +32,7 @@ MIN_RAYS = 1 << 10
 """Rays of a batch that are not divided further, however slow the device is."""
 DEFAULT_BATCH = 1 << 16
 QUEUE_BYTES = 64 << 20
-"""What the queue of a batch that nobody asked for may take; more on a GPU. Less where memory is short."""
+"""What the queue of a batch of no given size may take; more on a GPU. Less where memory is short."""
 Keep = Callable[["moderngl.Buffer", int, int, RoundOf], None]
 """Takes records: (their buffer, how many, bytes of one, where they belong)."""
 
@@ -64,7 +64,7 @@ class PhotonBatches:
         self._context = context
         self._pace = pace
         self._traced_once = False
-        """A first event of all tells of compiling."""
+        """The first event of all includes compiling."""
         self._held: dict[int, int] = {}
         """Rays of a batch, by light, whose paths branch so often that the queues hold no more."""
 
@@ -137,7 +137,7 @@ class PhotonBatches:
             stats.trace_seconds += took
             if queued and is_first and rays and is_compiled:
                 self.budget.learn(rays, took, self.dispatch_seconds)
-                most = self._context.traits.queue_read_steps  # then it is asked whether any rays are left
+                most = self._context.traits.queue_read_steps  # then the number of rays left is read
                 self.trace.events_at_once = int(np.clip(self.dispatch_seconds / max(took, 1e-6), 1, most))
             is_first, self._traced_once = False, True
             yield
@@ -198,10 +198,10 @@ def traced_besides(
             yield
 
 
-def batch_size(context: Context, features: Features, asked: int | None) -> int:
-    """Lattice points in flight at once: `asked`, or what the device and its memory have room for."""
-    batch = asked or DEFAULT_BATCH * context.traits.batch_scale
-    if asked is None:
+def batch_size(context: Context, features: Features, given: int | None) -> int:
+    """Lattice points in flight at once: `given`, or what the device and its memory have room for."""
+    batch = given or DEFAULT_BATCH * context.traits.batch_scale
+    if given is None:
         batch = _batch_that_fits(features, batch, QUEUE_BYTES * context.traits.batch_scale)
     return min(batch, _largest_batch(context, features))
 

@@ -101,8 +101,8 @@ class CameraSampling:
 
     def samples(self, camera_pass: CameraPass) -> int:
         """Samples a pixel in the way chosen: whole cycles, so that every band has its turn equally often, of as many
-        bands as could have been chosen. Frames that choose differently have as many samples then, and what stands still
-        in them stays."""
+        bands as could have been chosen. Frames that choose differently have as many samples then, and what does not
+        move in them stays."""
         spectrum = camera_pass.spectrum
         if spectrum.single:
             return spectrum.samples(self.budget)

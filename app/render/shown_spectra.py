@@ -53,7 +53,7 @@ class ShownSpectra:
         self.reflectances, self.reflectance_class = reflectance_classes(scene, buffers)
         edges = None if bins is None else tuple(np.linspace(380.0, 780.0, bins + 1).tolist())
         self.channels = tents(buffers.axis, features.map_tents) if features.map_tents else MapChannels(edges)
-        """What the maps' channels stand for."""
+        """What the maps' channels mean."""
         self.spectra: Sequence[Spectrum] = [light.spectral_power for light in scene.lights]
         self.variables = SpectralVariables.build(ctx, buffers.variables)
         self.gains: GainBuffers | None = None
@@ -66,7 +66,7 @@ class ShownSpectra:
 
     @property
     def reindexing(self) -> Reindexing | None:
-        """Which index belongs to which wavelength, where photons are told apart by the index."""
+        """Which index belongs to which wavelength, where photons are distinguished by the index."""
         return self._reindexing
 
     def show_spectra(self, spectra: Sequence[Spectrum]) -> bool:

@@ -28,7 +28,7 @@ def solo(spectrum: Spectrum, wavelength_nm: float) -> Spectrum:
 
 
 def solo_scene(scene: Scene, wavelength_nm: float | None) -> Scene:
-    """`scene` as seen in the light of one wavelength: lights narrowed, what lies behind everything dark; itself for
+    """`scene` as seen in the light of one wavelength: lights narrowed, the background dark; itself for
     None."""
     if wavelength_nm is None:
         return scene

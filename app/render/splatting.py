@@ -1,4 +1,4 @@
-"""Photon records into caustic maps, in parts so small that whoever draws meanwhile keeps its frames."""
+"""Photon records into caustic maps, in parts so small that a caller that draws meanwhile keeps its frame rate."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Pace:
 
     @staticmethod
     def of(context: Context) -> Pace:
-        """For a rendering that nobody looks at meanwhile."""
+        """For a rendering that is not shown meanwhile."""
         return Pace(not context.traits.work_is_queued)
 
     @staticmethod

@@ -1,4 +1,4 @@
-"""One rendering: a frame that stands alone, with what was done for it told."""
+"""One rendering: a single frame, with a report of what was done for it."""
 
 from __future__ import annotations
 
@@ -51,9 +51,9 @@ class RenderStats:
     camera_pass: CameraStats
     beams: BeamStats | None
     expected_bytes: int = 0
-    """Peak of the process, as thought before maps were made."""
+    """Peak of the process, as estimated before maps were made."""
     notices: tuple[str, ...] = ()
-    """What must be told without being asked."""
+    """What must be reported in any case (`notices`)."""
 
     @property
     def photons(self) -> int:
@@ -133,7 +133,7 @@ class RenderResult(Picture):
 
     stats: RenderStats = field(kw_only=True)
     layers: Mapping[str, Picture] = field(default_factory=dict, kw_only=True)
-    """Those that were asked for besides the settings' own."""
+    """Layers requested besides the settings' own."""
 
 
 def render(

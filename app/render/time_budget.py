@@ -16,16 +16,16 @@ from ..passes.caustic_maps import CausticMaps
 from .sampling import DEFAULT_SAMPLES
 
 _PROBES = 4, 2
-"""Sides of the picture over those of small ones, which tell the more the larger they are."""
+"""Sides of the picture over those of small ones, whose estimate is the better the larger they are."""
 _PROBE_SHARE = 0.02
 """Of the time, for a larger one than the first."""
 _MOST_FOR_CAMERA = 0.5
-"""Of the time that is left after preparing, where nobody says how many samples there shall be."""
+"""Of the time that is left after preparing, where no number of samples is given."""
 _LEAST_FOR_LIGHT = 0.02
 _SURE = 0.9
 """Of the time left, planned for the first samples: a lattice of samples is best taken whole."""
 _NOTHING = 0.02
-"""Share of the time that is not worth another sample."""
+"""Share of the time too short for another sample."""
 _ALMOST = 0.99
 MAX_SAMPLES = 4096
 
@@ -78,7 +78,7 @@ class TimeBudget:
                 self.compile_s, first = took[0] - took[1], False
 
     def for_light(self, samples: int | None) -> float:
-        """Seconds for photons, after `measuring`; `samples`: those a pixel that were asked for."""
+        """Seconds for photons, after `measuring`; `samples`: those a pixel that were requested."""
         left = self.left
         camera = (samples or DEFAULT_SAMPLES) * self.sample_s
         if samples is None:

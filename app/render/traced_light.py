@@ -10,7 +10,7 @@ from .pass_sizes import FIRST_PHOTONS, SHRINKING, endless_passes, pass_sizes
 from .sampling import LightSampling
 
 _TRIALS_SHARE = 0.1
-"""Of the time, for doubling passes that find out how fast a scene goes."""
+"""Of the time, for doubling passes that measure how fast a scene is traced."""
 _SMALLEST_PASS = FIRST_PHOTONS // 2
 """Photons; what time is left for fewer is given back."""
 
@@ -33,9 +33,9 @@ def traced_light(light: LightPass, sampling: LightSampling, stop: Callable[[], b
 def _traced_for(light: LightPass, seconds: float, seed: int, stop: Callable[[], bool]) -> Iterator[float]:
     """As many photons as `seconds` allow.
 
-    Doubling passes find out how fast the scene goes; when they have taken a tenth of the time, one pass fills what is
-    left of it, as one lattice is better than several. What it leaves in turn, since photons of a large pass take less
-    each, is filled in the same way. All stay in the sum, each with its weight."""
+    Doubling passes measure how fast the scene is traced; when they have taken a tenth of the time, one pass fills what
+    is left of it, as one lattice is better than several. What it leaves in turn, since photons of a large pass take
+    less each, is filled in the same way. All stay in the sum, each with its weight."""
     begun, number, trials = time.perf_counter(), 0, endless_passes(light.features.method)
     photons = next(trials)
     light.begin(photons, seed)
