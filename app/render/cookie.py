@@ -34,7 +34,7 @@ class Cookie:
     position: np.ndarray
     direction: np.ndarray
     up: np.ndarray
-    """Of the picture, world; unit, right-angled to `direction`."""
+    """The picture's upward direction, world; unit, perpendicular to `direction`."""
     half_angle_deg: float
     """From the axis to the middle of the picture's sides; all that is lit is within this cone."""
     seen_from: str

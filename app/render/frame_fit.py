@@ -39,7 +39,7 @@ class Survey:
 
     @staticmethod
     def of(light: LightPass) -> Survey:
-        """Of a light pass that has begun."""
+        """Survey of a light pass that has begun."""
         counts = {plan.index: (len(plan.bands), plan.light_points) for plan in light.plans}
         return Survey(light.buffers.space, tuple(light.survey.pilots.values()), light.buffers.axis.glasses, counts)
 
@@ -80,7 +80,7 @@ class FrameFit:
 
     @property
     def glasses(self) -> list[Dispersion]:
-        """Of all surveyed frames."""
+        """Glasses of all surveyed frames."""
         return [glass for survey in self.surveys for glass in survey.glasses]
 
     @property

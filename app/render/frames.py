@@ -42,9 +42,9 @@ from .time_budget import TimeBudget
 from .traced_light import traced_light
 
 _ENVIRONMENT_SHARE = 0.25
-"""Of a timed rendering, at most, for the light of the environment."""
+"""Share of a timed rendering, at most, for the light of the environment …"""
 _BOUNCES_SHARE = 0.15
-"""Of a timed rendering, at most, for what receivers give to each other."""
+"""… and for what receivers give to each other."""
 _PREPARING, _TRACING, _SEEING = "preparing", "tracing photons", "taking camera samples"
 _GATHERING = "gathering the environment's light"
 _BOUNCING = "gathering what surfaces give to each other"
@@ -130,9 +130,7 @@ class FrameRenderer:
         self.phase = _PREPARING
         """What `steps` is at."""
         self.seconds = FrameSeconds()
-        """Of the last frame."""
         self._progress = FrameProgress()
-        """Of the last frame."""
         self.memory: MemoryEstimate | None = None
         """Expected of the last frame that was traced."""
         self.traces = 0
@@ -277,7 +275,7 @@ class FrameRenderer:
             budget.sample_s = (time.perf_counter() - started) / taken
 
     def _progress_of_camera(self) -> FrameProgress:
-        """Of a frame whose light is there."""
+        """Progress of a frame whose light is there."""
         settings, progress = self._settings, FrameProgress()
         if not self._shows_map:
             progress.expect_samples(settings.width * settings.height * CameraSampling.of(settings).budget)
@@ -314,23 +312,23 @@ class FrameRenderer:
 
     @property
     def light(self) -> LightPass:
-        """Of the last frame."""
+        """Light pass of the last frame."""
         assert self._traced is not None, "steps() comes first"
         return self._traced.light
 
     @property
     def environment(self) -> EnvironmentLightPass | None:
-        """Of the last frame; None where nothing beyond it lights it."""
+        """Environment's light of the last frame; None where nothing beyond the scene lights it."""
         return self._traced.environment if self._traced is not None else None
 
     @property
     def bounces(self) -> BounceLightPass | None:
-        """Of the last frame; None where receivers do not light each other."""
+        """Bounces of the last frame; None where receivers do not light each other."""
         return self._traced.bounces if self._traced is not None else None
 
     @property
     def camera_pass(self) -> CameraPass | None:
-        """Of the last frame; None for a map."""
+        """Camera pass of the last frame; None for a map."""
         return self._traced.camera_pass if self._traced is not None else None
 
     @property

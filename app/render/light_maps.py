@@ -24,7 +24,7 @@ from ..passes.picture_window import PictureWindow
 from ..passes.splat import Splatter
 
 _ROWS = 256
-"""Of a map, that are read at once."""
+"""Rows of a map that are read at once."""
 
 
 class LightMaps:

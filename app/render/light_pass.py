@@ -83,7 +83,7 @@ class LightPass:
         """What `maps` are fitted to."""
         self.stats = LightStats()
         self._elsewhere = LightStats()
-        """Of `take`."""
+        """What others counted whose sums were taken over (`take`)."""
         self._division = division or Division()
         pace = pace or Pace.of(context)
         batch = max(batch_size(context, features, settings.batch), pace.min_batch)
@@ -282,7 +282,7 @@ class LightPass:
         yield from traced_besides(self.trace, self.settings.seed, plans, photons, keep)
 
     def sample_plans(self, photons: int) -> Generator[str | None, None, list[LightPlan]]:
-        """Of `sample_steps`."""
+        """The plans of `sample_steps`."""
         pilots = yield from self.survey.sample_pilots()
         return self._planner(pilots).plans(photons, self._texel_size())
 

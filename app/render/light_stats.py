@@ -23,7 +23,7 @@ class LightStats:
     polygons_w: float = 0.0
     """What beams left on receivers, untinted, W per pass weight."""
     outside_map_w: float = 0.0
-    """Of it, that of photons whose centre no map holds."""
+    """Power of photons whose centre no map holds."""
     footprints_dropped: int = 0
     dropped_w: float = 0.0
     """Flux of those photons, splatted as one texel each."""

@@ -51,9 +51,9 @@ class LightSurvey:
         """`moving`: see `LightPass`."""
         self.buffers = buffers
         self.domains: dict[int, EmissionDomain] = {}
-        """Of lights that may meet glass or mirrors."""
+        """Domains of lights that may meet glass or mirrors."""
         self.pilots: dict[int, Pilot] = {}
-        """Of those; empty where beams carry everything and maps are fitted to them."""
+        """Pilots of those; empty where beams carry everything and maps are fitted to them."""
         self.beam_light: BeamLight | None = None
         """Also where it has found that beams do not pay."""
         self._sample_pilots: dict[int, Pilot] = {}

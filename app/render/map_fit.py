@@ -43,7 +43,7 @@ class MapFit:
         return replace(self, width=width, height=height, fineness=PREVIEW_FINENESS)
 
     def fineness_for(self, targets: int) -> Fineness:
-        """Of maps with so many textures: memory bounds the finest."""
+        """Fineness of maps with so many textures: memory bounds the finest."""
         fine = min(self.fineness.fine, next(most for n, most in FINE_MAX if targets <= n))
         return replace(self.fineness, fine=fine, in_register=0 if self.is_shared else self.fineness.in_register)
 

@@ -42,8 +42,8 @@ class MemoryEstimate:
 
 
 def estimate(light: LightPass, layout: MapLayout, settings: RenderSettings) -> MemoryEstimate:
-    """Of a rendering whose maps are about to be laid out so. On a device with memory of its own only what is read back
-    counts."""
+    """Estimate for a rendering whose maps are about to be laid out so. On a device with memory of its own only what is
+    read back counts."""
     shows_map = settings.layer.startswith("map:")
     now = resident_bytes()
     texture = _TEXEL_BYTES * layout.size[0] * layout.size[1]

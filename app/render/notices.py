@@ -24,10 +24,10 @@ from .light_pass import LightPass
 from .light_stats import LightStats
 
 LOST_SHARE = 0.01
-"""Of the light that meets glass or mirrors, beyond which its loss is reported."""
+"""Share of the light that meets glass or mirrors beyond which its loss is reported."""
 HELD_SHARE = 0.5
-"""Of the light that a map puts into pixels which see it, below which a picture does not hold its map: where a pixel is
-a slanting patch, 16 samples weigh a spot within it to a quarter."""
+"""Share of the light that a map puts into pixels which see it, below which a picture does not hold its map: where a
+pixel is a slanting patch, 16 samples weigh a spot within it to a quarter."""
 _BRIGHTEST = 4096
 """Texels that are compared with the picture."""
 
@@ -56,7 +56,7 @@ class FrameNotices:
 
 
 def frame_notices(light: LightPass, camera: Camera, settings: RenderSettings, rgb: np.ndarray) -> list[str]:
-    """Of a finished frame: of its light and of its picture (H, W, 3)."""
+    """Notices about a finished frame: its light and its picture (H, W, 3)."""
     return [*light_notices(light), *picture_notices(light, camera, settings, rgb)]
 
 
@@ -94,7 +94,7 @@ def shares(stats: LightStats) -> dict[str, float]:
 
 
 def light_notices(light: LightPass) -> list[str]:
-    """Of a light pass that has finished."""
+    """Notices about a light pass that has finished."""
     found = loss_notices(shares(light.stats), light.settings.max_depth)
     for index in light.survey.domains:
         name = light.scene.lights[index].name

@@ -62,11 +62,11 @@ class PartHeader:
     scene: str
     """Its file."""
     key: str
-    """Of everything that decides the picture."""
+    """Hash of everything that decides the picture."""
     settings: Mapping[str, Any]
     share: Share
     rounds: int
-    """Of the whole rendering, over all parts."""
+    """Rounds of the whole rendering, over all parts."""
     layout: str
     """Hash of the maps' places (`layout_key`)."""
     size: tuple[int, int]
@@ -218,7 +218,7 @@ def check_maps(light: LightPass, header: PartHeader, name: str) -> None:
 
 
 def merged_header(headers: Sequence[PartHeader]) -> PartHeader:
-    """Of parts of one rendering, none of which holds what another does, merged into one."""
+    """Headers of parts of one rendering, none of which holds what another does, merged into one."""
     first, *others = sorted(index for header in headers for index in header.indices)
     stats = merged_stats(header.light_stats() for header in headers)
     weight = sum(header.photon_weight for header in headers)

@@ -22,7 +22,8 @@ from itertools import pairwise
 
 PROGRESSIVE, SHRINKING = "progressive", "progressive-stochastic"
 FIRST_PHOTONS = 1 << 13
-"""Of the first pass of a rendering without end: few enough for an early picture, enough that setting up is not all."""
+"""Photons of the first pass of a rendering without end: few enough for an early picture, enough that setting up is not
+all."""
 GROWTH = 4
 """Photons of a pass over those of the one before it. What has been traced by the end of a pass errs GROWTH / (GROWTH -
 1) times as much as one pass of all of it, and GROWTH times that just before the next has ended."""
@@ -38,7 +39,7 @@ PASS_PHOTONS = 1 << 14
 """Photons of a pass whose kernel shrinks: enough that its fixed costs do not count, few enough that a short rendering
 has several."""
 FIRST_KERNEL = 4.0
-"""Of the first such pass, in units of the width that other methods have. The bench tries others."""
+"""Width of the first such pass's kernel, in units of that of other methods."""
 
 
 def endless_passes(method: str) -> Iterator[int]:

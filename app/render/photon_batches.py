@@ -96,7 +96,7 @@ class PhotonBatches:
     def carry_on(
         self, rays: np.ndarray, light: int, of: RoundOf, into: Deposit, *, of_tails: bool = False
     ) -> Iterator[None]:
-        """The same for `rays` that are on their way already (`TracePass.carry_on`). `of_tails`: photons that carry on
+        """`lattice` for `rays` that are on their way already (`TracePass.carry_on`). `of_tails`: photons that carry on
         weak beams, for which a pass has photons besides."""
         waiting = [rays]
         while waiting:

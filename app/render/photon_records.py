@@ -32,7 +32,7 @@ class PhotonRecords(Protocol):
 
     @property
     def tables(self) -> PassTables:
-        """Of the passes that run; `begin` comes first."""
+        """Tables of the passes that run; `begin` comes first."""
 
     def begin(self, shown: ShownSpectra, spans: Spans, photons: int) -> None:
         """Passes of `photons` in bands of `spans` follow."""

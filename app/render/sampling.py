@@ -16,8 +16,8 @@ from ..passes.spectrum_choice import MAX_BANDS, MIN_SAMPLES, SAMPLES_A_BAND, Spe
 DEFAULT_SAMPLES = 16
 """Camera samples a pixel."""
 CAUSTIC_SAMPLES = 64
-"""Of a picture of the caustic alone, where outlines in front of a focus make half of the error and only they take more
-than two lookups."""
+"""Camera samples of a picture of the caustic alone, where outlines in front of a focus make half of the error and only
+they take more than two lookups."""
 LIVE_BANDS_FOR = 16
 """Samples whose error the viewer's number of bands is fitted to: not all that a still picture gets in the end, since it
 should be complete within seconds."""

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from .shown_spectra import ShownSpectra, ShownTables
 
 FLUSH_AHEAD = 0.9
-"""Of the photons after which a splat pass sums its maps up by itself."""
+"""Share of the photons after which a splat pass sums its maps up by itself."""
 FIRST_SUMMED = 256
 """Rows of a map that are summed up at first, before it is known how long they take."""
 FIRST_SPLATTED, SMALLEST_PART, LARGEST_PART = 1 << 16, 1 << 10, 1 << 20

@@ -18,12 +18,12 @@ from .sampling import DEFAULT_SAMPLES
 _PROBES = 4, 2
 """Sides of the picture over those of small ones, whose estimate is the better the larger they are."""
 _PROBE_SHARE = 0.02
-"""Of the time, for a larger one than the first."""
+"""Share of the time for a larger probe than the first."""
 _MOST_FOR_CAMERA = 0.5
-"""Of the time that is left after preparing, where no number of samples is given."""
+"""Share of the time that is left after preparing, where no number of samples is given."""
 _LEAST_FOR_LIGHT = 0.02
 _SURE = 0.9
-"""Of the time left, planned for the first samples: a lattice of samples is best taken whole."""
+"""Share of the time left that is planned for the first samples: a lattice of samples is best taken whole."""
 _NOTHING = 0.02
 """Share of the time too short for another sample."""
 _ALMOST = 0.99

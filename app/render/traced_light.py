@@ -10,7 +10,7 @@ from .pass_sizes import FIRST_PHOTONS, SHRINKING, endless_passes, pass_sizes
 from .sampling import LightSampling
 
 _TRIALS_SHARE = 0.1
-"""Of the time, for doubling passes that measure how fast a scene is traced."""
+"""Share of the time for doubling passes that measure how fast a scene is traced."""
 _SMALLEST_PASS = FIRST_PHOTONS // 2
 """Photons; what time is left for fewer is given back."""
 

@@ -17,11 +17,11 @@ FINER = 4
 
 @dataclass
 class Accumulation:
-    """Where one light pass stands in that order."""
+    """How far one light pass is in that order."""
 
     light: LiveLight
     photons: int
-    """Of the pass that runs."""
+    """Photons of the pass that runs."""
     largest: int
     """Photons of the finest pass."""
     target: int
@@ -115,7 +115,7 @@ class Accumulation:
             self.number, self.begun = 0, False
 
     def bring_back(self) -> None:
-        """Stand where the light was that is kept (`LiveLight.holds_shown`)."""
+        """Return to the state of the light that is kept (`LiveLight.holds_shown`)."""
         self.photons, self.number = self.light.bring_back()
         self.begun = True
 

@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 
 
 _ENVIRONMENT_S = 0.006
-"""What one dispatch that asks for the environment's light should take."""
+"""Seconds that one dispatch for the environment's light should take."""
 PATIENCE_S = 1.0
-"""After which whoever waits for a scene is told every step."""
+"""Seconds of building after which every step is shown."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Budget:
     largest_photons: int
     store_bytes: int
     finest_photons: int = 0
-    """Of the finest pass at least, however few are wanted in all."""
+    """Photons of the finest pass at least, however few are wanted in all."""
 
     @staticmethod
     def of(context: Context) -> Budget:
@@ -142,7 +142,7 @@ def build(
             light.fit_to(wanted)
         if light.environment is not None:
             # The first picture is not a dark one.
-            yield "asking the environment for its light"
+            yield "gathering the environment's light"
             for _ in light.environment.steps(_ENVIRONMENT_S):
                 yield None
                 if light.environment.is_worth_showing:
@@ -158,7 +158,7 @@ def build(
         while published[-1] < as_fine and next(steps, published) is not published:
             yield None
         accumulation.publish = publish
-    except BaseException:  # also when the generator is closed because nobody wants this scene any more
+    except BaseException:  # also when the generator is closed because this scene is no longer wanted
         light.release()
         raise
     yield "compiling the programs that see it, once for scenes of its kind"

@@ -1,8 +1,8 @@
 """A rendering that is never finished: it follows its inputs, shows a preview in time, and gets better while nothing
 changes.
 
-`set` says what is wanted, `advance` works on it for a while. What is done when is `Schedule`'s to say: the engine tells
-it what happens, and carries out what it says. Work is cut into parts of a few milliseconds, so that a frame's
+`set` says what is wanted, `advance` works on it for a while. What is done when is decided by `Schedule`: the engine
+reports what happens to it, and carries out its actions. Work is cut into parts of a few milliseconds, so that a frame's
 budget is kept on a software renderer too.
 """
 
@@ -42,17 +42,17 @@ PREVIEW_OVERRUN_S = 0.25
 PREVIEW_S = 0.016
 """What a coarse picture should take on a software renderer."""
 PREVIEW_GPU_S = 0.004
-"""And elsewhere."""
+"""What a coarse picture should take on a GPU."""
 HELD = 4
 """First passes' photons, at most, for which what is shown stays although the same light is being traced anew."""
 CAMERA_SHARE = 0.4
-"""Of a frame, where photons are traced as well."""
+"""The camera's share of a frame in which photons are traced as well."""
 
 REFIT_SHARE = 0.5
-"""Of a frame, at least, for maps that are filled while those of before are walked round."""
+"""Least share of a frame for maps that are filled while a moving camera sees the former ones."""
 
 ENVIRONMENT_SHARE = 0.3
-"""Of a frame, at least, for the environment's light until all of it is known."""
+"""Least share of a frame for the environment's light until all of it is known."""
 
 
 class LiveEngine(EngineAnswers):
@@ -113,7 +113,7 @@ class LiveEngine(EngineAnswers):
         return min(self.budget.largest_photons, max(self._target_photons, least))
 
     def set(self, inputs: LiveInputs) -> DirtyLevel:
-        """Want `inputs` from now on; returns what that asks for. The work is done by `advance`."""
+        """Want `inputs` from now on; returns what has to be redone. The work is done by `advance`."""
         if (scene := with_sun(inputs.scene)) is not inputs.scene:
             inputs = replace(inputs, scene=scene)
         before, self._wanted = self._wanted, inputs
@@ -124,7 +124,7 @@ class LiveEngine(EngineAnswers):
 
     @property
     def _only_moves(self) -> bool:
-        """What is wanted differs from what was traced in where things stand alone."""
+        """What is wanted differs from what was traced in the places of things alone."""
         return self._shown is not None and self._wanted is not None and only_moves(self._shown.traced, self._wanted)
 
     def retrace(self) -> None:
@@ -136,7 +136,7 @@ class LiveEngine(EngineAnswers):
         that fails."""
         shader.drop_programs(self.context.ctx)
         self.problem = None
-        self.schedule = replace(self.schedule, first_order=False)  # nobody waits for fine light
+        self.schedule = replace(self.schedule, first_order=False)  # no fine light is waited for
         if self._wanted is None:
             return
         self._tell(events.BuildAsked())
@@ -203,7 +203,7 @@ class LiveEngine(EngineAnswers):
         self._tally.seconds["camera"] += self._camera_pass.advance(end, one_sample=self.schedule.interacting)
         self._tell(events.CameraWorked(self._camera))
         if self.schedule.interacting and self.schedule.splatting and self._shown and self._shown.light.shows_outdated:
-            # A hand that walks round for long shall not see the maps of before all the while.
+            # A camera that moves for long shall not see the former maps all the while.
             self._work_on_photons(max(deadline, time.perf_counter() + REFIT_SHARE * budget_s), only_stored=True)
 
     # ---- schedule ----------------------------------------------------------------------------
@@ -305,13 +305,13 @@ class LiveEngine(EngineAnswers):
 
     def _refit(self, wanted: LiveInputs) -> None:
         assert self._shown is not None
-        # Whoever walks round meanwhile sees the maps of before; nobody else waits for a picture by these.
+        # A camera that moves meanwhile sees the former maps; no other picture is made of these.
         self._camera_pass.pause()
         self._shown.light.fit_to(wanted)
         self._splat_again(self._shown, refitted=True)
 
     def _splat_again(self, shown: Shown, *, refitted: bool = False) -> None:
-        """Also where nothing is traced any more; then tracing goes on."""
+        """Splat the stored photons, also where tracing has ended; then tracing continues."""
         self._splatting = shown.accumulation.show_stored()
         self._tracing = shown.accumulation.resumed()
         self._tell(events.SplattingBegan(shown.light.first_order, refitted))
@@ -331,7 +331,7 @@ class LiveEngine(EngineAnswers):
         )
 
     def _show_for_now(self, maps: LightMaps) -> None:
-        """A coarse picture at once: samples of other light do not stay beside those of this one."""
+        """A coarse picture at once: samples of other light are not mixed with those of this one."""
         self._set_maps(maps)
         self._tell(events.PreviewShown())
         self._restart_camera(same_view=False)
@@ -339,8 +339,8 @@ class LiveEngine(EngineAnswers):
     def _restart_camera(self, *, same_view: bool, finer_maps: bool = False) -> None:
         if self._maps is None or self._inputs is None:
             return
-        # One coarse picture now; the schedule asks again in full size when things are still. Where photons are splatted
-        # again, they want time too.
+        # One coarse picture now; the schedule orders another one in full size when nothing moves. Where photons are
+        # splatted again, they want time too.
         shared = self.context.is_software and self.schedule.shows_preview
         seconds = None if same_view else (0.6 if shared else 1.0) * self.preview_seconds
         view = self._inputs.camera, self._inputs.width, self._inputs.height
@@ -412,9 +412,9 @@ class LiveEngine(EngineAnswers):
             return
         end = max(deadline - CAMERA_SHARE * budget_s, time.perf_counter() + ENVIRONMENT_SHARE * budget_s)
         seconds, interacting = 0.5 * ENVIRONMENT_SHARE * budget_s, self.schedule.interacting
-        found = self._shown.light.ask_environment(end, seconds, interacting)
+        found = self._shown.light.gather_environment(end, seconds, interacting)
         if not self.schedule.moved:
-            found = self._shown.light.ask_bounces(end, seconds, interacting) or found
+            found = self._shown.light.gather_bounces(end, seconds, interacting) or found
         if found and not self._camera_pass.is_paused:
             self._restart_camera(same_view=not interacting)
 

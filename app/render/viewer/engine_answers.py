@@ -1,4 +1,4 @@
-"""What a live rendering answers when the window asks: what is shown and how good it is, what the stored photons say.
+"""What a live rendering reports: what is shown and how good it is, what the stored photons say.
 
 Nothing here works or changes anything: `LiveEngine` does, which keeps the fields.
 """
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 
 class EngineAnswers:
-    """What is wanted, what is shown and how far it is, for whoever asks."""
+    """What is wanted, what is shown and how far it is."""
 
     def __init__(self, context: Context) -> None:
         self.context = context
@@ -95,7 +95,7 @@ class EngineAnswers:
 
     @property
     def is_busy(self) -> bool:
-        """Never while anybody can ask: what is asked of it is done when it returns (see `ThreadedEngine`)."""
+        """Never: all work is done when a call returns (otherwise with `ThreadedEngine`)."""
         return False
 
     @property
@@ -154,7 +154,7 @@ class EngineAnswers:
 
     @property
     def _level(self) -> DirtyLevel:
-        """What is wanted asks for."""
+        """What has to be redone for what is wanted."""
         assert self._wanted is not None
         if self._shown is None or self._inputs is None:
             return DirtyLevel.BUILD

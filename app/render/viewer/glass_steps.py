@@ -5,12 +5,12 @@ from __future__ import annotations
 STEPS = (1, 2, 3, 6, 12, 24)
 """Sides of the blocks of pixels that share one path through glass, in motion."""
 REFINED = (6, 3, 1)
-"""The same once nothing moves, one after the other …"""
+"""Sides of the blocks once nothing moves, one after the other …"""
 REFINED_SOON = (6, 1)
 """… and where the last of these is there soon: the one before would take a ninth of its time, for a moment."""
 SOON_S = 20.0
-"""Of glass, by the rate of the few paths of a picture in motion, which is a fifth of that of many: photons wait so long
-for a whole picture."""
+"""Seconds of glass, by the rate of the few paths of a picture in motion, which is a fifth of that of many: photons wait
+so long for a whole picture."""
 _FIRST_STEP = 12
 """Before anything was measured: coarse, so that the first picture comes at once."""
 _RATE_BLEND = 0.5
@@ -23,7 +23,7 @@ class GlassSteps:
         self.rate: float | None = None
         """Paths through glass per second."""
         self.pixels = 0
-        """Of the last picture in motion, that see glass or mirrors."""
+        """Pixels of the last picture in motion that see glass or mirrors."""
 
     def learn(self, paths: int, seconds: float) -> None:
         """So many paths took `seconds`."""

@@ -30,8 +30,8 @@ SAME_INDEX = 1e-6
 
 
 def dirty_level(traced: LiveInputs, shown: LiveInputs, new: LiveInputs, beams: bool = False) -> DirtyLevel:
-    """What `new` asks for where the photons stand for `traced` and the picture for `shown`. `beams`: light goes as
-    beams while nothing is painted, which the brush cannot move."""
+    """What has to be redone for `new` where photons were traced for `traced` and the picture shows `shown`. `beams`:
+    beams, which the brush cannot move, carry light while nothing is painted."""
     if beams and is_painted(traced.scene, traced.local_gain) != is_painted(new.scene, new.local_gain):
         return DirtyLevel.BUILD
     paths = max(_inputs(traced, new), _scene(traced.scene, new.scene))
@@ -42,7 +42,7 @@ def dirty_level(traced: LiveInputs, shown: LiveInputs, new: LiveInputs, beams: b
 
 
 def only_moves(traced: LiveInputs, new: LiveInputs) -> bool:
-    """Objects or lights may stand elsewhere, and whoever looks; everything else is as it was traced."""
+    """Objects, lights or the camera may have moved; everything else is as it was traced."""
     if replace(new, scene=traced.scene, camera=traced.camera, width=traced.width, height=traced.height) != traced:
         return False
     a, b = traced.scene, new.scene
@@ -91,7 +91,7 @@ _INPUTS = {
     "local_gain": DirtyLevel.SPLAT,
     "seed": DirtyLevel.TRACE,
 }
-"""Fields that are not here (the method) ask for everything."""
+"""For fields that are not here (the method) everything is redone."""
 
 
 def _scene(old: Scene, new: Scene) -> DirtyLevel:
@@ -201,7 +201,7 @@ def _partition(pairs: list[tuple[Dispersion, Dispersion]], side: int) -> list[in
 
 
 def shown_glasses(traced: Scene, shown: Scene) -> Mapping[Dispersion, Dispersion] | None:
-    """The glass that stands in for each one photons were traced through; None where paths do not follow.
+    """The glass that replaces each one photons were traced through; None where paths do not follow.
 
     They follow where n_d stays, the glass was dispersive (photons carry its column), and objects of one glass are still
     of one.
@@ -237,7 +237,7 @@ def _light(old: Light, new: Light) -> DirtyLevel:
 
 
 def appearance_differs(old: LiveInputs, new: LiveInputs) -> bool:
-    """Whether what the camera sees without the maps differs: colours, lights, what lies behind everything, glass that
+    """Whether what the camera sees without the maps differs: colours, lights, the background, glass that
     bends its own rays otherwise."""
     a, b = old.scene, new.scene
     if _haze(a.render) != _haze(b.render):
@@ -257,6 +257,6 @@ def _material_differs(old: Material, new: Material) -> bool:
     if old is new:
         return False
     if old.transmits and new.transmits:
-        # The rest of a glass is traced anew before it is looked at.
+        # For all else of a glass light is traced anew before the camera sees it.
         return old.dispersion != new.dispersion
     return True

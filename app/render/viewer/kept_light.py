@@ -1,5 +1,5 @@
-"""The finest light of all wavelengths, kept while one alone is shown or an edit is tried, so that whoever takes that
-back finds it as it was.
+"""The finest light of all wavelengths, kept while one alone is shown or an edit is tried, so that it is there
+again when that is undone.
 
 Stored photons are splatted again, whatever is shown. Beams are not stored: where they carry everything, they would be
 searched for anew, from the coarsest on, and minutes of light be lost for a look at one wavelength.
@@ -33,7 +33,7 @@ class _Kept:
     photon_weight: float
     stats: LightStats
     photons: int
-    """Of the pass that was the last."""
+    """Photons of the last pass."""
     number: int
     """Passes of that size."""
 

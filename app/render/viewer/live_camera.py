@@ -38,11 +38,11 @@ if TYPE_CHECKING:
     from ...model.scene import Camera, Scene
 
 SCALES = (1.0, 0.5, 1 / 3, 0.25)
-"""Sides of a picture in motion over the side asked for: less than 1 only where what is seen directly takes a device
+"""Sides of a picture in motion over the side wanted: less than 1 only where what is seen directly takes a device
 longer than DIRECT_S."""
 DIRECT_S = 0.5
 MOVED_S = 0.1
-"""The same while things are moved, whose light and tree take their time as well."""
+"""`DIRECT_S` while things are moved, whose light and tree take time as well."""
 DISPATCH_SECONDS = 0.008
 FIRST_S = 0.06
 """What glass may take in the first picture of a view that nothing moves in."""
@@ -64,7 +64,7 @@ class LiveCamera:
         self._pass: CameraPass | None = None
         self._pictures: TextureStore | None = None
         self._looks = 1
-        """Of a sample at what is seen directly."""
+        """Lookups of a sample at what is seen directly."""
         self._surfaces: FirstSurfaces | None = None
         self._moving: MovingPicture | None = None
         self._geometry: object = None
@@ -111,7 +111,7 @@ class LiveCamera:
         self.version = 0
         """Counts what was published."""
         self.scale = 1.0
-        """Side of the shown picture over the side asked for, where glass and mirrors are seen …"""
+        """Side of the shown picture over the side wanted, where glass and mirrors are seen …"""
         self.direct_scale = 1.0
         """… and elsewhere."""
 
@@ -148,7 +148,7 @@ class LiveCamera:
             kept.release()
 
     def move(self, buffers: SceneBuffers, scene: Scene) -> None:
-        """Objects or lights stand elsewhere: `buffers` were moved in place, nothing else of `scene` differs."""
+        """Objects or lights have moved: `buffers` were moved in place, nothing else of `scene` differs."""
         assert self._pass is not None and self._surfaces is not None
         shown = copy.copy(buffers)
         shown.scene = scene
@@ -190,7 +190,7 @@ class LiveCamera:
         `direct_s`: what is seen directly becomes coarser where it takes longer.
 
         `same_view`: only the maps are better: what is shown stays until the new picture is as smooth. `finer_maps`: so
-        much better that more bands of the spectrum may be told apart in them."""
+        much better that more bands of the spectrum may be distinguished in them."""
         assert self._pass is not None
         keeps = same_view and self.scale == 1.0 and not self._shows_other
         is_drawn = self._drawn is not None and (camera, maps) == (self._camera, self._maps) and self.scale < 1.0
@@ -229,7 +229,7 @@ class LiveCamera:
 
     @property
     def is_paused(self) -> bool:
-        """It has no maps to look at."""
+        """It has no maps to look up."""
         return self._maps is None
 
     def pause(self) -> None:
@@ -261,12 +261,12 @@ class LiveCamera:
 
     @property
     def is_coarse(self) -> bool:
-        """The picture asked for last is less than what is wanted."""
+        """The picture requested last is less than what is wanted."""
         return self._is_preview
 
     @property
     def owes_picture(self) -> bool:
-        """Nothing of what was asked for last is shown yet."""
+        """Nothing of what was requested last is shown yet."""
         return self._maps is not None and self._owes
 
     @property
@@ -310,7 +310,7 @@ class LiveCamera:
 
     @property
     def _needed_bands(self) -> int | None:
-        """Of a fine picture; None while nobody knows."""
+        """Bands of a fine picture; None while they are not known."""
         assert self._pass is not None
         return self._sampling.fixed_bands(self._pass) or self._bands
 
@@ -333,7 +333,7 @@ class LiveCamera:
         return max(1, int(SMOOTH_SHARE * (self._needed_bands or 1)))
 
     def _begin(self, *, smooth: bool) -> None:
-        """Forget the samples; ask for the number of bands where it is needed first."""
+        """Forget the samples; find the number of bands where it is needed first."""
         assert self._pass is not None and self._camera is not None and self._maps is not None
         self._is_smooth = smooth
         self._taken = 0

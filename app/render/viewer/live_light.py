@@ -61,7 +61,7 @@ class LiveLight:
         self._kept = KeptLight()
         self._shown: LiveInputs | None = None
         self._sampled = 0
-        """Photons that those were asked for."""
+        """Photons that were requested of `_samples`."""
         self.moving = moving or MovingBeams()
         fit = MapFit(scene.camera, settings.width, settings.height, PREVIEW_FINENESS, avoids_powers_of_two=True)
         self.light_pass = LightPass(
@@ -76,24 +76,24 @@ class LiveLight:
             moving=self.moving,
         )
         self.environment: EnvironmentLightPass | None = None
-        """Light of what lies beyond everything, where the scene has it."""
+        """Light of what is beyond everything, where the scene has it."""
         if self.buffers.features.environment_lights:
             self.environment = EnvironmentLightPass(context, self.buffers, settings.seed)
         self.bounces: BounceLightPass | None = None
-        """What receivers give each other, where the scene asks for it."""
+        """What receivers give each other, where the scene wants it."""
         if self.buffers.features.bounces:
             self.bounces = BounceLightPass(context, self.buffers, self.environment, settings.seed)
         self._seen: Scene | None = None
-        """Colours and spectra that it is asked with."""
+        """Colours and spectra with which environment and bounces are gathered."""
         self.may_have_beams = Features.of(scene, replace(settings, local_gain=False)).beams
-        """Light goes as beams while nothing is painted."""
+        """Beams carry light while nothing is painted."""
         self.beam_seconds = 0.0
         """What beams took in the last preview."""
         self.finest = 0
         """Photons of the finest pass that there will be; 0: the one that there is."""
         self._widens = needs_widening(scene)
         self.judged_view: object = None
-        """The view for which `refit` last looked whether the maps fit."""
+        """The view for which `refit` judged the maps last."""
         self._preview: LightMaps | None = None
         self._moved: MovedLight | None = None
         self._guess: SpectrumGuess | None = None
@@ -169,7 +169,7 @@ class LiveLight:
 
     def fit_to(self, inputs: LiveInputs) -> None:
         """Maps laid out for the camera and picture size of `inputs`; empty, to be filled from the stored photons.
-        Those that there were stay to be looked at until `drop_outdated`."""
+        The former ones can be shown until `drop_outdated`."""
         self.is_coarse = False
         self.drop_outdated()
         before = self.light_pass.give_maps(), self._preview, self._guess
@@ -186,7 +186,7 @@ class LiveLight:
         return bool(self._outdated)
 
     def drop_outdated(self) -> None:
-        """Nobody looks at the maps of before `fit_to` any more."""
+        """The maps of before `fit_to` are no longer shown."""
         shader.release(*self._outdated)
         self._outdated = []
 
@@ -196,7 +196,8 @@ class LiveLight:
         return MapFit(inputs.camera, inputs.width, inputs.height, LIVE, avoids_powers_of_two=True)
 
     def keep(self, photons: int, number: int) -> None:
-        """Remember the maps, which `number` passes of `photons` have filled, for when one wavelength was looked at."""
+        """Remember the maps, which `number` passes of `photons` have filled, for after one wavelength was shown
+        alone."""
         if self.only_beams and self._shown is not None:
             self._kept.keep(self.light_pass, self._shown, photons, number)
 
@@ -211,7 +212,7 @@ class LiveLight:
         return self._kept.bring_back(self.light_pass)
 
     def move(self, scene: Scene) -> LightMaps | None:
-        """A few photons through `scene`, in which the same things stand elsewhere: buffers are moved there, and what is
+        """A few photons through `scene`, in which things have moved: buffers are moved there, and what is
         stored or accumulated no longer belongs to them. None, and nothing done, where buffers cannot be moved."""
         if scene is not self.buffers.scene and not self.buffers.move(scene):
             return None
@@ -220,7 +221,7 @@ class LiveLight:
         return self._moved.follow(scene, self.widening(self._moved.photons))
 
     def widening(self, photons: float) -> float:
-        """Of footprints in pictures by so few photons."""
+        """How much wider footprints are in pictures by so few photons."""
         return widening(photons, self.finest) if self._widens else 1.0
 
     # ---- stored photons ----------------------------------------------------------------------
@@ -300,10 +301,10 @@ class LiveLight:
 
     # ---- the environment ---------------------------------------------------------------------
 
-    def ask_environment(self, end: float, seconds: float, interacting: bool) -> bool:
-        """Ask for more of the environment's light until `end` (`time.perf_counter`), in dispatches of so many
-        `seconds`; whether so much more is known that it is shown. While something is dragged only the first of another
-        environment is asked for."""
+    def gather_environment(self, end: float, seconds: float, interacting: bool) -> bool:
+        """Gather more of the environment's light until `end` (`time.perf_counter`), in dispatches of so many `seconds`;
+        whether so much more is known that it is shown. While something is dragged only the first of another environment
+        is gathered."""
         environment = self.environment
         if environment is None or environment.is_done or (interacting and environment.shown):
             return False
@@ -333,12 +334,12 @@ class LiveLight:
             self.bounces.take(scene)
 
     def bounce_caustics(self, maps: CausticMaps) -> None:
-        """Other caustics are there for surfaces to hand on."""
+        """Surfaces reflect other caustics to each other from now on."""
         if self.bounces is not None and self._seen is not None:
             self.bounces.take(self._seen, maps, self.light_pass.map_channels)
 
-    def ask_bounces(self, end: float, seconds: float, interacting: bool) -> bool:
-        """As `ask_environment`, of what receivers give each other, once all of the environment's light is known; not
+    def gather_bounces(self, end: float, seconds: float, interacting: bool) -> bool:
+        """As `gather_environment`, of what receivers give each other, once all of the environment's light is known; not
         while something is dragged."""
         if self.bounces is None or interacting or not self.knows_environment:
             return False
@@ -353,26 +354,26 @@ class LiveLight:
     @property
     def shows_environment(self) -> bool:
         """Something of the environment's light is shown, and of what receivers give each other as soon as that may be
-        asked for."""
+        gathered."""
         environment, bounces = self.environment, self.bounces
         bounced = bounces is None or bounces.shown > 0 or not self.knows_environment
         return bounced and (environment is None or environment.shown > 0 or environment.is_done)
 
     @property
     def knows_environment(self) -> bool:
-        """All of it was asked for."""
+        """All of the environment's light was gathered."""
         return self.environment is None or self.environment.is_done
 
     @property
     def knows_bounces(self) -> bool:
-        """All of what receivers give each other was asked for."""
+        """All of what receivers give each other was gathered."""
         return self.bounces is None or self.bounces.is_done
 
     # ---- beams -------------------------------------------------------------------------------
 
     @property
     def only_beams(self) -> bool:
-        """All light goes as beams, but for what those hand to photons."""
+        """Beams carry all light, but for what they leave to photons."""
         return self.light_pass.only_beams
 
     def show_survey(self) -> None:

@@ -1,7 +1,7 @@
 """The light of a scene while something in it is held and moved: a few photons, traced anew for every place.
 
-Programs, spectral tables and the division of photons stay those of the scene that was built; only where things stand
-is another. What is built once the hand lets go replaces all of it.
+Programs, spectral tables and the division of photons stay those of the scene that was built; only their places
+differ. What is built when the drag ends replaces all of it.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class MovedLight:
         return self.maps
 
     def _plans_for(self, scene: Scene) -> list[LightPlan]:
-        """Divided as at first, from where lights and glass stand now."""
+        """Divided as at first, from where lights and glass are now."""
         light_pass = self._light_pass
         if self._plans is None:
             self._plans = finished(light_pass.sample_plans(FIRST_PHOTONS))
@@ -94,7 +94,8 @@ class MovedLight:
 
 
 def _box(item: SceneObject) -> np.ndarray:
-    """The sides of the object's own box as triangles (12, 3, 3) in the world: whoever meets the object meets them."""
+    """The sides of the object's own box as triangles (12, 3, 3) in the world: a ray that meets the object meets
+    them."""
     low, high = item.mesh.vertices.min(axis=0), item.mesh.vertices.max(axis=0)
     corners = np.where(np.indices((2, 2, 2)).reshape(3, 8).T, high, low)
     corners = corners @ item.object_to_world[:3, :3].T + item.object_to_world[:3, 3]

@@ -1,4 +1,4 @@
-"""Questions about the stored photons: what lands near a place, from where, and in which colours."""
+"""Queries of the stored photons: what lands near a place, from where, and in which colours."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ if TYPE_CHECKING:
 
 NO_OBJECT = 0xFFFF
 QUERIED_PHOTONS = 200_000
-"""Stored ones that are asked what lies under the cursor."""
+"""Stored photons by which it is found what lands under the cursor."""
 FINEST_BINS = 40
-"""Of 10 nm."""
+"""Each of 10 nm."""
 MOST_ERROR = 0.2
-"""Of a bin that is told."""
+"""Largest error of a bin that is reported."""
 
 
 def world_photons(light: LiveLight, inputs: LiveInputs, limit: int) -> StoredPhotons:
@@ -107,7 +107,7 @@ def caustic_spectrum(
     """The spectral irradiance of the caustic at a world `position` on object `receiver`.
 
     Photons within `radius` count, or within up to four times as much where they are few; what is still too noisy in
-    bins of 10 nm is told in bins of 20 or 40 nm, and what is too noisy in those is not told. `weight`: what the
+    bins of 10 nm is given in bins of 20 or 40 nm, and what is too noisy in those is not given. `weight`: what the
     photons' `flux_w` is power times. `traced`, `shown`: each light's spectrum then and now.
     """
     found = None
@@ -152,7 +152,7 @@ def _around(
         return np.zeros((0, FINEST_BINS)), np.zeros((0, FINEST_BINS))
     distance = np.linalg.norm(photons.chosen(near).landing(centres) - position, axis=2)
     low, high = photons.band_nm.min(axis=1)[near, None], photons.band_nm.max(axis=1)[near, None]
-    # Share of each bin that the photon's band covers; a band narrower than a bin stands for a line.
+    # Share of each bin that the photon's band covers; a band narrower than a bin represents a line.
     covered = np.clip(np.minimum(high, edges[1:]) - np.maximum(low, edges[:-1]), 0.0, None) / (edges[1] - edges[0])
     lines = (high - low)[:, 0] < 1e-6
     covered[lines] = (low[lines] >= edges[:-1]) & (low[lines] < edges[1:])

@@ -57,7 +57,7 @@ class PhotonStore:
             return
         size = count * stride
         if self.bytes + size > self.capacity_bytes:
-            # A round that is not whole is no sub-lattice: it goes again.
+            # A round that is not whole is no sub-lattice: it is dropped.
             self.drop_unfinished()
             self._closed = True
             return

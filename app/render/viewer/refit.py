@@ -1,9 +1,8 @@
 """Whether the maps still fit what the camera sees.
 
-Walking round traces nothing and keeps what is accumulated, so maps are only fitted again where that shows: the
-window has another size, the camera has come so near that texels are larger than pixels, or it looks beside the fine
-window at light that only the coarse one holds.
-"""
+Walking round traces nothing and keeps what is accumulated, so maps are only fitted again where that shows: the window
+has another size, the camera has come so near that texels are larger than pixels, or it sees light next to the fine
+window that only the coarse one holds."""
 
 from __future__ import annotations
 
@@ -20,11 +19,11 @@ if TYPE_CHECKING:
 PAYS = 1.5
 """Texels must get so many times smaller."""
 BESIDE = 0.25
-"""Share of the window that would be fitted now that may lie outside the present one."""
+"""Share of the window that would be fitted now that may be outside of the present one."""
 
 
 def is_judged(light: LiveLight, inputs: LiveInputs) -> bool:
-    """Whether `wants_new_maps` has looked at this view."""
+    """Whether `wants_new_maps` has judged this view."""
     return light.judged_view == (inputs.camera, inputs.width, inputs.height)
 
 

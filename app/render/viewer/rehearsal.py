@@ -1,4 +1,4 @@
-"""Programs of edits, compiled before anybody makes one: a small engine is taken through a drag of dispersion, a move of
+"""Programs of edits, compiled before one is made: a small engine is taken through a drag of dispersion, a move of
 glass or a mirror, and a stroke of the brush. The driver's cache has them then for every context."""
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 PHOTONS, WIDTH, HEIGHT = 1 << 12, 97, 55
 STEP_S = 0.5
 MOST_TRIANGLES = 1_000_000
-"""Of a scene, which is on the device twice meanwhile."""
+"""Largest scene that is rehearsed, since it is on the device twice meanwhile."""
 
 
 def rehearse(context: Context, inputs: LiveInputs) -> Generator[bool]:
@@ -69,7 +69,7 @@ class Rehearsals:
         self._step: Future[bool] | None = None
 
     def follow(self, inputs: LiveInputs) -> None:
-        """Take another step, once the last is done; `inputs` are shown, and nobody else needs the processor."""
+        """Take another step, once the last is done; `inputs` are shown, and nothing else needs the processor."""
         if (thread := self._thread()) is None or (self._step is not None and not self._step.done()):
             return
         if self._step is None or self._step.exception() or not self._step.result():

@@ -1,7 +1,7 @@
 """When a live rendering does what: one immutable value, and what every event makes of it.
 
-`step` is pure: it knows no device and reads no clock. The engine tells it what happened and carries out the actions
-that come back, so that everything about dragging, stillness, retracing and waiting can be tested without OpenGL.
+`step` is pure: it knows no device and reads no clock. The engine reports what happened and carries out the actions
+that are returned, so that everything about dragging, stillness, retracing and waiting can be tested without OpenGL.
 """
 
 from __future__ import annotations
@@ -47,11 +47,11 @@ class Action(Enum):
     REFIT_MAPS = auto()
     """Lay the maps out anew for what is wanted and fill them again."""
     FOLLOW_MOVE = auto()
-    """Show the same things where they stand now by a few photons; what was being built is not wanted any more."""
+    """Show the same things in their new places by a few photons; what was being built is not wanted any more."""
     JUDGE_MAPS = auto()
     """Refit where that would show more."""
     OFFER_MAPS = auto()
-    """The maps that waited may be shown: tell of them again (`MapsReady`)."""
+    """The maps that waited may be shown: report them again (`MapsReady`)."""
     REFINE_PICTURE = auto()
     """Replace the coarse picture of this view by a full one."""
 
@@ -63,7 +63,7 @@ class ShowMaps:
     same_view: bool
     """What is shown may stay until the new picture is as smooth."""
     finer_maps: bool
-    """So much better that more bands of the spectrum may be told apart in them."""
+    """So much better that more bands of the spectrum may be distinguished in them."""
 
 
 # ---- events ----------------------------------------------------------------------------------
@@ -93,15 +93,15 @@ class FrameBegan:
 
 @dataclass(frozen=True)
 class Examined:
-    """The engine asks what to do about what is wanted."""
+    """The engine has compared what is wanted with what is shown."""
 
     camera: CameraState = CameraState()
     level: DirtyLevel = DirtyLevel.NOTHING
-    """What it asks for."""
+    """What has to be redone for it."""
     moves_view: bool = False
     """Camera or picture size are others."""
     moves_things: bool = False
-    """Of what photons were traced for, nothing is another but where things stand."""
+    """Only the places of things differ from what photons were traced for."""
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ class PreviewShown:
 
 @dataclass(frozen=True)
 class SplattingBegan:
-    """The stored photons are being splatted again, then tracing goes on. `first_order`: they follow an edit to first
+    """The stored photons are being splatted again, then tracing continues. `first_order`: they follow an edit to first
     order only; `refitted`: into new maps."""
 
     first_order: bool
@@ -200,7 +200,7 @@ class Schedule:
     failed: bool = False
     """The last build or action; nothing is tried again by itself."""
     splatting: bool = False
-    """Stored photons are due in the maps again; goes before tracing."""
+    """Stored photons are due in the maps again, before tracing."""
     tracing: bool = False
     playing: bool = True
     """Photons accumulate."""
@@ -211,7 +211,7 @@ class Schedule:
     """They are those of a first preview."""
     shows_preview: bool = False
     moved: bool = False
-    """A few photons show things where a hand has moved them: what was traced before is of no use any more."""
+    """A few photons show things where a drag has moved them: what was traced before is of no use any more."""
     maps_wait: bool = False
     """Better maps are there, but the camera is within a cycle of bands."""
 
@@ -231,7 +231,7 @@ class Schedule:
         return self.shows_scene and self.refines_when_still and self.first_order and not self.failed
 
     def yields_to_camera(self, camera: CameraState) -> bool:
-        """A drag gets the whole budget: what its next step throws away is not begun. So does the first picture of a
+        """A drag gets the whole budget: what its next step discards is not begun. So does the first picture of a
         scene: better maps that come before it would begin it again and again."""
         return camera.owes_first or (self.interacting and (camera.owes_picture or self.shows_preview))
 

@@ -1,4 +1,4 @@
-"""What a live rendering tells about itself, for the timing panel and for tests."""
+"""What a live rendering reports about itself, for the timing panel and for tests."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class LiveStats:
     photons_per_second: float = 0.0
     """Emitted photons per second of trace and splat time, over the last second."""
     shows_other: bool = False
-    """Of the scene that is prepared or was, there is no picture yet: what is shown is what was there before."""
+    """There is no picture yet of the scene that is prepared or was: what is shown is the one before."""
     differs: Literal["", "light", "scene", "moved"] = ""
     """What of the wanted scene the picture does not show yet: nothing is missing, its light is being traced, all of it
     is being prepared, or light is shown by a few photons while something is moved."""
@@ -46,10 +46,10 @@ class LiveStats:
     converged: bool = False
     """Nothing is left to do: the target is reached."""
     resolution_scale: float = 1.0
-    """Side of the shown picture over the side asked for, where glass and mirrors are seen; 1: every pixel has its own
+    """Side of the shown picture over the side wanted, where glass and mirrors are seen; 1: every pixel has its own
     path."""
     direct_scale: float = 1.0
-    """The same for what is seen directly."""
+    """That of what is seen directly."""
     bytes: int = 0
     """GPU memory held."""
     fallbacks: dict[str, int] = field(default_factory=dict)
@@ -60,6 +60,6 @@ class LiveStats:
     polygons: int = 0
     """What they threw on the receivers."""
     only_beams: bool = False
-    """All light goes as beams: photons stand for how finely those are followed."""
+    """Beams carry all light: photons say how finely those are followed."""
     bands: dict[str, int] = field(default_factory=dict)
     """Spectral bands of each light."""

@@ -18,7 +18,7 @@ _STEP_S = 0.25
 _RECORD_BYTES = 256
 """A photon record with several spectral columns, rounded up."""
 _COARSER = 16
-"""Of the first of several passes; what answers for the light of beams (spectra) is as many photons."""
+"""How many times fewer photons the first of several passes has; as many represent the light of beams in queries."""
 _PER_PHOTON = 4
 """Landings that one emitted photon leaves at most, nearly."""
 
@@ -33,7 +33,7 @@ def still_engine(context: Context, settings: RenderSettings, exact: bool, coarse
         Budget.of(context), first_photons=first, largest_photons=photons, finest_photons=photons, store_bytes=room
     )
     engine = LiveEngine(context, budget)
-    # A pass emits a few photons more or less than it is asked for: whatever it was, one is enough.
+    # A pass emits a few photons more or less than requested: one is enough in any case.
     engine.target_photons, engine.camera_samples = 1, settings.spp or DEFAULT_SAMPLES
     engine.refine_when_still = exact
     return engine

@@ -25,7 +25,7 @@ class StoredPass:
     store: PhotonStore
     tables: PassTables
     pass_photons: int
-    """Photons the pass was asked for: the weight that its records carry."""
+    """Photons requested of the pass: the weight that its records carry."""
 
     def release(self) -> None:
         """Free photons and tables."""
@@ -48,7 +48,7 @@ class StoredPasses:
 
     @property
     def tables(self) -> PassTables:
-        """Of the pass that runs."""
+        """Tables of the pass that runs."""
         assert self.running is not None, "begin() comes first"
         return self.running.tables
 

@@ -1,8 +1,8 @@
 """A live engine on a thread of its own, with an OpenGL context of its own that shares its objects with the window's.
 
-Work and drawing take turns as they would on one thread: `advance` waits for the work that it asks for. Only where
+Work and drawing take turns as they would on one thread: `advance` waits for the work that it starts. Only where
 that takes much longer than its budget, because the driver compiles, does it return early. Until that work is done the
-engine `is_busy`: it follows nothing, answers `NOT_YET`, and tells how long it has been at it.
+engine `is_busy`: it follows nothing, answers `NOT_YET`, and reports how long that has taken.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class ThreadedEngine:
 
     @property
     def is_busy(self) -> bool:
-        """It works on what it was asked for before; this frame, too, will be without news."""
+        """It is still at earlier work; this frame, too, will be without news."""
         return self._stepped.is_under_way
 
     def advance(self, budget_s: float, interacting: bool = False) -> None:
@@ -80,7 +80,7 @@ class ThreadedEngine:
         self._engine.context.finish()  # what the window's context shows must be there
 
     def set(self, inputs: LiveInputs) -> DirtyLevel:
-        """As of a `LiveEngine`; whoever asks while it is busy asks again in the next frame."""
+        """As of a `LiveEngine`; a caller that finds it busy calls again in the next frame."""
         return DirtyLevel.NOTHING if self.is_busy else self._thread.run(lambda: self._engine.set(inputs))
 
     def retrace(self) -> None:
@@ -110,7 +110,7 @@ class ThreadedEngine:
         """What the engine answers on its thread."""
         return NOT_YET if self.is_busy else self._thread.run(question)
 
-    # ---- wishes ------------------------------------------------------------------------------
+    # ---- settings ------------------------------------------------------------------------------
 
     @property
     def playing(self) -> bool:

@@ -22,7 +22,7 @@ def needs_widening(scene: Scene) -> bool:
 
 
 def widening(photons: float, finest: float) -> float:
-    """Of footprints in a pass of so many photons, where the finest pass has `finest`."""
+    """How much wider footprints are in a pass of so many photons, where the finest pass has `finest`."""
     if photons >= min(finest, KNOWN_PHOTONS):
         return 1.0
     return float((KNOWN_PHOTONS / max(photons, 1.0)) ** (1.0 / _ROOT))

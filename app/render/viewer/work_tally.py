@@ -17,7 +17,7 @@ class WorkTally:
 
     def __init__(self) -> None:
         self.seconds = {"trace": 0.0, "splat": 0.0, "camera": 0.0}
-        """Of this frame, by pass."""
+        """Seconds of this frame, by pass."""
         self._history: deque[tuple[float, int, float]] = deque()
         """When, how many photons, in what time."""
 
