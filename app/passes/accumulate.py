@@ -1,4 +1,4 @@
-"""Adds the scratch textures of the caustic maps to their total, and puts the maps together for reading."""
+"""Adds the scratch textures of the caustic maps to their total, and assembles the maps for reading."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from ..model.geometry.charts import ChartAtlas
 
 ROWS = 16
-"""Of a group, and its columns."""
+"""Rows, and columns, of a work group."""
 _GROUP = 64
 
 
@@ -32,7 +32,7 @@ class Accumulate:
         self.run_rows(scratch, total, 0, total.height)
 
     def run_rows(self, scratch: moderngl.Texture, total: moderngl.Texture, first: int, rows: int) -> None:
-        """The same for some rows of them, a multiple of `ROWS` but for the last."""
+        """`run` for some rows, a multiple of `ROWS` but for the last."""
         self._ctx.memory_barrier()
         scratch.bind_to_image(0, read=True, write=True)
         total.bind_to_image(1, read=True, write=True)
@@ -45,14 +45,14 @@ class Accumulate:
 
 
 class SeamFold:
-    """Brings home what fell into chart gutters, from the total into a resolved copy.
+    """Returns what fell into chart gutters to its own texels, from the total into a resolved copy.
 
-    The gathering order is fixed, so the result is the same every time. Gutters then hold what lies across their seam,
+    The gathering order is fixed, so the result is the same every time. Gutters then hold what is across their seam,
     for interpolated lookups; those beyond an open border keep what fell there, which is lost to the receiver.
     """
 
     def __init__(self, ctx: moderngl.Context, charts: Sequence[tuple[Tile, ChartAtlas]]) -> None:
-        """Each `ChartAtlas` lies at its tile of the map atlas."""
+        """Each `ChartAtlas` with its tile of the map atlas."""
         self._ctx = ctx
         gather, fill, sources, ratios = [], [], [], []
         first = 0
@@ -103,7 +103,7 @@ class SeamFold:
 
 
 class LevelsFold:
-    """Adds what lies in a window's wide texels (broad splats, footprint.comp) to its fine ones, in place."""
+    """Adds what is in a window's wide texels (broad splats, footprint.comp) to its fine ones, in place."""
 
     def __init__(self, ctx: moderngl.Context, folds: Sequence[tuple[Tile, Tile]]) -> None:
         """`folds`: (wide tile, fine tile) in the order in which they are added up."""

@@ -1,8 +1,7 @@
 """Beam polygons in texels of one window, as the shaders read them: records, edges and the hulls to fill.
 
-Everything lies about a whole texel near the polygon, so that float32 knows a polygon of a hundredth of a texel at the
-far end of a wide map.
-"""
+Everything is relative to a whole texel near the polygon, so that float32 resolves a polygon of a hundredth of a texel
+at the far end of a wide map. """
 
 from __future__ import annotations
 
@@ -48,26 +47,26 @@ ROW_TEXELS = 4096
 NODES_MAX = 4096
 NODES_MIN = 4
 NO_EDGE = 1.0, 0.0, 1e6, 1.0
-"""Start of an edge that everything lies inside of."""
+"""Start of an edge that has everything inside."""
 LEAST_LEVEL = 0.05
-"""Of the density at the anchor over that at the polygon's centre."""
+"""Least ratio of the density at the anchor to that at the polygon's centre."""
 STILL = 0.02
 """Texels an edge may move over the band where it is drawn as if it stood in the middle."""
 FINEST_STEP, WIDEST_STEP = 0.125, 0.25
 """Windows (texels, unless a penumbra is wider) that a narrow polygon moves from node to node: a quarter of its width,
 within these."""
 PARTS = 3, 10
-"""In which a texel's time is looked at that a wide polygon's edges cross, at least and at most."""
+"""Parts in which the time of a texel is taken that a wide polygon's edges cross, at least and at most."""
 BORDER = 2.0
 """Texels that a triangle costs besides its own, per texel of its sides: they are filled in blocks of 4 x 4."""
 WIDE = 2.0
 """Windows; a wider polygon has texels that are all inside."""
 MOSTLY_INSIDE = 4.0
 """Windows; of a wider polygon few texels are crossed by its edges, whose times are taken in few parts."""
-LOOKS = 5
-"""Places across a narrow polygon at which it is asked how much of its light a mask keeps."""
+PLACES = 5
+"""Places across a narrow polygon at which the share of light that a mask keeps is taken."""
 LEAST_KEPT = 0.25
-"""Of a narrow polygon's light by one mask: about half of what is at a mask lies inside."""
+"""Least share of a narrow polygon's light that one mask keeps: about half of what is at a mask is inside."""
 BROAD = 4.0
 """Texels that a penumbra keeps at least where it is drawn in a map of wider ones."""
 
@@ -106,7 +105,7 @@ def _rows_of(rows: np.ndarray, first: np.ndarray, chosen: np.ndarray) -> tuple[n
 def texel_hulls(
     polygons: BeamPolygons, chosen: np.ndarray, to_texels: TexelMap
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Which of the `chosen` (n,) lie in front of the camera whose pixels are texels (all of them in maps along a
+    """Which of the `chosen` (n,) are in front of the camera whose pixels are texels (all of them in maps along a
     plane's own axes), their hulls' corners (H, 2) in texels and where each hull begins."""
     rows, counts = ragged(polygons.hull_start, chosen)
     hulls = polygons.hulls[rows]
@@ -205,7 +204,8 @@ def packed(
     edges = _edges(lines[..., :3], windows)
 
     records = BEAM.zeros(len(chosen))
-    # With q = (u, v, 1): 1 / W = r . q, the density's level = l . q / r . q, a texel's area goes as (r . q)^-3.
+    # With q = (u, v, 1): 1 / W = r . q, the density's level = l . q / r . q, a texel's area is proportional to (r .
+    # q)^-3.
     r = inverse[2]
     slope = polygons.slope[chosen]
     level_rows = slope @ inverse[:2] + (1.0 - np.sum(slope * polygons.centre[chosen], axis=1))[:, None] * r
@@ -290,7 +290,7 @@ def _windows_as_they_are(
 
 
 def _half_plane_share(normal: np.ndarray, inside: np.ndarray) -> np.ndarray:
-    """Part of a square of side 1 that lies within a line (n,) `inside` of its middle, `normal` (n, 2) across."""
+    """Part of a square of side 1 that is within a line (n,) `inside` of its middle, `normal` (n, 2) across."""
     n = np.abs(normal) / np.linalg.norm(normal, axis=1)[:, None]
     total, difference, h = 0.5 * n.sum(axis=1), 0.5 * np.abs(n[:, 0] - n[:, 1]), np.abs(inside)
     missing = np.maximum(total - h, 0.0)
@@ -311,7 +311,7 @@ def _windows(
     windows, is_mask, mean, widest = _windows_as_they_are(lines[..., 3], first)
     is_narrow = width <= WIDE * widest
     widest = np.where(is_narrow, np.round(mean), widest)
-    # Of a wide polygon little is beyond, and nothing tells how much.
+    # Of a wide polygon little is beyond, and how much is not known.
     lines[is_mask & ((widest < BROAD) | ~is_narrow)[owner], :, 2] = NO_EDGE[2]
     return np.where((is_narrow[owner] & ~is_mask)[:, None], widest[owner, None], windows), widest
 
@@ -342,7 +342,7 @@ def _kept_by_masks(
     penumbra = np.maximum.reduceat(lines[..., 3].max(axis=1), first)[of]
     half = np.maximum(0.5 * (high - low) - np.abs(ends[masks, :2]).sum(axis=1) * penumbra, 0.0)
     low, high = np.maximum(0.5 * (low + high)[None] + half * [[-1.0], [1.0]], 0.0)
-    along = (np.arange(LOOKS) + 0.5)[:, None] / LOOKS
+    along = (np.arange(PLACES) + 0.5)[:, None] / PLACES
     shares = [_half_plane_share(line[:, :2], place / widest[of]) for place in low + along * (high - low)]
     np.multiply.at(kept, of, np.maximum(np.mean(shares, axis=0), LEAST_KEPT))
     return kept
@@ -377,7 +377,7 @@ def _grown(hulls: np.ndarray, start: np.ndarray, windows: np.ndarray) -> tuple[n
 
 
 TEXEL_CORNERS = (0.5 + 1e-3) * np.array([[1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]])
-"""Farthest out for a side of a counter-clockwise polygon that goes up and right, up and left, …"""
+"""Farthest out for a side of a counter-clockwise polygon directed up and right, up and left, …"""
 
 
 def _quarter(along: np.ndarray) -> np.ndarray:

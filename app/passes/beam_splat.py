@@ -37,8 +37,8 @@ GROUP = 1 << 11
 """Polygons that are uploaded and drawn at a time: a software renderer sorts all of them into tiles before it draws."""
 _SMALLEST_GROUP = 16
 TEXELS = 1 << 19
-"""That the polygons drawn at a time cover in all, so that a window on a software renderer waits for a tenth of a second
-at most. Counted, not timed: sums must not depend on the machine's load."""
+"""Texels that the polygons drawn at a time cover in all, so that a window on a software renderer waits for a tenth of a
+second at most. Counted, not timed: sums must not depend on the machine's load."""
 UNIT_CONTACT = 2
 """Texture unit of the words of `contact_lines`."""
 FLUSH = 1 << 14
@@ -81,9 +81,9 @@ class BeamSplatter:
     ) -> Iterator[int]:
         """Add the energy of all polygons to `atlas`, times `weight` (what its sums hold per unit of energy:
         `LightMaps.photon_weight` where photons are added too), pausing after every portion with the number of its
-        polygons: on a software renderer all of a fine search take seconds, for which a window would stand still.
+        polygons: on a software renderer all of a fine search take seconds, during which a window would not be drawn.
 
-        `frames`: the plane of every receiver that polygons lie on. What no window holds is left out."""
+        `frames`: the plane of every receiver that polygons are on. What no window holds is left out."""
         if not len(polygons):
             return
         for placement, receiver, chosen in _windows(polygons, frames, layout):

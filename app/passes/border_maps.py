@@ -1,4 +1,4 @@
-"""Receivers' borders (`borders`) as the splat pass reads them, and which part of a map's texels lies inside of them."""
+"""Receivers' borders (`borders`) as the splat pass reads them, and which part of a map's texels is inside of them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def border_texture(ctx: moderngl.Context, layout: MapLayout) -> moderngl.Texture
 
 
 def inside_share(layout: MapLayout, receiver: int, level: int) -> Callable[[int, int], np.ndarray]:
-    """How much of each texel of a window lies inside of the receiver's borders: of rows `first` to `end`, (rows,
+    """How much of each texel of a window is inside of the receiver's borders: of rows `first` to `end`, (rows,
     width). Of a texel that a border crosses aslant about as much."""
     tile, frame = layout.tiles[receiver][level], layout.frames[receiver]
     index = int(layout.receivers["placement"][receiver])

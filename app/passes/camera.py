@@ -46,7 +46,7 @@ SPLIT_THRESHOLD = 0.0008
 """Share of a sample's power above which both parts of a split path are followed: small enough for the third reflection
 in a ball, whose choice by chance would show as grain."""
 MAX_TAPS = 24
-"""Looks along one sweep."""
+"""Lookups along one sweep."""
 SURVEY_FROM = 4
 """A still of as many samples or more surveys its pixels first: fewer would cost no more than the survey itself."""
 
@@ -101,7 +101,7 @@ class CameraPass:
         is compiled when it is needed."""
         self.max_taps = MAX_TAPS
         self.primary_samples = PRIMARY_SAMPLES if self.chooses or not self.disperses else 1
-        """Of a sample, at what is seen directly, while a pixel has few samples."""
+        """Lookups of a sample at what is seen directly, while a pixel has few samples."""
         self.only_directly = False
         """Leave what is seen in glass and mirrors black where a program of its own follows it."""
         self.split_threshold = SPLIT_THRESHOLD
@@ -124,7 +124,7 @@ class CameraPass:
             self._programs.of(variant)
 
     def move(self, scene: SceneBuffers) -> None:
-        """The same objects and lights stand elsewhere (`SceneBuffers.move`)."""
+        """Objects or lights have moved (`SceneBuffers.move`)."""
         self.scene = scene
         self._inputs.move(scene)
         if self._haze is not None:
@@ -154,7 +154,7 @@ class CameraPass:
 
     @property
     def brightness(self) -> np.ndarray | None:
-        """How much of what looks bright lies below each of equally spaced x; None where nothing disperses."""
+        """How much of what looks bright is below each of equally spaced x; None where nothing disperses."""
         return self._inputs.brightness if self.disperses else None
 
     def run(
@@ -193,7 +193,8 @@ class CameraPass:
         maps: CausticMaps | None = None,
         seed: int = 1,
     ) -> Iterator[float]:
-        """`run`, pausing after every dispatch with the share done: whoever draws meanwhile may bind what it likes."""
+        """`run`, pausing after every dispatch with the share done; a caller that draws meanwhile may bind what it
+        likes."""
         if sample_offset == 0 or self._sums.size != (width, height):
             self._clear(width, height)
         maps = maps or self._inputs.no_maps
@@ -208,7 +209,7 @@ class CameraPass:
         if directly > 1:
             looks = looks_lattice(samples, sample_offset)
             if (
-                not self._programs.has_lens  # few looks do not tell what lies before a blurred place
+                not self._programs.has_lens  # few lookups do not show what hides a blurred place
                 and sample_offset == 0
                 and samples >= SURVEY_FROM
                 and self._sums.is_single
@@ -232,7 +233,7 @@ class CameraPass:
         self, camera: Camera, width: int, height: int, samples: int, maps: CausticMaps | None = None
     ) -> Spectrum:
         """Sample the spectrum in the way that leaves the least error after so many samples, as far as a coarse grid of
-        the picture's own pixels tells.
+        the picture's own pixels shows.
 
         Sets and returns `spectrum`; what was summed up is forgotten. A method that prescribes its way keeps it."""
         for _ in self.choosing_spectrum(camera, width, height, samples, maps):
@@ -409,7 +410,7 @@ class CameraPass:
 
     def _survey(self, parameters: np.ndarray, width: int, height: int, maps: CausticMaps) -> Iterator[float]:
         """Find the pixels in which, and round which, nothing but one surface in the same light is seen directly, and
-        what that looks like: the samples then look at the others only. Pauses after every dispatch with 0.0."""
+        what that looks like: the samples then take lookups in the others only. Pauses after every dispatch with 0.0."""
         taken = parameters.copy()
         taken["survey_at"] = self._listed.survey_at(width * height)
         for _ in spread_survey(taken):

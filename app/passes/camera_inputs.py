@@ -1,4 +1,4 @@
-"""What the programs of the camera's pass read beside a dispatch's parameters, and where it is bound: the scene's
+"""What the programs of the camera's pass read besides a dispatch's parameters, and where it is bound: the scene's
 tables, lights and pictures, caustic maps, counters."""
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class CameraInputs:
 
     @property
     def structs(self) -> tuple[Struct, ...]:
-        """Of the records that programs read."""
+        """Structs of the records that programs read."""
         pictures = (PICTURE,) if self.pictures.structs else ()
         return *SCENE_STRUCTS, CAMERA_LIGHT, CAMERA_PARAMETERS, RECEIVER, PLACEMENT, *pictures
 
@@ -86,7 +86,7 @@ class CameraInputs:
         return lights
 
     def move(self, scene: SceneBuffers) -> None:
-        """The same objects and lights stand elsewhere."""
+        """Objects or lights have moved."""
         self.scene = scene
         self._lights.write(self._light_records().tobytes())
 
@@ -124,12 +124,12 @@ class CameraInputs:
 
     @property
     def brightness(self) -> np.ndarray:
-        """How much of what looks bright lies below each of equally spaced x."""
+        """How much of what looks bright is below each of equally spaced x."""
         return np.frombuffer(self._tables.cell_cdf.read(), "f4").astype(float)
 
     @property
     def no_maps(self) -> CausticMaps:
-        """Maps in which no light lies."""
+        """Maps without light."""
         if self._empty is None:
             self._empty = CausticMaps.without_light(self._ctx, len(self.scene.receivers), self._map_targets)
         return self._empty

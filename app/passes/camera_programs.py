@@ -131,7 +131,7 @@ def camera_defines(scene: SceneBuffers, channels: Channels, layer: str, maps: Ma
 
 
 def direct_defines(beyond: Defines) -> Defines:
-    """For what is seen directly, from what the listed pixels are compiled with."""
+    """Defines for what is seen directly, from what the listed pixels are compiled with."""
     return {name: value for name, value in beyond.items() if name not in _BEYOND_ONLY} | {
         **switched(LISTS_SPECULAR=True, FOLLOWED="CAMERA_SPECULAR" in beyond),
         "SPECTRAL_GROUPS": 0,
@@ -140,7 +140,7 @@ def direct_defines(beyond: Defines) -> Defines:
 
 
 def single_defines(beyond: Defines) -> Defines:
-    """For listed pixels whose samples are of one wavelength each."""
+    """Defines for listed pixels whose samples are of one wavelength each."""
     return {name: value for name, value in beyond.items() if name != "SPECTRAL_SWEEP"} | {
         "SPECTRAL_GROUPS": 0,
         "RANDOM_WAVELENGTH": 1,
@@ -149,13 +149,13 @@ def single_defines(beyond: Defines) -> Defines:
 
 
 def halting_defines(beyond: Defines) -> Defines:
-    """For listed pixels whose samples halt when their loops have run long."""
+    """Defines for listed pixels whose samples halt when their loops have run long."""
     numbers = {"HALT_ROUNDS": HALT_ROUNDS, "SPARE_ROUNDS": SPARE_ROUNDS, "BIND_HALTED": BIND_HALTED}
     return beyond | switched(HALTS=True) | numbers
 
 
 def lens_defines(shown: Defines) -> Defines:
-    """For a camera with a lens."""
+    """Defines for a camera with a lens."""
     return shown | switched(LENS=True)
 
 

@@ -1,4 +1,4 @@
-"""Records that the camera's shader reads: a light as it is looked at, and what one dispatch is told."""
+"""Records that the camera's shader reads: a light as rays meet it, and the parameters of one dispatch."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Spectra as the camera's rays meet them: indices of the glass that is shown, absorption, and emission times the
 observer.
 
-The emission table holds running sums over the spectral coordinate x. A look at a stretch of the spectrum is then the
+The emission table holds running sums over the spectral coordinate x. A lookup of a stretch of the spectrum is then the
 difference of two of its samples in every channel of the picture, however many wavelengths lie between them.
 Where the shown glass is an edit of the one that photons were traced through, the camera follows the shown one.
 """
@@ -29,13 +29,13 @@ from ..model.scene import Material, Scene
 from .picture_channels import Channels
 
 EMISSION_CELLS = SAMPLES - 1
-"""Cells of x that a stretch of the spectrum begins and ends with; a wavelength is told to 1/1024 of the indices'
+"""Cells of x that a stretch of the spectrum begins and ends with; a wavelength is resolved to 1/1024 of the indices'
 variation."""
 
 
 @dataclass(frozen=True)
 class CameraTables:
-    """GPU tables of one shown scene, and the symbols that tell the shader where in them is what."""
+    """GPU tables of one shown scene, and the symbols by which the shader finds its rows."""
 
     spectra: moderngl.Texture
     emission: moderngl.Texture
@@ -131,7 +131,7 @@ def _depth(kept: np.ndarray) -> np.ndarray:
 def _finishes(scene: Scene, first_row: int) -> tuple[np.ndarray | None, np.ndarray]:
     """What camera rays know of each object's finish, float32 (O, 4): the coat's alpha (below 0: none; 0: perfectly
     smooth), its index, its first row of tables, the base's roughness; None where all is plain. The tables
-    (rows, SAMPLES), over the cosine, stand after `first_row` others (`optics.rough_surfaces.coat_tables`)."""
+    (rows, SAMPLES), over the cosine, follow `first_row` others (`optics.rough_surfaces.coat_tables`)."""
     materials = [item.material for item in scene.objects]
     if not any(m.has_coat or m.diffuse_roughness for m in materials):
         return None, np.zeros((0, SAMPLES))
@@ -232,10 +232,10 @@ def _texture(ctx: moderngl.Context, rows: np.ndarray) -> moderngl.Texture:
 
 
 def _cell_cdf(axis: SpectralAxis, channels: Channels) -> np.ndarray:
-    """How much of what looks bright lies below each border of the cells of x: what daylight adds to X + Y + Z there, or
+    """How much of what looks bright is below each border of the cells of x: what daylight adds to X + Y + Z there, or
     evenly to all bins.
 
-    Random wavelengths are drawn by it, and looks along a sweep shared out."""
+    Random wavelengths are drawn by it, and lookups along a sweep are distributed by it."""
     x = np.linspace(0.0, 1.0, EMISSION_CELLS + 1)
     if channels.edges_nm is None:
         seen = cumulative(axis, Spectrum(daylight_per_lumen())).at(x)[:, :3].sum(axis=1)

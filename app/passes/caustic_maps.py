@@ -29,12 +29,12 @@ class CausticMaps:
 
     @classmethod
     def without_light(cls, ctx: moderngl.Context, receivers: int, targets: int) -> CausticMaps:
-        """Of a scene whose so many receivers have no maps: `targets` textures of one texel."""
+        """Maps of a scene whose so many receivers have none: `targets` textures of one texel."""
         records = RECEIVER.zeros(max(1, receivers))
         records["placement"] = NONE
         textures = [ctx.texture((1, 1), 4, bytes(16), dtype="f4") for _ in range(targets)]
         return cls(textures, ctx.buffer(records.tobytes()), ctx.buffer(reserve=PLACEMENT.stride))
 
     def release(self) -> None:
-        """Free everything; for whoever owns them."""
+        """Free everything; for their owner."""
         shader.release(*self.textures, self.receivers, self.placements)

@@ -44,7 +44,7 @@ NEAREST_FROM = 4.0
 """Enlarged more than this, pixels are shown as squares."""
 _MAX_TAPS = 4
 _GROUP = 32, 8
-"""Wide: a software renderer hands every group out by itself."""
+"""Wide: a software renderer dispatches groups one by one."""
 _ROWS = 16
 _HALO = 2
 """Texture unit."""
@@ -197,7 +197,7 @@ class Display:
         self._outputs.clear()
 
     def _develop(self, settings: Settings, exposure_ev: float) -> np.ndarray:
-        """Parameters of the look alone."""
+        """Parameters that only the settings decide."""
         parameters = DISPLAY_PARAMETERS.zeros(1)
         parameters["gain"] = 2.0 ** float(np.clip(exposure_ev, -60.0, 60.0))
         low, high = settings.false_colour_stops

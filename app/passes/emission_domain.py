@@ -53,7 +53,7 @@ class EmissionDomain:
     thinned: np.ndarray | None = None
     """bool, as `mask`: cells of it of which only some points are emitted, for all (`guided_emission`); None: none."""
     thinned_chance: float = 1.0
-    """Of a point in such a cell to be emitted."""
+    """Probability of a point in such a cell to be emitted."""
 
     @property
     def active_share(self) -> float:
@@ -198,7 +198,7 @@ def _diverging_domain(
     low, high = _bounds(flat)
     low, high = np.maximum(low - grow, -2.0), np.minimum(high + grow, 2.0)
     box_low, box_high = low.min(axis=0), high.max(axis=0)
-    # The point behind the light is the plane's whole rim: what lies near it gets a ring instead of boxes.
+    # The point behind the light is the plane's whole rim: what is near it gets a ring instead of boxes.
     behind = np.pi - farthest < _NEAR_ANTIPODE
     ring = np.inf
     if behind.any():
@@ -270,7 +270,7 @@ def _rect_and_mask(
 
 
 def _subdivided(triangles: np.ndarray, viewpoint: np.ndarray) -> np.ndarray:
-    """Triangles split until each looks small from `camera`: straight edges bend on the azimuthal plane."""
+    """Triangles split until each looks small from `viewpoint`: straight edges bend on the azimuthal plane."""
     done = []
     while len(triangles):
         edges = triangles - np.roll(triangles, 1, axis=1)

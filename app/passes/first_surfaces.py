@@ -13,7 +13,7 @@ from .camera_records import CAMERA_PARAMETERS
 _CORNER = np.dtype([("position", "f4", 3), ("primitive", "u4"), ("object", "u4")])
 FAR = 1e30
 _NEAREST = 1e-4
-"""Of the farthest corner's depth: what is drawn begins there, however near the camera."""
+"""Share of the farthest corner's depth at which what is drawn begins, however near the camera."""
 
 
 class FirstSurfaces:
@@ -59,7 +59,7 @@ class FirstSurfaces:
         return corners
 
     def move(self, scene: SceneBuffers) -> None:
-        """The same objects stand elsewhere."""
+        """Objects have moved."""
         if self._corners is not None:
             self._corners.write(self._corners_of(scene).tobytes())
 
@@ -82,7 +82,7 @@ class FirstSurfaces:
         return self.texture
 
     def _depths(self, parameters: np.ndarray) -> tuple[float, float]:
-        """Of the nearest and the farthest corner of all boxes."""
+        """Depths of the nearest and the farthest corner of all boxes."""
         low, high = self._bounds[::2], self._bounds[1::2]
         forward = parameters["forward"][0].astype(float)
         middle = (0.5 * (low + high) - parameters["position"][0]) @ forward

@@ -1,4 +1,4 @@
-"""Where light flies outside glass, stretch by stretch: what haze shows of it.
+"""Paths of light outside glass, stretch by stretch: what haze shows of it.
 
 Photons of their own are traced for that, on lattices like all others, whatever carries the light of surfaces: few are
 enough, because each is drawn as a whole beam. Light that meets glass or a mirror first has the photons that its domain
@@ -25,25 +25,25 @@ from .emission_domain import EmissionDomain, emission_domain
 from .trace import FLIGHT_ROOM, Band, LatticeSlice, TracePass
 
 PHOTONS = 1 << 15
-"""Of all lights together, that meet glass or a mirror first."""
+"""Photons of all lights together that meet glass or a mirror first."""
 DIRECT_SHARE, DIRECT_SHARE_OF_EXTENT = 1 / 8, 1 / 32
 """Times as many that do not; of a light with extent, whose haze has soft borders anyway. Their beams are broad, and so
 cost the more to draw."""
 BANDS = MAX_BANDS
-"""Where something disperses: neighbours in a prism's fan are then told apart by nobody."""
+"""Where something disperses: neighbours in a prism's fan cannot be distinguished then."""
 PLAIN_BANDS = 4
 """Elsewhere: tints differ over the spectrum."""
 LIGHT_POINTS = 16
 """On a light with extent."""
 MOST_EVENTS = 16
-"""Of a path: what comes after them is faint."""
+"""Events of a path: what comes after them is faint."""
 SPLIT_THRESHOLD = 0.002
 """Share of a photon's power below which roulette decides, whose survivors would be seen as needles."""
 FAINT, THINNED = 0.05, 8
 """Times the brightest of its band is what of a path is faint, and of so many such paths one is drawn; a Fibonacci
 number, which leaves a golden lattice even."""
 REACH = 4.0
-"""Of the scene's radius: so far light is followed that meets nothing more."""
+"""How many radii of the scene light is followed that meets nothing more."""
 _BATCH = 1 << 14
 _SPECULAR_BIT = 1
 
@@ -171,7 +171,7 @@ def _traced(trace: TracePass, part: _Part) -> list[np.ndarray]:
 
 
 def _kept(records: np.ndarray, specular: bool) -> np.ndarray:
-    """Of paths that meet something specular first, or of the others: stretches outside glass."""
+    """Stretches outside glass of paths that meet something specular first, or of the others."""
     depth, meets_specular = records["what"] >> 8, (records["what"] & _SPECULAR_BIT) != 0
     mine = (depth > 0) | meets_specular if specular else (depth == 0) & ~meets_specular
     return records[mine & (records["flux_w"] > 0.0)].copy()

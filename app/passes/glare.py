@@ -50,7 +50,7 @@ class Glare:
         return self._step("JOIN", 0, picture.size, (picture, halo.light), 1.0 - halo.kept)
 
     def halo(self, picture: moderngl.Texture, share: float, *, in_motion: bool = False) -> Halo:
-        """What `run` adds to the picture, where whoever shows that adds it (`Display.run`): joining takes a software
+        """What `run` adds to the picture, for `Display.run` to add: joining takes a software
         renderer longer than finding it. Valid until the next call."""
         # Rows of the finest octave, whose texels are as wide as its Gaussian.
         rows = _SPREAD / WIDEST * 2.0 ** (OCTAVES - 1)

@@ -3,9 +3,8 @@ receiver, because something stands before the glass or what the glass throws goe
 
 The few carry what the others would have: a point of a thinned cell is emitted with a known chance, by a Kronecker
 sequence in its number, and its weight is one over that chance. So nothing that the pilots missed is lost; it is only
-noisier, as after any roulette. Cells beside those that threw light keep all their points: what a pilot found through an
-opening narrower than its spacing, a neighbour might have found too.
-"""
+noisier, as after any roulette. Cells next to those whose light landed keep all their points: what a pilot found through
+an opening narrower than its spacing, a neighbour might have found too. """
 
 from __future__ import annotations
 
@@ -23,7 +22,7 @@ _REACH = 2
 _DARK_SHARE = 0.1
 """Photons of thinned cells, over those of the others."""
 _LEAST_CHANCE = 1.0 / 16.0
-"""Of a point to be emitted: what a missed cell throws is never more than 16 times a photon."""
+"""Least probability of a point to be emitted: what a missed cell throws is never more than 16 times a photon."""
 _LEAST_GAIN = 1.25
 """Photons saved, at least, that are worth another program."""
 

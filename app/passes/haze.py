@@ -32,7 +32,7 @@ _UNIT_DISTANCES = 0
 SMOOTHING = 0.6
 """Standard deviation of a footprint, lattice spacings."""
 BAND_BLUR = 0.5
-"""That of a band's sweep, sweeps: neighbours together have no steps."""
+"""Standard deviation of a band's blur, sweeps: neighbours together have no steps."""
 MIN_PIXELS = 0.6
 """Standard deviation of the narrowest beam, pixels."""
 SUBPIXELS = 2
@@ -84,7 +84,7 @@ class Haze:
         """What the picture shows."""
 
     def move(self, scene: SceneBuffers) -> None:
-        """Objects or lights stand elsewhere."""
+        """Objects or lights have moved."""
         self._scene = scene
         self._forget()
 

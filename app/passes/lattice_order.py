@@ -1,11 +1,9 @@
 """The order in which a batch's lattice points are emitted: along a Morton curve over the domain.
 
-Neighbours of a Kronecker lattice by number lie far apart in space. Rays of one work group that
-start side by side meet the same nodes and triangles and take the same branches: on a software
-renderer, which runs eight rays in step, that is worth a third of the tracing time, and on a GPU
-it is cache hits. Shifting the lattice only turns the torus it lies on, so one order serves every
-pass and every shift; what a photon is does not depend on it, only where it lies in the buffer.
-"""
+Neighbours of a Kronecker lattice by number are far apart in space. Rays of one work group that start side by side meet
+the same nodes and triangles and take the same branches, which spares a software renderer, which runs eight rays in
+step, and a GPU's caches. Shifting the lattice only turns the torus it lies on, so one order serves every pass and every
+shift; what a photon is does not depend on it, only its place in the buffer. """
 
 from __future__ import annotations
 
@@ -14,7 +12,7 @@ import numpy as np
 GOLDEN = 2654435769
 """2^32 / golden ratio: the lattice's second coordinate (shaders/lib/lattice.glsl)."""
 _BITS = 12
-"""Bits of each coordinate: 4096² cells tell more points apart than a batch has."""
+"""Bits of each coordinate: 4096² cells are more than a batch has points."""
 
 
 def morton_order(points: int, stride: int, lattice_count: int) -> np.ndarray:

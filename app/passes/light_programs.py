@@ -26,7 +26,7 @@ _FLAGS: Defines = {
 
 
 def light_defines(features: Features, traits: DeviceTraits) -> Defines:
-    """Of the programs that emit, trace and queue rays."""
+    """Defines of the programs that emit, trace and queue rays."""
     copies = " ".join(
         f"photon.dposition_dvar{g} = vec4(path.dposition[SPATIAL + {g}], 0.0);" for g in range(features.spectral_groups)
     )
@@ -46,7 +46,7 @@ def light_defines(features: Features, traits: DeviceTraits) -> Defines:
 
 
 def footprint_defines(features: Features) -> Defines:
-    """Of footprint.comp."""
+    """Defines of footprint.comp."""
     return (
         features.defines()
         | switched(CONTACT_LINES=features.contact_lines)
@@ -86,5 +86,5 @@ def draw_variants(features: Features) -> dict[int, tuple[str, Defines]]:
 
 
 def sum_defines(way: SplatWay) -> Defines:
-    """Of programs that add to sums in a buffer: how."""
+    """Defines of programs that add to sums in a buffer."""
     return switched(FLOAT_ATOMICS=way.extensions)

@@ -1,4 +1,4 @@
-"""The pixels that see glass or mirrors first, and how a dispatch after the other follows them.
+"""The pixels that see glass or mirrors first, and how one dispatch after the other follows them.
 
 The program for what is seen directly lists them; another follows the list, a portion at a time. Where a driver ends
 long loops, samples halt and are taken up again (shaders/camera/halts.glsl).
@@ -17,7 +17,7 @@ from ..gpu.records import NONE
 from .camera_programs import BIND_HALTED, BIND_LISTED
 
 _WHOLE = 64
-"""Pixels that a dispatch is given more or less by."""
+"""Multiples in which a dispatch is given pixels."""
 _FIRST = 1024
 _PLACES = 8192
 """Samples that may be under way, where they halt."""
@@ -42,12 +42,12 @@ class ListedPixels:
         self.room = 0
         """What the list holds."""
         self._surveyed = 0
-        """Pixels of a survey, which lie behind the list."""
+        """Pixels of a survey, which follow the list."""
         self.budget = self.resumed = DispatchBudget(1, 1, 1)
         """How many pixels, and how many halted samples, a dispatch is given."""
 
     def resize(self, pixels: int, room: int) -> None:
-        """For pictures of so many pixels, up to `room` of them on the list at a time."""
+        """Make room for pictures of so many pixels, up to `room` of them on the list at a time."""
         self.room, self._surveyed = room, 0
         self._reserve()
         self.budget = DispatchBudget(_FIRST, _WHOLE, max(pixels, _WHOLE))

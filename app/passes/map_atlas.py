@@ -79,9 +79,9 @@ class MapAtlas:
         self.pending = 0
         """Photons in the scratch textures."""
         self.contact_words: moderngl.Texture | None = None
-        """Of `contact_lines`, where such lines lie in the maps; the atlas's own."""
+        """Words of `contact_lines`, where maps have such lines; the atlas's own."""
         self.borders: moderngl.Texture | None = None
-        """Of `borders`, where light lands near receivers' borders; the atlas's own."""
+        """Receivers' `borders`, where light lands near them; the atlas's own."""
         self.clear()
 
     def _texture(self) -> moderngl.Texture:
@@ -99,14 +99,14 @@ class MapAtlas:
 
     @property
     def sums(self) -> SplatSums:
-        """What compute shaders add splats to; made when it is first asked for."""
+        """What compute shaders add splats to; made when it is first needed."""
         if self._sums is None:
             self._sums = SplatSums(self.ctx, self.size, self.targets)
             self._sums.forget(self.drawn_into)
         return self._sums
 
     def collect(self) -> None:
-        """What compute shaders added goes to the textures, as if it had been drawn there."""
+        """Move what compute shaders added to the textures, as if it had been drawn there."""
         if self._sums is not None:
             self._sums.move(self.drawn_into)
 
@@ -139,7 +139,7 @@ class MapAtlas:
 
     @property
     def scratch_bytes(self) -> int:
-        """Of these what only adding takes."""
+        """The part of `bytes` that only adding takes."""
         width, height = self.size
         return 16 * width * height * len(self.scratch_textures) + (self._sums.bytes if self._sums is not None else 0)
 

@@ -1,4 +1,4 @@
-"""Where on the receivers the caustic maps lie, fitted to where pilot photons landed.
+"""The layout of the caustic maps on the receivers, fitted to where pilot photons landed.
 
 A flat receiver gets a coarse window over everything that lands on it and a fine one inside: for a picture that is kept
 on the camera's own pixels, for one that changes where most of the light falls on (or the camera sees) a small part of
@@ -55,7 +55,7 @@ class Fineness:
     """… and of coarse ones."""
     in_register: int = 0
     """Texels along a pixel's side, at most, of windows on the picture's own pixels; 0: none is made, since each view
-    asks for others."""
+    needs others."""
 
     @property
     def least_pixels(self) -> float:
@@ -70,9 +70,9 @@ class Fineness:
 
 
 LIVE = Fineness(2.0, 2048, 768)
-"""Of a picture that somebody waits for."""
+"""For the viewer's pictures."""
 STILL = Fineness(4.0, 3072, 1024, 4)
-"""Of one that is kept."""
+"""For pictures that are kept."""
 _SHRINK = 0.85
 """Where maps do not fit a texture, they are made so much coarser until they do …"""
 _LEAST_TEXELS_PER_PIXEL = 0.5
@@ -107,12 +107,12 @@ class MapLayout:
     folds: tuple[tuple[Tile, Tile], ...]
     """(wider texels, finer texels) of the same window, in the order in which they are added up."""
     frames: dict[int, PlaneFrame] = field(default_factory=dict)
-    """Of flat receivers."""
+    """Frames of flat receivers."""
     borders: dict[int, np.ndarray] = field(default_factory=dict)
-    """Of convex flat receivers, (n, 4): those near which light lands (`borders.borders_near`)."""
+    """Borders of convex flat receivers, (n, 4): those near which light lands (`borders.borders_near`)."""
 
     def width_told(self, receiver: int) -> float:
-        """What a receiver's finest map tells apart, scene units: a texel's side, or half a pixel's where texels are
+        """What a receiver's finest map resolves, scene units: a texel's side, or half a pixel's where texels are
         smaller than that. These are so only that outlines cut them in smaller parts."""
         side = float(np.sqrt(self.placements["texel_area"][self.receivers[receiver]["placement"]]))
         window = next(iter(self.windows[receiver]), None)
@@ -277,7 +277,7 @@ def _grown(window: Window, share: float) -> Window:
 
 
 def _at_least(window: Window, side: float, extent: Window) -> Window:
-    """The window, or a wider one about its middle with sides of at least `side`, as far as `extent` goes."""
+    """The window, or a wider one about its middle with sides of at least `side`, as far as `extent` reaches."""
     middle, far = 0.5 * (window.low + window.high), np.maximum(np.abs(window.low), np.abs(window.high)).max()
     half = 0.5 * np.maximum(window.size, max(side, _MIN_SIDE * far))
     return _meet(Window(middle - half, middle + half), extent) or extent
@@ -403,7 +403,7 @@ def _tile_size(
 
 
 def project(camera: Camera, picture: tuple[int, int], points: np.ndarray) -> np.ndarray:
-    """Where world `points` (n, 3) lie in the picture: pixels (n, 2) from the left and the top; NaN behind a pinhole."""
+    """Places of world `points` (n, 3) in the picture: pixels (n, 2) from the left and the top; NaN behind a pinhole."""
     right, up, forward = camera_frame(camera)
     offset = points - np.asarray(camera.position, float)
     if camera.kind == "orthographic":

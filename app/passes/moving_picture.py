@@ -1,6 +1,6 @@
 """The picture while something moves: what is seen directly at full resolution, glass and mirrors coarser.
 
-What is seen directly costs a software renderer little where the rasteriser says what it is, direct light is looked at
+What is seen directly costs a software renderer little where the rasteriser says what it is, direct light is looked up
 on a lattice of pixels where it varies slowly, and only the caustic maps are looked up by every pixel. Of what is seen
 by way of glass or mirrors one pixel of each block is followed, with the footprint of the whole block, and its
 neighbours on the same surface share what it found.
@@ -33,26 +33,26 @@ MOVING_PARAMETERS = Struct(
         Field("blocks", "uvec2", "of pixels of which one is followed through glass"),
         Field("lattice_step", "uint", "pixels"),
         Field("glass_step", "uint", "side of a block, pixels"),
-        Field("lists_cells", "uint", "the lattice's program looks at listed cells, not at points"),
+        Field("lists_cells", "uint", "the lattice's program reads listed cells, not points"),
         Field("pad", "uint", "unused"),
     ),
 )
 LATTICE_STEP = 4
-"""Pixels between two looks at direct light where it varies slowly."""
+"""Pixels between two lookups of direct light where it varies slowly."""
 COARSE = 6
 """Blocks of glass of so many pixels and larger, whose shapes are far coarser than what their paths leave out …"""
 COARSE_SPLIT = 0.004
 """… follow both parts of a path from this share of its power on: five times what others do, a seventh less time."""
 BIND_MOVING = 10
-"""Of uniform blocks."""
+"""Uniform block."""
 BIND_MOVING_LISTS = 22
-"""Of storage buffers, one that no other program of the camera has."""
+"""Storage buffer; no other program of the camera has this one."""
 IMAGE_PICTURE, IMAGE_VISIBLE, IMAGE_PLACES, IMAGE_LIGHT, IMAGE_CHOSEN, IMAGE_FOUND, IMAGE_CELLS, IMAGE_MARKS = range(8)
 IMAGE_FACING = IMAGE_PLACES
-"""Devices promise eight: glass asks no lattice."""
+"""Devices promise eight images: programs for glass read no lattice."""
 _GROUP = 8, 8
 _CELLS_GROUP = 32, 8
-"""Many: a software renderer hands every group out by itself, which takes as long as thirty of its cells."""
+"""Many: a software renderer dispatches groups one by one, each of which takes as long as thirty cells."""
 _LISTED_GROUP = 64
 
 
@@ -117,13 +117,13 @@ class MovingPicture:
         if self._lists is None or self._lists.size != room:
             shader.release(self._lists)
             self._lists = self._ctx.buffer(reserve=room)
-        self._tell(1)
+        self._set_step(1)
         self._bind(maps, picture)
         self._run("lattice", lattice, _CELLS_GROUP)
         self._lists.write(bytes(8))
         self._run("cells", cells, _CELLS_GROUP)
         if count := self._listed()[0]:
-            self._tell(1, lists_cells=True)
+            self._set_step(1, lists_cells=True)
             self._run("lattice", (count, 1), (_CELLS_GROUP[0] * _CELLS_GROUP[1], 1))
         self._lists.write(bytes(8))
         self._run("direct", cells, _CELLS_GROUP)
@@ -136,7 +136,7 @@ class MovingPicture:
         self.followed = 0
         if not self.specular:
             return
-        blocks = self._tell(step)
+        blocks = self._set_step(step)
         if self._chosen is None or self._facing is None or self._chosen.size != blocks:
             if self._chosen is not None and self._facing is not None:
                 shader.release(self._chosen, self._facing)
@@ -161,7 +161,7 @@ class MovingPicture:
         assert self._lists is not None
         return list(np.frombuffer(self._lists.read(8), "u4").tolist())
 
-    def _tell(self, step: int, *, lists_cells: bool = False) -> tuple[int, int]:
+    def _set_step(self, step: int, *, lists_cells: bool = False) -> tuple[int, int]:
         """Write the parameters for blocks of this side; how many there are."""
         width, height = (int(side) for side in self._camera["size"][0])
         values = MOVING_PARAMETERS.zeros(1)

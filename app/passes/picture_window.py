@@ -1,5 +1,5 @@
 """A map whose texels are a picture's pixels, or an equal part of them: what the camera sees directly is then filtered
-once, by the pixel, and neither a focus nor a spectral line is blurred by texels that lie across pixels."""
+once, by the pixel, and neither a focus nor a spectral line is blurred by texels that straddle pixels."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ PLENTY, FINER = 2, 1536
 """Texels along a pixel that windows as large as there is room for may have; more of them, in windows up to this side,
 texels."""
 _LEAST_SHARE = 0.02
-"""Of the light that must land where the camera sees the plane, or that could as well be behind it."""
+"""Share of the light that must land where the camera sees the plane, or that could as well be behind it."""
 
 
 @dataclass(frozen=True)
@@ -60,9 +60,9 @@ class PictureWindow:
         return 1.0 / float(np.linalg.det(frame.on_plane(self.texel_rows(step))))
 
     def holds_grid(self, frame: PlaneFrame, u: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """bool (m, n): which places of the plane lie in it, `u` (n,) and `v` (m,) along its axes.
+        """bool (m, n): which places of the plane are in it, `u` (n,) and `v` (m,) along its axes.
 
-        Homogeneous pixels are a sum of what goes with u and what goes with v; a border p ≥ low is p_h − low w ≥ 0, so
+        Homogeneous pixels are a sum of a term in u and a term in v; a border p ≥ low is p_h − low w ≥ 0, so
         nothing is divided."""
         rows = frame.on_plane(self.rows)
         along, across = rows[:, 0, None] * u, rows[:, 1, None] * v + rows[:, 2, None]

@@ -1,4 +1,4 @@
-"""Where in a pixel its camera samples lie."""
+"""Places of camera samples in their pixel."""
 
 from __future__ import annotations
 
@@ -22,10 +22,9 @@ def pixel_lattice(samples: int, offset: int) -> np.ndarray:
     """(samples, 2) places in a pixel, shifted as a whole from launch to launch.
 
     Every row and every column of the pixel cut into `samples` holds one sample, so that edges of any slant are filtered
-    well, and the first launch's lie about the pixel's middle, so that the picture does not move. Powers of two are a
-    (0, m, 2)-net (Sobol's, with digital shifts), so that each sample has a cell of `cells_of` to itself; others a
-    golden-ratio lattice.
-    """
+    well, and the first launch's are centred on the pixel's middle, so that the picture does not move. Powers of two are
+    a (0, m, 2)-net (Sobol's, with digital shifts), so that each sample has a cell of `cells_of` to itself; others a
+    golden-ratio lattice. """
     if is_in_strips(samples, offset):
         return np.column_stack([(np.arange(samples) + 0.5) / samples, np.full(samples, 0.5)])
     shift = offset * np.array([0.7548776662466927, 0.5698402909980532])
@@ -46,18 +45,17 @@ def pixel_lattice(samples: int, offset: int) -> np.ndarray:
 
 
 LOOKS = 4
-"""Of a sample, at what is seen directly."""
+"""Lookups of a sample at what is seen directly."""
 
 
 def looks_lattice(samples: int, offset: int) -> np.ndarray:
-    """(samples, LOOKS, 2) places in a pixel at which the samples of `pixel_lattice` look at what is seen directly: one
-    lattice all together, shared out so that each sample's lie about it."""
+    """(samples, LOOKS, 2) places in a pixel at which the samples of `pixel_lattice` look up what is seen directly: one
+    lattice all together, distributed so that each sample's are round it."""
     looks, places = pixel_lattice(LOOKS * samples, offset), pixel_lattice(samples, offset)
     in_strips = is_in_strips(samples, offset)
     columns, rows = cells_of(samples)
     if columns and not in_strips:
-        # Each sample's cell holds as many looks, for these are a net as well: no search, and no import of scipy, a
-        # tenth of the viewer's start.
+        # Each sample's cell holds as many looks, for these are a net as well: no search, and no import of scipy.
         of_sample, of_look = (np.floor(lattice * (columns, rows)) @ (rows, 1) for lattice in (places, looks))
         of_cell = np.argsort(of_look, kind="stable").reshape(samples, LOOKS)
         return looks[of_cell[of_sample.astype(int)]]

@@ -97,7 +97,7 @@ class RayFan:
 
     @property
     def _radius(self) -> float:
-        """Of the specular part of the scene, which is what one looks at: floors may be endless."""
+        """Radius of the specular part of the scene, since floors may be endless."""
         return 1.0 / self._paths.scene.space.scale
 
     def _follow(self, origins: np.ndarray, directions: np.ndarray, nm: np.ndarray, reflections: int = 0) -> list[Path]:
@@ -109,7 +109,7 @@ class RayFan:
         if light.is_parallel:
             axis = np.asarray(light.direction, float) / np.linalg.norm(light.direction)
             if not light.has_place:
-                # From outside of everything, so that whatever stands in the way is met.
+                # From outside of everything, so that whatever is in the way is met.
                 return _Beam(centre - axis * float(np.linalg.norm(self._high - self._low)), axis, True, None)
             first, second, _ = light.axes().T
             half = light.half_extent
@@ -179,8 +179,8 @@ class RayFan:
         return middle
 
     def _plane_of_bending(self, beam: _Beam, middle: np.ndarray) -> np.ndarray:
-        """Unit vector across the beam along which the object deviates its middle ray; the level one where it goes
-        straight on."""
+        """Unit vector across the beam along which the object deviates its middle ray; the level one where the ray
+        is not deviated."""
         origin, direction = (
             (beam.origin + middle, beam.axis) if beam.is_parallel else (beam.origin, _unit(beam.axis + middle))
         )

@@ -1,8 +1,7 @@
 """How the camera's pass samples the spectrum of a picture: in how many bands, or wavelength by wavelength.
 
-A pilot looks at a coarse grid of the picture's own pixels and weighs what each way leaves: chance, which falls with the
-samples, and what one band's middle decides for all of it, which does not.
-"""
+A pilot renders a coarse grid of the picture's own pixels and compares the errors of each way: chance, which falls with
+the samples, and what one band's middle decides for all of it, which does not. """
 
 from __future__ import annotations
 
@@ -15,9 +14,9 @@ MIN_SAMPLES = 8
 """With fewer, a pilot would cost more than it brings: one band."""
 MAX_BANDS = 32
 SAMPLES_A_BAND = 8
-"""That every band must keep, to smooth an outline."""
+"""Samples that every band must keep, to smooth an outline."""
 _COLUMNS = 50
-"""Of a pilot's picture."""
+"""Columns of a pilot's picture."""
 SINGLE_SPEED = 4
 """Samples of one wavelength that take about as long as one of a band: three to eight, as the scene has it."""
 _SURE = 2.0
@@ -37,7 +36,7 @@ class Spectrum:
 
     @property
     def words(self) -> str:
-        """For a summary."""
+        """Words for a summary."""
         if self.single:
             return "of one wavelength each"
         return "of the whole spectrum" if self.bands == 1 else f"in {self.bands} bands"
@@ -50,7 +49,7 @@ class Spectrum:
 
 @dataclass(frozen=True)
 class PilotRender:
-    """One picture that the pilot asks for."""
+    """One picture that the pilot needs."""
 
     spectrum: Spectrum
     seed: int = 1

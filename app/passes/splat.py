@@ -203,7 +203,7 @@ class Splatter:
                 vertex_array.render_indirect(self._footprints.commands, moderngl.TRIANGLES, 1, first=kind - 1)
 
     def counts(self) -> dict[str, float]:
-        """Of `Footprints`, since the last reset."""
+        """Counts of `Footprints` since the last reset."""
         return self._footprints.counts()
 
     def reset_counts(self) -> None:

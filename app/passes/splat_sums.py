@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 BIND_SUMS = 2
 _SIDE = 16
-"""Of a work group."""
+"""Side of a work group."""
 
 
 class SplatSums:

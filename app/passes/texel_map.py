@@ -9,7 +9,7 @@ import numpy as np
 from .plane_frame import PlaneFrame
 
 NEAREST = 0.5
-"""Of the least weight in a map's rectangle; points with less lie towards the camera's own plane, or behind it."""
+"""Share of the least weight in a map's rectangle; points with less are near the camera's own plane, or behind it."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class TexelMap:
 
     @classmethod
     def of(cls, placement: np.void, frame: PlaneFrame) -> TexelMap:
-        """Of one PLACEMENT record."""
+        """The map of one PLACEMENT record."""
         rows = np.stack([placement[name] for name in ("row_u", "row_v", "row_w")]).astype(np.float64)
         return cls(frame.on_plane(rows), placement["rect"].astype(np.float64))
 
@@ -63,7 +63,7 @@ class TexelMap:
         return np.where(weight[..., None] > 0.0, found, np.nan)
 
     def density(self, points: np.ndarray) -> np.ndarray:
-        """Texels per GPU unit² (...) at points of the plane; of what lies too near to the camera, or behind it, as
+        """Texels per GPU unit² (...) at points of the plane; of what is too near to the camera, or behind it, as
         where that begins."""
         return np.linalg.det(self.matrix) / self.drawn_weights(points) ** 3
 
