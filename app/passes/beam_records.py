@@ -1,7 +1,7 @@
 """Beam polygons in texels of one window, as the shaders read them: records, edges and the hulls to fill.
 
 Everything is relative to a whole texel near the polygon, so that float32 resolves a polygon of a hundredth of a texel
-at the far end of a wide map. """
+at the far end of a wide map."""
 
 from __future__ import annotations
 

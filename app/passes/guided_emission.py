@@ -1,10 +1,10 @@
 """Emission guided to where light lands: cells of a light's domain from which no photon of its pilots came to a
-receiver, because something stands before the glass or what the glass throws goes past everything, get few photons.
+receiver, because something hides the glass or its light misses every receiver, get few photons.
 
 The few carry what the others would have: a point of a thinned cell is emitted with a known chance, by a Kronecker
 sequence in its number, and its weight is one over that chance. So nothing that the pilots missed is lost; it is only
 noisier, as after any roulette. Cells next to those whose light landed keep all their points: what a pilot found through
-an opening narrower than its spacing, a neighbour might have found too. """
+an opening narrower than its spacing, a neighbour might have found too."""
 
 from __future__ import annotations
 

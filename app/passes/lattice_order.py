@@ -3,7 +3,7 @@
 Neighbours of a Kronecker lattice by number are far apart in space. Rays of one work group that start side by side meet
 the same nodes and triangles and take the same branches, which spares a software renderer, which runs eight rays in
 step, and a GPU's caches. Shifting the lattice only turns the torus it lies on, so one order serves every pass and every
-shift; what a photon is does not depend on it, only its place in the buffer. """
+shift; what a photon is does not depend on it, only its place in the buffer."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ def pixel_lattice(samples: int, offset: int) -> np.ndarray:
     Every row and every column of the pixel cut into `samples` holds one sample, so that edges of any slant are filtered
     well, and the first launch's are centred on the pixel's middle, so that the picture does not move. Powers of two are
     a (0, m, 2)-net (Sobol's, with digital shifts), so that each sample has a cell of `cells_of` to itself; others a
-    golden-ratio lattice. """
+    golden-ratio lattice."""
     if is_in_strips(samples, offset):
         return np.column_stack([(np.arange(samples) + 0.5) / samples, np.full(samples, 0.5)])
     shift = offset * np.array([0.7548776662466927, 0.5698402909980532])

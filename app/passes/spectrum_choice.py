@@ -1,7 +1,7 @@
 """How the camera's pass samples the spectrum of a picture: in how many bands, or wavelength by wavelength.
 
 A pilot renders a coarse grid of the picture's own pixels and compares the errors of each way: chance, which falls with
-the samples, and what one band's middle decides for all of it, which does not. """
+the samples, and what one band's middle decides for all of it, which does not."""
 
 from __future__ import annotations
 
