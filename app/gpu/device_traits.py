@@ -17,6 +17,22 @@ _SOFTWARE_RENDERERS = ("llvmpipe", "softpipe", "swrast", "swiftshader")
 
 
 @dataclass(frozen=True)
+class Budget:
+    """Sizes of a live rendering: a software renderer answers in small steps, a GPU takes millions at a time."""
+
+    batch: int = 1 << 18
+    """Rays in flight at once."""
+    first_photons: int = 1 << 20
+    """Photons of the first picture …"""
+    largest_photons: int = 1 << 25
+    """… and of the best one."""
+    store_bytes: int = 1 << 30
+    """Photons kept so that edits need no new tracing."""
+    finest_photons: int = 0
+    """Photons of the finest pass at least, however few are wanted in all."""
+
+
+@dataclass(frozen=True)
 class DeviceTraits:
     """One device's peculiarities. The defaults are a GPU's."""
 
@@ -39,14 +55,8 @@ class DeviceTraits:
     paths_group: int = 64
     """Camera paths of a work group. A software renderer hands groups out to its threads one by one and runs eight paths
     of one side by side: with more in a group, few paths are shared out unevenly."""
-    viewer_batch: int = 1 << 18
-    """Rays of a batch while somebody watches …"""
-    viewer_first_photons: int = 1 << 20
-    """… photons of the first picture …"""
-    viewer_largest_photons: int = 1 << 25
-    """… and of the best one."""
-    viewer_store_bytes: int = 1 << 30
-    """Photons kept so that edits need no new tracing."""
+    viewer: Budget = Budget()
+    """Sizes while a picture is shown that gets better."""
     viewer_splat_photons: int = 1 << 18
     """Photons splatted between two pauses."""
     splats_by_compute: bool = False
@@ -75,10 +85,7 @@ class DeviceTraits:
             work_is_queued=False,
             dispatch_s=0.15,
             paths_group=8,
-            viewer_batch=1 << 14,
-            viewer_first_photons=1 << 14,
-            viewer_largest_photons=1 << 22,
-            viewer_store_bytes=256 << 20,
+            viewer=Budget(1 << 14, 1 << 14, 1 << 22, 256 << 20),
             viewer_splat_photons=1 << 12,
         )
 

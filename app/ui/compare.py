@@ -361,7 +361,7 @@ def engine_beside(context: Context, thread: ContextThread | None) -> Engine:
 
 
 def _engine(context: Context) -> LiveEngine:
-    from ..render.viewer.engine import Budget, LiveEngine
+    from ..render.viewer.engine import LiveEngine
 
     # It is never edited, so it need not store photons to show them again.
-    return LiveEngine(context, replace(Budget.of(context), store_bytes=1 << 20))
+    return LiveEngine(context, replace(context.traits.viewer, store_bytes=1 << 20))

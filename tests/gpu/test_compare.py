@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.edit.state import Compare, State
+from spectrasplat.gpu.device_traits import Budget
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.reference.direct_light import seen_directly
-from spectrasplat.render.viewer.engine import Budget, LiveEngine
+from spectrasplat.render.viewer.engine import LiveEngine
 from spectrasplat.ui.compare import Comparison
 
 SIZE = (64, 36)

@@ -10,7 +10,7 @@ import pytest
 from spectrasplat.gpu.context import Context
 from spectrasplat.render.sampling import MovingBeams
 from spectrasplat.render.viewer.dirty_level import DirtyLevel
-from spectrasplat.render.viewer.engine import Budget, LiveEngine
+from spectrasplat.render.viewer.engine import LiveEngine
 from spectrasplat.render.viewer.invalidation import dirty_level
 from spectrasplat.render.viewer.live_light import LiveLight
 
@@ -110,7 +110,7 @@ def test_a_dragged_glass_leaves_the_light_of_others_as_fine_as_it_was(gl: Contex
 
 
 def test_light_traced_anew_takes_the_place_of_light_as_fine(gl: Context) -> None:
-    engine = LiveEngine(gl, replace(Budget.of(gl), first_photons=1 << 12, largest_photons=1 << 14))
+    engine = LiveEngine(gl, replace(gl.traits.viewer, first_photons=1 << 12, largest_photons=1 << 14))
     engine.target_photons, engine.camera_samples = 1 << 14, 1
     try:
         engine.set(inputs(scene := shipped("prism")))
@@ -129,7 +129,7 @@ def test_light_traced_anew_takes_the_place_of_light_as_fine(gl: Context) -> None
 
 
 def test_the_engine_answers_questions_about_beams(gl: Context) -> None:
-    engine = LiveEngine(gl, replace(Budget.of(gl), first_photons=1 << 12, largest_photons=1 << 14))
+    engine = LiveEngine(gl, replace(gl.traits.viewer, first_photons=1 << 12, largest_photons=1 << 14))
     engine.target_photons, engine.camera_samples = 1 << 14, 1
     try:
         wanted = inputs(shipped("prism"))
@@ -145,7 +145,7 @@ def test_the_engine_answers_questions_about_beams(gl: Context) -> None:
 
 
 def test_leaving_one_wavelength_finds_the_light_as_it_was(gl: Context) -> None:
-    engine = LiveEngine(gl, replace(Budget.of(gl), first_photons=1 << 12, largest_photons=1 << 15))
+    engine = LiveEngine(gl, replace(gl.traits.viewer, first_photons=1 << 12, largest_photons=1 << 15))
     engine.target_photons, engine.camera_samples = 1 << 15, 1
     try:
         wanted = inputs(shipped("prism"))

@@ -14,6 +14,7 @@ from spectrasplat.edit.live_inputs import LiveInputs
 from spectrasplat.edit.picking import pick
 from spectrasplat.edit.projection import View
 from spectrasplat.gpu.context import Context
+from spectrasplat.gpu.device_traits import Budget
 from spectrasplat.model.environment import gradient, world_to_local
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.lights import SpotLight
@@ -24,7 +25,7 @@ from spectrasplat.model.texture import Environment
 from spectrasplat.passes.spectrum_choice import Spectrum
 from spectrasplat.render.solo import solo_scene
 from spectrasplat.render.viewer.dirty_level import DirtyLevel
-from spectrasplat.render.viewer.engine import PREVIEW_S, Budget, LiveEngine
+from spectrasplat.render.viewer.engine import PREVIEW_S, LiveEngine
 from spectrasplat.render.viewer.glass_steps import STEPS, GlassSteps
 from spectrasplat.render.viewer.invalidation import appearance_differs, dirty_level
 from spectrasplat.render.viewer.live_camera import MOVING_TAPS, _side

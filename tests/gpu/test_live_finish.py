@@ -11,6 +11,7 @@ import pytest
 from spectrasplat.edit.live_inputs import LiveInputs
 from spectrasplat.edit.objects import set_material
 from spectrasplat.gpu.context import Context
+from spectrasplat.gpu.device_traits import Budget
 from spectrasplat.model.environment import gradient
 from spectrasplat.model.geometry import primitives
 from spectrasplat.model.lights import PointLight
@@ -18,7 +19,7 @@ from spectrasplat.model.optics.glass import from_abbe
 from spectrasplat.model.optics.spectrum import illuminant
 from spectrasplat.model.scene import Camera, Dielectric, Diffuse, Scene, SceneObject
 from spectrasplat.render.viewer.dirty_level import DirtyLevel
-from spectrasplat.render.viewer.engine import Budget, LiveEngine
+from spectrasplat.render.viewer.engine import LiveEngine
 from spectrasplat.render.viewer.invalidation import dirty_level
 
 from tests.gpu.camera_rig import at

@@ -17,6 +17,7 @@ from spectrasplat.edit.objects import add_dabs
 from spectrasplat.edit.projection import View
 from spectrasplat.gpu import shader
 from spectrasplat.gpu.context import Context
+from spectrasplat.gpu.device_traits import Budget
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.scene import Dab, Dielectric, Scene
 from spectrasplat.model.settings import RenderSettings
@@ -25,7 +26,7 @@ from spectrasplat.passes.first_surfaces import FirstSurfaces
 from spectrasplat.passes.ray_paths import RayPaths
 from spectrasplat.render.device_scene import scene_buffers
 from spectrasplat.render.viewer import rehearsal
-from spectrasplat.render.viewer.engine import Budget, LiveEngine
+from spectrasplat.render.viewer.engine import LiveEngine
 from spectrasplat.render.viewer.invalidation import only_moves
 from spectrasplat.render.viewer.live_light import LiveLight
 

@@ -14,8 +14,9 @@ from spectrasplat.base.not_yet import NotYet
 from spectrasplat.edit.picking import pick_in
 from spectrasplat.edit.state import Selection
 from spectrasplat.gpu.context import Context
+from spectrasplat.gpu.device_traits import Budget
 from spectrasplat.model.scene import Dielectric, Diffuse
-from spectrasplat.render.viewer.engine import Budget, LiveEngine
+from spectrasplat.render.viewer.engine import LiveEngine
 from spectrasplat.ui.frame import Draw
 from spectrasplat.ui.headless import HeadlessInterface
 from spectrasplat.ui.session import Session

@@ -18,7 +18,7 @@ def test_llvmpipe_has_all_of_them() -> None:
     assert traits.is_software and traits.texels_as_images and traits.loops_may_end and not traits.work_is_queued
     assert traits.queue_read_steps == 1 and traits.clock is time.process_time
     assert traits.paths_group == 8 < DeviceTraits().paths_group
-    assert traits.viewer_batch < DeviceTraits().viewer_batch
+    assert traits.viewer.batch < DeviceTraits().viewer.batch
 
 
 def test_other_software_reads_textures() -> None:

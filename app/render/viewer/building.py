@@ -18,32 +18,13 @@ from .live_light import LiveLight
 if TYPE_CHECKING:
     from ...edit.live_inputs import LiveInputs
     from ...gpu.context import Context
+    from ...gpu.device_traits import Budget
 
 
 _ENVIRONMENT_S = 0.006
 """Seconds that one dispatch for the environment's light should take."""
 PATIENCE_S = 1.0
 """Seconds of building after which every step is shown."""
-
-
-@dataclass(frozen=True)
-class Budget:
-    """Sizes that depend on the device."""
-
-    batch: int
-    first_photons: int
-    largest_photons: int
-    store_bytes: int
-    finest_photons: int = 0
-    """Photons of the finest pass at least, however few are wanted in all."""
-
-    @staticmethod
-    def of(context: Context) -> Budget:
-        """A software renderer answers in small steps; a GPU takes millions at a time."""
-        traits = context.traits
-        return Budget(
-            traits.viewer_batch, traits.viewer_first_photons, traits.viewer_largest_photons, traits.viewer_store_bytes
-        )
 
 
 @dataclass

@@ -24,7 +24,7 @@ from ..light_maps import LightMaps
 from ..sampling import MovingBeams
 from ..solo import scene_seen
 from . import schedule as events
-from .building import Budget, Shown, build
+from .building import Shown, build
 from .dirty_level import DirtyLevel
 from .engine_answers import EngineAnswers
 from .invalidation import appearance_differs, dirty_level, lights_differ, moves_view, only_moves
@@ -36,6 +36,7 @@ from .work_tally import light_counts
 
 if TYPE_CHECKING:
     from ...gpu.context import Context
+    from ...gpu.device_traits import Budget
 
 PREVIEW_OVERRUN_S = 0.25
 """What a coarse picture may take beyond a frame's budget."""
@@ -61,7 +62,7 @@ class LiveEngine(EngineAnswers):
     def __init__(self, context: Context, budget: Budget | None = None) -> None:
         shader.keep_programs(context.ctx)
         super().__init__(context)
-        self.budget = budget or Budget.of(context)
+        self.budget = budget or context.traits.viewer
         self.preview_seconds = PREVIEW_S if context.is_software else PREVIEW_GPU_S
         """What a coarse picture should take."""
         self._target_photons = 32_000_000

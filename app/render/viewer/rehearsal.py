@@ -16,7 +16,6 @@ from ...edit.objects import add_dabs, set_transform
 from ...features.features import Features
 from ...model.scene import Dab, Scene
 from ...model.settings import RenderSettings
-from .building import Budget
 from .engine import LiveEngine
 
 if TYPE_CHECKING:
@@ -31,7 +30,7 @@ MOST_TRIANGLES = 1_000_000
 
 def rehearse(context: Context, inputs: LiveInputs) -> Generator[bool]:
     """Compile in `context` what edits of `inputs` need, True after every step."""
-    engine = LiveEngine(context, replace(Budget.of(context), first_photons=PHOTONS, largest_photons=PHOTONS))
+    engine = LiveEngine(context, replace(context.traits.viewer, first_photons=PHOTONS, largest_photons=PHOTONS))
     try:
         engine.target_photons = PHOTONS
         for scene in _edited(inputs.scene):

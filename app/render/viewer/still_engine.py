@@ -10,7 +10,6 @@ import numpy as np
 from ...base.errors import UserError
 from ...gpu.context import Context
 from ...model.settings import RenderSettings
-from .building import Budget
 from .engine import LiveEngine
 
 DEFAULT_SAMPLES = 32
@@ -27,11 +26,10 @@ def still_engine(context: Context, settings: RenderSettings, exact: bool, coarse
     """One that traces all photons in one pass and keeps them; `coarse_first`: after coarser passes, to be seen sooner.
     `exact`: trace again where an edit would be followed to first order only."""
     photons = settings.photons or 1
-    room = max(Budget.of(context).store_bytes, photons * _PER_PHOTON * _RECORD_BYTES)
-    first = min(photons, max(Budget.of(context).first_photons, photons // _COARSER)) if coarse_first else photons
-    budget = replace(
-        Budget.of(context), first_photons=first, largest_photons=photons, finest_photons=photons, store_bytes=room
-    )
+    live = context.traits.viewer
+    room = max(live.store_bytes, photons * _PER_PHOTON * _RECORD_BYTES)
+    first = min(photons, max(live.first_photons, photons // _COARSER)) if coarse_first else photons
+    budget = replace(live, first_photons=first, largest_photons=photons, finest_photons=photons, store_bytes=room)
     engine = LiveEngine(context, budget)
     # A pass emits a few photons more or less than requested: one is enough in any case.
     engine.target_photons, engine.camera_samples = 1, settings.spp or DEFAULT_SAMPLES
