@@ -22,13 +22,13 @@ if TYPE_CHECKING:
     import moderngl
 
 SAMPLES = 4097
-"""Of a running integral, equally spaced over x in [0, 1]."""
+"""Samples of a running integral, equally spaced over x in [0, 1]."""
 WIDTH = SAMPLES + 1
-"""Of the texture: a sample at the end of a curve has a neighbour."""
+"""Width of the texture: a sample at the end of a curve has a neighbour."""
 PAIRS = SAMPLES // 2
 """Emission lines in a row."""
 LINE_TOLERANCE = 1e-6
-"""How far in x a polygon of no band width may lie from its emission line."""
+"""How far in x a polygon of no band width may be from its emission line."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class BeamTables:
         return cls(texture, targets, len(reflectances), len(lights), tuple(f[0].line_x for f in folded))
 
     def parts(self, light: np.ndarray, reflectance_class: int, x_lo: np.ndarray, x_hi: np.ndarray) -> CurveParts:
-        """Of polygons (n,) each; raises ValueError where a band of no width is no line of its light."""
+        """Parts of curves for polygons (n,); raises ValueError where a band of no width is no line of its light."""
         is_line = x_hi <= x_lo
         row = light.astype(np.int64) * self.classes + reflectance_class
         place = np.stack([x_lo, x_hi], axis=1) * (SAMPLES - 1)

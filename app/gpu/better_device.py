@@ -1,7 +1,7 @@
 """Whether a better GPU may be there than the one that was chosen, and how to choose it.
 
 OpenGL takes a software renderer or a laptop's integrated GPU without a word where the better one's libraries, files or
-rights are missing. What the kernel knows of the machine is held against what draws.
+rights are missing. What the kernel knows of the machine is compared with what draws.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _FORCING = {
     "MESA_LOADER_DRIVER_OVERRIDE": ("swrast", "kms_swrast", "llvmpipe"),
     "SPECTRASPLAT_BACKEND": ("osmesa",),
 }
-"""Variables, and values of theirs, that ask for a software renderer."""
+"""Variables, and values of theirs, that force a software renderer."""
 _VENDOR_FOLDERS = ("usr/share/glvnd/egl_vendor.d", "etc/glvnd/egl_vendor.d")
 NVIDIA_EGL = "libEGL_nvidia.so.0"
 
@@ -38,7 +38,7 @@ class Card:
 
 @dataclass(frozen=True)
 class Machine:
-    """Where to look; tests have one of their own."""
+    """The system that is examined; tests have one of their own."""
 
     root: Path = Path("/")
     environment: Mapping[str, str] | None = None

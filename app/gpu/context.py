@@ -39,7 +39,7 @@ _MAX_EGL_DEVICES = 16
 def check_device(ctx: moderngl.Context, where: str) -> None:
     """Raise `DeviceError` if OpenGL has reported an error since the last check: a sentence with a way out.
 
-    moderngl does not look by itself: a dispatch past the limits silently does nothing.
+    moderngl does not check by itself: a dispatch past the limits silently does nothing.
     """
     error = ctx.error
     if error == "GL_OUT_OF_MEMORY":
@@ -56,7 +56,7 @@ def check_device(ctx: moderngl.Context, where: str) -> None:
 
 
 class Context:
-    """A current moderngl context with what the passes ask of it.
+    """A current moderngl context with what the passes need to know of it.
 
     `ctx` is the `moderngl.Context`; `backend` says how it was made.
     """

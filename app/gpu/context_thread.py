@@ -20,7 +20,7 @@ BUSY_FRAME_S = 0.08
 
 
 def no_thread(*_name: str) -> None:
-    """In place of what opens one: all work is done where it is asked for."""
+    """In place of what opens one: all work is done by the caller."""
 
 
 class ContextThread:
@@ -39,7 +39,7 @@ class ContextThread:
         return self._pool.submit(work)
 
     def run(self, work: Callable[[], T]) -> T:
-        """The same, and wait for it."""
+        """`submit`, and wait for it."""
         return self._pool.submit(work).result()
 
     def close(self) -> None:

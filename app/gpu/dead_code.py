@@ -4,7 +4,7 @@
 conditionals are resolved here by the defines at hand, comments go, and of what is left only
 the macros, constants, structs, functions, global variables, bindings and blocks stay that `main` can reach, without
 the statements that constants decide (`glsl_folding`), and of a struct only the members that are mentioned. A library
-may then be written without guards, and a test can look for a symbol instead of trusting an #ifdef.
+may then be written without guards, and a test can search for a symbol instead of trusting an #ifdef.
 (A full preprocessor, pcpp, does the first part only, expands every macro on the way, and takes 0.1 s a
 program; a dozen programs have to start within a second.)
 
@@ -34,8 +34,8 @@ _MADE = re.compile(r"\b([A-Z]\w*)\s*(?:\[\w*\])?\(")
 
 
 def stripped(lines: Sequence[Line], switches: frozenset[str] = frozenset()) -> list[Line]:
-    """The lines of `lines` that can run, without comments, in their order; `switches` are 0 where nobody defines
-    them."""
+    """The lines of `lines` that can run, without comments, in their order; `switches` are 0 where they are not
+    defined."""
     kept, resolved = resolve_conditionals(list(_units(_without_comments(lines))), switches=switches)
     if resolved:
         kept = _reachable(kept, switches)
@@ -95,7 +95,7 @@ class _Definition:
     text: str
     is_folded: bool = False
     structs: frozenset[str] = frozenset()
-    """Structs of a function's arguments: an overload for a struct that nobody uses is not called either."""
+    """Structs of a function's arguments: an overload for a struct that is not used is not called either."""
 
 
 def _reachable(units: Sequence[Unit], switches: frozenset[str]) -> list[Unit]:
@@ -139,7 +139,7 @@ class _Constants:
                 values |= {} if value is None else {name: value}
                 ours.add(name)
         self._values = values
-        # A count that is also a switch (TINT_LEVELS) stands for its number.
+        # A count that is also a switch (TINT_LEVELS) denotes its number.
         self._places = places_of(values, frozenset(name for name in ours if values.get(name) in (0, 1)))
 
     def decide(self, text: str) -> str:
@@ -211,7 +211,7 @@ def _declared(statement: str) -> frozenset[str]:
 
 
 def _whole_structs(structs: set[str], units: Sequence[Unit], statements: Sequence[str]) -> set[str]:
-    """Structs that keep all their members: what lies in buffers, and what is made by listing all members."""
+    """Structs that keep all their members: what is in buffers, and what is made by listing all members."""
     generated = {
         found.group(1) for unit in units if unit[0].file.startswith("<") and (found := _STRUCT.match(unit[0].text))
     }

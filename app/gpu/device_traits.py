@@ -43,17 +43,17 @@ class DeviceTraits:
     loops_may_end: bool = False
     """All loops of an invocation end, silently, once they have run about 65,535 rounds together."""
     queue_read_steps: int = 8
-    """Events of all rays between two looks at how many are left. Looking waits for the device, and empty steps cost a
+    """Events of all rays between two reads of how many are left. Reading waits for the device, and empty steps cost a
     GPU less."""
     batch_scale: int = 16
     """Rays in flight, and the memory for them, in units of the default batch. An event of a few rays takes a GPU as
     long as one of many: a batch has some forty, of five dispatches each."""
     work_is_queued: bool = True
-    """A command only queues work: whoever keeps a deadline must wait for the device."""
+    """A command only queues work: to keep a deadline is to wait for the device."""
     dispatch_s: float = DISPATCH_S
-    """What a dispatch should take where nobody waits for frames."""
+    """What a dispatch should take where no frames are waited for."""
     paths_group: int = 64
-    """Camera paths of a work group. A software renderer hands groups out to its threads one by one and runs eight paths
+    """Camera paths of a work group. A software renderer gives groups to its threads one by one and runs eight paths
     of one side by side: with more in a group, few paths are shared out unevenly."""
     viewer: Budget = Budget()
     """Sizes while a picture is shown that gets better."""

@@ -26,7 +26,7 @@ class DispatchBudget:
     def learn(self, units: int, took_s: float, wanted_s: float) -> None:
         """A dispatch of `units` took `took_s` and should have taken `wanted_s`.
 
-        A rest that was less than a whole portion tells little, unless it took too long."""
+        A rest that was less than a whole portion says little, unless it took too long."""
         if units < self.units and took_s < wanted_s:
             return
         fitting = int(units * wanted_s / max(took_s, _MIN_S)) // self.whole * self.whole

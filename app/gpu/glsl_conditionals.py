@@ -1,7 +1,7 @@
-"""Preprocessor conditionals of GLSL, resolved by the defines at hand.
+"""Preprocessor conditionals of GLSL, resolved by the given defines.
 
-Only #if … #endif are dealt with; macros are looked at, not expanded, so that the text stays the author's.
-Where only the driver can tell (GL_*, __VERSION__, names that are not defined) nothing is touched.
+Only #if … #endif are dealt with; macros are evaluated, not expanded, so that the text stays the author's.
+Where only the driver knows (GL_*, __VERSION__, names that are not defined) nothing is touched.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _DEEPEST = 8
 
 
 class _UnknownError(Exception):
-    """Only the driver can tell."""
+    """Only the driver knows."""
 
 
 class Line(NamedTuple):
@@ -66,11 +66,11 @@ class _Macros:
     """What is known of the preprocessor's names at a place of the text."""
 
     values: dict[str, str | None] = field(default_factory=dict)
-    """None: a macro with arguments, which no condition here asks for."""
+    """None: a macro with arguments, which no condition here uses."""
     doubtful: set[str] = field(default_factory=set)
-    """Defined or not under a condition that only the driver can tell."""
+    """Defined or not under a condition that only the driver can evaluate."""
     switches: frozenset[str] = frozenset()
-    """Names that are 0 where nobody defines them."""
+    """Names that are 0 where they are not defined."""
 
     def note(self, unit: Unit, certain: bool) -> None:
         """Take in a #define or #undef."""
@@ -100,7 +100,7 @@ class _Macros:
 
 
 def macros_of(units: Sequence[Unit], switches: frozenset[str] = frozenset()) -> _Macros:
-    """What is defined at the end of a text without conditionals; `switches` are 0 where nobody defines them."""
+    """What is defined at the end of a text without conditionals; `switches` are 0 where they are not defined."""
     macros = _Macros(switches=switches)
     for unit in units:
         macros.note(unit, certain=True)
@@ -108,7 +108,7 @@ def macros_of(units: Sequence[Unit], switches: frozenset[str] = frozenset()) -> 
 
 
 def value_of(expression: str, macros: _Macros) -> int | None:
-    """An integer expression's value; None where only the driver can tell."""
+    """An integer expression's value; None where only the driver knows."""
     try:
         return _expression([found.group(1) for found in _CONDITION_TOKEN.finditer(expression)], macros, 0)
     except _UnknownError:
@@ -118,10 +118,10 @@ def value_of(expression: str, macros: _Macros) -> int | None:
 def resolve_conditionals(
     units: Sequence[Unit], macros: _Macros | None = None, switches: frozenset[str] = frozenset()
 ) -> tuple[list[Unit], bool]:
-    """The units whose conditions hold, and whether every condition could be told. `switches` are 0 where nobody defines
-    them.
+    """The units whose conditions hold, and whether every condition could be evaluated. `switches` are 0 where they are
+    not defined.
 
-    A chain with a condition that cannot be told stays whole; what it defines is then not known either.
+    A chain with a condition that cannot be evaluated stays whole; what it defines is then not known either.
     """
     macros = macros or _Macros(switches=switches)
     kept: list[Unit] = []

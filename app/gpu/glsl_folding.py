@@ -177,7 +177,7 @@ def _with_decided(text: str, start: int, end: int, holds: bool) -> tuple[str, in
 
 
 def _statement_decided(text: str, start: int, end: int, holds: bool) -> tuple[str, int]:
-    """The same for `if (…)` from `start` to `end`."""
+    """`_with_decided` for `if (…)` from `start` to `end`."""
     first = _skip(text, end)
     first_end = _end_of_statement(text, first)
     second = _skip(text, first_end)
@@ -280,5 +280,5 @@ def _lines(text: str) -> str:
 
 
 def _in_lines(kept: str, replaced: str) -> str:
-    """`kept` with as many line breaks as what it stands for."""
+    """`kept` with as many line breaks as what it replaces."""
     return kept + "\n" * (replaced.count("\n") - kept.count("\n"))

@@ -1,5 +1,5 @@
 """GPU space: everything is moved and scaled into it first, so that float32 resolves the glass equally well in a scene
-of micrometres and in one that stands ten kilometres off the origin."""
+of micrometres and in one ten kilometres off the origin."""
 
 from __future__ import annotations
 

@@ -2,8 +2,8 @@
 
 A GPU runs the fewer invocations side by side the more registers each needs, so this number bounds how well a program
 hides its waiting for memory. No driver tells it through OpenGL; so the text is translated to SPIR-V, optimised as a
-driver would (everything inlined, variables turned into values) and looked through here. Compilers reorder and
-recompute, so theirs differs; it is for comparing programs, and for telling those that cannot fit (255 registers for an
+driver would (everything inlined, variables turned into values) and analysed here. Compilers reorder and
+recompute, so theirs differs; it is for comparing programs, and for finding those that cannot fit (255 registers for an
 invocation on NVIDIA, 256 on AMD) from those that do.
 
 Liveness is the textbook's (Aho, Lam, Sethi, Ullman, *Compilers*, 2nd ed., section 9.2.5) on static single assignment.
@@ -27,12 +27,12 @@ _ADDRESSES = frozenset(("OpAccessChain", "OpInBoundsAccessChain", "OpFunctionPar
 
 @dataclass(frozen=True)
 class LiveState:
-    """Of one shader, per invocation, in words of 32 bits."""
+    """What one shader holds, per invocation, in words of 32 bits."""
 
     registers: int
     """Values that are live at the fullest point."""
     scratch: int
-    """Arrays of its own that are indexed by numbers not known to the compiler: they lie in memory on most GPUs."""
+    """Arrays of its own that are indexed by numbers not known to the compiler: they are in memory on most GPUs."""
     instructions: int
 
 
@@ -46,7 +46,7 @@ class _Block:
 
 
 def live_state(assembly: str) -> LiveState:
-    """Of the entry function in a disassembly with raw identifiers (`spirv-dis --raw-id`), all calls inlined.
+    """Live state of the entry function in a disassembly with raw identifiers (`spirv-dis --raw-id`), all calls inlined.
 
     Raises `ValueError` where there is a call left or no function at all."""
     sizes = _Sizes()

@@ -1,9 +1,9 @@
-"""What the channels of a caustic map stand for.
+"""What the channels of a caustic map mean.
 
 A picture in colour needs the map's XYZ only, unless the camera sees it through glass that disperses: then every
 wavelength is looked up at another place, and the map holds coarse spectra beside XYZ. Their bins overlap by half
-(tents), so that a pure colour between two of them is a mixture of both and no step shows. A spectral picture asks for
-the bins it wants.
+(tents), so that a pure colour between two of them is a mixture of both and no step shows. A spectral picture has
+its own bins.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class MapChannels:
     """XYZ and W; the same with spectral tents after them; or bins with edges."""
 
     edges_nm: tuple[float, ...] | None = None
-    """Ascending edges of the bins that a spectral picture asks for."""
+    """Ascending edges of the bins of a spectral picture."""
     tents_nm: tuple[float, ...] = ()
     """Ascending peaks of the tents that follow XYZ and W; the first and the last one's flat sides reach on."""
 
@@ -70,7 +70,7 @@ class MapChannels:
         return self._padded(np.column_stack([K_M * cmf_xyz(), np.ones(len(VISIBLE_NM))]), VISIBLE_NM)
 
     def line_weights(self, line_nm: np.ndarray) -> np.ndarray:
-        """The same at exact wavelengths: (lines, columns)."""
+        """Weights at exact wavelengths: (lines, columns)."""
         if self.edges_nm is None:
             return self._padded(np.column_stack([K_M * cmf_at(line_nm), np.ones(len(line_nm))]), line_nm)
         edges = np.asarray(self.edges_nm, np.float64)

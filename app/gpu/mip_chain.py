@@ -41,7 +41,7 @@ def _chain(rgb: _Array, *, on_sphere: bool) -> list[_Array]:
     levels = [rgb]
     for k in range(1, level_count(width, height)):
         to_width, to_height = level_size(width, height, k)
-        # From the level before where its texels lie wholly in this one's, else from the picture itself.
+        # From the level before where its texels are wholly in this one's, else from the picture itself.
         nested = all(n == m or n == 2 * m for n, m in zip(levels[-1].shape[:2], (to_height, to_width), strict=True))
         source = levels[-1] if nested else rgb
         rows = _means(source, to_height, on_sphere)
@@ -66,7 +66,7 @@ def _means(values: _Array, count: int, on_sphere: bool) -> _Array:
         return weights[:, 0] * values[0::2] + weights[:, 1] * values[1::2]
     from scipy.sparse import coo_array
 
-    # In units where both grids' borders are whole numbers; a piece between two borders lies in one part and one cell.
+    # In units where both grids' borders are whole numbers; a piece between two borders is in one part and one cell.
     borders = np.union1d(np.arange(count + 1) * size, np.arange(size + 1) * count)
     part, cell = borders[:-1] // size, borders[:-1] // count
     share = np.diff(_measure(borders / (size * count), on_sphere))

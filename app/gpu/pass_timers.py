@@ -1,4 +1,4 @@
-"""How long the device itself worked for each pass: OpenGL's timer queries, where they tell the truth.
+"""How long the device itself worked for each pass: OpenGL's timer queries, where they are right.
 
 Software renderers answer them with nonsense, and so have drivers; a probe finds out. Elsewhere the wall clock about
 work that is waited for has to do.

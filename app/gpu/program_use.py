@@ -1,4 +1,4 @@
-"""What a program asks of the device: storage and uniform blocks, texture and image units, shared memory, size.
+"""What a program needs of the device: storage and uniform blocks, texture and image units, shared memory, size.
 
 Read from the text that is compiled, so that it can be told without a driver. Drivers count what is declared *and*
 used; so does this.
@@ -28,7 +28,7 @@ _WORDS = {"float": 1, "uint": 1, "int": 1, "vec2": 2, "uvec2": 2, "vec3": 3, "ve
 
 
 PROMISED_IMAGES = 8
-"""Image units of a compute shader that OpenGL 4.3 promises (core specification, table 23.66); moderngl does not tell
+"""Image units of a compute shader that OpenGL 4.3 promises (core specification, table 23.66); moderngl does not report
 how many there are."""
 PROMISED_SHARED_BYTES = 32768
 """Shared memory, likewise (table 23.65)."""
@@ -42,7 +42,7 @@ class StageUse:
     stage: Stage
     lines: int
     bytes: int
-    """Of the text."""
+    """Size of the text."""
     storage: tuple[str, ...]
     """Names of the storage blocks."""
     uniform: tuple[str, ...]
@@ -70,7 +70,7 @@ class StageUse:
 
 
 def use_of(source: Source) -> StageUse:
-    """What one shader asks for."""
+    """What one shader needs."""
     text = source.text
     defined = [line for line in text.splitlines() if line.lstrip().startswith("#")]
     defined += [f"#define {name} {value}" for name, value in _CONSTANT.findall(text)]
@@ -110,7 +110,7 @@ def use_of(source: Source) -> StageUse:
 
 
 def uses(built: Built) -> tuple[StageUse, ...]:
-    """Of a program's stages."""
+    """What a program's stages need."""
     return tuple(use_of(stage) for stage in built.stages)
 
 

@@ -38,7 +38,7 @@ class Reindexing:
     """The coordinate y of the glass that is shown, by the index n of the path: y = offset + scale · n."""
 
     axis: SpectralAxis
-    """y by the wavelength; it may stand still where n does."""
+    """y by the wavelength; it may be constant where n is."""
     offset: float
     scale: float
     y_reference: float

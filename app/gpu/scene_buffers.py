@@ -1,4 +1,4 @@
-"""The scene as the GPU sees it: what stands in it (`SceneGeometry`), objects' records, spectra.
+"""The scene as the GPU sees it: what is in it (`SceneGeometry`), objects' records, spectra.
 
 Everything is moved and scaled into GPU space first (`GpuSpace`).
 """
@@ -70,7 +70,7 @@ class SceneBuffers:
         axis: SpectralAxis,
         like: SceneBuffers | None = None,
     ) -> None:
-        """`like`: of a scene whose objects only stood elsewhere: GPU space, corners' turns, the tree's shape and what
+        """`like`: of a scene whose objects have only moved: GPU space, corners' turns, the tree's shape and what
         nests in what are taken from there."""
         self.ctx = ctx
         self.scene = scene
@@ -87,7 +87,7 @@ class SceneBuffers:
             else o.mesh.transformed(o.object_to_world)
             for i, o in enumerate(scene.objects)
         ]
-        # Of a mesh's normals, and asked again with every move of a hand.
+        # From a mesh's normals; needed again with every step of a drag.
         self._faceted: list[bool] = (
             [o.material.is_specular and o.mesh.is_faceted for o in scene.objects] if like is None else like._faceted
         )
@@ -95,7 +95,7 @@ class SceneBuffers:
         self.geometry: SceneGeometry
         self.geometry, self._sections = SceneGeometry.of(scene, self.world_meshes, self.space, features, before)
         self.triangle_count = len(self._sections.get("TRIANGLES", ()))
-        """Those that are looked for one by one: none of half-space solids."""
+        """Those that rays are tested with one by one: none of half-space solids."""
         self._buffers: dict[int, moderngl.Buffer] = {}
         self.defines: dict[str, int | str] = {**bindings.SCENE_DEFINES, "SPECTRAL_SAMPLES": SAMPLES}
         self._pack_geometry()
@@ -168,7 +168,7 @@ class SceneBuffers:
 
     @cached_property
     def tints(self) -> np.ndarray:
-        """`tint_curves` of the scene: every pass asks, and a mean chord takes all of a mesh's triangles."""
+        """`tint_curves` of the scene: every pass needs them, and a mean chord takes all of a mesh's triangles."""
         levels = self.tint_levels
         return tint_curves(self.scene, None if levels is None else levels.coefficient)
 
@@ -198,7 +198,7 @@ class SceneBuffers:
         return 0 if light.profile is None else self._profile_start[light.profile]
 
     def move(self, scene: Scene) -> bool:
-        """Take over `scene`, in which other objects stand elsewhere and nothing else differs that buffers hold, in the
+        """Take over `scene`, in which objects have moved and nothing else differs that buffers hold, in the
         GPU space that there is. False, and nothing done, where programs made for these buffers do not fit it."""
         moved = SceneBuffers(self.ctx, scene, self.features, self.axis, self)
         if moved.defines != self.defines:

@@ -35,12 +35,12 @@ class Solids:
 
     @staticmethod
     def of(scene: Scene, meshes: Sequence[Mesh], space: GpuSpace, *, moved: bool) -> Solids:
-        """`meshes`: in the world; `moved`: of a scene that was packed before, in which objects stand elsewhere."""
+        """`meshes`: in the world; `moved`: of a scene that was packed before, in which objects have moved."""
         found: list[tuple[int, np.ndarray]] = []
         known_meshes = set()
         for index, untransformed in half_spaces(scene).items():
             item, mesh = scene.objects[index], meshes[index]
-            # Of a mesh that stands in many places, they are found once.
+            # Of a mesh with many places, they are found once.
             own = mesh.convex_planes if not moved and id(item.mesh) not in known_meshes else None
             known_meshes.add(id(item.mesh))
             if own is None:  # a transform may push a borderline solid over the tolerance
@@ -85,7 +85,7 @@ class Curved:
         return Curved(own, tuple(faces), tuple(objects)), {"PIECES": records} if faces else {}
 
     def primitives(self, index: int, corners: np.ndarray) -> np.ndarray:
-        """uint32 (T,): the face that each triangle of an object's mesh stands for. `corners` (T, 3, 3): GPU space."""
+        """uint32 (T,): the face that each triangle of an object's mesh is part of. `corners` (T, 3, 3): GPU space."""
         first = self.objects.index(index)
         off = [np.abs(face.distance(corners)).max(axis=1) for face in self.faces[first : first + len(self.own[index])]]
         return (_CURVED_BIT | (first + np.argmin(off, axis=0))).astype(np.uint32)
@@ -111,9 +111,9 @@ class Triangles:
         has_tree: bool,
         before: Triangles | None,
     ) -> tuple[Triangles, dict[str, np.ndarray]]:
-        """With the sections of `SceneTexels`, which nobody needs once they are uploaded. `first`:
+        """With the sections of `SceneTexels`, which are not needed once they are uploaded. `first`:
         `SceneGeometry.first_triangle`; `loose`: objects that are neither `Solids` nor `Curved`; `before`: of a scene in
-        which they only stood elsewhere."""
+        which they have only moved."""
         corner_turn = np.tile(np.arange(3), (first[-1], 1)) if before is None else before.corner_turn
         if not loose:
             return Triangles(np.zeros(0, int), corner_turn, None), {}

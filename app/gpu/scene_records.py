@@ -1,4 +1,4 @@
-"""Records of what stands in a scene, as shaders read them."""
+"""Records of what is in a scene, as shaders read them."""
 
 from __future__ import annotations
 

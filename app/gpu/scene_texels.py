@@ -1,9 +1,8 @@
 """What rays look up at scattered places, as textures: tree, triangles, normals, objects, spectra.
 
 A texel is four words and one fetch. llvmpipe (Mesa 22.3) gathers a texel for eight rays at once
-but walks through a storage buffer ray by ray and word by word, under a mask test each: the tree
-is about 4 times faster this way there, and no slower on a GPU. It works out a mip level per ray for
-every `texelFetch`, half of the cost, so there the texture is bound as an image. Words are kept as unsigned
+but reads a storage buffer ray by ray and word by word, under a mask test each. It works out a mip
+level per ray for every `texelFetch`, so there the texture is bound as an image. Words are kept as unsigned
 integers, so that no driver flushes or quiets a bit pattern that is not a float.
 """
 

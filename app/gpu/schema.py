@@ -54,7 +54,7 @@ class Struct:
 
     @cached_property
     def _hash(self) -> int:
-        # Sources are kept by the structs that they hold, and a drag asks for a dozen of them in every frame.
+        # Sources are kept by the structs that they hold, and a drag needs a dozen of them in every frame.
         return hash((self.name, self.fields, self.texels))
 
     def __post_init__(self) -> None:
@@ -118,7 +118,7 @@ class Struct:
                     unpack.append(f"    {part} = {from_bits}({texel});")
                     word += 1
         count = f"{self.name}_TEXELS"
-        # Without a loop: a compiler that is told not to unroll (camera.comp) would load every texel, into memory, where
+        # Without a loop: a compiler with orders not to unroll (camera.comp) would load every texel, into memory, where
         # most callers want one member.
         loads = ", ".join(f"load((at) + {i}u)" for i in range(word // 4))
         return "\n".join(

@@ -48,7 +48,7 @@ class Releasable(Protocol):
 
 @dataclass(frozen=True)
 class Source:
-    """Flattened GLSL, as it is handed to the driver, and where each of its lines came from."""
+    """Flattened GLSL, as the driver gets it, and where each of its lines came from."""
 
     name: str
     text: str
@@ -74,7 +74,7 @@ def _switches() -> frozenset[str]:
 
 
 _files: dict[Path, tuple[tuple[int, int], list[tuple[Line, str]]]] = {}
-"""Of each shader file its time and size when it was read, and its lines: most programs include the same dozen."""
+"""By shader file: its time and size when it was read, and its lines: most programs include the same dozen."""
 
 
 def _read(root: Path, file: str) -> list[tuple[Line, str]]:
@@ -100,7 +100,7 @@ def load_source(
 ) -> Source:
     """Flatten the shader `name` (path under the shaders folder) and leave out what cannot run.
 
-    `extensions`: of GLSL that it asks for; they have to stand before everything else. Raises `ShaderError` naming the
+    `extensions`: of GLSL that it needs; they have to come before everything else. Raises `ShaderError` naming the
     including file and line when an include is missing.
     """
     root = root or paths.shaders_dir()
@@ -130,7 +130,7 @@ def load_source(
         try:
             read = _read(root, file)
         except OSError as error:
-            raise ShaderError(f"shader {file} asked for by {asked_by} cannot be read: {error.strerror}") from error
+            raise ShaderError(f"shader {file} included by {asked_by} cannot be read: {error.strerror}") from error
         for line, included in read:
             if included:
                 flatten(included, f"{file}:{line.number}")
@@ -153,7 +153,7 @@ _kept: dict[int, OrderedDict[tuple[str, ...], moderngl.ComputeShader | moderngl.
 _keepers: Counter[int] = Counter()
 """`keep_programs` not yet undone, by context."""
 _owners: Counter[int] = Counter()
-"""How many hold a program that was handed out while programs were kept, by its id."""
+"""How many hold a program that was lent while programs were kept, by its id."""
 _sources: dict[Hashable, Source] = {}
 """Flattened sources, where programs are kept."""
 KEPT_PROGRAMS = 96
@@ -183,7 +183,7 @@ def forget_programs(ctx: moderngl.Context) -> None:
 
 
 def drop_programs(ctx: moderngl.Context) -> None:
-    """Compile what is asked for from now on again, from the text that is on the disk then."""
+    """Compile every program again from now on, from the text that is on the disk then."""
     _sources.clear()
     programs = _kept.get(id(ctx), OrderedDict())
     while programs:
@@ -231,10 +231,10 @@ def _kept_or(ctx: moderngl.Context, texts: tuple[str, ...], compiled: Callable[[
 
 @dataclass(frozen=True)
 class Built:
-    """A program as it was handed to the driver."""
+    """A program as the driver got it."""
 
     stages: tuple[Source, ...]
-    """Of a drawing program the vertex shader first."""
+    """The vertex shader of a drawing program comes first."""
     seconds: float
     """Until the driver had compiled and linked it (some do the rest at the first use); 0 where it was kept."""
 
@@ -245,7 +245,7 @@ class Built:
 
     @property
     def texts(self) -> tuple[str, ...]:
-        """What tells it from others."""
+        """What distinguishes it from others."""
         return tuple(stage.text for stage in self.stages)
 
 

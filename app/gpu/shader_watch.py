@@ -19,7 +19,7 @@ Stamps = dict[Path, tuple[int, int]]
 
 
 class ShaderWatch:
-    """`changed()` is cheap enough to be asked in every frame."""
+    """`changed()` is cheap enough to be called in every frame."""
 
     def __init__(self, root: Path | None = None, clock: Callable[[], float] = time.monotonic) -> None:
         self._root = root or paths.shaders_dir()
@@ -28,7 +28,7 @@ class ShaderWatch:
         self._stamps = self._look()
 
     def changed(self) -> tuple[str, ...]:
-        """Files written, added or deleted since the last answer, relative to the folder; looks every half second."""
+        """Files written, added or deleted since the last answer, relative to the folder; checks every half second."""
         now = self._clock()
         if now < self._next_look:
             return ()
@@ -45,7 +45,7 @@ class ShaderWatch:
                 continue
             try:
                 status = path.stat()
-            except OSError:  # an editor is just replacing it: it will be there at the next look
+            except OSError:  # an editor is just replacing it: it will be there at the next check
                 continue
             stamps[path] = (status.st_mtime_ns, status.st_size)
         return stamps

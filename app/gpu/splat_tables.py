@@ -271,7 +271,7 @@ def _cells(sigma: float) -> int:
 def _kernels(width: int) -> dict[tuple[int, float], np.ndarray]:
     """(cells, sigma) -> (width, cells): what a unit of energy in each cell of a band gives at each xi.
 
-    A cell stands for a uniform density over it: a Gaussian at its middle with the cell's variance added.
+    A cell represents a uniform density over it: a Gaussian at its middle with the cell's variance added.
     The same for all spectra.
     """
     kernels = {}

@@ -1,7 +1,6 @@
 """Whether splats are drawn by the rasteriser or added by compute shaders: a device is fast at one of the two.
 
-Data-centre GPUs have next to no raster hardware: an NVIDIA H200 blends 0.7 G fragments a second into RGBA32F, where
-its compute shaders make a million footprints in 14 ms. Elsewhere the rasteriser is kept: software renderers and most
+Data-centre GPUs have next to no raster hardware. Elsewhere the rasteriser is kept: software renderers and most
 GPUs then add in a fixed order, and the same picture comes out every time.
 """
 
@@ -30,7 +29,7 @@ SLOW_BLENDING = 8e9
 _WAYS = ("raster", "compute")
 _SIDE, _QUADS = 1024, 8
 _PATIENCE_S = 0.1
-"""For a device to wake up and be fast; what is fast at once needs no more than a round."""
+"""Seconds for a device to wake up and be fast; what is fast at once needs no more than a round."""
 _VERTEX = """#version 430 core
 void main() {
     gl_Position = vec4(vec2(gl_VertexID % 3 == 1 ? 3.0 : -1.0, gl_VertexID % 3 == 2 ? 3.0 : -1.0), 0.0, 1.0);
@@ -52,7 +51,7 @@ class SplatWay:
     largest_sums: int
     """Bytes that the sums of compute shaders may take: of one storage block."""
     extensions: tuple[str, ...] = ()
-    """Of GLSL that adding asks for; without them it compares and swaps."""
+    """Extensions of GLSL that adding needs; without them it compares and swaps."""
 
     def for_maps(self, size: tuple[int, int], targets: int) -> bool:
         """Whether splats go by compute shaders into maps of so many texels and textures."""
@@ -65,7 +64,7 @@ class SplatWay:
 
 
 def sums_bytes(size: tuple[int, int], targets: int) -> int:
-    """Of the sums that compute shaders add splats to: whole blocks of 4 by 2 texels (`light/splat_sums.glsl`)."""
+    """Size of the sums that compute shaders add splats to: whole blocks of 4 by 2 texels (`light/splat_sums.glsl`)."""
     width, height = size
     return -(-width // 4) * -(-height // 2) * 8 * 16 * targets
 

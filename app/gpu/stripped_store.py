@@ -22,12 +22,12 @@ from .glsl_conditionals import Line
 MOST_FILES = 4096
 """8 KB each; all tests together build so many."""
 _MOST_BYTES = 1 << 22
-"""Of one file, packed and unpacked."""
+"""Largest file, packed and unpacked."""
 _SUFFIX = ".glsl.z"
 
 
 def stripped(lines: Sequence[Line], switches: frozenset[str]) -> list[Line]:
-    """`dead_code.stripped`, from the disk where it was asked for before. A folder that cannot be read or written, and a
+    """`dead_code.stripped`, from the disk where it was made before. A folder that cannot be read or written, and a
     damaged file, only cost time."""
     path = _path_of(lines, switches)
     kept = None if path is None else _load(path)

@@ -55,7 +55,7 @@ def textured_objects(scene: Scene) -> list[int]:
 
 
 def place_defines(binding: int, unit: int) -> dict[str, int]:
-    """Symbols that tell the shader what `TextureStore.bind(binding, unit)` will bind to."""
+    """Symbols by which the shader knows what `TextureStore.bind(binding, unit)` will bind to."""
     return {"BIND_PICTURES": binding, "UNIT_PICTURES": unit, "UNIT_CORNERS": unit + 1}
 
 
@@ -77,7 +77,7 @@ class _Source:
 
     @property
     def name(self) -> str:
-        """For people."""
+        """Its name in messages."""
         return self.owner.source or ("the environment" if isinstance(self.owner, Environment) else "a texture")
 
 

@@ -45,7 +45,7 @@ def pack(sizes: Sequence[tuple[int, int]], max_side: int = MAX_SIDE) -> tuple[li
             best = (size[0] * size[1], tiles, size)
     if best is None:
         raise UserError(
-            f"the caustic maps need {area / 1e6:.1f} M texels and do not fit a texture of {max_side}²; ask for a "
+            f"the caustic maps need {area / 1e6:.1f} M texels and do not fit a texture of {max_side}²; choose a "
             "smaller picture or map"
         )
     return best[1], best[2]

@@ -73,7 +73,7 @@ class DriverCalls:
         self._dispatch(x, y, z)
 
     def dispatch_indirect(self, program: int, buffer: int, offset: int) -> None:
-        """The same; how many groups stands in `buffer`."""
+        """Run a compute program; how many groups is in `buffer`."""
         self._use_program(program)
         self._bind_buffer(_DISPATCH_INDIRECT_BUFFER, buffer)
         self._dispatch_indirect(offset)
@@ -105,7 +105,7 @@ class UnlockedCompute(moderngl.ComputeShader):
 
 
 def unlocked(program: moderngl.ComputeShader) -> moderngl.ComputeShader:
-    """The same object; of an unlocked context, with runs that let other threads go on."""
+    """`program` itself; in an unlocked context with runs that let other threads go on."""
     if program.ctx in _calls:
         program.__class__ = UnlockedCompute
     return program

@@ -256,7 +256,7 @@ def test_messages_still_name_file_and_line(tmp_path: Path) -> None:
     ]
     assert source.explain("0:4(5): error") == "main.comp:6 (5): error"
     assert source.explain("0(2) : error") == "lib.glsl:4  : error"
-    with pytest.raises(ShaderError, match="nowhere.glsl asked for by main.comp:1"):
+    with pytest.raises(ShaderError, match="nowhere.glsl included by main.comp:1"):
         (tmp_path / "main.comp").write_text('#include "nowhere.glsl"\n')
         load_source("main.comp", {}, (), tmp_path)
 
