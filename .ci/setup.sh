@@ -87,8 +87,10 @@ offer_xvfb() {
     { command -v xvfb-run && command -v Xvfb && command -v xauth; } >/dev/null 2>&1 || apt_install xvfb xauth || true
 }
 
-# Compile the tree builder and the search for beams ahead of time, so that the first picture does not wait for it.
+# Compile the program's modules, as pip does for a wheel (where PYTHONDONTWRITEBYTECODE is set they would be compiled
+# at every start), the tree builder and the search for beams, so that the first picture does not wait for them.
 warm_caches() {
+    "$venv_python" -m compileall -q "$root/app" >/dev/null 2>&1 || true
     "$venv_python" -P -m spectrasplat.model.geometry.bvh --warm >/dev/null 2>&1 || true
     "$venv_python" -P -m spectrasplat.beams.compile >/dev/null 2>&1 || true
 }

@@ -26,9 +26,14 @@ if TYPE_CHECKING:
 def inspect(options: Inspect) -> int:
     """Show a scene, or its programs. Raises `UserError`."""
     from ..model.io.scene_file import load_scene
-    from .inspect_programs import programs_text
 
-    show((programs_text if options.programs else inspect_text)(load_scene(find_scene(options.scene))))
+    scene = load_scene(find_scene(options.scene))
+    if options.programs:
+        from .inspect_programs import programs_text
+
+        show(programs_text(scene))
+    else:
+        show(inspect_text(scene))
     return 0
 
 

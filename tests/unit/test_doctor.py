@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-import importlib.metadata
+from collections.abc import Callable
 from dataclasses import replace
+from importlib.metadata import PackageNotFoundError
 from pathlib import Path
+from typing import Any
 
 import pytest
 from spectrasplat.__main__ import main
@@ -48,11 +50,6 @@ def test_sound_machine(capsys: pytest.CaptureFixture[str]) -> None:
     assert "SpectraSplat can run here." in out and "!!" not in out
 
 
-def test_software_renderer_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(FakeContext, "is_software", True)
-    assert "software renderer" in found("renderer").found
-
-
 @pytest.mark.parametrize(
     "sentence",
     [
@@ -73,52 +70,11 @@ def test_opengl_missing_or_too_old(
     assert "OpenGL: run 'apt-get install libegl1' as root" in out
 
 
-def test_limit_too_small(monkeypatch: pytest.MonkeyPatch) -> None:
-    small = replace(NEEDED, draw_buffers=4, work_group_count=(65535, 65535, 100))
-    monkeypatch.setattr(FakeContext, "limits", small)
-    assert not found("limit draw_buffers").usable
-    assert found("limit draw_buffers").found == "4 (needed 8)"
-    assert not found("limit work_group_count").usable
-    assert found("limit texture_px").usable
-
-
 def test_a_better_gpu_is_told(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setattr(FakeContext, "advice", "the processor draws although there is a GPU by AMD: set A=1: now")
     assert main(["doctor"]) == 0
     out = capsys.readouterr().out
     assert "--  better GPU" in out and "better GPU: set A=1: now" in out
-
-
-def test_limits_beyond_what_opengl_promises_say_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(FakeContext, "limits", replace(NEEDED, vertex_storage_blocks=0))
-    assert "another GPU" in found("limit vertex_storage_blocks").remedy
-    assert found("limit of the brush").state == "optional"
-    monkeypatch.setattr(FakeContext, "limits", replace(NEEDED, storage_blocks=16))
-    assert all(check.name != "limit of the brush" for check in doctor.examine())
-
-
-def test_python_too_old(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(doctor.sys, "version_info", (3, 10, 4, "final", 0))
-    assert found("Python") == Check("Python", "3.10.4, needed 3.11", "missing", "install Python 3.11 or newer")
-
-
-def test_package_too_old(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(doctor, "installed_version", lambda name: {"numpy": "1.26.4", "glfw": "2.7.0"}[name])
-    check = found("package numpy")
-    assert not check.usable and check.found == "1.26.4, needed 2.0"
-    assert check.remedy.endswith("--upgrade 'numpy>=2.0'")
-    assert found("packages").found == "glfw 2.7.0"
-
-
-def test_package_missing(monkeypatch: pytest.MonkeyPatch) -> None:
-    def version(name: str) -> str:
-        if name == "glfw":
-            raise importlib.metadata.PackageNotFoundError(name)
-        return "9"
-
-    monkeypatch.setattr(doctor, "installed_version", version)
-    assert found("package glfw").found == "not installed"
-    assert not found("package glfw").usable
 
 
 @pytest.mark.parametrize(
@@ -142,27 +98,51 @@ def test_module_does_not_load(
     assert check.usable is usable
 
 
-def test_osmesa_is_optional(monkeypatch: pytest.MonkeyPatch) -> None:
-    def load() -> None:
-        raise OSError("none")
+def fails(error: Exception) -> Callable[..., Any]:
+    """A function that raises it."""
 
-    monkeypatch.setattr("spectrasplat.gpu.osmesa.load_library", load)
-    assert found("OSMesa").state == "optional"
+    def refuse(*_: object) -> Any:
+        raise error
 
-
-def test_cache_folder_not_writable(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    def refuse() -> Path:
-        raise PermissionError(13, "Permission denied", str(tmp_path))
-
-    monkeypatch.setattr(doctor, "cache_dir", refuse)
-    check = found("cache folder")
-    assert check.usable and "XDG_CACHE_HOME" in check.remedy
+    return refuse
 
 
-def test_program_files_missing(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(doctor, "shaders_dir", lambda: tmp_path / "shaders")
-    check = found("program files")
-    assert not check.usable and str(tmp_path / "shaders") in check.found
+OLD = {"numpy": "1.26.4", "glfw": "2.7.0"}
+SMALL = replace(NEEDED, draw_buffers=4, work_group_count=(65535, 65535, 100), vertex_storage_blocks=0)
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "name", "said", "state", "remedy"),
+    [
+        (f"{__name__}.FakeContext.is_software", True, "renderer", "software renderer", "ok", ""),
+        (f"{__name__}.FakeContext.limits", SMALL, "limit draw_buffers", "4 (needed 8)", "missing", "driver"),
+        (f"{__name__}.FakeContext.limits", SMALL, "limit work_group_count", "× 100 ", "missing", "driver"),
+        (f"{__name__}.FakeContext.limits", SMALL, "limit texture_px", "", "ok", ""),
+        (f"{__name__}.FakeContext.limits", SMALL, "limit vertex_storage_blocks", "0", "missing", "another GPU"),
+        (f"{__name__}.FakeContext.limits", SMALL, "limit of the brush", "storage blocks", "optional", "brush"),
+        ("sys.version_info", (3, 10, 4), "Python", "3.10.4, needed 3.11", "missing", "install Python 3.11 or newer"),
+        ("installed_version", OLD.get, "package numpy", "1.26.4, needed 2.0", "missing", "--upgrade 'numpy>=2.0'"),
+        ("installed_version", OLD.get, "packages", "glfw 2.7.0", "ok", ""),
+        ("installed_version", fails(PackageNotFoundError("glfw")), "package glfw", "not installed", "missing", "glfw"),
+        ("osmesa.load_library", fails(OSError("none")), "OSMesa", "not installed", "optional", ""),
+        ("cache_dir", fails(PermissionError(13, "Permission denied", "/c")), "cache folder", "/c", "optional",
+         "XDG_CACHE_HOME"),
+        ("shaders_dir", lambda: Path("/nowhere/shaders"), "program files", "/nowhere/shaders", "missing", "reinstall"),
+    ],
+)  # fmt: skip
+def test_what_is_missing_or_too_old(
+    place: str, value: object, name: str, said: str, state: str, remedy: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One thing is broken in each row."""
+    folder = "" if place.startswith(__name__) else "spectrasplat.gpu." if "osmesa" in place else f"{doctor.__name__}."
+    monkeypatch.setattr(folder + place, value)
+    check = found(name)
+    assert said in check.found and check.state == state and remedy in check.remedy
+
+
+def test_where_there_is_enough_the_brush_has_no_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(FakeContext, "limits", replace(NEEDED, storage_blocks=16))
+    assert all(check.name != "limit of the brush" for check in doctor.examine())
 
 
 @pytest.mark.parametrize(
