@@ -93,11 +93,6 @@ class Animation:
         """The stage at a frame: a function of its time alone."""
         return apply_all(self.start, {track.path: track.at(self.times_s[index]) for track in self.tracks})
 
-    @property
-    def moves(self) -> frozenset[str]:
-        """Paths of the parameters whose value changes."""
-        return frozenset(track.path for track in self.tracks if len(set(track.values)) > 1)
-
 
 def turntable(stage: Stage, frames: int, fps: float, turns: float = 1.0) -> Animation:
     """Once about the target in `frames` frames; the last comes before the first again, so that it can loop."""

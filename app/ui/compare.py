@@ -21,10 +21,11 @@ from ..model.environment_light import with_sun
 from ..render.solo import scene_seen
 from ..render.viewer.dirty_level import DirtyLevel
 from ..render.viewer.invalidation import dirty_level
-from .compared_with import FilePicture, GlassSwap
+from .compared_with import FilePicture, GlassSwap, with_alpha
 from .direct_picture import SAMPLES, DirectPicture
 from .panels.methods import METHOD_NAMES
 from .reference_thread import ReferenceThread, Snapshot
+from .screenshot import read_pixel, texels_of
 
 if TYPE_CHECKING:
     import moderngl
@@ -187,14 +188,7 @@ class Comparison:
     def pixel(self, place: tuple[float, float]) -> Vec3 | None:
         """Linear Rec.709 of `picture` at a place of it, 0..1 from the top left; None while there is none."""
         picture = self.picture
-        if picture is None:
-            return None
-        column, row = (min(int(share * side), side - 1) for share, side in zip(place, picture.size, strict=True))
-        framebuffer = self._context.ctx.framebuffer([picture])
-        data = framebuffer.read(viewport=(column, row, 1, 1), components=3, dtype="f4")
-        framebuffer.release()
-        red, green, blue = (float(v) for v in np.frombuffer(data, np.float32))
-        return red, green, blue
+        return None if picture is None else read_pixel(self._context, picture, place)
 
     # ---- work --------------------------------------------------------------------------------
 
@@ -316,7 +310,7 @@ class Comparison:
         made_from = (0 if snapshot is None else snapshot.number, self._direct.version)
         if snapshot is None or self._direct.version == 0 or made_from == self._composed_from:
             return
-        shown = _read(running.picture) if running.picture is not None else None
+        shown = texels_of(running.picture) if running.picture is not None else None
         height, width = snapshot.directly.shape
         whole = self._direct.rgb + snapshot.caustic_rgb
         if shown is not None and shown.shape == whole.shape:
@@ -324,10 +318,9 @@ class Comparison:
             stripes = np.where((rows + columns) // STRIPE_PX % 2, STRIPE_SHADE, 1.0).astype(np.float32)
             whole[rows, columns] = shown[rows, columns] * stripes[:, None]
         self._composed_from = made_from
-        texels = np.concatenate([whole, np.ones((height, width, 1), np.float32)], axis=-1)
         if self._composed is None:
             self._composed = self._context.ctx.texture((width, height), 4, dtype="f4")
-        self._composed.write(np.ascontiguousarray(texels))
+        self._composed.write(with_alpha(whole))
 
     def _is_known(self, snapshot: Snapshot) -> bool:
         """Whether the reference's own error is known, or will not be known better."""
@@ -344,13 +337,6 @@ class Comparison:
 
 def _counted(photons: int) -> str:
     return f"{photons / 1e6:.1f} million photons" if photons >= 100_000 else f"{photons:,} photons"
-
-
-def _read(picture: moderngl.Texture) -> np.ndarray:
-    """float32 (H, W, 3), row 0 on top."""
-    texels = np.empty((picture.height, picture.width, 4), np.float32)
-    picture.read_into(texels)
-    return texels[..., :3]
 
 
 def engine_beside(context: Context, thread: ContextThread | None) -> Engine:

@@ -74,14 +74,18 @@ class FilePicture:
         if (width, height) != size:
             rgb = of_height(rgb, size)
             self.words += f", scaled to the height of this view, {size[0]}×{size[1]}; one of that size compares best"
-        texels = np.concatenate([rgb, np.ones((*rgb.shape[:2], 1), np.float32)], axis=-1)
-        self.texture = self._context.ctx.texture(size, 4, np.ascontiguousarray(texels).tobytes(), dtype="f4")
+        self.texture = self._context.ctx.texture(size, 4, with_alpha(rgb), dtype="f4")
 
     def release(self) -> None:
         """Forget it."""
         if self.texture is not None:
             self.texture.release()
         self.texture, self.problem, self.words, self._key = None, None, "", ()
+
+
+def with_alpha(rgb: np.ndarray) -> np.ndarray:
+    """float32 (h, w, 4), as textures hold it."""
+    return np.concatenate([rgb, np.ones((*rgb.shape[:2], 1), np.float32)], axis=-1, dtype=np.float32)
 
 
 def of_height(rgb: np.ndarray, size: tuple[int, int]) -> np.ndarray:

@@ -13,7 +13,8 @@ from ..base.errors import UserError
 from ..base.not_yet import NotYet
 from ..edit.picking import PickHit, pick_in
 from ..edit.state import State
-from .live_picture import LivePicture, pixel_of
+from .live_picture import LivePicture
+from .screenshot import pixel_of
 from .view_model import CursorInfo, LightHere
 
 if TYPE_CHECKING:

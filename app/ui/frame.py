@@ -35,7 +35,6 @@ def view_model_of(session: Session) -> ViewModel:
         stats=stats,
         shown=picture.seen,
         picture=None if shown is None or picture.awaits_scene else shown.glo,
-        picture_size=(0, 0) if shown is None else shown.size,
         frame_ms=tuple(session.frame_ms),
         pass_ms=_pass_ms(session),
         process_bytes=resident_bytes() if session.state.preferences.panels.timing else 0,
@@ -109,6 +108,7 @@ def run_frame(session: Session, draw: Draw, budget_s: float = DEFAULT_BUDGET_S, 
     session.autosave.update(
         session.document.scene, session.document.title, session.document.source, session.document.unsaved
     )
+    _tell_once(session, "autosave", session.autosave.problem)
     _work(session, budget_s, slice_s)
     session.was_interacting = session.state.interacting
 
@@ -145,6 +145,13 @@ def _carry_out(session: Session, kind: type, work: Callable[[], None]) -> None:
         )
 
 
+def _tell_once(session: Session, of: str, problem: str | None) -> None:
+    """Show the problem of the autosave or of the picture, when it begins."""
+    if problem is not None and problem != session.told.get(of):
+        session.messages.show(sentence(problem), is_error=True)
+    session.told[of] = problem
+
+
 def _succeeded(session: Session) -> None:
     if session.picture.engine is not None:
         session.messages.succeed()
@@ -170,10 +177,7 @@ def _work(session: Session, budget_s: float, slice_s: float) -> None:
         return
     finally:
         session.engine_s = session.clock() - started
-    problem = session.picture.problem
-    if problem is not None and problem != session.problem_said and session.picture.shader_error is None:
-        session.messages.show(sentence(problem), is_error=True)
-    session.problem_said = problem
+    _tell_once(session, "picture", None if session.picture.shader_error else session.picture.problem)
     now = session.clock()
     try:
         session.picture.show(session.state, now, session.delta_s, session.jobs.comparison)

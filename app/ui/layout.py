@@ -42,15 +42,35 @@ class Docked(Protocol):
     def place(self) -> Place: ...
 
 
+BARE = (
+    imgui.WindowFlags_.no_decoration
+    | imgui.WindowFlags_.no_docking
+    | imgui.WindowFlags_.no_move
+    | imgui.WindowFlags_.no_saved_settings
+)
+"""Of windows that stand where the interface puts them."""
+ON_PICTURE = BARE | imgui.WindowFlags_.no_focus_on_appearing | imgui.WindowFlags_.no_nav
+
 _raised: dict[str, int] = {}
 """Fields of the panels to be shown in front, and for how many frames: a panel that is opened has its tab only in the
 second."""
 
-floating: list[str] = []
-"""Titles of the panels that floated in this frame."""
+floating: dict[str, str] = {}
+"""Titles of the panels that floated in this frame, by their fields; the last that was drawn comes last."""
 
 behind: set[str] = set()
 """Fields of the panels that were behind another one's tab in the last frame."""
+
+
+def begin_area(title: str, low: imgui.ImVec2, size: imgui.ImVec2, padding: imgui.ImVec2, flags: int = 0) -> None:
+    """Begin a window that is a part of the whole: square, without border, behind all others."""
+    imgui.set_next_window_pos(low)
+    imgui.set_next_window_size(size)
+    imgui.push_style_var(imgui.StyleVar_.window_padding, padding)
+    imgui.push_style_var(imgui.StyleVar_.window_rounding, 0.0)
+    imgui.push_style_var(imgui.StyleVar_.window_border_size, 0.0)
+    imgui.begin(title, None, BARE | imgui.WindowFlags_.no_bring_to_front_on_focus | flags)
+    imgui.pop_style_var(3)
 
 
 def dockspace(windows: Sequence[Docked], bottom_margin: float) -> None:
@@ -58,13 +78,8 @@ def dockspace(windows: Sequence[Docked], bottom_margin: float) -> None:
     window."""
     viewport = imgui.get_main_viewport()
     size = imgui.ImVec2(viewport.work_size.x, viewport.work_size.y - bottom_margin)
-    imgui.set_next_window_pos(viewport.work_pos)
-    imgui.set_next_window_size(size)
-    imgui.push_style_var(imgui.StyleVar_.window_padding, imgui.ImVec2(0, 0))
-    imgui.push_style_var(imgui.StyleVar_.window_rounding, 0.0)
-    imgui.push_style_var(imgui.StyleVar_.window_border_size, 0.0)
-    imgui.begin(_HOST, None, _BARE)
-    imgui.pop_style_var(3)
+    flags = imgui.WindowFlags_.no_nav_focus | imgui.WindowFlags_.no_background
+    begin_area(_HOST, viewport.work_pos, size, imgui.ImVec2(0, 0), flags)
     dock = imgui.get_id(_DOCKSPACE)
     memory, built = imgui.get_state_storage(), imgui.get_id("built in frame")
     if imgui.internal.dock_builder_get_node(dock) is None:
@@ -83,17 +98,6 @@ def reset() -> None:
     host = imgui.internal.find_window_by_name(_HOST)
     if host is not None:
         imgui.internal.dock_builder_remove_node(host.get_id(_DOCKSPACE))
-
-
-_BARE = (
-    imgui.WindowFlags_.no_decoration
-    | imgui.WindowFlags_.no_move
-    | imgui.WindowFlags_.no_docking
-    | imgui.WindowFlags_.no_bring_to_front_on_focus
-    | imgui.WindowFlags_.no_nav_focus
-    | imgui.WindowFlags_.no_background
-    | imgui.WindowFlags_.no_saved_settings
-)
 
 
 def _build(dock: int, size: imgui.ImVec2, windows: Sequence[Docked]) -> None:

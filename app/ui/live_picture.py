@@ -26,12 +26,13 @@ from ..passes.sample_picture import SamplePicture
 from ..render.viewer.dirty_level import DirtyLevel
 from ..render.viewer.stats import LiveStats
 from .auto_exposure import AutoExposure
+from .screenshot import pixel_of, read_pixel
 
 if TYPE_CHECKING:
     import moderngl
 
     from ..gpu.context import Context
-    from ..model.scene import Scene
+    from ..model.scene import Scene, Vec3
     from ..render.viewer.photon_queries import CausticSpectrum
     from ..render.viewer.threaded_engine import Engine
     from .compare import Comparison
@@ -248,16 +249,10 @@ class LivePicture:
         """The exposure is still on its way."""
         return self._exposure.is_moving
 
-    def pixel(self, place: tuple[float, float]) -> tuple[float, float, float] | None:
+    def pixel(self, place: tuple[float, float]) -> Vec3 | None:
         """Radiance at a place of the picture, 0..1 from the top left."""
         radiance = self.radiance
-        if radiance is None:
-            return None
-        framebuffer = self._context.ctx.framebuffer([radiance])
-        data = framebuffer.read(viewport=(*pixel_of(place, radiance.size), 1, 1), components=3, dtype="f4")
-        framebuffer.release()
-        red, green, blue = (float(v) for v in np.frombuffer(data, np.float32))
-        return red, green, blue
+        return None if radiance is None else read_pixel(self._context, radiance, place)
 
     def release(self) -> None:
         """Free everything."""
@@ -276,11 +271,6 @@ class LivePicture:
         except Exception as error:
             self.give_up()
             raise EngineError(str(error) or type(error).__name__) from error
-
-
-def pixel_of(place: tuple[float, float], size: tuple[int, int]) -> tuple[int, int]:
-    """Column and row (from the top) of a place 0..1 in a picture of `size`."""
-    return min(max(int(place[0] * size[0]), 0), size[0] - 1), min(max(int(place[1] * size[1]), 0), size[1] - 1)
 
 
 def _antialiases(state: State, other: Comparison | None) -> bool:

@@ -1,4 +1,4 @@
-"""What the window shows, as a file: textures are read at once, the rest is a `FileWriter`'s."""
+"""What the window shows, as numbers and as a file: textures are read at once, the rest is a `FileWriter`'s."""
 
 from __future__ import annotations
 
@@ -15,6 +15,9 @@ from ..base.image_io import SHOWN_SUFFIXES, check_finite, check_suffix, save_cod
 
 if TYPE_CHECKING:
     import moderngl
+
+    from ..gpu.context import Context
+    from ..model.scene import Vec3
 
 
 @dataclass(frozen=True)
@@ -34,7 +37,7 @@ class Shown:
 def screenshot(path: Path, shown: Shown) -> Callable[[], None]:
     """What writes what is shown: .png, .jpg and .webp as on the screen, .exr and .npy linear without tone curve. It
     needs no OpenGL any more. Raises `UserError` for an unknown suffix, and for linear numbers that are not there."""
-    rgb = None if shown.radiance is None else _texels(shown.radiance)
+    rgb = None if shown.radiance is None else texels_of(shown.radiance)
     if check_suffix(path) not in SHOWN_SUFFIXES:
         if rgb is None:
             raise UserError("the picture is being made; wait a moment")
@@ -60,7 +63,22 @@ def texture_codes(texture: moderngl.Texture) -> np.ndarray:
     return np.ascontiguousarray(raw.reshape(texture.height, texture.width, 4)[..., :3])
 
 
-def _texels(texture: moderngl.Texture) -> np.ndarray:
+def texels_of(texture: moderngl.Texture) -> np.ndarray:
+    """float32 (H, W, 3) of an RGBA32F texture whose row 0 is the top."""
     texels = np.empty((texture.height, texture.width, 4), np.float32)
     texture.read_into(texels)
     return np.ascontiguousarray(texels[..., :3])
+
+
+def read_pixel(context: Context, texture: moderngl.Texture, place: tuple[float, float]) -> Vec3:
+    """Linear Rec.709 of an RGBA32F texture at a place, 0..1 from the top left."""
+    framebuffer = context.ctx.framebuffer([texture])
+    data = framebuffer.read(viewport=(*pixel_of(place, texture.size), 1, 1), components=3, dtype="f4")
+    framebuffer.release()
+    red, green, blue = (float(v) for v in np.frombuffer(data, np.float32))
+    return red, green, blue
+
+
+def pixel_of(place: tuple[float, float], size: tuple[int, int]) -> tuple[int, int]:
+    """Column and row (from the top) of a place 0..1 in a picture of `size`."""
+    return min(max(int(place[0] * size[0]), 0), size[0] - 1), min(max(int(place[1] * size[1]), 0), size[1] - 1)

@@ -98,8 +98,8 @@ class Session:
         """In the last frame."""
         self.frames = 0
         """Since the layout last changed."""
-        self.problem_said: str | None = None
-        """The renderer's problem that the user has read."""
+        self.told: dict[str, str | None] = {}
+        """What is wrong with the autosave and the picture, as far as the user was told."""
         self._frame_started = self._last_start = clock()
         self.delta_s = 1 / 60
         self.state = _first_state(

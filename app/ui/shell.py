@@ -88,7 +88,6 @@ def draw_interface(state: State, view_model: ViewModel) -> State:
     numbers.use_units(state.scene.units)
     state = shortcuts.handle(state, view_model)
     shortcuts.focused_panel["field"] = ""
-    shortcuts.floating_panels.clear()
     layout.floating.clear()
     state = menu.draw_menu(state, view_model)
     if state.preferences.panels.start_page:
@@ -146,8 +145,7 @@ def _draw_panel(window: PanelWindow, state: State, view_model: ViewModel) -> Sta
     is_floating = not imgui.is_window_docked()
     (layout.behind.discard if shown or is_floating else layout.behind.add)(window.field)
     if is_floating:
-        shortcuts.floating_panels.append(window.field)
-        layout.floating.append(window.title)
+        layout.floating[window.field] = window.title
     is_leavable = is_floating or (window.field in _CALLED_UP and state.tool == "select")
     if is_leavable and imgui.is_window_focused(imgui.FocusedFlags_.child_windows):
         shortcuts.focused_panel["field"] = window.field

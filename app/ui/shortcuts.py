@@ -8,6 +8,7 @@ from functools import cache
 from imgui_bundle import imgui
 
 from ..edit.state import State
+from . import layout
 from .commands import COMMANDS, PANELS, VIEWS, Command
 from .view_model import ViewModel
 
@@ -23,8 +24,6 @@ _ALWAYS = ("Shortcuts", "Quit", "Full screen")
 
 focused_panel = {"field": ""}
 """The panel that floats or was called up and had the keyboard in the last frame, of `Panels`: Esc closes it."""
-floating_panels: list[str] = []
-"""All that floated: with nothing else to leave, Esc closes the last of them."""
 
 _NAMED = {
     "Esc": imgui.Key.escape,
@@ -90,7 +89,8 @@ def handle(state: State, view_model: ViewModel) -> State:
     if not is_free or imgui.is_mouse_down(imgui.MouseButton_.right):
         return _hold_compare(state, False)
     on_start_page = state.preferences.panels.start_page
-    closing = focused_panel["field"] or (floating_panels[-1] if floating_panels and state.tool == "select" else "")
+    # With nothing else to leave, it closes the last of those that float.
+    closing = focused_panel["field"] or (next(reversed(layout.floating), "") if state.tool == "select" else "")
     if closing and imgui.is_key_pressed(imgui.Key.escape):
         return state.opened(closing, False)
     if on_start_page and imgui.is_key_pressed(imgui.Key.escape):

@@ -91,7 +91,6 @@ class ViewModel:
     """What the picture shows; another one than the state's until that is drawn."""
     picture: int | None = None
     """Texture id of the displayed picture, top row first."""
-    picture_size: tuple[int, int] = (0, 0)
     frame_ms: tuple[float, ...] = ()
     """Durations of the last frames, newest last."""
     pass_ms: dict[str, float] = field(default_factory=dict)

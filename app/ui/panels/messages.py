@@ -15,15 +15,6 @@ from . import opened_card, widgets
 _FADE_S = 1.5
 _WIDTH_EM, _TOOLS_EM, _BADGES_EM = 28.0, 3.2, 2.6
 """Widths of a message and of the tools at the picture's left, height of the badges at its lower border."""
-_BARE = (
-    imgui.WindowFlags_.no_decoration
-    | imgui.WindowFlags_.always_auto_resize
-    | imgui.WindowFlags_.no_saved_settings
-    | imgui.WindowFlags_.no_focus_on_appearing
-    | imgui.WindowFlags_.no_nav
-    | imgui.WindowFlags_.no_docking
-    | imgui.WindowFlags_.no_move
-)
 _SHADER_WINDOW = "Shader error"
 
 _closed_shader_error = {"text": ""}
@@ -63,7 +54,7 @@ def _toast(state: State, message: Message, index: int, width: float) -> tuple[St
     imgui.push_style_var(imgui.StyleVar_.alpha, opacity)
     imgui.push_style_color(imgui.Col_.border, accent)
     imgui.push_style_color(imgui.Col_.window_bg, (*chosen.raised[:3], 0.97))
-    imgui.begin(f"##message {index}", None, _BARE)
+    imgui.begin(f"##message {index}", None, layout.ON_PICTURE | imgui.WindowFlags_.always_auto_resize)
     _put_in_front()
     with theme.coloured(accent):
         imgui.text_unformatted(icons.ICON_FA_TRIANGLE_EXCLAMATION if message.is_error else icons.ICON_FA_CIRCLE_INFO)
@@ -89,7 +80,7 @@ def _put_in_front() -> None:
     own = imgui.internal.get_current_window()
     imgui.internal.bring_window_to_display_front(own)
     dialogue = imgui.internal.get_top_most_popup_modal()
-    floating = [imgui.internal.find_window_by_name(title) for title in layout.floating]
+    floating = [imgui.internal.find_window_by_name(title) for title in layout.floating.values()]
     for other in (dialogue, *floating):
         if other is not None:
             imgui.internal.bring_window_to_display_behind(own, other)

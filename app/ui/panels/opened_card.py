@@ -9,19 +9,11 @@ from ...edit.objects import make_glass
 from ...edit.requests import StandUp
 from ...edit.state import State
 from ...model.materials.dielectric import DEFAULT_GLASS
-from .. import item_rects, theme
+from .. import item_rects, layout, theme
 from ..view_model import ViewModel
 from . import widgets
 
 _GLASSES = (DEFAULT_GLASS, "N-SF11", "diamond", "water")
-_FLAGS = (
-    imgui.WindowFlags_.no_decoration
-    | imgui.WindowFlags_.no_saved_settings
-    | imgui.WindowFlags_.no_focus_on_appearing
-    | imgui.WindowFlags_.no_nav
-    | imgui.WindowFlags_.no_docking
-    | imgui.WindowFlags_.no_move
-)
 _BORDER_EM = 0.8
 _WIDTH_EM = 26.0
 _MOST_PARTS = 12
@@ -45,7 +37,7 @@ def draw_opened_card(state: State, view_model: ViewModel, middle_x: float, botto
     imgui.set_next_window_pos((middle_x, bottom - theme.em(_BORDER_EM)), imgui.Cond_.always, imgui.ImVec2(0.5, 1.0))
     # Darker than fields and buttons, which must be seen on it whatever the picture.
     imgui.push_style_color(imgui.Col_.window_bg, (*theme.palette().window[:3], 0.97))
-    imgui.begin(WINDOW, None, _FLAGS)
+    imgui.begin(WINDOW, None, layout.ON_PICTURE)
     item_rects.note("Window: opened")
     if view_model.up is not None:
         state = _up(state, view_model)

@@ -8,31 +8,19 @@ from imgui_bundle import imgui
 from ...edit.autosave import Recovery
 from ...edit.requests import Recover
 from ...edit.state import State
-from .. import item_rects, theme
+from .. import item_rects, layout, theme
 from ..view_model import SceneEntry, ViewModel
 from . import dialogs, lesson_panel, messages, widgets
 
 _CARD_EM, _GAP_EM = 17.0, 1.1
 _ASPECT = 9 / 16
-_FLAGS = (
-    imgui.WindowFlags_.no_decoration
-    | imgui.WindowFlags_.no_docking
-    | imgui.WindowFlags_.no_move
-    | imgui.WindowFlags_.no_saved_settings
-    | imgui.WindowFlags_.no_bring_to_front_on_focus
-)
 
 
 def draw_start_page(state: State, view_model: ViewModel) -> State:
     """Draw the page over the whole window below the menu bar; it closes itself when something is opened."""
     viewport = imgui.get_main_viewport()
-    imgui.set_next_window_pos(viewport.work_pos)
-    imgui.set_next_window_size(viewport.work_size)
-    imgui.push_style_var(imgui.StyleVar_.window_padding, imgui.ImVec2(theme.em(2.2), theme.em(1.6)))
-    imgui.push_style_var(imgui.StyleVar_.window_rounding, 0.0)
-    imgui.push_style_var(imgui.StyleVar_.window_border_size, 0.0)
-    imgui.begin("##start page", None, _FLAGS)
-    imgui.pop_style_var(3)
+    padding = imgui.ImVec2(theme.em(2.2), theme.em(1.6))
+    layout.begin_area("##start page", viewport.work_pos, viewport.work_size, padding)
     _title(view_model)
     if view_model.recovery is not None:
         state = _recovery(state, view_model.recovery)

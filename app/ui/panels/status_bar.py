@@ -10,18 +10,9 @@ from imgui_bundle import imgui
 from ...edit.requests import CancelJob
 from ...edit.state import State
 from ...render.viewer.stats import LiveStats
-from .. import item_rects, theme
+from .. import item_rects, layout, theme
 from ..view_model import ViewModel
 from . import numbers, rows, widgets
-
-_FLAGS = (
-    imgui.WindowFlags_.no_decoration
-    | imgui.WindowFlags_.no_docking
-    | imgui.WindowFlags_.no_move
-    | imgui.WindowFlags_.no_saved_settings
-    | imgui.WindowFlags_.no_nav
-    | imgui.WindowFlags_.no_bring_to_front_on_focus
-)
 
 _RATES_EM = 14.0
 """For rate and frame time at the right end."""
@@ -37,13 +28,10 @@ def height() -> float:
 def draw_status_bar(state: State, view_model: ViewModel) -> State:
     """Draw the bar along the lower edge of the window."""
     viewport = imgui.get_main_viewport()
-    imgui.set_next_window_pos((viewport.work_pos.x, viewport.work_pos.y + viewport.work_size.y - height()))
-    imgui.set_next_window_size((viewport.work_size.x, height()))
-    imgui.push_style_var(imgui.StyleVar_.window_padding, imgui.ImVec2(theme.em(0.5), theme.em(0.15)))
-    imgui.push_style_var(imgui.StyleVar_.window_rounding, 0.0)
-    imgui.push_style_var(imgui.StyleVar_.window_border_size, 0.0)
+    low = imgui.ImVec2(viewport.work_pos.x, viewport.work_pos.y + viewport.work_size.y - height())
+    size, padding = imgui.ImVec2(viewport.work_size.x, height()), imgui.ImVec2(theme.em(0.5), theme.em(0.15))
     imgui.push_style_color(imgui.Col_.window_bg, theme.palette().raised)
-    imgui.begin("##status", None, _FLAGS)
+    layout.begin_area("##status", low, size, padding, imgui.WindowFlags_.no_nav)
     imgui.align_text_to_frame_padding()
     state = _progress(state, view_model)
     _selection(state)
@@ -55,7 +43,6 @@ def draw_status_bar(state: State, view_model: ViewModel) -> State:
     _right_end(view_model)
     imgui.end()
     imgui.pop_style_color()
-    imgui.pop_style_var(3)
     return state
 
 
