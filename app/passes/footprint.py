@@ -39,8 +39,8 @@ spacings, 1.2 % with 0.38), for a fifth less blur. `ball`, 10,000 photons: relMS
 0.45."""
 _WIDEST_NARROWED = 0.5
 """Smoothing, lattice spacings: wider Gaussians leave no ripple, and whoever asks for them means them."""
-VERTICES = (3, 6, 6, 6, 3, 6, 6)
-"""Per splat of kinds 1 to 7."""
+VERTICES = (3, 6, 6, 6)
+"""Per splat of kinds 1 to 4."""
 MOST_GROUPS = 65535
 """Work groups that add splats of a kind: what OpenGL promises in one dimension. Each then adds several."""
 UNIT_CONTACT = 1
@@ -64,10 +64,7 @@ SPLAT = Struct(
         Field("y_box", "float", "swept: half width of the texel across, same units"),
         Field("layer", "uint", "first layer of the spectral tables; bits 30, 31: side of a line of contact"),
         Field(
-            "kind",
-            "uint",
-            "0 nothing, 1 small, 2 swept, 3 swept with a cut band, 4 swept over the edge of rect; beside a line of "
-            "contact 5 small, 6 swept, 7 with a cut band",
+            "kind", "uint", "0 nothing, 1 small, 2 swept, 3 swept with a cut band, 4 swept over a line or fanning out"
         ),
         Field(
             "throughput",
@@ -77,7 +74,7 @@ SPLAT = Struct(
         Field(
             "x_range",
             "vec2",
-            "the photon's band, spectral coordinate; kinds 4 and 6 with `LIGHT_EDGES`: change of `lit` per xi and eta",
+            "the photon's band, spectral coordinate; kind 4 with `LIGHT_EDGES`: change of `lit` per xi and eta",
         ),
         Field("xi_half", "float", "half of the band in xi (small: 1 where the band was cut, else 0)"),
         Field("inverse_sigma_xi", "float", "1 / (sqrt(2) standard deviations along, in xi)"),
@@ -94,7 +91,7 @@ SPLAT = Struct(
             "swept: change of the W, 1 at the centre, by which places in it are divided, per unit of xi and of eta",
         ),
         Field("images", "uint", "a photon's first: of so many splats behind its own, its images beyond borders"),
-        Field("lit", "float", "kinds 4 and 6 with `LIGHT_EDGES`: lit share of a texel at the centre, not clamped"),
+        Field("lit", "float", "kind 4 with `LIGHT_EDGES`: lit share of a texel at the centre, not clamped"),
     ),
 )
 """A splat, ready to be drawn. xi runs over [-1, 1] from end to end of the whole band's smeared sweep."""
@@ -165,12 +162,12 @@ class Footprints:
         self._program = shader.compute(ctx, "light/footprint.comp", defines, structs)
         self._parameters = ctx.buffer(reserve=PARAMETERS.stride)
         self._sums = ctx.buffer(np.zeros((group, 4), np.float32))
-        kinds = 7 if features.contact_lines else 4
+        kinds = len(VERTICES)
         self._by_compute = by_compute
         if by_compute:
             self._no_commands = np.array([[0, 1, 1, 0, 0]] * kinds, np.uint32)
         else:
-            self._no_commands = np.array([[vertices, 1, 0, 0, 0] for vertices in VERTICES[:kinds]], np.uint32)
+            self._no_commands = np.array([[vertices, 1, 0, 0, 0] for vertices in VERTICES], np.uint32)
         self.commands = ctx.buffer(self._no_commands)
         """Indirect draws of all kinds, five words each; or indirect dispatches, with the number of splats in the last
         word."""

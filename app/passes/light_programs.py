@@ -77,12 +77,10 @@ def draw_variants(features: Features) -> dict[int, tuple[str, Defines]]:
     }
     if features.band_cuts and not features.point_spectrum:
         kinds[3] = ("light/splat_cut.frag", switched(CUT=True, CLIPPED=True))
-    if features.contact_lines:
-        # The same beside a line of contact; of swept ones those that an edge cuts as well.
-        beside = switched(CONTACT_LINES=True)
-        kinds |= {kind: (kinds[of][0], kinds[of][1] | beside) for kind, of in ((5, 1), (6, 4), (7, 3)) if of in kinds}
     common: Defines = {**features.defines(), "DENSITY_CELLS": f"{DENSITY_CELLS}u"}
-    return {kind: (kinds[kind][0], common | kinds[kind][1]) for kind in sorted(kinds)}
+    # Swept splats (2) have no line near them.
+    lines = {kind: switched(CONTACT_LINES=features.contact_lines and kind != 2) for kind in kinds}
+    return {kind: (kinds[kind][0], common | kinds[kind][1] | lines[kind]) for kind in sorted(kinds)}
 
 
 def sum_defines(way: SplatWay) -> Defines:

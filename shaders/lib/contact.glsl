@@ -19,10 +19,10 @@ uint side_of(uint word, vec2 within) {
     return ((word >> (part.y * CONTACT_PARTS + part.x)) & 1u) != 0u ? SEEN_SIDE : HIDDEN_SIDE;
 }
 
-// Whether a texel takes light of this side.
+// Whether a texel takes light of this side, or of a splat that no line is near (0).
 float takes_side(uint word, uint side) {
     bool sees = (word & 0xffffu) != 0u;
-    return (side == SEEN_SIDE) == sees ? 1.0 : 0.0;
+    return side == 0u || (side == SEEN_SIDE) == sees ? 1.0 : 0.0;
 }
 
 // Energy of a side that a texel holds, of what is drawn into it as if all of it were on that side.

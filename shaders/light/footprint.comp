@@ -166,14 +166,6 @@ bool in_front(Placement place, PhotonRecord photon, vec3 sweep_middle, vec3 swee
     return min(homogeneous_texel(place, from).z, homogeneous_texel(place, to).z) > 0.0;
 }
 
-// Smaller principal variance of the footprint, texels².
-float thin_variance(Footprint f) {
-    float trace = f.axis_s.x * f.axis_s.x + f.axis_t.x * f.axis_t.x + f.axis_s.y * f.axis_s.y + f.axis_t.y * f.axis_t.y;
-    float area = f.axis_s.x * f.axis_t.y - f.axis_s.y * f.axis_t.x;
-    float root = sqrt(max(0.25 * trace * trace - area * area, 0.0));
-    return 0.5 * trace - root;
-}
-
 // A splat broad in every direction is as well drawn in texels twice as wide, for a quarter of the
 // fragments; the maps are put together again when they are read (levels_fold.comp, bilinearly).
 void choose_level(inout Placement place, inout Footprint f, PhotonRecord photon, vec3 middle, vec3 sweep) {
@@ -193,8 +185,6 @@ void choose_level(inout Placement place, inout Footprint f, PhotonRecord photon,
     f.per_spacing *= shrink;
 }
 
-#include "light/splat_contact.glsl"
-
 SplatRecord splat_of(PhotonRecord photon, float power_w, float mean, Footprint f, uint table, vec4 band) {
     vec2 d = vec2(dot(f.axis_s, f.axis_s), dot(f.axis_t, f.axis_t));
     float cross_st = dot(f.axis_s, f.axis_t);
@@ -208,29 +198,6 @@ SplatRecord splat_of(PhotonRecord photon, float power_w, float mean, Footprint f
     splat.layer = table * uint(TARGETS);
     if (HERO) carry_companions(splat, photon);
     return splat;
-}
-
-vec2 half_extent(SplatRecord splat) {
-    if (splat.kind == 1u) return splat.along;
-    vec4 part = part_that_fans(splat.fan);
-    vec2 extent = vec2(0.0);
-    for (int i = 0; i < 4; ++i) {
-        vec2 corner = vec2((i & 1) == 0 ? part.x : part.z, (i & 2) == 0 ? part.y : part.w);
-        extent = max(extent, abs(corner.x * splat.along + corner.y * splat.across) / (1.0 + dot(splat.fan, corner)));
-    }
-    return extent;
-}
-
-// A swept splat that its rectangle or its light's edge cuts, or that fans out, is drawn by a program of its own: to ask
-// every fragment costs a tenth of the rate.
-void mark_edge(inout SplatRecord splat) {
-    vec2 extent = half_extent(splat);
-    bool whole = all(greaterThanEqual(splat.centre - extent, splat.rect.xy))
-        && all(lessThanEqual(splat.centre + extent, splat.rect.zw));
-    if (LIGHT_EDGES) whole = whole && splat.x_range == vec2(0.0);
-    if (splat.kind == 2u && (!whole || splat.fan != vec2(0.0))) {
-        splat.kind = 4u;
-    }
 }
 
 bool touches(vec4 rect, vec2 centre, vec2 extent) {
@@ -409,14 +376,13 @@ void main() {
 
     uint within = shown ? steps_within(place.rect, f, photon) : 0u;
     Placement drawn_in = place;
-#if CONTACT_LINES
-    float kept = 1.0, lost = 0.0;
-    float thin = thin_variance(f);
-    uint side = shown ? side_of_contact(place, f, photon.photon_id, kept, lost) : 0u;
-    sums[i].x += lost * power_w;
-    if (side == 0u)
-#endif
-        choose_level(drawn_in, f, photon, middle, sweep);
+    float kept = 1.0, lost = 0.0, thin = thin_variance(f);
+    uint side = 0u;
+    if (CONTACT_LINES) {
+        if (shown) side = side_of_contact(place, f, photon.photon_id, kept, lost);
+        sums[i].x += lost * power_w;
+    }
+    if (side == 0u) choose_level(drawn_in, f, photon, middle, sweep);
     SplatRecord fine = splat_of(photon, power_w, mean, f, table, table_band);
     fine.rect = drawn_in.rect;
     bool drawn = shown && touches(drawn_in.rect, fine.centre, half_extent(fine));
@@ -424,19 +390,14 @@ void main() {
     if (!drawn) {
         fine.kind = 0u;
     }
-    mark_edge(fine);
-    if (CONTACT_LINES) keep_to_side(fine, side, kept);
+    keep_within_lines(fine, side, kept);
     uint slot = i * uint(SLOTS + IMAGE_SLOTS);
-#if BORDER_IMAGES
-    // Behind the photon's own splats, so many of them.
-    Depicted depicted = Depicted(photon, middle, sweep, power_w, mean, table, table_band, 0u, 0.0);
-    if (CONTACT_LINES) {
-        depicted.side = side;
-        depicted.thin = thin;
+    if (BORDER_IMAGES) {
+        // Behind the photon's own splats, so many of them.
+        Depicted depicted = Depicted(photon, middle, sweep, power_w, mean, table, table_band, side, thin);
+        fine.images = put_images(depicted, place, slot + uint(SLOTS));
+        if (REINDEXED && !carries) fine.images = 0u;
     }
-    fine.images = put_images(depicted, place, slot + uint(SLOTS));
-    if (REINDEXED) fine.images = carries ? fine.images : 0u;
-#endif
     splats[slot] = fine;
 
     if (SLOTS == 2) {
@@ -463,7 +424,7 @@ void main() {
                 }
             }
         }
-        mark_edge(coarse);
+        keep_within_lines(coarse, 0u, 1.0);
         splats[slot + 1u] = coarse;
     }
 

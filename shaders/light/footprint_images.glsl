@@ -162,8 +162,7 @@ uint put_images(Depicted of, Placement place, uint slot) {
             } else {
                 next = NONE;
             }
-            mark_edge(splat);
-            if (CONTACT_LINES && keeps_side) keep_to_side(splat, of.side, 1.0);
+            keep_within_lines(splat, keeps_side ? of.side : 0u, 1.0);
             keeps_side = false;
             if (shown) splats[slot + count] = splat;
             count += shown ? 1u : 0u;

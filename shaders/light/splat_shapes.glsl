@@ -227,29 +227,26 @@ vec2 fan_of_splat(Footprint f, vec2 along, vec2 across, float xi_half) {
     return fan;
 }
 
-// Spacings by which wavelengths and texels blur the edge at most for the splat to be cut off there, and of footprints'
-// widths.
-const float BLURRED_EDGE = 0.4;
-const float WIDEST_CUT = 0.5;
-
-// Where the light's emission ends the splat is cut off, as bright as if all of it were lit; the photon carries its lit
-// share. At a fragment are the wavelengths that land about `share` of its way along the sweep (as in
-// `flatten_lattice`).
-void cut_at_edge(inout SplatRecord splat, Blur blur, Footprint f, uint word) {
-    vec3 edge = unpacked_edge(word);
+// Smaller principal variance of the footprint, texels².
+float thin_variance(Footprint f) {
+    float trace = f.axis_s.x * f.axis_s.x + f.axis_t.x * f.axis_t.x + f.axis_s.y * f.axis_s.y + f.axis_t.y * f.axis_t.y;
     float area = f.axis_s.x * f.axis_t.y - f.axis_s.y * f.axis_t.x;
-    if (abs(area) < 1e-6 || smoothing >= WIDEST_CUT || stride != 1u) return;
-    vec2 per_texel =
-        f.per_spacing / area * (edge.x * vec2(f.axis_t.y, -f.axis_t.x) + edge.y * vec2(-f.axis_s.y, f.axis_s.x));
-    float own = blur.along2, swept = blur.sweep * blur.sweep * TEXEL_VARIANCE, share = swept / (own + swept);
-    float along = dot(per_texel, blur.e),
-          variance = dot(per_texel, per_texel) * TEXEL_VARIANCE + along * along * share * own;
-    if (variance > BLURRED_EDGE * BLURRED_EDGE) return;
-    float sharpness = sqrt(TEXEL_VARIANCE / max(variance, 1e-12));
-    splat.lit = 0.5 + sharpness * edge.z;
-    splat.x_range = sharpness * vec2((1.0 - share) * dot(per_texel, splat.along), dot(per_texel, splat.across));
-    splat.amplitude /= lit_share(edge.z);
+    float root = sqrt(max(0.25 * trace * trace - area * area, 0.0));
+    return 0.5 * trace - root;
 }
+
+vec2 half_extent(SplatRecord splat) {
+    if (splat.kind == 1u) return splat.along;
+    vec4 part = part_that_fans(splat.fan);
+    vec2 extent = vec2(0.0);
+    for (int i = 0; i < 4; ++i) {
+        vec2 corner = vec2((i & 1) == 0 ? part.x : part.z, (i & 2) == 0 ? part.y : part.w);
+        extent = max(extent, abs(corner.x * splat.along + corner.y * splat.across) / (1.0 + dot(splat.fan, corner)));
+    }
+    return extent;
+}
+
+#include "light/splat_lines.glsl"
 
 SplatRecord swept_splat(PhotonRecord photon, float power_w, float mean, Footprint f, uint light_and_class, vec4 band) {
     SplatRecord splat;

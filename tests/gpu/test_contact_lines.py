@@ -176,7 +176,7 @@ def test_the_rules_of_a_texel_by_themselves(gl) -> None:
     words[64:128] |= 0xFFFF
     words[128:192] &= 0xFFFF
     within = rng.uniform(0.0, 1.0, (count, 2)).astype(np.float32)
-    side, part = rng.integers(1, 3, count).astype(np.uint32), rng.integers(0, 16, count).astype(np.uint32)
+    side, part = rng.integers(0, 3, count).astype(np.uint32), rng.integers(0, 16, count).astype(np.uint32)
     body = """
     seen = seen_share(word);
     contact = is_contact(word) ? 1u : 0u;
@@ -194,7 +194,7 @@ def test_the_rules_of_a_texel_by_themselves(gl) -> None:
     np.testing.assert_array_equal(got["contact"], bits[:, 16:].any(axis=1))
     cell = np.floor(within.astype(float) * 4.0).astype(int)
     np.testing.assert_array_equal(got["found"], 2 - bits[np.arange(count), 4 * cell[:, 1] + cell[:, 0]])
-    takes = np.where(side == 1, seen > 0.0, seen == 0.0)
+    takes = np.select([side == 0, side == 1], [True, seen > 0.0], seen == 0.0)
     np.testing.assert_array_equal(got["takes"], takes)
     np.testing.assert_allclose(got["held"], np.where(side == 1, seen, takes))
     np.testing.assert_allclose(got["place"], np.column_stack([part % 4, part // 4]) / 4.0 - 0.375)

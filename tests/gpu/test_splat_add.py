@@ -28,23 +28,21 @@ from spectrasplat.stress.rigs.splat_rig import Rig, photons
 SIZE = 130, 101
 """No multiple of the sums' blocks."""
 SMALL, SWEPT, CUT, EDGE = 1, 2, 3, 4
-BESIDE = {SMALL: 5, EDGE: 6, CUT: 7}
-"""Kinds beside a line of contact."""
 BINS = MapChannels(tuple(np.linspace(380.0, 780.0, 7).tolist()))
 ONE_COLOUR = Features(spectral_groups=0, point_spectrum=True)
 CASES = {
     "small": (SMALL, Features(spectral_groups=1)),
     "small of cut bands": (SMALL, Features(spectral_groups=1, band_cuts=True)),
-    "small beside contacts": (5, Features(spectral_groups=1, contact_lines=True)),
+    "small beside contacts": (SMALL, Features(spectral_groups=1, contact_lines=True)),
     "swept": (SWEPT, Features(spectral_groups=1)),
     "swept in bins": (SWEPT, Features(spectral_groups=1, bins=8)),
     "swept of one colour": (SWEPT, ONE_COLOUR),
     "swept of four wavelengths": (SWEPT, replace(ONE_COLOUR, hero=True)),
     "cut": (CUT, Features(spectral_groups=1, band_cuts=True)),
-    "cut in bins beside contacts": (7, Features(spectral_groups=1, band_cuts=True, contact_lines=True, bins=8)),
+    "cut in bins beside contacts": (CUT, Features(spectral_groups=1, band_cuts=True, contact_lines=True, bins=8)),
     "fanning": (EDGE, Features(spectral_groups=1)),
     "fanning at light edges": (EDGE, Features(spectral_groups=1, light_edges=True)),
-    "fanning beside contacts": (6, Features(spectral_groups=1, contact_lines=True, light_edges=True)),
+    "fanning beside contacts": (EDGE, Features(spectral_groups=1, contact_lines=True, light_edges=True)),
     "fanning of one colour": (EDGE, ONE_COLOUR),
 }
 
@@ -67,22 +65,21 @@ def frames(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray
 def splats(rig: Rig, rng: np.random.Generator, count: int, kind: int) -> np.ndarray:
     """Splat records (count,) of one kind, of all sizes and shapes, within and around the map."""
     records = SPLAT.zeros(count)
-    base = next((of for of, beside in BESIDE.items() if beside == kind), kind)
     records["kind"] = kind
     records["centre"] = rng.uniform([-8.0, -8.0], np.array(SIZE) + 8.0, (count, 2))
     records["rect"] = (0.0, 0.0, *rig.atlas.size)
     records["amplitude"] = rng.uniform(0.5, 1.0, count)
-    records["layer"] = rng.integers(1, 3, count).astype(np.uint32) << 30 if kind >= 5 else 0
+    records["layer"] = rng.integers(0, 3, count).astype(np.uint32) << 30 if rig.features.contact_lines else 0
     records["throughput"] = rng.uniform(0.0, 1.0, (count, 4))
     records["x_range"] = np.sort(rng.uniform(0.0, 1.0, (count, 2)), axis=1)
     if rig.features.hero:
         records["x_range"] = rng.integers(0, 200, (count, 2))
-    if base != SWEPT:
+    if kind != SWEPT:
         # Rectangles that cut, and one in three that does not.
         cuts = rng.uniform(size=count) < 0.67
         low = np.floor(rng.uniform(0.0, 60.0, (count, 2)))
         records["rect"][cuts] = np.concatenate([low, low + np.floor(rng.uniform(5.0, 70.0, (count, 2)))], axis=1)[cuts]
-    if base == SMALL:
+    if kind == SMALL:
         sigma = 10.0 ** rng.uniform(-1.5, 0.3, (count, 2))
         records["along"], records["across"] = 0.5 + 3.0 * sigma, np.sqrt(0.5) / sigma
         records["xi_half"] = rng.integers(0, 2, count) if rig.features.band_cuts else 0.0
@@ -100,7 +97,7 @@ def splats(rig: Rig, rng: np.random.Generator, count: int, kind: int) -> np.ndar
     records["waves"] = rng.normal(size=(count, 4))
     records["ripple"][:, :2] = rng.uniform(0.0, 0.05, (count, 2))
     records["lit"] = rng.uniform(-0.3, 1.3, count)
-    if base == EDGE:
+    if kind == EDGE:
         fan = np.stack([rng.uniform(-0.8, 0.8, count), rng.uniform(-0.05, 0.05, count)], axis=1)
         turned = rng.uniform(size=count) < 0.5
         fan[turned] = fan[turned, ::-1]
