@@ -355,7 +355,7 @@ void main() {
     float power_w = photon_power(photon, table / bands, table_band);
     if (REINDEXED) power_w = carries ? power_w : 0.0;
     sums[i].w += power_w;
-    float mean = mean_throughput(photon, power_w, table / bands, table_band);
+    float mean = mean_throughput(photon, power_w, table_band);
     vec3 middle = 0.5 * (to_lo + to_hi);
     vec3 sweep = to_hi - to_lo;
     Footprint f = footprint_in(place, photon, middle, sweep);

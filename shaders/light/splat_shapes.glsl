@@ -77,16 +77,18 @@ bool is_cut(PhotonRecord photon, vec4 band) {
 }
 
 // Throughput averaged over the light of the band. `power_w`: `photon_power`.
-float mean_throughput(PhotonRecord photon, float power_w, uint light_and_class, vec4 band) {
+float mean_throughput(PhotonRecord photon, float power_w, vec4 band) {
     if (HERO) {
         // Each of the four wavelengths has its own (`carry_companions`).
         return 1.0;
     } else if (POINT_SPECTRUM) {
         return photon.throughput.y;
     } else {
-        float whole_w = band.w;
-        if (BAND_CUTS && is_cut(photon, band))
-            whole_w = power_until(light_and_class, photon.x_hi) - power_until(light_and_class, photon.x_lo);
+        // By the table that `power_w` is from: it spreads a line at a band's end over both bands.
+        float whole_w = 0.0;
+        if (band.y > band.x && photon.x_hi > photon.x_lo) {
+            for (uint k = 0u; k < 2u * POWER_STEPS; ++k) whole_w += step_w[k];
+        }
         return whole_w > 0.0 ? power_w / whole_w : photon.throughput.y;
     }
 }

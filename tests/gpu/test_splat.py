@@ -153,6 +153,16 @@ def test_cut_of_a_small_splat_takes_its_share(cut_rig: Rig) -> None:
     assert part[..., 3].sum() == pytest.approx(expected, rel=3e-3)
 
 
+@pytest.mark.parametrize("features", [CUTS, Features(spectral_groups=0)], ids=["small", "broad, of one colour"])
+def test_a_line_at_a_band_s_end_is_all_there(gl, features: Features) -> None:
+    """Powers below x are known at few places: the line had a part of its power in a band that does not hold it."""
+    lamp, place = spectrum.Spectrum(np.zeros(401), ((540.0, 1.0),)), 0.4 + 1e-4
+    rig = Rig(gl.ctx, features, light=lamp, bands=((0.0, place), (place, 1.0)))
+    axes = (TINY, TINY) if features == CUTS else ([2.0, 0.0], [0.0, 2.0])
+    drawn = rig.draw(photons(features, [[32.0, 32.0]], *axes, x_lo=0.0, x_hi=place))
+    assert drawn[..., 3].sum() == pytest.approx(1.0, rel=5e-3)
+
+
 def test_throughput_over_the_band(rig: Rig) -> None:
     """Linear throughput over a chord of equal energy: the moments are those of quadrature."""
     image = rig.draw(photons(PLAIN, [[32.0, 32.0]], [1.0, 0.0], [0.0, 1.0], [24.0, 0.0], throughput=(0.2, 0.5, 0.9)))
