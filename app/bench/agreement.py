@@ -2,7 +2,7 @@
 
 Independent shifts of the lattices give the method's mean and its variance, photons of the reference give the
 reference's. Where both are right, the squared scores of n places have mean 1 with a standard error of √(2/n). What
-exceeds it is deviation: its size, with the noise of both taken out, says what a reviewer wants to know, since with
+exceeds it is deviation: its size, with the noise of both taken out, is what matters, since with
 enough photons every bias is significant.
 """
 
@@ -47,7 +47,7 @@ class Agreement(msgspec.Struct, frozen=True):
     places: int
     """With enough photons of the reference."""
     chi2: float
-    """Mean of the squared scores: 1 where nothing but chance tells the two apart."""
+    """Mean of the squared scores: 1 where the two differ by chance alone."""
     seldom: int
     """Places beyond ±`SELDOM`."""
     extreme: int

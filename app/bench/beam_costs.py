@@ -46,7 +46,7 @@ class BeamCost(msgspec.Struct, frozen=True):
     beams: int
     polygons: int
     pieces: int
-    handed: float
+    left: float = msgspec.field(name="handed")
     """Share of the light that entered, that is left to photons."""
     by_beams: bool
     """A rendering would follow beams."""
@@ -153,7 +153,7 @@ def plot(costs: list[BeamCost], stem: Path) -> None:
             colour, x = style.PALETTE[name][0], [cost.threshold for cost in mine]
             label = f"{facets:,d} facets"
             left.loglog(x, [cost.seconds for cost in mine], "o-", color=colour, label=label)
-            right.semilogx(x, [cost.handed for cost in mine], "o-", color=colour, label=label)
+            right.semilogx(x, [cost.left for cost in mine], "o-", color=colour, label=label)
         left.set(xlabel="threshold, share of the light", ylabel="seconds of the search")
         right.set(xlabel="threshold, share of the light", ylabel="light left to photons")
         for axes in (left, right):
@@ -170,8 +170,8 @@ def line(cost: BeamCost) -> str:
     """One line of the table."""
     return (
         f"{cost.facets:7,d}  {cost.threshold:9.0e}  {cost.seconds:8.3f}  {cost.beams:9,d}  {cost.polygons:9,d}  "
-        f"{cost.pieces:8,d}  {cost.handed:7.4f}  {'beams' if cost.by_beams else 'photons: ' + cost.why_not}"
+        f"{cost.pieces:8,d}  {cost.left:7.4f}  {'beams' if cost.by_beams else 'photons: ' + cost.why_not}"
     )
 
 
-HEAD = " facets  threshold   seconds      beams   polygons    pieces   handed  a rendering follows"
+HEAD = " facets  threshold   seconds      beams   polygons    pieces     left  a rendering follows"

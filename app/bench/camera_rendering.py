@@ -1,4 +1,4 @@
-"""One method of the camera pass in one scene, ready to run again and again: what `bench --eye` times, and nothing
+"""One method of the camera pass in one scene, ready to run again and again: what `bench --camera` times, and nothing
 else.
 
 All methods look up the same caustic maps, which are made once and cost nothing here: they differ in how camera rays
@@ -34,7 +34,7 @@ LIGHT_PHOTONS = 1 << 22
 reach in the time."""
 LIGHT_SEED = 1
 _TRIAL_SHARE = 0.25
-"""A trial this long, as a share of the time given, tells the rate of the longest rendering."""
+"""A trial this long, as a share of the time given, gives the rate of the longest rendering."""
 
 
 class SharedLight:
@@ -65,11 +65,11 @@ class SharedLight:
         light.prepare()
         light.begin(photons, LIGHT_SEED)
 
-        def told(done: float) -> bool:
+        def report(done: float) -> bool:
             progress(f"light pass, {100.0 * done:.0f} %")
             return True
 
-        light.run_pass(0, photons, told)
+        light.run_pass(0, photons, report)
         light.finish()
         self.channels, self.reflectances = light.map_channels, light.reflectances
         self.maps = light.caustic_maps()

@@ -130,7 +130,7 @@ def speed_up(points: Sequence[Point], baseline: Sequence[Point]) -> Reached | No
     """How many times sooner than `baseline` `points` reach the error that `baseline` ends with, as `Reached` whose
     seconds are the ratio; `at_once` then means "at least". None when they never get there.
 
-    A baseline that stopped improving is given the time at which it got there, not its last."""
+    For a baseline that stopped improving the time at which it got there counts, not its last."""
     own = time_to_error(baseline, baseline[-1].relmse) if baseline else None
     reached = time_to_error(points, baseline[-1].relmse) if baseline else None
     if own is None or reached is None:
@@ -169,7 +169,7 @@ def speed_ups(curves: Sequence[Curve], own: str = "srd") -> list[SpeedUp]:
         baselines = {name: p for name, p in points.items() if name not in OWN_METHODS}
         if own not in points or not baselines:
             return []
-        # Who was followed for less time might have got there before the others' ends.
+        # A baseline that was followed for less time might have got there before the others' ends.
         end = min(max(point.seconds for point in p) for p in baselines.values())
         for target in TARGETS:
             mine = time_to_error(points[own], target)

@@ -1,4 +1,4 @@
-"""What a whole frame costs where every photon is traced anew: the figure that a real-time program is asked for."""
+"""What a whole frame costs where every photon is traced anew: the figure that real-time programs are compared by."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where and with what a bench ran: figures mean little without it, and those of two machines are never mixed."""
+"""On what machine a bench ran: figures mean little without it, and those of two machines are never mixed."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _MEASURING = (
     "bench/rendering.py",
     "bench/runner.py",
 )
-"""Sources beside the shaders whose change changes a picture, its time or its error."""
+"""Sources besides the shaders whose change changes a picture, its time or its error."""
 
 
 def machine(context: Context) -> dict[str, str]:
@@ -52,7 +52,7 @@ _COPIES = 8
 
 
 def clocks() -> str:
-    """What NVIDIA's own tool says of the device and its clocks; "" where it is not there."""
+    """The device and its clocks as NVIDIA's own tool reports them; "" where there is none."""
     tool = shutil.which("nvidia-smi")
     if tool is None:
         return ""
@@ -91,7 +91,7 @@ def compile_line(programs: Iterable[Built]) -> str:
 
 
 def processor() -> str:
-    """The processor's name, where the system tells it."""
+    """The processor's name, where the system gives it."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:

@@ -1,4 +1,4 @@
-"""Every program that a scene needs, as it is handed to the driver: what tables, proofs and strict compilers look at."""
+"""Every program that a scene needs, as it is passed to the driver: for tables, proofs and strict compilers."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""Scenes that nobody chose: glass solids on and over a table, lit by what comes, for `bench-agreement --random`.
+"""Random scenes: glass solids on and over a table under random lights, for `bench-agreement --random`.
 
-Shipped scenes show what their authors thought of. These are drawn by chance within what a table can hold, so that they
-find what nobody thought of: light that grazes, glass in another one's shadow, solids that lean on nothing. Each is a
-function of its seed and its number alone, and is written as a scene file that anybody can open.
+Shipped scenes show what their authors thought of. Random ones hold what nobody thought of: grazing light, glass in
+another solid's shadow, solids that float at any angle. Each is a function of its seed and its number alone, and is
+written as a scene file that anybody can open.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from .random_solids import (
 SPECTRA = ("D65", "A", "E", {"blackbody": 3200}, {"lines": [[450.0, 1.0], [546.1, 2.0], [611.0, 1.5]]})
 TABLE_SIDE = 8.0
 _GAP = 1e-3
-"""Between what stands and the table: shipped scenes keep it too."""
+"""Between a solid and the table below it: shipped scenes keep it too."""
 
 
 def random_scene(seed: int, number: int, kind: str = "plain") -> Values:
@@ -96,7 +96,7 @@ def _solids(rng: np.random.Generator, wide: bool) -> tuple[list[Values], list[np
 def _placed(
     name: str, piece: Piece, material: Values, turned: list[float], place: np.ndarray, height: float
 ) -> list[Values]:
-    """Objects of a piece whose lowest point is `height` above the table; what says nothing of its own is made of
+    """Objects of a piece whose lowest point is `height` above the table; solids without a material of their own get
     `material`."""
     if len(piece.solids) == 1 and not piece.upright:
         where = {"rotation_deg": turned, "position": [*vector(place), 0.0], "rests_at_z": height}
@@ -111,7 +111,7 @@ def _placed(
 
 
 def _extras(rng: np.random.Generator, places: list[np.ndarray], wide: bool) -> list[Values]:
-    """Sometimes a mirror or something black, beside all glass; a grating, a white ball, a white board."""
+    """Sometimes a mirror or something black, next to all glass; a grating, a white ball, a white board."""
     if not chance(rng, 0.35):
         return []
     kind = str(rng.choice(["black", "mirror", *_MORE_EXTRAS] if wide else ["black", "mirror"]))
@@ -171,13 +171,13 @@ def _receivers(rng: np.random.Generator) -> list[Values]:
 
 
 def _from_above(rng: np.random.Generator, low_deg: float, high_deg: float, azimuths: tuple[float, float]) -> np.ndarray:
-    """Unit vector up to something that stands so high above the horizon."""
+    """Unit vector up to something so high above the horizon."""
     height, azimuth = np.radians(rng.uniform(low_deg, high_deg)), np.radians(rng.uniform(*azimuths))
     return np.array([np.cos(height) * np.cos(azimuth), np.cos(height) * np.sin(azimuth), np.sin(height)])
 
 
 _FROM_THE_FRONT = (180.0, 360.0)
-"""Azimuths, degrees: from the side of the camera, so that a wall is in no light's way."""
+"""Azimuths, degrees: from the side of the camera, so that a wall blocks no light."""
 
 
 def _light(rng: np.random.Generator, name: str, wide: bool) -> Values:

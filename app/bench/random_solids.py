@@ -1,6 +1,6 @@
-"""Pieces of glass that scenes drawn by chance hold, and what they are made of.
+"""The pieces of glass of random scenes, and their materials.
 
-`PLAIN` and `GLASSES` are those of every scene, `WIDER` and `wider_material` those of `--random-kinds all` besides: cut
+`PLAIN` and `GLASSES` are those of every scene, `WIDER` and `wider_material` are added by `--random-kinds all`: cut
 stones, vessels with something in them, bubbles, doublets; tinted, ground and invented glass, mirrors.
 """
 
@@ -43,7 +43,7 @@ class Piece:
     below: float = 0.0
     """From its origin down to its lowest point, scene units: of a piece of several solids."""
     upright: bool = False
-    """It stands, or spills."""
+    """It stays upright, as a vessel with liquid must."""
 
 
 def _prism(rng: np.random.Generator) -> Piece:
@@ -178,7 +178,7 @@ WIDER: Mapping[str, Callable[[np.random.Generator], Piece]] = {
 
 
 def wider_material(rng: np.random.Generator) -> Values:
-    """What a piece is made of: keys of an object."""
+    """The material of a piece: keys of an object."""
     kind = str(rng.choice(["glass", "numbers", "tinted", "ground", "widened", "mirror"], p=_SHARES))
     glass = str(rng.choice(GLASSES))
     if kind == "mirror":

@@ -1,9 +1,9 @@
 """One method in one scene, ready to render again and again: what the bench times, and nothing else. This is the light
 pass's; the camera pass's is `camera_rendering`.
 
-Programs, buffers, pilot and maps are made once. Then each rendering starts from nothing with one lattice of the
-photons asked for. Times are wall clock between points where the device has finished, on software and GPU alike; on
-a GPU the wait after every slice costs a little, which the figures then contain.
+Programs, buffers, pilot and maps are made once. Then each rendering starts from nothing with one lattice of the wanted
+photons. Times are wall clock between points where the device has finished, on software and GPU alike; on a GPU the wait
+after every slice costs a little, which the figures then contain.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ SMALLEST_BUDGET = 128
 FIRST_SECONDS = 0.02
 """Photon time of the smallest budget, as far as the costs that do not depend on it allow."""
 _TRIAL_SHARE = 0.25
-"""A trial this long, as a share of the time given, tells the rate of the longest rendering."""
+"""A trial this long, as a share of the time given, gives the rate of the longest rendering."""
 _TRIAL_GROWTH = 4
 
 
@@ -125,7 +125,7 @@ class MethodRig:
         if not seen:
             self.release()
             raise NothingToMeasure(
-                f"scene '{scene.name}': no light that glass or mirrors throw falls on what the camera sees directly, "
+                f"scene '{scene.name}': no light from glass or mirrors falls on what the camera sees directly, "
                 "so there is nothing to measure"
             )
         self.render(WARM_UP_PHOTONS, 1)
@@ -152,7 +152,7 @@ class MethodRig:
     def budgets(self, seconds: float, count: int) -> list[int]:
         """At most `count` photon counts, evenly spaced in the logarithm, the largest of which takes about `seconds`.
 
-        The first trials are small; each is four times the last, until one tells the rate."""
+        The first trials are small; each is four times the last, until one gives the rate."""
         photons = WARM_UP_PHOTONS
         while (took := self._photon_seconds(photons)) < _TRIAL_SHARE * seconds:
             photons *= _TRIAL_GROWTH
@@ -184,7 +184,7 @@ class MethodRig:
         return sum(seconds for stage, seconds in self._light_seconds(photons, 0).items() if stage != "plan")
 
     def _light_seconds(self, photons: int, seed: int) -> dict[str, float]:
-        """Fill the maps; seconds by stage. All that a pass does beside tracing counts as splatting."""
+        """Fill the maps; seconds by stage. All that a pass does besides tracing counts as splatting."""
         light = self._light
         light.forget_tables()
         sizes, planning, filling = pass_sizes(light.features.method, photons), 0.0, 0.0
@@ -192,7 +192,7 @@ class MethodRig:
         light.begin(sizes[0], seed)
         for number, size in enumerate(sizes):
             light.plan(size, number)
-            _ = light.batches.tables  # made when they are first asked for
+            _ = light.batches.tables  # made when they are first used
             planned = self._finished()
             light.run_pass(number, size, self._wait)
             filled = self._finished()
@@ -209,7 +209,7 @@ class MethodRig:
         }
 
     def _wait(self, _: float) -> bool:
-        """Finish a slice before the next is traced, so that its time is told to the right stage."""
+        """Finish a slice before the next is traced, so that its time counts for the right stage."""
         self._context.finish()
         return True
 

@@ -29,10 +29,10 @@ TARGETS = (0.3, 0.1, 0.03, 0.01, 0.003, 0.001)
 CLOCKS = ("photon", "whole")
 """By which speed-ups are given: the time of the measured pass, and that of a whole process."""
 ERROR_SOUGHT = 0.01
-"""A method that is worse than this after `BenchSettings.seconds` goes on to the horizon."""
+"""A method that is worse than this after `BenchSettings.seconds` is followed to the horizon."""
 
 OTHER_MEASURES = ("relmse_whole", "relmse_trimmed", "nrmse", "smape", "chroma")
-"""Measures beside relMSE by which times to equal error are given, so that no conclusion hangs on one."""
+"""Further measures by which times to equal error are given, so that no conclusion depends on relMSE alone."""
 
 
 RANDOM_KINDS = ("plain", "all")
@@ -42,7 +42,7 @@ REFERENCES = ("exact", "mesh")
 
 
 class BenchSettings(msgspec.Struct, frozen=True):
-    """What was asked for; results of other settings are never mixed."""
+    """The settings of a run; results of other settings are never mixed."""
 
     seconds: float = 3.0
     """Photon time of the largest rendering of each method and seed."""
@@ -121,8 +121,8 @@ class Point(msgspec.Struct, frozen=True):
     """Over seeds: mean, least and largest; freed of the reference's own variance."""
     bias2: float
     variance: float
-    """relMSE told apart: bias² of the mean picture (less what its own variance leaves) and mean variance. With one
-    seed they cannot be told apart: both are 0."""
+    """relMSE split in two: bias² of the mean picture (less what its own variance leaves) and mean variance. With one
+    seed it cannot be split: both are 0."""
     whole_seconds: float = 0.0
     """Median time of a whole process that makes this one picture: `Curve.setup_seconds` and every stage."""
 
@@ -234,7 +234,7 @@ class SceneResult(msgspec.Struct):
     strongest_abbe: float = 0.0
     """Lowest V_d in the scene; 0 when nothing disperses."""
     pictures: dict[str, str] = {}
-    """Files beside results.json, .npy of XYZ float32 (H, W, 3): "reference", "METHOD" (after
+    """Files next to results.json, .npy of XYZ float32 (H, W, 3): "reference", "METHOD" (after
     `equal_time` of photon time) and "METHOD early" and the like (after a share of it, see `MeasuredPass.pictures`)."""
     equal_time: float = 0.0
     """Photon seconds for which the pictures named by a method alone were made."""

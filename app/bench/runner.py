@@ -1,6 +1,6 @@
 """The bench, top to bottom: scene → reference → rigs → trials → every seed, every method, every budget → pictures.
 
-All methods of a scene stay on the device side by side. Within a seed they take turns, and who begins changes from seed
+All methods of a scene stay on the device at once. Within a seed they take turns, and who begins changes from seed
 to seed, so that what disturbs the machine hits all alike. After every method and seed all is on disk.
 """
 
@@ -60,7 +60,7 @@ def run_bench(
 
 
 def picture_size(scene: Scene, settings: BenchSettings) -> tuple[int, int]:
-    """As asked for, or `DEFAULT_WIDTH` in the scene's aspect."""
+    """As the settings say, or `DEFAULT_WIDTH` in the scene's aspect."""
     if settings.size is not None:
         return settings.size
     return DEFAULT_WIDTH, max(1, round(DEFAULT_WIDTH * scene.render.height / scene.render.width))
@@ -160,7 +160,7 @@ class _SceneBench:
                 self._store.save()
 
     def _tune(self, curve: Curve, rig: Rig) -> None:
-        """Budgets as far as the horizon asks for, and kernels with which a baseline is at its best."""
+        """Budgets up to the horizon, and kernels with which a baseline is at its best."""
 
         def judge(rendering: Rendering) -> tuple[float, float]:
             sample = self._sample(rendering, curve.method, 0, 0, None)

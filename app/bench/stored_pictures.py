@@ -1,7 +1,7 @@
-"""Small pictures that were made with many photons on one device, for another to be held against.
+"""Small pictures that were made with many photons on one device, for comparison with another.
 
-They say whether a driver draws what another drew, not whether that is right (known answers do): what a new driver
-breaks is seen here, in every part of a picture at once. `python -m spectrasplat.bench.stored_pictures` makes them anew.
+They show whether a driver draws what another drew, not whether that is right (known answers do): a new driver's faults
+show here in every part of a picture at once. `python -m spectrasplat.bench.stored_pictures` makes them anew.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _COMPARED = {"photons": 200_000, "spp": 8, "seed": 1}
 
 @dataclass(frozen=True)
 class Comparison:
-    """One scene, drawn here and held against what is stored."""
+    """One scene, drawn here and compared with the stored picture."""
 
     scene: str
     error: float

@@ -1,8 +1,8 @@
 """How fast the viewer answers: frame times while light gathers, while walking round, while the dispersion is dragged
 and while the glass is turned.
 
-The whole interface is drawn without a window and worked by a synthetic hand, so that the figures can be had on any
-machine, again and again. Every frame is finished on the device before its time is taken; no screen is waited for.
+The whole interface is drawn without a window and gets synthetic input, so that the figures can be repeated on any
+machine. Every frame is finished on the device before its time is taken; no screen is waited for.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ PATIENCE_S = 120.0
 NUDGES = 8
 """Single inputs whose answers are timed."""
 REST_S = 1.0
-"""What is under way may take so long to come to rest before each; a slow machine would take minutes."""
+"""Most time that is waited for before each until nothing changes; a slow machine would take minutes."""
 ANSWER_S = 2.0
 """An input that no picture shows by then is counted as missed."""
 _CHROME = (1.85, 1.6)
@@ -61,7 +61,7 @@ class Phase:
     pictures_per_second: float
     """New ones: what is seen to move."""
     direct: float
-    """Side of the picture over the side asked for, on average, for what is seen directly …"""
+    """Side of the picture over the wanted side, on average, for what is seen directly …"""
     glass: float
     """… and for what is seen by way of glass and mirrors."""
     whole_s: float
@@ -99,8 +99,8 @@ class Latency:
     def line(self) -> str:
         """Their median, a missed one being later than all others, and how many were missed."""
         median = np.median(np.concatenate([self.answered_ms, np.full(self.missed, np.inf)]))
-        told = f"{median:.0f} ms" if np.isfinite(median) else f"over {ANSWER_S:.0f} s"
-        return f"{told}, {self.missed} later than {ANSWER_S:.0f} s" if self.missed else told
+        words = f"{median:.0f} ms" if np.isfinite(median) else f"over {ANSWER_S:.0f} s"
+        return f"{words}, {self.missed} later than {ANSWER_S:.0f} s" if self.missed else words
 
 
 def run(context: Context, scene: Path, size: tuple[int, int], seconds: float) -> Iterator[str]:
@@ -138,7 +138,7 @@ def run(context: Context, scene: Path, size: tuple[int, int], seconds: float) ->
 
 
 class _Bench:
-    """A viewer and the hand that works it."""
+    """A viewer and its synthetic input."""
 
     def __init__(self, context: Context, scene: Path, size: tuple[int, int]) -> None:
         self._context = context
@@ -283,7 +283,7 @@ class _Bench:
         self.session.state = replace(state, scene=replace(state.scene, objects=tuple(objects)))
 
     def pause(self) -> None:
-        """Trace no more and let what is under way come to rest, for as long as `REST_S` at most."""
+        """Trace no more and wait until the picture no longer changes, `REST_S` at most."""
         self.session.state = replace(
             self.session.state,
             playing=False,

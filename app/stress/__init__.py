@@ -1,2 +1,2 @@
-"""`spectrasplat stress`: stiff and extreme cases, each a sweep of severities held against float64 and a stated
-bound."""
+"""`spectrasplat stress`: stiff and extreme cases, each a sweep of severities compared with float64 within a
+stated bound."""

@@ -1,4 +1,4 @@
-"""What a stress case is: one difficulty swept through its severities, each measured and held to what is promised.
+"""What a stress case is: one difficulty swept through its severities, each measured against what is promised.
 
 A case is a function that yields one `Measurement` per severity; `case` gives it its name and its sweep. The promises
 are the same everywhere: nothing is ever NaN or infinite, flux closes, every fall-back is counted, and each error stays
@@ -75,7 +75,7 @@ class Case:
     title: str
     """A sentence for the report."""
     why: str
-    """What goes wrong here in a careless renderer, and what is done about it."""
+    """What fails here in a careless renderer, and how it is prevented."""
     severity_name: str
     """The plot's horizontal axis, with its unit."""
     run: Run
@@ -99,7 +99,7 @@ class Case:
 
 
 def case(name: str, severity_name: str, sweep: Sequence[Any], logarithmic: bool = True) -> Callable[[Run], Case]:
-    """Makes a function a case; the first paragraph of its docstring is the title, the rest says why there is one."""
+    """Makes a function a case; the first paragraph of its docstring is the title, the rest `why`."""
 
     def made(run: Run) -> Case:
         title, _, why = inspect.cleandoc(run.__doc__ or "").partition("\n\n")

@@ -24,7 +24,7 @@ def test_finer_searches_leave_less(gl) -> None:
     boxes, dense = costs[:-1], costs[-1]
     assert [cost.threshold for cost in boxes] == list(beam_costs.THRESHOLDS) and all(cost.by_beams for cost in boxes)
     for coarse, fine in pairwise(boxes):
-        assert fine.beams > coarse.beams and fine.handed < coarse.handed
+        assert fine.beams > coarse.beams and fine.left < coarse.left
     assert not dense.by_beams and "10000 triangles" in dense.why_not and "10000 triangles" in beam_costs.line(dense)
 
 

@@ -103,7 +103,7 @@ def measure(
     try:
         features = light.features
         facts = Facts(scene, settings)
-        asked = trials(facts, features)
+        wanted = trials(facts, features)
         report.records = record_words(features)
         report.programs = program_sizes(compiled_sources(context, scene, settings))
         included = {name: is_in for name, is_in, _ in features.explain(facts)}
@@ -115,10 +115,10 @@ def measure(
             )
         work = _calibrated(report, light, seconds, context)
         sizes = static_costs(facts, features)
-        for index, trial in enumerate(asked):
+        for index, trial in enumerate(wanted):
             report.costs.append(cost_of(trial, sizes.get(trial.feature, ""), context, work, repeats))
-            report.complete = index + 1 == len(asked)
-            yield report, (index + 1) / len(asked)
+            report.complete = index + 1 == len(wanted)
+            yield report, (index + 1) / len(wanted)
     finally:
         light.release()
         light.buffers.release()

@@ -18,9 +18,9 @@ from ...model.scene import Absorption, Scene, SceneObject
 from ...reference.scene_surfaces import as_triangles
 
 FORCED_BINS = 16
-"""Spectral bins that a scene without any is made to pay for."""
+"""Spectral bins that are put into a scene without any."""
 MAX_LOOPED_TRIANGLES = 512
-"""A loop over more is not tried: it would take minutes to say what everybody knows."""
+"""A loop over more is not tried: it would take minutes."""
 DISPERSION = "dispersion in all"
 """Columns and cuts together: what a scene without dispersion does not pay."""
 

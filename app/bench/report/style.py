@@ -275,7 +275,7 @@ def inline_svg(document: str, prefix: str, label: str) -> str:
     text = text.replace("xlink:href=", "href=")
     text = re.sub(r'\b(id|href)="(#?)', rf'\1="\g<2>{prefix}-', text)
     text = text.replace("url(#", f"url(#{prefix}-")
-    # `patch_1` and its like serve nobody and fill the page.
+    # `patch_1` and similar ids are not used.
     referenced = set(re.findall(r'(?:href="#|url\(#)([^")]+)', text))
     text = re.sub(r' id="([^"]*)"', lambda found: found[0] if found[1] in referenced else "", text)
     for name, (on_paper, _) in PALETTE.items():

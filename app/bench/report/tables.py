@@ -106,7 +106,7 @@ def speed_up_table(scene: SceneResult) -> Table | None:
         for one in scene.speed_ups
     ]
     caption = (
-        "Each baseline has, at every budget, the kernel with the least actual error: no user could choose as well."
+        "Each baseline has, at every budget, the kernel with the least actual error: no user could choose so well."
     )
     headings = ("relMSE", "by", "speed-up", "srd s", "best baseline", "its s")
     return Table(headings, rows, caption, words=("by", "best baseline")) if rows else None
@@ -223,7 +223,7 @@ def summary_table(result: BenchResult) -> Table | None:
             rows,
             "Time of the best baseline over time of srd to each relMSE, and which baseline it is. ≥: srd's smallest "
             "rendering is already as good, or no baseline got there as long as all were followed; ≤: the baseline's "
-            "smallest rendering is already as good; –: nobody got there.",
+            "smallest rendering is already as good; –: no method got there.",
             words=("by",),
         )
         if rows

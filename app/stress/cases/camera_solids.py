@@ -86,7 +86,7 @@ def eye_guide(context: Context, counts: Sequence[int]) -> Measured:
 
 @case("eye-corner", "tilt (degrees)", (0.0, 2.0, 5.0, 10.0, 15.0), logarithmic=False)
 def eye_corner(context: Context, tilts_deg: Sequence[float]) -> Measured:
-    """A corner cube of glass throws the view back
+    """A corner cube of glass returns the view
 
     Three total reflections turn any ray round exactly; rounding must not."""
     n, corners = 1.8, np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], float)
@@ -98,7 +98,7 @@ def eye_corner(context: Context, tilts_deg: Sequence[float]) -> Measured:
         camera = straight(face / np.sqrt(3.0), -toward, 0.02)
         scene = with_sky(solid("corner", mesh, constant(n)), camera=camera, environment=slope_sky())
         sight = render_probe(context, scene, FEW)
-        # What its face reflects, outside or inside, goes to the mirrored side.
+        # What its face reflects, outside or inside, leaves on the mirrored side.
         r, back, across = float(fresnel(np.cos(tilt), n)), slope(toward), slope(mirrored)
         expected = r * across + (1.0 - r) ** 2 * (back + r * across) / (1.0 - r * r)
         # The face is no larger than the cube: of what it reflects inside, some comes out another way.
@@ -185,7 +185,7 @@ def eye_shells(context: Context, counts: Sequence[int]) -> Measured:
         yield seen(shells, f"{shells} shells", sight, held, ANY | {"band_uncut": 0.0})
 
 
-# ---- where the camera stands -------------------------------------------------------------------
+# ---- where the camera is ----------------------------------------------------------------------
 
 SURE = 1e-3
 """Nearer to a face than that the camera may be taken for inside or outside, for float32 and a ray's

@@ -1,8 +1,9 @@
 """The camera's rays at the stiffest single surfaces: the edge of total reflection, grazing views, glass that is hardly
 there or that no maker sells, and what a lens's focus makes of a pixel.
 
-Glass with flat sides is seen along one plane, so that every way of a ray is known (`flat_glass`). Other glass is held
-against `reference.camera_reference`, which follows one random wavelength a path and shares nothing with the shaders.
+Glass with flat sides is seen along one plane, so that every way of a ray is known (`flat_glass`). Other glass is
+compared with `reference.camera_reference`, which follows one random wavelength a path and shares nothing with the
+shaders.
 """
 
 from __future__ import annotations

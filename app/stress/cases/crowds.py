@@ -1,5 +1,5 @@
-"""Many of everything: lights, objects, stones, triangles, glasses, lines of absorption and tints. What lies outside of
-the beam may cost time and memory, and nothing else."""
+"""Many of everything: lights, objects, stones, triangles, glasses, lines of absorption and tints. Outside of the
+beam they may cost time and memory, and nothing else."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def _with_a_city(count: int) -> Scene:
 
 @case("many-objects", "objects", (1_000, 10_000, 65_534, 70_000))
 def many_objects(context: Context, counts: Sequence[int]) -> Measured:
-    """A ball in a beam, and up to 65,534 glass boxes beside it; 70,000 are refused
+    """A ball in a beam, and up to 65,534 glass boxes outside of it; 70,000 are refused
 
     A photon stores the object that it met first in 16 bits; what no light meets may not change the picture."""
     alone = probe(context, stage(_ball()))

@@ -1,8 +1,8 @@
 """Lights and cameras in places where geometry degenerates: on a face, along a face, in glass, far away, faint and
 fierce.
 
-Each is held to what every rendering promises (finite, closed, counted); where a neighbouring or a limiting
-scene has the same light, also to that.
+Each must keep what every rendering promises (finite, closed, counted) and, where a neighbouring or a limiting scene
+has the same light, agree with that.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ PLACES = (
     Place("a point light on a corner", lambda: _block(_point((SIDE, SIDE, TOP))), lost=0.05),
     Place("a panel lying on the top face", lambda: _block(_area((0.0, 0.0, TOP)))),
     Place("a panel of radius 1e-6", lambda: _block(_area((0.0, 0.0, 3.0), 1e-6))),
-    Place("a light that looks away from all glass", lambda: _block(_beam((0.0, 0.0, 3.0), (0.0, 0.0, 1.0)))),
+    Place("a light that points away from all glass", lambda: _block(_beam((0.0, 0.0, 3.0), (0.0, 0.0, 1.0)))),
     Place("a light under the table", lambda: _block(_beam((0.0, 0.0, -1.0), (0.0, 0.0, -1.0)))),
     Place("a light of no power", lambda: _block(replace(_beam((0.0, 0.0, 3.0)), spectral_power=Spectrum()))),
     Place("a block standing on the table, faces coincident", lambda: _block(_beam((0.0, 0.0, 3.0)), bottom=0.0)),
@@ -145,7 +145,7 @@ def refusals(_: Context, rows: Sequence[tuple[str, Callable[[], Scene]]]) -> Mea
 
 
 def refused(severity: float, label: str, scene: Callable[[], Scene]) -> Measurement:
-    """A scene that must not be taken, and the sentence that says so before anything is traced."""
+    """A scene that must be refused, and the sentence that refuses it before anything is traced."""
     try:
         check_scene(scene(), "scene")
         accepted, note = 1.0, "accepted"

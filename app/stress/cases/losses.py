@@ -1,7 +1,7 @@
 """What used to be lost in silence: unlike surfaces in contact, beams thinner than a pixel, lights at surfaces and
 lights that give none.
 
-Each severity is held to two promises: little is lost, and what is lost is reported by itself. The second is
+Each severity has two promises: little is lost, and what is lost is reported unasked. The second is
 judged by the tally and the picture alone; the rendering's own notices are only searched for a word.
 """
 
@@ -164,7 +164,7 @@ def _lit_by(light: Light) -> Scene:
 DARK: tuple[tuple[str, Callable[[], Scene]], ...] = (
     ("a light of no power", lambda: _lit_by(replace(BEAM, spectral_power=brighter(SPECTRUM, 0.0)))),
     (
-        "a mirror that throws all light away",
+        "a mirror that reflects all light away",
         lambda: stage(SceneObject("mirror", plane(3.0, 3.0), Mirror(), at(z=4.0))),
     ),
     ("a scene 1e16 from the origin", lambda: moved(_lit_by(BEAM), offset=(1e16, 0.0, 0.0))),

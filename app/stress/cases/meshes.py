@@ -64,7 +64,7 @@ def share(photons: Photons, *ends: str) -> float:
 
 
 def with_slivers(mesh: Mesh, height: float) -> Mesh:
-    """Each triangle in three: one a sliver whose apex stands `height` (a share of the triangle's) over the middle of an
+    """Each triangle in three: one a sliver whose apex is `height` (a share of the triangle's) over the middle of an
     edge."""
     a, b, c = np.moveaxis(mesh.corners(), 1, 0)
     middle = 0.5 * (a + b)
@@ -79,7 +79,7 @@ def slivers(context: Context, aspects: Sequence[float]) -> Measured:
 
     A thin triangle's normal is mostly rounding, and the edge tests of its neighbours must overlap or light leaks into
     the glass for good. Light through a sliver may go astray; how much light that is shrinks as fast."""
-    # A flat-faceted ball: too many planes for half-spaces, so it goes through the tree.
+    # A flat-faceted ball: too many planes for half-spaces, so the tree is used.
     smooth = sphere_mesh(1.0, 320)
     whole = make_mesh("ball", smooth.vertices, smooth.triangles)
     plain = through_ball(context, whole)

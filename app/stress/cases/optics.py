@@ -1,7 +1,7 @@
 """Single events at their stiffest: the edge of total reflection, grazing rays, media that hardly differ, and polarised
 light over many surfaces.
 
-The functions of shaders/lib run over arrays and are held against float64, which gets the same float32 numbers. Bounds
+The functions of shaders/lib run over arrays and are compared with float64, which gets the same float32 numbers. Bounds
 are running error bounds: every rounding of the formula, worst case, times the condition number of the step behind it.
 With u = `EPSILON`, d·n is known to 1.5 u (three products, two sums), and so
 
@@ -78,7 +78,7 @@ def cosine2_bound(e: Arrays) -> np.ndarray:
 
 
 def refraction_errors(e: Arrays, got: Arrays) -> dict[str, tuple]:
-    """What lies beyond the surface.
+    """Errors beyond the surface.
 
     Columns are judged where cos² is known to better than a half; closer to the edge they only have to be finite.
     """

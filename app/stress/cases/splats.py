@@ -1,7 +1,7 @@
 """Footprints at their stiffest: stretched, swept over a whole map, collapsed to a point, piled up on one texel, broken.
 
-Photon records made by hand go through the real splat pass; what they should deposit is known by itself: all of
-their energy, and for a focus its share of each texel.
+Photon records made by hand are drawn by the real splat pass; what they should deposit is known: all of their
+energy, and for a focus its share of each texel.
 
 A map holds averages over texels, but a splat is sampled at their centres along its sweep and under a Gaussian of
 variance `SAMPLED` at least. A texel grid sees such a Gaussian through its harmonics: by Poisson's formula the first
@@ -113,7 +113,7 @@ SWEEPS = ((0.0, 32, PLACES), (0.1, 32, PLACES), (1.0, 32, PLACES), (10.0, 48, PL
 def sweeps(context: Context, lengths: Sequence[tuple[float, int, int]]) -> Measured:
     """Spectral sweeps from nothing to a thousand texels, over sheared footprints
 
-    A strong prism throws one photon's spectrum across the whole map. The splat's table is chosen by blur over sweep,
+    A strong prism spreads one photon's spectrum across the whole map. The splat's table is chosen by blur over sweep,
     from 2^-8 to 2^5, and beyond either end something has to give: the blur along a long sweep is widened, never the
     energy changed."""
     rig = Rig(context.ctx, PLAIN, size=(SIDE, SIDE))

@@ -58,7 +58,7 @@ class Base:
 
 
 def scene_sweep(scene: Scene, prefix: str = "") -> tuple[Case, ...]:
-    """All cases for one scene; `prefix` goes before their names."""
+    """All cases for one scene; `prefix` begins their names."""
     base = Base(scene)
     return tuple(
         replace(

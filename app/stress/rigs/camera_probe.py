@@ -1,7 +1,7 @@
-"""What the camera cases share: one picture by the camera pass with its fall-backs, closed forms to hold it against, and
+"""What the camera cases share: one picture by the camera pass with its fall-backs, closed forms to compare it with, and
 skies.
 
-No light is traced: what a case is about lies between the camera and what shines by itself, or is lit directly. Pictures
+No light is traced: a case is about what is between the camera and what shines by itself, or is lit directly. Pictures
 are small, and most of them come from the same few programs.
 """
 
@@ -118,7 +118,7 @@ def look_with(
 def seen(
     severity: float, label: str, sight: Sight, held: Held, shares: Mapping[str, float] | None = None, note: str = ""
 ) -> Measurement:
-    """A sight's measurement: finite, and no fall-back taken more often than `shares` says, as a share of the samples
+    """A sight's measurement: finite, and no fall-back taken more often than `shares`, as a share of the samples
     (those not named: never)."""
     allowed = dict.fromkeys(sight.fallbacks, 0.0) | dict(shares or {})
     taken = {name.replace("_", " "): (sight.share(name), most) for name, most in allowed.items() if np.isfinite(most)}

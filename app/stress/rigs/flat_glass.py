@@ -71,7 +71,7 @@ def radiance_seen(
     radiance: Callable[[np.ndarray], np.ndarray],
     inside: bool = False,
 ) -> float:
-    """Radiance along a ray into a scene of nothing but the polygon and what `radiance` says of directions (…, 3)."""
+    """Radiance along a ray into a scene of the polygon alone, under the sky `radiance` of directions (…, 3)."""
     out = ways(outline, n, position, direction, inside)
     return float(radiance(np.array([way.direction for way in out])) @ np.array([way.weight for way in out]))
 

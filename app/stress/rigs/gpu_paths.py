@@ -2,7 +2,7 @@
 
 A light falls on glass or mirrors before a diffuse screen; the photon records come back with the
 float64 start of the lattice point each grew from and the choices of its path, so that every photon
-can be held against a closed form or the reference tracer.
+can be compared with a closed form or the reference tracer.
 """
 
 from __future__ import annotations
