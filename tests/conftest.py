@@ -3,6 +3,7 @@ tests."""
 
 from __future__ import annotations
 
+import copy
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -83,6 +84,17 @@ def gl(session_gl: Context) -> Iterator[Context]:
         resource = left.popleft()
         if hasattr(resource, "release"):  # those that were released are in the list too
             resource.release()
+
+
+@pytest.fixture(scope="module")
+def commands_share_context(gl: Context) -> Iterator[None]:
+    """Commands and renderings that a test starts in this process draw in its context, with the programs it has."""
+    lent = copy.copy(gl)
+    lent.release = lambda: None  # type: ignore[method-assign]
+    with pytest.MonkeyPatch.context() as patched:
+        for module in ("gpu.context", "render.still", "farm.desk", "farm.kinds"):
+            patched.setattr(f"spectrasplat.{module}.create_context", lambda *_: lent)
+        yield
 
 
 @pytest.fixture(autouse=True)

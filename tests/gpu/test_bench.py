@@ -26,6 +26,8 @@ from spectrasplat.render.still import render
 
 WIDTH, HEIGHT = 64, 36
 
+pytestmark = pytest.mark.usefixtures("commands_share_context")
+
 
 @pytest.fixture(scope="module")
 def prism() -> Scene:

@@ -10,7 +10,7 @@ from spectrasplat.__main__ import main
 from spectrasplat.bench.agreement import SceneAgreement
 from spectrasplat.render import pass_rounds
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("commands_share_context")]
 
 
 def found(folder: Path, *more: str) -> SceneAgreement:

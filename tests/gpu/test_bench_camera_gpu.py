@@ -26,6 +26,8 @@ from spectrasplat.render.still import render
 WIDTH, HEIGHT = 48, 27
 PHOTONS = 1 << 14
 
+pytestmark = pytest.mark.usefixtures("commands_share_context")
+
 
 @pytest.fixture(scope="module")
 def ball() -> Scene:

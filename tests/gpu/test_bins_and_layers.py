@@ -1,11 +1,10 @@
 """What a user asks of `render`, each option against a number it must bring about, on small scenes.
 
-The command line runs in this process and borrows the session's OpenGL context.
+The command line runs in this process.
 """
 
 from __future__ import annotations
 
-import functools
 import itertools
 import re
 import time
@@ -14,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import spectrasplat.render.still
 from spectrasplat.__main__ import main
 from spectrasplat.base.image_io import Picture, channel_name, read_image
 from spectrasplat.base.paths import assets_dir
@@ -62,15 +60,12 @@ PRISM_SCENE = beam(PRISM, x=0.25)
 
 
 @pytest.fixture
-def render(gl, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Render:
+def render(commands_share_context: None, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Render:
     """`spectrasplat render SCENE -o out.SUFFIX --size 64x36 --photons 10k --spp 1 --method srd-photons OPTIONS`, and
     what it wrote (beams would take ten times as long).
 
     The function's `said` then holds stdout, its `notes` stderr.
     """
-    monkeypatch.setattr(
-        spectrasplat.render.still, "render", functools.partial(spectrasplat.render.still.render, context=gl)
-    )
 
     def call(scene: str | Path, options: str = "", suffix: str = ".npy") -> Picture:
         output = tmp_path / f"out{suffix}"

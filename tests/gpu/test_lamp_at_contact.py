@@ -10,7 +10,7 @@ import pytest
 from spectrasplat.gpu.context import Context
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.reference.photon_reference import render_reference
+from spectrasplat.reference.photon_reference import cached_reference
 from spectrasplat.render.still import render
 
 SCENE = """
@@ -101,7 +101,7 @@ def test_penumbrae_of_halved_beams_are_the_lamp_s(gl, tmp_path: Path) -> None:
     scene, weights = load_scene(path), np.array([0.2126, 0.7152, 0.0722])
     settings = RenderSettings(width=64, height=36, layer="caustic", photons=100_000, spp=16)
     picture = render(scene, settings, context=gl).rgb @ weights
-    reference = render_reference(scene, 64, 36, photons=700_000).xyz[..., 1]
+    reference = cached_reference(scene, 64, 36, photons=700_000).xyz[..., 1]
     assert picture.sum() == pytest.approx(reference.sum(), rel=0.01)
     blocks = [some.reshape(9, 4, 16, 4).sum(axis=(1, 3)) for some in (picture, reference)]
     assert np.sqrt(((blocks[0] - blocks[1]) ** 2).mean() / (blocks[1] ** 2).mean()) < 0.02

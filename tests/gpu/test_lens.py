@@ -11,7 +11,7 @@ from spectrasplat.model.geometry.primitives_round import sphere
 from spectrasplat.model.lights import DirectionalLight
 from spectrasplat.model.optics.glass import sellmeier
 from spectrasplat.model.scene import Camera, Dielectric, Diffuse, Scene, SceneObject
-from spectrasplat.reference.camera_reference import render_camera_reference
+from spectrasplat.reference.camera_reference import cached_camera_reference
 
 from tests.gpu.camera_rig import (
     DOWN,
@@ -50,7 +50,7 @@ def relative(picture: np.ndarray, expected: np.ndarray) -> float:
 
 def reference(camera: Camera, objects: tuple[SceneObject, ...], samples: int) -> np.ndarray:
     scene = Scene("lens", camera, (SUN,), objects)
-    return render_camera_reference(scene, *SIZE, samples=samples).rgb
+    return cached_camera_reference(scene, *SIZE, samples=samples).rgb
 
 
 @pytest.mark.slow

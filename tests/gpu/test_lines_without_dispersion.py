@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.reference.photon_reference import render_reference
+from spectrasplat.reference.photon_reference import cached_reference
 from spectrasplat.render.still import render
 
 SCENE = """
@@ -53,7 +53,7 @@ def test_all_lines_of_a_lamp_are_drawn(gl, tmp_path: Path, tint: str, kind: str,
     scene = load_scene(path)
     settings = RenderSettings(96, 54, layer="caustic", photons=60_000)
     picture = render(scene, settings, context=gl).rgb.astype(float).sum(axis=(0, 1))
-    xyz = render_reference(scene, 96, 54, photons=400_000).xyz.sum(axis=(0, 1))
+    xyz = cached_reference(scene, 96, 54, photons=400_000).xyz.sum(axis=(0, 1))
     to_rgb = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
     assert picture == pytest.approx(to_rgb @ xyz, rel=0.02)
 
@@ -67,7 +67,7 @@ def test_light_that_pilot_photons_missed_is_kept(gl, tmp_path: Path) -> None:
     scene = load_scene(path)
     settings = RenderSettings(96, 54, layer="caustic", photons=100_000)
     picture = render(scene, settings, context=gl).rgb @ [0.2126, 0.7152, 0.0722]
-    reference = render_reference(scene, 96, 54, photons=400_000).xyz[..., 1]
+    reference = cached_reference(scene, 96, 54, photons=400_000).xyz[..., 1]
     far = np.s_[:8, 24:40]
     assert reference[far].sum() > 0.003 * reference.sum()
     assert picture[far].sum() == pytest.approx(reference[far].sum(), rel=0.25)

@@ -29,6 +29,7 @@ from spectrasplat.stress.rigs.scene_parts import BEAM, TABLE, solid, stage
 
 from tests.fuzz.kills import SCENE
 
+pytestmark = pytest.mark.usefixtures("commands_share_context")
 SETTINGS = RenderSettings(width=80, height=45, photons=8192, spp=4, layer="caustic")
 BLOCK = solid("block", box(), constant(1.5, "n"), (0.3, 0.0, 1.2))
 WHITE = illuminant("D65").scaled_to_luminous(10.0)

@@ -11,12 +11,13 @@ from spectrasplat.__main__ import main
 from spectrasplat.base.image_io import read_image
 
 ASKED = ("--size", "64x36", "--photons", "40k", "--spp", "4", "--batch", "4096")
+pytestmark = pytest.mark.usefixtures("commands_share_context")
 SPECTRAL = ("--method", "srd-photons", "--bins", "8")
 """Photons with spectral maps."""
 
 
 @pytest.fixture(scope="module")
-def parts(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+def parts(tmp_path_factory: pytest.TempPathFactory, commands_share_context: None) -> list[Path]:
     """Three parts of one picture, the last first: order must not matter."""
     made = [tmp_path_factory.mktemp("parts") / f"{index}.ssp" for index in (3, 2, 1)]
     for part in made:
@@ -102,7 +103,7 @@ def test_what_is_asked_wrongly_is_a_sentence(tmp_path: Path, capsys: pytest.Capt
         (("--passes", "1/3", "-o", tmp_path / "a.png"), "name the output .ssp"),
         (("-o", part), "say which by --passes"),
         (("--passes", "1/3", "--seconds", "1", "-o", part), "--passes and --seconds exclude each other"),
-        (("--passes", "1/3", "--photons", "1k", "-o", part), "not enough to share out"),
+        (("--passes", "1/3", "--photons", "1k", "--size", "64x36", "-o", part), "not enough to share out"),
     ):
         assert sentence in refusal(capsys, "render", "prism", *arguments)
     assert not part.exists()

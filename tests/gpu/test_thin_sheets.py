@@ -18,7 +18,7 @@ from spectrasplat.model.optics.spectrum import illuminant
 from spectrasplat.model.placement import rotation_about
 from spectrasplat.model.scene import Camera, Dielectric, Diffuse, Scene, SceneObject
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.reference.camera_reference import render_camera_reference
+from spectrasplat.reference.camera_reference import cached_camera_reference
 from spectrasplat.render.still import render
 from spectrasplat.stress.rigs.camera_probe import (
     PROBE,
@@ -130,6 +130,6 @@ def test_sheets_as_the_reference_sees_them(gl: Context, polarised: bool) -> None
     scene = with_sky(first, second, solid, camera=camera, environment=slope_sky())
     scene = replace(scene, render=replace(scene.render, polarisation=polarised))
     found = render_probe(gl, scene, resized(PROBE, 24, 18, 64)).picture
-    reference = render_camera_reference(scene, 24, 18, samples=1024).rgb
+    reference = cached_camera_reference(scene, 24, 18, samples=1024).rgb
     assert found.mean(axis=(0, 1)) == pytest.approx(reference.mean(axis=(0, 1)), rel=4e-3)
     assert np.abs(blocks(found, 6) - blocks(reference, 6)).max() < 0.03

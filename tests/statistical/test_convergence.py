@@ -18,7 +18,7 @@ from spectrasplat.gpu.context import Context
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.passes import pilot
 from spectrasplat.reference.metrics import ReferencePicture, measure
-from spectrasplat.reference.photon_reference import render_reference
+from spectrasplat.reference.photon_reference import cached_reference
 
 SIZE = (96, 54)
 PHOTONS = (25_000, 125_000, 500_000)
@@ -31,7 +31,7 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def reference() -> ReferencePicture:
     scene = load_scene(shipped_scenes()["prism_case"])
-    picture = render_reference(scene, *SIZE, photons=REFERENCE_PHOTONS, max_depth=scene.render.max_depth)
+    picture = cached_reference(scene, *SIZE, photons=REFERENCE_PHOTONS, max_depth=scene.render.max_depth)
     return ReferencePicture(picture.xyz, picture.variance)
 
 

@@ -17,7 +17,7 @@ from spectrasplat.model.scene import Camera, Dielectric, Diffuse, Mirror, Scene,
 from spectrasplat.model.scene_defaults import studio_environment
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.model.texture import Environment
-from spectrasplat.reference.camera_reference import render_camera_reference
+from spectrasplat.reference.camera_reference import cached_camera_reference
 from spectrasplat.render.frames import FrameRenderer
 
 SIZE, BLOCK = (96, 54), 6
@@ -98,7 +98,7 @@ def error(gl: Context, scene: Scene) -> np.ndarray:
         shown = blocks(renderer.run(stage).astype(float))
     finally:
         renderer.release()
-    expected = blocks(render_camera_reference(scene, *SIZE, samples=2048).rgb)
+    expected = blocks(cached_camera_reference(scene, *SIZE, samples=2048).rgb)
     return (shown - expected) / (expected + 0.05 * expected.mean())
 
 

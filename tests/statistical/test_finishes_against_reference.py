@@ -17,7 +17,7 @@ from spectrasplat.model.optics.spectrum import illuminant
 from spectrasplat.model.placement import rotation_about
 from spectrasplat.model.scene import Camera, Dielectric, Diffuse, Mirror, Scene, SceneObject
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.reference.camera_reference import render_camera_reference
+from spectrasplat.reference.camera_reference import cached_camera_reference
 from spectrasplat.render.frames import FrameRenderer
 
 SIZE, BLOCK = (96, 54), 6
@@ -117,7 +117,7 @@ def error(found: np.ndarray, expected: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("make", BOUNDS, ids=lambda make: make.__name__)
 def test_finished_surfaces_agree_with_the_reference(gl: Context, make) -> None:
     scene = make()
-    expected = blocks(render_camera_reference(scene, *SIZE, samples=2048).rgb)
+    expected = blocks(cached_camera_reference(scene, *SIZE, samples=2048).rgb)
     found = error(shown(gl, scene), expected)
     print(make.__name__, "rms", np.sqrt((found**2).mean()), "max", abs(found).max(), "mean", found.mean())
     assert abs(found.mean()) < BOUNDS[make][0]
@@ -129,5 +129,5 @@ def test_finished_surfaces_agree_with_the_reference(gl: Context, make) -> None:
         replace(o, material=Diffuse(o.material.reflectance_rgb)) if isinstance(o.material, Diffuse) else o
         for o in scene.objects
     ]
-    other = blocks(render_camera_reference(replace(scene, objects=tuple(plain)), *SIZE, samples=64).rgb)
+    other = blocks(cached_camera_reference(replace(scene, objects=tuple(plain)), *SIZE, samples=64).rgb)
     assert np.sqrt((error(other, expected) ** 2).mean()) > 3 * BOUNDS[make][0]

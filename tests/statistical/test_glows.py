@@ -20,7 +20,7 @@ from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes import trace
-from spectrasplat.reference.photon_reference import render_reference
+from spectrasplat.reference.photon_reference import cached_reference
 from spectrasplat.render.still import render
 
 WIDTH, HEIGHT, BLOCK = 96, 54, 6
@@ -102,7 +102,7 @@ def blocks(picture: np.ndarray) -> np.ndarray:
 
 
 def reference(scene: Scene, photons: int) -> np.ndarray:
-    return blocks(render_reference(scene, WIDTH, HEIGHT, photons=photons).xyz[..., 1])
+    return blocks(cached_reference(scene, WIDTH, HEIGHT, photons=photons).xyz[..., 1])
 
 
 def drawn(gl: Context, scene: Scene, photons: int) -> np.ndarray:

@@ -15,8 +15,8 @@ from spectrasplat.model.lights import AreaLight, CollimatedLight
 from spectrasplat.model.optics.spectrum import illuminant
 from spectrasplat.model.scene import Camera, Diffuse, Grating, Scene, SceneObject
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.reference.camera_reference import render_camera_reference
-from spectrasplat.reference.photon_reference import render_reference
+from spectrasplat.reference.camera_reference import cached_camera_reference
+from spectrasplat.reference.photon_reference import cached_reference
 from spectrasplat.render.still import render
 
 WIDTH, HEIGHT = 96, 48
@@ -79,7 +79,7 @@ SETTINGS = RenderSettings(width=WIDTH, height=HEIGHT, photons=120_000, spp=96)
 
 @pytest.mark.slow
 def test_the_camera_sees_the_slits_spectra() -> None:
-    reference = render_camera_reference(slit_seen_through(), WIDTH, HEIGHT, samples=1500).rgb
+    reference = cached_camera_reference(slit_seen_through(), WIDTH, HEIGHT, samples=1500).rgb
     found = {m: render(slit_seen_through(), replace(SETTINGS, method=m)).rgb for m in ("srd", "stochastic-even")}
     for method, picture in found.items():
         assert picture.sum(axis=(0, 1)) == pytest.approx(reference.sum(axis=(0, 1)), rel=0.02), method
@@ -92,7 +92,7 @@ def test_the_camera_sees_the_slits_spectra() -> None:
 @pytest.mark.parametrize("reflects", [False, True])
 def test_light_lands_in_the_same_spectra(reflects: bool) -> None:
     scene = spectra_on_a_wall(reflects=reflects)
-    reference = render_reference(scene, WIDTH, HEIGHT, photons=400_000).rgb
+    reference = cached_reference(scene, WIDTH, HEIGHT, photons=400_000).rgb
     picture = render(scene, replace(SETTINGS, layer="caustic")).rgb
     assert picture.sum(axis=(0, 1)) == pytest.approx(reference.sum(axis=(0, 1)), rel=0.02)
     assert error(picture, reference) < 0.05

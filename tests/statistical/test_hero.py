@@ -19,7 +19,7 @@ from spectrasplat.model.optics.glass import constant
 from spectrasplat.model.optics.spectrum import illuminant
 from spectrasplat.model.scene import Absorption, Camera, Dielectric, Diffuse, Mirror, Scene
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.reference.photon_reference import render_reference
+from spectrasplat.reference.photon_reference import cached_reference
 from spectrasplat.render.still import render
 
 from tests.statistical.test_reference_against_gpu import (
@@ -107,7 +107,7 @@ def chroma_noise(shown: np.ndarray) -> float:
 def test_hero_shows_the_reference(gl, scene) -> None:
     made = scene()
     shown = pictures(gl, made, "hero")
-    reference = render_reference(made, WIDTH, HEIGHT, photons=REFERENCE_PHOTONS)
+    reference = cached_reference(made, WIDTH, HEIGHT, photons=REFERENCE_PHOTONS)
     ours, theirs = blocks(shown.mean(axis=0)), blocks(reference.xyz)
     error = ours.sum(axis=(0, 1)) / theirs.sum(axis=(0, 1)) - 1.0
     totals = np.array([blocks(p).sum(axis=(0, 1)) for p in shown]) / theirs.sum(axis=(0, 1))

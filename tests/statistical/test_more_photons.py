@@ -11,7 +11,7 @@ from spectrasplat.bench.rendering import MethodRig
 from spectrasplat.gpu.context import Context
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.reference.metrics import ReferencePicture, measure
-from spectrasplat.reference.photon_reference import render_reference
+from spectrasplat.reference.photon_reference import cached_reference
 
 SIZE = (64, 36)
 PHOTONS = (5_000, 20_000, 80_000, 320_000)
@@ -41,7 +41,7 @@ def test_more_photons_are_never_worse(gl: Context, tmp_path: Path, name: str) ->
         keys = dict(zip(("camera", "fov", "shape", "size", "cauchy"), OWN[name], strict=True))
         path.write_text(SCENE.format(**keys), encoding="utf-8")
     scene = load_scene(path)
-    picture = render_reference(scene, *SIZE, photons=REFERENCE_PHOTONS, max_depth=scene.render.max_depth)
+    picture = cached_reference(scene, *SIZE, photons=REFERENCE_PHOTONS, max_depth=scene.render.max_depth)
     reference = ReferencePicture(picture.xyz, picture.variance)
     rig = MethodRig(gl, scene, "srd-photons", *SIZE)
     errors = np.array([measure(rig.render(n, 1).xyz, reference)["nrmse"] for n in PHOTONS])

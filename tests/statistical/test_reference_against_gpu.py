@@ -35,7 +35,7 @@ from spectrasplat.model.scene import (
     SceneObject,
 )
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.reference.photon_reference import render_reference
+from spectrasplat.reference.photon_reference import cached_reference
 from spectrasplat.render.still import render
 
 WIDTH, HEIGHT, BLOCK = 96, 64, 8
@@ -170,7 +170,7 @@ class Comparison:
     def __init__(
         self, context, scene: Scene, photons: int = PHOTONS, reference_photons: int = REFERENCE_PHOTONS
     ) -> None:
-        reference = render_reference(scene, WIDTH, HEIGHT, photons=reference_photons)
+        reference = cached_reference(scene, WIDTH, HEIGHT, photons=reference_photons)
         settings = RenderSettings(
             width=WIDTH, height=HEIGHT, photons=photons, method="stochastic-point", layer="caustic", spp=4
         )
@@ -233,7 +233,7 @@ def test_the_measured_case_agrees_with_a_third_program() -> None:
     other = np.zeros(stored["shape"])
     other[slice(*stored["rows"]), slice(*stored["columns"])] = stored["crop"].astype(float) * stored["scale"]
     scene = load_scene(assets_dir() / "scenes" / "prism_case.toml")
-    picture = render_reference(scene, 512, 512, photons=1_500_000)
+    picture = cached_reference(scene, 512, 512, photons=1_500_000)
     np.testing.assert_allclose(picture.rgb.sum(axis=(0, 1)), other.sum(axis=(0, 1)), rtol=4e-3)
     ours, theirs = blocks(picture.rgb, 4), blocks(other, 4)
     norm, own = np.sum(theirs**2), blocks(picture.variance, 4).sum() / 16 / np.sum(blocks(picture.xyz, 4) ** 2)

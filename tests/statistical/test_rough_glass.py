@@ -25,8 +25,8 @@ from spectrasplat.model.placement import rotation_about
 from spectrasplat.model.scene import Camera, Dielectric, Diffuse, RenderDefaults, Scene, SceneObject
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes import trace
-from spectrasplat.reference.camera_reference import render_camera_reference
-from spectrasplat.reference.photon_reference import render_reference
+from spectrasplat.reference.camera_reference import cached_camera_reference
+from spectrasplat.reference.photon_reference import cached_reference
 from spectrasplat.render.still import RenderResult, render
 
 from tests.gpu.test_beam_tails import held, passed
@@ -82,7 +82,7 @@ def test_a_slab_lets_through_what_the_reference_does(gl: Context, roughness: flo
     """Both surfaces, all reflections between them; the microfacets keep nothing."""
     scene = lit_slab(roughness)
     found = shares_of(caustic(gl, scene, 60_000, (8, 8)))
-    balance = render_reference(scene, 4, 4, photons=400_000).fates
+    balance = cached_reference(scene, 4, 4, photons=400_000).fates
     emitted = balance["emitted"]
     assert found["deposited"] == pytest.approx(balance["deposited"] / emitted, rel=4e-3)
     assert found["absorbed"] == pytest.approx(balance["absorbed"] / emitted, abs=4e-3)
@@ -187,7 +187,7 @@ def error(picture: np.ndarray, reference: np.ndarray) -> float:
 def test_the_pattern_behind_a_slab_is_the_references(gl: Context) -> None:
     """Blocks within the errors of both: the reference's own, by its independent parts, and 2 % of the photons'."""
     scene = lit_slab(0.4)
-    reference = render_reference(scene, 64, 64, photons=1_000_000)
+    reference = cached_reference(scene, 64, 64, photons=1_000_000)
     found = caustic(gl, scene, 60_000).rgb
     known, sigma = blocks(reference.xyz)[..., 1], np.sqrt(blocks(reference.variance)[..., 1]) / 8.0
     allowed = np.hypot(sigma, 0.02 * known + 2e-3 * known.max())
@@ -226,7 +226,7 @@ def prism(roughness: float, polarisation: bool = False, smooth: bool = False) ->
 def test_spectra_through_ground_flint(gl: Context, method: str, polarisation: bool, smooth: bool) -> None:
     """One microfacet for all of a band: its spectral column carries on through it."""
     scene = prism(0.2, polarisation, smooth)
-    reference = render_reference(scene, 64, 64, photons=600_000).rgb
+    reference = cached_reference(scene, 64, 64, photons=600_000).rgb
     found = caustic(gl, scene, 60_000, method=method).rgb
     assert found.sum(axis=(0, 1)) == pytest.approx(reference.sum(axis=(0, 1)), rel=0.02)
     assert error(found, reference) < 0.05
@@ -254,7 +254,7 @@ def seen_through(roughness: float, dispersion: Dispersion, smooth: bool) -> Scen
 @pytest.mark.parametrize("dispersion", [GLASS, find("N-SF11")], ids=["one index", "dispersive"])
 def test_the_camera_sees_through_rough_glass(gl: Context, dispersion: Dispersion, smooth: bool) -> None:
     scene = seen_through(0.4, dispersion, smooth)
-    reference = render_camera_reference(scene, 48, 32, samples=1500).rgb
+    reference = cached_camera_reference(scene, 48, 32, samples=1500).rgb
     found = render(scene, RenderSettings(48, 32, photons=1000, spp=64), context=gl).rgb
     assert found.sum(axis=(0, 1)) == pytest.approx(reference.sum(axis=(0, 1)), rel=0.01)
     assert error(found, reference) < 0.03
@@ -270,6 +270,6 @@ def test_the_environment_lights_through_rough_glass(gl: Context) -> None:
     sky = gradient((2.0, 2.0, 2.0), (0.1, 0.1, 0.1), (0.0, 0.0, 0.0))
     camera = Camera((0.0, 0.0, 0.8), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0), vertical_fov_deg=60.0)
     scene = Scene("pane", camera, (), (pane, floor), environment=sky)
-    reference = render_camera_reference(scene, 16, 16, samples=6000).rgb.mean()
+    reference = cached_camera_reference(scene, 16, 16, samples=6000).rgb.mean()
     found = render(scene, RenderSettings(16, 16, photons=1000, spp=4), context=gl).rgb.mean()
     assert found == pytest.approx(reference, rel=0.01)

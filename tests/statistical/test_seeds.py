@@ -165,7 +165,7 @@ def drawn_shifts(rng: np.random.Generator) -> Shift:
     return lambda seed, light, number, dimension: drawn.setdefault((seed, light, dimension), int(rng.integers(WORD)))
 
 
-@pytest.fixture(params=["prism_case", pytest.param("rod", marks=pytest.mark.slow)])
+@pytest.fixture(params=["prism_case", "rod"])
 def light(gl: Context, request: pytest.FixtureRequest) -> Iterator[LightPass]:
     scene = load_scene(assets_dir() / "scenes" / f"{request.param}.toml")
     settings = RenderSettings(
@@ -180,6 +180,7 @@ def light(gl: Context, request: pytest.FixtureRequest) -> Iterator[LightPass]:
     buffers.release()
 
 
+@pytest.mark.slow
 def test_seeds_differ_as_independent_shifts_do(light: LightPass, monkeypatch: pytest.MonkeyPatch) -> None:
     """The ratio of both noises, each of twelve maps: 1. Of near-copies it was 0.16 in one scene, 0.49 in the other."""
     found = {}

@@ -15,7 +15,7 @@ from spectrasplat.gpu.context import Context
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.reference.photon_reference import render_reference
+from spectrasplat.reference.photon_reference import cached_reference
 from spectrasplat.render.still import render
 
 WIDTH, HEIGHT, BLOCK = 96, 54, 6
@@ -65,7 +65,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 
 @pytest.fixture(scope="module")
 def truth(scene: Scene) -> np.ndarray:
-    return blocks(render_reference(scene, WIDTH, HEIGHT, photons=4_000_000).xyz[..., 1])
+    return blocks(cached_reference(scene, WIDTH, HEIGHT, photons=4_000_000).xyz[..., 1])
 
 
 def blocks(picture: np.ndarray) -> np.ndarray:
