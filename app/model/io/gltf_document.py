@@ -21,6 +21,7 @@ import numpy as np
 
 from ...base import files
 from ...base.errors import UserError
+from ..geometry.mesh_health import weld_map
 
 GLB_MAGIC = b"glTF"
 JSON_CHUNK, BIN_CHUNK = 0x4E4F534A, 0x004E4942
@@ -180,6 +181,51 @@ class GltfDocument:
             return files.read_bytes(target, files.DATA_BYTES)
         except OSError as error:
             raise self.fail(f"{what} needs {target}, which cannot be read ({error.strerror}); copy it there") from None
+
+
+class Additions:
+    """What is put into a document: entries of its top-level arrays, and bytes at the end of one buffer."""
+
+    def __init__(self, json: dict[str, Any], buffer: int) -> None:
+        """`buffer`: number of the buffer that will hold `data`."""
+        self._json, self._buffer = json, buffer
+        self.data = bytearray()
+
+    def append(self, key: str, entry: dict[str, Any]) -> int:
+        """Number of a new entry of a top-level array."""
+        values = self._json.setdefault(key, [])
+        values.append(entry)
+        return len(values) - 1
+
+    def view(self, data: bytes, **more: int) -> int:
+        """Number of a new buffer view that holds `data`."""
+        self.data += b"\0" * (-len(self.data) % 4)
+        view = {"buffer": self._buffer, "byteOffset": len(self.data), "byteLength": len(data)} | more
+        self.data += data
+        return self.append("bufferViews", view)
+
+    def primitive(self, corners: np.ndarray, normals: np.ndarray | None, uv: np.ndarray | None) -> dict[str, Any]:
+        """Attributes and indices of triangles (T, 3, 3), whose corners are one vertex where float32 cannot tell them
+        apart; `uv` runs down, as in glTF."""
+        given = {"POSITION": corners, "NORMAL": normals, "TEXCOORD_0": uv}
+        columns = {name: each.reshape(-1, each.shape[-1]) for name, each in given.items() if each is not None}
+        rows = np.hstack(list(columns.values())).astype("<f4")
+        kept, number = weld_map(rows.astype(np.float64))
+        ends = np.cumsum([each.shape[1] for each in columns.values()])
+        attributes = {
+            name: self._accessor(values, f"VEC{values.shape[1]}", bounds=name == "POSITION")
+            for name, values in zip(columns, np.split(rows[kept], ends[:-1], axis=1), strict=True)
+        }
+        return {"attributes": attributes, "indices": self._accessor(number.astype("<u4")[:, None], "SCALAR")}
+
+    def _accessor(self, values: np.ndarray, kind: str, bounds: bool = False) -> int:
+        is_index = values.dtype.kind == "u"
+        view = self.view(np.ascontiguousarray(values).tobytes(), target=34963 if is_index else 34962)
+        entry: dict[str, Any] = {"bufferView": view, "componentType": 5125 if is_index else 5126}
+        entry |= {"count": len(values), "type": kind}
+        if bounds:
+            entry |= {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
+        return self.append("accessors", entry)
 
 
 def open_document(path: str | os.PathLike[str]) -> GltfDocument:

@@ -6,7 +6,6 @@ glTF's texture coordinates run down where ours run up: `gltf` turns them on read
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -15,7 +14,7 @@ import numpy as np
 
 from ..naming import Unshown
 from ..texture import Texture
-from .gltf_document import GltfDocument
+from .gltf_document import Additions, GltfDocument
 from .picture_files import decode_8bit
 from .scene_pictures import nearest_levels, picture_name, png_bytes
 
@@ -98,25 +97,19 @@ class GltfTextures:
 class TextureWriter:
     """Puts textures into a document's JSON; one that it holds already is used again."""
 
-    def __init__(self, json: dict[str, Any], add_view: Callable[[bytes], int], known: dict[str, int]) -> None:
-        self._json, self._add_view = json, add_view
-        self._numbers = dict(known)
+    def __init__(self, new: Additions, known: dict[str, int]) -> None:
+        self._new, self._numbers = new, dict(known)
 
     def number(self, texture: Texture) -> int:
         """Number of a glTF texture with this picture and wrap."""
         key = texture_key(texture)
         if key not in self._numbers:
             data, kind = _file_of(texture)
-            image = self._append("images", {"bufferView": self._add_view(data), "mimeType": kind})
+            image = self._new.append("images", {"bufferView": self._new.view(data), "mimeType": kind})
             wrap = _CLAMP if texture.wrap == "clamp" else _REPEAT
-            sampler = self._append("samplers", {"wrapS": wrap, "wrapT": wrap})
-            self._numbers[key] = self._append("textures", {"source": image, "sampler": sampler})
+            sampler = self._new.append("samplers", {"wrapS": wrap, "wrapT": wrap})
+            self._numbers[key] = self._new.append("textures", {"source": image, "sampler": sampler})
         return self._numbers[key]
-
-    def _append(self, key: str, entry: dict[str, Any]) -> int:
-        values = self._json.setdefault(key, [])
-        values.append(entry)
-        return len(values) - 1
 
 
 def turned_over(uv: np.ndarray) -> np.ndarray:

@@ -18,7 +18,6 @@ import numpy as np
 from ...base.errors import UserError
 from ..fields import write_fields
 from ..geometry.mesh import Mesh
-from ..geometry.mesh_health import weld_map
 from ..lights import DirectionalLight, PointLight, SpotLight
 from ..lights.light_file import light_values
 from ..scene import (
@@ -30,7 +29,7 @@ from ..scene import (
 )
 from ..scene_camera import LENS
 from .gltf import LIGHTS, Origins, open_document, read_scene
-from .gltf_document import GltfDocument, save_document
+from .gltf_document import Additions, GltfDocument, save_document
 from .gltf_materials import EXTRAS, write_gltf_material, write_node_dabs, write_scene_extras
 from .gltf_textures import TextureWriter, turned_over
 
@@ -66,8 +65,8 @@ class _Writer:
         self.old = {o.name: o for o in before.objects} if before else {}
         self.old_lights = {light.name: light for light in before.lights} if before else {}
         self.old_camera = before.camera if before else None
-        self._data = bytearray()
-        self._textures = TextureWriter(self.json, self._view, origins.textures)
+        self._new = Additions(self.json, buffer=-1)
+        self._textures = TextureWriter(self._new, origins.textures)
         self._materials: dict[str, int] = {}
         self._meshes: dict[tuple[int, int | None], int] = {}
         self._geometry: dict[int, dict[str, Any]] = {}
@@ -122,7 +121,7 @@ class _Writer:
         else:
             # The node also carries something that stays: the moved parts get nodes of their own.
             for number, item in moved.items():
-                mesh = self._append("meshes", {"name": item.name, "primitives": [kept.pop(number)]})
+                mesh = self._new.append("meshes", {"name": item.name, "primitives": [kept.pop(number)]})
                 own = {"name": item.name, "mesh": mesh}
                 write_node_dabs(own, {0: item.local_dispersion})
                 self._add_node(own, item.object_to_world)
@@ -134,7 +133,7 @@ class _Writer:
             del entry["mesh"]
         elif len(remaining) != len(primitives) or any(a is not b for a, b in zip(remaining, primitives, strict=True)):
             clone = self.json["meshes"][entry["mesh"]] | {"primitives": remaining}
-            entry["mesh"] = self._append("meshes", clone)
+            entry["mesh"] = self._new.append("meshes", clone)
 
     def _updated(self, primitive: dict[str, Any], item: SceneObject, old: SceneObject) -> dict[str, Any]:
         """The primitive with the object's geometry and material; itself when neither changed."""
@@ -160,29 +159,15 @@ class _Writer:
         key = (id(item.mesh), material)
         if key not in self._meshes:
             primitive = self._primitive(item.mesh) | {"material": material}
-            self._meshes[key] = self._append("meshes", {"name": item.mesh.name, "primitives": [primitive]})
+            self._meshes[key] = self._new.append("meshes", {"name": item.mesh.name, "primitives": [primitive]})
         return self._meshes[key]
 
     def _primitive(self, mesh: Mesh) -> dict[str, Any]:
         """Attributes and indices of a mesh, written once."""
         if id(mesh) not in self._geometry:
             self._keep.append(mesh)  # so that no other mesh takes its id
-            columns = [mesh.corners().reshape(-1, 3)]
-            if mesh.corner_normals is not None:
-                columns.append(mesh.corner_normals.reshape(-1, 3))
-            if mesh.uv is not None:
-                columns.append(turned_over(mesh.uv).reshape(-1, 2))
-            # glTF holds float32: rounding first welds what it cannot tell apart.
-            rows = np.hstack(columns).astype("<f4")
-            kept, number = weld_map(rows.astype(np.float64))
-            rows = rows[kept]
-            attributes = {"POSITION": self._accessor(rows[:, :3], "VEC3", 34962, bounds=True)}
-            if mesh.corner_normals is not None:
-                attributes["NORMAL"] = self._accessor(rows[:, 3:6], "VEC3", 34962)
-            if mesh.uv is not None:
-                attributes["TEXCOORD_0"] = self._accessor(rows[:, -2:], "VEC2", 34962)
-            indices = self._accessor(number.astype("<u4")[:, None], "SCALAR", 34963)
-            self._geometry[id(mesh)] = {"attributes": attributes, "indices": indices}
+            uv = None if mesh.uv is None else turned_over(mesh.uv)
+            self._geometry[id(mesh)] = self._new.primitive(mesh.corners(), mesh.corner_normals, uv)
         return self._geometry[id(mesh)]
 
     # -- materials ------------------------------------------------------------------------
@@ -215,7 +200,7 @@ class _Writer:
             base = copy.deepcopy(self.json["materials"][index]) if index is not None else {}
             values = base or {"name": f"material {len(self.json.get('materials', []))}"}
             self._write_material(values, SceneObject("", mesh, material))
-            self._materials[key] = self._append("materials", values)
+            self._materials[key] = self._new.append("materials", values)
         return self._materials[key]
 
     def _write_material(self, values: dict[str, Any], item: SceneObject) -> None:
@@ -298,22 +283,17 @@ class _Writer:
             old = self.json["nodes"][node]
             lens = {**self.json["cameras"][old["camera"]], **lens}
             del old["camera"]
-        entry["camera"] = self._append("cameras", lens)
+        entry["camera"] = self._new.append("cameras", lens)
         entry["extras"] = {EXTRAS: {"target_distance": float(np.linalg.norm(offset))} | write_fields(LENS, camera)}
         # First in the scene, so that it is the camera a reader finds.
         self._add_node(entry, world, first=True)
 
     # -- low level ------------------------------------------------------------------------
 
-    def _append(self, key: str, entry: dict[str, Any]) -> int:
-        values = self.json.setdefault(key, [])
-        values.append(entry)
-        return len(values) - 1
-
     def _add_node(self, entry: dict[str, Any], world: np.ndarray, first: bool = False) -> None:
         if not np.array_equal(world, np.eye(4)):
             entry["matrix"] = world.T.ravel().tolist()
-        node = self._append("nodes", entry)
+        node = self._new.append("nodes", entry)
         scenes = self.json.setdefault("scenes", [])
         if not scenes:  # a file without scenes shows every root node
             children = {child for other in self.json["nodes"] for child in other.get("children", [])}
@@ -332,25 +312,9 @@ class _Writer:
             entry.pop(key, None)
         entry["matrix"] = np.linalg.solve(above, world).T.ravel().tolist()
 
-    def _accessor(self, values: np.ndarray, kind: str, target: int, bounds: bool = False) -> int:
-        view = self._view(np.ascontiguousarray(values).tobytes(), target=target)
-        component = 5126 if values.dtype.kind == "f" else 5125
-        entry: dict[str, Any] = {"bufferView": view, "componentType": component}
-        entry |= {"count": len(values), "type": kind}
-        if bounds:
-            entry |= {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
-        return self._append("accessors", entry)
-
-    def _view(self, data: bytes, **more: int) -> int:
-        """Number of a new buffer view that holds `data`."""
-        self._data += b"\0" * (-len(self._data) % 4)
-        view = {"buffer": -1, "byteOffset": len(self._data), "byteLength": len(data)} | more
-        self._data += data
-        return self._append("bufferViews", view)
-
     def _close_buffer(self) -> None:
         """Put new bytes behind the GLB's own chunk, or into a buffer of their own."""
-        if not self._data:
+        if not self._new.data:
             return
         buffers = self.json.setdefault("buffers", [])
         if not buffers:
@@ -363,7 +327,7 @@ class _Writer:
         else:
             old = b""
             buffers.append({})
-        data = old + bytes(self._data)
+        data = old + bytes(self._new.data)
         buffers[into]["byteLength"] = len(data)
         self.document.set_buffer(into, data)
         for view in self.json["bufferViews"]:
