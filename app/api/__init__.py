@@ -1,6 +1,6 @@
 """The Python interface: what `import spectrasplat as ss` offers (docs/python.md).
 
-`spectrasplat/__init__.py` imports this room when something of it is first asked for.
+`spectrasplat/__init__.py` imports this package when something of it is first used.
 """
 
 from __future__ import annotations

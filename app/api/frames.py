@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from ..render.viewer.photon_queries import CausticSpectrum
 
 _MOVING_QUALITY, _STILL_QUALITY = 80, 94
-"""Of JPEG: a coarse picture is gone in a moment."""
+"""Qualities of JPEG: a coarse picture is gone in a moment."""
 _LOOK = Look()
 
 
@@ -37,7 +37,7 @@ class Frame:
 
     data: bytes
     """A JPEG file."""
-    told: dict[str, Any]
+    facts: dict[str, Any]
     """Its size, and what it is made of."""
 
 
@@ -50,7 +50,7 @@ class Frames:
         self._exposure = AutoExposure()
         self._last_s = time.monotonic()
         self._direct = DirectLightQuery()
-        self._asked: tuple[object, ...] = ()
+        self._last: tuple[object, ...] = ()
         self._found: CausticSpectrum | NotYet | None = None
 
     @property
@@ -76,7 +76,7 @@ class Frames:
         quality = _MOVING_QUALITY if is_moving else _STILL_QUALITY
         Image.fromarray(codes).save(file, format="JPEG", quality=quality, subsampling=0)
         stats = engine.stats
-        told = {
+        facts = {
             "width": shown.width,
             "height": shown.height,
             "photons": stats.photons,
@@ -86,41 +86,41 @@ class Frames:
             "done": engine.is_idle,
             "moving": is_moving,
         }
-        return Frame(file.getvalue(), told)
+        return Frame(file.getvalue(), facts)
 
     def light_at(self, engine: LiveEngine, x: float, y: float) -> tuple[dict[str, Any], bool]:
         """What is under a place of the picture, 0 to 1 from its top left, as numbers; and whether that is all (direct
-        light is found beside, by float64 rays: ask again)."""
+        light is found meanwhile, by float64 rays: call again)."""
         inputs = engine.inputs
         if inputs is None:
             return {"object": None}, False
         hit = pick(inputs.scene, View.of(inputs.camera, inputs.width / inputs.height), x, y)
         if hit is None:
             return {"object": None}, True
-        told: dict[str, Any] = {
+        facts: dict[str, Any] = {
             "object": inputs.scene.objects[hit.object_index].name,
             "position": [round(float(v), 6) for v in hit.position],
         }
-        return self._spectrum(engine, hit, told) if hit.is_receiver else (told, True)
+        return self._spectrum(engine, hit, facts) if hit.is_receiver else (facts, True)
 
-    def _spectrum(self, engine: LiveEngine, hit: PickHit, told: dict[str, Any]) -> tuple[dict[str, Any], bool]:
+    def _spectrum(self, engine: LiveEngine, hit: PickHit, facts: dict[str, Any]) -> tuple[dict[str, Any], bool]:
         place, normal = np.asarray(hit.position, float), np.asarray(hit.normal, float)
-        asked = (hit.object_index, hit.position, engine.stats.photons, engine.inputs)
-        if asked != self._asked or isinstance(self._found, NotYet):
-            self._asked, self._found = asked, engine.caustic_spectrum(hit.object_index, place)
+        question = (hit.object_index, hit.position, engine.stats.photons, engine.inputs)
+        if question != self._last or isinstance(self._found, NotYet):
+            self._last, self._found = question, engine.caustic_spectrum(hit.object_index, place)
         found = self._found
         if found is None or isinstance(found, NotYet) or engine.inputs is None:
-            return told, False
+            return facts, False
         width = found.resolution_nm
-        told |= {"wavelength_nm": found.wavelength_nm.tolist(), "error": found.error}
-        told["caustic"] = None if found.irradiance is None else found.irradiance.tolist()
+        facts |= {"wavelength_nm": found.wavelength_nm.tolist(), "error": found.error}
+        facts["caustic"] = None if found.irradiance is None else found.irradiance.tolist()
         scene = engine.inputs.scene
         gains = self._direct.gains(scene, place, normal)
         if gains is None:
-            return told | {"direct": None}, self._direct.is_hopeless
+            return facts | {"direct": None}, self._direct.is_hopeless
         edges = np.append(found.wavelength_nm - 0.5 * width, found.wavelength_nm[-1] + 0.5 * width)
         direct = sum(g * light.spectral_power.binned(edges) for g, light in zip(gains, scene.lights, strict=True))
-        return told | {"direct": np.broadcast_to(direct, found.wavelength_nm.shape).tolist()}, True
+        return facts | {"direct": np.broadcast_to(direct, found.wavelength_nm.shape).tolist()}, True
 
     def release(self) -> None:
         """Free everything."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..base.errors import UserError, suggestion
 from ..base.image_io import png_bytes, write_image
 from ..model.scene import Scene
-from .asking import in_python
+from .arguments import in_python
 
 Floats = NDArray[np.float32]
 
@@ -25,7 +25,7 @@ class Statistics:
     photons: int
     """Photons that the picture was made of."""
     photons_traced: int
-    """Of those, traced for this picture; the others were kept from an earlier one (`Session`)."""
+    """Those of them that were traced for this picture; the others were kept from an earlier one (`Session`)."""
     camera_samples: int
     """A pixel; 0 where no camera took part."""
     seconds: float

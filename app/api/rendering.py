@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from ..base.errors import UserError
 from ..base.generators import finished
-from .asking import Count, Size, check_scene, settings_of
+from .arguments import Count, Size, check_scene, settings_of
 from .device import Cancel, Device, Progress
 from .picture import CausticMap, Picture, Statistics
 from .scene import Scene
@@ -38,7 +38,7 @@ def render(
     progress: Progress | None = None,
     cancel: Cancel | None = None,
 ) -> Picture:
-    """Render `scene`; what is not said is as the scene has it.
+    """Render `scene`; what is not given is as the scene has it.
 
     `size`: width and height in pixels. `photons` to emit ("4M" will do), or `seconds` to emit them for. `seed`: of the
     random numbers, 1 by default. `method`, `camera_method`: how wavelengths are sampled, "srd" by default. `layers`:

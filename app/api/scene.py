@@ -214,8 +214,8 @@ class Scene:
             for entry, placed in zip(entries, _split(self._model.objects, entries), strict=True)
         ]
 
-    def _told(self, values: dict[str, Any]) -> dict[str, Any]:
-        """What one of the scene's tables amounts to, in keys of the scene file."""
+    def _amounts(self, values: dict[str, Any]) -> dict[str, Any]:
+        """What one of the scene's tables amounts to with all defaults, in keys of the scene file."""
         model, objects = self._model, self._values["objects"]
         if values is self._values["camera"]:
             return camera_values(model.camera)
@@ -226,11 +226,11 @@ class Scene:
                 return light_values(light)
         for entry, (item, *_) in zip(objects, _split(model.objects, objects), strict=True):
             if entry is values:
-                told = _object_table(item) | {"position": [float(v) for v in item.object_to_world[:3, 3]]}
+                amounts = _object_table(item) | {"position": [float(v) for v in item.object_to_world[:3, 3]]}
                 if isinstance(glass := item.material, values_of.Dielectric):
-                    told |= {"dispersion_gain": glass.dispersion.gain, "priority": glass.priority}
-                    told |= {"roughness": glass.roughness}
-                return told
+                    amounts |= {"dispersion_gain": glass.dispersion.gain, "priority": glass.priority}
+                    amounts |= {"roughness": glass.roughness}
+                return amounts
         return {}
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from ..base.errors import UserError
 from ..base.not_yet import NotYet
 from ..edit.stored_photons import StoredPhotons
-from .asking import Count, Size, settings_of
+from .arguments import Count, Size, settings_of
 from .device import Cancel, Device, Progress
 from .picture import Picture, Statistics
 from .scene import Scene

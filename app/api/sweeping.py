@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from ..base.errors import UserError
 from ..edit.parameters import Stage
-from .asking import Count, Size, settings_of
+from .arguments import Count, Size, settings_of
 from .device import Cancel, Device, Progress
 from .picture import Picture, Statistics
 from .scene import Scene
@@ -31,7 +31,7 @@ class SweepPoint:
     number: int
     """Its place among all combinations, the last parameter running fastest."""
     values: Mapping[str, float]
-    """Of the parameters."""
+    """The parameters' values."""
     picture: Picture
 
 

@@ -31,7 +31,7 @@ class Owner(Protocol):
     def _editing(self, container: dict[str, Any] | list[Any]) -> AbstractContextManager[None]:
         """Edit `container`, one of the scene's, or leave everything as it was."""
 
-    def _told(self, values: dict[str, Any]) -> dict[str, Any]:
+    def _amounts(self, values: dict[str, Any]) -> dict[str, Any]:
         """What one of the tables amounts to."""
 
     def _names(self, key: str) -> list[str]:
@@ -58,7 +58,7 @@ class Table:
             raise AttributeError(key)
         if key in self._values:
             return _shown(self._scene, self._values[key], f"{self._where}.{key}")
-        known_values = self._scene._told(self._values)
+        known_values = self._scene._amounts(self._values)
         if key not in known_values:
             known = list(dict.fromkeys((*self._values, *known_values)))
             hint = suggestion(key, known) or f"; there are {', '.join(known)}"
@@ -89,7 +89,7 @@ class Table:
         return copied(self._values)  # type: ignore[no-any-return]
 
     def __dir__(self) -> list[str]:
-        return [*super().__dir__(), *self._values, *self._scene._told(self._values)]
+        return [*super().__dir__(), *self._values, *self._scene._amounts(self._values)]
 
     def __repr__(self) -> str:
         return f"{self._where}: " + ", ".join(f"{key} = {_words(value)}" for key, value in self._values.items())

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..base.errors import UserError
 from ..edit.stored_photons import StoredPhotons
-from .asking import Count, check_scene
+from .arguments import Count, check_scene
 from .device import Cancel, Device, Progress
 from .scene import Scene
 from .session import Session

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from .frames import Frames
 
 MAX_GAIN = 10.0
-"""Of the sliders."""
+"""Largest gain of the sliders."""
 _MOVING_S = 0.2
 """Something moves until so long after the last message that moved it."""
 _STEP_S, _STILL_STEP_S = 0.05, 0.08
@@ -199,8 +199,8 @@ class View:
             return False
         self._version, self._picture, self._sent_s = version, frame.data, now
         self._sent += 1
-        front.send({"kind": "picture", "number": self._sent} | frame.told, frame.data)
-        if frame.told["done"] or not self._shown.is_set():
+        front.send({"kind": "picture", "number": self._sent} | frame.facts, frame.data)
+        if frame.facts["done"] or not self._shown.is_set():
             front.keep(frame.data)
         self._shown.set()
         return not self._frames.is_settling
@@ -214,12 +214,12 @@ class View:
             return True
         if now - self._spectrum_s < _SPECTRUM_S:
             return False
-        told, is_all = self._frames.light_at(engine, *place)
+        facts, is_all = self._frames.light_at(engine, *place)
         self._spectrum_s = time.monotonic()
-        told |= {"kind": "light", "place": list(place)}
-        if told != self._light:
-            self._light = told
-            front.send(told)
+        facts |= {"kind": "light", "place": list(place)}
+        if facts != self._light:
+            self._light = facts
+            front.send(facts)
         if is_all:
             self._answered = question
         return is_all
@@ -228,9 +228,9 @@ class View:
         scene = self._session.scene
         listed = []
         for name, entry in zip(scene.objects.names, scene.objects, strict=True):
-            told = scene._told(entry._values)
-            if "dispersion_gain" in told:
-                gain = float(told["dispersion_gain"])
+            amounts = scene._amounts(entry._values)
+            if "dispersion_gain" in amounts:
+                gain = float(amounts["dispersion_gain"])
                 listed.append({"object": name, "gain": gain, "most": MAX_GAIN})
         return listed
 
@@ -245,9 +245,9 @@ class View:
                 bundle["image/jpeg"] = base64.b64encode(self._picture).decode()
             return bundle | {"text/plain": repr(self)}
         png = base64.b64encode(self._session.render()._repr_png_()).decode()
-        told = repr(self)
-        page = f'<img src="data:image/png;base64,{png}" alt="The rendered scene"/><p><small>{told}</small></p>'
-        return {"text/html": page, "image/png": png, "text/plain": told}
+        caption = repr(self)
+        page = f'<img src="data:image/png;base64,{png}" alt="The rendered scene"/><p><small>{caption}</small></p>'
+        return {"text/html": page, "image/png": png, "text/plain": caption}
 
     def __repr__(self) -> str:
         name = self._session.scene.name

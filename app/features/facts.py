@@ -25,7 +25,7 @@ MAP_TENTS = 8
 MAX_SOLID_PLANES = 96
 """A convex solid of more faces goes to the tree."""
 MOST_PLANES = 256
-"""Of all convex solids of a scene: rays test every plane, and a tree leaves most triangles out."""
+"""Most planes of all convex solids of a scene: rays test every plane, and a tree leaves most triangles out."""
 MAX_BEAM_TRIANGLES = 8192
 """A mesh of more is never tried as facets of beams; whether fewer pay is measured (`render.beam_light`)."""
 
@@ -266,12 +266,12 @@ def in_view(item: SceneObject, camera: Camera, aspect: float) -> bool:
     )
     x, y, depth = corners @ right, corners @ up, corners @ forward
     # A lens sees by as much more as a point there is out of focus.
-    beside = camera.lens_radius * np.abs(1.0 - depth / camera.plane_of_focus)
+    blur = camera.lens_radius * np.abs(1.0 - depth / camera.plane_of_focus)
     if camera.kind == "orthographic":
         half = 0.5 * camera.vertical_extent * np.ones_like(depth)
     else:
         half = np.tan(np.radians(0.5 * camera.vertical_fov_deg)) * depth
-    across, up_to = aspect * half + beside, half + beside
+    across, up_to = aspect * half + blur, half + blur
     outside = [x > across, x < -across, y > up_to, y < -up_to, depth < 0.0]
     return not any(side.all() for side in outside)
 

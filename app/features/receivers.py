@@ -13,12 +13,12 @@ from .facts import Facts, names
 from .row import Sizes, feature, size_words
 
 MOST_IMAGES = 4
-"""Of a footprint beyond its receiver's borders: across the two nearest ones, and across both."""
+"""Images of a footprint that its receiver's borders may reflect: at the two nearest ones, and at both."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ReceiverFeatures:
-    """Of caustic maps."""
+    """Features of caustic maps."""
 
     charts: bool = feature(
         "charts",
@@ -53,10 +53,10 @@ class ReceiverFeatures:
         ),
         why_not="nothing stands on a receiver",
         names=("contact_words", "takes_side", "side_of_contact"),
-        cost="4 B a texel; splats beside them have a program each",
+        cost="4 B a texel; splats next to them have a program each",
         stays="it needs the picture's own pixels, which the map that is drawn here does not have",
     )
-    """Something stands on a flat receiver: in a still, what lands beneath it is kept from what lands beside it."""
+    """An object touches a flat receiver: in a still, light beneath it does not spread to the places around."""
     border_images: bool = feature(
         "border images",
         lambda facts: facts.has_columns and bool(_bordered(facts)),
@@ -111,7 +111,7 @@ class ReceiverFeatures:
 
 @dataclass(frozen=True, kw_only=True)
 class PictureFeatures:
-    """Of what the camera sees: no caustic map depends on them."""
+    """Features of what the camera sees: no caustic map depends on them."""
 
     camera_specular: bool = feature(
         "camera refraction",
@@ -181,7 +181,7 @@ class PictureFeatures:
         "textures",
         lambda facts: bool(facts.having(lambda material: material.texture is not None)),
         why=lambda facts: f"on {names(facts.having(lambda m: m.receives and m.texture is not None))}",
-        why_not="no surface wears a picture",
+        why_not="no surface has a picture",
         cost=lambda facts, sizes: f"about {size_words(_texture_bytes(facts, sizes))}",
     )
     environment_map: bool = feature(

@@ -7,7 +7,7 @@
         ...
     )
 
-declares a field of `Features`, typed for whoever reads it, together with all that is said about it.
+declares a field of `Features`, typed for whoever reads it, together with all texts about it.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ class Sizes:
     """Bytes of records and tables, which rooms above know."""
 
     spectrum: int
-    """Of a table over the spectrum."""
+    """A table over the spectrum."""
     splat: int
     triangle: int
     """With its share of the tree."""
     piece: int
     """A face of a curved solid."""
     texel: int = 16
-    """Of four float32 or uint32."""
+    """Four float32 or uint32."""
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from .row import feature, size_words
 
 @dataclass(frozen=True, kw_only=True)
 class SpectrumFeatures:
-    """Of photon records."""
+    """Features of photon records."""
 
     point_spectrum: bool = feature("", lambda facts: facts.is_single, symbol="POINT_SPECTRUM")
     """Each photon has one wavelength instead of a band."""
@@ -60,7 +60,7 @@ class SpectrumFeatures:
             facts.groups > 0 and (facts.settings.method == "srd-lambda" or len(facts.dispersive) > MAX_GROUPS)
         ),
         symbol="MERGED_GROUPS",
-        why="more glasses than columns, or the λ-column was asked for",
+        why="more glasses than columns, or method srd-lambda",
         why_not="each glass has a column of its own",
         names=("SLOPE_ROW",),
         cost=lambda facts, sizes: (
@@ -115,7 +115,7 @@ class SpectrumFeatures:
         left_out="without it borders have colours",
         forced="",
     )
-    """Of one band some wavelengths may meet another surface than its anchor does."""
+    """Some wavelengths of a band may meet another surface than its anchor does."""
     reindexed: bool = feature(
         "photons by index",
         lambda facts: facts.is_reindexed,
@@ -158,7 +158,7 @@ class SpectrumFeatures:
         left_out="without it each lamp is drawn as a point",
         forced="every light of no breadth",
     )
-    """Some light is extended: photons carry how far the light of its other points lands beside theirs."""
+    """Some light is extended: photons carry how far from theirs the light of its other points lands."""
     light_edges: bool = feature(
         "light edges",
         lambda facts: (
@@ -173,12 +173,12 @@ class SpectrumFeatures:
         ),
         why_not="no light of photons with columns ends at a hard edge",
         names=("packed_edge", "unpacked_edge", "cut_at_edge"),
-        cost="splats beside an edge have another program; one more number a fragment",
+        cost="splats next to an edge have another program; one more number a fragment",
         requires=("footprints",),
         left_out="without it beams end in a comb",
         forced="no light with an edge",
     )
-    """Some light's emission ends at a hard edge: photons beside it carry where, and their footprints are cut off
+    """Some light's emission ends at a hard edge: photons next to it carry where, and their footprints are cut off
     there."""
     light_profiles: bool = feature(
         "light profiles",

@@ -15,7 +15,7 @@ MAX_LOOSE_TRIANGLES = 24
 
 @dataclass(frozen=True, kw_only=True)
 class SurfaceFeatures:
-    """Of transport."""
+    """Features of light's way from surface to surface."""
 
     dielectrics: bool = feature(
         "refraction",

@@ -2,8 +2,8 @@
 
 A ball, an ellipsoid, a lens of two convex or plane faces and a cylinder are where a few convex faces overlap, each the
 inside of a quadric or of a plane. A ray then enters at the last face and leaves at the first, as with half-spaces: no
-tree, no tessellation, and exact normals. What such a solid needs to be is said at `curved_solids`; everything else
-is met as triangles.
+tree, no tessellation, and exact normals. `curved_solids` says which solids are met so; everything else is met as
+triangles.
 """
 
 from __future__ import annotations

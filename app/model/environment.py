@@ -46,9 +46,9 @@ def from_map(
     path = Path(path).resolve()
     if not (math.isfinite(intensity) and intensity >= 0.0):
         raise UserError(f"{path}: the intensity is {intensity:g}; give a number of 0 or more")
-    rgb, said = read_picture(path)
+    rgb, read_notes = read_picture(path)
     height, width = rgb.shape[:2]
-    assumed = list(said)
+    assumed = list(read_notes)
     if width != 2 * height:
         assumed.append(
             f"{path.name} is {width} × {height}; a latitude-longitude picture is twice as wide as high, so it is "
@@ -65,8 +65,8 @@ def from_map(
         raise UserError(f"{path}: intensity {intensity:g} takes its brightest value out of range; give a smaller one")
     if notes is not None:
         notes += assumed
-    told = {"intensity": intensity, "rotation_deg": rotation_deg, "up": up}
-    return _made("map", rgb, told, lights, str(path))
+    parameters = {"intensity": intensity, "rotation_deg": rotation_deg, "up": up}
+    return _made("map", rgb, parameters, lights, str(path))
 
 
 def gradient(
@@ -130,7 +130,7 @@ def sky(
     rgb = np.empty((BAKED_HEIGHT, BAKED_WIDTH, 3))
     rgb[:half] = upper[..., None]  # D65 is white in Rec.709
     rgb[half:] = reflectance * horizontal_illuminance(upper) / math.pi
-    told = {
+    parameters = {
         "type": int(sky_type),
         "sun_elevation_deg": sun_elevation_deg,
         "sun_azimuth_deg": sun_azimuth_deg,
@@ -138,7 +138,7 @@ def sky(
         "ground": ground,
         "up": up,
     }
-    return _made("sky", rgb, told, lights)
+    return _made("sky", rgb, parameters, lights)
 
 
 def constant(radiance: Vec3, lights: bool = True) -> Environment:
@@ -224,16 +224,17 @@ def averaged_rows(rgb: np.ndarray, rows: int) -> np.ndarray:
 def _made(
     kind: Literal["map", "gradient", "sky", "constant"],
     rgb: np.ndarray,
-    told: dict[str, Any],
+    parameters: dict[str, Any],
     lights: bool,
     source: str | None = None,
 ) -> Environment:
-    """Of a picture, and what a scene file says to make it: `lights` only where it is not as usual."""
+    """An environment of this picture; `parameters`: the scene file's keys, without `lights`, which is added
+    where it is false."""
     rgb = np.ascontiguousarray(rgb, dtype=np.float32)
     rgb.setflags(write=False)
-    parameters = {key: value if isinstance(value, int) else _plain(value) for key, value in told.items()}
+    turned = world_to_local(parameters.get("up", Z_UP), parameters.get("rotation_deg", 0.0))
+    parameters = {key: value if isinstance(value, int) else _plain(value) for key, value in parameters.items()}
     parameters |= {} if lights else {"lights": False}
-    turned = world_to_local(told.get("up", Z_UP), told.get("rotation_deg", 0.0))
     return Environment(rgb, turned, kind, parameters, source, lights)
 
 

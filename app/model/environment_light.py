@@ -228,14 +228,14 @@ _found: WeakKeyDictionary[Environment, tuple[DirectionalLight, Environment] | No
 
 
 _last: list[tuple[Scene, Scene]] = []
-"""Scenes asked for lately, so that the same one gives the same one again."""
+"""The last scenes and their results: the same scene gives the same result again."""
 
 
 def with_sun(scene: Scene) -> Scene:
     """`scene` with its panorama's sun as the last of its lights and a panorama without; itself where there is none. The
     same scene gives the same one again, and the same environment the same light and panorama."""
-    for asked, answer in _last:
-        if asked is scene or answer is scene:
+    for given, answer in _last:
+        if given is scene or answer is scene:
             return answer
     answer = _with_sun(scene)
     _last[:] = [(scene, answer), *_last[:3]]
@@ -276,13 +276,13 @@ def sun_of(environment: Environment) -> tuple[DirectionalLight, Environment] | N
     ring = ndimage.binary_dilation(spot, iterations=3) & ~ndimage.binary_dilation(spot, iterations=1)
     if not ring.any():
         return None
-    beside = np.median(rgb[ring], axis=0)
-    excess = np.maximum(rgb[spot] - beside, 0.0)
+    around = np.median(rgb[ring], axis=0)
+    excess = np.maximum(rgb[spot] - around, 0.0)
     flux = (excess * solid[spot][:, None]).sum(axis=0)
-    if flux.mean() < _LEAST_SHARE * (bright * solid).sum() or excess.mean() < _CONTRAST * beside.mean():
+    if flux.mean() < _LEAST_SHARE * (bright * solid).sum() or excess.mean() < _CONTRAST * around.mean():
         return None
     rest = rgb.copy()
-    rest[spot] = np.minimum(rgb[spot], beside)
+    rest[spot] = np.minimum(rgb[spot], around)
     rest = np.roll(rest, -turn, axis=1).astype(np.float32)
     rest.setflags(write=False)
     rows, columns = np.nonzero(spot)

@@ -1,4 +1,4 @@
-"""Where an object stands: scale, rotation and position of a scene-file table as one matrix.
+"""Placement of an object: scale, rotation and position of a scene-file table as one matrix.
 
 p_world = T · R · S · p_object with column vectors. Rotations are right-handed; `rotation_deg`
 turns about the fixed world axes x, then y, then z (R = Rz Ry Rx).

@@ -56,7 +56,7 @@ class Camera:
 
     @property
     def plane_of_focus(self) -> float:
-        """`focus_distance`, or what stands for it."""
+        """`focus_distance`, or the distance of the target."""
         return math.dist(self.position, self.target) if self.focus_distance is None else self.focus_distance
 
 
@@ -134,7 +134,7 @@ class Scene:
     notes: tuple[str, ...] = ()
     """What was assumed while loading, one sentence each; shown to the user."""
     units: str = ""
-    """What people call the unit of length ("mm"); converts nothing. Empty where nobody said."""
+    """What people call the unit of length ("mm"); converts nothing. Empty: unknown."""
 
     @property
     def receiver_names(self) -> list[str]:

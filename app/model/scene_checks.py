@@ -77,8 +77,8 @@ def _touches(mesh: Mesh, point: np.ndarray) -> bool:
     """Whether `point` lies on a facet, up to what rounding does to a place (`ON_SURFACE`)."""
     near = ON_SURFACE * float(np.ptp(mesh.vertices, axis=0).max())
     corners = mesh.corners() - point
-    beside = (corners.min(axis=1) > near).any(axis=1) | (corners.max(axis=1) < -near).any(axis=1)
-    for first, second, third in corners[~beside]:
+    away = (corners.min(axis=1) > near).any(axis=1) | (corners.max(axis=1) < -near).any(axis=1)
+    for first, second, third in corners[~away]:
         normal = np.cross(second - first, third - first)
         length = float(np.linalg.norm(normal))
         if length == 0.0 or abs(float(first @ normal)) > near * length:
@@ -133,7 +133,7 @@ def _winding(mesh: Mesh, point: np.ndarray) -> float:
 
 
 def _check_sizes(scene: Scene, file_name: str) -> None:
-    """Refuse an object that float32 cannot tell from a point beside the others (a slip of units)."""
+    """Refuse an object that float32 cannot tell from a point, next to the others (a slip of units)."""
     sizes = {o.name: _size(o) for o in scene.objects}
     largest = max(sizes.values())
     if not MIN_SIZE <= largest <= 1.0 / MIN_SIZE:
@@ -144,7 +144,7 @@ def _check_sizes(scene: Scene, file_name: str) -> None:
     for light in scene.lights:
         if light.has_outline and light.area < (largest / MAX_SIZE_RATIO) ** 2:
             raise UserError(
-                f"{file_name}: light '{light.name}' is {light.area:.2g} square units large beside objects of "
+                f"{file_name}: light '{light.name}' is {light.area:.2g} square units large, next to objects of "
                 f"{largest:.2g} units; make it larger, or a point light"
             )
     places = [np.asarray(item.object_to_world[:3, 3]) for item in scene.objects]
@@ -209,17 +209,17 @@ def check_lines(light: Light, glasses: Sequence[SceneObject], file_name: str) ->
 def _sheet_notes(glasses: list[SceneObject]) -> list[str]:
     """What of thin sheets has no effect; sheets that are to be solid."""
     sheets = [o for o in glasses if o.material.thin]
-    # Of a mesh from a file, reading has said that it is open.
+    # Meshes from files got a note about open edges when they were read.
     open_ones = [o for o in glasses if o.material.is_solid and not o.mesh.source and not o.mesh.is_closed]
     opens = forms_of([o.mesh.transformed(o.object_to_world) for o in open_ones])
-    said = {
+    notes = {
         "absorption has no effect in a thin sheet": [o for o in sheets if o.material.absorption is not None],
         "roughness has no effect in a thin sheet": [o for o in sheets if o.material.roughness],
         "an open sheet is taken as the face of a solid; thin = true makes it a pane": [
             o for o, form in zip(open_ones, opens, strict=True) if form == "sheet"
         ],
     }
-    return [f"{listed([o.name for o in of])}: {what}" for what, of in said.items() if of]
+    return [f"{listed([o.name for o in of])}: {what}" for what, of in notes.items() if of]
 
 
 def _glass_notes(glasses: list[SceneObject]) -> list[str]:

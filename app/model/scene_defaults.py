@@ -1,6 +1,6 @@
 """What a scene gets where its file is silent: a camera, lights, a table, a quiet studio, fitted to the objects.
 
-The world is z-up. The light stands behind the object on the left, so that the caustic falls towards the viewer on the
+The world is z-up. The light is behind the object on the left, so that the caustic falls towards the viewer on the
 right, and the camera frames both. A file that says nothing of light or camera gets the whole studio: a lamp whose pool
 fades into the dark of the table, a wide weak light from above without which shadows would be holes, and a dark room
 with bright windows, which is what glass mirrors.

@@ -183,7 +183,7 @@ _HIDDEN = {"name", "names", "gradient"}
 def _parameters(shape: str) -> dict[str, tuple[str, bool]]:
     """Key -> (annotation, required) of a shape, in the order of its function.
 
-    A parameter that may be None is left out of a file to mean that: the key, where it stands, is of the other type.
+    A file leaves out a parameter that may be None to mean None; a key that is given has the other type.
     """
     if shape == INLINE:
         return {"vertices": ("rows3", True), "triangles": ("rows3", True), "uv": ("rows2", False)}

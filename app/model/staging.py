@@ -56,7 +56,7 @@ AS_FOUND = Staging()
 
 
 def guessed_up(mesh: Mesh, suffix: str) -> tuple[UpAxis, str]:
-    """The axis along which a mesh of a file with this `suffix` stands, and why: a few words for a note.
+    """Which axis is up in a mesh of a file with this `suffix`, and why: a few words for a note.
 
     y or z, whichever has a flat base below it; else the one along which the mesh is much the lower; else what files
     of this kind have most often.
@@ -92,7 +92,7 @@ def _base_share(mesh: Mesh, column: int) -> float:
 def with_glass(
     objects: Sequence[SceneObject], staging: Staging, file_name: str, materials: Sequence[str]
 ) -> list[SceneObject]:
-    """`objects`, whose materials have the names `materials` in their file ("": none), with the glasses asked for.
+    """`objects`, whose materials have the names `materials` in their file ("": none), with the glasses of `staging`.
 
     Raises UserError for an object or a glass that does not exist.
     """

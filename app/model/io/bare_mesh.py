@@ -60,10 +60,10 @@ def _materials(
         forms = iter(forms_of([part.mesh for part, each in zip(parts, made, strict=True) if each.transmits]))
         made = [material.changed(thin=next(forms) == "sheet") if material.transmits else material for material in made]
         glass = [name for name, material in zip(names, made, strict=True) if material.transmits]
-        said = (
+        sentence = (
             f"its materials make glass of {listed(glass)}; dispersion, of which they know nothing, is {DEFAULT_GLASS}'s"
         )
-        notes.insert(0, f"{path.name}: {said}.")
+        notes.insert(0, f"{path.name}: {sentence}.")
         return made
     if not is_asked:
         opaque = ", though its materials are opaque" if any(known) else ""

@@ -1,7 +1,7 @@
 """Opens a .glb or .gltf file directly as a scene: geometry, transforms, camera, lights and glass.
 
 Coordinates stay as they are (y is up, one unit is one metre), but for those of textures, which run down in glTF. What
-the file lacks is fitted to its bounds and said in `Scene.notes`, and so is everything that is passed over.
+the file lacks is fitted to its bounds and noted in `Scene.notes`, and so is everything that is ignored.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ class Origins:
 
 
 def load_gltf(path: str | os.PathLike[str], staging: Staging = AS_FOUND) -> Scene:
-    """The scene in a glTF file, with what is asked for. Raises UserError for files that are truncated, contradictory
+    """The scene in a glTF file, opened as `staging` says. Raises UserError for files that are truncated, contradictory
     or need extensions this program lacks, and for objects and glasses that there are not."""
     return read_scene(open_document(path), staging)[0]
 

@@ -28,7 +28,7 @@ JSON_CHUNK, BIN_CHUNK = 0x4E4F534A, 0x004E4942
 MAX_ELEMENTS = 100_000_000
 """Most elements of all accessors that are read together; many may show the same bytes."""
 MAX_UNSTORED = 1_000_000
-"""Elements of an accessor that stands for zeros, which no bytes of the file hold."""
+"""Most elements of an accessor of zeros, for which the file holds no bytes."""
 
 _COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
@@ -143,7 +143,7 @@ class GltfDocument:
         return self._view(f"bufferViews[{index}]", index, 0, np.dtype("u1"), length, 1).tobytes()
 
     def buffer(self, index: Any) -> bytes:
-        """Bytes of a buffer: the BIN chunk, a data URI, or a file beside this one."""
+        """Bytes of a buffer: the BIN chunk, a data URI, or a file next to this one."""
         entry = self.item("buffers", index)
         if index not in self._buffers:
             uri = entry.get("uri")
@@ -330,7 +330,7 @@ def write_document(document: GltfDocument, path: Path, into: Path) -> None:
 
 
 def is_file_name(uri: Any) -> bool:
-    """Whether a uri names a file beside the document (neither data nor something on the net)."""
+    """Whether a uri names a file next to the document (neither data nor something on the net)."""
     return isinstance(uri, str) and not uri.startswith("data:") and "://" not in uri
 
 
@@ -374,7 +374,7 @@ def _numbers_at(values: Any, names: tuple[str, ...], inside: bool = False) -> se
 
 
 def _with_embedded_images(document: GltfDocument, content: dict[str, Any]) -> dict[str, Any]:
-    """Images in files beside the old place would not be found from the new one; only what is a picture goes along."""
+    """Images embedded whose files would not be found from the new place; only those that are pictures."""
     images = [dict(image) for image in document.items("images")]
     shown = _shown_images(document)
     for index, image in enumerate(images):

@@ -87,7 +87,7 @@ def read_gltf_material(document: GltfDocument, index: int | None, textures: Gltf
 
 
 def _metallic_roughness(values: dict[str, Any]) -> dict[str, Any]:
-    """`values`, where KHR_materials_pbrSpecularGlossiness stands alone by what of it the usual words can say."""
+    """`values`, with a KHR_materials_pbrSpecularGlossiness that is alone translated to the metallic-roughness model."""
     old = values.get("extensions", {}).get(_GLOSSINESS)
     if old is None or "pbrMetallicRoughness" in values:
         return values
@@ -228,7 +228,7 @@ def write_gltf_material(values: dict[str, Any], material: Material, thickness: f
 
     Other viewers get the nearest they can show; `extras.spectrasplat.material` keeps the exact
     values where glTF has no word for them. `thickness` (scene units) is for their volume look. `texture`:
-    number of the document's texture that a diffuse material wears, if any.
+    number of the document's texture of a diffuse material, if any.
     """
     pbr = values.setdefault("pbrMetallicRoughness", {})
     extensions = {k: v for k, v in values.pop("extensions", {}).items() if k not in _GLASS_EXTENSIONS}

@@ -1,6 +1,6 @@
-"""glTF's base colour textures to ours and back: images embedded or beside the file, PNG or JPEG.
+"""glTF's base colour textures to ours and back: images embedded or in files next to it, PNG or JPEG.
 
-Only diffuse surfaces wear them; every other texture of a glTF material is named in a note and kept when saving.
+Only diffuse surfaces have them; every other texture of a glTF material is named in a note and kept when saving.
 glTF's texture coordinates run down where ours run up: `gltf` turns them on reading, `gltf_write` on writing.
 """
 

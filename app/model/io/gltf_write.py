@@ -148,10 +148,11 @@ class _Writer:
 
     @staticmethod
     def _moves_as_one(entry: dict[str, Any], kept: dict[int, Any], moved: dict[int, SceneObject]) -> bool:
-        """Whether a node can simply take a new matrix: all of it moves alike and nothing hangs on it."""
+        """Whether a node can simply take a new matrix: all of it moves alike, without children, camera, skin
+        or light."""
         places = {item.object_to_world.tobytes() for item in moved.values()}
-        hangs = entry.get("children") or entry.keys() & {"camera", "skin"} or LIGHTS in entry.get("extensions", {})
-        return len(places) == 1 and len(moved) == len(kept) and not hangs
+        carries = entry.get("children") or entry.keys() & {"camera", "skin"} or LIGHTS in entry.get("extensions", {})
+        return len(places) == 1 and len(moved) == len(kept) and not carries
 
     def _mesh(self, item: SceneObject) -> int:
         """Number of a glTF mesh with the object's geometry and material; instances share it."""
@@ -173,7 +174,7 @@ class _Writer:
     # -- materials ------------------------------------------------------------------------
 
     def _materials_in_place(self, scene: Scene) -> None:
-        """A material whose objects all changed in the same way is edited where it stands."""
+        """A material whose objects all changed in the same way is edited in place."""
         wanted: dict[int, dict[str, SceneObject]] = {}
         original: dict[int, Material] = {}
         for item in scene.objects:

@@ -46,7 +46,7 @@ def kept_light(
     power = next((key for key in after.power_keys if key.key in raw), None)
     old, new = (light_values(each, path, power) for each in (before, after))
     values = merged(raw, old, new, ("position", "direction", *(() if power is None else (power.key,))))
-    # A target says where a light is aimed only as long as it stands where it stood.
+    # A target says where a light is aimed only as long as it is not moved.
     aimed = _without(values, _AIM) | {key: new[key] for key in ("direction",) if key in new}
     candidates = (values, aimed)
     return next(
@@ -139,7 +139,7 @@ def _rounded(value: float) -> float:
 
 
 def _tidy(values: Any) -> Any:
-    """Numbers, or one, of as many digits as somebody might read; what is next to nothing beside the others is 0."""
+    """Numbers, or one, of as many digits as somebody might read; what is negligible next to the others is 0."""
     if isinstance(values, float):
         return _rounded(values)
     found = [_rounded(v) for v in values]

@@ -64,7 +64,7 @@ _CLAMP, _LINEAR, _MIPMAPPED = 33071, 9729, 9987
 
 
 def write_lit_gltf(lit: LitMesh, path: Path, into: Path) -> None:
-    """Write it, self-contained, into a file that becomes `path`; glTF's y is up, so what stands along z is turned."""
+    """Write it, self-contained, into a file that becomes `path`; glTF's y is up, so a z-up receiver is turned."""
     json: dict[str, Any] = {"asset": {"version": "2.0", "generator": "SpectraSplat"}, "scene": 0}
     new = Additions(json, buffer=0)
     primitive = new.primitive(lit.corners, lit.normals, lit.uv) | {"material": 0}

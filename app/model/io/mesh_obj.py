@@ -55,7 +55,7 @@ def read_obj(data: bytes, path: str) -> RawMesh:
 
 
 def _groups(kinds: dict[str, list[tuple[int, str]]], triangles: np.ndarray) -> Groups:
-    """What each face, of so many `triangles`, stands under: its object, or its group where there is only one object,
+    """What each face, of so many `triangles`, belongs to: its object, or its group where there is only one object,
     and its material."""
     lines = np.array([number for number, _ in kinds["f"]])
 

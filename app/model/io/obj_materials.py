@@ -31,7 +31,7 @@ class ObjMaterial:
     colour: Vec3 = (0.8, 0.8, 0.8)
     """Kd, taken as linear Rec.709."""
     dissolve: float | None = None
-    """1: opaque; None: nothing is said of it."""
+    """1: opaque; None: not given."""
     transparency: float | None = None
     """`Tr`: what `dissolve` lacks to 1."""
     filter: Vec3 | None = None

@@ -1,8 +1,7 @@
 """Opens a scene: our own TOML, a glTF file, or a bare mesh, always ending in one checked `Scene`.
 
 The TOML format is described in `assets/scenes/README.md`. It is read strictly: a key that
-is not understood is an error, and what the file leaves out is filled in and said in
-`Scene.notes`.
+is not understood is an error; what the file leaves out is filled in and noted in `Scene.notes`.
 """
 
 from __future__ import annotations
@@ -94,7 +93,7 @@ class Kept:
 
 
 def scene_of(values: dict[str, Any], path: Path, kept: Kept | None = None) -> Scene:
-    """The scene of the tables of a scene file that stands, or would stand, at `path`.
+    """The scene of the tables of a scene file in the file `path`, which need not exist.
 
     From Python, `mesh` may be a `Mesh`, `material` a `Material` and `environment` an `Environment`. Raises UserError
     as `load_scene`.

@@ -1,5 +1,5 @@
-"""Files of a scene that is saved: named where the scene may read them, copied beside it where not, and pictures written
-where they have none."""
+"""Files of a scene that is saved: named where the scene may read them, copied next to it where not; pictures
+without a file are written."""
 
 from __future__ import annotations
 

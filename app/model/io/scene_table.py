@@ -1,7 +1,7 @@
 """Strict reading of one table of a scene file: every mistake becomes one sentence with its full key path.
 
-A `SceneTable` hands out validated values and remembers which keys were asked for; `finish()`
-then refuses what nobody asked for and names the nearest key that would have been understood.
+A `SceneTable` returns validated values and remembers which keys were read; `finish()` then
+refuses keys that were not and names the nearest one that is known.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ REQUIRED: Any = object()
 
 
 class SceneTable:
-    """One TOML table, the file it stands in, and its path inside that file."""
+    """One TOML table, its file, and its path inside that file."""
 
     def __init__(self, values: Mapping[str, Any], file: Path, path: str = "", notes: list[str] | None = None) -> None:
         self._values = values
         self.notes: list[str] = [] if notes is None else notes
         """Sentences on what was assumed, of the whole file: tables in it share the list."""
-        self._asked: set[str] = set()
+        self._read: set[str] = set()
         self.file = file
         self.path = path
 
@@ -48,21 +48,21 @@ class SceneTable:
         raise UserError(f"{self.where(key)} {message}")
 
     def finish(self, noun: str = "this table") -> None:
-        """Refuse the first key that was never asked for; `noun` says whose keys are listed."""
-        unknown = [key for key in self._values if key not in self._asked]
+        """Refuse the first key that was never read; `noun` says whose keys are listed."""
+        unknown = [key for key in self._values if key not in self._read]
         if unknown:
             self._fail_unknown(unknown[0], noun)
 
     def _fail_unknown(self, key: str, noun: str) -> NoReturn:
-        near = nearest_names(key, sorted(self._asked), count=1)
-        remedy = f"did you mean '{near[0]}'?" if near else f"{noun} knows {', '.join(sorted(self._asked))}"
+        near = nearest_names(key, sorted(self._read), count=1)
+        remedy = f"did you mean '{near[0]}'?" if near else f"{noun} knows {', '.join(sorted(self._read))}"
         raise UserError(f"{self.file.name}: unknown key '{self.key_path(key)}', {remedy}")
 
     # -- raw access -----------------------------------------------------------------------
 
     def has(self, key: str) -> bool:
         """Is `key` given? Counts as understood from now on."""
-        self._asked.add(key)
+        self._read.add(key)
         if key == "colour" and key not in self._values and "color" in self._values:
             self._values = {key if name == "color" else name: value for name, value in self._values.items()}
         return key in self._values
@@ -85,7 +85,7 @@ class SceneTable:
         if default is REQUIRED:
             # A misspelt key is the likelier mistake, and the more helpful sentence.
             for unknown in self._values:
-                if unknown not in self._asked and nearest_names(unknown, [key]):
+                if unknown not in self._read and nearest_names(unknown, [key]):
                     self._fail_unknown(unknown, "this table")
             self.fail(key, "is missing")
         return default

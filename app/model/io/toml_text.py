@@ -56,7 +56,7 @@ def _update(table: Any, values: Mapping[str, Any], depth: int = 0) -> None:
 
 
 def _plain(known: Any) -> Any:
-    """The value of what stands in a document; tomlkit gives truth values as they are."""
+    """The plain value of an item of a document; tomlkit gives truth values as they are."""
     return known.unwrap() if isinstance(known, Item) else known
 
 
@@ -85,7 +85,7 @@ def _entries(values: list[Mapping[str, Any]], known: list[Any]) -> AoT:
 
 
 def _item(value: Any, depth: int) -> Item:
-    """A value that stands `depth` tables below the top."""
+    """The item of a value, `depth` tables below the top."""
     if isinstance(value, Mapping):
         # [materials] is no table of its own, only what holds [materials.NAME].
         holds_tables = depth == 0 and bool(value) and all(isinstance(v, Mapping) for v in value.values())

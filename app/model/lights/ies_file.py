@@ -218,7 +218,7 @@ class _Lm63(_Numbers):
     def profile(self) -> Profile:
         """All of the file."""
         if self._tilt == "INCLUDE":
-            # What a lamp loses when it is tilted; it hangs as it was measured.
+            # What a lamp loses when it is tilted; here it is never tilted.
             self._take(1, "the lamp's place in the luminaire")
             self._take(2 * self._count("tilt angles"), "the factors for a tilted lamp")
         elif self._tilt != "NONE":

@@ -154,7 +154,7 @@ class Light:
 
     @property
     def has_hard_edge(self) -> bool:
-        """Whether what it throws ends all at once, at its aperture or the border of its cone."""
+        """Whether its light ends abruptly, at its aperture or the border of its cone."""
         inner, outer = self.cone
         return (self.is_parallel and self.has_place) or (inner == outer < math.pi)
 

@@ -39,7 +39,7 @@ def with_gain(table: SceneTable, dispersion: Dispersion) -> Dispersion:
 
 
 def named_glass(table: SceneTable, key: str, name: str) -> Dispersion:
-    """The glass of this name, or in the file of this name, which stands under `key`."""
+    """The glass of this name, or in the file of this name, given under `key`."""
     if index_file.names_file(name):
         return _from_file(table, key)
     return index_file.find_glass(name, table.file.parent, table.where(key), table.notes)

@@ -43,9 +43,7 @@ _LINES = Number(
     ),
     animated=Animated("Lines of a grating to the millimetre", MIN_LINES, MAX_LINES),
 )
-_REFLECTS = Flag(
-    "reflects", False, optional=True, row=Row("Reflects", "Orders are thrown back instead of let through.")
-)
+_REFLECTS = Flag("reflects", False, optional=True, row=Row("Reflects", "Orders are reflected instead of transmitted."))
 
 
 class _Orders(Part):

@@ -2,8 +2,8 @@
 
 A `Dispersion` is one n(λ): a catalogue fit, n_d with an Abbe number, coefficients, a table
 or a constant. Wavelengths go in as nanometres and are clamped to the range the fit was
-made for, because a Sellmeier fit outside its range may have a pole; what that concerns is
-said by `clamps_visible()`. Make one with the constructors below: they refuse data that
+made for, because a Sellmeier fit outside its range may have a pole; `clamps_visible()` says
+where that happens. Make one with the constructors below: they refuse data that
 would give n ≤ 0, an imaginary or an infinite index anywhere in the visible range.
 """
 

@@ -1,7 +1,7 @@
 """Refractive indices from people's files: Zemax AGF catalogues, refractiveindex.info's YAML and CSV, tables of n.
 
 A glass is named as "SCHOTT.AGF:N-BK7", or by its name alone where a catalogue holds it: the program's own first, then
-those beside the scene file, then those in the folder `glass` of the user's settings.
+those next to the scene file, then those in the folder `glass` of the user's settings.
 """
 
 from __future__ import annotations
@@ -45,16 +45,16 @@ def names_file(name: str) -> bool:
     return _NAMES_FILE.search(name) is not None
 
 
-def find_glass(name: str, beside: Path, where: str, notes: list[str]) -> Dispersion:
-    """The glass `name`: of a file, of the program's catalogue, of an AGF file in `beside` or the user's settings."""
+def find_glass(name: str, folder: Path, where: str, notes: list[str]) -> Dispersion:
+    """The glass `name`: of a file, of the program's catalogue, of an AGF file in `folder` or the user's settings."""
     if names_file(name):
-        return read_index(beside / name, notes)
+        return read_index(folder / name, notes)
     try:
         return catalogue.find(name, where)
     except UserError:
-        for folder in (beside, config_path() / "glass"):
-            for path in sorted(p for p in folder.glob("*.[aA][gG][fF]") if files.is_file(p)):
-                if files.may_read(path, folder) and _known_as(name, _agf_glasses(path)):
+        for place in (folder, config_path() / "glass"):
+            for path in sorted(p for p in place.glob("*.[aA][gG][fF]") if files.is_file(p)):
+                if files.may_read(path, place) and _known_as(name, _agf_glasses(path)):
                     return _from_agf(path, name, notes)
         raise
 
@@ -147,11 +147,11 @@ def _from_agf(path: Path, name: str, notes: list[str]) -> Dispersion:
             f"{path} has no glass '{name}'{listed}" if name else f'{path}: which glass ("{path.name}:NAME"){listed}'
         )
     lines, where = glasses[found], f"{path}: {found}"
-    number, *said = _numbers(lines["NM"][1:2] + lines["NM"][3:4], where)
+    number, *stated = _numbers(lines["NM"][1:2] + lines["NM"][3:4], where)
     kind, coefficients = _as_published(int(number), [*_numbers(lines.get("CD", []), where), *[0.0] * 10][:10], where)
     dispersion = glass.from_formula(kind, coefficients, found, _range_nm(lines.get("LD", [])[:2], where), where)
-    if said and said[0] > 1.0 and abs(said[0] - dispersion.n_d) > _N_D_APART:
-        notes.append(f"{where}: its coefficients give n_d = {dispersion.n_d:.5f}, and its line NM says {said[0]:g}.")
+    if stated and stated[0] > 1.0 and abs(stated[0] - dispersion.n_d) > _N_D_APART:
+        notes.append(f"{where}: its coefficients give n_d = {dispersion.n_d:.5f}, and its line NM says {stated[0]:g}.")
     return dispersion
 
 
@@ -190,13 +190,13 @@ def _from_yaml(path: Path) -> tuple[Dispersion, np.ndarray | None]:
     entries = page.get("DATA") if isinstance(page, dict) else None
     found, k = None, None
     for entry in entries if isinstance(entries, list) else []:
-        said = {key: str(value) for key, value in entry.items()} if isinstance(entry, dict) else {}
-        kind = said.get("type", "")
+        texts = {key: str(value) for key, value in entry.items()} if isinstance(entry, dict) else {}
+        kind = texts.get("type", "")
         if kind.startswith("formula") and found is None:
-            range_nm = _range_nm(said.get("wavelength_range", said.get("range", "")).split(), path)
-            coefficients = _numbers(said.get("coefficients", "").split(), path)
+            range_nm = _range_nm(texts.get("wavelength_range", texts.get("range", "")).split(), path)
+            coefficients = _numbers(texts.get("coefficients", "").split(), path)
             found = glass.from_formula(cast(Kind, kind), coefficients, path.stem, range_nm, str(path))
-        rows = [_numbers(line.split(), path) for line in said.get("data", "").splitlines() if line.split()]
+        rows = [_numbers(line.split(), path) for line in texts.get("data", "").splitlines() if line.split()]
         if kind in ("tabulated n", "tabulated nk", "tabulated k") and {len(row) for row in rows} == {len(kind) - 9}:
             x, *columns = np.array(sorted(rows)).T
             x, first = np.unique(1e3 * x, return_index=True)

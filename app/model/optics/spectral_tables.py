@@ -59,7 +59,7 @@ class SpectralAxis:
 
     @cached_property
     def cell_edges_x(self) -> np.ndarray:
-        """x of the ends of the cells λ ± ½ nm, (402,), read-only: a scene's every spectrum asks for them."""
+        """x of the ends of the cells λ ± ½ nm, (402,), read-only: every spectrum of a scene uses them."""
         edges_x = self.x_of_nm(np.concatenate([[_LO_NM], VISIBLE_NM[:-1] + 0.5, [_HI_NM]]))
         edges_x.flags.writeable = False
         return edges_x
@@ -117,7 +117,7 @@ class SpectralAxis:
 
 @lru_cache(maxsize=16)
 def _axis_of(glasses: tuple[Dispersion, ...]) -> SpectralAxis:
-    """Kept, as every edit of a glass asks for it several times."""
+    """Kept, as every edit of a glass needs it several times."""
     if not glasses:
         return SpectralAxis((), (), _HI_NM - _LO_NM, 1.0, False)
     turning = tuple(_turning_points(glass) for glass in glasses)
@@ -173,7 +173,7 @@ class CumulativeSpectrum(NamedTuple):
     x: np.ndarray
     """float64 (n,), ascending from 0 to 1; twice the same value at a line."""
     values: np.ndarray
-    """float64 (n, columns), from 0; column meaning as `cumulative` was asked for."""
+    """float64 (n, columns), from 0; its columns are those of `cumulative`."""
 
     def at(self, x: np.ndarray | float) -> np.ndarray:
         """Integral over (0, x], a line at x included: (..., columns)."""

@@ -28,7 +28,7 @@ class Spectrum:
     """Spectral density and lines; equal by value, hashable, arrays read-only."""
 
     density: np.ndarray = field(default_factory=lambda: np.zeros(401))
-    """float64 (401,) on `VISIBLE_NM`, per nm; each value stands for the nanometre around it."""
+    """float64 (401,) on `VISIBLE_NM`, per nm; each value is that of the nanometre around it."""
     lines: tuple[tuple[float, float], ...] = ()
     """(wavelength_nm, power) with 380 <= wavelength_nm <= 780, ascending."""
 
