@@ -19,7 +19,7 @@ from ..gpu.splat_tables import SplatTables
 from ..gpu.tiles import pack
 from ..model.optics import spectrum
 from ..model.optics.spectral_tables import SpectralAxis
-from ..passes.footprint import SpectralVariables
+from ..passes.footprint import Photons, SpectralVariables, SplatSpectra
 from ..passes.map_atlas import MapAtlas, placement_rows
 from ..passes.splat import Splatter
 
@@ -52,7 +52,7 @@ def measure(ctx: moderngl.Context, pixels: float, count: int = 1 << 17) -> dict[
     plain = _Plain(ctx, count, size)
 
     def splat() -> None:
-        splatter.run(swept, count, variable, tables, atlas, receivers, 1.0)
+        splatter.run(Photons(swept, count), SplatSpectra(variable, tables), atlas, receivers, 1.0)
 
     def draw() -> None:
         for _ in range(-(-count // splatter.group)):

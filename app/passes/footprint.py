@@ -41,6 +41,8 @@ _WIDEST_NARROWED = 0.5
 """Smoothing, lattice spacings: wider Gaussians leave no ripple, and whoever asks for them means them."""
 VERTICES = (3, 6, 6, 6)
 """Per splat of kinds 1 to 4."""
+EXTENT_LIMIT = 8192.0
+"""Texels. A footprint axis or a sweep beyond twice the largest map is a numerical accident."""
 MOST_GROUPS = 65535
 """Work groups that add splats of a kind: what OpenGL promises in one dimension. Each then adds several."""
 UNIT_CONTACT = 1
@@ -145,6 +147,32 @@ class SpectralVariables:
         self.buffer.release()
 
 
+@dataclass(frozen=True)
+class Photons:
+    """Photon records `start`, start + stride, … of a buffer, `count` of them."""
+
+    buffer: moderngl.Buffer
+    count: int
+    start: int = 0
+    stride: int = 1
+
+    def part(self, first: int, count: int) -> Photons:
+        """`count` of them from the `first` on."""
+        return Photons(self.buffer, count, self.start + first * self.stride, self.stride)
+
+
+@dataclass(frozen=True)
+class SplatSpectra:
+    """The spectra by which photons are splatted."""
+
+    variables: SpectralVariables
+    tables: SplatTables
+    gains: GainBuffers | None = None
+    """The brush's, where the features have it."""
+    reindex: ReindexBuffer | None = None
+    """Which wavelengths the paths carry, where the features have it."""
+
+
 def slots_per_photon(features: Features) -> int:
     """Splats that a photon may become."""
     return 1 + features.nested_windows + image_slots(features)
@@ -185,21 +213,10 @@ class Footprints:
         self._list = shader.compute(ctx, list_shader, counts, (SPLAT,))
 
     def run(
-        self,
-        photons: moderngl.Buffer,
-        first: int,
-        count: int,
-        variables: SpectralVariables,
-        tables: SplatTables,
-        atlas: MapAtlas,
-        receivers: moderngl.Buffer,
-        smoothing: float,
-        extent_limit: float,
-        gains: GainBuffers | None = None,
-        stride: int = 1,
-        reindex: ReindexBuffer | None = None,
+        self, photons: Photons, spectra: SplatSpectra, atlas: MapAtlas, receivers: moderngl.Buffer, smoothing: float
     ) -> None:
-        """Fill slots [0, count * slots_per_photon) from photons first, first + stride, … (`count` of them)."""
+        """Fill slots [0, count * slots_per_photon) from `photons`."""
+        variables, tables, gains, reindex = spectra.variables, spectra.tables, spectra.gains, spectra.reindex
         values = PARAMETERS.zeros(1)
         x_reference = gains.x_reference if gains is not None else 0.0
         scale, offset = 1.0, 0.0
@@ -208,17 +225,17 @@ class Footprints:
             offset = reindex.reindexing.y(variables.base[0])
             reindex.bind()
         values[0] = (
-            first,
-            count,
+            photons.start,
+            photons.count,
             tables.classes,
             tables.bands,
             variables.samples,
             tables.rows,
             smoothing,
-            extent_limit,
+            EXTENT_LIMIT,
             variables.traced_row,
             x_reference,
-            stride,
+            photons.stride,
             tables.first_power,
             scale,
             offset,
@@ -229,7 +246,7 @@ class Footprints:
         self._parameters.bind_to_uniform_block(0)
         for binding, buffer in enumerate(
             (
-                photons,
+                photons.buffer,
                 self.splats,
                 atlas.placements,
                 receivers,
@@ -246,13 +263,13 @@ class Footprints:
         if atlas.borders is not None:
             atlas.borders.use(UNIT_BORDERS)
         self.commands.write(self._no_commands)
-        self._program.run(group_x=-(-count // WORKGROUP))
+        self._program.run(group_x=-(-photons.count // WORKGROUP))
         self._ctx.memory_barrier()
         self.commands.bind_to_storage_buffer(7)
         self.lists.bind_to_storage_buffer(8)
         self._list["capacity"].value = self.capacity
-        self._list["photons"].value = count
-        self._list.run(-(-count // LIST_WORKGROUP) if self._by_compute else 1)
+        self._list["photons"].value = photons.count
+        self._list.run(-(-photons.count // LIST_WORKGROUP) if self._by_compute else 1)
 
     def counts(self) -> dict[str, float]:
         """Since the last reset: `splats_w` (power of all splats over their bands, W), `outside_map_w` (that of photons

@@ -23,7 +23,8 @@ from .footprint import (
     UNIT_CONTACT,
     VERTICES,
     Footprints,
-    SpectralVariables,
+    Photons,
+    SplatSpectra,
     slots_per_photon,
 )
 from .light_programs import draw_variants, sum_defines
@@ -33,8 +34,6 @@ if TYPE_CHECKING:
     import moderngl
 
     from ..features.features import Features
-    from ..gpu.gain_buffers import GainBuffers
-    from ..gpu.reindex import ReindexBuffer
     from ..gpu.splat_tables import SplatTables
     from .map_atlas import MapAtlas
 
@@ -51,8 +50,6 @@ FLUSH_SHARE = 16
 LANES = 32
 """Invocations that add a splat together: as many as an NVIDIA GPU runs in step."""
 BIND_COMMANDS = 3
-EXTENT_LIMIT = 8192.0
-"""Texels. A footprint axis or a sweep beyond twice the largest map is a numerical accident."""
 
 PARAMETERS = Struct(
     "DrawParameters",
@@ -112,51 +109,22 @@ class Splatter:
             self._adds[kind] = shader.compute(self._ctx, "light/splat_add.comp", defines, (SPLAT,), way.extensions)
 
     def run(
-        self,
-        photons: moderngl.Buffer,
-        count: int,
-        variables: SpectralVariables,
-        tables: SplatTables,
-        atlas: MapAtlas,
-        receivers: moderngl.Buffer,
-        smoothing: float,
-        gains: GainBuffers | None = None,
-        start: int = 0,
-        stride: int = 1,
-        reindex: ReindexBuffer | None = None,
+        self, photons: Photons, spectra: SplatSpectra, atlas: MapAtlas, receivers: moderngl.Buffer, smoothing: float
     ) -> None:
-        """Deposit the `count` photons start, start + stride, … of `photons` (photon_record(groups)).
-
-        `variables`: each group's variable at equally spaced x; `receivers`: RECEIVER records; `smoothing`: standard
-        deviation of a footprint in lattice spacings; `gains`: the brush's, `reindex`: which wavelengths the paths
-        carry, where the features have them.
-        """
+        """Deposit `photons` (photon_record(groups)). `receivers`: RECEIVER records; `smoothing`: standard deviation of
+        a footprint in lattice spacings."""
         chunk = int(np.clip(atlas.size[0] * atlas.size[1] // FLUSH_SHARE, SMALLEST_CHUNK, CHUNK))
         group = min(self.group, chunk)
-        for done in range(0, count, group):
-            part = min(group, count - done)
-            first = start + done * stride
+        for done in range(0, photons.count, group):
+            part = photons.part(done, min(group, photons.count - done))
             self._ctx.memory_barrier()
-            self._footprints.run(
-                photons,
-                first,
-                part,
-                variables,
-                tables,
-                atlas,
-                receivers,
-                smoothing,
-                EXTENT_LIMIT,
-                gains,
-                stride,
-                reindex,
-            )
+            self._footprints.run(part, spectra, atlas, receivers, smoothing)
             self._ctx.memory_barrier()
-            self.draw(tables, atlas)
-            atlas.pending += part
+            self.draw(spectra.tables, atlas)
+            atlas.pending += part.count
             if atlas.pending >= chunk:
                 atlas.flush()
-        check_device(self._ctx, f"splatting {count} photons into a {atlas.size[0]} x {atlas.size[1]} atlas")
+        check_device(self._ctx, f"splatting {photons.count} photons into a {atlas.size[0]} x {atlas.size[1]} atlas")
 
     def draw(self, tables: SplatTables, atlas: MapAtlas) -> None:
         """Add the splats of the last group of photons to the atlas: to its scratch textures, or to its sums."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from ..gpu import shader
 from ..gpu.dispatch_budget import DISPATCH_S, DispatchBudget
 from ..passes.accumulate import ROWS, Accumulate
+from ..passes.footprint import Photons, SplatSpectra
 from ..passes.splat import CHUNK, FLUSH_SHARE
 from .light_plan import SMALLEST_BATCH
 
@@ -90,24 +91,14 @@ class Splatting:
             CHUNK, atlas.size[0] * atlas.size[1] / FLUSH_SHARE
         ):
             yield from self.summing(atlas)
+        all_photons = Photons(photons, count, stride=stride)
+        spectra = SplatSpectra(self._shown.variables, tables.tables, self._shown.gains, tables.reindex)
         start = 0
         while start < count:
             started = time.perf_counter()
             part = min(part_max, self._part.units if self._part else count, count - start)
             with self._context.timers.timing("splat"):
-                maps.splatter.run(
-                    photons,
-                    part,
-                    self._shown.variables,
-                    tables.tables,
-                    atlas,
-                    maps.receivers,
-                    smoothing,
-                    self._shown.gains,
-                    start * stride,
-                    stride,
-                    tables.reindex,
-                )
+                maps.splatter.run(all_photons.part(start, part), spectra, atlas, maps.receivers, smoothing)
             if self._pace.waits or self._part:
                 self._context.finish()
             took = time.perf_counter() - started

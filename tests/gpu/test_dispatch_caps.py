@@ -46,7 +46,7 @@ def traced(context, name: str, seconds: float, method: str = "srd") -> LightPass
     sizes: list[int] = []
     steps, splat = light.trace.steps, light.maps.splatter.run
     light.trace.steps = lambda piece, *rest: (sizes.append(piece.count), steps(piece, *rest))[1]  # type: ignore[method-assign]
-    light.maps.splatter.run = lambda photons, count, *rest: (sizes.append(count), splat(photons, count, *rest))[1]  # type: ignore[method-assign]
+    light.maps.splatter.run = lambda photons, *rest: (sizes.append(photons.count), splat(photons, *rest))[1]  # type: ignore[method-assign]
     for _ in range(2):
         for _ in light.steps_until(0, PHOTONS, lambda: False):
             pass

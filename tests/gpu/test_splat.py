@@ -19,6 +19,7 @@ from spectrasplat.model.geometry.primitives import box
 from spectrasplat.model.optics import spectrum
 from spectrasplat.model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz
 from spectrasplat.passes.accumulate import SeamFold
+from spectrasplat.passes.footprint import Photons
 from spectrasplat.passes.map_atlas import MapAtlas, placement_rows
 from spectrasplat.stress.rigs.splat_rig import Rig, photons
 
@@ -317,7 +318,7 @@ def test_charts_splat_by_triangle_and_seams_fold_home(gl) -> None:
     spread = rng.normal(size=(2, len(records), 3)) * np.sqrt(charts.texel_area.mean())
     records["dposition_ds"], records["dposition_dt"] = spread
     buffer = gl.ctx.buffer(records)
-    rig.splatter.run(buffer, len(records), rig.variable, rig.tables, atlas, gl.ctx.buffer(receiver), 0.8)
+    rig.splatter.run(Photons(buffer, len(records)), rig.spectra, atlas, gl.ctx.buffer(receiver), 0.8)
     total = atlas.read_total()
     fold = SeamFold(gl.ctx, [(tiles[1], charts)])
     resolved = gl.ctx.texture(size, 4, dtype="f4")

@@ -14,7 +14,7 @@ import numpy as np
 from ...gpu.map_channels import MapChannels, tents
 from ...gpu.scene_buffers import SceneBuffers
 from ...passes.border_maps import border_texture
-from ...passes.footprint import SpectralVariables
+from ...passes.footprint import Photons, SpectralVariables, SplatSpectra
 from ...passes.map_atlas import MapAtlas
 from ...passes.splat import Splatter
 from ...passes.trace import LatticeSlice, TracePass
@@ -122,10 +122,8 @@ class Rig:
             self._context.finish()
             middle = self._clock()
             self._splatter.run(
-                self._trace.photons,
-                batch.photons,
-                self._variables,
-                self._tables,
+                Photons(self._trace.photons, batch.photons),
+                SplatSpectra(self._variables, self._tables),
                 self._atlas,
                 self._work.light.maps.receivers,
                 self._work.light.settings.smoothing,

@@ -22,8 +22,9 @@ import numpy as np
 from ...features.features import Features
 from ...gpu.context import Context
 from ...gpu.records import FLAG_FOOTPRINT_DROPPED
+from ...passes.footprint import EXTENT_LIMIT, Photons
 from ...passes.light_programs import FAR_TOO_LARGE
-from ...passes.splat import CHUNK, EXTENT_LIMIT
+from ...passes.splat import CHUNK
 from ..case import EPSILON, Held, Measured, Measurement, case, judged, measured, not_finite
 from ..rigs.splat_rig import Rig, photons
 
@@ -214,7 +215,7 @@ def flushed(rig: Rig, records: np.ndarray, times: int) -> float:
     buffer = rig.ctx.buffer(records)
     rig.atlas.clear()
     for _ in range(times):
-        rig.splatter.run(buffer, len(records), rig.variable, rig.tables, rig.atlas, rig.receivers, 1.0)
+        rig.splatter.run(Photons(buffer, len(records)), rig.spectra, rig.atlas, rig.receivers, 1.0)
         rig.atlas.flush()
     buffer.release()
     return rig.atlas.read_tile(rig.tile).astype(np.float64)[..., 3].sum() / (times * once)

@@ -16,7 +16,7 @@ from ...gpu.splat_tables import SplatTables
 from ...gpu.tiles import Tile, pack
 from ...model.optics import spectrum
 from ...model.optics.spectral_tables import SpectralAxis
-from ...passes.footprint import SpectralVariables
+from ...passes.footprint import Photons, SpectralVariables, SplatSpectra
 from ...passes.map_atlas import MapAtlas, placement_rows
 from ...passes.splat import Splatter
 
@@ -53,6 +53,7 @@ class Rig:
         self.atlas = MapAtlas(self.ctx, atlas_size, placements, self.features.targets)
         self.receivers = self.ctx.buffer(RECEIVER.zeros(1))
         self.variable = SpectralVariables.build(self.ctx, np.linspace(0.0, 1.0, 1025)[None])
+        self.spectra = SplatSpectra(self.variable, self.tables)
         self.splatter = Splatter(self.ctx, self.features, self.by_compute)
 
     def draw(self, photons: np.ndarray, smoothing: float = 1.0, batch: int | None = None, tile: int = 0) -> np.ndarray:
@@ -61,7 +62,7 @@ class Rig:
         self.splatter.reset_counts()
         for part in np.array_split(photons, np.arange(batch, len(photons), batch)) if batch else [photons]:
             buffer = self.ctx.buffer(part)
-            self.splatter.run(buffer, len(part), self.variable, self.tables, self.atlas, self.receivers, smoothing)
+            self.splatter.run(Photons(buffer, len(part)), self.spectra, self.atlas, self.receivers, smoothing)
             buffer.release()
         return self.atlas.read_tile(self.tiles[tile]).astype(np.float64)
 
