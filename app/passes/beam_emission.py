@@ -21,7 +21,7 @@ from ..gpu.schema import Struct
 
 _SAME_X = 1e-6
 _BATCHES = 8
-"""That are laid out at once: few threads wait for each other, and half a million rays would take 400 MiB."""
+"""Batches that are laid out at once, so that few threads wait for each other; more would take too much memory."""
 
 
 class BeamEmission:
@@ -31,8 +31,8 @@ class BeamEmission:
         """`ray`: the trace pass's records; `spans`: bands of the spectral tables that photons are splatted by.
 
         A photon's interval may be any part of the spectrum where bands may be cut, else it is that of a table's band. A
-        line's is then all that lies nearer to it than to another; where no band is cut a lamp's strongest line in a
-        band stands for all of it. An emission line within a band that photons carry too is in their share, so that its
+        line's is then all that is nearer to it than to another; where no band is cut a lamp's strongest line in a
+        band represents all of it. An emission line within a band that photons carry too is in their share, so that its
         own pieces are not taken. Raises ValueError for a piece whose interval no table has.
         """
         self._scene = scene
@@ -122,7 +122,7 @@ class BeamEmission:
             records[f"axis_{'xyz'[k]}"] = axis[:, k]
 
     def _intervals(self, spans: Spans) -> tuple[np.ndarray, np.ndarray]:
-        """Ends of all that a line's photons stand for, (M,) each: up to half the way to the next line, unless the line
+        """Ends of all that a line's photons represent, (M,) each: up to half the way to the next line, unless the line
         is a table's band by itself."""
         lo, hi = self.pieces.x_lo.copy(), self.pieces.x_hi.copy()
         for light, lamp in enumerate(self._scene.scene.lights):
@@ -137,7 +137,7 @@ class BeamEmission:
         return lo, hi
 
     def _spectral_scale(self, band: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Of each ray the group whose variable changes most over its band, and dx by that variable there."""
+        """For each ray the group whose variable changes most over its band, and dx by that variable there."""
         table = self._scene.variables
         x = np.linspace(0.0, 1.0, table.shape[1])
         change = np.stack([np.interp(band[:, 2], x, row) - np.interp(band[:, 0], x, row) for row in table])
@@ -164,7 +164,7 @@ def _bands(pieces: BeamPieces, spans: Spans, *, any_interval: bool) -> np.ndarra
 def _lines_as_bands(pieces: BeamPieces, spans: Spans, scene: SceneBuffers) -> BeamPieces:
     """Pieces of emission lines of lamps that have nothing else, as pieces of the tables' bands that hold them.
 
-    What nothing disperses takes all lines the same way: those of a band's strongest stand for the others there."""
+    What nothing disperses takes all lines the same way: those of a band's strongest represent the others there."""
     lo, hi, taken = pieces.x_lo.copy(), pieces.x_hi.copy(), np.ones(len(pieces), bool)
     for light, lamp in enumerate(scene.scene.lights):
         mine = pieces.light == light
@@ -184,7 +184,7 @@ def _lines_as_bands(pieces: BeamPieces, spans: Spans, scene: SceneBuffers) -> Be
 
 
 def _by_bands(pieces: BeamPieces, spans: Spans) -> BeamPieces:
-    """Each piece once for every table's band within its interval, if they fill that. What nothing disperses looks the
+    """Each piece once for every table's band within its interval, if they fill that. What nothing disperses is the
     same at all wavelengths, but for its weight."""
     rows, bands = [], []
     for row, (light, lo, hi) in enumerate(zip(pieces.light, pieces.x_lo, pieces.x_hi, strict=True)):

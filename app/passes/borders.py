@@ -21,10 +21,11 @@ if TYPE_CHECKING:
     from ..model.scene import Scene
 
 MOST_BORDERS = 256
-"""Of a receiver: every photon there asks for all of them. An outline of more near which light lands has no images."""
+"""Borders of a receiver at most, since every photon there is tested with all of them: an outline of more near which
+light lands has no images."""
 _NEAR = 0.1
-"""Of the root of a receiver's area: light that lands no nearer to a border in a pilot has footprints that do not reach
-it. They would be 0.033 of it wide, with fewer than 200 photons on all of it."""
+"""Share of the root of a receiver's area: light that lands no nearer to a border in a pilot has footprints that do not
+reach it. They would be 0.033 of it wide, with fewer than 200 photons on all of it."""
 
 
 def lit_borders(

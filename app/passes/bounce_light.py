@@ -1,5 +1,5 @@
-"""Light that goes on from one diffuse surface to another, up to three times: found for texels of all receivers, once
-for all views, and added to the environment's light in the texture that the camera looks up.
+"""Light that is reflected from one diffuse surface to another, up to three times: found for texels of all receivers,
+once for all views, and added to the environment's light in the texture that the camera looks up.
 
 With K the operator that takes what surfaces send out to what arrives at others, straight or by way of glass and
 mirrors, ρ their reflectances and M what they send back of all other light, the irradiance after n bounces is
@@ -35,15 +35,15 @@ from .environment_places import environment_places
 from .gathered_light import FIRST_DIRECTIONS, PER_FOLLOWED, GatheredLight
 
 DIRECTIONS = 256
-"""Asked of every bounce, and as many places."""
+"""Directions of every bounce, and as many places."""
 LEAST_DIRECTIONS = 32
-"""That a still asks, however little time it has."""
+"""Directions of a still, however little time it has."""
 FINER = 0.25
-"""Factor on the number of texels where no environment asks for more: this light has no sharp edges."""
+"""Factor on the number of texels where no environment needs more: this light has no sharp edges."""
 _GUTTER = 2
 """Texels round each chart then: as many as a lookup reads."""
 _PAIRS = 8
-"""Of one dispatch at most: Mesa's software renderer ends loops that run long."""
+"""Directions of one dispatch at most: Mesa's software renderer ends loops that run long."""
 _MOST_ASKED = 2 * _PAIRS + -(-_PAIRS // PER_FOLLOWED)
 _KEY = 80
 """First of the words of a bounce's directions, places and choices …"""
@@ -90,8 +90,8 @@ class BounceLightPass(GatheredLight):
         directions: int = DIRECTIONS,
         finer: float = FINER,
     ) -> None:
-        """Of a scene whose receivers light each other (`Features.bounces`). `environment`: what else is in the texture,
-        and whose texels these are; where there is none, `finer` is a factor on their number."""
+        """For a scene whose receivers light each other (`Features.bounces`). `environment`: what else is in the
+        texture, and whose texels these are; where there is none, `finer` is a factor on their number."""
         self._environment, self.bounces = environment, buffers.features.bounces
         places = (
             environment.places
@@ -129,7 +129,7 @@ class BounceLightPass(GatheredLight):
 
     @property
     def is_done(self) -> bool:
-        """All directions were asked, or nothing is known to ask about."""
+        """All directions were followed, or there is no light to follow."""
         return self._scene is None or self.asked >= self.total or not len(self.places.places)
 
     @property
@@ -147,7 +147,7 @@ class BounceLightPass(GatheredLight):
         for _ in self.sources.steps():
             yield 0.0
         while not self.is_done:
-            # A round that was left is gone on with: what it has asked is in the sums.
+            # A round that was interrupted is continued: what it has found is in the sums.
             self._running = self._running or self._round()
             if next(self._running, None) is None:
                 self._running = None

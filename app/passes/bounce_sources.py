@@ -34,9 +34,9 @@ from .picture_channels import Channels
 SAMPLES, SAMPLES_OF_EXTENT = 16, 64
 """Shadow rays a place and light: over the place; over a light of some extent as well."""
 _AT_ONCE = 8
-"""Of one dispatch."""
+"""Samples of one dispatch."""
 _FLAT = 1e-4
-"""Height over a receiver, of what throws light on it, that is none: it stands there."""
+"""Height above a receiver below which what casts light on it is taken to touch it."""
 _GROUP = 64
 _BIND_PLACES, _BIND_LIGHTS, _BIND_GAINS, _BIND_SOURCES, _BIND_RECEIVERS, _BIND_PLACEMENTS, _BIND_PICTURES = range(8, 15)
 _UNIT_PICTURES = 10
@@ -115,7 +115,7 @@ class BounceSources:
         self._caustic, self._paint = self._looked_up(self._no_maps, MapChannels())
 
     def _place_of(self, scene: Scene) -> tuple[Scene, np.ndarray, np.ndarray]:
-        """For a store of the pictures on surfaces alone: what lies beyond is never looked up."""
+        """Arguments of a store of the pictures on surfaces alone: the environment is never looked up."""
         return replace(scene, environment=None), self._buffers.first_triangle, self._buffers.corner_turn
 
     def take_scene(self, scene: Scene) -> None:
@@ -144,15 +144,15 @@ class BounceSources:
 
     @property
     def is_done(self) -> bool:
-        """All lights were asked."""
+        """All lights were sampled."""
         return not self._left
 
     def take_maps(self, maps: CausticMaps, channels: MapChannels) -> None:
-        """Look up what the caustic maps hold now; they are not asked again."""
+        """Look up what the caustic maps hold now; they are not sampled again."""
         self._caustic, self._paint = self._looked_up(maps, channels)
 
     def _looked_up(self, maps: CausticMaps, channels: MapChannels) -> tuple[np.ndarray, np.ndarray]:
-        """Of every place `BounceSource.caustic` and `paint`, float64 (n, 3) each."""
+        """`BounceSource.caustic` and `paint` of every place, float64 (n, 3) each."""
         records = SOURCE.zeros(max(1, self._count))
         records["paint"] = 1.0
         self._sources.write(records.tobytes())
@@ -171,7 +171,7 @@ class BounceSources:
         return found["caustic"].astype(float) * self._may_be_lit[:, None], found["paint"].astype(float)
 
     def reflectance(self, scene: Scene) -> np.ndarray:
-        """Of every place, float64 (n, 3), linear Rec.709."""
+        """Light at every place, float64 (n, 3), linear Rec.709."""
         own = np.array([o.material.reflectance_rgb if o.material.receives else (0.0,) * 3 for o in scene.objects])
         return own.reshape(-1, 3)[self._places.places["object"]] * self._paint
 
@@ -235,7 +235,7 @@ def _colours_of(channels: MapChannels) -> list[np.ndarray]:
 
 
 def _faces_specular(buffers: SceneBuffers, places: EnvironmentPlaces) -> np.ndarray:
-    """bool (n,): some glass, mirror or grating lies on the side of its receiver that a place is on. Maps do not know
+    """bool (n,): some glass, mirror or grating is on the side of its receiver that a place is on. Maps do not know
     from which side their light came; where all that throws any is on one side, it was from there."""
     scene, objects, backs = buffers.scene, places.places["object"], places.places["inside"] != 0
     thrown = [i for i, o in enumerate(scene.objects) if o.material.is_specular]

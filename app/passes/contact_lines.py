@@ -1,4 +1,4 @@
-"""Which parts of a map's texels the camera sees, where something stands on the receiver.
+"""Which parts of a map's texels the camera sees, where something touches the receiver.
 
 Beneath the foot of a glass a table is bright, beside it dark, and a map's texel that lies across the line of contact
 holds the mean of both. In a still every texel of a flat receiver's fine window is part of a pixel, so the rasteriser
@@ -25,17 +25,17 @@ if TYPE_CHECKING:
     from .map_layout import MapLayout
 
 PARTS = 4
-"""Of a texel, along its side."""
+"""Parts of a texel along its side."""
 CLOSE = 6.0
-"""Texels that a surface may stand off a receiver and still hide a place whose light has nothing to do with what falls
-beside it."""
+"""Texels that a surface may be off a receiver and still hide a place whose light has nothing to do with what falls
+next to it."""
 ALL_SEEN = 0xFFFF
 """Word of a texel that holds no contact."""
 _SAMPLES_AT_ONCE = 1 << 22
 _NEAREST = 1e-4
-"""Of the farthest corner's depth: what is drawn begins there, however near the camera."""
+"""Share of the farthest corner's depth at which what is drawn begins, however near the camera."""
 _TIE = 4e-6
-"""Of the range of depths: what the last object is taken to lie farther off."""
+"""Share of the range of depths by which the last object is taken to be farther off."""
 _CORNER = np.dtype([("position", "f4", 3), ("object", "u4")])
 
 
@@ -70,7 +70,7 @@ def read_words(words: moderngl.Texture) -> np.ndarray:
 
 
 def seen_shares(words: np.ndarray) -> np.ndarray:
-    """What of a texel the energy in its map stands for: the seen part of one that a line of contact crosses, else
+    """Which part of a texel the energy in its map is of: the seen part of one that a line of contact crosses, else
     all."""
     seen = np.bitwise_count(words & ALL_SEEN) / float(PARTS * PARTS)
     return np.where((words > ALL_SEEN) & (seen > 0.0), seen, 1.0)

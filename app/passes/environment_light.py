@@ -1,4 +1,4 @@
-"""The environment's light on every receiver: a small program that asks how much of it reaches each texel, and the
+"""The environment's light on every receiver: a small program that finds how much of it reaches each texel, and the
 texture that the camera looks up.
 
 E(x) = ∫ L(ω) V(x, ω) cos θ dω is shared out by what a direction meets first. Nothing: it counts straight, in directions
@@ -33,13 +33,13 @@ from .environment_places import environment_places
 from .gathered_light import FIRST_DIRECTIONS, PER_FOLLOWED, GatheredLight
 
 DIRECTIONS = 512
-"""Asked in all, straight."""
+"""Straight directions in all."""
 LEAST_DIRECTIONS = 64
-"""That a still asks, however little time it has."""
+"""Directions of a still, however little time it has."""
 MOST_ASKED = 24
 """Directions of one dispatch at most: Mesa's software renderer ends loops that run long."""
 _KEY = 70
-"""Of the words that decide at surfaces of glass; those after it place directions towards glass."""
+"""First of the words that decide at surfaces of glass; those after it place directions towards glass."""
 
 PARAMETERS = Struct(
     "EnvironmentParameters",
@@ -81,7 +81,7 @@ class EnvironmentLightPass(GatheredLight):
         directions: int = DIRECTIONS,
         finer: float = 1.0,
     ) -> None:
-        """Of a scene that an environment lights (`Features.environment_lights`); `finer`: factor on the number of
+        """For a scene that an environment lights (`Features.environment_lights`); `finer`: factor on the number of
         texels."""
         environment = lighting_environment(buffers.scene)
         assert environment is not None
@@ -96,7 +96,7 @@ class EnvironmentLightPass(GatheredLight):
 
     def take(self, scene: Scene) -> None:
         """Another environment or other colours of the same things: what was found is forgotten where it must be. A
-        scene that nothing lights keeps what there is: its camera does not ask."""
+        scene that nothing lights keeps what there is: its camera does not look it up."""
         environment = lighting_environment(scene)
         if environment is None or (self._light is not None and self._light.environment is environment):
             return
@@ -114,7 +114,7 @@ class EnvironmentLightPass(GatheredLight):
 
     @property
     def is_done(self) -> bool:
-        """All directions were asked."""
+        """All directions were followed."""
         return self.asked >= self.total or not len(self.places.places)
 
     @property
@@ -178,7 +178,7 @@ class EnvironmentLightPass(GatheredLight):
     # ---- what was found ----------------------------------------------------------------------
 
     def irradiance(self) -> np.ndarray:
-        """Of every place, float64 (n, 3), linear Rec.709, lm/unit²: as far as it is known."""
+        """Light at every place, float64 (n, 3), linear Rec.709, lm/unit²: as far as it is known."""
         sums = self._found()
         asked_for, straight = sums["all"].astype(float), sums["straight"].astype(float)
         share = np.divide(straight, asked_for, out=np.zeros_like(straight), where=asked_for > 0.0)

@@ -23,19 +23,19 @@ from .map_layout import Window
 from .plane_frame import PlaneFrame, plane_frame
 
 FINE_TEXELS, BETWEEN_TEXELS, COARSE_TEXELS, CHART_TEXELS = 104 * 104, 32 * 32, 40 * 40, 88 * 88
-"""Of a flat receiver's windows, each side, and of a curved one."""
+"""Texels of a flat receiver's three windows, and of a curved one's charts."""
 _GROWTH = 6.0
-"""Of a window's side to that of the next one, at most."""
+"""Largest ratio of a window's side to that of the next one."""
 _BORDER = 0.07
-"""Of a thing's size: the fine window reaches beyond it by as much at least, and fades into the next one there."""
+"""Share of a thing's size: the fine window reaches beyond it by as much at least, and fades into the next one there."""
 ALL_PARTS = 0xFFFF
 """`PLACE.parts` of a whole texel."""
 MOST_TEXELS = 1 << 17
-"""Of all together: many receivers share them."""
+"""Texels of all receivers together, at most."""
 RECORD_TEXELS = 3
-"""Of a window or a chart's triangle: both rows, then the rectangle."""
+"""Texels of a window's record, or a chart's triangle's: both rows, then the rectangle."""
 _FULL_SHARE = 0.5
-"""Of a receiver's area, from which on one window serves all."""
+"""Share of a receiver's area from which on one window serves all."""
 
 PLACE = Struct(
     "EnvironmentPlace",
@@ -58,7 +58,7 @@ PLACE = Struct(
 
 @dataclass(frozen=True)
 class EnvironmentPlaces:
-    """Texels of all receivers, in one texture after the records that say where they lie."""
+    """Texels of all receivers, in one texture after the records of their places."""
 
     size: tuple[int, int]
     records: np.ndarray
@@ -71,7 +71,7 @@ class EnvironmentPlaces:
     tiles: tuple[tuple[int, int], ...]
     """First place of each tile, and the one after its last."""
     filled_xy: np.ndarray
-    """int (m, 2): texels beside charts that are looked up too …"""
+    """int (m, 2): texels next to charts that are looked up too …"""
     source: np.ndarray
     """int (m,): … and the place whose light they show."""
     on_top: np.ndarray
@@ -79,7 +79,7 @@ class EnvironmentPlaces:
     is_window: np.ndarray
     """bool (n,): of a window, not of charts."""
     covered: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
-    """int (k,): of the last k places, which stand for the covered parts of a texel, those for its other parts."""
+    """int (k,): of the last k places, which represent the covered parts of a texel, those for its other parts."""
     shares: np.ndarray = field(default_factory=lambda: np.zeros(0))
     """float (n - k,): how much of each texel is open and covered, in 64ths: 128 times the one plus the other."""
 
@@ -166,7 +166,7 @@ class _Side:
     back: bool = False
     atlas: ChartAtlas | None = None
     finer: Window | None = None
-    """The window that lies over a part of this one."""
+    """The window that covers a part of this one."""
 
 
 def environment_places(buffers: SceneBuffers, finer: float = 1.0, gutter: int = DEFAULT_GUTTER) -> EnvironmentPlaces:
@@ -333,7 +333,7 @@ def _window_places(buffers: SceneBuffers, tile: _Side, offset: np.ndarray) -> tu
 
 
 def _middles(tile: _Side) -> np.ndarray:
-    """Of a window's texels, row by row, on its plane: float64 (n, 2)."""
+    """Middles of a window's texels, row by row, on its plane: float64 (n, 2)."""
     assert tile.window is not None
     width, height = tile.size
     x, y = (g.ravel() for g in np.meshgrid(np.arange(width), np.arange(height)))
@@ -371,7 +371,7 @@ def _sides_of_texels(rows: np.ndarray) -> np.ndarray:
 def _chart_places(
     buffers: SceneBuffers, tile: _Side, index: int, offset: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Places and texels that triangles own, texels beside them, and of each of those the nearest place."""
+    """Places and texels that triangles own, texels next to them, and of each of those the nearest place."""
     from scipy.ndimage import distance_transform_edt
 
     mesh, atlas = buffers.world_meshes[index], tile.atlas

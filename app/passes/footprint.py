@@ -1,4 +1,4 @@
-"""From photon records to splat records: where each photon's light lies in the caustic maps.
+"""From photon records to splat records: the place of each photon's light in the caustic maps.
 
 One thread a photon, slots in photon order (never compacted with atomics), so that the sum of
 floating-point splats, and with it the picture, depends on nothing but the photons. What the
@@ -34,11 +34,10 @@ if TYPE_CHECKING:
 
 WORKGROUP, LIST_WORKGROUP = 64, 256
 NARROWED = 0.4 / 0.45
-"""Of `smoothing`, where splats take off what ripple that leaves: 0.7 % at most stay on an even plane (0.5 % with 0.45
-spacings, 1.2 % with 0.38), for a fifth less blur. `ball`, 10,000 photons: relMSE 0.44 with 0.36 spacings, 0.54 with
-0.45."""
+"""Share of `smoothing` with which footprints are drawn, where splats take off the ripple that this leaves: 0.7 % at
+most stay on an even plane, for a fifth less blur."""
 _WIDEST_NARROWED = 0.5
-"""Smoothing, lattice spacings: wider Gaussians leave no ripple, and whoever asks for them means them."""
+"""Smoothing, lattice spacings: wider Gaussians leave no ripple, and are used as they are given."""
 VERTICES = (3, 6, 6, 6)
 """Per splat of kinds 1 to 4."""
 EXTENT_LIMIT = 8192.0
@@ -48,7 +47,7 @@ MOST_GROUPS = 65535
 UNIT_CONTACT = 1
 """Texture unit of the words of `contact_lines`, in all programs that splat."""
 UNIT_BORDERS = 2
-"""Of receivers' borders (`borders`), in the program that makes footprints."""
+"""Texture unit of receivers' borders (`borders`), in the program that makes footprints."""
 
 SPLAT = Struct(
     "SplatRecord",
@@ -179,7 +178,7 @@ def slots_per_photon(features: Features) -> int:
 
 
 class Footprints:
-    """Owns the splat record buffer, the sum of what is drawn and the counts of what could not be drawn as asked."""
+    """Owns the splat record buffer, the sum of what is drawn and the counts of what could not be drawn as it should."""
 
     def __init__(self, ctx: moderngl.Context, features: Features, group: int, by_compute: bool = False) -> None:
         """`group`: the most photons one dispatch covers. `by_compute`: compute shaders add the splats, in any order."""

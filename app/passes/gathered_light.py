@@ -1,6 +1,6 @@
 """What finding the environment's light and the light of other receivers have in common: the places of a scene's
-receivers, of all of which a few directions are asked at a time, the sums of what was found, and the texture that the
-camera looks up."""
+receivers, for all of which a few directions are followed at a time, the sums of what was found, and the texture that
+the camera looks up."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ PER_FOLLOWED = 4
 FIRST_DIRECTIONS = 16
 """After which the light is worth showing."""
 MAX_EVENTS = 40
-"""Surfaces of glass and mirrors on one path; what goes on is lost and counted."""
+"""Surfaces of glass and mirrors on one path; what is left then is lost and counted."""
 ANCHOR_NM = 587.56
-"""Wavelength whose index bends what is followed: this light through glass does not part into colours."""
+"""Wavelength whose index bends what is followed: this light is not dispersed by glass."""
 RGB_NM = (612.0, 549.0, 465.0)
 """Wavelengths at which glass and mirrors tint linear red, green and blue."""
 SMOOTHING = 1.5
@@ -36,7 +36,7 @@ _BIND_PLACES, _BIND_ASKED, _BIND_SUMS, _UNIT = 8, 9, 10, 0
 SUM = Struct(
     "GatheredSum",
     (
-        Field("all", "vec3", "asked for (the environment's)"),
+        Field("all", "vec3", "of all directions (the environment's)"),
         Field("lost", "float", "paths given up"),
         Field("straight", "vec3", "what arrived straight: of that, or irradiance, linear Rec.709"),
         Field("reserved", "float", ""),
@@ -61,11 +61,11 @@ class GatheredLight:
         budget: DispatchBudget,
         bounces: int = 1,
     ) -> None:
-        """`program`: shader, name of its texture unit, records of its parameters and of what is asked."""
+        """`program`: shader, name of its texture unit, records of its parameters and of the directions."""
         self._context, self._ctx, self._buffers = context, context.ctx, buffers
         self._seed, self.total, self.places, self._budget = seed, total, places, budget
         self.asked = 0
-        """Directions asked so far."""
+        """Directions followed so far."""
         self.shown = 0
         """Those of them that the texture holds."""
         self.seconds = 0.0
@@ -97,7 +97,7 @@ class GatheredLight:
     def _dispatch(
         self, parameters: np.ndarray, asked: np.ndarray, texture: moderngl.Texture, timer: str, bounce: int = 0
     ) -> None:
-        """Ask of all places; `parameters` lack what all have in common."""
+        """Follow directions at all places; `parameters` lack what all have in common."""
         if self._sphere is not None:
             parameters["specular"] = self._sphere
         parameters["x_of_rgb"] = self._buffers.axis.x_of_nm(np.array([*RGB_NM, ANCHOR_NM]))

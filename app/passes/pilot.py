@@ -3,7 +3,7 @@
 The same lattice points are traced as one band, at several single wavelengths, and from the rim
 of an extended light. That tells where light lands (the maps are fitted to it), how far a chord
 in the spectral coordinate is from the true path (the number of bands), and how far an extended
-light smears what it throws (the number of points on it).
+light blurs what it casts (the number of points on it).
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ BAND_TOLERANCE = 0.2
 over the channel's light), and by less where that is narrower than half a pixel: a miss is then what is left of a
 picture's error, while every band more blurs by more than it mends where footprints are broad."""
 GROUND_TOLERANCE = 0.1
-"""The same of photons behind ground glass, whose footprints no band widens, for up to half a pixel."""
+"""`BAND_TOLERANCE` of photons behind ground glass, whose footprints no band widens, for up to half a pixel."""
 MOSTLY_GROUND = 0.9
-"""Share of the light behind ground glass from which on that asks for bands: they blur the rest."""
+"""Share of the light behind ground glass from which on it is given bands: they blur the rest."""
 FOLLOWED = 0.93
 """Share of each channel's light that keeps to it; the rest is weak branches, which are wide and dim."""
 LEAST_BROAD = 0.3
@@ -56,16 +56,16 @@ does."""
 MOST_MORE_FLIGHTS = 1.4
 """How many times the flights of a pilot that may take."""
 _FULL = 0.8
-"""Of a queue's room: a pilot's few points are not every batch."""
+"""Share of a queue's room that a pilot may fill: its few points are not every batch."""
 _FLIGHTS_OF_EVERY = 8
-"""Of so many points one tells how many flights that takes: weak branches are many, and this is but a ratio."""
+"""Only one in so many points is traced to count flights: weak branches are many, and this is but a ratio."""
 MAX_LIGHT_POINTS = 256
 FEWEST_COPIES = 3.4
 """With fewer, a single one from the lamp's middle errs by less: it lacks the lamp's variance r²/4 but for its own
 footprint's s², and M copies have M s² too much; r²/4 - s² = M s² at r = 4.2 s, where M = 0.8 r / s is 3.4."""
 FEWEST_COVERED = 14.0
-"""The same for photons that know how broad the lamp is (`Features.lamp_columns`): footprints of a single point are then
-as broad as its light, and copies only tell that from a disc's."""
+"""`FEWEST_COPIES` for photons that know how broad the lamp is (`Features.lamp_columns`): footprints of a single point
+are then as broad as its light, and copies only distinguish that from a disc's."""
 MAX_POINTS = 1 << 16
 """Lattice points of a pilot, however little of the domain holds glass."""
 MIN_LATTICE = 1024
@@ -85,9 +85,9 @@ class Pilot:
     rim: list[np.ndarray]
     """One from each of `RIM` (empty for a light without extent)."""
     flights: tuple[int, ...] = (0,) * (1 + len(KEPT_THRESHOLDS))
-    """Of all rays of `whole`, as roulette is played by default, and with each of `KEPT_THRESHOLDS`."""
+    """Flights of all rays of `whole`, as roulette is played by default, and with each of `KEPT_THRESHOLDS`."""
     fullness: tuple[float, ...] = (0.0,) * len(KEPT_THRESHOLDS)
-    """Of the queues with each of `KEPT_THRESHOLDS`, at most."""
+    """Largest share of the queues' room with each of `KEPT_THRESHOLDS`."""
 
 
 def pilot_steps(
@@ -96,7 +96,7 @@ def pilot_steps(
     """Trace the pilots of one light, pausing after every event of the rays; `power_w`: its whole power per unit
     weight."""
     count = min(max(1, int(PHOTONS / domain.active_share)), MAX_POINTS)
-    # In as many slices as the batch asks for: what a pilot finds must not depend on it.
+    # In as many slices as the batch needs: what a pilot finds must not depend on it.
     slices = -(-count // trace.batch)
 
     def traced(
@@ -188,9 +188,9 @@ class PilotFit:
     budget: int
     """Photons of the light in a pass."""
     active_share: float
-    """Of a pass's lattices: what is emitted (`EmissionDomain`)."""
+    """Share of a pass's lattices that is emitted (`EmissionDomain`)."""
     lamp_columns: bool = False
-    """Footprints are at least as broad as what the light's other points throw."""
+    """Footprints are at least as broad as what the light's other points cast."""
     lobe_columns: bool = False
     """Footprints behind ground glass are as broad as gaps between the light of one microfacet and the next."""
 
@@ -259,7 +259,7 @@ class PilotFit:
         return MAX_BANDS
 
     def _ground_bands(self, error: np.ndarray, axis: np.ndarray, weight: np.ndarray) -> int:
-        """The same for photons behind ground glass, whose footprints are as broad as all bands' photons together leave
+        """Bands for photons behind ground glass, whose footprints are as broad as all bands' photons together leave
         gaps: a band more blurs nothing of them."""
         relative = _weighted_quantile(error / axis, weight, FOLLOWED)
         narrower = lobe_part(self.budget) / lobe_part(self.pilot.lattice_count * self.active_share)
@@ -269,7 +269,7 @@ class PilotFit:
 
     def tint_tolerance(self) -> float:
         """What straight weights may miss of a tint (`cut_by_tints`), which shrinks as footprints do: with few photons
-        every band widens them, and that errs by more than a tint that is told coarsely."""
+        every band widens them, and that errs by more than a tint that is resolved coarsely."""
         return min(TINT_TOLERANCE * max(1.0, (2.0 * self._broad_texels(1)) ** 3), COARSEST_TINTS)
 
     def light_points(self, bands: int) -> int:
@@ -307,7 +307,7 @@ class PilotFit:
         return self.smoothing * broad * self._coarsening(lattices)
 
     def _ground(self, photons: np.ndarray) -> np.ndarray:
-        """Which of them have a lobe's footprints, which lie on no lattice, bool (n,)."""
+        """Which of them have a lobe's footprints, which are on no lattice, bool (n,)."""
         return (photons["flags"] >> LATTICE_BIT == 0) & self.lobe_columns
 
     @staticmethod
@@ -339,7 +339,8 @@ def same_paths(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def lobe_part(paths: float) -> float:
-    """Of a lobe's width: what one of so many photons is drawn as broad as (`lobe_part`, lib/rough_surface.glsl)."""
+    """Share of a lobe's width as broad as which one of so many photons is drawn (`lobe_part`,
+    lib/rough_surface.glsl)."""
     return min(4.4 * max(paths, 1.0) ** (-1.0 / 6.0), 1.1)
 
 

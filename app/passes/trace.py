@@ -31,7 +31,7 @@ PHOTON_ROOM = 4
 FLIGHT_ROOM = 24
 """Flights per lattice point of a batch, where they are recorded; most of glass splits into ten."""
 SPLIT_THRESHOLD = 0.3
-"""Share of a photon's power below which roulette decides whether a part of it goes on."""
+"""Share of a photon's power below which roulette decides whether a part of it is followed."""
 _CHUNK = 64
 _GROUP = 64
 _MAX_ORDERS = 8
@@ -111,12 +111,12 @@ class Batch:
     tally: FluxTally
     steps: int
     flights: int
-    """Of all rays, up to what they meet."""
+    """Stretches of all rays, up to what they meet."""
     overflow: int
     """Rays and photons that found no room. What carries their light is gone: only fewer points at once bring it back
     (`LatticeSlice.halves`)."""
     fullness: float
-    """Of the fuller queue, of rays or of photons, for lattice points that fill a batch."""
+    """Of the fuller of the queues of rays and of photons, for lattice points that fill a batch."""
 
 
 @dataclass(frozen=True)
@@ -144,7 +144,7 @@ class LatticeSlice:
     beam_objects: tuple[int, ...] = ()
     """Objects whose light beams carry: photons that meet one of them first end there (`Features.beams`)."""
     lamp_step: float = 0.0
-    """Sides of a footprint over the extent of what each point stands for on a lamp (`Features.lamp_columns`);
+    """Sides of a footprint over the extent of what each point represents on a lamp (`Features.lamp_columns`);
     0: footprints know of none."""
 
     @property
@@ -168,8 +168,8 @@ WIDEST_SWEEP = 1.0
 """How far a ray's direction may change over its band, radians: without a bound some light misses all maps, with a
 narrower one that of a strongly dispersing prism does."""
 WIDEST_ON_SURFACE = 0.06
-"""Of an object's size (half of its bounds' diagonal): the longest side of a footprint on it, and of what a lamp's other
-points add, where the lattice's own spacing is not longer."""
+"""As a share of an object's size (half of its bounds' diagonal): the longest side of a footprint on it, and of what a
+lamp's other points add, where the lattice's own spacing is not longer."""
 
 
 class TracePass:
@@ -278,7 +278,7 @@ class TracePass:
         max_depth: int | None = None,
         split_threshold: float | None = None,
     ) -> Generator[None, None, Batch]:
-        """`run`, pausing after every event of all rays: whoever draws meanwhile may bind what it likes.
+        """`run`, pausing after every event of all rays; a caller that draws meanwhile may bind what it likes.
         `split_threshold`: by default the pass's own."""
         max_depth = self.max_depth if max_depth is None else min(max_depth, self.max_depth)
         if piece.count > self.batch:
