@@ -91,8 +91,9 @@ offer_xvfb() {
 # at every start), the tree builder and the search for beams, so that the first picture does not wait for them.
 warm_caches() {
     "$venv_python" -m compileall -q "$root/app" >/dev/null 2>&1 || true
-    "$venv_python" -P -m spectrasplat.model.geometry.bvh --warm >/dev/null 2>&1 || true
+    "$venv_python" -P -m spectrasplat.model.geometry.bvh --warm >/dev/null 2>&1 &
     "$venv_python" -P -m spectrasplat.beams.compile >/dev/null 2>&1 || true
+    wait
 }
 
 is_installed() {

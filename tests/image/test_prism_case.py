@@ -62,7 +62,9 @@ def test_flux_closes(rendered: RenderResult) -> None:
     assert rendered.stats.light.tally.imbalance < 0.01  # beams are counted at three places of each band
 
 
-@pytest.mark.parametrize("wavelength_nm", FLOOR_X_CM)
+@pytest.mark.parametrize(
+    "wavelength_nm", [nm if nm in (400, 550, 700) else pytest.param(nm, marks=pytest.mark.slow) for nm in FLOOR_X_CM]
+)
 def test_wavelengths_arrive_within_a_pixel(gl, wavelength_nm: int) -> None:
     """One laser line at a time, its picture's centre against the double-precision landing point."""
     scene = load_scene(SCENE)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -18,7 +19,11 @@ MESHES = {
     "torus": primitives.torus(1.0, 0.4, 3_000),
     "water": primitives.rippled_water(resolution=40),
 }
-ATLASES = {name: build_charts(mesh, total_texels=160_000) for name, mesh in MESHES.items()}
+
+
+@cache
+def atlas_of(name: str) -> ChartAtlas:
+    return build_charts(MESHES[name], total_texels=160_000)
 
 
 def _point_at(mesh: Mesh, atlas: ChartAtlas, triangle: np.ndarray, texel: np.ndarray) -> np.ndarray:
@@ -40,7 +45,7 @@ def _texel_positions(mesh: Mesh, atlas: ChartAtlas) -> np.ndarray:
 
 @pytest.mark.parametrize("name", MESHES)
 def test_charts_cover_the_mesh_once(name: str) -> None:
-    mesh, atlas = MESHES[name], ATLASES[name]
+    mesh, atlas = MESHES[name], atlas_of(name)
     assert 0.8 * 160_000 <= atlas.width * atlas.height <= 160_000
     covered = atlas.owner[atlas.owner >= 0]
     assert atlas.texel_area[covered].sum() == pytest.approx(mesh.areas().sum(), rel=0.01)
@@ -58,7 +63,7 @@ def test_charts_cover_the_mesh_once(name: str) -> None:
 
 @pytest.mark.parametrize("name", MESHES)
 def test_rows_are_the_triangles_own_plane(name: str) -> None:
-    mesh, atlas = MESHES[name], ATLASES[name]
+    mesh, atlas = MESHES[name], atlas_of(name)
     scale = np.abs(atlas.rows[:, :, :3]).max()
     assert np.abs(np.einsum("tij,tj->ti", atlas.rows[:, :, :3], mesh.face_normals())).max() < 1e-9 * scale
     singular = np.linalg.svd(atlas.rows[:, :, :3], compute_uv=False)
@@ -67,14 +72,14 @@ def test_rows_are_the_triangles_own_plane(name: str) -> None:
 
 
 def test_number_of_charts_is_modest() -> None:
-    assert len(ATLASES["box"].rects) == 6
-    assert len(ATLASES["sphere"].rects) == 14
-    assert np.ptp(ATLASES["box"].texel_area) < 1e-12
+    assert len(atlas_of("box").rects) == 6
+    assert len(atlas_of("sphere").rects) == 14
+    assert np.ptp(atlas_of("box").texel_area) < 1e-12
 
 
 @pytest.mark.parametrize("name", MESHES)
 def test_every_uncovered_texel_of_a_chart_has_a_covered_destination(name: str) -> None:
-    atlas = ATLASES[name]
+    atlas = atlas_of(name)
     in_rect = np.zeros((atlas.height, atlas.width), bool)
     for x0, y0, x1, y1 in atlas.rects:
         in_rect[y0:y1, x0:x1] = True
@@ -86,7 +91,7 @@ def test_every_uncovered_texel_of_a_chart_has_a_covered_destination(name: str) -
 
 @pytest.mark.parametrize("name", MESHES)
 def test_gutter_next_to_a_seam_unfolds_to_where_it_is(name: str) -> None:
-    mesh, atlas = MESHES[name], ATLASES[name]
+    mesh, atlas = MESHES[name], atlas_of(name)
     positions = _texel_positions(mesh, atlas)
     texel = np.sqrt(atlas.texel_area.max())
     checked = 0
@@ -121,7 +126,7 @@ def _splat(atlas: ChartAtlas, triangle: int, hit: np.ndarray, sigma: float) -> n
 
 @pytest.mark.parametrize("name", MESHES)
 def test_splats_across_seams_keep_energy_and_place(name: str) -> None:
-    mesh, atlas = MESHES[name], ATLASES[name]
+    mesh, atlas = MESHES[name], atlas_of(name)
     positions = _texel_positions(mesh, atlas)
     texel = float(np.sqrt(np.median(atlas.texel_area)))
     # Hits on covered texels right beside a gutter.
@@ -145,7 +150,7 @@ def test_splats_across_seams_keep_energy_and_place(name: str) -> None:
 
 
 def test_uniform_energy_stays_uniform_and_gutters_are_filled() -> None:
-    atlas = ATLASES["sphere"]
+    atlas = atlas_of("sphere")
     density = np.where(atlas.owner >= 0, atlas.texel_area[np.maximum(atlas.owner, 0)], 0.0)
     filled = fill(atlas, density)
     x, y = atlas.gutter_texel_xy.T
@@ -155,7 +160,7 @@ def test_uniform_energy_stays_uniform_and_gutters_are_filled() -> None:
 
 
 def test_gather_lists_are_the_fold() -> None:
-    atlas = ATLASES["sphere"]
+    atlas = atlas_of("sphere")
     energy = np.random.default_rng(2).random((atlas.height, atlas.width))
     destinations, offsets, sources = atlas.gather_lists()
     gathered = energy.copy()
