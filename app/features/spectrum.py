@@ -70,14 +70,6 @@ class SpectrumFeatures:
         not_forced="light would be drawn another way",
     )
     """More dispersive materials than columns (or the paper's λ-column): some columns are by a shared variable."""
-    spectral_weights: bool = feature(
-        "",
-        lambda facts: (
-            not facts.is_single
-            and ((facts.groups > 0 and bool(facts.glass)) or bool(facts.absorbing) or facts.is_coloured)
-        ),
-    )
-    """What is left of light differs within a band: by Fresnel, absorption or colours."""
     band_cuts: bool = feature(
         "band cuts",
         lambda facts: facts.groups > 0,

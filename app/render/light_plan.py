@@ -190,7 +190,7 @@ class Planner:
             ends = ends_of(self.scene.lights[light].spectral_power, axis)
             edges = np.linspace(*ends, count + 1)
             edges[1:-1] += aside * (edges[1] - edges[0])
-            if self._tinted and len(self.buffers.tints):
+            if not self.features.random_wavelength and len(self.buffers.tints):
                 spectrum = self.scene.lights[light].spectral_power
                 tolerance, bins = fit.tint_tolerance(), self.settings.bins
                 if self.features.beams and not self.features.spectral_groups:
@@ -200,11 +200,4 @@ class Planner:
         return tuple(
             Band(float(lo), float(hi), float(mid), float(power.band(lo, hi)[3]))
             for lo, hi, mid in zip(edges[:-1], edges[1:], middles, strict=True)
-        )
-
-    @property
-    def _tinted(self) -> bool:
-        """Something on the way changes a spectrum's shape, and photons represent more than one wavelength of it."""
-        return (not self.features.random_wavelength and self.features.absorption) or (
-            (self.features.mirrors or self.features.filters) and self.features.spectral_weights
         )
