@@ -68,6 +68,29 @@ def test_a_scene_loads_and_can_be_rendered(path: Path) -> None:
         assert np.linalg.norm(ray - depth * forward) < depth * half * aspect
 
 
+def _through(
+    planes: np.ndarray, n: float, point: np.ndarray, direction: np.ndarray
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Place and direction behind a convex solid that refracts a ray twice; None where it does not."""
+    for ratio in (1.0 / n, n):
+        facing = planes[:, :3] @ direction
+        distance = (planes[:, 3] - planes[:, :3] @ point) / np.where(np.abs(facing) < 1e-12, np.nan, facing)
+        entering = ratio < 1.0
+        face = int(
+            np.nanargmax(np.where(facing < 0.0, distance, -np.inf))
+            if entering
+            else np.nanargmin(np.where(facing > 0.0, distance, np.inf))
+        )
+        point = point + distance[face] * direction
+        normal = planes[face, :3] * -np.sign(facing[face])
+        cosine = direction @ normal
+        transmitted = 1.0 - ratio**2 * (1.0 - cosine**2)
+        if transmitted < 0.0 or (planes[:, :3] @ point > planes[:, 3] + 1e-9).any():
+            return None
+        direction = ratio * direction - (ratio * cosine + math.sqrt(transmitted)) * normal
+    return point, direction
+
+
 def test_prism_case_sends_seven_wavelengths_where_the_reference_found_them() -> None:
     """Straight lines and Snell's law through the scene's own prism, float64, against the reference's list (cm)."""
     expected = {
@@ -88,17 +111,9 @@ def test_prism_case_sends_seven_wavelengths_where_the_reference_found_them() -> 
     planes = prism.mesh.convex_planes
     for wavelength, x in expected.items():
         n = float(prism.material.dispersion.index(wavelength))
-        point, direction = np.array(light.position), np.array(light.direction)
-        for ratio in (1.0 / n, n):
-            facing = planes[:, :3] @ direction
-            distance = (planes[:, 3] - planes[:, :3] @ point) / np.where(facing == 0.0, np.nan, facing)
-            enters = ratio < 1.0
-            candidates = np.where((facing < 0.0) == enters, distance, -np.inf if enters else np.inf)
-            face = int(np.nanargmax(candidates) if enters else np.nanargmin(candidates))
-            point = point + distance[face] * direction
-            normal = planes[face, :3] * -np.sign(facing[face])
-            cosine = direction @ normal
-            direction = ratio * direction - (ratio * cosine + math.sqrt(1.0 - ratio**2 * (1.0 - cosine**2))) * normal
+        left = _through(planes, n, np.array(light.position), np.array(light.direction))
+        assert left is not None
+        point, direction = left
         landing = point - direction * (point[2] / direction[2])
         # The PLY's coordinates hold six decimals, half a metre above the floor.
         assert landing[0] == pytest.approx(x, abs=3e-4) and landing[1] == pytest.approx(0.0, abs=1e-9)
@@ -239,25 +254,11 @@ def _through_prism(scene: Scene, wavelength_nm: float, angle_rad: float) -> floa
     prism = next(o for o in scene.objects if o.name == "prism")
     n = float(prism.material.dispersion.index(wavelength_nm))
     planes = prism.mesh.transformed(prism.object_to_world).convex_planes
-    point, direction = np.array(scene.camera.position), np.array([-math.sin(angle_rad), math.cos(angle_rad), 0.0])
-    for ratio in (1.0 / n, n):
-        facing = planes[:, :3] @ direction
-        distance = (planes[:, 3] - planes[:, :3] @ point) / np.where(np.abs(facing) < 1e-12, np.nan, facing)
-        entering = ratio < 1.0
-        face = int(
-            np.nanargmax(np.where(facing < 0.0, distance, -np.inf))
-            if entering
-            else np.nanargmin(np.where(facing > 0.0, distance, np.inf))
-        )
-        point = point + distance[face] * direction
-        if (planes[:, :3] @ point > planes[:, 3] + 1e-9).any():
-            return None
-        normal = planes[face, :3] * -np.sign(facing[face])
-        cosine = direction @ normal
-        transmitted = 1.0 - ratio**2 * (1.0 - cosine**2)
-        if transmitted < 0.0:
-            return None
-        direction = ratio * direction - (ratio * cosine + math.sqrt(transmitted)) * normal
+    direction = np.array([-math.sin(angle_rad), math.cos(angle_rad), 0.0])
+    left = _through(planes, n, np.array(scene.camera.position), direction)
+    if left is None:
+        return None
+    point, direction = left
     return float(point[0] + direction[0] * (3.0 - point[1]) / direction[1])
 
 

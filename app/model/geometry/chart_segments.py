@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .mesh import Mesh
-from .mesh_health import connected_roots, weld_map
+from .mesh_health import connected_roots, half_edges
 
 _SMOOTHING_ROUNDS = 8
 _MIN_COSINE = 0.57
@@ -51,11 +51,7 @@ def half_edge_twins(mesh: Mesh) -> np.ndarray:
 
     Vertices at one position count as one. Edges of more than two triangles pair up as they come.
     """
-    welded = weld_map(mesh.vertices)[1][mesh.triangles]
-    start, end = welded.ravel(), np.roll(welded, -1, axis=1).ravel()
-    key = np.minimum(start, end) * (len(mesh.vertices) + 1) + np.maximum(start, end)
-    order = np.argsort(key, kind="stable")
-    same = key[order[1:]] == key[order[:-1]]
+    order, same, _ = half_edges(mesh)
     # In a run of equal keys, pair 0-1, 2-3, …
     position = np.arange(len(order))
     begins = np.concatenate([[True], ~same])

@@ -103,6 +103,17 @@ def weld_map(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return first[rank], place[inverse.reshape(-1)]
 
 
+def half_edges(mesh: Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Which half-edges 3 t + i (corner i to i + 1 of triangle t) lie on one edge: `order` (3 T,) with those of one edge
+    in a row, `same` (3 T - 1,), where one is on the edge of the one before it; and vertices (T, 3), those at one
+    position with one number."""
+    vertex = weld_map(mesh.vertices)[1][mesh.triangles]
+    start, end = vertex.ravel(), np.roll(vertex, -1, axis=1).ravel()
+    key = np.minimum(start, end).astype(np.int64) * (int(vertex.max()) + 1) + np.maximum(start, end)
+    order = np.argsort(key, kind="stable")
+    return order, key[order[1:]] == key[order[:-1]], vertex
+
+
 def examine(mesh: Mesh) -> MeshHealth:
     """Count the faults of `mesh`, by vertex number (an unwelded closed mesh counts as open)."""
     triangles = mesh.triangles.astype(np.int64)

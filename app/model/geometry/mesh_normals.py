@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .mesh import Mesh, cross, normalised
-from .mesh_health import connected_roots, weld_map
+from .mesh_health import connected_roots, half_edges, weld_map
 
 FINE_TRIANGLES, FINE_BEND_DEG, FLAT_DEG = 500, 12.0, 0.05
 SMOOTH_CREASE_DEG = 30.0
@@ -134,11 +134,8 @@ class Edges:
     @classmethod
     def of(cls, mesh: Mesh) -> Edges:
         """All of `mesh`."""
-        vertex, faces = weld_map(mesh.vertices)[1][mesh.triangles], mesh.face_normals()
-        start, end = vertex.ravel(), np.roll(vertex, -1, axis=1).ravel()
-        key = np.minimum(start, end).astype(np.int64) * (int(vertex.max()) + 1) + np.maximum(start, end)
-        order = np.argsort(key, kind="stable")
-        same = key[order[1:]] == key[order[:-1]]
+        order, same, vertex = half_edges(mesh)
+        faces = mesh.face_normals()
         one, two = order[:-1][same], order[1:][same]
         cosine = np.einsum("ij,ij->i", faces[one // 3], faces[two // 3])
         return cls(vertex, one, two, np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
