@@ -30,7 +30,7 @@ _OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 _OPTIONS |= {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 """References are not counted, so nothing may be allocated inside: scratch comes from the caller (`search.WORK`)."""
 _MOST_BYTES = 1 << 26
-"""Of a file."""
+"""Bytes of a file, at most."""
 _RESULTS: dict[str, Any] = {"none": ctypes.c_void_p, "bool": ctypes.c_bool, "float64": ctypes.c_double}
 _COMPILERS = "numba", "llvmlite"
 _KNOWN = ("0.68.",)

@@ -42,9 +42,9 @@ FACET = np.dtype(
         # Counter-clockwise seen from where n points.
         ("corner", "f8", (MAX_CORNERS, 3)),
         ("corners", "i8"),
-        # Of the edge from each corner to the next: unit vector e, moment P x e [Pluecker].
+        # Edge from each corner to the next: unit vector e, moment P x e [Pluecker].
         ("edge", "f8", (MAX_CORNERS, 6)),
-        # Of a ball that holds it.
+        # Ball that holds it.
         ("centre", "f8", 3),
         ("radius", "f8"),
         # Origin and two axes of its plane; a receiver's are its map's.

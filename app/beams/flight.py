@@ -192,7 +192,7 @@ def fly(nodes, facets, solids, tables, source, obstacles, work):
     for h in range(count):
         top = subtract(nodes, rest, top, work.hits[h], facets, tables, work)
     for j in range(rest, top):
-        # Of the part alone: its rays are still about the whole beam's centre.
+        # Spread of the part alone: its rays are still about the whole beam's centre.
         spread_of(nodes[j], spread)
         if near_boxes(nodes[j], 1e9, obstacles, spread):
             nodes[j].ends = LEAF_PIECE

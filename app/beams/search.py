@@ -71,7 +71,7 @@ WORK = np.dtype(
         ("tolerance", "f8"),
         # How far outlines may move over a band (`drifts`).
         ("drift", "f8"),
-        # Of the light's power, of a band without width.
+        # Share of the light's power in a band without width.
         ("line_share", "f8"),
         # Centre and half side of a square in q that holds everything.
         ("room", "f8", 3),
@@ -93,7 +93,7 @@ WORK = np.dtype(
         ("spare_corner", "f8", (CORNERS, 2)),
         ("spare_side", "i4", CORNERS),
         ("height", "f8", CORNERS),
-        # Of a facet's edges by place, the last: another; which of them cut, how many are laid at each place.
+        # Lines of a facet's edges by place, the last: another; which of them cut, how many are laid at each place.
         ("lines", "f8", (MAX_CORNERS + 1, 3, 3)),
         ("cuts", "i8", MAX_CORNERS),
         ("laid", "i8", 3),

@@ -22,10 +22,10 @@ the radius inside of the circle, its corners 0.08 % outside."""
 _WIDEST = math.tan(math.radians(75.0))
 """Half side of a gnomonic plane up to which one is enough; else the six sides of a cube are taken."""
 _NEAREST = 1.65
-"""Of an extended lamp's half extent: from nearer facets penumbrae are wider than what casts them, and more would be
-drawn than lands."""
+"""Least distance of a facet, in half extents of an extended lamp: from nearer ones penumbrae are wider than what casts
+them, and more would be drawn than lands."""
 _MOST_BANDS = 32
-"""Into which a light's spectrum is cut where something is coloured."""
+"""Bands into which a light's spectrum is cut where something is coloured, at most."""
 _ON_FACET = 2e-7
 """GPU units: a light as near to a facet is on it (START_DISTANCE of shaders/lib/intersect.glsl)."""
 _GOLDEN = math.pi * (3.0 - math.sqrt(5.0))

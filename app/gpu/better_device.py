@@ -1,7 +1,7 @@
 """Whether a better GPU may be there than the one that was chosen, and how to choose it.
 
 OpenGL takes a software renderer or a laptop's integrated GPU without a word where the better one's libraries, files or
-rights are missing. What the kernel knows of the machine is compared with what draws.
+rights are missing. What the kernel reports of the machine is compared with what draws.
 """
 
 from __future__ import annotations

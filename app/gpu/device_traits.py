@@ -1,6 +1,6 @@
 """What differs between devices in how the programs are built and how much work they are given at a time.
 
-The only place that knows a renderer by its name: everyone else asks a `DeviceTraits` for what it wants to know. The
+The only place where renderers are told apart by name: all other code reads a `DeviceTraits`. The
 numbers of llvmpipe were measured with Mesa 22.3 on two cores.
 """
 
@@ -23,9 +23,9 @@ class Budget:
     batch: int = 1 << 18
     """Rays in flight at once."""
     first_photons: int = 1 << 20
-    """Photons of the first picture …"""
+    """Photons of the first picture."""
     largest_photons: int = 1 << 25
-    """… and of the best one."""
+    """Photons of the best picture."""
     store_bytes: int = 1 << 30
     """Photons kept so that edits need no new tracing."""
     finest_photons: int = 0

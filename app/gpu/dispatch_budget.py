@@ -19,9 +19,9 @@ class DispatchBudget:
 
     units: int
     whole: int
-    """They come in multiples of these …"""
+    """`units` is a multiple of this."""
     most: int
-    """… and are no more than these, unless one multiple is."""
+    """Largest `units`, unless `whole` is larger."""
 
     def learn(self, units: int, took_s: float, wanted_s: float) -> None:
         """A dispatch of `units` took `took_s` and should have taken `wanted_s`.

@@ -132,16 +132,16 @@ def resolve_conditionals(
             branches, end = _branches(units, at)
             try:
                 body = next((body for directive, body in branches if _holds(directive, macros)), [])
-                part, told = resolve_conditionals(body, macros)
+                part, settled = resolve_conditionals(body, macros)
             except _UnknownError:
-                part, told = list(units[at:end]), False
+                part, settled = list(units[at:end]), False
                 for unit in part:
                     macros.note(unit, certain=False)
         else:
-            end, part, told = at + 1, [units[at]], name not in ("elif", "else", "endif")
+            end, part, settled = at + 1, [units[at]], name not in ("elif", "else", "endif")
             macros.note(units[at], certain=True)
         kept += part
-        at, resolved = end, resolved and told
+        at, resolved = end, resolved and settled
     return kept, resolved
 
 

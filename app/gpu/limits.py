@@ -26,21 +26,21 @@ class Limits:
     storage_block_bytes: int = _limit("GL_MAX_SHADER_STORAGE_BLOCK_SIZE", 1 << 24)
     """Largest shader storage block; photon batches are cut to it."""
     storage_blocks: int = _limit("GL_MAX_COMPUTE_SHADER_STORAGE_BLOCKS", 8)
-    """Storage blocks of a compute shader …"""
+    """Storage blocks of a compute shader."""
     vertex_storage_blocks: int = _limit("GL_MAX_VERTEX_SHADER_STORAGE_BLOCKS", 5)
-    """… of a vertex shader …"""
+    """Storage blocks of a vertex shader."""
     fragment_storage_blocks: int = _limit("GL_MAX_FRAGMENT_SHADER_STORAGE_BLOCKS", 8)
-    """… and of a fragment shader."""
+    """Storage blocks of a fragment shader."""
     storage_bindings: int = _limit("GL_MAX_SHADER_STORAGE_BUFFER_BINDINGS", 23)
     """Binding points of storage blocks, for all shaders together."""
     uniform_blocks: int = _limit("GL_MAX_COMPUTE_UNIFORM_BLOCKS", 12)
-    """Of a compute shader."""
+    """Uniform blocks of a compute shader."""
     compute_textures: int = _limit("GL_MAX_COMPUTE_TEXTURE_IMAGE_UNITS", 16)
-    """Texture units of a compute shader …"""
+    """Texture units of a compute shader."""
     vertex_textures: int = _limit("GL_MAX_VERTEX_TEXTURE_IMAGE_UNITS", 16)
-    """… of a vertex shader …"""
+    """Texture units of a vertex shader."""
     fragment_textures: int = _limit("GL_MAX_TEXTURE_IMAGE_UNITS", 16)
-    """… and of a fragment shader."""
+    """Texture units of a fragment shader."""
     work_group_count: tuple[int, int, int] = _limit("GL_MAX_COMPUTE_WORK_GROUP_COUNT", (65535, 65535, 65535))
     """Work groups a dispatch may have; past it nothing runs and only the error flag reports it."""
     work_group_size: tuple[int, int, int] = _limit("GL_MAX_COMPUTE_WORK_GROUP_SIZE", (1024, 1024, 64))

@@ -1,4 +1,4 @@
-"""Pictures and their smaller copies, as the filter of shaders/lib/textures.glsl wants them.
+"""Pictures and their smaller copies, as the filter of shaders/lib/textures.glsl reads them.
 
 A texel of a level is the exact mean of the part of level 0 below it, also where a side is odd and its border cuts
 texels. On an environment "mean" is over solid angle, so that what little there is at the poles does not count as if

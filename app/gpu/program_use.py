@@ -1,6 +1,6 @@
 """What a program needs of the device: storage and uniform blocks, texture and image units, shared memory, size.
 
-Read from the text that is compiled, so that it can be told without a driver. Drivers count what is declared *and*
+Read from the text that is compiled, so that no driver is needed. Drivers count what is declared *and*
 used; so does this.
 """
 
@@ -58,7 +58,7 @@ class StageUse:
     def over(self, limits: Limits) -> list[str]:
         """A sentence for each limit that it exceeds."""
         prefix = "" if self.stage == "compute" else f"{self.stage}_"
-        asked = (
+        rows = (
             ("storage blocks", len(self.storage), getattr(limits, f"{prefix}storage_blocks")),
             ("binding points of storage blocks", self.storage_bindings, limits.storage_bindings),
             ("uniform blocks", len(self.uniform), limits.uniform_blocks),
@@ -66,7 +66,7 @@ class StageUse:
             ("image units", self.images, PROMISED_IMAGES),
             ("bytes of shared memory", self.shared_bytes, PROMISED_SHARED_BYTES),
         )
-        return [f"{self.name} needs {needed} {what} and has {had}" for what, needed, had in asked if needed > had]
+        return [f"{self.name} needs {needed} {what} and has {had}" for what, needed, had in rows if needed > had]
 
 
 def use_of(source: Source) -> StageUse:

@@ -82,7 +82,7 @@ def photon_record(groups: int, hero: bool = False) -> Struct:
 
 
 def specular_events(photons: np.ndarray) -> np.ndarray:
-    """Of photon records (n,): events on each one's path."""
+    """Number of events on the path of each photon record (n,)."""
     return photons["depth"] & ((1 << EDGE_BIT) - 1)
 
 

@@ -317,7 +317,7 @@ class SceneBuffers:
         ]
         levels, powers = self.tint_levels, self.light_power
         self.tint_row = NONE if levels is None else absorbers[levels.coefficient.tobytes()]
-        """Of the spectra: absorption of the glass whose way photons tell."""
+        """Row of the spectra: absorption of the glass in which photons count their way."""
         if levels is not None:
             behind = [spectrum for light in self.scene.lights for spectrum in levels.all_behind(light.spectral_power)]
             powers = [cumulative(self.axis, spectrum) for spectrum in behind]

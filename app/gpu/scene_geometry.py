@@ -19,7 +19,7 @@ from .scene_records import PIECE, SOLID, TRIANGLE
 from .scene_texels import tree_texels
 
 _PLANE_BIT = 0x80000000
-"""Of a primitive's number: a plane of a half-space solid, not a triangle (shaders/lib/intersect.glsl)."""
+"""Bit of a primitive's number: a plane of a half-space solid, not a triangle (shaders/lib/intersect.glsl)."""
 _CURVED_BIT = 0x40000000
 """Likewise, a face of a curved solid."""
 
@@ -62,7 +62,7 @@ class Curved:
     own: dict[int, tuple[Face, ...]]
     """By object, in their own frames."""
     faces: tuple[Face, ...]
-    """Of all objects, GPU space."""
+    """Faces of all objects, GPU space."""
     objects: tuple[int, ...]
     """Each face's object."""
 

@@ -104,8 +104,8 @@ def load_source(
     including file and line when an include is missing.
     """
     root = root or paths.shaders_dir()
-    asked = (name, tuple((defines or {}).items()), tuple(structs), root, tuple(extensions))
-    if _kept and (known := _sources.get(asked)) is not None:
+    identity = (name, tuple((defines or {}).items()), tuple(structs), root, tuple(extensions))
+    if _kept and (known := _sources.get(identity)) is not None:
         return known
     lines: list[Line] = []
 
@@ -123,14 +123,14 @@ def load_source(
 
     seen: set[str] = set()
 
-    def flatten(file: str, asked_by: str) -> None:
+    def flatten(file: str, includer: str) -> None:
         if file in seen:
             return
         seen.add(file)
         try:
             read = _read(root, file)
         except OSError as error:
-            raise ShaderError(f"shader {file} included by {asked_by} cannot be read: {error.strerror}") from error
+            raise ShaderError(f"shader {file} included by {includer} cannot be read: {error.strerror}") from error
         for line, included in read:
             if included:
                 flatten(included, f"{file}:{line.number}")
@@ -143,7 +143,7 @@ def load_source(
         name, "\n".join(line.text for line in kept) + "\n", tuple((line.file, line.number) for line in kept), len(lines)
     )
     if _kept:
-        _sources[asked] = source
+        _sources[identity] = source
         for old in list(_sources)[: -2 * KEPT_PROGRAMS]:
             _sources.pop(old, None)  # other threads' engines use them too
     return source

@@ -33,9 +33,9 @@ would cost a software renderer a fifth of its rate."""
 WIDTH, WIDTH_WITH_LINES, LEAST_WIDTH = 512, 1024, 64
 """Samples along xi; a line needs more, since nothing but the splat's width blurs it."""
 MOST_BYTES = 512 << 20
-"""Of all tables, beyond which they have fewer samples along xi: there are so many where bands are narrow."""
+"""Bytes of all tables beyond which they have fewer samples along xi: narrow bands are many."""
 MOST_LAYERS = 2048
-"""Of a texture array: as many as OpenGL 4.3 promises."""
+"""Layers of a texture array: as many as OpenGL 4.3 promises."""
 FINEST = 512
 """Cells of a band for the sharpest row."""
 DENSITY_CELLS, CUMULATIVE_SAMPLES = 1024, 2049
@@ -134,7 +134,7 @@ class SplatTables:
 
     @property
     def first_power(self) -> int:
-        """Of `band_buffer`, where powers begin, vec4."""
+        """Index in `band_buffer` where powers begin, vec4."""
         return self.integral_buffer.size // (48 * self.targets)
 
     def release(self) -> None:
@@ -149,7 +149,7 @@ def _by_target(values: np.ndarray, targets: int) -> np.ndarray:
 
 
 _KEPT_BYTES = 24 << 20
-"""Of blurred spectra that are kept for the next plan with the same bands."""
+"""Bytes of blurred spectra, at most, that are kept for the next plan with the same bands."""
 _blurred: dict[tuple[object, ...], tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
 
 

@@ -47,8 +47,8 @@ def complaints(built: Built) -> list[str]:
 def blocks(built: Built) -> set[str]:
     """Names of the uniform and storage blocks that the front end finds in use, all stages together."""
     with tempfile.TemporaryDirectory() as folder:
-        told = _output(FRONT_END, "-q", "-l", *_written(built, Path(folder)))[1]
-    _, _, after = told.partition(_REFLECTION)
+        output = _output(FRONT_END, "-q", "-l", *_written(built, Path(folder)))[1]
+    _, _, after = output.partition(_REFLECTION)
     return {line.partition(":")[0] for line in after.strip().split("\n\n")[0].splitlines() if ": offset" in line}
 
 
@@ -83,9 +83,9 @@ def _written(built: Built, folder: Path) -> list[str]:
 
 def _run(*command: str) -> list[str]:
     """The lines of a tool's complaint; none where it has none."""
-    code, told = _output(*command)
-    lines = [line for line in told.splitlines() if re.search(r"\b(?:error|warning)\b", line, re.IGNORECASE)]
-    return lines or ([f"{command[0]} ended with {code}: {told.strip()[-300:]}"] if code else [])
+    code, output = _output(*command)
+    lines = [line for line in output.splitlines() if re.search(r"\b(?:error|warning)\b", line, re.IGNORECASE)]
+    return lines or ([f"{command[0]} ended with {code}: {output.strip()[-300:]}"] if code else [])
 
 
 def _output(*command: str) -> tuple[int, str]:

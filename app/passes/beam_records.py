@@ -311,7 +311,7 @@ def _windows(
     windows, is_mask, mean, widest = _windows_as_they_are(lines[..., 3], first)
     is_narrow = width <= WIDE * widest
     widest = np.where(is_narrow, np.round(mean), widest)
-    # Of a wide polygon little is beyond, and how much is not known.
+    # Little of a wide polygon is beyond, and how much is not known.
     lines[is_mask & ((widest < BROAD) | ~is_narrow)[owner], :, 2] = NO_EDGE[2]
     return np.where((is_narrow[owner] & ~is_mask)[:, None], widest[owner, None], windows), widest
 

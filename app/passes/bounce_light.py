@@ -46,9 +46,9 @@ _PAIRS = 8
 """Directions of one dispatch at most: Mesa's software renderer ends loops that run long."""
 _MOST_ASKED = 2 * _PAIRS + -(-_PAIRS // PER_FOLLOWED)
 _KEY = 80
-"""First of the words of a bounce's directions, places and choices …"""
+"""First of the generator words of a bounce's directions, places and choices."""
 _KEYS = 16
-"""… and how many each bounce has."""
+"""Generator words of each bounce."""
 
 PARAMETERS = Struct(
     "BounceParameters",

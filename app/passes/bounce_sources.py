@@ -236,21 +236,21 @@ def _colours_of(channels: MapChannels) -> list[np.ndarray]:
 
 def _faces_specular(buffers: SceneBuffers, places: EnvironmentPlaces) -> np.ndarray:
     """bool (n,): some glass, mirror or grating is on the side of its receiver that a place is on. Maps do not know
-    from which side their light came; where all that throws any is on one side, it was from there."""
+    from which side their light came; where all specular objects are on one side, it was from there."""
     scene, objects, backs = buffers.scene, places.places["object"], places.places["inside"] != 0
-    thrown = [i for i, o in enumerate(scene.objects) if o.material.is_specular]
+    specular = [i for i, o in enumerate(scene.objects) if o.material.is_specular]
     found = np.zeros(len(objects), bool)
-    if not thrown:
+    if not specular:
         return found
     for index in buffers.receivers:
         mesh, item = buffers.world_meshes[index], scene.objects[index]
         if item.mesh.is_flat:
-            points = np.concatenate([buffers.world_meshes[i].vertices for i in thrown])
+            points = np.concatenate([buffers.world_meshes[i].vertices for i in specular])
             normal, size = mesh.face_normals()[int(np.argmax(mesh.areas()))], np.ptp(points, axis=0).max()
             height = (points - mesh.vertices[0]) @ normal
             front, back = (height > _FLAT * size).any(), (height < -_FLAT * size).any()
         elif mesh.is_closed:
-            within = [contains(item, world_bounds(scene.objects[i]).mean(axis=0)) for i in thrown]
+            within = [contains(item, world_bounds(scene.objects[i]).mean(axis=0)) for i in specular]
             front, back = not all(within), any(within)
         else:
             front = back = True

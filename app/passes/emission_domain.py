@@ -141,7 +141,7 @@ def _plane_domain(
     rect, mask = _rect_and_mask(low, high, box_low, box_high)
     if is_disc:
         mask &= _disc_mask(rect, np.zeros(2), half[0] + rim[0])
-    if not mask.any():  # the beam goes by
+    if not mask.any():  # the beam misses
         return None
     area = rect[2] * rect[3] / space.scale**2
     return EmissionDomain(

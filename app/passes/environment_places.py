@@ -71,9 +71,9 @@ class EnvironmentPlaces:
     tiles: tuple[tuple[int, int], ...]
     """First place of each tile, and the one after its last."""
     filled_xy: np.ndarray
-    """int (m, 2): texels next to charts that are looked up too …"""
+    """int (m, 2): texels next to charts, which are looked up too."""
     source: np.ndarray
-    """int (m,): … and the place whose light they show."""
+    """int (m,): the place whose light each of these texels shows."""
     on_top: np.ndarray
     """bool (n,): of a window, in a part of it that no finer one covers: looked up at its own middle."""
     is_window: np.ndarray

@@ -21,7 +21,7 @@ from .environment_places import PLACE, EnvironmentPlaces
 PER_FOLLOWED = 4
 """Straight ones for each that is followed through glass and over mirrors, which takes as long as many of them."""
 FIRST_DIRECTIONS = 16
-"""After which the light is worth showing."""
+"""Directions after which the light can be shown."""
 MAX_EVENTS = 40
 """Surfaces of glass and mirrors on one path; what is left then is lost and counted."""
 ANCHOR_NM = 587.56

@@ -18,19 +18,19 @@ from .lattice_order import GOLDEN
 from .pilot import Pilot
 
 _REACH = 2
-"""Cells round one that threw light which keep all their points: a pilot has about one point a cell."""
+"""Cells round one whose light landed which keep all their points: a pilot has about one point a cell."""
 _DARK_SHARE = 0.1
 """Photons of thinned cells, over those of the others."""
 _LEAST_CHANCE = 1.0 / 16.0
-"""Least probability of a point to be emitted: what a missed cell throws is never more than 16 times a photon."""
+"""Least probability of a point to be emitted: a photon of a missed cell carries at most 16 times another."""
 _LEAST_GAIN = 1.25
 """Photons saved, at least, that are worth another program."""
 
 
 def guided(domain: EmissionDomain, pilot: Pilot) -> EmissionDomain:
-    """`domain` with the cells thinned that threw no light in `pilot`, which traced the whole of it; `domain` itself
-    where that saves little or nothing landed."""
-    bright = domain.mask & _grown(_cells_that_threw(pilot), _REACH)
+    """`domain` with the cells thinned none of whose light landed in `pilot`, which traced the whole of it; `domain`
+    itself where that saves little or nothing landed."""
+    bright = domain.mask & _grown(_cells_that_landed(pilot), _REACH)
     dark = domain.mask & ~bright
     kept, others = int(bright.sum()), int(dark.sum())
     if not kept or not others:
@@ -41,7 +41,7 @@ def guided(domain: EmissionDomain, pilot: Pilot) -> EmissionDomain:
     return replace(domain, thinned=dark, thinned_chance=chance)
 
 
-def _cells_that_threw(pilot: Pilot) -> np.ndarray:
+def _cells_that_landed(pilot: Pilot) -> np.ndarray:
     """Cells, bool (MASK_SIZE, MASK_SIZE), that hold a pilot's point some of whose light landed."""
     landed = np.unique(np.concatenate([r["photon_id"] for r in (pilot.whole, *pilot.spectral, *pilot.rim)]))
     points = landed.astype(np.uint64)

@@ -23,9 +23,9 @@ _PLACES = 8192
 """Samples that may be under way, where they halt."""
 _LISTED_AT, _HALTED_AT = 0, 4
 SURVEYED = np.dtype([("key", "u4"), ("mean", "u4", 3)])
-"""What a survey keeps of a pixel (shaders/camera/survey.glsl) …"""
+"""Bytes that a survey keeps of a pixel (shaders/camera/survey.glsl)."""
 _UNEVEN_BYTES = 4
-"""… and its number, where it is not even."""
+"""Bytes of the number of a pixel that is not even."""
 
 Dispatch = Callable[[int], float]
 """Follows so many pixels, as `first_listed` and its neighbours in the parameters say; seconds it took."""

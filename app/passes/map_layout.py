@@ -50,9 +50,9 @@ class Fineness:
     """Along a pixel's side in a fine window: what is thinner than a texel is blurred to it, and a pixel's border cuts
     texels in parts."""
     fine: int
-    """Longest sides of fine windows, texels, …"""
+    """Longest side of a fine window, texels."""
     coarse: int
-    """… and of coarse ones."""
+    """Longest side of a coarse window, texels."""
     in_register: int = 0
     """Texels along a pixel's side, at most, of windows on the picture's own pixels; 0: none is made, since each view
     needs others."""
@@ -74,9 +74,9 @@ LIVE = Fineness(2.0, 2048, 768)
 STILL = Fineness(4.0, 3072, 1024, 4)
 """For pictures that are kept."""
 _SHRINK = 0.85
-"""Where maps do not fit a texture, they are made so much coarser until they do …"""
+"""Factor by which maps that do not fit a texture are made coarser until they do."""
 _LEAST_TEXELS_PER_PIXEL = 0.5
-"""… or are as coarse as this."""
+"""Maps are not made coarser than this to fit a texture."""
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ class MapLayout:
     borders: dict[int, np.ndarray] = field(default_factory=dict)
     """Borders of convex flat receivers, (n, 4): those near which light lands (`borders.borders_near`)."""
 
-    def width_told(self, receiver: int) -> float:
+    def resolved_width(self, receiver: int) -> float:
         """What a receiver's finest map resolves, scene units: a texel's side, or half a pixel's where texels are
         smaller than that. These are so only that outlines cut them in smaller parts."""
         side = float(np.sqrt(self.placements["texel_area"][self.receivers[receiver]["placement"]]))

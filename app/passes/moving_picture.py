@@ -40,9 +40,10 @@ MOVING_PARAMETERS = Struct(
 LATTICE_STEP = 4
 """Pixels between two lookups of direct light where it varies slowly."""
 COARSE = 6
-"""Blocks of glass of so many pixels and larger, whose shapes are far coarser than what their paths leave out …"""
+"""Side in pixels of blocks of glass from which on `COARSE_SPLIT` holds: their shapes are far coarser than what their
+paths leave out."""
 COARSE_SPLIT = 0.004
-"""… follow both parts of a path from this share of its power on: five times what others do, a seventh less time."""
+"""Share of its power above which both parts of a path are followed in coarse blocks: five times that of others."""
 BIND_MOVING = 10
 """Uniform block."""
 BIND_MOVING_LISTS = 22

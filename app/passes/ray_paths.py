@@ -1,7 +1,7 @@
 """Single paths through the scene, to be shown: the ray overlay.
 
 Rays in one dispatch, each at a wavelength of its own, refracted at every glass surface (reflected within it where it
-must be, or as often as is asked for), up to the first surface that is neither glass nor mirror. No branching, no
+must be, or as often as is set), up to the first surface that is neither glass nor mirror. No branching, no
 weights.
 """
 

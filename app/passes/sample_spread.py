@@ -13,9 +13,9 @@ TAPS_PER_PIXEL = 1.2
 """Lookups of one sample; colours between two of them are not resolved, so the more samples there are, the closer they
 are."""
 PRIMARY_SAMPLES = LOOKS
-"""Lookups of one sample at what is seen directly: outlines and textures there cost a tenth of what glass costs …"""
+"""Lookups of one sample at what is seen directly: outlines and textures there cost a tenth of what glass costs."""
 PRIMARY_SAMPLES_UNTIL = 64
-"""… and with more samples than these they are smooth as they are."""
+"""Samples of a pixel above which outlines and textures are smooth with one lookup each."""
 SURVEY_TAKES, SURVEY_KEPT = 1, 2
 """What a sample's parameters say of it: it is one of a survey, or even pixels keep what a survey found."""
 SURVEY_SAMPLES = 2

@@ -38,9 +38,9 @@ if TYPE_CHECKING:
     from .map_atlas import MapAtlas
 
 GROUP = 1 << 15
-"""Photons turned to splats and drawn at a time …"""
+"""Photons that are turned into splats and drawn at a time."""
 MOST_ADDED, ADDED_SPLATS = 1 << 17, 1 << 18
-"""… or added by compute shaders: so many, and no more than may become so many splats. Each group costs a GPU the time
+"""Photons that compute shaders add at a time, and splats that these may become at most. Each group costs a GPU the time
 of its dispatches."""
 CHUNK, SMALLEST_CHUNK = 1 << 18, 1 << 11
 """Photons between two flushes of the scratch textures, at most and at least. The fewer, the less a sum's rounding

@@ -116,7 +116,7 @@ class Batch:
     """Rays and photons that found no room. What carries their light is gone: only fewer points at once bring it back
     (`LatticeSlice.halves`)."""
     fullness: float
-    """Of the fuller of the queues of rays and of photons, for lattice points that fill a batch."""
+    """Share of the queue of rays or of photons, whichever is fuller, that lattice points which fill a batch take up."""
 
 
 @dataclass(frozen=True)

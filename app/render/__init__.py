@@ -10,10 +10,10 @@ from typing import Any
 
 
 class _Package(ModuleType):
-    def __call__(self, *arguments: Any, **asked: Any) -> Any:
+    def __call__(self, *arguments: Any, **options: Any) -> Any:
         from .. import called_render
 
-        return called_render(*arguments, **asked)  # type: ignore[operator]
+        return called_render(*arguments, **options)  # type: ignore[operator]
 
 
 sys.modules[__name__].__class__ = _Package

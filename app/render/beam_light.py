@@ -47,9 +47,9 @@ if TYPE_CHECKING:
     import moderngl
 
 PHOTONS_A_BEAM = 2.0
-"""Photons for each beam, half of them for what it leaves …"""
+"""Photons that a beam counts as in a scene of few facets, half of them for what it leaves."""
 _FACETS_A_BEAM = 350.0
-"""… and as many again for so many facets of the scene."""
+"""Facets of the scene with which a beam counts as twice as many photons."""
 _FINER = 32.0
 """A search that followed n beams says how many there are at thresholds down to this times root n finer."""
 COARSEST, FINEST = 1e-2, 1e-9
@@ -250,7 +250,7 @@ class BeamLight:
         for r in self.frames:
             record = layout.placements[layout.receivers[r]["placement"]]
             finer = share if record["kind"] == KIND_PICTURE else 1.0
-            texels[r] = finer * layout.width_told(r) * self._buffers.space.scale
+            texels[r] = finer * layout.resolved_width(r) * self._buffers.space.scale
         return texels
 
     def begin(self) -> None:

@@ -42,9 +42,9 @@ from .time_budget import TimeBudget
 from .traced_light import traced_light
 
 _ENVIRONMENT_SHARE = 0.25
-"""Share of a timed rendering, at most, for the light of the environment …"""
+"""Share of a timed rendering, at most, for the light of the environment."""
 _BOUNCES_SHARE = 0.15
-"""… and for what receivers give to each other."""
+"""Share of a timed rendering, at most, for what receivers give to each other."""
 _PREPARING, _TRACING, _SEEING = "preparing", "tracing photons", "taking camera samples"
 _GATHERING = "gathering the environment's light"
 _BOUNCING = "gathering what surfaces give to each other"
@@ -73,9 +73,9 @@ class _Traced:
     buffers: SceneBuffers
     light: LightPass
     environment: EnvironmentLightPass | None = None
-    """Where its scene's features include it …"""
+    """None where the scene's features lack it."""
     bounces: BounceLightPass | None = None
-    """… and likewise."""
+    """None where the scene's features lack them."""
     camera_buffers: SceneBuffers | None = None
     """The camera's own, where it has a method of its own."""
     camera_pass: CameraPass | None = None
@@ -233,7 +233,7 @@ class FrameRenderer:
         settings, camera_pass = self._settings, self._traced.camera_pass
         maps = self._traced.maps
         view = self._view(stage)
-        # A stop that was requested while tracing still wants a picture: only the first sample is taken then.
+        # Even after a stop while tracing there is to be a picture: only the first sample is taken then.
         stops_at_once, samples = stop(), 1
         budget = None if stops_at_once or settings.spp is not None else self._budget
         if not stops_at_once:

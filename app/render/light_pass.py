@@ -372,7 +372,7 @@ class LightPass:
     def _texel_size(self) -> np.ndarray:
         """What each receiver's finest window resolves, GPU units."""
         receivers = range(len(self.layout.receivers))
-        return np.array([self.layout.width_told(r) for r in receivers]) * self.buffers.space.scale
+        return np.array([self.layout.resolved_width(r) for r in receivers]) * self.buffers.space.scale
 
     def show_gains(self, scene: Scene | None) -> None:
         """Splat from now on with the brush's dabs of `scene`; None without."""

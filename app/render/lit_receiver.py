@@ -1,7 +1,7 @@
 """A baked map put onto its receiver: what glows instead of being lit through glass.
 
 A Lambertian surface of reflectance ρ under irradiance E sends out ρE/π, whatever the direction: so a texture of that
-radiance looks like the caustic from everywhere, and adds to what other lights do.
+radiance is the caustic from everywhere, and adds to what other lights do.
 """
 
 from __future__ import annotations

@@ -14,9 +14,9 @@ from .pass_rounds import BEAM_ROUND
 
 _MIB = 1 << 20
 _SPLAT_PROGRAMS = 130 * _MIB
-"""Programs that splat, compiled on the processor, with their tables and lists …"""
+"""Programs that splat, compiled on the processor, with their tables and lists."""
 _ALL_PROGRAMS = 170 * _MIB
-"""… and with the camera's."""
+"""Programs that splat and the camera's, likewise."""
 _BEAMS = 80 * _MIB
 """Half a million photons' worth of beams, with what they leave."""
 _TEXEL_BYTES = 16

@@ -1,5 +1,5 @@
 """What a rendering reports in any case: light that was lost, lights that reached nothing, maps and pictures that
-do not hold what they should. One line each; a picture that needs none is right as far as the program knows."""
+do not hold what they should. One line each; a picture without any is right as far as the program can tell."""
 
 from __future__ import annotations
 

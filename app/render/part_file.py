@@ -58,12 +58,12 @@ def read_header(path: Path) -> PartHeader:
         with zipfile.ZipFile(path) as archive:
             if archive.getinfo(_HEADER).file_size > _HEADER_BYTES:
                 raise ValueError("its header is too long")
-            told = json.loads(archive.read(_HEADER))
-            if told.pop("format") != FORMAT:
+            values = json.loads(archive.read(_HEADER))
+            if values.pop("format") != FORMAT:
                 raise ValueError("it is of another version of this program")
-            share = Share(**told.pop("share"))
-            lists = {"share": share, "size": tuple(told["size"]), "others": tuple(told["others"])}
-            header = PartHeader(**told | lists)
+            share = Share(**values.pop("share"))
+            lists = {"share": share, "size": tuple(values["size"]), "others": tuple(values["others"])}
+            header = PartHeader(**values | lists)
             width, height = header.size
             if not (0 < width <= _MAX_SIDE and 0 < height <= _MAX_SIDE and 0 < header.targets <= _MAX_TARGETS):
                 raise ValueError("its maps are of impossible size")

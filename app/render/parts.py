@@ -263,5 +263,5 @@ def _texels(light: LightPass, target: int) -> np.ndarray:
 
 def _plain(stats: LightStats) -> dict[str, Any]:
     """Counts only: bands and buffers are the same in all parts."""
-    told = asdict(stats)
-    return {name: value for name, value in told.items() if name not in ("bands", "light_points", "buffers")}
+    values = asdict(stats)
+    return {name: value for name, value in values.items() if name not in ("bands", "light_points", "buffers")}

@@ -32,7 +32,7 @@ def check_values(path: str, values: Sequence[float], stage: Stage, where: str = 
     """Raise `UserError` where a parameter is none, or cannot take one of its values, or gets one twice."""
     if not values:
         raise UserError(f"{where}{path} gets no value: give one or more")
-    # Of thousands the extremes say whether all can be taken.
+    # The extremes show whether all of them can be taken.
     for value in [value for value in values if not math.isfinite(value)] or (min(values), max(values)):
         check_value(stage, path, value, where)
     if len(set(values)) < len(values):

@@ -30,7 +30,7 @@ from .engine_answers import EngineAnswers
 from .invalidation import appearance_differs, dirty_level, lights_differ, moves_view, only_moves
 from .live_camera import DIRECT_S, MOVED_S
 from .live_light import LiveLight
-from .refit import wants_new_maps
+from .refit import needs_new_maps
 from .schedule import Action, ShowMaps
 from .work_tally import light_counts
 
@@ -233,7 +233,7 @@ class LiveEngine(EngineAnswers):
             case Action.REFIT_MAPS:
                 self._refit(self._wanted)
             case Action.JUDGE_MAPS:
-                if self._shown is not None and wants_new_maps(self._shown.light, self._wanted):
+                if self._shown is not None and needs_new_maps(self._shown.light, self._wanted):
                     self._refit(self._wanted)
             case Action.OFFER_MAPS:
                 self._maps_ready()

@@ -5,9 +5,10 @@ from __future__ import annotations
 STEPS = (1, 2, 3, 6, 12, 24)
 """Sides of the blocks of pixels that share one path through glass, in motion."""
 REFINED = (6, 3, 1)
-"""Sides of the blocks once nothing moves, one after the other …"""
+"""Sides of the blocks once nothing moves, one after the other."""
 REFINED_SOON = (6, 1)
-"""… and where the last of these is there soon: the one before would take a ninth of its time, for a moment."""
+"""Sides where the last of them takes less than `SOON_S`: the one before would take a ninth of its time, for a
+moment."""
 SOON_S = 20.0
 """Seconds of glass, by the rate of the few paths of a picture in motion, which is a fifth of that of many: photons wait
 so long for a whole picture."""

@@ -1,7 +1,7 @@
 """The camera pass of a live rendering: camera samples within a time budget, and the last picture worth showing.
 
 A picture is published when every pixel has a whole sample. The first ones of a view show what is seen directly at
-full resolution, and glass and mirrors as coarsely as the time that is left asks for (`MovingPicture`); once still these
+full resolution, and glass and mirrors as coarsely as the time that is left requires (`MovingPicture`); once still these
 become finer in steps, until every pixel has its own path, and then samples are added up.
 
 Where glass disperses, a sample of a fine picture sees one band of the spectrum only, and such a picture is whole after
@@ -111,9 +111,9 @@ class LiveCamera:
         self.version = 0
         """Counts what was published."""
         self.scale = 1.0
-        """Side of the shown picture over the side wanted, where glass and mirrors are seen …"""
+        """Side of the shown picture over the side wanted, where glass and mirrors are seen."""
         self.direct_scale = 1.0
-        """… and elsewhere."""
+        """Side of the shown picture over the side wanted, elsewhere."""
 
     def take_scene(
         self, buffers: SceneBuffers, scene: Scene, reflectances: list[np.ndarray | None], maps: MapChannels

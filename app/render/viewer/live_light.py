@@ -80,7 +80,7 @@ class LiveLight:
         if self.buffers.features.environment_lights:
             self.environment = EnvironmentLightPass(context, self.buffers, settings.seed)
         self.bounces: BounceLightPass | None = None
-        """What receivers give each other, where the scene wants it."""
+        """What receivers give each other, where the scene has it switched on."""
         if self.buffers.features.bounces:
             self.bounces = BounceLightPass(context, self.buffers, self.environment, settings.seed)
         self._seen: Scene | None = None

@@ -23,11 +23,11 @@ BESIDE = 0.25
 
 
 def is_judged(light: LiveLight, inputs: LiveInputs) -> bool:
-    """Whether `wants_new_maps` has judged this view."""
+    """Whether `needs_new_maps` has judged this view."""
     return light.judged_view == (inputs.camera, inputs.width, inputs.height)
 
 
-def wants_new_maps(light: LiveLight, inputs: LiveInputs) -> bool:
+def needs_new_maps(light: LiveLight, inputs: LiveInputs) -> bool:
     """Whether new maps would show more of what the camera of `inputs` sees."""
     if is_judged(light, inputs):
         return False

@@ -106,7 +106,7 @@ class ThreadedEngine:
             finally:
                 self._thread.close()
 
-    def _asked(self, question: Callable[[], T]) -> T | NotYet:
+    def _answer(self, question: Callable[[], T]) -> T | NotYet:
         """What the engine answers on its thread."""
         return NOT_YET if self.is_busy else self._thread.run(question)
 
@@ -198,11 +198,11 @@ class ThreadedEngine:
 
     def stored_photons(self, limit: int = QUERIED_PHOTONS) -> StoredPhotons | NotYet:
         """As of a `LiveEngine`."""
-        return self._asked(lambda: self._engine.stored_photons(limit))
+        return self._answer(lambda: self._engine.stored_photons(limit))
 
     def caustic_spectrum(self, receiver: int, position: np.ndarray) -> CausticSpectrum | NotYet:
         """As of a `LiveEngine`."""
-        return self._asked(lambda: self._engine.caustic_spectrum(receiver, position))
+        return self._answer(lambda: self._engine.caustic_spectrum(receiver, position))
 
 
 Engine = LiveEngine | ThreadedEngine
