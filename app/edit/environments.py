@@ -7,6 +7,7 @@ parameters. Where only its rotation changes, the picture itself stays: the rende
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
@@ -32,6 +33,7 @@ _ABSOLUTE = 10.0
 """A panorama within this factor of what suits the lights is taken to be in absolute units."""
 _SUN_DEG = 10.0
 """Apparent size beyond which a directional light is no sun."""
+_MADE_OF_NUMBERS: dict[str, Callable[..., Environment]] = {"gradient": gradient, "sky": sky, "constant": constant}
 _ZENITH, _HORIZON, _NADIR = (0.25, 0.45, 0.9), (0.9, 0.95, 1.0), (0.2, 0.18, 0.16)
 
 
@@ -64,20 +66,18 @@ def set_environment_kind(scene: Scene, kind: str) -> Scene:
     return replace(scene, environment=made)
 
 
-def set_gradient(scene: Scene, **changes: object) -> Scene:
-    """With other `zenith`, `horizon`, `nadir` (linear Rec.709) or `intensity`. Raises UserError for what is negative or
-    not finite."""
-    now = dict(_of_kind(scene, "gradient").parameters)
-    return replace(scene, environment=gradient(**_vectors(now | changes)))
-
-
-def set_sky(scene: Scene, **changes: object) -> Scene:
-    """With another `type`, `sun_elevation_deg`, `sun_azimuth_deg`, `luminance` or `ground`. Raises UserError for what
-    is out of range."""
-    now = _vectors(dict(_of_kind(scene, "sky").parameters) | changes)
-    return replace(
-        scene, environment=sky(**{("sky_type" if key == "type" else key): value for key, value in now.items()})
-    )
+def set_environment(scene: Scene, **changes: Any) -> Scene:
+    """A gradient, a sky or a constant environment with other parameters, named as in a scene file. Raises UserError for
+    what is out of range."""
+    now = scene.environment
+    if now is None or now.kind not in _MADE_OF_NUMBERS:
+        raise UserError("the environment of the scene is not made of numbers; choose a gradient or a sky first")
+    values = {key: tuple(value) if isinstance(value, list) else value for key, value in now.parameters.items()}
+    values |= changes
+    if "type" in values:
+        values["sky_type"] = values.pop("type")
+    made = _MADE_OF_NUMBERS[now.kind](**values)
+    return replace(scene, environment=made, background_rgb=values.get("radiance", scene.background_rgb))
 
 
 def set_environment_map(scene: Scene, path: Path) -> Scene:
@@ -101,7 +101,7 @@ def set_environment_map(scene: Scene, path: Path) -> Scene:
 
 def set_map_rotation(scene: Scene, rotation_deg: float) -> Scene:
     """Turn the map about its up direction, degrees; the picture itself stays."""
-    now = _of_kind(scene, "map")
+    now = _map_of(scene)
     if not math.isfinite(rotation_deg):
         raise UserError("the rotation of the environment must be a finite angle")
     up, _ = up_and_rotation(now)
@@ -111,7 +111,7 @@ def set_map_rotation(scene: Scene, rotation_deg: float) -> Scene:
 
 def set_map_intensity(scene: Scene, intensity: float) -> Scene:
     """Factor on the map's own values, 0 or more."""
-    now = _of_kind(scene, "map")
+    now = _map_of(scene)
     if not (math.isfinite(intensity) and intensity >= 0.0):
         raise UserError("the intensity of the environment must be a number of 0 or more")
     before = map_intensity(now)
@@ -129,12 +129,6 @@ def set_map_intensity(scene: Scene, intensity: float) -> Scene:
     rgb.setflags(write=False)
     kept = {"rotation_deg": rotation_deg, "up": list(up)} | dict(now.parameters) | {"intensity": float(intensity)}
     return replace(scene, environment=replace(now, rgb=rgb, parameters=kept))
-
-
-def set_constant(scene: Scene, radiance: Vec3) -> Scene:
-    """Another radiance from everywhere. Raises UserError for one that is negative or not finite."""
-    now = _of_kind(scene, "constant")
-    return replace(scene, environment=constant(radiance, now.lights), background_rgb=radiance)
 
 
 def set_environment_lights(scene: Scene, lights: bool) -> Scene:
@@ -199,15 +193,10 @@ def _without_environment(scene: Scene) -> Scene:
     return replace(scene, environment=None)
 
 
-def _of_kind(scene: Scene, kind: str) -> Environment:
-    if scene.environment is None or scene.environment.kind != kind:
-        raise UserError(f"the environment of the scene is no {kind}; choose that kind first")
+def _map_of(scene: Scene) -> Environment:
+    if scene.environment is None or scene.environment.kind != "map":
+        raise UserError("the environment of the scene is no map; choose that kind first")
     return scene.environment
-
-
-def _vectors(parameters: dict[str, Any]) -> dict[str, Any]:
-    """Lists as tuples."""
-    return {key: tuple(value) if isinstance(value, list) else value for key, value in parameters.items()}
 
 
 def _diffuse(scene: Scene, index: int) -> Diffuse:

@@ -92,7 +92,7 @@ def test_a_first_sky_is_as_bright_as_the_light_asks_for_and_follows_the_sun() ->
 
 
 def test_parameters_are_changed_one_at_a_time(scene: Scene) -> None:
-    made = environment.set_gradient(
+    made = environment.set_environment(
         environment.set_environment_kind(scene, "gradient"), zenith=(0.0, 0.0, 0.0), intensity=2.0
     )
     told = made.environment.parameters
@@ -100,12 +100,12 @@ def test_parameters_are_changed_one_at_a_time(scene: Scene) -> None:
     np.testing.assert_allclose(
         made.environment.rgb[127:129].mean(axis=(0, 1)), 2.0 * np.array(told["horizon"]), rtol=1e-3
     )
-    sky = environment.set_sky(environment.set_environment_kind(scene, "sky"), type=5, luminance=3.0)
+    sky = environment.set_environment(environment.set_environment_kind(scene, "sky"), type=5, luminance=3.0)
     assert np.ptp(sky.environment.rgb[:128]) < 1e-5 and sky.environment.rgb[0, 0, 0] == pytest.approx(3.0)
     with pytest.raises(UserError, match="type 16"):
-        environment.set_sky(sky, type=16)
-    with pytest.raises(UserError, match="choose that kind"):
-        environment.set_sky(made, type=3)
+        environment.set_environment(sky, type=16)
+    with pytest.raises(UserError, match="choose a gradient"):
+        environment.set_environment(scene, type=3)
 
 
 def test_turning_a_map_keeps_its_picture_and_is_only_looked_at(with_map: Scene) -> None:

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from ...edit import edits, environments
 from ...edit.state import State
 from ...model.environment import up_and_rotation
-from ...model.scene import Scene, Vec3
 from ...model.texture import Environment
 from ..view_model import ViewModel
 from . import picture_choice, widgets
 
-Edit = Callable[..., Scene]
 _KINDS = {"constant": "Plain colour", "gradient": "Gradient", "sky": "Sky", "map": "Picture all round"}
 _RADIANCE = "cd/unit²"
 _SKIES = {
@@ -36,6 +34,69 @@ _SKIES = {
     15: "White-blue, turbid, wide corona",
 }
 """The CIE's fifteen types of sky (ISO 15469), shortened."""
+_ABOUT_SKIES = (
+    "The CIE's fifteen types of sky: how bright it is towards the horizon and about the sun. Its disc is not drawn: a "
+    "light shows it."
+)
+
+
+def _sky_type(label: str, number: int, *, tip: str) -> int:
+    skies = {str(number): f"{number}  {words}" for number, words in _SKIES.items()}
+    return int(widgets.combo(label, skies, str(number), tip=tip))
+
+
+_angle = partial(widgets.slider, unit="°", format="%.1f")
+_many = partial(widgets.drag, low=0.0, high=1e9, format="%.4g", logarithmic=True)
+_factor = partial(_many, unit="×", reset=1.0)
+_SEEN = "Colour seen {}; the intensity below makes it a radiance."
+_ROWS: dict[str, tuple[tuple[str, str, Callable[..., Any], str, str], ...]] = {
+    "constant": (("radiance", "Radiance", widgets.colour, f"From everywhere, {_RADIANCE}.", "Radiance"),),
+    "gradient": (
+        ("zenith", "Above", widgets.colour, _SEEN.format("straight up"), "Above of the gradient"),
+        ("horizon", "Horizon", widgets.colour, _SEEN.format("all round"), "Horizon of the gradient"),
+        ("nadir", "Below", widgets.colour, _SEEN.format("straight down"), "Below of the gradient"),
+        ("intensity", "Intensity", _factor, "Factor on all of it.", "Intensity of the environment"),
+    ),
+    "sky": (
+        (
+            "type",
+            "Sky",
+            _sky_type,
+            _ABOUT_SKIES,
+            "Type of sky",
+        ),
+        (
+            "sun_elevation_deg",
+            "Sun's height",
+            partial(_angle, low=0.0, high=90.0),
+            "How high the sun is above the horizon.",
+            "Sun's height",
+        ),
+        (
+            "sun_azimuth_deg",
+            "Sun's azimuth",
+            partial(_angle, low=-180.0, high=180.0),
+            "Compass bearing of the sun, about the up direction from x.",
+            "Sun's azimuth",
+        ),
+        (
+            "luminance",
+            "Luminance",
+            partial(_many, unit=_RADIANCE),
+            "Luminance straight above.",
+            "Luminance of the sky",
+        ),
+        (
+            "ground",
+            "Ground",
+            partial(widgets.colour, highest=1.0),
+            "Reflectance of the ground below the horizon, which the sky lights.",
+            "Ground of the sky",
+        ),
+    ),
+}
+"""Of each kind that is made of numbers: parameters, the labels, controls and tooltips of their rows, and the labels of
+their edits."""
 
 
 def draw_environment(state: State, view_model: ViewModel) -> State:
@@ -49,63 +110,22 @@ def draw_environment(state: State, view_model: ViewModel) -> State:
     if kind != present:
         return edits.attempt(state, f"Environment: {_KINDS[kind].lower()}", environments.set_environment_kind, kind)
     if environment is None:
-        tip, before = f"Radiance behind everything, {_RADIANCE}.", state.scene.background_rgb
-        return _colour(state, "Background", before, tip, "Background", edits.set_background)
+        before = state.scene.background_rgb
+        rgb = widgets.colour("Background", before, tip=f"Radiance behind everything, {_RADIANCE}.")
+        return state if rgb == before else edits.attempt(state, "Background", edits.set_background, rgb)
     tip = "Whether it lights what is diffuse, besides being seen."
     lights = widgets.toggle("Lights surfaces", environment.lights, tip=tip)
     if lights != environment.lights:
         return edits.attempt(state, "Light of the environment", environments.set_environment_lights, lights)
-    match environment.kind:
-        case "gradient":
-            return _gradient(state, environment)
-        case "sky":
-            return _sky(state, environment)
-        case "map":
-            return _map(state, view_model, environment)
-    tip, before = f"From everywhere, {_RADIANCE}.", _vector(environment.parameters["radiance"])
-    return _colour(state, "Radiance", before, tip, "Radiance", environments.set_constant)
-
-
-def _gradient(state: State, environment: Environment) -> State:
-    parameters: Any = environment.parameters
-    for key, label, where in (
-        ("zenith", "Above", "straight up"),
-        ("horizon", "Horizon", "all round"),
-        ("nadir", "Below", "straight down"),
-    ):
-        tip, before = f"Colour seen {where}; the intensity below makes it a radiance.", _vector(parameters[key])
-        state = _colour(state, label, before, tip, f"{label} of the gradient", environments.set_gradient, key)
-    return _intensity(state, float(parameters.get("intensity", 1.0)), environments.set_gradient)
-
-
-def _sky(state: State, environment: Environment) -> State:
-    parameters: Any = environment.parameters
-    skies = {str(number): f"{number}  {words}" for number, words in _SKIES.items()}
-    tip = (
-        "The CIE's fifteen types of sky: how bright it is towards the horizon and about the sun. Its disc is not "
-        "drawn: a light shows it."
-    )
-    number = widgets.combo("Sky", skies, str(parameters["type"]), tip=tip)
-    if number != str(parameters["type"]):
-        return edits.attempt(state, "Type of sky", environments.set_sky, type=int(number))
-    above, bearing = (
-        "How high the sun is above the horizon.",
-        "Compass bearing of the sun, about the up direction from x.",
-    )
-    for key, label, low, high, tip in (
-        ("sun_elevation_deg", "Sun's height", 0.0, 90.0, above),
-        ("sun_azimuth_deg", "Sun's azimuth", -180.0, 180.0, bearing),
-    ):
-        before = float(parameters[key])
-        value = widgets.slider(label, before, low, high, unit="°", tip=tip, format="%.1f")
+    if environment.kind == "map":
+        return _map(state, view_model, environment)
+    for key, label, control, tip, undo in _ROWS[environment.kind]:
+        before = environment.parameters.get(key, 1.0)
+        before = tuple(before) if isinstance(before, list) else before
+        value = control(label, before, tip=tip)
         if value != before:
-            state = edits.attempt(state, label, environments.set_sky, **{key: value})
-    tip, before = "Luminance straight above.", float(parameters["luminance"])
-    value = widgets.drag("Luminance", before, 0.0, 1e9, unit=_RADIANCE, tip=tip, format="%.4g", logarithmic=True)
-    if value != before:
-        state = edits.attempt(state, "Luminance of the sky", environments.set_sky, luminance=value)
-    tip, ground = "Reflectance of the ground below the horizon, which the sky lights.", _vector(parameters["ground"])
-    return _colour(state, "Ground", ground, tip, "Ground of the sky", environments.set_sky, "ground", highest=1.0)
+            state = edits.attempt(state, undo, environments.set_environment, **{key: value})
+    return state
 
 
 def _map(state: State, view_model: ViewModel, environment: Environment) -> State:
@@ -122,25 +142,8 @@ def _map(state: State, view_model: ViewModel, environment: Environment) -> State
     angle = widgets.slider("Rotation", before, -180.0, 180.0, unit="°", format="%.1f", reset=0.0, tip=tip)
     if angle != before:
         state = edits.attempt(state, "Rotation of the environment", environments.set_map_rotation, angle)
-    return _intensity(state, environments.map_intensity(environment), environments.set_map_intensity)
-
-
-def _intensity(state: State, before: float, edit: Edit) -> State:
-    how: dict[str, Any] = {"unit": "×", "reset": 1.0, "format": "%.4g", "logarithmic": True}
-    value = widgets.drag("Intensity", before, 0.0, 1e9, tip="Factor on all of it.", **how)
-    return state if value == before else edits.attempt(state, "Intensity of the environment", edit, intensity=value)
-
-
-def _colour(
-    state: State, label: str, before: Vec3, tip: str, undo: str, edit: Edit, key: str = "", highest: float = math.inf
-) -> State:
-    """A row for a colour that `edit` sets, by the name `key` or alone."""
-    rgb = widgets.colour(label, before, tip=tip, highest=highest)
-    if rgb == before:
+    before = environments.map_intensity(environment)
+    value = _factor("Intensity", before, tip="Factor on all of it.")
+    if value == before:
         return state
-    return edits.attempt(state, undo, edit, **{key: rgb}) if key else edits.attempt(state, undo, edit, rgb)
-
-
-def _vector(value: Any) -> Vec3:
-    r, g, b = (float(v) for v in value)
-    return r, g, b
+    return edits.attempt(state, "Intensity of the environment", environments.set_map_intensity, value)

@@ -318,8 +318,8 @@ def _enter(folder: Path) -> None:
 
 def _entry(item: os.DirEntry[str]) -> _Entry | None:
     try:
-        view_model = item.stat()
-        return _Entry(Path(item.path), item.is_dir(), view_model.st_size, view_model.st_mtime)
+        status = item.stat()
+        return _Entry(Path(item.path), item.is_dir(), status.st_size, status.st_mtime)
     except OSError:
         return None  # a dangling link, or gone since
 

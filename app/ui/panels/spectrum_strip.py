@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
+from ...base.tone_map import srgb_oetf
 from ...model.optics.colorimetry import VISIBLE_NM, cmf_xyz, xyz_to_rgb709
 from .. import theme
 from . import rows
@@ -26,7 +27,7 @@ def spectral_srgb() -> np.ndarray:
     rise = np.clip((VISIBLE_NM - 380.0) / 40.0, 0.0, 1.0)
     fall = np.clip((780.0 - VISIBLE_NM) / 90.0, 0.0, 1.0)
     rgb = rgb * (_DIMMEST + (1.0 - _DIMMEST) * np.minimum(rise, fall))[:, None]
-    encoded = np.where(rgb <= 0.0031308, 12.92 * rgb, 1.055 * np.maximum(rgb, 1e-12) ** (1 / 2.4) - 0.055)
+    encoded = srgb_oetf(rgb)
     encoded.flags.writeable = False
     return encoded
 

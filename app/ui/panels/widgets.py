@@ -19,6 +19,7 @@ import numpy as np
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as icons
 
+from ...base.tone_map import srgb_eotf, srgb_oetf
 from ...edit import selecting
 from ...edit.state import Selection, State
 from ...model.io.scene_table import MAX_MAGNITUDE
@@ -227,15 +228,15 @@ def colour(label: str, rgb: Vec3, *, tip: str, highest: float = math.inf) -> Vec
     gap = style.item_inner_spacing.x
     imgui.set_next_item_width(max(imgui.get_content_region_avail().x - side - word_width - 2.0 * gap, side))
     flags = imgui.ColorEditFlags_
-    shown = list(rgb) if is_linear else [_encode(c) for c in rgb]
+    shown = list(rgb) if is_linear else srgb_oetf(np.array(rgb)).tolist()
     changed, numbers = imgui.color_edit3(
         f"##{label}", shown, flags.float.value | flags.no_small_preview.value | flags.no_options.value
     )
     hold(imgui.is_item_active())
     explain(label, f"{tip} These numbers are {word}.")
-    found = tuple(numbers[:3]) if is_linear else tuple(_decode(c) for c in numbers[:3])
+    found = numbers[:3] if is_linear else srgb_eotf(np.array(numbers[:3])).tolist()
     imgui.same_line(0.0, gap)
-    encoded = [_encode(min(max(c, 0.0), 1.0)) for c in rgb]
+    encoded = srgb_oetf(np.clip(rgb, 0.0, 1.0)).tolist()
     if imgui.color_button(
         f"##swatch {label}",
         imgui.ImVec4(encoded[0], encoded[1], encoded[2], 1.0),
@@ -252,7 +253,7 @@ def colour(label: str, rgb: Vec3, *, tip: str, highest: float = math.inf) -> Vec
         hold(imgui.is_item_active())
         item_rects.note(f"{label}: picker")
         if picked:
-            changed, found = True, tuple(_decode(c) for c in by_eye[:3])
+            changed, found = True, srgb_eotf(np.array(by_eye[:3])).tolist()
         imgui.end_popup()
     imgui.same_line(0.0, gap)
     if imgui.button(f"{word}##{label}", ImVec2(word_width, 0.0)):
@@ -414,11 +415,3 @@ def _fitting(text: str, width: float) -> str:
     while text and imgui.calc_text_size(text + "…").x > width:
         text = text[:-1]
     return text + "…"
-
-
-def _encode(linear: float) -> float:
-    return 12.92 * linear if linear <= 0.0031308 else 1.055 * linear ** (1 / 2.4) - 0.055
-
-
-def _decode(encoded: float) -> float:
-    return encoded / 12.92 if encoded <= 0.04045 else ((encoded + 0.055) / 1.055) ** 2.4
