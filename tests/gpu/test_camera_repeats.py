@@ -5,9 +5,6 @@ The smallest fault these tests see is one bit of one pixel.
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -29,25 +26,6 @@ from tests.gpu.camera_rig import released
 
 SCENES = sorted(Path("assets/scenes").glob("*.toml"))
 SIZE = 96, 54
-RUNS = 5
-"""Of a process; there are two, with one thread and with two."""
-_HASHES = """
-import hashlib, sys
-from dataclasses import replace
-import numpy as np
-from pathlib import Path
-from spectrasplat.gpu.context import create_context
-from spectrasplat.model.io.scene_file import load_scene
-from spectrasplat.model.settings import RenderSettings
-from spectrasplat.render.still import render
-context, scene = create_context(), load_scene(Path(sys.argv[1]))
-for run in range(int(sys.argv[2])):
-    context.traits = replace(context.traits, dispatch_s=(0.15, 0.02, 1.0, 0.003, 0.4)[run % 5])
-    settings = RenderSettings(width=96, height=54, photons=20_000, spp=4, seed=7, tally=True)
-    result = render(scene, settings, context=context)
-    assert result.stats.camera_pass.fallbacks["loops_ended"] == 0, result.stats.camera_pass.fallbacks
-    print(hashlib.sha256(np.ascontiguousarray(result.rgb).tobytes()).hexdigest())
-"""
 
 
 class Shuffled(CameraPass):
@@ -129,20 +107,3 @@ def test_without_halts_the_driver_cuts_samples_short(gl: Context, monkeypatch: p
     assert camera_pass.fallbacks["loops_ended"] > 100
     assert (first != other).any(axis=-1).sum() > 10
     released(camera_pass)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
-def test_a_scene_repeats_with_any_portions_and_threads(path: Path) -> None:
-    hashes = set()
-    for threads in "12":
-        done = subprocess.run(
-            [sys.executable, "-c", _HASHES, str(path), str(RUNS)],
-            env=os.environ | {"LP_NUM_THREADS": threads},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        assert done.returncode == 0, done.stderr
-        hashes |= set(done.stdout.split())
-    assert len(hashes) == 1
