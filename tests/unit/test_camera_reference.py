@@ -276,7 +276,7 @@ def test_a_mirrors_tint_is_its_colour() -> None:
     np.testing.assert_allclose(picture.rgb.mean(axis=(0, 1)), [1.8, 1.0, 0.4], rtol=2e-3)
 
 
-# ---- its own error, limits, the cache --------------------------------------------------------
+# ---- its own error, its key; limits and cache: test_photon_reference.py -----------------------
 
 
 def test_its_own_error_is_true() -> None:
@@ -288,54 +288,31 @@ def test_its_own_error_is_true() -> None:
     assert observed / claimed == pytest.approx(1.0, abs=0.3)
 
 
-def test_the_picture_grows_in_the_cache(tmp_path: Path) -> None:
-    scene = slab_scene(FLINT)
-    first = cached_camera_reference(scene, 8, 12, samples=16, folder=tmp_path)
-    again = cached_camera_reference(scene, 8, 12, samples=8, folder=tmp_path)
+def test_a_stored_picture_is_reused(tmp_path: Path) -> None:
+    first, again = (cached_camera_reference(slab_scene(FLINT), 8, 12, samples=n, folder=tmp_path) for n in (16, 8))
     assert first.amount == again.amount == 16 and np.array_equal(first.xyz, again.xyz)
-    more = cached_camera_reference(scene, 8, 12, samples=64, folder=tmp_path)
-    at_once = render_camera_reference(scene, 8, 12, samples=64)
-    np.testing.assert_allclose(more.xyz, at_once.xyz, rtol=1e-9, atol=1e-15)
-    good_enough = cached_camera_reference(scene, 8, 12, target_relmse=more.relmse * 1.01, folder=tmp_path)
-    assert good_enough.amount == 64
-    (stored,) = tmp_path.glob("*.npz")
-    stored.write_bytes(stored.read_bytes()[:500])
-    assert cached_camera_reference(scene, 8, 12, samples=16, folder=tmp_path).amount == 16
-
-
-def test_limits() -> None:
-    with pytest.raises(ValueError, match="limit"):
-        render_camera_reference(slab_scene(FLINT), 4, 4)
-    rough = render_camera_reference(slab_scene(FLINT), 8, 12, target_relmse=0.01)
-    assert 0.0 < rough.relmse <= 0.01
-    assert render_camera_reference(slab_scene(FLINT), 8, 12, seconds=0.05).amount > 0
-    stopped = render_camera_reference(slab_scene(FLINT), 8, 12, samples=10**9, cancelled=iter([False, True]).__next__)
-    assert 0 < stopped.amount < 10**9
 
 
 def test_the_key_knows_textures_and_what_lies_beyond() -> None:
     rgb = np.ones((2, 2, 3), np.float32)
-    scene = scene_of(PointLight("l", D65, (0, 0, 1)), plate(Diffuse(texture=Texture(rgb))))
-    other_texture = replace(scene, objects=(plate(Diffuse(texture=Texture(0.5 * rgb))),))
     room = Environment(rgb)
+    scene = scene_of(PointLight("l", D65, (0, 0, 1)), plate(Diffuse(texture=Texture(rgb))))
+
+    def key(caustic: CausticPlan | None = None, **changes: object) -> str:
+        return camera_reference_key(replace(scene, **changes), 8, 8, 64, caustic)  # type: ignore[arg-type]
+
+    in_room = key(environment=room)
     keys = [
-        camera_reference_key(scene, 8, 8, 64, None),
-        camera_reference_key(scene, 8, 8, 64, CausticPlan()),
-        camera_reference_key(scene, 8, 8, 64, CausticPlan(photons=5)),
-        camera_reference_key(other_texture, 8, 8, 64, None),
-        camera_reference_key(replace(scene, objects=(plate(Diffuse(texture=Texture(rgb, "clamp"))),)), 8, 8, 64, None),
-        camera_reference_key(replace(scene, background_rgb=(0.1, 0.1, 0.1)), 8, 8, 64, None),
-        camera_reference_key(replace(scene, environment=room), 8, 8, 64, None),
-        camera_reference_key(
-            replace(scene, environment=replace(room, world_to_local=np.diag([-1.0, -1.0, 1.0]))), 8, 8, 64, None
-        ),
-        camera_reference_key(replace(scene, environment=replace(room, rgb=2.0 * rgb)), 8, 8, 64, None),
+        key(),
+        key(CausticPlan()),
+        key(CausticPlan(photons=5)),
+        key(objects=(plate(Diffuse(texture=Texture(0.5 * rgb))),)),
+        key(objects=(plate(Diffuse(texture=Texture(rgb, "clamp"))),)),
+        key(background_rgb=(0.1, 0.1, 0.1)),
+        in_room,
+        key(environment=replace(room, world_to_local=np.diag([-1.0, -1.0, 1.0]))),
+        key(environment=replace(room, rgb=2.0 * rgb)),
     ]
     assert len(set(keys)) == len(keys)
-    assert (
-        camera_reference_key(
-            replace(scene, name="other", environment=replace(room, source="elsewhere")), 8, 8, 64, None
-        )
-        == keys[6]
-    )
+    assert key(name="other", environment=replace(room, source="elsewhere")) == in_room
     np.testing.assert_allclose(K_M * (rgb_basis() @ np.ones(3) * daylight_per_lumen()) @ cmf_xyz(), WHITE, rtol=1e-9)
