@@ -15,7 +15,7 @@ from click.shell_completion import get_completion_class
 
 from ..base.errors import UserError
 from ..base.paths import shipped_scenes
-from ..model.settings import CAMERA_METHODS, METHODS
+from ..model.settings import METHODS
 from .scenes import find_scene
 
 _STARTS = {
@@ -60,16 +60,6 @@ def glasses(_: click.Context, incomplete: str) -> list[str]:
     from ..model.optics import catalogue
 
     return sorted({entry.name for entry in catalogue.search(incomplete)})
-
-
-def methods(_: click.Context, incomplete: str) -> list[str]:
-    """Sampling methods of the light pass."""
-    return list(METHODS)
-
-
-def camera_methods(_: click.Context, incomplete: str) -> list[str]:
-    """Sampling methods of the camera pass."""
-    return list(CAMERA_METHODS)
 
 
 def method_lists(_: click.Context, incomplete: str) -> list[str]:

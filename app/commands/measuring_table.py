@@ -114,7 +114,7 @@ class BenchAgreement(ReadsScenes):
     size: tuple[int, int] | None = setting("WxH", "Pixels; default: 240x135.", options.size, fields=("width", "height"))
     reference_seconds: float | None = shared(_REFERENCE_SECONDS)
     reference: str | None = shared(_REFERENCE)
-    method: str | None = setting("NAME", "Default: srd.", options.one_of(*METHODS), complete=completion.methods)
+    method: str | None = setting("NAME", "Default: srd.", options.one_of(*METHODS), complete=METHODS)
     random: int | None = option(
         "N",
         "Compare N scenes drawn by chance instead: glass solids on and over a table; their files are written to DIR.",

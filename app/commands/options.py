@@ -22,8 +22,8 @@ from ..base.memory import MAX_SIDE_PX, memory_bytes
 
 Parse = Callable[[str, str], Any]
 """Reads a text: its arguments are the option's flag, for the sentence of a mistake, and the text."""
-Complete = Callable[[click.Context, str], Iterable[str]]
-"""What a shell offers: its arguments are the line so far, and the word that is being typed."""
+Complete = Iterable[str] | Callable[[click.Context, str], Iterable[str]]
+"""What a shell offers: words, or what finds them from the line so far and the word that is being typed."""
 Values = TypeVar("Values")
 
 MAX_PHOTONS = 10**12
@@ -89,7 +89,8 @@ class Row:
         return click.Option([self.name, *flags], required=is_required, multiple=option.repeated, **more)
 
     def _offered(self, context: click.Context, _: click.Parameter, incomplete: str) -> list[CompletionItem]:
-        words = self.option.complete(context, incomplete) if self.option.complete is not None else ()
+        words = self.option.complete or ()
+        words = words(context, incomplete) if callable(words) else words
         found = [CompletionItem(word) for word in words if word.startswith(incomplete)]
         return found or [CompletionItem(incomplete, type="file")]
 

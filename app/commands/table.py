@@ -87,7 +87,7 @@ _METHOD = Option(
     f"How wavelengths are sampled: {', '.join(METHODS)}; default: srd.",
     options.one_of(*METHODS),
     sets="settings",
-    complete=completion.methods,
+    complete=METHODS,
 )
 _CAMERA_METHOD = Option(
     "NAME",
@@ -95,7 +95,7 @@ _CAMERA_METHOD = Option(
     options.one_of(*CAMERA_METHODS),
     ("--camera-method", "--eye-method"),
     sets="settings",
-    complete=completion.camera_methods,
+    complete=CAMERA_METHODS,
 )
 _STATS = "Print the energy balance and the times of all stages."
 
