@@ -26,6 +26,7 @@ from ..passes.splat import Splatter
 if TYPE_CHECKING:
     import moderngl
 
+_FEATURES = Features(spectral_groups=1, band_cuts=True)
 _SIDE = 768
 _ROUNDS = 5
 _REACH = 3.0
@@ -40,12 +41,11 @@ def measure(ctx: moderngl.Context, pixels: float, count: int = 1 << 17) -> dict[
     `ratio` and `draw_ratio`. On a software renderer these compare processor time, which other work on the
     machine disturbs less.
     """
-    features = Features(spectral_groups=1, band_cuts=True)
     tiles, size = pack([(_SIDE, _SIDE)])
     rows = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]])
     atlas = MapAtlas(ctx, size, placement_rows(tiles[0], rows, 1.0))
     tables = SplatTables.build(ctx, SpectralAxis.build([]), [spectrum.illuminant("D65")], [None], [[(0.0, 1.0)]])
-    splatter = Splatter(ctx, features)
+    splatter = Splatter(ctx, _FEATURES)
     receivers = ctx.buffer(RECEIVER.zeros(1))
     variable = SpectralVariables.build(ctx, np.linspace(0.0, 1.0, 1025)[None])
     swept, still = (ctx.buffer(_photons(pixels, count, sweep)) for sweep in (True, False))
@@ -95,7 +95,7 @@ def _photons(pixels: float, count: int, sweep: bool) -> np.ndarray:
     margin = 2.0 * np.sqrt(pixels)
     angle = rng.uniform(0.0, 2.0 * np.pi, count)
     along = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    records = photon_record(Features.spectral_groups).zeros(count)
+    records = photon_record(_FEATURES.spectral_groups).zeros(count)
     records["position"][:, :2] = rng.uniform(margin, _SIDE - margin, (count, 2))
     records["dposition_ds"][:, :2] = along * sigma * (1.0 if sweep else 2.0)
     records["dposition_dt"][:, :2] = np.stack([-along[:, 1], along[:, 0]], axis=1) * sigma
@@ -111,7 +111,7 @@ class _Plain:
     def __init__(self, ctx: moderngl.Context, count: int, size: tuple[int, int]) -> None:
         self._ctx = ctx
         self._count = count
-        structs = (photon_record(Features.spectral_groups),)
+        structs = (photon_record(_FEATURES.spectral_groups),)
         self._program = shader.program(ctx, "bench/plain_gaussian.vert", "bench/plain_gaussian.frag", {}, structs)
         self._program["atlas_size"] = size
         corners = np.array([0, 1, 2, 2, 1, 3], np.uint32) + 4 * np.arange(count, dtype=np.uint32)[:, None]

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from spectrasplat.__main__ import main
 from spectrasplat.base.errors import UserError
-from spectrasplat.bench import runner
+from spectrasplat.bench import runner, splat_speed
 from spectrasplat.bench.measured_passes import LIGHT
 from spectrasplat.bench.rendering import KERNELS, MethodRig
 from spectrasplat.bench.results import BenchResult, Trial
@@ -102,6 +102,10 @@ def test_more_photons_err_less(gl: Any, prism: Scene) -> None:
     finally:
         rig.release()
     assert errors[1]["relmse"] < 0.2 * errors[0]["relmse"] and errors[1]["energy_ratio"] == pytest.approx(1.0, abs=0.02)
+
+
+def test_splats_are_timed_against_plain_ones(gl: Any) -> None:
+    assert all(0.0 < figure < 1e6 for figure in splat_speed.measure(gl.ctx, pixels=16, count=64).values())
 
 
 def test_a_scene_that_throws_no_light_is_said(gl: Any, prism: Scene) -> None:
