@@ -1,4 +1,4 @@
-"""A whole viewer without a window: real engine, real panels, a synthetic hand, sizes that suit a test."""
+"""A whole viewer without a window: real engine, real panels, a synthetic mouse, sizes that suit a test."""
 
 from __future__ import annotations
 

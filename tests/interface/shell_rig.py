@@ -1,4 +1,4 @@
-"""The whole interface around facts that a test sets, with a synthetic mouse: no session, no engine."""
+"""The whole interface with a view model that a test sets, with a synthetic mouse: no session, no engine."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""A hand that does anything to anything, seeded: the same actions every time, over every control that is on the
-screen."""
+"""Random mouse and keyboard, seeded: the same actions every time, over every control that is on the screen."""
 
 from __future__ import annotations
 
@@ -72,7 +71,7 @@ class Guard:
         return replace(after, requests=tuple(kept))
 
 
-class ViewportInput:
+class RandomHand:
     """Random actions on `hands`; `log` tells what was done, for the report of a failure."""
 
     def __init__(self, hands: Hands, seed: int) -> None:

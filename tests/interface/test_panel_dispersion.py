@@ -1,4 +1,4 @@
-"""The dispersion panel, the picker, the Abbe diagram and the curve: what a hand does changes the glass as expected."""
+"""The dispersion panel, the picker, the Abbe diagram and the curve: what the mouse does to the glass."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Export and compare panels with a synthetic hand: what they ask the host for, and what they show of it."""
+"""Export and compare panels with a synthetic mouse: what they ask the host for, and what they show of it."""
 
 from __future__ import annotations
 

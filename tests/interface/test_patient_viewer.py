@@ -1,4 +1,4 @@
-"""How long a frame lasts: short ones while a hand is there, longer ones for the light while none is."""
+"""How long a frame lasts: short ones while the mouse is used, longer ones for the light while it is not."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ class Rig:
             self.frame()
 
     def ask(self, *asked: requests.Request) -> State:
-        """A frame with requests and one more, whose facts tell what came of them."""
+        """A frame with requests and one more, whose view model tells what came of them."""
         self.frame(lambda state: state.asking(*asked))
         return self.frame()
 

@@ -17,7 +17,7 @@ from spectrasplat.ui import layout
 from spectrasplat.ui.crash_log import FILE_NAME
 
 from tests.interface.rig import Hands, viewer
-from tests.interface.soak import DATA, Guard, ViewportInput, device_objects, resident_bytes
+from tests.interface.soak import DATA, Guard, RandomHand, device_objects, resident_bytes
 
 WARM = 0.4
 """Share of the actions after which every panel was open and every cache is full."""
@@ -40,7 +40,7 @@ def soak(gl: Context, folder: Path, actions: int, seed: int) -> None:
         first = hands.settle()
         start, objects = hands.session.state, device_objects(DATA)
         hands.pace.frame_s = 0.006  # the picture may lag behind; the hand does not wait for it
-        hand = ViewportInput(hands, seed)
+        hand = RandomHand(hands, seed)
         resident = 0
         for number in range(actions):
             hand.act()
@@ -87,11 +87,6 @@ def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.chdir(tmp_path)
     return tmp_path
-
-
-@pytest.mark.slow
-def test_25_random_actions(gl: Context, own_folder: Path) -> None:
-    soak(gl, own_folder, 25, seed=1)
 
 
 @pytest.mark.slow

@@ -1,5 +1,5 @@
-"""The viewport with a synthetic hand and facts that the test sets: camera, selecting, gizmo, brush, pull, toolbar,
-wipe."""
+"""The viewport with a synthetic mouse and a view model that the test sets: camera, selecting, gizmo, brush, pull,
+toolbar, wipe."""
 
 from __future__ import annotations
 
