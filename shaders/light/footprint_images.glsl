@@ -59,7 +59,7 @@ Beside footprint_beside(Depicted of, Placement place, vec4 border, int index) {
     float spread = smoothing * border_spread(border, of.photon.dposition_ds, of.photon.dposition_dt);
     if (!sweeps_inside(border, from, to, spread)) return found;
     if (CONTACT_LINES) {
-        // A footprint that meets a line of contact (splat_contact.glsl) has its light back already: another receiver
+        // A footprint that meets a line of contact (splat_lines.glsl) has its light back already: another receiver
         // begins there.
         vec3 at_border = homogeneous_texel(place, centre - found.distance * border.xyz);
         if (place.kind == PLACED_PICTURE && of.thin <= CONTACT_VARIANCE && at_border.z > 0.0) {
