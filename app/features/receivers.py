@@ -199,7 +199,7 @@ class PictureFeatures:
             + ("; its sun is a light of its own" if with_sun(facts.scene) is not facts.scene else "")
         ),
         why_not=lambda facts: facts.no_environment_light or "",
-        names=("EnvironmentAsked",),
+        names=("add_environment",),
         cost="up to six lookups a diffuse surface; a texture of some thousand texels a receiver",
     )
     """What lies beyond everything lights receivers: camera rays look up how much."""

@@ -24,7 +24,6 @@ from ..gpu.context import Context
 from ..gpu.dispatch_budget import DispatchBudget
 from ..gpu.map_channels import MapChannels
 from ..gpu.scene_buffers import SceneBuffers
-from ..gpu.schema import Field, Struct
 from ..model.environment_light import even_points
 from ..model.scene import Scene
 from .bounce_sources import BounceSources
@@ -32,7 +31,7 @@ from .caustic_maps import CausticMaps
 from .covered_places import covered_places
 from .environment_light import EnvironmentLightPass
 from .environment_places import environment_places
-from .gathered_light import FIRST_DIRECTIONS, PER_FOLLOWED, GatheredLight
+from .gathered_light import DIRECTION, FIRST_DIRECTIONS, PARAMETERS, PER_FOLLOWED, GatheredLight
 
 DIRECTIONS = 256
 """Directions of every bounce, and as many places."""
@@ -49,32 +48,6 @@ _KEY = 80
 """First of the generator words of a bounce's directions, places and choices."""
 _KEYS = 16
 """Generator words of each bounce."""
-
-PARAMETERS = Struct(
-    "BounceParameters",
-    (
-        Field("specular", "vec4", "sphere that holds all glass and mirrors: centre and radius, GPU space"),
-        Field("x_of_rgb", "vec4", "spectral coordinates at which glass tints red, green, blue; of the index"),
-        Field("count", "uint", "places"),
-        Field("by_cosine", "uint", "of what is asked: directions"),
-        Field("straight", "uint", "and, up to here, places"),
-        Field("followed", "uint", "and, after those, directions towards glass and mirrors"),
-        Field("aims", "uint", "1: places are asked as well"),
-        Field("reserved", "uint", ""),
-        Field("reserved_too", "vec2", ""),
-    ),
-)
-ASKED = Struct(
-    "BounceAsked",
-    (
-        Field("place", "vec3", "that was drawn, GPU space; of a direction two numbers from 0 to 1"),
-        Field("density", "float", "with which it was drawn, per GPU unit²"),
-        Field("normal", "vec3", "of the side that shines there"),
-        Field("object", "uint", "it lies on; of one that is followed the key of its choices"),
-        Field("within", "vec2", "place within a texel"),
-        Field("reserved", "vec2", ""),
-    ),
-)
 
 
 class BounceLightPass(GatheredLight):
@@ -98,9 +71,8 @@ class BounceLightPass(GatheredLight):
             if environment is not None
             else covered_places(buffers, environment_places(buffers, finer, _GUTTER))
         )
-        program = ("light/bounce.comp", "UNIT_RADIANCE", PARAMETERS, ASKED)
         budget = DispatchBudget(PER_FOLLOWED, PER_FOLLOWED, _PAIRS)
-        super().__init__(context, buffers, places, seed, directions, program, _MOST_ASKED, budget, self.bounces)
+        super().__init__(context, buffers, places, seed, directions, _MOST_ASKED, budget, self.bounces)
         self.sources = BounceSources(context, buffers, self.places, self._places)
         self._radiance = [self._texture() for _ in range(self.bounces)]
         self._areas = self.places.areas
@@ -199,9 +171,9 @@ class BounceLightPass(GatheredLight):
         key, seed = _KEY + _KEYS * bounce, self._seed
         running, density = self._stages[bounce]
         numbers, aims = np.arange(first, first + count), bool(running[-1] > 0.0)
-        parameters, asked = PARAMETERS.zeros(1), ASKED.zeros(_MOST_ASKED)
+        parameters, asked = PARAMETERS.zeros(1), DIRECTION.zeros(_MOST_ASKED)
         points = even_points(numbers, seed, key)
-        asked["place"][:count, :2], asked["within"][:count] = points[:, :2], points[:, 2:]
+        asked["target"][:count, :2], asked["within"][:count] = points[:, :2], points[:, 2:]
         straight = count
         if aims:
             part = asked[count : 2 * count]
@@ -214,22 +186,22 @@ class BounceLightPass(GatheredLight):
         part = asked[straight : straight + len(followed)]
         if len(followed):
             points = even_points(followed, seed, key + 12)
-            part["place"][:, :2], part["within"] = points[:, :2], points[:, 2:]
-            part["object"] = [random_word(seed, 2 + bounce, int(n), _KEY) for n in followed]
+            part["target"][:, :2], part["within"] = points[:, :2], points[:, 2:]
+            part["key"] = [random_word(seed, 2 + bounce, int(n), _KEY) for n in followed]
         parameters["by_cosine"] = count
         parameters["straight"], parameters["followed"], parameters["aims"] = straight, len(followed), aims
         self._dispatch(parameters, asked, self._radiance[bounce], "bounces", bounce)
 
     def _draw(self, asked: np.ndarray, points: np.ndarray, running: np.ndarray, density: np.ndarray) -> None:
-        """Set ASKED (n,) to places drawn by `points` (n, 4): their first number chooses among rows of texels and goes
-        on across the row, their second along it, so that what is even in the square is even on the surfaces."""
+        """Aim records (n,) at places drawn by `points` (n, 4): the first number chooses among rows of texels and goes
+        on across the row, the second along it, so that what is even in the square is even on the surfaces."""
         low, width = _found(running, self._rows, points[:, 0] * running[-1])
         first, end = running[self._rows[low]], running[self._rows[low + 1]]
         index, along = _found(running, np.arange(len(running)), first + points[:, 1] * (end - first))
         chosen = self.places.places[index]
         u, v = along[:, None] - 0.5, width[:, None] - 0.5
-        asked["place"] = chosen["position"] + u * chosen["span_u"] + v * chosen["span_v"]
-        asked["normal"], asked["object"], asked["density"] = chosen["normal"], chosen["object"], density[index]
+        asked["target"] = chosen["position"] + u * chosen["span_u"] + v * chosen["span_v"]
+        asked["normal"], asked["key"], asked["density"] = chosen["normal"], chosen["object"], density[index]
 
     # ---- what was found ----------------------------------------------------------------------
 

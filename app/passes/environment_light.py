@@ -25,12 +25,11 @@ from ..gpu import shader
 from ..gpu.context import Context
 from ..gpu.dispatch_budget import DispatchBudget
 from ..gpu.scene_buffers import SceneBuffers
-from ..gpu.schema import Field, Struct
 from ..model.environment_light import EnvironmentLight, even_points, lighting_environment
 from ..model.scene import Scene
 from .covered_places import covered_places
 from .environment_places import environment_places
-from .gathered_light import FIRST_DIRECTIONS, PER_FOLLOWED, GatheredLight
+from .gathered_light import DIRECTION, FIRST_DIRECTIONS, PARAMETERS, PER_FOLLOWED, GatheredLight
 
 DIRECTIONS = 512
 """Straight directions in all."""
@@ -40,34 +39,6 @@ MOST_ASKED = 24
 """Directions of one dispatch at most: Mesa's software renderer ends loops that run long."""
 _KEY = 70
 """First of the words that decide at surfaces of glass; those after it place directions towards glass."""
-
-PARAMETERS = Struct(
-    "EnvironmentParameters",
-    (
-        Field("sky_x", "vec4", "column of the rotation from the world to the environment's frame"),
-        Field("sky_y", "vec4"),
-        Field("sky_z", "vec4"),
-        Field("specular", "vec4", "sphere that holds all glass and mirrors: centre and radius, GPU space"),
-        Field("x_of_rgb", "vec4", "spectral coordinates at which glass tints red, green, blue; of the index"),
-        Field("level_narrow", "uvec4", "level that is read: first row, width, height; for directions to the sphere"),
-        Field("level_wide", "uvec4", "for directions anywhere"),
-        Field("count", "uint", "places"),
-        Field("straight", "uint", "of the directions asked, how many are straight"),
-        Field("followed", "uint", "and how many after them are followed"),
-        Field("reserved", "uint", ""),
-    ),
-)
-ASKED = Struct(
-    "EnvironmentAsked",
-    (
-        Field("toward", "vec3", "unit; of one that is followed two numbers for its place"),
-        Field("key", "uint", "of one that is followed: of its choices"),
-        Field("weight", "vec3", "radiance over probability"),
-        Field("reserved", "uint", ""),
-        Field("within", "vec2", "place within a texel"),
-        Field("reserved_too", "vec2", ""),
-    ),
-)
 
 
 class EnvironmentLightPass(GatheredLight):
@@ -87,8 +58,7 @@ class EnvironmentLightPass(GatheredLight):
         assert environment is not None
         places = covered_places(buffers, environment_places(buffers, finer))
         budget = DispatchBudget(PER_FOLLOWED, PER_FOLLOWED, MOST_ASKED * PER_FOLLOWED // (PER_FOLLOWED + 1))
-        program = ("light/environment.comp", "UNIT_ENVIRONMENT", PARAMETERS, ASKED)
-        super().__init__(context, buffers, places, seed, directions, program, MOST_ASKED, budget)
+        super().__init__(context, buffers, places, seed, directions, MOST_ASKED, budget)
         self._levels: moderngl.Texture | None = None
         self._light: EnvironmentLight | None = None
         self._write(np.zeros((len(self.places.places), 3)))
@@ -144,15 +114,15 @@ class EnvironmentLightPass(GatheredLight):
         first_followed, end_followed = (
             (self.asked // PER_FOLLOWED, (self.asked + count) // PER_FOLLOWED) if follows else (0, 0)
         )
-        asked = ASKED.zeros(MOST_ASKED)
+        asked = DIRECTION.zeros(MOST_ASKED)
         drawn = self._light.directions(self.asked, count)
-        asked["toward"][:count], asked["weight"][:count] = drawn.toward, drawn.weight
+        asked["target"][:count], asked["weight"][:count] = drawn.toward, drawn.weight
         asked["within"][:count] = drawn.within
         followed = end_followed - first_followed
         if followed:
             numbers = np.arange(first_followed, end_followed)
             places = even_points(numbers, self._seed, _KEY + 1)
-            asked["toward"][count : count + followed, :2] = places[:, :2]
+            asked["target"][count : count + followed, :2] = places[:, :2]
             asked["within"][count : count + followed] = places[:, 2:]
             asked["key"][count : count + followed] = [random_word(self._seed, 1, int(n), _KEY) for n in numbers]
         parameters = PARAMETERS.zeros(1)

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import moderngl
 import numpy as np
 
+from ..features.program_switches import switched
 from ..gpu import bindings, shader
 from ..gpu.context import Context
 from ..gpu.dispatch_budget import DispatchBudget
@@ -44,6 +45,38 @@ SUM = Struct(
         Field("reserved_too", "float", ""),
     ),
 )
+PARAMETERS = Struct(
+    "GatherParameters",
+    (
+        Field("sky_x", "vec4", "column of the rotation from the world to the environment's frame"),
+        Field("sky_y", "vec4"),
+        Field("sky_z", "vec4"),
+        Field("specular", "vec4", "sphere that holds all glass and mirrors: centre and radius, GPU space"),
+        Field("x_of_rgb", "vec4", "spectral coordinates at which glass tints red, green, blue; of the index"),
+        Field("level_narrow", "uvec4", "environment's level: first row, width, height; for directions to the sphere"),
+        Field("level_wide", "uvec4", "for directions anywhere"),
+        Field("count", "uint", "places"),
+        Field("straight", "uint", "of the directions, how many are straight"),
+        Field("followed", "uint", "and how many after them are followed"),
+        Field("by_cosine", "uint", "receivers: of the straight ones, how many are drawn by the cosine"),
+        Field("aims", "uint", "receivers: 1 where places are drawn as well"),
+        Field("reserved", "uint", ""),
+        Field("reserved_too", "vec2", ""),
+    ),
+)
+DIRECTION = Struct(
+    "GatherDirection",
+    (
+        Field("target", "vec3", "unit direction, or place on a receiver; by the cosine or followed: two of 0 to 1"),
+        Field("key", "uint", "of a place its object; of one that is followed the key of its choices"),
+        Field("weight", "vec3", "environment: radiance over probability"),
+        Field("density", "float", "of a place: with which it was drawn, per GPU unit²"),
+        Field("normal", "vec3", "of a place: of the side that shines there"),
+        Field("reserved", "uint", ""),
+        Field("within", "vec2", "place within a texel"),
+        Field("reserved_too", "vec2", ""),
+    ),
+)
 
 
 class GatheredLight:
@@ -56,12 +89,11 @@ class GatheredLight:
         places: EnvironmentPlaces,
         seed: int,
         total: int,
-        program: tuple[str, str, Struct, Struct],
         most_asked: int,
         budget: DispatchBudget,
-        bounces: int = 1,
+        bounces: int = 0,
     ) -> None:
-        """`program`: shader, name of its texture unit, records of its parameters and of the directions."""
+        """`bounces`: of other receivers' light; 0: of the environment's."""
         self._context, self._ctx, self._buffers = context, context.ctx, buffers
         self._seed, self.total, self.places, self._budget = seed, total, places, budget
         self.asked = 0
@@ -72,22 +104,26 @@ class GatheredLight:
         """Spent on it."""
         self.texture = self._texture()
         """What the camera looks up."""
-        name, unit, parameters, asked = program
         self._places = self._ctx.buffer(places.places.tobytes() or bytes(PLACE.stride))
         size = max(1, len(places.places)) * SUM.stride
-        self._sums = [self._ctx.buffer(bytes(size)) for _ in range(bounces)]
-        self._asked_buffer = self._ctx.buffer(reserve=most_asked * asked.stride)
-        self._parameters = self._ctx.buffer(reserve=parameters.stride)
+        self._sums = [self._ctx.buffer(bytes(size)) for _ in range(max(bounces, 1))]
+        self._asked_buffer = self._ctx.buffer(reserve=most_asked * DIRECTION.stride)
+        self._parameters = self._ctx.buffer(reserve=PARAMETERS.stride)
         self._sphere = specular_sphere(buffers)
         defines = buffers.features.defines() | bindings.SCENE_DEFINES | buffers.defines
-        defines |= {"BIND_PLACES": _BIND_PLACES, "BIND_ASKED": _BIND_ASKED, "BIND_SUMS": _BIND_SUMS, unit: _UNIT}
-        defines |= {"MOST_ASKED": most_asked, "MAX_EVENTS": MAX_EVENTS}
+        defines |= {
+            "BIND_PLACES": _BIND_PLACES,
+            "BIND_ASKED": _BIND_ASKED,
+            "BIND_SUMS": _BIND_SUMS,
+            "UNIT_RADIANCE": _UNIT,
+        }
+        defines |= {"UNIT_RADIANCE": _UNIT, "MOST_ASKED": most_asked, "MAX_EVENTS": MAX_EVENTS}
+        defines |= switched(FOLLOWS_SPECULAR=self._sphere is not None, OF_RECEIVERS=bounces > 0)
         defines["SPECTRAL_GROUPS"] = 0  # rays of one index carry no columns
         for columns in ("NORMAL_DERIVATIVES", "LOBE_COLUMNS"):
             defines.pop(columns, None)
-        if self._sphere is not None:
-            defines["FOLLOWS_SPECULAR"] = 1
-        self._program = shader.compute(self._ctx, name, defines, (*SCENE_STRUCTS, PLACE, parameters, asked, SUM))
+        structs = (*SCENE_STRUCTS, PLACE, PARAMETERS, DIRECTION, SUM)
+        self._program = shader.compute(self._ctx, "light/gather.comp", defines, structs)
 
     def _texture(self) -> moderngl.Texture:
         texture = self._ctx.texture(self.places.size, 4, dtype="f4")

@@ -246,13 +246,13 @@ MUTANTS = {
         "gpu/test_splat.py::test_violet_lies_at_the_low_end_of_the_chord",
     ),
     "light of the environment without its cosine": Mutant(
-        "light/environment.comp",
+        "light/gather.comp",
         "max(dot(toward, place.normal), 0.0)",
         "float(dot(toward, place.normal) > 0.0)",
         _SHADOW,
     ),
     "light of the environment through what is in the way": Mutant(
-        "light/environment.comp", "reaches = !intersect_any", "reaches = intersect_any", _SHADOW
+        "light/gather.comp", "reaches = !intersect_any", "reaches = intersect_any", _SHADOW
     ),
     "columns: another glass's slope": Mutant(
         "lib/medium.glsl", "object_at(boundary.before).group == g", "true", f"{_COLUMNS}[doublet]"
@@ -364,7 +364,7 @@ MUTANTS = {
         "gpu/test_bounces.py::test_a_lit_floor_lights_the_wall_by_its_form_factor",
     ),
     "bounces: back": Mutant(
-        "light/bounce.comp",
+        "light/gather.comp",
         "dot(direction, hit.normal_g) > 0.0",
         "dot(direction, hit.normal_g) < 0.0",
         "gpu/test_bounces.py::test_a_lit_floor_lights_the_wall_by_its_form_factor",

@@ -30,7 +30,7 @@ from spectrasplat.gpu.texture_store import PICTURE
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.passes import bounce_light, environment_light, gathered_light
+from spectrasplat.passes import gathered_light
 from spectrasplat.passes.camera_programs import camera_defines, direct_defines, lens_defines
 from spectrasplat.passes.camera_records import CAMERA_LIGHT, CAMERA_PARAMETERS
 from spectrasplat.passes.environment_places import PLACE
@@ -80,13 +80,11 @@ def light_sources(features: Features) -> Iterator[shader.Source]:
 
 def gathered_sources(features: Features) -> Iterator[shader.Source]:
     defines = features.defines() | NUMBERS | {"MOST_ASKED": 24, "BIND_PLACES": 8, "BIND_ASKED": 9, "BIND_SUMS": 10}
-    for module, name, on in (
-        (environment_light, "environment", features.environment_lights),
-        (bounce_light, "bounce", features.bounces),
-    ):
+    structs: tuple[Struct, ...] = (*SCENE_STRUCTS, PLACE, gathered_light.PARAMETERS, gathered_light.DIRECTION)
+    for of_receivers, on in ((False, features.environment_lights), (True, features.bounces)):
         if on:
-            structs: tuple[Struct, ...] = (*SCENE_STRUCTS, PLACE, module.PARAMETERS, module.ASKED, gathered_light.SUM)
-            yield shader.load_source(f"light/{name}.comp", defines, structs)
+            chosen = defines | switched(OF_RECEIVERS=of_receivers)
+            yield shader.load_source("light/gather.comp", chosen, (*structs, gathered_light.SUM))
     if features.haze:
         structs = (records.FLIGHT, CAMERA_PARAMETERS, HAZE_PARAMETERS)
         for stage in ("vert", "frag"):
