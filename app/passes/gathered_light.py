@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import moderngl
 import numpy as np
 
-from ..features.program_switches import switched
+from ..features.program_switches import Defines, switched
 from ..gpu import bindings, shader
 from ..gpu.context import Context
 from ..gpu.dispatch_budget import DispatchBudget
@@ -110,13 +110,8 @@ class GatheredLight:
         self._asked_buffer = self._ctx.buffer(reserve=most_asked * DIRECTION.stride)
         self._parameters = self._ctx.buffer(reserve=PARAMETERS.stride)
         self._sphere = specular_sphere(buffers)
-        defines = buffers.features.defines() | bindings.SCENE_DEFINES | buffers.defines
-        defines |= {
-            "BIND_PLACES": _BIND_PLACES,
-            "BIND_ASKED": _BIND_ASKED,
-            "BIND_SUMS": _BIND_SUMS,
-            "UNIT_RADIANCE": _UNIT,
-        }
+        defines: Defines = {**buffers.features.defines(), **bindings.SCENE_DEFINES, **buffers.defines}
+        defines |= {"BIND_PLACES": _BIND_PLACES, "BIND_ASKED": _BIND_ASKED, "BIND_SUMS": _BIND_SUMS}
         defines |= {"UNIT_RADIANCE": _UNIT, "MOST_ASKED": most_asked, "MAX_EVENTS": MAX_EVENTS}
         defines |= switched(FOLLOWS_SPECULAR=self._sphere is not None, OF_RECEIVERS=bounces > 0)
         defines["SPECTRAL_GROUPS"] = 0  # rays of one index carry no columns
