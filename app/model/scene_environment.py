@@ -13,15 +13,7 @@ import numpy as np
 from ..base import files
 from ..base.errors import UserError
 from ..base.paths import assets_dir
-from .environment import (
-    DEFAULT_SKY_TYPE,
-    Z_UP,
-    constant,
-    from_map,
-    gradient,
-    sky,
-    up_and_rotation,
-)
+from .environment import DEFAULT_SKY_TYPE, Z_UP, constant, from_map, gradient, sky, up_and_rotation
 from .fields import Colour, Direction, Field, Integer, Number, Part, read_fields
 from .io.scene_pictures import picture_file
 from .io.scene_table import SceneTable

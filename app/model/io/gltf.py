@@ -24,13 +24,7 @@ from ..lights.light import made
 from ..lights.light_file import read_light
 from ..naming import Names, Unshown
 from ..placement import Surroundings
-from ..scene import (
-    Camera,
-    Light,
-    Material,
-    Scene,
-    SceneObject,
-)
+from ..scene import Camera, Light, Material, Scene, SceneObject
 from ..scene_camera import LENS
 from ..scene_defaults import (
     default_table,

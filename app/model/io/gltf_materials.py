@@ -22,16 +22,7 @@ from ..materials.diffuse import USUAL_COAT_INDEX, read_finish
 from ..materials.material_file import read_material
 from ..naming import Unshown
 from ..optics import catalogue, glass
-from ..scene import (
-    Absorption,
-    Dab,
-    Dielectric,
-    Diffuse,
-    Material,
-    Mirror,
-    RenderDefaults,
-    Scene,
-)
+from ..scene import Absorption, Dab, Dielectric, Diffuse, Material, Mirror, RenderDefaults, Scene
 from ..scene_environment import ENVIRONMENT, environment_values, read_environment
 from ..scene_render import read_render, render_values
 from ..texture import Environment

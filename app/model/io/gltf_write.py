@@ -20,13 +20,7 @@ from ..fields import write_fields
 from ..geometry.mesh import Mesh
 from ..lights import DirectionalLight, PointLight, SpotLight
 from ..lights.light_file import light_values
-from ..scene import (
-    Camera,
-    Light,
-    Material,
-    Scene,
-    SceneObject,
-)
+from ..scene import Camera, Light, Material, Scene, SceneObject
 from ..scene_camera import LENS
 from .gltf import LIGHTS, Origins, open_document, read_scene
 from .gltf_document import Additions, GltfDocument, save_document

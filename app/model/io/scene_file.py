@@ -19,12 +19,7 @@ from ..lights.light_file import read_light
 from ..materials.material_file import read_materials
 from ..naming import Names
 from ..placement import Surroundings
-from ..scene import (
-    Camera,
-    Light,
-    Scene,
-    SceneObject,
-)
+from ..scene import Camera, Light, Scene, SceneObject
 from ..scene_camera import read_camera
 from ..scene_checks import check_scene
 from ..scene_defaults import (
