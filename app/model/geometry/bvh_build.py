@@ -12,7 +12,7 @@ import numpy as np
 from ...base.compiling import compiled
 
 BIN_COUNT = 16
-# A visit fetches and tests two boxes. On llvmpipe 1 to 5 trace equally fast; 2 needs half the nodes of 1.
+# A visit fetches and tests two boxes.
 NODE_COST = 2.0
 TRIANGLE_COST = 1.0
 
