@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from spectrasplat.base.errors import UserError
-from spectrasplat.model.optics import catalogue, glass
+from spectrasplat.model.optics import catalogue, colorimetry, glass
 from spectrasplat.model.optics import spectrum as sp
 from spectrasplat.model.optics.colorimetry import K_M, VISIBLE_NM
 from spectrasplat.model.optics.glass import Dispersion
@@ -127,20 +127,20 @@ def test_bad_spectra(make, message: str) -> None:
 
 
 def test_rgb_matrices() -> None:
-    white = sp.xyz_to_rgb709(sp.illuminant("D65").scaled_to_luminous(1.0).xyz())
+    white = colorimetry.xyz_to_rgb709(sp.illuminant("D65").scaled_to_luminous(1.0).xyz())
     assert white == pytest.approx([1.0, 1.0, 1.0], abs=1e-14)
     # IEC 61966-2-1 prints this matrix to four digits, with its white rounded.
     published = [[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]
-    assert sp.rgb709_to_xyz_matrix() == pytest.approx(np.array(published), abs=5e-4)
+    assert colorimetry.rgb709_to_xyz_matrix() == pytest.approx(np.array(published), abs=5e-4)
     rgb = np.random.default_rng(1).uniform(-0.2, 1.0, (5, 4, 3))
-    assert sp.xyz_to_rgb709(sp.rgb709_to_xyz(rgb)) == pytest.approx(rgb, abs=1e-13)
+    assert colorimetry.xyz_to_rgb709(colorimetry.rgb709_to_xyz(rgb)) == pytest.approx(rgb, abs=1e-13)
 
 
 def _seen_through(rgb: np.ndarray, distance: float) -> np.ndarray:
     d65 = sp.illuminant("D65")
-    alpha = sp.attenuation_from_colour(tuple(rgb), distance)
+    alpha = colorimetry.attenuation_from_colour(tuple(rgb), distance)
     assert alpha.shape == (401,) and alpha.min() >= 0.0
-    return sp.xyz_to_rgb709(Spectrum(d65.density * np.exp(-alpha * distance)).xyz()) / d65.luminous()
+    return colorimetry.xyz_to_rgb709(Spectrum(d65.density * np.exp(-alpha * distance)).xyz()) / d65.luminous()
 
 
 def test_attenuation_gives_the_colour_back() -> None:
@@ -151,16 +151,16 @@ def test_attenuation_gives_the_colour_back() -> None:
 
 
 def test_attenuation_limits() -> None:
-    assert np.ptp(sp.attenuation_from_colour((0.3, 0.3, 0.3), 2.0)) == 0.0
-    assert sp.attenuation_from_colour((0.3, 0.3, 0.3), 2.0)[0] == pytest.approx(-math.log(0.3) / 2.0)
-    assert np.all(sp.attenuation_from_colour((1.0, 1.0, 1.0), 2.0) == 0.0)
-    assert np.all(sp.attenuation_from_colour((0.5, 0.2, 1.0), math.inf) == 0.0)
-    assert sp.attenuation_from_colour((0.0, 0.0, 0.0), 1.0).max() == pytest.approx(-math.log(1e-4))
+    assert np.ptp(colorimetry.attenuation_from_colour((0.3, 0.3, 0.3), 2.0)) == 0.0
+    assert colorimetry.attenuation_from_colour((0.3, 0.3, 0.3), 2.0)[0] == pytest.approx(-math.log(0.3) / 2.0)
+    assert np.all(colorimetry.attenuation_from_colour((1.0, 1.0, 1.0), 2.0) == 0.0)
+    assert np.all(colorimetry.attenuation_from_colour((0.5, 0.2, 1.0), math.inf) == 0.0)
+    assert colorimetry.attenuation_from_colour((0.0, 0.0, 0.0), 1.0).max() == pytest.approx(-math.log(1e-4))
     for bad in (0.0, -1.0, math.nan):
         with pytest.raises(UserError, match="m.glass: attenuation distance"):
-            sp.attenuation_from_colour((0.5, 0.5, 0.5), bad, "m.glass")
+            colorimetry.attenuation_from_colour((0.5, 0.5, 0.5), bad, "m.glass")
     with pytest.raises(UserError, match="attenuation colour"):
-        sp.attenuation_from_colour((0.5, -0.1, 0.5), 1.0)
+        colorimetry.attenuation_from_colour((0.5, -0.1, 0.5), 1.0)
 
 
 # ---- the spectral coordinate --------------------------------------------------------------
