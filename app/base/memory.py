@@ -13,6 +13,8 @@ from .errors import UserError
 MAX_SIDE_PX = 16384
 """Largest texture side OpenGL 4.3 promises."""
 _TEXEL_BYTES = 16  # RGBA32F
+_LISTED_BYTES, _SURVEYED_BYTES = 4, 20
+"""Of a pixel that sees glass, and of one that is surveyed, where one texture holds the sums."""
 _GIB, _MIB = 1 << 30, 1 << 20
 _LEAST_BYTES = 160 * _MIB
 """What any rendering takes beyond the interpreter: OpenGL and its compiler, programs, the queue of photons."""
@@ -22,11 +24,12 @@ _LEAST_ADDRESSES = 560 * _MIB
 
 def picture_bytes(width: int, height: int, bins: int | None) -> int:
     """Most memory that a picture takes at once while it is sampled and read back: the sums on the device with the list
-    of pixels that see glass, what is read of them, and what is made of that (`CameraPass`, `Channels`)."""
+    of pixels that see glass and the survey, what is read of them, and what is made of that (`CameraPass`, `Channels`)."""
     targets = math.ceil(bins / 4) if bins else 1
     sums = targets * _TEXEL_BYTES
     read = max(_TEXEL_BYTES + sums, sums + 4 * (bins or 0) + 12)
-    return width * height * (sums + 4 + read)
+    listed = _LISTED_BYTES + (_SURVEYED_BYTES if targets == 1 else 0)
+    return width * height * (sums + listed + read)
 
 
 def check_picture_memory(width: int, height: int, bins: int | None) -> None:

@@ -65,7 +65,8 @@ class ListedPixels:
         of each row, and before the first, how many there are (height + 1,)."""
         assert self._list is not None and self._surveyed == width * height
         begins, size = 8 + 4 * self.room, SURVEYED.itemsize * self._surveyed
-        survey = np.frombuffer(self._list.read(size, offset=begins), SURVEYED).copy()
+        survey = np.empty(self._surveyed, SURVEYED)
+        self._list.read_into(survey, size, offset=begins)
         even = even_keys(survey["key"].reshape(height, width))
         survey["key"] = even.ravel()
         self._list.write(survey, offset=begins)

@@ -64,7 +64,7 @@ def test_the_older_kind_too(groups: Path) -> None:
 
 def test_what_a_picture_takes() -> None:
     # Sums and list 20, read back 16 + 16.
-    assert memory.picture_bytes(100, 10, None) == 1000 * 52
+    assert memory.picture_bytes(100, 10, None) == 1000 * 72
     # Five textures and the list 84; sums that were read, bins and colours of them 80 + 80 + 12.
     assert memory.picture_bytes(100, 10, 20) == 1000 * 256
 
