@@ -24,7 +24,8 @@ _LEAST_ADDRESSES = 560 * _MIB
 
 def picture_bytes(width: int, height: int, bins: int | None) -> int:
     """Most memory that a picture takes at once while it is sampled and read back: the sums on the device with the list
-    of pixels that see glass and the survey, what is read of them, and what is made of that (`CameraPass`, `Channels`)."""
+    of pixels that see glass and the survey, what is read of them, and what is made of that (`CameraPass`,
+    `Channels`)."""
     targets = math.ceil(bins / 4) if bins else 1
     sums = targets * _TEXEL_BYTES
     read = max(_TEXEL_BYTES + sums, sums + 4 * (bins or 0) + 12)
