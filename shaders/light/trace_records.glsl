@@ -60,9 +60,11 @@ Path load_path(uint slot) {
     path.depth = ray.depth;
     path.restricted = 1u;
     path.recut = uint((ray.flags & FLAG_BAND_FINAL) != 0u);
-    for (int c = 0; c < COLUMNS; ++c) {
-        path.dposition[c] = ray.dposition[c].xyz;
-        path.ddirection[c] = ray.ddirection[c].xyz;
+    if (COLUMNS > 0) {
+        for (int c = 0; c < COLUMNS; ++c) {
+            path.dposition[c] = ray.dposition[c].xyz;
+            path.ddirection[c] = ray.ddirection[c].xyz;
+        }
     }
     if (HAS_GRATING) path.order = ray.flags >> ORDER_BIT;
     if (POLARISED) {
@@ -86,9 +88,11 @@ void store_path(uint slot, Path path) {
     ray.throughput = path.throughput;
     ray.depth = path.depth;
     ray.flags |= (path.origin.inside != 0u ? FLAG_INSIDE : 0u) | (path.recut != 0u ? FLAG_BAND_FINAL : 0u);
-    for (int c = 0; c < COLUMNS; ++c) {
-        ray.dposition[c].xyz = path.dposition[c];
-        ray.ddirection[c].xyz = path.ddirection[c];
+    if (COLUMNS > 0) {
+        for (int c = 0; c < COLUMNS; ++c) {
+            ray.dposition[c].xyz = path.dposition[c];
+            ray.ddirection[c].xyz = path.ddirection[c];
+        }
     }
     if (HAS_GRATING) ray.flags |= path.order << ORDER_BIT;
     if (POLARISED) {
