@@ -91,6 +91,22 @@ def test_normals_are_drawn_as_they_are_seen(gl) -> None:
             assert (off < 1e-3) == passes, (alpha, cosine, drawn_with, off)
 
 
+def test_the_rough_base_agrees_with_float64(gl) -> None:
+    rng = np.random.default_rng(4)
+    o, i = over_plane(rng, COUNT), over_plane(rng, COUNT)
+    rgb, roughness = as_f32(rng.uniform(0.0, 1.0, (COUNT, 3))), as_f32(rng.uniform(0.02, 1.0, COUNT))
+    body = "r = rough_response(c, s, o, i, o.z, i.z); a = rough_albedo(c, s, o.z);"
+    inputs = {"c": rgb, "s": roughness, "o": o, "i": i}
+    got = evaluate(gl.ctx, ROUGH, body, inputs, {"r": "vec3", "a": "vec3"})
+    want = np.array([finish.eon(c, s, a, b) for c, s, a, b in zip(rgb, roughness, o, i, strict=True)])
+    np.testing.assert_allclose(got["r"], want, atol=2e-5)
+    directions, weights = finish.hemisphere(100, 120)
+    for k in range(20):
+        sent = finish.eon(rgb[k], roughness[k], np.broadcast_to(o[k], directions.shape), directions)
+        mean = ((weights * directions[:, 2])[:, None] * sent).sum(axis=0) / np.pi
+        np.testing.assert_allclose(got["a"][k], mean, atol=5e-4)
+
+
 # ---- a room of one brightness ------------------------------------------------------------------
 
 LOW, STEEP = Camera((0.0, -3.0, 0.35), (0.0, 0.0, 0.0)), Camera((0.0, -1.0, 3.0), (0.0, 0.0, 0.0))

@@ -57,3 +57,22 @@ def hemisphere(rings: int, turns: int) -> tuple[np.ndarray, np.ndarray]:
 
 def toward(cosine: float) -> np.ndarray:
     return np.array([np.sqrt(1.0 - cosine**2), 0.0, cosine])
+
+
+def eon(rgb: np.ndarray, roughness: float, o: np.ndarray, i: np.ndarray) -> np.ndarray:
+    """π f of [Portsmouth, Kutz and Hill 2025], its listing with the exact albedo, directions (…, 3)."""
+    first, second = 0.5 - 2.0 / (3.0 * np.pi), 2.0 / 3.0 - 28.0 / (15.0 * np.pi)
+
+    def single(mu: np.ndarray) -> np.ndarray:
+        s = np.sqrt(1.0 - mu**2)
+        g = s * (np.arccos(mu) - s * mu) + 2.0 / 3.0 * (s / mu * (1.0 - s**3) - s)
+        return a + roughness * a / np.pi * g
+
+    a = 1.0 / (1.0 + first * roughness)
+    mu_o, mu_i = o[..., 2], i[..., 2]
+    s = dot(o, i) - mu_o * mu_i
+    ratio = np.where(s > 0.0, s / np.maximum(mu_o, mu_i), s)
+    mean = a * (1.0 + second * roughness)
+    multiple = rgb**2 * mean / (1.0 - rgb * (1.0 - mean))
+    lost = (1.0 - single(mu_o)) * (1.0 - single(mu_i)) / (1.0 - mean)
+    return rgb * (a * (1.0 + roughness * ratio))[..., None] + multiple * lost[..., None]
