@@ -4,12 +4,23 @@ from __future__ import annotations
 
 import os
 import shutil
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 from spectrasplat.base import paths
 
 SHADERS_VARIABLE = "SPECTRASPLAT_TEST_SHADERS"
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """`old` of a shader became `new`; `killed_by`: a test, from `tests` on."""
+
+    file: str
+    old: str
+    new: str
+    killed_by: str
 
 
 def mutate(monkeypatch: pytest.MonkeyPatch, folder: Path, file: str, old: str, new: str) -> None:

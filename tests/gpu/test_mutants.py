@@ -11,12 +11,12 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
-from tests.gpu.mutants import SHADERS_VARIABLE, mutated
+from tests.gpu.mutants import SHADERS_VARIABLE, Mutant, mutated
+from tests.gpu.mutants_of_library import OF_LIBRARY
 
 ROOT = Path(__file__).parents[2]
 _COLUMNS = "gpu/test_columns_gpu.py::test_columns_against_central_differences"
@@ -25,16 +25,6 @@ _PATHS = "gpu/test_whole_paths_gpu.py::test_position_and_throughput_at_three_wav
 _CUTS = "gpu/test_whole_paths_gpu.py::test_cut_bands_against_exact_paths"
 _SLAB = "gpu/test_known_answers_gpu.py::test_t3_slab_leaves_direction_without_dispersion"
 _SHADOW = "gpu/test_environment_light.py::test_a_balls_shadow_is_one_minus_its_form_factor"
-
-
-@dataclass(frozen=True)
-class Mutant:
-    """`old` of a shader became `new`; `killed_by`: a test, from `tests` on."""
-
-    file: str
-    old: str
-    new: str
-    killed_by: str
 
 
 MUTANTS = {
@@ -472,6 +462,8 @@ MUTANTS = {
         "gpu/test_camera_known_answers.py::test_fringe_of_an_edge_behind_a_thin_prism[N-SF11-1]",
     ),
 }
+
+MUTANTS |= OF_LIBRARY
 
 
 def test_mutants_are_of_todays_shaders() -> None:

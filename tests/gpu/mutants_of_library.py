@@ -1,0 +1,114 @@
+"""Mistakes in functions of shaders/lib and in the queue that have no test of their own: whole pictures and paths notice
+them."""
+
+from __future__ import annotations
+
+from tests.gpu.mutants import Mutant
+
+OF_LIBRARY = {
+    "pixels upside down": Mutant(
+        "lib/camera.glsl",
+        "1.0 - 2.0 * unit.y",
+        "2.0 * unit.y - 1.0",
+        "gpu/test_camera.py::test_lambert_floor_under_a_point_light",
+    ),
+    "a lamp half as wide": Mutant(
+        "lib/lights.glsl",
+        "target += on_light.x * light.half_u",
+        "target += 0.5 * on_light.x * light.half_u",
+        "gpu/test_camera.py::test_area_disc_lights_the_floor_and_is_seen_from_its_front_only",
+    ),
+    "a square aperture": Mutant(
+        "lib/lights.glsl",
+        "light.is_disc != 0u ? dot(at, at) <= 1.0",
+        "false ? dot(at, at) <= 1.0",
+        "gpu/test_camera.py::test_collimated_beam_ends_at_its_aperture",
+    ),
+    "a straight edge of a spot": Mutant(
+        "lib/spot.glsl", "t * t * (3.0 - 2.0 * t)", "t", "gpu/test_camera.py::test_spot_edge_hard_and_soft"
+    ),
+    "photons of other slots": Mutant(
+        "light/queue_scatter.comp",
+        "indices[state.ray_capacity + photon_at++] = k;",
+        "indices[state.ray_capacity + photon_at++] = k ^ 1u;",
+        "gpu/test_power_balance.py::test_all_that_was_emitted_is_drawn_or_accounted_for_where_reflection_is_total[prism]",
+    ),
+    "a photon too few": Mutant(
+        "light/queue_scan.comp",
+        "state.photons_new = min(landed, room);",
+        "state.photons_new = min(landed - min(landed, 1u), room);",
+        "gpu/test_power_balance.py::test_all_that_was_emitted_is_drawn_or_accounted_for_where_reflection_is_total[prism]",
+    ),
+    "pictures blurred by other levels": Mutant(
+        "lib/textures.glsl",
+        "LEVEL_BIAS = -0.8",
+        "LEVEL_BIAS = 0.8",
+        "gpu/test_textures_filter.py::test_a_patch_shows_its_mean",
+    ),
+    "too little of the brighter side": Mutant(
+        "lib/highlights.glsl",
+        "clamp((own - found.low)",
+        "clamp(0.8 * (own - found.low)",
+        "gpu/test_display.py::test_highlights_are_antialiased_alike_in_window_files_and_float64",
+    ),
+    "a rough base loses light": Mutant(
+        "lib/rough_diffuse.glsl",
+        "rough_multiple_colour(reflectance, roughness) * twice",
+        "0.9 * rough_multiple_colour(reflectance, roughness) * twice",
+        "gpu/test_finish_gpu.py::test_the_rough_base_agrees_with_float64",
+    ),
+    "a beam in haze met elsewhere": Mutant(
+        "lib/haze.glsl",
+        "(along_ray - found.cosine * along_beam) / sine2",
+        "(along_ray - found.cosine * along_beam)",
+        "gpu/test_haze.py::test_a_beam_is_as_bright_as_its_chord",
+    ),
+    "images short of the border": Mutant(
+        "lib/border.glsl",
+        "position - 2.0 * border_distance(border, position)",
+        "position - 1.8 * border_distance(border, position)",
+        "gpu/test_borders.py::test_mirrored_an_even_grid_is_even_up_to_borders_and_corners",
+    ),
+    "a grating in glass without its slope": Mutant(
+        "lib/grating.glsl",
+        "derivative -= medium_index",
+        "derivative -= 0.0 * medium_index",
+        "gpu/test_grating_gpu.py::test_inside_dispersive_glass_against_the_slow_tracer",
+    ),
+    "orders along the lines": Mutant(
+        "lib/grating.glsl",
+        "return side * normalize(cross(lines, normal))",
+        "return side * normalize(lines)",
+        "gpu/test_grating_gpu.py::test_lines_of_mercury",
+    ),
+    "polarisation without its power": Mutant(
+        "lib/band.glsl",
+        "weight * state.q",
+        "state.q",
+        "gpu/test_whole_paths_gpu.py::test_cut_bands_against_exact_paths[polarised]",
+    ),
+    "microfacets on a diagonal": Mutant(
+        "lib/rough_surface.glsl",
+        "kronecker(i, across, hash_pcg(own))",
+        "kronecker(i, along, own)",
+        "statistical/test_rough_glass.py::test_one_surface_reflects_what_its_microfacets_do",
+    ),
+    "glass that is never left": Mutant(
+        "lib/medium.glsl",
+        "boundary.behind = MediumStack(stack.mask, entering ? object : NONE);",
+        "boundary.behind = MediumStack(stack.mask, object);",
+        "gpu/test_whole_paths_gpu.py::test_position_and_throughput_at_three_wavelengths[absorption]",
+    ),
+    "normals of the wrong corner": Mutant(
+        "lib/interface.glsl",
+        "hit.bary.x * n1 + hit.bary.y * n2",
+        "hit.bary.x * n2 + hit.bary.y * n1",
+        "gpu/test_known_answers_gpu.py::test_t4_ball_lens[light]",
+    ),
+    "texels in perspective as flat": Mutant(
+        "lib/placement.glsl",
+        "place.texel_area * at.z * at.z * at.z",
+        "place.texel_area * at.z * at.z",
+        "gpu/test_picture_windows.py::test_a_pixel_shows_its_own_texels_only[1]",
+    ),
+}
