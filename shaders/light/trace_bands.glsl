@@ -1,6 +1,5 @@
 // Bands of the spectrum in flight, for `trace.comp`: cut where total internal reflection sets in, or parted where they
 // may not be.
-#if SPECTRAL_GROUPS > 0
 // Spectral columns are derivatives too. Grazing exits and curved surfaces, again and again inside a solid, make some of
 // them so steep that they would throw the ends of a band all over the scene, and out of it, where no light of the band
 // goes.
@@ -12,9 +11,7 @@ void keep_sweeps_within(inout Path path) {
         path.ddirection[SPATIAL + g] *= kept;
     }
 }
-#endif
 
-#ifdef BAND_CUTS
 // Whether `at` leaves a band too little on one side of it to be worth a path of its own.
 bool leaves_sliver(Path path, float at) { return min(at - path.band.x, path.band.z - at) <= 0.01 * MIN_CUT_BAND; }
 
@@ -43,7 +40,6 @@ float power_below(Path path, float at) {
     return clamp((power.y - power.x) / max(power.z - power.x, 1e-30), 0.0, 1.0);
 }
 
-#ifdef HAS_DIELECTRIC
 // Where the band is cut because total internal reflection sets in inside it, at `onset`; negative: nowhere. `start`:
 // the path before its flight, from which both parts set out again.
 float cut_of_band(Path path, Path start, Event event, float distance, out float onset) {
@@ -107,5 +103,3 @@ PassingPart passing_part(Path path, inout Event event, float onset) {
     event.reflectance = low ? vec3(kept, 1.0, 1.0) : vec3(1.0, 1.0, kept);
     return part;
 }
-#endif
-#endif

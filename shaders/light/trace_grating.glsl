@@ -1,5 +1,4 @@
 // A photon's path at a grating, for `trace.comp`.
-#ifdef HAS_GRATING
 #include "path/grating.glsl"
 
 // A grating of up to so many orders sends each on as a whole lattice where it is met first.
@@ -23,11 +22,11 @@ bool diffract(Path path, Hit hit, Event event, uint row, out Path child, inout P
         order = order_at(row, number);
         steps = order_steps(order, hit.object, met.medium, path.band);
         passes = order_passes(path, event, met, steps);
-#ifdef BAND_CUTS
-        bool is_final = path.recut != 0u && number == first;
-        if (any(passes) && !all(passes) && !is_final && path.band.z - path.band.x > MIN_CUT_BAND)
-            at = clear_cut(path, rest, evanescence_in_band(path, event, met, order, passes), hit.distance);
-#endif
+        if (BAND_CUTS) {
+            bool is_final = path.recut != 0u && number == first;
+            if (any(passes) && !all(passes) && !is_final && path.band.z - path.band.x > MIN_CUT_BAND)
+                at = clear_cut(path, rest, evanescence_in_band(path, event, met, order, passes), hit.distance);
+        }
         if (passes.y || at >= 0.0) break;
     }
     // Of the light that is here, what the orders from `first` on have left when this one, and the next one, has its
@@ -64,4 +63,3 @@ bool diffract(Path path, Hit hit, Event event, uint row, out Path child, inout P
     outcome.what |= geometric ? FELL_NORMAL : 0u;
     return survives(child, outcome.roulette_w, share, 16u + number, child.depth == 1u && orders <= MAX_WHOLE_ORDERS);
 }
-#endif

@@ -1,7 +1,6 @@
 // Bands whose wavelengths do not all meet what their anchor meets, for `trace.comp`: over a receiver's border, or over
 // the edge of what is in the way. Drawn whole on the anchor's receiver, a band lacks those colours beside the border
 // that its neighbour has too many of, on both sides.
-#ifdef LANDING_CUTS
 // Spacings of the lattice, along the narrower of its steps: of shorter chords no colour shows beside a border.
 #define SHORTEST_CUT_CHORD 0.02
 // Of either half of the band: so close to its ends a part that was cut there is not asked again.
@@ -57,4 +56,3 @@ bool meet_with_band(Path path, out Hit hit, out float border) {
     border = end > 3u ? clear_cut(path, path, x, hit.distance) : -1.0;
     return met;
 }
-#endif

@@ -57,7 +57,6 @@ void keep_directions_within(inout Path path) {
     path.ddirection[1] = turn_t;
 }
 
-#if defined(LAMP_COLUMNS) || defined(LOBE_COLUMNS)
 // Directions that have forgotten all, those of Lambert's law, have this as standard deviation along either axis
 // (sines).
 #define FORGOTTEN 0.5
@@ -80,10 +79,7 @@ void keep_pair_above(inout Path path, int c, vec3 normal) {
     path.ddirection[c] = turn_first - (1.0 - kept) * rise.x * up;
     path.ddirection[c + 1] = turn_second - (1.0 - kept) * rise.y * up;
 }
-#endif
 
-#ifdef LOBE_COLUMNS
-#ifdef LAMP_COLUMNS
 // Of the lobe's width and a lamp's own: light of places on a lamp that lie as far from each other as this lies evenly
 // behind a rough surface.
 #define EVENED_BY_LOBE 16.0
@@ -98,7 +94,6 @@ void narrow_lamp_by_lobe(inout Path path) {
     path.dposition[LAMP] *= left;
     path.dposition[LAMP + 1] *= left;
 }
-#endif
 
 // The footprint of a photon that rough surfaces have turned: its own, and of the lobe as much as one of so many photons
 // stands for. Where the lobe is small beside the lattice's spacing, neighbours still land side by side, and the lattice
@@ -112,4 +107,3 @@ bool widen_by_lobe(Path path, vec3 normal_g, inout vec3 dposition_ds, inout vec3
     join_sides(normal_g, dposition_ds, dposition_dt, part * first, part * second);
     return true;
 }
-#endif
