@@ -6,6 +6,7 @@ small commands start at once.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterable, Sequence
 from importlib import import_module
 from typing import Any
@@ -69,13 +70,16 @@ def run(arguments: Sequence[str]) -> int:
         code = program(names).main(list(arguments) or ["--help"], prog_name="spectrasplat", standalone_mode=False)
     except (_Interrupted, click.Abort) as interrupted:
         raise (interrupted.__cause__ or KeyboardInterrupt()) from None
+    except click.exceptions.NoArgsIsHelpError as error:
+        print(error.format_message(), file=sys.stderr)
+        return error.exit_code
     except click.ClickException as error:
         raise UserError(_usage_sentence(error.format_message())) from error
     return code if isinstance(code, int) else 0
 
 
 def _usage_sentence(message: str) -> str:
-    sentence = message.strip().rstrip(".?").replace(". Did you", ", did you")
+    sentence = message.strip().rstrip(".?").replace(". (Did you", " (did you").replace(". Did you", ", did you")
     return f"{sentence[:1].lower()}{sentence[1:]}; 'spectrasplat --help' shows the usage"
 
 
@@ -92,7 +96,8 @@ def _command(name: str, values: type, runs: str) -> click.Command:
         return named(runs)(typed)
 
     parameters = [row.parameter() for row in options.rows(values)]
-    return click.Command(name, callback=command, params=parameters, help=values.__doc__)
+    # click cuts a short help of its own making to 45 letters.
+    return click.Command(name, callback=command, params=parameters, help=values.__doc__, short_help=values.__doc__)
 
 
 def _ends(flag: str, help: str, does: Callable[[], None]) -> click.Option:
@@ -117,7 +122,8 @@ def program(names: Iterable[str] = COMMANDS) -> click.Group:
             _ends("--show-completion", "Print the script that does so.", lambda: print(completion.script())),
         ],
     )
-    farm = _Commands("farm", help="Render on many workers, here or on a Dask cluster; needs the extra 'farm'.")
+    on_farm = "Render on many workers, here or on a Dask cluster; needs the extra 'farm'."
+    farm = _Commands("farm", help=on_farm, short_help=on_farm)
     for name in names:
         group, own = (farm, name.removeprefix("farm ")) if name.startswith("farm ") else (app, name)
         values, runs = COMMANDS[name]

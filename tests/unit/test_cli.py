@@ -303,6 +303,10 @@ class TestProgram:
         for command in ("render", "inspect", "glass", "doctor", "bench-speed"):
             assert command in out
 
+    def test_commands_of_a_farm_are_listed(self, capsys: pytest.CaptureFixture[str]) -> None:
+        assert main(["farm"]) == 2
+        assert "\n  animate  Render an animation" in capsys.readouterr().err
+
     def test_version(self, capsys: pytest.CaptureFixture[str]) -> None:
         assert main(["--version"]) == 0
         assert capsys.readouterr().out == f"spectrasplat {__version__}\n"
@@ -314,6 +318,7 @@ class TestProgram:
             (["render"], "missing argument 'SCENE'"),
             (["render", "prism"], "missing option '-o' / '--output'"),
             (["doctor", "now"], "unexpected extra argument"),
+            (["render", "prism", "--photon", "5"], "no such option '--photon' (did you mean"),
         ],
     )
     def test_wrong_usage(self, arguments: list[str], sentence: str, capsys: pytest.CaptureFixture[str]) -> None:
