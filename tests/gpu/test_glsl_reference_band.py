@@ -88,7 +88,7 @@ def test_where_total_reflection_sets_in(gl) -> None:
     body = """
     float dtheta[SPECTRAL_GROUPS];
     dtheta[0] = slope;
-    MediumInterface boundary = MediumInterface(0u, NONE, MediumStack(0u, NONE), true);
+    MediumInterface boundary = MediumInterface(0u, NONE, MediumStack(0u, NONE), true, false);
     at = total_reflection_onset(band, theta, dtheta, straight, boundary, greaterThan(passes, vec3(0.5)));
     step_ = variable_step(0u, band.x, band.z);
     """
