@@ -37,7 +37,7 @@ OF_LIBRARY = {
         "light/queue_scan.comp",
         "state.photons_new = min(landed, room);",
         "state.photons_new = min(landed - min(landed, 1u), room);",
-        "gpu/test_power_balance.py::test_all_that_was_emitted_is_drawn_or_accounted_for_where_reflection_is_total[prism]",
+        "gpu/test_power_balance.py::test_all_that_was_emitted_is_drawn_or_accounted_for_where_reflection_is_total[brilliant]",
     ),
     "pictures blurred by other levels": Mutant(
         "lib/textures.glsl",
