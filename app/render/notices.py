@@ -216,7 +216,7 @@ def _may_be_hidden(light: LightPass, receiver: int, camera: Camera, places: np.n
         for index, item in enumerate(light.scene.objects):
             if index != receiver:
                 low, high = ((bound - start) / way for bound in world_bounds(item))
-                enter = np.nanmax(np.minimum(low, high), axis=1)
-                leave = np.nanmin(np.maximum(low, high), axis=1)
+                enter = np.fmax.reduce(np.minimum(low, high), axis=1)
+                leave = np.fmin.reduce(np.maximum(low, high), axis=1)
                 hidden |= (enter <= np.minimum(leave, 1.0)) & (leave >= 0.0)
     return hidden
