@@ -49,9 +49,6 @@ ERROR = np.array(
 """Berlin (Crameri 2018), sRGB (11, 3): blue is too dark, red too bright, and where there is no error it is nearly
 black."""
 
-BELOW_SRGB = (0.0, 0.0, 0.0)
-ABOVE_SRGB = (1.0, 1.0, 1.0)
-
 
 def sample(table: np.ndarray, position: np.ndarray | float) -> np.ndarray:
     """sRGB colours (…, 3) at `position` (…,) in 0…1 along `table`; clamped."""
