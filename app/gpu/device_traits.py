@@ -6,13 +6,17 @@ numbers of llvmpipe were measured with Mesa 22.3 on two cores.
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
+from ..base.errors import UserError, suggestion
 from .dispatch_budget import DISPATCH_S
 
+ENVIRONMENT_VARIABLE = "SPECTRASPLAT_DEVICE"
+"""`gpu`: programs, sizes and schedules are a GPU's, whatever draws; so a software renderer shows what a GPU does."""
 _SOFTWARE_RENDERERS = ("llvmpipe", "softpipe", "swrast", "swiftshader")
 
 
@@ -70,9 +74,11 @@ class DeviceTraits:
 
     @staticmethod
     def of(renderer: str) -> DeviceTraits:
-        """From OpenGL's GL_RENDERER."""
+        """From OpenGL's GL_RENDERER. Raises `UserError` where the environment names a device that there is not."""
         if _assumed:
             return _assumed[-1]
+        if _is_gpu_wanted():
+            return DeviceTraits(splats_by_compute=is_software_renderer(renderer))
         if not is_software_renderer(renderer):
             return DeviceTraits()
         llvmpipe = "llvmpipe" in renderer.casefold()
@@ -93,6 +99,14 @@ class DeviceTraits:
 def is_software_renderer(renderer: str) -> bool:
     """From OpenGL's GL_RENDERER, whatever is assumed."""
     return any(known in renderer.casefold() for known in _SOFTWARE_RENDERERS)
+
+
+def _is_gpu_wanted() -> bool:
+    name = os.environ.get(ENVIRONMENT_VARIABLE, "").strip().casefold()
+    if name not in ("", "gpu"):
+        hint = suggestion(name, ("gpu",)) or ", use 'gpu' or nothing"
+        raise UserError(f"{ENVIRONMENT_VARIABLE} is '{name}', which is no kind of device{hint}")
+    return name == "gpu"
 
 
 _assumed: list[DeviceTraits] = []
