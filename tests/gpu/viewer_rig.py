@@ -1,0 +1,214 @@
+"""Drives the live engine as a hand on the mouse does, frame by frame, on a device taken for a GPU: what every frame
+asks of OpenGL, and how long its Python takes.
+
+Python's time is the thread's own time less what it spends inside the calls that make a software renderer draw, wait
+or copy; all other calls (binding, uniforms) count.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, replace
+from typing import Any
+from unittest import mock
+
+import moderngl
+import numpy as np
+from gl_counts import Counts, counted
+from spectrasplat.base.paths import shipped_scenes
+from spectrasplat.edit.camera_controls import orbit
+from spectrasplat.edit.live_inputs import LiveInputs
+from spectrasplat.edit.state import Display as DisplaySettings
+from spectrasplat.gpu import device_traits, unlocked
+from spectrasplat.gpu.context import Context, create_context
+from spectrasplat.gpu.device_traits import Budget, DeviceTraits
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.optics.glass import with_gain
+from spectrasplat.model.scene import Scene
+from spectrasplat.passes.display import Display
+from spectrasplat.render.viewer.engine import LiveEngine
+
+SIZE = (160, 90)
+FRAME_S = 1 / 60
+PATIENCE_S = 300.0
+_TEXTURES = (moderngl.Texture, moderngl.TextureArray)
+_DRIVER = (
+    *(
+        (owner, name)
+        for owner in (moderngl.ComputeShader, unlocked.UnlockedCompute)
+        for name in ("run", "run_indirect")
+    ),
+    *((moderngl.VertexArray, name) for name in ("render", "render_indirect")),
+    *((owner, name) for owner in (moderngl.Buffer, *_TEXTURES) for name in ("read", "read_into", "write")),
+    *((moderngl.Framebuffer, name) for name in ("read", "read_into", "clear")),
+    (moderngl.Buffer, "clear"),
+    *((moderngl.Context, name) for name in ("finish", "memory_barrier", "copy_buffer", "copy_framebuffer")),
+    *((moderngl.Context, name) for name in ("buffer", "texture", "texture_array", "compute_shader", "program")),
+)
+
+
+@dataclass
+class Frame:
+    """One frame."""
+
+    counts: Counts
+    python_ms: float
+    version: int
+    """Of the picture."""
+
+
+@contextmanager
+def driver_clock() -> Iterator[Callable[[], float]]:
+    """Seconds of this thread within calls in which a software renderer works, until now."""
+    spent, inside = 0.0, 0
+
+    def watching(owner: Any, name: str) -> Any:
+        real = getattr(owner, name)
+
+        def watched(*arguments: Any, **named: Any) -> Any:
+            nonlocal spent, inside
+            started, inside = time.thread_time(), inside + 1
+            try:
+                return real(*arguments, **named)
+            finally:
+                inside -= 1
+                spent += 0.0 if inside else time.thread_time() - started
+
+        return mock.patch.object(owner, name, watched)
+
+    with ExitStack() as stack:
+        for owner, name in _DRIVER:
+            stack.enter_context(watching(owner, name))
+        yield lambda: spent
+
+
+class ViewerRig:
+    """The live engine on a scene, and the picture on its way to the window."""
+
+    def __init__(self, context: Context, scene: Scene, size: tuple[int, int] = SIZE, photons: int = 1 << 14) -> None:
+        self.engine = LiveEngine(context, Budget(1 << 13, photons, photons, 1 << 26))
+        self.engine.target_photons = photons
+        self.engine.refine_when_still = False
+        self._display = Display(context)
+        self._settings = DisplaySettings()
+        self.wanted = LiveInputs(scene, scene.camera, *size)
+
+    def settle(self) -> None:
+        """Until nothing is left to do."""
+        self.engine.set(self.wanted)
+        end = time.monotonic() + PATIENCE_S
+        while not self.engine.is_idle:
+            assert self.engine.problem is None, self.engine.problem
+            assert time.monotonic() < end, "it took too long"
+            self.engine.advance(0.1)
+
+    def frames(self, count: int, change: Callable[[LiveInputs, int], LiveInputs]) -> list[Frame]:
+        """So many frames, with `change` before each; first once untimed, to be counted, then timed: every second
+        frame either."""
+        found = []
+        start = self.wanted
+        for number in range(count):
+            self.wanted = change(start, number + 1)
+            with counted() as counts:
+                self._frame()
+            # Whatever counts takes time: the next step of the same movement is timed.
+            self.wanted = change(start, number + 1.5)
+            with driver_clock() as driver:
+                began = time.thread_time()
+                self._frame()
+                python = time.thread_time() - began - driver()
+            assert self.engine.problem is None, self.engine.problem
+            found.append(Frame(counts, 1e3 * python, self.engine.picture_version))
+        return found
+
+    def _frame(self) -> None:
+        self.engine.set(self.wanted)
+        self.engine.advance(FRAME_S, interacting=True)
+        picture = self.engine.picture
+        assert picture is not None
+        self._display.run(picture, self._settings, 0.0, (self.wanted.width, self.wanted.height))
+
+    def release(self) -> None:
+        """Free everything."""
+        self._display.release()
+        self.engine.release()
+
+
+def orbiting(before: LiveInputs, step: float) -> LiveInputs:
+    """The camera goes round."""
+    return replace(before, camera=orbit(before.camera, 3.0 * step, 0.3 * step))
+
+
+def dragging(before: LiveInputs, step: float) -> LiveInputs:
+    """The slider of the first dispersive glass is moved."""
+    objects = list(before.scene.objects)
+    at = next(i for i, o in enumerate(objects) if o.material.transmits and o.material.dispersion.is_dispersive)
+    material = objects[at].material
+    gain = material.dispersion.gain * (1.0 + 0.05 * step)
+    objects[at] = replace(objects[at], material=replace(material, dispersion=with_gain(material.dispersion, gain)))
+    return replace(before, scene=replace(before.scene, objects=tuple(objects)))
+
+
+def turning(before: LiveInputs, step: float) -> LiveInputs:
+    """The first glass is turned about the vertical axis through its middle."""
+    objects = list(before.scene.objects)
+    at = next(i for i, o in enumerate(objects) if o.material.transmits)
+    angle, matrix, turn = np.radians(step), objects[at].object_to_world.copy(), np.eye(4)
+    turn[:2, :2] = (np.cos(angle), -np.sin(angle)), (np.sin(angle), np.cos(angle))
+    middle = matrix[:3, 3].copy()
+    matrix[:3, 3] = 0.0
+    matrix = turn @ matrix
+    matrix[:3, 3] = middle
+    objects[at] = replace(objects[at], object_to_world=matrix)
+    return replace(before, scene=replace(before.scene, objects=tuple(objects)))
+
+
+MOVEMENTS = {"orbit": orbiting, "drag": dragging, "turn": turning}
+
+
+def table(frames: list[Frame]) -> str:
+    """What each frame asked for."""
+    lines = ["made programs up_KiB down_B reads finishes dispatches draws python_ms"]
+    for frame in frames:
+        c = frame.counts
+        lines.append(
+            f"{len(c.made):4} {c.programs:8} {c.written_bytes / 1024:6.1f} {c.read_bytes:6} {c.reads:5} "
+            f"{c.finishes:8} {c.dispatches:10} {c.draws:5} {frame.python_ms:9.2f}"
+        )
+    return "\n".join(lines)
+
+
+@contextmanager
+def viewer(name: str, size: tuple[int, int] = SIZE) -> Iterator[ViewerRig]:
+    """A shipped scene, settled, on a device taken for a GPU."""
+    with (
+        device_traits.assumed(DeviceTraits(splats_by_compute=True)),
+        create_context() as context,
+    ):
+        rig = ViewerRig(context, load_scene(shipped_scenes()[name]), size)
+        try:
+            rig.settle()
+            yield rig
+        finally:
+            rig.release()
+
+
+def main() -> None:
+    """`viewer_rig.py [scene …]`: counts and times of all movements."""
+    import sys
+    from collections import Counter
+
+    for name in sys.argv[1:] or ["prism", "default", "ball"]:
+        with viewer(name) as rig:
+            for movement, change in MOVEMENTS.items():
+                frames = rig.frames(8, change)
+                median = float(np.median([frame.python_ms for frame in frames[2:]]))
+                print(f"{name} {movement}: Python {median:.2f} ms a frame\n{table(frames)}")
+                print("  made in the last:", dict(Counter(frames[-1].counts.made)), flush=True)
+                rig.settle()
+
+
+if __name__ == "__main__":
+    main()
