@@ -7,7 +7,7 @@ vertex and the fragment shaders need is worked out here once a splat, not once a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -115,9 +115,12 @@ PARAMETERS = Struct(
         Field("y_scale", "float", "reindexed: coordinate of the tables = y_offset + y_scale · the path's variable"),
         Field("y_offset", "float", ""),
         Field("narrowed", "float", "least share of `smoothing` that a footprint of an even lattice is drawn with"),
-        Field("unused2", "float", ""),
+        Field("records", "uint", "how many the photon buffer holds; what is behind them is none"),
     ),
 )
+
+ALL_RECORDS = 0xFFFFFFFF
+_RECORDS_AT = PARAMETERS.stride - 4
 
 
 @dataclass(frozen=True)
@@ -148,16 +151,19 @@ class SpectralVariables:
 
 @dataclass(frozen=True)
 class Photons:
-    """Photon records `start`, start + stride, … of a buffer, `count` of them."""
+    """Photon records `start`, start + stride, … of a buffer, `count` of them, or as many of these as `held` tells."""
 
     buffer: moderngl.Buffer
     count: int
     start: int = 0
     stride: int = 1
+    held: tuple[moderngl.Buffer, int] | None = None
+    """Buffer and offset, bytes, of a uint: the records that the photon buffer holds. The device reads it, nothing waits
+    for it. None: all that are asked for."""
 
     def part(self, first: int, count: int) -> Photons:
         """`count` of them from the `first` on."""
-        return Photons(self.buffer, count, self.start + first * self.stride, self.stride)
+        return replace(self, count=count, start=self.start + first * self.stride)
 
 
 @dataclass(frozen=True)
@@ -214,7 +220,7 @@ class Footprints:
     def run(
         self, photons: Photons, spectra: SplatSpectra, atlas: MapAtlas, receivers: moderngl.Buffer, smoothing: float
     ) -> None:
-        """Fill slots [0, count * slots_per_photon) from `photons`."""
+        """Fill the slots of `photons`, `slots_per_photon` each, and list them by kind."""
         variables, tables, gains, reindex = spectra.variables, spectra.tables, spectra.gains, spectra.reindex
         values = PARAMETERS.zeros(1)
         x_reference = gains.x_reference if gains is not None else 0.0
@@ -239,9 +245,12 @@ class Footprints:
             scale,
             offset,
             NARROWED if smoothing < _WIDEST_NARROWED else 1.0,
-            0.0,
+            ALL_RECORDS,
         )
         self._parameters.write(values.tobytes())
+        if photons.held is not None:
+            held, offset_bytes = photons.held
+            self._ctx.copy_buffer(self._parameters, held, 4, read_offset=offset_bytes, write_offset=_RECORDS_AT)
         self._parameters.bind_to_uniform_block(0)
         for binding, buffer in enumerate(
             (
@@ -267,7 +276,6 @@ class Footprints:
         self.commands.bind_to_storage_buffer(7)
         self.lists.bind_to_storage_buffer(8)
         self._list["capacity"].value = self.capacity
-        self._list["photons"].value = photons.count
         self._list.run(-(-photons.count // LIST_WORKGROUP) if self._by_compute else 1)
 
     def counts(self) -> dict[str, float]:

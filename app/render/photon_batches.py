@@ -152,11 +152,12 @@ class PhotonBatches:
         into: Deposit,
         tables: ShownTables | None = None,
         stride: int = 1,
+        held: tuple[moderngl.Buffer, int] | None = None,
     ) -> Iterator[None]:
         """Add every `stride`-th photon record to maps, see `Splatting.steps`. `tables` of another plan than the one
         begun."""
         before, stats = self.splatting.seconds, into.stats
-        for _ in self.splatting.steps(photons, count, into.maps, tables or self.tables, into.smoothing, stride):
+        for _ in self.splatting.steps(photons, count, into.maps, tables or self.tables, into.smoothing, stride, held):
             stats.splat_seconds += self.splatting.seconds - before
             yield
             before = self.splatting.seconds

@@ -83,15 +83,17 @@ class Splatting:
         tables: ShownTables,
         smoothing: float,
         stride: int = 1,
+        held: tuple[moderngl.Buffer, int] | None = None,
     ) -> Iterator[None]:
         """Add every `stride`-th photon record to `maps`, pausing after every part of them. `count`: of those that are
-        added; `smoothing`: standard deviation of a footprint in lattice spacings."""
+        added, at most where the device alone knows how many are `held` (`Photons`); `smoothing`: standard deviation of
+        a footprint in lattice spacings."""
         atlas, part_max = maps.atlas, self._pace.splat_part
         if atlas.targets > 1 and atlas.pending + count >= FLUSH_AHEAD * min(
             CHUNK, atlas.size[0] * atlas.size[1] / FLUSH_SHARE
         ):
             yield from self.summing(atlas)
-        all_photons = Photons(photons, count, stride=stride)
+        all_photons = Photons(photons, count, stride=stride, held=held)
         spectra = SplatSpectra(self._shown.variables, tables.tables, self._shown.gains, tables.reindex)
         start = 0
         while start < count:

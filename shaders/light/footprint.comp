@@ -11,24 +11,7 @@
 
 layout(local_size_x = WORKGROUP) in;
 
-layout(std140, binding = 0) uniform Parameters {
-    uint first_photon;
-    uint photon_count;
-    uint classes;
-    uint bands;
-    uint var_samples;
-    uint table_rows;
-    float smoothing;
-    float extent_limit;
-    uint traced_row;
-    float x_reference;
-    uint stride;
-    uint first_power;
-    float y_scale;
-    float y_offset;
-    float narrowed;
-    float unused2;
-};
+#include "light/footprint_parameters.glsl"
 layout(std430, binding = 0) readonly buffer Photons { PhotonRecord photons[]; };
 layout(std430, binding = 1) writeonly buffer Splats { SplatRecord splats[]; };
 layout(std430, binding = 2) readonly buffer Placements { Placement placements[]; };
@@ -264,7 +247,7 @@ bool is_only_fine(SplatRecord splat, Placement place, Placement outer, vec3 posi
 
 void main() {
     uint i = gl_GlobalInvocationID.x;
-    if (i >= photon_count) {
+    if (i >= photons_there()) {
         return;
     }
     PhotonRecord photon = photons[first_photon + i * stride];

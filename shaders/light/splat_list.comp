@@ -7,15 +7,16 @@ layout(std430, binding = 1) readonly buffer Splats { SplatRecord splats[]; };
 layout(std430, binding = 7) buffer Commands { uint draw_words[5 * KINDS]; };
 layout(std430, binding = 8) writeonly buffer Lists { uint lists[]; };  // `capacity` a kind
 
-uniform uint photons;  // with SLOTS splats each, and images behind them
 uniform uint capacity;
 
 shared uint counts[WORKGROUP * int(KINDS)];
 
+#include "light/footprint_parameters.glsl"
 #include "light/splat_slots.glsl"
 
 void main() {
     uint me = gl_LocalInvocationID.x;
+    uint photons = photons_there();
     uint run = (photons + uint(WORKGROUP) - 1u) / uint(WORKGROUP);
     uint first = min(me * run, photons), last = min(first + run, photons);
     uint mine[KINDS];

@@ -6,19 +6,19 @@ layout(std430, binding = 1) readonly buffer Splats { SplatRecord splats[]; };
 layout(std430, binding = 7) buffer Commands { uint dispatch_words[5 * KINDS]; };
 layout(std430, binding = 8) writeonly buffer Lists { uint lists[]; };  // `capacity` a kind
 
-uniform uint photons;  // with SLOTS splats each, and images behind them
 uniform uint capacity;
 
 shared uint listed[KINDS];
 shared uint begins[KINDS];
 
+#include "light/footprint_parameters.glsl"
 #include "light/splat_slots.glsl"
 
 void main() {
     uint me = gl_LocalInvocationID.x, photon = gl_GlobalInvocationID.x;
     if (me < KINDS) listed[me] = 0u;
     barrier();
-    uint slot = photon * PHOTON_SLOTS, end = photon < photons ? end_of(photon) : slot;
+    uint slot = photon * PHOTON_SLOTS, end = photon < photons_there() ? end_of(photon) : slot;
     for (uint s = slot; s < end; ++s) {
         uint kind = splats[s].kind;
         if (kind > 0u) atomicAdd(listed[kind - 1u], 1u);

@@ -184,7 +184,7 @@ def test_records_packed_as_texels_lie_as_in_a_buffer(gl, struct: Struct) -> None
 
 _BLOCK = re.compile(r"layout\(std140,[^)]*\)\s*uniform\s+(\w+)\s*\{([^}]*)\}")
 HAND_WRITTEN = {
-    "light/footprint.comp": footprint.PARAMETERS,
+    "light/footprint_parameters.glsl": footprint.PARAMETERS,
     "light/splat_parameters.glsl": splat.PARAMETERS,
     "light/beam.vert": beam_splat.PARAMETERS,
 }
