@@ -57,11 +57,12 @@ const float LEAST_FAN = 0.015;
 // Texels: the texel's own blur knows no perspective, and of shorter footprints it is most of what is drawn.
 const float LEAST_FANNED = 0.75;
 const float MOST_FAN = 3.0;
-// Splats of three texels' standard deviation at least go to a map with texels twice as wide.
-const float BROAD_VARIANCE = 9.0;
+// Splats of one and a half texels' standard deviation at least go to a map with texels twice as wide.
+const float BROAD_VARIANCE = 2.25;
 const int WIDER_LEVELS = 6;
-// Of the wide texels' own area: their box and the interpolation at each level on the way back to the finest.
-const float LEVEL_BLUR = 0.29;
+// What texels twice as wide add to the variance of what is drawn, in their own area: the bilinear interpolation on the
+// way back (1/6) and their box (1/12) in place of the narrow texels' (1/48).
+const float LEVEL_BLUR = 11.0 / 48.0;
 const float MIN_SIGMA_TO_SWEEP = 1.0 / 256.0;
 const float MAX_SIGMA_TO_SWEEP = 32.0;
 
@@ -72,6 +73,7 @@ struct Footprint {
     vec2 chord;
     float per_spacing;  // the axes over the lattice's own steps
     vec2 fan;  // change of W (lib/fan.glsl) per texel, along the longer axis
+    float taken;  // variance that wide texels will add, and that is not drawn, texels²
 };
 
 float spectral_variable(uint group, float x) {
@@ -139,6 +141,7 @@ Footprint footprint_in(Placement place, PhotonRecord photon, vec3 sweep_middle, 
     f.axis_s = f.per_spacing * step_s;
     f.axis_t = f.per_spacing * step_t;
     f.fan = fan_in(place, photon, at.z, step_s, step_t);
+    f.taken = 0.0;
     return f;
 }
 
@@ -152,20 +155,14 @@ bool in_front(Placement place, PhotonRecord photon, vec3 sweep_middle, vec3 swee
 // A splat broad in every direction is as well drawn in texels twice as wide, for a quarter of the
 // fragments; the maps are put together again when they are read (levels_fold.comp, bilinearly).
 void choose_level(inout Placement place, inout Footprint f, PhotonRecord photon, vec3 middle, vec3 sweep) {
-    bool blurred = false;
     for (int step = 0; step < WIDER_LEVELS; ++step) {
         if (place.blurred != NONE && thin_variance(f) > BROAD_VARIANCE) {
+            float taken = 0.25 * f.taken + LEVEL_BLUR;
             place = placements[place.blurred];
             f = footprint_in(place, photon, middle, sweep);
-            blurred = true;
+            f.taken = taken;
         }
     }
-    // What that will blur is taken off beforehand.
-    float thin = thin_variance(f);
-    float shrink = blurred ? sqrt(max(1.0 - LEVEL_BLUR / max(thin, LEVEL_BLUR), 0.0)) : 1.0;
-    f.axis_s *= shrink;
-    f.axis_t *= shrink;
-    f.per_spacing *= shrink;
 }
 
 SplatRecord splat_of(PhotonRecord photon, float power_w, float mean, Footprint f, uint table, vec4 band) {

@@ -56,8 +56,8 @@ void flatten_lattice(inout SplatRecord splat, Blur blur, Footprint f, uint latti
         float coarse = max(abs(k[i].x), abs(k[i].y)), along = TWO_PI * dot(k[i], blur.e);
         // As a footprint's own Gaussian damps it, or more; of a needle's width float32 knows nothing, nor of waves
         // across it.
-        float own_cycles = f.per_spacing * length(steps[i]),
-              most = 2.0 * exp(-0.5 * TWO_PI * TWO_PI * own_cycles * own_cycles);
+        float own_cycles2 = f.per_spacing * f.per_spacing * dot(steps[i], steps[i]) - f.taken * dot(k[i], k[i]),
+              most = 2.0 * exp(-0.5 * TWO_PI * TWO_PI * max(own_cycles2, 0.0));
         heights[i] = clamp(damping(blur, k[i]), 0.0, most) * clamp(5.0 - 5.0 * coarse, 0.0, 1.0);
         kept[i] = 2.0 * exp(-0.5 * along * along * share * own);
     }
@@ -280,6 +280,9 @@ SplatRecord swept_splat(PhotonRecord photon, float power_w, float mean, Footprin
     float b = s_along.x * s_along.y + t_along.x * t_along.y;
     float c = s_along.y * s_along.y + t_along.y * t_along.y;
     float area = s_along.x * t_along.y - s_along.y * t_along.x;
+    float determinant = area * area - f.taken * (a + c - f.taken);
+    a -= f.taken;
+    c -= f.taken;
 
     // A texel seen along its m direction is a trapezoid: a box as wide as its longer side and, for the shorter, a
     // Gaussian of the same variance. The box is kept exactly (no ripple over the grid), the rest is Gaussian.
@@ -290,7 +293,7 @@ SplatRecord swept_splat(PhotonRecord photon, float power_w, float mean, Footprin
     float c_total = s2 + box * box * TEXEL_VARIANCE;
     float shear = b / c_total;
     // a - b²/c_total, without a difference of what may be alike.
-    float along2 = TEXEL_VARIANCE + (a * (c_total - c) + area * area) / c_total,
+    float along2 = TEXEL_VARIANCE + (a * (c_total - c) + determinant) / c_total,
           sampled = SAMPLED_VARIANCE * (1.0 + shear * shear);
     bool cut = false;
     if (BAND_CUTS) {
