@@ -7,13 +7,17 @@ work that is waited for has to do.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections import deque
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import moderngl
 
 _BYTES = 1 << 22
 _REPEATS = 8
+_LATE = 4
+"""Blocks of a pass that are timed before the first of them is asked for: by then the device is done with it."""
+Tell = Callable[[float], None]
 
 
 class PassTimers:
@@ -24,42 +28,70 @@ class PassTimers:
         self._ctx = ctx
         self.seconds: dict[str, float] = {}
         """Since the context was made; empty where timers do not work."""
-        self._query = ctx.query(time=True) if may_work else None
-        if self._query is not None and not self._tells_truth():
-            self._query = None
-
-    @property
-    def work(self) -> bool:
+        self.work = may_work and self._tells_truth()
         """There are sums."""
-        return self._query is not None
+        self._free: dict[str, list[moderngl.Query]] = {}
+        self._asked: dict[str, deque[tuple[moderngl.Query, Tell | None]]] = {}
+        self._inside = False
 
     @contextmanager
-    def timing(self, name: str) -> Iterator[None]:
-        """Count the device's work within the block towards pass `name`, and wait for it. Blocks do not nest."""
-        if self._query is None:
+    def timing(self, name: str, tell: Tell | None = None) -> Iterator[None]:
+        """Count the device's work within the block towards pass `name` and tell `tell` its seconds, some blocks of the
+        pass later, so that nobody waits. A block within another counts as the other's.
+
+        Where timers do not work nothing is counted, and who wants to be told waits for the device."""
+        if self._inside or not (self.work or tell):
             yield
             return
-        with self._query:
-            yield
-        self.seconds[name] = self.seconds.get(name, 0.0) + 1e-9 * self._query.elapsed
+        self._inside = True
+        started = time.perf_counter()
+        try:
+            if self.work:
+                free = self._free.setdefault(name, [])
+                asked = self._asked.setdefault(name, deque())
+                if not (free or asked):
+                    free += [self._ctx.query(time=True) for _ in range(_LATE)]
+                if not free:
+                    self._hear(name)
+                query = free.pop()
+                with query:
+                    yield
+                asked.append((query, tell))
+            elif tell:
+                yield
+                self._ctx.finish()
+                tell(time.perf_counter() - started)
+        finally:
+            self._inside = False
 
-    def since(self, before: dict[str, float]) -> dict[str, float]:
-        """Seconds by pass since `before`, a copy of `seconds`."""
+    def _hear(self, name: str) -> None:
+        query, tell = self._asked[name].popleft()
+        took = 1e-9 * query.elapsed
+        self._free[name].append(query)
+        self.seconds[name] = self.seconds.get(name, 0.0) + took
+        if tell is not None:
+            tell(took)
+
+    def since(self, before: dict[str, float], *, waits: bool = True) -> dict[str, float]:
+        """Seconds by pass since `before`, a copy of `seconds`; `waits`: of all that was timed."""
+        for name, asked in self._asked.items() if waits else ():
+            while asked:
+                self._hear(name)
         return {name: spent - before.get(name, 0.0) for name, spent in self.seconds.items()}
 
     def _tells_truth(self) -> bool:
         """Whether copying some memory takes more than no time, and no more than the wall clock says."""
-        assert self._query is not None
+        query = self._ctx.query(time=True)
         from_here, to_there = (self._ctx.buffer(reserve=_BYTES) for _ in range(2))
         try:
             self._ctx.finish()
             started = time.perf_counter()
-            with self._query:
+            with query:
                 for _ in range(_REPEATS):
                     self._ctx.copy_buffer(to_there, from_here)
             self._ctx.finish()
             wall = time.perf_counter() - started
-            return 0.0 < 1e-9 * self._query.elapsed <= 1.1 * wall
+            return 0.0 < 1e-9 * query.elapsed <= 1.1 * wall
         finally:
             from_here.release()
             to_there.release()

@@ -69,6 +69,9 @@ def contains(item: SceneObject, point: np.ndarray) -> bool:
     """Whether `point` (3,), in the world, lies inside the object's closed surface, and not on it, whichever way it
     faces there; slightly open meshes are judged too."""
     local = np.linalg.solve(item.object_to_world[:3, :3], np.asarray(point) - item.object_to_world[:3, 3])
+    low, high = item.mesh.bounds()
+    if np.any(local < low) or np.any(local > high):
+        return False
     winds = _crossings(item.mesh, local) != 0 if item.mesh.is_closed else abs(_winding(item.mesh, local)) > 0.5
     return winds and not _touches(item.mesh, local)
 

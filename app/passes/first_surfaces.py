@@ -11,6 +11,8 @@ from ..gpu.scene_buffers import SceneBuffers
 from .camera_records import CAMERA_PARAMETERS
 
 _CORNER = np.dtype([("position", "f4", 3), ("primitive", "u4"), ("object", "u4")])
+_BEYOND = np.array([((x, y, 0.0), NONE, NONE) for x, y in ((-1.0, -1.0), (3.0, -1.0), (-1.0, 3.0))], _CORNER)
+"""Drawn behind everything: all of the picture, in its own coordinates."""
 FAR = 1e30
 _NEAREST = 1e-4
 """Share of the farthest corner's depth at which what is drawn begins, however near the camera."""
@@ -31,20 +33,10 @@ class FirstSurfaces:
             (CAMERA_PARAMETERS,),
         )
         corners = self._corners_of(scene)
-        self._corners = ctx.buffer(corners.tobytes()) if len(corners) else None
-        self._draw = (
-            ctx.vertex_array(
-                self._program,
-                [(self._corners, "3f 8x", "position")]
-                if distances
-                else [(self._corners, "3f 1u 1u", "position", "primitive", "object")],
-            )
-            if self._corners is not None
-            else None
-        )
+        self._corners = ctx.buffer(corners.tobytes())
+        read = ("3f 8x", "position") if distances else ("3f 1u 1u", "position", "primitive", "object")
+        self._draw = ctx.vertex_array(self._program, [(self._corners, *read)])
         self._target: moderngl.Framebuffer | None = None
-        self._beyond = np.zeros(0)
-        """What a picture of the target's size holds beyond all."""
         self.texture: moderngl.Texture | None = None
 
     def _corners_of(self, scene: SceneBuffers) -> np.ndarray:
@@ -56,12 +48,11 @@ class FirstSurfaces:
             corners["object"] = np.repeat(np.arange(len(counts)), 3 * np.array(counts))
             self._bounds = np.concatenate([np.stack([p.min(axis=0), p.max(axis=0)]) for p in places if len(p)])
         corners["primitive"] = np.repeat(scene.primitives, 3)
-        return corners
+        return np.concatenate([_BEYOND, corners])
 
     def move(self, scene: SceneBuffers) -> None:
         """Objects have moved."""
-        if self._corners is not None:
-            self._corners.write(self._corners_of(scene).tobytes())
+        self._corners.write(self._corners_of(scene).tobytes())
 
     def run(self, parameters: np.ndarray) -> moderngl.Texture:
         """Draw what the camera of `parameters` (CAMERA_PARAMETERS, bound already) sees, in a picture of its size."""
@@ -70,13 +61,15 @@ class FirstSurfaces:
         target.use()
         target.viewport = (0, 0, width, height)
         assert self.texture is not None
-        target.clear(depth=1.0)
-        self.texture.write(self._beyond)
-        if self._draw is not None:
+        target.clear(FAR, depth=1.0)
+        self._ctx.enable_only(moderngl.NOTHING)
+        if not self._distances:  # integers cannot be cleared
+            self._draw.render(moderngl.TRIANGLES, vertices=len(_BEYOND))
+        if self._draw.vertices > len(_BEYOND):
             self._program["depths"] = self._depths(parameters)
             self._ctx.enable_only(moderngl.DEPTH_TEST)
             self._ctx.depth_func = "<"
-            self._draw.render(moderngl.TRIANGLES)
+            self._draw.render(moderngl.TRIANGLES, vertices=self._draw.vertices - len(_BEYOND), first=len(_BEYOND))
             self._ctx.enable_only(moderngl.NOTHING)
         self._ctx.memory_barrier()
         return self.texture
@@ -101,8 +94,6 @@ class FirstSurfaces:
                 if self._distances
                 else self._ctx.texture((width, height), 2, dtype="u4")
             )
-            pixels = (height, width)
-            self._beyond = np.full(pixels, FAR, "f4") if self._distances else np.full((*pixels, 2), NONE, "u4")
             self._target = self._ctx.framebuffer([self.texture], self._ctx.depth_texture((width, height)))
         return self._target
 
@@ -117,6 +108,4 @@ class FirstSurfaces:
     def release(self) -> None:
         """Free everything."""
         self._release_target()
-        for owned in (self._draw, self._corners, self._program):
-            if owned is not None:
-                shader.release(owned)
+        shader.release(self._draw, self._corners, self._program)

@@ -16,7 +16,6 @@ import numpy as np
 
 from ..features.program_switches import switched
 from ..gpu import shader
-from ..gpu.records import NONE
 from ..gpu.schema import Field, Struct
 from .camera_programs import direct_defines
 from .first_surfaces import FirstSurfaces
@@ -55,6 +54,10 @@ _GROUP = 8, 8
 _CELLS_GROUP = 32, 8
 """Many: a software renderer dispatches groups one by one, each of which takes as long as thirty cells."""
 _LISTED_GROUP = 64
+_EMPTY = np.array([0, 0, 0, 0, 0, 1, 1, 0, 0, 1, 1, 0], "u4").tobytes()
+"""Head of the lists (shaders/camera/moving_lists.glsl): counts, and work groups of either list."""
+_UNEVEN, _SPECULAR = 16, 32
+"""Where those groups are, bytes."""
 
 
 class MovingPicture:
@@ -82,21 +85,32 @@ class MovingPicture:
             "IMAGE_CELLS": IMAGE_CELLS,
             "IMAGE_MARKS": IMAGE_MARKS,
             "IMAGE_FACING": IMAGE_FACING,
+            "CELLS_LISTED": f"{_CELLS_GROUP[0] * _CELLS_GROUP[1]}u",
+            "PIXELS_LISTED": f"{_LISTED_GROUP}u",
         }
-        names = "lattice", "cells", "direct", "uneven", *(("blocks", "list", "glass") if view.follows else ())
+        names = "lattice", "cells", "direct", "uneven", *(("clear", "blocks", "list", "glass") if view.follows else ())
         self._programs = {
             name: shader.compute(self._ctx, f"camera/moving_{name}.comp", defines, (*structs, MOVING_PARAMETERS))
             for name in names
         }
+        self.follows = view.follows
+        """Something is seen by way of glass or mirrors."""
         self._parameters = self._ctx.buffer(reserve=MOVING_PARAMETERS.stride)
         self._lattice: list[moderngl.Texture] = []
         self._chosen: moderngl.Texture | None = None
         self._facing: moderngl.Texture | None = None
         self._lists: moderngl.Buffer | None = None
-        self.specular = 0
-        """Pixels that see glass, mirrors or coats first."""
-        self.followed = 0
-        """Paths that the last `glass` followed."""
+
+    @property
+    def specular(self) -> int:
+        """Pixels that see glass, mirrors or coats first; asking waits for the device."""
+        assert self._lists is not None
+        return int(np.frombuffer(self._lists.read(4, offset=4), "u4")[0])
+
+    @property
+    def followed(self) -> int:
+        """Paths that the last `glass` followed; asking waits for the device."""
+        return self._view.listed
 
     def direct(
         self, picture: moderngl.Texture, camera: Camera, maps: CausticMaps, max_taps: int, seed: int = 1
@@ -114,28 +128,25 @@ class MovingPicture:
             self._lattice = [self._ctx.texture(lattice, 4, dtype="f4") for _ in range(2)]
             self._lattice += [self._ctx.texture(size, 1, dtype="u4") for size in (cells, lattice)]
         # A pixel that sees a coat may be on both lists.
-        room = 8 + 4 * width * height * (2 if "COATS" in self._view.source[0] else 1)
+        room = len(_EMPTY) + 4 * width * height * (2 if "COATS" in self._view.source[0] else 1)
         if self._lists is None or self._lists.size != room:
             shader.release(self._lists)
             self._lists = self._ctx.buffer(reserve=room)
         self._set_step(1)
-        self._bind(maps, picture)
+        self._bind(picture)
         self._run("lattice", lattice, _CELLS_GROUP)
-        self._lists.write(bytes(8))
+        self._lists.write(_EMPTY)
         self._run("cells", cells, _CELLS_GROUP)
-        if count := self._listed()[0]:
-            self._set_step(1, lists_cells=True)
-            self._run("lattice", (count, 1), (_CELLS_GROUP[0] * _CELLS_GROUP[1], 1))
-        self._lists.write(bytes(8))
+        self._set_step(1, lists_cells=True)
+        self._run_listed("lattice", _UNEVEN)
+        self._lists.write(_EMPTY)
         self._run("direct", cells, _CELLS_GROUP)
-        uneven, self.specular = self._listed()
-        self._run_listed("uneven", uneven)
+        self._run_listed("uneven", _UNEVEN)
 
     def glass(self, picture: moderngl.Texture, maps: CausticMaps, step: int) -> Iterator[float]:
         """What is seen by way of glass and mirrors, one path for each block of `step`² pixels, added to what `direct`
         drew; pauses with the share done after every dispatch but the last."""
-        self.followed = 0
-        if not self.specular:
+        if not self.follows:
             return
         blocks = self._set_step(step)
         if self._chosen is None or self._facing is None or self._chosen.size != blocks:
@@ -143,24 +154,20 @@ class MovingPicture:
                 shader.release(self._chosen, self._facing)
             self._chosen = self._ctx.texture(blocks, 1, dtype="u4")
             self._facing = self._ctx.texture(blocks, 4, dtype="f4")
-        self._chosen.write(np.full(blocks[::-1], NONE, "u4"))
         self._camera["pixel_width"] = self._camera["pixel_height"] = step
         least = self._view.split_threshold
         self._camera["split_threshold"] = max(least, COARSE_SPLIT) if step >= COARSE else least
-        self._bind(maps, self._view.sums[0], glass=True)
-        self._run_listed("blocks", self.specular)
+        self._view.bind_for(self._camera, maps)
+        self._bind(self._view.sums[0], glass=True)
+        self._run("clear", blocks)
+        self._run_listed("blocks", _SPECULAR)
         self._view.start_list()
         self._run("list", blocks)
-        self.followed = self._view.listed
         yield 0.0
         yield from self._view.follow(self._camera, maps)
-        self._bind(maps, picture, glass=True)
-        self._run_listed("glass", self.specular)
-
-    def _listed(self) -> list[int]:
-        """What the last programs have listed from either end."""
-        assert self._lists is not None
-        return list(np.frombuffer(self._lists.read(8), "u4").tolist())
+        self._view.bind_for(self._camera, maps)
+        self._bind(picture, glass=True)
+        self._run_listed("glass", _SPECULAR)
 
     def _set_step(self, step: int, *, lists_cells: bool = False) -> tuple[int, int]:
         """Write the parameters for blocks of this side; how many there are."""
@@ -173,9 +180,9 @@ class MovingPicture:
         self._parameters.write(values.tobytes())
         return blocks
 
-    def _bind(self, maps: CausticMaps, picture: moderngl.Texture, *, glass: bool = False) -> None:
-        """What the programs read and write, for those that run one after the other; `glass`: of glass and mirrors."""
-        self._view.bind_for(self._camera, maps)
+    def _bind(self, picture: moderngl.Texture, *, glass: bool = False) -> None:
+        """What programs that run one after the other read and write besides the view's; `glass`: of glass and
+        mirrors."""
         self._parameters.bind_to_uniform_block(BIND_MOVING)
         assert self._lists is not None
         self._lists.bind_to_storage_buffer(BIND_MOVING_LISTS)
@@ -195,9 +202,10 @@ class MovingPicture:
             assert texture is not None
             texture.bind_to_image(unit, read=True, write=True)
 
-    def _run_listed(self, name: str, count: int) -> None:
-        if count:
-            self._run(name, (count, 1), (_LISTED_GROUP, 1))
+    def _run_listed(self, name: str, groups: int) -> None:
+        assert self._lists is not None
+        self._programs[name].run_indirect(self._lists, groups)
+        self._ctx.memory_barrier()
 
     def _run(self, name: str, size: tuple[int, ...], group: tuple[int, int] = _GROUP) -> None:
         self._programs[name].run(-(-size[0] // group[0]), -(-size[1] // group[1]))

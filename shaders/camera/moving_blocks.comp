@@ -8,7 +8,7 @@ layout(local_size_x = 64) in;
 layout(r32ui, binding = IMAGE_CHOSEN) uniform restrict uimage2D chosen;
 
 void main() {
-    uint at = gl_GlobalInvocationID.x;
+    uint at = place_on_list();
     if (at >= specular_count) return;
     uint number = specular_pixel(at);
     uvec2 pixel = pixel_of(number);

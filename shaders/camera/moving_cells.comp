@@ -40,7 +40,11 @@ void main() {
             }
         }
         // … but of something thin it does not tell enough.
-        if (alone && !thin) pixels[atomicAdd(uneven_count, 1u)] = uint(cell.x) | uint(cell.y) << 16;
+        if (alone && !thin) {
+            uint place = atomicAdd(uneven_count, 1u);
+            pixels[place] = uint(cell.x) | uint(cell.y) << 16;
+            COUNT_GROUPS(uneven_groups, place, CELLS_LISTED)
+        }
         if (alone) found = thin ? NONE : mark;
     }
     imageStore(cells, cell, uvec4(found));

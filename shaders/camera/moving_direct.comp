@@ -89,6 +89,18 @@ vec3 albedo_of(uvec2 pixel, uvec2 first) {
     return base_albedo(seen, receivers[object_at(first.y).receiver].reflectance_class == 0u);
 }
 
+void list_uneven(uint number) {
+    uint place = atomicAdd(uneven_count, 1u);
+    pixels[place] = number;
+    COUNT_GROUPS(uneven_groups, place, PIXELS_LISTED)
+}
+
+void list_specular(uint number) {
+    uint place = atomicAdd(specular_count, 1u);
+    pixels[specular_place(place)] = number;
+    COUNT_GROUPS(specular_groups, place, PIXELS_LISTED)
+}
+
 void main() {
     ivec2 cell = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(cell, ivec2(m.lattice) - 1))) return;
@@ -123,14 +135,14 @@ void main() {
         if (!even && inside) {
             bool specular = is_specular(kind_of(first));
             uint number = pixel.y * p.size.x + pixel.x;
-            if (!specular) pixels[atomicAdd(uneven_count, 1u)] = number;
-            if (!COATS && specular) pixels[p.size.x * p.size.y - 1u - atomicAdd(specular_count, 1u)] = number;
+            if (!specular) list_uneven(number);
+            if (!COATS && specular) list_specular(number);
         }
         if (COATS) {
             // What a coat reflects is followed besides.
             uint kind = inside ? kind_of(first) : NONE;
             if (is_specular(kind) || (kind == KIND_DIFFUSE && is_coated(first.y)))
-                pixels[2u * p.size.x * p.size.y - 1u - atomicAdd(specular_count, 1u)] = pixel.y * p.size.x + pixel.x;
+                list_specular(pixel.y * p.size.x + pixel.x);
         }
         if (inside) imageStore(picture, ivec2(pixel), vec4(found.rgb, 1.0));
     }

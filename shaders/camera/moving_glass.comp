@@ -26,7 +26,7 @@ float spline(float away) {
 }
 
 void main() {
-    uint at = gl_GlobalInvocationID.x;
+    uint at = place_on_list();
     if (at >= specular_count) return;
     uvec2 pixel = pixel_of(specular_pixel(at)), first = seen_first(pixel);
     vec3 normal = facing_of(first, pixel);

@@ -63,7 +63,7 @@ void main() {
     ivec2 at = ivec2(gl_GlobalInvocationID.xy);
     bool is_cell = m.lists_cells != 0u;
     if (is_cell) {
-        uint number = gl_WorkGroupID.x * gl_WorkGroupSize.x * gl_WorkGroupSize.y + gl_LocalInvocationIndex;
+        uint number = place_on_list();
         if (number >= uneven_count) return;
         at = ivec2(pixels[number] & 0xffffu, pixels[number] >> 16);
     } else if (any(greaterThanEqual(at, ivec2(m.lattice))))

@@ -7,7 +7,7 @@ layout(rgba32f, binding = IMAGE_PICTURE) uniform writeonly restrict image2D pict
 #include "camera/moving_lists.glsl"
 
 void main() {
-    uint at = gl_GlobalInvocationID.x;
+    uint at = place_on_list();
     if (at >= uneven_count) return;
     uvec2 pixel = pixel_of(pixels[at]), first = seen_first(pixel);
     bool met = first.y != NONE;

@@ -26,4 +26,7 @@ void main() {
     gl_Position = p.orthographic != 0u
         ? vec4(place.x, -place.y, (2.0 * depth - depths.x - depths.y) / span, 1.0)
         : vec4(place.x, -place.y, ((depths.y + depths.x) * depth - 2.0 * depths.x * depths.y) / span, depth);
+#if !DISTANCES
+    if (object == 0xffffffffu) gl_Position = vec4(position, 1.0);  // beyond all
+#endif
 }

@@ -68,8 +68,14 @@ class Mesh:
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Lowest and highest corner of the box round every vertex a triangle uses, float64 (3,) each."""
+        return self._bounds
+
+    @cached_property
+    def _bounds(self) -> tuple[np.ndarray, np.ndarray]:
         used = self.corners().reshape(-1, 3)
-        return used.min(axis=0), used.max(axis=0)
+        low, high = used.min(axis=0), used.max(axis=0)
+        low.flags.writeable = high.flags.writeable = False
+        return low, high
 
     def volume(self) -> float:
         """Signed volume, cubic units; positive when a closed mesh faces outward (divergence theorem)."""

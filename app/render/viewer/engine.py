@@ -173,7 +173,7 @@ class LiveEngine(EngineAnswers):
             self._building.drop()
             self.problem = str(error)
             self._tell(events.Failed())
-        self._tally.seconds |= self.context.timers.since(on_device)
+        self._tally.seconds |= self.context.timers.since(on_device, waits=False)
 
     def _follow(self, budget_s: float) -> None:
         """Bring what is shown nearer to what is wanted."""

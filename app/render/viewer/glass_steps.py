@@ -26,7 +26,7 @@ class GlassSteps:
         self.pixels = 0
         """Pixels of the last picture in motion that see glass or mirrors."""
 
-    def learn(self, paths: int, seconds: float) -> None:
+    def learn(self, paths: float, seconds: float) -> None:
         """So many paths took `seconds`."""
         self.rate = blended(self.rate, paths, seconds)
 
@@ -46,7 +46,7 @@ class GlassSteps:
         return [step for step in (REFINED_SOON if self.are_soon_done else REFINED) if step < side]
 
 
-def blended(rate: float | None, units: int, seconds: float) -> float:
+def blended(rate: float | None, units: float, seconds: float) -> float:
     """A rate, units per second, with so many that were done in `seconds`."""
     measured = units / max(seconds, 1e-4)
     return measured if rate is None else rate + _RATE_BLEND * (measured - rate)

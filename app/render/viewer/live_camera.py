@@ -14,6 +14,7 @@ from __future__ import annotations
 import copy
 import time
 from collections.abc import Iterator
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -389,29 +390,31 @@ class LiveCamera:
         assert self._maps is not None and self._camera is not None and self._moving is not None
         if self._drawn is None:
             self._drawn = self._spare_of(self._size)
-            started = time.perf_counter()
-            self._moving.direct(self._drawn, self._camera, self._maps, MOVING_TAPS)
-            self._context.finish()
-            if not self._is_first:  # drivers compile at the first use
-                self._direct_rate = blended(
-                    self._direct_rate, self._size[0] * self._size[1], time.perf_counter() - started
-                )
-            self._is_first = False
-            self._glass.pixels = self._moving.specular
+            learn = None if self._is_first else partial(self._learn_direct, self._size[0] * self._size[1])
+            with self._context.timers.timing("camera", learn):
+                self._moving.direct(self._drawn, self._camera, self._maps, MOVING_TAPS)
+            self._is_first = False  # drivers compile at the first use
+            self._glass.pixels = self._specular
             if not self._glass.pixels:
                 self._ladder = [1]
             return False
         step = self._ladder[0]
         if self._steps is None:
             self._steps, self._spent_s = self._moving.glass(self._drawn, self._maps, step), 0.0
-        started = time.perf_counter()
-        goes_on = next(self._steps, None) is not None
-        self._spent_s += time.perf_counter() - started
-        if goes_on:
-            return False
+        if self._context.traits.work_is_queued and self._is_preview:
+            # Nobody waits to count the paths: each block has one at most.
+            with self._context.timers.timing("camera", partial(self._glass.learn, self._glass.pixels / step**2)):
+                for _ in self._steps:
+                    pass
+        else:
+            started = time.perf_counter()
+            goes_on = next(self._steps, None) is not None
+            self._spent_s += time.perf_counter() - started
+            if goes_on:
+                return False
+            if not self._context.traits.work_is_queued and self._moving.followed:
+                self._glass.learn(self._moving.followed, self._spent_s)
         self._steps = None
-        if self._moving.followed:
-            self._glass.learn(self._moving.followed, self._spent_s)
         self._ladder.pop(0)
         assert self._pass is not None
         if self._pass.has_haze:
@@ -426,6 +429,17 @@ class LiveCamera:
         self._shows_whole = self._shows_other = self._owes = False
         self.version += 1
         return True
+
+    @property
+    def _specular(self) -> int:
+        """Pixels of the picture in motion that see glass or mirrors; at most, where asking would wait."""
+        assert self._moving is not None
+        if not self._moving.follows:
+            return 0
+        return self._size[0] * self._size[1] if self._context.traits.work_is_queued else self._moving.specular
+
+    def _learn_direct(self, pixels: int, seconds: float) -> None:
+        self._direct_rate = blended(self._direct_rate, pixels, seconds)
 
     def _spare_of(self, size: tuple[int, int]) -> moderngl.Texture:
         """A picture that is not shown."""
