@@ -11,12 +11,13 @@ import os
 import sys
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal, Self
+from typing import TYPE_CHECKING, Literal, Self
 
 from ..base.errors import DeviceError, OwnCallError, UserError, own_fault, suggestion
 from .better_device import advice
 from .device_traits import DeviceTraits
 from .limits import Limits
+from .linker import adopting_context
 from .splat_way import SplatWay, way_of
 
 if TYPE_CHECKING:
@@ -147,19 +148,20 @@ def _from_environment() -> Backend | None:
 
 
 def _create_egl() -> Context:
-    import moderngl
+    import glcontext
 
     egl = _first_loadable(("libEGL.so.1", "libEGL.so"))
     gl = _first_loadable(("libGL.so.1", "libOpenGL.so.0", "libGL.so"))
     if egl is None or gl is None:
         missing = "libEGL.so.1" if egl is None else "libGL.so.1"
         raise UserError(f"OpenGL is missing ({missing} is not installed): run '{APT_LINE}' as root")
-    libraries: Any = {"backend": "egl", "libegl": egl, "libgl": gl}
+    open_device = glcontext.get_backend_by_name("egl")
     problem = ""
     # The first device may be a card without rights or too old, and a software one follow it.
     for index in range(_MAX_EGL_DEVICES):
         try:
-            ctx = moderngl.create_standalone_context(require=GL_VERSION_CODE, **libraries | {"device_index": index})
+            loader = open_device(mode="standalone", glversion=GL_VERSION_CODE, libegl=egl, libgl=gl, device_index=index)
+            ctx = adopting_context(loader, GL_VERSION_CODE, standalone=True)
         except Exception as error:  # noqa: BLE001 - glcontext raises bare Exception
             if index > 0 and "requested device index" in str(error):
                 break
@@ -172,18 +174,15 @@ def _create_egl() -> Context:
 
 
 def _create_osmesa() -> Context:
-    import moderngl
-
     from .osmesa import OSMesaLoader
 
     try:
-        loader: Any = OSMesaLoader(*GL_VERSION)
+        loader = OSMesaLoader(*GL_VERSION)
     except OSError as error:
         raise UserError(
             f"OpenGL through OSMesa failed ({error}): run '{APT_LINE_OSMESA}' as root, or use EGL"
         ) from error
-    ctx = moderngl.create_context(require=GL_VERSION_CODE, standalone=True, context=loader)
-    return Context(ctx, "osmesa")
+    return Context(adopting_context(loader, GL_VERSION_CODE, standalone=True), "osmesa")
 
 
 def _explain_egl(problem: str) -> str:

@@ -63,6 +63,9 @@ class DeviceTraits:
     """Sizes while a picture is shown that gets better."""
     viewer_splat_photons: int = 1 << 18
     """Photons splatted between two pauses."""
+    compiles_ahead: bool = True
+    """The driver's threads compile programs side by side, where it has some, and binaries are kept on the disk. Of a
+    software renderer programs are compiled at their first dispatch, which no binary spares."""
     splats_by_compute: bool = False
     """Compute shaders add splats, the rasteriser does not draw them. Of a GPU that is measured (`splat_way`)."""
 
@@ -89,6 +92,7 @@ class DeviceTraits:
             queue_read_steps=1,
             batch_scale=1,
             work_is_queued=False,
+            compiles_ahead=False,
             dispatch_s=0.15,
             paths_group=8,
             viewer=Budget(1 << 14, 1 << 14, 1 << 22, 256 << 20),

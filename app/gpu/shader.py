@@ -17,19 +17,19 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from typing import TYPE_CHECKING, Protocol, cast
 
 from ..base import paths
 from ..features.features import all_symbols
 from .glsl_conditionals import Line
+from .linker import linker_of
 from .schema import Struct
 from .stripped_store import stripped
-from .unlocked import calls_of, unlocked
 
 if TYPE_CHECKING:
     import moderngl
 
-    P = TypeVar("P", moderngl.ComputeShader, moderngl.Program)
+    AnyProgram = moderngl.ComputeShader | moderngl.Program
 
 _INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"\s*$')
 _MESA_LINE = re.compile(r"\b\d+:(\d+)(?=\()")
@@ -149,7 +149,7 @@ def load_source(
     return source
 
 
-_kept: dict[int, OrderedDict[tuple[str, ...], moderngl.ComputeShader | moderngl.Program]] = {}
+_kept: dict[int, OrderedDict[tuple[str, ...], AnyProgram]] = {}
 _keepers: Counter[int] = Counter()
 """`keep_programs` not yet undone, by context."""
 _owners: Counter[int] = Counter()
@@ -216,7 +216,7 @@ def _drop(program: Releasable) -> None:
         program.release()
 
 
-def _kept_or(ctx: moderngl.Context, texts: tuple[str, ...], compiled: Callable[[], P]) -> P:
+def _kept_or(ctx: moderngl.Context, texts: tuple[str, ...], compiled: Callable[[], AnyProgram]) -> AnyProgram:
     programs = _kept.get(id(ctx))
     if programs is None:
         return compiled()
@@ -226,7 +226,7 @@ def _kept_or(ctx: moderngl.Context, texts: tuple[str, ...], compiled: Callable[[
             _drop(programs.popitem(last=False)[1])
     programs.move_to_end(texts)
     _owners[id(programs[texts])] += 1
-    return programs[texts]  # type: ignore[return-value]
+    return programs[texts]
 
 
 @dataclass(frozen=True)
@@ -263,17 +263,21 @@ def recorded() -> Iterator[list[Built]]:
         _recordings.pop()
 
 
-def _built(ctx: moderngl.Context, stages: tuple[Source, ...], compiled: Callable[[], P]) -> P:
+def _built(ctx: moderngl.Context, stages: tuple[Source, ...]) -> AnyProgram:
     """The program of these stages, kept or new. It is recorded before it is compiled, in case that ends everything."""
     texts = tuple(stage.text for stage in stages)
     started = time.perf_counter()
     is_new = texts not in _kept.get(id(ctx), ())
     for programs in _recordings:
         programs.append(Built(stages, 0.0))
-    calls = calls_of(ctx)
-    if is_new and calls is not None:
-        calls.compile(texts)
-    program = _kept_or(ctx, texts, compiled)
+
+    def refusal(log: str) -> ShaderError:
+        source = stages[-1] if "fragment" in log.lower() else stages[0]
+        names = " with ".join(stage.name for stage in stages)
+        return ShaderError(f"{names} does not compile:\n{source.explain(log)}")
+
+    at_once = bool(_recordings)  # seconds are asked for
+    program = _kept_or(ctx, texts, lambda: linker_of(ctx).program(ctx, texts, refusal, at_once))
     for programs in _recordings:
         programs[-1] = Built(stages, time.perf_counter() - started if is_new else 0.0)
     return program
@@ -286,12 +290,10 @@ def compute(
     structs: Sequence[Struct] = (),
     extensions: Sequence[str] = (),
 ) -> moderngl.ComputeShader:
-    """Compile the compute shader `name`; raises `ShaderError` with file and line."""
+    """The compute shader `name`; raises `ShaderError` with file and line, at its first use where the driver compiles
+    it meanwhile."""
     source = load_source(name, defines, structs, extensions=extensions)
-    try:
-        return _built(ctx, (source,), lambda: unlocked(ctx.compute_shader(source.text)))
-    except Exception as error:  # moderngl raises its own Error type with the driver's log
-        raise ShaderError(f"{name} does not compile:\n{source.explain(str(error))}") from error
+    return cast("moderngl.ComputeShader", _built(ctx, (source,)))
 
 
 def program(
@@ -301,17 +303,6 @@ def program(
     defines: Mapping[str, int | float | str] | None = None,
     structs: Sequence[Struct] = (),
 ) -> moderngl.Program:
-    """Compile and link a vertex and a fragment shader; raises `ShaderError` with file and line."""
-    vertex_source = load_source(vertex, defines, structs)
-    fragment_source = load_source(fragment, defines, structs)
-    stages = vertex_source, fragment_source
-    try:
-        return _built(
-            ctx,
-            stages,
-            lambda: ctx.program(vertex_shader=vertex_source.text, fragment_shader=fragment_source.text),
-        )
-    except Exception as error:
-        log = str(error)
-        source = fragment_source if "fragment" in log.lower() else vertex_source
-        raise ShaderError(f"{vertex} with {fragment} does not compile:\n{source.explain(log)}") from error
+    """A vertex and a fragment shader linked; raises as `compute` does."""
+    stages = load_source(vertex, defines, structs), load_source(fragment, defines, structs)
+    return cast("moderngl.Program", _built(ctx, stages))

@@ -14,7 +14,6 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, cast
 
-import moderngl
 import numpy as np
 from imgui_bundle import imgui  # before glfw: it brings the GLFW that both then use
 
@@ -25,6 +24,7 @@ from ..edit.preferences import WindowPlace
 from ..gpu import unlocked
 from ..gpu.context import GL_VERSION, GL_VERSION_CODE, Context
 from ..gpu.context_thread import ContextThread
+from ..gpu.linker import adopting_context
 from . import theme
 from .imgui_host import ImguiHost
 
@@ -74,8 +74,7 @@ class Window:
         place = place or WindowPlace()
         self._handle = _create(place, visible)
         glfw.make_context_current(self._handle)
-        loader: Any = GlfwLoader()
-        self.context = Context(moderngl.create_context(require=GL_VERSION_CODE, context=loader), "window")
+        self.context = Context(adopting_context(GlfwLoader(), GL_VERSION_CODE), "window")
         # A GPU waits for the screen; on the processor waiting would be time taken from the photons.
         glfw.swap_interval(0 if self.context.is_software else 1)
         self._screen = self.context.ctx.detect_framebuffer(0)
@@ -412,8 +411,8 @@ def _beside(window: Any) -> Any | None:
 def _entered(hidden: Any) -> Context:
     """The context of a hidden window, made current on the thread that asks."""
     glfw.make_context_current(hidden)
-    loader: Any = GlfwLoader()
-    context = Context(moderngl.create_context(require=GL_VERSION_CODE, context=loader), "window")
+    loader = GlfwLoader()
+    context = Context(adopting_context(loader, GL_VERSION_CODE), "window")
     unlocked.unlock(context.ctx, loader.load)
     return context
 

@@ -7,7 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-import moderngl
+import glcontext
 import numpy as np
 import pytest
 from spectrasplat.base.errors import UserError
@@ -131,7 +131,7 @@ class TestFailures:
                 raise Exception("requested device index 2, but found 2 devices")
             raise Exception(raw)
 
-        monkeypatch.setattr(moderngl, "create_standalone_context", refuse)
+        monkeypatch.setattr(glcontext, "get_backend_by_name", lambda _name: refuse)
         with pytest.raises(UserError, match=told) as caught:
             create_context("egl")
         assert tried == [0, 1, 2]  # every device had its chance

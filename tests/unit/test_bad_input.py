@@ -188,7 +188,7 @@ def test_warnings_are_told_before_a_failure(
 def test_opengl_missing_or_too_old(
     problem: str | None, told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    import moderngl
+    import glcontext
     from spectrasplat.gpu import context, osmesa
 
     def no_library(*_: object) -> None:
@@ -200,7 +200,7 @@ def test_opengl_missing_or_too_old(
     monkeypatch.delenv("SPECTRASPLAT_BACKEND", raising=False)
     monkeypatch.setattr(osmesa, "load_library", no_library)
     monkeypatch.setattr(context, "_first_loadable", lambda names: None if problem is None else names[0])
-    monkeypatch.setattr(moderngl, "create_standalone_context", refuse)
+    monkeypatch.setattr(glcontext, "get_backend_by_name", lambda _name: refuse)
     monkeypatch.chdir(tmp_path)
     lay_out(tmp_path, Case(PLAIN, ()))
     before = contents(tmp_path)

@@ -1,0 +1,179 @@
+"""Programs that the driver compiles ahead, and the binaries that spare a later start compiling: on a GPU's traits."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from spectrasplat.base import paths
+from spectrasplat.gpu import linker, program_store, shader
+from spectrasplat.gpu.context import Context, create_context
+from spectrasplat.gpu.device_traits import DeviceTraits, assumed
+from spectrasplat.gpu.linker import Pending, linker_of
+from spectrasplat.gpu.program_store import Binary
+
+DOUBLE = """#version 430 core
+layout(local_size_x = 64) in;
+layout(std430, binding = 0) buffer Values { float value[]; };
+uniform float factor;
+void main() { value[gl_GlobalInvocationID.x] *= factor; }
+"""
+VERTEX = "#version 430 core\nin vec2 place;\nvoid main() { gl_Position = vec4(place, 0.0, 1.0); }\n"
+FRAGMENT = "#version 430 core\nout vec4 colour;\nuniform vec4 paint;\nvoid main() { colour = paint; }\n"
+SECOND_START = """
+from spectrasplat.base.paths import shipped_scenes
+from spectrasplat.bench.programs import compiled_programs
+from spectrasplat.gpu import linker
+from spectrasplat.gpu.context import create_context
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.settings import RenderSettings
+
+calls = {"compiled": 0, "linked": 0}
+began = linker.Linker.__init__
+
+def begin(self, loader):
+    began(self, loader)
+    compile, link = self._compile_shader, self._link_program
+    self._compile_shader = lambda shader: calls.update(compiled=calls["compiled"] + 1) or compile(shader)
+    self._link_program = lambda program: calls.update(linked=calls["linked"] + 1) or link(program)
+
+with create_context() as context:  # it measures how fast the device blends, by a program of four lines
+    linker.Linker.__init__ = begin
+with create_context() as context:
+    calls.update(compiled=0, linked=0)
+    programs = compiled_programs(context, load_scene(shipped_scenes()["prism"]), RenderSettings(max_depth=16))
+    print(len(programs), calls["compiled"], calls["linked"])
+"""
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setattr(paths, "cache_dir", lambda: tmp_path)
+    return tmp_path / "programs"
+
+
+@pytest.fixture
+def ahead() -> Iterator[Context]:
+    """A context that compiles ahead and keeps binaries, as a GPU's does."""
+    with assumed(DeviceTraits()), create_context() as context:
+        if not linker_of(context.ctx)._device:
+            pytest.skip("this driver gives no binaries, as Mesa's without its cache")
+        yield context
+
+
+def doubling(context: Context, at_once: bool = True):
+    return linker_of(context.ctx).program(context.ctx, (DOUBLE,), RuntimeError, at_once)
+
+
+def is_compiled_anew(context: Context, monkeypatch: pytest.MonkeyPatch) -> bool:
+    """Whether the driver gets the text; the program works in any case."""
+    compiled = []
+    link = linker_of(context.ctx)
+    with monkeypatch.context() as patched:
+        compile_shader = link._compile_shader
+        patched.setattr(link, "_compile_shader", lambda shader: compiled.append(shader) or compile_shader(shader))
+        program = doubling(context)
+    values = context.ctx.buffer(np.arange(64, dtype="f4").tobytes())
+    values.bind_to_storage_buffer(0)
+    program["factor"] = 2.0
+    program.run(1)
+    assert np.frombuffer(values.read(), "f4").tolist() == [2.0 * n for n in range(64)]
+    values.release()
+    program.release()
+    return bool(compiled)
+
+
+def test_a_second_start_compiles_nothing(tmp_path: Path) -> None:
+    environment = os.environ | {"SPECTRASPLAT_DEVICE": "gpu", "XDG_CACHE_HOME": str(tmp_path / "cache")}
+
+    def start() -> list[int]:
+        command = [sys.executable, "-P", "-c", SECOND_START]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=600, check=True)
+        return [int(word) for word in done.stdout.split()]
+
+    programs, compiled, linked = start()
+    assert programs > 10 and compiled >= programs and linked == programs
+    assert start() == [programs, 0, 0]
+
+
+def test_what_is_damaged_or_anothers_is_compiled(ahead: Context, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert is_compiled_anew(ahead, monkeypatch)
+    assert not is_compiled_anew(ahead, monkeypatch)
+    (file,) = folder.iterdir()
+    whole = file.read_bytes()
+    for damaged in (b"", whole[: len(whole) // 2], whole[:-9] + bytes(9), b"\0" * len(whole)):
+        file.write_bytes(damaged)
+        assert is_compiled_anew(ahead, monkeypatch)
+        assert not is_compiled_anew(ahead, monkeypatch)
+    program_store.save(file.stem, Binary(0x1234, b"what no driver takes back"))
+    assert is_compiled_anew(ahead, monkeypatch)
+    assert ahead.ctx.error == "GL_NO_ERROR"
+    link = linker_of(ahead.ctx)
+    monkeypatch.setattr(link, "_device", ("another vendor", *link._device[1:]))
+    assert is_compiled_anew(ahead, monkeypatch)
+    assert len(list(folder.iterdir())) == 2
+
+
+def test_a_folder_that_cannot_be_written_costs_only_time(
+    ahead: Context, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder.write_text("not a folder")
+    assert is_compiled_anew(ahead, monkeypatch)
+    assert is_compiled_anew(ahead, monkeypatch)
+
+
+def test_old_binaries_are_forgotten(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(program_store, "MOST_BYTES", 3000)
+    code = np.random.default_rng(1).bytes(1000)
+    for at in range(5):
+        program_store.save(f"{at:064}", Binary(at, code))
+        os.utime(folder / f"{at:064}.program", ns=(at, at))
+    assert [program_store.load(f"{at:064}") is not None for at in range(5)] == [False, False, False, True, True]
+    assert program_store.load(f"{4:064}") == Binary(4, code)
+
+
+def test_nothing_waits_for_a_program_before_its_use(ahead: Context) -> None:
+    link = linker_of(ahead.ctx)
+    program = doubling(ahead, at_once=False)
+    assert isinstance(program, Pending)
+    while link.is_compiling:
+        pass
+    assert program["factor"].value == 0.0
+    assert not isinstance(program, Pending) and isinstance(program, linker.moderngl.ComputeShader)
+    program.release()
+    unused = doubling(ahead, at_once=False)
+    unused.release()
+    unused.release()
+    assert not link.is_compiling
+    drawing = link.program(ahead.ctx, (VERTEX, FRAGMENT), RuntimeError, at_once=False)
+    texture = ahead.ctx.texture((4, 4), 4, dtype="f4")
+    target = ahead.ctx.framebuffer([texture])
+    corners = ahead.ctx.buffer(np.float32([-1, -1, 3, -1, -1, 3]).tobytes())
+    array = ahead.ctx.vertex_array(drawing, [(corners, "2f", "place")])
+    drawing["paint"] = (1.0, 2.0, 3.0, 4.0)
+    target.use()
+    array.render()
+    assert np.frombuffer(texture.read(), "f4").reshape(16, 4).tolist() == 16 * [[1.0, 2.0, 3.0, 4.0]]
+    assert ahead.ctx.error == "GL_NO_ERROR"
+
+
+def test_a_refusal_names_file_and_line_whenever_it_comes(
+    ahead: Context, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(paths, "shaders_dir", lambda: tmp_path)
+    (tmp_path / "bad.comp").write_text("layout(local_size_x = 1) in;\nvoid main() {\n    int n = oops;\n}\n")
+    (tmp_path / "bad.vert").write_text("out vec3 a;\nvoid main() { a = vec3(1.0); gl_Position = vec4(1.0); }\n")
+    (tmp_path / "bad.frag").write_text("in vec4 a;\nout vec4 o;\nvoid main() { o = a; }\n")
+    program = shader.compute(ahead.ctx, "bad.comp")
+    for _ in range(2):
+        with pytest.raises(shader.ShaderError, match=r"bad\.comp does not compile:(.|\n)*bad\.comp:3"):
+            program.run(1)
+    with pytest.raises(shader.ShaderError, match=r"bad\.vert with bad\.frag does not compile"):
+        shader.program(ahead.ctx, "bad.vert", "bad.frag").get("x", None)
+    with shader.recorded(), pytest.raises(shader.ShaderError):
+        shader.compute(ahead.ctx, "bad.comp")
