@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ..features.features import Features
+from ..gpu import shader
 from ..model.settings import RenderSettings
 from ..passes.camera import CameraPass
 from ..render.device_scene import scene_buffers
 from ..render.light_pass import LightPass
+from ..render.photon_batches import traced_besides
 from ..render.splatting import Pace
 
 if TYPE_CHECKING:
@@ -19,6 +25,9 @@ if TYPE_CHECKING:
 
 _FRAMES = 4
 """The first one compiles."""
+_TRACES = 3
+"""Likewise."""
+_EVENTS = "events_per_dispatch"
 
 
 @dataclass(frozen=True)
@@ -36,38 +45,128 @@ class FrameCost:
     @property
     def all(self) -> float:
         """The whole frame."""
-        return self.trace + self.splat + self.camera
+        return self.light + self.camera
 
     @property
-    def line(self) -> str:
-        """For people."""
-        by_device = ", ".join(f"{name} {1e3 * spent:.2f}" for name, spent in self.device.items())
-        return (
-            f"{1e3 * self.all:.1f} ms: trace {1e3 * self.trace:.1f}, splat {1e3 * self.splat:.1f}, camera "
-            f"{1e3 * self.camera:.1f}; {self.photons / max(self.trace, 1e-9) / 1e6:.2f} M photons/s traced, "
-            f"{self.splats / max(self.splat, 1e-9) / 1e6:.2f} M splats/s"
-            + (f"; by the device's timers, ms: {by_device}" if by_device else "")
-        )
+    def light(self) -> float:
+        """Photons traced and in the maps."""
+        return self.trace + self.splat
+
+    @property
+    def figures(self) -> dict[str, float]:
+        """With units in their names."""
+        found = {
+            "photons": self.photons,
+            "frame_ms": _ms(self.all),
+            "trace_ms": _ms(self.trace),
+            "splat_ms": _ms(self.splat),
+            "camera_ms": _ms(self.camera),
+            "splats": self.splats,
+        }
+        return found | {f"{name}_device_ms": _ms(spent) for name, spent in self.device.items()}
 
 
-def measure(context: Context, scene: Scene, size: tuple[int, int], photons: int) -> FrameCost:
-    """The best of a few frames of `photons` by photons alone, maps fitted to a picture of `size`, and one camera sample
-    a pixel. What is done once for a scene (pilots, tables) is left out."""
-    settings = RenderSettings(
-        width=size[0], height=size[1], photons=photons, method="srd-photons", max_depth=scene.render.max_depth
-    )
+def _ms(seconds: float) -> float:
+    return round(1e3 * seconds, 3)
+
+
+def photons_within(costs: Sequence[FrameCost], seconds: float, with_camera: bool) -> int:
+    """Photons whose light, or whole frame, takes so many `seconds`, by the straight line through the two `costs` of
+    different photons that are nearest to it; 0 where none do."""
+    photons = np.array([cost.photons for cost in costs], float)
+    spent = np.array([cost.all if with_camera else cost.light for cost in costs])
+    order = np.argsort(photons)
+    photons, spent = photons[order], spent[order]
+    at = int(np.clip(np.searchsorted(spent, seconds), 1, len(spent) - 1))
+    slope = max(spent[at] - spent[at - 1], 1e-9) / (photons[at] - photons[at - 1])
+    return max(0, int(photons[at - 1] + (seconds - spent[at - 1]) / slope))
+
+
+@contextmanager
+def _light(context: Context, scene: Scene, settings: RenderSettings) -> Iterator[LightPass]:
+    """A light pass of `scene`, with what is done once for a scene (pilots, tables) done."""
+    settings = replace(settings, method="srd-photons", max_depth=scene.render.max_depth)
     buffers = scene_buffers(context, scene, settings)
     light = LightPass(context, scene, settings, Features.of(scene, settings), buffers, pace=Pace(True))
-    camera: CameraPass | None = None
     try:
         light.prepare()
-        camera = CameraPass(context, buffers, "beauty", light.reflectances, light.map_channels)
-        frames = [_frame(context, light, camera, size, photons, seed) for seed in range(_FRAMES)]
+        yield light
     finally:
-        for owned in (camera, light, buffers):
-            if owned is not None:
-                owned.release()
-    return min(frames[1:], key=lambda cost: cost.all)
+        shader.release(light, buffers)
+
+
+def measure(context: Context, scene: Scene, size: tuple[int, int], photons: Sequence[int]) -> Iterator[FrameCost]:
+    """For each number of `photons`, by photons alone: the best of a few frames with maps fitted to a picture of `size`
+    and one camera sample a pixel. What is done once for a scene is left out."""
+    with _light(context, scene, RenderSettings(width=size[0], height=size[1])) as light:
+        camera = CameraPass(context, light.buffers, "beauty", light.reflectances, light.map_channels)
+        try:
+            for count in photons:
+                frames = [_frame(context, light, camera, size, count, seed) for seed in range(_FRAMES)]
+                yield min(frames[1:], key=lambda cost: cost.all)
+        finally:
+            camera.release()
+
+
+def trace_rates(
+    context: Context, scene: Scene, photons: int, events: Sequence[int], batches: Sequence[int]
+) -> Iterator[dict[str, float]]:
+    """Tracing `photons` alone, with so many `events` a dispatch and rays in flight: the best of a few, ms."""
+    traits = context.traits
+    try:
+        for each in events:
+            if not hasattr(traits, _EVENTS):
+                if each > 1:
+                    continue
+            else:
+                context.traits = replace(traits, **{_EVENTS: each})  # type: ignore[arg-type]
+            for batch in batches:
+                with _light(context, scene, RenderSettings(width=480, height=270, batch=batch)) as light:
+                    light.begin(photons, 1)
+                    spent = [_trace(context, light, photons) for _ in range(_TRACES)]
+                ms, landed = _ms(min(spent[1:])[0]), spent[0][1]
+                yield {"events": each, "batch": batch, "ms": ms, "photons": photons, "landed": landed}
+    finally:
+        context.traits = traits
+
+
+def _trace(context: Context, light: LightPass, photons: int) -> tuple[float, int]:
+    landed = 0
+
+    def keep(_buffer: object, count: int, *_: object) -> None:
+        nonlocal landed
+        landed += count
+
+    context.finish()
+    started = time.perf_counter()
+    for _ in traced_besides(light.trace, 1, light.plans, photons, keep):
+        pass
+    context.finish()
+    return time.perf_counter() - started, landed
+
+
+def camera_costs(
+    context: Context, scene: Scene, size: tuple[int, int], caps_s: Sequence[float]
+) -> Iterator[dict[str, float]]:
+    """A camera sample a pixel where no dispatch shall take longer than each of `caps_s`: the best of a few, ms."""
+    with _light(context, scene, RenderSettings(width=size[0], height=size[1])) as light:
+        light.begin(1 << 14, 1)
+        light.run_pass(0, 1 << 14, lambda _: True)
+        light.atlas.flush()
+        camera = CameraPass(context, light.buffers, "beauty", light.reflectances, light.map_channels)
+        try:
+            for cap in caps_s:
+                camera.dispatch_seconds = cap
+                spent, pauses = [], 0
+                for seed in range(_FRAMES):
+                    started, pauses = time.perf_counter(), 0
+                    for _ in camera.samples(scene.camera, *size, 1, seed, light.caustic_maps(), 1):
+                        pauses += 1
+                    context.finish()
+                    spent.append(time.perf_counter() - started)
+                yield {"cap_ms": _ms(cap), "ms": _ms(min(spent[1:])), "first_ms": _ms(spent[0]), "pauses": pauses}
+        finally:
+            camera.release()
 
 
 def _frame(

@@ -60,8 +60,7 @@ def measure(ctx: moderngl.Context, pixels: float, count: int = 1 << 17) -> dict[
 
     software = "llvmpipe" in ctx.info["GL_RENDERER"]
     seconds, work = _best(ctx, {"splat": splat, "plain": lambda: plain.run(still, atlas), "draw": draw})
-    for resource in (atlas, tables, splatter, receivers, variable, swept, still, plain):
-        resource.release()
+    shader.release(atlas, tables, splatter, receivers, variable, swept, still, plain)
     cost = work if software else seconds
     drawn = -(-count // splatter.group) * min(count, splatter.group)
     return {
@@ -129,5 +128,4 @@ class _Plain:
         self._ctx.enable_only(moderngl.NOTHING)
 
     def release(self) -> None:
-        for resource in (self._draw, self._program, self._indices):
-            resource.release()
+        shader.release(self._draw, self._program, self._indices)

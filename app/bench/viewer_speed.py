@@ -72,6 +72,24 @@ class Phase:
     """Of a frame, by pass and by the device's own timers; empty where these do not work."""
 
     @property
+    def figures(self) -> dict[str, float]:
+        """With units in their names."""
+        median, worst = np.percentile(self.frame_ms, [50, 95])
+        found = {
+            "frames": len(self.frame_ms),
+            "median_ms": median,
+            "p95_ms": worst,
+            "longest_ms": float(self.frame_ms.max()),
+            "processor_ms": self.processor_ms,
+            "pictures_per_s": self.pictures_per_second,
+            "photons_per_s": self.photons_per_second,
+            "direct_side": self.direct,
+            "glass_side": self.glass,
+            "whole_s": self.whole_s,
+        } | {f"{name}_device_ms": spent for name, spent in self.device_ms.items()}
+        return {name: float(f"{figure:.4g}") for name, figure in found.items()}
+
+    @property
     def line(self) -> str:
         """For the table."""
         on_device = "".join(f"  {name} {spent:.2f} ms" for name, spent in self.device_ms.items())
@@ -103,6 +121,22 @@ class Latency:
         return f"{words}, {self.missed} later than {ANSWER_S:.0f} s" if self.missed else words
 
 
+def figures(
+    context: Context, scene: Path, size: tuple[int, int], frames: int, seconds: float
+) -> Iterator[tuple[str, dict[str, float]]]:
+    """So many `frames` of orbit, drag and turn each, as they are measured; fewer where they take longer than
+    `seconds`."""
+    bench = _Bench(context, scene, size)
+    try:
+        first = bench.wait_for_picture()
+        whole = first + bench.wait_for_whole()
+        yield f"{scene.stem}, start", {"first_picture_s": round(first, 3), "whole_s": round(whole, 3)}
+        for name, hold, act in bench.movements:
+            yield f"{scene.stem}, {name}", bench.phase(name, seconds, act, hold, frames).figures
+    finally:
+        bench.release()
+
+
 def run(context: Context, scene: Path, size: tuple[int, int], seconds: float) -> Iterator[str]:
     """Lines of the report, as they are measured: `seconds` for each phase, a viewport of `size` pixels."""
     bench = _Bench(context, scene, size)
@@ -119,12 +153,7 @@ def run(context: Context, scene: Path, size: tuple[int, int], seconds: float) ->
         heads = "".join(f" {head:>11}" for head in ("median", "95 %", "frames", "processor", "pictures"))
         heads += f" {'photons':>12} {'rays traced':>12} {'direct':>8} {'glass':>8} {'whole':>9} {'processor':>9}"
         yield f"{'':<24}{heads}"
-        for name, hold, act in (
-            ("accumulating", None, bench.rest),
-            ("orbiting", bench.holding_middle_button, bench.orbit),
-            ("dragging dispersion", bench.holding_gain, bench.drag_gain),
-            ("turning the glass", bench.holding_gain, bench.turn_glass),
-        ):
+        for name, hold, act in (("accumulating", None, bench.rest), *bench.movements):
             yield bench.phase(name, seconds, act, hold).line
             for _ in range(30):
                 bench.interface.frame()
@@ -204,11 +233,27 @@ class _Bench:
                 raise UserError(f"no picture after {PATIENCE_S:.0f} s")
         return time.perf_counter() - started
 
+    @property
+    def movements(self) -> tuple[tuple[str, Callable[[], _Held], Callable[[], None]], ...]:
+        """What is moved: its name, what is held, and what is done before each frame."""
+        return (
+            ("orbiting", self.holding_middle_button, self.orbit),
+            ("dragging dispersion", self.holding_gain, self.drag_gain),
+            ("turning the glass", self.holding_gain, self.turn_glass),
+        )
+
     def phase(
-        self, name: str, seconds: float, act: Callable[[], None], hold: Callable[[], _Held] | None = None
+        self,
+        name: str,
+        seconds: float,
+        act: Callable[[], None],
+        hold: Callable[[], _Held] | None = None,
+        frames: float = math.inf,
     ) -> Phase:
-        """Frames for `seconds`, with `act` before each and `hold` held; then until the picture is whole again."""
-        times, direct, glass = [], [], []
+        """Frames for `seconds`, `frames` at most, with `act` before each and `hold` held; then until the picture is
+        whole again."""
+        times: list[float] = []
+        direct, glass = [], []
         engine = self.session.picture.engine
         assert engine is not None
         pictures, before = 0, self.session.picture.stats
@@ -216,7 +261,7 @@ class _Bench:
         with hold() if hold is not None else nullcontext():
             version = engine.picture_version
             started, worked = time.perf_counter(), time.process_time()
-            while time.perf_counter() - started < seconds:
+            while time.perf_counter() - started < seconds and len(times) < frames:
                 act()
                 self.interface.frame()
                 times.append(self.session.frame_ms[-1])

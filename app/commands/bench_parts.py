@@ -1,22 +1,13 @@
-"""The commands that measure parts of the program: `bench-speed`, `bench-beams`, `bench-view`."""
+"""The commands that measure parts of the program: `bench-beams`, `bench-view`."""
 
 from __future__ import annotations
 
 from ..base.atomic import atomic_output, make_output_folder
-from .measuring_table import BenchBeams, BenchSpeed, BenchView
+from .measuring_table import BenchBeams, BenchView
 from .scenes import find_scene
 
 DEFAULT_SIZE = {True: (960, 540), False: (1920, 1080)}
 """Pixels of the viewport, by whether the processor draws: the sizes that the viewer promises its frame times for."""
-
-
-def bench_speed(options: BenchSpeed) -> int:
-    """Measure the stages and print; returns the exit code. Raises `UserError`."""
-    from ..bench import speed
-
-    for line in speed.run():
-        print(line, flush=True)
-    return 0
 
 
 def bench_view(options: BenchView) -> int:

@@ -14,7 +14,8 @@ from .table import ReadsScenes
 MAX_SEEDS = 1000
 MAX_BENCH_SECONDS = 3600.0
 MAX_RANDOM = 1000
-PROOF_PARTS = ("programs", "answers", "pictures", "stress", "frames", "speed", "view-small", "view-large", "bench")
+PROOF_PARTS = ("programs", "answers", "pictures", "stress")
+MEASURED_PARTS = ("dispatch", "frames", "trace", "camera", "viewer", "start", "compile", "additions", "splats")
 """What `prove-gpu` does after the doctor: the keys of `proof_steps.PARTS`."""
 _bench_seconds = options.seconds(MAX_BENCH_SECONDS)
 _REFERENCE = Option(
@@ -81,11 +82,6 @@ class Stress(ReadsScenes):
     output: Path | None = target("DIR", "Folder for stress.json and stress.html.", default=None)
     cases: str | None = option("A,B", "Only these cases; 'prism/' is all of that scene's.")
     list_cases: bool = switch("List the cases with their number of severities, and measure nothing.", flags=("--list",))
-
-
-@dataclass(frozen=True, kw_only=True)
-class BenchSpeed:
-    """Measure tracing, splatting, tree building, memory and the warm start on this machine."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -163,8 +159,11 @@ class Fingerprint(ReadsScenes):
 class ProveGpu:
     """Prove that this machine's GPU draws what it should, and measure how fast; exits with 10 and up where not."""
 
-    output: Path = target("DIR", "Folder for proof.json, proof.html and the bench's report.")
+    output: Path = target(
+        "DIR", "Folder for proof.json, proof.html and figures.jsonl; default: proof.", default=Path("proof")
+    )
+    quick: bool = switch("Only measure, within nine minutes: every figure is a line of JSON, the most important first.")
     short: bool = switch("Smaller pictures and fewer scenes, as on a software renderer in any case.")
     parts: tuple[str, ...] | None = option(
-        "A,B", f"Only these parts beside doctor: {', '.join(PROOF_PARTS)}.", options.names
+        "A,B", f"Only these parts beside doctor: {', '.join(PROOF_PARTS + MEASURED_PARTS)}.", options.names
     )

@@ -32,7 +32,6 @@ COMMANDS = {
     "doctor": ("table:Doctor", "doctor:doctor"),
     "bench": ("measuring_table:Bench", "bench:bench"),
     "stress": ("measuring_table:Stress", "stress:stress"),
-    "bench-speed": ("measuring_table:BenchSpeed", "bench_parts:bench_speed"),
     "bench-beams": ("measuring_table:BenchBeams", "bench_parts:bench_beams"),
     "bench-agreement": ("measuring_table:BenchAgreement", "bench_agreement:bench_agreement"),
     "bench-view": ("measuring_table:BenchView", "bench_parts:bench_view"),

@@ -10,10 +10,12 @@ from __future__ import annotations
 import base64
 import io
 import os
+import subprocess
 import sys
+import tempfile
 import time
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,10 +27,17 @@ if TYPE_CHECKING:
     import numpy as np
 
     from ..gpu.shader import Built
+    from ..model.scene import Scene
     from ..stress.results import CaseResult
 
 _MOST_COMPILERS = 8
-"""Processes that compile at a time; each holds some 400 MiB."""
+"""Processes or threads that compile at a time; each process holds some 400 MiB."""
+_SCREEN = (1920, 1080)
+_CACHE_FOLDERS = ("XDG_CACHE_HOME", "MESA_SHADER_CACHE_DIR", "__GL_SHADER_DISK_CACHE_PATH")
+"""Where drivers and SpectraSplat keep programs."""
+_NO_CACHE = {"MESA_SHADER_CACHE_DISABLE": "true", "__GL_SHADER_DISK_CACHE": "0"}
+"""Drivers keep none."""
+Figures = dict[str, float]
 
 
 class Finding(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -43,6 +52,8 @@ class Finding(msgspec.Struct, frozen=True, omit_defaults=True):
     """A PNG in base64: what is drawn here next to what is stored."""
     rows: list[list[str]] = []
     """A table, its headings first."""
+    figures: Figures = {}
+    """What was measured, with units in the names."""
     done: float | None = None
     """No finding but the share done of the part."""
 
@@ -57,6 +68,8 @@ class Part:
     """(short, folder for files) → what is found."""
     limit_s: tuple[float, float]
     """When it is ended; of the short form."""
+    measures: bool = False
+    """Nothing has to hold."""
 
 
 # -- doctor -------------------------------------------------------------------------------
@@ -65,13 +78,14 @@ class Part:
 def _doctor(_short: bool, _folder: Path) -> Iterator[Finding]:
     from ..bench.machine import clocks, machine
     from ..gpu.context import create_context
+    from ..gpu.device_traits import is_software_renderer
     from .doctor import examine
 
     checks = examine()
     yield from (Finding(check.name, check.found, not check.usable) for check in checks)
     with create_context() as context:
         yield from (Finding(f"machine {name}", value) for name, value in machine(context).items())
-        yield Finding("is software", "yes" if context.is_software else "no")
+        yield Finding("is software", "yes" if is_software_renderer(context.renderer) else "no")
     if said := clocks():
         yield Finding("nvidia-smi", said)
 
@@ -225,77 +239,136 @@ def _png(picture: np.ndarray, reference: np.ndarray) -> str:
 # -- times --------------------------------------------------------------------------------
 
 
-def _frames(short: bool, _folder: Path) -> Iterator[Finding]:
-    """A million photons a frame, traced, splatted and seen."""
-    from ..base.paths import shipped_scenes
-    from ..bench.frame_speed import measure
+def _dispatch(short: bool, _folder: Path) -> Iterator[Finding]:
+    from ..bench import device_costs
     from ..gpu.context import create_context
+
+    with create_context() as context:
+        yield from _measured(device_costs.dispatch_costs(context, 100 if short else 2000))
+
+
+def _frames(short: bool, _folder: Path) -> Iterator[Finding]:
+    """Photons traced anew every frame, at the size of a screen."""
+    from ..bench import frame_speed
+    from ..bench.machine import compile_line
+    from ..bench.programs import unique
+    from ..gpu.context import create_context
+    from ..gpu.shader import recorded
+
+    size, photons = ((320, 180), (1 << 12, 1 << 14)) if short else (_SCREEN, (1 << 17, 1 << 20, 1 << 18))
+    with create_context() as context:
+        for name, scene in _scenes(short):
+            costs = []
+            with recorded() as programs:
+                for cost in frame_speed.measure(context, scene, size, photons):
+                    costs.append(cost)
+                    yield _finding(name, cost.figures)
+            within = {
+                f"{what}_photons_in_{ms}_ms": frame_speed.photons_within(costs, 1e-3 * ms, what == "frame")
+                for what in ("light", "frame")
+                for ms in (4, 16)
+            }
+            yield _finding(f"{name}, {size[0]}×{size[1]}", within)
+            yield Finding(f"{name}, compiled", compile_line(unique(programs)))
+
+
+def _trace(short: bool, _folder: Path) -> Iterator[Finding]:
+    from ..bench.frame_speed import trace_rates
+    from ..gpu.context import create_context
+
+    photons, batches = (1 << 14, (1 << 13, 1 << 14)) if short else (1 << 20, (1 << 18, 1 << 20))
+    with create_context() as context:
+        for name, scene in _scenes(short):
+            yield from (_finding(name, found) for found in trace_rates(context, scene, photons, (1, 4, 8), batches))
+
+
+def _camera(short: bool, _folder: Path) -> Iterator[Finding]:
+    from ..bench.frame_speed import camera_costs
+    from ..gpu.context import create_context
+
+    with create_context() as context:
+        for name, scene in _scenes(short, ("default", "brilliant")):
+            size = (160, 90) if short else _SCREEN
+            yield from (_finding(name, found) for found in camera_costs(context, scene, size, (0.02, 2.0)))
+
+
+def _viewer(short: bool, _folder: Path) -> Iterator[Finding]:
+    from ..base.paths import shipped_scenes
+    from ..bench import viewer_speed
+    from ..gpu.context import create_context
+
+    size, frames, seconds = ((160, 90), 8, 2.0) if short else (_SCREEN, 120, 8.0)
+    for name in ("prism",) if short else ("prism", "default"):
+        with create_context() as context:
+            if short:
+                few = replace(context.traits.viewer, first_photons=1 << 11, largest_photons=1 << 12)
+                context.traits = replace(context.traits, viewer=few)
+            yield from _measured(viewer_speed.figures(context, shipped_scenes()[name], size, frames, seconds))
+
+
+def _start(short: bool, _folder: Path) -> Iterator[Finding]:
+    """From a process's start to a small picture on the disk."""
+    size, photons = ("160x90", "1k") if short else ("960x540", "32k")
+    for name in ("prism",) if short else ("default", "prism"):
+        with tempfile.TemporaryDirectory() as folder:
+            command = [sys.executable, "-P", "-m", "spectrasplat", "render", name, "-o", f"{folder}/first.png"]
+            command += ["--size", size, "--photons", photons, "--spp", "1"]
+            for state in ("cold", "warm"):
+                started = time.perf_counter()
+                subprocess.run(command, env=os.environ | dict.fromkeys(_CACHE_FOLDERS, folder), check=True)
+                yield _finding(f"{name}, {state}", {"first_picture_s": round(time.perf_counter() - started, 3)})
+
+
+def _compile(short: bool, _folder: Path) -> Iterator[Finding]:
+    from ..base.paths import shipped_scenes
+    from ..bench.device_costs import compile_times
+    from ..gpu.context import create_context
+
+    os.environ |= _NO_CACHE
+    for name in ("prism",) if short else ("default", "prism"):
+        compiled = _compiled(shipped_scenes()[name])
+        found = compile_times(compiled.programs, create_context, _MOST_COMPILERS)
+        yield from _measured((f"{name}, {what}", figures) for what, figures in found)
+
+
+def _additions(short: bool, _folder: Path) -> Iterator[Finding]:
+    from ..bench.device_costs import addition_rates
+    from ..gpu.context import create_context
+
+    with create_context() as context:
+        yield from _measured(addition_rates(context, 1 << (14 if short else 21)))
+
+
+def _splats(short: bool, _folder: Path) -> Iterator[Finding]:
+    from ..bench import splat_speed
+    from ..gpu import shader
+    from ..gpu.context import create_context
+
+    with create_context() as context:
+        shader.keep_programs(context.ctx)
+        for texels in (16, 64, 256, 1024, 4096, 16384):
+            found = splat_speed.measure(context.ctx, texels, (1 << (18 if short else 25)) // max(texels, 64))
+            yield _finding(f"{texels} texels", {name: float(f"{rate:.3g}") for name, rate in found.items()})
+        shader.forget_programs(context.ctx)
+
+
+def _scenes(
+    short: bool, names: tuple[str, ...] = ("prism", "default", "brilliant", "ball")
+) -> Iterator[tuple[str, Scene]]:
+    """Those that frames are measured by; in the short form the first alone."""
+    from ..base.paths import shipped_scenes
     from ..model.io.scene_file import load_scene
 
-    scene = load_scene(shipped_scenes()["prism"])
-    photons, sizes = (1 << 15, ((160, 90), (320, 180))) if short else (1_000_000, ((960, 540), (1920, 1080)))
-    with create_context() as context:
-        for size in sizes:
-            yield Finding(
-                f"prism {size[0]}×{size[1]}, {photons:,} photons", measure(context, scene, size, photons).line
-            )
+    yield from ((name, load_scene(shipped_scenes()[name])) for name in names[: 1 if short else None])
 
 
-def _speed(short: bool, _folder: Path) -> Iterator[Finding]:
-    from ..bench import speed
-
-    yield from map(_line, speed.run(short))
+def _measured(found: Iterable[tuple[str, Figures]]) -> Iterator[Finding]:
+    return (_finding(name, figures) for name, figures in found)
 
 
-def _view(size: tuple[int, int], short_size: tuple[int, int]) -> Callable[[bool, Path], Iterator[Finding]]:
-    def run(short: bool, _folder: Path) -> Iterator[Finding]:
-        from ..base.paths import shipped_scenes
-        from ..bench import viewer_speed
-        from ..gpu.context import create_context
-
-        with create_context() as context:
-            lines = viewer_speed.run(
-                context, shipped_scenes()["prism"], short_size if short else size, 0.5 if short else 4
-            )
-            yield from (Finding("", line) for line in lines)
-
-    return run
-
-
-def _line(line: str) -> Finding:
-    """A line of a table: the text before the first gap is its name."""
-    name, gap, value = line.partition("  ")
-    return Finding(name, " ".join(value.split())) if gap else Finding("", line)
-
-
-def _bench(short: bool, folder: Path) -> Iterator[Finding]:
-    from .bench import bench
-    from .measuring_table import Bench
-
-    said: list[str] = []
-
-    def show(content: object) -> None:
-        from rich.console import Console
-
-        text = io.StringIO()
-        Console(file=text, width=200).print(content)
-        said.append(text.getvalue())
-
-    options = Bench(
-        scenes=("prism",) if short else ("prism", "ball_plain"),
-        output=folder / "bench",
-        seconds=0.2 if short else 1.0,
-        horizon=0.2 if short else 1.0,
-        seeds=1 if short else 2,
-        methods=("srd", "srd-photons", "hero"),
-        size=(96, 54) if short else (480, 270),
-        reference_seconds=2.0 if short else 15.0,
-        fresh=True,
-    )
-    code = bench(options, show)
-    yield from (Finding("", text.rstrip()) for text in said)
-    if code:
-        raise UserError(f"bench ended with {code}")
+def _finding(name: str, figures: Mapping[str, float]) -> Finding:
+    words = ", ".join(f"{key.replace('_', ' ')} {figure:,}" for key, figure in figures.items())
+    return Finding(name, words, figures=dict(figures))
 
 
 PARTS = (
@@ -304,13 +377,17 @@ PARTS = (
     Part("answers", "Known answers", _answers, (90, 120)),
     Part("pictures", "Pictures against stored ones", _pictures, (240, 240)),
     Part("stress", "Stress", _stress, (120, 240)),
-    Part("frames", "Frames of a million photons", _frames, (60, 120)),
-    Part("speed", "Stages", _speed, (90, 240)),
-    Part("view-small", "Viewer, 960×540", _view((960, 540), (160, 90)), (90, 240)),
-    Part("view-large", "Viewer, 1920×1080", _view((1920, 1080), (320, 180)), (90, 240)),
-    Part("bench", "Error against run time", _bench, (180, 240)),
+    Part("dispatch", "Dispatches, waits, reads", _dispatch, (15, 15), True),
+    Part("frames", "Photons of a frame", _frames, (150, 120), True),
+    Part("trace", "Tracing, by events a dispatch and rays in flight", _trace, (120, 60), True),
+    Part("camera", "Camera samples, by the longest dispatch allowed", _camera, (60, 60), True),
+    Part("viewer", "Viewer while something moves", _viewer, (90, 60), True),
+    Part("start", "First picture, with an empty cache and with a full one", _start, (120, 60), True),
+    Part("compile", "Programs alone, and on threads", _compile, (120, 60), True),
+    Part("additions", "Additions to memory", _additions, (15, 15), True),
+    Part("splats", "Splats, by area", _splats, (40, 40), True),
 )
-"""In this order: what must hold first, what is only measured last."""
+"""In this order: what must hold first, then what is only measured, the most important first."""
 
 
 def main(arguments: list[str]) -> int:

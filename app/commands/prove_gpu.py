@@ -1,5 +1,5 @@
 """The prove-gpu command: everything that must be known of a device that was never seen before, within ten minutes, as
-one JSON and one HTML file.
+one JSON and one HTML file, and what is measured as lines of JSON too.
 
 Each part runs in a process of its own, so that a driver which crashes or hangs ends that part alone; what is found is
 kept as it is found.
@@ -27,12 +27,14 @@ from ..base.version import __version__
 from .measuring_table import ProveGpu
 from .proof_steps import PARTS, Finding, Part
 
-JSON, HTML = "proof.json", "proof.html"
-WHOLE_S = 600.0
-"""No part is begun, and none goes on, after this."""
+JSON, HTML, LINES = "proof.json", "proof.html", "figures.jsonl"
+WHOLE_S, QUICK_S = 900.0, 540.0
+"""No part is begun, and none goes on, after this; where there are only figures."""
 FIRST_CODE = 10
 """Exit code where the first part is the first that is broken; the second has one more, and so on."""
 _LOOK_EVERY_S = 0.2
+_OF_DEVICE = ("machine ", "splats", "nvidia-smi", "limit storage_block_bytes")
+"""What of the doctor's findings stands beside the figures."""
 
 State = Literal["holds", "broken", "crashed", "too slow", "stopped", "not begun"]
 
@@ -61,6 +63,8 @@ class Proof(msgspec.Struct):
     date: str
     short: bool
     parts: list[PartResult]
+    quick: bool = False
+    """Figures alone."""
     seconds: float = 0.0
 
     @property
@@ -87,31 +91,41 @@ def prove_gpu(options: ProveGpu) -> int:
     """Run all parts, keep what they find; returns the exit code. Raises `UserError`."""
     from ..base.progress import ProgressReporter
 
-    chosen = chosen_parts(options.parts)
-    make_output_folder(options.output, JSON, HTML)
+    chosen = chosen_parts(options.parts, options.quick)
+    make_output_folder(options.output, JSON, HTML, LINES)
     started = time.monotonic()
     proof = Proof(
         __version__,
         datetime.now(UTC).isoformat(timespec="seconds"),
         options.short,
         [PartResult(part.key, part.title) for part in chosen],
+        options.quick,
     )
-    with ProgressReporter("proof") as progress:
+    with ProgressReporter("proof") as progress, (options.output / LINES).open("wb", buffering=0) as lines:
+
+        def say(line: object) -> None:
+            text = msgspec.json.encode(line) + b"\n"
+            lines.write(text)
+            if options.quick:
+                sys.stdout.buffer.write(text)
+                sys.stdout.buffer.flush()
+
         try:
-            _run_all(proof, chosen, options.output, progress, started)
+            _run_all(proof, chosen, options.output, progress, say, started)
         except KeyboardInterrupt:
             print("spectrasplat: stopped; what was found is kept", file=sys.stderr)
     proof.seconds = time.monotonic() - started
     _keep(proof, options.output)
-    print(summary(proof))
-    print((options.output / HTML).resolve())
+    if not options.quick:
+        print(summary(proof))
+        print((options.output / HTML).resolve())
     return proof.exit_code
 
 
-def chosen_parts(names: Sequence[str] | None) -> list[Part]:
-    """The parts called so, in their own order, the doctor always; None: all."""
+def chosen_parts(names: Sequence[str] | None, quick: bool = False) -> list[Part]:
+    """The parts called so, in their own order, the doctor always; None: all, or those that measure (`quick`)."""
     if names is None:
-        return list(PARTS)
+        return [part for part in PARTS if part.key == "doctor" or part.measures or not quick]
     wanted = {*names} - {""}
     known = {part.key for part in PARTS}
     if unknown := sorted(wanted - known):
@@ -133,20 +147,33 @@ def summary(proof: Proof) -> str:
 
 
 def _run_all(
-    proof: Proof, parts: Sequence[Part], folder: Path, progress: Callable[[float, str], None], started: float
+    proof: Proof,
+    parts: Sequence[Part],
+    folder: Path,
+    progress: Callable[[float, str], None],
+    say: Callable[[object], None],
+    started: float,
 ) -> None:
+    """`say` gets every figure when it is found, and how each part ended."""
     for at, (part, result) in enumerate(zip(parts, proof.parts, strict=True)):
-        left = WHOLE_S - (time.monotonic() - started)
+        left = (QUICK_S if proof.quick else WHOLE_S) - (time.monotonic() - started)
         if left <= 0.0:
             return
 
         def tell(share: float, at: int = at, name: str = part.title) -> None:
             progress((at + share) / len(parts), name)
 
+        def note(finding: Finding, part: Part = part) -> None:
+            if part.measures or finding.name.startswith(_OF_DEVICE):
+                found: dict[str, object] = {"part": part.key, "name": finding.name}
+                say({**found, **(finding.figures or {"value": finding.value})})
+
         tell(0.0)
         try:
-            _run(part, result, _Run(proof.short, folder, part.limit_s[proof.short], left, tell))
+            _run(part, result, _Run(proof.short, folder, part.limit_s[proof.short], left, tell, note))
         finally:
+            why = {"why": plain(result.detail)[-500:]} if result.detail else {}
+            say({"part": part.key, "ended": result.state, "s": round(result.seconds, 1), **why})
             _keep(proof, folder)
         if part.key == "doctor":
             if result.is_wrong:  # nothing else can run
@@ -165,6 +192,9 @@ class _Run:
     left_s: float
     """Of the whole."""
     tell: Callable[[float], None]
+    """Gets the share done."""
+    note: Callable[[Finding], None]
+    """Gets what is found."""
 
 
 def command_of(part: Part, short: bool, findings: Path, folder: Path) -> list[str]:
@@ -193,7 +223,7 @@ def _run(part: Part, result: PartResult, how: _Run) -> None:
                 raise
             finally:
                 _end(process)
-                _take_in(file, result)
+                _take_in(file, result, how.note)
                 result.seconds = time.monotonic() - started
                 if result.state in ("crashed", "too slow"):
                     result.detail += " " + errors.read_text(encoding="utf-8", errors="replace")[-3000:].strip()
@@ -205,11 +235,11 @@ def _watched(process: subprocess.Popen, file: Path, result: PartResult, how: _Ru
             result.detail = f"not done after {how.limit_s:.0f} s."
             return "too slow"
         if time.monotonic() - started > how.left_s:
-            result.detail = f"the proof's {WHOLE_S:.0f} s were over."
+            result.detail = "the proof's time was over."
             return "stopped"
         time.sleep(_LOOK_EVERY_S)
-        how.tell(_take_in(file, result))
-    _take_in(file, result)
+        how.tell(_take_in(file, result, how.note))
+    _take_in(file, result, how.note)
     if code < 0:
         result.detail = f"ended by {signal.Signals(-code).name}."
     elif code:
@@ -219,15 +249,17 @@ def _watched(process: subprocess.Popen, file: Path, result: PartResult, how: _Ru
     return "broken" if any(finding.broken for finding in result.findings) else "holds"
 
 
-def _take_in(file: Path, result: PartResult) -> float:
-    """What the process has written so far; returns the share done."""
+def _take_in(file: Path, result: PartResult, note: Callable[[Finding], None]) -> float:
+    """What the process has written so far, what is new of it for `note` too; returns the share done."""
     try:
         written = file.read_bytes()
     except OSError:
         return 0.0
     whole = written[: written.rfind(b"\n") + 1].splitlines()
     found = [msgspec.json.decode(line, type=Finding) for line in whole]
-    result.findings = [finding for finding in found if finding.done is None]
+    known, result.findings = len(result.findings), [finding for finding in found if finding.done is None]
+    for finding in result.findings[known:]:
+        note(finding)
     return max((finding.done for finding in found if finding.done is not None), default=0.0)
 
 

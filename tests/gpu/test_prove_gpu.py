@@ -5,15 +5,18 @@ from __future__ import annotations
 import json
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from spectrasplat.__main__ import main
+from spectrasplat.bench.frame_speed import FrameCost, photons_within
 from spectrasplat.bench.stored_pictures import LARGEST_ERROR, SCENES, block_error, stored
 from spectrasplat.commands import prove_gpu
-from spectrasplat.commands.proof_steps import PARTS
+from spectrasplat.commands.measuring_table import MEASURED_PARTS
+from spectrasplat.commands.proof_steps import PARTS, Finding
 
 SOFTWARE = '{"name": "machine renderer", "value": "some"}\n{"name": "is software", "value": "yes"}\n'
 
@@ -52,7 +55,8 @@ def test_the_whole_short_form_on_this_machine(tmp_path: Path, capsys: pytest.Cap
     code, proof = proved(tmp_path, "--short")
     assert code == 0, capsys.readouterr().out
     assert [part["key"] for part in proof["parts"]] == [part.key for part in PARTS]
-    assert (tmp_path / "bench" / "report.html").exists()
+    lines = [json.loads(line) for line in (tmp_path / "figures.jsonl").read_text().splitlines()]
+    assert {line["part"] for line in lines if "ended" not in line} == {"doctor", *MEASURED_PARTS}
 
 
 def test_a_driver_that_crashes_ends_one_part(
@@ -71,6 +75,37 @@ def test_a_driver_that_crashes_ends_one_part(
     assert "SIGSEGV" in programs["detail"] and "mesa: error" in programs["detail"]
     assert proof["short"]  # since the processor draws
     assert "SIGSEGV" in capsys.readouterr().out
+
+
+def test_figures_are_lines_of_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, proof = proved(tmp_path, "--quick", "--short", "--parts", "dispatch,additions")
+    out = capsys.readouterr().out
+    lines = [json.loads(line) for line in out.splitlines()]
+    assert code == 0 and out == (tmp_path / "figures.jsonl").read_text()
+    assert [line["part"] for line in lines if "ended" in line] == ["doctor", "dispatch", "additions"]
+    assert all(line["us"] > 0.0 for line in lines if line["part"] == "dispatch" and "ended" not in line)
+    assert any("RGBA16F" in line.get("name", "") and line["texels_g_per_s"] > 0.0 for line in lines)
+    assert proof["quick"] and proof["short"]
+
+
+def test_a_crash_among_figures_is_a_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = 'out.write(\'{"name": "prism", "value": "", "figures": {"ms": 4.5}}\\n\'); '
+    told(monkeypatch, frames=found + "os.kill(os.getpid(), signal.SIGSEGV)", trace=found)
+    code, _ = proved(tmp_path, "--quick")
+    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert [line["part"] for line in lines if "ended" in line] == ["doctor", *MEASURED_PARTS]
+    assert next(line for line in lines if line["part"] == "trace") == {"part": "trace", "name": "prism", "ms": 4.5}
+    crash = next(line for line in lines if line["part"] == "frames" and "ended" in line)
+    assert code == prove_gpu.FIRST_CODE + 2 and crash["ended"] == "crashed" and "SIGSEGV" in crash["why"]
+
+
+def test_photons_of_a_frame_lie_on_the_line_through_what_was_measured() -> None:
+    costs = [FrameCost(n, 0, 1e-3 + 2e-9 * n, 1e-9 * n, 2e-3) for n in (1 << 20, 1 << 17, 1 << 18)]
+    assert photons_within(costs, 4e-3, with_camera=False) == pytest.approx(1e6, rel=1e-3)
+    assert photons_within(costs, 4e-3, with_camera=True) == pytest.approx(1e6 / 3, rel=1e-3)
+    assert photons_within(costs, 0.5e-3, with_camera=False) == 0
 
 
 def test_what_does_not_hold_is_told(
@@ -100,7 +135,7 @@ def test_it_ends_in_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     code, proof = proved(tmp_path, "--parts", "answers,stress")
     assert code == 130
     assert [part["state"] for part in proof["parts"]] == ["holds", "stopped", "not begun"]
-    assert "2 s were over" in proof["parts"][1]["detail"]
+    assert "time was over" in proof["parts"][1]["detail"]
 
 
 def test_without_a_device_nothing_else_is_tried(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -115,8 +150,8 @@ def test_ctrl_c_keeps_what_was_found(tmp_path: Path, monkeypatch: pytest.MonkeyP
     told(monkeypatch, answers='out.write(\'{"name": "gap", "value": "holds"}\\n\'); time.sleep(60)')
     real = prove_gpu._take_in
 
-    def interrupted(file: Path, result: prove_gpu.PartResult) -> float:
-        share = real(file, result)
+    def interrupted(file: Path, result: prove_gpu.PartResult, note: Callable[[Finding], None]) -> float:
+        share = real(file, result, note)
         if result.state == "not begun" and any(finding.name == "gap" for finding in result.findings):
             raise KeyboardInterrupt
         return share

@@ -21,7 +21,7 @@ from spectrasplat import __version__
 from spectrasplat.__main__ import main
 from spectrasplat.base.errors import UserError
 from spectrasplat.commands import options
-from spectrasplat.commands.measuring_table import PROOF_PARTS
+from spectrasplat.commands.measuring_table import MEASURED_PARTS, PROOF_PARTS
 from spectrasplat.commands.program import COMMANDS, named
 from spectrasplat.commands.proof_steps import PARTS
 from spectrasplat.commands.scenes import find_scene
@@ -295,12 +295,12 @@ class TestProgram:
         assert notes["options"].split(".")[-1] == named(values).__name__ and notes["return"] == "int"
 
     def test_every_part_of_the_proof_can_be_chosen(self) -> None:
-        assert [part.key for part in PARTS] == ["doctor", *PROOF_PARTS]
+        assert [part.key for part in PARTS] == ["doctor", *PROOF_PARTS, *MEASURED_PARTS]
 
     def test_help_without_arguments(self, capsys: pytest.CaptureFixture[str]) -> None:
         assert main([]) == 0
         out = capsys.readouterr().out
-        for command in ("render", "inspect", "glass", "doctor", "bench-speed"):
+        for command in ("render", "inspect", "glass", "doctor", "bench-view"):
             assert command in out
 
     def test_commands_of_a_farm_are_listed(self, capsys: pytest.CaptureFixture[str]) -> None:
