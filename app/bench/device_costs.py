@@ -7,15 +7,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..gpu import shader
+from ..gpu.linker import linker_of
 from ..gpu.splat_way import FLOAT_ATOMICS, blending_rate
-from ..gpu.unlocked import DriverCalls
 
 if TYPE_CHECKING:
     from ..gpu.context import Context
@@ -156,31 +155,20 @@ def _significant(value: float) -> float:
     return float(f"{value:.3g}")
 
 
-def compile_times(programs: Sequence[Built], make: Callable[[], Context], threads: int) -> Iterator[Named]:
-    """Driver seconds of `programs` as they were compiled, one after the other, the longest first; then all of them at
-    once on `threads`, each with a context of its own from `make`. The driver must keep none meanwhile."""
+def compile_times(programs: Sequence[Built], make: Callable[[], Context]) -> Iterator[Named]:
+    """Driver seconds of `programs` as they were compiled, one after the other, the longest first; then of all of them
+    as a start has them, in a context from `make`, and in one more, which may take what the first one has kept."""
     longest = sorted(programs, key=lambda built: built.seconds, reverse=True)
     for built in longest[:12]:
-        size = sum(map(len, built.texts))
-        yield built.name, {"alone_s": round(built.seconds, 3), "text_kb": round(size / 1e3, 1)}
-    started = time.perf_counter()
-    with ThreadPoolExecutor(threads) as pool:
-        shares = [[built.texts for built in longest[i::threads]] for i in range(threads)]
-        busy_s = sum(pool.map(lambda share: _compiled_s(make, share), shares))
-    yield (
-        f"{len(longest)} programs on {threads} threads",
-        {
-            "alone_s": round(sum(built.seconds for built in longest), 3),
-            "together_s": round(time.perf_counter() - started, 3),
-            "busy_s": round(busy_s, 3),
-        },
-    )
-
-
-def _compiled_s(make: Callable[[], Context], programs: Sequence[tuple[str, ...]]) -> float:
-    with make() as context:
-        calls = DriverCalls(context.ctx.mglo._context.load)
-        started = time.perf_counter()
-        for texts in programs:
-            calls.compile(texts)
-        return time.perf_counter() - started
+        yield built.name, {"alone_s": round(built.seconds, 3), "text_kb": round(sum(map(len, built.texts)) / 1e3, 1)}
+    alone_s = round(sum(built.seconds for built in longest), 3)
+    for name in ("side by side", "from what was kept"):
+        with make() as context:
+            started = time.perf_counter()
+            linker = linker_of(context.ctx)
+            made = [linker.program(context.ctx, built.texts, RuntimeError, at_once=False) for built in longest]
+            sent = time.perf_counter()
+            assert all(program.glo for program in made)  # waits
+            now = time.perf_counter()
+        figures = {"programs": len(made), "alone_s": alone_s, "sent_s": sent - started, "s": now - started}
+        yield name, {key: round(figure, 3) for key, figure in figures.items()}
