@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Literal, Self
 
 from ..base.errors import DeviceError, OwnCallError, UserError, own_fault, suggestion
 from .better_device import advice
-from .device_traits import DeviceTraits
+from .device_traits import DeviceTraits, is_software_renderer
 from .limits import Limits
 from .linker import adopting_context
 from .splat_way import SplatWay, way_of
@@ -90,7 +90,7 @@ class Context:
         """What the device itself took for each pass."""
         from .pass_timers import PassTimers
 
-        return PassTimers(self.ctx, not self.is_software)
+        return PassTimers(self.ctx, not self.is_software, is_software_renderer(self.renderer))
 
     def finish(self) -> None:
         """Wait until everything sent so far is done."""

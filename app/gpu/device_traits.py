@@ -56,6 +56,9 @@ class DeviceTraits:
     """A command only queues work: to keep a deadline is to wait for the device."""
     dispatch_s: float = DISPATCH_S
     """What a dispatch should take where no frames are waited for."""
+    camera_s: float = 0.25
+    """What a dispatch of the camera may take at most: an eighth of what drivers end. It is not waited for, so a picture
+    is cut up only after one has taken longer."""
     paths_group: int = 64
     """Camera paths of a work group. A software renderer gives groups to its threads one by one and runs eight paths
     of one side by side: with more in a group, few paths are shared out unevenly."""
@@ -94,6 +97,7 @@ class DeviceTraits:
             work_is_queued=False,
             compiles_ahead=False,
             dispatch_s=0.15,
+            camera_s=0.15,
             paths_group=8,
             viewer=Budget(1 << 14, 1 << 14, 1 << 22, 256 << 20),
             viewer_splat_photons=1 << 12,

@@ -23,9 +23,10 @@ Tell = Callable[[float], None]
 class PassTimers:
     """Sums of device time by pass."""
 
-    def __init__(self, ctx: moderngl.Context, may_work: bool) -> None:
-        """`may_work`: the device is no software renderer."""
+    def __init__(self, ctx: moderngl.Context, may_work: bool, runs_at_once: bool = False) -> None:
+        """`may_work`: the device is no software renderer. `runs_at_once`: a dispatch is done when it returns."""
         self._ctx = ctx
+        self._runs_at_once = runs_at_once
         self.seconds: dict[str, float] = {}
         """Since the context was made; empty where timers do not work."""
         self.work = may_work and self._tells_truth()
@@ -40,27 +41,29 @@ class PassTimers:
         pass later, so that nobody waits. A block within another counts as the other's.
 
         Where timers do not work nothing is counted, and who wants to be told waits for the device."""
-        if self._inside or not (self.work or tell):
+        if not self.work:
+            started = time.perf_counter()
+            yield
+            if tell is not None:
+                if not self._runs_at_once:
+                    self._ctx.finish()
+                tell(time.perf_counter() - started)
+            return
+        if self._inside:
             yield
             return
         self._inside = True
-        started = time.perf_counter()
         try:
-            if self.work:
-                free = self._free.setdefault(name, [])
-                asked = self._asked.setdefault(name, deque())
-                if not (free or asked):
-                    free += [self._ctx.query(time=True) for _ in range(_LATE)]
-                if not free:
-                    self._hear(name)
-                query = free.pop()
-                with query:
-                    yield
-                asked.append((query, tell))
-            elif tell:
+            free = self._free.setdefault(name, [])
+            asked = self._asked.setdefault(name, deque())
+            if not (free or asked):
+                free += [self._ctx.query(time=True) for _ in range(_LATE)]
+            if not free:
+                self._hear(name)
+            query = free.pop()
+            with query:
                 yield
-                self._ctx.finish()
-                tell(time.perf_counter() - started)
+            asked.append((query, tell))
         finally:
             self._inside = False
 

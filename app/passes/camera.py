@@ -1,15 +1,16 @@
 """The camera's pass: pictures of the scene from the caustic maps and the lights.
 
-A dispatch adds one camera sample to the pixels of a band of rows, or to some of those that see glass or mirrors there,
-so that none takes long on a software renderer: between two of them there is time for progress and for a stop. There a
-sample that takes long halts and is taken up by a later dispatch, for the driver would cut it short
+A dispatch adds one camera sample to the pixels of a band of rows; another follows those that see glass or mirrors
+there. On a GPU a band is the whole picture, unless earlier ones took long. On a software renderer bands are small, and
+lists are followed a portion at a time: between two dispatches there is time for progress and for a stop. There a sample
+that takes long halts and is taken up again by a later dispatch, for the driver would cut it short
 (shaders/camera/halts.glsl). Samples form a lattice inside the pixel that later launches refine (box filter).
 """
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import contextmanager
 
 import moderngl
 import numpy as np
@@ -27,7 +28,7 @@ from .camera_programs import CameraPrograms, camera_defines, halted_bytes, halti
 from .camera_records import camera_parameters
 from .caustic_maps import CausticMaps
 from .haze import Haze
-from .listed_pixels import SURVEYED, ListedPixels
+from .listed_pixels import ListedPixels
 from .picture_channels import Channels
 from .picture_sums import PictureSums
 from .pixel_lattice import LOOKS, cells_of, is_in_strips, looks_lattice, pixel_lattice
@@ -84,10 +85,9 @@ class CameraPass:
         self._ctx = context.ctx
         self._sums = PictureSums(self._ctx, self.channels.targets)
         self._rows = DispatchBudget(1, 1, 1)
-        self._uneven_before_row = np.zeros(1, int)
         self._within_rows = False
         """Some listed pixels of a band of rows have this sample, others are still to get it."""
-        self.dispatch_seconds = context.traits.dispatch_s
+        self.dispatch_seconds = context.traits.camera_s
         """What one dispatch should take; rows are divided to fit."""
         features = scene.features
         self.disperses = layer != "caustic" and features.camera_disperses
@@ -347,7 +347,12 @@ class CameraPass:
 
     def follow(self, parameters: np.ndarray, maps: CausticMaps) -> Iterator[float]:
         """Follow what is listed, into the sums; pauses with the share done."""
-        yield from self._follow_listed(parameters, maps)
+        if not self.follows:
+            return
+        yield from self._portions(parameters, maps)
+        if not self._listed.may_halt:
+            self._bind(maps, parameters)
+            self._run_listed(self._program_beyond())
 
     # ---- private ---------------------------------------------------------------------------
 
@@ -370,8 +375,9 @@ class CameraPass:
     def _add_sample(self, parameters: np.ndarray, width: int, height: int, maps: CausticMaps) -> Iterator[float]:
         """Dispatch one sample, yielding the share done after each dispatch: a band of rows, or some of its listed
         pixels."""
-        for row, rows in self._seen_directly(parameters, width, height, maps):
-            for share in self._follow_listed(parameters, maps):
+        follows = self.follows and not self.only_directly
+        for row, rows in self._bands(parameters, width, height, maps, follows=follows):
+            for share in self._portions(parameters, maps) if follows else ():
                 self._within_rows = True
                 yield (row + share * rows) / height
             if self._haze is not None and self._is_hazy:
@@ -380,70 +386,68 @@ class CameraPass:
             self._sums.samples_of_row[row : row + rows] += 1
             yield (row + rows) / height
 
-    def _seen_directly(
-        self, parameters: np.ndarray, width: int, height: int, maps: CausticMaps
+    def _bands(
+        self, parameters: np.ndarray, width: int, height: int, maps: CausticMaps, *, follows: bool
     ) -> Iterator[tuple[int, int]]:
-        """Look at what is seen directly, one dispatch after the other; pauses with the band's first row and their
-        number, which glass in it has been listed of."""
+        """A sample of what is seen directly, a band of rows after the other, and, where `follows`, of what its listed
+        pixels see, unless these are for `_portions`; pauses with the band's first row and their number."""
         row = 0
         while row < height:
             # Groups that overlap the next band would add its rows twice, so bands are whole groups.
             rows = min(self._rows.units, height - row)
             parameters["first_row"] = row
             self._listed.clear()
-            self._rows.learn(rows, self._see_rows(parameters, width, row, rows, maps), self.dispatch_seconds)
+            self._bind(maps, parameters)
+            with self._timing(self._rows, rows):
+                groups = -(-width // _GROUP), -(-rows // _GROUP)
+                if parameters["survey"] != SURVEY_KEPT:
+                    self._run(self._programs.of("direct"), *groups)
+                else:
+                    self._run(self._programs.of("kept"), *groups)
+                    self._run_listed(self._programs.of("direct"), uneven=True)
+                if follows and not self._listed.may_halt:
+                    self._run_listed(self._program_beyond())
             yield row, rows
             row += rows
-
-    def _see_rows(self, parameters: np.ndarray, width: int, row: int, rows: int, maps: CausticMaps) -> float:
-        """A sample of what is seen directly in a band of rows; seconds it took."""
-        groups = -(-width // _GROUP), -(-rows // _GROUP)
-        if parameters["survey"] != SURVEY_KEPT:
-            return self._dispatch(self._programs.of("direct"), parameters, maps, *groups)
-        took = self._dispatch(self._programs.of("kept"), parameters, maps, *groups)
-        first, end = self._uneven_before_row[[row, row + rows]]
-        if first == end:
-            return took
-        uneven_at = parameters["survey_at"] + SURVEYED.itemsize // 4 * self._sums.pixels
-        parameters["first_listed"], parameters["end_listed"] = uneven_at + first, uneven_at + end
-        return took + self._dispatch(self._programs.of("direct"), parameters, maps, -(-(end - first) // _GROUP**2), 1)
 
     def _survey(self, parameters: np.ndarray, width: int, height: int, maps: CausticMaps) -> Iterator[float]:
         """Find the pixels in which, and round which, nothing but one surface in the same light is seen directly, and
         what that looks like: the samples then take lookups in the others only. Pauses after every dispatch with 0.0."""
+        parameters["survey_at"] = self._listed.survey_at(width * height)
         taken = parameters.copy()
-        taken["survey_at"] = self._listed.survey_at(width * height)
         for _ in spread_survey(taken):
-            for _ in self._seen_directly(taken, width, height, maps):
+            for _ in self._bands(taken, width, height, maps, follows=False):
                 yield 0.0
-        parameters["survey"], parameters["survey_at"] = SURVEY_KEPT, taken["survey_at"]
-        self._uneven_before_row = self._listed.part_even(width, height)
+        self._bind(maps, taken)
+        self._run(self._programs.of("even"), -(-width // _GROUP), -(-height // _GROUP))
+        parameters["survey"] = SURVEY_KEPT
 
-    def _follow_listed(self, parameters: np.ndarray, maps: CausticMaps) -> Iterator[float]:
-        """Follow what the listed pixels of a band of rows see, yielding the share done."""
-        if self.only_directly or not self.follows:
+    def _portions(self, parameters: np.ndarray, maps: CausticMaps) -> Iterator[float]:
+        """Follow what listed pixels see where that is done by portions, yielding the share done."""
+        if not self._listed.may_halt:
             return
-        run = self._paths(parameters, maps)
-        yield from self._listed.follow(
-            parameters, lambda count: run(self._program_beyond(), count), self.dispatch_seconds
-        )
-
-    def _paths(self, parameters: np.ndarray, maps: CausticMaps) -> Callable[[moderngl.ComputeShader, int], float]:
-        """What runs a program for so many paths; seconds it took."""
         group = self.context.traits.paths_group
-        return lambda program, count: self._dispatch(program, parameters, maps, -(-count // group), 1)
 
-    def _dispatch(
-        self, program: moderngl.ComputeShader, parameters: np.ndarray, maps: CausticMaps, groups_x: int, groups_y: int
-    ) -> float:
-        """Run a program to its end; seconds it took."""
-        self._bind(maps, parameters)
-        start = time.perf_counter()
-        with self.context.timers.timing("camera"):
-            program.run(groups_x, groups_y)
-            self._ctx.memory_barrier()
-        self._ctx.finish()
-        return time.perf_counter() - start
+        def follow(budget: DispatchBudget, count: int) -> None:
+            self._bind(maps, parameters)
+            with self._timing(budget, count):
+                self._run(self._program_beyond(), -(-count // group))
+
+        yield from self._listed.follow(parameters, follow)
+
+    @contextmanager
+    def _timing(self, budget: DispatchBudget, units: int) -> Iterator[None]:
+        """`budget` learns, sooner or later, what so many units took within the block."""
+        with self.context.timers.timing("camera", lambda took: budget.learn(units, took, self.dispatch_seconds)):
+            yield
+
+    def _run(self, program: moderngl.ComputeShader, groups_x: int, groups_y: int = 1) -> None:
+        program.run(groups_x, groups_y)
+        self._ctx.memory_barrier()
+
+    def _run_listed(self, program: moderngl.ComputeShader, *, uneven: bool = False) -> None:
+        self._listed.run(program, uneven=uneven)
+        self._ctx.memory_barrier()
 
     def _program_beyond(self) -> moderngl.ComputeShader:
         """What follows rays beyond glass and mirrors."""

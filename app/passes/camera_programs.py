@@ -172,9 +172,10 @@ _VARIANTS: dict[str, Callable[[Defines], Defines]] = {
     "direct": direct_defines,
     "single": single_defines,
     "kept": direct_defines,
+    "even": direct_defines,
 }
-"""Programs: beyond glass and mirrors, for what is seen directly, beyond glass of one wavelength, and for pixels that a
-survey has found even."""
+"""Programs: beyond glass and mirrors, for what is seen directly, beyond glass of one wavelength, for pixels that a
+survey has found even, and for finding these."""
 
 
 class CameraPrograms:
@@ -194,8 +195,8 @@ class CameraPrograms:
         if key not in self._compiled:
             shown = lens_defines(self.defines) if self.has_lens else self.defines
             variants = _VARIANTS[variant](shown)
-            file = "camera/kept.comp" if variant == "kept" else "camera/camera.comp"
-            self._compiled[key] = shader.compute(self._ctx, file, variants, self.structs)
+            file = variant if variant in ("kept", "even") else "camera"
+            self._compiled[key] = shader.compute(self._ctx, f"camera/{file}.comp", variants, self.structs)
         return self._compiled[key]
 
     def release(self) -> None:

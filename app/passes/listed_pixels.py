@@ -1,7 +1,8 @@
 """The pixels that see glass or mirrors first, and how one dispatch after the other follows them.
 
-The program for what is seen directly lists them; another follows the list, a portion at a time. Where a driver ends
-long loops, samples halt and are taken up again (shaders/camera/halts.glsl).
+The program for what is seen directly lists them; another follows the list: all at once by a dispatch whose size the
+list holds. Where a driver ends long loops, it is followed a portion at a time, and samples halt and are taken up again
+(shaders/camera/halts.glsl).
 """
 
 from __future__ import annotations
@@ -21,14 +22,16 @@ _WHOLE = 64
 _FIRST = 1024
 _PLACES = 8192
 """Samples that may be under way, where they halt."""
-_LISTED_AT, _HALTED_AT = 0, 4
+_GROUPS_AT, _LISTED_AT, _UNEVEN_GROUPS_AT, _HALTED_AT = 0, 12, 16, 32
+_NOTHING = np.array((64, 0, 1, 0, 64, 0, 1, 0, 0), "u4")
+"""The list's first words where nothing is listed (shaders/camera/listed.glsl)."""
 SURVEYED = np.dtype([("key", "u4"), ("mean", "u4", 3)])
 """Bytes that a survey keeps of a pixel (shaders/camera/survey.glsl)."""
 _UNEVEN_BYTES = 4
 """Bytes of the number of a pixel that is not even."""
 
-Dispatch = Callable[[int], float]
-"""Follows so many pixels, as `first_listed` and its neighbours in the parameters say; seconds it took."""
+Dispatch = Callable[[DispatchBudget, int], None]
+"""Follows so many pixels, as `first_listed` and its neighbours in the parameters say; the budget learns from it."""
 
 
 class ListedPixels:
@@ -60,35 +63,25 @@ class ListedPixels:
             self._reserve()
         return self.room
 
-    def part_even(self, width: int, height: int) -> np.ndarray:
-        """Leave keys to even pixels only, and list the others behind the survey in the order of their rows: at the end
-        of each row, and before the first, how many there are (height + 1,)."""
-        assert self._list is not None and self._surveyed == width * height
-        begins, size = 8 + 4 * self.room, SURVEYED.itemsize * self._surveyed
-        survey = np.empty(self._surveyed, SURVEYED)
-        self._list.read_into(survey, size, offset=begins)
-        even = even_keys(survey["key"].reshape(height, width))
-        survey["key"] = even.ravel()
-        self._list.write(survey, offset=begins)
-        uneven = np.flatnonzero(even == 0).astype("u4")
-        if len(uneven):
-            self._list.write(uneven, offset=begins + size)
-        return np.searchsorted(uneven, width * np.arange(height + 1))
-
     @property
     def count(self) -> int:
-        """Pixels that are listed."""
+        """Pixels that are listed; waits for the device."""
         return self._count(_LISTED_AT)
+
+    @property
+    def may_halt(self) -> bool:
+        """It is followed a portion at a time (`follow`)."""
+        return self._halted is not None
+
+    def run(self, program: moderngl.ComputeShader, *, uneven: bool = False) -> None:
+        """Run `program` over all that is listed, or over the pixels that a survey found uneven."""
+        assert self._list is not None
+        program.run_indirect(self._list, _UNEVEN_GROUPS_AT if uneven else _GROUPS_AT)
 
     def clear(self) -> None:
         """Nothing is listed and nothing has halted."""
         assert self._list is not None
-        self._list.write(bytes(8))
-
-    def fill(self, count: int) -> None:
-        """The numbers from 0 on are listed, and nothing has halted."""
-        assert self._list is not None and count <= self.room
-        self._list.write(np.concatenate([[count, 0], np.arange(count)]).astype("u4").tobytes())
+        self._list.write(_NOTHING)
 
     def bind(self) -> None:
         """To the places that the programs read."""
@@ -97,26 +90,23 @@ class ListedPixels:
         if self._halted is not None:
             self._halted.bind_to_storage_buffer(BIND_HALTED)
 
-    def follow(self, parameters: np.ndarray, dispatch: Dispatch, target_s: float) -> Iterator[float]:
-        """Follow all that is listed, yielding the share done after each dispatch but the last; one takes about
-        `target_s`."""
+    def follow(self, parameters: np.ndarray, dispatch: Dispatch) -> Iterator[float]:
+        """Follow all that is listed by portions, yielding the share done after each dispatch but the last."""
         count, done, place = self._count(_LISTED_AT), 0, 0
         while done < count:
-            pixels = min(self.budget.units, count - done)
-            if self._halted is not None:
-                pixels = min(pixels, _PLACES - place)
+            pixels = min(self.budget.units, count - done, _PLACES - place)
             parameters["first_place"], parameters["queue"] = place, 0
-            _follow(self.budget, done, pixels, parameters, dispatch, target_s)
+            _follow(self.budget, done, pixels, parameters, dispatch)
             done, place = done + pixels, place + pixels
             # Those of many dispatches together, so that few are left without neighbours.
-            if self._halted is not None and (done == count or place == _PLACES):
-                for _ in self._resume_halted(parameters, dispatch, target_s):
+            if done == count or place == _PLACES:
+                for _ in self._resume_halted(parameters, dispatch):
                     yield done / count
                 place = 0
             if done < count:
                 yield done / count
 
-    def _resume_halted(self, parameters: np.ndarray, dispatch: Dispatch, target_s: float) -> Iterator[None]:
+    def _resume_halted(self, parameters: np.ndarray, dispatch: Dispatch) -> Iterator[None]:
         """Take up the samples that have halted until none is left, pausing before every dispatch."""
         assert self._list is not None
         parameters["first_place"] = NONE
@@ -127,7 +117,7 @@ class ListedPixels:
             while done < count:
                 yield
                 samples = min(self.resumed.units, count - done)
-                _follow(self.resumed, done, samples, parameters, dispatch, target_s)
+                _follow(self.resumed, done, samples, parameters, dispatch)
                 done += samples
 
     def _count(self, at: int) -> int:
@@ -137,25 +127,14 @@ class ListedPixels:
     def _reserve(self) -> None:
         shader.release(self._list)
         bytes_of_surveyed = SURVEYED.itemsize + _UNEVEN_BYTES
-        self._list = self._ctx.buffer(reserve=8 + 4 * self.room + bytes_of_surveyed * self._surveyed)
+        self._list = self._ctx.buffer(reserve=_NOTHING.nbytes + 4 * self.room + bytes_of_surveyed * self._surveyed)
 
     def release(self) -> None:
         """Free both."""
         shader.release(self._list, self._halted)
 
 
-def even_keys(keys: np.ndarray) -> np.ndarray:
-    """The keys of pixels (H, W) that share theirs with all their neighbours, 0 elsewhere."""
-    height, width = keys.shape
-    padded, even = np.pad(keys, 1, mode="edge"), keys.copy()
-    for row, column in np.ndindex(3, 3):
-        even[padded[row : row + height, column : column + width] != keys] = 0
-    return even
-
-
-def _follow(
-    budget: DispatchBudget, first: int, count: int, parameters: np.ndarray, dispatch: Dispatch, target_s: float
-) -> None:
+def _follow(budget: DispatchBudget, first: int, count: int, parameters: np.ndarray, dispatch: Dispatch) -> None:
     """Dispatch a portion of the listed pixels, or of the halted samples."""
     parameters["first_listed"], parameters["end_listed"] = first, first + count
-    budget.learn(count, dispatch(count), target_s)
+    dispatch(budget, count)

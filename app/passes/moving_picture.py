@@ -70,7 +70,6 @@ class MovingPicture:
         shown, structs = view.source
         defines = direct_defines(shown) | {
             **switched(IN_MOTION=True),
-            "THE_SAMPLE": "4u",
             "NUMBER_BITS": 27,
             "LATTICE_MAPS": "0xffffu",
             "LATTICE_OBJECTS": "0x10000u",

@@ -105,9 +105,10 @@ void add_to_picture(uvec2 pixel) {
 void see_pixel() {
     uvec2 pixel = gl_GlobalInvocationID.xy + uvec2(0u, p.first_row);
     if (p.survey == SURVEY_KEPT) {
-        uint at = p.first_listed + gl_WorkGroupID.x * 64u + gl_LocalInvocationIndex;
-        uint number = listed[min(at, p.end_listed - 1u)];
-        pixel = at < p.end_listed ? uvec2(number % p.size.x, number / p.size.x) : p.size;
+        uint at = place_in_list();
+        if (at >= uneven_count) return;
+        uint number = listed[uneven_place(at)];
+        pixel = uvec2(number % p.size.x, number / p.size.x);
     }
     if (pixel.x >= p.size.x || pixel.y >= p.size.y) return;
     uint pixel_key = hash_combine(hash_combine(p.seed, pixel.x), pixel.y);
@@ -142,25 +143,26 @@ void see_pixel() {
     if (FOLLOWED && specular_samples > 0u) {
         // A place in the pixel belongs to one on the lens: another pair may meet no glass.
         bool is_any = LENS ? p.primary_samples == 1u : specular_samples == p.primary_samples;
-        listed[atomicAdd(listed_count, 1u)] = listed_entry(number, is_any ? THE_SAMPLE : chosen, specular_samples);
+        list_entry(listed_entry(number, is_any ? THE_SAMPLE : chosen, specular_samples));
     }
     add_to_picture(pixel);
 }
 
 // A listed pixel: its path through glass and over mirrors, and all that it splits into.
 void follow_listed_pixel() {
-    uint at = HALTS ? shared_out(gl_WorkGroupID.x, gl_NumWorkGroups.x) * gl_WorkGroupSize.x + gl_LocalInvocationID.x
-                    : gl_GlobalInvocationID.x;
-    uint at_listed = p.first_listed + at;
-    if (at_listed >= p.end_listed) return;
     uint entry;
     bool resumes = false;
     if (HALTS) {
+        uint at = shared_out(gl_WorkGroupID.x, gl_NumWorkGroups.x) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
+        uint at_listed = p.first_listed + at;
+        if (at_listed >= p.end_listed) return;
         resumes = p.first_place == NONE;
         place = resumes ? halted[at_listed].queued[1u - p.queue] : p.first_place + at;
         entry = resumes ? halted[place].entry : listed[at_listed];
     } else {
-        entry = listed[at_listed];
+        uint at = place_in_list();
+        if (at >= listed_count) return;
+        entry = listed[at];
     }
     uint number = bitfieldExtract(entry, 0, int(LISTED_BITS)),
          primary_sample = bitfieldExtract(entry, int(LISTED_BITS), 3);

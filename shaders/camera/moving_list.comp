@@ -6,11 +6,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 layout(r32ui, binding = IMAGE_CHOSEN) uniform readonly restrict uimage2D chosen;
 layout(rgba32f, binding = IMAGE_PICTURE) uniform writeonly restrict image2D found;
 layout(rgba32f, binding = IMAGE_FACING) uniform writeonly restrict image2D facing;
-layout(std430, binding = BIND_LISTED) restrict buffer Listed {
-    uint listed_count;
-    uint halted_count;
-    uint listed[];
-};
+#include "camera/listed.glsl"
 
 void main() {
     uvec2 block = gl_GlobalInvocationID.xy;
@@ -21,6 +17,6 @@ void main() {
         uvec2 pixel = pixel_of(number), first = seen_first(pixel);
         imageStore(found, ivec2(pixel), vec4(0.0));
         imageStore(facing, ivec2(block), vec4(facing_of(first, pixel), uintBitsToFloat(first.y)));
-        listed[atomicAdd(listed_count, 1u)] = number | (THE_SAMPLE << NUMBER_BITS);
+        list_entry(listed_entry(number, THE_SAMPLE, 1u));
     }
 }

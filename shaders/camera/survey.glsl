@@ -13,7 +13,7 @@ struct Survey {
 
 // One look: what it met, and which lights it saw there.
 void survey_look(inout Survey survey, uint look, uint sees, bool met, Hit hit, uint lights_met) {
-    uint key = (hash_combine(met ? hit.object : NONE, lights_met) & ~KIND_BITS) | sees;
+    uint key = (hash_combine(met ? hit.object : NONE, lights_met) & ~KEY_FLAGS) | sees;
     if (look == 0u) survey = Survey(key, hit.normal_g);
     bool even = key == survey.key && !saw_light && !skipped_texels
         && (sees != SEES_DIRECTLY || !met || dot(hit.normal_g, survey.normal) >= EVEN_NORMALS);

@@ -17,7 +17,7 @@ from spectrasplat.gpu.scene_buffers import SceneBuffers
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.passes import camera_programs
+from spectrasplat.passes import camera_programs, listed_pixels
 from spectrasplat.passes.camera import CameraPass
 from spectrasplat.passes.caustic_maps import CausticMaps
 from spectrasplat.render.device_scene import spectral_axis
@@ -33,14 +33,15 @@ class Shuffled(CameraPass):
 
     order = 0
 
-    def _follow_listed(self, parameters: np.ndarray, maps: CausticMaps) -> Iterator[float]:
+    def _portions(self, parameters: np.ndarray, maps: CausticMaps) -> Iterator[float]:
         assert self._listed is not None
         pixels = self._listed._list
-        count = int(np.frombuffer(pixels.read(4), "u4")[0])
+        count = int(np.frombuffer(pixels.read(4, offset=listed_pixels._LISTED_AT), "u4")[0])
         if count:
-            listed = np.frombuffer(pixels.read(4 * count, offset=8), "u4")
-            pixels.write(np.random.default_rng(self.order).permutation(np.sort(listed)).tobytes(), offset=8)
-        yield from super()._follow_listed(parameters, maps)
+            begins = listed_pixels._NOTHING.nbytes
+            listed = np.frombuffer(pixels.read(4 * count, offset=begins), "u4")
+            pixels.write(np.random.default_rng(self.order).permutation(np.sort(listed)).tobytes(), offset=begins)
+        yield from super()._portions(parameters, maps)
 
 
 def shuffled(gl: Context, scene: Scene) -> Shuffled:

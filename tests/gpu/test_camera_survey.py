@@ -9,7 +9,7 @@ from spectrasplat.model.lights import DirectionalLight
 from spectrasplat.model.optics import glass
 from spectrasplat.model.scene import Camera, Dielectric, Diffuse, SceneObject
 from spectrasplat.passes import camera as camera_module
-from spectrasplat.passes.listed_pixels import even_keys
+from spectrasplat.passes import listed_pixels
 
 from tests.gpu.camera_rig import WHITE, floor, horizontal, opened_camera_pass, released
 
@@ -18,6 +18,7 @@ CAMERA = Camera(
     position=(0.4, -0.3, 10), target=(0.4, -0.3, 0), up=(0.1, 1, 0), kind="orthographic", vertical_extent=4.0
 )
 SUN = DirectionalLight("sun", WHITE, (0.4, 0.2, -1.0), 8.0)
+IS_EVEN = 4
 SHARP = DirectionalLight("sharp", WHITE, (-0.3, 0.2, -1.0), 0.0)
 
 
@@ -42,11 +43,22 @@ def picture(gl, surveys: bool, monkeypatch, samples=16, stop_after=None):
     rgb, taken = camera_pass.read_rgb(), camera_pass.samples_taken
     keys = None
     if surveys:
-        room_of_list = camera_pass._listed.room
-        words = np.frombuffer(camera_pass._listed._list.read(), "u4")[2 + room_of_list :]
-        keys = words[: 4 * SIZE[0] * SIZE[1]].reshape(SIZE[1], SIZE[0], 4)[..., 0]
+        keys = even_keys(camera_pass)
     released(camera_pass)
     return rgb, keys, taken
+
+
+def surveyed_keys(camera_pass):
+    """uint32 (H, W)."""
+    survey_at = len(listed_pixels._NOTHING) + camera_pass._listed.room
+    words = np.frombuffer(camera_pass._listed._list.read(), "u4")[survey_at:]
+    return words[: 4 * SIZE[0] * SIZE[1]].reshape(SIZE[1], SIZE[0], 4)[..., 0]
+
+
+def even_keys(camera_pass):
+    """The same, 0 where a pixel is not even."""
+    keys = surveyed_keys(camera_pass)
+    return np.where(keys & IS_EVEN, keys, 0)
 
 
 @pytest.fixture(scope="module")
@@ -85,12 +97,18 @@ def test_a_stop_leaves_a_picture_as_bright(gl, monkeypatch):
     assert stopped[seen] == pytest.approx(whole[seen], rel=1e-5)
 
 
-def test_a_pixel_keeps_its_key_among_eight_like_it():
-    keys = np.full((4, 5), 9, np.uint32)
-    keys[0, 4] = 5
-    kept = np.full((4, 5), 9)
-    kept[:2, 3:] = 0
-    assert np.array_equal(even_keys(keys), kept)
+def test_a_pixel_is_even_among_eight_like_it(gl, monkeypatch):
+    monkeypatch.setattr(camera_module, "SURVEY_FROM", 4)
+    camera_pass = opened_camera_pass(gl, room(), [SUN, SHARP], camera=CAMERA)
+    camera_pass.run(CAMERA, *SIZE, 4)
+    marked = surveyed_keys(camera_pass)
+    released(camera_pass)
+    keys = marked & ~np.uint32(IS_EVEN)
+    padded, alike = np.pad(keys, 1, mode="edge"), keys != 0
+    for row, column in np.ndindex(3, 3):
+        alike &= padded[row : row + SIZE[1], column : column + SIZE[0]] == keys
+    assert 0.1 < alike.mean() < 0.95
+    assert np.array_equal(marked & IS_EVEN != 0, alike)
 
 
 def test_few_samples_and_later_ones_have_no_survey(gl, monkeypatch):

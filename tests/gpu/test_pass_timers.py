@@ -56,6 +56,17 @@ def test_timers_are_believed_where_they_can_be_right(elapsed_ns: float, works: b
     assert timers.since(before) == ({"trace": pytest.approx(0.01)} if works else {})
 
 
+@pytest.mark.parametrize(("runs_at_once", "finishes"), [(True, 0), (False, 1)])
+def test_without_timers_the_wall_clock_is_read(runs_at_once: bool, finishes: int, monkeypatch) -> None:
+    waited, told = [], []
+    monkeypatch.setattr(Device, "finish", lambda self: waited.append(1))
+    timers = PassTimers(Device(0), False, runs_at_once)  # type: ignore[arg-type]
+    with timers.timing("camera", told.append):
+        time.sleep(0.002)
+    assert len(told) == 1 and told[0] > 0.001
+    assert len(waited) == finishes
+
+
 def test_a_software_renderer_has_none(gl) -> None:
     assert not gl.timers.work
     with gl.timers.timing("camera"):
