@@ -84,6 +84,8 @@ class PassTimers:
 
     def _tells_truth(self) -> bool:
         """Whether copying some memory takes more than no time, and no more than the wall clock says."""
+        if self._runs_at_once:
+            return False
         query = self._ctx.query(time=True)
         from_here, to_there = (self._ctx.buffer(reserve=_BYTES) for _ in range(2))
         try:
