@@ -8,8 +8,9 @@ from __future__ import annotations
 
 Defines = dict[str, int | float | str]
 PROGRAM_SWITCHES = frozenset(
-    # Emission: the light's domain, cells of it that are thinned; a driver that ends long loops.
-    ("LIGHT_AREA", "LIGHT_PLANE", "LIGHT_POINT", "LIGHT_PROFILE", "THINNED_CELLS", "LOOPS_MAY_END")
+    # Emission: the light's domain, cells of it that are thinned. A driver that ends long loops; rays followed for
+    # several events in a dispatch.
+    ("LIGHT_AREA", "LIGHT_PLANE", "LIGHT_POINT", "LIGHT_PROFILE", "THINNED_CELLS", "LOOPS_MAY_END", "RAY_POOL")
     # What the paths of a walk carry; the walk's own file defines them by features.
     + ("HAS_NORMAL_COLUMNS", "WIDENED_BY_LOBES")
     # Light of the environment and of other receivers, by way of glass.

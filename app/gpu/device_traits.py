@@ -46,12 +46,13 @@ class DeviceTraits:
     """Scene and pictures are read by `imageLoad`: `texelFetch` works out a mip level for every ray there."""
     loops_may_end: bool = False
     """All loops of an invocation end, silently, once they have run about 65,535 rounds together."""
-    queue_read_steps: int = 8
-    """Events of all rays between two reads of how many are left. Reading waits for the device, and empty steps cost a
-    GPU less."""
-    batch_scale: int = 16
-    """Rays in flight, and the memory for them, in units of the default batch. An event of a few rays takes a GPU as
-    long as one of many: a batch has some forty, of five dispatches each."""
+    ray_events: tuple[int, ...] = (4, 4, 8, 8, 64, 64, 64, 4096)
+    """For how many events each dispatch of a batch follows a ray; the last one follows all that becomes of it. Empty: a
+    dispatch is one event, after which rays are listed in order."""
+    photon_batch: int = 1 << 20
+    """Lattice points whose photons are traced at once, where memory allows."""
+    photon_queue_bytes: int = 1 << 30
+    """What their queue may take."""
     work_is_queued: bool = True
     """A command only queues work: to keep a deadline is to wait for the device."""
     dispatch_s: float = DISPATCH_S
@@ -92,8 +93,9 @@ class DeviceTraits:
             is_software=True,
             texels_as_images=llvmpipe,
             loops_may_end=True,
-            queue_read_steps=1,
-            batch_scale=1,
+            ray_events=(),
+            photon_batch=1 << 16,
+            photon_queue_bytes=64 << 20,
             work_is_queued=False,
             compiles_ahead=False,
             dispatch_s=0.15,

@@ -244,6 +244,9 @@ object first whose light beams carry."""
 FALLBACKS = ("footprint_dropped", "shading_normal", "band_cut", "queue_overflow")
 """Counted fall-backs, in the order of `Outcome.what`'s bits from 8."""
 
+WATTS = len(CATEGORIES) + 3
+"""Sums of flux in a tally."""
+
 CHUNK_COUNT = Struct(
     "ChunkCount",
     (
@@ -277,6 +280,43 @@ QUEUE_STATE = Struct(
         Field("flights", "uint", "of all rays, up to what they meet, since the batch began"),
         Field("most_alive", "uint", "rays of the fullest step"),
         Field("reserved", "uint"),
+    ),
+)
+POOL_TALLY = Struct(
+    "PoolTally",
+    (
+        Field("watts", "float", "ended flux by CATEGORIES, then absorbed, roulette's balance, emitted; W", WATTS),
+        Field("fallbacks", "uint", "by FALLBACKS", len(FALLBACKS)),
+    ),
+)
+"""What one work group has counted of a batch."""
+
+POOL_STATE = Struct(
+    "PoolState",
+    (
+        Field("alive", "uint", "rays of the running dispatch"),
+        Field("survivors", "uint", "of these, rays of earlier dispatches; the rest is new"),
+        Field("born_first", "uint", "place in the ring of free slots of the first new one"),
+        Field("capacity", "uint", "slots for rays"),
+        Field("taken", "uint", "place in the ring of the next free slot"),
+        Field("taken_before", "uint", "when the dispatch began"),
+        Field("free_end", "uint", "place behind the last slot that was free then"),
+        Field("returned", "uint", "place where the next slot is given back"),
+        Field("next_survivors", "uint"),
+        Field("photons", "uint", "landed since the batch began"),
+        Field("photon_capacity", "uint"),
+        Field("flights", "uint", "of all rays, up to what they meet, since the batch began"),
+        Field("trace_groups", "uvec4", "indirect dispatch size"),
+        Field("groups_done", "uint", "of the running dispatch"),
+        Field("dispatches", "uint", "that had a ray"),
+        Field("most_alive", "uint"),
+        Field("lent", "uint", "of the free slots those at the end, to whoever follows all that becomes of a ray"),
+        Field("overflow", "uint", "rays and photons that found no room"),
+        Field("drawn", "uint", "photons to be drawn: 0 where the batch has to be traced again"),
+        Field("watts", "float", "tally of all groups", WATTS),
+        Field("fallbacks", "uint", "likewise", len(FALLBACKS)),
+        Field("emitted", "uint", "rays that the batch began with"),
+        Field("reserved", "uint", "", 3),
     ),
 )
 MASK_SIZE = 64

@@ -22,7 +22,8 @@ from ..model.optics.spectral_tables import SpectralAxis, cumulative
 from ..model.scene import Scene
 from ..model.settings import RenderSettings
 from .emission_domain import EmissionDomain, emission_domain
-from .trace import FLIGHT_ROOM, Band, LatticeSlice, TracePass
+from .ray_queue import FLIGHT_ROOM
+from .trace import Band, LatticeSlice, TracePass
 
 PHOTONS = 1 << 15
 """Photons of all lights together that meet glass or a mirror first."""

@@ -34,7 +34,7 @@ def light_defines(features: Features, traits: DeviceTraits) -> Defines:
         features.defines()
         | bindings.LIGHT_HALF_DEFINES
         | _FLAGS
-        | switched(LOOPS_MAY_END=features.tree and traits.loops_may_end)
+        | switched(LOOPS_MAY_END=features.tree and traits.loops_may_end, RAY_POOL=bool(traits.ray_events))
         | {
             "MASK_SIZE": records.MASK_SIZE,
             "CATEGORY_COUNT": f"{len(records.CATEGORIES)}u",

@@ -1,15 +1,13 @@
 """The light pass's first two stages: a batch of lattice points becomes photon records.
 
-`emit` fills the queue, then every step sends all rays in flight to their next surface. The
-queue between steps is listed by count, scan and scatter without atomics, so the order of the
-photons is a function of the lattice alone.
+`emit` fills the queue, then rays are followed from surface to surface: one event after the other of all rays
+(`ray_queue`), or several of each at a time (`ray_pool`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 
 import moderngl
 import numpy as np
@@ -19,20 +17,19 @@ from ..features.features import Features
 from ..features.program_switches import switched
 from ..gpu import bindings, records, shader
 from ..gpu.context import Context
+from ..gpu.device_traits import DeviceTraits
 from ..gpu.scene_buffers import UNBOUNDED, SceneBuffers
 from ..gpu.scene_records import SCENE_STRUCTS
 from .emission_domain import EmissionDomain
 from .lattice_order import morton_order
 from .light_programs import light_defines
+from .ray_pool import STRUCTS as POOL_STRUCTS
+from .ray_pool import RayPool
+from .ray_queue import FLIGHT_ROOM, PHOTON_ROOM, OrderedQueue, QueueParts
+from .ray_queue import STRUCTS as QUEUE_STRUCTS
 
-RAY_ROOM = 3
-"""Rays in flight per lattice point of a batch: splitting rarely passes 1.5."""
-PHOTON_ROOM = 4
-FLIGHT_ROOM = 24
-"""Flights per lattice point of a batch, where they are recorded; most of glass splits into ten."""
 SPLIT_THRESHOLD = 0.3
 """Share of a photon's power below which roulette decides whether a part of it is followed."""
-_CHUNK = 64
 _GROUP = 64
 _MAX_ORDERS = 8
 """Emission orders kept: a pass has one for its batches and one for its last, shorter one."""
@@ -93,13 +90,9 @@ class FluxTally:
         return abs(started - sum(self.ended.values()) - self.roulette) / started if started else 0.0
 
 
-@lru_cache(maxsize=64)
-def queue_bytes(features: Features, batch: int) -> int:
-    """Device memory that tracing `batch` lattice points at once takes."""
-    ray = records.ray_record_of(features).stride
-    photon = records.photon_record(features.spectral_groups, features.hero).stride
-    room = RAY_ROOM * batch
-    return room * (4 * ray + records.OUTCOME.stride + photon + 8) + PHOTON_ROOM * batch * photon
+def queue_class(traits: DeviceTraits) -> type[OrderedQueue | RayPool]:
+    """How a device holds rays between two events."""
+    return RayPool if traits.ray_events else OrderedQueue
 
 
 @dataclass(frozen=True)
@@ -110,13 +103,17 @@ class Batch:
     emitted_photons: int
     tally: FluxTally
     steps: int
+    """Dispatches that had a ray."""
     flights: int
     """Stretches of all rays, up to what they meet."""
     overflow: int
     """Rays and photons that found no room. What carries their light is gone: only fewer points at once bring it back
     (`LatticeSlice.halves`)."""
-    fullness: float
-    """Share of the queue of rays or of photons, whichever is fuller, that lattice points which fill a batch take up."""
+
+    @property
+    def fullness(self) -> float:
+        """Share of the room for photons that lattice points which fill a batch take up."""
+        return self.photons / (PHOTON_ROOM * max(self.emitted_photons, 1))
 
 
 @dataclass(frozen=True)
@@ -190,8 +187,6 @@ class TracePass:
         self.scene = scene
         self.batch = batch
         self.max_depth = max_depth
-        self.events_at_once = 1
-        """Events of all rays between two pauses of `steps`: more where a pause would take longer than they do."""
         self.rays_traced = 0
         """Rays emitted since this pass was made, pilots and all."""
         self.split_threshold = split_threshold
@@ -200,7 +195,7 @@ class TracePass:
         self.photon = records.photon_record(features.spectral_groups, features.hero)
         ctx = context.ctx
         structs = (
-            *(*SCENE_STRUCTS, self.ray, self.photon, records.OUTCOME, records.CHUNK_COUNT, records.QUEUE_STATE),
+            *(*SCENE_STRUCTS, self.ray, self.photon, *(POOL_STRUCTS if context.traits.ray_events else QUEUE_STRUCTS)),
             *([records.FLIGHT] if features.flights else []),
         )
         defines = light_defines(features, context.traits) | scene.defines
@@ -210,25 +205,8 @@ class TracePass:
         self._emit: dict[tuple[str, bool], moderngl.ComputeShader] = {}
         self._orders: dict[tuple[int, int, int], moderngl.Buffer] = {}
         self._trace = shader.compute(ctx, "light/trace.comp", defines, (*structs, records.TRACE_PARAMETERS))
-        queue = {
-            name: shader.compute(ctx, f"light/queue_{name}.comp", defines, structs)
-            for name in ("count", "scan", "scatter", "gather")
-        }
-        self._count, self._scan, self._scatter, self._gather = queue.values()
-
-        ray_capacity = RAY_ROOM * batch
-        chunks = -(-ray_capacity // _CHUNK)
-        self._state_zero = records.QUEUE_STATE.zeros(1)
-        self._state_zero["ray_capacity"] = ray_capacity
-        self._state_zero["photon_capacity"] = PHOTON_ROOM * batch
-        self._rays = [ctx.buffer(reserve=2 * ray_capacity * self.ray.stride) for _ in range(2)]
-        self._outcomes = ctx.buffer(reserve=ray_capacity * records.OUTCOME.stride)
-        self._slots = ctx.buffer(reserve=ray_capacity * self.photon.stride)
-        self._indices = ctx.buffer(reserve=2 * ray_capacity * 4)
-        self._counts = ctx.buffer(reserve=chunks * records.CHUNK_COUNT.stride)
-        self._counts_zero = bytes(chunks * records.CHUNK_COUNT.stride)
-        self._state = ctx.buffer(self._state_zero.tobytes())
-        self.photons = ctx.buffer(reserve=PHOTON_ROOM * batch * self.photon.stride)
+        self._queue = queue_class(context.traits)(QueueParts(context, features, defines, structs, batch))
+        self.photons, self.emitted_rays = self._queue.photons, self._queue.rays
         self.flights = ctx.buffer(reserve=FLIGHT_ROOM * batch * records.FLIGHT.stride) if features.flights else None
         """What every ray of the last batch flew, in order, where the features have it: FLIGHT records."""
         self._emit_parameters = ctx.buffer(reserve=records.EMIT_PARAMETERS.stride)
@@ -236,25 +214,15 @@ class TracePass:
 
     def release_buffers(self) -> None:
         """Free the queue: nothing is traced any more."""
-        shader.release(*self._rays, self._outcomes, self._slots, self._indices, self._counts, self.photons)
+        self._queue.release_buffers()
 
     def release(self) -> None:
         """Free every buffer and program."""
         shader.release(
-            *self._rays,
-            self._outcomes,
-            self._slots,
-            self._indices,
-            self._counts,
-            self._state,
-            self.photons,
+            self._queue,
             self._emit_parameters,
             self._trace_parameters,
             self._trace,
-            self._count,
-            self._scan,
-            self._scatter,
-            self._gather,
             *self._emit.values(),
             *self._orders.values(),
             *([] if self.flights is None else [self.flights]),
@@ -263,7 +231,7 @@ class TracePass:
     @property
     def bytes(self) -> int:
         """Device memory that the queue takes while photons are traced."""
-        return queue_bytes(self._features, self.batch)
+        return self._queue.bytes_of(self._features, self.batch)
 
     def run(self, piece: LatticeSlice, domain: EmissionDomain, max_depth: int | None = None) -> Batch:
         """Trace `piece.count` ≤ batch lattice points; their photons replace the buffer's content.
@@ -278,7 +246,8 @@ class TracePass:
         max_depth: int | None = None,
         split_threshold: float | None = None,
     ) -> Generator[None, None, Batch]:
-        """`run`, pausing after every event of all rays; a caller that draws meanwhile may bind what it likes.
+        """`run`, pausing after every event of all rays, on a GPU after all of them; a caller that draws meanwhile may
+        bind what it likes.
         `split_threshold`: by default the pass's own."""
         max_depth = self.max_depth if max_depth is None else min(max_depth, self.max_depth)
         if piece.count > self.batch:
@@ -287,15 +256,12 @@ class TracePass:
             raise ValueError("objects are left to beams, and the programs were made without them")
         self._start(piece, domain, max_depth, split_threshold or self.split_threshold)
         self.scene.bind()
-        self._bind_queue()
-        self._bind_rays(0)
+        self._queue.begin(piece.count)
         self._emit_parameters.bind_to_storage_buffer(bindings.PARAMETERS)
         self.order(piece).bind_to_storage_buffer(bindings.INDICES)
         self._emit_program(domain).run(-(-piece.count // _GROUP))
-        self._indices.bind_to_storage_buffer(bindings.INDICES)
-        self._list_children(first=True, chunks=-(-piece.count // _CHUNK))
-        emitted = int(self._read_state()["alive"])
-        return (yield from self._follow(emitted, max_depth))
+        self._queue.emitted(piece.count)
+        return (yield from self._follow(max_depth))
 
     def carry_on(self, rays: np.ndarray, light: int, max_depth: int | None = None) -> Generator[None, None, Batch]:
         """`steps` for `rays` of one light that are on their way already: records (n,) of `ray` with n ≤ `batch`. Their
@@ -304,61 +270,38 @@ class TracePass:
         count = len(rays)
         if count > self.batch:
             raise ValueError(f"{count} rays in a batch of {self.batch}")
-        chunks = -(-count // _CHUNK)
-        state = self._state_zero.copy()
-        state["alive"] = state["flights"] = state["most_alive"] = count
-        state["trace_groups"] = (-(-count // _GROUP), 1, 1, 0)
-        state["next_chunk_groups"] = (-(-chunks // _GROUP), 1, 1, 0)
-        self._state.write(state.tobytes())
-        self._counts.write(self._counts_zero)
-        self._rays[0].write(np.ascontiguousarray(rays))
-        self._indices.write(np.arange(count, dtype=np.uint32))
+        self._queue.load(rays)
         self._trace_values = self._trace_parameters_of(light, 1, max_depth)
         self._trace_parameters.write(self._trace_values.tobytes())
-        batch = yield from self._follow(count, max_depth)
+        batch = yield from self._follow(max_depth)
         batch.tally.handed = float(rays["flux_w"].sum(dtype=float))
         return batch
 
-    def _follow(self, alive: int, max_depth: int) -> Generator[None, None, Batch]:
-        """Event after event of the rays in flight, until none is left."""
-        ctx, emitted = self.context.ctx, alive
-        self.rays_traced += emitted
+    def _follow(self, max_depth: int) -> Generator[None, None, Batch]:
         # Walking through covered surfaces, cutting bands and all but one of a grating's orders take steps without
         # being events.
         limit = (2 + self.scene.most_orders) * max_depth + 32
-        step = 0
-        while alive and step < limit:
-            self.scene.bind()
-            self._trace_parameters.bind_to_uniform_block(bindings.PARAMETERS)
-            self._bind_queue()
-            for _ in range(min(self.events_at_once, limit - step)):
-                if step == limit - 1:
-                    self._trace_values["max_depth"] = 0
-                    self._trace_parameters.write(self._trace_values.tobytes())
-                self._bind_rays(step + 1)
-                self._trace.run_indirect(self._state, records.QUEUE_STATE.offset("trace_groups"))
-                self._list_children(first=False)
-                step += 1
-                # Reading the count waits for the device: rarely on a GPU, where empty steps cost less.
-                if step % self.context.traits.queue_read_steps == 0:
-                    alive = int(self._read_state()["alive"])
-                    if not alive:
-                        break
-            yield
+        found = yield from self._queue.follow(self._trace, self._bind, limit, self._end_all)
         self.context.check("tracing photons")
-        state = self._read_state()
-        ctx.memory_barrier()
-        photons = int(state["photon_first"]) + int(state["photons_new"])
-        fullness = max(int(state["most_alive"]) / RAY_ROOM, photons / PHOTON_ROOM) / max(emitted, 1)
-        overflow = int(state["overflow"])
-        return Batch(photons, emitted, self._tally(overflow), step, int(state["flights"]), overflow, fullness)
+        self.rays_traced += found.emitted
+        tally = FluxTally(found.emitted_w, roulette=found.roulette_w)
+        tally.ended = dict(zip(records.CATEGORIES, found.ended_w, strict=True))
+        tally.ended["absorbed"] += found.absorbed_w
+        tally.fallbacks = dict(zip(records.FALLBACKS, found.fallbacks, strict=True))
+        tally.fallbacks["queue_overflow"] += found.overflow
+        return Batch(found.photons, found.emitted, tally, found.steps, found.flights, found.overflow)
+
+    def _end_all(self) -> None:
+        self._trace_values["max_depth"] = 0
+        self._trace_parameters.write(self._trace_values.tobytes())
+
+    def _bind(self) -> None:
+        self.scene.bind()
+        self._trace_parameters.bind_to_uniform_block(bindings.PARAMETERS)
+        if self.flights is not None:
+            self.flights.bind_to_storage_buffer(bindings.FLIGHTS)
 
     def _start(self, piece: LatticeSlice, domain: EmissionDomain, max_depth: int, split_threshold: float) -> None:
-        state = self._state_zero.copy()
-        state["alive"] = piece.count
-        state["dispatched"] = piece.count
-        self._state.write(state.tobytes())
-        self._counts.write(self._counts_zero)
         p = records.EMIT_PARAMETERS.zeros(1)
         p["origin"], p["axis"], p["tangent"], p["bitangent"] = (
             domain.origin,
@@ -427,40 +370,6 @@ class TracePass:
         p["beam_objects"] = np.packbits(bits, bitorder="little").view("<u4").reshape(p["beam_objects"].shape)
         return p
 
-    def _bind_queue(self) -> None:
-        self._outcomes.bind_to_storage_buffer(bindings.OUTCOMES)
-        self._slots.bind_to_storage_buffer(bindings.PHOTON_SLOTS)
-        self._indices.bind_to_storage_buffer(bindings.INDICES)
-        self._counts.bind_to_storage_buffer(bindings.COUNTS)
-        self._state.bind_to_storage_buffer(bindings.STATE)
-        self.photons.bind_to_storage_buffer(bindings.PHOTONS)
-        if self.flights is not None:
-            self.flights.bind_to_storage_buffer(bindings.FLIGHTS)
-
-    def _bind_rays(self, step: int) -> None:
-        # Step 0 (emission) writes rays[0]; step k reads rays[(k-1) % 2].
-        self._rays[step % 2].bind_to_storage_buffer(bindings.RAYS_OUT)
-        self._rays[(step + 1) % 2].bind_to_storage_buffer(bindings.RAYS_IN)
-
-    def _list_children(self, *, first: bool, chunks: int = 0) -> None:
-        ctx = self.context.ctx
-        offsets = {
-            name: records.QUEUE_STATE.offset(name) for name in ("chunk_groups", "next_chunk_groups", "gather_groups")
-        }
-        ctx.memory_barrier()
-        if first:
-            self._count.run(-(-chunks // _GROUP))
-        else:
-            self._count.run_indirect(self._state, offsets["next_chunk_groups"])
-        ctx.memory_barrier()
-        self._scan.run(1)
-        ctx.memory_barrier()
-        self._scatter.run_indirect(self._state, offsets["chunk_groups"])
-        ctx.memory_barrier()
-        if not first:
-            self._gather.run_indirect(self._state, offsets["gather_groups"])
-            ctx.memory_barrier()
-
     def order(self, piece: LatticeSlice) -> moderngl.Buffer:
         """The order in which `piece` is emitted, uint32 (points,); made by the processor where it is a new one."""
         key = (piece.points, piece.stride, piece.lattice_count)
@@ -479,19 +388,3 @@ class TracePass:
                 self.context.ctx, "light/emit.comp", self._defines | own, (*self._structs, records.EMIT_PARAMETERS)
             )
         return self._emit[variant]
-
-    def _read_state(self) -> np.void:
-        return np.frombuffer(self._state.read(), records.QUEUE_STATE.dtype)[0]
-
-    def _tally(self, overflow: int) -> FluxTally:
-        counts = np.frombuffer(self._counts.read(), records.CHUNK_COUNT.dtype)
-        tally = FluxTally(
-            emitted=float(counts["emitted_w"].sum(dtype=float)),
-            roulette=float(counts["roulette_w"].sum(dtype=float)),
-        )
-        flux = counts["flux_w"].sum(axis=0, dtype=float)
-        tally.ended = dict(zip(records.CATEGORIES, flux.tolist(), strict=True))
-        tally.ended["absorbed"] += float(counts["absorbed_w"].sum(dtype=float))
-        tally.fallbacks = dict(zip(records.FALLBACKS, counts["fallbacks"].sum(axis=0, dtype=int).tolist(), strict=True))
-        tally.fallbacks["queue_overflow"] += overflow
-        return tally

@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.memory import available_bytes
-from ..gpu import records
 from ..gpu.dispatch_budget import DISPATCH_S, DispatchBudget
-from ..passes.trace import RAY_ROOM, Batch, LatticeSlice, TracePass, queue_bytes
+from ..passes.trace import Batch, LatticeSlice, TracePass, queue_class
 from .light_plan import SMALLEST_BATCH, LightPlan
 from .photon_records import PhotonRecords, RoundOf
 from .splatting import Pace, Splatting
@@ -30,9 +29,6 @@ if TYPE_CHECKING:
 
 MIN_RAYS = 1 << 10
 """Rays of a batch that are not divided further, however slow the device is."""
-DEFAULT_BATCH = 1 << 16
-QUEUE_BYTES = 64 << 20
-"""What the queue of a batch of no given size may take; more on a GPU. Less where memory is short."""
 Keep = Callable[["moderngl.Buffer", int, int, RoundOf], None]
 """Takes records: (their buffer, how many, bytes of one, where they belong)."""
 
@@ -137,8 +133,6 @@ class PhotonBatches:
             stats.trace_seconds += took
             if queued and is_first and rays and is_compiled:
                 self.budget.learn(rays, took, self.dispatch_seconds)
-                most = self._context.traits.queue_read_steps  # then the number of rays left is read
-                self.trace.events_at_once = int(np.clip(self.dispatch_seconds / max(took, 1e-6), 1, most))
             is_first, self._traced_once = False, True
             yield
             started = time.perf_counter()
@@ -201,21 +195,8 @@ def traced_besides(
 
 def batch_size(context: Context, features: Features, given: int | None) -> int:
     """Lattice points in flight at once: `given`, or what the device and its memory have room for."""
-    batch = given or DEFAULT_BATCH * context.traits.batch_scale
-    if given is None:
-        batch = _batch_that_fits(features, batch, QUEUE_BYTES * context.traits.batch_scale)
-    return min(batch, _largest_batch(context, features))
-
-
-def _batch_that_fits(features: Features, batch: int, most_bytes: int) -> int:
-    """`batch`, halved until its queue takes no more than that, nor more than an eighth of the memory there is."""
-    while batch > SMALLEST_BATCH and queue_bytes(features, batch) > min(most_bytes, available_bytes() // 8):
+    traits, batch = context.traits, given or context.traits.photon_batch
+    queue, most_bytes = queue_class(traits), min(traits.photon_queue_bytes, available_bytes() // 8)
+    while given is None and batch > SMALLEST_BATCH and queue.bytes_of(features, batch) > most_bytes:
         batch >>= 1
-    return batch
-
-
-def _largest_batch(context: Context, features: Features) -> int:
-    """Lattice points whose queue fits the device's largest storage buffer."""
-    ray = records.ray_record_of(features).stride
-    limit = context.limits.storage_block_bytes
-    return max(64, int(limit // (2 * RAY_ROOM * ray)) // 64 * 64)
+    return min(batch, max(64, queue.most(features, context.limits.storage_block_bytes) // 64 * 64))

@@ -13,13 +13,34 @@ layout(local_size_x = 64) in;
 layout(std430, binding = BIND_PARAMETERS) readonly restrict buffer Parameters { EmitParameters p; };
 layout(std430, binding = BIND_RAYS_OUT) writeonly restrict buffer RaysOut { uvec4 rays[]; };
 layout(std430, binding = BIND_INDICES) readonly restrict buffer Order { uint order[]; };
+#ifdef RAY_POOL
+#include "lib/pool.glsl"
+shared uint group_rays, group_first;
+
+// In the pool; of what is emitted without gaps.
+uint emitted_slot(bool alive) {
+    bool is_first = gl_LocalInvocationIndex == 0u;
+    if (is_first) group_rays = 0u;
+    barrier();
+    uint rank = alive ? atomicAdd(group_rays, 1u) : 0u;
+    barrier();
+    if (is_first) group_first = atomicAdd(state.taken, group_rays);
+    if (is_first) atomicAdd(state.emitted, group_rays);
+    barrier();
+    return group_first + rank;
+}
+#else
 layout(std430, binding = BIND_OUTCOMES) writeonly restrict buffer Outcomes { uvec4 outcomes[]; };
+#endif
 
 vec3 to_world(vec3 local) { return local.x * p.tangent + local.y * p.bitangent + local.z * p.axis; }
 
 void main() {
     uint k = gl_GlobalInvocationID.x;
-    if (k >= p.count) return;
+    bool is_there = k < p.count;
+#ifndef RAY_POOL
+    if (!is_there) return;
+#endif
     // Every band, and every point on an extended light, has a regular lattice of its own, shifted
     // against the others: a lattice whose points jittered over the light would be noise.
     uint lattices = p.band_count * p.light_points;
@@ -110,6 +131,12 @@ void main() {
     }
     weight *= lit_share(spacings);
     alive = alive && weight > 0.0;
+    uint slot = 2u * k;
+#ifdef RAY_POOL
+    open_tally();
+    alive = alive && is_there;
+    slot = emitted_slot(alive);
+#endif
     if (alive) {
         RayRecord ray;
         ray.position = position;
@@ -203,11 +230,16 @@ void main() {
         }
         uvec4 texels[RayRecord_TEXELS];
         to_texels(ray, texels);
-        for (uint i = 0u; i < uint(RayRecord_TEXELS); ++i) rays[2u * k * uint(RayRecord_TEXELS) + i] = texels[i];
+        for (uint i = 0u; i < uint(RayRecord_TEXELS); ++i) rays[slot * uint(RayRecord_TEXELS) + i] = texels[i];
         outcome.what = 1u | 8u;
         outcome.flux_w = ray.flux_w;
     }
+#ifdef RAY_POOL
+    count_watts(EMITTED_ROW, outcome.flux_w);
+    close_group();
+#else
     uvec4 texels[Outcome_TEXELS];
     to_texels(outcome, texels);
     outcomes[k] = texels[0];
+#endif
 }

@@ -1,7 +1,7 @@
-// One specular event for every ray in flight: to the nearest surface, then reflection and
-// refraction with all derivative columns. A ray leaves at most two children (or one photon on a
-// receiver) in slots of its own; `queue_*.comp` list the living ones in order for the next call, so
-// results do not depend on how threads were scheduled.
+// Specular events of every ray in flight: to the nearest surface, then reflection and refraction with all derivative
+// columns. A ray leaves at most two children, or one photon on a receiver. Either one event in a dispatch, whose
+// children lie in slots of their own: `queue_*.comp` list the living ones in order for the next call, so results do not
+// depend on how threads were scheduled. Or several (RAY_POOL): one child is followed where its parent was.
 layout(local_size_x = 64) in;
 
 #include "lib/finite.glsl"
@@ -159,7 +159,7 @@ void land(inout Path path, Path start, uint receiver, uint triangle, Hit hit, ui
     }
     photon.flags = path.walk.flags | lattice_bits;
     if (TINT_LEVELS > 0) photon.flags |= tint_level(path) << uint(TINT_BIT);
-    store_photon(slot, photon);
+    if (!RAY_POOL || slot != NONE) store_photon(slot, photon);
     outcome.what |= LEFT_PHOTON;
 }
 
@@ -204,16 +204,16 @@ Flight flight_of(inout Path path, float distance) {
     return flight;
 }
 
-void main() {
-    uint k = gl_GlobalInvocationID.x;
-    if (k >= state.alive) return;
-    Path path = load_path(indices[k]);
+// Up to what the ray in `slot` meets next, and past it but for receivers; `k` says where its children go. Whether it
+// lands on a receiver: `path` has come there, from `start`.
+bool meets_receiver(uint slot, uint k, out Path path, out Path start, out Hit hit, out uint receiver, out uint triangle,
+    out Outcome outcome) {
+    path = load_path(slot);
     if (SPECTRAL_GROUPS > 0) keep_sweeps_within(path);
-    Path start = path;
-    Outcome outcome = Outcome(0u, 0.0, 0.0, 0.0);
+    start = path;
+    outcome = Outcome(0u, 0.0, 0.0, 0.0);
     if (!POINT_SPECTRUM) band_w = band_powers(power_row(path), path.band);
 
-    Hit hit;
     float border = -1.0;
     bool met = LANDING_CUTS ? meet_with_band(path, hit, border)
                             : intersect_closest(path.position, path.direction, FAR_DISTANCE, path.origin, hit);
@@ -223,14 +223,17 @@ void main() {
         uint rounds = 0u;
         while (rounds < 2u) rounds += min(p.lattices, 1u);
         if (rounds < 2u) {
-            outcomes[k] = uvec4(LOST_NUMERIC, floatBitsToUint(carried_w(path)), 0u, 0u);
-            return;
+            outcome = Outcome(LOST_NUMERIC, carried_w(path), 0.0, 0.0);
+            return false;
         }
     }
     // Looked up once for all branches; some object and facet where nothing was met.
     Object thing = object_at(met ? hit.object : 0u);
     Triangle facet = hit_triangle(hit);
     uint kind = met ? thing.kind : NONE;
+    receiver = thing.receiver;
+    triangle = facet.source;
+    bool lands = false;
 
 #if FLIGHTS
     Flight flight = flight_of(path, met ? hit.distance : FAR_DISTANCE);
@@ -247,7 +250,7 @@ void main() {
     if (BEAMS && met && (path.walk.light_and_source >> 16) == 0xffffu && is_beam_object(hit.object)) {
         outcome = Outcome(LEFT_TO_BEAMS, carried_w(path), 0.0, 0.0);
     } else if (kind == KIND_DIFFUSE && border < 0.0) {
-        land(path, start, thing.receiver, facet.source, hit, k, outcome);
+        lands = true;
     } else if (kind == KIND_BLACK && border < 0.0) {
         outcome.what |= ABSORBED;
         outcome.flux_w = carried_w(path);
@@ -255,7 +258,7 @@ void main() {
         // A ray that leaves the scene from inside a solid slipped through a crack.
         outcome.what |= is_inside(path.medium) ? LOST_NUMERIC : ESCAPED;
         outcome.flux_w = carried_w(path);
-    } else if (path.depth >= p.max_depth && border < 0.0) {
+    } else if (path.depth >= most_depth() && border < 0.0) {
         outcome.what |= LOST_DEPTH;
         outcome.flux_w = carried_w(path);
     } else {
@@ -267,7 +270,47 @@ void main() {
             if ((outcome.what & FELL_BAND) != 0u) flight.flux_w = 0.0;
         }
         flight.what |= kind == KIND_DIFFUSE || kind == KIND_BLACK || kind == NONE ? 0u : 1u;
+#ifndef RAY_POOL
         store_flight(state.flights - state.alive + k, flight);
+#else
+        if (outcome.what != WAITS) store_flight(atomicAdd(state.flights, 1u), flight);
+#endif
     }
+    return lands;
+}
+
+void main() {
+    uint k = gl_GlobalInvocationID.x, receiver, triangle;
+    Path path, start;
+    Hit hit;
+    Outcome outcome;
+#ifndef RAY_POOL
+    if (k >= state.alive) return;
+    if (meets_receiver(indices[k], k, path, start, hit, receiver, triangle, outcome))
+        land(path, start, receiver, triangle, hit, k, outcome);
     store_outcome(k, outcome);
+#else
+    open_tally();
+    find_ray(k);
+    do {
+        if (ray_goes_on) ray_goes_on = load_path(ray_slot).depth != NONE;
+        bool lands = false, waits = false;
+        for (uint event = 0u; (event < events || holds != 0u) && ray_goes_on && !waits; ++event) {
+            ray_goes_on = false;
+            second_slot = ray_slot;
+            lands = meets_receiver(ray_slot, ray_slot, path, start, hit, receiver, triangle, outcome);
+            waits = outcome.what == WAITS;
+            if (!waits && !lands) count_outcome(outcome);
+            if (!waits) ++events_done;
+            ray_goes_on = ray_goes_on || waits;
+        }
+        uint photon = hand_on_rays(lands && path.depth > 0u);
+        if (lands) {
+            land(path, start, receiver, triangle, hit, photon, outcome);
+            count_outcome(outcome);
+        }
+    } while (find_held());
+    if (!FLIGHTS) atomicAdd(group_events, events_done);
+    close_group();
+#endif
 }

@@ -1,12 +1,6 @@
 // What one step of the light pass reads and writes: rays, photons, outcomes.
 
 layout(std140, binding = BIND_PARAMETERS) uniform Parameters { TraceParameters p; };
-layout(std430, binding = BIND_RAYS_IN) readonly restrict buffer RaysIn { uvec4 rays_in[]; };
-layout(std430, binding = BIND_RAYS_OUT) writeonly restrict buffer RaysOut { uvec4 rays_out[]; };
-layout(std430, binding = BIND_OUTCOMES) writeonly restrict buffer Outcomes { uvec4 outcomes[]; };
-layout(std430, binding = BIND_PHOTON_SLOTS) writeonly restrict buffer PhotonSlots { uvec4 photon_slots[]; };
-layout(std430, binding = BIND_INDICES) readonly restrict buffer Indices { uint indices[]; };
-layout(std430, binding = BIND_STATE) readonly restrict buffer StateBlock { QueueState state; };
 
 // `Outcome.what`: where flux went …
 #define DEPOSITED (0u << 16)
@@ -24,6 +18,8 @@ layout(std430, binding = BIND_STATE) readonly restrict buffer StateBlock { Queue
 #define LEFT_FIRST 1u
 #define LEFT_SECOND 2u
 #define LEFT_PHOTON 4u
+// In a pool of rays: nothing happened yet.
+#define WAITS 16u
 
 #define SPATIAL (2 * FOOTPRINTS)
 #define PATH_COLUMNS COLUMNS
@@ -39,6 +35,22 @@ layout(std430, binding = BIND_STATE) readonly restrict buffer StateBlock { Queue
 // FLAG_FOOTPRINT_DROPPED.
 #define Walk RayRecord
 #include "path/event.glsl"
+
+#ifdef RAY_POOL
+#include "light/trace_pool.glsl"
+#else
+layout(std430, binding = BIND_RAYS_IN) readonly restrict buffer RaysIn { uvec4 rays_in[]; };
+layout(std430, binding = BIND_RAYS_OUT) writeonly restrict buffer RaysOut { uvec4 rays_out[]; };
+layout(std430, binding = BIND_OUTCOMES) writeonly restrict buffer Outcomes { uvec4 outcomes[]; };
+layout(std430, binding = BIND_PHOTON_SLOTS) writeonly restrict buffer PhotonSlots { uvec4 photon_slots[]; };
+layout(std430, binding = BIND_INDICES) readonly restrict buffer Indices { uint indices[]; };
+layout(std430, binding = BIND_STATE) readonly restrict buffer StateBlock { QueueState state; };
+
+// Where a ray's children go: two slots of its own.
+uint first_place(uint slot, bool both, bool stays) { return 2u * slot; }
+uint second_place(uint slot) { return 2u * slot + 1u; }
+uint most_depth() { return p.max_depth; }
+#endif
 
 // Bits of a record's flags from which on the order of a grating stands that is to be sent on next.
 #define ORDER_BIT 8
@@ -124,11 +136,13 @@ void store_flight(uint slot, Flight flight) {
     for (uint i = 0u; i < uint(Flight_TEXELS); ++i) flights[slot * uint(Flight_TEXELS) + i] = texels[i];
 }
 
+#ifndef RAY_POOL
 void store_outcome(uint slot, Outcome outcome) {
     uvec4 texels[Outcome_TEXELS];
     to_texels(outcome, texels);
     outcomes[slot] = texels[0];
 }
+#endif
 
 // Values of a spectral table at the three places of a band.
 vec3 spectral_row(uint row, vec3 x) {

@@ -108,8 +108,19 @@ void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object t
         lives = true;
     }
 #endif
+    bool both = false, stays = false;
+#ifdef HAS_DIELECTRIC
+    both = at >= 0.0 || splits && event.refracted.exists;
+    stays = splits && reflected_share > refracted_share;
+#endif
+    if (HAS_GRATING) both = both || rest_lives;
     if (lives) {
-        store_path(2u * slot, child);
+        uint place = first_place(slot, both, stays);
+        if (RAY_POOL && place == NONE) {
+            outcome.what = WAITS;
+            return;
+        }
+        store_path(place, child);
         outcome.what |= LEFT_FIRST;
     }
 
@@ -149,8 +160,15 @@ void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object t
         lives = survives(child, outcome.roulette_w, refracted_share, 2u);
     }
 #endif
+#ifdef RAY_POOL
+    if (!lives && second_slot != slot) {
+        // It was given room already, where nobody is to be found then.
+        child.depth = NONE;
+        lives = true;
+    }
+#endif
     if (lives) {
-        store_path(2u * slot + 1u, child);
+        store_path(second_place(slot), child);
         outcome.what |= LEFT_SECOND;
     }
 #endif

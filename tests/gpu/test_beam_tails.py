@@ -16,7 +16,7 @@ from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes.trace import Batch
-from spectrasplat.render import pass_rounds, photon_batches
+from spectrasplat.render import pass_rounds
 from spectrasplat.render.device_scene import scene_buffers
 from spectrasplat.render.light_pass import LightPass
 from spectrasplat.render.photon_records import NoRecords, RoundOf
@@ -183,7 +183,7 @@ def test_what_is_kept_to_be_shown_again_holds_no_tail(gl, tmp_path: Path) -> Non
 @pytest.mark.slow
 def test_rounds_of_photons_have_their_beams_together(gl, tmp_path: Path, monkeypatch) -> None:
     """Beside photons, a few rounds share a search; a pass may only be left where photons have caught up with beams."""
-    monkeypatch.setattr(photon_batches, "DEFAULT_BATCH", 4096)
+    monkeypatch.setattr(gl, "traits", replace(gl.traits, photon_batch=4096))
     monkeypatch.setattr(pass_rounds, "MIN_BEAM_PHOTONS", PHOTONS // 3)
     scene = stone(tmp_path, more=BALL + '\n[[lights]]\nkind = "point"\nposition = [25.0, 0.0, 20.0]')
     with passed(gl, scene) as light:

@@ -26,7 +26,7 @@ SLOW = 1e-9
 def queueing():
     """A device that behaves like a GPU as far as work goes; its programs are the software renderer's."""
     with create_context() as context:
-        traits = replace(context.traits, work_is_queued=True, batch_scale=1)
+        traits = replace(context.traits, work_is_queued=True)
     with device_traits.assumed(traits):
         context = create_context()
     yield context

@@ -92,9 +92,9 @@ def emit(
                 light_points,
             )
             # With no depth left every ray ends at its first surface, and what emission wrote stays where it is.
-            trace._rays[0].clear()
+            trace.emitted_rays.clear()
             trace.run(piece, domain, max_depth=0)
-            rays = np.frombuffer(trace._rays[0].read(size=2 * BATCH * ray.stride), ray.dtype)[::2]
+            rays = np.frombuffer(trace.emitted_rays.read(size=2 * BATCH * ray.stride), ray.dtype)
             rows.append(rays[rays["flux_w"] > 0.0])
         rays = np.concatenate(rows)
         return Emitted(

@@ -1,0 +1,120 @@
+"""Rays in flight where a dispatch follows each for several events: slots in a pool, taken and given back by the device.
+
+Nothing is read while a batch is traced: a fixed number of dispatches follows, of which the last find no ray any more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+
+import moderngl
+import numpy as np
+
+from ..features.features import Features
+from ..gpu import bindings, records, shader
+from .ray_queue import PHOTON_ROOM, Followed, QueueParts, strides
+
+RAY_ROOM = 2.5
+"""Slots per lattice point of a batch."""
+_GROUP = 64
+_LISTS = 5
+"""Numbers of slots in lists, ring and links, per slot (lib/pool.glsl)."""
+STRUCTS = (records.OUTCOME, records.POOL_TALLY, records.POOL_STATE)
+
+
+def _slots(batch: int) -> int:
+    return -(-int(RAY_ROOM * batch) // _GROUP) * _GROUP
+
+
+class RayPool:
+    """Owns the rays' buffer `rays`; `photons` is what they leave, in any order."""
+
+    def __init__(self, parts: QueueParts) -> None:
+        ctx, slots, (ray, photon) = parts.context.ctx, _slots(parts.batch), strides(parts.features)
+        self._context = parts.context
+        self._events = parts.context.traits.ray_events
+        self._sum = shader.compute(ctx, "light/pool_tally.comp", parts.defines, parts.structs)
+        self._state_zero = records.POOL_STATE.zeros(1)
+        self._state_zero["capacity"] = self._state_zero["free_end"] = self._state_zero["returned"] = slots
+        self._state_zero["photon_capacity"] = PHOTON_ROOM * parts.batch
+        self.rays = ctx.buffer(reserve=slots * ray)
+        self._lists = ctx.buffer(reserve=4 * _LISTS * slots)
+        self._tallies = ctx.buffer(bytes(slots // _GROUP * records.POOL_TALLY.stride))
+        self.state = ctx.buffer(self._state_zero.tobytes())
+        self.photons = ctx.buffer(reserve=PHOTON_ROOM * parts.batch * photon)
+
+    @staticmethod
+    def bytes_of(features: Features, batch: int) -> int:
+        """Device memory of the pool for so many lattice points."""
+        (ray, photon), slots = strides(features), _slots(batch)
+        return slots * (ray + 4 * _LISTS) + slots // _GROUP * records.POOL_TALLY.stride + PHOTON_ROOM * batch * photon
+
+    @staticmethod
+    def most(features: Features, block_bytes: int) -> int:
+        """Lattice points whose pool fits storage blocks of so many bytes, and a dispatch."""
+        ray, photon = strides(features)
+        per_point = max(RAY_ROOM * ray, PHOTON_ROOM * photon)
+        return int(min(block_bytes // per_point, 65535 * _GROUP // RAY_ROOM))
+
+    def begin(self, count: int) -> None:
+        """Before `count` lattice points are emitted."""
+        self.state.write(self._state_zero.tobytes())
+        self._bind()
+
+    def emitted(self, count: int) -> None:
+        """They have been."""
+        self._context.ctx.memory_barrier()
+
+    def load(self, rays: np.ndarray) -> None:
+        """These rays are on their way already."""
+        state, count = self._state_zero.copy(), len(rays)
+        state["alive"] = state["taken"] = state["taken_before"] = state["most_alive"] = state["emitted"] = count
+        state["trace_groups"] = (-(-count // _GROUP), 1, 1, 0)
+        self.state.write(state.tobytes())
+        self.rays.write(np.ascontiguousarray(rays))
+
+    def follow(
+        self, trace: moderngl.ComputeShader, bind: Callable[[], None], limit: int, end_all: Callable[[], None]
+    ) -> Generator[None, None, Followed]:
+        """`OrderedQueue.follow`, without a pause before the end; the last dispatch follows all that is left."""
+        ctx, events = self._context.ctx, self._events
+        bind()
+        self._bind()
+        for step, count in enumerate(events, 1):
+            trace["events"].value, trace["holds"].value = count, step == len(events)
+            trace.run_indirect(self.state, records.POOL_STATE.offset("trace_groups"))
+            ctx.memory_barrier()
+        self._sum.run(1)
+        ctx.memory_barrier()
+        yield
+        state = np.frombuffer(self.state.read(), records.POOL_STATE.dtype)[0]
+        watts = state["watts"].astype(float).tolist()
+        ended = len(records.CATEGORIES)
+        absorbed_w, roulette_w, emitted_w = watts[ended:]
+        overflow = int(state["overflow"])
+        photons = int(min(state["photons"], state["photon_capacity"]))
+        emitted, steps, flights = (int(state[name]) for name in ("emitted", "dispatches", "flights"))
+        fallbacks = state["fallbacks"].tolist()
+        return Followed(
+            emitted, photons, steps, flights, overflow, emitted_w, roulette_w, watts[:ended], absorbed_w, fallbacks
+        )
+
+    def _bind(self) -> None:
+        for binding, buffer in (
+            (bindings.RAYS_IN, self.rays),
+            (bindings.RAYS_OUT, self.rays),
+            (bindings.POOL_SLOTS, self._lists),
+            (bindings.COUNTS, self._tallies),
+            (bindings.STATE, self.state),
+            (bindings.PHOTONS, self.photons),
+        ):
+            buffer.bind_to_storage_buffer(binding)
+
+    def release_buffers(self) -> None:
+        """Free what rays and photons lie in."""
+        shader.release(self.rays, self._lists, self._tallies, self.photons)
+
+    def release(self) -> None:
+        """Free everything."""
+        self.release_buffers()
+        shader.release(self.state, self._sum)

@@ -1,0 +1,106 @@
+"""Rays that a GPU follows for several events in a dispatch: the photons of one event at a time, and what that takes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from gl_counts import counted
+from spectrasplat.base.paths import shipped_scenes
+from spectrasplat.gpu import device_traits
+from spectrasplat.gpu.context import Context, create_context
+from spectrasplat.gpu.device_traits import DeviceTraits
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.settings import RenderSettings
+from spectrasplat.passes import ray_pool
+from spectrasplat.passes.emission_domain import emission_domain
+from spectrasplat.passes.trace import Band, Batch, LatticeSlice, TracePass
+from spectrasplat.render.device_scene import scene_buffers
+
+POINTS = 2_000
+THRESHOLD = 0.003
+"""Few rays play roulette: paths branch often."""
+SCHEDULES: tuple[tuple[int, ...], ...] = ((), (1,) * 12 + (4096,), (4,) * 6 + (4096,), (8, 8, 8, 4096), (1, 4096))
+"""One event at a time, in order; then so many at once, and at last whatever is left."""
+FAST = ("prism", "spectrometer")
+BYTES_A_PHOTON = 1200
+
+
+@contextmanager
+def device(events: tuple[int, ...]) -> Iterator[Context]:
+    """This one, with rays followed like that."""
+    with create_context() as context:
+        traits = replace(context.traits, ray_events=events)
+    with device_traits.assumed(traits), create_context() as context:
+        yield context
+
+
+def traced(context: Context, name: str, points: int, room: int = 4) -> Iterator[tuple[TracePass, Batch]]:
+    """Photons of each light, of two bands, in a batch with room for so many times more."""
+    scene = load_scene(shipped_scenes()[name])
+    buffers = scene_buffers(context, scene, RenderSettings(photons=points, method="srd-photons"))
+    trace = TracePass(context, buffers.features, buffers, room * points, 64, THRESHOLD)
+    meshes = zip(buffers.world_meshes, scene.objects, strict=True)
+    specular = [buffers.space.to_gpu(mesh.corners()) for mesh, item in meshes if item.material.is_specular]
+    for index, light in enumerate(scene.lights):
+        domain = emission_domain(light, scene, buffers.space, np.concatenate(specular)) if specular else None
+        if domain is None:
+            continue
+        power = buffers.light_power[index]
+        bands = (
+            Band(0.0, 0.5, 0.25, float(power.band(0.0, 0.5)[3])),
+            Band(0.5, 1.0, 0.75, float(power.band(0.5, 1.0)[3])),
+        )
+        count = points // 2
+        yield trace, trace.run(LatticeSlice(index, bands, count, 0, 1, count, (5, 7), (1, 2), 3, 11), domain)
+    trace.release()
+    buffers.release()
+
+
+def photon_set(trace: TracePass, batch: Batch) -> np.ndarray:
+    """All bits of every photon, sorted."""
+    words = np.frombuffer(trace.photons.read(), np.uint32).reshape(-1, trace.photon.stride // 4)[: batch.photons]
+    return words[np.lexsort(words.T)]
+
+
+def compare(name: str, schedules: tuple[tuple[int, ...], ...]) -> None:
+    sets: list[list[np.ndarray]] = []
+    for events in schedules:
+        with device(events) as context:
+            found = []
+            for trace, batch in traced(context, name, POINTS):
+                assert batch.overflow == 0 and batch.tally.imbalance < 1e-5
+                found.append(photon_set(trace, batch))
+            sets.append(found)
+    for other in sets[1:]:
+        for mine, theirs in zip(sets[0], other, strict=True):
+            assert np.array_equal(mine, theirs)
+
+
+@pytest.mark.parametrize("name", FAST)
+def test_photons_are_the_same_however_many_events_are_followed_at_once(name: str) -> None:
+    compare(name, (SCHEDULES[0], SCHEDULES[2], SCHEDULES[-1]))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", list(shipped_scenes()))
+def test_photons_are_the_same_in_every_shipped_scene(name: str) -> None:
+    compare(name, SCHEDULES)
+
+
+def test_rays_without_room_wait_and_nothing_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fewer slots than rays that set out and their first children together: branching ones wait for those that end."""
+    monkeypatch.setattr(ray_pool, "RAY_ROOM", 1.5 / 4.0)
+    compare("prism", ((), (1,) * 60 + (4096,)))
+
+
+def test_a_batch_asks_for_few_dispatches_and_waits_for_nothing() -> None:
+    with device(DeviceTraits().ray_events) as context:
+        for trace, _ in traced(context, "prism", POINTS):
+            assert trace.bytes / trace.batch <= BYTES_A_PHOTON
+        with counted() as counts:
+            batches = len(list(traced(context, "prism", POINTS)))
+    assert counts.dispatches <= 12 * batches and counts.finishes == 0 and counts.reads <= batches
