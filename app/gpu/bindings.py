@@ -10,8 +10,10 @@ POOL_SLOTS = PHOTON_SLOTS
 """Where rays lie in a pool, photons need no slots first."""
 FLIGHTS = 16
 
-UNIT_SCENE, UNIT_SPECTRA = 14, 15
-"""Texture units of the scene; a pass is free to use 0-13 as it likes."""
+UNIT_PLACES, UNIT_SCENE, UNIT_SPECTRA = 13, 14, 15
+"""Texture units of the scene; a pass is free to use 0-12 as it likes."""
+PLACES_A_ROW = 256
+"""Objects of a row of the texture of places."""
 IMAGE_SCENE, IMAGE_SPECTRA = 8, 9
 """Image units of the scene on llvmpipe; a pass is free to use 0-7 and those from 10 on as it likes."""
 
@@ -19,6 +21,8 @@ SCENE_DEFINES = {
     "BIND_SOLIDS": SOLIDS,
     "BIND_PLANES": PLANES,
     "BIND_PROFILES": PROFILES,
+    "UNIT_PLACES": UNIT_PLACES,
+    "PLACES_A_ROW": PLACES_A_ROW,
     "UNIT_SCENE": UNIT_SCENE,
     "UNIT_SPECTRA": UNIT_SPECTRA,
     "IMAGE_SCENE": IMAGE_SCENE,

@@ -14,7 +14,6 @@ import numpy as np
 from ..base.errors import UserError
 from ..features.features import Features
 from ..model.contacts import overlapping_solids
-from ..model.geometry.mesh import Mesh
 from ..model.optics import rough_surfaces
 from ..model.optics.colorimetry import VISIBLE_NM, mirror_reflectance
 from ..model.optics.glass import Dispersion
@@ -25,7 +24,7 @@ from ..model.optics.spectral_tables import (
     index_table,
     wavelength_cdf,
 )
-from ..model.scene import Grating, Light, Scene
+from ..model.scene import Grating, Light, Scene, SceneObject
 from ..model.scene_checks import contains
 from ..model.tint_bands import tint_curves
 from ..model.tint_levels import TintLevels, tint_levels
@@ -33,7 +32,8 @@ from . import bindings, shader
 from .gpu_space import GpuSpace
 from .records import NONE
 from .scene_geometry import SceneGeometry
-from .scene_records import GRATING, GRATING_ORDER, OBJECT
+from .scene_motion import MovingTriangles, ObjectPlaces, WorldMeshes
+from .scene_records import GRATING, GRATING_ORDER, OBJECT, PIECE
 from .scene_texels import SceneTexels, spectra_texture
 from .spectral_groups import SAMPLES, Groups, index_slope
 from .texture_store import textured_objects
@@ -68,38 +68,28 @@ class SceneBuffers:
         scene: Scene,
         features: Features,
         axis: SpectralAxis,
-        like: SceneBuffers | None = None,
     ) -> None:
-        """`like`: of a scene whose objects have only moved: GPU space, corners' turns, the tree's shape and what
-        nests in what are taken from there."""
         self.ctx = ctx
         self.scene = scene
         self.features = features
         self.axis = axis
-        self.space: GpuSpace = GpuSpace.of(scene) if like is None else like.space
+        self.space = GpuSpace.of(scene)
         self.groups = Groups.of(scene, features)
         self.receivers = [i for i, o in enumerate(scene.objects) if o.material.receives]
         self.traced_glasses = [o.material.dispersion for o in scene.objects]
         """Each object's glass as the records number it, whatever `scene` is replaced by to be shown."""
-        self.world_meshes: list[Mesh] = [
-            like.world_meshes[i]
-            if like is not None and like.scene.objects[i].object_to_world is o.object_to_world
-            else o.mesh.transformed(o.object_to_world)
-            for i, o in enumerate(scene.objects)
-        ]
-        # From a mesh's normals; needed again with every step of a drag.
-        self._faceted: list[bool] = (
-            [o.material.is_specular and o.mesh.is_faceted for o in scene.objects] if like is None else like._faceted
-        )
-        before = None if like is None else like.geometry
+        self.world_meshes = WorldMeshes(scene)
+        self.places = ObjectPlaces(ctx, scene, self.space)
+        self._motion: MovingTriangles | None = None
         self.geometry: SceneGeometry
-        self.geometry, self._sections = SceneGeometry.of(scene, self.world_meshes, self.space, features, before)
+        self.geometry, self._sections = SceneGeometry.of(scene, self.world_meshes.packed, self.space, features)
+        """As it was packed, wherever objects have moved."""
         self.triangle_count = len(self._sections.get("TRIANGLES", ()))
         """Those that rays are tested with one by one: none of half-space solids."""
         self._buffers: dict[int, moderngl.Buffer] = {}
         self.defines: dict[str, int | str] = {**bindings.SCENE_DEFINES, "SPECTRAL_SAMPLES": SAMPLES}
         self._pack_geometry()
-        self._pack_objects(like)
+        self._pack_objects()
         self._pack_profiles()
         self.texels = SceneTexels(ctx, self._sections)
         self._sections.clear()
@@ -136,6 +126,7 @@ class SceneBuffers:
         """Bind every scene texture and buffer to its place."""
         self.texels.bind()
         self.texels.bind_spectra(self._spectra)
+        self.places.bind()
         for binding, buffer in self._buffers.items():
             if self._in_storage or binding == bindings.PROFILES:
                 buffer.bind_to_storage_buffer(binding)
@@ -146,16 +137,15 @@ class SceneBuffers:
         """Free buffers and textures."""
         self.texels.release()
         self._spectra.release()
-        shader.release(*self._buffers.values())
+        shader.release(*self._buffers.values(), self.places.texture, self._motion)
         self._buffers.clear()
 
     @property
     def bytes(self) -> int:
         """GPU memory held."""
         pixels = (self.texels.texture, 16), (self._spectra, 8)
-        return sum(buffer.size for buffer in self._buffers.values()) + sum(
-            t.width * t.height * size for t, size in pixels
-        )
+        moving = 0 if self._motion is None else self._motion.bytes
+        return moving + sum(b.size for b in self._buffers.values()) + sum(t.width * t.height * s for t, s in pixels)
 
     def _pack_profiles(self) -> None:
         """Intensity tables of lights that have one, each once."""
@@ -180,7 +170,7 @@ class SceneBuffers:
     @cached_property
     def primitives(self) -> np.ndarray:
         """uint32 (T,): what a ray that left each triangle has as `last_primitive`; T counts all objects' triangles."""
-        return self.geometry.primitives(self.world_meshes, self.space)
+        return self.geometry.primitives(self.world_meshes.packed, self.space)
 
     @property
     def corner_turn(self) -> np.ndarray:
@@ -198,17 +188,46 @@ class SceneBuffers:
         return 0 if light.profile is None else self._profile_start[light.profile]
 
     def move(self, scene: Scene) -> bool:
-        """Take over `scene`, in which objects have moved and nothing else differs that buffers hold, in the
-        GPU space that there is. False, and nothing done, where programs made for these buffers do not fit it."""
-        moved = SceneBuffers(self.ctx, scene, self.features, self.axis, self)
-        if moved.defines != self.defines:
-            moved.release()
+        """Take over `scene`, in which objects have moved and nothing else differs that buffers hold, in the GPU space
+        that there is. False, and nothing done, where one was mirrored. Raises `UserError` where one was flattened."""
+        pairs = enumerate(zip(self.scene.objects, scene.objects, strict=True))
+        moved = [(i, b) for i, (a, b) in pairs if a.object_to_world is not b.object_to_world]
+        turns = [
+            np.linalg.det(self.scene.objects[i].object_to_world) * b.mesh.determinant(b.object_to_world)
+            for i, b in moved
+        ]
+        if any(turn < 0.0 for turn in turns):
             return False
-        self.release()
-        for kept in ("primitives", "tints"):
-            self.__dict__.pop(kept, None)
-        self.__dict__.update(moved.__dict__)
+        self.scene = scene
+        self.__dict__.pop("tints", None)
+        for index, item in moved:
+            self.world_meshes.move(index, item)
+            matrix = self.places.move(index, item.object_to_world)
+            if (planes := self.geometry.solids.moved(index, matrix)) is not None:
+                self._buffers[bindings.PLANES].write(planes[1], offset=16 * planes[0])
+            if (pieces := self.geometry.curved.moved(index, matrix)) is not None:
+                self.texels.write("PIECES", PIECE.stride // 16 * pieces[0], pieces[1])
+            self._move_record(index, item)
+        if self.triangle_count and moved:
+            if self._motion is None:
+                tree = self.geometry.triangles.tree
+                self._motion = MovingTriangles(self.ctx, self.texels, tree, self.triangle_count)
+            self.places.bind()
+            self._motion.run()
         return True
+
+    def _move_record(self, index: int, item: SceneObject) -> None:
+        record = self._records[index : index + 1].copy()
+        sizes = record["colour"][:, 3 if item.material.is_mirror else 2]
+        sized = item.material.is_mirror or item.material.dispersion is not None
+        if sized and sizes[0] < UNBOUNDED:
+            half = 0.5 * np.ptp(self.world_meshes.packed[index].vertices, axis=0)
+            sizes[:] = self.space.scale * np.linalg.norm(np.abs(self.places.matrices[index, :, :3]) @ half)
+            self.texels.write("OBJECTS", OBJECT.stride // 16 * index, record)
+        if isinstance(item.material, Grating):
+            self.texels.write(
+                "GRATINGS", int(record["weight_row"][0]), _grating_texels(item.material, item.object_to_world)
+            )
 
     def _pack_geometry(self) -> None:
         solids, tree = self.geometry.solids, self.geometry.triangles.tree
@@ -230,7 +249,7 @@ class SceneBuffers:
             "PIECE_COUNT": len(self.geometry.curved.faces),
         }
 
-    def _pack_objects(self, like: SceneBuffers | None) -> None:
+    def _pack_objects(self) -> None:
         media: list[Dispersion] = []
         weights: list[np.ndarray] = []
         gratings: list[np.ndarray] = []
@@ -239,11 +258,7 @@ class SceneBuffers:
         widths = rough_surfaces.distinct_widths(item.material.microfacet_width for item in self.scene.objects)
         x = np.linspace(0.0, 1.0, SAMPLES)
         nm = self.axis.nm_of_samples(SAMPLES)
-        stack_bits: dict[int, int] = {}
-        if like is not None:
-            stack_bits = {index: bit for bit, index in enumerate(like.stack_objects)}
-        elif self.features.medium_stack:
-            stack_bits = _stack_bits(self.scene)
+        stack_bits = _stack_bits(self.scene) if self.features.medium_stack else {}
         records = OBJECT.zeros(len(self.scene.objects))
         for name in ("medium", "weight_row", "stack_bit", "receiver", "group", "texture"):
             records[name] = NONE
@@ -257,7 +272,7 @@ class SceneBuffers:
             if material.receives:
                 record["receiver"] = self.receivers.index(index)
             size = UNBOUNDED
-            if material.is_specular and (material.is_rough or not self._faceted[index]):
+            if material.is_specular and (material.is_rough or not item.mesh.is_faceted):
                 size = self.space.scale * 0.5 * float(np.linalg.norm(np.ptp(self.world_meshes[index].vertices, axis=0)))
             if material.is_mirror:
                 record["colour"][3] = size
@@ -289,7 +304,7 @@ class SceneBuffers:
                 record["weight_row"] = row
                 if row == len(weights):
                     weights.append(np.interp(nm, VISIBLE_NM, alpha) / self.space.scale)
-        self._sections["OBJECTS"] = records
+        self._sections["OBJECTS"] = self._records = records
         if gratings:
             self._sections["GRATINGS"] = np.concatenate(gratings)
         self.most_orders = max((len(texels) - 1 for texels in gratings), default=0)

@@ -22,6 +22,7 @@ _PLANE_BIT = 0x80000000
 """Bit of a primitive's number: a plane of a half-space solid, not a triangle (shaders/lib/intersect.glsl)."""
 _CURVED_BIT = 0x40000000
 """Likewise, a face of a curved solid."""
+_LAST_ROW = (0.0, 0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -34,14 +35,14 @@ class Solids:
     """float32 (P, 4): n·x <= d, GPU space."""
 
     @staticmethod
-    def of(scene: Scene, meshes: Sequence[Mesh], space: GpuSpace, *, moved: bool) -> Solids:
-        """`meshes`: in the world; `moved`: of a scene that was packed before, in which objects have moved."""
+    def of(scene: Scene, meshes: Sequence[Mesh], space: GpuSpace) -> Solids:
+        """`meshes`: in the world."""
         found: list[tuple[int, np.ndarray]] = []
         known_meshes = set()
         for index, untransformed in half_spaces(scene).items():
             item, mesh = scene.objects[index], meshes[index]
             # Of a mesh with many places, they are found once.
-            own = mesh.convex_planes if not moved and id(item.mesh) not in known_meshes else None
+            own = mesh.convex_planes if id(item.mesh) not in known_meshes else None
             known_meshes.add(id(item.mesh))
             if own is None:  # a transform may push a borderline solid over the tolerance
                 own = _transformed_planes(untransformed, item.object_to_world)
@@ -53,6 +54,16 @@ class Solids:
         records["plane_count"], records["first_plane"] = counts, np.cumsum([0, *counts])[:-1]
         planes = np.concatenate([planes for _, planes in found]) if found else np.zeros((0, 4))
         return Solids(records, np.ascontiguousarray(planes, "f4"))
+
+    def moved(self, index: int, matrix: np.ndarray) -> tuple[int, np.ndarray] | None:
+        """Number of the first plane of object `index`, and all of them, float32 (n, 4), under `matrix` (3, 4); None
+        where it is no such solid."""
+        mine = np.flatnonzero(self.records["object"] == index)
+        if not len(mine):
+            return None
+        first, count = (int(self.records[name][mine[0]]) for name in ("first_plane", "plane_count"))
+        planes = _transformed_planes(self.planes[first : first + count].astype(float), np.vstack([matrix, _LAST_ROW]))
+        return first, np.ascontiguousarray(planes, "f4")
 
 
 @dataclass(frozen=True)
@@ -75,14 +86,17 @@ class Curved:
             offset = (matrix[:3, 3] - space.centre) * space.scale
             faces += [face.moved(space.scale * matrix[:3, :3], offset) for face in found]
         objects = [index for index, found in own.items() for _ in found]
-        records = PIECE.zeros(len(faces))
-        for record, face in zip(records, faces, strict=True):
-            record["row_x"], record["row_y"], record["row_z"] = face.rows
-            record["origin"], record["linear"], record["constant"] = face.origin, face.linear, face.constant
-            record["is_plane"] = face.is_plane
-        records["object"] = objects
-        records["is_last"] = np.diff([*objects, -1]) != 0
+        records = _pieces(faces, objects)
         return Curved(own, tuple(faces), tuple(objects)), {"PIECES": records} if faces else {}
+
+    def moved(self, index: int, matrix: np.ndarray) -> tuple[int, np.ndarray] | None:
+        """Number of the first face of object `index`, and records of all of them, under `matrix` (3, 4); None where it
+        is no such solid."""
+        if index not in self.own:
+            return None
+        first = self.objects.index(index)
+        faces = self.faces[first : first + len(self.own[index])]
+        return first, _pieces([face.moved(matrix[:, :3], matrix[:, 3]) for face in faces], [index] * len(faces))
 
     def primitives(self, index: int, corners: np.ndarray) -> np.ndarray:
         """uint32 (T,): the face that each triangle of an object's mesh is part of. `corners` (T, 3, 3): GPU space."""
@@ -109,24 +123,20 @@ class Triangles:
         first: np.ndarray,
         loose: Sequence[int],
         has_tree: bool,
-        before: Triangles | None,
     ) -> tuple[Triangles, dict[str, np.ndarray]]:
         """With the sections of `SceneTexels`, which are not needed once they are uploaded. `first`:
-        `SceneGeometry.first_triangle`; `loose`: objects that are neither `Solids` nor `Curved`; `before`: of a scene in
-        which they have only moved."""
-        corner_turn = np.tile(np.arange(3), (first[-1], 1)) if before is None else before.corner_turn
+        `SceneGeometry.first_triangle`; `loose`: objects that are neither `Solids` nor `Curved`."""
+        corner_turn = np.tile(np.arange(3), (first[-1], 1))
         if not loose:
             return Triangles(np.zeros(0, int), corner_turn, None), {}
         source = np.concatenate([np.arange(first[i], first[i + 1]) for i in loose])
         corners = np.concatenate([space.to_gpu(meshes[i].corners()) for i in loose]).astype("f4")
-        if before is None:
-            corner_turn[source] = _best_corner_first(corners)[..., 0]
+        corner_turn[source] = _best_corner_first(corners)[..., 0]
         turned = corner_turn[source][..., None]
         corners = np.take_along_axis(corners, turned, axis=1)
         order, tree = np.arange(len(corners)), None
         if has_tree:
-            known = None if before is None else before.tree
-            tree = build_bvh(corners) if known is None else known.refitted(corners)
+            tree = build_bvh(corners)
             order = tree.order
         found = Triangles(source[order], corner_turn, tree)
         sections = {} if tree is None else {"TREE": tree_texels(tree.nodes)}
@@ -160,20 +170,15 @@ class SceneGeometry:
 
     @staticmethod
     def of(
-        scene: Scene, meshes: Sequence[Mesh], space: GpuSpace, features: Features, before: SceneGeometry | None = None
+        scene: Scene, meshes: Sequence[Mesh], space: GpuSpace, features: Features
     ) -> tuple[SceneGeometry, dict[str, np.ndarray]]:
-        """With sections of `SceneTexels`. `meshes`: in the world; `before`: of a scene whose objects only stood
-        elsewhere: what is curved, corners' turns and the tree's shape are taken from there."""
-        solids = Solids.of(scene, meshes, space, moved=before is not None)
-        own: dict[int, tuple[Face, ...]] = {}
-        if features.curved_solids:
-            own = curved_solids(scene) if before is None else before.curved.own
-        curved, pieces = Curved.of(scene, space, own)
-        packed = set(solids.records["object"].tolist()) | set(own)
+        """With sections of `SceneTexels`. `meshes`: in the world."""
+        solids = Solids.of(scene, meshes, space)
+        curved, pieces = Curved.of(scene, space, curved_solids(scene) if features.curved_solids else {})
+        packed = set(solids.records["object"].tolist()) | set(curved.own)
         loose = [i for i in range(len(meshes)) if i not in packed]
         first = np.cumsum([0] + [len(mesh.triangles) for mesh in meshes])
-        known = None if before is None else before.triangles
-        triangles, sections = Triangles.of(scene, meshes, space, first, loose, features.tree, known)
+        triangles, sections = Triangles.of(scene, meshes, space, first, loose, features.tree)
         return SceneGeometry(solids, curved, triangles, first), sections | pieces
 
     def primitives(self, meshes: Sequence[Mesh], space: GpuSpace) -> np.ndarray:
@@ -211,6 +216,18 @@ def _best_corner_first(corners: np.ndarray) -> np.ndarray:
     size = np.linalg.norm(to_next, axis=2) * np.linalg.norm(from_last, axis=2)
     cosine = np.abs(np.divide(along, size, out=np.ones_like(along), where=size > 0.0))
     return ((cosine.argmin(axis=1)[:, None] + np.arange(3)) % 3)[..., None]
+
+
+def _pieces(faces: Sequence[Face], objects: Sequence[int]) -> np.ndarray:
+    """PIECE records."""
+    records = PIECE.zeros(len(faces))
+    for record, face in zip(records, faces, strict=True):
+        record["row_x"], record["row_y"], record["row_z"] = face.rows
+        record["origin"], record["linear"], record["constant"] = face.origin, face.linear, face.constant
+        record["is_plane"] = face.is_plane
+    records["object"] = objects
+    records["is_last"] = np.diff([*objects, -1]) != 0
+    return records
 
 
 def _transformed_planes(planes: np.ndarray, matrix: np.ndarray) -> np.ndarray:

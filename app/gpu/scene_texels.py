@@ -54,6 +54,15 @@ class SceneTexels:
         self.texture = ctx.texture((ROW_TEXELS, rows), 4, image, dtype="u4")
         self.texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
 
+    def write(self, name: str, first: int, part: np.ndarray) -> None:
+        """Replace texels of section `name` from its `first` on by `part`."""
+        texels, at = _words(part), self.defines[f"{name}_AT"] + first
+        while len(texels):
+            row, column = divmod(at, ROW_TEXELS)
+            some = texels[: ROW_TEXELS - column]
+            self.texture.write(np.ascontiguousarray(some), (column, row, len(some), 1))
+            texels, at = texels[len(some) :], at + len(some)
+
     def bind(self) -> None:
         """Bind the texture to its unit."""
         if self._as_image:

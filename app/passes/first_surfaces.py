@@ -24,35 +24,32 @@ class FirstSurfaces:
 
     def __init__(self, ctx: moderngl.Context, scene: SceneBuffers, distances: bool = False) -> None:
         self._ctx = ctx
+        self._places = scene.places
         self._distances = distances
         self._program = shader.program(
             ctx,
             "camera/visible.vert",
             "camera/visible.frag",
-            {"BIND_PARAMETERS": bindings.PARAMETERS} | ({"DISTANCES": 1} if distances else {}),
+            bindings.SCENE_DEFINES | ({"DISTANCES": 1} if distances else {}),
             (CAMERA_PARAMETERS,),
         )
         corners = self._corners_of(scene)
         self._corners = ctx.buffer(corners.tobytes())
-        read = ("3f 8x", "position") if distances else ("3f 1u 1u", "position", "primitive", "object")
+        read = ("3f 4x 1u", "position", "object") if distances else ("3f 1u 1u", "position", "primitive", "object")
         self._draw = ctx.vertex_array(self._program, [(self._corners, *read)])
         self._target: moderngl.Framebuffer | None = None
         self.texture: moderngl.Texture | None = None
 
     def _corners_of(self, scene: SceneBuffers) -> np.ndarray:
-        counts = [len(mesh.triangles) for mesh in scene.world_meshes]
+        counts = [len(mesh.triangles) for mesh in scene.world_meshes.packed]
         corners = np.zeros(3 * sum(counts), _CORNER)
         if counts:
-            places = [scene.space.to_gpu(mesh.corners()).reshape(-1, 3) for mesh in scene.world_meshes]
+            places = [scene.space.to_gpu(mesh.corners()).reshape(-1, 3) for mesh in scene.world_meshes.packed]
             corners["position"] = np.concatenate(places)
             corners["object"] = np.repeat(np.arange(len(counts)), 3 * np.array(counts))
-            self._bounds = np.concatenate([np.stack([p.min(axis=0), p.max(axis=0)]) for p in places if len(p)])
+            self._bounds = np.stack([[p.min(axis=0), p.max(axis=0)] for p in places])
         corners["primitive"] = np.repeat(scene.primitives, 3)
         return np.concatenate([_BEYOND, corners])
-
-    def move(self, scene: SceneBuffers) -> None:
-        """Objects have moved."""
-        self._corners.write(self._corners_of(scene).tobytes())
 
     def run(self, parameters: np.ndarray) -> moderngl.Texture:
         """Draw what the camera of `parameters` (CAMERA_PARAMETERS, bound already) sees, in a picture of its size."""
@@ -67,6 +64,7 @@ class FirstSurfaces:
             self._draw.render(moderngl.TRIANGLES, vertices=len(_BEYOND))
         if self._draw.vertices > len(_BEYOND):
             self._program["depths"] = self._depths(parameters)
+            self._places.bind()
             self._ctx.enable_only(moderngl.DEPTH_TEST)
             self._ctx.depth_func = "<"
             self._draw.render(moderngl.TRIANGLES, vertices=self._draw.vertices - len(_BEYOND), first=len(_BEYOND))
@@ -76,10 +74,11 @@ class FirstSurfaces:
 
     def _depths(self, parameters: np.ndarray) -> tuple[float, float]:
         """Depths of the nearest and the farthest corner of all boxes."""
-        low, high = self._bounds[::2], self._bounds[1::2]
-        forward = parameters["forward"][0].astype(float)
-        middle = (0.5 * (low + high) - parameters["position"][0]) @ forward
-        reach = 0.5 * (high - low) @ np.abs(forward)
+        low, high = self._bounds[:, 0], self._bounds[:, 1]
+        forward, matrices = parameters["forward"][0].astype(float), self._places.matrices
+        middle = (matrices[..., :3] @ (0.5 * (low + high))[..., None])[..., 0] + matrices[..., 3]
+        middle = (middle - parameters["position"][0]) @ forward
+        reach = (np.abs(matrices[..., :3]) @ (0.5 * (high - low))[..., None])[..., 0] @ np.abs(forward)
         margin = 1e-3 * float(np.ptp(np.concatenate([middle - reach, middle + reach]))) + 1e-6
         nearest, farthest = float((middle - reach).min()) - margin, float((middle + reach).max()) + margin
         if parameters["orthographic"][0]:

@@ -94,7 +94,6 @@ class Haze:
         same_space = mine.space.scale == theirs.space.scale and np.array_equal(mine.space.centre, theirs.space.centre)
         if same_space and self._channels == before._channels and _same_ways(mine.scene, theirs.scene):
             self._beams, before._beams = before._beams, self._beams
-            self._surfaces, before._surfaces = before._surfaces, self._surfaces
 
     def draw(self, camera: Camera, width: int, height: int, *, coarse: bool = False) -> None:
         """Draw all beams as `camera` sees them, through the middle of its lens; nothing where that was done last.

@@ -160,7 +160,7 @@ class BeamLight:
         }
         self._traced = self.finder = BeamFinder(
             scene,
-            buffers.world_meshes,
+            list(buffers.world_meshes),
             {r: (frame.origin, frame.axes) for r, frame in self.frames.items()},
             {},
             buffers.axis,

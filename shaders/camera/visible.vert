@@ -1,7 +1,8 @@
 // The first surface of every pixel, by the rasteriser: a software renderer finds it twenty times as fast so as by a ray
 // a pixel.
 layout(std140, binding = BIND_PARAMETERS) uniform Parameters { CameraParameters p; };
-layout(location = 0) in vec3 position;  // GPU space
+#include "lib/moved.glsl"
+layout(location = 0) in vec3 position;  // GPU space, where its object was packed
 layout(location = 1) in uint primitive;  // as rays number it
 layout(location = 2) in uint object;
 layout(location = 0) uniform vec2 depths;  // nearest and farthest that is drawn, GPU units along `forward`
@@ -12,7 +13,10 @@ flat out uvec2 seen;
 #endif
 
 void main() {
-    vec3 way = position - p.position;
+    vec4 at = vec4(position, 1.0);
+    uint mover = object == 0xffffffffu ? 0u : object;
+    vec3 stands = vec3(dot(place_row(mover, 0), at), dot(place_row(mover, 1), at), dot(place_row(mover, 2), at));
+    vec3 way = stands - p.position;
     float depth = dot(way, p.forward);
     vec2 place =
         vec2(dot(way, p.half_right) / dot(p.half_right, p.half_right), dot(way, p.half_up) / dot(p.half_up, p.half_up));

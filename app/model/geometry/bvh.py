@@ -57,27 +57,6 @@ class Bvh:
     depth: int
     """Edges from the root to the deepest leaf, at most MAX_DEPTH: the stack a traversal needs."""
 
-    def refitted(self, triangles_xyz: np.ndarray) -> Bvh:
-        """The same tree with boxes about float32 `triangles_xyz` (T, 3, 3), in the order of the input: some have moved.
-
-        Every ray finds what it would in a new tree; where much has moved it takes more steps to."""
-        nodes, corners = self.nodes.copy(), triangles_xyz[self.order]
-        leaves = np.flatnonzero(nodes["count"] > 0)
-        leaves = leaves[np.argsort(nodes["left_or_first"][leaves])]
-        first = nodes["left_or_first"][leaves].astype(np.int64)
-        nodes["bounds_min"][leaves] = np.minimum.reduceat(corners.min(axis=1), first)
-        nodes["bounds_max"][leaves] = np.maximum.reduceat(corners.max(axis=1), first)
-        levels = [np.zeros(1, np.int64)]
-        while len(levels[-1]):
-            inner = levels[-1] = levels[-1][nodes["count"][levels[-1]] == 0]
-            left = nodes["left_or_first"][inner].astype(np.int64)
-            levels.append(np.concatenate([left, left + 1]))
-        for inner in reversed(levels):
-            left = nodes["left_or_first"][inner].astype(np.int64)
-            nodes["bounds_min"][inner] = np.minimum(nodes["bounds_min"][left], nodes["bounds_min"][left + 1])
-            nodes["bounds_max"][inner] = np.maximum(nodes["bounds_max"][left], nodes["bounds_max"][left + 1])
-        return Bvh(nodes, self.order, self.depth)
-
 
 def build_bvh(triangles_xyz: np.ndarray, *, use_cache: bool = True) -> Bvh:
     """Tree over float32 `triangles_xyz` (T, 3, 3), T >= 1; the same input gives the same tree.

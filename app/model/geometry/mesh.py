@@ -100,10 +100,7 @@ class Mesh:
         that outside stays outside. A singular matrix raises UserError.
         """
         matrix = np.asarray(matrix, dtype=np.float64)
-        linear = matrix[:3, :3]
-        determinant = np.linalg.det(linear)
-        if not np.isfinite(matrix).all() or abs(determinant) <= 1e-30 * np.linalg.norm(linear) ** 3:
-            raise UserError(f"mesh '{self.name}': its transform flattens it; use a scale other than zero on every axis")
+        linear, determinant = matrix[:3, :3], self.determinant(matrix)
         vertices = self.vertices @ linear.T + matrix[:3, 3]
         normals = self.corner_normals
         if normals is not None:
@@ -120,6 +117,14 @@ class Mesh:
             corner_normals=None if normals is None else _frozen(normals),
             uv=None if uv is None else _frozen(uv),
         )
+
+    def determinant(self, matrix: np.ndarray) -> float:
+        """Of a transform of the mesh; negative where it mirrors. Raises UserError where it is singular."""
+        linear = matrix[:3, :3]
+        determinant = float(np.linalg.det(linear))
+        if not np.isfinite(matrix).all() or abs(determinant) <= 1e-30 * np.linalg.norm(linear) ** 3:
+            raise UserError(f"mesh '{self.name}': its transform flattens it; use a scale other than zero on every axis")
+        return determinant
 
     @cached_property
     def is_closed(self) -> bool:

@@ -150,12 +150,10 @@ class LiveCamera:
 
     def move(self, buffers: SceneBuffers, scene: Scene) -> None:
         """Objects or lights have moved: `buffers` were moved in place, nothing else of `scene` differs."""
-        assert self._pass is not None and self._surfaces is not None
+        assert self._pass is not None
         shown = copy.copy(buffers)
         shown.scene = scene
         self._pass.move(shown)
-        self._surfaces.move(buffers)
-        self._geometry = buffers.texels
         self.pause()
 
     def _take_moving(self, buffers: SceneBuffers) -> None:
