@@ -10,6 +10,7 @@ from gl_counts import counted
 from spectrasplat.base.errors import UserError
 from spectrasplat.base.paths import shipped_scenes
 from spectrasplat.gpu.context import Context
+from spectrasplat.gpu.records import NONE
 from spectrasplat.gpu.scene_buffers import SceneBuffers
 from spectrasplat.gpu.scene_records import TRIANGLE
 from spectrasplat.model.io.scene_file import load_scene
@@ -53,7 +54,7 @@ def test_a_step_of_a_movement_uploads_matrices_only(gl: Context, name: str) -> N
         with counted() as counts:
             assert buffers.move(placed(scene, turn(0.2, 0.2)))
         assert not counts.made and not counts.programs and not counts.waits
-        assert counts.written_bytes <= 1024
+        assert counts.written_bytes <= 4096
     finally:
         buffers.release()
 
@@ -67,15 +68,17 @@ def test_moved_triangles_their_normals_and_boxes(gl: Context) -> None:
         at_first = texels(buffers, "TREE", 4).copy()
         assert buffers.move(after)
         mine, theirs = triangles(buffers), triangles(fresh)
-        place = np.argsort(theirs["source"])[np.argsort(np.argsort(mine["source"]))]
-        scale = buffers.space.scale / fresh.space.scale
-        for field in ("edge1", "edge2"):  # places are in two GPU spaces
-            np.testing.assert_allclose(mine[field], scale * theirs[field][place], atol=2e-6)
-        normals = [
-            texels(b, "NORMALS", 3 * len(mine)).view("<f4")[t["normals"][t["normals"] != 0xFFFFFFFF]]
-            for b, t in ((buffers, mine), (fresh, theirs[place]))
-        ]
-        np.testing.assert_allclose(normals[0], normals[1], atol=2e-6)
+        theirs = theirs[np.argsort(theirs["source"])[np.argsort(np.argsort(mine["source"]))]]
+        found = []
+        for b, t in ((buffers, mine), (fresh, theirs)):  # their corners may be turned otherwise
+            e1, e2 = (t[edge].astype(float) / b.space.scale for edge in ("edge1", "edge2"))
+            middle = b.space.to_world(t["vertex"]) + (e1 + e2) / 3.0
+            first = t["normals"][t["normals"] != NONE]
+            normals = texels(b, "NORMALS", 3 * len(t))[first[:, None] + np.arange(3)].view("<f4")
+            found.append((middle, np.cross(e1, e2), normals[..., :3].sum(axis=1)))
+        assert len(found[0][2]) > 100
+        for one, other in zip(*found, strict=True):
+            np.testing.assert_allclose(one, other, atol=1e-5)
         corners = mine["vertex"][:, None] + np.stack([0.0 * mine["edge1"], mine["edge1"], mine["edge2"]], axis=1)
         root = texels(buffers, "TREE", 3).view("<f4").ravel()
         low, high = np.minimum(root[0:3], root[6:9]), np.maximum(root[3:6], root[9:12])
