@@ -15,8 +15,9 @@ PROGRAM_SWITCHES = frozenset(
     + ("HAS_NORMAL_COLUMNS", "WIDENED_BY_LOBES")
     # Light of the environment and of other receivers, by way of glass.
     + ("FOLLOWS_SPECULAR", "OF_RECEIVERS")
-    # Kinds of splats, beams that no wavelength moves, sums by atomics, seams between charts.
-    + ("SMALL", "SWEPT", "CUT", "EDGE", "CLIPPED", "FANS", "CONTACT_LINES", "STILL", "FLOAT_ATOMICS", "FILL")
+    # Kinds of splats, beams that no wavelength moves, sums by atomics, of pieces of splats, seams between charts.
+    + ("SMALL", "SWEPT", "CUT", "EDGE", "CLIPPED", "FANS", "CONTACT_LINES", "STILL", "FLOAT_ATOMICS", "IN_PIECES")
+    + ("FILL",)
     # Layers of the picture.
     + ("LAYER_BEAUTY", "RGB_CHANNELS", "MAP_BINS", "RECEIVER_LIGHT", "VISIBLE_LIGHTS")
     # Camera rays beyond glass, and the program for what is seen directly.

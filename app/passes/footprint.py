@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..features.program_switches import Defines
+from ..features.program_switches import Defines, switched
 from ..gpu import shader
 from ..gpu.records import (
     GAIN_BOX,
@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from .map_atlas import MapAtlas
 
 WORKGROUP, LIST_WORKGROUP = 64, 256
+_MOST_FOOTPRINT_GROUPS = 4096
+"""Work groups that make splats where their order does not matter: as many as fill a GPU. Each then makes several."""
 NARROWED = 0.4 / 0.45
 """Share of `smoothing` with which footprints are drawn, where splats take off the ripple that this leaves: 0.7 % at
 most stay on an even plane, for a fifth less blur."""
@@ -44,6 +46,14 @@ EXTENT_LIMIT = 8192.0
 """Texels. A footprint axis or a sweep beyond twice the largest map is a numerical accident."""
 MOST_GROUPS = 65535
 """Work groups that add splats of a kind: what OpenGL promises in one dimension. Each then adds several."""
+TEAM, TEAMS = 8, 8
+"""Invocations that add a piece of a splat together, and such teams of a work group."""
+PIECE_TEXELS = 16 * TEAM
+"""Texels that a piece has at most."""
+ENTRIES_A_SLOT = 4
+"""Pieces that there is room for in the list, for every splat; where there are more, an entry stands for several."""
+KIND_WORDS = 8
+"""Words a kind of what pieces are counted and added by: see `light/splat_pieces.glsl`."""
 UNIT_CONTACT = 1
 """Texture unit of the words of `contact_lines`, in all programs that splat."""
 UNIT_BORDERS = 2
@@ -65,7 +75,10 @@ SPLAT = Struct(
         Field("y_box", "float", "swept: half width of the texel across, same units"),
         Field("layer", "uint", "first layer of the spectral tables; bits 30, 31: side of a line of contact"),
         Field(
-            "kind", "uint", "0 nothing, 1 small, 2 swept, 3 swept with a cut band, 4 swept over a line or fanning out"
+            "kind",
+            "uint",
+            "0 nothing, 1 small, 2 swept, 3 swept with a cut band, 4 swept over a line or fanning out; where compute "
+            "shaders add it, bit 3: lines are columns; from bit 4 on: pieces",
         ),
         Field(
             "throughput",
@@ -190,32 +203,42 @@ class Footprints:
         """`group`: the most photons one dispatch covers. `by_compute`: compute shaders add the splats, in any order."""
         self._ctx = ctx
         groups = features.spectral_groups
-        defines = footprint_defines(features) | {"WORKGROUP": WORKGROUP}
+        kinds = len(VERTICES)
+        pieces = switched(IN_PIECES=by_compute) | {"KINDS": f"{kinds}u", "PIECE_TEXELS": PIECE_TEXELS}
+        defines = footprint_defines(features) | pieces | {"WORKGROUP": WORKGROUP}
         structs = (photon_record(groups, features.hero), PLACEMENT, RECEIVER, SPLAT, GAIN_BOX)
         self._program = shader.compute(ctx, "light/footprint.comp", defines, structs)
         self._parameters = ctx.buffer(reserve=PARAMETERS.stride)
-        self._sums = ctx.buffer(np.zeros((group, 4), np.float32))
-        kinds = len(VERTICES)
         self._by_compute = by_compute
         if by_compute:
-            self._no_commands = np.array([[0, 1, 1, 0, 0]] * kinds, np.uint32)
+            self._no_commands = np.array([[0, 1, 1, 0, 0, 0, 0, 0]] * kinds, np.uint32)
         else:
             self._no_commands = np.array([[vertices, 1, 0, 0, 0] for vertices in VERTICES], np.uint32)
-        self.commands = ctx.buffer(self._no_commands)
-        """Indirect draws of all kinds, five words each; or indirect dispatches, with the number of splats in the last
-        word."""
+        sums = np.zeros((min(group, _MOST_FOOTPRINT_GROUPS * WORKGROUP), 4), np.float32)
+        # Counts of pieces stand before the sums, as a compute shader has eight storage blocks.
+        self._sums_at = self._no_commands.nbytes if by_compute else 0
+        self._sums = ctx.buffer(reserve=self._sums_at + sums.nbytes)
+        self.commands = self._sums if by_compute else ctx.buffer(reserve=self._no_commands.nbytes)
+        """Indirect draws of all kinds, five words each; or indirect dispatches, `KIND_WORDS` each."""
+        self._no_sums = ctx.buffer(sums)
+        self.reset_counts()
         self.slots_per_photon = slots_per_photon(features)
         self.capacity = group * self.slots_per_photon
         """Splats of a kind that the lists have room for."""
         self.splats = ctx.buffer(reserve=self.capacity * SPLAT.stride)
-        self.lists = ctx.buffer(reserve=kinds * self.capacity * 4)
-        """Slots of each kind, `capacity` each."""
-        counts: Defines = {"WORKGROUP": LIST_WORKGROUP, "KINDS": f"{kinds}u"}
+        self.lists = ctx.buffer(reserve=self.capacity * (8 * ENTRIES_A_SLOT if by_compute else 4 * kinds))
+        """Slots of each kind, `capacity` each; or the pieces of all."""
+        counts: Defines = {"WORKGROUP": LIST_WORKGROUP} | pieces
         counts |= {name: defines[name] for name in ("SLOTS", "IMAGE_SLOTS", "BORDER_IMAGES") if name in defines}
         if by_compute:
-            counts |= {"MOST_GROUPS": f"{MOST_GROUPS}u"}
+            counts |= {"MOST_GROUPS": f"{MOST_GROUPS}u", "TEAMS": TEAMS}
         list_shader = "light/splat_list_any.comp" if by_compute else "light/splat_list.comp"
         self._list = shader.compute(ctx, list_shader, counts, (SPLAT,))
+
+    @property
+    def entries(self) -> int:
+        """Pieces of splats that the list has room for."""
+        return self.lists.size // 8
 
     def run(
         self, photons: Photons, spectra: SplatSpectra, atlas: MapAtlas, receivers: moderngl.Buffer, smoothing: float
@@ -271,17 +294,20 @@ class Footprints:
         if atlas.borders is not None:
             atlas.borders.use(UNIT_BORDERS)
         self.commands.write(self._no_commands)
-        self._program.run(group_x=-(-photons.count // WORKGROUP))
+        self._program.run(min(-(-photons.count // WORKGROUP), _MOST_FOOTPRINT_GROUPS))
         self._ctx.memory_barrier()
         self.commands.bind_to_storage_buffer(7)
         self.lists.bind_to_storage_buffer(8)
-        self._list["capacity"].value = self.capacity
+        if self._by_compute:
+            self._list["entries_room"].value = self.entries
+        else:
+            self._list["capacity"].value = self.capacity
         self._list.run(-(-photons.count // LIST_WORKGROUP) if self._by_compute else 1)
 
     def counts(self) -> dict[str, float]:
         """Since the last reset: `splats_w` (power of all splats over their bands, W), `outside_map_w` (that of photons
         whose centre no window holds, W), `footprints_dropped` (number of photons), `dropped_w` (their power, W)."""
-        records = np.frombuffer(self._sums.read(), np.float32).reshape(-1, 4)
+        records = np.frombuffer(self._sums.read(offset=self._sums_at), np.float32).reshape(-1, 4)
         outside, dropped_w, dropped, splats_w = records.sum(axis=0, dtype=np.float64)
         return {
             "splats_w": float(splats_w),
@@ -296,7 +322,7 @@ class Footprints:
         return self.splats.size + self.lists.size + self._sums.size
 
     def reset_counts(self) -> None:
-        self._sums.clear()
+        self._ctx.copy_buffer(self._sums, self._no_sums, self._no_sums.size, write_offset=self._sums_at)
 
     def release(self) -> None:
         shader.release(
@@ -305,6 +331,7 @@ class Footprints:
             self.lists,
             self._parameters,
             self._sums,
-            self.commands,
+            self._no_sums,
+            *(() if self._by_compute else (self.commands,)),
             self.splats,
         )

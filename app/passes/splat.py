@@ -19,7 +19,10 @@ from ..gpu.framebuffers import adding
 from ..gpu.schema import Field, Struct
 from ..gpu.splat_way import way_of
 from .footprint import (
+    KIND_WORDS,
     SPLAT,
+    TEAM,
+    TEAMS,
     UNIT_CONTACT,
     VERTICES,
     Footprints,
@@ -47,8 +50,6 @@ CHUNK, SMALLEST_CHUNK = 1 << 18, 1 << 11
 depends on the order in which batches bring the photons."""
 FLUSH_SHARE = 16
 """Texels of the atlas per photon of a chunk: what flushing may cost, in texels a photon."""
-LANES = 32
-"""Invocations that add a splat together: as many as an NVIDIA GPU runs in step."""
 BIND_COMMANDS = 3
 
 PARAMETERS = Struct(
@@ -104,7 +105,13 @@ class Splatter:
     def _build_adds(self) -> None:
         way = way_of(self._ctx)
         for kind, (_, chosen) in draw_variants(self._features).items():
-            numbers: Defines = {"KIND": kind, "LANES": LANES, "FIRST_OF_KIND": self._first_of(kind)}
+            numbers: Defines = {
+                "KIND": kind,
+                "KINDS": f"{len(VERTICES)}u",
+                "TEAM": TEAM,
+                "TEAMS": TEAMS,
+                "LANES": TEAM * TEAMS,
+            }
             defines = chosen | sum_defines(way) | numbers
             self._adds[kind] = shader.compute(self._ctx, "light/splat_add.comp", defines, (SPLAT,), way.extensions)
 
@@ -159,7 +166,8 @@ class Splatter:
         commands = self._footprints.commands
         commands.bind_to_storage_buffer(BIND_COMMANDS)
         for kind, program in self._adds.items():
-            program.run_indirect(commands, 20 * (kind - 1))
+            program["entries_room"].value = self._footprints.entries
+            program.run_indirect(commands, 4 * KIND_WORDS * (kind - 1))
 
     def _draw(self, atlas: MapAtlas) -> None:
         import moderngl

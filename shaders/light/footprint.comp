@@ -12,6 +12,7 @@
 layout(local_size_x = WORKGROUP) in;
 
 #include "light/footprint_parameters.glsl"
+#include "light/splat_pieces.glsl"
 layout(std430, binding = 0) readonly buffer Photons { PhotonRecord photons[]; };
 layout(std430, binding = 1) writeonly buffer Splats { SplatRecord splats[]; };
 layout(std430, binding = 2) readonly buffer Placements { Placement placements[]; };
@@ -21,6 +22,9 @@ layout(std430, binding = 5) readonly buffer Bands {
     vec4 table_bands[];
 };  // x_lo, x_hi, mean place of the light in it (0..1), W; then W below x, by light and class
 layout(std430, binding = 6) buffer Sums {
+#if IN_PIECES
+    uint kind_words[KIND_WORDS * KINDS];  // splat_pieces.glsl
+#endif
     vec4 sums[];
 };  // of the photons of this thread: W with the centre in no window, W drawn as one texel, how many so, W of all
 
@@ -240,13 +244,29 @@ bool is_only_fine(SplatRecord splat, Placement place, Placement outer, vec3 posi
         && all(lessThan(splat.centre + extent, place.rect.zw));
 }
 
+#include "light/splat_sides.glsl"
+
+#if IN_PIECES
+shared uint splats_of[KINDS];
+shared uint pieces_of[KINDS];
+#endif
+
+void put(uint slot, SplatRecord splat) {
+#if IN_PIECES
+    if (splat.kind != 0u) {
+        uint bits = pieces_to_add(splat);
+        atomicAdd(splats_of[splat.kind - 1u], 1u);
+        atomicAdd(pieces_of[splat.kind - 1u], bits >> PIECES_BIT);
+        splat.kind |= bits;
+    }
+#endif
+    splats[slot] = splat;
+}
+
 #include "light/footprint_images.glsl"
 
-void main() {
-    uint i = gl_GlobalInvocationID.x;
-    if (i >= photons_there()) {
-        return;
-    }
+void make_splats(uint i) {
+    uint own = gl_GlobalInvocationID.x;
     PhotonRecord photon = photons[first_photon + i * stride];
     Receiver receiver = receivers[photon.receiver];
     uint at = receiver.placement;
@@ -334,7 +354,7 @@ void main() {
 #endif
     float power_w = photon_power(photon, table / bands, table_band);
     if (REINDEXED) power_w = carries ? power_w : 0.0;
-    sums[i].w += power_w;
+    sums[own].w += power_w;
     float mean = mean_throughput(photon, power_w, table_band);
     vec3 middle = 0.5 * (to_lo + to_hi);
     vec3 sweep = to_hi - to_lo;
@@ -351,7 +371,7 @@ void main() {
     if (held < 1.0) {
         shrink(photon, middle, sweep, held);
         f = footprint_in(place, photon, middle, sweep);
-        sums[i].yz += vec2(power_w, 1.0);
+        sums[own].yz += vec2(power_w, 1.0);
     }
 
     uint within = shown ? steps_within(place.rect, f, photon) : 0u;
@@ -360,7 +380,7 @@ void main() {
     uint side = 0u;
     if (CONTACT_LINES) {
         if (shown) side = side_of_contact(place, f, photon.photon_id, kept, lost);
-        sums[i].x += lost * power_w;
+        sums[own].x += lost * power_w;
     }
     if (side == 0u) choose_level(drawn_in, f, photon, middle, sweep);
     SplatRecord fine = splat_of(photon, power_w, mean, f, table, table_band);
@@ -378,7 +398,7 @@ void main() {
         fine.images = put_images(depicted, place, slot + uint(SLOTS));
         if (REINDEXED && !carries) fine.images = 0u;
     }
-    splats[slot] = fine;
+    put(slot, fine);
 
     if (SLOTS == 2) {
         SplatRecord coarse = empty_splat();
@@ -405,8 +425,24 @@ void main() {
             }
         }
         keep_within_lines(coarse, 0u, 1.0);
-        splats[slot + 1u] = coarse;
+        put(slot + 1u, coarse);
     }
 
-    sums[i].x += power_w * (1.0 - share_within(photon, within));
+    sums[own].x += power_w * (1.0 - share_within(photon, within));
+}
+
+void main() {
+    uint me = gl_LocalInvocationID.x, count = photons_there();
+#if IN_PIECES
+    if (me < KINDS) splats_of[me] = pieces_of[me] = 0u;
+    barrier();
+#endif
+    for (uint i = gl_GlobalInvocationID.x; i < count; i += gl_NumWorkGroups.x * uint(WORKGROUP)) make_splats(i);
+#if IN_PIECES
+    barrier();
+    if (me < KINDS) {
+        atomicAdd(kind_words[KIND_WORDS * me + SPLATS_AT], splats_of[me]);
+        atomicAdd(kind_words[KIND_WORDS * me + PIECES_AT], pieces_of[me]);
+    }
+#endif
 }

@@ -164,7 +164,7 @@ uint put_images(Depicted of, Placement place, uint slot) {
             }
             keep_within_lines(splat, keeps_side ? of.side : 0u, 1.0);
             keeps_side = false;
-            if (shown) splats[slot + count] = splat;
+            if (shown) put(slot + count, splat);
             count += shown ? 1u : 0u;
         }
     }

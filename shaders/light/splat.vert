@@ -3,6 +3,8 @@
 // set-up instead of two (it wins below about 40 texels).
 #include "light/splat_setup.glsl"
 
+layout(std430, binding = 8) readonly buffer Lists { uint lists[]; };  // slots of each kind (splat_list.comp)
+
 flat out vec4 rect;
 flat out uint side;
 #if SMALL

@@ -4,7 +4,6 @@
 #include "lib/swept.glsl"
 
 layout(std430, binding = 1) readonly buffer Splats { SplatRecord splats[]; };
-layout(std430, binding = 8) readonly buffer Lists { uint lists[]; };  // slots of each kind (splat_list.comp)
 layout(std430, binding = 5) readonly buffer Bands { vec4 table_bands[]; };
 layout(std430, binding = 6) readonly buffer Integrals {
     vec4 band_integral[];

@@ -313,8 +313,8 @@ MUTANTS = {
     ),
     "added splats: clipped by no rectangle": Mutant(
         "light/splat_add.comp",
-        "max(lowest + splat.centre, splat.rect.xy)",
-        "(lowest + splat.centre)",
+        "max(sides.lowest + splat.centre, splat.rect.xy)",
+        "(sides.lowest + splat.centre)",
         "gpu/test_splat_add.py::test_every_kind_is_added_as_it_is_drawn[compare and swap-small]",
     ),
     "added splats: as bright where it fans out": Mutant(
@@ -325,14 +325,14 @@ MUTANTS = {
     ),
     "added splats: lines beside their places": Mutant(
         "light/splat_add.comp",
-        "float(line) - middle.y;",
-        "float(line) - middle.x;",
+        "float(begin.y + line) - middle.y",
+        "float(begin.y + line) - middle.x",
         "gpu/test_splat_add.py::test_every_kind_is_added_as_it_is_drawn[compare and swap-swept]",
     ),
-    "added splats: half of the lanes' texels": Mutant(
+    "added splats: half of the team's texels": Mutant(
         "light/splat_add.comp",
-        "t += LANES;",
-        "t += 2 * LANES;",
+        "t += TEAM;",
+        "t += 2 * TEAM;",
         "gpu/test_splat_add.py::test_every_kind_is_added_as_it_is_drawn[compare and swap-swept]",
     ),
     "added splats: sums that overlap": Mutant(

@@ -20,7 +20,7 @@ from spectrasplat.gpu.map_channels import MapChannels
 from spectrasplat.gpu.splat_way import FLOAT_ATOMICS, SplatWay
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.passes.footprint import MOST_GROUPS, SPLAT, VERTICES
+from spectrasplat.passes.footprint import MOST_GROUPS, PIECE_TEXELS, SPLAT, TEAMS, VERTICES
 from spectrasplat.passes.map_atlas import MapAtlas
 from spectrasplat.render.still import render
 from spectrasplat.stress.rigs.splat_rig import Rig, photons
@@ -120,26 +120,39 @@ def rigs(gl: Context, features: Features) -> tuple[Rig, Rig]:
     return made[0], made[1]
 
 
-def drawn(rig: Rig, records: np.ndarray) -> np.ndarray:
-    """The map after these splat records alone, float64."""
+def drawn(rig: Rig, records: np.ndarray, most_groups: int = MOST_GROUPS) -> np.ndarray:
+    """The map after these splat records alone, float64; `most_groups` that add them."""
     footprints, atlas = rig.splatter._footprints, rig.atlas
     atlas.clear()
     kind, count = int(records["kind"][0]), len(records)
     assert (records["kind"] == kind).all() and count <= footprints.capacity
-    footprints.splats.write(records.tobytes())
-    footprints.lists.write(np.arange(count, dtype=np.uint32), offset=4 * (kind - 1) * footprints.capacity)
     commands = footprints._no_commands.copy()
     if rig.splatter.by_compute:
-        commands[:, 0] = 0
-        commands[kind - 1, [0, 4]] = min(count, MOST_GROUPS), count
+        pieces = pieces_at_most(records)
+        records = records.copy()
+        records["kind"] |= pieces << 4
+        entries = np.column_stack([np.repeat(np.arange(count), pieces), np.concatenate([np.arange(n) for n in pieces])])
+        commands[kind - 1, [0, 3, 4, 5]] = min(-(-len(entries) // TEAMS), most_groups), count, *[len(entries)] * 2
+        footprints.lists.write(entries.astype(np.uint32).tobytes())
     else:
         commands[:, 0] = 0
         commands[kind - 1, 0] = VERTICES[kind - 1] * count
+        footprints.lists.write(np.arange(count, dtype=np.uint32), offset=4 * (kind - 1) * footprints.capacity)
+    footprints.splats.write(records.tobytes())
     footprints.commands.write(commands)
     rig.ctx.memory_barrier()
     rig.splatter.draw(rig.tables, atlas)
     atlas.pending = count
     return atlas.read_tile(rig.tiles[0]).astype(np.float64)
+
+
+def pieces_at_most(records: np.ndarray) -> np.ndarray:
+    """Pieces (n,) in which each could be added by rows if it filled its box."""
+    with np.errstate(all="ignore"):
+        across = 0.0 if records["kind"][0] == SMALL else records["across"]
+        reach = (np.abs(records["along"]) + np.abs(across)) / 0.15
+        sides = np.nan_to_num(2.0 * reach, nan=1e9, posinf=1e9).clip(1.0, SIZE).astype(int)
+    return (sides[:, 1] * -(-sides[:, 0] // PIECE_TEXELS)).astype(np.uint32)
 
 
 def difference(a: np.ndarray, b: np.ndarray) -> float:
@@ -211,9 +224,8 @@ def test_more_splats_than_groups_are_all_added(gl: Context) -> None:
     raster, compute = rigs(gl, Features(spectral_groups=1))
     record = splats(compute, np.random.default_rng(2), 1, SMALL)
     record["centre"], record["rect"] = 40.5, (0.0, 0.0, *SIZE)
-    count = min(MOST_GROUPS + 4000, compute.splatter._footprints.capacity)
-    assert count > MOST_GROUPS
-    one, all_of_them = drawn(raster, record), drawn(compute, np.repeat(record, count))
+    count = 3000
+    one, all_of_them = drawn(raster, record), drawn(compute, np.repeat(record, count), most_groups=7)
     np.testing.assert_allclose(all_of_them, count * one, rtol=2e-3, atol=1e-4 * count * one.max())
 
 

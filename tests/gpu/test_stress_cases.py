@@ -105,7 +105,7 @@ MUTANTS = {
     "lost footprints not counted": (
         "overflow",
         "light/footprint.comp",
-        "sums[i].yz += vec2(power_w, 1.0);",
+        "sums[own].yz += vec2(power_w, 1.0);",
         "",
         "photons were degraded but only 0 fall-backs counted",
     ),
