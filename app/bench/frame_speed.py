@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,7 +17,6 @@ from ..passes.camera import CameraPass
 from ..render.device_scene import scene_buffers
 from ..render.light_pass import LightPass
 from ..render.photon_batches import traced_besides
-from ..render.splatting import Pace
 
 if TYPE_CHECKING:
     from ..gpu.context import Context
@@ -32,15 +31,16 @@ _EVENTS = "events_per_dispatch"
 
 @dataclass(frozen=True)
 class FrameCost:
-    """Of one frame, s by the wall clock with the device finished after every stage."""
+    """Of one frame, s by the wall clock; nothing within a stage is waited for."""
 
     photons: int
     splats: int
     trace: float
-    splat: float
+    """Of the same photons alone."""
+    light: float
+    """Photons traced and in the maps."""
     camera: float
-    device: dict[str, float] = field(default_factory=dict)
-    """Of the same, by the device's own timers; empty where these do not work."""
+    """One sample a pixel."""
 
     @property
     def all(self) -> float:
@@ -48,22 +48,10 @@ class FrameCost:
         return self.light + self.camera
 
     @property
-    def light(self) -> float:
-        """Photons traced and in the maps."""
-        return self.trace + self.splat
-
-    @property
     def figures(self) -> dict[str, float]:
         """With units in their names."""
-        found = {
-            "photons": self.photons,
-            "frame_ms": _ms(self.all),
-            "trace_ms": _ms(self.trace),
-            "splat_ms": _ms(self.splat),
-            "camera_ms": _ms(self.camera),
-            "splats": self.splats,
-        }
-        return found | {f"{name}_device_ms": _ms(spent) for name, spent in self.device.items()}
+        spent = {"frame_ms": self.all, "light_ms": self.light, "trace_ms": self.trace, "camera_ms": self.camera}
+        return {"photons": self.photons, "splats": self.splats} | {name: _ms(s) for name, s in spent.items()}
 
 
 def _ms(seconds: float) -> float:
@@ -87,7 +75,7 @@ def _light(context: Context, scene: Scene, settings: RenderSettings) -> Iterator
     """A light pass of `scene`, with what is done once for a scene (pilots, tables) done."""
     settings = replace(settings, method="srd-photons", max_depth=scene.render.max_depth)
     buffers = scene_buffers(context, scene, settings)
-    light = LightPass(context, scene, settings, Features.of(scene, settings), buffers, pace=Pace(True))
+    light = LightPass(context, scene, settings, Features.of(scene, settings), buffers)
     try:
         light.prepare()
         yield light
@@ -173,9 +161,8 @@ def _frame(
     context: Context, light: LightPass, camera: CameraPass, size: tuple[int, int], photons: int, seed: int
 ) -> FrameCost:
     light.begin(photons, seed)
-    before = light.stats.photons, light.stats.splats, light.stats.trace_seconds
-    on_device = dict(context.timers.seconds)
-    context.finish()
+    trace, _ = _trace(context, light, photons)
+    before = light.stats.photons, light.stats.splats
     started = time.perf_counter()
     for _ in light.steps_until(0, photons, lambda: False):
         pass
@@ -185,13 +172,5 @@ def _frame(
     for _ in camera.samples(light.scene.camera, *size, 1, 0, light.caustic_maps(), seed):
         pass
     context.finish()
-    seen = time.perf_counter()
-    trace = light.stats.trace_seconds - before[2]
-    return FrameCost(
-        light.stats.photons - before[0],
-        light.stats.splats - before[1],
-        trace,
-        lit - started - trace,
-        seen - lit,
-        context.timers.since(on_device),
-    )
+    emitted, splats = light.stats.photons - before[0], light.stats.splats - before[1]
+    return FrameCost(emitted, splats, trace, lit - started, time.perf_counter() - lit)

@@ -102,7 +102,7 @@ def test_a_crash_among_figures_is_a_line(
 
 
 def test_photons_of_a_frame_lie_on_the_line_through_what_was_measured() -> None:
-    costs = [FrameCost(n, 0, 1e-3 + 2e-9 * n, 1e-9 * n, 2e-3) for n in (1 << 20, 1 << 17, 1 << 18)]
+    costs = [FrameCost(n, 0, 2e-9 * n, 1e-3 + 3e-9 * n, 2e-3) for n in (1 << 20, 1 << 17, 1 << 18)]
     assert photons_within(costs, 4e-3, with_camera=False) == pytest.approx(1e6, rel=1e-3)
     assert photons_within(costs, 4e-3, with_camera=True) == pytest.approx(1e6 / 3, rel=1e-3)
     assert photons_within(costs, 0.5e-3, with_camera=False) == 0
