@@ -34,6 +34,8 @@ class Budget:
     """Photons kept so that edits need no new tracing."""
     finest_photons: int = 0
     """Photons of the finest pass at least, however few are wanted in all."""
+    portion: int = 1 << 30
+    """Photons traced between two pauses, at most."""
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 
 import moderngl
 
@@ -18,6 +19,16 @@ _REPEATS = 8
 _LATE = 4
 """Blocks of a pass that are timed before the first of them is asked for: by then the device is done with it."""
 Tell = Callable[[float], None]
+
+
+@dataclass
+class FrameTimes:
+    """What the device took for one frame."""
+
+    seconds: dict[str, float] = field(default_factory=dict)
+    """By pass, as far as it is known."""
+    awaited: int = 0
+    """Blocks of which it is not."""
 
 
 class PassTimers:
@@ -32,8 +43,10 @@ class PassTimers:
         self.work = may_work and self._tells_truth()
         """There are sums."""
         self._free: dict[str, list[moderngl.Query]] = {}
-        self._asked: dict[str, deque[tuple[moderngl.Query, Tell | None]]] = {}
+        self._asked: dict[str, deque[tuple[moderngl.Query, Tell | None, FrameTimes | None]]] = {}
         self._inside = False
+        self.frame: FrameTimes | None = None
+        """Gets what is timed from now on as well."""
 
     @contextmanager
     def timing(self, name: str, tell: Tell | None = None) -> Iterator[None]:
@@ -63,15 +76,20 @@ class PassTimers:
             query = free.pop()
             with query:
                 yield
-            asked.append((query, tell))
+            asked.append((query, tell, self.frame))
+            if self.frame is not None:
+                self.frame.awaited += 1
         finally:
             self._inside = False
 
     def _hear(self, name: str) -> None:
-        query, tell = self._asked[name].popleft()
+        query, tell, frame = self._asked[name].popleft()
         took = 1e-9 * query.elapsed
         self._free[name].append(query)
         self.seconds[name] = self.seconds.get(name, 0.0) + took
+        if frame is not None:
+            frame.seconds[name] = frame.seconds.get(name, 0.0) + took
+            frame.awaited -= 1
         if tell is not None:
             tell(took)
 

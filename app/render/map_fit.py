@@ -36,11 +36,10 @@ class MapFit:
     """Mesa's software renderer compiles what reads a texture once more, for seconds, where a side becomes a power of
     two: for maps that are made while a user waits."""
 
-    @property
-    def preview(self) -> MapFit:
-        """Small maps of the same, to be filled at once."""
-        width, height = preview_size(self.width, self.height)
-        return replace(self, width=width, height=height, fineness=PREVIEW_FINENESS)
+    def preview(self, side: float = 1.0) -> MapFit:
+        """Small maps of the same, to be filled at once; `side`: of theirs over the usual one."""
+        width, height = preview_size(self.width * side, self.height * side)
+        return replace(self, width=width, height=height, fineness=PREVIEW_FINENESS.times(side))
 
     def fineness_for(self, targets: int) -> Fineness:
         """Fineness of maps with so many textures: memory bounds the finest."""
@@ -54,7 +53,7 @@ class MapFit:
         return [_landings(pilot, at, space) for at, pilot in (*((space, pilot) for pilot in own), *self.others)]
 
 
-def preview_size(width: int, height: int) -> tuple[int, int]:
+def preview_size(width: float, height: float) -> tuple[int, int]:
     """Picture size for which the maps of a preview are laid out."""
     return max(16, round(width / PREVIEW)), max(16, round(height / PREVIEW))
 

@@ -57,6 +57,8 @@ class PhotonBatches:
         self.dispatch_seconds = DISPATCH_S
         """What the first event of a batch may take where the device queues work: smaller batches follow one that took
         longer."""
+        self.portion = trace.batch
+        """Rays of a batch at most: what a frame that is shown meanwhile has time for."""
         self._context = context
         self._pace = pace
         self._traced_once = False
@@ -78,7 +80,7 @@ class PhotonBatches:
         whose paths the queues hold."""
         lattices, first, left = part.count // part.points, part.first, part.points
         while left:
-            most = min(self.budget.units, self._held.get(part.light, self.budget.units))
+            most = min(self.budget.units, self.portion, self._held.get(part.light, self.budget.units))
             points = min(left, max(most // lattices, 1))
             piece = replace(part, first=first, points=points)
             self.trace.order(piece)  # the processor's work, which would pass for the device's below

@@ -36,6 +36,7 @@ def view_model_of(session: Session) -> ViewModel:
         shown=picture.seen,
         picture=None if shown is None or picture.awaits_scene else shown.glo,
         frame_ms=tuple(session.frame_ms),
+        wanted_hz=session.wanted_hz,
         pass_ms=_pass_ms(session),
         process_bytes=resident_bytes() if session.state.preferences.panels.timing else 0,
         cursor=session.jobs.cursor.view_model,
@@ -75,12 +76,13 @@ def _pass_ms(session: Session) -> dict[str, float]:
     stats = session.picture.stats
     seconds = {
         "trace": stats.trace_s,
-        "splat": stats.splat_s,
+        "splats": stats.splat_s,
+        "resolve": stats.resolve_s,
         "camera": stats.camera_s,
         "display": session.picture.display_s,
         "interface": session.interface_s,
     }
-    return {name: 1000.0 * value for name, value in seconds.items()}
+    return {name: 1000.0 * value for name, value in seconds.items() if name != "resolve" or not stats.is_software}
 
 
 Draw = Callable[[State, ViewModel], State]

@@ -170,18 +170,19 @@ class LivePicture:
     def _advance(engine: Engine, interacting: bool, budget_s: float, slice_s: float, stops: Stops) -> LiveStats:
         """The engine's stats, with what all slices together took."""
         version, started = engine.picture_version, time.perf_counter()
-        trace_s = splat_s = camera_s = 0.0
+        trace_s = splat_s = resolve_s = camera_s = 0.0
         while True:
             begun = time.perf_counter()
             given = min(slice_s, max(budget_s - (begun - started), 0.5 * min(slice_s, budget_s)))
             engine.advance(given, interacting)
             stats = engine.stats
-            trace_s, splat_s, camera_s = trace_s + stats.trace_s, splat_s + stats.splat_s, camera_s + stats.camera_s
+            trace_s, splat_s = trace_s + stats.trace_s, splat_s + stats.splat_s
+            resolve_s, camera_s = resolve_s + stats.resolve_s, camera_s + stats.camera_s
             now = time.perf_counter()
             ends = now - started > budget_s - 0.5 * min(slice_s, budget_s) or now - begun < 0.5 * given
             ends |= engine.is_busy or engine.picture_version != version or stats.converged
             if ends or stops():
-                return replace(stats, trace_s=trace_s, splat_s=splat_s, camera_s=camera_s)
+                return replace(stats, trace_s=trace_s, splat_s=splat_s, resolve_s=resolve_s, camera_s=camera_s)
 
     def show(self, state: State, now_s: float, delta_s: float, other: Comparison | None = None) -> None:
         """Develop the engine's picture for the screen."""

@@ -100,6 +100,7 @@ class Session:
         """Since the layout last changed."""
         self.told: dict[str, str | None] = {}
         """What is wrong with the autosave and the picture, as far as the user was told."""
+        self.wanted_hz = 60.0
         self._frame_started = self._last_start = clock()
         self.delta_s = 1 / 60
         self.state = _first_state(

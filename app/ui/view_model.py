@@ -93,8 +93,10 @@ class ViewModel:
     """Texture id of the displayed picture, top row first."""
     frame_ms: tuple[float, ...] = ()
     """Durations of the last frames, newest last."""
+    wanted_hz: float = 60.0
+    """Frames a second that the engine's share of a frame is meant for."""
     pass_ms: dict[str, float] = field(default_factory=dict)
-    """Times of the last frame, by pass: trace, splat, camera, display, interface."""
+    """Times of the last frame, by pass: trace, splats, resolve, camera, display, interface."""
     process_bytes: int = 0
     """Resident memory of this process while a panel shows it; 0 where the system does not say."""
     cursor: CursorInfo | None = None

@@ -68,6 +68,7 @@ class Viewer:
     def __init__(self, session: Session, draw: Draw = draw_interface, refresh_s: float = 1 / 60) -> None:
         self.session = session
         self.pace = Pace(session.context.is_software, refresh_s)
+        session.wanted_hz = 1.0 / (SOFTWARE_FRAME_S if session.context.is_software else refresh_s)
         self._draw = draw
         self._drawn_at = 0.0
 

@@ -95,7 +95,7 @@ def test_the_picture_of_a_frame_answers_its_input(rig: Rig) -> None:
     assert rig.session.picture.pixel((0.5, 0.5)) == pytest.approx((0.7, 0.7, 0.7))
     rig.frame()
     assert rig.view_model.picture is not None
-    assert set(rig.view_model.pass_ms) >= {"trace", "splat", "camera", "display", "interface"}
+    assert set(rig.view_model.pass_ms) >= {"trace", "splats", "camera", "display", "interface"}
 
 
 def test_shown_texture_stays_valid_in_the_frame_in_which_the_size_changes(rig: Rig) -> None:

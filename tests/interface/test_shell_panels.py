@@ -45,7 +45,7 @@ def full_view_model() -> ViewModel:
     return ViewModel(
         stats=stats,
         frame_ms=tuple(float(v) for v in range(10, 30)),
-        pass_ms={"trace": 8.0, "splat": 5.0, "interface": 2.0},
+        pass_ms={"trace": 8.0, "splats": 5.0, "interface": 2.0},
         cursor=CursorInfo(
             (10, 10),
             (0.8, 0.4, 0.0),

@@ -118,6 +118,7 @@ def build(
     try:
         yield "following the first photons"
         yield from light.light_pass.preparing()
+        light.light_pass.batches.portion = budget.portion
         light.show(wanted)
         if as_fine:
             light.fit_to(wanted)

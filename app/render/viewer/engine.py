@@ -8,6 +8,7 @@ budget is kept on a software renderer too.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterator
 from dataclasses import replace
@@ -27,6 +28,7 @@ from . import schedule as events
 from .building import Shown, build
 from .dirty_level import DirtyLevel
 from .engine_answers import EngineAnswers
+from .frame_planner import FramePlanner, Kind
 from .invalidation import appearance_differs, dirty_level, lights_differ, moves_view, only_moves
 from .live_camera import DIRECT_S, MOVED_S
 from .live_light import LiveLight
@@ -70,6 +72,9 @@ class LiveEngine(EngineAnswers):
         self._tracing: Iterator[None] = iter(())
         self._maps: CausticMaps | None = None
         self._preview_photons = 1 << 13
+        self._frame_s = 0.0
+        self._planner = FramePlanner(context) if budget is None and context.traits.work_is_queued else None
+        """Where given, says how many photons a frame has; where not, batches and previews have sizes of their own."""
         self._moving = MovingBeams()
 
     # ---- what is wanted ----------------------------------------------------------------------
@@ -160,6 +165,9 @@ class LiveEngine(EngineAnswers):
         if self._wanted is None:
             return
         on_device = dict(self.context.timers.seconds)
+        self._frame_s = budget_s
+        if self._planner is not None:
+            self._planner.begin()
         try:
             self._tell(events.FrameBegan(interacting))
             waited = self.schedule.wish_is_due and self.schedule.finishes_preview(self._camera)
@@ -173,6 +181,8 @@ class LiveEngine(EngineAnswers):
             self._building.drop()
             self.problem = str(error)
             self._tell(events.Failed())
+        if self._planner is not None:
+            self._planner.end()
         self._tally.seconds |= self.context.timers.since(on_device, waits=False)
 
     def _follow(self, budget_s: float) -> None:
@@ -222,7 +232,7 @@ class LiveEngine(EngineAnswers):
                 self.problem = None
                 if self._shown is not None and self._shown.light.light_pass.beams is not None:
                     self._shown.light.light_pass.beams.pause()
-                sizes = self.budget, self._wanted, self._largest, self._target_photons
+                sizes = self._first_budget, self._wanted, self._largest, self._target_photons
                 self._building.begin(build(self.context, *sizes, self._maps_ready, self._moving, self._held_photons))
             case Action.FOLLOW_PHOTONS:
                 self._follow_photons(self._wanted, 0.4 * budget_s)
@@ -243,6 +253,14 @@ class LiveEngine(EngineAnswers):
                 assert self._shown is not None
                 self._set_maps(self._shown.light.light_pass.maps)
                 self._restart_camera(same_view=same_view, finer_maps=finer_maps)
+
+    @property
+    def _first_budget(self) -> Budget:
+        """Sizes of the first picture of a scene."""
+        if self._planner is None:
+            return self.budget
+        portion = self._planner["refining"].photons
+        return replace(self.budget, first_photons=min(self.budget.first_photons, 4 * portion), portion=portion)
 
     @property
     def _held_photons(self) -> int:
@@ -295,10 +313,12 @@ class LiveEngine(EngineAnswers):
         self._camera_pass.pause()
         if shown.light.light_pass.beams is not None:
             shown.light.light_pass.beams.pause()
-        maps = shown.light.move(replace(wanted.scene, camera=wanted.camera))
+        plan = None if self._planner is None else self._planner["moved"]
+        maps = shown.light.move(replace(wanted.scene, camera=wanted.camera), plan)
         if maps is None:
             self._tell(events.BuildAsked())
             return
+        self._count("moved", int(maps.photon_weight), self._frame_s)
         self._camera_pass.move(shown.light.buffers, scene_seen(wanted.scene, wanted.camera, wanted.solo_nm))
         self._inputs = wanted
         self._set_maps(maps)
@@ -321,11 +341,15 @@ class LiveEngine(EngineAnswers):
         """As many stored photons as can be splatted in about `seconds`, in coarse maps of their own, as the picture for
         now."""
         assert self._shown is not None
-        started = time.perf_counter()
-        maps = self._shown.light.splat_preview(self._preview_photons)
+        started, light, planner = time.perf_counter(), self._shown.light, self._planner
+        photons, side = (self._preview_photons, 1.0) if planner is None else planner["stored"].size
+        maps = light.splat_preview(photons, side)
         if maps is None:
             return
         self._show_for_now(maps)
+        self._count("stored", light.preview_photons, self._frame_s)
+        if planner is not None:
+            return
         took = time.perf_counter() - started - self._shown.light.beam_seconds
         self._preview_photons = int(
             np.clip(self._preview_photons * np.clip(seconds / max(took, 1e-4), 0.5, 2.0), 1 << 12, 1 << 24)
@@ -352,7 +376,8 @@ class LiveEngine(EngineAnswers):
 
     def _set_maps(self, maps: LightMaps) -> None:
         assert self._shown is not None
-        self._maps = self._shown.light.caustic_maps(maps)
+        with self.context.timers.timing("resolve"):
+            self._maps = self._shown.light.caustic_maps(maps)
         self._shown.light.drop_outdated()
         if not self.schedule.moved:  # places on what is moved stay where it was
             self._shown.light.bounce_caustics(self._maps)
@@ -393,14 +418,29 @@ class LiveEngine(EngineAnswers):
         """Splat what is due, then trace, but for `only_stored`."""
         assert self._shown is not None
         light_pass = self._shown.light.light_pass
-        before = light_counts(light_pass.stats)
-        while time.perf_counter() < deadline and self.schedule.has_photon_work:
+        before, most, splats = light_counts(light_pass.stats), math.inf, self.schedule.splatting
+        if self._planner is not None:
+            most = light_pass.batches.portion = self._planner["refining"].photons
+        while (
+            time.perf_counter() < deadline
+            and self.schedule.has_photon_work
+            and light_pass.stats.photons - before[2] < most
+        ):
             if only_stored and not self.schedule.splatting:
                 break
             work = self._splatting if self.schedule.splatting else self._tracing
             if next(work, self) is self:
                 self._tell(events.SplattingEnded() if self.schedule.splatting else events.TracingEnded())
         self._tally.note_light(before, light_pass.stats)
+        if not splats:
+            room = 1.0 if self._camera.is_done else 1.0 - CAMERA_SHARE
+            self._count("refining", max(light_pass.stats.photons - before[2], 0), room * self._frame_s)
+
+    def _count(self, kind: Kind, photons: int, frame_s: float) -> None:
+        """This frame has had so many photons, within so many seconds."""
+        self._tally.photons = photons or self._tally.photons
+        if self._planner is not None:
+            self._planner.count(kind, photons, frame_s)
 
     def _work_on_environment(self, deadline: float, budget_s: float) -> None:
         """A part of a frame or what is left of it, while the camera has a picture to show: for the environment's light,

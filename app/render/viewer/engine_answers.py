@@ -137,6 +137,8 @@ class EngineAnswers:
             photons=int(self._published_photons),
             photons_stored=light.photons_stored,
             passes=self._shown.accumulation.number,
+            frame_photons=self._tally.photons,
+            resolve_s=seconds.get("resolve", 0.0),
             trace_s=seconds["trace"],
             splat_s=seconds["splat"] + seconds.get("beams", 0.0),  # apart only by the device's own timers
             camera_s=seconds["camera"],

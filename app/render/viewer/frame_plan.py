@@ -24,8 +24,8 @@ DEPTHS = (4, 8, 16, 64)
 """Specular events at most, while things are moved."""
 SIDES = (0.5, 1.0, 2.0)
 """Side of the maps of a moving picture over the usual one."""
-_GROWTH = 1.5
-"""Most by which photons grow from frame to frame: what they cost may be others' doing."""
+_GROWTH, _SHRINKING = 1.5, 0.25
+"""Most by which photons grow and shrink from frame to frame: what they cost may be others' doing."""
 _FULL, _AIM = 1.0, 0.85
 """Shares of the time there is: photons become fewer above the first, and more below three quarters; then this much is
 used."""
@@ -68,6 +68,11 @@ class FramePlan:
     settled: int = 0
     """Frames since depth or side changed."""
 
+    @property
+    def size(self) -> tuple[int, float]:
+        """Photons and side."""
+        return self.photons, self.side
+
     def after(self, spent: Spent, frame_s: float) -> FramePlan:
         """The plan once `spent` is known of a frame, of whose kind each shall take `frame_s`."""
         if not spent.is_sane or not spent.photons or not frame_s > 0.0:
@@ -79,7 +84,7 @@ class FramePlan:
         used = each * self.photons / room
         photons = float(self.photons)
         if used > _FULL or used < 0.75 * _AIM:
-            photons *= min(_AIM / max(used, 1e-9), _GROWTH)
+            photons *= min(max(_AIM / max(used, 1e-9), _SHRINKING), _GROWTH)
         photons = int(min(max(photons, FEWEST), MOST))
         plan = replace(self, photons=photons, known=known, settled=self.settled + 1)
         return plan if plan.settled < _PATIENCE else plan._sized(maps / frame_s, used)

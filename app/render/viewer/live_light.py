@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from ...model.scene import Scene
     from ...model.settings import RenderSettings
     from ...passes.caustic_maps import CausticMaps
+    from .frame_plan import FramePlan
 
 BEAM_SECONDS = 0.03
 """What finding and drawing beams should take while something is dragged."""
@@ -95,6 +96,9 @@ class LiveLight:
         self.judged_view: object = None
         """The view for which `refit` judged the maps last."""
         self._preview: LightMaps | None = None
+        self._preview_side = 1.0
+        self.preview_photons = 0
+        """Records that were splatted into the last preview."""
         self._moved: MovedLight | None = None
         self._guess: SpectrumGuess | None = None
         self._outdated: list[LightMaps | SpectrumGuess] = []
@@ -211,14 +215,16 @@ class LiveLight:
         passes."""
         return self._kept.bring_back(self.light_pass)
 
-    def move(self, scene: Scene) -> LightMaps | None:
+    def move(self, scene: Scene, plan: FramePlan | None = None) -> LightMaps | None:
         """A few photons through `scene`, in which things have moved: buffers are moved there, and what is
-        stored or accumulated no longer belongs to them. None, and nothing done, where buffers cannot be moved."""
+        stored or accumulated no longer belongs to them. None, and nothing done, where buffers cannot be moved. `plan`:
+        how many photons, as in `MovedLight.follow`."""
         if scene is not self.buffers.scene and not self.buffers.move(scene):
             return None
         if self._moved is None:
             self._moved = MovedLight(self._context, self.light_pass, self._preview_features)
-        return self._moved.follow(scene, self.widening(self._moved.photons))
+        photons = self._moved.photons if plan is None else plan.photons
+        return self._moved.follow(scene, self.widening(photons), plan)
 
     def widening(self, photons: float) -> float:
         """How much wider footprints are in pictures by so few photons."""
@@ -261,9 +267,9 @@ class LiveLight:
         yield from self.light_pass.beam_steps_again(kept.pass_photons * share)
         maps.photon_weight = kept.pass_photons * share
 
-    def splat_preview(self, photons: int) -> LightMaps | None:
-        """About so many stored photons as they are shown now, in small maps of their own (`MapFit.preview`), and the
-        strongest beams; None where there is nothing.
+    def splat_preview(self, photons: int, side: float = 1.0) -> LightMaps | None:
+        """About so many stored photons (`preview_photons`) as they are shown now, in small maps of their own
+        (`MapFit.preview` with `side`), and the strongest beams; None where there is nothing.
 
         For while something is dragged: the maps that accumulate are left alone.
         """
@@ -271,11 +277,12 @@ class LiveLight:
         has_photons = kept is not None and bool(kept.store.rounds)
         if not has_photons and not self.only_beams:
             return None
-        if self._preview is None:
-            layout = light_pass.layout_for(light_pass.fit.preview)
+        if self._preview is None or side != self._preview_side:
+            shader.release(self._preview)
+            layout, self._preview_side = light_pass.layout_for(light_pass.fit.preview(side)), side
             self._preview = LightMaps(self._context.ctx, layout, self._preview_features)
         self._preview.clear()
-        self._preview.photon_weight = 1.0
+        self._preview.photon_weight, self.preview_photons = 1.0, 0
         if kept is not None and has_photons:
             self._splat_some(kept, photons, self._preview)
         started = time.perf_counter()
@@ -293,6 +300,7 @@ class LiveLight:
         share = rounds / kept.store.rounds_of_pass / stride
         wider = share**-0.5 * self.widening(kept.pass_photons * share)
         for slab in slabs:
+            self.preview_photons += -(-slab.count // stride)
             for _ in self.light_pass.splat_steps(
                 slab.buffer, -(-slab.count // stride), wider, kept.tables.preview, maps, stride
             ):

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from ...gpu.context import Context
     from ..light_pass import LightPass
     from ..light_plan import LightPlan
+    from .frame_plan import FramePlan
 
 SECONDS = 0.05
 """What tracing and splatting should take."""
@@ -48,16 +49,22 @@ class MovedLight:
         self._store = PhotonStore(context.ctx, _BYTES)
         self.maps: LightMaps | None = None
 
-    def follow(self, scene: Scene, widening: float = 1.0) -> LightMaps:
-        """Photons through `scene`, in maps that are fitted to where they land, with footprints so much wider."""
-        light_pass, photons, started = self._light_pass, self.photons, time.perf_counter()
+    def follow(self, scene: Scene, widening: float = 1.0, plan: FramePlan | None = None) -> LightMaps:
+        """Photons through `scene`, in maps that are fitted to where they land, with footprints so much wider. Without a
+        `plan` there are as many as took about `SECONDS` before."""
+        light_pass, started = self._light_pass, time.perf_counter()
+        photons, depth = (self.photons, DEPTH) if plan is None else (plan.photons, plan.depth)
         plans = self._plans_for(scene)
         self._store.clear()
-        for _ in traced_besides(light_pass.trace, light_pass.settings.seed, plans, photons, self._store.keep, DEPTH):
-            pass
+        tracing = traced_besides(light_pass.trace, light_pass.settings.seed, plans, photons, self._store.keep, depth)
+        with self._context.timers.timing("trace"):
+            for _ in tracing:
+                pass
         slabs = self._store.of_rounds(0, self._store.rounds)
         records = self._store.read(len(slabs) and 1 << 30, light_pass.trace.photon.dtype)
-        layout = light_pass.layout_about(landings_of([Pilot(1, records, [], [])]), light_pass.fit.preview)
+        layout = light_pass.layout_about(
+            landings_of([Pilot(1, records, [], [])]), light_pass.fit.preview(1.0 if plan is None else plan.side)
+        )
         shader.release(self.maps)
         self.maps = LightMaps(self._context.ctx, layout, self._features)
         self.maps.clear()
@@ -67,7 +74,8 @@ class MovedLight:
                 pass
         self.maps.photon_weight = float(photons)
         took = time.perf_counter() - started
-        self.photons = int(np.clip(photons * np.clip(SECONDS / max(took, 1e-4), 0.5, 2.0), FEWEST, MOST))
+        if plan is None:
+            self.photons = int(np.clip(photons * np.clip(SECONDS / max(took, 1e-4), 0.5, 2.0), FEWEST, MOST))
         return self.maps
 
     def _plans_for(self, scene: Scene) -> list[LightPlan]:

@@ -27,8 +27,12 @@ class LiveStats:
     """Stretches of the spectrum that the shown picture's samples are divided over."""
     camera_fallbacks: dict[str, int] = field(default_factory=dict)
     """What camera rays met: columns dropped, paths given up."""
+    frame_photons: int = 0
+    """Photons that were traced, or shown otherwise, in the last frame that had any."""
     trace_s: float = 0.0
     splat_s: float = 0.0
+    resolve_s: float = 0.0
+    """Summing maps up for the camera; only where the device has timers, else with `splat_s`."""
     camera_s: float = 0.0
     photons_per_second: float = 0.0
     """Emitted photons per second of trace and splat time, over the last second."""

@@ -18,6 +18,8 @@ class WorkTally:
     def __init__(self) -> None:
         self.seconds = {"trace": 0.0, "splat": 0.0, "camera": 0.0}
         """Seconds of this frame, by pass."""
+        self.photons = 0
+        """Traced or splatted anew in the last frame that had any."""
         self._history: deque[tuple[float, int, float]] = deque()
         """When, how many photons, in what time."""
 

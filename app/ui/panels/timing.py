@@ -17,7 +17,8 @@ from . import numbers, rows, widgets
 
 PASSES = {
     "trace": "Photons through the glass, to the receivers.",
-    "splat": "Stored photons into the caustic maps.",
+    "splats": "Photons into the caustic maps.",
+    "resolve": "Caustic maps summed up for the camera.",
     "camera": "Camera samples: what the picture shows, through glass and mirrors.",
     "display": "Exposure, tone curve and comparison.",
     "interface": "Panels and plots.",
@@ -92,10 +93,13 @@ def _first_order(state: State, stats: LiveStats) -> State:
 
 def _frame_plot(view_model: ViewModel, height: float) -> None:
     times = np.asarray(view_model.frame_ms[-240:], float)
-    latest = float(times[-10:].mean()) if times.size else 0.0
-    rate = f"{1000 / latest:.0f} frames/s" if latest > 0 else "no frame yet"
+    latest, wanted = float(times[-10:].mean()) if times.size else 0.0, view_model.wanted_hz
+    rate = f"{1000 / latest:.0f} of {wanted:.0f} frames/s wanted" if latest > 0 else "no frame yet"
     imgui.text_unformatted(f"Frame  {numbers.milliseconds(latest)}")
-    rows.explain("Frame time", "Mean duration of the last ten frames, milliseconds.")
+    rows.explain(
+        "Frame time",
+        "Mean duration of the last ten frames, milliseconds, and the rate that frames are cut down to hold.",
+    )
     imgui.same_line()
     imgui.text_disabled(rate)
     flags = implot.Flags_.no_legend | implot.Flags_.no_inputs | implot.Flags_.no_menus | implot.Flags_.no_mouse_text
@@ -109,7 +113,9 @@ def _frame_plot(view_model: ViewModel, height: float) -> None:
     implot.setup_axes_limits(0, 239, 0, top, implot.Cond_.always)
     muted = imgui.ImVec4(*theme.palette().muted)
     implot.plot_inf_lines(
-        "##limits", np.array([1000 / 60, 50.0]), implot.Spec(line_color=muted, flags=implot.InfLinesFlags_.horizontal)
+        "##limits",
+        np.array([1000 / wanted, 50.0]),
+        implot.Spec(line_color=muted, flags=implot.InfLinesFlags_.horizontal),
     )
     if times.size:
         start = 240 - times.size
@@ -119,7 +125,9 @@ def _frame_plot(view_model: ViewModel, height: float) -> None:
         )
     implot.end_plot()
     rows.explain(
-        "Frame plot", "Durations of the last 240 frames in milliseconds. Lines: 16.7 ms (60 frames/s) and 50 ms."
+        "Frame plot",
+        f"Durations of the last 240 frames in milliseconds. Lines: {1000 / wanted:.1f} ms ({wanted:.0f} frames/s) and "
+        "50 ms.",
     )
 
 
@@ -175,7 +183,19 @@ def counts_of(state: State, view_model: ViewModel) -> list[tuple[str, str, str]]
             f"{numbers.count(stats.photons)} of {numbers.count(target)}" if stats.photons else "none yet",
             "Emitted photons that the shown map holds, and where it stops.",
         ),
-        ("Rate", f"{numbers.count(stats.photons_per_second)}/s", "Emitted photons per second of trace and splat time."),
+        (
+            "A frame",
+            f"{numbers.count(stats.frame_photons)} photons" if stats.frame_photons else "none yet",
+            (
+                "Photons that were traced, or shown otherwise, in the last frame that had any. A GPU gets as many as "
+                "leave the frame rate as it is wanted."
+            ),
+        ),
+        (
+            "A second",
+            f"{numbers.count(stats.photons_per_second)} photons",
+            "Emitted photons per second of trace and splat time.",
+        ),
         (
             "Beams",
             numbers.count(stats.beams),
