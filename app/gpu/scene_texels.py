@@ -114,12 +114,17 @@ def tree_texels(nodes: np.ndarray) -> np.ndarray:
 
 
 def spectra_texture(ctx: moderngl.Context, rows: np.ndarray) -> moderngl.Texture:
-    """RG32F texture of tables (R, samples >= 2): texel (i, r) holds samples i and i + 1 of row r."""
-    table = np.asarray(rows, "<f4")
-    pairs = np.stack([table[:, :-1], table[:, 1:]], axis=-1)
-    texture = ctx.texture(pairs.shape[1::-1], 2, np.ascontiguousarray(pairs), dtype="f4")
+    """RG32F texture of tables (R, samples >= 2)."""
+    pairs = spectra_texels(rows)
+    texture = ctx.texture(pairs.shape[1::-1], 2, pairs, dtype="f4")
     texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
     return texture
+
+
+def spectra_texels(rows: np.ndarray) -> np.ndarray:
+    """float32 (R, samples - 1, 2) of tables (R, samples >= 2): texel (i, r) holds samples i and i + 1 of row r."""
+    table = np.asarray(rows, "<f4")
+    return np.ascontiguousarray(np.stack([table[:, :-1], table[:, 1:]], axis=-1))
 
 
 def _words(part: np.ndarray | None) -> np.ndarray:

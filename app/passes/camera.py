@@ -106,6 +106,7 @@ class CameraPass:
         """Leave what is seen in glass and mirrors black where a program of its own follows it."""
         self.split_threshold = SPLIT_THRESHOLD
         shown = camera_defines(scene, self.channels, layer, maps)
+        self._made_for = layer, tuple(reflectances), maps, dict(shown)
         self._inputs = CameraInputs(
             self._ctx, scene, self.channels, reflectances, maps, pictures, "RECEIVER_LIGHT" in shown
         )
@@ -123,17 +124,27 @@ class CameraPass:
         for variant in ("all", "direct") if self.follows else ("direct",):
             self._programs.of(variant)
 
+    def take(self, scene: SceneBuffers, reflectances: Sequence[np.ndarray | None], maps: MapChannels) -> bool:
+        """Show `scene`, the same geometry with other colours, glass, lights or pictures, from now on, in the buffers
+        that there are. False, and nothing done, where a new pass is needed."""
+        layer, classes, channels, defines = self._made_for
+        if maps != channels or len(classes) != len(reflectances) or scene.texels is not self.scene.texels:
+            return False
+        if any(a is not b for a, b in zip(classes, reflectances, strict=True)):
+            return False
+        if camera_defines(scene, self.channels, layer, maps) != defines or not self._inputs.take(scene):
+            return False
+        self.scene = scene
+        if self._haze is not None:
+            self._haze.take(scene)
+        return True
+
     def move(self, scene: SceneBuffers) -> None:
         """Objects or lights have moved (`SceneBuffers.move`)."""
         self.scene = scene
         self._inputs.move(scene)
         if self._haze is not None:
             self._haze.move(scene)
-
-    def inherit(self, before: CameraPass) -> None:
-        """Take over what stays as it was of `before`, which is about to be released."""
-        if self._haze is not None and before._haze is not None:
-            self._haze.inherit(before._haze)
 
     @property
     def has_haze(self) -> bool:

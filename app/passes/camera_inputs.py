@@ -54,7 +54,8 @@ class CameraInputs:
         """As of `CameraPass`; `receiver_light`: programs look up what the environment and other receivers send."""
         self._ctx = ctx
         self.scene = scene
-        self._tables = CameraTables.build(ctx, scene, channels, reflectances, maps)
+        self._classes = channels, reflectances, maps
+        self._tables = CameraTables.build(ctx, scene, *self._classes)
         self._owns_pictures = pictures is None
         self.pictures = pictures or TextureStore(ctx, scene.scene, scene.first_triangle, scene.corner_turn)
         lights = self._light_records()
@@ -66,6 +67,7 @@ class CameraInputs:
         """Light of an environment, or of other receivers, of which nothing is known."""
         self._empty: CausticMaps | None = None
         self._map_targets = maps.targets
+        self._picture_defines = dict(self.pictures.defines)
 
     @property
     def structs(self) -> tuple[Struct, ...]:
@@ -84,6 +86,17 @@ class CameraInputs:
         for i, light in enumerate(self.scene.scene.lights):
             lights[i] = light_record(light, self.scene)
         return lights
+
+    def take(self, scene: SceneBuffers) -> bool:
+        """Show other colours, glass and spectra of the same geometry; False where other programs are needed for them."""
+        same = self.pictures.defines == self._picture_defines
+        if not same or len(scene.scene.lights) != len(self.scene.scene.lights):
+            return False
+        if not self._tables.take(scene, *self._classes):
+            return False
+        self._counters.write(bytes(4 * len(FALLBACKS)))
+        self.move(scene)
+        return True
 
     def move(self, scene: SceneBuffers) -> None:
         """Objects or lights have moved."""

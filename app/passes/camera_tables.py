@@ -17,7 +17,7 @@ import numpy as np
 from ..gpu import shader
 from ..gpu.map_channels import MapChannels
 from ..gpu.scene_buffers import SceneBuffers
-from ..gpu.scene_texels import spectra_texture
+from ..gpu.scene_texels import spectra_texels
 from ..gpu.spectral_groups import SAMPLES, index_slope
 from ..model.materials.diffuse import SMOOTH_ROUGHNESS
 from ..model.optics.colorimetry import VISIBLE_NM, daylight_per_lumen, rgb_basis
@@ -42,7 +42,6 @@ class CameraTables:
     object_colours: moderngl.Buffer
     cell_cdf: moderngl.Buffer
     defines: dict[str, int | str]
-    axis: SpectralAxis
 
     @classmethod
     def build(
@@ -56,6 +55,63 @@ class CameraTables:
         """`scene.scene` is what is shown; its geometry and its partition into glasses are those of `scene`.
 
         `reflectances`: classes as the splat tables were built with. `maps`: what the caustic maps' channels are."""
+        values = _Values.of(scene, channels, reflectances, maps)
+        spectra, emission = (
+            ctx.texture(texels.shape[1::-1], texels.shape[2], texels, dtype="f4")
+            for texels in (values.spectra, values.emission)
+        )
+        for texture in (spectra, emission):
+            texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        colours, cell_cdf = (ctx.buffer(numbers) for numbers in (values.object_colours, values.cell_cdf))
+        return cls(spectra, emission, colours, cell_cdf, values.defines)
+
+    def take(
+        self,
+        scene: SceneBuffers,
+        channels: Channels,
+        reflectances: Sequence[np.ndarray | None],
+        maps: MapChannels,
+    ) -> bool:
+        """Be tables of another shown scene, as of `build`, in the same textures and buffers. False, and nothing done,
+        where they do not fit or the shader would find its rows elsewhere."""
+        values = _Values.of(scene, channels, reflectances, maps)
+        sizes = tuple(texels.shape[1::-1] for texels in (values.spectra, values.emission))
+        if values.defines != self.defines or sizes != (self.spectra.size, self.emission.size):
+            return False
+        if values.object_colours.nbytes != self.object_colours.size:
+            return False
+        self.spectra.write(values.spectra)
+        self.emission.write(values.emission)
+        self.object_colours.write(values.object_colours)
+        self.cell_cdf.write(values.cell_cdf)
+        return True
+
+    def release(self) -> None:
+        """Free everything."""
+        shader.release(self.spectra, self.emission, self.object_colours, self.cell_cdf)
+
+
+@dataclass(frozen=True)
+class _Values:
+    """What the tables hold, float32 as it is uploaded."""
+
+    spectra: np.ndarray
+    """(rows, samples - 1, 2), see `spectra_texels`."""
+    emission: np.ndarray
+    """(rows · targets, samples, 4): row r of target t at r · targets + t."""
+    object_colours: np.ndarray
+    cell_cdf: np.ndarray
+    defines: dict[str, int | str]
+
+    @classmethod
+    def of(
+        cls,
+        scene: SceneBuffers,
+        channels: Channels,
+        reflectances: Sequence[np.ndarray | None],
+        maps: MapChannels,
+    ) -> _Values:
+        """As of `CameraTables.build`."""
         shown = scene.scene
         glasses = _shown_media(scene)
         axis = _axis(scene, list(glasses.values()))
@@ -76,18 +132,15 @@ class CameraTables:
             for column, coefficient in zip((3, 0), _absorptions(item.material, scene.space.scale), strict=True):
                 if coefficient is not None:
                     row[column] = next(i for i, known in enumerate(absorptions) if np.array_equal(known, coefficient))
+        count, samples, columns = emission.shape
+        texels = emission.reshape(count, samples, columns // 4, 4).transpose(0, 2, 1, 3).reshape(-1, samples, 4)
         return cls(
-            spectra_texture(ctx, spectra),
-            _texture(ctx, emission),
-            ctx.buffer((colours if finishes is None else np.concatenate([colours, finishes])).tobytes()),
-            ctx.buffer(cell_cdf.astype("f4").tobytes()),
+            spectra_texels(spectra),
+            np.ascontiguousarray(texels, "f4"),
+            colours if finishes is None else np.concatenate([colours, finishes]),
+            cell_cdf.astype("f4"),
             {**defines, **rows},
-            axis,
         )
-
-    def release(self) -> None:
-        """Free everything."""
-        shader.release(self.spectra, self.emission, self.object_colours, self.cell_cdf)
 
 
 def _shown_media(scene: SceneBuffers) -> dict[Dispersion, Dispersion]:
@@ -220,15 +273,6 @@ def _emission(
         # Mean over each bin of the reflectance basis: the last sample alone is read.
         rows += [np.broadcast_to(channels.of_reflectance(tuple(np.eye(3)[c])), rows[0].shape) for c in range(3)]
     return np.stack(rows), defines
-
-
-def _texture(ctx: moderngl.Context, rows: np.ndarray) -> moderngl.Texture:
-    """RGBA32F: row r of target t at y = r · targets + t."""
-    count, samples, columns = rows.shape
-    texels = rows.reshape(count, samples, columns // 4, 4).transpose(0, 2, 1, 3).reshape(-1, samples, 4)
-    texture = ctx.texture((samples, len(texels)), 4, np.ascontiguousarray(texels, "f4"), dtype="f4")
-    texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-    return texture
 
 
 def _cell_cdf(axis: SpectralAxis, channels: Channels) -> np.ndarray:

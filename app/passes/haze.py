@@ -88,12 +88,11 @@ class Haze:
         self._scene = scene
         self._forget()
 
-    def inherit(self, before: Haze) -> None:
-        """Take over the beams of `before`, which is of no use then, where these are the same."""
-        mine, theirs = self._scene, before._scene
-        same_space = mine.space.scale == theirs.space.scale and np.array_equal(mine.space.centre, theirs.space.centre)
-        if same_space and self._channels == before._channels and _same_ways(mine.scene, theirs.scene):
-            self._beams, before._beams = before._beams, self._beams
+    def take(self, scene: SceneBuffers) -> None:
+        """Other colours, glass or lights of the same geometry; beams whose ways are the same stay."""
+        before, self._scene, self._view = self._scene, scene, None
+        if not _same_ways(before.scene, scene.scene):
+            self._forget()
 
     def draw(self, camera: Camera, width: int, height: int, *, coarse: bool = False) -> None:
         """Draw all beams as `camera` sees them, through the middle of its lens; nothing where that was done last.

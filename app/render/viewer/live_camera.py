@@ -127,26 +127,23 @@ class LiveCamera:
         shown.scene = scene
         kept, before = self._pictures, self._pass
         pictures = self._store_of(shown)
-        try:
-            self._pass = CameraPass(self._context, shown, "beauty", reflectances, maps, pictures)
-        except BaseException:
-            if pictures is not kept:
-                pictures.release()
-            elif before is not None:
-                kept.follow(before.scene.scene, before.scene.first_triangle, before.scene.corner_turn)
-            raise
-        self._pictures = pictures
-        self._pass.dispatch_seconds = DISPATCH_SECONDS
-        self._looks = self._pass.primary_samples
+        if pictures is not kept or before is None or not before.take(shown, reflectances, maps):
+            try:
+                self._pass = CameraPass(self._context, shown, "beauty", reflectances, maps, pictures)
+            except BaseException:
+                if pictures is not kept:
+                    pictures.release()
+                elif before is not None:
+                    kept.follow(before.scene.scene, before.scene.first_triangle, before.scene.corner_turn)
+                raise
+            self._pictures = pictures
+            self._pass.dispatch_seconds = DISPATCH_SECONDS
+            self._looks = self._pass.primary_samples
+            self._take_moving(buffers)
+            shader.release(before, kept if kept is not pictures else None)
         self._steps = self._choosing = self._bands = None
         self._ladder, self._drawn = [], None
-        self._take_moving(buffers)
         self._shows_other = True
-        if before is not None:
-            self._pass.inherit(before)
-            before.release()
-        if kept is not None and kept is not pictures:
-            kept.release()
 
     def move(self, buffers: SceneBuffers, scene: Scene) -> None:
         """Objects or lights have moved: `buffers` were moved in place, nothing else of `scene` differs."""
