@@ -72,6 +72,9 @@ class DeviceTraits:
     compiles_ahead: bool = True
     """The driver's threads compile programs side by side, where it has some, and binaries are kept on the disk. Of a
     software renderer programs are compiled at their first dispatch, which no binary spares."""
+    moves_by_photons: bool = True
+    """Where beams carry light, photons stand for it while something is dragged: a search for beams takes the processor
+    longer than a GPU takes to splat a million photons."""
     splats_by_compute: bool = False
     """Compute shaders add splats, the rasteriser does not draw them. Of a GPU that is measured (`splat_way`)."""
 
@@ -103,6 +106,7 @@ class DeviceTraits:
             dispatch_s=0.15,
             camera_s=0.15,
             paths_group=8,
+            moves_by_photons=False,
             viewer=Budget(1 << 14, 1 << 14, 1 << 22, 256 << 20),
             viewer_splat_photons=1 << 12,
         )

@@ -21,6 +21,13 @@ def park(ctx: moderngl.Context) -> None:
     ctx.extra.use()
 
 
+def frame_of(ctx: moderngl.Context, texture: moderngl.Texture) -> moderngl.Framebuffer:
+    """The framebuffer of a texture alone, to clear it or to copy from or to it; `shader.release` frees both."""
+    if texture.extra is None:
+        texture.extra = ctx.framebuffer([texture])
+    return texture.extra
+
+
 @contextmanager
 def adding(ctx: moderngl.Context) -> Iterator[None]:
     """Within the block what is drawn is added to what there is."""

@@ -19,6 +19,7 @@ import numpy as np
 
 from ..model.optics.glass import LINE_D_NM, Dispersion, with_gain
 from ..model.optics.spectral_tables import SpectralAxis
+from .growing import filled
 
 if TYPE_CHECKING:
     import moderngl
@@ -111,9 +112,10 @@ class ReindexBuffer:
         shown: Spans,
         lights: Sequence[Spectrum],
         classes: int,
+        into: ReindexBuffer | None = None,
     ) -> None:
         """`classes`: reflectance classes of the tables; bands are padded to the light that has most, as the tables
-        are."""
+        are. `into`: one that is of no use any more, whose buffer becomes this one's."""
         count = max(len(bands) for bands in traced)
         rows = np.zeros((len(traced), classes, count, 2, 4), np.float32)
         for i, (bands, mine, support) in enumerate(zip(traced, shown, reindexing.supports(lights), strict=True)):
@@ -121,7 +123,7 @@ class ReindexBuffer:
                 rows[i, :, k, 0] = (*old, *support)
                 rows[i, :, k, 1, :2] = (k == 0, k == len(bands) - 1)
         self.reindexing = reindexing
-        self._buffer = ctx.buffer(np.ascontiguousarray(rows))
+        self._buffer: moderngl.Buffer = filled(ctx, None if into is None else into._buffer, rows)
 
     def bind(self) -> None:
         """To the place that footprint.comp reads."""

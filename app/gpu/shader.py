@@ -198,6 +198,8 @@ def release(*resources: Releasable | None) -> None:
             continue
         owners = _owners.get(id(owned))
         if owners is None:
+            if (frame := getattr(owned, "extra", None)) is not None:  # `framebuffers.frame_of`
+                frame.release()
             owned.release()
             continue
         if owners <= 0:  # given back already

@@ -19,6 +19,7 @@ from ..model.optics.colorimetry import VISIBLE_NM
 from ..model.optics.spectral_tables import CumulativeSpectrum, SpectralAxis, cumulative
 from ..model.optics.spectrum import Spectrum
 from . import shader
+from .growing import filled
 from .map_channels import MapChannels
 
 if TYPE_CHECKING:
@@ -57,6 +58,8 @@ class SplatTables:
     """vec4 per (light, class, target) and cell of x: mean energy density over x."""
     cumulative_buffer: moderngl.Buffer
     """vec4 per (light, class, target) and sample of x: energy below x."""
+    first_power: int
+    """Index in `band_buffer` where powers begin, vec4."""
     classes: int
     bands: int
     targets: int
@@ -75,13 +78,15 @@ class SplatTables:
         bands: Sequence[Sequence[tuple[float, float]]],
         channels: MapChannels = MapChannels(),
         width: int | None = None,
+        into: SplatTables | None = None,
     ) -> SplatTables:
         """Tables for the lights' spectra under each reflectance (401,) or None.
 
         `bands[light]`: (x_lo, x_hi) of its bands; a band of no width stands for a line. Lights with fewer
         bands than others are padded with empty ones. `channels`: X, Y, Z (lm) and radiant W, what follows them, or bins
         (W), four a target.
-        `width`: samples along xi, None for what a finished picture needs.
+        `width`: samples along xi, None for what a finished picture needs. `into`: tables that are of no use any more,
+        whose textures and buffers become these'.
         """
         import moderngl
 
@@ -114,15 +119,25 @@ class SplatTables:
                 texels[spectra[i, j, :count] % across, :, spectra[i, j, :count] // across] = table
                 integrals[i, j, :count] = summary.reshape(count, 3, targets, 4).swapaxes(1, 2)
                 spans[i, j, :count] = np.column_stack([edges, place, energy[:, channels.power].sum(axis=-1)])
-        texture = ctx.texture_array((width, stacked * len(SIGMAS), across * targets), 4, texels, dtype="f4")
-        texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        texture.repeat_x = texture.repeat_y = False
+        size = width, stacked * len(SIGMAS), across * targets
+        texture = None if into is None else into.texture
+        if texture is None or (texture.width, texture.height, texture.layers) != size:
+            shader.release(texture)
+            texture = ctx.texture_array(size, 4, dtype="f4")
+            texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+            texture.repeat_x = texture.repeat_y = False
+        texture.write(texels)
+        before = into.buffers if into is not None else (None,) * 4
+        bands_and_power = np.concatenate([spans.ravel(), power.ravel(), np.zeros(-power.size % 4, np.float32)])
+        values = bands_and_power, integrals, density, running
+        buffers = [filled(ctx, *pair) for pair in zip(before, values, strict=True)]
         return cls(
             texture,
-            ctx.buffer(np.concatenate([spans.ravel(), power.ravel(), np.zeros(-power.size % 4, np.float32)])),
-            ctx.buffer(integrals),
-            ctx.buffer(density),
-            ctx.buffer(running),
+            buffers[0],
+            buffers[1],
+            buffers[2],
+            buffers[3],
+            first_power=spectra.size,
             classes=shape[1],
             bands=band_count,
             targets=targets,
@@ -133,14 +148,12 @@ class SplatTables:
         )
 
     @property
-    def first_power(self) -> int:
-        """Index in `band_buffer` where powers begin, vec4."""
-        return self.integral_buffer.size // (48 * self.targets)
+    def buffers(self) -> tuple[moderngl.Buffer, ...]:
+        """All of them."""
+        return self.band_buffer, self.integral_buffer, self.density_buffer, self.cumulative_buffer
 
     def release(self) -> None:
-        shader.release(
-            self.texture, self.band_buffer, self.integral_buffer, self.density_buffer, self.cumulative_buffer
-        )
+        shader.release(self.texture, *self.buffers)
 
 
 def _by_target(values: np.ndarray, targets: int) -> np.ndarray:

@@ -112,6 +112,7 @@ class TextureStore:
         self._records: moderngl.Buffer | None = None
         self._sources = _sources(scene)
         self._tiles: list[Tile] = []
+        self._filled_for: tuple[list[object], np.ndarray] = [], np.zeros(0)
         self.defines: dict[str, int] = {}
         """TEXTURE_COUNT (textured objects), HAS_TEXTURES, HAS_ENVIRONMENT_MAP, TEXTURES_IMAGE; only what there is."""
         self.structs: tuple[Struct, ...] = (PICTURE,) if self._sources else ()
@@ -133,7 +134,8 @@ class TextureStore:
             _same_picture(a.owner, b.owner) for a, b in zip(sources, self._sources, strict=True)
         ):
             return False
-        if self._sources:
+        worn, turn = self._filled_for
+        if self._sources and (turn is not corner_turn or worn != _wearers(scene)):
             self._fill(scene, first_triangle, corner_turn)
         return True
 
@@ -206,6 +208,7 @@ class TextureStore:
         shader.release(self._records, self._corners)
         self._records = self.ctx.buffer(np.ascontiguousarray(records))
         self._corners = None if texels is None else _texture(self.ctx, texels)
+        self._filled_for = _wearers(scene), corner_turn
         self.defines = {"TEXTURE_COUNT": len(textured)}
         switches = {
             "HAS_TEXTURES": textured,
@@ -231,6 +234,12 @@ def _sources(scene: Scene) -> list[_Source]:
         if not any(_same_picture(owner, known.owner) for known in distinct):
             distinct.append(_Source(owner, owner.rgb))
     return distinct
+
+
+def _wearers(scene: Scene) -> list[object]:
+    """What the records and the texture coordinates depend on besides the pictures; compared by identity."""
+    items = [(index, scene.objects[index]) for index in textured_objects(scene)]
+    return [*((i, o.mesh, o.material.texture, o.object_to_world.tobytes()) for i, o in items), scene.environment]
 
 
 def _same_picture(one: Texture | Environment, other: Texture | Environment) -> bool:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..gpu import shader
+from ..gpu.framebuffers import frame_of
 
 if TYPE_CHECKING:
     import moderngl
@@ -129,10 +130,7 @@ class LevelsFold:
 def copy_texture(ctx: moderngl.Context, source: moderngl.Texture, target: moderngl.Texture) -> None:
     """Copy a whole texture to another of the same size and format."""
     ctx.memory_barrier()
-    read, write = ctx.framebuffer([source]), ctx.framebuffer([target])
-    ctx.copy_framebuffer(write, read)
-    read.release()
-    write.release()
+    ctx.copy_framebuffer(frame_of(ctx, target), frame_of(ctx, source))
 
 
 def _uints(ctx: moderngl.Context, parts: list[np.ndarray], width: int) -> moderngl.Buffer:

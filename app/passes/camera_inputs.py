@@ -88,7 +88,7 @@ class CameraInputs:
         return lights
 
     def take(self, scene: SceneBuffers) -> bool:
-        """Show other colours, glass and spectra of the same geometry; False where other programs are needed for them."""
+        """Show other colours, glass and spectra of the same geometry; False where other programs are needed."""
         same = self.pictures.defines == self._picture_defines
         if not same or len(scene.scene.lights) != len(self.scene.scene.lights):
             return False

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..features.program_switches import Defines, switched
 from ..gpu import shader
+from ..gpu.growing import filled
 from ..gpu.records import (
     GAIN_BOX,
     PLACEMENT,
@@ -149,14 +150,25 @@ class SpectralVariables:
     """What is subtracted from each group's rows: only differences count, and they keep more digits."""
 
     @classmethod
-    def build(cls, ctx: moderngl.Context, shown: np.ndarray, traced: np.ndarray | None = None) -> SpectralVariables:
-        """`shown`, `traced`: float64 (groups, samples), `traced` None where the photons' glass is the one shown."""
+    def build(
+        cls,
+        ctx: moderngl.Context,
+        shown: np.ndarray,
+        traced: np.ndarray | None = None,
+        into: SpectralVariables | None = None,
+    ) -> SpectralVariables:
+        """`shown`, `traced`: float64 (groups, samples), `traced` None where the photons' glass is the one shown.
+        `into`: variables that are of no use any more, whose buffer becomes these'."""
         if not shown.size:
-            return cls(ctx.buffer(reserve=16), 2)
+            return into or cls(ctx.buffer(reserve=16), 2)
+        buffer = None if into is None else into.buffer
         base = (shown if traced is None else traced)[:, shown.shape[1] // 2, None]
+        if into is not None and traced is not None and into.traced_row:  # which stay
+            into.buffer.write((shown - base).astype(np.float32))
+            return into
         rows = shown - base if traced is None else np.concatenate([shown - base, traced - base])
         row = 0 if traced is None else len(shown)
-        return cls(ctx.buffer(np.ascontiguousarray(rows, np.float32)), shown.shape[1], row, tuple(base[:, 0].tolist()))
+        return cls(filled(ctx, buffer, rows.astype(np.float32)), shown.shape[1], row, tuple(base[:, 0].tolist()))
 
     def release(self) -> None:
         self.buffer.release()

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..gpu import shader
-from ..gpu.framebuffers import park
+from ..gpu.framebuffers import frame_of, park
 from ..gpu.records import NONE, PLACEMENT
 from .splat_sums import SplatSums
 
@@ -146,10 +146,7 @@ class MapAtlas:
     def clear(self) -> None:
         """Forget everything deposited."""
         for texture in self.total_textures:
-            frame = self.ctx.framebuffer([texture])
-            frame.clear()
-            park(self.ctx)
-            frame.release()
+            frame_of(self.ctx, texture).clear()
         self.framebuffer.clear()
         if self._sums is not None:
             self._sums.forget(self.drawn_into)

@@ -148,11 +148,10 @@ class MovingPicture:
         if not self.follows:
             return
         blocks = self._set_step(step)
-        if self._chosen is None or self._facing is None or self._chosen.size != blocks:
-            if self._chosen is not None and self._facing is not None:
-                shader.release(self._chosen, self._facing)
-            self._chosen = self._ctx.texture(blocks, 1, dtype="u4")
-            self._facing = self._ctx.texture(blocks, 4, dtype="f4")
+        if self._chosen is None or self._chosen.size != picture.size:  # room for blocks of any side
+            shader.release(self._chosen, self._facing)
+            self._chosen = self._ctx.texture(picture.size, 1, dtype="u4")
+            self._facing = self._ctx.texture(picture.size, 4, dtype="f4")
         self._camera["pixel_width"] = self._camera["pixel_height"] = step
         least = self._view.split_threshold
         self._camera["split_threshold"] = max(least, COARSE_SPLIT) if step >= COARSE else least

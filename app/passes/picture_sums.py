@@ -6,6 +6,7 @@ import moderngl
 import numpy as np
 
 from ..gpu import shader
+from ..gpu.framebuffers import frame_of
 
 
 class PictureSums:
@@ -40,9 +41,8 @@ class PictureSums:
         if is_new:
             self.release()
             self.textures = [self._ctx.texture((width, height), 4, dtype="f4") for _ in range(self._targets)]
-        zeros = bytes(width * height * 16)
         for texture in self.textures:
-            texture.write(zeros)
+            frame_of(self._ctx, texture).clear()
         self.samples_of_row = np.zeros(height, int)
         return is_new
 

@@ -158,7 +158,7 @@ class BeamLight:
             for r, i in enumerate(buffers.receivers)
             if scene.objects[i].mesh.is_flat
         }
-        self._traced = self.finder = BeamFinder(
+        self._traced = BeamFinder(
             scene,
             list(buffers.world_meshes),
             {r: (frame.origin, frame.axes) for r, frame in self.frames.items()},
@@ -168,6 +168,8 @@ class BeamLight:
             buffers.space.scale,
             shown.channels.bins,
         )
+        self._finder: BeamFinder | None = self._traced
+        self._scene = scene
         self._coarse: tuple[MapLayout, BeamFinder] | None = None
         self.drawing = BeamDrawing(context, buffers, shown, self.frames)
         self.carried: dict[int, tuple[int, ...]] = {}
@@ -226,13 +228,20 @@ class BeamLight:
         self.carried = {light: objects for light, objects in found.carried.items() if objects}
         self._surveyed, self._with_tails = max(1.0, found.followed() * to_survey), max(1.0, strongest.followed())
 
+    @property
+    def finder(self) -> BeamFinder:
+        """For what is shown; made when it is needed."""
+        if self._finder is None:
+            self._finder = self._traced.shown_as(self._scene)
+        return self._finder
+
     def show(self, scene: Scene) -> None:
         """Follow `scene` from now on: other glass and spectra, which `shown` has too."""
         traced = self._traced.shown
         same = all(a.material is b.material for a, b in zip(traced.objects, scene.objects, strict=True)) and all(
             a.spectral_power is b.spectral_power for a, b in zip(traced.lights, scene.lights, strict=True)
         )
-        self.finder = self._traced if same else self._traced.shown_as(scene)
+        self._finder, self._scene = self._traced if same else None, scene
         self._coarse = None
         self.drawing.forget_tables()
 

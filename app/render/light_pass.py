@@ -33,7 +33,7 @@ from ..passes.map_layout import MapLayout, check_map_receiver, layout_maps
 from ..passes.pilot import Pilot
 from ..passes.trace import TracePass
 from .light_maps import LightMaps
-from .light_plan import Division, LightPlan, Planner
+from .light_plan import Division, LightPlan, Planner, spans_of
 from .light_stats import LightStats, PassStep
 from .light_survey import LightSurvey
 from .map_fit import MapFit
@@ -254,9 +254,7 @@ class LightPass:
         for plan in self.plans:
             name = self.scene.lights[plan.index].name
             self.stats.bands[name], self.stats.light_points[name] = len(plan.bands), plan.light_points
-        limits = {plan.index: [(b.x_lo, b.x_hi) for b in plan.bands] for plan in self.plans}
-        spans = [limits.get(i, [(0.0, 1.0)]) for i in range(len(self.scene.lights))]
-        self.batches.records.begin(self.shown, spans, photons)
+        self.batches.records.begin(self.shown, spans_of(self.plans, len(self.scene.lights)), photons)
         if beams is not None:
             self.plans = [
                 replace(plan, beam_objects=beams.carried.get(plan.index, ()))
@@ -276,10 +274,12 @@ class LightPass:
             self._division,
         )
 
-    def sample_steps(self, photons: int, keep: Keep) -> Iterator[str | None]:
-        """Trace about `photons` as if there were no beams and pass them to `keep`; the maps stay as they are."""
+    def sample_steps(self, photons: int, keep: Keep) -> Generator[str | None, None, list[LightPlan]]:
+        """Trace about `photons` as if there were no beams and pass them to `keep`; the maps stay as they are. Returns
+        their plans."""
         plans = yield from self.sample_plans(photons)
         yield from traced_besides(self.trace, self.settings.seed, plans, photons, keep)
+        return plans
 
     def sample_plans(self, photons: int) -> Generator[str | None, None, list[LightPlan]]:
         """The plans of `sample_steps`."""

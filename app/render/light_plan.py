@@ -74,6 +74,12 @@ class LightPlan:
         )
 
 
+def spans_of(plans: Iterable[LightPlan], lights: int) -> list[list[tuple[float, float]]]:
+    """Ends of the bands of each of so many lights; of one without a plan, all of x."""
+    limits = {plan.index: [(b.x_lo, b.x_hi) for b in plan.bands] for plan in plans}
+    return [limits.get(i, [(0.0, 1.0)]) for i in range(lights)]
+
+
 @dataclass(frozen=True)
 class Division:
     """How finely sub-lattices are divided at least, whatever a plan needs by itself: for frames whose lattices shall

@@ -56,6 +56,8 @@ class ShownSpectra:
         """What the maps' channels mean."""
         self.spectra: Sequence[Spectrum] = [light.spectral_power for light in scene.lights]
         self.variables = SpectralVariables.build(ctx, buffers.variables)
+        self._are_traced = True
+        """The variables are those of what was traced."""
         self.gains: GainBuffers | None = None
         self.changed: Mapping[Dispersion, Dispersion] = {}
         """Glasses that are shown otherwise than they were traced."""
@@ -81,18 +83,20 @@ class ShownSpectra:
             return False
         self.changed = changed
         table, axis = self._buffers.variables, self._buffers.axis
-        self.variables.release()
         if self._reindexes:
             (traced,) = axis.glasses
             reindexing = Reindexing.of(traced, changed.get(traced, traced))
             if reindexing is not None:
                 self._reindexing = reindexing
-                self.variables = SpectralVariables.build(self._ctx, table)
+                if not self._are_traced:
+                    self.variables = SpectralVariables.build(self._ctx, table, into=self.variables)
+                self._are_traced = True
                 return True
             self._reindexing = self._unchanged()
+        self._are_traced = not changed
         groups = self._buffers.groups
         shown = replace(groups, glasses=tuple(changed.get(glass, glass) for glass in groups.glasses)).variables(axis)
-        self.variables = SpectralVariables.build(self._ctx, shown, table if changed else None)
+        self.variables = SpectralVariables.build(self._ctx, shown, table if changed else None, self.variables)
         return self._reindexes
 
     def show_gains(self, scene: Scene | None) -> None:
@@ -106,16 +110,26 @@ class ShownSpectra:
         else:
             self.gains.update(scene)
 
-    def tables(self, spans: Spans, channels: MapChannels | None = None, width: int | None = None) -> ShownTables:
-        """Tables for bands of `spans`, the caller's; `channels` of maps that are not the light pass's own."""
+    def tables(
+        self,
+        spans: Spans,
+        channels: MapChannels | None = None,
+        width: int | None = None,
+        into: ShownTables | None = None,
+    ) -> ShownTables:
+        """Tables for bands of `spans`, the caller's; `channels` of maps that are not the light pass's own. `into`:
+        tables that are of no use any more, whose textures and buffers become these'."""
         ctx, spectra, channels = self._ctx, self.spectra, channels or self.channels
+        before = None if into is None else into.tables
         if self._reindexing is None:
             return ShownTables(
-                traced_tables(ctx, self._buffers, spectra, self.reflectances, spans, channels, width), None
+                traced_tables(ctx, self._buffers, spectra, self.reflectances, spans, channels, width, before), None
             )
         shown = self._reindexing.spans(spans, self._buffers.axis, spectra)
-        tables = SplatTables.build(ctx, self._reindexing.axis, spectra, self.reflectances, shown, channels, width)
-        return ShownTables(tables, ReindexBuffer(ctx, self._reindexing, spans, shown, spectra, tables.classes))
+        axis = self._reindexing.axis
+        tables = SplatTables.build(ctx, axis, spectra, self.reflectances, shown, channels, width, before)
+        reindex = None if into is None else into.reindex
+        return ShownTables(tables, ReindexBuffer(ctx, self._reindexing, spans, shown, spectra, tables.classes, reindex))
 
     def _unchanged(self) -> Reindexing | None:
         (traced, *_) = self._buffers.axis.glasses
@@ -135,6 +149,7 @@ def traced_tables(
     spans: Sequence[Sequence[tuple[float, float]]],
     channels: MapChannels,
     width: int | None = None,
+    into: SplatTables | None = None,
 ) -> SplatTables:
     """`SplatTables.build` for the lights' spectra: behind every level of a tint, one after the other, where photons
     tell them."""
@@ -143,7 +158,7 @@ def traced_tables(
         width = width or (None if any(light.lines for light in spectra) else LEVELS_WIDTH)
         spectra = [behind for light in spectra for behind in levels.all_behind(light)]
         spans = [bands for bands in spans for _ in range(LEVELS)]
-    return SplatTables.build(ctx, buffers.axis, spectra, reflectances, spans, channels, width)
+    return SplatTables.build(ctx, buffers.axis, spectra, reflectances, spans, channels, width, into)
 
 
 class PassTables:
@@ -155,26 +170,33 @@ class PassTables:
         self.spans = spans
         self._full: ShownTables | None = None
         self._preview: ShownTables | None = None
+        self._is_full = self._is_preview = False
+        """They are of what is shown."""
 
     @property
     def full(self) -> ShownTables:
         """For the light pass's own maps."""
-        if self._full is None:
-            self._full = self._shown.tables(self.spans)
+        if self._full is None or not self._is_full:
+            self._full, self._is_full = self._shown.tables(self.spans, into=self._full), True
         return self._full
 
     @property
     def preview(self) -> ShownTables:
         """For maps in colour only."""
         channels = self._shown.channels
-        if self._full is not None and not channels.tents_nm:
+        if self._full is not None and self._is_full and not channels.tents_nm:
             return self._full
-        if self._preview is None:
-            self._preview = self._shown.tables(self.spans, MapChannels(channels.edges_nm), PREVIEW_WIDTH)
+        if self._preview is None or not self._is_preview:
+            coarse = MapChannels(channels.edges_nm), PREVIEW_WIDTH, self._preview
+            self._preview, self._is_preview = self._shown.tables(self.spans, *coarse), True
         return self._preview
 
-    def forget(self) -> None:
+    def outdate(self) -> None:
         """They show another glass or light than what is wanted now."""
+        self._is_full = self._is_preview = False
+
+    def forget(self) -> None:
+        """Free them."""
         shader.release(self._full, self._preview)
         self._full = self._preview = None
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...base.generators import mapped
 from ...features.features import Features
 from ...gpu import shader
 from ...passes.bounce_light import BounceLightPass
@@ -18,8 +19,10 @@ from ...passes.map_layout import LIVE
 from ..device_scene import scene_buffers
 from ..light_maps import LightMaps
 from ..light_pass import LightPass
+from ..light_plan import spans_of
 from ..map_fit import PREVIEW_FINENESS, MapFit
 from ..sampling import MovingBeams
+from ..shown_spectra import PassTables
 from ..solo import solo, solo_scene
 from ..splatting import Pace
 from .invalidation import shown_glasses
@@ -59,6 +62,8 @@ class LiveLight:
         self.buffers = scene_buffers(context, scene, settings)
         self.stored = StoredPasses(context.ctx, capacity_bytes)
         self._samples = PhotonStore(context.ctx, capacity_bytes)
+        self._sample_pass: StoredPass | None = None
+        """The same, once they are whole."""
         self._kept = KeptLight()
         self._shown: LiveInputs | None = None
         self._sampled = 0
@@ -150,6 +155,8 @@ class LiveLight:
         forgets = shown.show_glass({a: b for a, b in glasses.items() if a != b})
         if forgets or stale:
             self.stored.forget_tables()
+            if self._sample_pass is not None:
+                self._sample_pass.tables.outdate()
         beams = self.light_pass.beams
         if beams is not None and (stale or shown.changed != before):
             beams.show(solo_scene(inputs.scene, inputs.solo_nm))
@@ -271,11 +278,14 @@ class LiveLight:
         """About so many stored photons (`preview_photons`) as they are shown now, in small maps of their own
         (`MapFit.preview` with `side`), and the strongest beams; None where there is nothing.
 
-        For while something is dragged: the maps that accumulate are left alone.
+        For while something is dragged: the maps that accumulate are left alone. On devices that splat fast, photons
+        that answer questions stand for beams too.
         """
-        kept, light_pass = self.stored.fullest, self.light_pass
+        kept, light_pass, beams = self.stored.fullest, self.light_pass, self.light_pass.beams
+        if self._sample_pass is not None and self._context.traits.moves_by_photons:
+            kept, beams = self._sample_pass, None
         has_photons = kept is not None and bool(kept.store.rounds)
-        if not has_photons and not self.only_beams:
+        if not has_photons and (beams is None or not self.only_beams):
             return None
         if self._preview is None or side != self._preview_side:
             shader.release(self._preview)
@@ -286,9 +296,9 @@ class LiveLight:
         if kept is not None and has_photons:
             self._splat_some(kept, photons, self._preview)
         started = time.perf_counter()
-        if light_pass.beams is not None:
+        if beams is not None:
             weight = self._preview.photon_weight
-            light_pass.beams.draw_moving(self._preview, weight, self.moving, BEAM_SECONDS, alone=not has_photons)
+            beams.draw_moving(self._preview, weight, self.moving, BEAM_SECONDS, alone=not has_photons)
         self.beam_seconds = time.perf_counter() - started
         return self._preview
 
@@ -394,8 +404,9 @@ class LiveLight:
         some."""
         if self.light_pass.has_beams and not self._samples.photons:
             self._sampled = photons
-            for _ in self.light_pass.sample_steps(photons, self._samples.keep):
-                yield
+            plans = yield from mapped(self.light_pass.sample_steps(photons, self._samples.keep), lambda step: None)
+            tables = PassTables(self.light_pass.shown, spans_of(plans, len(self.light_pass.scene.lights)))
+            self._sample_pass = StoredPass(self._samples, tables, photons)
 
     @property
     def has_records(self) -> bool:
@@ -432,6 +443,8 @@ class LiveLight:
     def release(self) -> None:
         """Free everything, the stored photons and the scene's buffers too."""
         self._samples.clear()
+        if self._sample_pass is not None:
+            self._sample_pass.release()
         self.drop_outdated()
         owners = (
             self._kept,

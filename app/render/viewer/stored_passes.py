@@ -81,7 +81,7 @@ class StoredPasses:
     def forget_tables(self) -> None:
         """Another glass or light is shown from now on."""
         for kept in self._passes:
-            kept.tables.forget()
+            kept.tables.outdate()
 
     @property
     def bytes(self) -> int:
