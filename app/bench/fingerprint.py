@@ -198,6 +198,8 @@ def _hash(parts: Iterable[bytes]) -> str:
 class _HashedRecords:
     """`PhotonRecords` that hashes each batch on its way to `records`."""
 
+    keeps = True
+
     def __init__(self, records: PhotonRecords, hashes: list[str]) -> None:
         self._records, self._hashes = records, hashes
 

@@ -56,9 +56,11 @@ class RayPool:
         per_point = max(RAY_ROOM * ray, PHOTON_ROOM * photon)
         return int(min(block_bytes // per_point, 65535 * _GROUP // RAY_ROOM))
 
-    def begin(self, count: int) -> None:
-        """Before `count` lattice points are emitted."""
-        self.state.write(self._state_zero.tobytes())
+    def begin(self, count: int, most_photons: int = 1 << 31) -> None:
+        """Before `count` lattice points are emitted, which leave `most_photons` or are traced again."""
+        state = self._state_zero.copy()
+        state["photon_capacity"] = min(most_photons, state["photon_capacity"][0])
+        self.state.write(state.tobytes())
         self._bind()
 
     def emitted(self, count: int) -> None:
@@ -73,26 +75,34 @@ class RayPool:
         self.state.write(state.tobytes())
         self.rays.write(np.ascontiguousarray(rays))
 
+    def send(self, trace: moderngl.ComputeShader, bind: Callable[[], None]) -> None:
+        """Follow the rays; the last dispatch follows all that is left. Nothing is waited for."""
+        bind()
+        self._bind()
+        for step, count in enumerate(self._events, 1):
+            trace["events"].value, trace["holds"].value = count, step == len(self._events)
+            trace.run_indirect(self.state, records.POOL_STATE.offset("trace_groups"))
+            self._context.ctx.memory_barrier()
+        self._sum.run(1)
+        self._context.ctx.memory_barrier()
+
     def follow(
         self, trace: moderngl.ComputeShader, bind: Callable[[], None], limit: int, end_all: Callable[[], None]
     ) -> Generator[None, None, Followed]:
-        """`OrderedQueue.follow`, without a pause before the end; the last dispatch follows all that is left."""
-        ctx, events = self._context.ctx, self._events
-        bind()
-        self._bind()
-        for step, count in enumerate(events, 1):
-            trace["events"].value, trace["holds"].value = count, step == len(events)
-            trace.run_indirect(self.state, records.POOL_STATE.offset("trace_groups"))
-            ctx.memory_barrier()
-        self._sum.run(1)
-        ctx.memory_barrier()
+        """`OrderedQueue.follow`, with a single pause."""
+        self.send(trace, bind)
         yield
-        state = np.frombuffer(self.state.read(), records.POOL_STATE.dtype)[0]
+        return self.counted(self.state)
+
+    @staticmethod
+    def counted(report: moderngl.Buffer) -> Followed:
+        """What became of the rays, from `state` or a copy of it; waits for the device."""
+        state = np.frombuffer(report.read(), records.POOL_STATE.dtype)[0]
         watts = state["watts"].astype(float).tolist()
         ended = len(records.CATEGORIES)
         absorbed_w, roulette_w, emitted_w = watts[ended:]
         overflow = int(state["overflow"])
-        photons = int(min(state["photons"], state["photon_capacity"]))
+        photons = int(state["photons"])
         emitted, steps, flights = (int(state[name]) for name in ("emitted", "dispatches", "flights"))
         fallbacks = state["fallbacks"].tolist()
         return Followed(

@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, field, replace
 
 import moderngl
@@ -25,12 +25,14 @@ from .lattice_order import morton_order
 from .light_programs import light_defines
 from .ray_pool import STRUCTS as POOL_STRUCTS
 from .ray_pool import RayPool
-from .ray_queue import FLIGHT_ROOM, PHOTON_ROOM, OrderedQueue, QueueParts
+from .ray_queue import FLIGHT_ROOM, PHOTON_ROOM, Followed, OrderedQueue, QueueParts
 from .ray_queue import STRUCTS as QUEUE_STRUCTS
 
 SPLIT_THRESHOLD = 0.3
 """Share of a photon's power below which roulette decides whether a part of it is followed."""
 _GROUP = 64
+MORE_PHOTONS = 1.25
+"""Photons that there is room for, over those that the last batch of the same light left for as many points."""
 _MAX_ORDERS = 8
 """Emission orders kept: a pass has one for its batches and one for its last, shorter one."""
 
@@ -156,6 +158,19 @@ class LatticeSlice:
         return replace(self, stride=2 * self.stride, points=(self.points + 1) // 2), later
 
 
+@dataclass(frozen=True)
+class Sent:
+    """A batch that is traced without being waited for. Its photons are drawn by a number that the device knows: none of
+    those of a batch that has to be traced again."""
+
+    most: int
+    """Photons that it leaves at most."""
+    held: tuple[moderngl.Buffer, int]
+    """Buffer, and offset in bytes, where a uint says how many are to be drawn."""
+    batch: Callable[[], Batch]
+    """What became of it; waits for the device. To be called once."""
+
+
 WIDEST_TURN = 1.4
 """Radians times the sixth root of the photons, the bandwidth of a density in the plane [Silverman 1986]: how far the
 directions of a footprint may differ behind a surface."""
@@ -202,8 +217,11 @@ class TracePass:
         self._features = features
         self._defines = defines
         self._structs = structs
-        self._emit: dict[tuple[str, bool], moderngl.ComputeShader] = {}
+        self._emission: dict[tuple[str, bool], moderngl.ComputeShader] = {}
         self._orders: dict[tuple[int, int, int], moderngl.Buffer] = {}
+        self._reports: list[moderngl.Buffer] = []
+        self._photons_a_point: dict[int, float] = {}
+        """Room that batches of a light are given, as earlier ones needed it."""
         self._trace = shader.compute(ctx, "light/trace.comp", defines, (*structs, records.TRACE_PARAMETERS))
         self._queue = queue_class(context.traits)(QueueParts(context, features, defines, structs, batch))
         self.photons, self.emitted_rays = self._queue.photons, self._queue.rays
@@ -223,8 +241,9 @@ class TracePass:
             self._emit_parameters,
             self._trace_parameters,
             self._trace,
-            *self._emit.values(),
+            *self._emission.values(),
             *self._orders.values(),
+            *self._reports,
             *([] if self.flights is None else [self.flights]),
         )
 
@@ -250,18 +269,41 @@ class TracePass:
         bind what it likes.
         `split_threshold`: by default the pass's own."""
         max_depth = self.max_depth if max_depth is None else min(max_depth, self.max_depth)
+        self._queue.begin(piece.count)
+        self._emit(piece, domain, max_depth, split_threshold or self.split_threshold)
+        return (yield from self._follow(max_depth))
+
+    def send(self, piece: LatticeSlice, domain: EmissionDomain) -> Sent | None:
+        """`run` without waiting; None where rays are counted after every event."""
+        queue = self._queue
+        if not isinstance(queue, RayPool):
+            return None
+        most = int(min(PHOTON_ROOM, self._photons_a_point.get(piece.light, PHOTON_ROOM)) * piece.count) + _GROUP
+        queue.begin(piece.count, most)
+        self._emit(piece, domain, self.max_depth, self.split_threshold)
+        queue.send(self._trace, self._bind)
+        report = self._reports.pop() if self._reports else self.context.ctx.buffer(reserve=queue.state.size)
+        self.context.ctx.copy_buffer(report, queue.state)
+
+        def batch() -> Batch:
+            self._reports.append(report)
+            counted = self._batch_of(queue.counted(report))
+            self._photons_a_point[piece.light] = MORE_PHOTONS * counted.photons / piece.count
+            return counted
+
+        return Sent(most, (queue.state, records.POOL_STATE.offset("drawn")), batch)
+
+    def _emit(self, piece: LatticeSlice, domain: EmissionDomain, max_depth: int, split_threshold: float) -> None:
         if piece.count > self.batch:
             raise ValueError(f"{piece.count} lattice points in a batch of {self.batch}")
         if piece.beam_objects and not self._features.beams:
             raise ValueError("objects are left to beams, and the programs were made without them")
-        self._start(piece, domain, max_depth, split_threshold or self.split_threshold)
+        self._start(piece, domain, max_depth, split_threshold)
         self.scene.bind()
-        self._queue.begin(piece.count)
         self._emit_parameters.bind_to_storage_buffer(bindings.PARAMETERS)
         self.order(piece).bind_to_storage_buffer(bindings.INDICES)
         self._emit_program(domain).run(-(-piece.count // _GROUP))
         self._queue.emitted(piece.count)
-        return (yield from self._follow(max_depth))
 
     def carry_on(self, rays: np.ndarray, light: int, max_depth: int | None = None) -> Generator[None, None, Batch]:
         """`steps` for `rays` of one light that are on their way already: records (n,) of `ray` with n ≤ `batch`. Their
@@ -281,7 +323,9 @@ class TracePass:
         # Walking through covered surfaces, cutting bands and all but one of a grating's orders take steps without
         # being events.
         limit = (2 + self.scene.most_orders) * max_depth + 32
-        found = yield from self._queue.follow(self._trace, self._bind, limit, self._end_all)
+        return self._batch_of((yield from self._queue.follow(self._trace, self._bind, limit, self._end_all)))
+
+    def _batch_of(self, found: Followed) -> Batch:
         self.context.check("tracing photons")
         self.rays_traced += found.emitted
         tally = FluxTally(found.emitted_w, roulette=found.roulette_w)
@@ -381,10 +425,10 @@ class TracePass:
 
     def _emit_program(self, domain: EmissionDomain) -> moderngl.ComputeShader:
         variant = domain.kind, domain.thinned is not None
-        if variant not in self._emit:
+        if variant not in self._emission:
             kind, is_thinned = variant
             own = switched(**{f"LIGHT_{kind.upper()}": True}, THINNED_CELLS=is_thinned)
-            self._emit[variant] = shader.compute(
+            self._emission[variant] = shader.compute(
                 self.context.ctx, "light/emit.comp", self._defines | own, (*self._structs, records.EMIT_PARAMETERS)
             )
-        return self._emit[variant]
+        return self._emission[variant]

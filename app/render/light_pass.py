@@ -201,6 +201,7 @@ class LightPass:
 
     def caustic_maps(self, textures: Sequence[moderngl.Texture] | None = None) -> CausticMaps:
         """The summed maps as the camera reads them; `textures` where they are not `resolved_textures`."""
+        self.batches.settled()
         return self.maps.caustic_maps(textures)
 
     def resolved_textures(self) -> list[moderngl.Texture]:
@@ -385,6 +386,7 @@ class LightPass:
 
     def finish(self) -> None:
         """Sum what is pending and fetch the counters."""
+        self.batches.settled()
         self.atlas.flush()
         self.stats.buffers = {
             "scene": self.buffers.bytes,

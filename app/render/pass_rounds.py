@@ -81,6 +81,8 @@ class PassRounds:
                 end = min((j // together + 1) * together, rounds)
                 yield from self._beams(RoundOf(self.number, j, rounds, False), j / rounds, end - j)
             yield from self._photons(j, rounds)
+            for _ in self.batches.settle() if j + 1 == rounds else ():
+                yield PassStep(j / rounds, False)
             self.into.maps.photon_weight += self.weight / rounds
             yield PassStep((j + 1) / rounds, (j + 1) % together == 0 or j + 1 == rounds)
 

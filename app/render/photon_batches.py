@@ -11,7 +11,7 @@ import numpy as np
 
 from ..base.memory import available_bytes
 from ..gpu.dispatch_budget import DISPATCH_S, DispatchBudget
-from ..passes.trace import Batch, LatticeSlice, TracePass, queue_class
+from ..passes.trace import Batch, LatticeSlice, Sent, TracePass, queue_class
 from .light_plan import SMALLEST_BATCH, LightPlan
 from .photon_records import PhotonRecords, RoundOf
 from .splatting import Pace, Splatting
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 MIN_RAYS = 1 << 10
 """Rays of a batch that are not divided further, however slow the device is."""
+LONGEST_SHARE = 0.5
+"""What the longest dispatch takes of a batch's time, where rays are followed for several events in one."""
 Keep = Callable[["moderngl.Buffer", int, int, RoundOf], None]
 """Takes records: (their buffer, how many, bytes of one, where they belong)."""
 
@@ -63,6 +65,10 @@ class PhotonBatches:
         self._pace = pace
         self._traced_once = False
         """The first event of all includes compiling."""
+        self._is_timed = False
+        """A batch has been waited for, and held by the queue."""
+        self._sent: list[tuple[Sent, LatticeSlice, EmissionDomain, RoundOf, Deposit]] = []
+        """Batches whose photons are drawn and not counted yet."""
         self._held: dict[int, int] = {}
         """Rays of a batch, by light, whose paths branch so often that the queues hold no more."""
 
@@ -74,6 +80,7 @@ class PhotonBatches:
     def begin(self) -> None:
         """Forget what another rendering's photons needed: the same passes are divided in the same way again."""
         self._held.clear()
+        self._sent.clear()
 
     def lattice(self, part: LatticeSlice, domain: EmissionDomain, of: RoundOf, into: Deposit) -> Iterator[None]:
         """Trace `part`, keep, splat and count what landed, in slices that the device has shown to manage in time and
@@ -84,12 +91,45 @@ class PhotonBatches:
             points = min(left, max(most // lattices, 1))
             piece = replace(part, first=first, points=points)
             self.trace.order(piece)  # the processor's work, which would pass for the device's below
-            batch = yield from self._traced(self.trace.steps(piece, domain), into.stats, piece.count)
-            if batch.overflow and points > 1:
-                self._held[part.light] = piece.count // 2
-                continue
+            its = replace(of, is_last_light=of.is_last_light and left == points)
+            sent = self.trace.send(piece, domain) if self._counts_late else None
+            if sent is not None:
+                yield
+                yield from self.splat(self.trace.photons, sent.most, into, held=sent.held)
+                self._sent.append((sent, piece, domain, its, into))
+                yield from self.settle(1)
+            else:
+                batch = yield from self._traced(self.trace.steps(piece, domain), into.stats, piece.count)
+                if batch.overflow and points > 1:
+                    self._held[part.light] = piece.count // 2
+                    continue
+                self._is_timed = True
+                yield from self._landed(batch, its, into)
             first, left = first + points * part.stride, left - points
-            yield from self._landed(batch, replace(of, is_last_light=of.is_last_light and not left), into)
+
+    @property
+    def _counts_late(self) -> bool:
+        """Nobody wants a batch's numbers while it is traced, and how long one takes is known."""
+        return self._is_timed and not self.records.keeps
+
+    def settle(self, left: int = 0) -> Iterator[None]:
+        """Count what was sent, but for the last `left` batches. Those that found no room, of which nothing was drawn,
+        are traced again in parts."""
+        while len(self._sent) > left:
+            sent, piece, domain, of, into = self._sent.pop(0)
+            started = time.perf_counter()
+            batch = sent.batch()
+            into.stats.trace_seconds += time.perf_counter() - started
+            if batch.overflow:
+                self._is_timed = False
+                yield from self.lattice(piece, domain, of, into)
+            else:
+                self._count(batch, into)
+
+    def settled(self) -> None:
+        """`settle` without pauses."""
+        for _ in self.settle():
+            pass
 
     def carry_on(
         self, rays: np.ndarray, light: int, of: RoundOf, into: Deposit, *, of_tails: bool = False
@@ -110,6 +150,10 @@ class PhotonBatches:
             self.records.keep(self.trace.photons, batch, self.trace.photon.stride, of)
         yield
         yield from self.splat(self.trace.photons, batch.photons, into)
+        self._count(batch, into, of_tails)
+
+    @staticmethod
+    def _count(batch: Batch, into: Deposit, of_tails: bool = False) -> None:
         into.stats.photons += 0 if of_tails else batch.emitted_photons
         into.stats.splats += batch.photons
         into.stats.tally.merge(batch.tally.without_beams)
@@ -134,7 +178,8 @@ class PhotonBatches:
             took, is_compiled = time.perf_counter() - started, self._traced_once
             stats.trace_seconds += took
             if queued and is_first and rays and is_compiled:
-                self.budget.learn(rays, took, self.dispatch_seconds)
+                longest = LONGEST_SHARE if self._context.traits.ray_events else 1.0
+                self.budget.learn(rays, longest * took, self.dispatch_seconds)
             is_first, self._traced_once = False, True
             yield
             started = time.perf_counter()

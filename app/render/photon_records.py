@@ -27,6 +27,8 @@ class RoundOf:
 class PhotonRecords(Protocol):
     """Where traced photons go besides the maps, with the spectral tables that belong to them."""
 
+    keeps: bool
+    """Every batch has to be counted before it is drawn."""
     takes_tails: bool
     """Photons that carry on weak beams are kept too. Whoever shows photons again has such beams play roulette."""
 
@@ -47,7 +49,7 @@ class PhotonRecords(Protocol):
 class NoRecords:
     """`PhotonRecords` for photons that are splatted and forgotten."""
 
-    takes_tails = False
+    keeps = takes_tails = False
 
     def __init__(self) -> None:
         self._tables: PassTables | None = None

@@ -61,7 +61,7 @@ def stone(folder: Path, light: str = BEAM, spectrum: str = '"D65"', more: str = 
 class _Counted(NoRecords):
     """Counts what it is asked to keep."""
 
-    kept = 0
+    keeps, kept = True, 0
 
     def keep(self, photons: moderngl.Buffer, batch: Batch, stride: int, of: RoundOf) -> None:
         self.kept += batch.photons

@@ -16,11 +16,13 @@ from spectrasplat.gpu.device_traits import DeviceTraits
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes import ray_pool
+from spectrasplat.passes import trace as trace_pass
 from spectrasplat.passes.emission_domain import emission_domain
 from spectrasplat.passes.trace import Band, Batch, LatticeSlice, TracePass
 from spectrasplat.render.device_scene import scene_buffers
+from spectrasplat.render.light_pass import LightPass
 
-POINTS = 2_000
+POINTS, PHOTONS = 2_000, 12_000
 THRESHOLD = 0.003
 """Few rays play roulette: paths branch often."""
 SCHEDULES: tuple[tuple[int, ...], ...] = ((), (1,) * 12 + (4096,), (4,) * 6 + (4096,), (8, 8, 8, 4096), (1, 4096))
@@ -104,3 +106,34 @@ def test_a_batch_asks_for_few_dispatches_and_waits_for_nothing() -> None:
         with counted() as counts:
             batches = len(list(traced(context, "prism", POINTS)))
     assert counts.dispatches <= 12 * batches and counts.finishes == 0 and counts.reads <= batches
+
+
+@pytest.mark.parametrize("too_few", [False, True])
+def test_what_is_counted_late_is_the_same_light(too_few: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Batches are drawn before anybody knows how many photons they left. One that found no room is traced again."""
+    scene, settings = (
+        load_scene(shipped_scenes()["prism"]),
+        RenderSettings(width=64, height=36, photons=PHOTONS, method="srd-photons", batch=2_048),
+    )
+    found = []
+    with device(DeviceTraits().ray_events) as context:
+        buffers = scene_buffers(context, scene, settings)
+        for keeps in (True, False):
+            light = LightPass(context, scene, settings, buffers.features, buffers)
+            light.batches.records.keeps = keeps
+            light.prepare()
+            light.begin(PHOTONS, 1)
+            if too_few:
+                monkeypatch.setattr(trace_pass, "MORE_PHOTONS", 0.5)
+            for _ in light.pass_steps(0, PHOTONS):
+                pass
+            light.finish()
+            sums = np.frombuffer(light.atlas.total_textures[0].read(), np.float32).astype(float)
+            found.append((sums, light.stats, light.trace.rays_traced))
+            assert light.stats.tally.fallbacks["queue_overflow"] == 0 and light.stats.tally.imbalance < 1e-5
+            light.release()
+        buffers.release()
+    (maps, stats, rays), (others, late, again) = found
+    assert (again > rays) == too_few
+    assert stats.splats == late.splats and stats.photons == late.photons > 0.0
+    assert np.sqrt(((maps - others) ** 2).mean()) < 1e-5 * np.sqrt((maps**2).mean())

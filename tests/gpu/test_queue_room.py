@@ -10,7 +10,7 @@ from spectrasplat.base.paths import assets_dir
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.materials.grating import Grating
 from spectrasplat.model.scene import Scene
-from spectrasplat.passes import pilot
+from spectrasplat.passes import pilot, ray_pool
 from spectrasplat.passes.trace import Band, LatticeSlice
 from spectrasplat.stress.rigs.probe import SMALL, light_pass, probe
 
@@ -56,6 +56,8 @@ def test_a_slice_that_overflows_is_traced_again_in_parts(gl, crowded: Scene, mon
     # Pilots of so many orders would take most of the time.
     monkeypatch.setattr(pilot, "MAX_DEPTH", FEW)
     monkeypatch.setattr(pilot, "PHOTONS", 512)
+    # With more a pool has what waits for its turn.
+    monkeypatch.setattr(ray_pool, "RAY_ROOM", 1.0)
     with light_pass(gl, crowded, replace(SMALL, photons=2_560, batch=2_048, max_depth=FEW)) as (light, _):
         light.begin(2_560, 1)
         plan = light.plans[0]

@@ -38,7 +38,7 @@ class StoredPasses:
 
     A pass that has only begun holds fewer photons than the one before it: until it has as many, the older ones stay."""
 
-    takes_tails = False
+    keeps, takes_tails = True, False
 
     def __init__(self, ctx: moderngl.Context, capacity_bytes: int) -> None:
         self._ctx = ctx

@@ -55,7 +55,7 @@ half a texel of blur changes a quarter of the contrast, and some 4 % of the pixe
 class WatchedRecords:
     """`PhotonRecords` that checks every batch of photons for non-finite values and counts dropped footprints."""
 
-    takes_tails = True
+    keeps = takes_tails = True
 
     def __init__(self, groups: int) -> None:
         self._dtype = records.photon_record(groups).dtype
