@@ -15,8 +15,9 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-BUSY_FRAME_S = 0.08
-"""How long each frame waits for a step that has overrun: the processor is that step's for most of the time."""
+BUSY_FRAME_S, BUSY_GPU_FRAME_S = 0.08, 0.005
+"""How long each frame waits for a step that has overrun: where the processor draws, it is that step's for most of the
+time."""
 
 
 def no_thread(*_name: str) -> None:
@@ -55,6 +56,8 @@ class SteppedWork(Generic[T]):
 
     def __init__(self, thread: ContextThread | None) -> None:
         self._thread = thread
+        is_gpu = thread is not None and not thread.context.is_software
+        self._busy_frame_s = BUSY_GPU_FRAME_S if is_gpu else BUSY_FRAME_S
         self._under_way: Future[T] | None = None
 
     @property
@@ -70,7 +73,7 @@ class SteppedWork(Generic[T]):
         if self._under_way is None:
             self._under_way = self._thread.submit(work)
         else:
-            patience_s = BUSY_FRAME_S
+            patience_s = self._busy_frame_s
         wait((self._under_way,), patience_s)
         return self._taken() if self._under_way.done() else None
 

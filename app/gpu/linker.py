@@ -8,6 +8,7 @@ program before its first use. Binaries are kept on the disk (`program_store`), s
 from __future__ import annotations
 
 import ctypes
+import time
 import weakref
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
@@ -28,6 +29,7 @@ _KINDS = {1: {"compute": _COMPUTE_SHADER}, 2: {"vertex": _VERTEX_SHADER, "fragme
 _STUB = "#version 430 core\nvoid main() {}\n"
 _COMPUTE_STUB = f"{_STUB}layout(local_size_x = 1) in;\n"
 """What moderngl compiles in place of a program that it adopts."""
+_LOOK_S = 0.002
 _UINT, _INT, _POINTER = ctypes.c_uint, ctypes.c_int, ctypes.c_void_p
 _FUNCTYPE = getattr(ctypes, "WINFUNCTYPE", ctypes.CFUNCTYPE)
 
@@ -118,10 +120,13 @@ class Linker:
         if self._integer(self._get_integer, _BINARY_FORMATS):
             self._device = tuple(str(info[name]) for name in ("GL_VENDOR", "GL_RENDERER", "GL_VERSION"))
 
-    @property
-    def is_compiling(self) -> bool:
-        """To use one of its programs would be to wait for the driver."""
-        return not all(map(self._is_done, self._pending))
+    def compiled_by(self, deadline: float) -> bool:
+        """Whether using its programs waits for nothing, now or soon before `deadline` (`time.perf_counter`)."""
+        while not all(map(self._is_done, self._pending)):
+            if time.perf_counter() >= deadline:
+                return False
+            time.sleep(_LOOK_S)
+        return True
 
     def _is_done(self, made: Pending) -> bool:
         return bool(self._integer(self._of_program, made.program, _COMPLETION_STATUS))

@@ -285,6 +285,12 @@ def _built(ctx: moderngl.Context, stages: tuple[Source, ...]) -> AnyProgram:
     return program
 
 
+def compiled_by(ctx: moderngl.Context, deadline: float) -> bool:
+    """Whether all programs of `ctx` can be used without waiting for the driver, now or soon before `deadline`
+    (`time.perf_counter`)."""
+    return linker_of(ctx).compiled_by(deadline)
+
+
 def compute(
     ctx: moderngl.Context,
     name: str,

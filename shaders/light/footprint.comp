@@ -158,15 +158,19 @@ bool in_front(Placement place, PhotonRecord photon, vec3 sweep_middle, vec3 swee
 
 // A splat broad in every direction is as well drawn in texels twice as wide, for a quarter of the
 // fragments; the maps are put together again when they are read (levels_fold.comp, bilinearly).
-void choose_level(inout Placement place, inout Footprint f, PhotonRecord photon, vec3 middle, vec3 sweep) {
+// Returns the index of the placement with these texels.
+uint choose_level(uint at, inout Footprint f, PhotonRecord photon, vec3 middle, vec3 sweep) {
     for (int step = 0; step < WIDER_LEVELS; ++step) {
-        if (place.blurred != NONE && thin_variance(f) > BROAD_VARIANCE) {
+        uint wider = placements[at].blurred;
+        if (wider != NONE && thin_variance(f) > BROAD_VARIANCE) {
             float taken = 0.25 * f.taken + LEVEL_BLUR;
-            place = placements[place.blurred];
+            at = wider;
+            Placement place = placements[at];
             f = footprint_in(place, photon, middle, sweep);
             f.taken = taken;
         }
     }
+    return at;
 }
 
 SplatRecord splat_of(PhotonRecord photon, float power_w, float mean, Footprint f, uint table, vec4 band) {
@@ -235,13 +239,13 @@ float share_within(PhotonRecord photon, uint within) {
     return power.y > 0.0 ? power.x / power.y : float(bitCount(within)) / float(2u * POWER_STEPS);
 }
 
-// Whether a splat lies so deep inside a fine window that nobody reads it in the coarse one `outer`: that is read up to
-// the fine one's border, plus what a bilinear lookup there reaches.
-bool is_only_fine(SplatRecord splat, Placement place, Placement outer, vec3 position) {
+// Whether a splat of this half extent, drawn by the placement `at`, lies so deep inside a fine window that nobody reads
+// it in the coarse one `outer`: that is read up to the fine one's border, plus what a bilinear lookup there reaches.
+bool is_only_fine(vec2 centre, vec2 extent, uint at, Placement outer, vec3 position) {
+    Placement place = placements[at];
     vec3 in_outer = homogeneous_texel(outer, position), in_fine = homogeneous_texel(place, position);
-    vec2 extent = half_extent(splat) + 3.0 * texels_per_length(place, in_fine) / texels_per_length(outer, in_outer);
-    return all(greaterThan(splat.centre - extent, place.rect.xy))
-        && all(lessThan(splat.centre + extent, place.rect.zw));
+    extent += 3.0 * texels_per_length(place, in_fine) / texels_per_length(outer, in_outer);
+    return all(greaterThan(centre - extent, place.rect.xy)) && all(lessThan(centre + extent, place.rect.zw));
 }
 
 #include "light/splat_sides.glsl"
@@ -375,35 +379,39 @@ void make_splats(uint i) {
     }
 
     uint within = shown ? steps_within(place.rect, f, photon) : 0u;
-    Placement drawn_in = place;
     float kept = 1.0, lost = 0.0, thin = thin_variance(f);
     uint side = 0u;
     if (CONTACT_LINES) {
         if (shown) side = side_of_contact(place, f, photon.photon_id, kept, lost);
         sums[own].x += lost * power_w;
     }
-    if (side == 0u) choose_level(drawn_in, f, photon, middle, sweep);
+    uint drawn_in = at;
+    if (side == 0u) drawn_in = choose_level(at, f, photon, middle, sweep);
+    // Written at once, and held no longer: a GPU has room for few words an invocation.
     SplatRecord fine = splat_of(photon, power_w, mean, f, table, table_band);
-    fine.rect = drawn_in.rect;
-    bool drawn = shown && touches(drawn_in.rect, fine.centre, half_extent(fine));
+    fine.rect = placements[drawn_in].rect;
+    vec2 fine_centre = fine.centre, fine_extent = half_extent(fine);
+    bool drawn = shown && touches(fine.rect, fine_centre, fine_extent);
     if (REINDEXED) drawn = drawn && carries;
     if (!drawn) {
         fine.kind = 0u;
     }
     keep_within_lines(fine, side, kept);
     uint slot = i * uint(SLOTS + IMAGE_SLOTS);
+    put(slot, fine);
     if (BORDER_IMAGES) {
         // Behind the photon's own splats, so many of them.
         Depicted depicted = Depicted(photon, middle, sweep, power_w, mean, table, table_band, side, thin);
-        fine.images = put_images(depicted, place, slot + uint(SLOTS));
-        if (REINDEXED && !carries) fine.images = 0u;
+        uint images = put_images(depicted, at, slot + uint(SLOTS));
+        if (REINDEXED && !carries) images = 0u;
+        splats[slot].images = images;
     }
-    put(slot, fine);
 
     if (SLOTS == 2) {
         SplatRecord coarse = empty_splat();
-        if (place.next != NONE) {
-            Placement outer = placements[place.next];
+        uint next = placements[at].next;
+        if (next != NONE) {
+            Placement outer = placements[next];
             // Far from the camera, texels of its pixels are the larger ones.
             Footprint g = footprint_in(outer, photon, middle, sweep);
             float held_there = held_size(outer, photon, g);
@@ -412,11 +420,12 @@ void make_splats(uint i) {
                 g = footprint_in(outer, photon, middle, sweep);
             }
             within |= steps_within(outer.rect, g, photon);
-            choose_level(outer, g, photon, middle, sweep);
-            if (!shown || !is_only_fine(fine, drawn_in, outer, photon.position)) {
+            next = choose_level(next, g, photon, middle, sweep);
+            outer = placements[next];
+            if (!shown || !is_only_fine(fine_centre, fine_extent, drawn_in, outer, photon.position)) {
                 coarse = splat_of(photon, power_w, mean, g, table, table_band);
-                coarse.rect = outer.rect;
-                if (!touches(outer.rect, coarse.centre, half_extent(coarse))) {
+                coarse.rect = placements[next].rect;
+                if (!touches(coarse.rect, coarse.centre, half_extent(coarse))) {
                     coarse.kind = 0u;
                 }
                 if (REINDEXED && !carries) {

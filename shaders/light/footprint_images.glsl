@@ -112,8 +112,8 @@ Depicted image_of(Depicted of, Beside first, Beside second, uint bit) {
 // Write all images of a photon from `slot` on, in all windows of its receiver; returns how many splats those are. Their
 // number is found first, so that a software renderer, which runs the body of an `if` for all, goes through the loop
 // only with photons that have any; what makes a splat stands there once.
-uint put_images(Depicted of, Placement place, uint slot) {
-    Placement read_in = place;
+uint put_images(Depicted of, uint at, uint slot) {
+    Placement place = placements[at], read_in = place;
     if (SLOTS == 2) {
         vec3 at = homogeneous_texel(place, of.photon.position + of.middle);
         if (place.next != NONE && (at.z <= 0.0 || !contains(place.rect, at.xy / at.z, 0.0)))
@@ -142,22 +142,23 @@ uint put_images(Depicted of, Placement place, uint slot) {
     for (uint left = uint(MOST_IMAGES); left > 0u && images != 0u; --left) {
         Depicted image = image_of(of, first, second, uint(findLSB(images)));
         images &= images - 1u;
-        Placement window = place;
         bool keeps_side = of.side != 0u;
-        for (uint next = 0u; next != NONE;) {
-            Placement drawn_in = window;
+        for (uint window_at = at; window_at != NONE;) {
+            Placement window = placements[window_at];
+            uint drawn_in = window_at, next = window.next;
             Footprint f = footprint_in(window, image.photon, image.middle, image.sweep);
             bool shown =
                 in_front(window, image.photon, image.middle, image.sweep) && held_size(window, image.photon, f) >= 1.0;
-            if (!keeps_side) choose_level(drawn_in, f, image.photon, image.middle, image.sweep);
+            if (!keeps_side) drawn_in = choose_level(drawn_in, f, image.photon, image.middle, image.sweep);
             SplatRecord splat = splat_of(image.photon, image.power_w, image.mean, f, image.table, image.band);
-            splat.rect = drawn_in.rect;
-            shown = shown && touches(drawn_in.rect, splat.centre, half_extent(splat));
-            next = window.next;
+            splat.rect = placements[drawn_in].rect;
+            vec2 extent = half_extent(splat);
+            shown = shown && touches(splat.rect, splat.centre, extent);
             if (SLOTS == 2) {
                 if (next != NONE) {
-                    window = placements[next];
-                    next = shown && is_only_fine(splat, drawn_in, window, image.photon.position) ? NONE : next;
+                    Placement outer = placements[next];
+                    bool is_fine = is_only_fine(splat.centre, extent, drawn_in, outer, image.photon.position);
+                    next = shown && is_fine ? NONE : next;
                 }
             } else {
                 next = NONE;
@@ -166,6 +167,7 @@ uint put_images(Depicted of, Placement place, uint slot) {
             keeps_side = false;
             if (shown) put(slot + count, splat);
             count += shown ? 1u : 0u;
+            window_at = next;
         }
     }
     return count;

@@ -14,9 +14,10 @@ from spectrasplat.edit.live_inputs import LiveInputs
 from spectrasplat.edit.state import State
 from spectrasplat.gpu.context import Context
 from spectrasplat.gpu.context_thread import ContextThread
+from spectrasplat.render.viewer.building import COMPILING
 from spectrasplat.render.viewer.dirty_level import DirtyLevel
 from spectrasplat.render.viewer.stats import LiveStats
-from spectrasplat.render.viewer.threaded_engine import COMPILING, ThreadedEngine
+from spectrasplat.render.viewer.threaded_engine import ThreadedEngine
 from spectrasplat.ui.session import IDLE_S, LAYOUT_FRAMES, Session
 from spectrasplat.ui.viewer import Viewer, headless_viewer
 

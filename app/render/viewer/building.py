@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from itertools import chain
 from typing import TYPE_CHECKING
 
+from ...gpu.shader import compiled_by
 from ...model.settings import RenderSettings
 from ..map_fit import preview_size
 from ..sampling import MovingBeams
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 _ENVIRONMENT_S = 0.006
 """Seconds that one dispatch for the environment's light should take."""
+COMPILING = "compiling a program, once for scenes of its kind"
 PATIENCE_S = 1.0
 """Seconds of building after which every step is shown."""
 
@@ -68,6 +70,9 @@ class Building:
         """Go on until about `deadline` (`time.perf_counter`); what was built, once it is."""
         assert self._steps is not None
         while time.perf_counter() < deadline:
+            if not compiled_by(self._context.ctx, deadline):
+                self.at = COMPILING
+                break
             try:
                 at = next(self._steps)
             except StopIteration as end:

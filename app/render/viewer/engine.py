@@ -198,6 +198,8 @@ class LiveEngine(EngineAnswers):
         reserved = CAMERA_SHARE * budget_s
         if self.schedule.building:
             self._build(deadline - (reserved if sees and camera.owes_picture else 0.0))
+        elif not shader.compiled_by(self.context.ctx, deadline):
+            return  # what is shown stays until the next can be drawn
         elif (
             self.schedule.has_photon_work
             and not self.schedule.yields_to_camera(camera)

@@ -16,7 +16,7 @@ from ...base.not_yet import NOT_YET, NotYet
 from ...edit.stored_photons import StoredPhotons
 from ...gpu import shader
 from ...gpu.context_thread import ContextThread, SteppedWork
-from .building import PATIENCE_S
+from .building import COMPILING, PATIENCE_S
 from .dirty_level import DirtyLevel
 from .engine import LiveEngine
 from .photon_queries import QUERIED_PHOTONS
@@ -32,9 +32,9 @@ if TYPE_CHECKING:
 
     T = TypeVar("T")
 
-OVERRUN_S = 0.15
-"""What work may take beyond its budget before the window is drawn without it."""
-COMPILING = "compiling a program, once for scenes of its kind"
+OVERRUN_S, OVERRUN_GPU_S = 0.15, 0.02
+"""What work may take beyond its budget before the window is drawn without it, where the processor draws and where a
+GPU does."""
 
 
 class ThreadedEngine:
@@ -50,6 +50,7 @@ class ThreadedEngine:
         self.context, self._thread = context, thread
         self._engine = thread.run(lambda: make(thread.context))
         self._stepped: SteppedWork[None] = SteppedWork(thread)
+        self._overrun_s = OVERRUN_S if context.is_software else OVERRUN_GPU_S
         self._work_began = 0.0
         self._is_released = False
         self._stats, self._inputs = self._engine.stats, self._engine.inputs
@@ -69,7 +70,7 @@ class ThreadedEngine:
         """As of a `LiveEngine`; returns without news where the driver compiles."""
         if not self.is_busy:
             self._work_began = time.perf_counter()
-        self._stepped.step(lambda: self._advance(budget_s, interacting), budget_s + OVERRUN_S)
+        self._stepped.step(lambda: self._advance(budget_s, interacting), budget_s + self._overrun_s)
         if self.is_busy:
             return
         self._stats, self._inputs = self._engine.stats, self._engine.inputs
