@@ -11,18 +11,19 @@ import ctypes
 import time
 import weakref
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Protocol
+from types import SimpleNamespace
+from typing import Any
 
 import moderngl
 
 from . import program_store
 from .device_traits import DeviceTraits
 from .program_store import Binary
-from .unlocked import unlocked
 
 _COMPUTE_SHADER, _VERTEX_SHADER, _FRAGMENT_SHADER = 0x91B9, 0x8B31, 0x8B30
 _COMPILE_STATUS, _LINK_STATUS, _COMPLETION_STATUS, _LOG_LENGTH = 0x8B81, 0x8B82, 0x91B1, 0x8B84
 _BINARY_HINT, _BINARY_LENGTH, _BINARY_FORMATS = 0x8257, 0x8741, 0x87FE
+_DISPATCH_INDIRECT_BUFFER = 0x90EE
 _PARALLEL = "GL_KHR_parallel_shader_compile"
 _KINDS = {1: {"compute": _COMPUTE_SHADER}, 2: {"vertex": _VERTEX_SHADER, "fragment": _FRAGMENT_SHADER}}
 """By the number of stages."""
@@ -30,55 +31,45 @@ _STUB = "#version 430 core\nvoid main() {}\n"
 _COMPUTE_STUB = f"{_STUB}layout(local_size_x = 1) in;\n"
 """What moderngl compiles in place of a program that it adopts."""
 _LOOK_S = 0.002
-_UINT, _INT, _POINTER = ctypes.c_uint, ctypes.c_int, ctypes.c_void_p
+_UINT, _INT, _POINTER, _TEXT = ctypes.c_uint, ctypes.c_int, ctypes.c_void_p, ctypes.c_char_p
+_INTEGER = ctypes.POINTER(_INT)
 _FUNCTYPE = getattr(ctypes, "WINFUNCTYPE", ctypes.CFUNCTYPE)
-
-
-class Loader(Protocol):
-    """A current context, in the form in which `moderngl.create_context(context=…)` takes it."""
-
-    def load(self, name: str) -> int: ...
-    def release(self) -> None: ...
-    def __enter__(self) -> object: ...
-    def __exit__(self, *exception: object) -> None: ...
+_SIGNATURES: dict[str, tuple[Any, ...]] = {
+    "CreateProgram GetError": (_UINT,),
+    "CreateShader": (_UINT, _UINT),
+    "ShaderSource": (None, _UINT, _INT, ctypes.POINTER(_TEXT), _POINTER),
+    "CompileShader LinkProgram DeleteShader DeleteProgram UseProgram": (None, _UINT),
+    "AttachShader DetachShader BindBuffer": (None, _UINT, _UINT),
+    "GetShaderiv GetProgramiv": (None, _UINT, _UINT, _INTEGER),
+    "GetShaderInfoLog GetProgramInfoLog": (None, _UINT, _INT, _INTEGER, _TEXT),
+    "ProgramParameteri": (None, _UINT, _UINT, _INT),
+    "GetProgramBinary": (None, _UINT, _INT, _INTEGER, ctypes.POINTER(_UINT), _TEXT),
+    "ProgramBinary": (None, _UINT, _UINT, _TEXT, _INT),
+    "GetIntegerv": (None, _UINT, _INTEGER),
+    "DispatchCompute": (None, _UINT, _UINT, _UINT),
+    "DispatchComputeIndirect": (None, _POINTER),
+}
+"""Result and arguments of OpenGL's functions."""
 
 
 class Linker:
     """Makes the programs of a context; for moderngl the loader of its functions."""
 
-    def __init__(self, loader: Loader) -> None:
-        """Raises `LookupError` where OpenGL lacks a function."""
-        self._loader = loader
-
-        def function(name: str, *arguments: Any, result: Any = None) -> Callable[..., int]:
-            address = loader.load(name)
-            if not address:
-                raise LookupError(f"OpenGL has no {name}")
-            return _FUNCTYPE(result, *arguments)(address)
-
-        text, integer = ctypes.c_char_p, ctypes.POINTER(_INT)
-        self._create_program = function("glCreateProgram", result=_UINT)
-        self._create_shader = function("glCreateShader", _UINT, result=_UINT)
-        self._shader_source = function("glShaderSource", _UINT, _INT, ctypes.POINTER(text), _POINTER)
-        self._compile_shader = function("glCompileShader", _UINT)
-        self._attach_shader = function("glAttachShader", _UINT, _UINT)
-        self._detach_shader = function("glDetachShader", _UINT, _UINT)
-        self._link_program = function("glLinkProgram", _UINT)
-        self._delete_shader = function("glDeleteShader", _UINT)
-        self._delete_program = function("glDeleteProgram", _UINT)
-        self._of_shader = function("glGetShaderiv", _UINT, _UINT, integer)
-        self._of_program = function("glGetProgramiv", _UINT, _UINT, integer)
-        self._shader_log = function("glGetShaderInfoLog", _UINT, _INT, integer, text)
-        self._program_log = function("glGetProgramInfoLog", _UINT, _INT, integer, text)
-        self._set_parameter = function("glProgramParameteri", _UINT, _UINT, _INT)
-        self._get_binary = function("glGetProgramBinary", _UINT, _INT, integer, ctypes.POINTER(_UINT), text)
-        self._set_binary = function("glProgramBinary", _UINT, _UINT, text, _INT)
-        self._get_integer = function("glGetIntegerv", _UINT, integer)
-        self._get_error = function("glGetError", result=_UINT)
+    def __init__(self, loader: Any, unlocked: bool = False) -> None:
+        """`loader`: of the current context, in the form that `moderngl.create_context(context=…)` takes; `unlocked`:
+        dispatches, too, let other threads go on."""
+        self._loader, self._unlocked = loader, unlocked
+        self.gl = SimpleNamespace(
+            **{
+                name: _FUNCTYPE(*signature)(loader.load(f"gl{name}"))
+                for names, signature in _SIGNATURES.items()
+                for name in names.split()
+            }
+        )
         self._adopted = 0
         """What moderngl gets for the program that it makes now; 0: a new one."""
         self._callbacks = {
-            "glCreateProgram": _FUNCTYPE(_UINT)(lambda: self._adopted or self._create_program()),
+            "glCreateProgram": _FUNCTYPE(_UINT)(lambda: self._adopted or self.gl.CreateProgram()),
             "glAttachShader": _FUNCTYPE(None, _UINT, _UINT)(self._attach_for_moderngl),
             "glLinkProgram": _FUNCTYPE(None, _UINT)(self._link_for_moderngl),
         }
@@ -106,18 +97,18 @@ class Linker:
 
     def _attach_for_moderngl(self, program: int, shader: int) -> None:
         if not self._adopted:
-            self._attach_shader(program, shader)
+            self.gl.AttachShader(program, shader)
 
     def _link_for_moderngl(self, program: int) -> None:
         if not self._adopted:
-            self._link_program(program)
+            self.gl.LinkProgram(program)
 
     # ---- programs ----------------------------------------------------------------------------
 
     def work_ahead(self, info: Mapping[str, Any], extensions: set[str]) -> None:
         """From now on compile side by side and keep binaries, as far as the driver, as moderngl tells of it, can."""
         self._is_parallel = _PARALLEL in extensions
-        if self._integer(self._get_integer, _BINARY_FORMATS):
+        if self._integer(self.gl.GetIntegerv, _BINARY_FORMATS):
             self._device = tuple(str(info[name]) for name in ("GL_VENDOR", "GL_RENDERER", "GL_VERSION"))
 
     def compiled_by(self, deadline: float) -> bool:
@@ -129,7 +120,7 @@ class Linker:
         return True
 
     def _is_done(self, made: Pending) -> bool:
-        return bool(self._integer(self._of_program, made.program, _COMPLETION_STATUS))
+        return bool(self._integer(self.gl.GetProgramiv, made.program, _COMPLETION_STATUS))
 
     def program(
         self, ctx: moderngl.Context, texts: Sequence[str], refusal: Callable[[str], Exception], at_once: bool
@@ -145,47 +136,47 @@ class Linker:
         return made
 
     def _begin(self, made: Pending, texts: Sequence[str]) -> None:
-        program = made.program = self._create_program()
+        program = made.program = self.gl.CreateProgram()
         key = program_store.key_of(self._device, texts) if self._device else ""
         if key and (binary := program_store.load(key)) is not None:
-            self._set_binary(program, binary.form, binary.code, len(binary.code))
-            if self._integer(self._of_program, program, _LINK_STATUS):
+            self.gl.ProgramBinary(program, binary.form, binary.code, len(binary.code))
+            if self._integer(self.gl.GetProgramiv, program, _LINK_STATUS):
                 return
-            self._get_error()  # another version of the driver under the same name
+            self.gl.GetError()  # another version of the driver under the same name
         for (stage, kind), text in zip(_KINDS[len(texts)].items(), texts, strict=True):
-            shader = made.shaders[stage] = self._create_shader(kind)
-            self._shader_source(shader, 1, (ctypes.c_char_p * 1)(text.encode()), None)
-            self._compile_shader(shader)
-            self._attach_shader(program, shader)
+            shader = made.shaders[stage] = self.gl.CreateShader(kind)
+            self.gl.ShaderSource(shader, 1, (ctypes.c_char_p * 1)(text.encode()), None)
+            self.gl.CompileShader(shader)
+            self.gl.AttachShader(program, shader)
         made.key = key
         if key:
-            self._set_parameter(program, _BINARY_HINT, 1)
-        self._link_program(program)
+            self.gl.ProgramParameteri(program, _BINARY_HINT, 1)
+        self.gl.LinkProgram(program)
 
     def finish(self, made: Pending) -> None:
         """Wait until it is compiled. Raises as `program` does."""
         self._pending.discard(made)
-        if made.shaders and not self._integer(self._of_program, made.program, _LINK_STATUS):
+        if made.shaders and not self._integer(self.gl.GetProgramiv, made.program, _LINK_STATUS):
             made.problem = made.refusal(self._log_of(made))
             self._delete(made)
             raise made.problem
         for shader in made.shaders.values():
-            self._detach_shader(made.program, shader)
-            self._delete_shader(shader)
+            self.gl.DetachShader(made.program, shader)
+            self.gl.DeleteShader(shader)
         self._keep(made)
 
     def _keep(self, made: Pending) -> None:
-        if made.key and (size := self._integer(self._of_program, made.program, _BINARY_LENGTH)):
+        if made.key and (size := self._integer(self.gl.GetProgramiv, made.program, _BINARY_LENGTH)):
             form, written, code = _UINT(), _INT(), ctypes.create_string_buffer(size)
-            self._get_binary(made.program, size, written, form, code)
+            self.gl.GetProgramBinary(made.program, size, written, form, code)
             if written.value > 0:
                 program_store.save(made.key, Binary(form.value, code.raw[: written.value]))
 
     def _log_of(self, made: Pending) -> str:
-        log = self._log(self._of_program, self._program_log, made.program)
+        log = self._log(self.gl.GetProgramiv, self.gl.GetProgramInfoLog, made.program)
         for stage, shader in made.shaders.items():
-            if not self._integer(self._of_shader, shader, _COMPILE_STATUS):
-                log = f"{stage} shader:\n{self._log(self._of_shader, self._shader_log, shader)}"
+            if not self._integer(self.gl.GetShaderiv, shader, _COMPILE_STATUS):
+                log = f"{stage} shader:\n{self._log(self.gl.GetShaderiv, self.gl.GetShaderInfoLog, shader)}"
         return log
 
     def drop(self, made: Pending) -> None:
@@ -197,15 +188,18 @@ class Linker:
 
     def _delete(self, made: Pending) -> None:
         for shader in made.shaders.values():
-            self._delete_shader(shader)
-        self._delete_program(made.program)
+            self.gl.DeleteShader(shader)
+        self.gl.DeleteProgram(made.program)
 
     def adopt(self, made: Pending) -> moderngl.ComputeShader | moderngl.Program:
         """moderngl's own object of it, once it is compiled."""
         self._adopted = made.program
         try:
             if isinstance(made, PendingCompute):
-                return unlocked(made.ctx.compute_shader(_COMPUTE_STUB))
+                compute = made.ctx.compute_shader(_COMPUTE_STUB)
+                if self._unlocked:
+                    compute.__class__ = UnlockedCompute
+                return compute
             return made.ctx.program(_STUB, _STUB)
         finally:
             self._adopted = 0
@@ -264,12 +258,31 @@ class PendingProgram(Pending, moderngl.Program):
     """A program that draws."""
 
 
+class UnlockedCompute(moderngl.ComputeShader):
+    """A compute program whose runs let other threads go on: some drivers compile as late as the first one, for
+    seconds."""
+
+    def run(self, group_x: int = 1, group_y: int = 1, group_z: int = 1) -> None:
+        """As of any compute program."""
+        gl = linker_of(self.ctx).gl
+        gl.UseProgram(self.glo)
+        gl.DispatchCompute(group_x, group_y, group_z)
+
+    def run_indirect(self, buffer: moderngl.Buffer, offset: int = 0) -> None:
+        """As of any compute program."""
+        gl = linker_of(self.ctx).gl
+        gl.UseProgram(self.glo)
+        gl.BindBuffer(_DISPATCH_INDIRECT_BUFFER, buffer.glo)
+        gl.DispatchComputeIndirect(offset)
+
+
 _linkers: weakref.WeakKeyDictionary[moderngl.Context, Linker] = weakref.WeakKeyDictionary()
 
 
-def adopting_context(loader: Loader, require: int, standalone: bool = False) -> moderngl.Context:
-    """moderngl's context for the current one, of at least this version of OpenGL (430: 4.3)."""
-    linker: Any = Linker(loader)
+def adopting_context(loader: Any, require: int, standalone: bool = False, unlocked: bool = False) -> moderngl.Context:
+    """moderngl's context for the current one, of at least this version of OpenGL (430: 4.3); the rest as `Linker`
+    takes it."""
+    linker: Any = Linker(loader, unlocked)
     ctx = moderngl.create_context(require=require, standalone=standalone, context=linker)
     _linkers[ctx] = linker
     if DeviceTraits.of(ctx.info["GL_RENDERER"]).compiles_ahead:

@@ -21,7 +21,6 @@ import glfw  # isort: skip
 
 from ..base.errors import UserError
 from ..edit.preferences import WindowPlace
-from ..gpu import unlocked
 from ..gpu.context import GL_VERSION, GL_VERSION_CODE, Context
 from ..gpu.context_thread import ContextThread
 from ..gpu.linker import adopting_context
@@ -411,10 +410,7 @@ def _beside(window: Any) -> Any | None:
 def _entered(hidden: Any) -> Context:
     """The context of a hidden window, made current on the thread that asks."""
     glfw.make_context_current(hidden)
-    loader = GlfwLoader()
-    context = Context(adopting_context(loader, GL_VERSION_CODE), "window")
-    unlocked.unlock(context.ctx, loader.load)
-    return context
+    return Context(adopting_context(GlfwLoader(), GL_VERSION_CODE, unlocked=True), "window")
 
 
 def _shrink_to_screen(handle: Any) -> None:

@@ -160,12 +160,12 @@ bool in_front(Placement place, PhotonRecord photon, vec3 sweep_middle, vec3 swee
 // fragments; the maps are put together again when they are read (levels_fold.comp, bilinearly).
 // Returns the index of the placement with these texels.
 uint choose_level(uint at, inout Footprint f, PhotonRecord photon, vec3 middle, vec3 sweep) {
+    Placement place = placements[at];
     for (int step = 0; step < WIDER_LEVELS; ++step) {
-        uint wider = placements[at].blurred;
-        if (wider != NONE && thin_variance(f) > BROAD_VARIANCE) {
+        if (place.blurred != NONE && thin_variance(f) > BROAD_VARIANCE) {
             float taken = 0.25 * f.taken + LEVEL_BLUR;
-            at = wider;
-            Placement place = placements[at];
+            at = place.blurred;
+            place = placements[at];
             f = footprint_in(place, photon, middle, sweep);
             f.taken = taken;
         }

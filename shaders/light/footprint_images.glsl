@@ -109,7 +109,7 @@ Depicted image_of(Depicted of, Beside first, Beside second, uint bit) {
     return mirrored(mirrored(of, first.border), second.border);
 }
 
-// Write all images of a photon from `slot` on, in all windows of its receiver; returns how many splats those are. Their
+// Write all images of a photon from `slot` on, in the windows that it is drawn in; returns how many splats those are. Their
 // number is found first, so that a software renderer, which runs the body of an `if` for all, goes through the loop
 // only with photons that have any; what makes a splat stands there once.
 uint put_images(Depicted of, uint at, uint slot) {
@@ -143,7 +143,9 @@ uint put_images(Depicted of, uint at, uint slot) {
         Depicted image = image_of(of, first, second, uint(findLSB(images)));
         images &= images - 1u;
         bool keeps_side = of.side != 0u;
-        for (uint window_at = at; window_at != NONE;) {
+        uint window_at = at;
+        // Where the photon itself is drawn: in so many windows.
+        for (int level = 0; level < SLOTS && window_at != NONE; ++level) {
             Placement window = placements[window_at];
             uint drawn_in = window_at, next = window.next;
             Footprint f = footprint_in(window, image.photon, image.middle, image.sweep);
@@ -154,14 +156,10 @@ uint put_images(Depicted of, uint at, uint slot) {
             splat.rect = placements[drawn_in].rect;
             vec2 extent = half_extent(splat);
             shown = shown && touches(splat.rect, splat.centre, extent);
-            if (SLOTS == 2) {
-                if (next != NONE) {
-                    Placement outer = placements[next];
-                    bool is_fine = is_only_fine(splat.centre, extent, drawn_in, outer, image.photon.position);
-                    next = shown && is_fine ? NONE : next;
-                }
-            } else {
-                next = NONE;
+            if (SLOTS == 2 && next != NONE) {
+                Placement outer = placements[next];
+                bool is_fine = is_only_fine(splat.centre, extent, drawn_in, outer, image.photon.position);
+                next = shown && is_fine ? NONE : next;
             }
             keep_within_lines(splat, keeps_side ? of.side : 0u, 1.0);
             keeps_side = false;

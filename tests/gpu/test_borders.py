@@ -6,13 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from spectrasplat.base.paths import shipped_scenes
 from spectrasplat.features import facts
 from spectrasplat.features.features import Features
+from spectrasplat.features.receivers import MOST_IMAGES
 from spectrasplat.model.geometry.primitives import box, plane
+from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.optics.glass import constant
 from spectrasplat.model.scene import Camera, Diffuse, Scene, SceneObject
 from spectrasplat.model.scene_camera import camera_frame
 from spectrasplat.model.settings import RenderSettings
+from spectrasplat.passes.footprint import SPLAT, Footprints
 from spectrasplat.render.still import render
 from spectrasplat.stress.rigs.probe import light_pass
 from spectrasplat.stress.rigs.scene_parts import SUN, solid, stage, turn
@@ -140,3 +144,20 @@ def test_what_lands_beyond_a_border_is_not_mirrored(gl, place: tuple[float, floa
     records = photons(swept, np.array([place]), axis_s=(1.2, 0.0), axis_t=(0.0, 1.2), chord=chord, x_anchor=0.0)
     with_images, bare = drawn(gl, SQUARE, records, swept), drawn(gl, ((0.0, 0.0, 0.0, 0.0),), records, swept)
     assert (with_images[:, 8:56].sum() > 1.001 * bare[:, 8:56].sum()) == lights_up
+
+
+def test_images_keep_to_their_photons_slots(gl, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where a receiver has three windows: a photon has splats in two."""
+    found: list[int] = []
+    real = Footprints.run
+
+    def run(self: Footprints, *arguments: object) -> None:
+        real(self, *arguments)  # type: ignore[arg-type]
+        splats = np.frombuffer(self.splats.read(), SPLAT.dtype)[:: self.slots_per_photon]
+        found.append(int(splats["images"].max()))
+
+    monkeypatch.setattr(Footprints, "run", run)
+    render(
+        load_scene(shipped_scenes()["lens_text"]), RenderSettings(width=64, height=36, photons=6000, spp=1), context=gl
+    )
+    assert 0 < max(found) <= MOST_IMAGES * 2

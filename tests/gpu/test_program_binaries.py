@@ -45,9 +45,10 @@ began = linker.Linker.__init__
 
 def begin(self, loader):
     began(self, loader)
-    compile, link = self._compile_shader, self._link_program
-    self._compile_shader = lambda shader: calls.update(compiled=calls["compiled"] + 1) or compile(shader)
-    self._link_program = lambda program: calls.update(linked=calls["linked"] + 1) or link(program)
+    gl = self.gl
+    compile, link = gl.CompileShader, gl.LinkProgram
+    gl.CompileShader = lambda shader: calls.update(compiled=calls["compiled"] + 1) or compile(shader)
+    gl.LinkProgram = lambda program: calls.update(linked=calls["linked"] + 1) or link(program)
 
 with create_context() as context:  # it measures how fast the device blends, by a program of four lines
     linker.Linker.__init__ = begin
@@ -89,8 +90,8 @@ def is_compiled_anew(context: Context, monkeypatch: pytest.MonkeyPatch) -> bool:
     compiled = []
     link = linker_of(context.ctx)
     with monkeypatch.context() as patched:
-        compile_shader = link._compile_shader
-        patched.setattr(link, "_compile_shader", lambda shader: compiled.append(shader) or compile_shader(shader))
+        compile_shader = link.gl.CompileShader
+        patched.setattr(link.gl, "CompileShader", lambda shader: compiled.append(shader) or compile_shader(shader))
         program = doubling(context)
     values = context.ctx.buffer(np.arange(64, dtype="f4").tobytes())
     values.bind_to_storage_buffer(0)

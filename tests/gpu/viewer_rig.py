@@ -21,9 +21,10 @@ from spectrasplat.base.paths import shipped_scenes
 from spectrasplat.edit.camera_controls import orbit
 from spectrasplat.edit.live_inputs import LiveInputs
 from spectrasplat.edit.state import Display as DisplaySettings
-from spectrasplat.gpu import device_traits, unlocked
+from spectrasplat.gpu import device_traits
 from spectrasplat.gpu.context import Context, create_context
 from spectrasplat.gpu.device_traits import Budget, DeviceTraits
+from spectrasplat.gpu.linker import UnlockedCompute
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.optics.glass import with_gain
 from spectrasplat.model.scene import Scene
@@ -35,11 +36,7 @@ FRAME_S = 1 / 60
 PATIENCE_S = 300.0
 _TEXTURES = (moderngl.Texture, moderngl.TextureArray)
 _DRIVER = (
-    *(
-        (owner, name)
-        for owner in (moderngl.ComputeShader, unlocked.UnlockedCompute)
-        for name in ("run", "run_indirect")
-    ),
+    *((owner, name) for owner in (moderngl.ComputeShader, UnlockedCompute) for name in ("run", "run_indirect")),
     *((moderngl.VertexArray, name) for name in ("render", "render_indirect")),
     *((owner, name) for owner in (moderngl.Buffer, *_TEXTURES) for name in ("read", "read_into", "write")),
     *((moderngl.Framebuffer, name) for name in ("read", "read_into", "clear")),
