@@ -402,9 +402,9 @@ void make_splats(uint i) {
     if (BORDER_IMAGES) {
         // Behind the photon's own splats, so many of them.
         Depicted depicted = Depicted(photon, middle, sweep, power_w, mean, table, table_band, side, thin);
-        uint images = put_images(depicted, at, slot + uint(SLOTS));
-        if (REINDEXED && !carries) images = 0u;
-        splats[slot].images = images;
+        bool has_images = true;
+        if (REINDEXED) has_images = carries;
+        splats[slot].images = has_images ? put_images(depicted, at, slot + uint(SLOTS)) : 0u;
     }
 
     if (SLOTS == 2) {
