@@ -13,11 +13,17 @@ if TYPE_CHECKING:
     from .map_layout import MapLayout
 
 
-def border_texture(ctx: moderngl.Context, layout: MapLayout) -> moderngl.Texture:
-    """RGBA32F: a row a receiver, its borders from the left, zeros behind them."""
+def border_rows(layout: MapLayout) -> np.ndarray:
+    """float32 (receivers, n, 4): each receiver's borders from the left, zeros behind them."""
     rows = np.zeros((len(layout.receivers), 1 + max(map(len, layout.borders.values()))), (np.float32, 4))
     for receiver, borders in layout.borders.items():
         rows[receiver, : len(borders)] = borders
+    return rows
+
+
+def border_texture(ctx: moderngl.Context, layout: MapLayout) -> moderngl.Texture:
+    """RGBA32F, `border_rows`."""
+    rows = border_rows(layout)
     return ctx.texture(rows.shape[1::-1], 4, rows, dtype="f4")
 
 

@@ -110,6 +110,8 @@ class MapLayout:
     """Frames of flat receivers."""
     borders: dict[int, np.ndarray] = field(default_factory=dict)
     """Borders of convex flat receivers, (n, 4): those near which light lands (`borders.borders_near`)."""
+    seen: dict[int, Window | None] = field(default_factory=dict)
+    """What the camera sees of flat receivers (`visible`)."""
 
     def resolved_width(self, receiver: int) -> float:
         """What a receiver's finest map resolves, scene units: a texel's side, or half a pixel's where texels are
@@ -155,6 +157,7 @@ def _layout_maps(
     fineness: Fineness,
 ) -> MapLayout:
     sizes: list[tuple[int, int]] = []
+    seen: dict[int, Window | None] = {}
     plans: list[tuple[int, PlaneFrame | None, list[Window | PictureWindow], ChartAtlas | None]] = []
     for receiver, object_index in enumerate(buffers.receivers):
         item = scene.objects[object_index]
@@ -162,14 +165,15 @@ def _layout_maps(
         landed = landings.get(receiver)
         if item.mesh.is_flat:
             frame = plane_frame(points)
-            extent = _extent(frame.project(points))
+            extent = extent_of(frame.project(points))
             windows: list[Window | PictureWindow]
             if receiver == map_receiver:
-                around = extent if landed is None else _at_least(_extent_of_light(frame, extent, landed), 0.0, extent)
+                around = extent if landed is None else _at_least(known_windows(frame, extent, landed)[0], 0.0, extent)
                 windows = [_with_aspect(around, picture)]
             else:
                 seen_in = None if map_receiver is not None else picture
-                windows = _flat_windows(scene.camera, buffers, frame, extent, landed, seen_in, fineness)
+                seen[receiver] = None if seen_in is None else visible(scene.camera, buffers, frame, picture)
+                windows = _flat_windows(scene.camera, buffers, frame, extent, landed, seen_in, seen[receiver], fineness)
             for level, window in enumerate(windows):
                 largest = fineness.coarse if level else fineness.fine
                 if isinstance(window, PictureWindow):
@@ -192,7 +196,7 @@ def _layout_maps(
             plans.append((receiver, None, [], atlas))
     tiles, size = pack(sizes, max_side)
     layout = _place(scene, buffers, plans, tiles, size, reflectance_class)
-    return replace(layout, borders=lit_borders(scene, buffers, layout.frames, landings))
+    return replace(layout, borders=lit_borders(scene, buffers, layout.frames, landings), seen=seen)
 
 
 def _place(
@@ -267,11 +271,13 @@ def _placed(
     return placement_rows(tile, rows, float(np.prod(window.size / texels)) / scale**2)
 
 
-def _extent(points: np.ndarray) -> Window:
+def extent_of(points: np.ndarray) -> Window:
+    """The box of `points` (n, 2)."""
     return Window(points.min(axis=0), points.max(axis=0))
 
 
-def _grown(window: Window, share: float) -> Window:
+def grown(window: Window, share: float) -> Window:
+    """Larger on each side by a share of its size."""
     margin = share * window.size + 1e-9
     return Window(window.low - margin, window.high + margin)
 
@@ -280,17 +286,20 @@ def _at_least(window: Window, side: float, extent: Window) -> Window:
     """The window, or a wider one about its middle with sides of at least `side`, as far as `extent` reaches."""
     middle, far = 0.5 * (window.low + window.high), np.maximum(np.abs(window.low), np.abs(window.high)).max()
     half = 0.5 * np.maximum(window.size, max(side, _MIN_SIDE * far))
-    return _meet(Window(middle - half, middle + half), extent) or extent
+    return meet(Window(middle - half, middle + half), extent) or extent
 
 
-def _meet(a: Window, b: Window) -> Window | None:
+def meet(a: Window, b: Window) -> Window | None:
+    """What is in both."""
     low, high = np.maximum(a.low, b.low), np.minimum(a.high, b.high)
     return Window(low, high) if np.all(high - low > 1e-12) else None
 
 
-def _extent_of_light(frame: PlaneFrame, extent: Window, landed: Landings) -> Window:
+def known_windows(frame: PlaneFrame, extent: Window, landed: Landings) -> list[Window]:
+    """Of most of the light that landed, and of all of it."""
     flat = frame.project(landed.positions)
-    return _meet(_grown(_quantile_box(flat, landed.flux_w, _QUANTILE), _MARGIN), extent) or extent
+    everything = meet(grown(extent_of(flat), 0.02), extent) or extent
+    return [meet(grown(_quantile_box(flat, landed.flux_w, _QUANTILE), _MARGIN), extent) or everything, everything]
 
 
 def _with_aspect(window: Window, picture: tuple[int, int]) -> Window:
@@ -319,20 +328,20 @@ def _flat_windows(
     extent: Window,
     landed: Landings | None,
     picture: tuple[int, int] | None,
+    seen: Window | None,
     fineness: Fineness,
 ) -> list[Window | PictureWindow]:
     """Fine (where it pays) and coarse window, and one of what may land beyond them, finest first."""
     if landed is None or len(landed.positions) == 0:
         return [extent]
-    flat = frame.project(landed.positions)
-    seen = _visible(camera, buffers, frame, picture) if picture is not None else None
 
     def widened(window: Window) -> Window:
         """Where a caustic is thinner than a pixel."""
         pixel = 0.0 if picture is None else pixel_side(camera, buffers, frame, window, picture)
         return _at_least(window, fineness.least_pixels * pixel, extent)
 
-    everything = widened(_meet(_grown(_extent(flat), 0.02), extent) or extent)
+    light, everything = known_windows(frame, extent, landed)
+    everything = widened(everything)
     if picture is not None and fineness.in_register:
         on_pixels = picture_window(
             camera,
@@ -347,8 +356,7 @@ def _flat_windows(
         if on_pixels is not None:
             known: list[Window | PictureWindow] = [on_pixels] if on_pixels.is_all else [on_pixels, everything]
             return [*known, *_beyond(everything, seen, extent)]
-    light = _meet(_grown(_quantile_box(flat, landed.flux_w, _QUANTILE), _MARGIN), extent) or everything
-    fine = light if seen is None else _meet(light, _grown(seen, 0.02))
+    fine = light if seen is None else meet(light, grown(seen, 0.02))
     known = [everything]
     if fine is not None:
         fine = widened(fine)
@@ -359,16 +367,16 @@ def _flat_windows(
 def _beyond(known: Window, seen: Window | None, extent: Window) -> list[Window]:
     """A window, of few texels, round the known one for what pilot photons did not find: a rare path, or one that begins
     in a part of a lamp only. None where the receiver ends there."""
-    wide = _grown(known, _BEYOND)
+    wide = grown(known, _BEYOND)
     if seen is not None:
         wide = Window(np.minimum(wide.low, seen.low), np.maximum(wide.high, seen.high))
-    found = _meet(wide, extent)
+    found = meet(wide, extent)
     if found is None or not (np.any(found.low < known.low) or np.any(found.high > known.high)):
         return []
     return [replace(found, largest=_BEYOND_TEXELS)]
 
 
-def _visible(camera: Camera, buffers: SceneBuffers, frame: PlaneFrame, picture: tuple[int, int]) -> Window | None:
+def visible(camera: Camera, buffers: SceneBuffers, frame: PlaneFrame, picture: tuple[int, int]) -> Window | None:
     """Box of the plane's points that camera rays meet, or None where none does or the horizon is in view."""
     origins, directions = camera_rays(camera, picture, grid=33)
     origins = buffers.space.to_gpu(origins).reshape(-1, 3)
@@ -381,7 +389,7 @@ def _visible(camera: Camera, buffers: SceneBuffers, frame: PlaneFrame, picture: 
     if not ahead.any():
         return None
     points = origins[ahead] + distance[ahead, None] * directions[ahead]
-    return _extent(frame.project(points))
+    return extent_of(frame.project(points))
 
 
 def _tile_size(

@@ -17,7 +17,7 @@ from ..gpu.records import LATTICE_BIT, MAX_BANDS
 from ..model.scene import Scene
 from ..model.tint_bands import TOLERANCE as TINT_TOLERANCE
 from .emission_domain import EmissionDomain
-from .landings import Landings
+from .landings import Landings, by_receiver
 from .trace import SPLIT_THRESHOLD, Band, FluxTally, LatticeSlice, TracePass
 
 PHOTONS = 4096
@@ -163,12 +163,7 @@ def landings_of(pilots: Iterable[Pilot]) -> dict[int, Landings]:
     records = [photons for pilot in pilots for photons in (pilot.whole, *pilot.spectral, *pilot.rim) if len(photons)]
     if not records:
         return {}
-    photons = np.concatenate(records)
-    found = {}
-    for receiver in np.unique(photons["receiver"]):
-        mine = photons[photons["receiver"] == receiver]
-        found[int(receiver)] = Landings(mine["position"].astype(float), mine["flux_w"].astype(float))
-    return found
+    return by_receiver(np.concatenate(records))
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from ..gpu.shader import Releasable
 from ..gpu.splat_way import way_of
 from ..gpu.tiles import Tile
 from ..passes.accumulate import LevelsFold, SeamFold, copy_texture
-from ..passes.border_maps import border_texture, inside_share
+from ..passes.border_maps import border_rows, border_texture, inside_share
 from ..passes.caustic_maps import CausticMaps
 from ..passes.contact_lines import read_words, seen_shares
 from ..passes.map_atlas import MapAtlas
@@ -63,6 +63,19 @@ class LightMaps:
         self._is_settled = False
         self._levels_fold = LevelsFold(ctx, layout.folds)
         self._seam_fold = SeamFold(ctx, [(layout.tiles[r][0], charts) for r, charts in layout.charts.items()])
+
+    def follow(self, layout: MapLayout) -> bool:
+        """Be laid out as `layout`, of the same tiles, from now on. False, and nothing done, where borders are others in
+        number."""
+        counts, before = ({r: len(b) for r, b in of.borders.items()} for of in (layout, self.layout))
+        if counts != before:
+            return False
+        if layout is not self.layout:
+            self.layout = layout
+            self.atlas.placements.write(layout.placements)
+            if self.atlas.borders is not None:
+                self.atlas.borders.write(border_rows(layout))
+        return True
 
     def take(self, features: Features) -> None:
         """Splat from now on with other features of the same layout (the brush came or went)."""

@@ -1,7 +1,7 @@
-"""The light of a scene while something in it is held and moved: a few photons, traced anew for every place.
+"""The light of a scene while something in it is held and moved: photons traced anew for every place.
 
-Programs, spectral tables and the division of photons stay those of the scene that was built; only their places
-differ. What is built when the drag ends replaces all of it.
+Programs, spectral tables, the division of photons and the tiles of the maps stay those of the scene that was built, or
+first moved; only places differ. What is built when the drag ends replaces all of it.
 """
 
 from __future__ import annotations
@@ -16,29 +16,28 @@ from ...base.generators import finished
 from ...gpu import shader
 from ...model.scene import Scene, SceneObject
 from ...passes.emission_domain import EmissionDomain, emission_domain
-from ...passes.pilot import Pilot, landings_of
+from ...passes.landings import ChosenLandings
+from ...passes.moving_layout import followed
 from ..light_maps import LightMaps
-from ..photon_batches import traced_besides
 from ..shown_spectra import PassTables
-from .photon_store import PhotonStore
 
 if TYPE_CHECKING:
     from ...features.features import Features
     from ...gpu.context import Context
+    from ...passes.map_layout import MapLayout
     from ..light_pass import LightPass
     from ..light_plan import LightPlan
     from .frame_plan import FramePlan
 
 SECONDS = 0.05
-"""What tracing and splatting should take."""
+"""What tracing and splatting should take where the processor draws."""
 FIRST_PHOTONS, FEWEST, MOST = 1 << 12, 1 << 11, 1 << 20
 DEPTH = 8
 """Specular events; what comes after them is for when things are still."""
-_BYTES = 64 << 20
 
 
 class MovedLight:
-    """Owns the photons and their maps. `light_pass` must be the one whose buffers are moved (`SceneBuffers.move`)."""
+    """Owns maps of photons. `light_pass` must be the one whose buffers are moved (`SceneBuffers.move`)."""
 
     def __init__(self, context: Context, light_pass: LightPass, features: Features) -> None:
         """`features`: of the maps, which hold colour only."""
@@ -46,36 +45,71 @@ class MovedLight:
         self.photons = FIRST_PHOTONS
         self._plans: list[LightPlan] | None = None
         self._tables: PassTables | None = None
-        self._store = PhotonStore(context.ctx, _BYTES)
+        self._landed = ChosenLandings(context.ctx, light_pass.trace.photon)
+        self._scene: Scene | None = None
+        """Whose light the maps hold."""
+        self._side = 1.0
         self.maps: LightMaps | None = None
 
     def follow(self, scene: Scene, widening: float = 1.0, plan: FramePlan | None = None) -> LightMaps:
-        """Photons through `scene`, in maps that are fitted to where they land, with footprints so much wider. Without a
-        `plan` there are as many as took about `SECONDS` before."""
-        light_pass, started = self._light_pass, time.perf_counter()
-        photons, depth = (self.photons, DEPTH) if plan is None else (plan.photons, plan.depth)
-        plans = self._plans_for(scene)
-        self._store.clear()
-        tracing = traced_besides(light_pass.trace, light_pass.settings.seed, plans, photons, self._store.keep, depth)
-        with self._context.timers.timing("trace"):
-            for _ in tracing:
-                pass
-        slabs = self._store.of_rounds(0, self._store.rounds)
-        records = self._store.read(len(slabs) and 1 << 30, light_pass.trace.photon.dtype)
-        layout = light_pass.layout_about(
-            landings_of([Pilot(1, records, [], [])]), light_pass.fit.preview(1.0 if plan is None else plan.side)
+        """Photons through `scene`, with footprints so much wider, in maps that are fitted to where those of the frame
+        before have landed. Without a `plan` there are as many as took about `SECONDS` before."""
+        started = time.perf_counter()
+        photons, depth, side = (
+            (self.photons, DEPTH, 1.0) if plan is None else (_steady(plan.photons), plan.depth, plan.side)
         )
-        shader.release(self.maps)
-        self.maps = LightMaps(self._context.ctx, layout, self._features)
-        self.maps.clear()
-        assert self._tables is not None
-        for slab in slabs:
-            for _ in light_pass.splat_steps(slab.buffer, slab.count, widening, self._tables.preview, self.maps):
-                pass
-        self.maps.photon_weight = float(photons)
+        plans = self._plans_for(scene)
+        if self._scene is None:
+            self._trace(plans, FIRST_PHOTONS, depth, None, widening)
+        maps = self._fitted(scene, side)
+        maps.clear()
+        self._trace(plans, photons, depth, maps, widening)
+        maps.photon_weight = float(photons)
         took = time.perf_counter() - started
         if plan is None:
             self.photons = int(np.clip(photons * np.clip(SECONDS / max(took, 1e-4), 0.5, 2.0), FEWEST, MOST))
+        return maps
+
+    def _trace(self, plans: list[LightPlan], photons: int, depth: int, maps: LightMaps | None, widening: float) -> None:
+        """Trace about so many photons into `maps`, and choose some of them."""
+        light_pass, trace = self._light_pass, self._light_pass.trace
+        pieces = []
+        for plan in plans:
+            lattice = plan.lattice_count(photons)
+            parts = -(-lattice * plan.lattices // trace.batch)
+            for i in range(parts):
+                points = len(range(i, lattice, parts))
+                pieces.append(
+                    (plan.slice(light_pass.settings.seed, 0, lattice, i, parts, points, float(photons)), plan.domain)
+                )
+        for number, (piece, domain) in enumerate(pieces):
+            waiting = [piece]
+            while waiting:
+                part = waiting.pop()
+                with self._context.timers.timing("trace"):
+                    batch = finished(trace.steps(part, domain, depth))
+                if batch.overflow and part.points > 1:
+                    waiting += part.halves
+                    continue
+                self._landed.choose(trace.photons, batch.photons, None, number, len(pieces))
+                if maps is not None:
+                    assert self._tables is not None
+                    for _ in light_pass.splat_steps(trace.photons, batch.photons, widening, self._tables.preview, maps):
+                        pass
+
+    def _fitted(self, scene: Scene, side: float) -> LightMaps:
+        """Maps for what was chosen of the last photons: those that there are, unless a curved receiver has moved."""
+        light_pass, landings = self._light_pass, self._landed.read()
+        layout: MapLayout | None = None
+        if self.maps is not None and self._scene is not None and side == self._side:
+            pairs = enumerate(zip(self._scene.objects, scene.objects, strict=True))
+            moved = {i for i, (a, b) in pairs if a.object_to_world is not b.object_to_world}
+            layout = followed(self.maps.layout, scene, light_pass.buffers, landings, moved)
+        self._scene, self._side = scene, side
+        if layout is None or self.maps is None or not self.maps.follow(layout):
+            shader.release(self.maps)
+            layout = light_pass.layout_about(landings, light_pass.fit.preview(side))
+            self.maps = LightMaps(self._context.ctx, layout, self._features)
         return self.maps
 
     def _plans_for(self, scene: Scene) -> list[LightPlan]:
@@ -95,10 +129,14 @@ class MovedLight:
 
     def release(self) -> None:
         """Free everything."""
-        self._store.clear()
-        shader.release(self.maps)
+        shader.release(self.maps, self._landed)
         if self._tables is not None:
             self._tables.forget()
+
+
+def _steady(photons: int) -> int:
+    """About so many, of a few numbers only: each has orders of emission of its own."""
+    return int(2.0 ** (np.floor(2.0 * np.log2(max(photons, 2))) / 2.0))
 
 
 def _box(item: SceneObject) -> np.ndarray:
