@@ -45,7 +45,7 @@ class ChosenLandings:
     def __init__(self, ctx: moderngl.Context, photon: Struct) -> None:
         self._ctx = ctx
         self._program = shader.compute(ctx, "light/landings.comp", {"WORKGROUP": _GROUP}, (photon,))
-        self._landed = ctx.buffer(reserve=CHOSEN * _LANDED.itemsize)
+        self._landed = ctx.buffer(bytes(CHOSEN * _LANDED.itemsize))
         self._count = ctx.buffer(reserve=4)
 
     def choose(

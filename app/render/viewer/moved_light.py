@@ -55,9 +55,8 @@ class MovedLight:
         """Photons through `scene`, with footprints so much wider, in maps that are fitted to where those of the frame
         before have landed. Without a `plan` there are as many as took about `SECONDS` before."""
         started = time.perf_counter()
-        photons, depth, side = (
-            (self.photons, DEPTH, 1.0) if plan is None else (_steady(plan.photons), plan.depth, plan.side)
-        )
+        wished, depth, side = (self.photons, DEPTH, 1.0) if plan is None else (plan.photons, plan.depth, plan.side)
+        photons = _steady(wished)
         plans = self._plans_for(scene)
         if self._scene is None:
             self._trace(plans, FIRST_PHOTONS, depth, None, widening)
@@ -67,21 +66,19 @@ class MovedLight:
         maps.photon_weight = float(photons)
         took = time.perf_counter() - started
         if plan is None:
-            self.photons = int(np.clip(photons * np.clip(SECONDS / max(took, 1e-4), 0.5, 2.0), FEWEST, MOST))
+            self.photons = int(np.clip(wished * np.clip(SECONDS / max(took, 1e-4), 0.5, 2.0), FEWEST, MOST))
         return maps
 
     def _trace(self, plans: list[LightPlan], photons: int, depth: int, maps: LightMaps | None, widening: float) -> None:
         """Trace about so many photons into `maps`, and choose some of them."""
         light_pass, trace = self._light_pass, self._light_pass.trace
-        pieces = []
+        pieces, seed = [], light_pass.settings.seed
         for plan in plans:
             lattice = plan.lattice_count(photons)
-            parts = -(-lattice * plan.lattices // trace.batch)
+            parts = -(-lattice // (trace.batch // plan.lattices))
             for i in range(parts):
                 points = len(range(i, lattice, parts))
-                pieces.append(
-                    (plan.slice(light_pass.settings.seed, 0, lattice, i, parts, points, float(photons)), plan.domain)
-                )
+                pieces.append((plan.slice(seed, 0, lattice, i, parts, points, float(photons)), plan.domain))
         for number, (piece, domain) in enumerate(pieces):
             waiting = [piece]
             while waiting:
