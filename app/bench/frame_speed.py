@@ -26,7 +26,8 @@ _FRAMES = 4
 """The first one compiles."""
 _TRACES = 3
 """Likewise."""
-_EVENTS = "events_per_dispatch"
+SCHEDULES = {f"{each}, then all": (each,) * (32 // each) + (4096,) for each in (1, 4, 8)} | {"1, in order": ()}
+"""By name: `DeviceTraits.ray_events`."""
 
 
 @dataclass(frozen=True)
@@ -97,23 +98,19 @@ def measure(context: Context, scene: Scene, size: tuple[int, int], photons: Sequ
 
 
 def trace_rates(
-    context: Context, scene: Scene, photons: int, events: Sequence[int], batches: Sequence[int]
-) -> Iterator[dict[str, float]]:
-    """Tracing `photons` alone, with so many `events` a dispatch and rays in flight: the best of a few, ms."""
+    context: Context, scene: Scene, photons: int, batches: Sequence[int]
+) -> Iterator[tuple[str, dict[str, float]]]:
+    """Tracing `photons` alone, so many at once and by each of `SCHEDULES`: the best of a few, ms."""
     traits = context.traits
     try:
-        for each in events:
-            if not hasattr(traits, _EVENTS):
-                if each > 1:
-                    continue
-            else:
-                context.traits = replace(traits, **{_EVENTS: each})  # type: ignore[arg-type]
+        for name, ray_events in {"the device's own": traits.ray_events, **SCHEDULES}.items():
+            context.traits = replace(traits, ray_events=ray_events)
             for batch in batches:
                 with _light(context, scene, RenderSettings(width=480, height=270, batch=batch)) as light:
                     light.begin(photons, 1)
                     spent = [_trace(context, light, photons) for _ in range(_TRACES)]
-                ms, landed = _ms(min(spent[1:])[0]), spent[0][1]
-                yield {"events": each, "batch": batch, "ms": ms, "photons": photons, "landed": landed}
+                figures = {"batch": batch, "photons": photons, "landed": spent[0][1], "ms": _ms(min(spent[1:])[0])}
+                yield f"events a dispatch: {name}", figures
     finally:
         context.traits = traits
 

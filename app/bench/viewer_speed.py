@@ -68,6 +68,8 @@ class Phase:
     """From the last input until every pixel has its own path again …"""
     whole_processor_s: float
     """… and what that took on all cores."""
+    frame_photons: int = 0
+    """Of the last frame that had any."""
     device_ms: dict[str, float] = field(default_factory=dict)
     """Of a frame, by pass and by the device's own timers; empty where these do not work."""
 
@@ -82,6 +84,7 @@ class Phase:
             "longest_ms": float(self.frame_ms.max()),
             "processor_ms": self.processor_ms,
             "pictures_per_s": self.pictures_per_second,
+            "frame_photons": self.frame_photons,
             "photons_per_s": self.photons_per_second,
             "direct_side": self.direct,
             "glass_side": self.glass,
@@ -272,6 +275,7 @@ class _Bench:
             elapsed, worked = time.perf_counter() - started, time.process_time() - worked
             rays = self.session.picture.stats.rays_traced - before.rays_traced
             spent = self._context.timers.since(on_device)
+            photons = self.session.picture.stats.frame_photons
         ended = time.process_time()
         whole_s = self.wait_for_whole()
         return Phase(
@@ -285,6 +289,7 @@ class _Bench:
             float(np.mean(glass)),
             whole_s,
             time.process_time() - ended,
+            photons,
             {name: 1e3 * seconds / len(times) for name, seconds in spent.items()},
         )
 

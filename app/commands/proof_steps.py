@@ -250,26 +250,21 @@ def _dispatch(short: bool, _folder: Path) -> Iterator[Finding]:
 def _frames(short: bool, _folder: Path) -> Iterator[Finding]:
     """Photons traced anew every frame, at the size of a screen."""
     from ..bench import frame_speed
-    from ..bench.machine import compile_line
-    from ..bench.programs import unique
     from ..gpu.context import create_context
-    from ..gpu.shader import recorded
 
     size, photons = ((320, 180), (1 << 12, 1 << 14)) if short else (_SCREEN, (1 << 17, 1 << 20, 1 << 18))
     with create_context() as context:
         for name, scene in _scenes(short):
-            costs = []
-            with recorded() as programs:
-                for cost in frame_speed.measure(context, scene, size, photons):
-                    costs.append(cost)
-                    yield _finding(name, cost.figures)
+            costs, started = [], time.perf_counter()
+            for cost in frame_speed.measure(context, scene, size, photons):
+                costs.append(cost)
+                yield _finding(name, cost.figures | {"since_opened_s": round(time.perf_counter() - started, 2)})
             within = {
                 f"{what}_photons_in_{ms}_ms": frame_speed.photons_within(costs, 1e-3 * ms, what == "frame")
                 for what in ("light", "frame")
                 for ms in (4, 16)
             }
             yield _finding(f"{name}, {size[0]}×{size[1]}", within)
-            yield Finding(f"{name}, compiled", compile_line(unique(programs)))
 
 
 def _trace(short: bool, _folder: Path) -> Iterator[Finding]:
@@ -279,7 +274,8 @@ def _trace(short: bool, _folder: Path) -> Iterator[Finding]:
     photons, batches = (1 << 14, (1 << 13, 1 << 14)) if short else (1 << 20, (1 << 18, 1 << 20))
     with create_context() as context:
         for name, scene in _scenes(short):
-            yield from (_finding(name, found) for found in trace_rates(context, scene, photons, (1, 4, 8), batches))
+            found = trace_rates(context, scene, photons, batches)
+            yield from _measured((f"{name}, {what}", figures) for what, figures in found)
 
 
 def _camera(short: bool, _folder: Path) -> Iterator[Finding]:
@@ -297,7 +293,7 @@ def _viewer(short: bool, _folder: Path) -> Iterator[Finding]:
     from ..bench import viewer_speed
     from ..gpu.context import create_context
 
-    size, frames, seconds = ((160, 90), 8, 2.0) if short else (_SCREEN, 120, 8.0)
+    size, frames, seconds = ((320, 180), 8, 2.0) if short else (_SCREEN, 120, 8.0)
     for name in ("prism",) if short else ("prism", "default"):
         with create_context() as context:
             if short:
@@ -385,7 +381,7 @@ PARTS = (
     Part("trace", "Tracing, by events a dispatch and rays in flight", _trace, (120, 60), True),
     Part("camera", "Camera samples, by the longest dispatch allowed", _camera, (60, 60), True),
     Part("viewer", "Viewer while something moves", _viewer, (90, 60), True),
-    Part("start", "First picture, with an empty cache and with a full one", _start, (120, 60), True),
+    Part("start", "First picture, with an empty cache and with a full one", _start, (120, 120), True),
     Part("compile", "Programs alone, and together", _compile, (120, 120), True),
     Part("additions", "Additions to memory", _additions, (15, 15), True),
     Part("splats", "Splats, by area", _splats, (40, 40), True),

@@ -69,7 +69,7 @@ def draw_timing(state: State, view_model: ViewModel) -> State:
     height = max(imgui.get_content_region_avail().y, theme.em(7)) if is_wide else theme.em(7)
     if imgui.begin_table("##columns", 3 if is_wide else 1, imgui.TableFlags_.sizing_stretch_same):
         imgui.table_next_column()
-        _frame_plot(view_model, height)
+        _frame_plot(state, view_model, height)
         imgui.table_next_column()
         _passes(view_model)
         imgui.table_next_column()
@@ -91,10 +91,12 @@ def _first_order(state: State, stats: LiveStats) -> State:
     return state
 
 
-def _frame_plot(view_model: ViewModel, height: float) -> None:
+def _frame_plot(state: State, view_model: ViewModel, height: float) -> None:
     times = np.asarray(view_model.frame_ms[-240:], float)
     latest, wanted = float(times[-10:].mean()) if times.size else 0.0, view_model.wanted_hz
-    rate = f"{1000 / latest:.0f} of {wanted:.0f} frames/s wanted" if latest > 0 else "no frame yet"
+    rate = f"{1000 / latest:.0f} frames/s" if latest > 0 else "no frame yet"
+    if state.interacting or not view_model.stats.is_software:  # which takes its time while nothing moves
+        rate += f", {wanted:.0f} wanted"
     imgui.text_unformatted(f"Frame  {numbers.milliseconds(latest)}")
     rows.explain(
         "Frame time",
