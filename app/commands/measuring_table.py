@@ -85,13 +85,6 @@ class Stress(ReadsScenes):
 
 
 @dataclass(frozen=True, kw_only=True)
-class BenchBeams:
-    """Measure the search for beams by facets and threshold, and what is left to photons."""
-
-    output: Path = target("DIR", "Folder for beam_costs.json and the plot.", default=Path("bench_beams"))
-
-
-@dataclass(frozen=True, kw_only=True)
 class BenchAgreement(ReadsScenes):
     """Compare a method's caustics with the float64 reference by standard scores, by pixels and in 8x8 blocks."""
 

@@ -10,10 +10,14 @@ from pathlib import Path
 import moderngl
 import numpy as np
 import pytest
-from spectrasplat.bench.beam_costs import scene_of
-from spectrasplat.bench.beam_costs import stone as convex_stone
+from scipy.spatial import ConvexHull
+from spectrasplat.model.geometry.mesh import Mesh
+from spectrasplat.model.geometry.primitives import plane
 from spectrasplat.model.io.scene_file import load_scene
-from spectrasplat.model.scene import Scene
+from spectrasplat.model.lights import CollimatedLight
+from spectrasplat.model.optics.catalogue import find
+from spectrasplat.model.optics.spectrum import illuminant
+from spectrasplat.model.scene import Camera, Dielectric, Diffuse, Scene, SceneObject
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes.trace import Batch
 from spectrasplat.render import pass_rounds
@@ -50,6 +54,38 @@ BEAM = 'kind = "collimated"\nposition = [-8.4, 5.6, 35.0]\ntarget = [0.0, 0.0, 7
 LAMP = 'kind = "spot"\nposition = [-4.2, 2.8, 21.0]\ntarget = [0.0, 0.0, 7.0]\nhalf_angle_deg = 10.0'
 LINES = "{ lines = [[435.8, 1.0], [546.1, 2.0]] }"
 BALL = '[[objects]]\nname = "ball"\nshape = "sphere"\nradius = 2.0\nglass = "N-BK7"\nposition = [25.0, 0.0, 2.0]'
+
+
+def convex_stone(facets: int) -> Mesh:
+    """The hull of points on a Fibonacci spiral: V points in general position give 2 V - 4 triangles."""
+    k = np.arange(facets // 2 + 2)
+    z, turn = 1.0 - (2.0 * k + 1.0) / len(k), k * np.pi * (3.0 - np.sqrt(5.0))
+    ring = np.sqrt(1.0 - z * z)
+    points = 0.5 * np.stack([ring * np.cos(turn), ring * np.sin(turn), z], axis=1)
+    triangles = ConvexHull(points).simplices
+    a, b, c = (points[triangles[:, i]] for i in range(3))
+    outward = np.einsum("ij,ij->i", np.cross(b - a, c - a), a + b + c) > 0.0
+    return Mesh(f"{facets} facets", points, np.where(outward[:, None], triangles, triangles[:, ::-1]))
+
+
+def scene_of(mesh: Mesh) -> Scene:
+    """A stone of diamond, tilted, in a narrow beam above a table."""
+    turned, raised = np.eye(4), np.eye(4)
+    for axes, angle in (((1, 2), 0.21), ((0, 2), 0.13)):
+        step = np.eye(4)
+        step[np.ix_(axes, axes)] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+        turned = step @ turned
+    raised[2, 3] = 1.0
+    lamp = CollimatedLight("lamp", illuminant("D65"), position=(0.0, 0.0, 4.0), direction=(0.0, 0.0, -1.0), radius=0.4)
+    return Scene(
+        name=mesh.name,
+        camera=Camera((0.0, -6.0, 4.0), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+        lights=(lamp,),
+        objects=(
+            SceneObject("stone", mesh, Dielectric(find("diamond")), raised @ turned),
+            SceneObject("table", plane(30.0, 30.0), Diffuse((0.8, 0.8, 0.8)), np.eye(4)),
+        ),
+    )
 
 
 def stone(folder: Path, light: str = BEAM, spectrum: str = '"D65"', more: str = "") -> Scene:
