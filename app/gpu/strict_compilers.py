@@ -10,9 +10,11 @@ import re
 import shutil
 import subprocess
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 from ..base.errors import UserError
+from .glsl_conditionals import Line, macros_of, value_of
 from .live_state import LiveState, live_state
 from .shader import Built
 
@@ -20,6 +22,11 @@ FRONT_END, VALIDATOR, OPTIMISER, DISASSEMBLER = "glslangValidator", "spirv-val",
 _ENVIRONMENT = "opengl4.5"
 APT_LINE = "apt-get install glslang-tools spirv-tools"
 PATIENCE_S = 60.0
+_MOST_UNROLLED = 16
+"""Rounds."""
+_LOOP = re.compile(r"\bfor \(u?int (\w+) = 0u?; \1 < (?:uint\()?(\w+?)u?\)?; \+\+\1\)")
+_BODY = re.compile(r"\s*(?:[^{;]*;|\{(?:[^{}]|\{[^{}]*\})*\})")
+"""A statement, or a block with none but flat ones in it."""
 _REFLECTION = "Uniform block reflection:"
 
 
@@ -56,8 +63,26 @@ def live_states(built: Built) -> tuple[LiveState, ...]:
     """What each stage of a program holds at once, after an optimiser that inlines everything.
 
     Raises `UserError` where the tools are not installed, hang or refuse the program."""
+    stages = tuple(replace(stage, text=_unrolled(stage.text)) for stage in built.stages)
     with tempfile.TemporaryDirectory() as folder:
-        return tuple(_live_state(file) for file in _written(built, Path(folder)))
+        return tuple(_live_state(file) for file in _written(replace(built, stages=stages), Path(folder)))
+
+
+def _unrolled(text: str) -> str:
+    """Loops marked that drivers unroll: over elements of arrays, of known length and few, which become values so. Where
+    the driver is told not to, there are none."""
+    if "unroll none" in text:
+        return text
+    macros = macros_of([(Line(line, "", 0),) for line in text.splitlines() if line.startswith("#define")])
+
+    def marked(found: re.Match[str]) -> str:
+        body = _BODY.match(text, found.end())
+        rounds = value_of(found[2], macros)
+        indexes = body is not None and re.search(rf"\[[^\]]*\b{found[1]}\b", body[0])
+        return f"[[unroll]] {found[0]}" if indexes and rounds and rounds <= _MOST_UNROLLED else found[0]
+
+    version, _, rest = _LOOP.sub(marked, text).partition("\n")
+    return f"{version}\n#extension GL_EXT_control_flow_attributes : require\n{rest}"
 
 
 def _live_state(file: str) -> LiveState:

@@ -170,9 +170,11 @@ class FrameRenderer:
             if traced.buffers.features.environment_lights:
                 traced.environment = EnvironmentLightPass(self._context, traced.buffers, self._settings.seed)
                 yield from self._gather(traced.environment, _GATHERING, _ENVIRONMENT_SHARE, LEAST_DIRECTIONS, stop)
+            if not self._shows_map and (budget is not None or self._context.traits.compiles_ahead):
+                # The driver can compile its programs while light is traced.
+                self._add_camera_pass(traced)
             if budget is not None:
                 if not self._shows_map:
-                    self._add_camera_pass(traced)
                     assert traced.camera_pass is not None
                     traced.camera_pass.draw_haze(*self._view(stage))
                     yield from budget.measuring(traced.camera_pass, *self._view(stage), first=True)

@@ -1,0 +1,60 @@
+"""What the programs of a GPU hold and how large they are: drivers take steeply longer for large ones, and a GPU hides
+its waiting for memory behind as many invocations as its registers have room for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from spectrasplat.base.paths import assets_dir
+from spectrasplat.bench.programs import compiled_programs
+from spectrasplat.gpu import shader, strict_compilers
+from spectrasplat.gpu.context import Context, create_context
+from spectrasplat.gpu.device_traits import DeviceTraits, assumed
+from spectrasplat.gpu.shader import Built
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.settings import RenderSettings
+
+SCENES = sorted((assets_dir() / "scenes").glob("*.toml"), key=lambda path: path.stem)
+MOST_LIVE, MOST_ARRAY_WORDS, MOST_BYTES, MOST_SCENE_BYTES = 220, 64, 75_000, 500_000
+CAMERA = "camera/"
+"""Its programs have bounds of their own."""
+_held: set[tuple[str, ...]] = set()
+"""Texts that were looked at."""
+
+
+@pytest.fixture(scope="module", params=[False, True], ids=["drawn splats", "added splats"])
+def device(request: pytest.FixtureRequest) -> Iterator[Context]:
+    with assumed(DeviceTraits(splats_by_compute=request.param)), create_context() as context:
+        shader.keep_programs(context.ctx)
+        yield context
+        shader.forget_programs(context.ctx)
+
+
+def programs_of(context: Context, path: Path) -> list[Built]:
+    scene = load_scene(path)
+    return compiled_programs(context, scene, RenderSettings(max_depth=scene.render.max_depth))
+
+
+def check(programs: list[Built]) -> None:
+    assert sum(len(text) for built in programs for text in built.texts) <= MOST_SCENE_BYTES
+    for built in programs:
+        if built.name.startswith(CAMERA) or built.texts in _held:
+            continue
+        _held.add(built.texts)
+        assert max(map(len, built.texts)) <= MOST_BYTES, built.name
+        if strict_compilers.missing():
+            continue
+        for state in strict_compilers.live_states(built):
+            assert state.registers <= MOST_LIVE and state.scratch <= MOST_ARRAY_WORDS, (built.name, state)
+
+
+def test_a_scenes_programs_are_small(device: Context) -> None:
+    check(programs_of(device, assets_dir() / "scenes" / "prism.toml"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
+def test_every_scenes_programs_are_small(device: Context, path: Path) -> None:
+    check(programs_of(device, path))
