@@ -17,6 +17,8 @@ from ..gpu.linker import linker_of
 from ..gpu.splat_way import FLOAT_ATOMICS, blending_rate
 
 if TYPE_CHECKING:
+    import moderngl
+
     from ..gpu.context import Context
     from ..gpu.shader import Built
 
@@ -123,7 +125,7 @@ def addition_rates(context: Context, count: int) -> Iterator[Named]:
             )
             sums.clear()
             sums.bind_to_storage_buffer(0)
-            texels_s = count / _best_s(context, partial(program.run, count // _GROUP))
+            texels_s = count / best_s(ctx, partial(program.run, count // _GROUP))
             program.release()
             yield (
                 f"{'float atomics' if is_atomic else 'compare and swap'}, {channels} channels, {pattern}",
@@ -137,16 +139,16 @@ def addition_rates(context: Context, count: int) -> Iterator[Named]:
         yield f"blending RGBA{8 * int(dtype[1])}F", {"texels_g_per_s": _significant(blending_rate(ctx, dtype) / 1e9)}
 
 
-def _best_s(context: Context, work: Callable[[], object]) -> float:
+def best_s(ctx: moderngl.Context, work: Callable[[], object]) -> float:
     """The shortest of a few rounds, s; the first one only warms up."""
     best, until = np.inf, time.perf_counter() + _PATIENCE_S
     for round_number in range(6):
+        ctx.finish()
         started = time.perf_counter()
         work()
-        context.finish()
-        now = time.perf_counter()
-        best = min(best, now - started) if round_number else best
-        if round_number and now > until:
+        ctx.finish()
+        best = min(best, time.perf_counter() - started) if round_number else best
+        if round_number and time.perf_counter() > until:
             break
     return float(best)
 

@@ -7,8 +7,7 @@ import os
 import platform
 import shutil
 import subprocess
-import time
-from collections.abc import Iterable
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,7 +15,6 @@ from ..base.paths import shaders_dir
 
 if TYPE_CHECKING:
     from ..gpu.context import Context
-    from ..gpu.shader import Built
 
 _MEASURING = (
     "model/**/*.py",
@@ -46,9 +44,6 @@ def machine(context: Context) -> dict[str, str]:
 
 
 _CLOCKS = "name,driver_version,clocks.sm,clocks.mem,clocks.max.sm,clocks.max.mem,memory.total,power.limit"
-_COPIED_BYTES = {True: 1 << 24, False: 1 << 28}
-"""By whether the processor draws."""
-_COPIES = 8
 
 
 def clocks() -> str:
@@ -64,30 +59,9 @@ def clocks() -> str:
     return f"{'; '.join(done.stdout.splitlines()) or done.stderr.strip()[:200]} ({_CLOCKS})"
 
 
-def copied_bytes_per_second(context: Context, repeats: int = 4) -> float:
-    """Bytes that the device reads and writes where it copies memory: what its bandwidth can be taken for."""
-    size = _COPIED_BYTES[context.is_software]
-    from_here, to_there = (context.ctx.buffer(reserve=size) for _ in range(2))
-    try:
-        best = 0.0
-        for _ in range(repeats):
-            context.finish()
-            started = time.perf_counter()
-            for _ in range(_COPIES):  # so that starting and waiting, some 0.1 ms on a GPU, take little of it
-                context.ctx.copy_buffer(to_there, from_here)
-            context.finish()
-            best = max(best, 2 * _COPIES * size / max(time.perf_counter() - started, 1e-9))
-        return best
-    finally:
-        from_here.release()
-        to_there.release()
-
-
-def compile_line(programs: Iterable[Built]) -> str:
-    """Seconds that the driver took to compile and link, in all and for the longest three."""
-    slowest = sorted(programs, key=lambda built: built.seconds, reverse=True)
-    longest = ", ".join(f"{built.name} {built.seconds:.2f}" for built in slowest[:3])
-    return f"{len(slowest)} programs in {sum(built.seconds for built in slowest):.2f} s (the longest: {longest})"
+def words(figures: Mapping[str, float]) -> str:
+    """Figures with units in their names, for people."""
+    return ", ".join(f"{name.replace('_', ' ')} {figure:,}" for name, figure in figures.items())
 
 
 def processor() -> str:

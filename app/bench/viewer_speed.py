@@ -18,17 +18,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.errors import UserError
-from ..base.process_age import process_age_s
 from ..edit.glass import set_dispersion_gain
 from ..edit.state import Selection
-from ..gpu.shader import recorded
 from ..passes.sample_picture import SamplePicture
 from ..render.viewer.engine import LiveEngine
 from ..ui.headless import HeadlessInterface
 from ..ui.session import Session
 from ..ui.viewer import Viewer, headless_viewer
-from .machine import clocks, compile_line
-from .programs import unique
 
 if TYPE_CHECKING:
     from ..gpu.context import Context
@@ -89,23 +85,9 @@ class Phase:
             "direct_side": self.direct,
             "glass_side": self.glass,
             "whole_s": self.whole_s,
+            "whole_processor_s": self.whole_processor_s,
         } | {f"{name}_device_ms": spent for name, spent in self.device_ms.items()}
         return {name: float(f"{figure:.4g}") for name, figure in found.items()}
-
-    @property
-    def line(self) -> str:
-        """For the table."""
-        on_device = "".join(f"  {name} {spent:.2f} ms" for name, spent in self.device_ms.items())
-        median, worst = np.percentile(self.frame_ms, [50, 95])
-        return (
-            f"{self.name:<24} {median:8.1f} ms {worst:8.1f} ms {1000 / median:8.1f} /s "
-            f"{self.processor_ms:8.1f} ms "
-            f"{self.pictures_per_second:8.1f} /s "
-            f"{self.photons_per_second / 1e6:8.3f} M/s "
-            f"{self.rays_traced:>12,} {100 * self.direct:6.0f} % {100 * self.glass:6.0f} % {self.whole_s:7.2f} s "
-            f"{self.whole_processor_s:7.2f} s"
-            f"{on_device}"
-        )
 
 
 @dataclass(frozen=True)
@@ -117,54 +99,35 @@ class Latency:
     """Inputs that had none within `ANSWER_S`."""
 
     @property
-    def line(self) -> str:
-        """Their median, a missed one being later than all others, and how many were missed."""
-        median = np.median(np.concatenate([self.answered_ms, np.full(self.missed, np.inf)]))
-        words = f"{median:.0f} ms" if np.isfinite(median) else f"over {ANSWER_S:.0f} s"
-        return f"{words}, {self.missed} later than {ANSWER_S:.0f} s" if self.missed else words
+    def figures(self) -> dict[str, float]:
+        """Their median, where those that were missed took all the time there was, and how many these are."""
+        answered = np.concatenate([self.answered_ms, np.full(self.missed, 1e3 * ANSWER_S)])
+        return {"answered_ms": round(float(np.median(answered)), 1), "missed": self.missed}
 
 
-def figures(
-    context: Context, scene: Path, size: tuple[int, int], frames: int, seconds: float
+def run(
+    context: Context, scene: Path, size: tuple[int, int], seconds: float, frames: float = math.inf
 ) -> Iterator[tuple[str, dict[str, float]]]:
-    """So many `frames` of orbit, drag and turn each, as they are measured; fewer where they take longer than
-    `seconds`."""
+    """What was done, and figures with units in their names, as they are measured: `seconds` for each phase or so many
+    `frames`, a viewport of `size` pixels."""
     bench = _Bench(context, scene, size)
     try:
         first = bench.wait_for_picture()
         whole = first + bench.wait_for_whole()
-        yield f"{scene.stem}, start", {"first_picture_s": round(first, 3), "whole_s": round(whole, 3)}
-        for name, hold, act in bench.movements:
-            yield f"{scene.stem}, {name}", bench.phase(name, seconds, act, hold, frames).figures
-    finally:
-        bench.release()
-
-
-def run(context: Context, scene: Path, size: tuple[int, int], seconds: float) -> Iterator[str]:
-    """Lines of the report, as they are measured: `seconds` for each phase, a viewport of `size` pixels."""
-    bench = _Bench(context, scene, size)
-    try:
-        yield f"{scene.stem}, viewport {bench.viewport[0]}×{bench.viewport[1]}, {context.renderer}, {context.version}"
-        if known := clocks():
-            yield known
-        with recorded() as programs:
-            first = bench.wait_for_picture()
-        yield f"first picture after {first:.2f} s; compiled {compile_line(unique(programs))}"
-        whole = f"whole after {first + bench.wait_for_whole():.2f} s"
-        age = process_age_s()
-        yield whole if age is None else f"{whole}, {age:.2f} s from the start of the process"
-        heads = "".join(f" {head:>11}" for head in ("median", "95 %", "frames", "processor", "pictures"))
-        heads += f" {'photons':>12} {'rays traced':>12} {'direct':>8} {'glass':>8} {'whole':>9} {'processor':>9}"
-        yield f"{'':<24}{heads}"
-        for name, hold, act in (("accumulating", None, bench.rest), *bench.movements):
-            yield bench.phase(name, seconds, act, hold).line
+        yield "first picture", {"first_s": round(first, 3), "whole_s": round(whole, 3)}
+        if frames == math.inf:
+            yield "accumulating", bench.phase("accumulating", seconds, bench.rest).figures
+        for name, hold, act in (
+            ("orbiting", bench.holding_middle_button, bench.orbit),
+            ("dragging dispersion", bench.holding_gain, bench.drag_gain),
+            ("turning the glass", bench.holding_gain, bench.turn_glass),
+        ):
+            yield name, bench.phase(name, seconds, act, hold, frames).figures
             for _ in range(30):
                 bench.interface.frame()
-        yield (
-            f"input to picture: camera {bench.latency(bench.nudge_camera).line}, "
-            f"dispersion {bench.latency(bench.nudge_gain).line} (median of {NUDGES})"
-        )
-        yield f"device memory {bench.session.picture.stats.bytes / 2**20:.0f} MiB"
+        yield "device memory", {"mib": round(bench.session.picture.stats.bytes / 2**20)}
+        yield "a step of the camera", bench.latency(bench.nudge_camera).figures
+        yield "a step of dispersion", bench.latency(bench.nudge_gain).figures
     finally:
         bench.release()
 
@@ -235,15 +198,6 @@ class _Bench:
             if time.perf_counter() - started > PATIENCE_S:
                 raise UserError(f"no picture after {PATIENCE_S:.0f} s")
         return time.perf_counter() - started
-
-    @property
-    def movements(self) -> tuple[tuple[str, Callable[[], _Held], Callable[[], None]], ...]:
-        """What is moved: its name, what is held, and what is done before each frame."""
-        return (
-            ("orbiting", self.holding_middle_button, self.orbit),
-            ("dragging dispersion", self.holding_gain, self.drag_gain),
-            ("turning the glass", self.holding_gain, self.turn_glass),
-        )
 
     def phase(
         self,

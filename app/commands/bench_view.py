@@ -14,10 +14,12 @@ def bench_view(options: BenchView) -> int:
     scene = find_scene(options.scene)
 
     from ..bench import viewer_speed
+    from ..bench.machine import words
     from ..gpu.context import create_context
 
     with create_context() as context:
         size = options.size or DEFAULT_SIZE[context.is_software]
-        for line in viewer_speed.run(context, scene, size, options.seconds):
-            print(line, flush=True)
+        print(f"{scene.stem}, viewport {size[0]}×{size[1]}, {context.renderer}, {context.version}")
+        for name, figures in viewer_speed.run(context, scene, size, options.seconds):
+            print(f"{name:<22}{words(figures)}", flush=True)
     return 0

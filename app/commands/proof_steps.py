@@ -299,7 +299,8 @@ def _viewer(short: bool, _folder: Path) -> Iterator[Finding]:
             if short:
                 few = replace(context.traits.viewer, first_photons=1 << 11, largest_photons=1 << 12)
                 context.traits = replace(context.traits, viewer=few)
-            yield from _measured(viewer_speed.figures(context, shipped_scenes()[name], size, frames, seconds))
+            found = viewer_speed.run(context, shipped_scenes()[name], size, seconds, frames)
+            yield from _measured((f"{name}, {what}", figures) for what, figures in found)
 
 
 def _start(short: bool, _folder: Path) -> Iterator[Finding]:
@@ -366,8 +367,9 @@ def _measured(found: Iterable[tuple[str, Mapping[str, float]]]) -> Iterator[Find
 
 
 def _finding(name: str, figures: Mapping[str, float]) -> Finding:
-    words = ", ".join(f"{key.replace('_', ' ')} {figure:,}" for key, figure in figures.items())
-    return Finding(name, words, figures=dict(figures))
+    from ..bench.machine import words
+
+    return Finding(name, words(figures), figures=dict(figures))
 
 
 PARTS = (
