@@ -13,6 +13,7 @@ import numpy as np
 from ..features.features import Features
 from ..model.scene_checks import MAX_OBJECTS
 from ..model.tint_levels import LEVELS
+from .packed_records import PackedStruct
 from .schema import Field, Struct
 
 NONE = 0xFFFFFFFF
@@ -148,11 +149,16 @@ _COMPANIONS_POLARISATION = tuple(
 
 
 def ray_record(
-    columns: int, hero: bool = False, polarised: bool = False, flights: bool = False, tinted: bool = False
+    columns: int,
+    hero: bool = False,
+    polarised: bool = False,
+    flights: bool = False,
+    tinted: bool = False,
+    packs: bool = False,
 ) -> Struct:
     """State of one ray between two surfaces; `columns` derivative columns, spatial ones first; `hero` as above;
     `polarised`: with its state of polarisation; `flights`: with how far it has come through haze; `tinted`: and through
-    the glass whose tint has levels."""
+    the glass whose tint has levels. `packs`: `DeviceTraits.packs_rays`."""
     fields = [
         Field("position", "vec3", "GPU space"),
         Field("flux_w", "float", "accounted radiant flux of the band, W"),
@@ -169,9 +175,11 @@ def ray_record(
         Field("flags", "uint", "FLAG_*"),
         Field("depth", "uint", "specular events so far"),
         Field("last_primitive", "uint", "facet the ray left, or NONE"),
-        Field("last_object", "uint", "its object, or NONE"),
         Field("inside_mask", "uint", "medium stack: one bit a solid the ray is inside of"),
-        Field("inside_object", "uint", "without a medium stack: the solid the ray is inside of, or NONE"),
+        Field("last_object", "uint", "its object, or NONE", packing="index"),
+        Field(
+            "inside_object", "uint", "without a medium stack: the solid the ray is inside of, or NONE", packing="index"
+        ),
     ]
     if columns:
         fields += [
@@ -181,20 +189,22 @@ def ray_record(
                 "xyz: GPU space per lattice spacing, or per unit of a group's variable; w of the first: where its light"
                 " ends (`packed_edge`), as a number",
                 columns,
+                "columns, w",
             ),
-            Field("ddirection", "vec4", "xyz: per the same", columns),
+            Field("ddirection", "vec4", "xyz: per the same", columns, "columns"),
         ]
     fields += _COMPANIONS if hero else ()
     fields += _POLARISATION if polarised else ()
     fields += _COMPANIONS_POLARISATION if hero and polarised else ()
     fields += (Field("flown", "vec4", "x: way outside glass so far, GPU units"),) if flights else ()
     fields += (Field("tinted", "vec4", "x: way through that glass so far, times its rate"),) if tinted else ()
-    return Struct("RayRecord", tuple(fields), texels=True)
+    return (PackedStruct if packs else Struct)("RayRecord", tuple(fields), texels=True)
 
 
-def ray_record_of(features: Features) -> Struct:
+def ray_record_of(features: Features, packs: bool = False) -> Struct:
     """`ray_record` as a scene's programs have it."""
-    return ray_record(features.columns, features.hero, features.polarised, features.flights, features.tint_levels > 0)
+    is_tinted = features.tint_levels > 0
+    return ray_record(features.columns, features.hero, features.polarised, features.flights, is_tinted, packs)
 
 
 FLIGHT = Struct(

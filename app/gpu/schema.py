@@ -25,7 +25,7 @@ _TYPES = {
 
 
 # numpy base -> GLSL to and from its bits
-_BITS = {"f4": ("floatBitsToUint", "uintBitsToFloat"), "u4": ("uint", "uint"), "i4": ("uint", "int")}
+BITS = {"f4": ("floatBitsToUint", "uintBitsToFloat"), "u4": ("uint", "uint"), "i4": ("uint", "int")}
 
 
 @dataclass(frozen=True)
@@ -37,6 +37,18 @@ class Field:
     comment: str = ""
     count: int = 1
     """Array length; 1 is a plain member."""
+    packing: str = ""
+    """How a `PackedStruct` holds it; "": as it is."""
+
+    @property
+    def base(self) -> str:
+        """Of numpy, of a component."""
+        return _TYPES[self.type][0]
+
+    @property
+    def components(self) -> int:
+        """Of a vector; 0: none."""
+        return _TYPES[self.type][1] if _TYPES[self.type][1] > 1 else 0
 
 
 @dataclass(frozen=True)
@@ -113,17 +125,20 @@ class Struct:
                 for component in range(components):
                     part = member + (f"[{component}]" if components > 1 else "")
                     texel = f"texels[{word // 4}][{word % 4}]"
-                    to_bits, from_bits = _BITS[base]
+                    to_bits, from_bits = BITS[base]
                     pack.append(f"    {texel} = {to_bits}({part});")
                     unpack.append(f"    {part} = {from_bits}({texel});")
                     word += 1
+        return self._functions(word // 4, pack, unpack)
+
+    def _functions(self, texels: int, pack: list[str], unpack: list[str]) -> str:
         count = f"{self.name}_TEXELS"
         # Without a loop: a compiler with orders not to unroll (camera.comp) would load every texel, into memory, where
         # most callers want one member.
-        loads = ", ".join(f"load((at) + {i}u)" for i in range(word // 4))
+        loads = ", ".join(f"load((at) + {i}u)" for i in range(texels))
         return "\n".join(
             [
-                f"#define {count} {word // 4}",
+                f"#define {count} {texels}",
                 f"void to_texels({self.name} value, out uvec4 texels[{count}]) {{",
                 *pack,
                 "}",
@@ -135,6 +150,10 @@ class Struct:
                 f"#define {self.name}_FROM(load, at) {self.name}_of(uvec4[{count}]({loads}))\n",
             ]
         )
+
+    def packed(self, records: np.ndarray) -> np.ndarray:
+        """Records as the device has them."""
+        return np.ascontiguousarray(records)
 
     def zeros(self, count: int) -> np.ndarray:
         """`count` records of zero bytes."""

@@ -12,13 +12,15 @@ import numpy as np
 
 from ..features.features import Features
 from ..gpu import bindings, records, shader
-from .ray_queue import PHOTON_ROOM, Followed, QueueParts, strides
+from ..gpu.device_traits import DeviceTraits
+from .ray_queue import Followed, QueueParts, strides
 
-RAY_ROOM = 2.5
-"""Slots per lattice point of a batch."""
+RAY_ROOM, PHOTON_ROOM = 1.6, 2.5
+"""Slots for rays per lattice point of a batch, and room for photons: what finds no slot waits, a batch without room for
+its photons is traced again in parts."""
 _GROUP = 64
-_LISTS = 5
-"""Numbers of slots in lists, ring and links, per slot (lib/pool.glsl)."""
+_LISTS = 4
+"""Numbers of slots in lists and ring, per slot (lib/pool.glsl)."""
 STRUCTS = (records.OUTCOME, records.POOL_TALLY, records.POOL_STATE)
 
 
@@ -30,29 +32,36 @@ class RayPool:
     """Owns the rays' buffer `rays`; `photons` is what they leave, in any order."""
 
     def __init__(self, parts: QueueParts) -> None:
-        ctx, slots, (ray, photon) = parts.context.ctx, _slots(parts.batch), strides(parts.features)
+        ctx, slots, (ray, photon) = (
+            parts.context.ctx,
+            _slots(parts.batch),
+            strides(parts.features, parts.context.traits),
+        )
         self._context = parts.context
+        self._ray = records.ray_record_of(parts.features, parts.context.traits.packs_rays)
         self._events = parts.context.traits.ray_events
         self._sum = shader.compute(ctx, "light/pool_tally.comp", parts.defines, parts.structs)
         self._state_zero = records.POOL_STATE.zeros(1)
         self._state_zero["capacity"] = self._state_zero["free_end"] = self._state_zero["returned"] = slots
-        self._state_zero["photon_capacity"] = PHOTON_ROOM * parts.batch
+        self._state_zero["photon_capacity"] = int(PHOTON_ROOM * parts.batch)
         self.rays = ctx.buffer(reserve=slots * ray)
         self._lists = ctx.buffer(reserve=4 * _LISTS * slots)
         self._tallies = ctx.buffer(bytes(slots // _GROUP * records.POOL_TALLY.stride))
         self.state = ctx.buffer(self._state_zero.tobytes())
-        self.photons = ctx.buffer(reserve=PHOTON_ROOM * parts.batch * photon)
+        self.photons = ctx.buffer(reserve=int(PHOTON_ROOM * parts.batch) * photon)
 
     @staticmethod
-    def bytes_of(features: Features, batch: int) -> int:
+    def bytes_of(features: Features, traits: DeviceTraits, batch: int) -> int:
         """Device memory of the pool for so many lattice points."""
-        (ray, photon), slots = strides(features), _slots(batch)
-        return slots * (ray + 4 * _LISTS) + slots // _GROUP * records.POOL_TALLY.stride + PHOTON_ROOM * batch * photon
+        (ray, photon), slots = strides(features, traits), _slots(batch)
+        return (
+            slots * (ray + 4 * _LISTS) + slots // _GROUP * records.POOL_TALLY.stride + int(PHOTON_ROOM * batch) * photon
+        )
 
     @staticmethod
-    def most(features: Features, block_bytes: int) -> int:
+    def most(features: Features, traits: DeviceTraits, block_bytes: int) -> int:
         """Lattice points whose pool fits storage blocks of so many bytes, and a dispatch."""
-        ray, photon = strides(features)
+        ray, photon = strides(features, traits)
         per_point = max(RAY_ROOM * ray, PHOTON_ROOM * photon)
         return int(min(block_bytes // per_point, 65535 * _GROUP // RAY_ROOM))
 
@@ -73,7 +82,7 @@ class RayPool:
         state["alive"] = state["taken"] = state["taken_before"] = state["most_alive"] = state["emitted"] = count
         state["trace_groups"] = (-(-count // _GROUP), 1, 1, 0)
         self.state.write(state.tobytes())
-        self.rays.write(np.ascontiguousarray(rays))
+        self.rays.write(self._ray.packed(rays))
 
     def send(self, trace: moderngl.ComputeShader, bind: Callable[[], None]) -> None:
         """Follow the rays; the last dispatch follows all that is left. Nothing is waited for."""

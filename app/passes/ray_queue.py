@@ -15,6 +15,7 @@ from ..features.features import Features
 from ..features.program_switches import Defines
 from ..gpu import bindings, records, shader
 from ..gpu.context import Context
+from ..gpu.device_traits import DeviceTraits
 from ..gpu.schema import Struct
 
 RAY_ROOM = 3
@@ -39,10 +40,10 @@ class QueueParts:
     """Lattice points."""
 
 
-def strides(features: Features) -> tuple[int, int]:
+def strides(features: Features, traits: DeviceTraits) -> tuple[int, int]:
     """Bytes of a ray's record and of a photon's."""
     photon = records.photon_record(features.spectral_groups, features.hero)
-    return records.ray_record_of(features).stride, photon.stride
+    return records.ray_record_of(features, traits.packs_rays).stride, photon.stride
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,7 @@ class OrderedQueue:
     """Owns the rays' buffers, of which emission fills `rays`; `photons` is what they leave."""
 
     def __init__(self, parts: QueueParts) -> None:
-        ctx, batch, (ray, photon) = parts.context.ctx, parts.batch, strides(parts.features)
+        ctx, batch, (ray, photon) = parts.context.ctx, parts.batch, strides(parts.features, parts.context.traits)
         self._context = parts.context
         names = "count", "scan", "scatter", "gather"
         queue = [shader.compute(ctx, f"light/queue_{name}.comp", parts.defines, parts.structs) for name in names]
@@ -90,15 +91,15 @@ class OrderedQueue:
         self._emitted = 0
 
     @staticmethod
-    def bytes_of(features: Features, batch: int) -> int:
+    def bytes_of(features: Features, traits: DeviceTraits, batch: int) -> int:
         """Device memory of the queue for so many lattice points."""
-        (ray, photon), room = strides(features), RAY_ROOM * batch
+        (ray, photon), room = strides(features, traits), RAY_ROOM * batch
         return room * (4 * ray + records.OUTCOME.stride + photon + 8) + PHOTON_ROOM * batch * photon
 
     @staticmethod
-    def most(features: Features, block_bytes: int) -> int:
+    def most(features: Features, traits: DeviceTraits, block_bytes: int) -> int:
         """Lattice points whose queue fits storage blocks of so many bytes."""
-        return block_bytes // (2 * RAY_ROOM * strides(features)[0])
+        return block_bytes // (2 * RAY_ROOM * strides(features, traits)[0])
 
     def begin(self, count: int) -> None:
         """Before `count` lattice points are emitted."""

@@ -206,7 +206,7 @@ class TracePass:
         """Rays emitted since this pass was made, pilots and all."""
         self.split_threshold = split_threshold
         self.widest_on_surface = widest_on_surface
-        self.ray = records.ray_record_of(features)
+        self.ray = records.ray_record_of(features, context.traits.packs_rays)
         self.photon = records.photon_record(features.spectral_groups, features.hero)
         ctx = context.ctx
         structs = (
@@ -221,7 +221,7 @@ class TracePass:
         self._orders: dict[tuple[int, int, int], moderngl.Buffer] = {}
         self._reports: list[moderngl.Buffer] = []
         self._photons_a_point: dict[int, float] = {}
-        """Room that batches of a light are given, as earlier ones needed it."""
+        """Room that batches of a light are given, as the last one needed it."""
         self._trace = shader.compute(ctx, "light/trace.comp", defines, (*structs, records.TRACE_PARAMETERS))
         self._queue = queue_class(context.traits)(QueueParts(context, features, defines, structs, batch))
         self.photons, self.emitted_rays = self._queue.photons, self._queue.rays
@@ -250,7 +250,7 @@ class TracePass:
     @property
     def bytes(self) -> int:
         """Device memory that the queue takes while photons are traced."""
-        return self._queue.bytes_of(self._features, self.batch)
+        return self._queue.bytes_of(self._features, self.context.traits, self.batch)
 
     def run(self, piece: LatticeSlice, domain: EmissionDomain, max_depth: int | None = None) -> Batch:
         """Trace `piece.count` ≤ batch lattice points; their photons replace the buffer's content.
@@ -271,14 +271,28 @@ class TracePass:
         max_depth = self.max_depth if max_depth is None else min(max_depth, self.max_depth)
         self._queue.begin(piece.count)
         self._emit(piece, domain, max_depth, split_threshold or self.split_threshold)
-        return (yield from self._follow(max_depth))
+        return self._learned(piece, (yield from self._follow(max_depth)))
+
+    def most_points(self, light: int) -> int:
+        """Lattice points of a batch whose photons find room, as far as it is known."""
+        return min(self.batch, int(self._photon_room / max(self._photons_a_point.get(light, 0.0), 1e-9)))
+
+    def _learned(self, piece: LatticeSlice, batch: Batch) -> Batch:
+        self._photons_a_point[piece.light] = MORE_PHOTONS * batch.photons / max(piece.count, 1)
+        return batch
+
+    @property
+    def _photon_room(self) -> int:
+        return self.photons.size // self.photon.stride
 
     def send(self, piece: LatticeSlice, domain: EmissionDomain) -> Sent | None:
         """`run` without waiting; None where rays are counted after every event."""
         queue = self._queue
         if not isinstance(queue, RayPool):
             return None
-        most = int(min(PHOTON_ROOM, self._photons_a_point.get(piece.light, PHOTON_ROOM)) * piece.count) + _GROUP
+        most = self._photon_room
+        if piece.light in self._photons_a_point:
+            most = min(most, int(self._photons_a_point[piece.light] * piece.count) + _GROUP)
         queue.begin(piece.count, most)
         self._emit(piece, domain, self.max_depth, self.split_threshold)
         queue.send(self._trace, self._bind)
@@ -287,9 +301,7 @@ class TracePass:
 
         def batch() -> Batch:
             self._reports.append(report)
-            counted = self._batch_of(queue.counted(report))
-            self._photons_a_point[piece.light] = MORE_PHOTONS * counted.photons / piece.count
-            return counted
+            return self._learned(piece, self._batch_of(queue.counted(report)))
 
         return Sent(most, (queue.state, records.POOL_STATE.offset("drawn")), batch)
 

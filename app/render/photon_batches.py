@@ -244,6 +244,6 @@ def batch_size(context: Context, features: Features, given: int | None) -> int:
     """Lattice points in flight at once: `given`, or what the device and its memory have room for."""
     traits, batch = context.traits, given or context.traits.photon_batch
     queue, most_bytes = queue_class(traits), min(traits.photon_queue_bytes, available_bytes() // 8)
-    while given is None and batch > SMALLEST_BATCH and queue.bytes_of(features, batch) > most_bytes:
+    while given is None and batch > SMALLEST_BATCH and queue.bytes_of(features, traits, batch) > most_bytes:
         batch >>= 1
-    return min(batch, max(64, queue.most(features, context.limits.storage_block_bytes) // 64 * 64))
+    return min(batch, max(64, queue.most(features, traits, context.limits.storage_block_bytes) // 64 * 64))

@@ -9,7 +9,8 @@ layout(std430, binding = BIND_POOL_SLOTS) restrict buffer PoolSlots { uint pool_
 // twice as many places as slots, or one would be given back where another that is new has not been found yet.
 uint listed_at(uint later, uint k) { return ((state.dispatches + later) & 1u) * state.capacity + k; }
 uint ring_at(uint place) { return 2u * state.capacity + place % (2u * state.capacity); }
-uint link_at(uint slot) { return 4u * state.capacity + slot; }
+// Where an invocation follows all that becomes of its ray, none stays: their list is free.
+uint link_at(uint slot) { return listed_at(1u, slot); }
 
 // At first every slot is free, in order.
 uint free_slot(uint place) { return place < state.capacity ? place : pool_slots[ring_at(place)]; }

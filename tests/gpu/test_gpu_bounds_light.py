@@ -28,14 +28,14 @@ THRESHOLD = 0.003
 SCHEDULES: tuple[tuple[int, ...], ...] = ((), (1,) * 12 + (4096,), (4,) * 6 + (4096,), (8, 8, 8, 4096), (1, 4096))
 """One event at a time, in order; then so many at once, and at last whatever is left."""
 FAST = ("prism", "spectrometer")
-BYTES_A_PHOTON = 1200
+BYTES_A_PHOTON = 600
 
 
 @contextmanager
-def device(events: tuple[int, ...]) -> Iterator[Context]:
+def device(events: tuple[int, ...], packs: bool = False) -> Iterator[Context]:
     """This one, with rays followed like that."""
     with create_context() as context:
-        traits = replace(context.traits, ray_events=events)
+        traits = replace(context.traits, ray_events=events, packs_rays=packs)
     with device_traits.assumed(traits), create_context() as context:
         yield context
 
@@ -100,7 +100,7 @@ def test_rays_without_room_wait_and_nothing_is_lost(monkeypatch: pytest.MonkeyPa
 
 
 def test_a_batch_asks_for_few_dispatches_and_waits_for_nothing() -> None:
-    with device(DeviceTraits().ray_events) as context:
+    with device(DeviceTraits().ray_events, packs=True) as context:
         for trace, _ in traced(context, "prism", POINTS):
             assert trace.bytes / trace.batch <= BYTES_A_PHOTON
         with counted() as counts:
@@ -115,6 +115,7 @@ def test_what_is_counted_late_is_the_same_light(too_few: bool, monkeypatch: pyte
         load_scene(shipped_scenes()["prism"]),
         RenderSettings(width=64, height=36, photons=PHOTONS, method="srd-photons", batch=2_048),
     )
+    monkeypatch.setattr(ray_pool, "PHOTON_ROOM", 5.0)
     found = []
     with device(DeviceTraits().ray_events) as context:
         buffers = scene_buffers(context, scene, settings)

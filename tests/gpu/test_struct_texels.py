@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from spectrasplat.gpu.records import OUTCOME, photon_record, ray_record
+from spectrasplat.gpu.packed_records import PackedStruct
+from spectrasplat.gpu.records import NONE, OUTCOME, photon_record, ray_record
 from spectrasplat.gpu.schema import Field, Struct
 from spectrasplat.stress.rigs.glsl_function import evaluate
 
@@ -83,3 +84,42 @@ def test_members_lie_where_numpy_has_them(gl) -> None:
 def test_a_record_that_does_not_fill_texels_is_refused() -> None:
     with pytest.raises(ValueError, match="whole texels"):
         Struct("Short", (Field("a", "uint"), Field("b", "uint")), texels=True)
+
+
+def test_a_packed_record_keeps_what_it_says(gl) -> None:
+    """Columns to 18 bits of their largest component, small indices and all else whole; numpy packs the same words."""
+    fields = (
+        Field("columns", "vec4", "", 2, "columns, w"),
+        Field("first", "uint", packing="index"),
+        Field("second", "uint", packing="index"),
+        Field("whole", "vec2"),
+    )
+    struct = PackedStruct("Packed", fields, texels=True)
+    assert struct.stride == 32 and struct.dtype.itemsize == 48
+    random = np.random.default_rng(3)
+    records = struct.zeros(ROWS)
+    records["columns"] = random.normal(size=(ROWS, 2, 4)) * 10.0 ** random.uniform(-10, 5, (ROWS, 2, 1))
+    records["columns"][0] = 0.0
+    records["columns"][1, :, 0] = 1e9
+    records["first"], records["second"] = random.integers(0, 0xFFFF, (2, ROWS))
+    records["second"][::3] = NONE
+    records["whole"] = random.normal(size=(ROWS, 2))
+    words = struct.packed(records)
+    texels = {f"half{i}": np.ascontiguousarray(words[:, 2 * i : 2 * i + 2]) for i in range(4)}
+    body = """
+    uvec4 texel0 = uvec4(half0, half1), texel1 = uvec4(half2, half3);
+    Packed value = Packed_of(uvec4[2](texel0, texel1));
+    uvec4 texels[2];
+    to_texels(value, texels);
+    same = all(equal(texels[0], texel0)) && all(equal(texels[1], texel1)) ? 1u : 0u;
+    column = value.columns[1].xyz; edge = value.columns[0].w;
+    first = value.first; second = value.second; whole = value.whole;
+    """
+    outputs = {"same": "uint", "column": "vec3", "edge": "float", "first": "uint", "second": "uint", "whole": "vec2"}
+    got = evaluate(gl.ctx, ["lib/random.glsl"], body, texels, outputs, structs=[struct])
+    for name in ("first", "second", "whole"):
+        np.testing.assert_array_equal(got[name], records[name])
+    np.testing.assert_array_equal(got["edge"], records["columns"][:, 0, 3])
+    assert (got["same"][2:] == 1).all() and not np.isfinite(got["column"][1]).any()
+    column, wanted = got["column"][2:].astype(float), records["columns"][2:, 1, :3].astype(float)
+    assert (np.abs(column - wanted) <= np.abs(wanted).max(axis=1)[:, None] * 2.0**-18).all()

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from unittest import mock
 
 import numpy as np
 from spectrasplat.features.features import Features
@@ -68,7 +69,8 @@ def emit(
     scene = Scene("emission", Camera((0, 0, 9), (0, 0, 0), up=(0, 1, 0)), (light,), objects)
     features = Features.of(scene, RenderSettings(method="stochastic-point"))
     buffers = SceneBuffers(gl.ctx, scene, features, spectral_axis(scene, features))
-    trace = TracePass(gl, features, buffers, batch=BATCH, max_depth=1)
+    with mock.patch.object(gl, "traits", replace(gl.traits, packs_rays=False)):
+        trace = TracePass(gl, features, buffers, batch=BATCH, max_depth=1)
     rng = np.random.default_rng(seed)
     try:
         domain = emission_domain(light, scene, buffers.space, buffers.space.to_gpu(solid.corners()))
