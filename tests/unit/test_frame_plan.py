@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Sequence
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from spectrasplat.render.viewer.frame_plan import DEPTHS, FEWEST, FIRST, MOST, SIDES, FramePlan, Spent
+from spectrasplat.render.viewer.frame_planner import FramePlanner
 
 FRAME_S = 1 / 60
 Device = Callable[[int, FramePlan], Spent]
@@ -124,3 +127,48 @@ def test_what_cannot_be_is_ignored() -> None:
     for _ in range(12):
         plan = plan.after(Spent(1, 1e9), 1e-9)
     assert plan.photons == FEWEST
+
+
+def planner(works: bool = True) -> tuple[FramePlanner, SimpleNamespace]:
+    timers = SimpleNamespace(work=works, frame=None)
+    return FramePlanner(SimpleNamespace(timers=timers, finish=lambda: time.sleep(2e-3))), timers  # type: ignore[arg-type]
+
+
+def test_a_frame_is_learnt_of_once_all_its_times_are_known() -> None:
+    plans, timers = planner()
+    plans.begin()
+    times = timers.frame
+    times.awaited = 1
+    plans.count("moved", FIRST, FRAME_S)
+    plans.end()
+    assert timers.frame is None
+    plans.begin()
+    plans.end()
+    assert plans["moved"] == FramePlan()
+    times.seconds, times.awaited = {"trace": 0.02, "splat": 0.02, "camera": 0.004}, 0
+    plans.begin()
+    assert plans["moved"].known == (Spent(FIRST, 0.04, 0.0, 0.004),) and plans["moved"].photons < FIRST
+    assert plans["stored"] == plans["refining"] == FramePlan()
+    plans.restart()
+    assert plans["moved"] == FramePlan()
+
+
+def test_what_one_frame_traces_and_the_next_one_splats_counts_together() -> None:
+    plans, timers = planner()
+    for photons, seconds in ((0, {"trace": 3e-3}), (1000, {"splat": 2e-3, "camera": 9e-3})):
+        plans.begin()
+        timers.frame.seconds = seconds
+        plans.count("refining", photons, FRAME_S)
+        plans.end()
+    plans.begin()
+    assert plans["refining"].known == (Spent(1000, pytest.approx(5e-3), 0.0, 0.0),)
+
+
+def test_without_timers_the_clock_serves() -> None:
+    plans, _ = planner(works=False)
+    plans.begin()
+    plans.count("stored", 1000, FRAME_S)
+    plans.end()
+    plans.begin()
+    (spent,) = plans["stored"].known
+    assert 2e-3 <= spent.light < 0.1 and 2e-3 <= spent.rest < 0.1

@@ -232,6 +232,8 @@ class LiveEngine(EngineAnswers):
         match action:
             case Action.BUILD:
                 self.problem = None
+                if self._planner is not None and self._level == DirtyLevel.BUILD:
+                    self._planner.restart()
                 if self._shown is not None and self._shown.light.light_pass.beams is not None:
                     self._shown.light.light_pass.beams.pause()
                 sizes = self._first_budget, self._wanted, self._largest, self._target_photons

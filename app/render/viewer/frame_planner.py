@@ -36,10 +36,15 @@ class FramePlanner:
 
     def __init__(self, context: Context) -> None:
         self._context = context
-        self._plans: dict[Kind, FramePlan] = dict.fromkeys(get_args(Kind), FramePlan())
+        self.restart()
         self._frames: deque[_Frame] = deque(maxlen=_LATEST)
         self._frame = _Frame(FrameTimes())
-        self._started = self._unpaired = 0.0
+        self._started = 0.0
+
+    def restart(self) -> None:
+        """Another scene: what is known of this one's light says nothing of it."""
+        self._plans: dict[Kind, FramePlan] = dict.fromkeys(get_args(Kind), FramePlan())
+        self._unpaired = 0.0
 
     def __getitem__(self, kind: Kind) -> FramePlan:
         return self._plans[kind]
