@@ -2,12 +2,13 @@
 
 moderngl waits for every program, holds Python's lock meanwhile, and knows no binaries. Here the driver compiles without
 the lock, and programs side by side where it has threads for them (GL_KHR_parallel_shader_compile): nothing waits for a
-program before its first use. Binaries are kept on the disk (`program_store`), so that a later process compiles nothing.
+program before its first use. Binaries are kept on the disk (`BINARIES`), so that a later process compiles nothing.
 """
 
 from __future__ import annotations
 
 import ctypes
+import hashlib
 import time
 import weakref
 from collections.abc import Callable, Mapping, Sequence
@@ -16,9 +17,8 @@ from typing import Any
 
 import moderngl
 
-from . import program_store
+from ..base.kept_files import KeptFiles
 from .device_traits import DeviceTraits
-from .program_store import Binary
 
 _COMPUTE_SHADER, _VERTEX_SHADER, _FRAGMENT_SHADER = 0x91B9, 0x8B31, 0x8B30
 _COMPILE_STATUS, _LINK_STATUS, _COMPLETION_STATUS, _LOG_LENGTH = 0x8B81, 0x8B82, 0x91B1, 0x8B84
@@ -30,6 +30,8 @@ _KINDS = {1: {"compute": _COMPUTE_SHADER}, 2: {"vertex": _VERTEX_SHADER, "fragme
 _STUB = "#version 430 core\nvoid main() {}\n"
 _COMPUTE_STUB = f"{_STUB}layout(local_size_x = 1) in;\n"
 """What moderngl compiles in place of a program that it adopts."""
+BINARIES = KeptFiles("programs", 64 << 20, most_bytes=256 << 20)
+"""Form (4 bytes) and code of each, as glGetProgramBinary gives them for one device and driver."""
 _LOOK_S = 0.002
 _UINT, _INT, _POINTER, _TEXT = ctypes.c_uint, ctypes.c_int, ctypes.c_void_p, ctypes.c_char_p
 _INTEGER = ctypes.POINTER(_INT)
@@ -48,6 +50,7 @@ _SIGNATURES: dict[str, tuple[Any, ...]] = {
     "GetIntegerv": (None, _UINT, _INTEGER),
     "DispatchCompute": (None, _UINT, _UINT, _UINT),
     "DispatchComputeIndirect": (None, _POINTER),
+    "MaxShaderCompilerThreadsKHR": (None, _UINT),
 }
 """Result and arguments of OpenGL's functions."""
 
@@ -70,8 +73,8 @@ class Linker:
         """What moderngl gets for the program that it makes now; 0: a new one."""
         self._callbacks = {
             "glCreateProgram": _FUNCTYPE(_UINT)(lambda: self._adopted or self.gl.CreateProgram()),
-            "glAttachShader": _FUNCTYPE(None, _UINT, _UINT)(self._attach_for_moderngl),
-            "glLinkProgram": _FUNCTYPE(None, _UINT)(self._link_for_moderngl),
+            "glAttachShader": _FUNCTYPE(None, _UINT, _UINT)(lambda *of: self._adopted or self.gl.AttachShader(*of)),
+            "glLinkProgram": _FUNCTYPE(None, _UINT)(lambda *of: self._adopted or self.gl.LinkProgram(*of)),
         }
         self._device: tuple[str, ...] = ()
         """Names of driver and device; none where no binaries are kept."""
@@ -85,29 +88,19 @@ class Linker:
         ours = self._callbacks.get(name)
         return self._loader.load(name) if ours is None else ctypes.cast(ours, _POINTER).value or 0
 
-    def release(self) -> None:
-        """As of its loader."""
-        self._loader.release()
+    load_opengl_function = load  # moderngl takes the one or the other
 
-    def __enter__(self) -> object:
-        return self._loader.__enter__()
-
-    def __exit__(self, *exception: object) -> None:
-        self._loader.__exit__(*exception)
-
-    def _attach_for_moderngl(self, program: int, shader: int) -> None:
-        if not self._adopted:
-            self.gl.AttachShader(program, shader)
-
-    def _link_for_moderngl(self, program: int) -> None:
-        if not self._adopted:
-            self.gl.LinkProgram(program)
+    def __getattr__(self, name: str) -> Any:
+        """The rest is its loader's."""
+        return getattr(self._loader, name)
 
     # ---- programs ----------------------------------------------------------------------------
 
     def work_ahead(self, info: Mapping[str, Any], extensions: set[str]) -> None:
         """From now on compile side by side and keep binaries, as far as the driver, as moderngl tells of it, can."""
         self._is_parallel = _PARALLEL in extensions
+        if self._is_parallel:
+            self.gl.MaxShaderCompilerThreadsKHR(0xFFFFFFFF)  # as many as it likes
         if self._integer(self.gl.GetIntegerv, _BINARY_FORMATS):
             self._device = tuple(str(info[name]) for name in ("GL_VENDOR", "GL_RENDERER", "GL_VERSION"))
 
@@ -137,9 +130,10 @@ class Linker:
 
     def _begin(self, made: Pending, texts: Sequence[str]) -> None:
         program = made.program = self.gl.CreateProgram()
-        key = program_store.key_of(self._device, texts) if self._device else ""
-        if key and (binary := program_store.load(key)) is not None:
-            self.gl.ProgramBinary(program, binary.form, binary.code, len(binary.code))
+        key = hashlib.sha256("\0".join((*self._device, *texts)).encode()).hexdigest() if self._device else ""
+        if key and (kept := BINARIES.load(key)) is not None:
+            form, code = int.from_bytes(kept[:4], "little"), kept[4:]
+            self.gl.ProgramBinary(program, form, code, len(code))
             if self._integer(self.gl.GetProgramiv, program, _LINK_STATUS):
                 return
             self.gl.GetError()  # another version of the driver under the same name
@@ -170,7 +164,7 @@ class Linker:
             form, written, code = _UINT(), _INT(), ctypes.create_string_buffer(size)
             self.gl.GetProgramBinary(made.program, size, written, form, code)
             if written.value > 0:
-                program_store.save(made.key, Binary(form.value, code.raw[: written.value]))
+                BINARIES.save(made.key, form.value.to_bytes(4, "little") + code.raw[: written.value])
 
     def _log_of(self, made: Pending) -> str:
         log = self._log(self.gl.GetProgramiv, self.gl.GetProgramInfoLog, made.program)

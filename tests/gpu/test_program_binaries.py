@@ -16,11 +16,10 @@ from spectrasplat.base import paths
 from spectrasplat.edit.document import Document
 from spectrasplat.edit.live_inputs import LiveInputs
 from spectrasplat.edit.state import State
-from spectrasplat.gpu import linker, program_store, shader
+from spectrasplat.gpu import linker, shader
 from spectrasplat.gpu.context import Context, create_context
 from spectrasplat.gpu.device_traits import DeviceTraits, assumed
-from spectrasplat.gpu.linker import Pending, linker_of
-from spectrasplat.gpu.program_store import Binary
+from spectrasplat.gpu.linker import BINARIES, Pending, linker_of
 from spectrasplat.render.viewer.building import COMPILING
 from spectrasplat.render.viewer.engine import LiveEngine
 
@@ -35,27 +34,18 @@ FRAGMENT = "#version 430 core\nout vec4 colour;\nuniform vec4 paint;\nvoid main(
 SECOND_START = """
 from spectrasplat.base.paths import shipped_scenes
 from spectrasplat.bench.programs import compiled_programs
-from spectrasplat.gpu import linker
 from spectrasplat.gpu.context import create_context
+from spectrasplat.gpu.linker import linker_of
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.settings import RenderSettings
 
-calls = {"compiled": 0, "linked": 0}
-began = linker.Linker.__init__
-
-def begin(self, loader):
-    began(self, loader)
-    gl = self.gl
-    compile, link = gl.CompileShader, gl.LinkProgram
-    gl.CompileShader = lambda shader: calls.update(compiled=calls["compiled"] + 1) or compile(shader)
-    gl.LinkProgram = lambda program: calls.update(linked=calls["linked"] + 1) or link(program)
-
-with create_context() as context:  # it measures how fast the device blends, by a program of four lines
-    linker.Linker.__init__ = begin
 with create_context() as context:
-    calls.update(compiled=0, linked=0)
+    gl, calls = linker_of(context.ctx).gl, []
+    compile, link = gl.CompileShader, gl.LinkProgram
+    gl.CompileShader = lambda shader: calls.append("compiled") or compile(shader)
+    gl.LinkProgram = lambda program: calls.append("linked") or link(program)
     programs = compiled_programs(context, load_scene(shipped_scenes()["prism"]), RenderSettings(max_depth=16))
-    print(len(programs), calls["compiled"], calls["linked"])
+    print(len(programs), calls.count("compiled"), calls.count("linked"))
 """
 
 
@@ -125,7 +115,7 @@ def test_what_is_damaged_or_anothers_is_compiled(ahead: Context, folder: Path, m
         file.write_bytes(damaged)
         assert is_compiled_anew(ahead, monkeypatch)
         assert not is_compiled_anew(ahead, monkeypatch)
-    program_store.save(file.stem, Binary(0x1234, b"what no driver takes back"))
+    BINARIES.save(file.stem, b"\x34\x12\0\0 what no driver takes back")
     assert is_compiled_anew(ahead, monkeypatch)
     assert ahead.ctx.error == "GL_NO_ERROR"
     link = linker_of(ahead.ctx)
@@ -140,16 +130,6 @@ def test_a_folder_that_cannot_be_written_costs_only_time(
     folder.write_text("not a folder")
     assert is_compiled_anew(ahead, monkeypatch)
     assert is_compiled_anew(ahead, monkeypatch)
-
-
-def test_old_binaries_are_forgotten(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(program_store, "MOST_BYTES", 3000)
-    code = np.random.default_rng(1).bytes(1000)
-    for at in range(5):
-        program_store.save(f"{at:064}", Binary(at, code))
-        os.utime(folder / f"{at:064}.program", ns=(at, at))
-    assert [program_store.load(f"{at:064}") is not None for at in range(5)] == [False, False, False, True, True]
-    assert program_store.load(f"{4:064}") == Binary(4, code)
 
 
 def test_nothing_waits_for_a_program_before_its_use(ahead: Context) -> None:

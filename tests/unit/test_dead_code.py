@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -325,7 +326,7 @@ def test_without_a_folder_it_works(stripping: list[int], monkeypatch: pytest.Mon
 
 
 def test_what_is_oldest_is_forgotten(stripping: list[int], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(stripped_store, "MOST_FILES", 3)
+    monkeypatch.setattr(stripped_store, "KEPT", replace(stripped_store.KEPT, most_files=3))
     for shift in range(6):
         stripped_store.stripped(lines(shift), NO_SWITCHES)
     assert len(list((tmp_path / "shaders").iterdir())) == 3

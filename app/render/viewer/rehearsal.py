@@ -1,5 +1,6 @@
 """Programs of edits, compiled before one is made: a small engine is taken through a drag of dispersion, a move of
-glass or a mirror, and a stroke of the brush. The driver's cache has them then for every context."""
+glass or a mirror, and a stroke of the brush. The driver's cache, or ours (`gpu/linker`), has them then for every
+context."""
 
 from __future__ import annotations
 
