@@ -22,7 +22,7 @@ PROGRAM_SWITCHES = frozenset(
     + ("LAYER_BEAUTY", "RGB_CHANNELS", "MAP_BINS", "RECEIVER_LIGHT", "VISIBLE_LIGHTS")
     # Camera rays beyond glass, and the program for what is seen directly.
     + ("CAMERA_SPECULAR", "HAS_DISPERSION", "SPECTRAL_SWEEP", "LENS", "HALTS", "FOLLOWED", "LISTS_SPECULAR")
-    + ("IN_MOTION", "DISTANCES")
+    + ("IN_MOTION", "DISTANCES", "PAIRS")
     # Where data lies.
     + ("LIGHTS_IN_STORAGE", "SOLIDS_IN_STORAGE", "SCENE_IMAGE", "TEXTURES_IMAGE")
     + ("HAS_IMAGES", "HAS_TEXTURES", "HAS_ENVIRONMENT_MAP")

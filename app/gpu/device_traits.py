@@ -74,6 +74,8 @@ class DeviceTraits:
     compiles_ahead: bool = True
     """The driver's threads compile programs side by side, where it has some, and binaries are kept on the disk. Of a
     software renderer programs are compiled at their first dispatch, which no binary spares."""
+    tables_by_compute: bool = True
+    """Spectral tables of pictures in motion are written by compute shaders, in their float32."""
     moves_by_photons: bool = True
     """Where beams carry light, photons stand for it while something is dragged: a search for beams takes the processor
     longer than a GPU takes to splat a million photons."""
@@ -109,6 +111,7 @@ class DeviceTraits:
             dispatch_s=0.15,
             camera_s=0.15,
             paths_group=8,
+            tables_by_compute=False,
             moves_by_photons=False,
             viewer=Budget(1 << 14, 1 << 14, 1 << 22, 256 << 20),
             viewer_splat_photons=1 << 12,

@@ -60,7 +60,7 @@ class Reindexing:
         span = float(n_new[1] - n_new[0])
         if span * (n[1] - n[0]) <= 0.0:
             return None
-        axis = replace(axes[1], fill=0.0)
+        axis = replace(axes[1], fill=0.0) if axes[1].fill else axes[1]
         return cls(axis, -float(n_new[0]) / span, 1.0 / span, float(axis.x_of_nm(LINE_D_NM)), traced)
 
     def y(self, n: float) -> float:
@@ -70,12 +70,8 @@ class Reindexing:
     def supports(self, lights: Sequence[Spectrum]) -> list[tuple[float, float]]:
         """y of the ends of each light's spectrum."""
         ends = [light.support_nm() for light in lights]
-        return [
-            (float(self.axis.x_of_nm(lo)), float(self.axis.x_of_nm(hi)))
-            if hi - lo < 1e-6
-            else (float(self.axis.x_of_nm(max(lo - 0.5, 380.0))), float(self.axis.x_of_nm(min(hi + 0.5, 780.0))))
-            for lo, hi in ends
-        ]
+        nm = [(lo, hi) if hi - lo < 1e-6 else (max(lo - 0.5, 380.0), min(hi + 0.5, 780.0)) for lo, hi in ends]
+        return [(float(lo), float(hi)) for lo, hi in self.axis.x_of_nm(np.array(nm).reshape(-1, 2))]
 
     def spans(self, traced: Spans, axis: SpectralAxis, lights: Sequence[Spectrum]) -> Spans:
         """The bands' intervals of y, cut to their light's spectrum, the outermost stretched to its ends.

@@ -232,12 +232,13 @@ class FoldedSpectrum:
         x = lo + (hi - lo) * np.linspace(0.0, 1.0, FINEST + 1)
         finest = np.diff(self.smooth.at(x), axis=1).transpose(1, 0, 2)
         masses = {
-            n: finest.reshape(n, -1, finest[0].size).sum(axis=1).astype(np.float32) for n in {_cells(s) for s in SIGMAS}
+            n: finest.reshape(n, -1, finest[0].size).sum(axis=1).astype(np.float32)
+            for n in {cells_of_row(s) for s in SIGMAS}
         }
         kernels = _kernels(width)
         rows = np.empty((len(SIGMAS), width, finest[0].size), np.float32)
         for row, sigma in zip(rows, SIGMAS, strict=True):
-            cells = _cells(sigma)
+            cells = cells_of_row(sigma)
             np.matmul(kernels[cells, float(sigma)], masses[cells], out=row)
             for band, place, energy in lines:
                 row[:, band * columns : (band + 1) * columns] += (
@@ -274,7 +275,8 @@ def _mean(moments: np.ndarray, energies: np.ndarray, dark: float) -> np.ndarray:
     return np.where(lit, moments / np.where(lit, energies, 1.0), dark)
 
 
-def _cells(sigma: float) -> int:
+@lru_cache(maxsize=256)
+def cells_of_row(sigma: float) -> int:
     """Cells of a band, a power of two, each at most a quarter of a standard deviation wide (then they add up to 1 % to
     the variance) unless the spectrum itself is no finer."""
     return int(min(FINEST, max(8, 2 ** np.ceil(np.log2(4.0 / sigma)))))
@@ -289,7 +291,7 @@ def _kernels(width: int) -> dict[tuple[int, float], np.ndarray]:
     """
     kernels = {}
     for sigma in SIGMAS:
-        cells = _cells(sigma)
+        cells = cells_of_row(sigma)
         places = (np.arange(cells) + 0.5) / cells
         kernels[cells, float(sigma)] = _kernel(
             width, sigma, places.astype(np.float32), np.sqrt(sigma**2 + 1.0 / (12.0 * cells**2))

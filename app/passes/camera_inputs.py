@@ -54,8 +54,7 @@ class CameraInputs:
         """As of `CameraPass`; `receiver_light`: programs look up what the environment and other receivers send."""
         self._ctx = ctx
         self.scene = scene
-        self._classes = channels, reflectances, maps
-        self._tables = CameraTables.build(ctx, scene, *self._classes)
+        self._tables = CameraTables(ctx, scene, channels, reflectances, maps)
         self._owns_pictures = pictures is None
         self.pictures = pictures or TextureStore(ctx, scene.scene, scene.first_triangle, scene.corner_turn)
         lights = self._light_records()
@@ -92,7 +91,7 @@ class CameraInputs:
         same = self.pictures.defines == self._picture_defines
         if not same or len(scene.scene.lights) != len(self.scene.scene.lights):
             return False
-        if not self._tables.take(scene, *self._classes):
+        if not self._tables.take(scene):
             return False
         self._counters.write(bytes(4 * len(FALLBACKS)))
         self.move(scene)

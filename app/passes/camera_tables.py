@@ -8,14 +8,18 @@ Where the shown glass is an edit of the one that photons were traced through, th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import moderngl
 import numpy as np
 
+from ..features.program_switches import switched
 from ..gpu import shader
+from ..gpu.device_traits import DeviceTraits
 from ..gpu.map_channels import MapChannels
+from ..gpu.running_sums import RunningSums, SumRow
 from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.scene_texels import spectra_texels
 from ..gpu.spectral_groups import SAMPLES, index_slope
@@ -31,74 +35,110 @@ from .picture_channels import Channels
 EMISSION_CELLS = SAMPLES - 1
 """Cells of x that a stretch of the spectrum begins and ends with; a wavelength is resolved to 1/1024 of the indices'
 variation."""
+_GROUP = 64
 
 
-@dataclass(frozen=True)
 class CameraTables:
     """GPU tables of one shown scene, and the symbols by which the shader finds its rows."""
 
-    spectra: moderngl.Texture
-    emission: moderngl.Texture
-    object_colours: moderngl.Buffer
-    cell_cdf: moderngl.Buffer
-    defines: dict[str, int | str]
-
-    @classmethod
-    def build(
-        cls,
+    def __init__(
+        self,
         ctx: moderngl.Context,
         scene: SceneBuffers,
         channels: Channels,
         reflectances: Sequence[np.ndarray | None],
         maps: MapChannels,
-    ) -> CameraTables:
+    ) -> None:
         """`scene.scene` is what is shown; its geometry and its partition into glasses are those of `scene`.
 
         `reflectances`: classes as the splat tables were built with. `maps`: what the caustic maps' channels are."""
+        self._ctx, self._of = ctx, (channels, reflectances, maps)
+        by_compute = DeviceTraits.of(ctx.info["GL_RENDERER"]).tables_by_compute
         values = _Values.of(scene, channels, reflectances, maps)
-        spectra, emission = (
+        self.defines = values.defines
+        self.spectra, self.emission = (
             ctx.texture(texels.shape[1::-1], texels.shape[2], texels, dtype="f4")
-            for texels in (values.spectra, values.emission)
+            for texels in (spectra_texels(values.rows), _emission(values.emission, values.axis))
         )
-        for texture in (spectra, emission):
+        for texture in (self.spectra, self.emission):
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        colours, cell_cdf = (ctx.buffer(numbers) for numbers in (values.object_colours, values.cell_cdf))
-        return cls(spectra, emission, colours, cell_cdf, values.defines)
+        self.object_colours = ctx.buffer(values.object_colours)
+        self.cell_cdf = ctx.buffer(values.cell_cdf)
+        self._rows = values.rows
+        self._device = _DeviceTables(ctx, values.rows) if by_compute and channels.edges_nm is None else None
 
-    def take(
-        self,
-        scene: SceneBuffers,
-        channels: Channels,
-        reflectances: Sequence[np.ndarray | None],
-        maps: MapChannels,
-    ) -> bool:
-        """Be tables of another shown scene, as of `build`, in the same textures and buffers. False, and nothing done,
-        where they do not fit or the shader would find its rows elsewhere."""
-        values = _Values.of(scene, channels, reflectances, maps)
-        sizes = tuple(texels.shape[1::-1] for texels in (values.spectra, values.emission))
-        if values.defines != self.defines or sizes != (self.spectra.size, self.emission.size):
+    def take(self, scene: SceneBuffers) -> bool:
+        """Be tables of another shown scene in the same textures and buffers. False, and nothing done, where they do not
+        fit or the shader would find its rows elsewhere."""
+        values = _Values.of(scene, *self._of)
+        if values.defines != self.defines or values.rows.shape != self._rows.shape:
             return False
         if values.object_colours.nbytes != self.object_colours.size:
             return False
-        self.spectra.write(values.spectra)
-        self.emission.write(values.emission)
+        if self._device is None:
+            self.spectra.write(spectra_texels(values.rows))
+            self.emission.write(_emission(values.emission, values.axis))
+        else:
+            self._device.write(values, np.any(values.rows != self._rows, axis=1), self.spectra, self.emission)
+        self._rows = values.rows
         self.object_colours.write(values.object_colours)
         self.cell_cdf.write(values.cell_cdf)
         return True
 
     def release(self) -> None:
         """Free everything."""
-        shader.release(self.spectra, self.emission, self.object_colours, self.cell_cdf)
+        shader.release(self.spectra, self.emission, self.object_colours, self.cell_cdf, self._device)
+
+
+class _DeviceTables:
+    """Writes the textures on the device: what is uploaded is a third of one and next to nothing of the other. Owns what
+    it reads."""
+
+    def __init__(self, ctx: moderngl.Context, rows: np.ndarray) -> None:
+        self._ctx = ctx
+        self._rows = ctx.buffer(np.ascontiguousarray(rows))
+        self._lit: tuple[Spectrum, ...] = ()
+        self._sums: RunningSums | None = None
+        self._pairs = shader.compute(ctx, "camera/table_rows.comp", switched(PAIRS=True) | {"BIND_ROWS": 0})
+
+    def write(
+        self, values: _Values, changed: np.ndarray, spectra: moderngl.Texture, emission: moderngl.Texture
+    ) -> None:
+        """`changed`: rows of `values` that are others than those last written."""
+        if self._sums is None or any(a is not b for a, b in zip(self._lit, values.lit, strict=True)):
+            shader.release(self._sums)
+            rows = values.emission()
+            self._lit, self._sums = values.lit, RunningSums(self._ctx, [row.sums for row in rows])
+            self._emission = shader.compute(self._ctx, "camera/table_rows.comp", self._sums.defines)
+        self._ctx.memory_barrier()
+        if changed.any():
+            first, end = int(np.argmax(changed)), len(changed) - int(np.argmax(changed[::-1]))
+            self._rows.write(values.rows[first:end], offset=values.rows[0].nbytes * first)
+            self._rows.bind_to_storage_buffer(0)
+            spectra.bind_to_image(0, read=False, write=True)
+            self._pairs.run(-(-spectra.width // _GROUP), spectra.height)
+        self._sums.bind(values.axis)
+        emission.bind_to_image(0, read=False, write=True)
+        self._emission.run(-(-emission.width // _GROUP), emission.height)
+        self._ctx.memory_barrier()
+
+    def release(self) -> None:
+        """Free everything."""
+        if self._sums is not None:
+            shader.release(self._emission)
+        shader.release(self._rows, self._sums, self._pairs)
 
 
 @dataclass(frozen=True)
 class _Values:
     """What the tables hold, float32 as it is uploaded."""
 
-    spectra: np.ndarray
-    """(rows, samples - 1, 2), see `spectra_texels`."""
-    emission: np.ndarray
-    """(rows · targets, samples, 4): row r of target t at r · targets + t."""
+    rows: np.ndarray
+    """Of `spectra_texels`, (rows, samples)."""
+    axis: SpectralAxis
+    lit: tuple[Spectrum, ...]
+    """The lights'."""
+    emission: Callable[[], list[_EmissionRow]]
     object_colours: np.ndarray
     cell_cdf: np.ndarray
     defines: dict[str, int | str]
@@ -118,7 +158,8 @@ class _Values:
         absorptions = _distinct_absorptions(shown, scene.space.scale)
         cell_cdf = _cell_cdf(axis, channels)
         spectra, defines = _spectra(scene, glasses, axis, absorptions, cell_cdf, maps)
-        emission, rows = _emission(shown, axis, channels, reflectances, maps, scene.space.scale)
+        emission = partial(_emission_rows, shown, channels, reflectances, maps, scene.space.scale)
+        rows = _emission_defines(len(shown.lights), len(reflectances), maps)
         finishes, coats = _finishes(shown, len(spectra))
         if finishes is not None:
             spectra, rows = np.concatenate([spectra, coats]), rows | {"FINISHES_AT": len(shown.objects)}
@@ -132,11 +173,11 @@ class _Values:
             for column, coefficient in zip((3, 0), _absorptions(item.material, scene.space.scale), strict=True):
                 if coefficient is not None:
                     row[column] = next(i for i, known in enumerate(absorptions) if np.array_equal(known, coefficient))
-        count, samples, columns = emission.shape
-        texels = emission.reshape(count, samples, columns // 4, 4).transpose(0, 2, 1, 3).reshape(-1, samples, 4)
         return cls(
-            spectra_texels(spectra),
-            np.ascontiguousarray(texels, "f4"),
+            np.asarray(spectra, "<f4"),
+            axis,
+            tuple(light.spectral_power for light in shown.lights),
+            emission,
             colours if finishes is None else np.concatenate([colours, finishes]),
             cell_cdf.astype("f4"),
             {**defines, **rows},
@@ -236,43 +277,65 @@ def _spectra(
     return np.concatenate(list(sections.values())), defines | {"ABSORBERS": len(absorptions)}
 
 
-def _emission(
-    scene: Scene,
-    axis: SpectralAxis,
-    channels: Channels,
-    reflectances: Sequence[np.ndarray | None],
-    maps: MapChannels,
-    scale: float,
-) -> tuple[np.ndarray, dict[str, int]]:
-    """Running sums (rows, EMISSION_CELLS + 1, 4·targets) and where each kind of row begins."""
-    x = np.linspace(0.0, 1.0, EMISSION_CELLS + 1)
-    observer, basis = channels.observer(), rgb_basis()
+@dataclass(frozen=True)
+class _EmissionRow:
+    """A running sum over x of the spectrum times weights (401, 4·targets)."""
 
-    def running(spectrum: Spectrum, reflectance: np.ndarray | None = None) -> np.ndarray:
-        weights = observer if reflectance is None else observer * np.asarray(reflectance)[:, None]
-        sums = cumulative(axis, spectrum, weights).at(x)
-        # All of the spectrum is between the first sample and the last, a line at 380 nm too.
-        sums[0] = 0.0
-        return sums
+    spectrum: Spectrum
+    weights: np.ndarray
+    unit: float = 1.0
 
-    white = Spectrum(daylight_per_lumen())
-    rows = [running(white), *(running(white, column) for column in basis.T)]
-    defines = {"WHITE_ROW": 0, "LIGHT_ROW": len(rows), "ROWS_PER_LIGHT": 4 + len(reflectances) - 1}
+    @property
+    def sums(self) -> SumRow:
+        """As the device sums it up."""
+        line_nm = np.array(self.spectrum.lines, float).reshape(-1, 2)[:, 0]
+        at_lines = np.column_stack([np.interp(line_nm, VISIBLE_NM, column) for column in self.weights.T])
+        return SumRow.of(self.spectrum, self.unit * self.weights, self.unit * at_lines)
+
+
+def _emission_rows(
+    scene: Scene, channels: Channels, reflectances: Sequence[np.ndarray | None], maps: MapChannels, scale: float
+) -> list[_EmissionRow]:
+    observer, basis, white = channels.observer(), rgb_basis(), Spectrum(daylight_per_lumen())
+    seen = [observer, *(observer * column[:, None] for column in basis.T)]
+    rows = [_EmissionRow(white, weights) for weights in seen]
+    seen += [observer * np.asarray(reflectance)[:, None] for reflectance in reflectances[1:]]
     for light in scene.lights:
         # Intensity over distance² in GPU units needs the square of the scale; the other kinds are free of lengths.
         unit = scale**2 if light.is_intensity else 1.0
-        rows += [
-            unit * running(light.spectral_power),
-            *(unit * running(light.spectral_power, column) for column in basis.T),
-        ]
-        rows += [unit * running(light.spectral_power, reflectance) for reflectance in reflectances[1:]]
-    defines["BIN_SPECTRUM_ROW"] = len(rows)
-    rows += [running(spectrum) for spectrum in maps.spectra(scene.lights)]
-    defines["REFLECTANCE_ROW"] = len(rows)
+        rows += [_EmissionRow(light.spectral_power, weights, unit) for weights in seen]
+    rows += [_EmissionRow(spectrum, observer) for spectrum in maps.spectra(scene.lights)]
     if channels.edges_nm is not None:
         # Mean over each bin of the reflectance basis: the last sample alone is read.
-        rows += [np.broadcast_to(channels.of_reflectance(tuple(np.eye(3)[c])), rows[0].shape) for c in range(3)]
-    return np.stack(rows), defines
+        constant = np.zeros(len(VISIBLE_NM))
+        constant[0] = 1.0
+        means = [channels.of_reflectance(tuple(np.eye(3)[c])) for c in range(3)]
+        rows += [_EmissionRow(Spectrum(constant), np.tile(mean, (len(VISIBLE_NM), 1))) for mean in means]
+    return rows
+
+
+def _emission_defines(lights: int, classes: int, maps: MapChannels) -> dict[str, int]:
+    """Where each kind of row begins."""
+    a_light = 4 + classes - 1
+    bins = 4 + lights * a_light
+    return {
+        "WHITE_ROW": 0,
+        "LIGHT_ROW": 4,
+        "ROWS_PER_LIGHT": a_light,
+        "BIN_SPECTRUM_ROW": bins,
+        "REFLECTANCE_ROW": bins + maps.count,
+    }
+
+
+def _emission(rows: Callable[[], list[_EmissionRow]], axis: SpectralAxis) -> np.ndarray:
+    """float32 (rows · targets, EMISSION_CELLS + 1, 4): row r of target t at r · targets + t."""
+    x = np.linspace(0.0, 1.0, EMISSION_CELLS + 1)
+    sums = np.stack([row.unit * cumulative(axis, row.spectrum, row.weights).at(x) for row in rows()])
+    # All of the spectrum is between the first sample and the last, a line at 380 nm too.
+    sums[:, 0] = 0.0
+    count, samples, columns = sums.shape
+    texels = sums.reshape(count, samples, columns // 4, 4).transpose(0, 2, 1, 3).reshape(-1, samples, 4)
+    return np.ascontiguousarray(texels, "f4")
 
 
 def _cell_cdf(axis: SpectralAxis, channels: Channels) -> np.ndarray:

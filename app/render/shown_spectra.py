@@ -13,18 +13,20 @@ import moderngl
 import numpy as np
 
 from ..gpu import shader
+from ..gpu.device_tables import DeviceTables
+from ..gpu.device_traits import DeviceTraits
 from ..gpu.gain_buffers import GainBuffers
 from ..gpu.map_channels import MapChannels, tents
 from ..gpu.reindex import ReindexBuffer, Reindexing, Spans
 from ..gpu.scene_buffers import SceneBuffers
-from ..gpu.splat_tables import SplatTables
+from ..gpu.splat_tables import LEAST_WIDTH, SplatTables
 from ..model.optics.glass import Dispersion
 from ..model.optics.spectrum import Spectrum
 from ..model.scene import Scene
 from ..model.tint_levels import LEVELS
 from ..passes.footprint import SpectralVariables
 
-PREVIEW_WIDTH = 64
+PREVIEW_WIDTH = LEAST_WIDTH
 """Samples of the spectral tables of a preview."""
 LEVELS_WIDTH = 256
 """Where there are as many as a tint has levels."""
@@ -58,6 +60,8 @@ class ShownSpectra:
         self.variables = SpectralVariables.build(ctx, buffers.variables)
         self._are_traced = True
         """The variables are those of what was traced."""
+        self._by_compute = DeviceTraits.of(ctx.info["GL_RENDERER"]).tables_by_compute
+        self._device_tables: DeviceTables | None = None
         self.gains: GainBuffers | None = None
         self.changed: Mapping[Dispersion, Dispersion] = {}
         """Glasses that are shown otherwise than they were traced."""
@@ -75,6 +79,9 @@ class ShownSpectra:
         """Light the scene with `spectra`; True where tables follow."""
         stale = spectra != self.spectra
         self.spectra = spectra
+        if stale:
+            shader.release(self._device_tables)
+            self._device_tables = None
         return stale
 
     def show_glass(self, changed: Mapping[Dispersion, Dispersion]) -> bool:
@@ -127,7 +134,12 @@ class ShownSpectra:
             )
         shown = self._reindexing.spans(spans, self._buffers.axis, spectra)
         axis = self._reindexing.axis
-        tables = SplatTables.build(ctx, axis, spectra, self.reflectances, shown, channels, width, before)
+        if width == PREVIEW_WIDTH and channels == MapChannels() and self._by_compute:
+            if self._device_tables is None:
+                self._device_tables = DeviceTables(ctx, spectra, self.reflectances)
+            tables = self._device_tables.tables(axis, shown, before)
+        else:
+            tables = SplatTables.build(ctx, axis, spectra, self.reflectances, shown, channels, width, before)
         reindex = None if into is None else into.reindex
         return ShownTables(tables, ReindexBuffer(ctx, self._reindexing, spans, shown, spectra, tables.classes, reindex))
 
@@ -138,6 +150,7 @@ class ShownSpectra:
     def release(self) -> None:
         """Free what it owns."""
         self.variables.release()
+        shader.release(self._device_tables)
         self.show_gains(None)
 
 

@@ -46,6 +46,18 @@ def evaluate(kind: Kind, coefficients: Coefficients, wavelength_um: np.ndarray) 
         return _FORMULAS[kind](coefficients, wavelength_um)
 
 
+def index(kind: Kind, coefficients: Coefficients, wavelength_um: np.ndarray) -> np.ndarray:
+    """n of `evaluate` alone."""
+    if kind not in ("formula 1", "formula 2"):
+        return evaluate(kind, coefficients, wavelength_um)[0]
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        square = wavelength_um * wavelength_um
+        n_squared = np.full_like(wavelength_um, 1.0 + coefficients[0])
+        for b, c in sellmeier_poles(kind, coefficients):
+            n_squared += b * square / (square - c)
+        return np.sqrt(n_squared)
+
+
 def _root(n_squared: np.ndarray, slope_of_square: np.ndarray) -> IndexAndSlope:
     n = np.sqrt(n_squared)
     return n, slope_of_square / (2.0 * n)

@@ -43,7 +43,9 @@ class Dispersion:
 
     def index(self, wavelength_nm: np.ndarray | float) -> np.ndarray:
         """Refractive index, float64 of the shape of `wavelength_nm`."""
-        return self._evaluate(wavelength_nm)[0]
+        clamped = np.clip(np.asarray(wavelength_nm, dtype=np.float64), *self.range_nm)
+        n = formulas.index(self.kind, self.coefficients, clamped * 1e-3)
+        return n if self.gain == 1.0 else self.n_d + self.gain * (n - self.n_d)
 
     def derivative(self, wavelength_nm: np.ndarray | float) -> np.ndarray:
         """dn/dλ in 1/µm, analytic, float64; zero outside the fit's range, where n is clamped."""

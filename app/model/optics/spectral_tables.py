@@ -33,6 +33,7 @@ MOST_FILL = 0.25
 
 
 _MAX_STEPS = 60
+_FEW = 64
 _FIRST_LINE_X = 1e-12
 
 
@@ -70,7 +71,8 @@ class SpectralAxis:
         linear = (wavelength - _LO_NM) / (_HI_NM - _LO_NM)
         if not self.glasses:
             return linear
-        path = sum(_variation(g, t, wavelength) for g, t in zip(self.glasses, self.turning_nm, strict=True))
+        ends = zip(self.glasses, self.turning_nm, self._turning_index, strict=True)
+        path = sum(_variation(*of_glass, wavelength) for of_glass in ends)
         share = path / self.total
         return np.clip(share + self.fill * (linear - share), 0.0, 1.0)
 
@@ -80,7 +82,10 @@ class SpectralAxis:
         target = np.clip(np.asarray(x, dtype=np.float64), 0.0, 1.0)
         if not self.glasses:
             return _LO_NM + target * (_HI_NM - _LO_NM)
-        fine_x = self.x_of_nm(_FINE_NM)
+        key = target.tobytes()
+        if key in self._inverted:
+            return self._inverted[key].reshape(target.shape)
+        fine_x = self._fine_x
         i = np.clip(np.searchsorted(fine_x, target, side="right") - 1, 0, len(fine_x) - 2)
         lo, hi = _FINE_NM[i], _FINE_NM[i + 1]
         wavelength = np.interp(target, fine_x, _FINE_NM)
@@ -95,6 +100,10 @@ class SpectralAxis:
             wavelength = following
             if moved < 1e-11:
                 break
+        if target.size <= _FEW:  # ends of bands, which every edit asks for
+            if len(self._inverted) > _FEW:
+                self._inverted.clear()
+            self._inverted[key] = np.array(wavelength)
         return wavelength
 
     def nm_of_samples(self, count: int) -> np.ndarray:
@@ -104,6 +113,20 @@ class SpectralAxis:
             wavelengths.setflags(write=False)
             self._sampled[count] = wavelengths
         return self._sampled[count]
+
+    @cached_property
+    def _turning_index(self) -> list[list[np.ndarray]]:
+        """n of each glass where it turns."""
+        return [[glass.index(nm) for nm in turns] for glass, turns in zip(self.glasses, self.turning_nm, strict=True)]
+
+    @cached_property
+    def _fine_x(self) -> np.ndarray:
+        return self.x_of_nm(_FINE_NM)
+
+    @cached_property
+    def _inverted(self) -> dict[bytes, np.ndarray]:
+        """Wavelengths that were asked for, by the bytes of x."""
+        return {}
 
     @cached_property
     def _sampled(self) -> dict[int, np.ndarray]:
@@ -121,9 +144,11 @@ def _axis_of(glasses: tuple[Dispersion, ...]) -> SpectralAxis:
     if not glasses:
         return SpectralAxis((), (), _HI_NM - _LO_NM, 1.0, False)
     turning = tuple(_turning_points(glass) for glass in glasses)
-    speed = sum(np.abs(glass.derivative(_FINE_NM)) for glass in glasses)
+    speed = sum(np.abs(_fine_slope(glass)) for glass in glasses)
     stands_still = bool(np.any(speed <= 0.0)) or any(len(t) > 2 for t in turning)
-    variation = [_variation(g, t, np.array(_HI_NM)) for g, t in zip(glasses, turning, strict=True)]
+    variation = [
+        _variation(g, t, [g.index(nm) for nm in t], np.array(_HI_NM)) for g, t in zip(glasses, turning, strict=True)
+    ]
     monotone = len(glasses) == 1 and not stands_still
     seen = np.interp(_FINE_NM, VISIBLE_NM, cmf_xyz().sum(axis=1))
     still = float(seen[speed <= 0.0].sum() / seen.sum())
@@ -133,7 +158,7 @@ def _axis_of(glasses: tuple[Dispersion, ...]) -> SpectralAxis:
 
 def _turning_points(glass: Dispersion) -> np.ndarray:
     """380, the wavelengths where n(λ) turns (bisected to rounding), 780."""
-    sign = np.sign(glass.derivative(_FINE_NM))
+    sign = np.sign(_fine_slope(glass))
     moving = np.flatnonzero(sign)
     turns = []
     turned = np.flatnonzero(sign[moving[:-1]] != sign[moving[1:]])
@@ -147,11 +172,19 @@ def _turning_points(glass: Dispersion) -> np.ndarray:
     return np.array([_LO_NM, *turns, _HI_NM])
 
 
-def _variation(glass: Dispersion, turning_nm: np.ndarray, wavelength_nm: np.ndarray) -> np.ndarray:
-    """Total variation of n between 380 nm and each wavelength: exact, no quadrature."""
+@lru_cache(maxsize=16)
+def _fine_slope(glass: Dispersion) -> np.ndarray:
+    return glass.derivative(_FINE_NM)
+
+
+def _variation(
+    glass: Dispersion, turning_nm: np.ndarray, turning_index: Sequence[np.ndarray], wavelength_nm: np.ndarray
+) -> np.ndarray:
+    """Total variation of n between 380 nm and each wavelength: exact, no quadrature. `turning_index`: n where it
+    turns."""
     total = np.zeros_like(wavelength_nm)
-    for start, end in itertools.pairwise(turning_nm):
-        total = total + np.abs(glass.index(np.clip(wavelength_nm, start, end)) - glass.index(start))
+    for (start, end), n in zip(itertools.pairwise(turning_nm), turning_index, strict=False):
+        total = total + np.abs(glass.index(np.clip(wavelength_nm, start, end)) - n)
     return total
 
 

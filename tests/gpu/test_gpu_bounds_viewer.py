@@ -1,0 +1,61 @@
+"""What a frame of the viewer asks of a GPU while the camera orbits and while a dispersion is dragged."""
+
+from __future__ import annotations
+
+import moderngl
+import numpy as np
+import pytest
+from spectrasplat.base.paths import shipped_scenes
+from spectrasplat.gpu.context import Context
+from spectrasplat.gpu.device_tables import DeviceTables
+from spectrasplat.gpu.splat_tables import LEAST_WIDTH, SplatTables
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.optics.spectral_tables import SpectralAxis
+from spectrasplat.model.optics.spectrum import Spectrum, illuminant
+from viewer_rig import MOVEMENTS, viewer
+
+MOST_BYTES = 64 << 10
+PYTHON_MS = {"orbit": 1.0, "drag": 6.0}
+
+
+@pytest.mark.parametrize(
+    "name", ["prism", pytest.param("default", marks=pytest.mark.slow), pytest.param("ball", marks=pytest.mark.slow)]
+)
+def test_a_viewer_makes_nothing_anew(name: str) -> None:
+    with viewer(name) as rig:
+        for movement, bound in PYTHON_MS.items():
+            frames = rig.frames(8, MOVEMENTS[movement])
+            for frame in frames[2:]:
+                assert not (frame.counts.made or frame.counts.programs), (movement, frame.counts.made)
+                assert frame.counts.written_bytes <= MOST_BYTES and frame.counts.read_bytes == 0, movement
+            assert frames[-1].version > frames[2].version, "nothing was shown"
+            assert min(frame.python_ms for frame in frames[2:]) <= bound, movement
+            rig.settle()
+
+
+def test_tables_that_the_device_writes_are_those_of_numpy(gl: Context) -> None:
+    scene = load_scene(shipped_scenes()["prism"])
+    axis = SpectralAxis.build([o.material.dispersion for o in scene.objects if o.material.transmits])
+    lights = [illuminant("D65"), Spectrum(0.1 * np.ones(401), ((546.1, 3.0), (435.8, 2.0)))]
+    classes = [None, np.linspace(0.2, 0.9, 401)]
+    bands = [[(0.0, 0.3), (0.3, 1.0)], [(0.1, 0.5), (0.5, 0.5), (0.5, 0.9)]]
+    exact = SplatTables.build(gl.ctx, axis, lights, classes, bands, width=LEAST_WIDTH)
+    device = DeviceTables(gl.ctx, lights, classes)
+    made = device.tables(axis, bands, None)
+    again = device.tables(axis, bands, made)
+    assert again is made
+
+    def values(owner: moderngl.Buffer | moderngl.TextureArray) -> np.ndarray:
+        return np.frombuffer(owner.read(), "f4")
+
+    for name in ("first_power", "classes", "bands", "targets", "rows", "width", "layers", "stacked"):
+        assert getattr(exact, name) == getattr(made, name)
+    pairs = [(exact.texture, made.texture), *zip(exact.buffers, made.buffers, strict=True)]
+    for expected, got in (tuple(map(values, pair)) for pair in pairs):
+        np.testing.assert_allclose(got, expected, rtol=0.0, atol=1e-4 * np.abs(expected).max())
+    places, spans = (
+        values(tables.band_buffer)[: 4 * tables.first_power].reshape(-1, 4)[:, :3] for tables in (exact, made)
+    )
+    np.testing.assert_allclose(spans, places, atol=1e-5)
+    for owned in (exact, made, device):
+        owned.release()
