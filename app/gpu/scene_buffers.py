@@ -221,8 +221,8 @@ class SceneBuffers:
         sizes = record["colour"][:, 3 if item.material.is_mirror else 2]
         sized = item.material.is_mirror or item.material.dispersion is not None
         if sized and sizes[0] < UNBOUNDED:
-            half = 0.5 * np.ptp(self.world_meshes.packed[index].vertices, axis=0)
-            sizes[:] = self.space.scale * np.linalg.norm(np.abs(self.places.matrices[index, :, :3]) @ half)
+            sides = np.abs(self.places.matrices[index, :, :3]) @ self.world_meshes.half_size(index)
+            sizes[:] = self.space.scale * np.linalg.norm(sides)
             self.texels.write("OBJECTS", OBJECT.stride // 16 * index, record)
         if isinstance(item.material, Grating):
             self.texels.write(

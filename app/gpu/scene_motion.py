@@ -26,6 +26,7 @@ class WorldMeshes(Sequence[Mesh]):
     def __init__(self, scene: Scene) -> None:
         self.packed = [o.mesh.transformed(o.object_to_world) for o in scene.objects]
         """Where they were at first."""
+        self._half_sizes: dict[int, np.ndarray] = {}
         self._now: list[Mesh | SceneObject] = [*self.packed]
 
     def __len__(self) -> int:
@@ -36,6 +37,12 @@ class WorldMeshes(Sequence[Mesh]):
         if isinstance(mesh, SceneObject):
             mesh = self._now[index] = mesh.mesh.transformed(mesh.object_to_world)
         return mesh
+
+    def half_size(self, index: int) -> np.ndarray:
+        """Half the sides of the box about object `index` where it was at first, (3,)."""
+        if index not in self._half_sizes:
+            self._half_sizes[index] = 0.5 * np.ptp(self.packed[index].vertices, axis=0)
+        return self._half_sizes[index]
 
     def move(self, index: int, item: SceneObject) -> None:
         """Object `index` stands elsewhere."""

@@ -285,7 +285,7 @@ class TracePass:
     def _photon_room(self) -> int:
         return self.photons.size // self.photon.stride
 
-    def send(self, piece: LatticeSlice, domain: EmissionDomain) -> Sent | None:
+    def send(self, piece: LatticeSlice, domain: EmissionDomain, max_depth: int | None = None) -> Sent | None:
         """`run` without waiting; None where rays are counted after every event."""
         queue = self._queue
         if not isinstance(queue, RayPool):
@@ -294,7 +294,7 @@ class TracePass:
         if piece.light in self._photons_a_point:
             most = min(most, int(self._photons_a_point[piece.light] * piece.count) + _GROUP)
         queue.begin(piece.count, most)
-        self._emit(piece, domain, self.max_depth, self.split_threshold)
+        self._emit(piece, domain, min(max_depth or self.max_depth, self.max_depth), self.split_threshold)
         queue.send(self._trace, self._bind)
         report = self._reports.pop() if self._reports else self.context.ctx.buffer(reserve=queue.state.size)
         self.context.ctx.copy_buffer(report, queue.state)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, cast
 
 import numpy as np
@@ -179,6 +180,10 @@ class Light:
 
     def axes(self) -> np.ndarray:
         """Columns tangent, bitangent and axis (propagation), unit and right-handed, float64 (3, 3)."""
+        return self._axes
+
+    @cached_property
+    def _axes(self) -> np.ndarray:
         axis = np.asarray(self.direction, float) / np.linalg.norm(self.direction)
         guide = np.eye(3)[np.argmin(np.abs(axis))] if self.tangent is None else np.asarray(self.tangent, float)
         first = guide - axis * (guide @ axis)

@@ -14,8 +14,10 @@ import numpy as np
 
 from ...base.generators import finished
 from ...gpu import shader
-from ...model.scene import Scene, SceneObject
+from ...model.geometry.mesh import Mesh
+from ...model.scene import Scene
 from ...passes.emission_domain import EmissionDomain, emission_domain
+from ...passes.footprint import Photons, SplatSpectra
 from ...passes.landings import ChosenLandings
 from ...passes.moving_layout import followed
 from ..light_maps import LightMaps
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
     from ...features.features import Features
     from ...gpu.context import Context
     from ...passes.map_layout import MapLayout
+    from ...passes.trace import Sent
     from ..light_pass import LightPass
     from ..light_plan import LightPlan
     from .frame_plan import FramePlan
@@ -45,6 +48,11 @@ class MovedLight:
         self.photons = FIRST_PHOTONS
         self._plans: list[LightPlan] | None = None
         self._tables: PassTables | None = None
+        self._boxes: list[Mesh] = []
+        """About objects, each in its own frame."""
+        self._sent: list[Sent] = []
+        """Batches of the frame before."""
+        self._parts = 1
         self._landed = ChosenLandings(context.ctx, light_pass.trace.photon)
         self._scene: Scene | None = None
         """Whose light the maps hold."""
@@ -55,6 +63,9 @@ class MovedLight:
         """Photons through `scene`, with footprints so much wider, in maps that are fitted to where those of the frame
         before have landed. Without a `plan` there are as many as took about `SECONDS` before."""
         started = time.perf_counter()
+        # What found no room was not drawn: it is traced in smaller parts from now on.
+        self._parts *= 1 + bool(sum(sent.batch().overflow for sent in self._sent))
+        self._sent.clear()
         wished, depth, side = (self.photons, DEPTH, 1.0) if plan is None else (plan.photons, plan.depth, plan.side)
         photons = _steady(wished)
         plans = self._plans_for(scene)
@@ -75,7 +86,7 @@ class MovedLight:
         pieces, seed = [], light_pass.settings.seed
         for plan in plans:
             lattice = plan.lattice_count(photons)
-            parts = -(-lattice // (trace.batch // plan.lattices))
+            parts = min(-(-lattice // (trace.batch // plan.lattices)) * self._parts, lattice)
             for i in range(parts):
                 points = len(range(i, lattice, parts))
                 pieces.append((plan.slice(seed, 0, lattice, i, parts, points, float(photons)), plan.domain))
@@ -84,15 +95,24 @@ class MovedLight:
             while waiting:
                 part = waiting.pop()
                 with self._context.timers.timing("trace"):
-                    batch = finished(trace.steps(part, domain, depth))
-                if batch.overflow and part.points > 1:
+                    sent = trace.send(part, domain, depth)
+                    batch = finished(trace.steps(part, domain, depth)) if sent is None else None
+                if batch is not None and batch.overflow and part.points > 1:
                     waiting += part.halves
                     continue
-                self._landed.choose(trace.photons, batch.photons, None, number, len(pieces))
+                if sent is not None:
+                    self._sent.append(sent)
+                    count, held = sent.most, sent.held
+                elif batch is not None:
+                    count, held = batch.photons, None
+                self._landed.choose(trace.photons, count, held, number, len(pieces))
                 if maps is not None:
                     assert self._tables is not None
-                    for _ in light_pass.splat_steps(trace.photons, batch.photons, widening, self._tables.preview, maps):
-                        pass
+                    tables, shown, smoothing = self._tables.preview, light_pass.shown, light_pass.smoothing * widening
+                    spectra = SplatSpectra(shown.variables, tables.tables, shown.gains, tables.reindex)
+                    landed = Photons(trace.photons, count, held=held)
+                    with self._context.timers.timing("splat"):
+                        maps.splatter.run(landed, spectra, maps.atlas, maps.receivers, smoothing)
 
     def _fitted(self, scene: Scene, side: float) -> LightMaps:
         """Maps for what was chosen of the last photons: those that there are, unless a curved receiver has moved."""
@@ -116,11 +136,13 @@ class MovedLight:
             self._plans = finished(light_pass.sample_plans(FIRST_PHOTONS))
             limits = {plan.index: [(b.x_lo, b.x_hi) for b in plan.bands] for plan in self._plans}
             self._tables = PassTables(light_pass.shown, [limits.get(i, [(0.0, 1.0)]) for i in range(len(scene.lights))])
-        boxes = [_box(o) for o in scene.objects if o.material.is_specular]
-        triangles = light_pass.buffers.space.to_gpu(np.concatenate(boxes)) if boxes else np.zeros((0, 3, 3))
+            self._boxes = [_box(item.mesh) for item in scene.objects]
+        boxes = [replace(item, mesh=box) for item, box in zip(scene.objects, self._boxes, strict=True)]
+        space, specular = light_pass.buffers.space, [b.world_vertices[_SIDES] for b in boxes if b.material.is_specular]
+        triangles = space.to_gpu(np.concatenate(specular)) if specular else np.zeros((0, 3, 3))
+        boxed = replace(scene, objects=tuple(boxes))
         domains: dict[int, EmissionDomain | None] = {
-            plan.index: emission_domain(scene.lights[plan.index], scene, light_pass.buffers.space, triangles)
-            for plan in self._plans
+            plan.index: emission_domain(scene.lights[plan.index], boxed, space, triangles) for plan in self._plans
         }
         return [replace(p, domain=d) for p in self._plans if (d := domains[p.index]) is not None]
 
@@ -136,13 +158,10 @@ def _steady(photons: int) -> int:
     return int(2.0 ** (np.floor(2.0 * np.log2(max(photons, 2))) / 2.0))
 
 
-def _box(item: SceneObject) -> np.ndarray:
-    """The sides of the object's own box as triangles (12, 3, 3) in the world: a ray that meets the object meets
-    them."""
-    low, high = item.mesh.vertices.min(axis=0), item.mesh.vertices.max(axis=0)
-    corners = np.where(np.indices((2, 2, 2)).reshape(3, 8).T, high, low)
-    corners = corners @ item.object_to_world[:3, :3].T + item.object_to_world[:3, 3]
-    return corners[_SIDES]
+def _box(mesh: Mesh) -> Mesh:
+    """A box about it, in its own frame: a ray that meets the mesh meets the sides."""
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    return Mesh("box", np.where(np.indices((2, 2, 2)).reshape(3, 8).T, high, low), _SIDES)
 
 
 _SIDES = np.array(
