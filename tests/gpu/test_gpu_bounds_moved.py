@@ -9,6 +9,7 @@ import pytest
 from gl_counts import counted
 from spectrasplat.base.errors import UserError
 from spectrasplat.base.paths import shipped_scenes
+from spectrasplat.edit.live_inputs import LiveInputs
 from spectrasplat.gpu.context import Context
 from spectrasplat.gpu.records import NONE
 from spectrasplat.gpu.scene_buffers import SceneBuffers
@@ -17,6 +18,11 @@ from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.render.device_scene import scene_buffers
+from spectrasplat.render.viewer.live_light import LiveLight
+from viewer_rig import table, turning, viewer
+
+SLACK = 5.0
+"""Other work on the machine, and a processor slower than those that go with a GPU."""
 
 
 def placed(scene: Scene, matrix: np.ndarray) -> Scene:
@@ -43,6 +49,56 @@ def texels(buffers: SceneBuffers, name: str, count: int) -> np.ndarray:
 def triangles(buffers: SceneBuffers) -> np.ndarray:
     words = texels(buffers, "TRIANGLES", TRIANGLE.stride // 16 * buffers.triangle_count)
     return np.ascontiguousarray(words).reshape(-1).view(TRIANGLE.dtype)
+
+
+def pulling(before: LiveInputs, step: float) -> LiveInputs:
+    """The first glass is dragged along x."""
+    objects = list(before.scene.objects)
+    at = next(i for i, o in enumerate(objects) if o.material.transmits)
+    matrix = objects[at].object_to_world.copy()
+    matrix[0, 3] += 0.01 * step
+    objects[at] = replace(objects[at], object_to_world=matrix)
+    return replace(before, scene=replace(before.scene, objects=tuple(objects)))
+
+
+@pytest.mark.parametrize("name", ["prism", pytest.param("default", marks=pytest.mark.slow)])
+def test_a_frame_of_what_moves_asks_for_little(name: str) -> None:
+    with viewer(name) as rig:
+        for change in (pulling, turning):
+            seen = set()
+            for frame in rig.frames(5, change)[2:]:
+                counts = frame.counts
+                assert not counts.programs and not counts.finishes, table([frame])
+                assert not [made for made in counts.made if not made.startswith("buffer")], table([frame])
+                assert counts.written_bytes <= 64 << 10, table([frame])
+                # Of the frame before: where some of its photons landed, and what became of its batches.
+                assert counts.read_bytes <= 12 << 10, table([frame])
+                assert frame.python_ms <= SLACK * 3.0, table([frame])
+                seen.add(frame.version)
+            assert len(seen) == 3
+            rig.settle()
+
+
+def test_windows_stay_until_light_leaves_them(gl: Context) -> None:
+    """Where something is moved to and fro the same maps serve, and a step that carries light off is followed."""
+    scene = load_scene(shipped_scenes()["prism"])
+    light = LiveLight(
+        gl, scene, RenderSettings(width=120, height=68, batch=8192, any_view=True, editable=True), 1 << 26
+    )
+    try:
+        light.light_pass.prepare()
+        light.light_pass.begin(1 << 13, 1)
+        layouts, fluxes = [], []
+        for step in (0.0, 0.01, 0.0, 0.01, 0.0, 1.5, 1.51):
+            maps = light.move(placed(scene, turn(0.0, step)))
+            assert maps is not None
+            layouts.append(maps.layout)
+            fluxes.append(maps.flux(True) * maps.scale)
+        assert layouts[3] is layouts[4]
+        assert layouts[6] is not layouts[5] and layouts[6].size == layouts[5].size
+        assert fluxes[6] == pytest.approx(fluxes[0], rel=0.2)
+    finally:
+        light.release()
 
 
 @pytest.mark.parametrize("name", ["wine_glass", "ball", "default"])
