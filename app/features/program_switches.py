@@ -17,7 +17,7 @@ PROGRAM_SWITCHES = frozenset(
     + ("FOLLOWS_SPECULAR", "OF_RECEIVERS")
     # Kinds of splats, beams that no wavelength moves, sums by atomics, of pieces of splats, seams between charts.
     + ("SMALL", "SWEPT", "CUT", "EDGE", "CLIPPED", "FANS", "CONTACT_LINES", "STILL", "FLOAT_ATOMICS", "IN_PIECES")
-    + ("FILL",)
+    + ("FROM_SUMS", "FROM_SCRATCH", "SEAMS", "IN_BULK")
     # Layers of the picture.
     + ("LAYER_BEAUTY", "RGB_CHANNELS", "MAP_BINS", "RECEIVER_LIGHT", "VISIBLE_LIGHTS")
     # Camera rays beyond glass, and the program for what is seen directly.

@@ -48,14 +48,16 @@ class SplatWay:
     by_compute: bool
     reason: str
     """What decided, for people."""
-    largest_sums: int
-    """Bytes that the sums of compute shaders may take: of one storage block."""
+    largest_block: int
+    """Bytes of a storage block: what sums of compute shaders may take."""
     extensions: tuple[str, ...] = ()
     """Extensions of GLSL that adding needs; without them it compares and swaps."""
+    in_bulk: bool = False
+    """Many photons at a time and in any order, as GPUs like it: sums are read where they are, and seldom moved."""
 
     def for_maps(self, size: tuple[int, int], targets: int) -> bool:
         """Whether splats go by compute shaders into maps of so many texels and textures."""
-        return self.by_compute and sums_bytes(size, targets) <= self.largest_sums
+        return self.by_compute and sums_bytes(size, targets) <= self.largest_block
 
     @property
     def sentence(self) -> str:
@@ -85,17 +87,18 @@ def _found(ctx: moderngl.Context) -> SplatWay:
     renderer = ctx.info["GL_RENDERER"]
     extensions = (FLOAT_ATOMICS,) if FLOAT_ATOMICS in ctx.extensions else ()
     largest = Limits.read(ctx.info).storage_block_bytes
-    forced = _from_environment()
+    traits, forced = DeviceTraits.of(renderer), _from_environment()
     if forced:
-        return SplatWay(forced == "compute", f"{ENVIRONMENT_VARIABLE} is set", largest, extensions)
-    if is_software_renderer(renderer):
+        by_compute, reason = forced == "compute", f"{ENVIRONMENT_VARIABLE} is set"
+    elif is_software_renderer(renderer):
         # Where a GPU is assumed its programs are for strict compilers too: without extensions.
-        is_assumed = DeviceTraits.of(renderer).splats_by_compute
-        return SplatWay(is_assumed, "as on all software renderers", largest)
-    if not extensions:
-        return SplatWay(False, f"it has no {FLOAT_ATOMICS}", largest)
-    rate = blending_rate(ctx)
-    return SplatWay(rate < SLOW_BLENDING, f"it blends {rate / 1e9:.1f} G fragments/s", largest, extensions)
+        by_compute, reason, extensions = traits.splats_by_compute, "as on all software renderers", ()
+    elif not extensions:
+        by_compute, reason = False, f"it has no {FLOAT_ATOMICS}"
+    else:
+        rate = blending_rate(ctx)
+        by_compute, reason = rate < SLOW_BLENDING, f"it blends {rate / 1e9:.1f} G fragments/s"
+    return SplatWay(by_compute, reason, largest, extensions, traits.work_is_queued)
 
 
 def _from_environment() -> str:

@@ -47,6 +47,8 @@ EXTENT_LIMIT = 8192.0
 """Texels. A footprint axis or a sweep beyond twice the largest map is a numerical accident."""
 MOST_GROUPS = 65535
 """Work groups that add splats of a kind: what OpenGL promises in one dimension. Each then adds several."""
+_FIRST_ROOM = 1 << 14
+"""Photons that there is room for before many are given."""
 TEAM, TEAMS = 8, 8
 """Invocations that add a piece of a splat together, and such teams of a work group."""
 PIECE_TEXELS = 16 * TEAM
@@ -211,8 +213,16 @@ def slots_per_photon(features: Features) -> int:
 class Footprints:
     """Owns the splat record buffer, the sum of what is drawn and the counts of what could not be drawn as it should."""
 
-    def __init__(self, ctx: moderngl.Context, features: Features, group: int, by_compute: bool = False) -> None:
-        """`group`: the most photons one dispatch covers. `by_compute`: compute shaders add the splats, in any order."""
+    def __init__(
+        self,
+        ctx: moderngl.Context,
+        features: Features,
+        group: int,
+        by_compute: bool = False,
+        in_bulk: bool = False,
+    ) -> None:
+        """`group`: the most photons one dispatch covers. `by_compute`: compute shaders add the splats. `in_bulk`: in
+        any order, as they also do; there is room for as many photons as were given at once, and not for all before."""
         self._ctx = ctx
         groups = features.spectral_groups
         kinds = len(VERTICES)
@@ -221,9 +231,11 @@ class Footprints:
         structs = (photon_record(groups, features.hero), PLACEMENT, RECEIVER, SPLAT, GAIN_BOX)
         self._program = shader.compute(ctx, "light/footprint.comp", defines, structs)
         self._parameters = ctx.buffer(reserve=PARAMETERS.stride)
-        self._by_compute = by_compute
+        self._by_compute, self._in_any_order = by_compute, by_compute or in_bulk
         if by_compute:
             self._no_commands = np.array([[0, 1, 1, 0, 0, 0, 0, 0]] * kinds, np.uint32)
+        elif in_bulk:
+            self._no_commands = np.array([[0, 1, 0, 0, 0]] * kinds, np.uint32)
         else:
             self._no_commands = np.array([[vertices, 1, 0, 0, 0] for vertices in VERTICES], np.uint32)
         sums = np.zeros((min(group, _MOST_FOOTPRINT_GROUPS * WORKGROUP), 4), np.float32)
@@ -235,17 +247,32 @@ class Footprints:
         self._no_sums = ctx.buffer(sums)
         self.reset_counts()
         self.slots_per_photon = slots_per_photon(features)
-        self.capacity = group * self.slots_per_photon
+        self._group = group
+        self.capacity = 0
         """Splats of a kind that the lists have room for."""
-        self.splats = ctx.buffer(reserve=self.capacity * SPLAT.stride)
-        self.lists = ctx.buffer(reserve=self.capacity * (8 * ENTRIES_A_SLOT if by_compute else 4 * kinds))
+        self.splats: moderngl.Buffer
+        """Records, `slots_per_photon` a photon."""
+        self.lists: moderngl.Buffer
         """Slots of each kind, `capacity` each; or the pieces of all."""
+        self.make_room(_FIRST_ROOM if in_bulk else group)
         counts: Defines = {"WORKGROUP": LIST_WORKGROUP} | pieces
         counts |= {name: defines[name] for name in ("SLOTS", "IMAGE_SLOTS", "BORDER_IMAGES") if name in defines}
         if by_compute:
             counts |= {"MOST_GROUPS": f"{MOST_GROUPS}u", "TEAMS": TEAMS}
-        list_shader = "light/splat_list_any.comp" if by_compute else "light/splat_list.comp"
+        list_shader = "light/splat_list_any.comp" if self._in_any_order else "light/splat_list.comp"
         self._list = shader.compute(ctx, list_shader, counts, (SPLAT,))
+
+    def make_room(self, photons: int) -> None:
+        """For the splats of so many; what there was of others' is forgotten where there was none."""
+        needed = min(photons, self._group) * self.slots_per_photon
+        if needed <= self.capacity:
+            return
+        if self.capacity:
+            shader.release(self.splats, self.lists)
+            needed = min(max(needed, 2 * self.capacity), self._group * self.slots_per_photon)
+        self.capacity = needed
+        self.splats = self._ctx.buffer(reserve=needed * SPLAT.stride)
+        self.lists = self._ctx.buffer(reserve=needed * (8 * ENTRIES_A_SLOT if self._by_compute else 4 * len(VERTICES)))
 
     @property
     def entries(self) -> int:
@@ -256,6 +283,7 @@ class Footprints:
         self, photons: Photons, spectra: SplatSpectra, atlas: MapAtlas, receivers: moderngl.Buffer, smoothing: float
     ) -> None:
         """Fill the slots of `photons`, `slots_per_photon` each, and list them by kind."""
+        self.make_room(photons.count)
         variables, tables, gains, reindex = spectra.variables, spectra.tables, spectra.gains, spectra.reindex
         values = PARAMETERS.zeros(1)
         x_reference = gains.x_reference if gains is not None else 0.0
@@ -314,7 +342,7 @@ class Footprints:
             self._list["entries_room"].value = self.entries
         else:
             self._list["capacity"].value = self.capacity
-        self._list.run(-(-photons.count // LIST_WORKGROUP) if self._by_compute else 1)
+        self._list.run(-(-photons.count // LIST_WORKGROUP) if self._in_any_order else 1)
 
     def counts(self) -> dict[str, float]:
         """Since the last reset: `splats_w` (power of all splats over their bands, W), `outside_map_w` (that of photons

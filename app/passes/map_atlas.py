@@ -1,7 +1,7 @@
 """All receivers' caustic maps as tiles of one texture, and the sums kept in it.
 
-Splats are added to a scratch texture first and from there to the total after fixed numbers of photons: a float32
-sum of a million small numbers loses digits that a sum of sums keeps.
+Splats are added to a scratch texture, or to sums in a buffer, and from there to the total after fixed numbers of
+photons: a float32 sum of a million small numbers loses digits that a sum of sums keeps.
 """
 
 from __future__ import annotations
@@ -73,16 +73,22 @@ class MapAtlas:
         )
         self.total_textures = [self._texture() for _ in range(targets)]
         self.scratch_textures = [self._texture() for _ in range(targets if scratched is None else scratched)]
-        self.framebuffer = ctx.framebuffer(self.drawn_into)
+        self._framebuffer = ctx.framebuffer(self.drawn_into)
+        self.has_totals = False
+        """The totals hold something; else they may hold anything, and count as zero."""
+        self.is_drawn = False
+        """Something was drawn since `clear`: scratch textures hold what is pending, and what totals left of it."""
+        self.is_added = False
+        """The sums hold something."""
         self._accumulate = Accumulate(ctx)
         self._sums: SplatSums | None = None
         self.pending = 0
-        """Photons in the scratch textures."""
+        """Photons in the scratch textures and sums."""
         self.contact_words: moderngl.Texture | None = None
         """Words of `contact_lines`, where maps have such lines; the atlas's own."""
         self.borders: moderngl.Texture | None = None
         """Receivers' `borders`, where light lands near them; the atlas's own."""
-        self.clear()
+        self._framebuffer.clear()
 
     def _texture(self) -> moderngl.Texture:
         import moderngl
@@ -98,31 +104,43 @@ class MapAtlas:
         return self.scratch_textures + self.total_textures[len(self.scratch_textures) :]
 
     @property
+    def framebuffer(self) -> moderngl.Framebuffer:
+        """To draw into: a texture for each target, in their order."""
+        if len(self.scratch_textures) < self.targets:
+            self.ready_totals()
+        self.is_drawn = True
+        return self._framebuffer
+
+    @property
     def sums(self) -> SplatSums:
         """What compute shaders add splats to; made when it is first needed."""
         if self._sums is None:
             self._sums = SplatSums(self.ctx, self.size, self.targets)
-            self._sums.forget(self.drawn_into)
         return self._sums
 
-    def collect(self) -> None:
-        """Move what compute shaders added to the textures, as if it had been drawn there."""
-        if self._sums is not None:
-            self._sums.move(self.drawn_into)
+    def ready_totals(self) -> None:
+        """Totals can be added to, read and written; what compute shaders added is in them."""
+        if not self.has_totals:
+            for texture in self.total_textures:
+                frame_of(self.ctx, texture).clear()
+            self.has_totals = True
+        if self._sums is not None and self.is_added:
+            self._sums.move(self.total_textures)
+            self.is_added = False
 
     def flush(self) -> None:
-        """Add the scratch textures to the total and clear them."""
-        if self.pending:
-            self.collect()
+        """Add all that is pending to the totals."""
+        self.ready_totals()
+        if self.pending and self.is_drawn:
             for scratch, total in zip(self.scratch_textures, self.total_textures, strict=False):
                 self._accumulate.run(scratch, total)
-            self.pending = 0
+        self.pending = 0
 
     def settle(self) -> None:
         """Flush for the last time: nothing is added any more, and the scratch textures are given back."""
         self.flush()
         park(self.ctx)
-        shader.release(self.framebuffer, *self.scratch_textures)
+        shader.release(self._framebuffer, *self.scratch_textures)
         self.scratch_textures = []
         self._release_sums()
 
@@ -145,11 +163,11 @@ class MapAtlas:
 
     def clear(self) -> None:
         """Forget everything deposited."""
-        for texture in self.total_textures:
-            frame_of(self.ctx, texture).clear()
-        self.framebuffer.clear()
-        if self._sums is not None:
-            self._sums.forget(self.drawn_into)
+        if self.is_drawn:
+            self._framebuffer.clear()
+        if self._sums is not None and self.is_added:
+            self._sums.clear()
+        self.has_totals = self.is_drawn = self.is_added = False
         self.pending = 0
 
     def read_total(self) -> np.ndarray:
@@ -173,6 +191,10 @@ class MapAtlas:
         self._release_sums()
         park(self.ctx)
         shader.release(
-            self.framebuffer, self._accumulate, *self.scratch_textures, *self.total_textures, self.placements
+            self._framebuffer,
+            self._accumulate,
+            *self.scratch_textures,
+            *self.total_textures,
+            self.placements,
         )
         shader.release(self.contact_words, self.borders)

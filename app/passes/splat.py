@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..features.program_switches import Defines
+from ..features.program_switches import Defines, switched
 from ..gpu import shader
 from ..gpu.context import check_device
 from ..gpu.framebuffers import adding
@@ -40,14 +40,14 @@ if TYPE_CHECKING:
     from ..gpu.splat_tables import SplatTables
     from .map_atlas import MapAtlas
 
-GROUP = 1 << 15
-"""Photons that are turned into splats and drawn at a time."""
-MOST_ADDED, ADDED_SPLATS = 1 << 17, 1 << 18
-"""Photons that compute shaders add at a time, and splats that these may become at most. Each group costs a GPU the time
-of its dispatches."""
-CHUNK, SMALLEST_CHUNK = 1 << 18, 1 << 11
-"""Photons between two flushes of the scratch textures, at most and at least. The fewer, the less a sum's rounding
-depends on the order in which batches bring the photons."""
+GROUP, BULK_GROUP = 1 << 15, 1 << 22
+"""Photons that are turned into splats and drawn at a time; on GPUs, each group of which costs the time of its
+dispatches."""
+BULK_BYTES = 512 << 20
+"""What splat records may take there."""
+CHUNK, SMALLEST_CHUNK, BULK_CHUNK = 1 << 18, 1 << 11, 1 << 21
+"""Photons between two flushes of the scratch textures, at most and at least, and on GPUs, where a flush costs as much
+as a picture. The fewer, the less a sum's rounding depends on the order in which batches bring the photons."""
 FLUSH_SHARE = 16
 """Texels of the atlas per photon of a chunk: what flushing may cost, in texels a photon."""
 BIND_COMMANDS = 3
@@ -58,7 +58,7 @@ PARAMETERS = Struct(
         Field("atlas_size", "vec2", "texels"),
         Field("table_u", "vec2", "texture u = x * xi + y"),
         Field("bands", "uint", ""),
-        Field("density_cells", "uint", ""),
+        Field("capacity", "uint", "slots that are listed of each kind"),
         Field("cumulative_samples", "uint", ""),
         Field("tables", "uint", "layers of the texture; from bit 16 on: tables that lie one below the other in each"),
     ),
@@ -72,13 +72,14 @@ class Splatter:
         """`by_compute`: whether compute shaders add the splats; None as the context's device likes it."""
         self._ctx = ctx
         self._features = features
-        self.by_compute = way_of(ctx).by_compute if by_compute is None else by_compute
+        way = way_of(ctx)
+        self.by_compute = way.by_compute if by_compute is None else by_compute
+        self._in_bulk = way.in_bulk
         self.group = GROUP
-        while (
-            self.by_compute and self.group < MOST_ADDED and 2 * self.group * slots_per_photon(features) <= ADDED_SPLATS
-        ):
-            self.group *= 2
-        self._footprints = Footprints(ctx, features, self.group, self.by_compute)
+        if self._in_bulk:
+            most_bytes = min(BULK_BYTES, way.largest_block)
+            self.group = min(BULK_GROUP, most_bytes // (SPLAT.stride * slots_per_photon(features)))
+        self._footprints = Footprints(ctx, features, self.group, self.by_compute, self._in_bulk)
         self._indices: moderngl.Buffer | None = None
         self._draws: dict[int, moderngl.VertexArray] = {}
         self._adds: dict[int, moderngl.ComputeShader] = {}
@@ -89,30 +90,21 @@ class Splatter:
         self._parameters = ctx.buffer(reserve=PARAMETERS.stride)
 
     def _build_draws(self) -> None:
-        slots = self.group * self._footprints.slots_per_photon
-        corners = np.array([0, 1, 2, 2, 1, 3], np.uint32) + 4 * np.arange(slots, dtype=np.uint32)[:, None]
-        self._indices = self._ctx.buffer(corners)
+        if not self._in_bulk:
+            slots = self.group * self._footprints.slots_per_photon
+            corners = np.array([0, 1, 2, 2, 1, 3], np.uint32) + 4 * np.arange(slots, dtype=np.uint32)[:, None]
+            self._indices = self._ctx.buffer(corners)
         for kind, (fragment, chosen) in draw_variants(self._features).items():
-            defines = chosen | {"FIRST_OF_KIND": self._first_of(kind)}
+            defines = chosen | switched(IN_BULK=self._in_bulk) | {"KIND": kind}
             program = shader.program(self._ctx, "light/splat.vert", fragment, defines, (SPLAT,))
-            corners_shared = VERTICES[kind - 1] == 6
-            indices = self._indices if corners_shared else None
+            indices = self._indices if VERTICES[kind - 1] == 6 else None
             self._draws[kind] = self._ctx.vertex_array(program, [], index_buffer=indices)
-
-    def _first_of(self, kind: int) -> str:
-        return f"{(kind - 1) * self._footprints.capacity}u"
 
     def _build_adds(self) -> None:
         way = way_of(self._ctx)
         for kind, (_, chosen) in draw_variants(self._features).items():
-            numbers: Defines = {
-                "KIND": kind,
-                "KINDS": f"{len(VERTICES)}u",
-                "TEAM": TEAM,
-                "TEAMS": TEAMS,
-                "LANES": TEAM * TEAMS,
-            }
-            defines = chosen | sum_defines(way) | numbers
+            numbers: Defines = {"KIND": kind, "KINDS": f"{len(VERTICES)}u", "TEAM": TEAM, "TEAMS": TEAMS}
+            defines = chosen | sum_defines(way) | numbers | {"LANES": TEAM * TEAMS}
             self._adds[kind] = shader.compute(self._ctx, "light/splat_add.comp", defines, (SPLAT,), way.extensions)
 
     def run(
@@ -121,6 +113,8 @@ class Splatter:
         """Deposit `photons` (photon_record(groups)). `receivers`: RECEIVER records; `smoothing`: standard deviation of
         a footprint in lattice spacings."""
         chunk = int(np.clip(atlas.size[0] * atlas.size[1] // FLUSH_SHARE, SMALLEST_CHUNK, CHUNK))
+        if self._in_bulk:
+            chunk = BULK_CHUNK
         group = min(self.group, chunk)
         for done in range(0, photons.count, group):
             part = photons.part(done, min(group, photons.count - done))
@@ -135,11 +129,11 @@ class Splatter:
 
     def draw(self, tables: SplatTables, atlas: MapAtlas) -> None:
         """Add the splats of the last group of photons to the atlas: to its scratch textures, or to its sums."""
-        from ..gpu.splat_tables import CUMULATIVE_SAMPLES, DENSITY_CELLS
+        from ..gpu.splat_tables import CUMULATIVE_SAMPLES
 
         values = PARAMETERS.zeros(1)
         packing = tables.layers | tables.stacked << 16
-        values[0] = (atlas.size, (0.5, 0.5), tables.bands, DENSITY_CELLS, CUMULATIVE_SAMPLES, packing)
+        values[0] = (atlas.size, (0.5, 0.5), tables.bands, self._footprints.capacity, CUMULATIVE_SAMPLES, packing)
         self._parameters.write(values.tobytes())
         self._parameters.bind_to_uniform_block(0)
         curve = tables.density_buffer if self._features.point_spectrum else tables.cumulative_buffer
@@ -162,6 +156,7 @@ class Splatter:
     def _add(self, atlas: MapAtlas) -> None:
         # Made, where it is the first time, before what it needs is bound.
         sums = atlas.sums
+        atlas.is_added = True
         sums.buffer.bind_to_storage_buffer(BIND_SUMS)
         commands = self._footprints.commands
         commands.bind_to_storage_buffer(BIND_COMMANDS)

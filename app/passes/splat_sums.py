@@ -21,31 +21,32 @@ class SplatSums:
     """Owns the sums of an atlas: blocks of texels for each of its targets, as `light/splat_sums.glsl` lays them out."""
 
     def __init__(self, ctx: moderngl.Context, size: tuple[int, int], targets: int) -> None:
-        """What the sums hold at first is anything: `forget` it."""
         self._ctx = ctx
         self._size = size
+        self._targets = targets
         way = way_of(ctx)
         self.buffer = ctx.buffer(reserve=sums_bytes(size, targets))
         defines = sum_defines(way) | {"SIDE": _SIDE}
         self._program = shader.compute(ctx, "light/splat_sums.comp", defines, extensions=way.extensions)
+        self.clear()
 
     def move(self, textures: Sequence[moderngl.Texture]) -> None:
         """Add the sums to `textures`, RGBA32F of the atlas's size, one a target; they are zero then."""
-        self._run(textures, 1)
+        for target, texture in enumerate(textures):
+            texture.bind_to_image(0, read=True, write=True)
+            self._run(target, 1, counts=True)
 
-    def forget(self, textures: Sequence[moderngl.Texture]) -> None:
-        """Make them zero; `textures`, as for `move`, stay as they are."""
-        self._run(textures, 0)
+    def clear(self) -> None:
+        """Make them zero."""
+        self._run(0, self._targets, counts=False)
 
-    def _run(self, textures: Sequence[moderngl.Texture], counts: int) -> None:
+    def _run(self, first: int, targets: int, *, counts: bool) -> None:
         self._ctx.memory_barrier()
         self.buffer.bind_to_storage_buffer(BIND_SUMS)
         width, height = self._size
-        self._program["counts"].value = counts
-        for target, texture in enumerate(textures):
-            texture.bind_to_image(0, read=True, write=True)
-            self._program["target"].value = target
-            self._program.run(-(-width // _SIDE), -(-height // _SIDE))
+        for name, value in (("size", self._size), ("target", first), ("counts", int(counts))):
+            self._program[name].value = value
+        self._program.run(-(-width // _SIDE), -(-height // _SIDE), targets)
         self._ctx.memory_barrier()
 
     @property

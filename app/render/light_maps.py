@@ -10,17 +10,19 @@ import numpy as np
 
 from ..features.features import Features
 from ..gpu import shader
+from ..gpu.framebuffers import frame_of
 from ..gpu.records import RECEIVER
 from ..gpu.shader import Releasable
 from ..gpu.splat_way import way_of
 from ..gpu.tiles import Tile
-from ..passes.accumulate import LevelsFold, SeamFold, copy_texture
+from ..passes.accumulate import copy_texture
 from ..passes.border_maps import border_rows, border_texture, inside_share
 from ..passes.caustic_maps import CausticMaps
 from ..passes.contact_lines import read_words, seen_shares
 from ..passes.map_atlas import MapAtlas
 from ..passes.map_layout import MapLayout, Window
 from ..passes.picture_window import PictureWindow
+from ..passes.resolve import Resolve
 from ..passes.splat import Splatter
 
 _ROWS = 256
@@ -61,8 +63,15 @@ class LightMaps:
         """What was deposited is energy times this."""
         self._resolved: list[moderngl.Texture] = []
         self._is_settled = False
-        self._levels_fold = LevelsFold(ctx, layout.folds)
-        self._seam_fold = SeamFold(ctx, [(layout.tiles[r][0], charts) for r, charts in layout.charts.items()])
+        self._in_bulk = way_of(ctx).in_bulk
+        self._resolve = Resolve(
+            ctx,
+            features.targets,
+            [tile for tiles in layout.tiles.values() for tile in tiles],
+            layout.folds,
+            [(layout.tiles[r][0], charts) for r, charts in layout.charts.items()],
+            self.splatter.by_compute,
+        )
 
     def follow(self, layout: MapLayout) -> bool:
         """Be laid out as `layout`, of the same tiles, from now on. False, and nothing done, where borders are others in
@@ -110,6 +119,7 @@ class LightMaps:
     def bring_back(self, sums: Sequence[moderngl.Texture], photon_weight: float) -> None:
         """Hold again what `copied_sums` gave, with the weight of that time."""
         self.clear()
+        self.atlas.ready_totals()
         for source, target in zip(sums, self.atlas.total_textures, strict=True):
             copy_texture(self._ctx, source, target)
         self.photon_weight = photon_weight
@@ -135,8 +145,9 @@ class LightMaps:
             self.resolved_textures()
             shader.release(*self.atlas.total_textures)
         else:
-            self._resolved, self.atlas.total_textures = self.atlas.total_textures, []
-            self._levels_fold.run(self._resolved)
+            shader.release(*self._resolved)
+            self._resolved = self.atlas.total_textures
+            self._resolve.run(self.atlas, self._resolved)
         self.atlas.total_textures = []
         self._is_settled = True
 
@@ -144,17 +155,13 @@ class LightMaps:
         """The summed maps for lookups: wide texels added to fine ones, charts' seams folded home."""
         if self._is_settled:
             return self._resolved
-        self.atlas.flush()
-        ctx = self._ctx
-        total = self.atlas.total_textures
+        if not self._in_bulk or (self.splatter.by_compute and self.atlas.is_drawn):
+            self.atlas.flush()
         if not self._resolved:
-            self._resolved = [ctx.texture(self.atlas.size, 4, dtype="f4") for _ in total]
-        if self.layout.charts:
-            self._seam_fold.run(total, self._resolved)
-        else:
-            for source, target in zip(total, self._resolved, strict=True):
-                copy_texture(ctx, source, target)
-        self._levels_fold.run(self._resolved)
+            self._resolved = [self._ctx.texture(self.atlas.size, 4, dtype="f4") for _ in range(self.atlas.targets)]
+            for texture in self._resolved:
+                frame_of(self._ctx, texture).clear()
+        self._resolve.run(self.atlas, self._resolved)
         return self._resolved
 
     def caustic_maps(self, textures: Sequence[moderngl.Texture] | None = None) -> CausticMaps:
@@ -243,7 +250,6 @@ class LightMaps:
             self.atlas,
             self.receivers,
             *self._resolved,
-            self._levels_fold,
-            self._seam_fold,
+            self._resolve,
         )
         shader.release(*owned)

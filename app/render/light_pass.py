@@ -406,6 +406,7 @@ class LightPass:
         """After `begin`, instead of passes: what others traced for these maps.
 
         `sums`: for every texture of the atlas in turn, float32 (height, width, 4); `stats`: what they counted."""
+        self.atlas.ready_totals()
         for texture, values in zip(self.atlas.total_textures, sums, strict=True):
             texture.write(np.ascontiguousarray(values, np.float32))
         self.maps.photon_weight = photon_weight

@@ -56,7 +56,8 @@ class Pace:
     @staticmethod
     def within_frames(context: Context) -> Pace:
         """For one that takes little of every frame; extended lights make do with as many points."""
-        return Pace(True, context.traits.viewer_splat_photons, True, 1024, True)
+        queued = context.traits.work_is_queued
+        return Pace(True, context.traits.viewer_splat_photons, not queued, 1024, True)
 
 
 class Splatting:
@@ -71,6 +72,8 @@ class Splatting:
         self.dispatch_seconds = DISPATCH_S
         """What a part may take where the device queues work. Elsewhere parts stay, as sums in another order are rounded
         otherwise."""
+        self._is_fast = False
+        """The last part that was waited for took so little that the largest may be given at once, without waiting."""
         self._part: DispatchBudget | None = None
         if context.traits.work_is_queued:
             self._part = DispatchBudget(FIRST_SPLATTED, SMALLEST_PART, LARGEST_PART)
@@ -98,15 +101,17 @@ class Splatting:
         start = 0
         while start < count:
             started = time.perf_counter()
-            part = min(part_max, self._part.units if self._part else count, count - start)
+            is_capped = self._part is not None and not self._is_fast
+            part = min(part_max, self._part.units if self._part and is_capped else count, count - start)
             with self._context.timers.timing("splat"):
                 maps.splatter.run(all_photons.part(start, part), spectra, atlas, maps.receivers, smoothing)
-            if self._pace.waits or self._part:
+            if self._pace.waits or is_capped:
                 self._context.finish()
             took = time.perf_counter() - started
             self.seconds += took
-            if self._part:
+            if self._part and (self._pace.waits or is_capped):
                 self._part.learn(part, took, self.dispatch_seconds)
+                self._is_fast = took * LARGEST_PART < part * self.dispatch_seconds
             start += part
             if start < count:
                 yield
@@ -114,9 +119,9 @@ class Splatting:
     def summing(self, atlas: MapAtlas) -> Iterator[None]:
         """Sum up what is pending with pauses, so that the maps can be shown at once; nothing where the pace knows no
         parts."""
-        if self._accumulate is None or not atlas.pending:
+        if self._accumulate is None or not atlas.pending or not atlas.is_drawn:
             return
-        atlas.collect()
+        atlas.ready_totals()
         height = atlas.size[1]
         dispatch_budget = DispatchBudget(FIRST_SUMMED, ROWS, -(-height // ROWS) * ROWS)
         for scratch, total in zip(atlas.scratch_textures, atlas.total_textures, strict=False):

@@ -157,7 +157,7 @@ bool in_front(Placement place, PhotonRecord photon, vec3 sweep_middle, vec3 swee
 }
 
 // A splat broad in every direction is as well drawn in texels twice as wide, for a quarter of the
-// fragments; the maps are put together again when they are read (levels_fold.comp, bilinearly).
+// fragments; the maps are put together again when they are read (resolve.comp, bilinearly).
 // Returns the index of the placement with these texels.
 uint choose_level(uint at, inout Footprint f, PhotonRecord photon, vec3 middle, vec3 sweep) {
     Placement place = placements[at];

@@ -1,5 +1,5 @@
 // Vertex pulling, nothing instanced. SMALL, SWEPT or CUT chooses the class: a swept splat is a parallelogram (four
-// corners through an index buffer), a small one a triangle about its square, which costs a software rasteriser one
+// corners through an index buffer, where photons are many two triangles without), a small one a triangle about its square, which costs a software rasteriser one
 // set-up instead of two (it wins below about 40 texels).
 #include "light/splat_setup.glsl"
 
@@ -64,7 +64,7 @@ vec4 part_inside(SplatRecord splat) {
 
 void main() {
 #if SMALL
-    SplatRecord splat = splats[lists[FIRST_OF_KIND + uint(gl_VertexID / 3)]];
+    SplatRecord splat = splats[lists[uint(KIND - 1) * capacity + uint(gl_VertexID / 3)]];
     if (CONTACT_LINES) side = side_taken_off(splat);
     int third = gl_VertexID % 3;
     vec2 corner = vec2(third == 1 ? 3.0 : -1.0, third == 2 ? 3.0 : -1.0);
@@ -73,9 +73,15 @@ void main() {
     at = reach * splat.across;
     half_texel = half_texel_of(splat);
 #else
-    SplatRecord splat = splats[lists[FIRST_OF_KIND + uint(gl_VertexID >> 2)]];
+#if IN_BULK
+    // Two triangles, no index buffer: of corners 0, 1, 2 and 2, 1, 3.
+    int sixth = gl_VertexID % 6, vertex = gl_VertexID / 6 * 4 + (sixth < 3 ? sixth : sixth == 4 ? 1 : sixth / 2 + 1);
+#else
+    int vertex = gl_VertexID;
+#endif
+    SplatRecord splat = splats[lists[uint(KIND - 1) * capacity + uint(vertex >> 2)]];
     if (CONTACT_LINES) side = side_taken_off(splat);
-    vec2 corner = vec2(float(gl_VertexID & 1), float((gl_VertexID >> 1) & 1)) * 2.0 - 1.0;
+    vec2 corner = vec2(float(vertex & 1), float((vertex >> 1) & 1)) * 2.0 - 1.0;
     if (CLIPPED) {
         vec4 inside = part_inside(splat);
         inside.zw = max(inside.xy, inside.zw);

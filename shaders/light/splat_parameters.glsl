@@ -3,7 +3,7 @@ layout(std140, binding = 0) uniform DrawParameters {
     vec2 atlas_size;
     vec2 table_u;  // texture u = table_u.x * xi + table_u.y
     uint bands;
-    uint density_cells;
+    uint capacity;  // slots that are listed of each kind
     uint cumulative_samples;
     uint tables;  // layers of the texture; from bit 16 on: tables that lie one below the other in each
 };

@@ -31,7 +31,7 @@ vec4 energy(SplatRecord splat, uint g) {
             // Four wavelengths, their cells two a number.
             if (span.y > span.x) {
                 uvec2 cells = uvec2(splat.x_range);
-                uint base = row * density_cells;
+                uint base = row * DENSITY_CELLS;
                 return splat.throughput.x * curve[base + cells.x / DENSITY_CELLS]
                     + splat.throughput.y * curve[base + cells.x % DENSITY_CELLS]
                     + splat.throughput.z * curve[base + cells.y / DENSITY_CELLS]
@@ -41,8 +41,8 @@ vec4 energy(SplatRecord splat, uint g) {
         }
         bool single = splat.x_range.y <= splat.x_range.x && span.y > span.x;
         if (single) {
-            uint cell = min(uint(splat.throughput.x * float(density_cells)), density_cells - 1u);
-            return curve[row * density_cells + cell];
+            uint cell = min(uint(splat.throughput.x * float(DENSITY_CELLS)), DENSITY_CELLS - 1u);
+            return curve[row * DENSITY_CELLS + cell];
         }
     } else if (BAND_CUTS) {
         if (splat.xi_half > 0.0) {

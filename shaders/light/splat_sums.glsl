@@ -20,6 +20,12 @@ uint place_in_sums(ivec2 texel, ivec2 size, int target) {
     return block * (4u * CHANNEL_STEP) + (at.y & 1u) * 4u + (at.x & 3u);
 }
 
+vec4 sums_at(ivec2 texel, ivec2 size, int target) {
+    uint place = place_in_sums(texel, size, target);
+    return vec4(sum_at(place), sum_at(place + CHANNEL_STEP), sum_at(place + 2u * CHANNEL_STEP),
+        sum_at(place + 3u * CHANNEL_STEP));
+}
+
 void add_to_sum(uint place, float value) {
     // Most channels far from a splat's middle round to nothing.
     if (value == 0.0) return;

@@ -2,12 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
+from unittest import mock
+
+import moderngl
 import numpy as np
 import pytest
 from gl_counts import counted
+from spectrasplat.base.paths import shipped_scenes
 from spectrasplat.features.features import Features
-from spectrasplat.gpu.context import Context
+from spectrasplat.gpu import device_traits, splat_way
+from spectrasplat.gpu.context import Context, create_context
+from spectrasplat.gpu.device_traits import DeviceTraits
+from spectrasplat.gpu.splat_way import way_of
+from spectrasplat.gpu.tiles import pack
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes.footprint import KIND_WORDS, PIECE_TEXELS, SPLAT, TEAMS, Footprints, Photons
+from spectrasplat.passes.map_atlas import MapAtlas
+from spectrasplat.passes.resolve import Resolve
+from spectrasplat.render.device_scene import scene_buffers
+from spectrasplat.render.light_pass import LightPass
+from spectrasplat.render.photon_batches import Deposit
+from spectrasplat.render.still import render
 from spectrasplat.stress.rigs.splat_rig import Rig, photons
 
 FEATURES = Features(spectral_groups=1)
@@ -96,3 +114,108 @@ def test_a_list_without_room_for_all_pieces_holds_all_light(gl: Context, monkeyp
     got = rig.draw(broad(200))
     np.testing.assert_allclose(got, want, rtol=1e-4, atol=1e-6 * want.max())
     assert want.max() > 0.0
+
+
+@pytest.fixture(params=[True, False], ids=["added", "drawn"])
+def gpu(request: pytest.FixtureRequest, gl: Context) -> Iterator[Context]:
+    """A device that is taken for a GPU, with either way of adding splats."""
+    with device_traits.assumed(DeviceTraits(splats_by_compute=request.param)), create_context() as context:
+        yield context
+    gl.ctx.__enter__()
+
+
+def test_a_pass_is_eight_dispatches_one_clear_and_one_resolve(gpu: Context) -> None:
+    """After the trace, whatever the number of photons; and no sum is moved, nor anything read or waited for."""
+    scene = load_scene(shipped_scenes()["prism"])
+    settings = RenderSettings(width=96, height=54, photons=4000, method="srd-photons")
+    buffers = scene_buffers(gpu, scene, settings)
+    light = LightPass(gpu, scene, settings, buffers.features, buffers)
+    light.prepare()
+    light.begin(4000, 1)
+    given: list[tuple[moderngl.Buffer, int]] = []
+    splat = light.batches.splat
+
+    def noted(
+        photons: moderngl.Buffer, most: int, into: Deposit, **further: tuple[moderngl.Buffer, int]
+    ) -> Iterator[None]:
+        held = further.get("held")
+        count = most if held is None else min(most, int(np.frombuffer(held[0].read(4, offset=held[1]), np.uint32)[0]))
+        given.append((gpu.ctx.buffer(photons.read(count * light.trace.photon.stride)), count))
+        return splat(photons, most, into, **further)
+
+    with mock.patch.object(light.batches, "splat", noted):
+        for _ in light.steps_until(0, 4000, lambda: False):
+            pass
+    want = [np.frombuffer(texture.read(), np.float32) for texture in light.resolved_textures()]
+    light.batches.splatting.dispatch_seconds = 1e3
+    for _ in range(2):
+        with counted() as clearing:
+            light.maps.clear()
+        with counted() as counts:
+            for photons, count in given:
+                for _ in light.splat_steps(photons, count):
+                    pass
+            got = light.resolved_textures()
+        with counted() as resolving:
+            light.resolved_textures()
+    if light.maps.splatter.by_compute:
+        assert len(given) > 1 or counts.dispatches <= 8
+        assert clearing.dispatches == 1
+    assert counts.waits == 0 and not counts.made and not clearing.made
+    assert counts.dispatches + counts.draws <= len(given) * 6 + resolving.dispatches
+    assert resolving.dispatches <= 2 and resolving.draws == 0
+    assert not light.atlas.has_totals or not light.maps.splatter.by_compute
+    for texture, sums in zip(got, want, strict=True):
+        np.testing.assert_allclose(np.frombuffer(texture.read(), np.float32), sums, rtol=1e-3, atol=1e-5 * sums.max())
+    light.release()
+    buffers.release()
+
+
+@pytest.mark.parametrize("scene", ["prism", pytest.param("lens", marks=pytest.mark.slow)])
+def test_pictures_of_a_gpu_are_those_of_the_processor(gpu: Context, gl: Context, scene: str) -> None:
+    """With the same photons: other groups, lists and sums, and maps resolved without a flush."""
+    assert gpu.traits.splats_by_compute == way_of(gpu.ctx).by_compute and way_of(gpu.ctx).in_bulk
+    settings = RenderSettings(width=96, height=54, photons=20_000, spp=1)
+    pictures = []
+    for context in (gl, gpu):
+        context.ctx.__enter__()
+        pictures.append(render(load_scene(shipped_scenes()[scene]), settings, context=context).rgb.astype(np.float64))
+    wanted, found = pictures
+    assert np.mean((wanted - found) ** 2 / (wanted**2 + 1e-2 * wanted.mean() ** 2)) < 1e-6
+
+
+@pytest.mark.parametrize("in_bulk", [False, True])
+def test_windows_are_resolved_from_the_widest_texels_on(
+    gl: Context, monkeypatch: pytest.MonkeyPatch, in_bulk: bool
+) -> None:
+    """Three levels, sides that are no multiples, and totals that are resolved in place: as numpy adds them up."""
+    monkeypatch.setitem(splat_way._ways, gl.ctx, replace(way_of(gl.ctx), in_bulk=in_bulk))
+    sizes = [(53, 37), (27, 19), (14, 10), (20, 20)]
+    tiles, size = pack(sizes)
+    rng = np.random.default_rng(5)
+    atlas = MapAtlas(gl.ctx, size, np.zeros(0))
+    values = rng.uniform(size=(size[1], size[0], 4)).astype(np.float32)
+    atlas.ready_totals()
+    atlas.total_textures[0].write(values)
+    resolve = Resolve(gl.ctx, 1, [tiles[0], tiles[3]], [(tiles[2], tiles[1]), (tiles[1], tiles[0])], [], False)
+    resolve.run(atlas, atlas.total_textures)
+    got = np.frombuffer(atlas.total_textures[0].read(), np.float32).reshape(values.shape)
+
+    def held(level: int) -> np.ndarray:
+        x0, y0, x1, y1 = tiles[level].rect
+        return values[y0:y1, x0:x1].astype(np.float64)
+
+    want = held(2)
+    for level in (1, 0):
+        fine = held(level)
+        places = [(np.arange(n) + 0.5) / 2.0 - 0.5 for n in fine.shape[:2]]
+        low = [np.floor(place).astype(int) for place in places]
+        below, above = ([np.clip(i + k, 0, n - 1) for i, n in zip(low, want.shape, strict=False)] for k in (0, 1))
+        v, u = (place - i for place, i in zip(places, low, strict=True))
+        v, u = v[:, None, None], u[None, :, None]
+        rows = [(1.0 - u) * want[np.ix_(r, below[1])] + u * want[np.ix_(r, above[1])] for r in (below[0], above[0])]
+        want = fine + 0.25 * ((1.0 - v) * rows[0] + v * rows[1])
+    x0, y0, x1, y1 = tiles[0].rect
+    np.testing.assert_allclose(got[y0:y1, x0:x1], want, rtol=1e-5)
+    x0, y0, x1, y1 = tiles[3].rect
+    np.testing.assert_array_equal(got[y0:y1, x0:x1], values[y0:y1, x0:x1])

@@ -18,9 +18,9 @@ from spectrasplat.model.geometry.charts import build_charts
 from spectrasplat.model.geometry.primitives import box
 from spectrasplat.model.optics import spectrum
 from spectrasplat.model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz
-from spectrasplat.passes.accumulate import SeamFold
 from spectrasplat.passes.footprint import Photons
 from spectrasplat.passes.map_atlas import MapAtlas, placement_rows
+from spectrasplat.passes.resolve import Resolve
 from spectrasplat.stress.rigs.splat_rig import Rig, photons
 
 PLAIN = Features(spectral_groups=1)
@@ -320,9 +320,9 @@ def test_charts_splat_by_triangle_and_seams_fold_home(gl) -> None:
     buffer = gl.ctx.buffer(records)
     rig.splatter.run(Photons(buffer, len(records)), rig.spectra, atlas, gl.ctx.buffer(receiver), 0.8)
     total = atlas.read_total()
-    fold = SeamFold(gl.ctx, [(tiles[1], charts)])
+    resolve = Resolve(gl.ctx, 1, [tiles[1]], [], [(tiles[1], charts)], by_compute=False)
     resolved = gl.ctx.texture(size, 4, dtype="f4")
-    fold.run(atlas.total_textures, [resolved])
+    resolve.run(atlas, [resolved])
     image = np.frombuffer(resolved.read(), np.float32).reshape(size[1], size[0], 4)
     x0, y0, x1, y1 = tiles[1].rect
     folded = chart_folds.fold(charts, total[y0:y1, x0:x1])

@@ -313,6 +313,6 @@ def test_a_software_renderer_draws_and_a_probe_tells_how_fast_it_blends(gl: Cont
 
 
 def test_maps_beyond_a_storage_block_are_drawn() -> None:
-    way = SplatWay(True, "a test", largest_sums=1 << 27)
+    way = SplatWay(True, "a test", largest_block=1 << 27)
     assert way.for_maps((2048, 2048), 1) and not way.for_maps((2048, 2048), 3)
     assert splat_way.sums_bytes((5, 3), 2) == 2 * 2 * 2 * 128
