@@ -15,7 +15,7 @@ from spectrasplat.gpu.records import NONE
 from spectrasplat.gpu.scene_buffers import SceneBuffers
 from spectrasplat.gpu.scene_records import TRIANGLE
 from spectrasplat.model.io.scene_file import load_scene
-from spectrasplat.model.scene import Scene
+from spectrasplat.model.scene import Light, Scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.render.device_scene import scene_buffers
 from spectrasplat.render.viewer.live_light import LiveLight
@@ -49,6 +49,10 @@ def texels(buffers: SceneBuffers, name: str, count: int) -> np.ndarray:
 def triangles(buffers: SceneBuffers) -> np.ndarray:
     words = texels(buffers, "TRIANGLES", TRIANGLE.stride // 16 * buffers.triangle_count)
     return np.ascontiguousarray(words).reshape(-1).view(TRIANGLE.dtype)
+
+
+def shifted(lamp: Light, step: float) -> Light:
+    return replace(lamp, position=(lamp.position[0] + step, *lamp.position[1:])) if lamp.has_place else lamp
 
 
 def pulling(before: LiveInputs, step: float) -> LiveInputs:
@@ -89,8 +93,9 @@ def test_windows_stay_until_light_leaves_them(gl: Context) -> None:
         light.light_pass.prepare()
         light.light_pass.begin(1 << 13, 1)
         layouts, fluxes = [], []
-        for step in (0.0, 0.01, 0.0, 0.01, 0.0, 1.5, 1.51):
-            maps = light.move(placed(scene, turn(0.0, step)))
+        for step in (0.0, 0.01, 0.0, 0.01, 0.0, 4.0, 4.01):
+            lamps = tuple(shifted(lamp, step) for lamp in scene.lights)
+            maps = light.move(replace(placed(scene, turn(0.0, step)), lights=lamps))
             assert maps is not None
             layouts.append(maps.layout)
             fluxes.append(maps.flux(True) * maps.scale)
