@@ -28,6 +28,7 @@ from . import schedule as events
 from .building import Shown, build
 from .dirty_level import DirtyLevel
 from .engine_answers import EngineAnswers
+from .frame_plan import FramePlan
 from .frame_planner import FramePlanner, Kind
 from .invalidation import appearance_differs, dirty_level, lights_differ, moves_view, only_moves
 from .live_camera import DIRECT_S, MOVED_S
@@ -346,8 +347,8 @@ class LiveEngine(EngineAnswers):
         now."""
         assert self._shown is not None
         started, light, planner = time.perf_counter(), self._shown.light, self._planner
-        photons, side = (self._preview_photons, 1.0) if planner is None else planner["stored"].size
-        maps = light.splat_preview(photons, side)
+        plan = FramePlan(self._preview_photons) if planner is None else planner["stored"]
+        maps = light.splat_preview(plan.photons, plan.side)
         if maps is None:
             return
         self._show_for_now(maps)

@@ -68,11 +68,6 @@ class FramePlan:
     settled: int = 0
     """Frames since depth or side changed."""
 
-    @property
-    def size(self) -> tuple[int, float]:
-        """Photons and side."""
-        return self.photons, self.side
-
     def after(self, spent: Spent, frame_s: float) -> FramePlan:
         """The plan once `spent` is known of a frame, of whose kind each shall take `frame_s`."""
         if not spent.is_sane or not spent.photons or not frame_s > 0.0:
