@@ -20,7 +20,9 @@ from dataclasses import dataclass
 
 from .glsl_conditionals import DEFINE, Line, Unit, directive_of, macros_of, resolve_conditionals, value_of
 from .glsl_folding import folded, places_of
+from .glsl_unrolling import unrolled
 
+_UNROLLS_NOTHING = "optionNV(unroll none)"
 _WORD = re.compile(r"[A-Za-z_]\w*")
 _USE = re.compile(r"(?<![.\w])[A-Za-z_]\w*|\.[A-Za-z_]\w*")
 _FUNCTION = re.compile(r"\s*(?:\w+\s+)*?\w+\s+(\w+)\s*\(([^)]*)\)\s*\{")
@@ -139,12 +141,16 @@ class _Constants:
                 values |= {} if value is None else {name: value}
                 ours.add(name)
         self._values = values
+        self._macros = macros
+        self._unrolls = any(_UNROLLS_NOTHING in unit[0].text for unit in units)
         # A count that is also a switch (TINT_LEVELS) denotes its number.
         self._places = places_of(values, frozenset(name for name in ours if values.get(name) in (0, 1)))
 
     def decide(self, text: str) -> str:
-        """A function without what they decide, in as many lines."""
-        return folded(text, self._values, self._places)
+        """A function without what they decide, and without the short loops that no driver is to unroll, in as many
+        lines."""
+        text = folded(text, self._values, self._places)
+        return unrolled(text, lambda name: value_of(name, self._macros)) if self._unrolls else text
 
 
 def _with_text(units: list[Unit], text: str) -> list[Unit]:

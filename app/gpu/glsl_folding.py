@@ -179,11 +179,11 @@ def _with_decided(text: str, start: int, end: int, holds: bool) -> tuple[str, in
 def _statement_decided(text: str, start: int, end: int, holds: bool) -> tuple[str, int]:
     """`_with_decided` for `if (…)` from `start` to `end`."""
     first = _skip(text, end)
-    first_end = _end_of_statement(text, first)
+    first_end = end_of_statement(text, first)
     second = _skip(text, first_end)
     if re.match(r"else\b", text[second : second + 5]):
         second = _skip(text, second + 4)
-        last = _end_of_statement(text, second)
+        last = end_of_statement(text, second)
     else:
         second = last = first_end
     kept, kept_end = (first, first_end) if holds else (second, last)
@@ -215,14 +215,15 @@ def _clashes(body: str, around: str) -> bool:
     return bool(names) and bool(names & set(re.findall(r"[A-Za-z_]\w*", around)))
 
 
-def _end_of_statement(text: str, at: int) -> int:
+def end_of_statement(text: str, at: int) -> int:
+    """Where the statement that begins at `at` ends."""
     if text[at] == "{":
         return _match(text, at) + 1
     if head := re.match(r"(if|for|while|switch)\s*\(", text[at : at + 20]):
-        end = _end_of_statement(text, _skip(text, _match(text, at + head.end() - 1) + 1))
+        end = end_of_statement(text, _skip(text, _match(text, at + head.end() - 1) + 1))
         after = _skip(text, end)
         if head.group(1) == "if" and re.match(r"else\b", text[after : after + 5]):
-            return _end_of_statement(text, _skip(text, after + 4))
+            return end_of_statement(text, _skip(text, after + 4))
         return end
     depth = 0
     while text[at] != ";" or depth:
