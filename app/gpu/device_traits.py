@@ -64,6 +64,8 @@ class DeviceTraits:
     camera_s: float = 0.25
     """What a dispatch of the camera may take at most: an eighth of what drivers end. It is not waited for, so a picture
     is cut up only after one has taken longer."""
+    camera_paths: int = 1 << 15
+    """Camera paths that are followed side by side, each of which needs some kilobytes: as many as fill a GPU."""
     paths_group: int = 64
     """Camera paths of a work group. A software renderer gives groups to its threads one by one and runs eight paths
     of one side by side: with more in a group, few paths are shared out unevenly."""
@@ -110,6 +112,7 @@ class DeviceTraits:
             compiles_ahead=False,
             dispatch_s=0.15,
             camera_s=0.15,
+            camera_paths=1 << 13,
             paths_group=8,
             tables_by_compute=False,
             moves_by_photons=False,

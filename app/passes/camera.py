@@ -4,7 +4,7 @@ A dispatch adds one camera sample to the pixels of a band of rows; another follo
 there. On a GPU a band is the whole picture, unless earlier ones took long. On a software renderer bands are small, and
 lists are followed a portion at a time: between two dispatches there is time for progress and for a stop. There a sample
 that takes long halts and is taken up again by a later dispatch, for the driver would cut it short
-(shaders/camera/halts.glsl). Samples form a lattice inside the pixel that later launches refine (box filter).
+(shaders/camera/waiting.glsl). Samples form a lattice inside the pixel that later launches refine (box filter).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from ..gpu.schema import Struct
 from ..gpu.texture_store import TextureStore
 from ..model.scene import Camera
 from .camera_inputs import CameraInputs
-from .camera_programs import CameraPrograms, camera_defines, halted_bytes, halting_defines, lens_defines
+from .camera_programs import CameraPrograms, camera_defines, halting_defines, lens_defines, waiting_bytes
 from .camera_records import camera_parameters
 from .caustic_maps import CausticMaps
 from .haze import Haze
@@ -110,13 +110,16 @@ class CameraPass:
         self._inputs = CameraInputs(
             self._ctx, scene, self.channels, reflectances, maps, pictures, "RECEIVER_LIGHT" in shown
         )
-        shown |= self._inputs.defines | {"PATHS_GROUP": context.traits.paths_group}
+        shown |= self._inputs.defines
+        shown |= {"PATHS_GROUP": context.traits.paths_group, "PATHS_AT_ONCE": context.traits.camera_paths}
         self.follows = "CAMERA_SPECULAR" in shown
         """Some paths go on beyond glass or mirrors."""
-        halts = self.follows and context.traits.loops_may_end
+        if self.follows and context.traits.loops_may_end:
+            shown = halting_defines(shown)
         # A viewer may open the lens later.
-        self._listed = ListedPixels(self._ctx, halted_bytes(lens_defines(shown)) if halts else None)
-        shown = halting_defines(shown) if halts else shown
+        self._listed = ListedPixels(
+            self._ctx, context.traits, waiting_bytes(lens_defines(shown)) if self.follows else 0
+        )
         self._programs = CameraPrograms(self._ctx, shown, self._inputs.structs, features.lens)
         self._haze = Haze(context, scene, self.channels) if features.haze and layer == "beauty" else None
         self._is_hazy = False

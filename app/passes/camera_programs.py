@@ -49,7 +49,7 @@ TINT_STEPS = 48
     BIND_PICTURES,
     BIND_COUNTERS,
     BIND_LISTED,
-    BIND_HALTED,
+    BIND_WAITING,
 ) = range(8, 17)
 UNIT_RECEIVER_LIGHT, UNIT_EMISSION, UNIT_PICTURES = 9, 10, 11
 _BEYOND_ONLY = (
@@ -100,6 +100,7 @@ def camera_defines(scene: SceneBuffers, channels: Channels, layer: str, maps: Ma
             "BIND_CELL_CDF": BIND_CELL_CDF,
             "BIND_COUNTERS": BIND_COUNTERS,
             "BIND_LISTED": BIND_LISTED,
+            "BIND_WAITING": BIND_WAITING,
             "BIND_RECEIVERS": BIND_RECEIVERS,
             "BIND_PLACEMENTS": BIND_PLACEMENTS,
             "UNIT_RECEIVER_LIGHT": UNIT_RECEIVER_LIGHT,
@@ -150,7 +151,7 @@ def single_defines(beyond: Defines) -> Defines:
 
 def halting_defines(beyond: Defines) -> Defines:
     """Defines for listed pixels whose samples halt when their loops have run long."""
-    numbers = {"HALT_ROUNDS": HALT_ROUNDS, "SPARE_ROUNDS": SPARE_ROUNDS, "BIND_HALTED": BIND_HALTED}
+    numbers = {"HALT_ROUNDS": HALT_ROUNDS, "SPARE_ROUNDS": SPARE_ROUNDS}
     return beyond | switched(HALTS=True) | numbers
 
 
@@ -159,12 +160,13 @@ def lens_defines(shown: Defines) -> Defines:
     return shown | switched(LENS=True)
 
 
-def halted_bytes(beyond: Defines) -> int:
-    """Room that surely holds one halted sample: its paths, and what it knows besides."""
+def waiting_bytes(beyond: Defines) -> int:
+    """Room that surely holds what a sample lets wait: its paths, their ends, and what it knows besides."""
     columns = int(beyond["SPECTRAL_GROUPS"]) + 2 * int("LENS" in beyond)
     path = 312 + 40 * columns + 4 * int(beyond.get("ABSORBERS", 0)) + 64 * int("POLARISED" in beyond)
     path += 16 * int("COATS" in beyond)
-    return (STACK + 1) * path + 16 * int(beyond["TARGETS"]) + 64
+    ends = 0 if "HALTS" in beyond else ENDS_HELD * (path + 64)
+    return (STACK + 1) * path + ends + 16 * int(beyond["TARGETS"]) + 64
 
 
 _VARIANTS: dict[str, Callable[[Defines], Defines]] = {

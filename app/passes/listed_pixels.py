@@ -2,7 +2,7 @@
 
 The program for what is seen directly lists them; another follows the list: all at once by a dispatch whose size the
 list holds. Where a driver ends long loops, it is followed a portion at a time, and samples halt and are taken up again
-(shaders/camera/halts.glsl).
+(shaders/camera/waiting.glsl).
 """
 
 from __future__ import annotations
@@ -13,17 +13,16 @@ import moderngl
 import numpy as np
 
 from ..gpu import shader
+from ..gpu.device_traits import DeviceTraits
 from ..gpu.dispatch_budget import DispatchBudget
 from ..gpu.records import NONE
-from .camera_programs import BIND_HALTED, BIND_LISTED
+from .camera_programs import BIND_LISTED, BIND_WAITING
 
 _WHOLE = 64
 """Multiples in which a dispatch is given pixels."""
 _FIRST = 1024
-_PLACES = 8192
-"""Samples that may be under way, where they halt."""
 _GROUPS_AT, _LISTED_AT, _UNEVEN_GROUPS_AT, _HALTED_AT = 0, 12, 16, 32
-_NOTHING = np.array((64, 0, 1, 0, 64, 0, 1, 0, 0), "u4")
+_NOTHING = np.array((0, 1, 1, 0, 64, 0, 1, 0, 0, 0), "u4")
 """The list's first words where nothing is listed (shaders/camera/listed.glsl)."""
 SURVEYED = np.dtype([("key", "u4"), ("mean", "u4", 3)])
 """Bytes that a survey keeps of a pixel (shaders/camera/survey.glsl)."""
@@ -35,12 +34,15 @@ Dispatch = Callable[[DispatchBudget, int], None]
 
 
 class ListedPixels:
-    """Owns the list and, where samples may halt, the room that they wait in."""
+    """Owns the list and the room that the paths of samples wait in."""
 
-    def __init__(self, ctx: moderngl.Context, bytes_of_halted: int | None) -> None:
-        """`bytes_of_halted`: room of one halted sample; None where none halts."""
+    def __init__(self, ctx: moderngl.Context, traits: DeviceTraits, bytes_of_waiting: int) -> None:
+        """`bytes_of_waiting`: room of one sample's paths; 0 where none are followed."""
         self._ctx = ctx
-        self._halted = None if bytes_of_halted is None else ctx.buffer(reserve=_PLACES * bytes_of_halted)
+        self.may_halt = bytes_of_waiting > 0 and traits.loops_may_end
+        """It is followed a portion at a time (`follow`)."""
+        self._places, self._bytes_of_waiting = traits.camera_paths, bytes_of_waiting
+        self._waiting: moderngl.Buffer | None = None
         self._list: moderngl.Buffer | None = None
         self.room = 0
         """What the list holds."""
@@ -54,7 +56,11 @@ class ListedPixels:
         self.room, self._surveyed = room, 0
         self._reserve()
         self.budget = DispatchBudget(_FIRST, _WHOLE, max(pixels, _WHOLE))
-        self.resumed = DispatchBudget(_FIRST, _WHOLE, _PLACES)
+        self.resumed = DispatchBudget(_FIRST, _WHOLE, self._places)
+        wanted = min(self._places, -(-pixels // _WHOLE) * _WHOLE) * self._bytes_of_waiting
+        if wanted > (0 if self._waiting is None else self._waiting.size):
+            shader.release(self._waiting)
+            self._waiting = self._ctx.buffer(reserve=wanted)
 
     def survey_at(self, pixels: int) -> int:
         """Make room for a survey of so many pixels behind the list; where it begins, in words behind the counts."""
@@ -67,11 +73,6 @@ class ListedPixels:
     def count(self) -> int:
         """Pixels that are listed; waits for the device."""
         return self._count(_LISTED_AT)
-
-    @property
-    def may_halt(self) -> bool:
-        """It is followed a portion at a time (`follow`)."""
-        return self._halted is not None
 
     def run(self, program: moderngl.ComputeShader, *, uneven: bool = False) -> None:
         """Run `program` over all that is listed, or over the pixels that a survey found uneven."""
@@ -87,19 +88,19 @@ class ListedPixels:
         """To the places that the programs read."""
         if self._list is not None:
             self._list.bind_to_storage_buffer(BIND_LISTED)
-        if self._halted is not None:
-            self._halted.bind_to_storage_buffer(BIND_HALTED)
+        if self._waiting is not None:
+            self._waiting.bind_to_storage_buffer(BIND_WAITING)
 
     def follow(self, parameters: np.ndarray, dispatch: Dispatch) -> Iterator[float]:
         """Follow all that is listed by portions, yielding the share done after each dispatch but the last."""
         count, done, place = self._count(_LISTED_AT), 0, 0
         while done < count:
-            pixels = min(self.budget.units, count - done, _PLACES - place)
+            pixels = min(self.budget.units, count - done, self._places - place)
             parameters["first_place"], parameters["queue"] = place, 0
             _follow(self.budget, done, pixels, parameters, dispatch)
             done, place = done + pixels, place + pixels
             # Those of many dispatches together, so that few are left without neighbours.
-            if done == count or place == _PLACES:
+            if done == count or place == self._places:
                 for _ in self._resume_halted(parameters, dispatch):
                     yield done / count
                 place = 0
@@ -131,7 +132,7 @@ class ListedPixels:
 
     def release(self) -> None:
         """Free both."""
-        shader.release(self._list, self._halted)
+        shader.release(self._list, self._waiting)
 
 
 def _follow(budget: DispatchBudget, first: int, count: int, parameters: np.ndarray, dispatch: Dispatch) -> None:

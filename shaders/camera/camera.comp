@@ -20,40 +20,16 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "camera/listed.glsl"
 layout(rgba32f, binding = 0) uniform image2D picture[TARGETS];
 
-// Paths that wait while another is followed; global as `radiance` is.
-int stack_size;
-Path path_stack[STACK];
-// Rays traced to find out where paths diverge.
-int asked = 0;
-// What this event adds to the waiting paths, stored in one place: storing a path at an index takes a compiler long.
-Path pending_path;
-bool pushes_path;
 // Where this event cuts the path's band; negative: nowhere.
 float cut_at;
 
-// Ends of paths are looked up together, when there are that many or no path is left: a software renderer, and a GPU,
-// then looks up those of neighbouring pixels side by side.
-struct PathEnd {
-    Path path;
-    Hit hit;
-    uint met;  // 1: `hit` was met
-    uint same_hit;
-};
+#include "camera/waiting.glsl"
+// On a software renderer; on a GPU they wait in the buffer.
 PathEnd ended[ENDS_HELD];
 
-#include "camera/halts.glsl"
 #include "camera/cuts.glsl"
 #include "camera/survey.glsl"
 #include "camera/meet.glsl"
-
-void push(Path path) {
-    if (HALTS)
-        halted[place].path_stack[stack_size++] = path;
-    else
-        path_stack[stack_size++] = path;
-}
-
-Path pop() { return HALTS ? halted[place].path_stack[--stack_size] : path_stack[--stack_size]; }
 
 // 2^32 times the fractions of the cube roots of 2 and 4: badly approximable together, and of no other field than the
 // plastic number's, by which places on lights are drawn.
@@ -105,7 +81,7 @@ void add_to_picture(uvec2 pixel) {
 void see_pixel() {
     uvec2 pixel = gl_GlobalInvocationID.xy + uvec2(0u, p.first_row);
     if (p.survey == SURVEY_KEPT) {
-        uint at = place_in_list();
+        uint at = (gl_WorkGroupID.y * UNEVEN_ROW + gl_WorkGroupID.x) * 64u + gl_LocalInvocationIndex;
         if (at >= uneven_count) return;
         uint number = listed[uneven_place(at)];
         pixel = uvec2(number % p.size.x, number / p.size.x);
@@ -148,38 +124,29 @@ void see_pixel() {
     add_to_picture(pixel);
 }
 
-// A listed pixel: its path through glass and over mirrors, and all that it splits into.
-void follow_listed_pixel() {
-    uint entry;
-    bool resumes = false;
-    if (HALTS) {
-        uint at = shared_out(gl_WorkGroupID.x, gl_NumWorkGroups.x) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
-        uint at_listed = p.first_listed + at;
-        if (at_listed >= p.end_listed) return;
-        resumes = p.first_place == NONE;
-        place = resumes ? halted[at_listed].queued[1u - p.queue] : p.first_place + at;
-        entry = resumes ? halted[place].entry : listed[at_listed];
-    } else {
-        uint at = place_in_list();
-        if (at >= listed_count) return;
-        entry = listed[at];
-    }
+// A listed pixel: its path through glass and over mirrors, and all that it splits into. `resumes`: its sample has
+// halted.
+void follow(uint entry, bool resumes) {
     uint number = bitfieldExtract(entry, 0, int(LISTED_BITS)),
          primary_sample = bitfieldExtract(entry, int(LISTED_BITS), 3);
     float gain = float((entry >> (LISTED_BITS + 3u)) + 1u) / float(p.primary_samples);
     uvec2 pixel = uvec2(number % p.size.x, number / p.size.x);
     uint pixel_key = hash_combine(hash_combine(p.seed, pixel.x), pixel.y);
-    Path path = camera_path(pixel, primary_sample, gain);
+    Path first = camera_path(pixel, primary_sample, gain);
     begin_sample(pixel);
-    stack_size = 0;
+    stack_size = asked = 0;
+    took_turn = false;
     int events = 0;
-    bool goes_on = true, halts = false;
     if (HALTS && resumes) {
         resume(events);
-        goes_on = false;
+    } else {
+        push(first);
     }
-    while ((goes_on || stack_size > 0) && !halts) {
+    bool halts = false;
+    while (stack_size > 0 && !halts) {
         int found = 0;
+        bool goes_on = true;
+        Path path = pop();
         for (; (goes_on || stack_size > 0) && found < ENDS_HELD && !halts; ++events) {
             COUNT_ROUNDS(12);
             if (!goes_on) path = pop();
@@ -189,7 +156,6 @@ void follow_listed_pixel() {
             uint kind = met ? object_at(hit.object).kind : NONE;
             bool ends = !met || kind == KIND_DIFFUSE, same_hit = true, parts = false,
                  event_limit_reached = events >= MAX_EVENTS;
-            pushes_path = false;
             bool coated = COATS && met && kind == KIND_DIFFUSE && is_coated(hit.object);
             if (SPECTRAL_SWEEP) {
                 cut_at = -1.0;
@@ -212,31 +178,31 @@ void follow_listed_pixel() {
                      leaves = specular && (event_limit_reached || path.depth >= uint(MAX_DEPTH));
                 if (leaves) atomicAdd(fallbacks[FELL_DEPTH], 1u);
                 if (HAS_GRATING && leaves && kind == KIND_GRATING) path.throughput *= efficiency_left(path, hit.object);
-                if (ends || leaves) ended[found++] = PathEnd(path, hit, uint(met && ends), uint(same_hit || leaves));
+                if (ends || leaves) {
+                    if (HALTS)
+                        ended[found++] = PathEnd(path, hit, uint(met && ends), uint(same_hit || leaves));
+                    else
+                        waiting[place].ended[found++] =
+                            PathEnd(path, hit, uint(met && ends), uint(same_hit || leaves));
+                }
                 goes_on = specular && !leaves;
                 if (COATS) goes_on = goes_on || (coated && !event_limit_reached && path.depth < uint(MAX_DEPTH));
                 if (goes_on) meet_surface(path, hit, kind, pixel_key);
                 if (HAS_GRATING || COATS || ROUGH_SURFACES) goes_on = goes_on && path.walk.inverse_pdf > 0.0;
             }
             if (SPECTRAL_SWEEP && cut_at >= 0.0) cut_band(path, cut_at, pixel_key);
-            if (HALTS) {
-                halts = rounds >= uint(HALT_ROUNDS);
-                // One place stores both what is pending and, where it halts, what is followed.
-                bool sets_path = halts && goes_on;
-                if (!pushes_path) pending_path = path;
-                for (bool stores = pushes_path || sets_path; stores;) {
-                    push(pending_path);
-                    stores = pushes_path && sets_path;
-                    pushes_path = false;
-                    pending_path = path;
-                }
-                goes_on = goes_on && !halts;
-            } else if (pushes_path) {
-                push(pending_path);
+            if (HALTS) halts = rounds >= uint(HALT_ROUNDS);
+        }
+        if (goes_on) push(path);
+        if (HALTS) {
+            for (int e = 0; e < found; ++e)
+                add_end(ended[e].path, ended[e].met != 0u, ended[e].hit, ended[e].same_hit != 0u, pixel_key);
+        } else {
+            for (int e = 0; e < found; ++e) {
+                PathEnd end = waiting[place].ended[e];
+                add_end(end.path, end.met != 0u, end.hit, end.same_hit != 0u, pixel_key);
             }
         }
-        for (int e = 0; e < found; ++e)
-            add_end(ended[e].path, ended[e].met != 0u, ended[e].hit, ended[e].same_hit != 0u, pixel_key);
     }
     if (HALTS) {
         if (!loops_run()) atomicAdd(fallbacks[FELL_LOOPS], 1u);
@@ -248,9 +214,26 @@ void follow_listed_pixel() {
     add_to_picture(pixel);
 }
 
+void follow_portion() {
+    uint at = shared_out(gl_WorkGroupID.x, gl_NumWorkGroups.x) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
+    uint at_listed = p.first_listed + at;
+    if (at_listed >= p.end_listed) return;
+    bool resumes = p.first_place == NONE;
+    place = resumes ? waiting[at_listed].queued[1u - p.queue] : p.first_place + at;
+    follow(resumes ? waiting[place].entry : listed[at_listed], resumes);
+}
+
+void follow_all() {
+    place = gl_GlobalInvocationID.x;
+    for (uint at = place; at < listed_count; at = PLACES + atomicAdd(taken_count, 1u)) follow(listed[at], false);
+}
+
 void main() {
-    if (CAMERA_SPECULAR)
-        follow_listed_pixel();
-    else
+    if (!CAMERA_SPECULAR) {
         see_pixel();
+    } else if (HALTS) {
+        follow_portion();
+    } else {
+        follow_all();
+    }
 }

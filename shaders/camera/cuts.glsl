@@ -26,8 +26,8 @@ float share_below(Path path, float at) {
     return clamp((cell_cdf[emission_cell(at)] - brightness.x) / max(brightness.y - brightness.x, 1e-9), 0.05, 0.95);
 }
 
-// Both parts of a cut band set out again from the path's last surface (`restrict_to`): `path` is one, the other is
-// pending. Of weak parts one is chosen by chance.
+// Both parts of a cut band set out again from the path's last surface (`restrict_to`): `path` is one, the other
+// waits. Of weak parts one is chosen by chance.
 void cut_band(inout Path path, float at, uint pixel_key) {
     float below = share_below(path, at);
     bool both = path.walk.branch_weight * min(below, 1.0 - below) > CUT_THRESHOLD && stack_size < STACK;
@@ -51,9 +51,8 @@ void cut_band(inout Path path, float at, uint pixel_key) {
             path.walk.inverse_pdf /= share;
         float lo = low ? whole.band.x : at, hi = low ? at : whole.band.z;
         restrict_to(path, vec3(lo, anchor_of(whole, lo, hi), hi));
-        if (part == 0) pending_path = path;
+        if (part == 0) push(path);
     }
-    pushes_path = both;
 }
 
 // Whether the ray at the wavelength x meets what the path's own ray met. `ends`: the path ends there; colours that end

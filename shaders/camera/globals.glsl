@@ -2,7 +2,7 @@
 // where it ends.
 
 #ifdef HALTS
-// Rounds that this invocation's loops have run in this dispatch; see camera/halts.glsl.
+// Rounds that this invocation's loops have run in this dispatch; see camera/waiting.glsl.
 uint rounds = 0u;
 #define COUNT_ROUNDS(count) rounds += uint(count)
 #endif

@@ -83,10 +83,10 @@ void meet_grating(inout Path path, Path whole, Hit hit, Event event, uint pixel_
         here = here || cut;
     }
     if (more) {
-        pending_path = whole;
-        pending_path.order = number + 1u;
-        pending_path.recut = 0u;
-        pushes_path = true;
+        Path rest = whole;
+        rest.order = number + 1u;
+        rest.recut = 0u;
+        push(rest);
     }
     if (cut || !here) {
         path.order = number | ONLY_ORDER;

@@ -14,7 +14,7 @@ void main() {
          sees = key & KIND_BITS;
     if ((key & IS_EVEN) == 0u) {
         uint at = atomicAdd(uneven_count, 1u);
-        if (at % (LIST_ROW * 64u) == 0u) atomicAdd(uneven_groups[1], 1u);
+        if (at % (UNEVEN_ROW * 64u) == 0u) atomicAdd(uneven_groups[1], 1u);
         listed[uneven_place(at)] = number;
         return;
     }

@@ -1,16 +1,20 @@
 // The list of pixels that see glass or mirrors first, and behind it what a survey keeps of all pixels, and the list of
-// those that are not even. A dispatch over a list takes its size from here: LIST_ROW groups by as many as the list needs.
+// those that are not even. Dispatches over lists take their sizes from here.
 
-const uint LIST_ROW = 64u;
+// Invocations that follow listed pixels side by side; one that is done with its own takes the next that has none.
+const uint PLACES = uint(PATHS_AT_ONCE);
+// Groups of a row of those that are not even, for there may be more than fit one dimension.
+const uint UNEVEN_ROW = 64u;
 
-// Groups and number of the listed pixels, the same of those that are not even, how many of the listed pixels' paths have
-// halted, and what is to be known of the listed ones.
+// Groups and number of the listed pixels, the same of those that are not even, how many samples have halted, how many
+// listed pixels were taken by invocations that were done with their own, and what is to be known of the listed ones.
 layout(std430, binding = BIND_LISTED) restrict buffer Listed {
     uint listed_groups[3];
     uint listed_count;
     uint uneven_groups[3];
     uint uneven_count;
     uint halted_count;
+    uint taken_count;
     uint listed[];
 };
 
@@ -22,14 +26,8 @@ uint listed_entry(uint number, uint primary_sample, uint count) {
 
 void list_entry(uint entry) {
     uint at = atomicAdd(listed_count, 1u);
-    if (at % (LIST_ROW * uint(PATHS_GROUP)) == 0u) atomicAdd(listed_groups[1], 1u);
+    if (at < PLACES && at % uint(PATHS_GROUP) == 0u) atomicAdd(listed_groups[0], 1u);
     listed[at] = entry;
-}
-
-// Number of an invocation of a dispatch over a list.
-uint place_in_list() {
-    return (gl_WorkGroupID.y * LIST_ROW + gl_WorkGroupID.x) * (gl_WorkGroupSize.x * gl_WorkGroupSize.y)
-        + gl_LocalInvocationIndex;
 }
 
 // Looks of one sample at what is seen directly, which costs little, have places of their own. Those that meet something

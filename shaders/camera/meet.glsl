@@ -92,8 +92,7 @@ void cross_glass(inout Path path, Path whole, Hit hit, Event event, uint pixel_k
         leave_surface(mirrored, hit, !entering);
         vec3 unhidden = reflect_path(mirrored, mirror, geometric);
         send_on(mirrored, mirror, mirror.reflectance, unhidden);
-        pushes_path = mirrored.walk.inverse_pdf > 0.0;
-        pending_path = mirrored;
+        if (mirrored.walk.inverse_pdf > 0.0) push(mirrored);
     }
     vec3 share = total ? vec3(1.0) : 1.0 - event.reflectance;
     if (!total && !splits) {

@@ -90,7 +90,7 @@ def test_a_part_chosen_by_chance_stands_for_both(gl, edge: Scene, monkeypatch) -
 def test_a_part_that_is_lost_is_noticed(gl, edge: Scene, monkeypatch, tmp_path) -> None:
     """Seeds and all else same_hit: what differs is the lost light."""
     right = picture(gl, edge, 32)
-    mutate(monkeypatch, tmp_path, "camera/cuts.glsl", "pushes_path = both;", "pushes_path = false;")
+    mutate(monkeypatch, tmp_path, "camera/cuts.glsl", "if (part == 0) push(path);", "")
     lost = picture(gl, edge, 32)
     assert error(lost, right) > 2e-4 and lost.sum() < right.sum()
 

@@ -175,8 +175,8 @@ MUTANTS = {
     "branches put away and forgotten": (
         "eye-shells",
         "camera/meet.glsl",
-        "        pending_path = mirrored;\n",
-        "        pushes_path = false;\n",
+        "if (mirrored.walk.inverse_pdf > 0.0) push(mirrored);",
+        "",
         "energy",
     ),
     "leaving taken for entering": (
