@@ -47,19 +47,16 @@ void cross_glass(inout Path path, Path whole, Hit hit, Event event, uint pixel_k
     }
     Path mirrored = path;
     Event mirror = event;
-    bool begins = false;
     // What is reflected off the outside of glass knows no wavelength but in its strength: it stays whole. What goes
     // on is one band.
-    if (HAS_DISPERSION && path.restricted == 0u && (event.n_i.x != event.n_i.z || event.n_t.x != event.n_t.z)) {
-        begins = all(greaterThan(event.cosine2, vec3(0.0)));
+    bool disperses =
+        HAS_DISPERSION && path.restricted == 0u && (event.n_i.x != event.n_i.z || event.n_t.x != event.n_t.z);
+    bool begins = disperses && all(greaterThan(event.cosine2, vec3(0.0)));
+    if (HAS_DISPERSION && disperses) {
         restrict_to_band(path, pixel_key);
         share_out(path, event);
-        if (!begins) {
-            mirrored = path;
-            mirror = event;
-        }
     }
-    if (SPECTRAL_SWEEP) {
+    if (SPECTRAL_SWEEP && !begins) {
         float onset = path.restricted != 0u && path.recut == 0u ? total_reflection_in_band(path, event) : -1.0;
         if (onset >= 0.0) {
             onset = cell_border(onset);
@@ -73,6 +70,10 @@ void cross_glass(inout Path path, Path whole, Hit hit, Event event, uint pixel_k
                 return;
             }
         }
+    }
+    if (!begins) {
+        mirrored = path;
+        mirror = event;
     }
     // A microfacet's share is its own, also where what it lets through does not leave the surface.
     bool total = !event.refracted.exists;

@@ -229,21 +229,22 @@ Steady steady_lights(SurfaceInteraction seen, vec3 lo, vec3 hi, uint pixel_key) 
     steady.along = way / max(dot(way, way), 1e-20);
     float share = clamp(dot(middle - lo, steady.along), 0.0, 1.0);
     for (uint i = 0u; i < uint(min(LIGHT_COUNT, STEADY_LIGHTS)); ++i) {
-        float gains[3];
-        uint hidden[2];
         LightSample s;
-        gains[2] = unshadowed(i, seen, light_point(i, pixel_key), s);
-        for (int end = 0; end < 2; ++end) {
-            seen.position = end == 0 ? lo : hi;
-            gains[end] = unshadowed(i, seen, light_point(i, pixel_key), s);
-            hidden[end] = 0u;
-            if (gains[end] > 0.0) hidden[end] = uint(hidden_from(s, seen));
+        float gain_middle = unshadowed(i, seen, light_point(i, pixel_key), s);
+        vec2 gains;
+        bvec2 hidden;
+        for (uint end = 0u; end < 2u; ++end) {  // which no compiler should write out: tracing rays is long
+            seen.position = end == 0u ? lo : hi;
+            float gain = unshadowed(i, seen, light_point(i, pixel_key), s);
+            bool hides = gain > 0.0 && hidden_from(s, seen);
+            gains = vec2(end == 0u ? gain : gains.x, gain);
+            hidden = bvec2(end == 0u ? hides : hidden.x, hides);
         }
         seen.position = middle;
-        bool straight = abs(gains[2] - mix(gains[0], gains[1], share)) <= STEADY_TOLERANCE * max(gains[0], gains[1]);
-        if (hidden[0] == hidden[1] && (straight || hidden[0] != 0u)) steady.lights |= 1u << i;
-        steady.gains[2u * i] = hidden[0] != 0u ? 0.0 : gains[0];
-        steady.gains[2u * i + 1u] = hidden[1] != 0u ? 0.0 : gains[1];
+        bool straight = abs(gain_middle - mix(gains.x, gains.y, share)) <= STEADY_TOLERANCE * max(gains.x, gains.y);
+        if (hidden.x == hidden.y && (straight || hidden.x)) steady.lights |= 1u << i;
+        steady.gains[2u * i] = hidden.x ? 0.0 : gains.x;
+        steady.gains[2u * i + 1u] = hidden.y ? 0.0 : gains.y;
     }
     return steady;
 }

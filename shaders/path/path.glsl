@@ -47,8 +47,9 @@ void linear_end(Path path, int end, out vec3 position, out vec3 direction) {
     position = path.position;
     direction = path.direction;
     for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
-        position += path.end_step[g][end] * path.dposition[SPATIAL + g];
-        direction += path.end_step[g][end] * path.ddirection[SPATIAL + g];
+        float change = end == 0 ? path.end_step[g].x : path.end_step[g].y;  // an index would put it into memory
+        position += change * path.dposition[SPATIAL + g];
+        direction += change * path.ddirection[SPATIAL + g];
     }
     direction = normalize(direction);
 }

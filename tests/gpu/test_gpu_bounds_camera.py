@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from spectrasplat.base.paths import shipped_scenes
+from spectrasplat.gpu import shader, strict_compilers
 from spectrasplat.gpu.context import Context, create_context
 from spectrasplat.gpu.device_traits import DeviceTraits, assumed
 from spectrasplat.model.io.scene_file import load_scene
@@ -71,3 +73,40 @@ def test_rows_are_cut_up_after_samples_that_took_long(gpu: Context) -> None:
     assert cut.dispatches >= 2 * 2 * (SIZE[1] // 8) > whole.dispatches
     np.testing.assert_array_equal(camera_pass.read_rgb(), expected)
     released(camera_pass)
+
+
+LIVE_WORDS, ARRAY_WORDS = 280, 64
+"""At most; a GPU has some 255 registers for an invocation, and keeps 220 live words apart from its addresses in them.
+Arrays that unknown numbers index are in memory."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["prism", "default", "ball"])
+def test_what_programs_hold(gpu: Context, name: str) -> None:
+    if strict_compilers.missing():
+        pytest.skip(strict_compilers.missing())
+    with shader.recorded() as programs:
+        released(opened(gpu, name))
+    assert len(programs) == 2
+    for program in programs:
+        [held] = strict_compilers.live_states(program)
+        assert held.registers <= LIVE_WORDS
+        assert held.scratch <= ARRAY_WORDS
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["prism", "default", "wine_glass"])
+def test_a_gpu_shows_what_a_software_renderer_does(gl: Context, gpu: Context, name: str) -> None:
+    """Paths wait elsewhere, lists are followed whole, and places are taken again by others: few here, so that each has
+    many samples."""
+    pictures = []
+    few = replace(gpu.traits, camera_paths=64)
+    with assumed(few), create_context() as narrow:
+        for context in (gl, gpu, narrow):
+            camera_pass = opened(context, name)
+            camera_pass.run(camera_pass.scene.scene.camera, *SIZE, 2)
+            pictures.append(camera_pass.read_rgb())
+            released(camera_pass)
+    software, *others = pictures
+    for other in others:
+        np.testing.assert_allclose(other, software, rtol=1e-4, atol=1e-4 * software.mean())
