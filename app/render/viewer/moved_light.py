@@ -76,7 +76,7 @@ class MovedLight:
         self._trace(plans, photons, depth, maps, widening)
         maps.photon_weight = float(photons)
         took = time.perf_counter() - started
-        if plan is None:
+        if plan is None and not self._context.traits.work_is_queued:  # else it says nothing
             self.photons = int(np.clip(wished * np.clip(SECONDS / max(took, 1e-4), 0.5, 2.0), FEWEST, MOST))
         return maps
 
