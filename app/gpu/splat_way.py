@@ -1,7 +1,7 @@
 """Whether splats are drawn by the rasteriser or added by compute shaders: a device is fast at one of the two.
 
-Data-centre GPUs have next to no raster hardware. Elsewhere the rasteriser is kept: software renderers and most
-GPUs then add in a fixed order, and the same picture comes out every time.
+Data-centre GPUs have next to no raster hardware. Elsewhere the rasteriser is kept. A software renderer then adds in
+photons' order, and the same picture comes out every time; on GPUs many photons are added at once, in any order.
 """
 
 from __future__ import annotations
@@ -62,7 +62,9 @@ class SplatWay:
     @property
     def sentence(self) -> str:
         """For `doctor`."""
-        return f"{'added by compute shaders' if self.by_compute else 'drawn by the rasteriser'} ({self.reason})"
+        if not self.by_compute:
+            return f"drawn by the rasteriser ({self.reason})"
+        return f"added by compute shaders ({self.reason}; maps over {self.largest_block >> 20} MiB by the rasteriser)"
 
 
 def sums_bytes(size: tuple[int, int], targets: int) -> int:

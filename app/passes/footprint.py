@@ -1,8 +1,8 @@
 """From photon records to splat records: the place of each photon's light in the caustic maps.
 
-One thread a photon, slots in photon order (never compacted with atomics), so that the sum of
-floating-point splats, and with it the picture, depends on nothing but the photons. What the
-vertex and the fragment shaders need is worked out here once a splat, not once a vertex.
+One thread a photon, slots in photon order. Their lists are in that order too, but for GPUs, so that the sum of
+floating-point splats, and with it the picture, depends on nothing but the photons. What the vertex and the fragment
+shaders need is worked out here once a splat, not once a vertex.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Draws splat records into the caustic maps: additive blending, a program a class, fixed order. On devices whose
-rasteriser blends slowly (`gpu/splat_way.py`) compute shaders add them instead, with atomics and so in any order.
+"""Draws splat records into the caustic maps: additive blending, a program a class. On devices whose rasteriser blends
+slowly (`gpu/splat_way.py`) compute shaders add them instead, with atomics.
 
 Small splats, swept ones and those of a cut band have a program each because a software renderer runs both sides of a
-branch. A group of photons is made into splats and drawn before the next, so the splat records of a few ten thousand
-photons are all that exists at a time, and the order of all sums is the photons' own order.
+branch. There a group of a few ten thousand photons is made into splats and drawn before the next, and the order of all
+sums is the photons' own. A GPU takes all of a pass at once, in any order.
 """
 
 from __future__ import annotations

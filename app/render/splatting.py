@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 from ..gpu import shader
@@ -26,8 +27,10 @@ FLUSH_AHEAD = 0.9
 """Share of the photons after which a splat pass sums its maps up by itself."""
 FIRST_SUMMED = 256
 """Rows of a map that are summed up at first, before it is known how long they take."""
-FIRST_SPLATTED, SMALLEST_PART, LARGEST_PART = 1 << 16, 1 << 10, 1 << 20
+FIRST_SPLATTED, SMALLEST_PART, LARGEST_PART = 1 << 18, 1 << 10, 1 << 22
 """Photons that a GPU splats at once: at first, and when it is known how long they take."""
+UNSEEN_S = 0.25
+"""What that may take where no frames are shown meanwhile: an eighth of what drivers end."""
 SUMMING_SECONDS = 0.01
 """What one part of it may take."""
 
@@ -69,11 +72,9 @@ class Splatting:
         self._pace = pace
         self._accumulate = Accumulate(context.ctx) if pace.sums_in_parts else None
         self.seconds = 0.0
-        self.dispatch_seconds = DISPATCH_S
-        """What a part may take where the device queues work. Elsewhere parts stay, as sums in another order are rounded
-        otherwise."""
-        self._is_fast = False
-        """The last part that was waited for took so little that the largest may be given at once, without waiting."""
+        self.dispatch_seconds = DISPATCH_S if pace.waits else UNSEEN_S
+        """What a part may take where the device queues work, as the last ones have shown. Elsewhere parts stay, as sums
+        in another order are rounded otherwise."""
         self._part: DispatchBudget | None = None
         if context.traits.work_is_queued:
             self._part = DispatchBudget(FIRST_SPLATTED, SMALLEST_PART, LARGEST_PART)
@@ -101,20 +102,19 @@ class Splatting:
         start = 0
         while start < count:
             started = time.perf_counter()
-            is_capped = self._part is not None and not self._is_fast
-            part = min(part_max, self._part.units if self._part and is_capped else count, count - start)
-            with self._context.timers.timing("splat"):
+            part = min(part_max, self._part.units if self._part else count, count - start)
+            with self._context.timers.timing("splat", partial(self._learn, part) if self._part else None):
                 maps.splatter.run(all_photons.part(start, part), spectra, atlas, maps.receivers, smoothing)
-            if self._pace.waits or is_capped:
+            if self._pace.waits:
                 self._context.finish()
-            took = time.perf_counter() - started
-            self.seconds += took
-            if self._part and (self._pace.waits or is_capped):
-                self._part.learn(part, took, self.dispatch_seconds)
-                self._is_fast = took * LARGEST_PART < part * self.dispatch_seconds
+            self.seconds += time.perf_counter() - started
             start += part
             if start < count:
                 yield
+
+    def _learn(self, photons: int, took: float) -> None:
+        assert self._part is not None
+        self._part.learn(photons, took, self.dispatch_seconds)
 
     def summing(self, atlas: MapAtlas) -> Iterator[None]:
         """Sum up what is pending with pauses, so that the maps can be shown at once; nothing where the pace knows no
