@@ -35,11 +35,11 @@ class RayPool:
         ctx, slots, (ray, photon) = (
             parts.context.ctx,
             _slots(parts.batch),
-            strides(parts.features, parts.context.traits),
+            strides(parts.features, parts.traits),
         )
         self._context = parts.context
-        self._ray = records.ray_record_of(parts.features, parts.context.traits.packs_rays)
-        self._events = parts.context.traits.ray_events
+        self._ray = records.ray_record_of(parts.features, parts.traits.packs_rays)
+        self._events = parts.traits.ray_events
         self._sum = shader.compute(ctx, "light/pool_tally.comp", parts.defines, parts.structs)
         self._state_zero = records.POOL_STATE.zeros(1)
         self._state_zero["capacity"] = self._state_zero["free_end"] = self._state_zero["returned"] = slots

@@ -33,6 +33,7 @@ class QueueParts:
     """What a queue is made for."""
 
     context: Context
+    traits: DeviceTraits
     features: Features
     defines: Defines
     structs: tuple[Struct, ...]
@@ -69,7 +70,7 @@ class OrderedQueue:
     """Owns the rays' buffers, of which emission fills `rays`; `photons` is what they leave."""
 
     def __init__(self, parts: QueueParts) -> None:
-        ctx, batch, (ray, photon) = parts.context.ctx, parts.batch, strides(parts.features, parts.context.traits)
+        ctx, batch, (ray, photon) = parts.context.ctx, parts.batch, strides(parts.features, parts.traits)
         self._context = parts.context
         names = "count", "scan", "scatter", "gather"
         queue = [shader.compute(ctx, f"light/queue_{name}.comp", parts.defines, parts.structs) for name in names]

@@ -206,7 +206,10 @@ class TracePass:
         """Rays emitted since this pass was made, pilots and all."""
         self.split_threshold = split_threshold
         self.widest_on_surface = widest_on_surface
-        self.ray = records.ray_record_of(features, context.traits.packs_rays)
+        # Derivatives are wanted as they are.
+        packs = context.traits.packs_rays and widest_on_surface < UNBOUNDED
+        traits = self._traits = replace(context.traits, packs_rays=packs)
+        self.ray = records.ray_record_of(features, packs)
         self.photon = records.photon_record(features.spectral_groups, features.hero)
         ctx = context.ctx
         structs = (
@@ -223,7 +226,7 @@ class TracePass:
         self._photons_a_point: dict[int, float] = {}
         """Room that batches of a light are given, as the last one needed it."""
         self._trace = shader.compute(ctx, "light/trace.comp", defines, (*structs, records.TRACE_PARAMETERS))
-        self._queue = queue_class(context.traits)(QueueParts(context, features, defines, structs, batch))
+        self._queue = queue_class(traits)(QueueParts(context, traits, features, defines, structs, batch))
         self.photons, self.emitted_rays = self._queue.photons, self._queue.rays
         self.flights = ctx.buffer(reserve=FLIGHT_ROOM * batch * records.FLIGHT.stride) if features.flights else None
         """What every ray of the last batch flew, in order, where the features have it: FLIGHT records."""
@@ -250,7 +253,7 @@ class TracePass:
     @property
     def bytes(self) -> int:
         """Device memory that the queue takes while photons are traced."""
-        return self._queue.bytes_of(self._features, self.context.traits, self.batch)
+        return self._queue.bytes_of(self._features, self._traits, self.batch)
 
     def run(self, piece: LatticeSlice, domain: EmissionDomain, max_depth: int | None = None) -> Batch:
         """Trace `piece.count` ≤ batch lattice points; their photons replace the buffer's content.

@@ -95,8 +95,20 @@ uint fan_where_it_landed(Path path, Path start, Hit hit) {
     return is_within2(fan, FAN_LIMIT) ? packHalf2x16(fan) : 0u;
 }
 
+// Where a ray has come to, as it set out and as it is there.
+struct Arrival {
+    Path path, start;
+    Hit hit;
+    Triangle facet;
+    Object thing;
+    uint kind;
+    float border;  // where its band is cut before it lands; negative: nowhere
+};
+
 // A photon on a receiver. The share that no specular event precedes the camera pass draws.
-void land(inout Path path, Path start, uint receiver, uint triangle, Hit hit, uint slot, inout Outcome outcome) {
+void land(Arrival at, uint slot, inout Outcome outcome) {
+    Path path = at.path;
+    Hit hit = at.hit;
     outcome.what |= path.depth == 0u ? DIRECT : DEPOSITED;
     outcome.flux_w = carried_w(path);
     if (path.depth == 0u) return;
@@ -109,7 +121,7 @@ void land(inout Path path, Path start, uint receiver, uint triangle, Hit hit, ui
     if (FOOTPRINTS) {
         photon.dposition_ds = path.dposition[0] * path.walk.footprint_scale;
         photon.dposition_dt = path.dposition[1] * path.walk.footprint_scale;
-        photon.fan = fan_where_it_landed(path, start, hit);
+        photon.fan = fan_where_it_landed(path, at.start, hit);
     }
     uint lattice_bits = p.lattice_bits;
     if (LAMP_COLUMNS) {
@@ -135,8 +147,8 @@ void land(inout Path path, Path start, uint receiver, uint triangle, Hit hit, ui
         photon.companion_throughput = path.walk.companion_throughput;
     }
     photon.x_anchor = path.band.y;
-    photon.triangle = triangle;
-    photon.receiver = receiver;
+    photon.triangle = at.facet.source;
+    photon.receiver = at.thing.receiver;
     photon.photon_id = path.walk.photon_id;
     photon.light_and_source = path.walk.light_and_source;
     photon.branch_key = path.walk.branch_key;
@@ -159,7 +171,7 @@ void land(inout Path path, Path start, uint receiver, uint triangle, Hit hit, ui
     }
     photon.flags = path.walk.flags | lattice_bits;
     if (TINT_LEVELS > 0) photon.flags |= tint_level(path) << uint(TINT_BIT);
-    if (!RAY_POOL || slot != NONE) store_photon(slot, photon);
+    store_photon(slot, photon);
     outcome.what |= LEFT_PHOTON;
 }
 
@@ -204,13 +216,21 @@ Flight flight_of(inout Path path, float distance) {
     return flight;
 }
 
-// Up to what the ray in `slot` meets next, and past it but for receivers; `k` says where its children go. Whether it
-// lands on a receiver: `path` has come there, from `start`.
-bool meets_receiver(uint slot, uint k, out Path path, out Path start, out Hit hit, out uint receiver, out uint triangle,
-    out Outcome outcome) {
-    path = load_path(slot);
+#if FLIGHTS
+Flight flight;
+#endif
+
+#define ENDED 0u
+#define LANDS 1u
+#define GOES_ON 2u
+
+// Up to what the ray in `slot` meets next: whether it has ended there as `outcome` says, lands on a receiver, or
+// `go_past` tells.
+uint arrive(uint slot, out Arrival at, out Outcome outcome) {
+    Path path = load_path(slot);
     if (SPECTRAL_GROUPS > 0) keep_sweeps_within(path);
-    start = path;
+    Path start = path;
+    Hit hit;
     outcome = Outcome(0u, 0.0, 0.0, 0.0);
     if (!POINT_SPECTRUM) band_w = band_powers(power_row(path), path.band);
 
@@ -224,19 +244,16 @@ bool meets_receiver(uint slot, uint k, out Path path, out Path start, out Hit hi
         while (rounds < 2u) rounds += min(p.lattices, 1u);
         if (rounds < 2u) {
             outcome = Outcome(LOST_NUMERIC, carried_w(path), 0.0, 0.0);
-            return false;
+            return ENDED;
         }
     }
     // Looked up once for all branches; some object and facet where nothing was met.
     Object thing = object_at(met ? hit.object : 0u);
     Triangle facet = hit_triangle(hit);
     uint kind = met ? thing.kind : NONE;
-    receiver = thing.receiver;
-    triangle = facet.source;
-    bool lands = false;
 
 #if FLIGHTS
-    Flight flight = flight_of(path, met ? hit.distance : FAR_DISTANCE);
+    flight = flight_of(path, met ? hit.distance : FAR_DISTANCE);
 #endif
     if (ABSORPTION && met) absorb(path, hit.distance, outcome.absorbed_w);
     if (met) path.position = surface_point(hit, facet, path.position, path.direction);
@@ -247,47 +264,65 @@ bool meets_receiver(uint slot, uint k, out Path path, out Path start, out Hit hi
     if (FOOTPRINTS && (IS_GLASS(kind) || kind == KIND_MIRROR))
         keep_columns_within(path, start, thing.kind == KIND_MIRROR ? thing.colour.w : thing.colour.z, hit.distance);
 
+    at = Arrival(path, start, hit, facet, thing, kind, border);
     if (BEAMS && met && (path.walk.light_and_source >> 16) == 0xffffu && is_beam_object(hit.object)) {
         outcome = Outcome(LEFT_TO_BEAMS, carried_w(path), 0.0, 0.0);
-    } else if (kind == KIND_DIFFUSE && border < 0.0) {
-        lands = true;
-    } else if (kind == KIND_BLACK && border < 0.0) {
+        return ENDED;
+    }
+    return kind == KIND_DIFFUSE && border < 0.0 ? LANDS : GOES_ON;
+}
+
+// What becomes of a ray that does not land; `k` says where its children go.
+void go_past(Arrival at, uint k, inout Outcome outcome) {
+    if (at.kind == KIND_BLACK && at.border < 0.0) {
         outcome.what |= ABSORBED;
-        outcome.flux_w = carried_w(path);
-    } else if (kind == NONE) {
+        outcome.flux_w = carried_w(at.path);
+    } else if (at.kind == NONE) {
         // A ray that leaves the scene from inside a solid slipped through a crack.
-        outcome.what |= is_inside(path.medium) ? LOST_NUMERIC : ESCAPED;
-        outcome.flux_w = carried_w(path);
-    } else if (path.depth >= most_depth() && border < 0.0) {
+        outcome.what |= is_inside(at.path.medium) ? LOST_NUMERIC : ESCAPED;
+        outcome.flux_w = carried_w(at.path);
+    } else if (at.path.depth >= most_depth() && at.border < 0.0) {
         outcome.what |= LOST_DEPTH;
-        outcome.flux_w = carried_w(path);
+        outcome.flux_w = carried_w(at.path);
     } else {
-        scatter(path, start, hit, facet, kind, thing, border, k, outcome);
+        scatter(at.path, at.start, at.hit, at.facet, at.kind, at.thing, at.border, k, outcome);
     }
-    if (FLIGHTS) {
-        if (BAND_CUTS) {
-            // The parts of a band that is cut fly again.
-            if ((outcome.what & FELL_BAND) != 0u) flight.flux_w = 0.0;
-        }
-        flight.what |= kind == KIND_DIFFUSE || kind == KIND_BLACK || kind == NONE ? 0u : 1u;
+}
+
+#if FLIGHTS
+void note_flight(Arrival at, uint k, Outcome outcome) {
+    if (BAND_CUTS) {
+        // The parts of a band that is cut fly again.
+        if ((outcome.what & FELL_BAND) != 0u) flight.flux_w = 0.0;
+    }
+    flight.what |= at.kind == KIND_DIFFUSE || at.kind == KIND_BLACK || at.kind == NONE ? 0u : 1u;
 #ifndef RAY_POOL
-        store_flight(state.flights - state.alive + k, flight);
+    store_flight(state.flights - state.alive + k, flight);
 #else
-        if (outcome.what != WAITS) store_flight(atomicAdd(state.flights, 1u), flight);
+    if (outcome.what != WAITS) store_flight(atomicAdd(state.flights, 1u), flight);
 #endif
-    }
-    return lands;
+}
+#endif
+
+// An event of the ray in `slot`; `k` says where what it leaves goes.
+void follow(uint slot, uint k, out Outcome outcome) {
+    Arrival at;
+    uint comes_to = arrive(slot, at, outcome);
+    if (comes_to == LANDS)
+        land(at, k, outcome);
+    else if (comes_to == GOES_ON)
+        go_past(at, k, outcome);
+#if FLIGHTS
+    note_flight(at, k, outcome);
+#endif
 }
 
 void main() {
-    uint k = gl_GlobalInvocationID.x, receiver, triangle;
-    Path path, start;
-    Hit hit;
+    uint k = gl_GlobalInvocationID.x;
     Outcome outcome;
 #ifndef RAY_POOL
     if (k >= state.alive) return;
-    if (meets_receiver(indices[k], k, path, start, hit, receiver, triangle, outcome))
-        land(path, start, receiver, triangle, hit, k, outcome);
+    follow(indices[k], k, outcome);
     store_outcome(k, outcome);
 #else
     open_tally();
@@ -298,17 +333,16 @@ void main() {
         for (uint event = 0u; (event < events || holds != 0u) && ray_goes_on && !waits; ++event) {
             ray_goes_on = false;
             second_slot = ray_slot;
-            lands = meets_receiver(ray_slot, ray_slot, path, start, hit, receiver, triangle, outcome);
+            follow(ray_slot, ray_slot, outcome);
+            lands = (outcome.what & LEFT_PHOTON) != 0u;
             waits = outcome.what == WAITS;
-            if (!waits && !lands) count_outcome(outcome);
-            if (!waits) ++events_done;
+            if (!waits) {
+                count_outcome(outcome);
+                ++events_done;
+            }
             ray_goes_on = ray_goes_on || waits;
         }
-        uint photon = hand_on_rays(lands && path.depth > 0u);
-        if (lands) {
-            land(path, start, receiver, triangle, hit, photon, outcome);
-            count_outcome(outcome);
-        }
+        hand_on_rays(lands);
     } while (find_held());
     if (!FLIGHTS) atomicAdd(group_events, events_done);
     close_group();

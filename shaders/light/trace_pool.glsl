@@ -6,8 +6,11 @@
 #include "lib/pool.glsl"
 
 layout(std430, binding = BIND_RAYS_IN) restrict buffer Rays { uvec4 rays_in[]; };
-layout(std430, binding = BIND_PHOTONS) writeonly restrict buffer Photons { uvec4 photon_slots[]; };
+layout(std430, binding = BIND_PHOTONS) writeonly restrict buffer Photons { uvec4 photons[]; };
 #define rays_out rays_in
+// A photon lies in its ray's slot, which is no smaller, until its group has found room for all of them.
+#define photon_slots rays_in
+#define PHOTON_STRIDE RayRecord_TEXELS
 
 uniform uint events;  // that a ray is followed for
 uniform uint holds;  // 1: an invocation follows all that becomes of its ray; after so many events whatever is left ends
@@ -70,8 +73,8 @@ uint most_depth() { return holds != 0u && events_done >= events ? 0u : p.max_dep
 shared uint group_counts[4];
 shared uint group_begins[4];
 
-// Hands rays on once they have been followed, and finds room for a photon where one `lands`; NONE: there is none.
-uint hand_on_rays(bool lands) {
+// Hands rays on once they have been followed; where one `lands`, its photon goes behind all others.
+void hand_on_rays(bool lands) {
     uint lane = gl_LocalInvocationIndex;
     barrier();
     if (lane < 4u) group_counts[lane] = 0u;
@@ -96,7 +99,10 @@ uint hand_on_rays(bool lands) {
             pool_slots[ring_at(group_begins[RETURNED] + rank)] = ray_slot;
     }
     photon += group_begins[LANDED];
-    return lands && photon < state.photon_capacity ? photon : NONE;
+    if (lands && photon < state.photon_capacity) {
+        for (uint i = 0u; i < uint(PhotonRecord_TEXELS); ++i)
+            photons[photon * uint(PhotonRecord_TEXELS) + i] = rays_in[ray_slot * uint(RayRecord_TEXELS) + i];
+    }
 }
 
 // The next of the children that wait. Whether any of the group has one.

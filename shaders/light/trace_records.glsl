@@ -46,6 +46,8 @@ layout(std430, binding = BIND_PHOTON_SLOTS) writeonly restrict buffer PhotonSlot
 layout(std430, binding = BIND_INDICES) readonly restrict buffer Indices { uint indices[]; };
 layout(std430, binding = BIND_STATE) readonly restrict buffer StateBlock { QueueState state; };
 
+#define PHOTON_STRIDE PhotonRecord_TEXELS
+
 // Where a ray's children go: two slots of its own.
 uint first_place(uint slot, bool both, bool stays) { return 2u * slot; }
 uint second_place(uint slot) { return 2u * slot + 1u; }
@@ -123,8 +125,7 @@ void store_path(uint slot, Path path) {
 void store_photon(uint slot, PhotonRecord photon) {
     uvec4 texels[PhotonRecord_TEXELS];
     to_texels(photon, texels);
-    for (uint i = 0u; i < uint(PhotonRecord_TEXELS); ++i)
-        photon_slots[slot * uint(PhotonRecord_TEXELS) + i] = texels[i];
+    for (uint i = 0u; i < uint(PhotonRecord_TEXELS); ++i) photon_slots[slot * uint(PHOTON_STRIDE) + i] = texels[i];
 }
 
 layout(std430, binding = BIND_FLIGHTS) writeonly restrict buffer Flights { uvec4 flights[]; };
