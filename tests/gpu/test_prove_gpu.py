@@ -146,6 +146,16 @@ def test_without_a_device_nothing_else_is_tried(tmp_path: Path, monkeypatch: pyt
     assert "no OpenGL" in proof["parts"][0]["detail"]
 
 
+def test_a_device_that_lacks_something_is_measured_all_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lacking = '{"name": "OSMesa", "value": "missing", "broken": true}\n'
+    told(monkeypatch, doctor=f"out.write({lacking + SOFTWARE!r})")
+    code, proof = proved(tmp_path, "--parts", "answers")
+    assert code == prove_gpu.FIRST_CODE
+    assert [part["state"] for part in proof["parts"]] == ["broken", "holds"]
+
+
 def test_ctrl_c_keeps_what_was_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     told(monkeypatch, answers='out.write(\'{"name": "gap", "value": "holds"}\\n\'); time.sleep(60)')
     real = prove_gpu._take_in
