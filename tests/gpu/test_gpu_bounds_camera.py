@@ -87,15 +87,16 @@ def test_what_programs_hold(gpu: Context, name: str) -> None:
         pytest.skip(strict_compilers.missing())
     with shader.recorded() as programs:
         released(opened(gpu, name))
-    assert len(programs) == 2
-    for program in programs:
+    seen = [program for program in programs if program.name == "camera/camera.comp"]
+    assert len(seen) == 2
+    for program in seen:
         [held] = strict_compilers.live_states(program)
         assert held.registers <= LIVE_WORDS
         assert held.scratch <= ARRAY_WORDS
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["prism", "default", "wine_glass"])
+@pytest.mark.parametrize("name", ["prism", "default"])
 def test_a_gpu_shows_what_a_software_renderer_does(gl: Context, gpu: Context, name: str) -> None:
     """Paths wait elsewhere, lists are followed whole, and places are taken again by others, where there are few: not so
     few that llvmpipe would end their loops."""
