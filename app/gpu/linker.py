@@ -147,18 +147,6 @@ class Linker:
             self.gl.ProgramParameteri(program, _BINARY_HINT, 1)
         self.gl.LinkProgram(program)
 
-    def finish(self, made: Pending) -> None:
-        """Wait until it is compiled. Raises as `program` does."""
-        self._pending.discard(made)
-        if made.shaders and not self._integer(self.gl.GetProgramiv, made.program, _LINK_STATUS):
-            made.problem = made.refusal(self._log_of(made))
-            self._delete(made)
-            raise made.problem
-        for shader in made.shaders.values():
-            self.gl.DetachShader(made.program, shader)
-            self.gl.DeleteShader(shader)
-        self._keep(made)
-
     def _keep(self, made: Pending) -> None:
         if made.key and (size := self._integer(self.gl.GetProgramiv, made.program, _BINARY_LENGTH)):
             form, written, code = _UINT(), _INT(), ctypes.create_string_buffer(size)
@@ -175,18 +163,25 @@ class Linker:
 
     def drop(self, made: Pending) -> None:
         """Free it, compiled or not."""
-        self._pending.discard(made)
-        if self._is_done(made):
-            self._keep(made)
-        self._delete(made)
-
-    def _delete(self, made: Pending) -> None:
+        if made in self._pending:
+            self._pending.discard(made)
+            if self._is_done(made):
+                self._keep(made)
         for shader in made.shaders.values():
             self.gl.DeleteShader(shader)
         self.gl.DeleteProgram(made.program)
 
-    def adopt(self, made: Pending) -> moderngl.ComputeShader | moderngl.Program:
-        """moderngl's own object of it, once it is compiled."""
+    def adopted(self, made: Pending) -> moderngl.ComputeShader | moderngl.Program:
+        """moderngl's own object of it; waits until it is compiled. Raises as `program` does."""
+        self._pending.discard(made)
+        if made.shaders and not self._integer(self.gl.GetProgramiv, made.program, _LINK_STATUS):
+            made.problem = made.refusal(self._log_of(made))
+            self.drop(made)
+            raise made.problem
+        for shader in made.shaders.values():
+            self.gl.DetachShader(made.program, shader)
+            self.gl.DeleteShader(shader)
+        self._keep(made)
         self._adopted = made.program
         try:
             if isinstance(made, PendingCompute):
@@ -225,8 +220,7 @@ class Pending:
         """Wait for the driver. Raises as `Linker.program` does."""
         if self.problem is not None:
             raise self.problem
-        self._linker.finish(self)
-        made: Any = self._linker.adopt(self)
+        made: Any = self._linker.adopted(self)
         self.__dict__, made.__dict__ = made.__dict__, {}
         self.__class__ = type(made)
 

@@ -22,7 +22,7 @@ FRONT_END, VALIDATOR, OPTIMISER, DISASSEMBLER = "glslangValidator", "spirv-val",
 _ENVIRONMENT = "opengl4.5"
 APT_LINE = "apt-get install glslang-tools spirv-tools"
 PATIENCE_S = 60.0
-_MOST_UNROLLED = 16
+_MOST_UNROLLED = 32
 """Rounds."""
 _LOOP = re.compile(r"\bfor \(u?int (\w+) = 0u?; \1 < (?:uint\()?(\w+?)u?\)?; \+\+\1\)")
 _BODY = re.compile(r"\s*(?:[^{;]*;|\{(?:[^{}]|\{[^{}]*\})*\})")
