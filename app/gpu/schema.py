@@ -6,6 +6,7 @@ from the same fields, and any padding std430 would slip in is an error instead o
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -49,6 +50,9 @@ class Field:
     def components(self) -> int:
         """Of a vector; 0: none."""
         return _TYPES[self.type][1] if _TYPES[self.type][1] > 1 else 0
+
+
+_TEXEL = re.compile(r"texels\[(\d+)\]")
 
 
 @dataclass(frozen=True)
@@ -136,6 +140,14 @@ class Struct:
         # Without a loop: a compiler with orders not to unroll (camera.comp) would load every texel, into memory, where
         # most callers want one member.
         loads = ", ".join(f"load((at) + {i}u)" for i in range(texels))
+        # Texel by texel: all together would be held beside what they are made of.
+        stores, at = [], 0
+        for line in pack:
+            if (found := _TEXEL.search(line)) and int(found[1]) > at:
+                stores.append(f"store((at) + {at}u, texel);")
+                at += 1
+            stores.append(_TEXEL.sub("texel", line.strip()).replace("value.", "(value)."))
+        stores.append(f"store((at) + {at}u, texel);")
         return "\n".join(
             [
                 f"#define {count} {texels}",
@@ -147,7 +159,8 @@ class Struct:
                 *unpack,
                 "    return value;",
                 "}",
-                f"#define {self.name}_FROM(load, at) {self.name}_of(uvec4[{count}]({loads}))\n",
+                f"#define {self.name}_FROM(load, at) {self.name}_of(uvec4[{count}]({loads}))",
+                f"#define {self.name}_TO(store, at, value) {{ uvec4 texel; {' '.join(stores)} }}\n",
             ]
         )
 

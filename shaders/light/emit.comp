@@ -35,6 +35,8 @@ layout(std430, binding = BIND_OUTCOMES) writeonly restrict buffer Outcomes { uve
 
 vec3 to_world(vec3 local) { return local.x * p.tangent + local.y * p.bitangent + local.z * p.axis; }
 
+#define STORE_RAY(at, texel) rays[at] = texel
+
 void main() {
     uint k = gl_GlobalInvocationID.x;
     bool is_there = k < p.count;
@@ -228,9 +230,7 @@ void main() {
                 for (int c = COLUMNS - 2; c < COLUMNS; ++c) ray.dposition[c].xyz = -p.back * ray.ddirection[c].xyz;
             }
         }
-        uvec4 texels[RayRecord_TEXELS];
-        to_texels(ray, texels);
-        for (uint i = 0u; i < uint(RayRecord_TEXELS); ++i) rays[slot * uint(RayRecord_TEXELS) + i] = texels[i];
+        RayRecord_TO(STORE_RAY, slot * uint(RayRecord_TEXELS), ray)
         outcome.what = 1u | 8u;
         outcome.flux_w = ray.flux_w;
     }

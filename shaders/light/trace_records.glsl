@@ -57,6 +57,9 @@ uint most_depth() { return p.max_depth; }
 // Bits of a record's flags from which on the order of a grating stands that is to be sent on next.
 #define ORDER_BIT 8
 
+#define STORE_RAY(at, texel) rays_out[at] = texel
+#define STORE_PHOTON(at, texel) photon_slots[at] = texel
+
 Path load_path(uint slot) {
     uvec4 texels[RayRecord_TEXELS];
     for (uint i = 0u; i < uint(RayRecord_TEXELS); ++i) texels[i] = rays_in[slot * uint(RayRecord_TEXELS) + i];
@@ -117,15 +120,11 @@ void store_path(uint slot, Path path) {
         ray.stokes_u = path.polarisation.u;
         ray.stokes_v = path.polarisation.v;
     }
-    uvec4 texels[RayRecord_TEXELS];
-    to_texels(ray, texels);
-    for (uint i = 0u; i < uint(RayRecord_TEXELS); ++i) rays_out[slot * uint(RayRecord_TEXELS) + i] = texels[i];
+    RayRecord_TO(STORE_RAY, slot * uint(RayRecord_TEXELS), ray)
 }
 
 void store_photon(uint slot, PhotonRecord photon) {
-    uvec4 texels[PhotonRecord_TEXELS];
-    to_texels(photon, texels);
-    for (uint i = 0u; i < uint(PhotonRecord_TEXELS); ++i) photon_slots[slot * uint(PHOTON_STRIDE) + i] = texels[i];
+    PhotonRecord_TO(STORE_PHOTON, slot * uint(PHOTON_STRIDE), photon)
 }
 
 layout(std430, binding = BIND_FLIGHTS) writeonly restrict buffer Flights { uvec4 flights[]; };

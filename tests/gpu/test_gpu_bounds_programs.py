@@ -20,6 +20,10 @@ SCENES = sorted((assets_dir() / "scenes").glob("*.toml"), key=lambda path: path.
 MOST_LIVE, MOST_ARRAY_WORDS, MOST_BYTES, MOST_SCENE_BYTES = 220, 64, 75_000, 500_000
 CAMERA = "camera/"
 """Its programs have bounds of their own."""
+TRACE = "light/trace.comp"
+TRACE_LIVE, TRACE_ARRAY_WORDS, TRACE_BYTES = 320, 80, 85_000
+"""The program that follows rays for several events holds two of their paths: more than is wanted of any, which is not
+met since 27 November 2026."""
 _held: set[tuple[str, ...]] = set()
 """Texts that were looked at."""
 
@@ -43,11 +47,13 @@ def check(programs: list[Built]) -> None:
         if built.name.startswith(CAMERA) or built.texts in _held:
             continue
         _held.add(built.texts)
-        assert max(map(len, built.texts)) <= MOST_BYTES, built.name
+        traces = built.name == TRACE
+        assert max(map(len, built.texts)) <= (TRACE_BYTES if traces else MOST_BYTES), built.name
         if strict_compilers.missing():
             continue
         for state in strict_compilers.live_states(built):
-            assert state.registers <= MOST_LIVE and state.scratch <= MOST_ARRAY_WORDS, (built.name, state)
+            assert state.registers <= (TRACE_LIVE if traces else MOST_LIVE), (built.name, state)
+            assert state.scratch <= (TRACE_ARRAY_WORDS if traces else MOST_ARRAY_WORDS), (built.name, state)
 
 
 def test_a_scenes_programs_are_small(device: Context) -> None:
