@@ -15,7 +15,7 @@ from ..gpu import bindings, records, shader
 from ..gpu.device_traits import DeviceTraits
 from .ray_queue import Followed, QueueParts, strides
 
-RAY_ROOM, PHOTON_ROOM = 1.6, 2.5
+RAY_ROOM, PHOTON_ROOM = 1.5, 2.5
 """Slots for rays per lattice point of a batch, and room for photons: what finds no slot waits, a batch without room for
 its photons is traced again in parts."""
 _GROUP = 64
