@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 SECONDS = 0.05
 """What tracing and splatting should take where the processor draws."""
 FIRST_PHOTONS, FEWEST, MOST = 1 << 12, 1 << 11, 1 << 20
+MOST_PARTS = 64
 DEPTH = 8
 """Specular events; what comes after them is for when things are still."""
 
@@ -52,7 +53,7 @@ class MovedLight:
         """About objects, each in its own frame."""
         self._sent: list[Sent] = []
         """Batches of the frame before."""
-        self._parts = 1
+        self._parts, self._overflows = 1, False
         self._landed = ChosenLandings(context.ctx, light_pass.trace.photon)
         self._scene: Scene | None = None
         """Whose light the maps hold."""
@@ -63,8 +64,9 @@ class MovedLight:
         """Photons through `scene`, with footprints so much wider, in maps that are fitted to where those of the frame
         before have landed. Without a `plan` there are as many as took about `SECONDS` before."""
         started = time.perf_counter()
-        # What found no room was not drawn: it is traced in smaller parts from now on.
-        self._parts *= 1 + bool(sum(sent.batch().overflow for sent in self._sent))
+        # What found no room was not drawn. The next batch is given more; where that does not help, they become smaller.
+        before, self._overflows = self._overflows, bool(sum(sent.batch().overflow for sent in self._sent))
+        self._parts = min(2 * self._parts, MOST_PARTS) if before and self._overflows else self._parts
         self._sent.clear()
         wished, depth, side = (self.photons, DEPTH, 1.0) if plan is None else (plan.photons, plan.depth, plan.side)
         photons = _steady(wished)
