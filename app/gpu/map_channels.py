@@ -81,12 +81,13 @@ class MapChannels:
         weights[np.flatnonzero(inside), at[inside]] = 1.0
         return weights
 
-    def coordinate(self, axis: SpectralAxis, x: np.ndarray) -> np.ndarray:
-        """Where on the row of spectral channels x lies: channel k is touched from k − 1 (tents; bins: k) to k + 1."""
+    def coordinate(self, wavelength_nm: np.ndarray) -> np.ndarray:
+        """Where on the row of spectral channels wavelengths lie: channel k is touched from k − 1 (tents; bins: k) to
+        k + 1."""
         marks = self.edges_nm if self.edges_nm is not None else self.tents_nm
         if len(marks) < 2:
-            return np.zeros_like(x)
-        return np.interp(axis.nm_of_x(x), marks, np.arange(len(marks)))
+            return np.zeros_like(wavelength_nm)
+        return np.interp(wavelength_nm, marks, np.arange(len(marks)))
 
     def spectra(self, lights: Sequence[Light]) -> list[Spectrum]:
         """Spectral density of one watt in each spectral channel: the lights' own, within it."""

@@ -94,7 +94,9 @@ class CameraInputs:
         if not self._tables.take(scene):
             return False
         self._counters.write(bytes(4 * len(FALLBACKS)))
-        self.move(scene)
+        before, self.scene = self.scene.scene.lights, scene
+        if any(a is not b for a, b in zip(before, scene.scene.lights, strict=True)):
+            self.move(scene)
         return True
 
     def move(self, scene: SceneBuffers) -> None:

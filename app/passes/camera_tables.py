@@ -265,7 +265,7 @@ def _spectra(
         "VARIABLE_ROW": variables,
         "ABSORPTION_ROW": np.array([np.interp(nm, VISIBLE_NM, a) for a in absorptions]).reshape(-1, SAMPLES),
         "BASIS_ROW": np.array([np.interp(nm, VISIBLE_NM, column) for column in rgb_basis().T]),
-        "BIN_ROW": maps.coordinate(axis, x)[None],
+        "BIN_ROW": maps.coordinate(nm)[None],
         "QUANTILE_ROW": np.interp(x, cell_cdf, np.linspace(0.0, 1.0, EMISSION_CELLS + 1))[None],
         "ROUGH_ROW": glass_tables(widths, SAMPLES),
     }

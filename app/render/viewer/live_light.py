@@ -60,8 +60,8 @@ class LiveLight:
         preview. `moving`: how fine beams are while something is dragged."""
         self._context = context
         self.buffers = scene_buffers(context, scene, settings)
-        self.stored = StoredPasses(context.ctx, capacity_bytes)
-        self._samples = PhotonStore(context.ctx, capacity_bytes)
+        self.stored = StoredPasses(context.ctx, capacity_bytes, context.traits.work_is_queued)
+        self._samples = PhotonStore(context.ctx, capacity_bytes, context.traits.work_is_queued)
         self._sample_pass: StoredPass | None = None
         """The same, once they are whole."""
         self._kept = KeptLight()
@@ -266,7 +266,7 @@ class LiveLight:
         share = store.rounds / store.rounds_of_pass
         if self.only_beams:
             share = 1.0
-        for slab in store.of_rounds(0, store.rounds):
+        for slab in store.first_slabs(store.rounds):
             coarsening = 1.0 if of_running else share**-0.5
             coarsening *= self.widening(kept.pass_photons * (1.0 if of_running else share))
             yield from self.light_pass.splat_steps(slab.buffer, slab.count, coarsening, kept.tables.full)
@@ -304,7 +304,7 @@ class LiveLight:
 
     def _splat_some(self, kept: StoredPass, photons: int, maps: LightMaps) -> None:
         rounds = kept.store.first_rounds(photons)
-        slabs = kept.store.of_rounds(0, rounds)
+        slabs = kept.store.first_slabs(rounds)
         # Records follow a space-filling curve over the lattice: every n-th of them is nearly a lattice again.
         stride = max(1, sum(slab.count for slab in slabs) // photons)
         share = rounds / kept.store.rounds_of_pass / stride

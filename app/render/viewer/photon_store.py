@@ -6,7 +6,7 @@ are the same picture, only coarser. A preview shows those while a slider is drag
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,50 +29,72 @@ class Slab:
 class PhotonStore:
     """Owns the slabs of one pass, up to a number of bytes."""
 
-    def __init__(self, ctx: moderngl.Context, capacity_bytes: int) -> None:
+    def __init__(self, ctx: moderngl.Context, capacity_bytes: int, in_one: bool = False) -> None:
+        """`in_one`: slabs lie one after the other in one buffer, as many as a shader can be given, and are splatted at
+        once."""
         self._ctx = ctx
+        self._most_in_one = int(ctx.info["GL_MAX_SHADER_STORAGE_BLOCK_SIZE"]) if in_one else 0
+        self._used = 0
+        """Bytes of the slabs."""
         self.capacity_bytes = capacity_bytes
         self.slabs: list[Slab] = []
         self.rounds = 0
         """Rounds of which everything is here."""
         self.rounds_of_pass = 1
+        self._stride = 1
         self._closed = False
 
     def clear(self) -> None:
         """Forget everything."""
-        for slab in self.slabs:
-            slab.buffer.release()
-        self.slabs = []
+        self.rounds = 0
+        self.drop_unfinished()
         self.rounds, self.rounds_of_pass, self._closed = 0, 1, False
 
     def drop_unfinished(self) -> None:
         """Forget photons of the round that is not whole yet."""
-        for slab in [s for s in self.slabs if s.round >= self.rounds]:
-            slab.buffer.release()
-            self.slabs.remove(slab)
+        kept = [slab for slab in self.slabs if slab.round < self.rounds]
+        for buffer in {slab.buffer for slab in self.slabs} - {slab.buffer for slab in kept}:
+            buffer.release()
+        self.slabs, self._used = kept, sum(slab.count for slab in kept) * self._stride
 
     def keep(self, photons: moderngl.Buffer, count: int, stride: int, of: RoundOf) -> None:
         """Copy `count` records of a batch, unless the store is full or the batch is not of the first pass."""
         if of.number > 0 or self._closed:
             return
         size = count * stride
-        if self.bytes + size > self.capacity_bytes:
+        if self._used + size > self.capacity_bytes:
             # A round that is not whole is no sub-lattice: it is dropped.
             self.drop_unfinished()
             self._closed = True
             return
         if count:
-            buffer = self._ctx.buffer(reserve=size)
-            self._ctx.copy_buffer(buffer, photons, size)
+            self._stride = stride
+            buffer, at = self._room(size)
+            self._ctx.copy_buffer(buffer, photons, size, write_offset=at)
             self.slabs.append(Slab(buffer, count, of.index))
+            self._used += size
         self.rounds_of_pass = of.count
         if of.is_last_light:
             self.rounds = of.index + 1
 
+    def _room(self, size: int) -> tuple[moderngl.Buffer, int]:
+        """A buffer, and where in it there is room for so many bytes: behind the last slab, while it may grow."""
+        last = self.slabs[-1].buffer if self.slabs else None
+        at = sum(slab.count for slab in self.slabs if slab.buffer is last) * self._stride
+        if last is None or at + size > self._most_in_one:
+            return self._ctx.buffer(reserve=size), 0
+        if at + size <= last.size:
+            return last, at
+        grown = self._ctx.buffer(reserve=min(2 * (at + size), self._most_in_one))
+        self._ctx.copy_buffer(grown, last, at)
+        self.slabs = [replace(slab, buffer=grown) if slab.buffer is last else slab for slab in self.slabs]
+        last.release()
+        return grown, at
+
     @property
     def bytes(self) -> int:
         """Device memory held."""
-        return sum(slab.buffer.size for slab in self.slabs)
+        return sum(buffer.size for buffer in {slab.buffer for slab in self.slabs})
 
     @property
     def photons(self) -> int:
@@ -85,11 +107,16 @@ class PhotonStore:
             return 0
         return int(np.clip(photons * self.rounds // max(self.photons, 1), 1, self.rounds))
 
-    def of_rounds(self, first: int, end: int) -> list[Slab]:
-        """Slabs of rounds [first, end)."""
-        return [slab for slab in self.slabs if first <= slab.round < end]
+    def first_slabs(self, rounds: int) -> list[Slab]:
+        """Slabs of the first so many rounds, one for all that lie in one buffer."""
+        found: dict[moderngl.Buffer, Slab] = {}
+        for slab in self.slabs:
+            if slab.round < rounds:
+                before = found.get(slab.buffer)
+                found[slab.buffer] = slab if before is None else replace(slab, count=before.count + slab.count)
+        return list(found.values())
 
     def read(self, limit: int, dtype: np.dtype) -> np.ndarray:
         """About `limit` records at most, in whole rounds (one at least), as a numpy array of `dtype`."""
-        slabs = self.of_rounds(0, self.first_rounds(limit))
-        return np.frombuffer(b"".join(slab.buffer.read() for slab in slabs), dtype)
+        slabs = self.first_slabs(self.first_rounds(limit))
+        return np.frombuffer(b"".join(slab.buffer.read(slab.count * self._stride) for slab in slabs), dtype)

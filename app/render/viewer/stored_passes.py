@@ -40,8 +40,9 @@ class StoredPasses:
 
     keeps, takes_tails = True, False
 
-    def __init__(self, ctx: moderngl.Context, capacity_bytes: int) -> None:
-        self._ctx = ctx
+    def __init__(self, ctx: moderngl.Context, capacity_bytes: int, in_one: bool = False) -> None:
+        """`in_one`: see `PhotonStore`."""
+        self._ctx, self._in_one = ctx, in_one
         self._capacity_bytes = capacity_bytes
         self.running: StoredPass | None = None
         self._older: StoredPass | None = None
@@ -59,7 +60,9 @@ class StoredPasses:
             if kept is not fullest:
                 kept.release()
         self._older = fullest
-        self.running = StoredPass(PhotonStore(self._ctx, self._capacity_bytes), PassTables(shown, spans), photons)
+        self.running = StoredPass(
+            PhotonStore(self._ctx, self._capacity_bytes, self._in_one), PassTables(shown, spans), photons
+        )
 
     def keep(self, photons: moderngl.Buffer, batch: Batch, stride: int, of: RoundOf) -> None:
         """Store the batch."""
