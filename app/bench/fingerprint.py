@@ -156,9 +156,9 @@ def _render(context: Context, scene: Scene, settings: RenderSettings) -> Fingerp
     def fill(light: LightPass, sampling: LightSampling, stop: Stop) -> Iterator[float]:
         light.batches.records = _HashedRecords(light.batches.records, records)  # type: ignore[assignment]
         yield from traced_light(light, sampling, stop)
-        light.atlas.flush()
+        light.maps.atlas.flush()
         context.ctx.memory_barrier()
-        maps.extend(texture.read() for texture in light.atlas.total_textures)
+        maps.extend(texture.read() for texture in light.maps.atlas.total_textures)
 
     picture = render(scene, settings, context=context, fill=fill)
     samples = [picture.rgb] if picture.spectral is None else [picture.rgb, picture.spectral]

@@ -137,7 +137,7 @@ def camera_costs(
     with _light(context, scene, RenderSettings(width=size[0], height=size[1])) as light:
         light.begin(1 << 14, 1)
         light.run_pass(0, 1 << 14, lambda _: True)
-        light.atlas.flush()
+        light.maps.atlas.flush()
         camera = CameraPass(context, light.buffers, "beauty", light.reflectances, light.map_channels)
         try:
             for cap in caps_s:
@@ -163,7 +163,7 @@ def _frame(
     started = time.perf_counter()
     for _ in light.steps_until(0, photons, lambda: False):
         pass
-    light.atlas.flush()
+    light.maps.atlas.flush()
     context.finish()
     lit = time.perf_counter()
     for _ in camera.samples(light.scene.camera, *size, 1, 0, light.caustic_maps(), seed):

@@ -17,6 +17,7 @@ from typing import Protocol
 import numpy as np
 
 from ..base.errors import UserError
+from ..gpu import splat_tables
 from ..gpu.context import Context
 from ..model.optics.colorimetry import rgb709_to_xyz
 from ..model.scene import Scene
@@ -186,7 +187,9 @@ class MethodRig:
     def _light_seconds(self, photons: int, seed: int) -> dict[str, float]:
         """Fill the maps; seconds by stage. All that a pass does besides tracing counts as splatting."""
         light = self._light
-        light.forget_tables()
+        # As a process that renders once has none yet.
+        light.batches.records.release()
+        splat_tables.forget_blurred()
         sizes, planning, filling = pass_sizes(light.features.method, photons), 0.0, 0.0
         started = self._finished()
         light.begin(sizes[0], seed)
@@ -197,7 +200,7 @@ class MethodRig:
             light.run_pass(number, size, self._wait)
             filled = self._finished()
             planning, filling, started = planning + planned - started, filling + filled - planned, filled
-        self._textures = light.resolved_textures()
+        self._textures = light.maps.resolved_textures()
         resolved = self._finished()
         self._context.check("a rendering of the bench")
         trace = light.stats.trace_seconds

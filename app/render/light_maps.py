@@ -188,9 +188,9 @@ class LightMaps:
                 texels[first : first + len(rows), :, 4 * target : 4 * target + 4] = rows
         return texels
 
-    def flux(self, is_xyz: bool) -> float:
+    def flux(self) -> float:
         """What the maps hold where they are read: the sum of XYZ maps' last channel (W), or of all bins."""
-        flux = 0.0
+        flux, is_xyz = 0.0, not self.features.bins
         words = None if self.atlas.contact_words is None else read_words(self.atlas.contact_words)
         targets = 1 if is_xyz else len(self.resolved_textures())
         bordered = self.layout.borders if self.features.border_images else {}

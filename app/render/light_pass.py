@@ -11,14 +11,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import moderngl
 import numpy as np
 
 from ..base.generators import finished
 from ..features.features import Features
-from ..gpu import shader, splat_tables
+from ..gpu import shader
 from ..gpu.context import Context
 from ..gpu.limits import check_brush, check_splats
 from ..gpu.map_channels import MapChannels
@@ -28,7 +27,6 @@ from ..model.settings import RenderSettings
 from ..passes.caustic_maps import CausticMaps
 from ..passes.contact_lines import contact_words
 from ..passes.landings import Landings
-from ..passes.map_atlas import MapAtlas
 from ..passes.map_layout import MapLayout, check_map_receiver, layout_maps
 from ..passes.pilot import Pilot
 from ..passes.trace import TracePass
@@ -39,14 +37,11 @@ from .light_survey import LightSurvey
 from .map_fit import MapFit
 from .pass_rounds import PassRounds, roulette_word
 from .pass_sizes import FIRST_KERNEL, PROGRESSIVE, SHRINKING, emphasis, kernel_scale
-from .photon_batches import Deposit, Keep, PhotonBatches, batch_size, traced_besides
+from .photon_batches import Deposit, PhotonBatches, batch_size
 from .photon_records import NoRecords, PhotonRecords
 from .sampling import MovingBeams
 from .shown_spectra import ShownSpectra, ShownTables
 from .splatting import Pace
-
-if TYPE_CHECKING:
-    from .beam_light import BeamLight
 
 
 class LightPass:
@@ -189,37 +184,10 @@ class LightPass:
         """Places of the maps in the atlas."""
         return self.maps.layout
 
-    @property
-    def atlas(self) -> MapAtlas:
-        """What splats are added to."""
-        return self.maps.atlas
-
-    @property
-    def map_scale(self) -> float:
-        """Factor from what the maps have summed to energy per texel."""
-        return self.maps.scale
-
     def caustic_maps(self, textures: Sequence[moderngl.Texture] | None = None) -> CausticMaps:
         """The summed maps as the camera reads them; `textures` where they are not `resolved_textures`."""
         self.batches.settled()
         return self.maps.caustic_maps(textures)
-
-    def resolved_textures(self) -> list[moderngl.Texture]:
-        """The summed maps for lookups: wide texels added to fine ones, charts' seams folded home."""
-        return self.maps.resolved_textures()
-
-    def resolved_map(self, receiver: int) -> np.ndarray:
-        """A receiver's finest map: float32 (height, width, channels), row 0 at texel y = 0."""
-        return self.maps.receiver(receiver)
-
-    def map_flux(self) -> float:
-        """What the maps hold where they are read: the sum of XYZ maps' last channel (W), or of all bins."""
-        return self.maps.flux(self.bin_edges_nm is None)
-
-    def forget_tables(self) -> None:
-        """Make spectral tables anew when they are next needed, as a process that renders once does."""
-        self.batches.records.release()
-        splat_tables.forget_blurred()
 
     # ---- work --------------------------------------------------------------------------------
 
@@ -275,15 +243,8 @@ class LightPass:
             self._division,
         )
 
-    def sample_steps(self, photons: int, keep: Keep) -> Generator[str | None, None, list[LightPlan]]:
-        """Trace about `photons` as if there were no beams and pass them to `keep`; the maps stay as they are. Returns
-        their plans."""
-        plans = yield from self.sample_plans(photons)
-        yield from traced_besides(self.trace, self.settings.seed, plans, photons, keep)
-        return plans
-
     def sample_plans(self, photons: int) -> Generator[str | None, None, list[LightPlan]]:
-        """The plans of `sample_steps`."""
+        """Plans for about `photons` as if there were no beams."""
         pilots = yield from self.survey.sample_pilots()
         return self._planner(pilots).plans(photons, self._texel_size())
 
@@ -329,26 +290,11 @@ class LightPass:
         coarsening = self.widening * (kernel_scale(number) if self._shrinks else 1.0)
         return Deposit(self.maps, self.stats, self.smoothing * coarsening)
 
-    @property
-    def has_beams(self) -> bool:
-        """Beams carry part of the light."""
-        return self.survey.has_beams
-
-    @property
-    def only_beams(self) -> bool:
-        """No light needs photons but for what beams leave to them."""
-        return self.survey.only_beams
-
-    @property
-    def beams(self) -> BeamLight | None:
-        """What finds and draws them; None where there are none."""
-        return self.survey.beams
-
     def beam_steps_again(self, photons: float) -> Iterator[None]:
         """Add what beams of a pass of so many photons add to the maps, as they are shown now; nothing is left to
         photons."""
-        if self.beams is not None and photons > 0.0:
-            for _ in self.beams.steps(photons, photons, roulette_word(self.seed, 0), self.maps, tails=False):
+        if self.survey.beams is not None and photons > 0.0:
+            for _ in self.survey.beams.steps(photons, photons, roulette_word(self.seed, 0), self.maps, tails=False):
                 yield
 
     def splat_steps(
@@ -368,7 +314,7 @@ class LightPass:
 
     def settling(self) -> Iterator[None]:
         """Sum up what is pending, so that the maps can be shown at once."""
-        yield from self.batches.settling(self.atlas, self.stats)
+        yield from self.batches.settling(self.maps.atlas, self.stats)
 
     def _texel_size(self) -> np.ndarray:
         """What each receiver's finest window resolves, GPU units."""
@@ -387,13 +333,13 @@ class LightPass:
     def finish(self) -> None:
         """Sum what is pending and fetch the counters."""
         self.batches.settled()
-        self.atlas.flush()
+        self.maps.atlas.flush()
         self.stats.buffers = {
             "scene": self.buffers.bytes,
             "photon queue": self.trace.bytes,
             "splats": self.maps.splatter.bytes,
-            "map sums": 16 * len(self.atlas.total_textures) * self.atlas.size[0] * self.atlas.size[1],
-            "map scratch": self.atlas.scratch_bytes,
+            "map sums": 16 * len(self.maps.atlas.total_textures) * self.maps.atlas.size[0] * self.maps.atlas.size[1],
+            "map scratch": self.maps.atlas.scratch_bytes,
         }
         counts = self.maps.splatter.counts()
         elsewhere = self._elsewhere
@@ -406,8 +352,8 @@ class LightPass:
         """After `begin`, instead of passes: what others traced for these maps.
 
         `sums`: for every texture of the atlas in turn, float32 (height, width, 4); `stats`: what they counted."""
-        self.atlas.ready_totals()
-        for texture, values in zip(self.atlas.total_textures, sums, strict=True):
+        self.maps.atlas.ready_totals()
+        for texture, values in zip(self.maps.atlas.total_textures, sums, strict=True):
             texture.write(np.ascontiguousarray(values, np.float32))
         self.maps.photon_weight = photon_weight
         self._elsewhere = stats

@@ -21,7 +21,7 @@ def map_picture(light: LightPass) -> tuple[np.ndarray, np.ndarray | None]:
     for target in range(1 if is_xyz else light.features.targets):
         for first, rows in light.maps.portions(tile, target):
             covers = areas if len(areas) == 1 else areas[first : first + len(rows)]
-            texels = rows.astype(float) * light.map_scale / covers
+            texels = rows.astype(float) * light.maps.scale / covers
             # Row 0 of the map is the picture's last.
             above = slice(tile.height - first - len(rows), tile.height - first)
             if is_xyz:

@@ -60,7 +60,7 @@ def estimate(light: LightPass, layout: MapLayout, settings: RenderSettings) -> M
     resolved = targets if layout.charts else 0
     maps = texture * (targets + max(scratched, resolved))
     beams = 0
-    if light.has_beams:
+    if light.survey.has_beams:
         beams = int(_BEAMS * min(settings.photons or BEAM_ROUND, BEAM_ROUND) / BEAM_ROUND)
     return MemoryEstimate(now, maps + beams + _SPLAT_PROGRAMS, maps + (0 if shows_map else _ALL_PROGRAMS) + picture)
 

@@ -177,7 +177,7 @@ def _pixels_of(
     if material.texture is not None:
         return {}
     texel_area = 1.0 / (to_texels.density(to_texels.points(corners + 0.5)) * space.scale**2)
-    energy = luminous * light.map_scale / texel_area * reflectance / np.pi * area_px
+    energy = luminous * light.maps.scale / texel_area * reflectance / np.pi * area_px
     inside &= np.isfinite(energy) & ~_may_be_hidden(light, number, camera, places)
     found: dict[tuple[int, int], float] = {}
     for (column, row), value in zip(

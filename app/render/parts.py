@@ -130,7 +130,7 @@ def trace_part(
         rounds, groups = _rounds_and_groups(light, sampling)
         if sum(groups) < share.count:
             way_out = "give fewer parts, more photons or a smaller --batch"
-            if light.only_beams:
+            if light.survey.only_beams:
                 way_out = "beams carry its light, in rounds of a million photons: --method srd-photons has more"
             raise UserError(
                 f"{share.count} parts: this rendering is traced in {sum(groups)} rounds, which are not enough to "
@@ -155,13 +155,13 @@ def trace_part(
             share,
             rounds,
             layout_key(light),
-            light.atlas.size,
-            light.atlas.targets,
+            light.maps.atlas.size,
+            light.maps.atlas.targets,
             light.maps.photon_weight,
             _plain(light.stats),
             context.renderer,
         )
-        return Part(header, [_texels(light, target) for target in range(light.atlas.targets)])
+        return Part(header, [_texels(light, target) for target in range(light.maps.atlas.targets)])
 
 
 def parts_at_most(context: Context, scene: Scene, settings: RenderSettings) -> int:
@@ -203,14 +203,18 @@ def _rounds_and_groups(light: LightPass, sampling: LightSampling) -> tuple[int, 
 
 def layout_key(light: LightPass) -> str:
     """Hash of the maps' places and of what their channels are."""
-    digest = hashlib.sha256(repr((light.layout.size, light.atlas.targets, light.bin_edges_nm)).encode())
+    digest = hashlib.sha256(repr((light.layout.size, light.maps.atlas.targets, light.bin_edges_nm)).encode())
     digest.update(np.ascontiguousarray(light.layout.placements).tobytes())
     return digest.hexdigest()
 
 
 def check_maps(light: LightPass, header: PartHeader, name: str) -> None:
     """Raise `UserError` where a part, called `name`, was traced for other maps than those of `light`."""
-    if (layout_key(light), light.atlas.size, light.atlas.targets) != (header.layout, header.size, header.targets):
+    if (layout_key(light), light.maps.atlas.size, light.maps.atlas.targets) != (
+        header.layout,
+        header.size,
+        header.targets,
+    ):
         raise UserError(
             f"{name} was traced by '{header.renderer}', whose maps have other places than those of "
             f"'{light.context.renderer}': merge where the parts were traced"
@@ -254,10 +258,10 @@ def merged_light(
 
 
 def _texels(light: LightPass, target: int) -> np.ndarray:
-    width, height = light.atlas.size
+    width, height = light.maps.atlas.size
     texels = np.empty((height, width, 4), np.float32)
     light.context.ctx.memory_barrier()
-    light.atlas.total_textures[target].read_into(texels)
+    light.maps.atlas.total_textures[target].read_into(texels)
     return texels
 
 

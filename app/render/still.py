@@ -188,8 +188,8 @@ def _stats(context: Context, frames: FrameRenderer, settings: RenderSettings) ->
         frames.seconds.prepare,
         frames.seconds.camera,
         light.layout.size,
-        light.map_flux() if settings.tally else 0.0,
+        light.maps.flux() if settings.tally else 0.0,
         camera,
-        None if light.beams is None else light.beams.stats,
+        None if light.survey.beams is None else light.survey.beams.stats,
         frames.memory.peak if frames.memory is not None else 0,
     )

@@ -43,7 +43,7 @@ def _traced_for(light: LightPass, seconds: float, seed: int, stop: Callable[[], 
     def spent() -> float:
         return min((time.perf_counter() - begun) / seconds, 1.0)
 
-    while light.plans or light.has_beams:
+    while light.plans or light.survey.has_beams:
         started = time.perf_counter()
         light.plan(photons, number)
         for _ in light.steps_until(number, photons, lambda: spent() >= 1.0 or stop()):

@@ -104,7 +104,7 @@ def test_a_curved_receiver_comes_with_the_place_of_every_triangle(gl, tmp_path: 
     for _ in renderer.steps(stage):
         pass
     light = renderer.light
-    energy = light.resolved_map(0)[light.layout.charts[0].owner >= 0].astype(float)[:, 1].sum() * light.map_scale
+    energy = light.maps.receiver(0)[light.layout.charts[0].owner >= 0].astype(float)[:, 1].sum() * light.maps.scale
     renderer.release()
     assert flux.sum() == pytest.approx(energy, rel=0.02)
     middle = np.einsum("tp,tpi->i", flux, points) / flux.sum()

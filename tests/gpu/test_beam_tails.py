@@ -129,12 +129,12 @@ def landing(light: LightPass) -> float:
 
 def held(light: LightPass) -> float:
     """Share of that in the map."""
-    return light.map_flux() / light.stats.tally.ended["deposited"]
+    return light.maps.flux() / light.stats.tally.ended["deposited"]
 
 
 def coarse(light: LightPass) -> np.ndarray:
     """The table's map in blocks of eight by eight texels."""
-    texels = light.resolved_map(0)[..., :3] * light.map_scale
+    texels = light.maps.receiver(0)[..., :3] * light.maps.scale
     height, width = (8 * (side // 8) for side in texels.shape[:2])
     return texels[:height, :width].reshape(height // 8, 8, width // 8, 8, 3).sum(axis=(1, 3))
 
@@ -146,7 +146,7 @@ def test_photons_carry_what_beams_leave_in_a_scene_of_any_size(gl, tmp_path: Pat
     with passed(gl, scene, "stochastic", photons=4 * PHOTONS) as alone:
         share, in_map = landing(alone), landing(alone) * held(alone)
     with passed(gl, scene) as by_beams:
-        assert by_beams.only_beams and by_beams.trace.rays_traced > PHOTONS / 4
+        assert by_beams.survey.only_beams and by_beams.trace.rays_traced > PHOTONS / 4
         stats, tally = by_beams.beam_stats, by_beams.stats.tally
         assert stats is not None and 0.01 < stats.left_w / stats.entered_w < 0.7
         # What beams say they left, and what photons took up.
@@ -163,7 +163,7 @@ def test_more_facets_ahead_than_a_flight_keeps(gl) -> None:
     with passed(gl, scene, "stochastic", photons=4 * PHOTONS) as alone:
         share = landing(alone)
     with passed(gl, scene) as by_beams:
-        assert by_beams.only_beams and landing(by_beams) == pytest.approx(share, rel=5e-3)
+        assert by_beams.survey.only_beams and landing(by_beams) == pytest.approx(share, rel=5e-3)
         # The map of a layer leaves out a hundredth of the light at each side.
         assert held(by_beams) == pytest.approx(1.0, abs=0.04)
 
@@ -190,7 +190,7 @@ def test_lines_are_carried_on_one_by_one(gl, tmp_path: Path) -> None:
         with passed(gl, replace(scene, lights=(only,))) as alone:
             each.append(coarse(alone).sum(axis=(0, 1)))
     with passed(gl, scene) as both:
-        assert both.only_beams and both.trace.rays_traced > PHOTONS / 4
+        assert both.survey.only_beams and both.trace.rays_traced > PHOTONS / 4
         assert coarse(both).sum(axis=(0, 1)) == pytest.approx(sum(each), rel=0.01)
 
 
@@ -200,20 +200,20 @@ def test_lines_over_a_continuum_go_by_photons(gl, tmp_path: Path) -> None:
     (lamp,) = scene.lights
     mixed = replace(lamp.spectral_power, lines=((546.1, 2.0),))
     with passed(gl, replace(scene, lights=(replace(lamp, spectral_power=mixed),))) as light:
-        assert light.beams is None and "continuum" in light.survey.beam_light.why_not
+        assert light.survey.beams is None and "continuum" in light.survey.beam_light.why_not
 
 
 def test_what_is_kept_to_be_shown_again_holds_no_tail(gl, tmp_path: Path) -> None:
     """Weak beams play roulette when they are drawn again: kept tails, 8 % of the light, would count twice."""
     with passed(gl, stone(tmp_path)) as light:
         assert light.stats.splats > 1000 and light.batches.records.kept == 0
-        whole = light.map_flux() * light.map_scale
+        whole = light.maps.flux() * light.maps.scale
         light.maps.clear()
         for _ in light.beam_steps_again(float(PHOTONS)):
             pass
         light.maps.photon_weight = float(PHOTONS)
         light.finish()
-        assert light.map_flux() * light.map_scale == pytest.approx(whole, rel=0.06)
+        assert light.maps.flux() * light.maps.scale == pytest.approx(whole, rel=0.06)
 
 
 @pytest.mark.slow
@@ -223,10 +223,10 @@ def test_rounds_of_photons_have_their_beams_together(gl, tmp_path: Path, monkeyp
     monkeypatch.setattr(pass_rounds, "MIN_BEAM_PHOTONS", PHOTONS // 3)
     scene = stone(tmp_path, more=BALL + '\n[[lights]]\nkind = "point"\nposition = [25.0, 0.0, 20.0]')
     with passed(gl, scene) as light:
-        assert light.has_beams and not light.only_beams
+        assert light.survey.has_beams and not light.survey.only_beams
         steps = [step for step in light.pass_steps(1, PHOTONS) if step.round_done]
-        stats = light.beams.stats
+        stats = light.survey.beams.stats
         assert stats is not None
         searches = stats.searches / 2
         assert searches == len(steps) and 2 <= searches <= 4 and steps[-1].fraction == 1.0
-        assert light.map_scale == pytest.approx(0.5 / PHOTONS, rel=1e-6)
+        assert light.maps.scale == pytest.approx(0.5 / PHOTONS, rel=1e-6)

@@ -45,8 +45,8 @@ def traced(gl: Context, tmp_path_factory: pytest.TempPathFactory, request: pytes
     light = LiveLight(gl, scene, settings, 64 << 20)
     light.light_pass.prepare()
     light.light_pass.begin(PHOTONS, 1)
-    assert light.light_pass.has_beams == (request.param == "srd")
-    for _ in light.sample(PHOTONS) if light.light_pass.has_beams else light.light_pass.pass_steps(0, PHOTONS):
+    assert light.light_pass.survey.has_beams == (request.param == "srd")
+    for _ in light.sample(PHOTONS) if light.light_pass.survey.has_beams else light.light_pass.pass_steps(0, PHOTONS):
         pass
     yield light, inputs
     light.release()

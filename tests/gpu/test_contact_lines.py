@@ -82,7 +82,7 @@ def without(monkeypatch: pytest.MonkeyPatch):
 
 def test_words_are_what_rays_see(gl) -> None:
     with light_pass(gl, under_a_plate(), replace(SETTINGS, method="srd")) as (light, _):
-        words = light.atlas.contact_words
+        words = light.maps.atlas.contact_words
         assert words is not None
         window, tile = light.layout.windows[0][0], light.layout.tiles[0][0]
         assert isinstance(window, PictureWindow)
@@ -107,7 +107,7 @@ def test_a_face_just_behind_a_wall_does_not_hide_it_from_within_the_glass(gl) ->
     with light_pass(gl, pool, replace(SETTINGS, width=1280, height=720, photons=2_000)) as (light, _):
         wall = 1  # of the receivers: floor, far wall, …
         tile = light.layout.tiles[wall][0]
-        words = read_words(light.atlas.contact_words)[tile.y : tile.y + tile.height, tile.x : tile.x + tile.width]
+        words = read_words(light.maps.atlas.contact_words)[tile.y : tile.y + tile.height, tile.x : tile.x + tile.width]
     wall_round_it = uniform_filter(((words & 0xFFFF) == 0xFFFF).astype(float), 9)
     assert not ((words > 0xFFFF) & (wall_round_it > 0.8)).any() and (words > 0xFFFF).any()
 

@@ -56,7 +56,7 @@ def traced(context, name: str, seconds: float, method: str = "srd") -> LightPass
 
 
 def _splatters(light: LightPass) -> list[BeamSplatter]:
-    beams = light.beams
+    beams = light.survey.beams
     if beams is None:
         return []
     maps = light._maps
@@ -71,11 +71,11 @@ def test_slow_devices_get_small_portions_and_the_same_light(queueing, name: str,
     passes = [traced(queueing, name, seconds, method) for seconds in (1e3, SLOW)]
     try:
         freely, slowly = passes
-        assert len(slowly.sizes) > 4 * len(freely.sizes) or slowly.beams is not None
-        if slowly.beams is None:
+        assert len(slowly.sizes) > 4 * len(freely.sizes) or slowly.survey.beams is not None
+        if slowly.survey.beams is None:
             assert min(slowly.sizes) <= 1024 and max(slowly.sizes[-8:]) <= 1024
-        if slowly.beams is not None:
-            (splatter,) = slowly.beams.drawing.splatters.values()
+        if slowly.survey.beams is not None:
+            (splatter,) = slowly.survey.beams.drawing.splatters.values()
             assert splatter._portion is not None and splatter._portion.units == 16
         assert slowly.stats.photons == freely.stats.photons
         for texture, other in zip(freely.atlas.total_textures, slowly.atlas.total_textures, strict=True):

@@ -40,7 +40,7 @@ def luminance(gl: Context, passes: list[int]) -> np.ndarray:
             run.photons, run.number, run.begun = photons, 0, False
             for _ in run._pass():
                 pass
-        return light.light_pass.resolved_map(0)[..., 1].astype(float) * light.light_pass.map_scale
+        return light.light_pass.maps.receiver(0)[..., 1].astype(float) * light.light_pass.maps.scale
     finally:
         light.release()
 

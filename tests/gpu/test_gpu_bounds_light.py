@@ -144,7 +144,7 @@ def test_what_is_counted_late_is_the_same_light(too_few: bool, monkeypatch: pyte
             for _ in light.pass_steps(0, PHOTONS):
                 pass
             light.finish()
-            sums = np.frombuffer(light.atlas.total_textures[0].read(), np.float32).astype(float)
+            sums = np.frombuffer(light.maps.atlas.total_textures[0].read(), np.float32).astype(float)
             found.append((sums, light.stats, light.trace.rays_traced))
             assert light.stats.tally.fallbacks["queue_overflow"] == 0 and light.stats.tally.imbalance < 1e-5
             light.release()

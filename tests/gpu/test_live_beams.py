@@ -54,14 +54,14 @@ def test_a_preview_holds_the_same_light_and_does_not_flicker(gl: Context) -> Non
     light = begun(gl, shipped("prism"))
     try:
         drawn(light)
-        full = light.light_pass.map_flux() * light.light_pass.map_scale
+        full = light.light_pass.maps.flux() * light.light_pass.maps.scale
         preview = light.splat_preview(4096)
         assert preview is not None
-        first = preview.flux(True)
+        first = preview.flux()
         assert first == pytest.approx(full, rel=0.05)
         light.moving.threshold = MovingBeams().threshold
         again = light.splat_preview(4096)
-        assert again is not None and again.flux(True) == pytest.approx(first, rel=0.01)
+        assert again is not None and again.flux() == pytest.approx(first, rel=0.01)
     finally:
         light.release()
 
@@ -95,13 +95,13 @@ def test_a_dragged_glass_leaves_the_light_of_others_as_fine_as_it_was(gl: Contex
     try:
         for _ in light.light_pass.pass_steps(0, PHOTONS):
             pass
-        before = light.light_pass.beams.found.polygons
+        before = light.light_pass.survey.beams.found.polygons
         alone = before.met & 1 == 0  # light that never met the prism
         assert 0 < alone.sum() < len(before) and alone[before.source == 1].any()
         first = edited(scene, 1.5).objects[0]
         light.show(inputs(replace(scene, objects=(first, *scene.objects[1:]))))
-        previews = [light.splat_preview(4096).flux(True) for _ in range(2)]
-        after = light.light_pass.beams.found.polygons
+        previews = [light.splat_preview(4096).flux() for _ in range(2)]
+        after = light.light_pass.survey.beams.found.polygons
         assert np.array_equal(after.flux[after.met & 1 == 0], before.flux[alone])
         assert 0 < (after.met & 1 != 0).sum() < (~alone).sum()  # as coarse as a drag has them
         assert previews[1] == pytest.approx(previews[0], rel=0.02)  # the first is drawn, the second begins from a copy

@@ -75,10 +75,10 @@ def trace(light: LiveLight, photons: int = PHOTONS) -> None:
 
 def maps(light: LiveLight) -> np.ndarray:
     """XYZ and W of every texel, scaled to energy."""
-    texture, *_ = light.light_pass.resolved_textures()  # what follows are spectral channels of the same light
+    texture, *_ = light.light_pass.maps.resolved_textures()  # what follows are spectral channels of the same light
     return (
         np.frombuffer(texture.read(), np.float32).reshape(texture.height, texture.width, 4).astype(float)
-        * light.light_pass.map_scale
+        * light.light_pass.maps.scale
     )
 
 
@@ -272,7 +272,7 @@ def test_first_rounds_are_the_same_picture_only_coarser(gl: Context) -> None:
         coarse = np.frombuffer(texture.read(), np.float32).astype(float).reshape(-1, 4) * quick.scale
         light_pass = light.light_pass
         # A quarter of the sub-lattices: what survives roulette in them is few lattices, whose points may be some more.
-        assert quick.flux(True) * quick.scale == pytest.approx(light_pass.map_flux() * light_pass.map_scale, rel=0.04)
+        assert quick.flux() * quick.scale == pytest.approx(light_pass.maps.flux() * light_pass.maps.scale, rel=0.04)
         assert np.isfinite(coarse).all() and whole.max() > 0.0
 
 

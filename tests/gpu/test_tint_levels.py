@@ -65,7 +65,7 @@ def traced(gl: Context, scene: Scene, photons: int, *, told: bool = True) -> tup
     for _ in light.pass_steps(0, photons):
         pass
     light.finish()
-    found = light.resolved_map(0) * light.map_scale / float(light.layout.placements[0]["texel_area"])
+    found = light.maps.receiver(0) * light.maps.scale / float(light.layout.placements[0]["texel_area"])
     rows, columns = (slice(side // 4, side - side // 4) for side in found.shape[:2])
     return found[rows, columns], light
 

@@ -117,7 +117,7 @@ def renderings(light: LightPass, domain: EmissionDomain) -> tuple[np.ndarray, np
         light.begin(PHOTONS, 1 + seed)
         light.run_pass(0, PHOTONS, lambda _: True)
         tally = light.stats.tally
-        sums.append(np.array([tally.ended["deposited"], tally.emitted]) * light.map_scale)
+        sums.append(np.array([tally.ended["deposited"], tally.emitted]) * light.maps.scale)
     light.survey.domains = guided
     return tuple(np.array(sums).T)
 

@@ -129,7 +129,7 @@ def rendered(
                 half.widening = 1.0 if shrinks else (photons / sizes[0]) ** 0.5
                 half.plan(photons, number)
                 half.run_pass(number, photons, lambda _: True)
-            maps.append(half.resolved_map(0)[..., :3].astype(float) * half.map_scale)
+            maps.append(half.maps.receiver(0)[..., :3].astype(float) * half.maps.scale)
         frame = plane_frame(buffers.space.to_gpu(buffers.world_meshes[1].vertices))
         (window,) = half.layout.windows[0]
         scale = buffers.space.scale

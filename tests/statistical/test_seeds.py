@@ -155,7 +155,7 @@ def noise(light: LightPass, first: int) -> float:
     for seed in range(first, first + SEEDS):
         light.begin(PHOTONS, seed)
         light.run_pass(0, PHOTONS, lambda _: True)
-        maps.append(light.resolved_map(0)[..., :3].astype(float) * light.map_scale)
+        maps.append(light.maps.receiver(0)[..., :3].astype(float) * light.maps.scale)
     return float(np.sqrt(np.var(maps, axis=0, ddof=1).mean() / np.mean(np.mean(maps, axis=0) ** 2)))
 
 

@@ -59,7 +59,7 @@ class Accumulation:
         light_pass = self.light.light_pass
         while not self.is_done:
             yield from self._pass()
-            if not light_pass.plans and not light_pass.has_beams:
+            if not light_pass.plans and not light_pass.survey.has_beams:
                 self.number, self.photons = 1, self.largest
                 self.publish()
                 return

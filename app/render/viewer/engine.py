@@ -235,8 +235,8 @@ class LiveEngine(EngineAnswers):
                 self.problem = None
                 if self._planner is not None and self._level == DirtyLevel.BUILD:
                     self._planner.restart()
-                if self._shown is not None and self._shown.light.light_pass.beams is not None:
-                    self._shown.light.light_pass.beams.pause()
+                if self._shown is not None and self._shown.light.light_pass.survey.beams is not None:
+                    self._shown.light.light_pass.survey.beams.pause()
                 sizes = self._first_budget, self._wanted, self._largest, self._target_photons
                 self._building.begin(build(self.context, *sizes, self._maps_ready, self._moving, self._held_photons))
             case Action.FOLLOW_PHOTONS:
@@ -316,8 +316,8 @@ class LiveEngine(EngineAnswers):
         self._building.drop()
         self._splatting, self._tracing = iter(()), iter(())
         self._camera_pass.pause()
-        if shown.light.light_pass.beams is not None:
-            shown.light.light_pass.beams.pause()
+        if shown.light.light_pass.survey.beams is not None:
+            shown.light.light_pass.survey.beams.pause()
         plan = None if self._planner is None else self._planner["moved"]
         maps = shown.light.move(replace(wanted.scene, camera=wanted.camera), plan)
         if maps is None:

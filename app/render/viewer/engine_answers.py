@@ -130,7 +130,7 @@ class EngineAnswers:
         light = self._shown.light
         light_pass = light.light_pass
         tally = light_pass.stats.tally
-        beams, polygons = (0, 0) if light_pass.beams is None else light_pass.beams.counts
+        beams, polygons = (0, 0) if light_pass.survey.beams is None else light_pass.survey.beams.counts
         return replace(
             common,
             rays_traced=self._rays_before + light_pass.trace.rays_traced,

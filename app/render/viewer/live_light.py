@@ -21,6 +21,7 @@ from ..light_maps import LightMaps
 from ..light_pass import LightPass
 from ..light_plan import spans_of
 from ..map_fit import PREVIEW_FINENESS, MapFit
+from ..photon_batches import traced_besides
 from ..sampling import MovingBeams
 from ..shown_spectra import PassTables
 from ..solo import solo, solo_scene
@@ -61,13 +62,11 @@ class LiveLight:
         self._context = context
         self.buffers = scene_buffers(context, scene, settings)
         self.stored = StoredPasses(context.ctx, capacity_bytes, context.traits.work_is_queued)
-        self._samples = PhotonStore(context.ctx, capacity_bytes, context.traits.work_is_queued)
-        self._sample_pass: StoredPass | None = None
-        """The same, once they are whole."""
+        self._capacity_bytes = capacity_bytes
+        self._sample: StoredPass | None = None
+        """Photons that answer questions about what beams carry."""
         self._kept = KeptLight()
         self._shown: LiveInputs | None = None
-        self._sampled = 0
-        """Photons that were requested of `_samples`."""
         self.moving = moving or MovingBeams()
         fit = MapFit(scene.camera, settings.width, settings.height, PREVIEW_FINENESS, avoids_powers_of_two=True)
         self.light_pass = LightPass(
@@ -155,9 +154,9 @@ class LiveLight:
         forgets = shown.show_glass({a: b for a, b in glasses.items() if a != b})
         if forgets or stale:
             self.stored.forget_tables()
-            if self._sample_pass is not None:
-                self._sample_pass.tables.outdate()
-        beams = self.light_pass.beams
+            if self._sample is not None:
+                self._sample.tables.outdate()
+        beams = self.light_pass.survey.beams
         if beams is not None and (stale or shown.changed != before):
             beams.show(solo_scene(inputs.scene, inputs.solo_nm))
 
@@ -187,8 +186,8 @@ class LiveLight:
         self._outdated = [owned for owned in before if owned is not None]
         self._preview = self._guess = None
         self._kept.release()
-        if self.light_pass.beams is not None and self.only_beams:
-            self.light_pass.beams.survey_again()
+        if self.light_pass.survey.beams is not None and self.only_beams:
+            self.light_pass.survey.beams.survey_again()
         self.light_pass.lay_out(self.fit_of(inputs))
 
     @property
@@ -281,9 +280,9 @@ class LiveLight:
         For while something is dragged: the maps that accumulate are left alone. On devices that splat fast, photons
         that answer questions stand for beams too.
         """
-        kept, light_pass, beams = self.stored.fullest, self.light_pass, self.light_pass.beams
-        if self._sample_pass is not None and self._context.traits.moves_by_photons:
-            kept, beams = self._sample_pass, None
+        kept, light_pass, beams = self.stored.fullest, self.light_pass, self.light_pass.survey.beams
+        if self._sample is not None and self._sample.store.rounds and self._context.traits.moves_by_photons:
+            kept, beams = self._sample, None
         has_photons = kept is not None and bool(kept.store.rounds)
         if not has_photons and (beams is None or not self.only_beams):
             return None
@@ -392,44 +391,46 @@ class LiveLight:
     @property
     def only_beams(self) -> bool:
         """Beams carry all light, but for what they leave to photons."""
-        return self.light_pass.only_beams
+        return self.light_pass.survey.only_beams
 
     def show_survey(self) -> None:
         """The beams that were found first, in the light pass's maps."""
-        assert self.light_pass.beams is not None
-        self.light_pass.beams.draw_found(self.light_pass.maps, self.moving.threshold)
+        assert self.light_pass.survey.beams is not None
+        self.light_pass.survey.beams.draw_found(self.light_pass.maps, self.moving.threshold)
 
     def sample(self, photons: int) -> Iterator[None]:
         """Trace photons that answer questions (`stored_records`) about what beams carry; nothing where there are
         some."""
-        if self.light_pass.has_beams and not self._samples.photons:
-            self._sampled = photons
-            plans = yield from mapped(self.light_pass.sample_steps(photons, self._samples.keep), lambda step: None)
-            tables = PassTables(self.light_pass.shown, spans_of(plans, len(self.light_pass.scene.lights)))
-            self._sample_pass = StoredPass(self._samples, tables, photons)
+        light_pass = self.light_pass
+        if not light_pass.survey.has_beams or self.has_records:
+            return
+        plans = yield from mapped(light_pass.sample_plans(photons), lambda step: None)
+        tables = PassTables(light_pass.shown, spans_of(plans, len(light_pass.scene.lights)))
+        shader.release(self._sample)
+        store = PhotonStore(self._context.ctx, self._capacity_bytes, self._context.traits.work_is_queued)
+        self._sample = StoredPass(store, tables, photons)
+        yield from traced_besides(light_pass.trace, light_pass.settings.seed, plans, photons, store.keep)
+
+    @property
+    def _asked(self) -> StoredPass | None:
+        """Photons of all light, beams' too."""
+        return self._sample if self.light_pass.survey.has_beams else self.stored.fullest
 
     @property
     def has_records(self) -> bool:
-        """`stored_records` knows something of all light."""
-        fullest = self.stored.fullest
-        return (self._samples.rounds if self.light_pass.has_beams else fullest.store.rounds if fullest else 0) > 0
+        """`stored_records` knows something."""
+        return self._asked is not None and self._asked.store.rounds > 0
 
     def stored_records(self, limit: int) -> np.ndarray:
         """About `limit` stored records (`gpu.records.photon_record`) of all light, beams' too."""
         dtype = self.light_pass.trace.photon.dtype
-        if self.light_pass.has_beams:
-            return self._samples.read(limit, dtype)
-        return self.stored.fullest.store.read(limit, dtype) if self.stored.fullest else np.zeros(0, dtype)
+        return np.zeros(0, dtype) if self._asked is None else self._asked.store.read(limit, dtype)
 
     def stored_weight(self, limit: int) -> float:
         """What the flux of `stored_records(limit)` is power times."""
-        if self.light_pass.has_beams:
-            store, photons = self._samples, self._sampled
-        elif self.stored.fullest:
-            store, photons = self.stored.fullest.store, self.stored.fullest.pass_photons
-        else:
+        if (asked := self._asked) is None:
             return 0.0
-        return photons * store.first_rounds(limit) / max(store.rounds_of_pass, 1)
+        return asked.pass_photons * asked.store.first_rounds(limit) / asked.store.rounds_of_pass
 
     @property
     def bytes(self) -> int:
@@ -437,16 +438,14 @@ class LiveLight:
         there = self.light_pass.maps, self._preview, *self._outdated
         maps = sum(maps.bytes for maps in there if isinstance(maps, LightMaps))
         maps += sum(light.bytes for light in (self.environment, self.bounces) if light is not None)
-        photons = self.stored.bytes + self._samples.bytes
+        photons = self.stored.bytes + (0 if self._sample is None else self._sample.store.bytes)
         return photons + self.light_pass.trace.bytes + self.buffers.bytes + maps + self._kept.bytes
 
     def release(self) -> None:
         """Free everything, the stored photons and the scene's buffers too."""
-        self._samples.clear()
-        if self._sample_pass is not None:
-            self._sample_pass.release()
         self.drop_outdated()
         owners = (
+            self._sample,
             self._kept,
             self._moved,
             self._preview,

@@ -210,7 +210,7 @@ def passes(context: Context, counts: Sequence[int], base: Base) -> Measured:
             # Every texel against as many times the maps after one pass, relative to the brightest.
             error = np.abs(sums - wanted * one).max() / (wanted * np.abs(one).max()) if one.any() else 0.0
             bad = not_finite([sums]) + records.nonfinite_photons
-            found = Probe(np.zeros((1, 1, 3)), light.stats, bad, records.dropped, light.map_flux())
+            found = Probe(np.zeros((1, 1, 3)), light.stats, bad, records.dropped, light.maps.flux())
             yield rendered(wanted, f"{wanted} passes", found, {"sum": (error, SAME_TO_ROUNDING)})
 
 

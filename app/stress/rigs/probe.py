@@ -109,7 +109,7 @@ class Probe:
     dropped: int
     """Photon records flagged as having lost their footprint."""
     map_flux_w: float
-    """Flux in the part of the maps that lookups use (`LightPass.map_flux`), per pass weight."""
+    """Flux in the part of the maps that lookups use (`LightMaps.flux`), per pass weight."""
 
     @property
     def shares(self) -> dict[str, float]:
@@ -157,13 +157,13 @@ def probe(context: Context, scene: Scene, settings: RenderSettings = SMALL) -> P
             camera_pass.release()
         seen = (picture, read_maps(light), *([] if spectral is None else [spectral]))
         bad = photon_records.nonfinite_photons + not_finite(seen)
-        return Probe(picture.astype(float), light.stats, bad, photon_records.dropped, light.map_flux())
+        return Probe(picture.astype(float), light.stats, bad, photon_records.dropped, light.maps.flux())
 
 
 def read_maps(light: LightPass) -> np.ndarray:
     """All caustic maps as the camera pass reads them, float32 (targets, height, width, 4)."""
-    width, height = light.atlas.size
-    textures = light.resolved_textures()
+    width, height = light.maps.atlas.size
+    textures = light.maps.resolved_textures()
     values = np.empty((len(textures), height, width, 4), np.float32)
     for texture, layer in zip(textures, values, strict=True):
         texture.read_into(layer)
