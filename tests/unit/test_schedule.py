@@ -16,17 +16,12 @@ from spectrasplat.render.viewer.schedule import (
     CameraWorked,
     Event,
     Examined,
-    Failed,
     FrameBegan,
+    Happened,
     MapsReady,
-    PreviewShown,
-    RetraceAsked,
     Schedule,
     ShowMaps,
     SplattingBegan,
-    SplattingEnded,
-    TracingEnded,
-    Wished,
     step,
 )
 
@@ -52,7 +47,9 @@ def asked(level: DirtyLevel, camera: CameraState = DONE, moves_view: bool = Fals
 
 
 def test_the_first_wish_is_built_once() -> None:
-    schedule, done = run(Schedule(), Wished(), Examined(level=DirtyLevel.BUILD), Examined(level=DirtyLevel.BUILD))
+    schedule, done = run(
+        Schedule(), Happened.WISHED, Examined(level=DirtyLevel.BUILD), Examined(level=DirtyLevel.BUILD)
+    )
     assert done == [Action.BUILD] and schedule.building and not schedule.wish_is_due
     schedule, done = run(schedule, Built(), MapsReady(1, DONE))
     assert done == [ShowMaps(same_view=True, finer_maps=True)]
@@ -70,40 +67,40 @@ def test_the_first_wish_is_built_once() -> None:
     ],
 )
 def test_a_wish_costs_what_it_asks_for_and_once(level: DirtyLevel, actions: list[Action]) -> None:
-    schedule, done = run(SHOWN, Wished(), asked(level), asked(level))
+    schedule, done = run(SHOWN, Happened.WISHED, asked(level), asked(level))
     assert done == actions and not schedule.wish_is_due
 
 
 def test_a_camera_that_moves_while_photons_are_made_is_followed_at_once() -> None:
-    _, done = run(SHOWN, Wished(), asked(DirtyLevel.TRACE, moves_view=True))
+    _, done = run(SHOWN, Happened.WISHED, asked(DirtyLevel.TRACE, moves_view=True))
     assert done == [Action.BUILD, Action.MOVE_CAMERA]
     # What else is only seen waits for what is built.
-    _, done = run(replace(SHOWN, building=True), Wished(), asked(DirtyLevel.CAMERA))
+    _, done = run(replace(SHOWN, building=True), Happened.WISHED, asked(DirtyLevel.CAMERA))
     assert done == [Action.MOVE_CAMERA]
 
 
 def test_a_build_is_finished_and_shown_before_a_newer_wish() -> None:
-    schedule, _ = run(SHOWN, Wished(), asked(DirtyLevel.TRACE))
-    schedule, done = run(schedule, Wished(), asked(DirtyLevel.TRACE), asked(DirtyLevel.TRACE))
+    schedule, _ = run(SHOWN, Happened.WISHED, asked(DirtyLevel.TRACE))
+    schedule, done = run(schedule, Happened.WISHED, asked(DirtyLevel.TRACE), asked(DirtyLevel.TRACE))
     assert done == [] and schedule.building and schedule.wish_is_due
     schedule, done = run(schedule, Built(), asked(DirtyLevel.TRACE))
     assert done == [Action.BUILD] and schedule.building and not schedule.wish_is_due
 
 
 def test_a_build_nobody_overtook_leaves_nothing_due() -> None:
-    schedule, _ = run(SHOWN, Wished(), asked(DirtyLevel.TRACE), Built())
+    schedule, _ = run(SHOWN, Happened.WISHED, asked(DirtyLevel.TRACE), Built())
     assert not schedule.wish_is_due and not schedule.wish_is_newer
 
 
 def test_a_drag_finishes_the_preview_it_owes_first() -> None:
-    schedule, done = run(SHOWN, FrameBegan(True), Wished(), asked(DirtyLevel.SPLAT, OWED))
+    schedule, done = run(SHOWN, FrameBegan(True), Happened.WISHED, asked(DirtyLevel.SPLAT, OWED))
     assert done == [] and schedule.wish_is_due and schedule.finishes_preview(OWED)
     _, done = run(schedule, asked(DirtyLevel.SPLAT, COARSE))
     assert done == [Action.FOLLOW_PHOTONS]
 
 
 def test_a_drag_begins_no_work_that_its_next_step_throws_away() -> None:
-    dragging, _ = run(replace(SHOWN, tracing=True), FrameBegan(True), PreviewShown())
+    dragging, _ = run(replace(SHOWN, tracing=True), FrameBegan(True), Happened.PREVIEW_SHOWN)
     assert dragging.yields_to_camera(DONE)
     assert dragging.yields_to_camera(OWED)
     assert not replace(dragging, shows_preview=False).yields_to_camera(COARSE)
@@ -118,8 +115,10 @@ def test_the_end_of_a_drag_is_a_wish() -> None:
 
 
 def test_what_followed_to_first_order_is_traced_once_still() -> None:
-    schedule, _ = run(SHOWN, Wished(), asked(DirtyLevel.SPLAT), SplattingBegan(first_order=True), SplattingEnded())
-    schedule, _ = run(schedule, TracingEnded())
+    schedule, _ = run(
+        SHOWN, Happened.WISHED, asked(DirtyLevel.SPLAT), SplattingBegan(first_order=True), Happened.SPLATTING_ENDED
+    )
+    schedule, _ = run(schedule, Happened.TRACING_ENDED)
     early, done = run(schedule, Examined(), now=0.9 * STILL_S)
     assert done == [] and not early.is_idle(DONE)
     assert run(replace(schedule, interacting=True), Examined(), now=2 * STILL_S)[1] == []
@@ -131,8 +130,8 @@ def test_what_followed_to_first_order_is_traced_once_still() -> None:
 def test_who_does_not_want_that_asks_for_it() -> None:
     schedule = replace(SHOWN, first_order=True, refines_when_still=False)
     assert run(schedule, Examined(), now=9.0)[1] == [Action.JUDGE_MAPS] and schedule.is_idle(DONE)
-    assert run(schedule, RetraceAsked(), Examined())[1] == [Action.BUILD]
-    assert run(SHOWN, RetraceAsked(), Examined())[1] == []  # nothing to gain
+    assert run(schedule, Happened.RETRACE_ASKED, Examined())[1] == [Action.BUILD]
+    assert run(SHOWN, Happened.RETRACE_ASKED, Examined())[1] == []  # nothing to gain
 
 
 def test_coarse_maps_are_refitted_when_nothing_is_dragged_and_others_judged_when_still() -> None:
@@ -157,7 +156,7 @@ def test_better_maps_wait_for_a_cycle_of_bands() -> None:
     assert done == [] and waiting.maps_wait and not waiting.last_maps_wait
     # Newer ones are on their way: these are left out.
     assert run(waiting, CameraWorked(DONE))[1] == []
-    last, _ = run(waiting, TracingEnded())
+    last, _ = run(waiting, Happened.TRACING_ENDED)
     assert last.last_maps_wait and not last.is_idle(MID_CYCLE)
     assert run(last, CameraWorked(MID_CYCLE))[1] == []
     assert run(last, CameraWorked(DONE))[1] == [Action.OFFER_MAPS]
@@ -196,9 +195,9 @@ def test_pausing_stops_tracing_but_not_what_an_edit_asks_for() -> None:
 
 
 def test_what_failed_is_not_tried_again_by_itself() -> None:
-    schedule, _ = run(Schedule(), Wished(), Examined(level=DirtyLevel.BUILD), Failed())
+    schedule, _ = run(Schedule(), Happened.WISHED, Examined(level=DirtyLevel.BUILD), Happened.FAILED)
     assert run(schedule, Examined(level=DirtyLevel.BUILD))[1] == [] and schedule.is_idle(DONE)
-    again, done = run(schedule, Wished(), Examined(level=DirtyLevel.BUILD))
+    again, done = run(schedule, Happened.WISHED, Examined(level=DirtyLevel.BUILD))
     assert done == [Action.BUILD] and not again.failed
     # Neither is a refinement, which would fail in every frame.
     refining = replace(SHOWN, first_order=True, failed=True)
@@ -225,19 +224,19 @@ def moving(level: DirtyLevel = DirtyLevel.TRACE, camera: CameraState = DONE) -> 
 
 
 def test_what_is_held_and_moved_is_followed_until_it_is_let_go() -> None:
-    schedule, done = run(replace(SHOWN, tracing=True, splatting=True), FrameBegan(True), Wished(), moving())
+    schedule, done = run(replace(SHOWN, tracing=True, splatting=True), FrameBegan(True), Happened.WISHED, moving())
     assert done == [Action.FOLLOW_MOVE]
     assert schedule.moved and not (schedule.building or schedule.has_photon_work or schedule.will_retrace)
     schedule, done = run(schedule, FrameBegan(False), moving())
     assert done == [Action.BUILD]
-    schedule, done = run(schedule, Failed(), moving(DirtyLevel.NOTHING), now=2 * STILL_S)
+    schedule, done = run(schedule, Happened.FAILED, moving(DirtyLevel.NOTHING), now=2 * STILL_S)
     assert done == [] and schedule.moved, "old photons are never shown in what was moved"
     assert not run(schedule, Built())[0].moved
 
 
 def test_a_move_goes_before_what_is_being_built() -> None:
-    building, _ = run(SHOWN, Wished(), asked(DirtyLevel.TRACE))
-    schedule, done = run(building, FrameBegan(True), Wished(), moving())
+    building, _ = run(SHOWN, Happened.WISHED, asked(DirtyLevel.TRACE))
+    schedule, done = run(building, FrameBegan(True), Happened.WISHED, moving())
     assert done == [Action.FOLLOW_MOVE] and not schedule.building
     # A number that is typed is no drag.
-    assert run(SHOWN, Wished(), moving())[1] == [Action.BUILD]
+    assert run(SHOWN, Happened.WISHED, moving())[1] == [Action.BUILD]

@@ -34,7 +34,7 @@ from .invalidation import appearance_differs, dirty_level, lights_differ, moves_
 from .live_camera import DIRECT_S, MOVED_S
 from .live_light import LiveLight
 from .refit import needs_new_maps
-from .schedule import Action, ShowMaps
+from .schedule import Action, Happened, ShowMaps
 from .work_tally import light_counts
 
 if TYPE_CHECKING:
@@ -112,7 +112,7 @@ class LiveEngine(EngineAnswers):
             accumulation.aim_at(photons, self._largest)
             if not (self.schedule.tracing or self.schedule.moved or accumulation.is_done):
                 self._tracing = accumulation.steps()
-                self._tell(events.TracingBegan())
+                self._tell(Happened.TRACING_BEGAN)
 
     @property
     def _largest(self) -> int:
@@ -126,7 +126,7 @@ class LiveEngine(EngineAnswers):
         before, self._wanted = self._wanted, inputs
         if before is not None and dirty_level(before, before, inputs) == DirtyLevel.NOTHING:
             return DirtyLevel.NOTHING
-        self._tell(events.Wished())
+        self._tell(Happened.WISHED)
         return self._level
 
     @property
@@ -136,7 +136,7 @@ class LiveEngine(EngineAnswers):
 
     def retrace(self) -> None:
         """Trace with the glass that is shown, where the picture followed an edit to first order only."""
-        self._tell(events.RetraceAsked())
+        self._tell(Happened.RETRACE_ASKED)
 
     def rebuild(self) -> None:
         """Compile every program again (shaders changed on disk). Raises `ShaderError`, and the present ones stay, where
@@ -146,13 +146,13 @@ class LiveEngine(EngineAnswers):
         self.schedule = replace(self.schedule, first_order=False)  # no fine light is waited for
         if self._wanted is None:
             return
-        self._tell(events.BuildAsked())
+        self._tell(Happened.BUILD_ASKED)
         while self.schedule.building:
             try:
                 self._build(float("inf"))
             except (shader.ShaderError, UserError):
                 self._building.drop()
-                self._tell(events.Failed())
+                self._tell(Happened.FAILED)
                 raise
 
     # ---- work --------------------------------------------------------------------------------
@@ -181,7 +181,7 @@ class LiveEngine(EngineAnswers):
         except (shader.ShaderError, UserError) as error:
             self._building.drop()
             self.problem = str(error)
-            self._tell(events.Failed())
+            self._tell(Happened.FAILED)
         if self._planner is not None:
             self._planner.end()
         self._tally.seconds |= self.context.timers.since(on_device, waits=False)
@@ -321,7 +321,7 @@ class LiveEngine(EngineAnswers):
         plan = None if self._planner is None else self._planner["moved"]
         maps = shown.light.move(replace(wanted.scene, camera=wanted.camera), plan)
         if maps is None:
-            self._tell(events.BuildAsked())
+            self._tell(Happened.BUILD_ASKED)
             return
         self._count("moved", int(maps.photon_weight), self._frame_s)
         self._camera_pass.move(shown.light.buffers, scene_seen(wanted.scene, wanted.camera, wanted.solo_nm))
@@ -363,7 +363,7 @@ class LiveEngine(EngineAnswers):
     def _show_for_now(self, maps: LightMaps) -> None:
         """A coarse picture at once: samples of other light are not mixed with those of this one."""
         self._set_maps(maps)
-        self._tell(events.PreviewShown())
+        self._tell(Happened.PREVIEW_SHOWN)
         self._restart_camera(same_view=False)
 
     def _restart_camera(self, *, same_view: bool, finer_maps: bool = False) -> None:
@@ -435,7 +435,7 @@ class LiveEngine(EngineAnswers):
                 break
             work = self._splatting if self.schedule.splatting else self._tracing
             if next(work, self) is self:
-                self._tell(events.SplattingEnded() if self.schedule.splatting else events.TracingEnded())
+                self._tell(Happened.SPLATTING_ENDED if self.schedule.splatting else Happened.TRACING_ENDED)
         self._tally.note_light(before, light_pass.stats)
         if not splats:
             room = 1.0 if self._camera.is_done else 1.0 - CAMERA_SHARE

@@ -69,19 +69,25 @@ class ShowMaps:
 # ---- events ----------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Wished:
+class Happened(Enum):
+    """Events of which nothing more is to be said."""
+
+    WISHED = auto()
     """Something else is wanted."""
-
-
-@dataclass(frozen=True)
-class RetraceAsked:
+    RETRACE_ASKED = auto()
     """Photons shall be traced through the glass that is shown."""
-
-
-@dataclass(frozen=True)
-class BuildAsked:
+    BUILD_ASKED = auto()
     """Everything shall be made anew, whatever runs."""
+    FAILED = auto()
+    """A build or an action failed; what was shown stays."""
+    PREVIEW_SHOWN = auto()
+    """The camera sees the maps of a preview."""
+    SPLATTING_ENDED = auto()
+    """The stored photons are in the maps again."""
+    TRACING_BEGAN = auto()
+    """There are photons to trace."""
+    TRACING_ENDED = auto()
+    """The target is reached."""
 
 
 @dataclass(frozen=True)
@@ -112,37 +118,12 @@ class Built:
 
 
 @dataclass(frozen=True)
-class Failed:
-    """A build or an action failed; what was shown stays."""
-
-
-@dataclass(frozen=True)
-class PreviewShown:
-    """The camera sees the maps of a preview."""
-
-
-@dataclass(frozen=True)
 class SplattingBegan:
     """The stored photons are being splatted again, then tracing continues. `first_order`: they follow an edit to first
     order only; `refitted`: into new maps."""
 
     first_order: bool
     refitted: bool = False
-
-
-@dataclass(frozen=True)
-class SplattingEnded:
-    """The stored photons are in the maps again."""
-
-
-@dataclass(frozen=True)
-class TracingBegan:
-    """There are photons to trace."""
-
-
-@dataclass(frozen=True)
-class TracingEnded:
-    """The target is reached."""
 
 
 @dataclass(frozen=True)
@@ -160,22 +141,7 @@ class CameraWorked:
     camera: CameraState = CameraState()
 
 
-Event = (
-    Wished
-    | RetraceAsked
-    | BuildAsked
-    | FrameBegan
-    | Examined
-    | Built
-    | Failed
-    | PreviewShown
-    | SplattingBegan
-    | SplattingEnded
-    | TracingBegan
-    | TracingEnded
-    | MapsReady
-    | CameraWorked
-)
+Event = Happened | FrameBegan | Examined | Built | SplattingBegan | MapsReady | CameraWorked
 Next = tuple["Schedule", tuple[Action | ShowMaps, ...]]
 
 
@@ -254,11 +220,11 @@ def step(schedule: Schedule, event: Event, now: float) -> Next:
     """What `event` at `now` (s) makes of `schedule`, and what is to be done, in order."""
     s = schedule
     match event:
-        case Wished():
+        case Happened.WISHED:
             return replace(s, changed_at=now, wish_is_due=True, wish_is_newer=s.building), ()
-        case RetraceAsked():
+        case Happened.RETRACE_ASKED:
             return replace(s, retrace_is_due=s.shows_scene and s.first_order), ()
-        case BuildAsked():
+        case Happened.BUILD_ASKED:
             return _build(s)
         case FrameBegan(interacting):
             if s.interacting and not interacting:
@@ -268,18 +234,18 @@ def step(schedule: Schedule, event: Event, now: float) -> Next:
             return _examine(s, event, now)
         case Built(coarse_maps):
             return replace(_built(s), maps_are_coarse=coarse_maps), ()
-        case Failed():
+        case Happened.FAILED:
             return replace(s, building=False, wish_is_newer=False, failed=True), ()
-        case PreviewShown():
+        case Happened.PREVIEW_SHOWN:
             return replace(s, shows_preview=True), ()
         case SplattingBegan(first_order, refitted):
             coarse = s.maps_are_coarse and not refitted
             return replace(s, splatting=True, tracing=True, first_order=first_order, maps_are_coarse=coarse), ()
-        case SplattingEnded():
+        case Happened.SPLATTING_ENDED:
             return replace(s, splatting=False), ()
-        case TracingBegan():
+        case Happened.TRACING_BEGAN:
             return replace(s, tracing=True), ()
-        case TracingEnded():
+        case Happened.TRACING_ENDED:
             return replace(s, tracing=False), ()
         case MapsReady():
             return _maps_ready(s, event)
