@@ -40,7 +40,7 @@ def warm_up() -> float:
     hulls_of(corner, ends, np.zeros(0), corner, corner, ends.copy(), corner)
     lifetimes_of(np.zeros((0, 8)), ends, corner, ends)
     lattice = PieceLattice(_square(), [CumulativeSpectrum(np.array([0.0, 1.0]), np.eye(2, 4))], [1.0])
-    lattice.rays(0, 1, (0, 0), 0)
+    next(lattice.portions(0, 1, (0, 0), 0))
     return time.perf_counter() - start
 
 

@@ -124,8 +124,6 @@ def rays(
     shift_u,
     shift_v,
     key,
-    first,
-    stride,
     polygons,
     cut,
     scratches,
@@ -136,15 +134,10 @@ def rays(
     """Rays of the pieces `chosen`, from the `done[0]`th on, into `found` (n, COLUMNS) from its row `done[1]` on; ends
     where that is full, or where `bodies` are fewer than the cells of a piece: `done[2]` is 1 then.
 
-    Piece chosen[k] has about points[k] >= 1 lattice points and is to carry boost[k] times its `content`. Of the cells
-    those of sub-lattice `first` of `stride`.
+    Piece chosen[k] has about points[k] >= 1 lattice points and is to carry boost[k] times its `content`.
     """
     scratch = scratches[0]
     frame, cell, polygon = scratch.frame, scratch.cell, polygons[0]
-    # Rows of cells are shifted against each other, so that every sub-lattice is spread over the whole.
-    row_step = max(1, int(np.rint(GOLDEN * stride)))
-    while stride > 1 and math.gcd(row_step, stride) != 1:
-        row_step += 1
     for k in range(done[0], len(chosen)):
         done[0], i = k, chosen[k]
         piece = pieces[i]
@@ -170,10 +163,8 @@ def rays(
         # Lit cells that hold less than `least` are chosen by chance, in order along the lattice.
         least = piece.content / points[k] / min(across_it, 4.0)
         lit, small = 0, 0.0
-        offset = int(_random(key, piece.key, 2) * stride)
         for row in range(rows + 1):
-            column = (first + offset + row * row_step) % stride
-            while column <= columns:
+            for column in range(columns + 1):
                 if lit == len(bodies):
                     done[2] = 1
                     return
@@ -198,22 +189,19 @@ def rays(
                     if bodies[lit, 0] < least:
                         small += bodies[lit, 0]
                     lit += 1
-                column += stride
         count = done[1]
         if count + lit > len(found):
             return
-        # All that the small ones hold, in equal parts; where it is less than one part, a sub-lattice has it by chance.
+        # All that the small ones hold, in equal parts.
         parts = max(1.0, np.rint(small / least))
         part = small / parts
-        if stride > 1 and small < least:
-            parts, part = (1.0 if _random(key, piece.key, 3 + first) * least < small else 0.0), least
-        running, at = 0.0, _random(key, piece.key, 3 + stride + first)
+        running, at = 0.0, _random(key, piece.key, 4)
         for body in range(lit):
             carried = bodies[body, 0]
             if carried < least:
                 before = running
                 running += carried / small * parts
-                carried = part * (math.floor(running + at) - math.floor(before + at)) if parts > 0.0 else 0.0
+                carried = part * (math.floor(running + at) - math.floor(before + at))
             if carried <= 0.0:
                 continue
             if ray_of(

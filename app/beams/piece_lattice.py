@@ -84,18 +84,10 @@ class PieceLattice:
         """(M,), W of each piece over its band."""
         return self._records["content"] * self._measures[self.pieces.light]
 
-    def rays(
-        self, light: int, count: int, shift: tuple[int, int], key: int, first: int = 0, stride: int = 1
-    ) -> PieceRays:
-        """All of `portions` at once."""
-        (rays,) = self.portions(light, count, shift, key, first, stride, most=1 << 62)
-        return rays
-
     def portions(
-        self, light: int, count: int, shift: tuple[int, int], key: int, first: int = 0, stride: int = 1, *, most: int
+        self, light: int, count: int, shift: tuple[int, int], key: int, most: int = 1 << 62
     ) -> Iterator[PieceRays]:
-        """Sub-lattice `first` of `stride` of lattices with about `count` points over all pieces of `light`, about
-        `most` rays at once.
+        """Lattices with about `count` points over all pieces of `light`, about `most` rays at once.
 
         Points are shared out by flux per unit of spectral power, and by the bands' widths: no colour is coarser than
         another, as on the emission lattices. Where all are tails, points go by the root of that (where it is dim, the
@@ -122,8 +114,6 @@ class PieceLattice:
                     shift[0] / _WORD,
                     shift[1] / _WORD,
                     key,
-                    first,
-                    stride,
                     *room,
                     bodies,
                     found,
@@ -139,7 +129,7 @@ class PieceLattice:
         start = 0
         while start == 0 or start < len(mine):
             before = running[start - 1] if start else 0.0
-            end = int(np.searchsorted(running, before + stride * float(most)))
+            end = int(np.searchsorted(running, before + float(most)))
             end = max(end - end % _CHUNK, start + _CHUNK) if end < len(mine) else len(mine)
             yield _joined(_in_threads(lay, start, end))
             start = max(end, 1)

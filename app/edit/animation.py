@@ -94,17 +94,17 @@ class Animation:
         return apply_all(self.start, {track.path: track.at(self.times_s[index]) for track in self.tracks})
 
 
-def turntable(stage: Stage, frames: int, fps: float, turns: float = 1.0) -> Animation:
+def turntable(stage: Stage, frames: int, fps: float) -> Animation:
     """Once about the target in `frames` frames; the last comes before the first again, so that it can loop."""
-    return with_turntable(Animation(stage, (), tuple(i / fps for i in range(frames))), turns)
+    return with_turntable(Animation(stage, (), tuple(i / fps for i in range(frames))))
 
 
-def with_turntable(animation: Animation, turns: float = 1.0) -> Animation:
-    """`animation` while the camera turns about its target at an even pace; all frames together are whole turns."""
+def with_turntable(animation: Animation) -> Animation:
+    """`animation` while the camera turns about its target at an even pace; all frames together are one turn."""
     frames = len(animation.times_s)
     first = animation.times_s[0]
     step = animation.times_s[1] - first if frames > 1 else 1.0
-    track = Track(ORBIT, (first, first + frames * step), (0.0, 360.0 * turns), ("linear", "linear"))
+    track = Track(ORBIT, (first, first + frames * step), (0.0, 360.0), ("linear", "linear"))
     others = tuple(t for t in animation.tracks if t.path != ORBIT)
     return replace(animation, tracks=(*others, track))
 

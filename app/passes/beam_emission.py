@@ -67,12 +67,10 @@ class BeamEmission:
         shift: tuple[int, int],
         key: int,
         most: int,
-        first: int = 0,
-        stride: int = 1,
     ) -> Iterator[np.ndarray]:
-        """Ray records of sub-lattice `first` of `stride` of about `count` points over a light's pieces, at most `most`
-        at once. `weight`, `shift` and `key` as of a `LatticeSlice`: its weight, shift and seed."""
-        for rays in self._lattice.portions(light, count, shift, key, first, stride, most=_BATCHES * most):
+        """Ray records of about `count` points over a light's pieces, at most `most` at once. `weight`, `shift` and
+        `key` as of a `LatticeSlice`: its weight, shift and seed."""
+        for rays in self._lattice.portions(light, count, shift, key, _BATCHES * most):
             records = self._records(rays, light, weight, key)
             for start in range(0, len(records), most):
                 yield records[start : start + most]

@@ -240,24 +240,16 @@ class CameraPass:
 
     @property
     def chooses(self) -> bool:
-        """`choose_spectrum` has something to choose: the method leaves it open, and some paths are followed."""
+        """`choosing_spectrum` has something to choose: the method leaves it open, and some paths are followed."""
         return self.disperses and self.fixed_bands is None and not self.scene.features.random_wavelength
-
-    def choose_spectrum(
-        self, camera: Camera, width: int, height: int, samples: int, maps: CausticMaps | None = None
-    ) -> Spectrum:
-        """Sample the spectrum in the way that leaves the least error after so many samples, as far as a coarse grid of
-        the picture's own pixels shows.
-
-        Sets and returns `spectrum`; what was summed up is forgotten. A method that prescribes its way keeps it."""
-        for _ in self.choosing_spectrum(camera, width, height, samples, maps):
-            pass
-        return self.spectrum
 
     def choosing_spectrum(
         self, camera: Camera, width: int, height: int, samples: int, maps: CausticMaps | None = None
     ) -> Iterator[float]:
-        """`choose_spectrum`, pausing after every dispatch."""
+        """Sample the spectrum in the way that leaves the least error after so many samples, as far as a coarse grid of
+        the picture's own pixels shows; pauses after every dispatch.
+
+        Sets `spectrum`; what was summed up is forgotten. A method that prescribes its way keeps it."""
         if not self.chooses:
             return
         maps = maps or self._inputs.no_maps
@@ -340,14 +332,14 @@ class CameraPass:
         return self._listed.count
 
     def moving_parameters(
-        self, camera: Camera, width: int, height: int, maps: CausticMaps, max_taps: int, seed: int
+        self, camera: Camera, width: int, height: int, maps: CausticMaps, max_taps: int
     ) -> np.ndarray:
         """CAMERA_PARAMETERS (1,) of one sample of the whole spectrum in every pixel's middle; sums have that size
         then, whatever is in them."""
         if self._sums.size != (width, height):
             self._clear(width, height)
         self.spectrum, self.max_taps = Spectrum(1), max_taps
-        parameters = self._parameters(camera, width, height, maps.scale, seed)
+        parameters = self._parameters(camera, width, height, maps.scale, seed=1)
         spread_alone(parameters)
         return parameters
 

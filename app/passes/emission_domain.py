@@ -72,9 +72,9 @@ class EmissionDomain:
         return self.rect[2:] / np.sqrt(count)
 
 
-def orthonormal_frame(axis: np.ndarray, tangent: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+def orthonormal_frame(axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Two unit vectors that make a right-handed frame with the unit `axis`."""
-    guide = np.asarray(tangent, float) if tangent is not None else np.eye(3)[np.argmin(np.abs(axis))]
+    guide = np.eye(3)[np.argmin(np.abs(axis))]
     first = guide - axis * (guide @ axis)
     first /= np.linalg.norm(first)
     return first, np.cross(axis, first)

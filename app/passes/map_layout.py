@@ -128,7 +128,6 @@ def layout_maps(
     picture: tuple[int, int],
     reflectance_class: dict[int, int],
     map_receiver: int | None = None,
-    max_side: int = 4096,
     fineness: Fineness = STILL,
 ) -> MapLayout:
     """Fit windows and charts, as fine as `fineness` says or as fit a texture.
@@ -139,7 +138,7 @@ def layout_maps(
     """
     while True:
         try:
-            return _layout_maps(scene, buffers, landings, picture, reflectance_class, map_receiver, max_side, fineness)
+            return _layout_maps(scene, buffers, landings, picture, reflectance_class, map_receiver, fineness)
         except UserError:
             fineness = fineness.times(_SHRINK)
             if map_receiver is not None or fineness.texels_per_pixel < _LEAST_TEXELS_PER_PIXEL:
@@ -153,7 +152,6 @@ def _layout_maps(
     picture: tuple[int, int],
     reflectance_class: dict[int, int],
     map_receiver: int | None,
-    max_side: int,
     fineness: Fineness,
 ) -> MapLayout:
     sizes: list[tuple[int, int]] = []
@@ -194,7 +192,7 @@ def _layout_maps(
             atlas = build_charts(buffers.world_meshes[object_index], total_texels=side * side)
             sizes.append((atlas.width, atlas.height))
             plans.append((receiver, None, [], atlas))
-    tiles, size = pack(sizes, max_side)
+    tiles, size = pack(sizes)
     layout = _place(scene, buffers, plans, tiles, size, reflectance_class)
     return replace(layout, borders=lit_borders(scene, buffers, layout.frames, landings), seen=seen)
 

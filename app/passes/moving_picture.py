@@ -111,13 +111,11 @@ class MovingPicture:
         """Paths that the last `glass` followed; asking waits for the device."""
         return self._view.listed
 
-    def direct(
-        self, picture: moderngl.Texture, camera: Camera, maps: CausticMaps, max_taps: int, seed: int = 1
-    ) -> None:
+    def direct(self, picture: moderngl.Texture, camera: Camera, maps: CausticMaps, max_taps: int) -> None:
         """What is seen directly, into `picture` (RGBA32F, of the size that is seen); where glass or mirrors are seen it
         is black."""
         width, height = picture.size
-        self._camera = self._view.moving_parameters(camera, width, height, maps, max_taps, seed)
+        self._camera = self._view.moving_parameters(camera, width, height, maps, max_taps)
         self._view.bind_for(self._camera, maps)
         self._visible = self._surfaces.run(self._camera)
         cells = tuple(-(-side // LATTICE_STEP) for side in picture.size)

@@ -276,10 +276,6 @@ class TracePass:
         self._emit(piece, domain, max_depth, split_threshold or self.split_threshold)
         return self._learned(piece, (yield from self._follow(max_depth)))
 
-    def most_points(self, light: int) -> int:
-        """Lattice points of a batch whose photons find room, as far as it is known."""
-        return min(self.batch, int(self._photon_room / max(self._photons_a_point.get(light, 0.0), 1e-9)))
-
     def _learned(self, piece: LatticeSlice, batch: Batch) -> Batch:
         self._photons_a_point[piece.light] = MORE_PHOTONS * batch.photons / max(piece.count, 1)
         return batch

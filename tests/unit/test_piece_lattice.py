@@ -70,9 +70,10 @@ def numbered(pieces: BeamPieces) -> BeamPieces:
     return replace(pieces, key=np.arange(1, len(pieces) + 1))
 
 
-def rays_of(pieces: BeamPieces, count: int, first: int = 0, stride: int = 1, key: int = KEY) -> PieceRays:
+def rays_of(pieces: BeamPieces, count: int, key: int = KEY) -> PieceRays:
     lattice = PieceLattice(numbered(pieces), [EVEN, LINE], [1.0, 1.0])
-    return lattice.rays(int(pieces.light[0]), count, (1 << 30, 3 << 29), key, first, stride)
+    (rays,) = lattice.portions(int(pieces.light[0]), count, (1 << 30, 3 << 29), key)
+    return rays
 
 
 def triangle(base: float, height: float) -> np.ndarray:
@@ -150,24 +151,11 @@ def test_rays_follow_a_sliver_that_moves_over_their_cells() -> None:
     assert min(covered) > 0.0
 
 
-def test_sub_lattices_are_even_and_make_the_whole() -> None:
-    pieces = joined([piece(), piece(triangle(4.0, 0.02)), piece(0.01 * SQUARE, move=(0.5, 0.1))])
-    whole = rays_of(pieces, 3000)
-    parts = [rays_of(pieces, 3000, first, 5) for first in range(5)]
-    flux = np.array([part.flux_w.sum() for part in parts])
-    assert flux.sum() == pytest.approx(whole.flux_w.sum(), rel=0.01)
-    assert flux == pytest.approx(flux.mean(), rel=0.05)
-    numbers = np.concatenate([np.stack([part.piece, part.number]) for part in parts], axis=1)
-    assert len(np.unique(numbers, axis=1).T) == len(numbers.T)
-    middle = np.array([part.flux_w @ part.position[:, :2] / part.flux_w.sum() for part in parts])
-    assert np.ptp(middle, axis=0).max() < 0.05
-
-
 def test_no_colour_is_coarser_than_another() -> None:
     """A band of a hundredth of the power has as many points; two halves of a band have as many as the whole."""
     faint = CumulativeSpectrum(np.array([0.0, 0.5, 1.0]), np.outer([0.0, 0.01, 1.0], np.ones(4)))
     halves = joined([piece(band=(0.0, 0.5)), piece(band=(0.5, 0.75)), piece(band=(0.75, 1.0))])
-    rays = PieceLattice(numbered(halves), [faint], [1.0]).rays(0, 4000, (0, 0), KEY)
+    (rays,) = PieceLattice(numbered(halves), [faint], [1.0]).portions(0, 4000, (0, 0), KEY)
     assert np.bincount(rays.piece) == pytest.approx(np.array([2000, 1000, 1000]), rel=0.12)
     assert np.bincount(rays.piece, rays.flux_w) == pytest.approx([0.04, 1.98, 1.98], rel=1e-6)
 
@@ -179,7 +167,7 @@ def test_many_small_pieces_are_stood_for_by_some() -> None:
     assert lattice.flux_w == pytest.approx(4.0 * sizes**2 * 3.0 * 0.5, rel=1e-9)
     mean = np.zeros(1000)
     for key in range(400):
-        rays = lattice.rays(0, 100, (0, 0), key * 0x9E3779B9)
+        (rays,) = lattice.portions(0, 100, (0, 0), key * 0x9E3779B9)
         assert 90 <= len(rays) <= 110
         assert rays.flux_w.sum() == pytest.approx(lattice.flux_w.sum(), rel=0.011)
         np.add.at(mean, rays.piece, rays.flux_w / 400)

@@ -104,7 +104,9 @@ def look_with(
     if bands is not None:
         camera_pass.spectrum = Spectrum(bands)
     else:
-        bands = camera_pass.choose_spectrum(camera, settings.width, settings.height, samples).bands
+        for _ in camera_pass.choosing_spectrum(camera, settings.width, settings.height, samples):
+            pass
+        bands = camera_pass.spectrum.bands
     before = camera_pass.fallbacks
     samples = -(-samples // bands) * bands
     camera_pass.run(camera, settings.width, settings.height, samples, seed=settings.seed)

@@ -44,14 +44,9 @@ def _packed(row: int, opacity: float) -> int:
     return imgui.color_convert_float4_to_u32((red, green, blue, opacity))
 
 
-@lru_cache(maxsize=16)
-def _strip(steps: int, opacity: float) -> list[int]:
-    return [colour_of_nm(380.0 + 400.0 * i / steps, opacity) for i in range(steps + 1)]
-
-
-def draw_strip(drawing: imgui.ImDrawList, low: ImVec2, high: ImVec2, opacity: float = 1.0, steps: int = 64) -> None:
+def draw_strip(drawing: imgui.ImDrawList, low: ImVec2, high: ImVec2) -> None:
     """A band of 380 to 780 nm, from left to right, between two corners in pixels."""
-    draw_gradient(drawing, low, high, _strip(steps, opacity))
+    draw_gradient(drawing, low, high, [colour_of_nm(380.0 + 400.0 * i / 64) for i in range(65)])
 
 
 def draw_gradient(drawing: imgui.ImDrawList, low: ImVec2, high: ImVec2, colours: Sequence[int]) -> None:
