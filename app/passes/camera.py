@@ -9,7 +9,7 @@ that takes long halts and is taken up again by a later dispatch, for the driver 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import contextmanager
 
 import moderngl
@@ -180,22 +180,10 @@ class CameraPass:
         sample_offset: int = 0,
         maps: CausticMaps | None = None,
         seed: int = 1,
-        progress: Callable[[float], None] | None = None,
-        cancelled: Callable[[], bool] | None = None,
-    ) -> bool:
-        """Add `samples` camera samples to every pixel; False when `cancelled` stopped it, after one at least.
-
-        `sample_offset` is the number of samples already there; 0 starts anew. `maps` None shows
-        direct light only. `progress` gets the share done, 0 to 1.
-        """
-        stops = False
-        for share in self.samples(camera, width, height, samples, sample_offset, maps, seed):
-            if progress is not None:
-                progress(share)
-            stops = stops or (cancelled is not None and cancelled())
-            if stops and self.is_even and self.samples_taken:
-                return False
-        return True
+    ) -> None:
+        """`samples`, without a pause."""
+        for _ in self.samples(camera, width, height, samples, sample_offset, maps, seed):
+            pass
 
     def samples(
         self,
@@ -207,8 +195,10 @@ class CameraPass:
         maps: CausticMaps | None = None,
         seed: int = 1,
     ) -> Iterator[float]:
-        """`run`, pausing after every dispatch with the share done; a caller that draws meanwhile may bind what it
-        likes."""
+        """Add `samples` camera samples to every pixel, pausing after every dispatch with the share done; a caller that
+        draws meanwhile may bind what it likes, and one that leaves does so where `is_even`.
+
+        `sample_offset` is the number of samples already there; 0 starts anew. `maps` None shows direct light only."""
         if sample_offset == 0 or self._sums.size != (width, height):
             self._clear(width, height)
         maps = maps or self._inputs.no_maps

@@ -36,10 +36,9 @@ def picture(gl, surveys: bool, monkeypatch, samples=16, stop_after=None):
     camera_pass = opened_camera_pass(gl, room(), [SUN, SHARP], camera=CAMERA)
     taken = 0
 
-    def cancelled() -> bool:
-        return stop_after is not None and camera_pass.samples_taken >= stop_after
-
-    camera_pass.run(CAMERA, *SIZE, samples, cancelled=cancelled)
+    for _ in camera_pass.samples(CAMERA, *SIZE, samples):
+        if stop_after is not None and camera_pass.samples_taken >= stop_after and camera_pass.is_even:
+            break
     rgb, taken = camera_pass.read_rgb(), camera_pass.samples_taken
     keys = None
     if surveys:

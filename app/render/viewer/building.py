@@ -134,7 +134,7 @@ def build(
                 yield None
                 if light.environment.is_worth_showing:
                     break
-            light.show_environment()
+            light.show_gathered()
         published = [-1]
         first = min(budget.first_photons, largest)
         accumulation = Accumulation(

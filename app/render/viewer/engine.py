@@ -454,13 +454,11 @@ class LiveEngine(EngineAnswers):
             return
         # The rest of it would begin the picture anew each time that more is known, and share frames with it.
         awaits_maps = self._camera_pass.is_paused and self.schedule.has_photon_work
-        if (self._camera_pass.is_becoming_whole or awaits_maps) and self._shown.light.shows_environment:
+        if (self._camera_pass.is_becoming_whole or awaits_maps) and self._shown.light.shows_gathered:
             return
         end = max(deadline - CAMERA_SHARE * budget_s, time.perf_counter() + ENVIRONMENT_SHARE * budget_s)
         seconds, interacting = 0.5 * ENVIRONMENT_SHARE * budget_s, self.schedule.interacting
-        found = self._shown.light.gather_environment(end, seconds, interacting)
-        if not self.schedule.moved:
-            found = self._shown.light.gather_bounces(end, seconds, interacting) or found
+        found = self._shown.light.gather(end, seconds, interacting, self.schedule.moved)
         if found and not self._camera_pass.is_paused:
             self._restart_camera(same_view=not interacting)
 

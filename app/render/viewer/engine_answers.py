@@ -104,7 +104,8 @@ class EngineAnswers:
         if self._wanted is None:
             return True
         judged = self._shown is None or is_judged(self._shown.light, self._wanted)
-        return judged and self._knows_environment and self.schedule.is_idle(self._camera)
+        knows = self._shown is None or self._shown.light.knows_gathered
+        return judged and knows and self.schedule.is_idle(self._camera)
 
     @property
     def stats(self) -> LiveStats:
@@ -166,10 +167,6 @@ class EngineAnswers:
     @property
     def _camera(self) -> CameraState:
         return self._camera_pass.state
-
-    @property
-    def _knows_environment(self) -> bool:
-        return self._shown is None or (self._shown.light.knows_environment and self._shown.light.knows_bounces)
 
     # ---- the scene and its light -------------------------------------------------------------
 

@@ -127,8 +127,8 @@ class LiveLight:
                 self._guess = SpectrumGuess(self._context.ctx, channels, lights, maps.atlas.size)
             self._guess.run(textures[0])
             textures = [*textures, *self._guess.textures]
-        known = self.bounces or self.environment
-        return replace(maps.caustic_maps(textures), environment=None if known is None else known.texture)
+        known = self._gathered
+        return replace(maps.caustic_maps(textures), environment=known[-1].texture if known else None)
 
     # ---- what is shown -----------------------------------------------------------------------
 
@@ -316,75 +316,58 @@ class LiveLight:
                 pass
         maps.photon_weight = kept.pass_photons * share
 
-    # ---- the environment ---------------------------------------------------------------------
+    # ---- the environment, and what receivers give each other ---------------------------------
 
-    def gather_environment(self, end: float, seconds: float, interacting: bool) -> bool:
-        """Gather more of the environment's light until `end` (`time.perf_counter`), in dispatches of so many `seconds`;
-        whether so much more is known that it is shown. While something is dragged only the first of another environment
-        is gathered."""
-        environment = self.environment
-        if environment is None or environment.is_done or (interacting and environment.shown):
-            return False
-        for _ in environment.steps(seconds):
-            if time.perf_counter() >= end or (interacting and environment.is_worth_showing):
+    @property
+    def _gathered(self) -> list[EnvironmentLightPass | BounceLightPass]:
+        """Light that is gathered, one after the other."""
+        return [light for light in (self.environment, self.bounces) if light is not None]
+
+    def gather(self, end: float, seconds: float, interacting: bool, moved: bool) -> bool:
+        """Gather more of it until `end` (`time.perf_counter`), in dispatches of so many `seconds`; whether so much more
+        is known that it is shown. While something is dragged only the first of another environment is gathered, and
+        while things are `moved` only the environment: places on them stay where they were."""
+        found = False
+        for light in self._gathered:
+            if light.is_done:
+                continue
+            if (light is self.bounces and (interacting or moved)) or (interacting and light.shown):
                 break
-        if not environment.is_worth_showing:
-            return False
-        self.show_environment()
-        return True
+            for _ in light.steps(seconds):
+                if time.perf_counter() >= end or (interacting and light.is_worth_showing):
+                    break
+            if light.is_worth_showing:
+                found = True
+                self.show_gathered()
+            if not light.is_done:
+                break
+        return found
 
-    def show_environment(self) -> None:
-        """What is known of the environment's light becomes what the camera looks up."""
-        if self.environment is not None:
-            self.environment.show()
-        if self.bounces is not None:
-            self.bounces.show()
-
-    # ---- what receivers give each other ------------------------------------------------------
+    def show_gathered(self) -> None:
+        """What is known becomes what the camera looks up."""
+        for light in self._gathered:
+            light.show()
 
     def take_seen(self, scene: Scene) -> None:
         """Other colours, spectra or another environment of the same things."""
         self._seen = scene
-        if self.environment is not None:
-            self.environment.take(scene)
-        if self.bounces is not None:
-            self.bounces.take(scene)
+        for light in self._gathered:
+            light.take(scene)
 
     def bounce_caustics(self, maps: CausticMaps) -> None:
         """Surfaces reflect other caustics to each other from now on."""
         if self.bounces is not None and self._seen is not None:
             self.bounces.take(self._seen, maps, self.light_pass.map_channels)
 
-    def gather_bounces(self, end: float, seconds: float, interacting: bool) -> bool:
-        """As `gather_environment`, of what receivers give each other, once all of the environment's light is known; not
-        while something is dragged."""
-        if self.bounces is None or interacting or not self.knows_environment:
-            return False
-        for _ in self.bounces.steps(seconds):
-            if time.perf_counter() >= end:
-                break
-        if not self.bounces.is_worth_showing:
-            return False
-        self.bounces.show()
-        return True
+    @property
+    def shows_gathered(self) -> bool:
+        """Something is shown of all that may be gathered now."""
+        return next((light.shown > 0 for light in self._gathered if not light.is_done), True)
 
     @property
-    def shows_environment(self) -> bool:
-        """Something of the environment's light is shown, and of what receivers give each other as soon as that may be
-        gathered."""
-        environment, bounces = self.environment, self.bounces
-        bounced = bounces is None or bounces.shown > 0 or not self.knows_environment
-        return bounced and (environment is None or environment.shown > 0 or environment.is_done)
-
-    @property
-    def knows_environment(self) -> bool:
-        """All of the environment's light was gathered."""
-        return self.environment is None or self.environment.is_done
-
-    @property
-    def knows_bounces(self) -> bool:
-        """All of what receivers give each other was gathered."""
-        return self.bounces is None or self.bounces.is_done
+    def knows_gathered(self) -> bool:
+        """All of it was gathered."""
+        return all(light.is_done for light in self._gathered)
 
     # ---- beams -------------------------------------------------------------------------------
 
@@ -437,7 +420,7 @@ class LiveLight:
         """Device memory of photons, queues, maps and scene."""
         there = self.light_pass.maps, self._preview, *self._outdated
         maps = sum(maps.bytes for maps in there if isinstance(maps, LightMaps))
-        maps += sum(light.bytes for light in (self.environment, self.bounces) if light is not None)
+        maps += sum(light.bytes for light in self._gathered)
         photons = self.stored.bytes + (0 if self._sample is None else self._sample.store.bytes)
         return photons + self.light_pass.trace.bytes + self.buffers.bytes + maps + self._kept.bytes
 
