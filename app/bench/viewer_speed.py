@@ -174,7 +174,7 @@ class _Bench:
             got = self.viewport
             if abs(got[0] - size[0]) <= 2 and abs(got[1] - size[1]) <= 2:
                 break
-            self.session.wait_for_layout()
+            self.session.frames = 0
             interface.release()
             window = (window[0] + size[0] - got[0], window[1] + size[1] - got[1])
         else:

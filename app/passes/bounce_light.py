@@ -125,12 +125,6 @@ class BounceLightPass(GatheredLight):
                 self._running = None
             yield self.asked / self.total
 
-    def run(self) -> None:
-        """All at once."""
-        for _ in self.steps():
-            pass
-        self.show()
-
     def _round(self) -> Iterator[bool]:
         """A few directions of every bounce, pausing after each."""
         assert self._scene is not None

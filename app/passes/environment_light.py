@@ -101,12 +101,6 @@ class EnvironmentLightPass(GatheredLight):
             self._ask(min(self._budget.units, self.total - self.asked), seconds)
             yield self.asked / self.total
 
-    def run(self) -> None:
-        """All at once."""
-        for _ in self.steps():
-            pass
-        self.show()
-
     def _ask(self, count: int, seconds: float) -> None:
         assert self._light is not None and self._levels is not None
         started = time.perf_counter()

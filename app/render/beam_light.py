@@ -97,13 +97,9 @@ class BeamStats:
     find_seconds: float = 0.0
     draw_seconds: float = 0.0
 
-    def count_finding(self, seconds: float) -> None:
-        """A search took so much more time."""
-        self.find_seconds += seconds
-
-    def count_drawing(self, seconds: float) -> None:
-        """Drawing took so much more time."""
-        self.draw_seconds += seconds
+    def count(self, name: str, seconds: float) -> None:
+        """Finding or drawing took so much more time."""
+        setattr(self, name, getattr(self, name) + seconds)
 
 
 SURVEY_PARTS = 4
@@ -282,7 +278,7 @@ class BeamLight:
         while True:
             threshold = max(self._threshold(photons, surveyed, growth), finest)
             search = self._worker.searched(partial(self.finder.find, threshold, self._depth, word, tails=tails))
-            found = yield from mapped(timed(search, stats.count_finding), lambda share: 0.5 * share)
+            found = yield from mapped(timed(search, partial(stats.count, "find_seconds")), lambda share: 0.5 * share)
             # Where light leaves the scene soon, fewer weak beams follow than expected: the search is done again, finer.
             # No later pass uses what is learnt here: a pass must not depend on those before it.
             followed = found.followed()
@@ -297,7 +293,7 @@ class BeamLight:
         self.found = found
         self._count(found)
         if found.polygons is not None:
-            yield from timed(self._drawn(found.polygons, maps, weight), stats.count_drawing)
+            yield from timed(self._drawn(found.polygons, maps, weight), partial(stats.count, "draw_seconds"))
         yield 1.0
 
     def _drawn(self, polygons: BeamPolygons, maps: LightMaps, weight: float) -> Generator[float]:

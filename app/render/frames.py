@@ -66,7 +66,7 @@ class Picture:
 
 
 @dataclass
-class _Traced:
+class Traced:
     """What frames share as long as their light does. Owns it."""
 
     inputs: LiveInputs
@@ -122,7 +122,8 @@ class FrameRenderer:
         self._settings = settings = replace(settings, any_view=settings.any_view or moves)
         self._fit = FrameFit.of(stages, settings)
         self._unsurveyed = list(stages_to_survey(stages, settings))
-        self._traced: _Traced | None = None
+        self.traced: Traced | None = None
+        """Light and passes of the last frame."""
         self._budget: TimeBudget | None = None
         if settings.seconds is not None:
             self._budget = TimeBudget(settings.seconds, time.perf_counter() if begun is None else begun)
@@ -143,7 +144,7 @@ class FrameRenderer:
         self.seconds, self.phase, self._progress = FrameSeconds(), _PREPARING, self._progress_of_camera()
         yield from self._survey()
         stage = _with_sun(stage)
-        if self._traced is None or not share_light(self._traced.inputs, inputs_of(stage, self._settings)):
+        if self.traced is None or not share_light(self.traced.inputs, inputs_of(stage, self._settings)):
             yield from self._trace(stage, stop)
         if not self._shows_map:
             yield from self._see(stage, stop)
@@ -153,8 +154,8 @@ class FrameRenderer:
         yield from self._survey()
         self.release()
         stage = _with_sun(stage)
-        self._traced = self._made(stage, inputs_of(stage, self._settings))
-        for _ in self._traced.light.preparing():
+        self.traced = self._made(stage, inputs_of(stage, self._settings))
+        for _ in self.traced.light.preparing():
             yield 0.0
         self.seconds.prepare = time.perf_counter() - self.seconds.started
 
@@ -162,8 +163,8 @@ class FrameRenderer:
         """The light pass of `stage`, and the camera pass that sees it."""
         try:
             yield from self.preparing(stage)
-            assert self._traced is not None
-            traced, light = self._traced, self._traced.light
+            assert self.traced is not None
+            traced, light = self.traced, self.traced.light
             sampling, budget = LightSampling.of(stage.scene, self._settings), self._budget
             if light.survey.domains:
                 self._progress.expect_photons(sampling.photons)
@@ -211,7 +212,7 @@ class FrameRenderer:
                 break
         light.show()
 
-    def _add_camera_pass(self, traced: _Traced) -> None:
+    def _add_camera_pass(self, traced: Traced) -> None:
         """The camera pass of `traced`."""
         started, light = time.perf_counter(), traced.light
         if has_own_method(self._settings):
@@ -230,10 +231,10 @@ class FrameRenderer:
 
     def _see(self, stage: Stage, stop: Stop) -> Iterator[float]:
         """The camera pass of `stage`."""
-        assert self._traced is not None and self._traced.camera_pass is not None
+        assert self.traced is not None and self.traced.camera_pass is not None
         started, self.phase = time.perf_counter(), _SEEING
-        settings, camera_pass = self._settings, self._traced.camera_pass
-        maps = self._traced.maps
+        settings, camera_pass = self._settings, self.traced.camera_pass
+        maps = self.traced.maps
         view = self._view(stage)
         # Even after a stop while tracing there is to be a picture: only the first sample is taken then.
         stops_at_once, samples = stop(), 1
@@ -260,8 +261,8 @@ class FrameRenderer:
 
     def _see_until(self, budget: TimeBudget, stage: Stage, maps: CausticMaps, stop: Stop) -> Iterator[float]:
         """Whole turns of samples until the time is over, one at least."""
-        assert self._traced is not None and self._traced.camera_pass is not None
-        camera_pass, view = self._traced.camera_pass, self._view(stage)
+        assert self.traced is not None and self.traced.camera_pass is not None
+        camera_pass, view = self.traced.camera_pass, self._view(stage)
         if budget.samples():  # else there is nothing to decide
             yield from budget.measuring(camera_pass, *view, maps)
         turn, taken, started = camera_pass.spectrum.bands, 0, time.perf_counter()
@@ -295,7 +296,7 @@ class FrameRenderer:
     def steps_of_layer(self, layer: str, stage: Stage, stop: Stop = lambda: False) -> Iterator[float]:
         """Another layer ("beauty", "caustic") of the frame that `steps` rendered, from the same photons; `picture` is
         it then. To be called last: later frames would show this layer too."""
-        traced = self._traced
+        traced = self.traced
         assert traced is not None and traced.camera_pass is not None, "steps() comes first, and not of a map"
         light = traced.light
         traced.camera_pass.release()
@@ -315,23 +316,13 @@ class FrameRenderer:
     @property
     def light(self) -> LightPass:
         """Light pass of the last frame."""
-        assert self._traced is not None, "steps() comes first"
-        return self._traced.light
-
-    @property
-    def environment(self) -> EnvironmentLightPass | None:
-        """Environment's light of the last frame; None where nothing beyond the scene lights it."""
-        return self._traced.environment if self._traced is not None else None
-
-    @property
-    def bounces(self) -> BounceLightPass | None:
-        """Bounces of the last frame; None where receivers do not light each other."""
-        return self._traced.bounces if self._traced is not None else None
+        assert self.traced is not None, "steps() comes first"
+        return self.traced.light
 
     @property
     def camera_pass(self) -> CameraPass | None:
         """Camera pass of the last frame; None for a map."""
-        return self._traced.camera_pass if self._traced is not None else None
+        return self.traced.camera_pass if self.traced is not None else None
 
     @property
     def picture(self) -> Picture:
@@ -348,8 +339,8 @@ class FrameRenderer:
 
     def release(self) -> None:
         """Free everything but the context's programs."""
-        shader.release(self._traced)
-        self._traced = None
+        shader.release(self.traced)
+        self.traced = None
 
     # ---- what frames share -------------------------------------------------------------------
 
@@ -367,7 +358,7 @@ class FrameRenderer:
                 traced.release()
             self._unsurveyed.pop(0)
 
-    def _made(self, stage: Stage, inputs: LiveInputs) -> _Traced:
+    def _made(self, stage: Stage, inputs: LiveInputs) -> Traced:
         settings = self._fit.settings
         scene = scene_seen(stage.scene, stage.camera, stage.solo_nm)
         features = Features.of(scene, settings)
@@ -380,7 +371,7 @@ class FrameRenderer:
             check_room(self.memory, settings)
 
         light.before_maps = look_at_memory
-        return _Traced(inputs, buffers, light)
+        return Traced(inputs, buffers, light)
 
     def _axis(self, scene: Scene, features: Features) -> SpectralAxis:
         """One axis for all frames: bands of equal places on it are then the same wavelengths in all."""

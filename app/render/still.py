@@ -160,7 +160,8 @@ def render(
             progress(share, Phase(frames.phase, frames.phase_ends))
         picture = frames.picture
         notices = tuple(frame_notices(frames.light, scene.camera, settings, picture.rgb))
-        notices += tuple(environment_notices(frames.environment, frames.bounces))
+        assert frames.traced is not None
+        notices += tuple(environment_notices(frames.traced.environment, frames.traced.bounces))
         stats = replace(_stats(context, frames, settings), notices=notices)
         layers = {}
         for layer in more_layers:

@@ -26,11 +26,6 @@ class AutoExposure:
         self._next_s = 0.0
 
     @property
-    def ev(self) -> float:
-        """The exposure in use; 0 before the first picture."""
-        return 0.0 if self._ev is None else self._ev
-
-    @property
     def is_moving(self) -> bool:
         """On its way to a new exposure."""
         return self._ev is not None and self._ev != self._target

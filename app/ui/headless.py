@@ -142,10 +142,6 @@ class HeadlessInterface:
                 self.let_go(button)
         self.frame()
 
-    def double_click(self, where: str | Point) -> None:
-        """Double-click a control or a place."""
-        self.click(where, count=2)
-
     def drag(
         self, start: str | Point, end: Point, steps: int = 6, button: int = 0, keys: Sequence[imgui.Key] = ()
     ) -> None:

@@ -127,11 +127,6 @@ class Session:
         if self.state.preferences.panels.start_page:
             self.jobs.gallery.step()
 
-    def wait_for_layout(self) -> None:
-        """The window's size has changed before anything was made for it: leave the engine alone for some frames
-        more."""
-        self.frames = 0
-
     def finished(self) -> None:
         """After the frame is on the screen."""
         self._keep_settings()

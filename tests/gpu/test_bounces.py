@@ -64,7 +64,8 @@ def found(gl: Context, scene: Scene, directions: int, finer: float = 0.1, unifor
         if uniform:
             light.sources.radiosity = lambda *_: np.full((len(light.places.places), 3), math.pi)  # type: ignore[method-assign]
         light.take(scene)
-        light.run()
+        for _ in light.steps():
+            pass
         places = light.places.places
         own = light.sources.radiosity(scene, None)
         return (
@@ -186,8 +187,10 @@ def test_maps_in_bins_hand_on_the_same_light(gl: Context) -> None:
         renderer = FrameRenderer(gl, replace(SETTINGS, photons=20_000, bins=bins), [Stage(scene, scene.camera)])
         try:
             renderer.run(Stage(scene, scene.camera))
-            assert renderer.bounces is not None
-            found.append((renderer.bounces.sources.radiosity(scene, None).sum(axis=0), renderer.picture.rgb.sum()))
+            assert renderer.traced.bounces is not None
+            found.append(
+                (renderer.traced.bounces.sources.radiosity(scene, None).sum(axis=0), renderer.picture.rgb.sum())
+            )
         finally:
             renderer.release()
     np.testing.assert_allclose(found[1][0], found[0][0], rtol=0.02)
@@ -200,7 +203,7 @@ def test_what_a_mirror_throws_on_a_floor_lights_the_wall(gl: Context) -> None:
     renderer = FrameRenderer(gl, replace(SETTINGS, photons=40_000), [Stage(scene, scene.camera)])
     try:
         renderer.run(Stage(scene, scene.camera))
-        bounces = renderer.bounces
+        bounces = renderer.traced.bounces
         assert bounces is not None
         at, normal = renderer.light.buffers.space.to_world(bounces.places.places["position"]), bounces.places.normals
         own = bounces.sources.radiosity(scene, None)
@@ -241,7 +244,7 @@ def test_the_environments_light_bounces_too(gl: Context) -> None:
     renderer = FrameRenderer(gl, SETTINGS, [stage])
     try:
         renderer.run(stage)
-        bounces, environment = renderer.bounces, renderer.environment
+        bounces, environment = renderer.traced.bounces, renderer.traced.environment
         assert bounces is not None and environment is not None and bounces.places is environment.places
         straight, more = environment.irradiance(), bounces.irradiance()
         space = renderer.light.buffers.space

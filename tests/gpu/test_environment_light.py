@@ -55,11 +55,10 @@ def asked(gl: Context, scene: Scene, directions: int = 512, portion: int | None 
     buffers = scene_buffers(gl, scene, SETTINGS)
     light = EnvironmentLightPass(gl, buffers, directions=directions, finer=finer)
     try:
-        if portion is None:
-            light.run()
-        else:
+        if portion is not None:
             light._budget.units = light._budget.most = portion
-            light.run()
+        for _ in light.steps():
+            pass
         places = light.places.places
         position = buffers.space.to_world(places["position"])
         return position, light.places.normals, places["object"], light.irradiance() / math.pi

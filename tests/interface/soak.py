@@ -131,7 +131,7 @@ class RandomHand:
 
     def _double_click(self) -> str:
         item = self._item()
-        self._hands.interface.double_click(item)
+        self._hands.interface.click(item, count=2)
         return f"double click {item}"
 
     def _right_click(self) -> str:

@@ -133,7 +133,7 @@ def test_azimuth_survives_straight_down() -> None:
 
 
 def test_name_is_taken_when_the_field_is_left(panel: PanelRig) -> None:
-    panel.double_click("Name")
+    panel.click("Name", count=2)
     panel.type("sunbeam")
     panel.click("Light spectrum")
     assert panel.light.name == "sunbeam"
@@ -214,7 +214,7 @@ def test_brush_settings_and_tools(painted: PanelRig) -> None:
     brush = painted.state.brush
     assert (brush.mode, brush.radius) == ("erase", 0.25)
     assert brush.falloff == pytest.approx(0.1, abs=0.05)
-    painted.double_click("Radius")
+    painted.click("Radius", count=2)
     view = painted.state.view
     assert painted.state.brush.radius == pytest.approx(USUAL_RADIUS * view.height_at(view.target_distance))
 

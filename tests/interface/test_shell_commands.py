@@ -205,7 +205,7 @@ def test_file_browser_opens_and_saves(rig: ShellRig, tmp_path: Path) -> None:
     rig.key(imgui.Key.o, [CTRL])
     rig.frame(2)
     assert "ignored.txt" not in rig.items.items and "folder" in rig.items.items
-    rig.double_click("mine.toml")
+    rig.click("mine.toml", count=2)
     rig.frame(2)
     assert rig.asked == [requests.Open(tmp_path / "mine.toml")]
     rig.asked.clear()

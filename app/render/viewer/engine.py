@@ -129,11 +129,6 @@ class LiveEngine(EngineAnswers):
         self._tell(Happened.WISHED)
         return self._level
 
-    @property
-    def _only_moves(self) -> bool:
-        """What is wanted differs from what was traced in the places of things alone."""
-        return self._shown is not None and self._wanted is not None and only_moves(self._shown.traced, self._wanted)
-
     def retrace(self) -> None:
         """Trace with the glass that is shown, where the picture followed an edit to first order only."""
         self._tell(Happened.RETRACE_ASKED)
@@ -188,10 +183,12 @@ class LiveEngine(EngineAnswers):
 
     def _follow(self, budget_s: float) -> None:
         """Bring what is shown nearer to what is wanted."""
-        due = self.schedule.wish_is_due
+        assert self._wanted is not None
+        due, traced = self.schedule.wish_is_due, None if self._shown is None else self._shown.traced
         level = self._level if due else DirtyLevel.NOTHING
         moves = due and moves_view(self._inputs, self._wanted)
-        things = due and self.schedule.interacting and level >= DirtyLevel.TRACE and self._only_moves
+        held = due and self.schedule.interacting and level >= DirtyLevel.TRACE
+        things = held and traced is not None and only_moves(traced, self._wanted)
         self._tell(events.Examined(self._camera, level, moves, things), budget_s)
 
     def _work(self, deadline: float, budget_s: float) -> None:
