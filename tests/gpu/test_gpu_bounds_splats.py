@@ -146,7 +146,7 @@ def test_a_pass_is_eight_dispatches_one_clear_and_one_resolve(gpu: Context) -> N
     with mock.patch.object(light.batches, "splat", noted):
         for _ in light.steps_until(0, 4000, lambda: False):
             pass
-    want = [np.frombuffer(texture.read(), np.float32) for texture in light.resolved_textures()]
+    want = [np.frombuffer(texture.read(), np.float32) for texture in light.maps.resolved_textures()]
     light.batches.splatting.dispatch_seconds = 1e3
     for _ in range(2):
         with counted() as clearing:
@@ -155,16 +155,16 @@ def test_a_pass_is_eight_dispatches_one_clear_and_one_resolve(gpu: Context) -> N
             for photons, count in given:
                 for _ in light.splat_steps(photons, count):
                     pass
-            got = light.resolved_textures()
+            got = light.maps.resolved_textures()
         with counted() as resolving:
-            light.resolved_textures()
+            light.maps.resolved_textures()
     if light.maps.splatter.by_compute:
         assert len(given) > 1 or counts.dispatches <= 8
         assert clearing.dispatches == 1
     assert counts.waits == 0 and not counts.made and not clearing.made
     assert counts.dispatches + counts.draws <= len(given) * 6 + resolving.dispatches
     assert resolving.dispatches <= 2 and resolving.draws == 0
-    assert not light.atlas.has_totals or not light.maps.splatter.by_compute
+    assert not light.maps.atlas.has_totals or not light.maps.splatter.by_compute
     for texture, sums in zip(got, want, strict=True):
         np.testing.assert_allclose(np.frombuffer(texture.read(), np.float32), sums, rtol=1e-3, atol=1e-5 * sums.max())
     light.release()
