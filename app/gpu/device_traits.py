@@ -71,8 +71,6 @@ class DeviceTraits:
     of one side by side: with more in a group, few paths are shared out unevenly."""
     viewer: Budget = Budget()
     """Sizes while a picture is shown that gets better."""
-    viewer_splat_photons: int = 1 << 18
-    """Photons splatted between two pauses."""
     compiles_ahead: bool = True
     """The driver's threads compile programs side by side, where it has some, and binaries are kept on the disk. Of a
     software renderer programs are compiled at their first dispatch, which no binary spares."""
@@ -117,7 +115,6 @@ class DeviceTraits:
             tables_by_compute=False,
             moves_by_photons=False,
             viewer=Budget(1 << 14, 1 << 14, 1 << 22, 256 << 20),
-            viewer_splat_photons=1 << 12,
         )
 
 

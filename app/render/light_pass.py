@@ -4,7 +4,7 @@ What a survey finds (`LightSurvey`: pilots, beams) says where maps must lie and 
 (`Planner`). A pass (`PassRounds`) adds beams and batches of photons (`PhotonBatches`) to the maps (`LightMaps`).
 
 What varies from one kind of rendering to another is an argument: what maps are fitted to (`MapFit`), how finely
-lattices are divided (`Division`), where photons are kept (`PhotonRecords`), how work is cut (`Pace`).
+lattices are divided (`Division`), where photons are kept (`PhotonRecords`).
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from ..passes.map_layout import MapLayout, check_map_receiver, layout_maps
 from ..passes.pilot import Pilot
 from ..passes.trace import TracePass
 from .light_maps import LightMaps
-from .light_plan import Division, LightPlan, Planner, spans_of
+from .light_plan import SMALLEST_BATCH, Division, LightPlan, Planner, spans_of
 from .light_stats import LightStats, PassStep
 from .light_survey import LightSurvey
 from .map_fit import MapFit
@@ -41,7 +41,9 @@ from .photon_batches import Deposit, PhotonBatches, batch_size
 from .photon_records import NoRecords, PhotonRecords
 from .sampling import MovingBeams
 from .shown_spectra import ShownSpectra, ShownTables
-from .splatting import Pace
+
+_LEAST_IN_FRAMES = 1024
+"""Rays in flight, at least, of a pass that takes little of every frame."""
 
 
 class LightPass:
@@ -58,12 +60,12 @@ class LightPass:
         fit: MapFit | None = None,
         division: Division | None = None,
         photon_records: PhotonRecords | None = None,
-        pace: Pace | None = None,
         moving: MovingBeams | None = None,
     ) -> None:
         """`fit` None fits maps to the scene's camera and the picture of `settings`. `photon_records` becomes the light
-        pass's own. `moving`: beams are first found as fast as while something is dragged, and where they carry all,
-        maps are fitted to those instead of pilots."""
+        pass's own. `moving`: the pass takes little of every frame of a window: beams are first found as fast as
+        while something is dragged, on a thread of their own, and where they carry all, maps are fitted to those instead
+        of pilots; extended lights make do with fewer points."""
         check_splats(context.limits)
         if features.local_gain:
             check_brush(context.limits)
@@ -80,14 +82,13 @@ class LightPass:
         self._elsewhere = LightStats()
         """What others counted whose sums were taken over (`take`)."""
         self._division = division or Division()
-        pace = pace or Pace.of(context)
-        batch = max(batch_size(context, features, settings.batch), pace.min_batch)
+        in_frames = moving is not None
+        # With fewer than `SMALLEST_BATCH` rays in flight the plan depends on their number.
+        batch = max(batch_size(context, features, settings.batch), _LEAST_IN_FRAMES if in_frames else SMALLEST_BATCH)
         self.trace = TracePass(context, features, buffers, batch, settings.max_depth)
         self.shown = ShownSpectra(context.ctx, scene, buffers, settings.bins)
-        self.survey = LightSurvey(
-            context, scene, features, buffers, self.trace, self.shown, self._division, pace, moving
-        )
-        self.batches = PhotonBatches(context, self.trace, self.shown, photon_records or NoRecords(), pace)
+        self.survey = LightSurvey(context, scene, features, buffers, self.trace, self.shown, self._division, moving)
+        self.batches = PhotonBatches(context, self.trace, self.shown, photon_records or NoRecords(), in_frames)
         self._shrinks = features.method == SHRINKING
         self.smoothing = settings.smoothing * (FIRST_KERNEL if self._shrinks else 1.0)
         """Standard deviation of a footprint in lattice spacings; where passes shrink it, of the first one's."""

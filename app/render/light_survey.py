@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from .map_fit import MapFit
     from .sampling import MovingBeams
     from .shown_spectra import ShownSpectra
-    from .splatting import Pace
 
 
 class LightSurvey:
@@ -45,7 +44,6 @@ class LightSurvey:
         trace: TracePass,
         shown: ShownSpectra,
         division: Division,
-        pace: Pace,
         moving: MovingBeams | None,
     ) -> None:
         """`moving`: see `LightPass`."""
@@ -64,7 +62,6 @@ class LightSurvey:
         self._trace = trace
         self._shown = shown
         self._division = division
-        self._pace = pace
         self._moving = moving
 
     # ---- once for a scene --------------------------------------------------------------------
@@ -82,7 +79,7 @@ class LightSurvey:
                 self.buffers,
                 self._shown,
                 self._trace.max_depth,
-                in_thread=self._pace.searches_in_thread,
+                in_thread=self._moving is not None,
             )
             yield None
             yield from self.beam_light.surveying(self._moving)

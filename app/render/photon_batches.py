@@ -14,7 +14,7 @@ from ..gpu.dispatch_budget import DISPATCH_S, DispatchBudget
 from ..passes.trace import Batch, LatticeSlice, Sent, TracePass, queue_class
 from .light_plan import SMALLEST_BATCH, LightPlan
 from .photon_records import PhotonRecords, RoundOf
-from .splatting import Pace, Splatting
+from .splatting import Splatting
 
 if TYPE_CHECKING:
     import moderngl
@@ -49,11 +49,12 @@ class PhotonBatches:
     """Owns what traces, keeps and splats photons; `trace` and `records` become its own."""
 
     def __init__(
-        self, context: Context, trace: TracePass, shown: ShownSpectra, records: PhotonRecords, pace: Pace
+        self, context: Context, trace: TracePass, shown: ShownSpectra, records: PhotonRecords, in_frames: bool
     ) -> None:
+        """`in_frames`: see `Splatting`."""
         self.trace = trace
         self.records = records
-        self.splatting = Splatting(context, shown, pace)
+        self.splatting = Splatting(context, shown, in_frames)
         self.budget = DispatchBudget(trace.batch, MIN_RAYS, trace.batch)
         """Rays of the next batch."""
         self.dispatch_seconds = DISPATCH_S
@@ -62,7 +63,7 @@ class PhotonBatches:
         self.portion = trace.batch
         """Rays of a batch at most: what a frame that is shown meanwhile has time for."""
         self._context = context
-        self._pace = pace
+        self._waits = in_frames or not context.traits.work_is_queued
         self._traced_once = False
         """The first event of all includes compiling."""
         self._is_timed = False
@@ -165,7 +166,7 @@ class PhotonBatches:
         started = time.perf_counter()
         while True:
             try:
-                if self._pace.waits:
+                if self._waits:
                     with self._context.timers.timing("trace"):
                         next(tracing)
                 else:
@@ -173,7 +174,7 @@ class PhotonBatches:
             except StopIteration as finished:
                 batch: Batch = finished.value
                 break
-            if queued and (self._pace.waits or is_first):
+            if queued and (self._waits or is_first):
                 self._context.finish()
             took, is_compiled = time.perf_counter() - started, self._traced_once
             stats.trace_seconds += took

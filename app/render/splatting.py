@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -13,7 +12,6 @@ from ..gpu.dispatch_budget import DISPATCH_S, DispatchBudget
 from ..passes.accumulate import ROWS, Accumulate
 from ..passes.footprint import Photons, SplatSpectra
 from ..passes.splat import CHUNK, FLUSH_SHARE
-from .light_plan import SMALLEST_BATCH
 
 if TYPE_CHECKING:
     import moderngl
@@ -29,54 +27,34 @@ FIRST_SUMMED = 256
 """Rows of a map that are summed up at first, before it is known how long they take."""
 FIRST_SPLATTED, SMALLEST_PART, LARGEST_PART = 1 << 18, 1 << 10, 1 << 22
 """Photons that a GPU splats at once: at first, and when it is known how long they take."""
+SOFTWARE_PART = 1 << 12
+"""What a software renderer splats between two pauses of a frame."""
 UNSEEN_S = 0.25
 """What that may take where no frames are shown meanwhile: an eighth of what drivers end."""
 SUMMING_SECONDS = 0.01
 """What one part of it may take."""
 
 
-@dataclass(frozen=True)
-class Pace:
-    """How a light pass cuts its work."""
-
-    waits: bool
-    """Wait for the device at every pause: times are then what the work took, and a budget is kept."""
-    splat_part: int = 1 << 30
-    """Photons splatted without a pause."""
-    sums_in_parts: bool = False
-    """Maps of several textures are summed up one by one before it has to be, as all together take longer than a
-    frame."""
-    min_batch: int = SMALLEST_BATCH
-    """Rays in flight, at least. With fewer than `SMALLEST_BATCH` the plan depends on the batch."""
-    searches_in_thread: bool = False
-    """Beams are searched for in a thread of their own."""
-
-    @staticmethod
-    def of(context: Context) -> Pace:
-        """For a rendering that is not shown meanwhile."""
-        return Pace(not context.traits.work_is_queued)
-
-    @staticmethod
-    def within_frames(context: Context) -> Pace:
-        """For one that takes little of every frame; extended lights make do with as many points."""
-        queued = context.traits.work_is_queued
-        return Pace(True, context.traits.viewer_splat_photons, not queued, 1024, True)
-
-
 class Splatting:
     """Adds photons to maps as `shown` has them; `seconds` counts what it took."""
 
-    def __init__(self, context: Context, shown: ShownSpectra, pace: Pace) -> None:
+    def __init__(self, context: Context, shown: ShownSpectra, in_frames: bool) -> None:
+        """`in_frames`: it takes little of every frame, and waits for the device at every pause."""
         self._context = context
         self._shown = shown
-        self._pace = pace
-        self._accumulate = Accumulate(context.ctx) if pace.sums_in_parts else None
+        queued = context.traits.work_is_queued
+        self._waits = in_frames or not queued
+        in_parts = in_frames and not queued
+        self._accumulate = Accumulate(context.ctx) if in_parts else None
+        """Where maps of several textures are summed up one by one before they have to be, as all together take longer
+        than a frame."""
+        self._most = SOFTWARE_PART if in_parts else 1 << 30
         self.seconds = 0.0
-        self.dispatch_seconds = DISPATCH_S if pace.waits else UNSEEN_S
+        self.dispatch_seconds = DISPATCH_S if in_frames else UNSEEN_S
         """What a part may take where the device queues work, as the last ones have shown. Elsewhere parts stay, as sums
         in another order are rounded otherwise."""
         self._part: DispatchBudget | None = None
-        if context.traits.work_is_queued:
+        if queued:
             self._part = DispatchBudget(FIRST_SPLATTED, SMALLEST_PART, LARGEST_PART)
 
     def steps(
@@ -92,7 +70,7 @@ class Splatting:
         """Add every `stride`-th photon record to `maps`, pausing after every part of them. `count`: of those that are
         added, at most where the device alone knows how many are `held` (`Photons`); `smoothing`: standard deviation of
         a footprint in lattice spacings."""
-        atlas, part_max = maps.atlas, self._pace.splat_part
+        atlas = maps.atlas
         if atlas.targets > 1 and atlas.pending + count >= FLUSH_AHEAD * min(
             CHUNK, atlas.size[0] * atlas.size[1] / FLUSH_SHARE
         ):
@@ -102,10 +80,10 @@ class Splatting:
         start = 0
         while start < count:
             started = time.perf_counter()
-            part = min(part_max, self._part.units if self._part else count, count - start)
+            part = min(self._part.units if self._part else self._most, count - start)
             with self._context.timers.timing("splat", partial(self._learn, part) if self._part else None):
                 maps.splatter.run(all_photons.part(start, part), spectra, atlas, maps.receivers, smoothing)
-            if self._pace.waits:
+            if self._waits:
                 self._context.finish()
             self.seconds += time.perf_counter() - started
             start += part
@@ -117,8 +95,8 @@ class Splatting:
         self._part.learn(photons, took, self.dispatch_seconds)
 
     def summing(self, atlas: MapAtlas) -> Iterator[None]:
-        """Sum up what is pending with pauses, so that the maps can be shown at once; nothing where the pace knows no
-        parts."""
+        """Sum up what is pending with pauses, so that the maps can be shown at once; nothing where that is done at
+        once."""
         if self._accumulate is None or not atlas.pending or not atlas.is_drawn:
             return
         atlas.ready_totals()
@@ -130,7 +108,7 @@ class Splatting:
                 started = time.perf_counter()
                 rows = min(dispatch_budget.units, height - row)
                 self._accumulate.run_rows(scratch, total, row, rows)
-                if self._pace.waits:
+                if self._waits:
                     self._context.finish()
                 took = time.perf_counter() - started
                 dispatch_budget.learn(rows, took, SUMMING_SECONDS)

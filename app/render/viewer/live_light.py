@@ -25,7 +25,6 @@ from ..photon_batches import traced_besides
 from ..sampling import MovingBeams
 from ..shown_spectra import PassTables
 from ..solo import solo, solo_scene
-from ..splatting import Pace
 from .invalidation import shown_glasses
 from .kept_light import KeptLight
 from .moved_light import MovedLight
@@ -77,7 +76,6 @@ class LiveLight:
             self.buffers,
             fit=fit,
             photon_records=self.stored,
-            pace=Pace.within_frames(context),
             moving=self.moving,
         )
         self.environment: EnvironmentLightPass | None = None
