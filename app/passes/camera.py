@@ -117,9 +117,7 @@ class CameraPass:
         if self.follows and context.traits.loops_may_end:
             shown = halting_defines(shown)
         # A viewer may open the lens later.
-        self._listed = ListedPixels(
-            self._ctx, context.traits, waiting_bytes(lens_defines(shown)) if self.follows else 0
-        )
+        self.listed = ListedPixels(self._ctx, context.traits, waiting_bytes(lens_defines(shown)) if self.follows else 0)
         self._programs = CameraPrograms(self._ctx, shown, self._inputs.structs, features.lens)
         self._haze = Haze(context, scene, self.channels) if features.haze and layer == "beauty" else None
         self._is_hazy = False
@@ -270,9 +268,10 @@ class CameraPass:
         # Beside a picture in colour, turns are counted.
         return picture[..., :3] if self.channels.edges_nm is None else picture
 
-    def _bind(self, maps: CausticMaps, parameters: np.ndarray) -> None:
+    def bind(self, maps: CausticMaps, parameters: np.ndarray) -> None:
+        """Bind everything that the camera's programs read."""
         self._inputs.bind(maps, parameters)
-        self._listed.bind()
+        self.listed.bind()
         self._sums.bind()
 
     @property
@@ -307,7 +306,7 @@ class CameraPass:
 
     def release(self) -> None:
         """Free every buffer, texture and program."""
-        shader.release(self._inputs, self._programs, self._sums, self._listed, self._haze)
+        shader.release(self._inputs, self._programs, self._sums, self.listed, self._haze)
 
     # ---- for pictures in motion ------------------------------------------------------------
 
@@ -315,11 +314,6 @@ class CameraPass:
     def source(self) -> tuple[dict[str, int | float | str], tuple[Struct, ...]]:
         """Defines and structs of the program that follows listed pixels; those of the others are made from them."""
         return self._programs.defines, self._programs.structs
-
-    @property
-    def listed(self) -> int:
-        """Pixels that are listed."""
-        return self._listed.count
 
     def moving_parameters(
         self, camera: Camera, width: int, height: int, maps: CausticMaps, max_taps: int
@@ -333,21 +327,13 @@ class CameraPass:
         spread_alone(parameters)
         return parameters
 
-    def bind_for(self, parameters: np.ndarray, maps: CausticMaps) -> None:
-        """Bind everything that the camera's programs read."""
-        self._bind(maps, parameters)
-
-    def start_list(self) -> None:
-        """Nothing is listed."""
-        self._listed.clear()
-
     def follow(self, parameters: np.ndarray, maps: CausticMaps) -> Iterator[float]:
         """Follow what is listed, into the sums; pauses with the share done."""
         if not self.follows:
             return
         yield from self._portions(parameters, maps)
-        if not self._listed.may_halt:
-            self._bind(maps, parameters)
+        if not self.listed.may_halt:
+            self.bind(maps, parameters)
             self._run_listed(self._program_beyond())
 
     # ---- private ---------------------------------------------------------------------------
@@ -365,7 +351,7 @@ class CameraPass:
     def _clear(self, width: int, height: int) -> None:
         if self._sums.clear(width, height):
             self._rows = DispatchBudget(_FIRST_ROWS, _GROUP, -(-height // _GROUP) * _GROUP)
-            self._listed.resize(width * height, width * (-(-height // _GROUP) * _GROUP))
+            self.listed.resize(width * height, width * (-(-height // _GROUP) * _GROUP))
         self._within_rows = False
 
     def _add_sample(self, parameters: np.ndarray, width: int, height: int, maps: CausticMaps) -> Iterator[float]:
@@ -392,8 +378,8 @@ class CameraPass:
             # Groups that overlap the next band would add its rows twice, so bands are whole groups.
             rows = min(self._rows.units, height - row)
             parameters["first_row"] = row
-            self._listed.clear()
-            self._bind(maps, parameters)
+            self.listed.clear()
+            self.bind(maps, parameters)
             with self._timing(self._rows, rows):
                 groups = -(-width // _GROUP), -(-rows // _GROUP)
                 if parameters["survey"] != SURVEY_KEPT:
@@ -401,7 +387,7 @@ class CameraPass:
                 else:
                     self._run(self._programs.of("kept"), *groups)
                     self._run_listed(self._programs.of("direct"), uneven=True)
-                if follows and not self._listed.may_halt:
+                if follows and not self.listed.may_halt:
                     self._run_listed(self._program_beyond())
             yield row, rows
             row += rows
@@ -409,27 +395,27 @@ class CameraPass:
     def _survey(self, parameters: np.ndarray, width: int, height: int, maps: CausticMaps) -> Iterator[float]:
         """Find the pixels in which, and round which, nothing but one surface in the same light is seen directly, and
         what that looks like: the samples then take lookups in the others only. Pauses after every dispatch with 0.0."""
-        parameters["survey_at"] = self._listed.survey_at(width * height)
+        parameters["survey_at"] = self.listed.survey_at(width * height)
         taken = parameters.copy()
         for _ in spread_survey(taken):
             for _ in self._bands(taken, width, height, maps, follows=False):
                 yield 0.0
-        self._bind(maps, taken)
+        self.bind(maps, taken)
         self._run(self._programs.of("even"), -(-width // _GROUP), -(-height // _GROUP))
         parameters["survey"] = SURVEY_KEPT
 
     def _portions(self, parameters: np.ndarray, maps: CausticMaps) -> Iterator[float]:
         """Follow what listed pixels see where that is done by portions, yielding the share done."""
-        if not self._listed.may_halt:
+        if not self.listed.may_halt:
             return
         group = self.context.traits.paths_group
 
         def follow(budget: DispatchBudget, count: int) -> None:
-            self._bind(maps, parameters)
+            self.bind(maps, parameters)
             with self._timing(budget, count):
                 self._run(self._program_beyond(), -(-count // group))
 
-        yield from self._listed.follow(parameters, follow)
+        yield from self.listed.follow(parameters, follow)
 
     @contextmanager
     def _timing(self, budget: DispatchBudget, units: int) -> Iterator[None]:
@@ -442,7 +428,7 @@ class CameraPass:
         self._ctx.memory_barrier()
 
     def _run_listed(self, program: moderngl.ComputeShader, *, uneven: bool = False) -> None:
-        self._listed.run(program, uneven=uneven)
+        self.listed.run(program, uneven=uneven)
         self._ctx.memory_barrier()
 
     def _program_beyond(self) -> moderngl.ComputeShader:

@@ -106,17 +106,12 @@ class MovingPicture:
         assert self._lists is not None
         return int(np.frombuffer(self._lists.read(4, offset=4), "u4")[0])
 
-    @property
-    def followed(self) -> int:
-        """Paths that the last `glass` followed; asking waits for the device."""
-        return self._view.listed
-
     def direct(self, picture: moderngl.Texture, camera: Camera, maps: CausticMaps, max_taps: int) -> None:
         """What is seen directly, into `picture` (RGBA32F, of the size that is seen); where glass or mirrors are seen it
         is black."""
         width, height = picture.size
         self._camera = self._view.moving_parameters(camera, width, height, maps, max_taps)
-        self._view.bind_for(self._camera, maps)
+        self._view.bind(maps, self._camera)
         self._visible = self._surfaces.run(self._camera)
         cells = tuple(-(-side // LATTICE_STEP) for side in picture.size)
         lattice = cells[0] + 1, cells[1] + 1
@@ -153,15 +148,15 @@ class MovingPicture:
         self._camera["pixel_width"] = self._camera["pixel_height"] = step
         least = self._view.split_threshold
         self._camera["split_threshold"] = max(least, COARSE_SPLIT) if step >= COARSE else least
-        self._view.bind_for(self._camera, maps)
+        self._view.bind(maps, self._camera)
         self._bind(self._view.sums[0], glass=True)
         self._run("clear", blocks)
         self._run_listed("blocks", _SPECULAR)
-        self._view.start_list()
+        self._view.listed.clear()
         self._run("list", blocks)
         yield 0.0
         yield from self._view.follow(self._camera, maps)
-        self._view.bind_for(self._camera, maps)
+        self._view.bind(maps, self._camera)
         self._bind(picture, glass=True)
         self._run_listed("glass", _SPECULAR)
 

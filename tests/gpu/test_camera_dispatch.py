@@ -30,7 +30,7 @@ def begun(camera_pass: CameraPass, rows: int, pixels: int) -> CameraPass:
     camera_pass.run(CAMERA, *SIZE, 1)
     camera_pass.dispatch_seconds = 0.0  # they shall not grow
     camera_pass._rows = DispatchBudget(rows, 8, 56)
-    camera_pass._listed.budget = DispatchBudget(pixels, 64, 1 << 20)
+    camera_pass.listed.budget = DispatchBudget(pixels, 64, 1 << 20)
     return camera_pass
 
 

@@ -34,8 +34,8 @@ class Shuffled(CameraPass):
     order = 0
 
     def _portions(self, parameters: np.ndarray, maps: CausticMaps) -> Iterator[float]:
-        assert self._listed is not None
-        pixels = self._listed._list
+        assert self.listed is not None
+        pixels = self.listed._list
         count = int(np.frombuffer(pixels.read(4, offset=listed_pixels._LISTED_AT), "u4")[0])
         if count:
             begins = listed_pixels._NOTHING.nbytes
@@ -56,7 +56,7 @@ def pictures(camera_pass: Shuffled, scene: Scene, orders: int, samples: int) -> 
         camera_pass.run(scene.camera, *SIZE, 1)  # which learns how fast this device is
         camera_pass.dispatch_seconds = (0.15, 0.0, 0.02)[camera_pass.order % 3]
         if camera_pass.order % 3 == 1:
-            camera_pass._listed.budget, camera_pass._listed.resumed = (
+            camera_pass.listed.budget, camera_pass.listed.resumed = (
                 DispatchBudget(64 * 7, 64, 1 << 20),
                 DispatchBudget(64 * 3, 64, 1 << 20),
             )

@@ -49,8 +49,8 @@ def picture(gl, surveys: bool, monkeypatch, samples=16, stop_after=None):
 
 def surveyed_keys(camera_pass):
     """uint32 (H, W)."""
-    survey_at = len(listed_pixels._NOTHING) + camera_pass._listed.room
-    words = np.frombuffer(camera_pass._listed._list.read(), "u4")[survey_at:]
+    survey_at = len(listed_pixels._NOTHING) + camera_pass.listed.room
+    words = np.frombuffer(camera_pass.listed._list.read(), "u4")[survey_at:]
     return words[: 4 * SIZE[0] * SIZE[1]].reshape(SIZE[1], SIZE[0], 4)[..., 0]
 
 
@@ -115,7 +115,7 @@ def test_few_samples_and_later_ones_have_no_survey(gl, monkeypatch):
     monkeypatch.setattr(camera_module, "SURVEY_FROM", 4)
     camera_pass = opened_camera_pass(gl, room(), [SUN, SHARP], camera=CAMERA)
     camera_pass.run(CAMERA, *SIZE, 2)
-    assert not camera_pass._listed._surveyed
+    assert not camera_pass.listed._surveyed
     camera_pass.run(CAMERA, *SIZE, 8, sample_offset=2)
-    assert not camera_pass._listed._surveyed
+    assert not camera_pass.listed._surveyed
     released(camera_pass)

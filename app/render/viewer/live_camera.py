@@ -237,7 +237,7 @@ class LiveCamera:
     def state(self) -> CameraState:
         """How far the picture is."""
         return CameraState(
-            self.is_coarse,
+            self._is_preview,
             self.owes_picture,
             self.is_within_cycle,
             self.is_done,
@@ -254,11 +254,6 @@ class LiveCamera:
     @property
     def _sampling(self) -> CameraSampling:
         return CameraSampling.live(self.target_samples)
-
-    @property
-    def is_coarse(self) -> bool:
-        """The picture requested last is less than what is wanted."""
-        return self._is_preview
 
     @property
     def owes_picture(self) -> bool:
@@ -285,7 +280,7 @@ class LiveCamera:
     def is_done(self) -> bool:
         """Every sample is taken, in full size."""
         return self._maps is None or not (
-            self.is_coarse or self._ladder or self._is_smooth or self._choosing or self._taken < self._target
+            self._is_preview or self._ladder or self._is_smooth or self._choosing or self._taken < self._target
         )
 
     def advance(self, deadline: float, *, one_sample: bool = False) -> float:
@@ -383,6 +378,7 @@ class LiveCamera:
     def _move(self) -> bool:
         """One part of a picture in motion; whether it was published."""
         assert self._maps is not None and self._camera is not None and self._moving is not None
+        assert self._pass is not None
         if self._drawn is None:
             self._drawn = self._spare_of(self._size)
             learn = None if self._is_first else partial(self._learn_direct, self._size[0] * self._size[1])
@@ -407,11 +403,10 @@ class LiveCamera:
             self._spent_s += time.perf_counter() - started
             if goes_on:
                 return False
-            if not self._context.traits.work_is_queued and self._moving.followed:
-                self._glass.learn(self._moving.followed, self._spent_s)
+            if not self._context.traits.work_is_queued and (followed := self._pass.listed.count):
+                self._glass.learn(followed, self._spent_s)
         self._steps = None
         self._ladder.pop(0)
-        assert self._pass is not None
         if self._pass.has_haze:
             # Glass is still to become finer in what was drawn.
             self._show(self._drawn, 1.0)
