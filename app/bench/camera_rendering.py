@@ -71,7 +71,7 @@ class SharedLight:
 
         light.run_pass(0, photons, report)
         light.finish()
-        self.channels, self.reflectances = light.map_channels, light.reflectances
+        self.channels, self.reflectances = light.shown.channels, light.shown.reflectances
         self.maps = light.caustic_maps()
         context.finish()
         context.check("the light pass of the bench")

@@ -88,7 +88,7 @@ def measure(context: Context, scene: Scene, size: tuple[int, int], photons: Sequ
     """For each number of `photons`, by photons alone: the best of a few frames with maps fitted to a picture of `size`
     and one camera sample a pixel. What is done once for a scene is left out."""
     with _light(context, scene, RenderSettings(width=size[0], height=size[1])) as light:
-        camera = CameraPass(context, light.buffers, "beauty", light.reflectances, light.map_channels)
+        camera = CameraPass(context, light.buffers, "beauty", light.shown.reflectances, light.shown.channels)
         try:
             for count in photons:
                 frames = [_frame(context, light, camera, size, count, seed) for seed in range(_FRAMES)]
@@ -138,7 +138,7 @@ def camera_costs(
         light.begin(1 << 14, 1)
         light.run_pass(0, 1 << 14, lambda _: True)
         light.maps.atlas.flush()
-        camera = CameraPass(context, light.buffers, "beauty", light.reflectances, light.map_channels)
+        camera = CameraPass(context, light.buffers, "beauty", light.shown.reflectances, light.shown.channels)
         try:
             for cap in caps_s:
                 camera.dispatch_seconds = cap

@@ -114,7 +114,7 @@ class MethodRig:
         self._buffers = scene_buffers(context, scene, self._settings)
         buffered = self._finished()
         self._light = LightPass(context, scene, self._settings, self._buffers.features, self._buffers)
-        self._camera_pass = CameraPass(context, self._buffers, "caustic", self._light.reflectances)
+        self._camera_pass = CameraPass(context, self._buffers, "caustic", self._light.shown.reflectances)
         compiled = self._finished()
         self._light.prepare()
         piloted = self._finished()

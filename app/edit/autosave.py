@@ -97,16 +97,12 @@ class Autosave:
         self._interval_s = interval_s
         self._clock = clock
         self._folder = folder / _FOLDER
-        self._path = self._folder / f"{os.getpid()}_{id(self):x}.toml"
+        self.path = self._folder / f"{os.getpid()}_{id(self):x}.toml"
+        """The autosaved scene of this process; the file exists only while the scene has unsaved changes."""
         self._lock: IO[str] | None = None
         self._thread: threading.Thread | None = None
         self._written: Scene | None = None
         self._last_s = clock()
-
-    @property
-    def path(self) -> Path:
-        """The autosaved scene of this process; the file exists only while the scene has unsaved changes."""
-        return self._path
 
     def update(self, scene: Scene, title: str, original: Path | None, unsaved: bool) -> None:
         """Write `scene` if it is unsaved, has changed, and was last written at least `interval_s` ago."""
@@ -148,11 +144,11 @@ class Autosave:
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
             with files.own_files():  # refers to the scene's meshes and pictures in place
-                save_scene(scene, self._path)
+                save_scene(scene, self.path)
             if self._lock is None:
-                self._lock = self._path.with_suffix(".lock").open("w", encoding="utf-8")
+                self._lock = self.path.with_suffix(".lock").open("w", encoding="utf-8")
                 lock(self._lock.fileno())
-            with atomic_output(self._path.with_suffix(".json")) as temporary:
+            with atomic_output(self.path.with_suffix(".json")) as temporary:
                 temporary.write_bytes(msgspec.json.encode(note))
             self.problem = None
         except (OSError, UserError) as error:
@@ -163,7 +159,7 @@ class Autosave:
         if self._lock is not None:
             self._lock.close()
             self._lock = None
-        _remove(self._path)
+        _remove(self.path)
         self._written = None
 
 

@@ -38,8 +38,9 @@ class SceneTexels:
         words = {name: _words(sections.get(name)) for name in SECTIONS}
         starts = np.cumsum([0] + [len(part) for part in words.values()]).tolist()
         self.defines = {f"{name}_AT": start for name, start in zip(words, starts[:-1], strict=True)}
-        self._as_image = DeviceTraits.of(ctx.info["GL_RENDERER"]).texels_as_images if as_image is None else as_image
-        if self._as_image:
+        self.as_image = DeviceTraits.of(ctx.info["GL_RENDERER"]).texels_as_images if as_image is None else as_image
+        """Whether shaders read images instead of textures."""
+        if self.as_image:
             self.defines["SCENE_IMAGE"] = 1
         rows = max(1, -(-starts[-1] // ROW_TEXELS))
         limit = ctx.info["GL_MAX_TEXTURE_SIZE"]
@@ -65,22 +66,17 @@ class SceneTexels:
 
     def bind(self) -> None:
         """Bind the texture to its unit."""
-        if self._as_image:
+        if self.as_image:
             self.texture.bind_to_image(bindings.IMAGE_SCENE, read=True, write=False)
         else:
             self.texture.use(bindings.UNIT_SCENE)
 
     def bind_spectra(self, spectra: moderngl.Texture) -> None:
         """Bind tables made by `spectra_texture` as these shaders read them."""
-        if self._as_image:
+        if self.as_image:
             spectra.bind_to_image(bindings.IMAGE_SPECTRA, read=True, write=False)
         else:
             spectra.use(bindings.UNIT_SPECTRA)
-
-    @property
-    def as_image(self) -> bool:
-        """Whether shaders read images instead of textures."""
-        return self._as_image
 
     def release(self) -> None:
         """Free the texture."""

@@ -125,11 +125,6 @@ class Haze:
         """Add what was drawn to these rows of the camera's sums."""
         self._picture.add(sums, first_row, rows)
 
-    @property
-    def textures(self) -> Sequence[moderngl.Texture]:
-        """What was drawn: RGBA32F, four channels each, row 0 on top."""
-        return self._picture.textures
-
     def release(self) -> None:
         """Free everything."""
         self._forget()

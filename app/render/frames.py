@@ -189,7 +189,7 @@ class FrameRenderer:
                 traced.bounces = bounces = BounceLightPass(
                     self._context, traced.buffers, traced.environment, self._settings.seed
                 )
-                bounces.take(light.scene, light.caustic_maps(), light.map_channels)
+                bounces.take(light.scene, light.caustic_maps(), light.shown.channels)
                 yield from self._gather(bounces, _BOUNCING, _BOUNCES_SHARE, LEAST_OF_BOUNCES, stop)
             if traced.camera_pass is None and not self._shows_map:
                 self._add_camera_pass(traced)
@@ -214,17 +214,15 @@ class FrameRenderer:
 
     def _add_camera_pass(self, traced: Traced) -> None:
         """The camera pass of `traced`."""
-        started, light = time.perf_counter(), traced.light
+        started = time.perf_counter()
         if has_own_method(self._settings):
-            traced.camera_buffers = scene_buffers(self._context, light.scene, camera_settings(self._settings))
-        traced.camera_pass = CameraPass(
-            self._context,
-            traced.camera_buffers or traced.buffers,
-            self._settings.layer,
-            light.reflectances,
-            light.map_channels,
-        )
+            traced.camera_buffers = scene_buffers(self._context, traced.light.scene, camera_settings(self._settings))
+        traced.camera_pass = self._pass_of(traced, self._settings.layer)
         self.seconds.camera = time.perf_counter() - started
+
+    def _pass_of(self, traced: Traced, layer: str) -> CameraPass:
+        buffers, shown = traced.camera_buffers or traced.buffers, traced.light.shown
+        return CameraPass(self._context, buffers, layer, shown.reflectances, shown.channels)
 
     def _view(self, stage: Stage) -> tuple[Camera, int, int]:
         return stage.camera, self._settings.width, self._settings.height
@@ -298,11 +296,8 @@ class FrameRenderer:
         it then. To be called last: later frames would show this layer too."""
         traced = self.traced
         assert traced is not None and traced.camera_pass is not None, "steps() comes first, and not of a map"
-        light = traced.light
         traced.camera_pass.release()
-        traced.camera_pass = CameraPass(
-            self._context, traced.camera_buffers or traced.buffers, layer, light.reflectances, light.map_channels
-        )
+        traced.camera_pass = self._pass_of(traced, layer)
         yield from self._see(_with_sun(stage), stop)
 
     def run(self, stage: Stage) -> np.ndarray:

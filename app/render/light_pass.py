@@ -20,7 +20,6 @@ from ..features.features import Features
 from ..gpu import shader
 from ..gpu.context import Context
 from ..gpu.limits import check_brush, check_splats
-from ..gpu.map_channels import MapChannels
 from ..gpu.scene_buffers import SceneBuffers
 from ..model.scene import Scene
 from ..model.settings import RenderSettings
@@ -160,19 +159,10 @@ class LightPass:
     # ---- what there is -----------------------------------------------------------------------
 
     @property
-    def map_channels(self) -> MapChannels:
-        """What the maps' channels mean."""
-        return self.shown.channels
-
-    @property
-    def reflectances(self) -> list[np.ndarray | None]:
-        """Spectral reflectances that are folded into the tables; None: none."""
-        return self.shown.reflectances
-
-    @property
     def bin_edges_nm(self) -> np.ndarray | None:
         """Edges of a spectral picture's bins."""
-        return None if self.map_channels.edges_nm is None else np.array(self.map_channels.edges_nm)
+        edges = self.shown.channels.edges_nm
+        return None if edges is None else np.array(edges)
 
     @property
     def maps(self) -> LightMaps:

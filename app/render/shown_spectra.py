@@ -66,14 +66,10 @@ class ShownSpectra:
         self.changed: Mapping[Dispersion, Dispersion] = {}
         """Glasses that are shown otherwise than they were traced."""
         self._reindexes = features.reindexed
-        self._reindexing = self._unchanged() if features.reindexed else None
+        self.reindexing = self._unchanged() if features.reindexed else None
+        """Which index belongs to which wavelength, where photons are distinguished by the index."""
         if features.local_gain:
             self.show_gains(scene)
-
-    @property
-    def reindexing(self) -> Reindexing | None:
-        """Which index belongs to which wavelength, where photons are distinguished by the index."""
-        return self._reindexing
 
     def show_spectra(self, spectra: Sequence[Spectrum]) -> bool:
         """Light the scene with `spectra`; True where tables follow."""
@@ -94,12 +90,12 @@ class ShownSpectra:
             (traced,) = axis.glasses
             reindexing = Reindexing.of(traced, changed.get(traced, traced))
             if reindexing is not None:
-                self._reindexing = reindexing
+                self.reindexing = reindexing
                 if not self._are_traced:
                     self.variables = SpectralVariables.build(self._ctx, table, into=self.variables)
                 self._are_traced = True
                 return True
-            self._reindexing = self._unchanged()
+            self.reindexing = self._unchanged()
         self._are_traced = not changed
         groups = self._buffers.groups
         shown = replace(groups, glasses=tuple(changed.get(glass, glass) for glass in groups.glasses)).variables(axis)
@@ -128,12 +124,12 @@ class ShownSpectra:
         tables that are of no use any more, whose textures and buffers become these'."""
         ctx, spectra, channels = self._ctx, self.spectra, channels or self.channels
         before = None if into is None else into.tables
-        if self._reindexing is None:
+        if self.reindexing is None:
             return ShownTables(
                 traced_tables(ctx, self._buffers, spectra, self.reflectances, spans, channels, width, before), None
             )
-        shown = self._reindexing.spans(spans, self._buffers.axis, spectra)
-        axis = self._reindexing.axis
+        shown = self.reindexing.spans(spans, self._buffers.axis, spectra)
+        axis = self.reindexing.axis
         if width == PREVIEW_WIDTH and channels == MapChannels() and self._by_compute:
             if self._device_tables is None:
                 self._device_tables = DeviceTables(ctx, spectra, self.reflectances)
@@ -141,7 +137,7 @@ class ShownSpectra:
         else:
             tables = SplatTables.build(ctx, axis, spectra, self.reflectances, shown, channels, width, before)
         reindex = None if into is None else into.reindex
-        return ShownTables(tables, ReindexBuffer(ctx, self._reindexing, spans, shown, spectra, tables.classes, reindex))
+        return ShownTables(tables, ReindexBuffer(ctx, self.reindexing, spans, shown, spectra, tables.classes, reindex))
 
     def _unchanged(self) -> Reindexing | None:
         (traced, *_) = self._buffers.axis.glasses

@@ -59,7 +59,7 @@ def picture_of(gl: Context, scene: Scene) -> np.ndarray:
     haze = Haze(gl, buffers, Channels())
     try:
         haze.draw(scene.camera, *SIZE)
-        (texture,) = haze.textures
+        (texture,) = haze._picture.textures
         rgb = np.frombuffer(texture.read(), "f4").reshape(SIZE[1], SIZE[0], 4)[..., :3].astype(float)
         return rgb @ np.array([0.2126, 0.7152, 0.0722])
     finally:
@@ -98,7 +98,7 @@ def test_all_that_is_scattered_is_seen(gl: Context) -> None:
     haze = Haze(gl, buffers, Channels((380.0, 480.0, 550.0, 600.0, 650.0, 700.0, 780.0)))
     haze.draw(camera, *SIZE)
     sums = np.concatenate(
-        [np.frombuffer(t.read(), "f4").reshape(-1, 4).sum(axis=0, dtype=float) for t in haze.textures]
+        [np.frombuffer(t.read(), "f4").reshape(-1, 4).sum(axis=0, dtype=float) for t in haze._picture.textures]
     )
     watts = scene_in_bins.lights[0].spectral_power.power_w() * WIDTH**2
     assert sums.sum() * (extent / SIZE[1]) ** 2 == pytest.approx(watts * scattering * 4.0 / (4.0 * math.pi), rel=0.005)

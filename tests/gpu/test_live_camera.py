@@ -502,7 +502,7 @@ def test_sides_in_motion_are_no_powers_of_two() -> None:
 def test_the_spectrum_guessed_for_a_colour_has_that_colour(gl: Context, engine: LiveEngine, stage: Scene) -> None:
     engine.set(inputs(stage))
     until(lambda: engine._shown is not None, engine)
-    channels = engine._shown.light.light_pass.map_channels
+    channels = engine._shown.light.light_pass.shown.channels
     weights, luminance = guess_weights(channels, stage.lights)
     xyz = np.array([spectrum.xyz() for spectrum in channels.spectra(stage.lights)])
     np.testing.assert_allclose(weights.T @ xyz, np.eye(3), atol=1e-9)

@@ -107,7 +107,7 @@ class Rig:
             ctx,
             self._buffers,
             spectra,
-            light.reflectances,
+            light.shown.reflectances,
             [spans.get(i, [(0.0, 1.0)]) for i in range(len(spectra))],
             channels,
         )

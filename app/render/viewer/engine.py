@@ -389,7 +389,7 @@ class LiveEngine(EngineAnswers):
         scene = scene_seen(inputs.scene, inputs.camera, inputs.solo_nm)
         light_pass = light.light_pass
         light.take_seen(scene)
-        self._camera_pass.take_scene(light.buffers, scene, light_pass.reflectances, light_pass.map_channels)
+        self._camera_pass.take_scene(light.buffers, scene, light_pass.shown.reflectances, light_pass.shown.channels)
 
     # ---- building ----------------------------------------------------------------------------
 

@@ -121,7 +121,7 @@ class LiveLight:
                 self._guess.release()
                 self._guess = None
             if self._guess is None:
-                channels, lights = self.light_pass.map_channels, self.light_pass.scene.lights
+                channels, lights = self.light_pass.shown.channels, self.light_pass.scene.lights
                 self._guess = SpectrumGuess(self._context.ctx, channels, lights, maps.atlas.size)
             self._guess.run(textures[0])
             textures = [*textures, *self._guess.textures]
@@ -355,7 +355,7 @@ class LiveLight:
     def bounce_caustics(self, maps: CausticMaps) -> None:
         """Surfaces reflect other caustics to each other from now on."""
         if self.bounces is not None and self._seen is not None:
-            self.bounces.take(self._seen, maps, self.light_pass.map_channels)
+            self.bounces.take(self._seen, maps, self.light_pass.shown.channels)
 
     @property
     def shows_gathered(self) -> bool:

@@ -147,7 +147,7 @@ def probe(context: Context, scene: Scene, settings: RenderSettings = SMALL) -> P
         light.finish()
         if photon_records.watched != light.stats.splats:
             raise RuntimeError(f"{photon_records.watched} of {light.stats.splats} photon records were seen")
-        camera_pass = CameraPass(context, light.buffers, settings.layer, light.reflectances, light.map_channels)
+        camera_pass = CameraPass(context, light.buffers, settings.layer, light.shown.reflectances, light.shown.channels)
         try:
             view = scene.camera, settings.width, settings.height
             camera_pass.run(*view, settings.spp or 1, 0, light.caustic_maps(), settings.seed)
