@@ -110,7 +110,7 @@ class Autosave:
             return
         if not unsaved:
             if self._written is not None:
-                self._forget()
+                self.close()
             return
         now = self._clock()
         if scene is self._written or now - self._last_s < self._interval_s:
@@ -128,10 +128,6 @@ class Autosave:
         """Wait until the autosave that is being written, if any, is on the disk."""
         if self._thread is not None:
             self._thread.join()
-
-    def close(self) -> None:
-        """Remove the autosave: the program ends normally, with nothing to recover."""
-        self._forget()
 
     def _start(self, scene: Scene, title: str, original: Path | None, now: float) -> None:
         self._written, self._last_s = scene, now
@@ -154,7 +150,8 @@ class Autosave:
         except (OSError, UserError) as error:
             self.problem = f"The scene could not be autosaved: {error}."
 
-    def _forget(self) -> None:
+    def close(self) -> None:
+        """Remove the autosave: there is nothing to recover."""
         self.wait()
         if self._lock is not None:
             self._lock.close()

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..model.local_dispersion import GainGrid
 from ..model.optics.glass import LINE_D_NM
+from .growing import filled
 from .records import GAIN_BOX
 
 if TYPE_CHECKING:
@@ -58,9 +59,7 @@ class GainBuffers:
             first += parts[-1].size
         self._boxes.write(boxes.tobytes())
         gains = np.concatenate(parts) if parts else np.ones(1, np.float32)
-        if gains.nbytes != self._gains.size:
-            self._gains.orphan(gains.nbytes)
-        self._gains.write(np.ascontiguousarray(gains))
+        self._gains = filled(self._ctx, self._gains, gains)
 
     def bind(self) -> None:
         """To the places that footprint.comp reads."""

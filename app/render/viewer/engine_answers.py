@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Literal
 
 from ...base.not_yet import NOT_YET, NotYet
 from ...edit.stored_photons import StoredPhotons
+from ..notices import shares
 from .building import Building, Shown
 from .dirty_level import DirtyLevel
 from .invalidation import dirty_level
@@ -130,7 +131,6 @@ class EngineAnswers:
             return common
         light = self._shown.light
         light_pass = light.light_pass
-        tally = light_pass.stats.tally
         beams, polygons = (0, 0) if light_pass.survey.beams is None else light_pass.survey.beams.counts
         return replace(
             common,
@@ -147,8 +147,8 @@ class EngineAnswers:
             first_order=light.first_order,
             converged=self.is_idle,
             bytes=light.bytes,
-            fallbacks=dict(tally.fallbacks),
-            lost={name: flux / tally.emitted for name, flux in tally.ended.items()} if tally.emitted else {},
+            fallbacks=dict(light_pass.stats.tally.fallbacks),
+            lost=shares(light_pass.stats),
             bands=dict(light_pass.stats.bands),
             beams=beams,
             polygons=polygons,
