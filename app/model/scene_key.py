@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import astuple
+from dataclasses import astuple, fields
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -48,8 +48,8 @@ def scene_key(scene: Scene, *more: object) -> str:
     )
     for light in scene.lights:
         spectrum = light.spectral_power
-        fields = {name: value for name, value in vars(light).items() if name not in ("name", "spectral_power")}
-        key.add("light", spectrum.density, spectrum.lines, *(_plain(fields[name]) for name in sorted(fields)))
+        names = sorted({field.name for field in fields(light)} - {"name", "spectral_power"})
+        key.add("light", spectrum.density, spectrum.lines, *(_plain(getattr(light, name)) for name in names))
     for item in scene.objects:
         mesh = item.mesh
         key.add("mesh", mesh.vertices, mesh.triangles, np.asarray(item.object_to_world, float))

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from spectrasplat.base.errors import UserError
+from spectrasplat.base.paths import shipped_scenes
 from spectrasplat.commands.inspect_report import camera_line
 from spectrasplat.commands.opened import open_scene
 from spectrasplat.commands.options import read
@@ -128,3 +129,10 @@ def test_a_lens_sees_what_a_pinhole_does_not(tmp_path: Path, kind: str) -> None:
 def test_the_caustic_layers_reference_has_none(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="lens_radius"):
         render_reference(scene_of(tmp_path, "lens_radius = 0.1"), 8, 8, photons=1000)
+
+
+def test_a_scene_that_was_used_has_the_same_key() -> None:
+    """Lights keep what they have worked out."""
+    scene = load_scene(shipped_scenes()["prism"])
+    before = scene_key(scene)
+    assert all(light.axes().size for light in scene.lights) and scene_key(scene) == before
