@@ -41,6 +41,8 @@ def light_defines(features: Features, traits: DeviceTraits) -> Defines:
             "FALLBACK_COUNT": f"{len(records.FALLBACKS)}u",
             "SPECTRAL_COPY": copies,
             "BIND_FLIGHTS": bindings.FLIGHTS,
+            "DISPATCHES": len(traits.ray_events),
+            "RAY_EVENTS": ", ".join(f"{count}u" for count in traits.ray_events),
         }
     )
 

@@ -39,7 +39,7 @@ class RayPool:
         )
         self._context = parts.context
         self._ray = records.ray_record_of(parts.features, parts.traits.packs_rays)
-        self._events = parts.traits.ray_events
+        self._dispatches = len(parts.traits.ray_events)
         self._sum = shader.compute(ctx, "light/pool_tally.comp", parts.defines, parts.structs)
         self._state_zero = records.POOL_STATE.zeros(1)
         self._state_zero["capacity"] = self._state_zero["free_end"] = self._state_zero["returned"] = slots
@@ -88,8 +88,7 @@ class RayPool:
         """Follow the rays; the last dispatch follows all that is left. Nothing is waited for."""
         bind()
         self._bind()
-        for step, count in enumerate(self._events, 1):
-            trace["events"].value, trace["holds"].value = count, step == len(self._events)
+        for _ in range(self._dispatches):
             trace.run_indirect(self.state, records.POOL_STATE.offset("trace_groups"))
             self._context.ctx.memory_barrier()
         self._sum.run(1)

@@ -330,7 +330,7 @@ void main() {
     do {
         if (ray_goes_on) ray_goes_on = load_path(ray_slot).depth != NONE;
         bool lands = false, waits = false;
-        for (uint event = 0u; (event < events || holds != 0u) && ray_goes_on && !waits; ++event) {
+        for (uint event = 0u; (event < events || ends_all) && ray_goes_on && !waits; ++event) {
             ray_goes_on = false;
             second_slot = ray_slot;
             follow(ray_slot, ray_slot, outcome);

@@ -12,8 +12,10 @@ layout(std430, binding = BIND_PHOTONS) writeonly restrict buffer Photons { uvec4
 #define photon_slots rays_in
 #define PHOTON_STRIDE RayRecord_TEXELS
 
-uniform uint events;  // that a ray is followed for
-uniform uint holds;  // 1: an invocation follows all that becomes of its ray; after so many events whatever is left ends
+const uint schedule[DISPATCHES] = uint[DISPATCHES](RAY_EVENTS);
+uint events;  // that a ray is followed for
+// In the last dispatch an invocation follows all that becomes of its ray; after so many events whatever is left ends.
+bool ends_all;
 
 // The ray of this invocation.
 uint ray_slot;
@@ -24,6 +26,9 @@ uint held_slot = NONE;
 bool is_held = false;
 
 void find_ray(uint k) {
+    uint dispatch = min(state.dispatches, uint(DISPATCHES) - 1u);
+    events = schedule[dispatch];
+    ends_all = dispatch == uint(DISPATCHES) - 1u;
     ray_goes_on = k < state.alive;
     ray_slot = NONE;
     if (ray_goes_on)
@@ -35,7 +40,7 @@ uint second_slot;
 
 // A free slot; NONE: there is none.
 uint taken_slot() {
-    if (holds == 0u) {
+    if (!ends_all) {
         uint taken = atomicAdd(state.taken, 1u);
         return taken < state.free_end ? free_slot(taken) : NONE;
     }
@@ -64,7 +69,7 @@ uint second_place(uint slot) {
     return second_slot;
 }
 
-uint most_depth() { return holds != 0u && events_done >= events ? 0u : p.max_depth; }
+uint most_depth() { return ends_all && events_done >= events ? 0u : p.max_depth; }
 
 #define RETURNED 0
 #define KEPT 1
@@ -79,7 +84,7 @@ void hand_on_rays(bool lands) {
     barrier();
     if (lane < 4u) group_counts[lane] = 0u;
     barrier();
-    bool is_kept = ray_slot != NONE && !is_held, is_lost = holds != 0u && ray_goes_on;
+    bool is_kept = ray_slot != NONE && !is_held, is_lost = ends_all && ray_goes_on;
     uint rank = 0u, photon = 0u;
     if (is_lost) atomicAdd(state.overflow, 1u);
     if (is_kept) rank = atomicAdd(group_counts[ray_goes_on && !is_lost ? KEPT : RETURNED], 1u);
