@@ -99,9 +99,9 @@ class _Macros:
         return body
 
 
-def macros_of(units: Sequence[Unit], switches: frozenset[str] = frozenset()) -> _Macros:
-    """What is defined at the end of a text without conditionals; `switches` are 0 where they are not defined."""
-    macros = _Macros(switches=switches)
+def macros_of(units: Sequence[Unit]) -> _Macros:
+    """What is defined at the end of a text without conditionals."""
+    macros = _Macros()
     for unit in units:
         macros.note(unit, certain=True)
     return macros

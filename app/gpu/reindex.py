@@ -105,7 +105,6 @@ class ReindexBuffer:
         ctx: moderngl.Context,
         reindexing: Reindexing,
         traced: Spans,
-        shown: Spans,
         lights: Sequence[Spectrum],
         classes: int,
         into: ReindexBuffer | None = None,
@@ -114,9 +113,9 @@ class ReindexBuffer:
         are. `into`: one that is of no use any more, whose buffer becomes this one's."""
         count = max(len(bands) for bands in traced)
         rows = np.zeros((len(traced), classes, count, 2, 4), np.float32)
-        for i, (bands, mine, support) in enumerate(zip(traced, shown, reindexing.supports(lights), strict=True)):
-            for k, (old, _new) in enumerate(zip(bands, mine, strict=True)):
-                rows[i, :, k, 0] = (*old, *support)
+        for i, (bands, support) in enumerate(zip(traced, reindexing.supports(lights), strict=True)):
+            for k, ends in enumerate(bands):
+                rows[i, :, k, 0] = (*ends, *support)
                 rows[i, :, k, 1, :2] = (k == 0, k == len(bands) - 1)
         self.reindexing = reindexing
         self._buffer: moderngl.Buffer = filled(ctx, None if into is None else into._buffer, rows)

@@ -79,7 +79,7 @@ class Splatter:
         if self._in_bulk:
             most_bytes = min(BULK_BYTES, way.largest_block)
             self.group = min(BULK_GROUP, most_bytes // (SPLAT.stride * slots_per_photon(features)))
-        self._footprints = Footprints(ctx, features, self.group, self.by_compute, self._in_bulk)
+        self.footprints = Footprints(ctx, features, self.group, self.by_compute, self._in_bulk)
         self._indices: moderngl.Buffer | None = None
         self._draws: dict[int, moderngl.VertexArray] = {}
         self._adds: dict[int, moderngl.ComputeShader] = {}
@@ -91,7 +91,7 @@ class Splatter:
 
     def _build_draws(self) -> None:
         if not self._in_bulk:
-            slots = self.group * self._footprints.slots_per_photon
+            slots = self.group * self.footprints.slots_per_photon
             corners = np.array([0, 1, 2, 2, 1, 3], np.uint32) + 4 * np.arange(slots, dtype=np.uint32)[:, None]
             self._indices = self._ctx.buffer(corners)
         for kind, (fragment, chosen) in draw_variants(self._features).items():
@@ -119,7 +119,7 @@ class Splatter:
         for done in range(0, photons.count, group):
             part = photons.part(done, min(group, photons.count - done))
             self._ctx.memory_barrier()
-            self._footprints.run(part, spectra, atlas, receivers, smoothing)
+            self.footprints.run(part, spectra, atlas, receivers, smoothing)
             self._ctx.memory_barrier()
             self.draw(spectra.tables, atlas)
             atlas.pending += part.count
@@ -133,16 +133,16 @@ class Splatter:
 
         values = PARAMETERS.zeros(1)
         packing = tables.layers | tables.stacked << 16
-        values[0] = (atlas.size, (0.5, 0.5), tables.bands, self._footprints.capacity, CUMULATIVE_SAMPLES, packing)
+        values[0] = (atlas.size, (0.5, 0.5), tables.bands, self.footprints.capacity, CUMULATIVE_SAMPLES, packing)
         self._parameters.write(values.tobytes())
         self._parameters.bind_to_uniform_block(0)
         curve = tables.density_buffer if self._features.point_spectrum else tables.cumulative_buffer
         for binding, buffer in (
-            (1, self._footprints.splats),
+            (1, self.footprints.splats),
             (5, tables.band_buffer),
             (6, tables.integral_buffer),
             (7, curve),
-            (8, self._footprints.lists),
+            (8, self.footprints.lists),
         ):
             buffer.bind_to_storage_buffer(binding)
         tables.texture.use(0)
@@ -158,10 +158,10 @@ class Splatter:
         sums = atlas.sums
         atlas.is_added = True
         sums.buffer.bind_to_storage_buffer(BIND_SUMS)
-        commands = self._footprints.commands
+        commands = self.footprints.commands
         commands.bind_to_storage_buffer(BIND_COMMANDS)
         for kind, program in self._adds.items():
-            program["entries_room"].value = self._footprints.entries
+            program["entries_room"].value = self.footprints.entries
             program.run_indirect(commands, 4 * KIND_WORDS * (kind - 1))
 
     def _draw(self, atlas: MapAtlas) -> None:
@@ -171,19 +171,12 @@ class Splatter:
         # A kind that no splat of the group is of has no vertices.
         with adding(self._ctx):
             for kind, vertex_array in self._draws.items():
-                vertex_array.render_indirect(self._footprints.commands, moderngl.TRIANGLES, 1, first=kind - 1)
-
-    def counts(self) -> dict[str, float]:
-        """Counts of `Footprints` since the last reset."""
-        return self._footprints.counts()
-
-    def reset_counts(self) -> None:
-        self._footprints.reset_counts()
+                vertex_array.render_indirect(self.footprints.commands, moderngl.TRIANGLES, 1, first=kind - 1)
 
     @property
     def bytes(self) -> int:
         """Device memory of splat records and their lists."""
-        return (self._indices.size if self._indices is not None else 0) + self._footprints.bytes
+        return (self._indices.size if self._indices is not None else 0) + self.footprints.bytes
 
     def release(self) -> None:
         for vertex_array in self._draws.values():
@@ -192,4 +185,4 @@ class Splatter:
         shader.release(*self._adds.values())
         shader.release(self._indices)
         self._parameters.release()
-        self._footprints.release()
+        self.footprints.release()

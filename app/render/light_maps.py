@@ -105,7 +105,7 @@ class LightMaps:
         """Forget what was deposited and counted."""
         self.photon_weight = 0.0
         self.atlas.clear()
-        self.splatter.reset_counts()
+        self.splatter.footprints.reset_counts()
 
     def copied_sums(self, into: Sequence[moderngl.Texture] | None = None) -> list[moderngl.Texture]:
         """What was summed, in textures of the caller's; `into`: those of an earlier call."""

@@ -332,7 +332,7 @@ class LightPass:
             "map sums": 16 * len(self.maps.atlas.total_textures) * self.maps.atlas.size[0] * self.maps.atlas.size[1],
             "map scratch": self.maps.atlas.scratch_bytes,
         }
-        counts = self.maps.splatter.counts()
+        counts = self.maps.splatter.footprints.counts()
         elsewhere = self._elsewhere
         self.stats.splats_w = counts["splats_w"] + elsewhere.splats_w
         self.stats.outside_map_w = counts["outside_map_w"] + elsewhere.outside_map_w

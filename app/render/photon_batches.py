@@ -218,11 +218,8 @@ class PhotonBatches:
         self.splatting.release()
 
 
-def traced_besides(
-    trace: TracePass, seed: int, plans: Sequence[LightPlan], photons: int, keep: Keep, max_depth: int | None = None
-) -> Iterator[None]:
-    """Trace about `photons` by `plans` that belong to no map of a light pass, for `keep`, pausing after every batch;
-    `max_depth`: specular events, by default those of `trace`."""
+def traced_besides(trace: TracePass, seed: int, plans: Sequence[LightPlan], photons: int, keep: Keep) -> Iterator[None]:
+    """Trace about `photons` by `plans` that belong to no map of a light pass, for `keep`, pausing after every batch."""
     counts = [plan.lattice_count(photons) for plan in plans]
     rounds = max((-(-n // (trace.batch // plan.lattices)) for n, plan in zip(counts, plans, strict=True)), default=0)
     for j in range(rounds):
@@ -232,7 +229,7 @@ def traced_besides(
                 waiting = [plan.slice(seed, 0, lattice, j, rounds, points, float(photons))]
                 while waiting:
                     part = waiting.pop()
-                    batch = yield from trace.steps(part, plan.domain, max_depth)
+                    batch = yield from trace.steps(part, plan.domain)
                     if batch.overflow and part.points > 1:
                         waiting += part.halves
                         continue

@@ -137,7 +137,7 @@ class ShownSpectra:
         else:
             tables = SplatTables.build(ctx, axis, spectra, self.reflectances, shown, channels, width, before)
         reindex = None if into is None else into.reindex
-        return ShownTables(tables, ReindexBuffer(ctx, self.reindexing, spans, shown, spectra, tables.classes, reindex))
+        return ShownTables(tables, ReindexBuffer(ctx, self.reindexing, spans, spectra, tables.classes, reindex))
 
     def _unchanged(self) -> Reindexing | None:
         (traced, *_) = self._buffers.axis.glasses

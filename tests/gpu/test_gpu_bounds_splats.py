@@ -90,7 +90,7 @@ def test_no_work_group_takes_more_than_sixteen_rounds(gl: Context) -> None:
     """However large splats are: they are added in pieces, few of which the map cuts off."""
     rig = Rig(gl.ctx, FEATURES, (300, 300), by_compute=True)
     rig.draw(broad(400))
-    footprints = rig.splatter._footprints
+    footprints = rig.splatter.footprints
     splats = np.frombuffer(footprints.splats.read(400 * SPLAT.stride), SPLAT.dtype)
     splats = splats[splats["kind"] > 0]
     words = np.frombuffer(footprints.commands.read(16 * KIND_WORDS), np.uint32).reshape(4, KIND_WORDS)

@@ -215,7 +215,7 @@ def test_nothing_is_drawn_outside_the_tile_and_outside_flux_is_counted(rig: Rig)
     total = rig.atlas.read_total()
     assert total.sum(dtype=np.float64) == pytest.approx(image.sum(), rel=1e-6)
     assert 0.4 < image[..., 3].sum() / rig.light.power_w() < 0.7
-    counts = rig.splatter.counts()
+    counts = rig.splatter.footprints.counts()
     assert counts["outside_map_w"] == pytest.approx(2.0 * rig.light.power_w(), rel=1e-5)
     assert counts["splats_w"] == pytest.approx(3.0 * rig.light.power_w(), rel=1e-5)
     assert counts["footprints_dropped"] == counts["dropped_w"] == 0
@@ -230,7 +230,7 @@ def test_broken_footprints_become_single_texels_and_are_counted(rig: Rig, broken
     image = rig.draw(records)
     for at in (20, 40, 50):
         assert image[at, at, 3] == pytest.approx(rig.light.power_w(), rel=1e-5)
-    assert rig.splatter.counts()["footprints_dropped"] == 3
+    assert rig.splatter.footprints.counts()["footprints_dropped"] == 3
 
 
 @pytest.mark.parametrize("angle_deg", [0.0, 31.0, 45.0])
@@ -261,7 +261,7 @@ def test_too_large_ones_are_drawn_as_large_as_can_be_and_counted(gl, far: float,
         for tile in range(1 if coarse is None else 2):
             image = rig.draw(records, tile=tile)
             assert np.isfinite(image).all() and image.max() < 0.05 * rig.light.power_w()
-        assert image.sum() > 0.0 and (rig.splatter.counts()["footprints_dropped"] > 0) == (far > 1e5)
+        assert image.sum() > 0.0 and (rig.splatter.footprints.counts()["footprints_dropped"] > 0) == (far > 1e5)
 
 
 def test_nested_windows_are_complete_where_they_are_read(gl) -> None:

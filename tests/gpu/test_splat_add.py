@@ -122,7 +122,7 @@ def rigs(gl: Context, features: Features) -> tuple[Rig, Rig]:
 
 def drawn(rig: Rig, records: np.ndarray, most_groups: int = MOST_GROUPS) -> np.ndarray:
     """The map after these splat records alone, float64; `most_groups` that add them."""
-    footprints, atlas = rig.splatter._footprints, rig.atlas
+    footprints, atlas = rig.splatter.footprints, rig.atlas
     atlas.clear()
     kind, count = int(records["kind"][0]), len(records)
     assert (records["kind"] == kind).all() and count <= footprints.capacity
@@ -257,7 +257,7 @@ def test_photons_come_to_the_same_maps(gl: Context, nested: bool) -> None:
         np.testing.assert_allclose(got.sum(axis=(0, 1)), want.sum(axis=(0, 1)), rtol=2e-5)
     # What was drawn is forgotten with everything else.
     np.testing.assert_allclose(compute.draw(records, 0.6, tile=tile), got, rtol=1e-4, atol=1e-6 * got.max())
-    assert compute.splatter.counts() == raster.splatter.counts()
+    assert compute.splatter.footprints.counts() == raster.splatter.footprints.counts()
 
 
 def test_an_atlas_forgets_and_gives_back_its_sums(gl: Context) -> None:

@@ -91,7 +91,8 @@ class Accumulation:
             light_pass.begin(self.photons, self.seed)
             self.begun = True
             yield
-        for _ in light_pass.pass_steps(self.number, self.photons, 0 if self.number else self.light.rounds_running):
+        running = None if self.number else self.light.stored.running
+        for _ in light_pass.pass_steps(self.number, self.photons, running.store.rounds if running else 0):
             yield
         self.number += 1
 

@@ -241,11 +241,6 @@ class LiveLight:
         """Records that can be splatted again."""
         return self.stored.fullest.store.photons if self.stored.fullest else 0
 
-    @property
-    def rounds_running(self) -> int:
-        """Whole rounds stored of the pass that runs."""
-        return self.stored.running.store.rounds if self.stored.running else 0
-
     def splat_stored(self, *, of_running: bool = False) -> Iterator[None]:
         """Empty maps, then the stored photons as they are shown now, pausing after every slab, and beams as fine as
         those.

@@ -281,10 +281,10 @@ def overflow(context: Context, values: Sequence[float]) -> Measured:
         # What is merely too large keeps its shape at the limit: it is drawn by itself, and makes no firefly.
         large = np.isfinite(value) and not sound and abs(value) < FAR_TOO_LARGE
         images = [rig.draw(records[6:] if large else records)]
-        counted, broken = int(rig.splatter.counts()["footprints_dropped"]), 1 if sound else 7
+        counted, broken = int(rig.splatter.footprints.counts()["footprints_dropped"]), 1 if sound else 7
         if large:
             images.append(rig.draw(records[:6]))
-            counted += int(rig.splatter.counts()["footprints_dropped"])
+            counted += int(rig.splatter.footprints.counts()["footprints_dropped"])
         # A dropped footprint is one texel's splat: nothing of it leaves its own square of eight texels.
         squares = images[0][..., 3].reshape(2, 8, 4, 8).sum(axis=(1, 3)).ravel() / rig.light.power_w()
         dropped = [7] if sound or large else [0, 1, 2, 3, 4, 5, 7]

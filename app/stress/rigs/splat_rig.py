@@ -59,7 +59,7 @@ class Rig:
     def draw(self, photons: np.ndarray, smoothing: float = 1.0, batch: int | None = None, tile: int = 0) -> np.ndarray:
         """The tile after these photons alone, float64 (height, width, channels)."""
         self.atlas.clear()
-        self.splatter.reset_counts()
+        self.splatter.footprints.reset_counts()
         for part in np.array_split(photons, np.arange(batch, len(photons), batch)) if batch else [photons]:
             buffer = self.ctx.buffer(part)
             self.splatter.run(Photons(buffer, len(part)), self.spectra, self.atlas, self.receivers, smoothing)

@@ -85,7 +85,7 @@ def whole(
 
 
 def reciprocal_slider(
-    label: str, value: float, low: float, *, unit: str, tip: str, reset: float | None = None, format: str = "%.2f"
+    label: str, value: float, low: float, *, unit: str, tip: str, reset: float | None = None
 ) -> float:
     """A slider over `low` to infinity that is even in 1/value, as an Abbe number feels even.
 
@@ -94,15 +94,15 @@ def reciprocal_slider(
     label_hit = begin_row(label)
     reverse = 0.0 if math.isinf(value) else 1.0 / value
     if is_typed_in(label):
-        changed, moved = imgui.slider_float(f"##{label}", value if math.isfinite(value) else 0.0, low, 100.0, format)
+        changed, moved = imgui.slider_float(f"##{label}", value if math.isfinite(value) else 0.0, low, 100.0, "%.2f")
         after = _tidy(moved)
     else:
-        shown = "none" if math.isinf(value) else _with_unit(format % value, unit)
+        shown = "none" if math.isinf(value) else _with_unit(f"{value:.2f}", unit)
         with slider_mark.hidden_grab():
             changed, moved = imgui.slider_float(f"##{label}", reverse, 1.0 / low, 0.0, shown)
         slider_mark.draw(slider_mark.share_of(reverse, 1.0 / low, 0.0))
         after = math.inf if abs(moved) < 1e-4 else float(f"{1.0 / moved:.5g}")
-    explain(label, tip, unit, how_to(None if reset is None else "none" if math.isinf(reset) else format % reset))
+    explain(label, tip, unit, how_to(None if reset is None else "none" if math.isinf(reset) else f"{reset:.2f}"))
     return _settled(changed, value, after, reset, label_hit, infinite=True)
 
 
