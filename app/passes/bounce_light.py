@@ -74,7 +74,7 @@ class BounceLightPass(GatheredLight):
         budget = DispatchBudget(PER_FOLLOWED, PER_FOLLOWED, _PAIRS)
         super().__init__(context, buffers, places, seed, directions, _MOST_ASKED, budget, self.bounces)
         self.sources = BounceSources(context, buffers, self.places, self._places)
-        self._radiance = [self._texture() for _ in range(self.bounces)]
+        self._read = [self._texture() for _ in range(self.bounces)]
         self._areas = self.places.areas
         self._rows = self.places.rows
         self._scene: Scene | None = None
@@ -158,7 +158,7 @@ class BounceLightPass(GatheredLight):
         chance = power / total if total > 0.0 else power
         density = np.divide(chance, self._areas, out=np.zeros_like(chance), where=self._areas > 0.0)
         texels = np.concatenate([radiance, density[:, None]], axis=1)
-        self._radiance[bounce].write(self.places.image(texels).tobytes())
+        self._read[bounce].write(self.places.image(texels).tobytes())
         return np.concatenate([[0.0], np.cumsum(chance)]), density.astype(np.float32)
 
     def _ask(self, bounce: int, first: int, count: int) -> None:
@@ -184,7 +184,7 @@ class BounceLightPass(GatheredLight):
             part["key"] = [random_word(seed, 2 + bounce, int(n), _KEY) for n in followed]
         parameters["by_cosine"] = count
         parameters["straight"], parameters["followed"], parameters["aims"] = straight, len(followed), aims
-        self._dispatch(parameters, asked, self._radiance[bounce], "bounces", bounce)
+        self._dispatch(parameters, asked, self._read[bounce], "bounces", bounce)
 
     def _draw(self, asked: np.ndarray, points: np.ndarray, running: np.ndarray, density: np.ndarray) -> None:
         """Aim records (n,) at places drawn by `points` (n, 4): the first number chooses among rows of texels and goes
@@ -222,12 +222,12 @@ class BounceLightPass(GatheredLight):
     @property
     def bytes(self) -> int:
         """Device memory held."""
-        return self._bytes(*self._radiance) + self.sources.bytes
+        return super().bytes + self.sources.bytes
 
     def release(self) -> None:
         """Free everything."""
         self.sources.release()
-        self._release(self._radiance)
+        super().release()
 
 
 def _found(running: np.ndarray, borders: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -59,7 +59,6 @@ class EnvironmentLightPass(GatheredLight):
         places = covered_places(buffers, environment_places(buffers, finer))
         budget = DispatchBudget(PER_FOLLOWED, PER_FOLLOWED, MOST_ASKED * PER_FOLLOWED // (PER_FOLLOWED + 1))
         super().__init__(context, buffers, places, seed, directions, MOST_ASKED, budget)
-        self._levels: moderngl.Texture | None = None
         self._light: EnvironmentLight | None = None
         self._write(np.zeros((len(self.places.places), 3)))
         self.take(buffers.scene)
@@ -73,11 +72,12 @@ class EnvironmentLightPass(GatheredLight):
         self._light = EnvironmentLight(environment, self._seed)
         self._unshadowed = self._light.unshadowed(self.places.normals) if len(self.places.places) else np.zeros((0, 3))
         packed, self._level_places = self._light.levels()
-        shader.release(self._levels)
+        shader.release(*self._read)
         texels = np.zeros((*packed.shape[:2], 4), np.float32)
         texels[..., :3] = packed
-        self._levels = self._ctx.texture(packed.shape[1::-1], 4, texels, dtype="f4")
-        self._levels.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        levels = self._ctx.texture(packed.shape[1::-1], 4, texels, dtype="f4")
+        levels.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self._read = [levels]
         # What is shown stays until something is known of the new one.
         self.asked = self.shown = 0
         self._sums[0].clear()
@@ -102,7 +102,7 @@ class EnvironmentLightPass(GatheredLight):
             yield self.asked / self.total
 
     def _ask(self, count: int, seconds: float) -> None:
-        assert self._light is not None and self._levels is not None
+        assert self._light is not None
         started = time.perf_counter()
         follows = self._sphere is not None
         first_followed, end_followed = (
@@ -127,7 +127,7 @@ class EnvironmentLightPass(GatheredLight):
         parameters["level_wide"][0, :3] = self._level(wide)
         parameters["level_narrow"][0, :3] = self._level(0.25 * wide)
         parameters["straight"], parameters["followed"] = count, followed
-        self._dispatch(parameters, asked, self._levels, "environment")
+        self._dispatch(parameters, asked, self._read[0], "environment")
         self.asked += count
         took = time.perf_counter() - started
         self.seconds += took
@@ -157,15 +157,6 @@ class EnvironmentLightPass(GatheredLight):
 
     def _write(self, irradiance: np.ndarray) -> None:
         self.texture.write(self.places.image(irradiance).tobytes())
-
-    @property
-    def bytes(self) -> int:
-        """Device memory held."""
-        return self._bytes(self._levels)
-
-    def release(self) -> None:
-        """Free everything."""
-        self._release([self._levels])
 
 
 def without_light(ctx: moderngl.Context, receivers: int) -> moderngl.Texture:

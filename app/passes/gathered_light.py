@@ -4,8 +4,6 @@ the camera looks up."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import moderngl
 import numpy as np
 
@@ -104,6 +102,8 @@ class GatheredLight:
         """Spent on it."""
         self.texture = self._texture()
         """What the camera looks up."""
+        self._read: list[moderngl.Texture] = []
+        """What light is looked up in, its own."""
         self._places = self._ctx.buffer(places.places.tobytes() or bytes(PLACE.stride))
         size = max(1, len(places.places)) * SUM.stride
         self._sums = [self._ctx.buffer(bytes(size)) for _ in range(max(bounces, 1))]
@@ -165,13 +165,16 @@ class GatheredLight:
         lost = [self._found(bounce)["lost"].mean(dtype=float) for bounce in range(len(self._sums))]
         return float(np.mean(lost) / (self.asked // PER_FOLLOWED))
 
-    def _bytes(self, *textures: moderngl.Texture | None) -> int:
-        sizes = [16 * t.width * t.height for t in (self.texture, *textures) if t is not None]
+    @property
+    def bytes(self) -> int:
+        """Device memory held."""
+        sizes = [16 * t.width * t.height for t in (self.texture, *self._read)]
         return self._places.size + sum(sums.size for sums in self._sums) + sum(sizes)
 
-    def _release(self, others: Sequence[moderngl.Texture | None]) -> None:
+    def release(self) -> None:
+        """Free everything."""
         shader.release(self._places, self._asked_buffer, self._parameters, self._program, self.texture, *self._sums)
-        shader.release(*(texture for texture in others if texture is not None))
+        shader.release(*self._read)
 
 
 def specular_sphere(buffers: SceneBuffers) -> np.ndarray | None:
