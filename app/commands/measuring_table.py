@@ -130,25 +130,6 @@ class BenchView(ReadsScenes):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Fingerprint(ReadsScenes):
-    """Hash every scene's programs and small pictures, to see what a change of the shaders changes."""
-
-    scenes: tuple[str, ...] = argument(
-        "[SCENE]...",
-        "Scenes; default: every shipped one and every lesson.",
-        complete=completion.scenes,
-        repeated=True,
-        default=(),
-    )
-    output: Path | None = target("FILE.json", "Write all hashes.", default=None)
-    against: Path | None = option("FILE.json", "Name what differs from these hashes; then exits with 1.")
-    cases: tuple[str, ...] | None = option(
-        "A,B", "Only these methods, layers, views …: 'srd,caustic,viewer'; default: all.", options.names
-    )
-    texts: bool = switch("Programs alone, without photons, maps and camera samples.")
-
-
-@dataclass(frozen=True, kw_only=True)
 class ProveGpu:
     """Prove that this machine's GPU draws what it should, and measure how fast; exits with 10 and up where not."""
 

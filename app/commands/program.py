@@ -34,7 +34,6 @@ COMMANDS = {
     "stress": ("measuring_table:Stress", "stress:stress"),
     "bench-agreement": ("measuring_table:BenchAgreement", "bench_agreement:bench_agreement"),
     "bench-view": ("measuring_table:BenchView", "bench_view:bench_view"),
-    "fingerprint": ("measuring_table:Fingerprint", "fingerprint:fingerprint"),
     "prove-gpu": ("measuring_table:ProveGpu", "prove_gpu:prove_gpu"),
     "farm render": ("table:FarmRender", "farm:render"),
     "farm animate": ("table:FarmAnimate", "farm:animate"),
