@@ -1,9 +1,9 @@
 """CPU reference of emit.comp, for tests and stress cases: how rays leave a light, in float64 and world units.
 
-It has no derivatives: the shader's ray differentials are checked against difference quotients of `Emitter.start`. A
-ray's start does not depend on its wavelength, which `drawn_wavelengths` samples. Lattice, equal-area map, disc and spot
-edge follow their mathematical definitions, independently of shaders/lib/emission.glsl and spot.glsl. Points of the
-plane or of the unit square have shape (..., 2), directions (..., 3).
+It has no derivatives: the shader's ray differentials are checked against difference quotients of `Emitter.start`.
+Lattice, equal-area map, disc and spot edge follow their mathematical definitions, independently of
+shaders/lib/emission.glsl and spot.glsl. Points of the plane or of the unit square have shape (..., 2), directions
+(..., 3).
 """
 
 from __future__ import annotations
@@ -14,9 +14,6 @@ from math import erf
 import numpy as np
 
 from ..gpu.gpu_space import GpuSpace
-from ..model.optics.colorimetry import VISIBLE_NM, cmf_xyz
-from ..model.optics.spectral_tables import SpectralAxis
-from ..model.optics.spectrum import Spectrum, cmf_at
 from ..model.scene import Light
 from ..passes.emission_domain import EmissionDomain
 from .optics import unit
@@ -31,14 +28,6 @@ def lattice_point(i: Array, count: int, shift: tuple[Array | int, Array | int]) 
     """Point i of the golden-ratio Kronecker lattice of `count` points in the unit square, shifted modulo 2³²."""
     along = (np.asarray(i, np.float64) + unit_float(shift[0])) / count
     return np.stack(np.broadcast_arrays(along, kronecker(i, GOLDEN, shift[1])), axis=-1)
-
-
-def mirrored_lattice_point(i: Array, count: int, shift: tuple[Array | int, Array | int]) -> Array:
-    """Point i of `count`: even ones are a lattice in the left half of the unit square, each odd one is the mirror image
-    in the square's middle of the one before it."""
-    i = np.asarray(i)
-    unit = lattice_point(i // 2, (count + 1) // 2, shift) * (0.5, 1.0)
-    return np.where(i[..., None] % 2 == 0, unit, 1.0 - unit)
 
 
 def azimuthal_direction(q: Array) -> Array:
@@ -161,41 +150,3 @@ def _lit_share(spacings: np.ndarray) -> np.ndarray:
     """Lit share of a lattice point that lies `spacings` inside a hard edge; 0 or 1 beyond one spacing."""
     share = 0.5 * (1.0 + np.vectorize(erf, otypes=[float])(spacings / (np.sqrt(2.0) * EDGE_SPREAD)))
     return np.where(np.abs(spacings) < 1.0, share, spacings > 0.0)
-
-
-def drawn_wavelengths(
-    spectrum: Spectrum,
-    axis: SpectralAxis,
-    band: tuple[float, float],
-    place: np.ndarray,
-    cells: int = 1024,
-    by_power: bool = False,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Reference of lib/wavelength.glsl: random wavelengths in `band`, as (spectral coordinate x, one over its density).
-
-    They are sampled by the random numbers `place` (...,) in [0, 1), with a density that is 0.6 of X + Y + Z, 0.2 of
-    radiant power and 0.2 uniform over the light's support; with `by_power` 0.8 of radiant power and 0.2 uniform. The
-    density is constant in each of `cells` equal cells of x."""
-    borders = np.linspace(0.0, 1.0, cells + 1)
-    nm = np.concatenate([[380.0], VISIBLE_NM[:-1] + 0.5, [780.0]])
-    lo_nm, hi_nm = spectrum.support_nm()
-    start, end = axis.x_of_nm(np.array([lo_nm - 0.5, hi_nm + 0.5]))
-    even = np.maximum(np.minimum(borders[1:], end) - np.maximum(borders[:-1], start), 0.0)
-
-    def in_cells(per_nm: np.ndarray, line_weights: np.ndarray) -> np.ndarray:
-        mass = np.diff(np.interp(borders, axis.x_of_nm(nm), np.concatenate([[0.0], np.cumsum(per_nm)])))
-        for (line_nm, power), weight in zip(spectrum.lines, line_weights, strict=True):
-            at = np.clip(np.ceil(float(axis.x_of_nm(line_nm)) * cells) - 1, 0, cells - 1)
-            mass[int(at)] += power * weight
-        return mass / mass.sum() if mass.sum() > 0.0 else even / even.sum()
-
-    line_nm = np.array([wavelength for wavelength, _ in spectrum.lines])
-    watt = in_cells(spectrum.density, np.ones(len(line_nm)))
-    seen = in_cells(spectrum.density * cmf_xyz().sum(axis=1), cmf_at(line_nm).reshape(-1, 3).sum(axis=1))
-    share = (0.8 * watt if by_power else 0.6 * seen + 0.2 * watt) + 0.2 * even / even.sum()
-    cumulative = np.concatenate([[0.0], np.cumsum(share)])
-    below, above = np.interp(band, borders, cumulative)
-    wanted = below + np.asarray(place, np.float64) * (above - below)
-    cell = np.clip(np.searchsorted(cumulative, wanted, side="right") - 1, 0, cells - 1)
-    x = borders[cell] + (wanted - cumulative[cell]) / (share[cell] * cells)
-    return x, (above - below) / (share[cell] * cells)

@@ -2,8 +2,7 @@
 
 Arrays of 3-vectors have shape (..., 3), scalars (...); everything broadcasts. As in the
 shaders `normal` faces the incoming ray (direction · normal < 0) and eta_it = n_incident /
-n_transmitted. Where a function exists in a stable and a textbook form both are here: they are
-derived differently and agree to rounding, so that each checks the other.
+n_transmitted.
 """
 
 from __future__ import annotations
@@ -63,17 +62,6 @@ def reflect(direction: Array, normal: Array) -> Array:
     return direction - times(2.0 * dot(direction, normal), normal)
 
 
-def fresnel_reflectance(direction: Array, normal: Array, eta_it: Array) -> Array:
-    """Unpolarised reflectance by Fresnel's tangent and sine laws' cosine form; 1 at total reflection."""
-    n_i, n_t = np.asarray(eta_it, np.float64), 1.0
-    cosine_i = -dot(direction, normal)
-    cosine2_t = transmitted_cosine2(direction, normal, eta_it)
-    cosine_t = np.sqrt(np.maximum(cosine2_t, 0.0))
-    senkrecht = (n_i * cosine_i - n_t * cosine_t) / (n_i * cosine_i + n_t * cosine_t)
-    parallel = (n_t * cosine_i - n_i * cosine_t) / (n_t * cosine_i + n_i * cosine_t)
-    return np.where(cosine2_t > 0.0, 0.5 * (senkrecht**2 + parallel**2), 1.0)
-
-
 def transfer_column(dposition: Array, ddirection: Array, direction: Array, normal_g: Array, distance: Array) -> Array:
     """∂(hit point): Igehy 1999, eq. 10 and 12, with the derivative of the distance written out."""
     ddistance = -dot(dposition + times(distance, ddirection), normal_g) / dot(direction, normal_g)
@@ -87,27 +75,12 @@ def reflect_column(direction: Array, ddirection: Array, normal: Array, dnormal: 
     return ddirection - times(2.0 * dtheta, normal) - times(2.0 * theta, dnormal)
 
 
-def refract_column_textbook(
-    direction: Array, ddirection: Array, normal: Array, dnormal: Array, eta_it: Array, deta_it: Array
-) -> Array:
-    """∂(refracted direction): Igehy 1999, eq. 18–19, with the ∂eta terms of Elek et al. 2014."""
-    eta = np.asarray(eta_it, np.float64)
-    deta = np.asarray(deta_it, np.float64)
-    theta = dot(direction, normal)
-    omega = np.sqrt(1.0 - eta**2 * (1.0 - theta**2))
-    mu = eta * theta + omega
-    dtheta = dot(ddirection, normal) + dot(direction, dnormal)
-    # omega² = 1 - eta² (1 - theta²), differentiated.
-    domega = (eta**2 * theta * dtheta - eta * deta * (1.0 - theta**2)) / omega
-    dmu = deta * theta + eta * dtheta + domega
-    return times(deta, direction) + times(eta, ddirection) - times(dmu, normal) - times(mu, dnormal)
-
-
 def refract_column_stable(
     direction: Array, ddirection: Array, normal: Array, dnormal: Array, eta_it: Array, deta_it: Array
 ) -> Array:
-    """The same, arranged so that nothing cancels at eta_it near 1: with omega² = (1-eta)(1+eta) + eta²theta²,
-    mu is (1-eta)(1+eta) / (omega - eta theta) instead of the difference eta theta + omega."""
+    """∂(refracted direction): Igehy 1999, eq. 18–19, with the ∂eta terms of Elek et al. 2014, arranged so that nothing
+    cancels at eta_it near 1: with omega² = (1-eta)(1+eta) + eta²theta², mu is (1-eta)(1+eta) / (omega - eta theta)
+    instead of the difference eta theta + omega."""
     eta = np.asarray(eta_it, np.float64)
     theta = dot(direction, normal)
     sine2 = (1.0 - theta) * (1.0 + theta)
@@ -128,27 +101,3 @@ def normalised_derivative(vector: Array, dvector: Array) -> Array:
     length = np.linalg.norm(vector, axis=-1, keepdims=True)
     direction = vector / length
     return (dvector - times(dot(direction, dvector), direction)) / length
-
-
-def barycentric_weights(triangle: Array, point: Array) -> Array:
-    """Weights (3,) of the corners for a point in the plane of `triangle` (3, 3), by signed areas."""
-    a, b, c = triangle
-    normal = cross(b - a, c - a)
-    areas = np.array([cross(c - b, point - b), cross(a - c, point - c), cross(b - a, point - a)]) @ normal
-    return areas / (normal @ normal)
-
-
-def shading_normal_column(
-    triangle: Array, corner_normals: Array, point: Array, dposition: Array
-) -> tuple[Array, Array]:
-    """(n̂, ∂n̂) of normals interpolated over a triangle; ∂n̂ for dposition (..., 3) in its plane.
-
-    The weights are linear in the point, so their change is found by weighing a moved point:
-    no gradient formula is shared with the shaders.
-    """
-    weights = barycentric_weights(triangle, point)
-    summed = weights @ corner_normals
-    columns = np.reshape(dposition, (-1, 3))
-    dweights = np.array([barycentric_weights(triangle, point + column) - weights for column in columns]).reshape(-1, 3)
-    dnormal = normalised_derivative(summed, dweights @ corner_normals)
-    return unit(summed), dnormal.reshape(np.shape(dposition))

@@ -35,14 +35,5 @@ def kronecker(i: Array | int, generator: Array | int, shift: Array | int) -> Arr
     return unit_float((_wide(i) * _wide(generator) + _wide(shift)) & _MASK)
 
 
-def radical_inverse(i: Array | int, shift: Array | int) -> Array:
-    """The binary digits of i mirrored at the point, those of `shift` added without carry."""
-    word = _wide(i)
-    mirrored = np.zeros_like(word)
-    for bit in range(32):
-        mirrored = mirrored | ((word >> np.uint64(bit) & np.uint64(1)) << np.uint64(31 - bit))
-    return unit_float(mirrored ^ _wide(shift))
-
-
 def _wide(value: Array | int) -> Array:
     return np.asarray(value).astype(np.uint64) & _MASK

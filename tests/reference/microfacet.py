@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from reference.textbook_optics import fresnel_reflectance
 from spectrasplat.reference import optics
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -83,7 +84,7 @@ def shares(angle: float, width: float, eta_it: float) -> tuple[float, float]:
     seen = facing > 0.0
     normal, incident = facets.normal[seen], np.broadcast_to(-light, (int(seen.sum()), 3))
     met = facing[seen] / facets.normal[seen, 2] * facets.area[seen] * unhidden(angle, width) / np.cos(angle)
-    reflectance = optics.fresnel_reflectance(incident, normal, np.array(eta_it))
+    reflectance = fresnel_reflectance(incident, normal, np.array(eta_it))
     reflected = np.sum(met * reflectance * hidden(optics.reflect(incident, normal)[:, 2]))
     passes = optics.transmitted_cosine2(incident, normal, np.array(eta_it)) > 0.0
     refracted = optics.refract(incident[passes], normal[passes], np.array(eta_it))
@@ -104,7 +105,7 @@ def lobe_on_plane(radius: np.ndarray, height: float, width: float, index: float)
     microfacet = toward_many(0.5 * tilt)
     hidden = Unhidden(width)
     down = np.broadcast_to(-UP, microfacet.shape)
-    reflectance = optics.fresnel_reflectance(down, microfacet, np.array(1.0 / index))
+    reflectance = fresnel_reflectance(down, microfacet, np.array(1.0 / index))
     intensity = area_density(microfacet, width) * reflectance * hidden(np.cos(tilt)) / 4.0
     return intensity * np.cos(tilt) ** 3 / height**2
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from spectrasplat.reference.optics import cross, normalised_derivative, shading_normal_column, unit
+from spectrasplat.reference.optics import Array, cross, normalised_derivative, unit
 
 
 class Surface(Protocol):
@@ -89,3 +89,27 @@ class Facet:
     def area_vector(self) -> np.ndarray:
         a, b, c = self.corners
         return cross(b - a, c - a)
+
+
+def barycentric_weights(triangle: Array, point: Array) -> Array:
+    """Weights (3,) of the corners for a point in the plane of `triangle` (3, 3), by signed areas."""
+    a, b, c = triangle
+    normal = cross(b - a, c - a)
+    areas = np.array([cross(c - b, point - b), cross(a - c, point - c), cross(b - a, point - a)]) @ normal
+    return areas / (normal @ normal)
+
+
+def shading_normal_column(
+    triangle: Array, corner_normals: Array, point: Array, dposition: Array
+) -> tuple[Array, Array]:
+    """(n̂, ∂n̂) of normals interpolated over a triangle; ∂n̂ for dposition (..., 3) in its plane.
+
+    The weights are linear in the point, so their change is found by weighing a moved point:
+    no gradient formula is shared with the shaders.
+    """
+    weights = barycentric_weights(triangle, point)
+    summed = weights @ corner_normals
+    columns = np.reshape(dposition, (-1, 3))
+    dweights = np.array([barycentric_weights(triangle, point + column) - weights for column in columns]).reshape(-1, 3)
+    dnormal = normalised_derivative(summed, dweights @ corner_normals)
+    return unit(summed), dnormal.reshape(np.shape(dposition))

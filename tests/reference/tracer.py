@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 from reference.grating import diffract_columns
 from reference.surfaces import Facet, Surface
+from reference.textbook_optics import fresnel_reflectance, refract_column_textbook
 from spectrasplat.reference import optics, polarised
 
 
@@ -88,7 +89,7 @@ def refracted(ray: Ray, normal: np.ndarray, dnormal: np.ndarray, n_i: Index, n_t
     return replace(
         ray,
         direction=optics.refract(ray.direction, normal, eta),
-        ddirection=optics.refract_column_textbook(ray.direction, ray.ddirection, normal, dnormal, eta, deta),
+        ddirection=refract_column_textbook(ray.direction, ray.ddirection, normal, dnormal, eta, deta),
     )
 
 
@@ -276,7 +277,7 @@ def follow(
             ray, inside = arrived, after
             continue
         eta_it = n_i.index.n / n_t.index.n
-        reflectance = float(optics.fresnel_reflectance(arrived.direction, normal, eta_it))
+        reflectance = float(fresnel_reflectance(arrived.direction, normal, eta_it))
         margin = min(margin, float(np.sqrt(abs(optics.transmitted_cosine2(arrived.direction, normal, eta_it)))))
         beyond = None if reflects(len(reflections)) else refracted(arrived, normal, dnormal, n_i.index, n_t.index)
         sent = reflected(arrived, normal, dnormal) if beyond is None else beyond

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from reference.textbook_optics import fresnel_reflectance
 from spectrasplat.features.features import Features
 from spectrasplat.gpu.context import Context
 from spectrasplat.gpu.scene_buffers import SceneBuffers
@@ -179,7 +180,7 @@ def histogram(window: Window) -> np.ndarray:
             )
             facing = normal if optics.dot(direction[0], normal) < 0 else -normal
             normals = np.broadcast_to(facing, direction.shape)
-            weight = weight * (1.0 - optics.fresnel_reflectance(direction, normals, eta))
+            weight = weight * (1.0 - fresnel_reflectance(direction, normals, eta))
             direction = optics.refract(direction, normals, eta)
         position = (
             position + ((window.origin - position) @ window.normal / (direction @ window.normal))[:, None] * direction

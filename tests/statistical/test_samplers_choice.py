@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from reference.textbook_optics import fresnel_reflectance
 from spectrasplat.features.features import Features
 from spectrasplat.gpu import records as records_of_the_device
 from spectrasplat.gpu.scene_buffers import SceneBuffers
@@ -21,7 +22,6 @@ from spectrasplat.model.scene import Camera, Diffuse, Scene, SceneObject
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes.emission_domain import emission_domain
 from spectrasplat.passes.trace import Band, LatticeSlice, TracePass
-from spectrasplat.reference import optics
 from spectrasplat.reference.glasses import index
 from spectrasplat.render.device_scene import spectral_axis
 from spectrasplat.stress.rigs.gpu_paths import glass, screen
@@ -84,7 +84,7 @@ def landed(gl) -> tuple[np.ndarray, float]:
 
 def reflectance() -> float:
     direction, normal = np.array([np.sin(ANGLE), 0.0, -np.cos(ANGLE)]), np.array([0.0, 0.0, 1.0])
-    return float(optics.fresnel_reflectance(direction, normal, 1.0 / index("N-BK7", NM)))
+    return float(fresnel_reflectance(direction, normal, 1.0 / index("N-BK7", NM)))
 
 
 def standard_errors(landed: tuple[np.ndarray, float], r: float) -> np.ndarray:

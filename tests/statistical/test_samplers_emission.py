@@ -11,10 +11,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from reference.lamps import cosine, isotropic, lamp, lopsided
+from reference.samplers import drawn_wavelengths
 from spectrasplat.model.lights import AreaLight, CollimatedLight, DirectionalLight, PointLight, SpotLight
 from spectrasplat.model.optics.spectral_tables import SpectralAxis
 from spectrasplat.model.optics.spectrum import constant
-from spectrasplat.reference.emission import drawn_wavelengths
 from spectrasplat.reference.optics import unit
 
 from tests.statistical.chi_square import ALPHA, chi_square, smallest_tilt, thinned

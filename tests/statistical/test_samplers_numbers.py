@@ -11,13 +11,14 @@ import re
 
 import numpy as np
 import pytest
+from reference.samplers import mirrored_lattice_point, radical_inverse
 from scipy.spatial import KDTree
 from spectrasplat.base import paths
 from spectrasplat.base.random_words import PASS_GENERATORS
 from spectrasplat.gpu.records import LATTICE_BIT, TRACE_PARAMETERS
 from spectrasplat.passes.pixel_lattice import cells_of, pixel_lattice
-from spectrasplat.reference.emission import GOLDEN, PLASTIC, lattice_point, mirrored_lattice_point
-from spectrasplat.reference.random_numbers import hash_combine, hash_pcg, kronecker, radical_inverse, unit_float
+from spectrasplat.reference.emission import GOLDEN, PLASTIC, lattice_point
+from spectrasplat.reference.random_numbers import hash_combine, hash_pcg, kronecker, unit_float
 from spectrasplat.stress.rigs.glsl_function import evaluate
 
 from tests.statistical.chi_square import (

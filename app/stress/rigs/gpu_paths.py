@@ -103,10 +103,6 @@ class Photons:
                         table[band, int(keys[place])] = tuple(_CHOICES[digit] for digit in digits)
         return [table[key] for key in zip(self.band.tolist(), self.records["branch_key"].tolist(), strict=True)]
 
-    def of_band(self, band: int) -> Photons:
-        """Those of one of the given bands."""
-        return self.where(self.band == band)
-
     def where(self, chosen: np.ndarray) -> Photons:
         names = ["records", "q", "start", "direction", "position", "weight", "nm"]
         names += ["dposition_ds", "dposition_dt", "dposition_dvar"]
