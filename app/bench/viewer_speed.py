@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator
-from contextlib import nullcontext
-from dataclasses import dataclass, field, replace
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,6 +20,7 @@ import numpy as np
 from ..base.errors import UserError
 from ..edit.glass import set_dispersion_gain
 from ..edit.state import Selection
+from ..model.placement import rotation_about
 from ..passes.sample_picture import SamplePicture
 from ..render.viewer.engine import LiveEngine
 from ..ui.headless import HeadlessInterface
@@ -44,91 +45,39 @@ _CHROME = (1.85, 1.6)
 """Window over viewport, first guess."""
 
 
-@dataclass(frozen=True)
-class Phase:
-    """What was measured while one thing was done."""
-
-    name: str
-    frame_ms: np.ndarray
-    processor_ms: float
-    """Of a frame on all cores, which other programs change less than they change the clock's time."""
-    photons_per_second: float
-    rays_traced: int
-    pictures_per_second: float
-    """New ones: what is seen to move."""
-    direct: float
-    """Side of the picture over the wanted side, on average, for what is seen directly …"""
-    glass: float
-    """… and for what is seen by way of glass and mirrors."""
-    whole_s: float
-    """From the last input until every pixel has its own path again …"""
-    whole_processor_s: float
-    """… and what that took on all cores."""
-    frame_photons: int = 0
-    """Of the last frame that had any."""
-    device_ms: dict[str, float] = field(default_factory=dict)
-    """Of a frame, by pass and by the device's own timers; empty where these do not work."""
-
-    @property
-    def figures(self) -> dict[str, float]:
-        """With units in their names."""
-        median, worst = np.percentile(self.frame_ms, [50, 95])
-        found = {
-            "frames": len(self.frame_ms),
-            "median_ms": median,
-            "p95_ms": worst,
-            "longest_ms": float(self.frame_ms.max()),
-            "processor_ms": self.processor_ms,
-            "pictures_per_s": self.pictures_per_second,
-            "frame_photons": self.frame_photons,
-            "photons_per_s": self.photons_per_second,
-            "direct_side": self.direct,
-            "glass_side": self.glass,
-            "whole_s": self.whole_s,
-            "whole_processor_s": self.whole_processor_s,
-        } | {f"{name}_device_ms": spent for name, spent in self.device_ms.items()}
-        return {name: float(f"{figure:.4g}") for name, figure in found.items()}
-
-
-@dataclass(frozen=True)
-class Latency:
-    """From single inputs to the pictures that show them."""
-
-    answered_ms: np.ndarray
-    missed: int
-    """Inputs that had none within `ANSWER_S`."""
-
-    @property
-    def figures(self) -> dict[str, float]:
-        """Their median, where those that were missed took all the time there was, and how many these are."""
-        answered = np.concatenate([self.answered_ms, np.full(self.missed, 1e3 * ANSWER_S)])
-        return {"answered_ms": round(float(np.median(answered)), 1), "missed": self.missed}
+Figures = dict[str, float]
+"""With units in their names. Of a phase: `photons_per_s` traced, `pictures_per_s` new ones, what is seen to move;
+`frame_photons` of the last frame that had any; `processor_ms` of a frame on all cores, which other programs change less
+than they change the clock's time; `direct_side` and `glass_side`, the picture's side over the wanted one, on average,
+for what is seen directly and by way of glass and mirrors; `whole_s` from the last input until every pixel has its own
+path again, and `whole_processor_s` on all cores; `…_device_ms` of a frame, by pass and the device's own timers, where
+these work."""
 
 
 def run(
     context: Context, scene: Path, size: tuple[int, int], seconds: float, frames: float = math.inf
-) -> Iterator[tuple[str, dict[str, float]]]:
-    """What was done, and figures with units in their names, as they are measured: `seconds` for each phase, a viewport
-    of `size` pixels. With `frames` only what is moved, for so many at most."""
+) -> Iterator[tuple[str, Figures]]:
+    """What was done and its figures, as they are measured: `seconds` for each phase, a viewport of `size` pixels. With
+    `frames` only what is moved, for so many at most."""
     bench = _Bench(context, scene, size)
     try:
         first = bench.wait_for_picture()
         whole = first + bench.wait_for_whole()
         yield "first picture", {"first_s": round(first, 3), "whole_s": round(whole, 3)}
         if frames == math.inf:
-            yield "accumulating", bench.phase("accumulating", seconds, bench.rest).figures
+            yield "accumulating", bench.phase(seconds, bench.rest)
         for name, hold, act in (
             ("orbiting", bench.holding_middle_button, bench.orbit),
             ("dragging dispersion", bench.holding_gain, bench.drag_gain),
             ("turning the glass", bench.holding_gain, bench.turn_glass),
         ):
-            yield name, bench.phase(name, seconds, act, hold, frames).figures
+            yield name, bench.phase(seconds, act, hold, frames)
             for _ in range(30):
                 bench.interface.frame()
         yield "device memory", {"mib": round(bench.session.picture.stats.bytes / 2**20)}
         if frames == math.inf:
-            yield "a step of the camera", bench.latency(bench.nudge_camera).figures
-            yield "a step of dispersion", bench.latency(bench.nudge_gain).figures
+            yield "a step of the camera", bench.latency(bench.nudge_camera)
+            yield "a step of dispersion", bench.latency(bench.nudge_gain)
     finally:
         bench.release()
 
@@ -202,12 +151,11 @@ class _Bench:
 
     def phase(
         self,
-        name: str,
         seconds: float,
         act: Callable[[], None],
-        hold: Callable[[], _Held] | None = None,
+        hold: Callable[[], AbstractContextManager[None]] = nullcontext,
         frames: float = math.inf,
-    ) -> Phase:
+    ) -> Figures:
         """Frames for `seconds`, `frames` at most, with `act` before each and `hold` held; then until the picture is
         whole again."""
         times: list[float] = []
@@ -216,7 +164,7 @@ class _Bench:
         assert engine is not None
         pictures, before = 0, self.session.picture.stats
         on_device = dict(self._context.timers.seconds)
-        with hold() if hold is not None else nullcontext():
+        with hold():
             version = engine.picture_version
             started, worked = time.perf_counter(), time.process_time()
             while time.perf_counter() - started < seconds and len(times) < frames:
@@ -233,27 +181,38 @@ class _Bench:
             photons = self.session.picture.stats.frame_photons
         ended = time.process_time()
         whole_s = self.wait_for_whole()
-        return Phase(
-            name,
-            np.array(times),
-            1e3 * worked / len(times),
-            rays / elapsed,
-            rays,
-            pictures / elapsed,
-            float(np.mean(direct)),
-            float(np.mean(glass)),
-            whole_s,
-            time.process_time() - ended,
-            photons,
-            {name: 1e3 * seconds / len(times) for name, seconds in spent.items()},
-        )
+        found = {
+            "frames": len(times),
+            "median_ms": float(np.median(times)),
+            "p95_ms": float(np.percentile(times, 95)),
+            "longest_ms": max(times),
+            "processor_ms": 1e3 * worked / len(times),
+            "pictures_per_s": pictures / elapsed,
+            "frame_photons": photons,
+            "photons_per_s": rays / elapsed,
+            "direct_side": float(np.mean(direct)),
+            "glass_side": float(np.mean(glass)),
+            "whole_s": whole_s,
+            "whole_processor_s": time.process_time() - ended,
+        } | {f"{name}_device_ms": 1e3 * seconds / len(times) for name, seconds in spent.items()}
+        return {name: float(f"{figure:.4g}") for name, figure in found.items()}
 
     def rest(self) -> None:
         """Do nothing."""
 
-    def holding_middle_button(self) -> _Held:
+    @contextmanager
+    def held(self, place: tuple[float, float], button: int) -> Iterator[None]:
+        """A mouse button is down at a place."""
+        self.interface.move(place)
+        self.interface.press(button)
+        try:
+            yield
+        finally:
+            self.interface.let_go(button)
+
+    def holding_middle_button(self) -> AbstractContextManager[None]:
         """The viewport is held to orbit."""
-        return _Held(self.interface, self.interface.find("Picture").centre, 2)
+        return self.held(self.interface.find("Picture").centre, 2)
 
     def orbit(self) -> None:
         """Turn a little, in a slow circle of the mouse."""
@@ -264,9 +223,9 @@ class _Bench:
             (x + ORBIT_PX / 0.05 * math.sin(angle), y + 0.3 * ORBIT_PX / 0.05 * (1 - math.cos(angle)))
         )
 
-    def holding_gain(self) -> _Held:
+    def holding_gain(self) -> AbstractContextManager[None]:
         """The slider of the dispersion gain is held."""
-        return _Held(self.interface, self.interface.find("Dispersion gain").at(0.1), 0)
+        return self.held(self.interface.find("Dispersion gain").at(0.1), 0)
 
     def drag_gain(self) -> None:
         """Move the slider to and fro."""
@@ -275,14 +234,10 @@ class _Bench:
 
     def turn_glass(self) -> None:
         """Turn the object a little about the vertical axis through its middle, as the gizmo does."""
-        angle, state = math.radians(TURN_DEG), self.session.state
-        turn, item = np.eye(4), state.scene.objects[self._glass]
-        turn[:2, :2] = (math.cos(angle), -math.sin(angle)), (math.sin(angle), math.cos(angle))
+        state = self.session.state
+        item = state.scene.objects[self._glass]
         matrix = item.object_to_world.copy()
-        middle = matrix[:3, 3].copy()
-        matrix[:3, 3] = 0.0
-        matrix = turn @ matrix
-        matrix[:3, 3] = middle
+        matrix[:3, :3] = rotation_about((0.0, 0.0, 1.0), math.radians(TURN_DEG)) @ matrix[:3, :3]
         objects = list(state.scene.objects)
         objects[self._glass] = replace(item, object_to_world=matrix)
         self.session.state = replace(state, scene=replace(state.scene, objects=tuple(objects)))
@@ -311,8 +266,9 @@ class _Bench:
         gain = material.dispersion.gain
         self.session.state = replace(state, scene=set_dispersion_gain(state.scene, self._glass, min(gain * 1.07, 10.0)))
 
-    def latency(self, nudge: Callable[[], None]) -> Latency:
-        """From single inputs to the end of the first frame whose picture shows each.
+    def latency(self, nudge: Callable[[], None]) -> Figures:
+        """From single inputs to the end of the first frame whose picture shows each: the median, where those that were
+        missed (no such picture within `ANSWER_S`) took all that time, and how many these are.
 
         Pictures are finished after one camera sample from now on: what is timed begins at rest where the machine comes
         to it in time. Where it does not, pictures change by themselves: only one that was made after the engine took
@@ -334,23 +290,10 @@ class _Bench:
                 if made and not np.array_equal(self._look(), before):
                     found.append(spent)
                     break
-        return Latency(np.array(found), NUDGES - len(found))
+        missed = NUDGES - len(found)
+        return {"answered_ms": round(float(np.median(found + [1e3 * ANSWER_S] * missed)), 1), "missed": missed}
 
     def _look(self) -> np.ndarray:
         radiance = self.session.picture.radiance
         assert radiance is not None
         return self._sampler.run(radiance)
-
-
-class _Held:
-    """A mouse button that is down within a block."""
-
-    def __init__(self, interface: HeadlessInterface, place: tuple[float, float], button: int) -> None:
-        self._interface, self._place, self._button = interface, place, button
-
-    def __enter__(self) -> None:
-        self._interface.move(self._place)
-        self._interface.press(self._button)
-
-    def __exit__(self, *_exception: object) -> None:
-        self._interface.let_go(self._button)

@@ -23,23 +23,24 @@ def test_walking_round_and_dragging_the_dispersion_trace_nothing(gl: Context, mo
     assert abs(bench.viewport[0] - 640) <= 2 and abs(bench.viewport[1] - 400) <= 2
     bench.wait_for_picture()
     bench.wait_for_whole()
-    resting = bench.phase("accumulating", 2.0, bench.rest)  # the first of it goes into finer maps
+    resting = bench.phase(2.0, bench.rest)  # the first of it goes into finer maps
     camera = bench.session.state.camera
-    orbiting = bench.phase("orbiting", 0.3, bench.orbit, bench.holding_middle_button)
+    orbiting = bench.phase(0.3, bench.orbit, bench.holding_middle_button)
     assert bench.session.state.camera != camera
-    dragging = bench.phase("dragging dispersion", 0.9, bench.drag_gain, bench.holding_gain)
+    dragging = bench.phase(0.9, bench.drag_gain, bench.holding_gain)
     # What is seen directly has every pixel in motion too, and all of the picture has once it rests.
-    assert orbiting.glass < orbiting.direct and orbiting.whole_s > 0.0 < orbiting.whole_processor_s
+    assert orbiting["glass_side"] < orbiting["direct_side"]
+    assert orbiting["whole_s"] > 0.0 < orbiting["whole_processor_s"]
     gain = bench.session.state.scene.objects[bench._glass].material.dispersion.gain
     assert gain != 1.0
-    assert resting.rays_traced > 0
-    assert orbiting.rays_traced == dragging.rays_traced == 0
-    assert 0.0 < orbiting.processor_ms < 60_000.0
-    assert len(dragging.frame_ms) > 2 and dragging.figures["median_ms"] > 0.0
+    assert resting["photons_per_s"] > 0.0
+    assert orbiting["photons_per_s"] == dragging["photons_per_s"] == 0.0
+    assert 0.0 < orbiting["processor_ms"] < 60_000.0
+    assert dragging["frames"] > 2 and dragging["median_ms"] > 0.0
     seen = bench.latency(bench.nudge_camera)
-    assert seen.missed == 0 and 0 < seen.answered_ms[0] < 1e3 * viewer_speed.ANSWER_S
+    assert seen["missed"] == 0 and 0.0 < seen["answered_ms"] < 1e3 * viewer_speed.ANSWER_S
     monkeypatch.setattr(viewer_speed, "ANSWER_S", 0.0)
-    assert bench.latency(bench.nudge_camera).missed == 1
+    assert bench.latency(bench.nudge_camera) == {"answered_ms": 0.0, "missed": 1}
     bench.release()
 
 
@@ -68,11 +69,5 @@ def test_an_input_that_is_never_answered_is_missed_in_time(monkeypatch: pytest.M
     monkeypatch.setattr(viewer_speed, "REST_S", 0.02)
     monkeypatch.setattr(viewer_speed, "ANSWER_S", 0.03)
     found = bench.latency(lambda: None)
-    assert found.missed == viewer_speed.NUDGES and not len(found.answered_ms)
+    assert found == {"answered_ms": 30.0, "missed": viewer_speed.NUDGES}
     assert frames[-1] - frames[0] < 1.0
-
-
-def test_inputs_that_were_missed_are_later_than_all_others() -> None:
-    assert viewer_speed.Latency(np.array([10.0, 30.0]), 0).figures == {"answered_ms": 20.0, "missed": 0}
-    assert viewer_speed.Latency(np.array([10.0, 30.0]), 1).figures["answered_ms"] == 30.0
-    assert viewer_speed.Latency(np.array([10.0]), 3).figures["answered_ms"] == 1e3 * viewer_speed.ANSWER_S
