@@ -25,12 +25,12 @@ if TYPE_CHECKING:
 _LINES = (("F", LINE_F_NM, "#2f7fd0"), ("d", LINE_D_NM, "#c99a00"), ("C", LINE_C_NM, "#c0392b"))
 
 
-def list_glasses(query: str = "", limit: int | None = None) -> Table:
+def list_glasses(query: str) -> Table:
     """A table of the glasses that match `query` ("" = all): name, maker, n_d, V_d, range.
 
     Raises `UserError` when nothing resembles the query.
     """
-    found = search(query, limit)
+    found = search(query)
     if not found:
         raise UserError(f"no glass resembles '{query}'; 'spectrasplat glass' without a name lists all")
     what = "similar names among" if is_guess(query) else "of"

@@ -232,13 +232,11 @@ def test_spiral_ramp_is_cut_until_it_does_not_overlap() -> None:
     assert atlas.texel_area[covered].sum() == pytest.approx(ramp.areas().sum(), rel=0.02)
 
 
-def test_texel_size_is_kept_and_absurd_ones_are_refused() -> None:
-    atlas = build_charts(MESHES["box"], texel_size=0.01)
-    np.testing.assert_allclose(atlas.texel_area, 1e-4)
-    with pytest.raises(UserError, match="greater than 0"):
-        build_charts(MESHES["box"], texel_size=0.0)
-    with pytest.raises(UserError, match="fewer or larger"):
-        build_charts(MESHES["box"], texel_size=1e-5)
+def test_absurd_numbers_of_texels_are_refused() -> None:
+    with pytest.raises(UserError, match="more than 0"):
+        build_charts(MESHES["box"], total_texels=0)
+    with pytest.raises(UserError, match="ask for fewer"):
+        build_charts(MESHES["box"], total_texels=10**11)
 
 
 def test_sliver_triangles_do_no_harm() -> None:

@@ -71,58 +71,40 @@ class ChartAtlas:
         return destinations, offsets, self.gutter_texel_xy[kept][order]
 
 
-def build_charts(
-    mesh: Mesh,
-    total_texels: int | None = None,
-    texel_size: float | None = None,
-    gutter: int = DEFAULT_GUTTER,
-) -> ChartAtlas:
-    """Charts of `mesh` (in world space), with about `total_texels` in all or texels of `texel_size` units.
+def build_charts(mesh: Mesh, total_texels: int, gutter: int = DEFAULT_GUTTER) -> ChartAtlas:
+    """Charts of `mesh` (in world space), with about `total_texels` in all.
 
     The mesh's own texture coordinates are used when they neither overlap nor degenerate, and were
     not made for pictures (`Mesh.uv_unwraps`); otherwise triangles are grouped by direction and projected, which shrinks
-    areas by at most about a half (recorded in `texel_area`). Raises UserError for a size that is not positive or leads
-    to more than MAX_TEXELS.
+    areas by at most about a half (recorded in `texel_area`). Raises UserError for a number that is not positive or
+    leads to more than MAX_TEXELS.
     """
-    chosen = total_texels if texel_size is None else texel_size
-    if chosen is None or None not in (total_texels, texel_size):
-        raise ValueError("give either total_texels or texel_size")
-    if not (math.isfinite(chosen) and chosen > 0):
-        raise UserError(
-            f"mesh '{mesh.name}': the texel number or size of its map must be greater than 0, not {chosen:g}"
-        )
+    if total_texels <= 0:
+        raise UserError(f"mesh '{mesh.name}': the texels of its map must be more than 0, not {total_texels}")
     for own_uv in (True, False) if mesh.uv is not None and mesh.uv_unwraps else (False,):
         layout = lay_out(mesh, own_uv)
         # Charts by projection that still overlap are halved until none does.
         while layout is not None:
-            atlas, overlapping = _at_resolution(mesh, layout, total_texels, chosen, gutter)
+            atlas, overlapping = _at_resolution(mesh, layout, total_texels, gutter)
             if not len(overlapping):
                 return atlas
             layout = None if own_uv else layout.split(mesh, overlapping)
     raise AssertionError("a chart of one triangle cannot overlap itself")
 
 
-def _at_resolution(
-    mesh: Mesh, layout: Layout, total_texels: int | None, texel_size: float, gutter: int
-) -> tuple[ChartAtlas, np.ndarray]:
-    """The packed atlas, and the numbers of charts that overlap themselves (the atlas then is not to be used).
-
-    `texel_size` counts where `total_texels` is None.
-    """
+def _at_resolution(mesh: Mesh, layout: Layout, total_texels: int, gutter: int) -> tuple[ChartAtlas, np.ndarray]:
+    """The packed atlas, and the numbers of charts that overlap themselves (the atlas then is not to be used)."""
     area = float(layout.extents.prod(axis=1).sum())
-    scale = 1.0 / texel_size if total_texels is None else math.sqrt(0.8 * total_texels / area)
+    scale = math.sqrt(0.8 * total_texels / area)
     places, size = _pack(layout.extents * scale, gutter)
-    if total_texels is not None:
-        for _ in range(4):  # gutters do not scale, so the size is approached in a few steps
-            used = size[0] * size[1]
-            if 0.85 * total_texels <= used <= total_texels:
-                break
-            scale *= min(2.0, max(0.25, math.sqrt(0.93 * total_texels / used)))
-            places, size = _pack(layout.extents * scale, gutter)
+    for _ in range(4):  # gutters do not scale, so the size is approached in a few steps
+        used = size[0] * size[1]
+        if 0.85 * total_texels <= used <= total_texels:
+            break
+        scale *= min(2.0, max(0.25, math.sqrt(0.93 * total_texels / used)))
+        places, size = _pack(layout.extents * scale, gutter)
     if size[0] * size[1] > MAX_TEXELS:
-        raise UserError(
-            f"mesh '{mesh.name}': its map would need {size[0]} × {size[1]} texels; ask for fewer or larger texels"
-        )
+        raise UserError(f"mesh '{mesh.name}': its map would need {size[0]} × {size[1]} texels; ask for fewer")
     # Corners in texels: each chart's lowest corner lies `gutter` texels inside its rectangle.
     corners = layout.corners * scale + (places + gutter)[layout.chart_of][:, None]
     rows, texel_area = _placement_rows(mesh, corners)

@@ -358,10 +358,10 @@ def _shown_images(document: GltfDocument) -> set[int]:
 _ACCESSORS_OF_MESHES = ("attributes", "indices", "targets")
 
 
-def _numbers_at(values: Any, names: tuple[str, ...], inside: bool = False) -> set[int]:
+def _numbers_at(values: Any, names: tuple[str, ...]) -> set[int]:
     """All whole numbers below the keys `names`, at any depth."""
     found: set[int] = set()
-    waiting = [(values, inside)]
+    waiting = [(values, False)]
     while waiting:
         value, counts = waiting.pop()
         if isinstance(value, dict):

@@ -107,7 +107,7 @@ def find(name: str, where: str = "") -> Dispersion:
     return find_entry(name, where).dispersion
 
 
-def search(query: str = "", limit: int | None = None) -> list[Entry]:
+def search(query: str = "") -> list[Entry]:
     """Entries whose maker, name or other name contains every word of `query`, best first.
 
     An exact name comes first, then names that begin with the query, then the rest in catalogue
@@ -115,8 +115,8 @@ def search(query: str = "", limit: int | None = None) -> list[Entry]:
     """
     found = _matching(query)
     if not found and query.strip():
-        return list(dict.fromkeys(entry for _, entry in _resembling(query, limit or 8)))
-    return found[:limit]
+        return list(dict.fromkeys(entry for _, entry in _resembling(query, 8)))
+    return found
 
 
 def is_guess(query: str) -> bool:
