@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from reference.path_check import ReferenceScene
+from reference.path_check import ReferenceScene, choices_of
 from spectrasplat.gpu.context import Context
 from spectrasplat.model.geometry.mesh import make_mesh
 from spectrasplat.model.geometry.primitives import box
@@ -189,7 +189,7 @@ def columns_agree(gl: Context, case: Case) -> None:
     assert photons.groups.count == case.groups
     assert photons.tally.fallbacks["footprint_dropped"] == 0
     reference = ReferenceScene.of(objects)
-    choices = photons.choices(case.depth)
+    choices = choices_of(photons, case.depth)
     bodies = reference.bodies(NM)
     compared, skipped, sensitive = 0, 0, np.zeros(2 + case.groups)
     for i in some_of_each(choices, case):

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from reference.path_check import ReferenceScene
+from reference.path_check import ReferenceScene, choices_of
 from spectrasplat.gpu.context import Context
 from spectrasplat.model.geometry.primitives import box
 from spectrasplat.model.geometry.primitives_round import sphere
@@ -152,7 +152,7 @@ def weights_agree(gl: Context, case: Case) -> None:
     objects = (*case.objects(), placed("room", box((16.0, 16.0, 16.0)), Diffuse()))
     photons = trace_light(gl, objects, LIGHT, [BAND], case.lattice, case.depth, polarisation=case.polarisation)
     reference = replace(ReferenceScene.of(objects), polarisation=case.polarisation)
-    choices = photons.choices(case.depth)
+    choices = choices_of(photons, case.depth)
     compared, covered, skipped, spread = 0, 0, 0, []
     rows = [
         i for i in np.random.default_rng(2).permutation(len(choices)) if choices[i].count(REFRACTED) >= case.refractions
@@ -211,7 +211,7 @@ def cuts_agree(gl: Context, polarisation: bool = False) -> None:
     light = beam_light(np.append(entry - 4 * along, 0.0), np.append(along, 0.0), 0.1)
     photons = trace_light(gl, objects, light, [(500.0, 506.0)], 150, 5, polarisation=polarisation)
     reference = replace(ReferenceScene.of(objects), polarisation=polarisation)
-    choices = photons.choices(7)
+    choices = choices_of(photons, 7)
     parts = {
         part: [i for i, made in enumerate(choices) if made[:4] == (REFRACTED, REFRACTED, REFRACTED, part)]
         for part in (CUT_LOW, CUT_HIGH)

@@ -24,7 +24,10 @@ from spectrasplat.model.optics.colorimetry import VISIBLE_NM, mirror_reflectance
 from spectrasplat.model.optics.glass import Dispersion
 from spectrasplat.model.scene import Dielectric, Diffuse, Mirror, SceneObject
 from spectrasplat.reference import glasses
-from spectrasplat.stress.rigs.gpu_paths import MIRRORED, REFLECTED, REFRACTED, Photons
+from spectrasplat.reference.random_numbers import hash_combine
+from spectrasplat.stress.rigs.gpu_paths import CUT_HIGH, CUT_LOW, MIRRORED, REFLECTED, REFRACTED, Photons, branch_key
+
+CHOICES = (REFLECTED, REFRACTED, MIRRORED, CUT_LOW, CUT_HIGH)
 
 STEP = 1e-4
 """Of all differences; fourth order leaves 1e-12 of round-off and less of truncation."""
@@ -111,6 +114,21 @@ class ReferenceScene:
             for g in range(photons.groups.count)
         ]
         return np.array([central_difference(path_of, STEP)[0] for path_of in (*sides, *spectral)])
+
+
+def choices_of(photons: Photons, longest: int) -> list[tuple[int, ...]]:
+    """Each photon's choices, at most `longest` of them; KeyError where a path made more."""
+    wanted = set(zip(photons.band.tolist(), photons.records["branch_key"].tolist(), strict=True))
+    table = {}
+    for band in np.unique(photons.band).tolist():
+        keys = np.array([branch_key((), band)])
+        for length in range(1, longest + 1):
+            keys = hash_combine(keys[:, None], np.array(CHOICES)).ravel()
+            for place in np.flatnonzero(np.isin(keys, photons.records["branch_key"])).tolist():
+                if (band, int(keys[place])) in wanted:
+                    digits = np.unravel_index(place, (len(CHOICES),) * length)
+                    table[band, int(keys[place])] = tuple(CHOICES[digit] for digit in digits)
+    return [table[key] for key in zip(photons.band.tolist(), photons.records["branch_key"].tolist(), strict=True)]
 
 
 def shifted_indices(photons: Photons, group: int, nm: float, step: float) -> IndexOf:

@@ -41,7 +41,6 @@ SHIFT = (123456789, 987654321)
 SEED = 1
 REFLECTED, REFRACTED, MIRRORED, CUT_LOW, CUT_HIGH = 1, 2, 3, 5, 6
 """Choices of a path as trace.comp names them in the branch key."""
-_CHOICES = (REFLECTED, REFRACTED, MIRRORED, CUT_LOW, CUT_HIGH)
 
 
 @dataclass(frozen=True)
@@ -88,20 +87,6 @@ class Photons:
         """Those whose path took these choices, one an event (`REFLECTED`, …)."""
         keys = {int(band): branch_key(choices, int(band)) for band in np.unique(self.band)}
         return self.where(self.records["branch_key"] == np.array([keys[int(band)] for band in self.band], np.uint32))
-
-    def choices(self, longest: int) -> list[tuple[int, ...]]:
-        """Each photon's choices, at most `longest` of them; KeyError where a path made more."""
-        wanted = set(zip(self.band.tolist(), self.records["branch_key"].tolist(), strict=True))
-        table = {}
-        for band in np.unique(self.band).tolist():
-            keys = np.array([branch_key((), band)])
-            for length in range(1, longest + 1):
-                keys = hash_combine(keys[:, None], np.array(_CHOICES)).ravel()
-                for place in np.flatnonzero(np.isin(keys, self.records["branch_key"])).tolist():
-                    if (band, int(keys[place])) in wanted:
-                        digits = np.unravel_index(place, (len(_CHOICES),) * length)
-                        table[band, int(keys[place])] = tuple(_CHOICES[digit] for digit in digits)
-        return [table[key] for key in zip(self.band.tolist(), self.records["branch_key"].tolist(), strict=True)]
 
     def where(self, chosen: np.ndarray) -> Photons:
         names = ["records", "q", "start", "direction", "position", "weight", "nm"]
