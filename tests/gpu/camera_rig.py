@@ -79,7 +79,7 @@ def released(camera_pass: CameraPass) -> None:
 def render(gl, objects, lights=(), size=(32, 24), samples=1, camera=ABOVE, maps=None, **options) -> np.ndarray:
     """Linear Rec.709 picture (H, W, 3); `maps`: caustic maps."""
     camera_pass = opened_camera_pass(gl, objects, lights, camera=camera, **options)
-    assert camera_pass.run(camera, *size, samples, maps=maps)
+    camera_pass.run(camera, *size, samples, maps=maps)
     rgb = camera_pass.read_rgb()
     released(camera_pass)
     return rgb
