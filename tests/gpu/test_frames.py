@@ -207,7 +207,7 @@ def test_what_is_shown_while_it_is_made_compiles_no_second_program() -> None:
 
 
 def test_no_driver_chooses_by_itself() -> None:
-    """`may_be_single` and `choosing_spectrum` stand in the camera pass and in sampling.py alone."""
+    """`may_be_single` and `choosing_spectrum` stand in the camera pass, in sampling.py and where stress measures it."""
     import spectrasplat
 
     root = Path(spectrasplat.__path__[0])
@@ -216,4 +216,5 @@ def test_no_driver_chooses_by_itself() -> None:
         for path in root.rglob("*.py")
         if any(word in path.read_text(encoding="utf-8") for word in ("may_be_single", ".choosing_spectrum("))
     }
-    assert users == {"passes/camera.py", "passes/spectrum_choice.py", "render/sampling.py"}
+    measured = "stress/rigs/camera_probe.py"
+    assert users == {"passes/camera.py", "passes/spectrum_choice.py", "render/sampling.py", measured}

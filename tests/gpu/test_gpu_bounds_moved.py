@@ -98,7 +98,7 @@ def test_windows_stay_until_light_leaves_them(gl: Context) -> None:
             maps = light.move(replace(placed(scene, turn(0.0, step)), lights=lamps))
             assert maps is not None
             layouts.append(maps.layout)
-            fluxes.append(maps.flux(True) * maps.scale)
+            fluxes.append(maps.flux() * maps.scale)
         assert layouts[3] is layouts[4]
         assert layouts[6] is not layouts[5] and layouts[6].size == layouts[5].size
         assert fluxes[6] == pytest.approx(fluxes[0], rel=0.2)
