@@ -58,13 +58,13 @@ def test_a_dragged_handle_carries_glass_and_light_along(hands: Hands) -> None:
     before = hands.settle()
     start = session.state.scene.objects[hands.glass()].object_to_world
     x, y = interface.find("Gizmo").centre
-    interface.move((x + 40, y))
+    interface.move((x + 24, y))
     interface.press()
-    interface.move((x + 44, y))
+    interface.move((x + 28, y))
     interface.frame(3)  # the first one makes what the others use
     versions, begun = [hands.engine.picture_version], time.process_time()
     for step in range(1, STEPS + 1):
-        interface.move((x + 44 + 10 * step, y))
+        interface.move((x + 28 + 10 * step, y))
         versions.append(hands.engine.picture_version)
         assert session.picture.shown_scene is session.state.scene  # what is picked and what is seen agree
         assert "A few photons while it moves" in badges(hands)
