@@ -182,8 +182,7 @@ void follow(uint entry, bool resumes) {
                     if (HALTS)
                         ended[found++] = PathEnd(path, hit, uint(met && ends), uint(same_hit || leaves));
                     else
-                        waiting[place].ended[found++] =
-                            PathEnd(path, hit, uint(met && ends), uint(same_hit || leaves));
+                        waiting[place].ended[found++] = PathEnd(path, hit, uint(met && ends), uint(same_hit || leaves));
                 }
                 goes_on = specular && !leaves;
                 if (COATS) goes_on = goes_on || (coated && !event_limit_reached && path.depth < uint(MAX_DEPTH));

@@ -10,8 +10,7 @@ layout(rgba32f, binding = 0) uniform image2D picture;
 void main() {
     uvec2 pixel = gl_GlobalInvocationID.xy + uvec2(0u, p.first_row);
     if (pixel.x >= p.size.x || pixel.y >= p.size.y) return;
-    uint number = pixel.y * p.size.x + pixel.x, key = listed[survey_place(number)],
-         sees = key & KIND_BITS;
+    uint number = pixel.y * p.size.x + pixel.x, key = listed[survey_place(number)], sees = key & KIND_BITS;
     if ((key & IS_EVEN) == 0u) {
         uint at = atomicAdd(uneven_count, 1u);
         if (at % (UNEVEN_ROW * 64u) == 0u) atomicAdd(uneven_groups[1], 1u);

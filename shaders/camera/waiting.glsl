@@ -1,10 +1,10 @@
 // The paths of a sample wait in a buffer: an invocation holds the one that it follows.
 //
 // With HALTS, a sample whose loops have run long halts between two surfaces, and another dispatch takes it up again.
-// llvmpipe ends all loops of the invocations that it runs side by side (eight, with AVX2) without a word once these have
-// run 65,535 rounds together: what a path found would then depend on which pixels happen to be its neighbours. Whatever a
-// sample knows goes along, and nothing is added to the picture before its end: where it halts changes no bit of it. A GPU
-// has no such limit, and no halts.
+// llvmpipe ends all loops of the invocations that it runs side by side (eight, with AVX2) without a word once these
+// have run 65,535 rounds together: what a path found would then depend on which pixels happen to be its neighbours.
+// Whatever a sample knows goes along, and nothing is added to the picture before its end: where it halts changes no bit
+// of it. A GPU has no such limit, and no halts.
 
 // Ends of paths are looked up together, when there are that many or no path is left: a software renderer, and a GPU,
 // then looks up those of neighbouring pixels side by side.

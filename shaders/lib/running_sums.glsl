@@ -16,7 +16,8 @@ vec4 smooth_below(uint row, float x) {
     float span = knots[low + 1u] - knots[low];
     float share = span > 0.0 ? clamp((x - knots[low]) / span, 0.0, 1.0) : 1.0;
     uint at = row * uint(SUM_KNOTS + SUM_LINES) + low;
-    return mix(sums[at], sums[at + 1u], share);
+    vec4 below = sums[at], above = sums[at + 1u];
+    return mix(below, above, share);
 }
 
 float line_x(int line) { return knots[SUM_KNOTS + line]; }

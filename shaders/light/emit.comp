@@ -230,8 +230,7 @@ void main() {
                 for (int c = COLUMNS - 2; c < COLUMNS; ++c) ray.dposition[c].xyz = -p.back * ray.ddirection[c].xyz;
             }
         }
-        RayRecord_TO(STORE_RAY, slot * uint(RayRecord_TEXELS), ray)
-        outcome.what = 1u | 8u;
+        RayRecord_TO(STORE_RAY, slot * uint(RayRecord_TEXELS), ray) outcome.what = 1u | 8u;
         outcome.flux_w = ray.flux_w;
     }
 #ifdef RAY_POOL

@@ -109,9 +109,9 @@ Depicted image_of(Depicted of, Beside first, Beside second, uint bit) {
     return mirrored(mirrored(of, first.border), second.border);
 }
 
-// Write all images of a photon from `slot` on, in the windows that it is drawn in; returns how many splats those are. Their
-// number is found first, so that a software renderer, which runs the body of an `if` for all, goes through the loop
-// only with photons that have any; what makes a splat stands there once.
+// Write all images of a photon from `slot` on, in the windows that it is drawn in; returns how many splats those are.
+// Their number is found first, so that a software renderer, which runs the body of an `if` for all, goes through the
+// loop only with photons that have any; what makes a splat stands there once.
 uint put_images(Depicted of, uint at, uint slot) {
     Placement place = placements[at], read_in = place;
     if (SLOTS == 2) {

@@ -1,5 +1,5 @@
-// Sums up the tallies of all groups of a batch, which begin again at nothing, and says how many photons are to be drawn:
-// none of a batch that has not ended or whose photons found no room, which is traced again.
+// Sums up the tallies of all groups of a batch, which begin again at nothing, and says how many photons are to be
+// drawn: none of a batch that has not ended or whose photons found no room, which is traced again.
 layout(local_size_x = 256) in;
 
 #include "lib/pool.glsl"

@@ -1,6 +1,6 @@
 // Vertex pulling, nothing instanced. SMALL, SWEPT or CUT chooses the class: a swept splat is a parallelogram (four
-// corners through an index buffer, where photons are many two triangles without), a small one a triangle about its square, which costs a software rasteriser one
-// set-up instead of two (it wins below about 40 texels).
+// corners through an index buffer, where photons are many two triangles without), a small one a triangle about its
+// square, which costs a software rasteriser one set-up instead of two (it wins below about 40 texels).
 #include "light/splat_setup.glsl"
 
 layout(std430, binding = 8) readonly buffer Lists { uint lists[]; };  // slots of each kind (splat_list.comp)

@@ -1,7 +1,7 @@
-// Adds splats to sums in a buffer, with atomics: for devices whose rasteriser blends slowly. A team of invocations a piece
-// of a splat (splat_pieces.glsl): each line of texels that crosses it is worked out, its stretch within the splat from
-// its straight sides, and the texels of those stretches are shared out evenly, so that long thin splats cost no more than
-// what they cover. What a texel gets is said by splat_texel.glsl, as for the rasteriser.
+// Adds splats to sums in a buffer, with atomics: for devices whose rasteriser blends slowly. A team of invocations a
+// piece of a splat (splat_pieces.glsl): each line of texels that crosses it is worked out, its stretch within the splat
+// from its straight sides, and the texels of those stretches are shared out evenly, so that long thin splats cost no
+// more than what they cover. What a texel gets is said by splat_texel.glsl, as for the rasteriser.
 layout(local_size_x = LANES) in;
 
 #include "lib/finite.glsl"

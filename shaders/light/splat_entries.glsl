@@ -1,5 +1,5 @@
-// Where in the list of pieces those of a kind are, told by the counts of all kinds (`kind_words`). There is room for more
-// entries than splats.
+// Where in the list of pieces those of a kind are, told by the counts of all kinds (`kind_words`). There is room for
+// more entries than splats.
 
 // Pieces of a splat that an entry stands for: one, unless the list would be too long.
 uint pieces_an_entry() {

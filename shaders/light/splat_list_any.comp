@@ -1,6 +1,6 @@
-// Lists the splats of each kind in any order: many photons at a time, for devices that add them in any order anyway. Each
-// work group takes room in the list for all of its own at once. For the draws an entry is a splat's slot; where compute
-// shaders add them (splat_add.comp), a splat has an entry a piece.
+// Lists the splats of each kind in any order: many photons at a time, for devices that add them in any order anyway.
+// Each work group takes room in the list for all of its own at once. For the draws an entry is a splat's slot; where
+// compute shaders add them (splat_add.comp), a splat has an entry a piece.
 layout(local_size_x = WORKGROUP) in;
 
 layout(std430, binding = 1) readonly buffer Splats { SplatRecord splats[]; };

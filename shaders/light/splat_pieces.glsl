@@ -1,8 +1,7 @@
-// Splats are added in pieces of some texels, each by a team of invocations, so that small ones leave none idle and large
-// ones are shared out. How many pieces a splat has is counted where it is made (footprint.comp), so that the list of all
-// pieces (splat_list_any.comp) knows where those of a kind begin. Where it has no room for all, an entry stands for
-// several.
-// Of a record's `kind`: whether its lines of texels are columns, pieces.
+// Splats are added in pieces of some texels, each by a team of invocations, so that small ones leave none idle and
+// large ones are shared out. How many pieces a splat has is counted where it is made (footprint.comp), so that the list
+// of all pieces (splat_list_any.comp) knows where those of a kind begin. Where it has no room for all, an entry stands
+// for several. Of a record's `kind`: whether its lines of texels are columns, pieces.
 const uint COLUMNS_BIT = 3u;
 const uint PIECES_BIT = 4u;
 // Words of each kind: work groups that add it (x, y, z), splats, pieces, entries of the list.

@@ -71,7 +71,8 @@ void main() {
     for (int line = 0; line < SUM_LINES; ++line) {
         float place = place_in(span, line_x(line));
         if (place >= 0.0)
-            sum += gaussian(at, sigma, place, sigma) * inverse_integral(sigma, place, sigma) * line_energy(span.row, line);
+            sum +=
+                gaussian(at, sigma, place, sigma) * inverse_integral(sigma, place, sigma) * line_energy(span.row, line);
     }
     uint layers = uint(imageSize(table).z);
     ivec3 texel = ivec3(at, band / layers * gl_NumWorkGroups.x + row, band % layers);

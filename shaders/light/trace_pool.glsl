@@ -32,7 +32,8 @@ void find_ray(uint k) {
     ray_goes_on = k < state.alive;
     ray_slot = NONE;
     if (ray_goes_on)
-        ray_slot = k < state.survivors ? pool_slots[listed_at(0u, k)] : free_slot(state.born_first + k - state.survivors);
+        ray_slot =
+            k < state.survivors ? pool_slots[listed_at(0u, k)] : free_slot(state.born_first + k - state.survivors);
 }
 
 // Where the second child goes.

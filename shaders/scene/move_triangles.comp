@@ -24,8 +24,7 @@ void main() {
         for (uint k = 0u; k < uint(Triangle_TEXELS); ++k) imageStore(scene_texels, texel_at(at + k), texels[k]);
         if (facet.normals == NONE) continue;
         // The inverse transpose, but for a factor that no normal keeps.
-        mat3 turn = mat3(
-            cross(linear[1], linear[2]), cross(linear[2], linear[0]), cross(linear[0], linear[1]));
+        mat3 turn = mat3(cross(linear[1], linear[2]), cross(linear[2], linear[0]), cross(linear[0], linear[1]));
         for (uint k = 0u; k < 3u; ++k) {
             uint corner = uint(NORMALS_AT) + facet.normals + k;
             vec3 normal = normalize(turn * uintBitsToFloat(packed_texel(corner).xyz));
