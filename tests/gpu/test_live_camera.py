@@ -446,7 +446,8 @@ def test_whoever_walks_round_while_maps_are_laid_out_anew_sees_those_of_before(
     assert engine._shown.light.shows_outdated and engine._camera_pass.is_paused
     version, seen = engine.picture_version, []
     for step in range(MOST_STEPS):
-        position = tuple(np.add(table.camera.position, (0.1 * (step % 50 + 1), 0.05, 0.0)))
+        # Never the same place twice.
+        position = tuple(np.add(table.camera.position, (0.1 * (step % 50 + 1), 0.05 + 0.01 * (step // 50), 0.0)))
         camera = replace(table.camera, position=position)
         engine.set(replace(inputs(table), camera=camera))
         engine.advance(1e-3, interacting=True)
