@@ -26,6 +26,7 @@ from .splat_tables import (
     SIGMAS,
     SplatTables,
     cells_of_row,
+    table_texture,
 )
 
 _SPAN = np.dtype([("ends", "f4", 2), ("row", "u4"), ("there", "u4")])
@@ -85,12 +86,9 @@ class DeviceTables:
         ctx, rows = self._ctx, self._shape[0] * self._shape[1]
         layers = min(spectra, MOST_LAYERS)
         stacked = -(-spectra // layers)
-        texture = ctx.texture_array((LEAST_WIDTH, stacked * len(SIGMAS), layers), 4, dtype="f4")
-        texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        texture.repeat_x = texture.repeat_y = False
         powers = -(-rows * CUMULATIVE_SAMPLES // 4)
         return SplatTables(
-            texture,
+            table_texture(ctx, (LEAST_WIDTH, stacked * len(SIGMAS), layers)),
             ctx.buffer(reserve=16 * (spectra + powers)),
             ctx.buffer(reserve=48 * spectra),
             ctx.buffer(reserve=16 * rows * DENSITY_CELLS),

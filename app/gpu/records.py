@@ -286,10 +286,8 @@ QUEUE_STATE = Struct(
         Field("chunk_groups", "uvec4", "over the outcomes of this step"),
         Field("next_chunk_groups", "uvec4", "over the outcomes of the next step"),
         Field("gather_groups", "uvec4"),
-        Field("iterations", "uint", "steps that had a ray"),
         Field("flights", "uint", "of all rays, up to what they meet, since the batch began"),
-        Field("most_alive", "uint", "rays of the fullest step"),
-        Field("reserved", "uint"),
+        Field("reserved", "uint", "", 3),
     ),
 )
 POOL_TALLY = Struct(
@@ -319,14 +317,12 @@ POOL_STATE = Struct(
         Field("trace_groups", "uvec4", "indirect dispatch size"),
         Field("groups_done", "uint", "of the running dispatch"),
         Field("dispatches", "uint", "that had a ray"),
-        Field("most_alive", "uint"),
         Field("lent", "uint", "of the free slots those at the end, to whoever follows all that becomes of a ray"),
         Field("overflow", "uint", "rays and photons that found no room"),
         Field("drawn", "uint", "photons to be drawn: 0 where the batch has to be traced again"),
         Field("watts", "float", "tally of all groups", WATTS),
         Field("fallbacks", "uint", "likewise", len(FALLBACKS)),
         Field("emitted", "uint", "rays that the batch began with"),
-        Field("reserved", "uint", "", 3),
     ),
 )
 MASK_SIZE = 64

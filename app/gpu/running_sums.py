@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 BIND_KNOTS, BIND_SUMS = 0, 1
 _KNOTS = 402
-_FIRST_LINE_X = 1e-12
 
 
 @dataclass(frozen=True)
@@ -60,8 +59,7 @@ class RunningSums:
 
     def bind(self, axis: SpectralAxis) -> None:
         """To the places that shaders read, over x of `axis`."""
-        lines = np.maximum(axis.x_of_nm(self._line_nm), _FIRST_LINE_X)
-        self._knots.write(np.concatenate([axis.cell_edges_x, lines]).astype("f4"))
+        self._knots.write(np.concatenate([axis.cell_edges_x, axis.x_of_lines(self._line_nm)]).astype("f4"))
         self._knots.bind_to_storage_buffer(BIND_KNOTS)
         self._sums.bind_to_storage_buffer(BIND_SUMS)
 

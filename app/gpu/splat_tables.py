@@ -88,8 +88,6 @@ class SplatTables:
         `width`: samples along xi, None for what a finished picture needs. `into`: tables that are of no use any more,
         whose textures and buffers become these'.
         """
-        import moderngl
-
         band_count = max(len(of_light) for of_light in bands)
         targets = channels.targets
         width = width or (WIDTH_WITH_LINES if any(light.lines for light in lights) else WIDTH)
@@ -123,9 +121,7 @@ class SplatTables:
         texture = None if into is None else into.texture
         if texture is None or (texture.width, texture.height, texture.layers) != size:
             shader.release(texture)
-            texture = ctx.texture_array(size, 4, dtype="f4")
-            texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-            texture.repeat_x = texture.repeat_y = False
+            texture = table_texture(ctx, size)
         texture.write(texels)
         before = into.buffers if into is not None else (None,) * 4
         bands_and_power = np.concatenate([spans.ravel(), power.ravel(), np.zeros(-power.size % 4, np.float32)])
@@ -154,6 +150,14 @@ class SplatTables:
 
     def release(self) -> None:
         shader.release(self.texture, *self.buffers)
+
+
+def table_texture(ctx: moderngl.Context, size: tuple[int, int, int]) -> moderngl.TextureArray:
+    """A texture of tables (width, stacked rows, layers), read texel by texel."""
+    texture = ctx.texture_array(size, 4, dtype="f4")
+    texture.filter = (ctx.NEAREST, ctx.NEAREST)
+    texture.repeat_x = texture.repeat_y = False
+    return texture
 
 
 def _by_target(values: np.ndarray, targets: int) -> np.ndarray:

@@ -79,7 +79,7 @@ class RayPool:
     def load(self, rays: np.ndarray) -> None:
         """These rays are on their way already."""
         state, count = self._state_zero.copy(), len(rays)
-        state["alive"] = state["taken"] = state["taken_before"] = state["most_alive"] = state["emitted"] = count
+        state["alive"] = state["taken"] = state["taken_before"] = state["emitted"] = count
         state["trace_groups"] = (-(-count // _GROUP), 1, 1, 0)
         self.state.write(state.tobytes())
         self.rays.write(self._ray.packed(rays))

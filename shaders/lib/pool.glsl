@@ -63,7 +63,6 @@ void close_group() {
     state.free_end = atomicAdd(state.returned, 0u);
     state.survivors = atomicExchange(state.next_survivors, 0u);
     state.alive = state.survivors + taken - state.born_first;
-    state.most_alive = max(state.most_alive, state.alive);
     state.trace_groups = uvec4((state.alive + 63u) / 64u, 1u, 1u, 0u);
     state.lent = state.groups_done = 0u;
     state.dispatches += 1u;

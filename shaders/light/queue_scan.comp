@@ -49,8 +49,6 @@ void main() {
         state.next_chunk_groups = uvec4(((state.next_alive + CHUNK - 1u) / CHUNK + 63u) / 64u, 1u, 1u, 0u);
         state.alive = state.next_alive;
         state.flights += state.alive;
-        state.most_alive = max(state.most_alive, state.alive);
-        state.iterations += state.alive > 0u ? 1u : 0u;
         state.gather_groups = uvec4((state.photons_new + 63u) / 64u, 1u, 1u, 0u);
     }
 }

@@ -106,6 +106,10 @@ class SpectralAxis:
             self._inverted[key] = np.array(wavelength)
         return wavelength
 
+    def x_of_lines(self, line_nm: np.ndarray) -> np.ndarray:
+        """x of emission lines, (n,): that of one at 380 nm lies inside (0, 1] too, or no band would hold it."""
+        return np.maximum(self.x_of_nm(line_nm), _FIRST_LINE_X)
+
     def nm_of_samples(self, count: int) -> np.ndarray:
         """Wavelengths of `count` equally spaced x from 0 to 1, float64 (count,); kept, so not to be written to."""
         if count not in self._sampled:
@@ -238,8 +242,7 @@ def cumulative(axis: SpectralAxis, spectrum: Spectrum, weights: np.ndarray | Non
     line_nm, power = np.array(spectrum.lines).T
     line_weights = np.column_stack([np.interp(line_nm, VISIBLE_NM, column) for column in table.T])
     steps = np.cumsum(power[:, None] * line_weights, axis=0)
-    # A line at 380 nm must lie inside (0, 1], or no band would hold it.
-    line_x = np.maximum(axis.x_of_nm(line_nm), _FIRST_LINE_X)
+    line_x = axis.x_of_lines(line_nm)
     below = np.column_stack([np.interp(line_x, edges_x, column) for column in running.T])
     steps = np.vstack([np.zeros(table.shape[1]), steps])
     running = running + steps[np.searchsorted(line_x, edges_x, side="left")]
