@@ -33,10 +33,6 @@ CAMERA_SCENES = ("prism_edge", "lens_text", "brilliant_studio", "ball_caustic")
 
 def bench(options: Bench, show: Callable[[object], None] = show) -> int:
     """Run the bench; returns the exit code. Raises `UserError`."""
-    if options.features is not None:
-        if options.camera_pass:
-            raise UserError("--features and --camera exclude each other: give one of them")
-        return _features(options)
     if options.output is None:
         raise UserError("bench needs a folder for what it finds: give one with -o DIR")
     settings = settings_of(options)
@@ -145,20 +141,6 @@ def kept_text(result: BenchResult) -> str:
             done = sum(len({sample.seed for sample in curve.samples}) for curve in scene.curves)
             text += f", {done} of {scene.seeds * len(result.settings.methods)} method seeds of '{scene.scene}' kept"
     return text + "; the same command goes on from there"
-
-
-def _features(options: Bench) -> int:
-    """What each feature costs in one scene."""
-    assert options.features is not None
-    if options.scenes:
-        raise UserError(
-            f"--features measures one scene alone: give 'bench --features {options.features}' without further scenes"
-        )
-    scene = load_scenes([options.features])
-
-    from ..bench.features import cost as features_cost
-
-    return features_cost.command(next(iter(scene.values())), options.output)
 
 
 def write_and_show(result: BenchResult, directory: Path, show: Callable[[object], None]) -> None:

@@ -1,4 +1,4 @@
-"""What each program of a scene asks of the device, for `inspect --programs`."""
+"""What each program of a scene asks of the device and whose code it holds, for `inspect --programs`."""
 
 from __future__ import annotations
 
@@ -13,10 +13,12 @@ from .printing import table
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
+    from rich.table import Table
 
     from ..gpu.live_state import LiveState
     from ..gpu.shader import Built
     from ..model.scene import Scene
+    from .inspect_features import Proof
 
 HEADINGS = (
     "program",
@@ -87,11 +89,14 @@ def programs_text(scene: Scene) -> RenderableType:
     from rich.console import Group
 
     from ..bench.programs import compiled_programs
+    from ..features.features import Features
     from ..gpu.context import create_context
     from ..model.settings import RenderSettings
+    from .inspect_features import prove
 
+    settings = RenderSettings(max_depth=scene.render.max_depth)
     with create_context() as context:
-        programs = compiled_programs(context, scene, RenderSettings(max_depth=scene.render.max_depth))
+        programs = compiled_programs(context, scene, settings)
         renderer = context.renderer
     headings = (HEADINGS[0], *(f">{heading}" for heading in HEADINGS[1:]))
     rows = [row.cells() for row in program_rows(programs)]
@@ -102,7 +107,20 @@ def programs_text(scene: Scene) -> RenderableType:
         "runs.",
         _live_words_told(),
         *beyond_promises(programs),
+        _proofs_table(prove([stage for built in programs for stage in built.stages], Features.of(scene, settings))),
     )
+
+
+def _proofs_table(proofs: Sequence[Proof]) -> Table:
+    rows = [
+        (
+            proof.feature,
+            "in" if proof.included else "out" if proof.holds else "out, yet found",
+            ", ".join(proof.programs) or "no program",
+        )
+        for proof in proofs
+    ]
+    return table("Parts of the programs, by the names that each part alone uses", ("part", " ", "found in"), rows)
 
 
 def _live_words_told() -> str:

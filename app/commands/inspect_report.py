@@ -138,11 +138,11 @@ def _lights_table(lights: tuple[Light, ...]) -> Table:
 
 
 def _compiled(scene: Scene) -> list[RenderableType]:
-    from ..bench.features.compiled import record_words, static_costs
     from ..features.facts import Facts
     from ..features.features import Features
     from ..model.settings import RenderSettings
     from .inspect_camera import lookups
+    from .inspect_features import record_words, static_costs
 
     wishes = scene.render
     settings = RenderSettings(width=wishes.width, height=wishes.height, max_depth=wishes.max_depth)
@@ -154,7 +154,7 @@ def _compiled(scene: Scene) -> list[RenderableType]:
     ]
     return [
         table("Compiled into the programs", ("part", " ", "why", "costs"), rows),
-        f"{record_words(features)} What each part costs in time: bench --features.",
+        record_words(features),
         table("Looked up by camera rays", ("what", "content", "how", "memory"), lookups(scene, features)),
     ]
 

@@ -58,9 +58,6 @@ class Bench(ReadsScenes):
     size: tuple[int, int] | None = setting("WxH", "Pixels; default: 480 wide, in the scene's aspect.", options.size)
     reference_seconds: float | None = shared(_REFERENCE_SECONDS)
     reference: str | None = shared(_REFERENCE)
-    features: str | None = option(
-        "SCENE", "Measure instead what each feature of the programs costs in this scene.", complete=completion.scenes
-    )
     fresh: bool = switch("Begin anew instead of going on from what DIR holds.")
     camera_pass: bool = switch(
         "Measure the camera pass, by samples a pixel, instead of the light pass by photons.",

@@ -422,7 +422,9 @@ class Inspect(ReadsScenes):
     """Show what a scene holds, its glasses and mesh health, and which features its programs need."""
 
     scene: str = shared(_SCENE, default=MISSING)
-    programs: bool = switch("List instead what each of its programs needs of the driver; compiles them.")
+    programs: bool = switch(
+        "List instead what each of its programs needs of the driver and holds code of; compiles them."
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

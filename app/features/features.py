@@ -67,13 +67,6 @@ class Features(PictureFeatures, ReceiverFeatures, SurfaceFeatures, SpectrumFeatu
             "ONE_COLOUR": self.point_spectrum or self.spectral_groups == 0,
         }
 
-    def without(self, *names: str) -> Features:
-        """The same with features left out, and all whose code needs theirs."""
-        left_out = set(names)
-        while more := {name for name, row in ROWS.items() if left_out & {*row.requires}} - left_out:
-            left_out |= more
-        return self.changed(**{name: ROWS[name].off for name in left_out})
-
     def changed(self, **values: Any) -> Features:
         """`replace` for fields whose names are data."""
         return replace(self, **values)

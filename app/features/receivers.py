@@ -30,8 +30,6 @@ class ReceiverFeatures:
         cost=lambda facts, sizes: (
             f"{len(facts.receivers) - len(facts.flat_receivers)} receiver(s) with a placement a facet"
         ),
-        stays="light would land elsewhere",
-        forced="",
     )
     """A receiver is curved and carries charts."""
     nested_windows: bool = feature(
@@ -41,8 +39,6 @@ class ReceiverFeatures:
         why_not="no receiver has two windows",
         names=("is_only_fine", "outer"),
         cost=lambda facts, sizes: f"{sizes.splat} B a photon: a splat for each window",
-        left_out="against the finest window alone",
-        forced="",
     )
     """Flat receivers carry a fine window inside a coarse one."""
     contact_lines: bool = feature(
@@ -54,7 +50,6 @@ class ReceiverFeatures:
         why_not="nothing stands on a receiver",
         names=("contact_words", "takes_side", "side_of_contact"),
         cost="4 B a texel; splats next to them have a program each",
-        stays="it needs the picture's own pixels, which the map that is drawn here does not have",
     )
     """An object touches a flat receiver: in a still, light beneath it does not spread to the places around."""
     border_images: bool = feature(
@@ -65,8 +60,6 @@ class ReceiverFeatures:
         why_not="no flat receiver is convex, or no light lands near a border",
         names=("put_images", "border_distance", "mirrored_step"),
         cost=lambda facts, sizes: f"room for {MOST_IMAGES} more splats a photon and window, {sizes.splat} B each",
-        left_out="without them borders are too dark",
-        not_forced="no light lands near a border",
     )
     """A flat receiver is convex: what footprints would spread beyond its borders comes back as their mirror image."""
     local_gain: bool = feature(
@@ -78,7 +71,6 @@ class ReceiverFeatures:
         names=("gain_boxes", "local_gain"),
         cost="eight voxels a photon",
         requires=("spectral_groups",),
-        stays="light would land elsewhere",
     )
     """The dispersion brush scales spectral displacements on some receiver."""
     bins: int = feature(
@@ -87,8 +79,6 @@ class ReceiverFeatures:
         why=lambda facts: f"{facts.settings.bins} of equal width, instead of XYZ",
         why_not="the picture is in colours",
         cost=lambda facts, sizes: f"{4 * (facts.settings.bins or 0)} B a texel instead of {sizes.texel}",
-        left_out="against XYZ",
-        forced="16 bins in 4 targets",
         off=0,
     )
     """Spectral bins of the picture; 0: it is in colours."""
@@ -100,8 +90,6 @@ class ReceiverFeatures:
         names=("BIN_ROW", "BIN_SPECTRUM_ROW", "BIN_TARGET"),
         cost=lambda facts, sizes: f"{4 * facts.tents} B a texel",
         requires=("camera_disperses",),
-        left_out="against XYZ alone",
-        not_forced="the channels are those of glass that the camera sees",
         off=0,
     )
     """Spectral channels of the caustic maps beside XYZ, for light whose dispersion the camera's adds to."""

@@ -59,15 +59,7 @@ class Row:
     cost: str | Callable[[Facts, Sizes], str] = ""
     """What it adds to tables and work; bytes of rays and photons are added up without it."""
     requires: tuple[str, ...] = ()
-    """Fields of features whose code this one's is written on: left out together, put in together."""
-    left_out: str = ""
-    """What becomes of the map without it."""
-    stays: str = ""
-    """Why no program can be tried without it; "": one can."""
-    forced: str | None = None
-    """With what data a scene that does not need it carries it; None: it cannot be put in."""
-    not_forced: str = ""
-    """Why it cannot."""
+    """Fields of features whose code this one's is written on."""
     off: bool | int = False
 
     def cost_words(self, facts: Facts, sizes: Sizes) -> str:

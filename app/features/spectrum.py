@@ -33,7 +33,6 @@ class SpectrumFeatures:
         why="footprints are anisotropic",
         why_not="the method splats single texels",
         names=("fan_where_it_landed", "keep_columns_within", r"ray\.ddirection\[0\]\.xyz = "),
-        left_out="without them every splat is one texel",
     )
     """Photons carry spatial columns."""
     spectral_groups: int = feature(
@@ -50,7 +49,6 @@ class SpectrumFeatures:
             "VARIABLE_ROW",
         ),
         requires=("footprints",),
-        forced="a column that stays zero",
         off=0,
     )
     """Spectral columns carried by every photon (0: nothing disperses, or the method needs none)."""
@@ -67,7 +65,6 @@ class SpectrumFeatures:
             f"one lookup of the slope a refraction, {size_words(sizes.spectrum * facts.distinct_glasses)}"
         ),
         requires=("spectral_groups",),
-        not_forced="light would be drawn another way",
     )
     """More dispersive materials than columns (or the paper's λ-column): some columns are by a shared variable."""
     band_cuts: bool = feature(
@@ -87,7 +84,6 @@ class SpectrumFeatures:
         ),
         cost="one program more; a cut ray becomes two",
         requires=("spectral_groups",),
-        forced="",
     )
     """Total internal reflection may cut a band."""
     landing_cuts: bool = feature(
@@ -104,8 +100,6 @@ class SpectrumFeatures:
         names=("meet_with_band", "lands_broadly"),
         cost="two rays more a landing; a cut ray becomes two",
         requires=("band_cuts",),
-        left_out="without it borders have colours",
-        forced="",
     )
     """Some wavelengths of a band may meet another surface than its anchor does."""
     reindexed: bool = feature(
@@ -117,7 +111,6 @@ class SpectrumFeatures:
         names=("traced_bands", "v_path"),
         cost="32 B a band",
         requires=("spectral_groups",),
-        stays="edits would move no wavelength",
     )
     """Photons stand for intervals of the one index that disperses, and carry whatever wavelengths an edit puts
     there."""
@@ -130,7 +123,6 @@ class SpectrumFeatures:
         names=("tint_level", "TINT_LEVELS"),
         cost=f"{LEVELS} tables a light and band instead of one",
         requires=("absorption",),
-        left_out="without them a band knows three places of a tint",
         off=0,
     )
     """Steps of the way through one tinted glass that photons count (`model.tint_levels`)."""
@@ -147,8 +139,6 @@ class SpectrumFeatures:
         why_not=lambda facts: _why_no_lamp_columns(facts),
         names=("cover_sides", "LAMP"),
         requires=("footprints",),
-        left_out="without it each lamp is drawn as a point",
-        forced="every light of no breadth",
     )
     """Some light is extended: photons carry how far from theirs the light of its other points lands."""
     light_edges: bool = feature(
@@ -167,8 +157,6 @@ class SpectrumFeatures:
         names=("packed_edge", "unpacked_edge", "cut_at_edge"),
         cost="splats next to an edge have another program; one more number a fragment",
         requires=("footprints",),
-        left_out="without it beams end in a comb",
-        forced="no light with an edge",
     )
     """Some light's emission ends at a hard edge: photons next to it carry where, and their footprints are cut off
     there."""
@@ -179,7 +167,6 @@ class SpectrumFeatures:
         why=lambda facts: f"measured lamps: {names(lamp for lamp in facts.scene.lights if lamp.profile is not None)}",
         why_not="no light comes from a photometric file",
         names=("profile_intensity", "profile_stretch"),
-        stays="light would go elsewhere",
     )
     """Some light shines by a table of intensities over directions."""
 

@@ -27,8 +27,6 @@ class SurfaceFeatures:
         cost=lambda facts, sizes: (
             f"{size_words(sizes.spectrum * facts.distinct_glasses)} of indices; two children a surface"
         ),
-        stays="light would end there",
-        forced="",
     )
     sheets: bool = feature(
         "thin sheets",
@@ -39,8 +37,6 @@ class SurfaceFeatures:
         names=("both_faces", "KIND_SHEET"),
         cost="one more kind of surface; indices of both sides are looked up",
         requires=("dielectrics",),
-        stays="light would end there",
-        forced="no surface is thin",
     )
     """Some glass is a thin sheet, with one medium on both sides."""
     filters: bool = feature(
@@ -52,8 +48,6 @@ class SurfaceFeatures:
         names=("filter_by", "passed"),
         cost=lambda facts, sizes: f"3 lookups a surface, {size_words(sizes.spectrum)} a colour",
         requires=("dielectrics",),
-        left_out="without it surfaces are clear",
-        forced="no surface has a colour",
     )
     """Some surface of glass lets through only a share of what enters."""
     absorption: bool = feature(
@@ -65,7 +59,6 @@ class SurfaceFeatures:
         names=("medium_weight_row", "light: absorb"),
         cost=lambda facts, sizes: f"3 lookups a flight, {size_words(sizes.spectrum * len(facts.absorbing))}",
         requires=("dielectrics",),
-        forced="every glass with an absorption of zero",
     )
     rough: bool = feature(
         "rough surfaces",
@@ -75,8 +68,6 @@ class SurfaceFeatures:
         why_not="all glass is polished",
         names=("lobe_axes", "smith_share", "microfacet_numbers", "regained"),
         requires=("dielectrics",),
-        left_out="without it all glass is polished",
-        forced="every surface of width zero",
     )
     """Some glass has a ground surface, whose microfacets turn paths by chance."""
     polarised: bool = feature(
@@ -91,8 +82,6 @@ class SurfaceFeatures:
         ),
         names=("stokes_q", "incidence_axis", "fresnel_reflection", "behind_interface", "see_polarised"),
         requires=("dielectrics",),
-        left_out="without it light is weighed another way",
-        not_forced="light would be weighed another way",
     )
     """Paths carry their light's state of polarisation from surface to surface."""
     mirrors: bool = feature(
@@ -103,8 +92,6 @@ class SurfaceFeatures:
         why_not="there are no mirrors",
         names=(r"\(kind == KIND_MIRROR\) ",),
         cost=lambda facts, sizes: f"{size_words(sizes.spectrum * len(facts.mirrors))} of reflectances",
-        stays="light would end there",
-        forced="",
     )
     gratings: bool = feature(
         "gratings",
@@ -114,8 +101,6 @@ class SurfaceFeatures:
         why_not="there is no grating",
         names=("grating_at", "diffract_direction", "GRATINGS_AT"),
         cost=lambda facts, sizes: f"{sizes.texel} B an order; a step of the queue for each",
-        stays="light would end there",
-        forced="",
     )
     smooth_normals: bool = feature(
         "interpolated normals",
@@ -127,8 +112,6 @@ class SurfaceFeatures:
         cost=lambda facts, sizes: (
             f"{3 * sizes.texel} B a facet, {size_words(3 * sizes.texel * facts.smooth_triangles)}"
         ),
-        stays="light would land elsewhere",
-        forced="every facet with three equal normals, where facets are triangles",
     )
     """Some specular surface has interpolated normals."""
     normal_derivatives: bool = feature(
@@ -140,8 +123,6 @@ class SurfaceFeatures:
         names=("light: summed_change", "light: gradient_u"),
         cost="one more vector a column and surface",
         requires=("footprints", "smooth_normals"),
-        left_out="without them footprints are wrong, but light goes the same ways",
-        forced="every facet with three equal normals, where facets are triangles",
     )
     """Interpolated normals, or those of curved solids, bend columns too."""
     medium_stack: bool = feature(
@@ -153,8 +134,6 @@ class SurfaceFeatures:
         names=("medium_of", "stack_objects", "STACK_OBJECTS", "mask_before"),
         cost=lambda facts, sizes: f"{len(overlapping_solids(facts.scene))} bit(s) of a ray's mask",
         requires=("dielectrics",),
-        left_out="without it nested solids refract wrongly",
-        forced="every solid on the stack",
     )
     """Transparent solids nest or touch, so priorities decide the medium."""
     contacts: bool = feature(
@@ -166,8 +145,6 @@ class SurfaceFeatures:
         names=("accept_sheet", "crossed_in_contact", "comes_first", "left_normal"),
         cost=lambda facts, sizes: f"{len(contacts(facts.scene))} pair(s) that may touch",
         requires=("loose_triangles",),
-        left_out="without it light is lost between surfaces",
-        forced="",
     )
     """Other surfaces touch each other or glass: surfaces at one place are one interface."""
     loose_triangles: bool = feature("", lambda facts: facts.loose_triangles > 0, symbol="LOOSE_TRIANGLES")
@@ -181,8 +158,6 @@ class SurfaceFeatures:
         names=("intersect_tree", "box_entry", "LEAF_BIT", "TREE_AT", "TREE_STACK"),
         cost=lambda facts, sizes: f"about {size_words(facts.loose_triangles * sizes.triangle)}",
         requires=("loose_triangles",),
-        left_out="against a loop",
-        forced="against a loop",
     )
     """Triangles are found through a tree; otherwise by a loop."""
     convex_solids: bool = feature(
@@ -193,7 +168,6 @@ class SurfaceFeatures:
         why_not="no convex faceted solid",
         names=("intersect_solid", "planes", "solids", "SOLID_COUNT"),
         cost=lambda facts, sizes: _walk_words("planes", sum(map(len, facts.half_spaces.values())), sizes.texel),
-        left_out="against triangles of the same facets",
     )
     """Convex faceted solids are intersected as half-spaces."""
     curved_solids: bool = feature(
@@ -204,7 +178,6 @@ class SurfaceFeatures:
         why_not="no ball, ellipsoid, lens or cylinder stands by itself",
         names=("intersect_curved", "piece_at", "PIECES_AT", "PIECE_COUNT"),
         cost=lambda facts, sizes: _walk_words("faces", sum(map(len, facts.curved.values())), sizes.piece),
-        left_out="against a tree over triangles that stand for them",
     )
     """Balls, ellipsoids, lenses and cylinders are met as the quadrics they are, not as triangles."""
     beams: bool = feature(

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
-from types import ModuleType
 from typing import Any, Self
 
 import pytest
@@ -99,9 +98,6 @@ def seen(monkeypatch: pytest.MonkeyPatch) -> Seen:
             "prism -o out --camera --methods stochastic-point",
             "--methods 'stochastic-point' is a method of the light pass alone",
         ),
-        ("--camera --features prism", "--features and --camera exclude each other"),
-        ("--features prism ball", "'bench --features prism' without further scenes"),
-        ("--features nowhere", "neither a file nor shipped"),
     ],
 )
 def test_mistakes_are_one_sentence(
@@ -207,14 +203,3 @@ def test_two_scenes_of_one_name(tmp_path: Path) -> None:
     other.write_text('[[objects]]\nshape = "sphere"\nglass = "N-SF11"\n')
     with pytest.raises(UserError, match="another scene of this run is called 'prism' too"):
         scenes.load_scenes(["prism", str(other)])
-
-
-def test_features_has_its_own_command(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    asked = []
-    stand_in = ModuleType("features_cost")
-    stand_in.command = lambda scene, output: asked.append((scene.name, output)) or 0  # type: ignore[attr-defined]
-    monkeypatch.setattr("spectrasplat.bench.features.cost", stand_in, raising=False)
-    monkeypatch.setitem(__import__("sys").modules, "spectrasplat.bench.features.cost", stand_in)
-    assert main(["bench", "--features", "ball_plain", "-o", str(tmp_path)]) == 0
-    assert main(["bench", "--features", "prism"]) == 0
-    assert asked == [("ball without dispersion", tmp_path), ("prism", None)]

@@ -1,6 +1,6 @@
 """What a scene does not need is not in the text of its programs, nor in its records; what it needs is.
 
-These tests read the sources as the driver gets them, without a driver. `tests/gpu/test_features_cost.py`
+These tests read the sources as the driver gets them, without a driver. `tests/gpu/test_running_programs.py`
 does the same with every program that a rendering builds.
 """
 
@@ -15,7 +15,7 @@ from typing import Any, cast
 
 import pytest
 from spectrasplat.base import paths
-from spectrasplat.bench.features.compiled import PROVED, occurring, program_sizes, prove, static_costs
+from spectrasplat.commands.inspect_features import occurring, prove, static_costs
 from spectrasplat.features.facts import Facts
 from spectrasplat.features.features import ROWS, Features, all_symbols
 from spectrasplat.features.program_switches import Defines, switched
@@ -115,8 +115,16 @@ def test_names_come_and_go_with_their_feature(field: str) -> None:
     # Polarised light has no mean reflectance of its own.
     everything = replace(EVERYTHING, polarised=field == "polarised")
     assert {s for source in sources(everything) for s in occurring(source, names)} == set(names)
-    for source in sources(everything.without(field, *CAMERA_TOO.get(field, ()))):
+    for source in sources(without(everything, field, *CAMERA_TOO.get(field, ()))):
         assert occurring(source, names) == (), source.name
+
+
+def without(features: Features, *names: str) -> Features:
+    """The same with features left out, and all whose code needs theirs."""
+    left_out = set(names)
+    while more := {name for name, row in ROWS.items() if left_out & {*row.requires}} - left_out:
+        left_out |= more
+    return features.changed(**{name: ROWS[name].off for name in left_out})
 
 
 def test_rows_name_features_and_symbols_once() -> None:
@@ -177,7 +185,7 @@ def test_shipped_scenes_leave_out_what_they_do_not_need(name: str) -> None:
     features = Features.of(scene, RenderSettings())
     included = {feature: inside for feature, inside, _ in explained(scene)}
     assert not any(included[feature] for feature in SHIPPED[name])
-    proofs = prove(program_sizes(sources(features)), included)
+    proofs = prove(sources(features), features)
     assert [p.feature for p in proofs if not p.holds] == []
 
 
@@ -255,11 +263,10 @@ def test_what_is_in_tells_its_bytes_and_what_is_out_tells_none() -> None:
 
 def test_the_proof_fails_where_a_program_carries_what_it_should_not(monkeypatch: pytest.MonkeyPatch) -> None:
     features = scene_features("prism")
-    included = dict.fromkeys(PROVED, False)
     # Comments and guarded code left in, as in a text whose conditions only the driver resolves.
     monkeypatch.setattr(shader, "stripped", lambda lines, switches: lines)
     monkeypatch.setattr(shader, "_kept", {})  # nor a text that an earlier test had made
-    told = {p.feature: p.holds for p in prove(program_sizes(sources(features)), included)}
+    told = {p.feature: p.holds for p in prove(sources(features), Features())}
     assert not told["triangle tree"] and not told["normal derivatives"] and not told["medium stack"]
 
 
@@ -273,7 +280,7 @@ def test_a_guard_forgotten_in_a_shader_is_noticed(monkeypatch: pytest.MonkeyPatc
     text = (mutant / "lib" / "intersect.glsl").read_text()
     (mutant / "lib" / "intersect.glsl").write_text(text.replace("if (HAS_TREE)", "if (true)"))
     monkeypatch.setattr(paths, "shaders_dir", lambda: mutant)
-    proofs = prove(program_sizes(sources(scene_features("prism"))), dict.fromkeys(PROVED, False))
+    proofs = prove(sources(scene_features("prism")), Features())
     assert not next(p for p in proofs if p.feature == "triangle tree").holds
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from spectrasplat.base.errors import UserError
 from spectrasplat.base.paths import assets_dir
-from spectrasplat.bench.features.compiled import static_costs
+from spectrasplat.commands.inspect_features import static_costs
 from spectrasplat.edit import objects
 from spectrasplat.edit.objects import set_diffuse_colour, set_material
 from spectrasplat.edit.parameters import Stage, apply, paths, value_of
