@@ -23,7 +23,6 @@ from .device_traits import DeviceTraits
 _COMPUTE_SHADER, _VERTEX_SHADER, _FRAGMENT_SHADER = 0x91B9, 0x8B31, 0x8B30
 _COMPILE_STATUS, _LINK_STATUS, _COMPLETION_STATUS, _LOG_LENGTH = 0x8B81, 0x8B82, 0x91B1, 0x8B84
 _BINARY_HINT, _BINARY_LENGTH, _BINARY_FORMATS = 0x8257, 0x8741, 0x87FE
-_DISPATCH_INDIRECT_BUFFER = 0x90EE
 _PARALLEL = "GL_KHR_parallel_shader_compile"
 _KINDS = {1: {"compute": _COMPUTE_SHADER}, 2: {"vertex": _VERTEX_SHADER, "fragment": _FRAGMENT_SHADER}}
 """By the number of stages."""
@@ -40,19 +39,33 @@ _SIGNATURES: dict[str, tuple[Any, ...]] = {
     "CreateProgram GetError": (_UINT,),
     "CreateShader": (_UINT, _UINT),
     "ShaderSource": (None, _UINT, _INT, ctypes.POINTER(_TEXT), _POINTER),
-    "CompileShader LinkProgram DeleteShader DeleteProgram UseProgram": (None, _UINT),
-    "AttachShader DetachShader BindBuffer": (None, _UINT, _UINT),
+    "CompileShader LinkProgram DeleteShader DeleteProgram": (None, _UINT),
+    "AttachShader DetachShader": (None, _UINT, _UINT),
     "GetShaderiv GetProgramiv": (None, _UINT, _UINT, _INTEGER),
     "GetShaderInfoLog GetProgramInfoLog": (None, _UINT, _INT, _INTEGER, _TEXT),
     "ProgramParameteri": (None, _UINT, _UINT, _INT),
     "GetProgramBinary": (None, _UINT, _INT, _INTEGER, ctypes.POINTER(_UINT), _TEXT),
     "ProgramBinary": (None, _UINT, _UINT, _TEXT, _INT),
     "GetIntegerv": (None, _UINT, _INTEGER),
-    "DispatchCompute": (None, _UINT, _UINT, _UINT),
-    "DispatchComputeIndirect": (None, _POINTER),
     "MaxShaderCompilerThreadsKHR": (None, _UINT),
+    "GenQueries": (None, _INT, ctypes.POINTER(_UINT)),
+    "BeginQuery": (None, _UINT, _UINT),
+    "EndQuery": (None, _UINT),
+    "GetQueryObjectuiv": (None, _UINT, _UINT, ctypes.POINTER(_UINT)),
+    "GetQueryObjectui64v": (None, _UINT, _UINT, ctypes.POINTER(ctypes.c_uint64)),
 }
 """Result and arguments of OpenGL's functions."""
+_SIZE = ctypes.c_ssize_t
+_LONG: dict[str, tuple[Any, ...]] = {
+    "Finish": (None,),
+    "MapBufferRange": (_POINTER, _UINT, _SIZE, _SIZE, _UINT),
+    "GetTexImage": (None, _UINT, _INT, _UINT, _UINT, _POINTER),
+    "ReadPixels": (None, _INT, _INT, _INT, _INT, _UINT, _UINT, _POINTER),
+    "DispatchCompute": (None, _UINT, _UINT, _UINT),
+    "DispatchComputeIndirect": (None, _SIZE),
+    "DrawArraysInstanced": (None, _UINT, _INT, _INT, _INT),
+}
+"""Those that wait for the device; and some drivers compile as late as the first dispatch or drawing, for seconds."""
 
 
 class Linker:
@@ -60,8 +73,8 @@ class Linker:
 
     def __init__(self, loader: Any, unlocked: bool = False) -> None:
         """`loader`: of the current context, in the form that `moderngl.create_context(context=…)` takes; `unlocked`:
-        dispatches, too, let other threads go on."""
-        self._loader, self._unlocked = loader, unlocked
+        whatever may take long lets other threads go on."""
+        self._loader = loader
         self.gl = SimpleNamespace(
             **{
                 name: _FUNCTYPE(*signature)(loader.load(f"gl{name}"))
@@ -76,6 +89,9 @@ class Linker:
             "glAttachShader": _FUNCTYPE(None, _UINT, _UINT)(lambda *of: self._adopted or self.gl.AttachShader(*of)),
             "glLinkProgram": _FUNCTYPE(None, _UINT)(lambda *of: self._adopted or self.gl.LinkProgram(*of)),
         }
+        for name, signature in _LONG.items() if unlocked else ():
+            kind = _FUNCTYPE(*signature)
+            self._callbacks[f"gl{name}"] = kind(kind(loader.load(f"gl{name}")))
         self._device: tuple[str, ...] = ()
         """Names of driver and device; none where no binaries are kept."""
         self._is_parallel = False
@@ -185,10 +201,7 @@ class Linker:
         self._adopted = made.program
         try:
             if isinstance(made, PendingCompute):
-                compute = made.ctx.compute_shader(_COMPUTE_STUB)
-                if self._unlocked:
-                    compute.__class__ = UnlockedCompute
-                return compute
+                return made.ctx.compute_shader(_COMPUTE_STUB)
             return made.ctx.program(_STUB, _STUB)
         finally:
             self._adopted = 0
@@ -244,24 +257,6 @@ class PendingCompute(Pending, moderngl.ComputeShader):
 
 class PendingProgram(Pending, moderngl.Program):
     """A program that draws."""
-
-
-class UnlockedCompute(moderngl.ComputeShader):
-    """A compute program whose runs let other threads go on: some drivers compile as late as the first one, for
-    seconds."""
-
-    def run(self, group_x: int = 1, group_y: int = 1, group_z: int = 1) -> None:
-        """As of any compute program."""
-        gl = linker_of(self.ctx).gl
-        gl.UseProgram(self.glo)
-        gl.DispatchCompute(group_x, group_y, group_z)
-
-    def run_indirect(self, buffer: moderngl.Buffer, offset: int = 0) -> None:
-        """As of any compute program."""
-        gl = linker_of(self.ctx).gl
-        gl.UseProgram(self.glo)
-        gl.BindBuffer(_DISPATCH_INDIRECT_BUFFER, buffer.glo)
-        gl.DispatchComputeIndirect(offset)
 
 
 _linkers: weakref.WeakKeyDictionary[moderngl.Context, Linker] = weakref.WeakKeyDictionary()

@@ -10,7 +10,6 @@ from unittest import mock
 
 import moderngl
 import numpy as np
-from spectrasplat.gpu.linker import UnlockedCompute
 
 _TEXTURES = (moderngl.Texture, moderngl.TextureArray, moderngl.Texture3D, moderngl.TextureCube)
 _MADE = ("buffer", "texture", "texture3d", "texture_array", "texture_cube", "depth_texture", "framebuffer")
@@ -105,9 +104,8 @@ def counted() -> Iterator[Counts]:
 
     context = moderngl.Context
     with ExitStack() as stack:
-        for owner in (moderngl.ComputeShader, UnlockedCompute):
-            stack.enter_context(noting(owner, "run", dispatched))
-            stack.enter_context(noting(owner, "run_indirect", dispatched_indirect))
+        stack.enter_context(noting(moderngl.ComputeShader, "run", dispatched))
+        stack.enter_context(noting(moderngl.ComputeShader, "run_indirect", dispatched_indirect))
         for name in ("render", "render_indirect"):
             stack.enter_context(noting(moderngl.VertexArray, name, drawn))
         for owner in (moderngl.Buffer, *_TEXTURES, moderngl.Framebuffer):

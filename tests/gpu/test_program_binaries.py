@@ -5,9 +5,11 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +18,7 @@ from spectrasplat.base import paths
 from spectrasplat.edit.document import Document
 from spectrasplat.edit.live_inputs import LiveInputs
 from spectrasplat.edit.state import State
+from spectrasplat.gpu import context as context_module
 from spectrasplat.gpu import linker, shader
 from spectrasplat.gpu.context import Context, create_context
 from spectrasplat.gpu.device_traits import DeviceTraits, assumed
@@ -30,6 +33,15 @@ uniform float factor;
 void main() { value[gl_GlobalInvocationID.x] *= factor; }
 """
 VERTEX = "#version 430 core\nin vec2 place;\nvoid main() { gl_Position = vec4(place, 0.0, 1.0); }\n"
+SLOW = """#version 430 core
+layout(local_size_x = 8) in;
+layout(std430, binding = 0) buffer Values { float value[]; };
+void main() {
+    float x = value[gl_GlobalInvocationID.x];
+    for (int i = 0; i < 60000; ++i) x = sin(x + 1.0);
+    value[gl_GlobalInvocationID.x] = x;
+}
+"""
 FRAGMENT = "#version 430 core\nout vec4 colour;\nuniform vec4 paint;\nvoid main() { colour = paint; }\n"
 SECOND_START = """
 from spectrasplat.base.paths import shipped_scenes
@@ -91,6 +103,32 @@ def is_compiled_anew(context: Context, monkeypatch: pytest.MonkeyPatch) -> bool:
     values.release()
     program.release()
     return bool(compiled)
+
+
+def test_whatever_waits_lets_other_threads_go_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(context_module, "adopting_context", partial(linker.adopting_context, unlocked=True))
+    ticks, ends = [], threading.Event()
+
+    def tick() -> None:
+        while not ends.wait(1e-3):
+            ticks.append(time.perf_counter())
+
+    thread = threading.Thread(target=tick)
+    with create_context() as context:
+        values, groups = context.ctx.buffer(bytes(1 << 12)), context.ctx.buffer(np.array([64, 1, 1], "u4").tobytes())
+        values.bind_to_storage_buffer(0)
+        slow = linker_of(context.ctx).program(context.ctx, (SLOW,), RuntimeError, True)
+        thread.start()
+        started = time.perf_counter()
+        for run in (partial(slow.run, 64), partial(slow.run_indirect, groups)):
+            run()
+            context.finish()
+            run()
+            values.read(4)
+        took = time.perf_counter() - started
+        ends.set()
+        thread.join()
+    assert len(ticks) > 50 and np.diff(ticks).max() < 0.2 * took
 
 
 def test_a_second_start_compiles_nothing(tmp_path: Path) -> None:

@@ -23,7 +23,6 @@ from spectrasplat.edit.state import Display as DisplaySettings
 from spectrasplat.gpu import device_traits
 from spectrasplat.gpu.context import Context, create_context
 from spectrasplat.gpu.device_traits import Budget, DeviceTraits
-from spectrasplat.gpu.linker import UnlockedCompute
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.optics.glass import with_gain
 from spectrasplat.model.scene import Scene
@@ -34,7 +33,7 @@ SIZE = (160, 90)
 FRAME_S = 1 / 60
 PATIENCE_S = 300.0
 _WORK = (
-    *((owner, name) for owner in (moderngl.ComputeShader, UnlockedCompute) for name in ("run", "run_indirect")),
+    *((moderngl.ComputeShader, name) for name in ("run", "run_indirect")),
     *((moderngl.VertexArray, name) for name in ("render", "render_indirect")),
     *((moderngl.Context, name) for name in ("finish", "memory_barrier", "copy_buffer", "copy_framebuffer")),
     (moderngl.Framebuffer, "clear"),

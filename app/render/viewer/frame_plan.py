@@ -2,7 +2,8 @@
 
 Pure: `FramePlan.after` reads no clock and knows no device. A portion of photons costs something that does not depend on
 their number besides what each of them costs; the next number is the last one times the time that there is over the time
-that it took, so it comes to the right one from either side without passing it.
+that it took, so it comes to the right one from either side without passing it. One frame that took much too long says
+nothing of the usual, but the next one is given what it shows to be safe: no two follow each other that stall.
 """
 
 from __future__ import annotations
@@ -31,6 +32,8 @@ _FULL, _AIM = 1.0, 0.85
 used."""
 _HELD = 3
 """Frames whose median counts: one that stalled says nothing."""
+_DEAR = 2.0
+"""Times the time there is that the usual photons would take by the newest frame alone: then there are fewer at once."""
 _MAPS_SHARE = 0.25
 """Of a frame, at most, for what maps cost whatever is in them."""
 _PATIENCE = 24
@@ -61,6 +64,8 @@ class FramePlan:
     """What the next frame does."""
 
     photons: int = FIRST
+    usual: int = FIRST
+    """Photons, but for frames after one that took much too long."""
     depth: int = 8
     side: float = 1.0
     known: tuple[Spent, ...] = ()
@@ -75,13 +80,15 @@ class FramePlan:
         known = (*self.known[1 - _HELD :], spent)
         maps, rest = median(s.maps for s in known), median(s.rest for s in known)
         each = median(s.light / s.photons for s in known)
-        room = max(frame_s - rest - maps, 0.1 * frame_s)
-        used = each * self.photons / room
-        photons = float(self.photons)
+        used = each * self.usual / _room(frame_s, maps + rest)
+        usual: float = self.usual
         if used > _FULL or used < 0.75 * _AIM:
-            photons *= min(max(_AIM / max(used, 1e-9), _SHRINKING), _GROWTH)
-        photons = int(min(max(photons, FEWEST), MOST))
-        plan = replace(self, photons=photons, known=known, settled=self.settled + 1)
+            usual *= min(max(_AIM / max(used, 1e-9), _SHRINKING), _GROWTH)
+        usual = photons = int(min(max(usual, FEWEST), MOST))
+        room, newest = _room(frame_s, spent.maps + spent.rest), spent.light / spent.photons
+        if newest * usual > _DEAR * room:
+            photons = max(int(_AIM * room / newest), FEWEST)
+        plan = replace(self, photons=photons, usual=usual, known=known, settled=self.settled + 1)
         return plan if plan.settled < _PATIENCE else plan._sized(maps / frame_s, used)
 
     def _sized(self, maps: float, used: float) -> FramePlan:
@@ -92,13 +99,18 @@ class FramePlan:
         side, depth = self.side, self.depth
         if maps > _MAPS_SHARE:
             side = smaller
-        elif self.photons <= FEWEST and used > _FULL:
+        elif self.usual <= FEWEST and used > _FULL:
             depth = shallower
-        elif self.photons >= PLENTY:
+        elif self.usual >= PLENTY:
             depth, side = deeper, larger if maps * (larger / side) ** 2 < 0.5 * _MAPS_SHARE else side
         if (side, depth) == (self.side, self.depth):
             return self
         return replace(self, side=side, depth=depth, known=(), settled=0)
+
+
+def _room(frame_s: float, others_s: float) -> float:
+    """What of a frame is left for light, a tenth at least."""
+    return max(frame_s - others_s, 0.1 * frame_s)
 
 
 def _beside(steps: tuple[T, ...], at: T) -> tuple[T, T]:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, get_args
 
 from ...gpu.pass_timers import FrameTimes
-from .frame_plan import FramePlan, Spent
+from .frame_plan import FEWEST, FramePlan, Spent
 
 if TYPE_CHECKING:
     from ...gpu.context import Context
@@ -19,11 +19,14 @@ LIGHT = ("trace", "splat", "beams")
 """Passes that take as long as photons are many."""
 _LATEST = 12
 """Frames after which nothing more is expected of one."""
+BEHIND_S = 0.05
+"""The device is not done with a frame that began so long ago: until it is, it gets next to no light."""
 
 
 @dataclass
 class _Frame:
     times: FrameTimes
+    began: float
     kind: Kind | None = None
     """None: nothing is to be learnt of it."""
     photons: int = 0
@@ -38,7 +41,7 @@ class FramePlanner:
         self._context = context
         self.restart()
         self._frames: deque[_Frame] = deque(maxlen=_LATEST)
-        self._frame = _Frame(FrameTimes())
+        self._frame = _Frame(FrameTimes(), 0.0)
         self._started = 0.0
 
     def restart(self) -> None:
@@ -47,15 +50,18 @@ class FramePlanner:
         self._unpaired = 0.0
 
     def __getitem__(self, kind: Kind) -> FramePlan:
-        return self._plans[kind]
+        plan, waits = self._plans[kind], self._frames
+        is_behind = waits and self._frame.began - waits[0].began > BEHIND_S
+        return replace(plan, photons=FEWEST) if is_behind else plan
 
     def begin(self) -> None:
         """A frame begins."""
+        self._context.timers.hear()
         for frame in [frame for frame in self._frames if not frame.times.awaited]:
             self._frames.remove(frame)
             self._learn(frame)
-        self._frame = _Frame(FrameTimes())
         self._started = time.perf_counter()
+        self._frame = _Frame(FrameTimes(), self._started)
         self._context.timers.frame = self._frame.times
 
     def count(self, kind: Kind, photons: int, frame_s: float) -> None:
