@@ -14,28 +14,7 @@ from .base.version import __version__ as __version__
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 if TYPE_CHECKING:
-    from .api import CausticMap as CausticMap
-    from .api import Entries as Entries
-    from .api import Fan as Fan
-    from .api import Glass as Glass
-    from .api import Photons as Photons
-    from .api import Picture as Picture
-    from .api import Scene as Scene
-    from .api import Session as Session
-    from .api import Statistics as Statistics
-    from .api import SweepPoint as SweepPoint
-    from .api import Table as Table
-    from .api import UserError as UserError
-    from .api import View as View
-    from .api import caustic as caustic
-    from .api import fan as fan
-    from .api import glass as glass
-    from .api import glasses as glasses
-    from .api import load as load
-    from .api import render as render
-    from .api import scenes as scenes
-    from .api import sweep as sweep
-    from .api import trace as trace
+    from .api import *  # noqa: F403 - the names of its `__all__`
 
 _OFFERED = (
     "CausticMap",

@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 
 from ..reference.metrics import ReferencePicture, bias_variance
-from .results import BASELINE, CLOCKS, OWN_METHODS, TARGETS, Curve, Point, Sample, SpeedUp
+from .results import CLOCKS, OWN_METHODS, TARGETS, Curve, Point, Sample, SpeedUp
 
 SMALLEST_ERROR = 1e-12
 """Stands for 0 in logarithms."""
@@ -124,27 +124,6 @@ def budget_at_time(points: Sequence[Point], seconds: float) -> int:
     return int(
         np.exp(np.interp(np.log(seconds), [np.log(p.seconds) for p in order], [np.log(p.photons) for p in order]))
     )
-
-
-def speed_up(points: Sequence[Point], baseline: Sequence[Point]) -> Reached | None:
-    """How many times sooner than `baseline` `points` reach the error that `baseline` ends with, as `Reached` whose
-    seconds are the ratio; `at_once` then means "at least". None when they never get there.
-
-    For a baseline that stopped improving the time at which it got there counts, not its last."""
-    own = time_to_error(baseline, baseline[-1].relmse) if baseline else None
-    reached = time_to_error(points, baseline[-1].relmse) if baseline else None
-    if own is None or reached is None:
-        return None
-    return Reached(own.seconds / reached.seconds, reached.at_once)
-
-
-def ratios_of(curves: Sequence[Curve], measure: str = "relmse") -> dict[str, float]:
-    """Method → how many times sooner it reaches the error that `BASELINE` ends with, by any measure that falls."""
-    points = {curve.method: curve.points if measure == "relmse" else points_by(curve, measure) for curve in curves}
-    if BASELINE not in points:
-        return {}
-    found = {name: speed_up(own, points[BASELINE]) for name, own in points.items()}
-    return {name: reached.seconds for name, reached in found.items() if reached is not None}
 
 
 def whole_process(points: Sequence[Point]) -> list[Point]:

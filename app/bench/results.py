@@ -20,8 +20,6 @@ DEFAULT_METHODS = (
     "srd",
 )
 
-BASELINE = "stochastic"
-"""The method whose error at its end the others are timed to."""
 OWN_METHODS = ("srd", "srd-photons", "progressive")
 """The program's own, measured as they ship; all others are baselines, each at its best (`tuning`)."""
 TARGETS = (0.3, 0.1, 0.03, 0.01, 0.003, 0.001)
@@ -30,10 +28,6 @@ CLOCKS = ("photon", "whole")
 """By which speed-ups are given: the time of the measured pass, and that of a whole process."""
 ERROR_SOUGHT = 0.01
 """A method that is worse than this after `BenchSettings.seconds` is followed to the horizon."""
-
-OTHER_MEASURES = ("relmse_whole", "relmse_trimmed", "nrmse", "smape", "chroma")
-"""Further measures by which times to equal error are given, so that no conclusion depends on relMSE alone."""
-
 
 RANDOM_KINDS = ("plain", "all")
 """What scenes drawn by chance hold (`random_scenes`)."""
@@ -223,11 +217,6 @@ class SceneResult(msgspec.Struct):
     """Photon time given to each method and seed's largest rendering."""
     reference: ReferenceInfo | None
     curves: list[Curve]
-    time_to_equal_error: dict[str, float] = {}
-    """For each method: time `stochastic` needs over time the method needs to reach `stochastic`'s final error;
-    below 1 the method is slower, absent when it never gets there."""
-    time_to_equal_other: dict[str, dict[str, float]] = {}
-    """The same by other measures: `OTHER_MEASURES` → method → ratio."""
     speed_ups: list[SpeedUp] = []
     """`srd` against the best baseline at each of `TARGETS`, by both clocks."""
     strongest_glass: str = ""

@@ -15,10 +15,10 @@ from ..gpu.context import Context
 from ..model.scene import Scene
 from ..reference import metrics
 from ..reference.metrics import ReferencePicture
-from .curves import budget_at_time, complete_curve, ratios_of, speed_ups
+from .curves import budget_at_time, complete_curve, speed_ups
 from .measured_passes import MEASURED_PASSES
 from .rendering import NothingToMeasure, Rendering, Rig
-from .results import OTHER_MEASURES, BenchSettings, Curve, Sample, SceneResult
+from .results import BenchSettings, Curve, Sample, SceneResult
 from .store import Store
 from .subjects import SUBJECTS, Progress, Subject
 from .tuning import kernel_at, tune
@@ -210,7 +210,7 @@ class _SceneBench:
         complete_curve(
             curve, {n: sums[i].astype(np.float64) / seed for i, n in enumerate(curve.budgets)}, reference_image
         )
-        self._judge()
+        result.speed_ups = speed_ups(result.curves)
         store.save()
         store.drop_sums(result.scene, curve.method, seed - 1)
 
@@ -229,13 +229,6 @@ class _SceneBench:
             metrics.measure(rendering.xyz, self._reference_image),
             kernel or 0.0,
         )
-
-    def _judge(self) -> None:
-        """What all curves so far say about each other."""
-        result = self._result
-        result.time_to_equal_error = ratios_of(result.curves)
-        result.time_to_equal_other = {measure: ratios_of(result.curves, measure) for measure in OTHER_MEASURES}
-        result.speed_ups = speed_ups(result.curves)
 
     def _make_pictures(self, method: str, rig: Rig) -> None:
         """Pictures at equal time, with FLIP."""

@@ -155,8 +155,8 @@ def test_a_tiny_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pyt
             if sample.photons == max(curve.budgets)
         )  # 1 s of reference: its energy is known to a few %
         assert curve.points[-1].relmse <= curve.points[0].relmse
-    assert "time ratio" in shown
-    assert (out / "report.html").stat().st_size > 10_000 and (out / "plots" / "overview.svg").exists()
+    assert "tail slope" in shown
+    assert (out / "report.html").stat().st_size > 10_000 and (out / "plots" / "scenes.svg").exists()
     before = (out / "results.json").read_bytes()
     monkeypatch.setattr("spectrasplat.bench.report.report.write_report", lambda *_: None)
     assert main([*arguments, "--reference-seconds", "1"]) == 0  # all is there already

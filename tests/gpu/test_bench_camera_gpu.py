@@ -123,7 +123,7 @@ def test_a_tiny_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pyt
             if sample.photons == max(curve.budgets)
         )
     assert scene.curves[0].points[-1].relmse < scene.curves[0].points[0].relmse
-    assert [claim.name for claim in scene.claims][:1] == ["time to equal error"] and "samples" in shown
+    assert "samples" in shown
     assert set(scene.pictures) == {
         "reference",
         *(f"{method}{ending}" for method in ("stochastic", "srd") for ending in ("", " early", " first")),

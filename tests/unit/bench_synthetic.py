@@ -144,15 +144,7 @@ def synthetic_scene(
         scene.picture_samples[curve.method] = curve.samples[-1]
         scene.picture_samples[f"{curve.method} early"] = curve.samples[0]
     if {"srd", "stochastic"} <= set(methods):
-        scene.time_to_equal_error = {
-            "stochastic": 1.0,
-            "srd": gain,
-            "stochastic-point": 0.4,
-            "srd-lambda": 3.0,
-            "regular-16": 1.7,
-        }
         scene.speed_ups = speed_ups(curves)
-        scene.time_to_equal_other = {"nrmse": {"srd": 61.0, "stochastic": 1.0}, "relmse_whole": {"srd": 17.0}}
     return scene
 
 

@@ -154,7 +154,6 @@ def test_the_report_speaks_of_samples(tmp_path: Path) -> None:
     assert {
         "edge_error_time",
         "edge_error_samples",
-        "overview",
         "scenes",
     } <= stems
     assert "edge_error_photons" not in stems

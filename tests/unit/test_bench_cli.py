@@ -12,7 +12,7 @@ from spectrasplat.__main__ import main
 from spectrasplat.base.errors import UserError
 from spectrasplat.base.paths import shipped_scenes
 from spectrasplat.bench import runner
-from spectrasplat.bench.results import BenchSettings, Curve, Point, Sample, SceneResult
+from spectrasplat.bench.results import BenchSettings, Curve, Point, Sample, SceneResult, SpeedUp
 from spectrasplat.commands import scenes
 from spectrasplat.model.settings import CAMERA_METHODS, METHODS
 
@@ -59,8 +59,8 @@ def seen(monkeypatch: pytest.MonkeyPatch) -> Seen:
                 skipped(f"'{name}': nothing to measure")
                 continue
             curve = Curve("srd", {}, samples, [100, 1000], points, -1.0, 0.1)
-            equal = {"srd": 40.0}
-            done = SceneResult(name, name, (4, 4), 2, 1.0, None, [curve], time_to_equal_error=equal)
+            done = SceneResult(name, name, (4, 4), 2, 1.0, None, [curve])
+            done.speed_ups = [SpeedUp(0.01, "photon", 1.0, False, "stochastic", 40.0, False)]
             done.complete = not found.interrupt
             store.put_scene(done)
         store.save()

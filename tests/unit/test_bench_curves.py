@@ -11,8 +11,6 @@ from spectrasplat.bench.curves import (
     complete_curve,
     error_at_time,
     points_by,
-    ratios_of,
-    speed_up,
     speed_ups,
     tail_slope,
     time_to_error,
@@ -49,37 +47,7 @@ def curve(method: str, points: list[Point], seeds: int = 5) -> Curve:
     return Curve(method, {}, samples, BUDGETS, points)
 
 
-def test_time_to_equal_error_of_power_laws() -> None:
-    slow, fast = law(1.0), law(0.01)
-    ratio = speed_up(fast, slow)
-    assert ratio is not None and not ratio.at_once and ratio.seconds == pytest.approx(100.0, rel=1e-9)
-    # Other exponents: 0.1 t^-2 = 1 / t_end at t = sqrt(0.1 t_end).
-    end = slow[-1].seconds
-    ratio = speed_up(law(0.1, -2.0), slow)
-    assert ratio is not None and ratio.seconds == pytest.approx(end / np.sqrt(0.1 * end), rel=1e-9)
-    same = speed_up(slow, slow)
-    assert same is not None and same.seconds == pytest.approx(1.0)
-
-
-def test_a_baseline_that_stopped_improving_is_given_the_time_it_got_there() -> None:
-    flat = [p if p.seconds < 1.0 else Point(p.photons, p.seconds, 1.0, 1.0, 1.0, 1.0, 0.0) for p in law(1.0)]
-    first_flat = next(p.seconds for p in flat if p.relmse == 1.0)
-    ratio = speed_up(law(0.01), flat)
-    assert ratio is not None and ratio.seconds == pytest.approx(first_flat / flat[0].seconds) and ratio.at_once
-    own = speed_up(flat, flat)
-    assert own is not None and own.seconds == pytest.approx(1.0)
-
-
-def test_a_curve_that_never_gets_there_and_one_that_is_there_at_once() -> None:
-    slow = law(0.1)
-    assert speed_up(law(0.01, floor=1.0), slow) is None
-    at_once = speed_up(law(1e-6), slow)
-    assert at_once is not None and at_once.at_once
-    assert at_once.seconds == pytest.approx(slow[-1].seconds / slow[0].seconds)
-    assert speed_up(law(1.0), []) is None and time_to_error([], 1.0) is None
-
-
-def test_ratios_by_another_measure() -> None:
+def test_points_by_another_measure() -> None:
     def measured(method: str, scale: float) -> Curve:
         plain = curve(method, law(1.0))
         plain.samples = [
@@ -95,9 +63,20 @@ def test_ratios_by_another_measure() -> None:
         ]
         return plain
 
-    curves = [measured("stochastic", 1.0), measured("srd", 0.05)]
-    assert points_by(curves[0], "nrmse")[-1].relmse == pytest.approx(RATE / BUDGETS[-1])
-    assert ratios_of(curves, "nrmse")["srd"] == pytest.approx(20.0) and ratios_of(curves)["srd"] == pytest.approx(1.0)
+    for scale in (1.0, 0.05):
+        assert points_by(measured("srd", scale), "nrmse")[-1].relmse == pytest.approx(scale * RATE / BUDGETS[-1])
+
+
+def test_a_curve_reaches_an_error_in_time_at_once_or_never() -> None:
+    # Another exponent: 0.1 t^-2 = 1 / t_end at t = sqrt(0.1 t_end).
+    end = law(1.0)[-1].seconds
+    reached = time_to_error(law(0.1, -2.0), 1.0 / end)
+    assert (
+        reached is not None and not reached.at_once and reached.seconds == pytest.approx(np.sqrt(0.1 * end), rel=1e-9)
+    )
+    at_once = time_to_error(law(1e-6), 0.1)
+    assert at_once is not None and at_once.at_once and at_once.seconds == law(1e-6)[0].seconds
+    assert time_to_error(law(0.01, floor=1.0), 0.1) is None and time_to_error([], 1.0) is None
 
 
 def test_a_lucky_point_gains_nothing() -> None:
@@ -202,8 +181,3 @@ def test_the_best_baseline_is_the_best_where_all_are_followed() -> None:
     short = curve("stochastic-even", law(0.5))
     assert best_baseline([long_run, short, curve("srd", law(1e-6))]).method == "stochastic-even"  # type: ignore[union-attr]
     assert best_baseline([curve("srd", law(1.0)), curve("srd-photons", law(1.0))]) is None
-
-
-def test_ratios_are_to_the_baseline() -> None:
-    srd, stochastic = curve("srd", law(0.01)), curve("stochastic", law(1.0))
-    assert ratios_of([srd]) == {} and ratios_of([stochastic, srd])["srd"] == pytest.approx(100.0)

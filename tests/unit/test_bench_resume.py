@@ -175,7 +175,6 @@ def test_one_whole_run(tmp_path: Path, rigs: Rigs) -> None:
     noise = {curve.method: curve for curve in scene.curves}
     assert noise["srd"].points[-1].bias2 == pytest.approx(1e-4, rel=0.3)
     assert noise["stochastic"].points[0].variance == pytest.approx(0.09, rel=0.3)
-    assert scene.time_to_equal_error["srd"] > 1.0
     assert len(rigs.rendered) == 2 * (2 * 3 * 4 + 4) and rigs.released == 4
     first_of_seed = [next(m for m, _, seed in rigs.rendered if seed == s) for s in (1, 2, 3)]
     assert first_of_seed == ["stochastic", "srd", "stochastic"]  # who begins changes

@@ -13,11 +13,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..curves import speed_up, time_to_error
 from ..measured_passes import MEASURED_PASSES
-from ..results import BASELINE, Curve, Point, SceneResult
+from ..results import Curve, Point, SceneResult
 from . import style
-from .text import count, number, ratio_text, seeds_text
+from .text import count, number, seeds_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -75,8 +74,6 @@ def error_against(scene: SceneResult, abscissa: str) -> Figure:
     for one in drawn:
         draw_series(axes, one)
     _draw_reference_error(axes, own)
-    if abscissa == "seconds":
-        _draw_ratio_arrow(axes, scene)
     label_ends(axes, drawn)
     return figure
 
@@ -139,20 +136,6 @@ def _draw_reference_error(axes: Axes, own: float) -> None:
     style.note(axes, "reference's own error", (0.012, own), -3.0 if under else 3.0, **place)
 
 
-def _draw_ratio_arrow(axes: Axes, scene: SceneResult) -> None:
-    """From the end of `stochastic` to where `srd` reaches that error: the ratio as a length."""
-    ratio = scene.time_to_equal_error.get("srd", 0.0)
-    points = points_of(scene, BASELINE)
-    own = time_to_error(points, points[-1].relmse) if points else None
-    if own is None or not 1.2 < ratio < math.inf or not 0 < points[-1].relmse < math.inf:
-        return
-    error, reached_s = points[-1].relmse, max(own.seconds / ratio, axes.get_xlim()[0])
-    draw_time_arrow(axes, own.seconds, reached_s, error)
-    words = f"{ratio_text(ratio, is_lower_bound(scene, 'srd'))} less time"
-    looks = {"color": style.method_style("srd").colour, "fontweight": "bold", "fontsize": 9}
-    style.note(axes, words, (math.sqrt(own.seconds * reached_s), error), -3.5, ha="center", va="top", **looks)
-
-
 def draw_time_arrow(axes: Axes, from_s: float, to_s: float, error: float) -> None:
     """From when another method has an error to when `srd` has it."""
     line = {"lw": 1.0, "ls": (0.0, (4.0, 2.0)), "color": style.method_style("srd").colour}
@@ -163,13 +146,6 @@ def draw_time_arrow(axes: Axes, from_s: float, to_s: float, error: float) -> Non
 def points_of(scene: SceneResult, method: str) -> list[Point]:
     """A method's points; none where it has none yet."""
     return next((curve.points for curve in scene.curves if curve.method == method), [])
-
-
-def is_lower_bound(scene: SceneResult, method: str) -> bool:
-    """Whether the method's shortest rendering is already as good as the baseline's longest, so that the true ratio is
-    larger still."""
-    reached = speed_up(points_of(scene, method), points_of(scene, BASELINE))
-    return reached is not None and reached.at_once and method != BASELINE
 
 
 def label_ends(axes: Axes, drawn: Sequence[Series], gap_pt: float = 11.5) -> None:

@@ -1,8 +1,8 @@
 """Writes what a bench run has found: plots as PNG and SVG, and one page that needs no other file.
 
     DIR/plots/SCENE_error_time.png .svg    DIR/plots/SCENE_error_photons.png .svg (the camera pass: _samples)
-    DIR/plots/overview.png .svg            DIR/plots/scenes.png .svg (the README's figure)
-    DIR/plots/speed_up.png .svg            DIR/report.html, DIR/tables.md
+    DIR/plots/speed_up.png .svg            DIR/plots/scenes.png .svg (the README's figure)
+    DIR/report.html, DIR/tables.md
 
 A run that was stopped can be reported as well: what is missing is named in its place.
 """
@@ -27,8 +27,6 @@ from .page import PROSE, inlined, render
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_EQUAL_ERROR = "time to equal error"
-
 
 def write_report(result: BenchResult, directory: Path) -> None:
     """Write plots and page into `directory`, where the files that `SceneResult.pictures` names lie as well.
@@ -46,8 +44,6 @@ def write_report(result: BenchResult, directory: Path) -> None:
         for index, (scene, name) in enumerate(zip(result.scenes, names, strict=True)):
             progress(index / (len(names) + 1), scene.scene)
             scenes.append(_scene(scene, name, plots))
-        label = "time to equal error of each method in each scene, as a ratio to stochastic"
-        glance = inlined(style.save(run_plots.overview(result), plots / "overview"), "overview", label)
         headline, curve = run_plots.speed_up_over_error(result), None
         if headline is not None:
             label = "speed-up of srd over the best baseline against target error, by scene"
@@ -55,7 +51,7 @@ def write_report(result: BenchResult, directory: Path) -> None:
         readme_plot(result, plots / "scenes")
         progress(1.0, "page")
     with atomic_output(directory / "report.html") as temporary:
-        temporary.write_text(document(result, scenes, glance, curve), encoding="utf-8")
+        temporary.write_text(document(result, scenes, curve), encoding="utf-8")
     with atomic_output(directory / "tables.md") as temporary:
         temporary.write_text(tables.markdown(result), encoding="utf-8")
 
@@ -73,7 +69,7 @@ def file_names(scenes: list[str]) -> list[str]:
     for scene in scenes:
         base = re.sub(r"[^A-Za-z0-9_-]+", "_", scene)[:60].strip("_") or "scene"
         name, count = base, 1
-        while name in taken or name in ("overview", "scenes"):
+        while name in taken or name in ("speed_up", "scenes"):
             count += 1
             name = f"{base}_{count}"
         taken.append(name)
@@ -83,8 +79,8 @@ def file_names(scenes: list[str]) -> list[str]:
 # -- the page -----------------------------------------------------------------------------
 
 
-def document(result: BenchResult, scenes: Sequence[dict[str, object]], glance: Markup, speed_up: Markup | None) -> str:
-    """The whole page; `glance`: the ratios of all scenes to `stochastic`, `speed_up`: to the best baseline, drawn."""
+def document(result: BenchResult, scenes: Sequence[dict[str, object]], speed_up: Markup | None) -> str:
+    """The whole page; `speed_up`: over the best baseline in all scenes, drawn."""
     prose, settings, count = PROSE[result.settings.measured_pass], result.settings, len(result.scenes)
     measured = MEASURED_PASSES[settings.measured_pass]
     used = style.by_rank(sorted({curve.method for scene in result.scenes for curve in scene.curves}))
@@ -102,10 +98,8 @@ def document(result: BenchResult, scenes: Sequence[dict[str, object]], glance: M
             f"{text.seeds_text(settings.seeds)}, {count} scene{'' if count == 1 else 's'}",
         },
         scenes=scenes,
-        glance=glance,
         speed_up=speed_up,
         speed_ups=tables.summary_table(result),
-        glance_caption=text.sentence(prose.metrics[_EQUAL_ERROR]),
         methods={name: prose.methods.get(name, "Not described.") for name in used},
         doubts=[(scene.scene, warning) for scene in result.scenes for warning in text.warnings_of(scene)],
     )
@@ -136,7 +130,6 @@ def _scene(scene: SceneResult, name: str, plots: Path) -> dict[str, object]:
         "speed": tables.speed_table(scene),
         "sweep": drawn(curve_plots.sweep_plot(scene), "sweep", "error of each baseline against its kernel"),
         "kernels": tables.kernel_table(scene),
-        "other_measures": tables.other_measures_table(scene),
         "bias": drawn(curve_plots.bias_and_variance(scene), "bias", bias),
         "errors": tables.error_table(scene),
         "pictures": pictures.matrix(scene, plots.parent),

@@ -1,23 +1,21 @@
-"""The plots over all scenes of a run: time ratios, error against time as small multiples, speed-up over target error.
+"""The plots over all scenes of a run: error against time as small multiples, speed-up over target error.
 
 Figures must be made and saved inside `style.plot_style()`.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from ..curves import best_baseline, time_to_error
-from ..results import BASELINE, CLOCKS, TARGETS, BenchResult, SceneResult
+from ..results import CLOCKS, TARGETS, BenchResult, SceneResult
 from . import style
 from .curve_plots import (
     Series,
     axis_name,
     draw_series,
     draw_time_arrow,
-    is_lower_bound,
     label_ends,
     points_of,
     scene_series,
@@ -29,8 +27,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_NEVER_PLACE = 1.18
-"""Where a method that never gets there is drawn, as a factor on the axis's left end."""
 _RIVALS = ("stochastic-even", "srd-lambda")
 """Shown next to `stochastic` and `srd` in the small panels: the first that the run has."""
 _SCENE_COLOURS = (
@@ -39,75 +35,11 @@ _SCENE_COLOURS = (
 )
 
 
-def overview(result: BenchResult) -> Figure:
-    """Per scene the time to equal error as a ratio to `stochastic`, a dot for each method."""
-    from matplotlib.lines import Line2D
-
-    scenes = sorted(result.scenes, key=lambda s: s.time_to_equal_error.get("srd", -1.0))
-    height = 1.75 + 0.34 * max(len(scenes), 1)
-    figure = style.new_figure(8.6, height)
-    axes = figure.add_axes((0.27, 0.92 / height, 0.705, 1 - 1.6 / height))
-    ratios = [r for s in scenes for r in s.time_to_equal_error.values() if r > 0 and math.isfinite(r)]
-    left = min([0.5, *ratios]) / 2.2
-    style.log_axis(axes, "x", (left, max([2.0, *ratios]) * 2.2), times)
-    axes.axvline(1.0, color=style.MUTED, lw=0.8, ls=(0.0, (3.0, 2.0)), zorder=1)
-    above = {"xycoords": ("data", "axes fraction"), "ha": "center", "va": "bottom", "color": style.MUTED}
-    style.note(axes, "as fast as stochastic", (1.0, 1), 3.0, **above)
-    methods = style.by_rank(sorted({c.method for s in scenes for c in s.curves} - {BASELINE}))
-    if any(_ratio(scene, curve.method) is None for scene in scenes for curve in scene.curves):
-        style.note(axes, "never", (left * _NEVER_PLACE, 1), 3.0, **above)
-    style.title(axes, "Time to equal error", " ")
-    for row, scene in enumerate(scenes):
-        _draw_ratios(axes, row, scene, left)
-    axes.set_xlabel("time of stochastic ÷ time of the method, to the error stochastic has at its end; larger is faster")
-    axes.set_ylim(-0.6, max(len(scenes), 1) - 0.4)
-    axes.set_yticks(range(len(scenes)), [_scene_label(scene) for scene in scenes])
-    axes.tick_params(axis="y", length=0)
-    axes.spines["left"].set_visible(False)
-    # A line of markers at the foot: dots cannot be named directly where many rows share them.
-    looks = {name: style.method_style(name) for name in methods}
-    handles = [Line2D([], [], ls="", marker=look.marker, color=look.colour, label=n) for n, look in looks.items()]
-    if handles:
-        place: style.Settings = {"loc": "lower left", "bbox_to_anchor": (0.26, 0.06 / height), "handletextpad": 0.2}
-        figure.legend(handles=handles, ncols=len(handles), **place)
-    return figure
-
-
-def _draw_ratios(axes: Axes, row: int, scene: SceneResult, left: float) -> None:
-    for method in (curve.method for curve in scene.curves if curve.method != BASELINE):
-        looks, strong, ratio = style.method_style(method), method == "srd", _ratio(scene, method)
-        x, fill = (left * _NEVER_PLACE, style.PAPER) if ratio is None else (ratio, looks.colour)
-        dot: style.Settings = {
-            "ms": 8.5 if strong else 5.0,
-            "mfc": fill,
-            "mec": looks.colour,
-            "mew": 1.0,
-            "clip_on": False,
-        }
-        axes.plot(x, row, looks.marker, zorder=5 + looks.rank, **dot)
-        if strong and ratio is not None:
-            words = ratio_text(ratio, is_lower_bound(scene, "srd"))
-            style.note(axes, words, (x, row), 5.0, ha="center", color=looks.colour, fontweight="bold", fontsize=9)
-
-
-def _ratio(scene: SceneResult, method: str) -> float | None:
-    """Time to equal error, None where the method never gets there."""
-    ratio = scene.time_to_equal_error.get(method, 1.0 if method == BASELINE else 0.0)
-    return ratio if ratio > 0 and math.isfinite(ratio) else None
-
-
-def _scene_label(scene: SceneResult) -> str:
-    name = scene.scene if len(scene.scene) <= 20 else f"{scene.scene[:19]}…"
-    if scene.strongest_abbe <= 0:
-        return f"{name}  (no dispersion)"
-    return f"{name}  ({scene.strongest_glass[:14]}, Abbe {scene.strongest_abbe:.0f})"
-
-
 def small_multiples(result: BenchResult) -> Figure:
     """Panels that share both axes, one for each scene that has points, in the order that the scenes were named in;
     each says how much sooner `srd` has the error that the best of all baselines ends with."""
     measured = {curve.method for scene in result.scenes for curve in scene.curves if curve.points}
-    shown = {BASELINE, "srd", *[name for name in _RIVALS if name in measured][:1]}
+    shown = {"stochastic", "srd", *[name for name in _RIVALS if name in measured][:1]}
     found = [(s, [one for one in scene_series(s, "seconds") if one.method in shown]) for s in result.scenes]
     found = [(scene, drawn) for scene, drawn in found if drawn]
     columns = 2 if len(found) == 4 else min(3, max(len(found), 1))

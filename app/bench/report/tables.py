@@ -8,11 +8,10 @@ from functools import partial
 
 from ..curves import error_at_time, points_by
 from ..measured_passes import MEASURED_PASSES
-from ..results import BASELINE, CLOCKS, OTHER_MEASURES, TARGETS, BenchResult, Curve, Point, SceneResult, SpeedUp
-from .curve_plots import is_lower_bound
+from ..results import CLOCKS, TARGETS, BenchResult, Curve, Point, SceneResult, SpeedUp
 from .page import Table
 from .style import by_rank
-from .text import NONE, clock_name, count, number, percent, ratio_text, slope_text, speed_up_text, warnings_of
+from .text import NONE, clock_name, count, number, percent, slope_text, speed_up_text, warnings_of
 
 MEASURES = {
     "relmse_whole": "relMSE, ε of the whole picture",
@@ -21,7 +20,7 @@ MEASURES = {
     "smape": "SMAPE",
     "chroma": "Δu'v'",
 }
-"""Names of `results.OTHER_MEASURES` for the reader."""
+"""Further measures of `Sample.metrics` for the reader, so that no conclusion depends on relMSE alone."""
 
 
 def ranked(scene: SceneResult) -> list[Curve]:
@@ -45,26 +44,24 @@ def _mean(values: Iterable[float]) -> float | None:
 
 
 def speed_table(scene: SceneResult) -> Table:
-    """Errors at a few times and at the ends, their slope, and the time to equal error."""
+    """Errors at a few times and at the ends, and their slope."""
     measured = MEASURED_PASSES[scene.measured_pass]
     seconds = [t for t in measured.compared_seconds if t < scene.seconds]
     headings = [
-        *("method", "time ratio", *(f"relMSE at {t:g} s" for t in seconds)),
+        *("method", *(f"relMSE at {t:g} s" for t in seconds)),
         *("relMSE, shortest run", "relMSE, longest run", "over seeds", "bias's share", "tail slope (95 %)"),
         *(f"{measured.time.split()[0]} s", measured.units),
     ]
-    compared = any(curve.method == BASELINE and curve.points for curve in scene.curves)
     rows = []
     for curve in ranked(scene):
         if not curve.points:
             rows.append([curve.method, *[NONE] * (len(headings) - 1)])
             continue
-        (first, last), ratio = ends(curve), scene.time_to_equal_error.get(curve.method)
+        first, last = ends(curve)
         share = bias_share(last)
         rows.append(
             [
                 curve.method,
-                ratio_text(ratio, is_lower_bound(scene, curve.method)) if compared or ratio else NONE,
                 *(number(error_at_time(curve.points, t)) for t in seconds),
                 f"{number(first.relmse)} at {first.seconds:.2g} s",
                 number(last.relmse),
@@ -80,9 +77,7 @@ def speed_table(scene: SceneResult) -> Table:
     return Table(
         headings,
         rows,
-        "Time ratio: time of stochastic over time of the method, to the error that stochastic ends with; above 1 the "
-        "method is faster.",
-        f"{scene.scene}, {size}, {scene.seeds} seed{'s' * (scene.seeds != 1)}{own}",
+        title=f"{scene.scene}, {size}, {scene.seeds} seed{'s' * (scene.seeds != 1)}{own}",
     )
 
 
@@ -137,33 +132,19 @@ def kernel_table(scene: SceneResult) -> Table | None:
     )
 
 
-def other_measures_table(scene: SceneResult) -> Table | None:
-    """Time ratios by every measure, so that none is trusted alone."""
-    measures = [name for name in OTHER_MEASURES if name in scene.time_to_equal_other]
-    columns = [scene.time_to_equal_error, *(scene.time_to_equal_other[name] for name in measures)]
-    rows = [
-        [curve.method, *(ratio_text(column.get(curve.method)) for column in columns)]
-        for curve in ranked(scene)
-        if curve.method != BASELINE
-    ]
-    headings = ("time ratio by", "relMSE", *(MEASURES.get(name, name) for name in measures))
-    return Table(headings, rows, "The same ratio by other measures.") if measures else None
-
-
 def error_table(scene: SceneResult) -> Table:
     """What the error of the longest run consists of, and the other metrics there."""
-    keys = ("relmse_trimmed", "smape", "chroma", "nrmse")
     rows = []
     for curve in ranked(scene):
         samples = curve.largest_samples()
-        means = {key: _mean(s.metrics[key] for s in samples if key in s.metrics) for key in (*keys, "energy_ratio")}
+        means = {key: _mean(s.metrics[key] for s in samples if key in s.metrics) for key in (*MEASURES, "energy_ratio")}
         last = ends(curve)[1:] if scene.seeds > 1 else []
         split = [number(last[0].bias2), number(last[0].variance)] if last else [NONE, NONE]
         energy = means["energy_ratio"]
-        others = (number(means[key]) for key in keys)
+        others = (number(means[key]) for key in MEASURES)
         rows.append([curve.method, *split, *others, NONE if energy is None else f"{energy:.4f}"])
     return Table(
-        ("method", "bias²", "variance", *(MEASURES[key] for key in keys), "energy"),
+        ("method", "bias²", "variance", *MEASURES.values(), "energy"),
         rows,
         "What the error of the longest run consists of, and the other metrics there (means over seeds).",
     )

@@ -151,7 +151,7 @@ def _times_fall(curve: Curve) -> bool:
 
 
 def headline(result: BenchResult) -> list[str]:
-    """The findings in two or three sentences: srd against the best baseline by both clocks, and against stochastic."""
+    """The findings in a sentence or two: srd against the best baseline by both clocks."""
     found = []
     for clock in ("photon", "whole"):
         known = [one for s in result.scenes for one in s.speed_ups if one.clock == clock and one.target == ERROR_SOUGHT]
@@ -164,15 +164,6 @@ def headline(result: BenchResult) -> list[str]:
                 f"best of all baselines, each with its best kernel, in {sum(ratio > 1.0 for ratio in ratios)} of "
                 f"{len(known)} scenes{_range_of(ratios)}{f' ({bounds} of these are bounds)' if bounds else ''}."
             )
-    compared = [
-        s for s in result.scenes if {"srd", "stochastic"} <= {curve.method for curve in s.curves if curve.points}
-    ]
-    ratios = [r for s in compared if (r := s.time_to_equal_error.get("srd", 0.0)) > 0 and math.isfinite(r)]
-    if compared:
-        found.append(
-            f"srd reached the error that stochastic ends with in {len(ratios)} of {len(compared)} "
-            f"scenes{_range_of(ratios)}."
-        )
     return found or ["Nothing has been compared yet: the run was stopped early or had one method only."]
 
 
