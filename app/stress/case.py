@@ -28,7 +28,7 @@ class Measurement:
     """One severity of one case."""
 
     severity: float
-    """Place on the plot's axis; larger need not be harder."""
+    """As a number; larger need not be harder."""
     label: str
     """The severity for people, with its unit: "1e-3 rad"."""
     nonfinite: int
@@ -77,12 +77,10 @@ class Case:
     why: str
     """What fails here in a careless renderer, and how it is prevented."""
     severity_name: str
-    """The plot's horizontal axis, with its unit."""
+    """What the sweep changes, with its unit."""
     run: Run
     sweep: Sequence[Any]
     """The severities, or rows that hold one each."""
-    logarithmic: bool = True
-    """Whether the axis is logarithmic."""
 
     @property
     def steps(self) -> int:
@@ -98,13 +96,13 @@ class Case:
         return replace(self, sweep=sweep)
 
 
-def case(name: str, severity_name: str, sweep: Sequence[Any], logarithmic: bool = True) -> Callable[[Run], Case]:
+def case(name: str, severity_name: str, sweep: Sequence[Any]) -> Callable[[Run], Case]:
     """Makes a function a case; the first paragraph of its docstring is the title, the rest `why`."""
 
     def made(run: Run) -> Case:
         title, _, why = inspect.cleandoc(run.__doc__ or "").partition("\n\n")
         title = " ".join(title.split()).removesuffix(".")
-        return Case(name, title, " ".join(why.split()), severity_name, run, sweep, logarithmic)
+        return Case(name, title, " ".join(why.split()), severity_name, run, sweep)
 
     return made
 

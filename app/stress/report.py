@@ -1,5 +1,5 @@
-"""The stress result for readers: a table for each case, on the screen and on one HTML page with verdict, machine and a
-plot."""
+"""The stress result for readers: a table for each case, on the screen and on one HTML page with verdict and
+machine."""
 
 from __future__ import annotations
 
@@ -9,10 +9,8 @@ from pathlib import Path
 from markupsafe import Markup
 
 from ..base.atomic import atomic_output
-from ..bench.report.page import Table, inlined, render
-from ..bench.report.style import plot_style, svg_text
+from ..bench.report.page import Table, render
 from .case import FLUX_CLOSURE, Measurement
-from .plots import case_plot
 from .results import CaseResult, StressResult
 
 
@@ -24,19 +22,6 @@ def write_html(result: StressResult, path: Path) -> None:
 
 def html_text(result: StressResult) -> str:
     """The page. It holds no script and fetches nothing."""
-    cases = []
-    with plot_style():
-        for number, found in enumerate(result.cases):
-            drawn = case_plot(found)
-            label = f"{found.case.name}: errors and bounds against {found.case.severity_name}"
-            cases.append(
-                {
-                    "case": found.case,
-                    "stops": _stops(found),
-                    "plot": None if drawn is None else inlined(svg_text(drawn), f"case-{number}", label),
-                    "table": case_table(found),
-                }
-            )
     return render(
         "stress.html",
         result=result,
@@ -45,7 +30,7 @@ def html_text(result: StressResult) -> str:
         closure=f"{FLUX_CLOSURE:.0e}",
         run={"version": result.version, "date": result.date, **result.machine},
         overview=_overview(result),
-        cases=cases,
+        cases=[{"case": found.case, "stops": _stops(found), "table": case_table(found)} for found in result.cases],
     )
 
 

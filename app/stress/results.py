@@ -98,7 +98,6 @@ def _record(result: StressResult) -> dict[str, Any]:
                 "title": found.case.title,
                 "why": found.case.why,
                 "severity": found.case.severity_name,
-                "logarithmic": found.case.logarithmic,
                 "steps": found.case.steps,
                 "seconds": found.seconds,
                 "failure": found.failure,

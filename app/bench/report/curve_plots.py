@@ -1,4 +1,4 @@
-"""The plots of one scene: error against time and photons, bias and variance, and the kernels that were tried.
+"""The plots of one scene: error against time and photons.
 
 Figures must be made and saved inside `style.plot_style()`. All error axes are logarithmic. A mean error of zero (the
 debiased estimate lies below the reference's own noise) is drawn as a hollow triangle on the floor of the plot.
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..measured_passes import MEASURED_PASSES
-from ..results import Curve, Point, SceneResult
+from ..results import Point, SceneResult
 from . import style
 from .text import count, number, seeds_text
 
@@ -37,22 +37,16 @@ class Series:
     """relMSE: mean, least and largest of the seeds; finite, may be ≤ 0."""
 
 
-def scene_series(
-    scene: SceneResult, abscissa: str, fields: Sequence[str] = ("relmse_low", "relmse_high")
-) -> list[Series]:
+def scene_series(scene: SceneResult, abscissa: str) -> list[Series]:
     """The finite points of all curves of a scene that have any, over "seconds" or "photons", in drawing order (the last
-    lies on top); `fields` of a point as `low` and `high`."""
-    drawn = []
+    lies on top)."""
+    drawn, names = [], (abscissa, "relmse", "relmse_low", "relmse_high")
     for curve in scene.curves:
-        names = (abscissa, "relmse", *fields)
         rows = [[float(getattr(p, name)) for name in names] for p in sorted(curve.points, key=lambda p: p.photons)]
         rows = [row for row in rows if row[0] > 0 and all(map(math.isfinite, row))]
         if rows:
             drawn.append(Series(curve.method, *np.array(rows).T))
     return sorted(drawn, key=lambda one: style.method_style(one.method).rank)
-
-
-# -- error against time or photons --------------------------------------------------------------
 
 
 def error_against(scene: SceneResult, abscissa: str) -> Figure:
@@ -180,64 +174,3 @@ def spread(wanted: Sequence[float], gap: float, height: float) -> list[float]:
     steps = gap * np.arange(len(wanted))
     levels = isotonic_regression(np.asarray(wanted, float) - steps).x if len(wanted) else steps
     return (np.clip(levels, 0.0, max(height - gap * (len(wanted) - 1), 0.0)) + steps).tolist()
-
-
-# -- bias and variance, kernels -----------------------------------------------------------------
-
-
-def bias_and_variance(scene: SceneResult) -> Figure | None:
-    """A panel for each method: variance (solid) and bias² (ink, dots) against time; None where one seed cannot
-    distinguish them."""
-    from matplotlib.lines import Line2D
-
-    parts = {one.method: one for one in scene_series(scene, "seconds", ("bias2", "variance"))}
-    if not any(np.any(one.low > 0) or np.any(one.high > 0) for one in parts.values()):
-        return None
-    names = style.by_rank([*parts])
-    columns = min(len(names), 6)
-    figure, grid = style.panels(len(names), columns, (1.85, 2.15), (0.68, 0.1, 0.5, 0.65))
-    everything = [Series(name, one.x, v, v, v) for name, one in parts.items() for v in (one.low, one.high)]
-    for axes, name in zip(grid, names, strict=True):
-        set_limits(axes, everything)
-        style.method_title(axes, name)
-        bias2, variance = (np.where(v > 0, v, np.nan) for v in (parts[name].low, parts[name].high))
-        axes.plot(parts[name].x, variance, color=style.method_style(name).colour, lw=2.0)
-        axes.plot(parts[name].x, bias2, color=style.INK, lw=1.0, marker="o", ms=3.2)
-        style.floor_marks(axes, parts[name].x[np.isnan(bias2)], style.INK)
-    style.label_panels(grid, columns, axis_name(scene.measured_pass), "share of relMSE")
-    style.heading(figure, f"{scene.scene}: bias and variance", 0.68)
-    handles = [
-        Line2D([], [], color=style.MUTED, lw=2.0, label="variance"),
-        Line2D([], [], color=style.INK, lw=1.0, marker="o", ms=3.2, label="bias²"),
-        Line2D([], [], ls="", marker="v", ms=5, mfc=style.PAPER, mec=style.INK, label="no bias detected"),
-    ]
-    width, height = figure.get_size_inches()
-    figure.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.58 / width, 1 - 0.26 / height), ncols=3)
-    return figure
-
-
-def sweep_plot(scene: SceneResult) -> Figure | None:
-    """relMSE against the kernel's width, a panel a baseline, a line a budget; None where no kernel was swept."""
-    swept = {curve.method: curve for curve in scene.curves if curve.kernels}
-    errors = [trial.relmse for curve in swept.values() for trial in curve.sweep if trial.relmse > 0]
-    if not errors:
-        return None
-    columns = min(len(swept), 4)
-    figure, grid = style.panels(len(swept), columns, (2.1, 2.2), (0.7, 0.1, 0.5, 0.4))
-    style.heading(figure, f"{scene.scene}: the kernels that were tried", 0.7)
-    for axes, name in zip(grid, style.by_rank([*swept]), strict=True):
-        style.log_axis(axes, "x", (0.4, 60.0), places=[0.5, 1, 2, 4, 8, 16, 32])
-        style.error_axis(axes, (min(errors) / 1.5, max(errors) * 1.5))
-        style.method_title(axes, name)
-        _draw_sweep(axes, swept[name])
-    style.label_panels(grid, columns, "kernel (lattice spacings)", "relMSE")
-    return figure
-
-
-def _draw_sweep(axes: Axes, curve: Curve) -> None:
-    for photons in sorted({t.photons for t in curve.sweep}):
-        line = sorted((t.smoothing, t.relmse) for t in curve.sweep if t.photons == photons and t.relmse > 0)
-        if line:
-            x, y = np.array(line).T
-            axes.plot(x, y, color=style.method_style(curve.method).colour, lw=1.0, marker="o", ms=2.5)
-            axes.text(x[-1] * 1.1, y[-1], count(photons), fontsize=7, color=style.MUTED)

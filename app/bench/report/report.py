@@ -25,7 +25,7 @@ from . import curve_plots, pictures, run_plots, style, tables, text
 from .page import PROSE, inlined, render
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    pass
 
 
 def write_report(result: BenchResult, directory: Path) -> None:
@@ -109,16 +109,11 @@ def _scene(scene: SceneResult, name: str, plots: Path) -> dict[str, object]:
     """What the page shows of one scene; its curves over time and over photons or samples are saved as well."""
     anchor, measured = f"scene-{name}", MEASURED_PASSES[scene.measured_pass]
 
-    def drawn(figure: Figure | None, part: str, label: str) -> Markup | None:
-        document = None if figure is None else style.svg_text(figure)
-        return None if document is None else inlined(document, f"{anchor}-{part}", f"{scene.scene}: {label}")
-
     curves = []
     for abscissa, ending, words in (("seconds", "time", measured.time), ("photons", measured.units, measured.unit)):
         saved = style.save(curve_plots.error_against(scene, abscissa), plots / f"{name}_error_{ending}")
         label = f"{scene.scene}: relMSE of each method against {words}, logarithmic axes"
         curves.append(inlined(saved, f"{name}-{ending}", label))
-    bias = f"bias squared and variance of each method against {measured.time}"
     return {
         "name": scene.scene,
         "title": scene.title,
@@ -128,9 +123,7 @@ def _scene(scene: SceneResult, name: str, plots: Path) -> dict[str, object]:
         "curves": curves,
         "speed_ups": tables.speed_up_table(scene),
         "speed": tables.speed_table(scene),
-        "sweep": drawn(curve_plots.sweep_plot(scene), "sweep", "error of each baseline against its kernel"),
         "kernels": tables.kernel_table(scene),
-        "bias": drawn(curve_plots.bias_and_variance(scene), "bias", bias),
         "errors": tables.error_table(scene),
         "pictures": pictures.matrix(scene, plots.parent),
         "cost": tables.cost_table(scene),

@@ -224,18 +224,6 @@ def title(axes: Axes, words: str, detail: str = "") -> None:
     note(axes, detail, (0, 1), 7.0, fontsize=8.5, color=MUTED, **place)
 
 
-def heading(figure: Figure, words: str, left_in: float) -> None:
-    """A bold title over panels."""
-    width, height = figure.get_size_inches()
-    figure.text(left_in / width, 1 - 0.12 / height, words, fontsize=10.5, fontweight="bold", va="top")
-
-
-def method_title(axes: Axes, name: str) -> None:
-    """A panel's method in its colour."""
-    weight = "bold" if name == "srd" else "normal"
-    axes.set_title(name, loc="left", fontsize=9.5, color=method_style(name).colour, pad=4, fontweight=weight)
-
-
 def floor_marks(axes: Axes, x: Any, colour: str) -> None:
     """Hollow triangles on the floor of the axes: an error too small to be known."""
     if len(x):

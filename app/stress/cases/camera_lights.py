@@ -104,7 +104,7 @@ def _smooth(d: np.ndarray) -> np.ndarray:
     return 1.0 + 0.5 * d[..., 0] + 0.3 * d[..., 1] + 0.1 * d[..., 2] + 0.2 * (d[..., 0] ** 2 - d[..., 1] ** 2)
 
 
-@case("eye-poles", "degrees from the zenith", (80.0, 89.0, 89.9, 89.999, 90.0, -90.0), logarithmic=False)
+@case("eye-poles", "degrees from the zenith", (80.0, 89.0, 89.9, 89.999, 90.0, -90.0))
 def eye_poles(context: Context, elevations_deg: Sequence[float]) -> Measured:
     """A panorama's poles, against the function it was made of
 
@@ -184,7 +184,7 @@ COEFFICIENTS = (
 )
 
 
-@case("eye-absorption", "coefficient", COEFFICIENTS, logarithmic=False)
+@case("eye-absorption", "coefficient", COEFFICIENTS)
 def eye_absorption(context: Context, rows: Sequence[tuple[str, np.ndarray]]) -> Measured:
     """Glass that absorbs nothing, everything, or everything below 550 nm, against the sum over reflections
 

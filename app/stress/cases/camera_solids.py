@@ -52,7 +52,7 @@ from .meshes import FAULTS, Fault
 ORIGIN = (0.0, 0.0, 0.0)
 
 
-@case("eye-guide", "reflections", (10, 20, 30, 40, 60), logarithmic=False)
+@case("eye-guide", "reflections", (10, 20, 30, 40, 60))
 def eye_guide(context: Context, counts: Sequence[int]) -> Measured:
     """A light guide of ten to sixty total reflections, against the sum over all ways
 
@@ -84,7 +84,7 @@ def eye_guide(context: Context, counts: Sequence[int]) -> Measured:
         yield seen(bounces, f"{bounces} reflections", sight, held, shares, note)
 
 
-@case("eye-corner", "tilt (degrees)", (0.0, 2.0, 5.0, 10.0, 15.0), logarithmic=False)
+@case("eye-corner", "tilt (degrees)", (0.0, 2.0, 5.0, 10.0, 15.0))
 def eye_corner(context: Context, tilts_deg: Sequence[float]) -> Measured:
     """A corner cube of glass returns the view
 
@@ -116,7 +116,7 @@ STONES = (
 )
 
 
-@case("eye-gems", "gem", STONES, logarithmic=False)
+@case("eye-gems", "gem", STONES)
 def eye_gems(context: Context, stones: Sequence[tuple[str, Mesh, Dispersion, float]]) -> Measured:
     """Gems before white: nothing of them may be seen
 
@@ -129,7 +129,7 @@ def eye_gems(context: Context, stones: Sequence[tuple[str, Mesh, Dispersion, flo
         yield seen(number, label, sight, in_furnace(sight.picture, mean, 0.2), shares)
 
 
-@case("eye-room", "reflectance", (1.0, 0.98, 0.9, 0.5), logarithmic=False)
+@case("eye-room", "reflectance", (1.0, 0.98, 0.9, 0.5))
 def eye_room(context: Context, reflectances: Sequence[float]) -> Measured:
     """A closed room of mirrors
 
@@ -167,7 +167,7 @@ def eye_mirrors(context: Context, counts: Sequence[int]) -> Measured:
         yield seen(hops, f"{hops} reflections", sight, held)
 
 
-@case("eye-shells", "shells", (1, 2, 3), logarithmic=False)
+@case("eye-shells", "shells", (1, 2, 3))
 def eye_shells(context: Context, counts: Sequence[int]) -> Measured:
     """Shells within shells, each of which splits a path strongly
 
@@ -192,7 +192,7 @@ SURE = 1e-3
 safe distance cannot distinguish them."""
 
 
-@case("eye-inside", "place", (0.3, 1e-2, 1e-3, 1e-5, 1e-7, 0.0, -1e-7, -1e-5, -1e-3, -1e-2, -0.3), logarithmic=False)
+@case("eye-inside", "place", (0.3, 1e-2, 1e-3, 1e-5, 1e-7, 0.0, -1e-7, -1e-5, -1e-3, -1e-2, -0.3))
 def eye_inside(context: Context, distances: Sequence[float]) -> Measured:
     """The camera inside glass, on its face and before it, against the sum over all ways
 
@@ -249,7 +249,7 @@ def _glass_alone(scene: Scene) -> Scene:
     return with_glass(scene, lambda dispersion: constant(dispersion.n_d, dispersion.name))
 
 
-@case("eye-contacts", "pair", [pair for pair in PAIRS if pair.label in CHOSEN_PAIRS], logarithmic=False)
+@case("eye-contacts", "pair", [pair for pair in PAIRS if pair.label in CHOSEN_PAIRS])
 def eye_contacts(context: Context, pairs: Sequence[Pair]) -> Measured:
     """Solids that nest or touch, seen through, against a simpler scene of the same look
 
@@ -268,7 +268,7 @@ CHANGES = (
 )
 
 
-@case("eye-scale", "change", CHANGES, logarithmic=False)
+@case("eye-scale", "change", CHANGES)
 def eye_scale(context: Context, changes: Sequence[tuple[str, float, float]]) -> Measured:
     """A brilliant on a table, at other sizes and far from the origin
 
@@ -285,7 +285,7 @@ def eye_scale(context: Context, changes: Sequence[tuple[str, float, float]]) -> 
 CHOSEN_FAULTS = [fault for fault in FAULTS if fault.label not in ("nothing", "every face twice")]
 
 
-@case("eye-meshes", "fault", CHOSEN_FAULTS, logarithmic=False)
+@case("eye-meshes", "fault", CHOSEN_FAULTS)
 def eye_meshes(context: Context, faults: Sequence[Fault]) -> Measured:
     """Mesh files with slivers, zero normals, doubled vertices and holes, seen against the sound solid
 

@@ -143,7 +143,7 @@ RIM_GRAIN = 0.05
 pixel's samples some have a band there and some the whole spectrum."""
 
 
-@case("eye-index-matched", "n − 1", [(d, delta) for d in (False, True) for delta in DIFFERENCES], logarithmic=False)
+@case("eye-index-matched", "n − 1", [(d, delta) for d in (False, True) for delta in DIFFERENCES])
 def eye_index_matched(context: Context, rows: Sequence[tuple[bool, float]]) -> Measured:
     """A ball of next to no glass, and of next to none that disperses, against no ball
 
@@ -210,7 +210,7 @@ GLASSES = (
 """Label, glass, what a picture in bands may err by, as a share of it."""
 
 
-@case("eye-glasses", "glass", GLASSES, logarithmic=False)
+@case("eye-glasses", "glass", GLASSES)
 def eye_glasses(context: Context, glasses: Sequence[tuple[str, Dispersion, float]]) -> Measured:
     """A ball and a prism of glass with any dispersion, before a sky of stripes, against the float64 reference
 
@@ -233,7 +233,7 @@ FOCI = (*(("wall", defocus) for defocus in (0.5, 0.1, 0.01, 0.0)), ("camera", 0.
 """What is near the ball's focus, and its distance from it, radii."""
 
 
-@case("eye-focus", "place", FOCI, logarithmic=False)
+@case("eye-focus", "place", FOCI)
 def eye_focus(context: Context, places: Sequence[tuple[str, float]]) -> Measured:
     """A wall through the focus of a ball, and the camera in it, against the float64 reference
 

@@ -302,7 +302,7 @@ def beam_films(_: Context, thicknesses: Sequence[float]) -> Measured:
         yield kept([film], light, thickness, f"{thickness:g} thick")
 
 
-@case("beam-contact", "gap", (1e-3, 1e-6, 0.0, -1e-6, -1e-3, -0.3), logarithmic=False)
+@case("beam-contact", "gap", (1e-3, 1e-6, 0.0, -1e-6, -1e-3, -0.3))
 def beam_contact(_: Context, gaps: Sequence[float]) -> Measured:
     """Beams through solids apart, cemented, and one within the other
 
@@ -312,7 +312,7 @@ def beam_contact(_: Context, gaps: Sequence[float]) -> Measured:
         yield kept([one, block((gap, -0.3, 0.0), (0.5, 0.3, 0.5), "N-BK7")], light, gap, f"{gap:g} apart")
 
 
-@case("beam-edge-on", "angle (rad)", (1e-2, 1e-5, 1e-8, 0.0), logarithmic=False)
+@case("beam-edge-on", "angle (rad)", (1e-2, 1e-5, 1e-8, 0.0))
 def beam_edge_on(_: Context, angles: Sequence[float]) -> Measured:
     """Facets seen from their edge
 

@@ -159,7 +159,7 @@ PAIRS = (
 )
 
 
-@case("contacts", "pair", PAIRS, logarithmic=False)
+@case("contacts", "pair", PAIRS)
 def contacts(context: Context, pairs: Sequence[Pair]) -> Measured:
     """Solids that share faces, nest or overlap, against a simpler scene of the same light
 

@@ -223,7 +223,7 @@ def behind_a_pane(light: Light, height: float, x: float, depth: np.ndarray) -> n
     return np.asarray(xyz_to_rgb709(K_M * (light.spectral_power.density * share) @ cmf_xyz()))
 
 
-@case("tinted-panes", "row", TINTED, logarithmic=False)
+@case("tinted-panes", "row", TINTED)
 def tinted_panes(context: Context, rows: Sequence[tuple[int, str, str, float, int]]) -> Measured:
     """Panes of one to eight tints, 1e-4 to 10 thick, under every kind of lamp, against Beer and Lambert's law
 

@@ -116,7 +116,7 @@ PLACES = (
 )
 
 
-@case("places", "place", PLACES, logarithmic=False)
+@case("places", "place", PLACES)
 def places(context: Context, rows: Sequence[Place]) -> Measured:
     """Lights and cameras on faces, along faces, on corners, in glass
 
@@ -135,7 +135,7 @@ REFUSED: tuple[tuple[str, Callable[[], Scene]], ...] = (
 )
 
 
-@case("refusals", "scene", REFUSED, logarithmic=False)
+@case("refusals", "scene", REFUSED)
 def refusals(_: Context, rows: Sequence[tuple[str, Callable[[], Scene]]]) -> Measured:
     """Scenes that cannot be right
 
@@ -193,7 +193,7 @@ LAMPS = (
 )
 
 
-@case("lamps", "lamp", LAMPS, logarithmic=False)
+@case("lamps", "lamp", LAMPS)
 def lamps(context: Context, rows: Sequence[Lamp]) -> Measured:
     """Photometric files with peaks, zeros and edges
 

@@ -173,7 +173,7 @@ DARK: tuple[tuple[str, Callable[[], Scene]], ...] = (
 )
 
 
-@case("dark-lights", "scene", DARK, logarithmic=False)
+@case("dark-lights", "scene", DARK)
 def dark_lights(context: Context, rows: Sequence[tuple[str, Callable[[], Scene]]]) -> Measured:
     """Lights that give no light, and scenes that cannot be computed
 

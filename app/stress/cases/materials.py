@@ -60,7 +60,7 @@ REFUSED: tuple[Callable[[], Dispersion], ...] = (
 )
 
 
-@case("extreme-index", "index (1.5…: V_d varies)", EXTREMES, logarithmic=False)
+@case("extreme-index", "index (1.5…: V_d varies)", EXTREMES)
 def extreme_index(context: Context, extremes: Sequence[tuple[float, str, Dispersion]]) -> Measured:
     """Indices from a gas to germanium, dispersion from none to all there is, and the wrong way round
 

@@ -141,7 +141,7 @@ def needles(context: Context, segments: Sequence[int]) -> Measured:
 NORMAL_FAULTS = ("a tenth zero", "all zero", "lengths 1e-6 to 1e6", "a tenth backwards", "all backwards", "at random")
 
 
-@case("bad-normals", "kind of fault", NORMAL_FAULTS, logarithmic=False)
+@case("bad-normals", "kind of fault", NORMAL_FAULTS)
 def bad_normals(context: Context, faults: Sequence[str]) -> Measured:
     """Shading normals that are zero, unnormalised, backwards or random
 
@@ -267,7 +267,7 @@ FAULTS = (
 )
 
 
-@case("mesh-files", "fault", FAULTS, logarithmic=False)
+@case("mesh-files", "fault", FAULTS)
 def mesh_files(context: Context, faults: Sequence[Fault]) -> Measured:
     """Mesh files with slivers, zero normals, doubled vertices and holes, against the sound solid
 

@@ -21,7 +21,7 @@ from ..rigs.scene_parts import IMPOSSIBLE, STEP, SUN, solid, stage
 from .sweeps import scene_sweep
 
 
-@case("gems", "glass", list(IMPOSSIBLE.items()), logarithmic=False)
+@case("gems", "glass", list(IMPOSSIBLE.items()))
 def gems(context: Context, glasses: Sequence[tuple[str, Dispersion]]) -> Measured:
     """A prism, a ball, a diamond and a cube of glass that no maker sells, against one-wavelength photons
 
@@ -61,7 +61,7 @@ def shipped(name: str) -> Scene:
 SHIPPED = sorted(file.stem for file in (assets_dir() / "scenes").glob("*.toml"))
 
 
-@case("shipped", "scene", SHIPPED, logarithmic=False)
+@case("shipped", "scene", SHIPPED)
 def every_shipped(context: Context, names: Sequence[str]) -> Measured:
     """Every shipped scene with few photons
 

@@ -97,7 +97,7 @@ def offset(context: Context, offsets: Sequence[float], base: Base) -> Measured:
         yield rendered(far, f"{far:.0e} extents", found, unchanged(found, base.probe(context)))
 
 
-@case("rotation", "angle, degrees", (30.0, 90.0, 137.0), logarithmic=False)
+@case("rotation", "angle, degrees", (30.0, 90.0, 137.0))
 def rotation(context: Context, angles_deg: Sequence[float], base: Base) -> Measured:
     """The whole scene turned
 
