@@ -73,8 +73,8 @@ class Reindexing:
         nm = [(lo, hi) if hi - lo < 1e-6 else (max(lo - 0.5, 380.0), min(hi + 0.5, 780.0)) for lo, hi in ends]
         return [(float(lo), float(hi)) for lo, hi in self.axis.x_of_nm(np.array(nm).reshape(-1, 2))]
 
-    def spans(self, traced: Spans, axis: SpectralAxis, lights: Sequence[Spectrum]) -> Spans:
-        """The bands' intervals of y, cut to their light's spectrum, the outermost stretched to its ends.
+    def spans(self, traced: Spans, axis: SpectralAxis, supports: Sequence[tuple[float, float]]) -> Spans:
+        """The bands' intervals of y, cut to their light's spectrum (`supports`), the outermost stretched to its ends.
 
         `traced`: in the coordinate of `axis`, photons' own. A band wholly beyond the spectrum keeps its interval, in
         which there is no light.
@@ -82,7 +82,7 @@ class Reindexing:
         edges = np.array([edge for bands in traced for edge in bands])
         indices = iter(self.offset + self.scale * self.traced.index(axis.nm_of_x(edges)))
         shown: Spans = []
-        for bands, (low, high) in zip(traced, self.supports(lights), strict=True):
+        for bands, (low, high) in zip(traced, supports, strict=True):
             row = []
             for k, (lo, hi) in enumerate(bands):
                 a, b = (float(y) for y in next(indices))
@@ -105,7 +105,7 @@ class ReindexBuffer:
         ctx: moderngl.Context,
         reindexing: Reindexing,
         traced: Spans,
-        lights: Sequence[Spectrum],
+        supports: Sequence[tuple[float, float]],
         classes: int,
         into: ReindexBuffer | None = None,
     ) -> None:
@@ -113,7 +113,7 @@ class ReindexBuffer:
         are. `into`: one that is of no use any more, whose buffer becomes this one's."""
         count = max(len(bands) for bands in traced)
         rows = np.zeros((len(traced), classes, count, 2, 4), np.float32)
-        for i, (bands, support) in enumerate(zip(traced, reindexing.supports(lights), strict=True)):
+        for i, (bands, support) in enumerate(zip(traced, supports, strict=True)):
             for k, ends in enumerate(bands):
                 rows[i, :, k, 0] = (*ends, *support)
                 rows[i, :, k, 1, :2] = (k == 0, k == len(bands) - 1)

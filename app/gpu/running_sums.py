@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..model.optics.spectral_tables import CELL_EDGES_NM
 from . import shader
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from ..model.optics.spectrum import Spectrum
 
 BIND_KNOTS, BIND_SUMS = 0, 1
-_KNOTS = 402
+KNOTS = len(CELL_EDGES_NM)
 
 
 @dataclass(frozen=True)
@@ -44,16 +45,16 @@ class RunningSums:
 
     def __init__(self, ctx: moderngl.Context, rows: Sequence[SumRow]) -> None:
         self._line_nm = np.unique(np.concatenate([row.line_nm for row in rows]))
-        sums = np.zeros((len(rows), _KNOTS + len(self._line_nm), 4), np.float32)
+        sums = np.zeros((len(rows), KNOTS + len(self._line_nm), 4), np.float32)
         for values, row in zip(sums, rows, strict=True):
-            values[1:_KNOTS] = np.cumsum(row.cells, axis=0)
-            np.add.at(values, _KNOTS + np.searchsorted(self._line_nm, row.line_nm), row.lines)
+            values[1:KNOTS] = np.cumsum(row.cells, axis=0)
+            np.add.at(values, KNOTS + np.searchsorted(self._line_nm, row.line_nm), row.lines)
         self._sums = ctx.buffer(sums)
         self._knots = ctx.buffer(reserve=4 * sums.shape[1])
         self.defines: Defines = {
             "BIND_KNOTS": BIND_KNOTS,
             "BIND_SUMS": BIND_SUMS,
-            "SUM_KNOTS": _KNOTS,
+            "SUM_KNOTS": KNOTS,
             "SUM_LINES": len(self._line_nm),
         }
 

@@ -35,7 +35,7 @@ from .scene_geometry import SceneGeometry
 from .scene_motion import MovingTriangles, ObjectPlaces, WorldMeshes
 from .scene_records import GRATING, GRATING_ORDER, OBJECT, PIECE
 from .scene_texels import SceneTexels, spectra_texture
-from .spectral_groups import SAMPLES, Groups, index_slope
+from .spectral_groups import SAMPLES, Groups, index_slope, samples_of
 from .texture_store import textured_objects
 
 UNBOUNDED = 1e30
@@ -256,8 +256,7 @@ class SceneBuffers:
         absorbers: dict[bytes, int] = {}
         """Row of each curve."""
         widths = rough_surfaces.distinct_widths(item.material.microfacet_width for item in self.scene.objects)
-        x = np.linspace(0.0, 1.0, SAMPLES)
-        nm = self.axis.nm_of_samples(SAMPLES)
+        nm, x = samples_of(self.axis)
         stack_bits = _stack_bits(self.scene) if self.features.medium_stack else {}
         records = OBJECT.zeros(len(self.scene.objects))
         for name in ("medium", "weight_row", "stack_bit", "receiver", "group", "texture"):
@@ -314,11 +313,9 @@ class SceneBuffers:
         self.stack_objects: list[int] = [by_bit[bit] for bit in range(len(by_bit))]
 
         index_rows = index_table(self.axis, media, SAMPLES) if media else np.ones((0, SAMPLES))
-        variables = self.groups.variables(self.axis)
+        variables = self.groups.variables(nm, x)
         slopes = [
-            index_slope(
-                self.groups, self.groups.glasses.index(g) if g in self.groups.glasses else None, self.axis, variables
-            )
+            index_slope(self.groups, self.groups.glasses.index(g) if g in self.groups.glasses else None, nm, x)
             for g in media
         ]
         rows = [

@@ -35,10 +35,8 @@ class Groups:
         group = tuple(min(i, count - 1) for i in range(len(glasses))) if count else ()
         return Groups(glasses, group, count, features.merged_groups and len(glasses) <= MAX_GROUPS)
 
-    def variables(self, axis: SpectralAxis) -> np.ndarray:
-        """var_g over x, float64 (count, SAMPLES): n of the glass, or a shared variable."""
-        x = np.linspace(0.0, 1.0, SAMPLES)
-        nm = axis.nm_of_samples(SAMPLES)
+    def variables(self, nm: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """var_g, float64 (count, n), at places (n,) of the spectrum: n of the glass, or a shared variable."""
         rows = []
         for g in range(self.count):
             members = [glass for glass, owner in zip(self.glasses, self.group, strict=True) if owner == g]
@@ -48,16 +46,20 @@ class Groups:
                 rows.append(members[0].index(nm))
             else:
                 rows.append(x)
-        return np.array(rows).reshape(self.count, SAMPLES)
+        return np.array(rows).reshape(self.count, len(nm))
 
 
-def index_slope(groups: Groups, glass: int | None, axis: SpectralAxis, variables: np.ndarray) -> np.ndarray:
-    """dn/dvar over x of a glass (its number in `groups`) with respect to its group's variable: 1 where n is the
-    variable, 0 without a group."""
+def samples_of(axis: SpectralAxis) -> tuple[np.ndarray, np.ndarray]:
+    """Wavelengths, nm, and x of a table's samples."""
+    return axis.nm_of_samples(SAMPLES), np.linspace(0.0, 1.0, SAMPLES)
+
+
+def index_slope(groups: Groups, glass: int | None, nm: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """dn/dvar, where `Groups.variables` is taken, of a glass (its number in `groups`) with respect to its group's
+    variable: 1 where n is the variable, 0 without a group."""
     if glass is None or not groups.count:
-        return np.zeros(SAMPLES)
-    variable = variables[groups.group[glass]]
-    n = groups.glasses[glass].index(axis.nm_of_samples(SAMPLES))
-    if np.array_equal(n, variable):
-        return np.ones(SAMPLES)
-    return np.gradient(n, variable, edge_order=2)
+        return np.zeros(len(nm))
+    group = groups.group[glass]
+    if not groups.by_wavelength and groups.group.count(group) == 1:
+        return np.ones(len(nm))
+    return np.gradient(groups.glasses[glass].index(nm), groups.variables(nm, x)[group], edge_order=2)

@@ -15,19 +15,19 @@ from functools import partial
 import moderngl
 import numpy as np
 
-from ..features.program_switches import switched
+from ..features.program_switches import Defines, switched
 from ..gpu import shader
 from ..gpu.device_traits import DeviceTraits
 from ..gpu.map_channels import MapChannels
-from ..gpu.running_sums import RunningSums, SumRow
+from ..gpu.running_sums import BIND_KNOTS, KNOTS, RunningSums, SumRow
 from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.scene_texels import spectra_texels
-from ..gpu.spectral_groups import SAMPLES, index_slope
+from ..gpu.spectral_groups import SAMPLES, index_slope, samples_of
 from ..model.materials.diffuse import SMOOTH_ROUGHNESS
-from ..model.optics.colorimetry import VISIBLE_NM, daylight_per_lumen, rgb_basis
+from ..model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz, daylight_per_lumen, rgb_basis
 from ..model.optics.glass import Dispersion
 from ..model.optics.rough_surfaces import coat_tables, glass_defines, glass_tables
-from ..model.optics.spectral_tables import SpectralAxis, cumulative, index_table
+from ..model.optics.spectral_tables import CELL_EDGES_NM, SpectralAxis, cumulative
 from ..model.optics.spectrum import Spectrum
 from ..model.scene import Material, Scene
 from .picture_channels import Channels
@@ -57,30 +57,29 @@ class CameraTables:
         values = _Values.of(scene, channels, reflectances, maps)
         self.defines = values.defines
         self.spectra, self.emission = (
-            ctx.texture(texels.shape[1::-1], texels.shape[2], texels, dtype="f4")
-            for texels in (spectra_texels(values.rows), _emission(values.emission, values.axis))
+            ctx.texture(texels.shape[1::-1], texels.shape[2], texels, dtype="f4") for texels in values.textures
         )
         for texture in (self.spectra, self.emission):
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self.object_colours = ctx.buffer(values.object_colours)
         self.cell_cdf = ctx.buffer(values.cell_cdf)
-        self._rows = values.rows
-        self._device = _DeviceTables(ctx, values.rows) if by_compute and channels.edges_nm is None else None
+        curves, rows = int(values.defines["QUANTILE_ROW"]), self.spectra.height
+        self._device = _DeviceTables(ctx, curves, rows) if by_compute and channels.edges_nm is None else None
 
     def take(self, scene: SceneBuffers) -> bool:
         """Be tables of another shown scene in the same textures and buffers. False, and nothing done, where they do not
         fit or the shader would find its rows elsewhere."""
         values = _Values.of(scene, *self._of)
-        if values.defines != self.defines or values.rows.shape != self._rows.shape:
+        rows = int(values.defines["QUANTILE_ROW"]) + len(values.sampled)
+        if values.defines != self.defines or rows != self.spectra.height:
             return False
         if values.object_colours.nbytes != self.object_colours.size:
             return False
         if self._device is None:
-            self.spectra.write(spectra_texels(values.rows))
-            self.emission.write(_emission(values.emission, values.axis))
+            for texture, texels in zip((self.spectra, self.emission), values.textures, strict=True):
+                texture.write(texels)
         else:
-            self._device.write(values, np.any(values.rows != self._rows, axis=1), self.spectra, self.emission)
-        self._rows = values.rows
+            self._device.write(values, self.spectra, self.emission)
         self.object_colours.write(values.object_colours)
         self.cell_cdf.write(values.cell_cdf)
         return True
@@ -91,33 +90,37 @@ class CameraTables:
 
 
 class _DeviceTables:
-    """Writes the textures on the device: what is uploaded is a third of one and next to nothing of the other. Owns what
-    it reads."""
+    """Writes the textures on the device: uploaded are x of the nanometre cells' edges, and of what lies over wavelength
+    what has changed at these. Owns what it reads."""
 
-    def __init__(self, ctx: moderngl.Context, rows: np.ndarray) -> None:
+    def __init__(self, ctx: moderngl.Context, curves: int, rows: int) -> None:
+        """Of so many `rows` the first are `curves` over wavelength."""
         self._ctx = ctx
-        self._rows = ctx.buffer(np.ascontiguousarray(rows))
+        self._held = [np.zeros(0, "f4")] * rows
+        self._rows = ctx.buffer(reserve=4 * (KNOTS * curves + SAMPLES * (rows - curves)))
         self._lit: tuple[Spectrum, ...] = ()
         self._sums: RunningSums | None = None
-        self._pairs = shader.compute(ctx, "camera/table_rows.comp", switched(PAIRS=True) | {"BIND_ROWS": 0})
+        of_rows: Defines = {"BIND_KNOTS": BIND_KNOTS, "BIND_ROWS": 2, "SUM_KNOTS": KNOTS, "CURVES": curves}
+        self._pairs = shader.compute(ctx, "camera/table_rows.comp", switched(PAIRS=True) | of_rows)
 
-    def write(
-        self, values: _Values, changed: np.ndarray, spectra: moderngl.Texture, emission: moderngl.Texture
-    ) -> None:
-        """`changed`: rows of `values` that are others than those last written."""
+    def write(self, values: _Values, spectra: moderngl.Texture, emission: moderngl.Texture) -> None:
+        """`values` into the textures."""
         if self._sums is None or any(a is not b for a, b in zip(self._lit, values.lit, strict=True)):
             shader.release(self._sums)
             rows = values.emission()
             self._lit, self._sums = values.lit, RunningSums(self._ctx, [row.sums for row in rows])
             self._emission = shader.compute(self._ctx, "camera/table_rows.comp", self._sums.defines)
+        offset, curves = 0, values.curves(CELL_EDGES_NM, values.axis.cell_edges_x)
+        for number, row in enumerate([*curves.astype("f4"), *values.sampled.astype("f4")]):
+            if not np.array_equal(row, self._held[number]):
+                self._held[number] = row
+                self._rows.write(row, offset=offset)
+            offset += row.nbytes
         self._ctx.memory_barrier()
-        if changed.any():
-            first, end = int(np.argmax(changed)), len(changed) - int(np.argmax(changed[::-1]))
-            self._rows.write(values.rows[first:end], offset=values.rows[0].nbytes * first)
-            self._rows.bind_to_storage_buffer(0)
-            spectra.bind_to_image(0, read=False, write=True)
-            self._pairs.run(-(-spectra.width // _GROUP), spectra.height)
         self._sums.bind(values.axis)
+        self._rows.bind_to_storage_buffer(2)
+        spectra.bind_to_image(0, read=False, write=True)
+        self._pairs.run(-(-spectra.width // _GROUP), spectra.height)
         emission.bind_to_image(0, read=False, write=True)
         self._emission.run(-(-emission.width // _GROUP), emission.height)
         self._ctx.memory_barrier()
@@ -131,10 +134,12 @@ class _DeviceTables:
 
 @dataclass(frozen=True)
 class _Values:
-    """What the tables hold, float32 as it is uploaded."""
+    """What the tables hold."""
 
-    rows: np.ndarray
-    """Of `spectra_texels`, (rows, samples)."""
+    curves: Callable[[np.ndarray, np.ndarray], np.ndarray]
+    """Rows of `spectra_texels` over wavelength, (rows, n), by nm and x, (n,) each."""
+    sampled: np.ndarray
+    """The others, which follow, (rows, SAMPLES)."""
     axis: SpectralAxis
     lit: tuple[Spectrum, ...]
     """The lights'."""
@@ -157,12 +162,19 @@ class _Values:
         axis = _axis(scene, list(glasses.values()))
         absorptions = _distinct_absorptions(shown, scene.space.scale)
         cell_cdf = _cell_cdf(axis, channels)
-        spectra, defines = _spectra(scene, glasses, axis, absorptions, cell_cdf, maps)
+        sections = _curves(scene, glasses, absorptions, maps)
+        starts = np.cumsum([0, *(rows for rows, _ in sections.values())]).tolist()
+        defines: dict[str, int | str] = dict(zip([*sections, "QUANTILE_ROW"], starts, strict=True))
+        widths = [item.material.microfacet_width for item in shown.objects]
+        if any(width > 0.0 for width in widths):
+            defines |= glass_defines(starts[-1] + 1)
+        quantiles = np.interp(np.linspace(0.0, 1.0, SAMPLES), cell_cdf, np.linspace(0.0, 1.0, EMISSION_CELLS + 1))
+        sampled = np.concatenate([quantiles[None], glass_tables(widths, SAMPLES)])
         emission = partial(_emission_rows, shown, channels, reflectances, maps, scene.space.scale)
         rows = _emission_defines(len(shown.lights), len(reflectances), maps)
-        finishes, coats = _finishes(shown, len(spectra))
+        finishes, coats = _finishes(shown, starts[-1] + len(sampled))
         if finishes is not None:
-            spectra, rows = np.concatenate([spectra, coats]), rows | {"FINISHES_AT": len(shown.objects)}
+            sampled, rows = np.concatenate([sampled, coats]), rows | {"FINISHES_AT": len(shown.objects)}
         colours = np.zeros((len(shown.objects), 4), "f4")
         colours[:, 3] = -1.0
         for row, item in zip(colours, shown.objects, strict=True):
@@ -174,14 +186,21 @@ class _Values:
                 if coefficient is not None:
                     row[column] = next(i for i, known in enumerate(absorptions) if np.array_equal(known, coefficient))
         return cls(
-            np.asarray(spectra, "<f4"),
+            lambda nm, x: np.concatenate([rows_of(nm, x) for _, rows_of in sections.values()]),
+            sampled,
             axis,
             tuple(light.spectral_power for light in shown.lights),
             emission,
             colours if finishes is None else np.concatenate([colours, finishes]),
             cell_cdf.astype("f4"),
-            {**defines, **rows},
+            {**defines, "ABSORBERS": len(absorptions), **rows},
         )
+
+    @property
+    def textures(self) -> tuple[np.ndarray, np.ndarray]:
+        """Texels of spectra and emission, exact to float32."""
+        rows = np.concatenate([self.curves(*samples_of(self.axis)), self.sampled])
+        return spectra_texels(np.asarray(rows, "<f4")), _emission(self.emission, self.axis)
 
 
 def _shown_media(scene: SceneBuffers) -> dict[Dispersion, Dispersion]:
@@ -241,40 +260,31 @@ def _finishes(scene: Scene, first_row: int) -> tuple[np.ndarray | None, np.ndarr
     return finishes, np.concatenate([np.zeros((0, SAMPLES)), *tables.values()])
 
 
-def _spectra(
-    scene: SceneBuffers,
-    glasses: dict[Dispersion, Dispersion],
-    axis: SpectralAxis,
-    absorptions: list[np.ndarray],
-    cell_cdf: np.ndarray,
-    maps: MapChannels,
-) -> tuple[np.ndarray, dict[str, int | str]]:
-    """Rows over x as `lib/scene.glsl` reads them, and where they begin."""
-    x = np.linspace(0.0, 1.0, SAMPLES)
-    nm = axis.nm_of_samples(SAMPLES)
+def _curves(
+    scene: SceneBuffers, glasses: dict[Dispersion, Dispersion], absorptions: list[np.ndarray], maps: MapChannels
+) -> dict[str, tuple[int, Callable[[np.ndarray, np.ndarray], np.ndarray]]]:
+    """Rows over wavelength as `lib/scene.glsl` reads them, by the symbol of their first: how many, and `_Values.curves`
+    of these."""
     groups = replace(scene.groups, glasses=tuple(glasses[g] for g in scene.groups.glasses))
-    variables = groups.variables(axis)
-    slopes = [
-        index_slope(groups, scene.groups.glasses.index(g) if g in scene.groups.glasses else None, axis, variables)
-        for g in glasses
-    ]
-    widths = [item.material.microfacet_width for item in scene.scene.objects]
-    sections = {
-        "INDEX_ROW": np.asarray(index_table(axis, list(glasses.values()), SAMPLES), float),
-        "SLOPE_ROW": np.array(slopes).reshape(-1, SAMPLES),
-        "VARIABLE_ROW": variables,
-        "ABSORPTION_ROW": np.array([np.interp(nm, VISIBLE_NM, a) for a in absorptions]).reshape(-1, SAMPLES),
-        "BASIS_ROW": np.array([np.interp(nm, VISIBLE_NM, column) for column in rgb_basis().T]),
-        "BIN_ROW": maps.coordinate(nm)[None],
-        "QUANTILE_ROW": np.interp(x, cell_cdf, np.linspace(0.0, 1.0, EMISSION_CELLS + 1))[None],
-        "ROUGH_ROW": glass_tables(widths, SAMPLES),
+    numbers = [scene.groups.glasses.index(g) if g in scene.groups.glasses else None for g in glasses]
+
+    def sampled(curves: Sequence[np.ndarray]) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
+        return lambda nm, _x: np.array([np.interp(nm, VISIBLE_NM, curve) for curve in curves]).reshape(-1, len(nm))
+
+    def indices(nm: np.ndarray, _x: np.ndarray) -> np.ndarray:
+        return np.array([shown.index(nm) for shown in glasses.values()]).reshape(-1, len(nm))
+
+    def slopes(nm: np.ndarray, x: np.ndarray) -> np.ndarray:
+        return np.array([index_slope(groups, number, nm, x) for number in numbers]).reshape(-1, len(nm))
+
+    return {
+        "INDEX_ROW": (len(glasses), indices),
+        "SLOPE_ROW": (len(glasses), slopes),
+        "VARIABLE_ROW": (groups.count, groups.variables),
+        "ABSORPTION_ROW": (len(absorptions), sampled(absorptions)),
+        "BASIS_ROW": (3, sampled(list(rgb_basis().T))),
+        "BIN_ROW": (1, lambda nm, _x: maps.coordinate(nm)[None]),
     }
-    starts = np.cumsum([0] + [len(rows) for rows in sections.values()])
-    defines: dict[str, int | str] = dict(zip(sections, starts.tolist(), strict=False))
-    rough_row = int(defines.pop("ROUGH_ROW"))
-    if any(width > 0.0 for width in widths):
-        defines |= glass_defines(rough_row)
-    return np.concatenate(list(sections.values())), defines | {"ABSORBERS": len(absorptions)}
 
 
 @dataclass(frozen=True)
@@ -343,14 +353,9 @@ def _cell_cdf(axis: SpectralAxis, channels: Channels) -> np.ndarray:
     evenly to all bins.
 
     Random wavelengths are drawn by it, and lookups along a sweep are distributed by it."""
-    x = np.linspace(0.0, 1.0, EMISSION_CELLS + 1)
-    if channels.edges_nm is None:
-        seen = cumulative(axis, Spectrum(daylight_per_lumen())).at(x)[:, :3].sum(axis=1)
-    else:
-        white = daylight_per_lumen()
-        seen = cumulative(axis, Spectrum(white), (channels.observer().sum(axis=1) / white)[:, None] * np.ones(4)).at(x)[
-            :, 0
-        ]
+    x, white = np.linspace(0.0, 1.0, EMISSION_CELLS + 1), daylight_per_lumen()
+    bright = white * K_M * cmf_xyz().sum(axis=1) if channels.edges_nm is None else channels.observer().sum(axis=1)
+    seen = np.interp(x, axis.cell_edges_x, np.concatenate([[0.0], np.cumsum(bright)]))
     # No cell is impossible: another light may be brighter there.
     mixed = 0.98 * seen / seen[-1] + 0.02 * x
     mixed[0], mixed[-1] = 0.0, 1.0

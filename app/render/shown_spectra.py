@@ -19,6 +19,7 @@ from ..gpu.gain_buffers import GainBuffers
 from ..gpu.map_channels import MapChannels, tents
 from ..gpu.reindex import ReindexBuffer, Reindexing, Spans
 from ..gpu.scene_buffers import SceneBuffers
+from ..gpu.spectral_groups import samples_of
 from ..gpu.splat_tables import LEAST_WIDTH, SplatTables
 from ..model.optics.glass import Dispersion
 from ..model.optics.spectrum import Spectrum
@@ -98,7 +99,8 @@ class ShownSpectra:
             self.reindexing = self._unchanged()
         self._are_traced = not changed
         groups = self._buffers.groups
-        shown = replace(groups, glasses=tuple(changed.get(glass, glass) for glass in groups.glasses)).variables(axis)
+        groups = replace(groups, glasses=tuple(changed.get(glass, glass) for glass in groups.glasses))
+        shown = groups.variables(*samples_of(axis))
         self.variables = SpectralVariables.build(self._ctx, shown, table if changed else None, self.variables)
         return self._reindexes
 
@@ -128,7 +130,8 @@ class ShownSpectra:
             return ShownTables(
                 traced_tables(ctx, self._buffers, spectra, self.reflectances, spans, channels, width, before), None
             )
-        shown = self.reindexing.spans(spans, self._buffers.axis, spectra)
+        supports = self.reindexing.supports(spectra)
+        shown = self.reindexing.spans(spans, self._buffers.axis, supports)
         axis = self.reindexing.axis
         if width == PREVIEW_WIDTH and channels == MapChannels() and self._by_compute:
             if self._device_tables is None:
@@ -137,7 +140,7 @@ class ShownSpectra:
         else:
             tables = SplatTables.build(ctx, axis, spectra, self.reflectances, shown, channels, width, before)
         reindex = None if into is None else into.reindex
-        return ShownTables(tables, ReindexBuffer(ctx, self.reindexing, spans, spectra, tables.classes, reindex))
+        return ShownTables(tables, ReindexBuffer(ctx, self.reindexing, spans, supports, tables.classes, reindex))
 
     def _unchanged(self) -> Reindexing | None:
         (traced, *_) = self._buffers.axis.glasses

@@ -3,8 +3,8 @@
 layout(std430, binding = BIND_KNOTS) readonly restrict buffer Knots { float knots[]; };
 layout(std430, binding = BIND_SUMS) readonly restrict buffer Sums { vec4 sums[]; };
 
-// Without lines.
-vec4 smooth_below(uint row, float x) {
+// The last knot that x is not below, and which share of its cell is below x.
+uint knot_below(float x, out float share) {
     uint low = 0u, high = uint(SUM_KNOTS) - 1u;
     while (high - low > 1u) {
         uint middle = (low + high) / 2u;
@@ -14,8 +14,14 @@ vec4 smooth_below(uint row, float x) {
             high = middle;
     }
     float span = knots[low + 1u] - knots[low];
-    float share = span > 0.0 ? clamp((x - knots[low]) / span, 0.0, 1.0) : 1.0;
-    uint at = row * uint(SUM_KNOTS + SUM_LINES) + low;
+    share = span > 0.0 ? clamp((x - knots[low]) / span, 0.0, 1.0) : 1.0;
+    return low;
+}
+
+// Without lines.
+vec4 smooth_below(uint row, float x) {
+    float share;
+    uint at = row * uint(SUM_KNOTS + SUM_LINES) + knot_below(x, share);
     vec4 below = sums[at], above = sums[at + 1u];
     return mix(below, above, share);
 }

@@ -6,13 +6,20 @@ import moderngl
 import numpy as np
 import pytest
 from spectrasplat.base.paths import shipped_scenes
-from spectrasplat.gpu.context import Context
+from spectrasplat.gpu import device_traits
+from spectrasplat.gpu.context import Context, create_context
 from spectrasplat.gpu.device_tables import DeviceTables
+from spectrasplat.gpu.device_traits import DeviceTraits
 from spectrasplat.gpu.splat_tables import LEAST_WIDTH, SplatTables
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.optics.spectral_tables import SpectralAxis
 from spectrasplat.model.optics.spectrum import Spectrum, illuminant
-from viewer_rig import MOVEMENTS, viewer
+from spectrasplat.model.settings import RenderSettings
+from spectrasplat.passes.camera_tables import CameraTables
+from spectrasplat.passes.picture_channels import Channels
+from spectrasplat.render.device_scene import scene_buffers
+from spectrasplat.render.shown_spectra import ShownSpectra
+from viewer_rig import MOVEMENTS, viewer, with_gains
 
 MOST_BYTES = 64 << 10
 PYTHON_MS = {"orbit": 1.0, "drag": 6.0}
@@ -60,3 +67,33 @@ def test_tables_that_the_device_writes_are_those_of_numpy(gl: Context) -> None:
     np.testing.assert_allclose(spans, places, atol=1e-5)
     for owned in (exact, made, device):
         owned.release()
+
+
+@pytest.mark.parametrize("name", ["prism", "default", "wine_glass"])
+def test_what_the_device_writes_for_the_camera_is_what_numpy_does(name: str) -> None:
+    """Over wavelength straight between nanometres, which are more than a kink of a clamped index asks for."""
+    scene = load_scene(shipped_scenes()[name])
+    with device_traits.assumed(DeviceTraits(splats_by_compute=True)), create_context() as context:
+        buffers = scene_buffers(context, scene, RenderSettings(width=64, height=36))
+        shown = ShownSpectra(context.ctx, scene, buffers, None)
+        of = Channels(), shown.reflectances, shown.channels
+        tables = CameraTables(context.ctx, buffers, *of)
+        try:
+            for gain in (3.0, 0.0):
+                buffers.scene = with_gains(scene, [gain])
+                assert tables.take(buffers)
+                fresh = CameraTables(context.ctx, buffers, *of)
+                first = [int(fresh.defines[f"{row}_ROW"]) for row in ("INDEX", "ABSORPTION", "QUANTILE")]
+                rows, expected = (
+                    np.frombuffer(t.spectra.read(), "f4").reshape(t.spectra.height, -1) for t in (tables, fresh)
+                )
+                indices, seen, sampled = slice(first[0], first[1]), slice(first[1], first[2]), slice(first[2], None)
+                np.testing.assert_allclose(rows[indices], expected[indices], atol=2e-5)
+                np.testing.assert_allclose(rows[seen], expected[seen], atol=3e-3)
+                np.testing.assert_array_equal(rows[sampled], expected[sampled])
+                sums, exact = (np.frombuffer(t.emission.read(), "f4") for t in (tables, fresh))
+                np.testing.assert_allclose(sums, exact, atol=2e-6 * np.abs(exact).max())
+                fresh.release()
+        finally:
+            for owned in (tables, shown, buffers):
+                owned.release()

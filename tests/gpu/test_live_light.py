@@ -101,7 +101,7 @@ def anchored_alike(fresh: LiveLight, light: LiveLight) -> list[LightPlan]:
     spans = reindexing.spans(
         light.stored.running.tables.spans,
         light.buffers.axis,
-        [lamp.spectral_power for lamp in fresh.light_pass.scene.lights],
+        reindexing.supports([lamp.spectral_power for lamp in fresh.light_pass.scene.lights]),
     )
     plans = []
     for plan, old in zip(fresh.light_pass.plans, light.light_pass.plans, strict=True):

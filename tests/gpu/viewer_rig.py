@@ -2,13 +2,14 @@
 asks of OpenGL, and how long its Python takes.
 
 Python's time is the thread's own in frames whose dispatches, draws, waits and copies are left out; all other calls
-(binding, uniforms, uploads) count.
+(binding, uniforms, uploads) count. It is given as on a machine with nothing else to do: a piece of work of the same
+kind is timed beside every frame.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from unittest import mock
@@ -32,6 +33,8 @@ from spectrasplat.render.viewer.engine import LiveEngine
 SIZE = (160, 90)
 FRAME_S = 1 / 60
 PATIENCE_S = 300.0
+QUIET_MS = 0.65
+"""What `_same_work` takes on the machine that the bounds are for, with nothing else to do there."""
 _WORK = (
     *((moderngl.ComputeShader, name) for name in ("run", "run_indirect")),
     *((moderngl.VertexArray, name) for name in ("render", "render_indirect")),
@@ -89,17 +92,23 @@ class ViewerRig:
             self.wanted = change(start, number + 1)
             with counted() as counts:
                 self._frame()
-            took = []
+            took, beside = [], []
             for step in range(4):
                 self.wanted = change(start, number + 1.2 + 0.2 * step)
                 with without_work():
-                    began = time.thread_time()
-                    self._frame()
-                    took.append(time.thread_time() - began)
-            python = min(took)
+                    took.append(_seconds(self._frame))
+                beside.append(_seconds(_same_work))
             assert self.engine.problem is None, self.engine.problem
-            found.append(Frame(counts, 1e3 * python, self.engine.picture_version))
+            found.append(Frame(counts, QUIET_MS * min(took) / min(beside), self.engine.picture_version))
         return found
+
+    def steps(self, wanted: Iterable[LiveInputs]) -> Iterator[Counts]:
+        """What a frame of each asks for."""
+        for self.wanted in wanted:
+            with counted() as counts:
+                self._frame()
+            assert self.engine.problem is None, self.engine.problem
+            yield counts
 
     def _frame(self) -> None:
         self.engine.set(self.wanted)
@@ -112,6 +121,33 @@ class ViewerRig:
         """Free everything."""
         self._display.release()
         self.engine.release()
+
+
+def _seconds(work: Callable[[], None]) -> float:
+    began = time.thread_time()
+    work()
+    return time.thread_time() - began
+
+
+def _same_work() -> None:
+    """Small arrays, values replaced and looked up, as frames have them."""
+    x, light = np.linspace(0.0, 1.0, 402), {}
+    for step in range(40):
+        y = np.interp(x, x, np.cumsum(np.clip(x - 0.1, 0.0, 1.0)))
+        light[replace(DisplaySettings(), exposure_ev=0.1 * step)] = np.array_equal(x, y), y.astype("f4").tobytes()
+
+
+def with_gains(scene: Scene, gains: Iterable[float]) -> Scene:
+    """Glasses whose dispersion is so many times what it is, one after the other."""
+    glasses = dict.fromkeys(o.material.dispersion for o in scene.objects if o.material.transmits)
+    gain_of = dict(zip(glasses, gains, strict=False))
+    objects = (
+        replace(o, material=replace(o.material, dispersion=with_gain(d, gain_of[d])))
+        if (d := o.material.dispersion) in gain_of
+        else o
+        for o in scene.objects
+    )
+    return replace(scene, objects=tuple(objects))
 
 
 def orbiting(before: LiveInputs, step: float) -> LiveInputs:

@@ -23,6 +23,8 @@ from .spectrum import Spectrum
 
 _LO_NM, _HI_NM = float(VISIBLE_NM[0]), float(VISIBLE_NM[-1])
 _FINE_NM = np.linspace(_LO_NM, _HI_NM, 4001)
+CELL_EDGES_NM = np.concatenate([[_LO_NM], VISIBLE_NM[:-1] + 0.5, [_HI_NM]])
+"""Ends of the nanometre cells of a spectrum, (402,)."""
 
 FILL = 1e-6
 """Least share of x given to plain wavelength where no index changes (outside the fits' ranges). More is given where
@@ -61,7 +63,7 @@ class SpectralAxis:
     @cached_property
     def cell_edges_x(self) -> np.ndarray:
         """x of the ends of the cells λ ± ½ nm, (402,), read-only: every spectrum of a scene uses them."""
-        edges_x = self.x_of_nm(np.concatenate([[_LO_NM], VISIBLE_NM[:-1] + 0.5, [_HI_NM]]))
+        edges_x = self.x_of_nm(CELL_EDGES_NM)
         edges_x.flags.writeable = False
         return edges_x
 
@@ -147,19 +149,19 @@ def _axis_of(glasses: tuple[Dispersion, ...]) -> SpectralAxis:
     """Kept, as every edit of a glass needs it several times."""
     if not glasses:
         return SpectralAxis((), (), _HI_NM - _LO_NM, 1.0, False)
-    turning = tuple(_turning_points(glass) for glass in glasses)
-    speed = sum(np.abs(_fine_slope(glass)) for glass in glasses)
-    stands_still = bool(np.any(speed <= 0.0)) or any(len(t) > 2 for t in turning)
-    variation = [
-        _variation(g, t, [g.index(nm) for nm in t], np.array(_HI_NM)) for g, t in zip(glasses, turning, strict=True)
-    ]
+    turning = tuple(_turning_points(glass.natural) for glass in glasses)
+    still = np.logical_and.reduce([_fine_slope(glass.natural) == 0.0 for glass in glasses])
+    stands_still = bool(still.any()) or any(len(t) > 2 for t in turning)
+    total = sum(_whole_variation(glass) for glass in glasses)
     monotone = len(glasses) == 1 and not stands_still
-    seen = np.interp(_FINE_NM, VISIBLE_NM, cmf_xyz().sum(axis=1))
-    still = float(seen[speed <= 0.0].sum() / seen.sum())
-    fill = min(max(FILL, still), MOST_FILL) if stands_still else 0.0
-    return SpectralAxis(glasses, turning, float(sum(variation)), fill, monotone)
+    fill = 0.0
+    if stands_still:
+        seen = np.interp(_FINE_NM, VISIBLE_NM, cmf_xyz().sum(axis=1))
+        fill = min(max(FILL, float(seen[still].sum() / seen.sum())), MOST_FILL)
+    return SpectralAxis(glasses, turning, total, fill, monotone)
 
 
+@lru_cache(maxsize=16)
 def _turning_points(glass: Dispersion) -> np.ndarray:
     """380, the wavelengths where n(λ) turns (bisected to rounding), 780."""
     sign = np.sign(_fine_slope(glass))
@@ -179,6 +181,12 @@ def _turning_points(glass: Dispersion) -> np.ndarray:
 @lru_cache(maxsize=16)
 def _fine_slope(glass: Dispersion) -> np.ndarray:
     return glass.derivative(_FINE_NM)
+
+
+@lru_cache(maxsize=16)
+def _whole_variation(glass: Dispersion) -> float:
+    turning = _turning_points(glass.natural)
+    return float(_variation(glass, turning, [glass.index(nm) for nm in turning], np.array(_HI_NM)))
 
 
 def _variation(
