@@ -11,7 +11,6 @@ from __future__ import annotations
 import numpy as np
 
 from ..features.features import Features
-from ..model.scene_checks import MAX_OBJECTS
 from ..model.tint_levels import LEVELS
 from .packed_records import PackedStruct
 from .schema import Field, Struct
@@ -374,32 +373,41 @@ EMIT_PARAMETERS = Struct(
         Field("reserved", "uint", "", 3),
     ),
 )
-TRACE_PARAMETERS = Struct(
-    "TraceParameters",
-    (
-        Field("max_depth", "uint", "specular events"),
-        Field("split_threshold", "float", "survival below which a child plays roulette"),
-        Field("power_row", "uint", "row of the light's cumulative power over x"),
-        Field("lattices", "uint", "sub-lattices of the pass: photon_id = lattice point · lattices + sub-lattice"),
-        Field("lattice_bits", "uint", "points of each sub-lattice, from LATTICE_BIT on; 0: rays lie on none"),
-        Field("lattice_shift", "uint", "of the first sub-lattice's points across, as emitted"),
-        Field("lattices_together", "uint", "so many sub-lattices after each other have one shift"),
-        Field("surface_key", "uint", "of the numbers for microfacets of rough surfaces"),
-        Field("tint_rate", "float", "1/GPU unit: a way w through the glass whose tint has levels counts rate · w"),
-        Field("tint_row", "uint", "row of its absorption"),
-        Field("tint_key", "uint", "of the numbers by which levels are rounded"),
-        Field("widest_on_surface", "float", "side of a footprint, of the size of the glass or mirror that it is on"),
-        Field("widest_turn", "float", "of a footprint's directions behind a surface, rad a side"),
-        Field("paths", "float", "of the pass, over all of its sub-lattices: each has microfacets of its own"),
-        Field("widest_sweep", "float", "of a ray's directions over its band, rad"),
-        Field(
-            "bounded",
-            "uint",
-            "0: a lamp's and a lobe's columns are wanted as derivatives, whatever is believed of them",
+
+
+def trace_parameters(objects: int = 1) -> Struct:
+    """What rays of one light are traced by, in a scene of so many objects."""
+    return Struct(
+        "TraceParameters",
+        (
+            Field("max_depth", "uint", "specular events"),
+            Field("split_threshold", "float", "survival below which a child plays roulette"),
+            Field("power_row", "uint", "row of the light's cumulative power over x"),
+            Field("lattices", "uint", "sub-lattices of the pass: photon_id = lattice point · lattices + sub-lattice"),
+            Field("lattice_bits", "uint", "points of each sub-lattice, from LATTICE_BIT on; 0: rays lie on none"),
+            Field("lattice_shift", "uint", "of the first sub-lattice's points across, as emitted"),
+            Field("lattices_together", "uint", "so many sub-lattices after each other have one shift"),
+            Field("surface_key", "uint", "of the numbers for microfacets of rough surfaces"),
+            Field("tint_rate", "float", "1/GPU unit: a way w through the glass whose tint has levels counts rate · w"),
+            Field("tint_row", "uint", "row of its absorption"),
+            Field("tint_key", "uint", "of the numbers by which levels are rounded"),
+            Field(
+                "widest_on_surface", "float", "side of a footprint, of the size of the glass or mirror that it is on"
+            ),
+            Field("widest_turn", "float", "of a footprint's directions behind a surface, rad a side"),
+            Field("paths", "float", "of the pass, over all of its sub-lattices: each has microfacets of its own"),
+            Field("widest_sweep", "float", "of a ray's directions over its band, rad"),
+            Field(
+                "bounded",
+                "uint",
+                "0: a lamp's and a lobe's columns are wanted as derivatives, whatever is believed of them",
+            ),
+            Field("tint_halfway", "vec4", "odds for the next level, of a way in the middle between both", LEVELS // 4),
+            Field(
+                "beam_objects",
+                "uvec4",
+                "one bit an object: who meets it first is left to beams",
+                -(-max(objects, 1) // 128),
+            ),
         ),
-        Field("tint_halfway", "vec4", "odds for the next level, of a way in the middle between both", LEVELS // 4),
-        Field(
-            "beam_objects", "uvec4", "one bit an object: who meets it first is left to beams", -(-MAX_OBJECTS // 128)
-        ),
-    ),
-)
+    )

@@ -22,8 +22,9 @@ from ..model.optics.spectral_tables import SpectralAxis, cumulative
 from ..model.scene import Scene
 from ..model.settings import RenderSettings
 from .emission_domain import EmissionDomain, emission_domain
+from .lattice_slice import Band, LatticeSlice, every
 from .ray_queue import FLIGHT_ROOM
-from .trace import Band, LatticeSlice, TracePass
+from .trace import Batch, TracePass
 
 PHOTONS = 1 << 15
 """Photons of all lights together that meet glass or a mirror first."""
@@ -153,21 +154,17 @@ def _traced(trace: TracePass, part: _Part) -> list[np.ndarray]:
     lattice = max(16, round(part.photons / lattices / part.domain.active_share))
     stride = -(-lattice * lattices // trace.batch)
     found = []
-    pending = [
-        LatticeSlice(part.light, part.bands, lattice, first, stride, points, (0, 0), (0, 0), 0, 1, part.light_points)
-        for first in range(stride)
-        if (points := len(range(first, lattice, stride)))
-    ]
-    while pending:
-        piece = pending.pop(0)
-        batch = trace.run(piece, part.domain, part.max_depth)
-        if (batch.overflow or batch.flights > FLIGHT_ROOM * trace.batch) and piece.points > 1:
-            pending += piece.halves
-            continue
+
+    def keep(batch: Batch, _: bool) -> None:
         assert trace.flights is not None
         count = min(batch.flights, FLIGHT_ROOM * trace.batch)
         records = np.frombuffer(trace.flights.read(count * FLIGHT.stride), FLIGHT.dtype)
         found.append(_kept(records, part.max_depth > 0))
+
+    piece = LatticeSlice(part.light, part.bands, lattice, 0, 1, lattice, (0, 0), (0, 0), 0, 1, part.light_points)
+    for i in range(stride):
+        for _ in trace.whole(every(stride, i, [(piece, part.domain)]), keep, part.max_depth):
+            pass
     return found
 
 

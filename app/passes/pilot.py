@@ -18,7 +18,8 @@ from ..model.scene import Scene
 from ..model.tint_bands import TOLERANCE as TINT_TOLERANCE
 from .emission_domain import EmissionDomain
 from .landings import Landings, by_receiver
-from .trace import SPLIT_THRESHOLD, Band, FluxTally, LatticeSlice, TracePass
+from .lattice_slice import Band, LatticeSlice
+from .trace import SPLIT_THRESHOLD, Batch, FluxTally, TracePass
 
 PHOTONS = 4096
 PLACES = (0.02, 0.25, 0.75, 0.98)
@@ -107,23 +108,18 @@ def pilot_steps(
         every: int = 1,
     ) -> Generator[None, None, tuple[np.ndarray, FluxTally, int, float]]:
         raw, tally, flights, fullness = b"", FluxTally(), 0, 0.0
-        waiting = []
-        for first in range(0, slices * every, every):
-            points = len(range(first, count, slices * every))
-            piece = LatticeSlice(
-                light, (band,), count, first, slices * every, points, (0, 0), (0, 0), 0, 1, light_place=place
-            )
-            waiting.append(piece)
-        while waiting:
-            piece = waiting.pop(0)
-            batch = yield from trace.steps(piece, domain, depth, split_threshold)
-            if batch.overflow and piece.points > 1:
-                waiting[:0] = piece.halves
-                continue
+
+        def keep(batch: Batch, _: bool) -> None:
+            nonlocal raw, flights, fullness
             raw += trace.photons.read(size=batch.photons * trace.photon.stride) if batch.photons else b""
             tally.merge(batch.tally)
             flights += batch.flights
             fullness = max(fullness, batch.fullness)
+
+        piece = LatticeSlice(light, (band,), count, 0, 1, count, (0, 0), (0, 0), 0, 1, light_place=place)
+        for i in range(slices):
+            part = piece.every(every, 0).every(slices, i), domain
+            yield from trace.whole([part], keep, depth, split_threshold)
         return np.frombuffer(raw, trace.photon.dtype), tally, flights, fullness
 
     depth, everything = MAX_DEPTH, Band(0.0, 1.0, 0.5, power_w)

@@ -66,7 +66,7 @@ class RayPool:
         return int(min(block_bytes // per_point, 65535 * _GROUP // RAY_ROOM))
 
     def begin(self, count: int, most_photons: int = 1 << 31) -> None:
-        """Before `count` lattice points are emitted, which leave `most_photons` or are traced again."""
+        """Before about `count` rays are emitted, which leave `most_photons` or are traced again."""
         state = self._state_zero.copy()
         state["photon_capacity"] = min(most_photons, state["photon_capacity"][0])
         self.state.write(state.tobytes())

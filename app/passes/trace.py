@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field, replace
 
@@ -22,6 +23,7 @@ from ..gpu.scene_buffers import UNBOUNDED, SceneBuffers
 from ..gpu.scene_records import SCENE_STRUCTS
 from .emission_domain import EmissionDomain
 from .lattice_order import morton_order
+from .lattice_slice import LatticeSlice, Parts, points_of
 from .light_programs import light_defines
 from .ray_pool import STRUCTS as POOL_STRUCTS
 from .ray_pool import RayPool
@@ -34,18 +36,9 @@ _GROUP = 64
 MORE_PHOTONS = 1.25
 """Photons that there is room for, over those that the last batch of the same light left for as many points."""
 _MAX_ORDERS = 8
-"""Emission orders kept: a pass has one for its batches and one for its last, shorter one."""
-
-
-@dataclass(frozen=True)
-class Band:
-    """One light's part of the spectral axis in a pass."""
-
-    x_lo: float
-    x_hi: float
-    x_anchor: float
-    power_w: float
-    """Radiant power of the band per unit weight."""
+"""Emission orders kept, a light: a pass has one for its batches and one for its last, shorter one."""
+_MOST_POINTS = 65535 * _GROUP
+"""Of a slice that is emitted by one dispatch."""
 
 
 @dataclass
@@ -109,53 +102,13 @@ class Batch:
     flights: int
     """Stretches of all rays, up to what they meet."""
     overflow: int
-    """Rays and photons that found no room. What carries their light is gone: only fewer points at once bring it back
-    (`LatticeSlice.halves`)."""
+    """Rays, photons and flights that found no room. What carries their light is gone: only fewer points at once bring
+    it back (`TracePass.whole`)."""
 
     @property
     def fullness(self) -> float:
         """Share of the room for photons that lattice points which fill a batch take up."""
         return self.photons / (PHOTON_ROOM * max(self.emitted_photons, 1))
-
-
-@dataclass(frozen=True)
-class LatticeSlice:
-    """Part of a light's pass: `points` points of each of its sub-lattices (one a band and point on the light)."""
-
-    light: int
-    bands: tuple[Band, ...]
-    lattice_count: int
-    """Points of one whole sub-lattice."""
-    first: int
-    stride: int
-    points: int
-    """Lattice points first, first + stride, … of this slice."""
-    shift: tuple[int, int]
-    shift_light: tuple[int, int]
-    shift_spectral: int
-    seed: int
-    """Key of roulette's draws."""
-    light_points: int = 1
-    light_place: tuple[float, float] = (0.5, 0.5)
-    """Place on an extended light when `light_points` is 1."""
-    weight: float = 1.0
-    """Factor on every weight; a pass uses its photon count, so that passes add up by size."""
-    beam_objects: tuple[int, ...] = ()
-    """Objects whose light beams carry: photons that meet one of them first end there (`Features.beams`)."""
-    lamp_step: float = 0.0
-    """Sides of a footprint over the extent of what each point represents on a lamp (`Features.lamp_columns`);
-    0: footprints know of none."""
-
-    @property
-    def count(self) -> int:
-        """Rays emitted at most."""
-        return self.points * len(self.bands) * self.light_points
-
-    @property
-    def halves(self) -> tuple[LatticeSlice, LatticeSlice]:
-        """Every other point, and the rest; of more than one."""
-        later = replace(self, first=self.first + self.stride, stride=2 * self.stride, points=self.points // 2)
-        return replace(self, stride=2 * self.stride, points=(self.points + 1) // 2), later
 
 
 @dataclass(frozen=True)
@@ -210,28 +163,32 @@ class TracePass:
         packs = context.traits.packs_rays and widest_on_surface < UNBOUNDED
         traits = self._traits = replace(context.traits, packs_rays=packs)
         self.ray = records.ray_record_of(features, packs)
+        self._parameters = records.trace_parameters(len(scene.scene.objects))
+        shared = max(1, min(len(scene.scene.lights), context.limits.uniform_block_bytes // self._parameters.stride))
+        self._lights = shared if context.traits.ray_events else 1
+        """Lights whose rays are traced together: whose parameters a uniform block holds."""
         self.photon = records.photon_record(features.spectral_groups, features.hero)
         ctx = context.ctx
         structs = (
             *(*SCENE_STRUCTS, self.ray, self.photon, *(POOL_STRUCTS if context.traits.ray_events else QUEUE_STRUCTS)),
             *([records.FLIGHT] if features.flights else []),
         )
-        defines = light_defines(features, context.traits) | scene.defines
+        defines = light_defines(features, context.traits) | scene.defines | {"LIGHTS": f"{self._lights}u"}
         self._features = features
         self._defines = defines
         self._structs = structs
         self._emission: dict[tuple[str, bool], moderngl.ComputeShader] = {}
         self._orders: dict[tuple[int, int, int], moderngl.Buffer] = {}
         self._reports: list[moderngl.Buffer] = []
-        self._photons_a_point: dict[int, float] = {}
-        """Room that batches of a light are given, as the last one needed it."""
-        self._trace = shader.compute(ctx, "light/trace.comp", defines, (*structs, records.TRACE_PARAMETERS))
+        self._photons_a_ray: dict[tuple[int, ...], float] = {}
+        """Room that batches of some lights are given, as the last one needed it."""
+        self._trace = shader.compute(ctx, "light/trace.comp", defines, (*structs, self._parameters))
         self._queue = queue_class(traits)(QueueParts(context, traits, features, defines, structs, batch))
         self.photons, self.emitted_rays = self._queue.photons, self._queue.rays
         self.flights = ctx.buffer(reserve=FLIGHT_ROOM * batch * records.FLIGHT.stride) if features.flights else None
         """What every ray of the last batch flew, in order, where the features have it: FLIGHT records."""
         self._emit_parameters = ctx.buffer(reserve=records.EMIT_PARAMETERS.stride)
-        self._trace_parameters = ctx.buffer(reserve=records.TRACE_PARAMETERS.stride)
+        self._trace_parameters = ctx.buffer(reserve=self._lights * self._parameters.stride)
 
     def release_buffers(self) -> None:
         """Free the queue: nothing is traced any more."""
@@ -259,62 +216,114 @@ class TracePass:
         """Trace `piece.count` ≤ batch lattice points; their photons replace the buffer's content.
 
         `max_depth`: specular events, by default the pass's own."""
-        return finished(self.steps(piece, domain, max_depth))
+        return finished(self.steps([(piece, domain)], max_depth))
 
-    def steps(
+    def whole(
         self,
-        piece: LatticeSlice,
-        domain: EmissionDomain,
+        parts: Parts,
+        keep: Callable[[Batch, bool], None],
         max_depth: int | None = None,
         split_threshold: float | None = None,
-    ) -> Generator[None, None, Batch]:
-        """`run`, pausing after every event of all rays, on a GPU after all of them; a caller that draws meanwhile may
-        bind what it likes.
-        `split_threshold`: by default the pass's own."""
-        max_depth = self.max_depth if max_depth is None else min(max_depth, self.max_depth)
-        self._queue.begin(piece.count)
-        self._emit(piece, domain, max_depth, split_threshold or self.split_threshold)
-        return self._learned(piece, (yield from self._follow(max_depth)))
+    ) -> Generator[None, None, None]:
+        """`steps` of `parts` in as many batches as they need; `keep` takes each while its photons are there, and
+        whether it is the last."""
+        most = self.batch
+        while parts:
+            some, rest = self.fill(parts, most)
+            batch = yield from self.steps(some, max_depth, split_threshold)
+            if batch.overflow and points_of(some) > 1:
+                most = self.rays_of(some) // 2
+                continue
+            keep(batch, not rest)
+            parts = rest
 
-    def _learned(self, piece: LatticeSlice, batch: Batch) -> Batch:
-        self._photons_a_point[piece.light] = MORE_PHOTONS * batch.photons / max(piece.count, 1)
+    def fill(self, parts: Parts, most: int) -> tuple[Parts, Parts]:
+        """The front of `parts`, about `most` rays that are traced together, and the rest."""
+        some: list[tuple[LatticeSlice, EmissionDomain]] = []
+        room = float(most)
+        for number, (piece, domain) in enumerate(parts):
+            if some and piece.light // self._lights != some[0][0].light // self._lights:
+                return some, parts[number:]
+            rays = self._rays_a_point(piece, domain)
+            points = min(piece.points, max(int(room / rays), 0 if some else 1), _MOST_POINTS // piece.lattices)
+            room -= points * rays
+            front, behind = piece.split(points)
+            some += [(front, domain)] if points else []
+            if behind.points:
+                return some, [(behind, domain), *parts[number + 1 :]]
+        return some, []
+
+    def rounds(self, parts: Parts) -> int:
+        """Of how many points each a batch must take one, so that it holds a part of all whose rays are traced
+        together."""
+        batches: dict[int, float] = {}
+        for piece, domain in parts:
+            held = max(int(self.batch / self._rays_a_point(piece, domain)), 1)
+            together = piece.light // self._lights
+            batches[together] = batches.get(together, 0.0) + piece.points / held
+        return max((math.ceil(count) for count in batches.values()), default=0)
+
+    def rays_of(self, parts: Parts) -> int:
+        """About how many rays `parts` emit."""
+        return math.ceil(sum(piece.points * self._rays_a_point(piece, domain) for piece, domain in parts))
+
+    def _rays_a_point(self, piece: LatticeSlice, domain: EmissionDomain) -> float:
+        # In a pool points from which none sets out take no room.
+        return piece.lattices * (domain.active_share if self._traits.ray_events else 1.0)
+
+    def steps(
+        self, parts: Parts, max_depth: int | None = None, split_threshold: float | None = None
+    ) -> Generator[None, None, Batch]:
+        """`run` of parts that go together (`fill`), pausing after every event of all rays, on a GPU after all of them;
+        a caller that draws meanwhile may bind what it likes. `split_threshold`: by default the pass's own."""
+        max_depth = self.max_depth if max_depth is None else min(max_depth, self.max_depth)
+        self._queue.begin(self.rays_of(parts))
+        self._emit(parts, max_depth, split_threshold or self.split_threshold)
+        return self._learned(parts, (yield from self._follow(max_depth)))
+
+    def _learned(self, parts: Parts, batch: Batch) -> Batch:
+        self._photons_a_ray[tuple(piece.light for piece, _ in parts)] = (
+            MORE_PHOTONS * batch.photons / max(batch.emitted_photons, 1)
+        )
         return batch
 
     @property
     def _photon_room(self) -> int:
         return self.photons.size // self.photon.stride
 
-    def send(self, piece: LatticeSlice, domain: EmissionDomain, max_depth: int | None = None) -> Sent | None:
-        """`run` without waiting; None where rays are counted after every event."""
-        queue = self._queue
+    def send(self, parts: Parts, max_depth: int | None = None) -> Sent | None:
+        """`steps` without waiting; None where rays are counted after every event."""
+        queue, rays = self._queue, self.rays_of(parts)
         if not isinstance(queue, RayPool):
             return None
         most = self._photon_room
-        if piece.light in self._photons_a_point:
-            most = min(most, int(self._photons_a_point[piece.light] * piece.count) + _GROUP)
-        queue.begin(piece.count, most)
-        self._emit(piece, domain, min(max_depth or self.max_depth, self.max_depth), self.split_threshold)
+        if (photons_a_ray := self._photons_a_ray.get(tuple(piece.light for piece, _ in parts))) is not None:
+            most = min(most, int(photons_a_ray * rays) + _GROUP)
+        queue.begin(rays, most)
+        self._emit(parts, min(max_depth or self.max_depth, self.max_depth), self.split_threshold)
         queue.send(self._trace, self._bind)
         report = self._reports.pop() if self._reports else self.context.ctx.buffer(reserve=queue.state.size)
         self.context.ctx.copy_buffer(report, queue.state)
 
         def batch() -> Batch:
             self._reports.append(report)
-            return self._learned(piece, self._batch_of(queue.counted(report)))
+            return self._learned(parts, self._batch_of(queue.counted(report)))
 
         return Sent(most, (queue.state, records.POOL_STATE.offset("drawn")), batch)
 
-    def _emit(self, piece: LatticeSlice, domain: EmissionDomain, max_depth: int, split_threshold: float) -> None:
-        if piece.count > self.batch:
-            raise ValueError(f"{piece.count} lattice points in a batch of {self.batch}")
-        if piece.beam_objects and not self._features.beams:
+    def _emit(self, parts: Parts, max_depth: int, split_threshold: float) -> None:
+        if (rays := self.rays_of(parts)) > self.batch:
+            raise ValueError(f"{rays} rays in a batch of {self.batch}")
+        if any(piece.beam_objects for piece, _ in parts) and not self._features.beams:
             raise ValueError("objects are left to beams, and the programs were made without them")
-        self._start(piece, domain, max_depth, split_threshold)
+        self._set_parameters({part[0].light: self._parameters_of(*part, max_depth, split_threshold) for part in parts})
         self.scene.bind()
         self._emit_parameters.bind_to_storage_buffer(bindings.PARAMETERS)
-        self.order(piece).bind_to_storage_buffer(bindings.INDICES)
-        self._emit_program(domain).run(-(-piece.count // _GROUP))
-        self._queue.emitted(piece.count)
+        for piece, domain in parts:
+            self._emit_parameters.write(self._emission_of(piece, domain).tobytes())
+            self.order(piece).bind_to_storage_buffer(bindings.INDICES)
+            self._emit_program(domain).run(-(-piece.count // _GROUP))
+            self._queue.emitted(piece.count)
 
     def carry_on(self, rays: np.ndarray, light: int, max_depth: int | None = None) -> Generator[None, None, Batch]:
         """`steps` for `rays` of one light that are on their way already: records (n,) of `ray` with n ≤ `batch`. Their
@@ -324,8 +333,7 @@ class TracePass:
         if count > self.batch:
             raise ValueError(f"{count} rays in a batch of {self.batch}")
         self._queue.load(rays)
-        self._trace_values = self._trace_parameters_of(light, 1, max_depth)
-        self._trace_parameters.write(self._trace_values.tobytes())
+        self._set_parameters({light: self._carried_on(light, max_depth)})
         batch = yield from self._follow(max_depth)
         batch.tally.handed = float(rays["flux_w"].sum(dtype=float))
         return batch
@@ -344,7 +352,10 @@ class TracePass:
         tally.ended["absorbed"] += found.absorbed_w
         tally.fallbacks = dict(zip(records.FALLBACKS, found.fallbacks, strict=True))
         tally.fallbacks["queue_overflow"] += found.overflow
-        return Batch(found.photons, found.emitted, tally, found.steps, found.flights, found.overflow)
+        overflow = found.overflow
+        if self.flights is not None:
+            overflow += max(0, found.flights - FLIGHT_ROOM * self.batch)
+        return Batch(found.photons, found.emitted, tally, found.steps, found.flights, overflow)
 
     def _end_all(self) -> None:
         self._trace_values["max_depth"] = 0
@@ -356,7 +367,7 @@ class TracePass:
         if self.flights is not None:
             self.flights.bind_to_storage_buffer(bindings.FLIGHTS)
 
-    def _start(self, piece: LatticeSlice, domain: EmissionDomain, max_depth: int, split_threshold: float) -> None:
+    def _emission_of(self, piece: LatticeSlice, domain: EmissionDomain) -> np.ndarray:
         p = records.EMIT_PARAMETERS.zeros(1)
         p["origin"], p["axis"], p["tangent"], p["bitangent"] = (
             domain.origin,
@@ -389,28 +400,38 @@ class TracePass:
             p["thinned"] = np.packbits(domain.thinned.ravel(), bitorder="little").view("<u4")
         p["thinned_chance"] = domain.thinned_chance
         p["lamp_step"] = piece.lamp_step
-        self._emit_parameters.write(p.tobytes())
-        lattices = len(piece.bands) * piece.light_points
-        self._trace_values = self._trace_parameters_of(piece.light, lattices, max_depth, piece.beam_objects)
-        self._trace_values["split_threshold"] = split_threshold
+        return p
+
+    def _parameters_of(
+        self, piece: LatticeSlice, domain: EmissionDomain, max_depth: int, threshold: float
+    ) -> np.ndarray:
+        p = self._carried_on(piece.light, max_depth)
+        p["lattices"], p["split_threshold"] = piece.lattices, threshold
         if piece.lattice_count < 1 << (32 - records.LATTICE_BIT):
-            self._trace_values["lattice_bits"] = piece.lattice_count << records.LATTICE_BIT
-        paths = piece.lattice_count * lattices * domain.active_share
-        self._trace_values["paths"], self._trace_values["widest_turn"] = paths, self._widest_turn(paths)
-        self._trace_values["lattice_shift"] = piece.shift[1]
-        self._trace_values["surface_key"] = self._trace_values["tint_key"] = piece.seed
-        self._trace_values["lattices_together"] = 1 if self._features.spectral_groups else len(piece.bands)
+            p["lattice_bits"] = piece.lattice_count << records.LATTICE_BIT
+        paths = piece.lattice_count * piece.lattices * domain.active_share
+        p["paths"], p["widest_turn"] = paths, self._widest_turn(paths)
+        p["lattice_shift"] = piece.shift[1]
+        p["surface_key"] = p["tint_key"] = piece.seed
+        p["lattices_together"] = 1 if self._features.spectral_groups else len(piece.bands)
+        bits = np.zeros(p["beam_objects"].size * 32, bool)
+        bits[list(piece.beam_objects)] = True
+        p["beam_objects"] = np.packbits(bits, bitorder="little").view("<u4").reshape(p["beam_objects"].shape)
+        return p
+
+    def _set_parameters(self, of_lights: dict[int, np.ndarray]) -> None:
+        self._trace_values = self._parameters.zeros(self._lights)
+        for light, values in of_lights.items():
+            self._trace_values[light % self._lights] = values[0]
         self._trace_parameters.write(self._trace_values.tobytes())
 
     def _widest_turn(self, photons: float) -> float:
         """Radians a side, in a pass of so many photons of a light."""
         return WIDEST_TURN * max(photons, 1.0) ** (-1.0 / 6.0) if self.widest_on_surface < UNBOUNDED else UNBOUNDED
 
-    def _trace_parameters_of(
-        self, light: int, lattices: int, max_depth: int, beam_objects: tuple[int, ...] = ()
-    ) -> np.ndarray:
-        p = records.TRACE_PARAMETERS.zeros(1)
-        p["max_depth"], p["split_threshold"], p["lattices"] = max_depth, self.split_threshold, lattices
+    def _carried_on(self, light: int, max_depth: int) -> np.ndarray:
+        p = self._parameters.zeros(1)
+        p["max_depth"], p["split_threshold"], p["lattices"] = max_depth, self.split_threshold, 1
         p["lattices_together"], p["widest_on_surface"] = 1, self.widest_on_surface
         p["paths"], p["widest_turn"] = CARRIED_ON_POINTS, self._widest_turn(CARRIED_ON_POINTS)
         p["bounded"] = self.widest_on_surface < UNBOUNDED
@@ -420,16 +441,13 @@ class TracePass:
         if self.scene.tint_levels is not None:
             p["tint_rate"] = self.scene.tint_levels.rate / self.scene.space.scale
             p["tint_halfway"] = self.scene.tint_halfway[light]
-        bits = np.zeros(p["beam_objects"].size * 32, bool)
-        bits[list(beam_objects)] = True
-        p["beam_objects"] = np.packbits(bits, bitorder="little").view("<u4").reshape(p["beam_objects"].shape)
         return p
 
     def order(self, piece: LatticeSlice) -> moderngl.Buffer:
         """The order in which `piece` is emitted, uint32 (points,); made by the processor where it is a new one."""
         key = (piece.points, piece.stride, piece.lattice_count)
         if key not in self._orders:
-            if len(self._orders) >= _MAX_ORDERS:
+            if len(self._orders) >= _MAX_ORDERS * max(1, len(self.scene.scene.lights)):
                 self._orders.pop(next(iter(self._orders))).release()
             self._orders[key] = self.context.ctx.buffer(morton_order(*key).tobytes())
         return self._orders[key]

@@ -17,8 +17,8 @@ from ..model.scene import Scene
 from ..model.settings import RenderSettings, divides_spectrum
 from ..model.tint_bands import TOLERANCE, cut_by_tints, ends_of
 from ..passes.emission_domain import EmissionDomain
+from ..passes.lattice_slice import Band, LatticeSlice, Part
 from ..passes.pilot import MAX_LIGHT_POINTS, Pilot, PilotFit
-from ..passes.trace import Band, LatticeSlice
 
 SMALLEST_BATCH = MAX_BANDS * MAX_LIGHT_POINTS
 """One point of every sub-lattice a light may have."""
@@ -50,28 +50,28 @@ class LightPlan:
         """Points of each sub-lattice over the whole rectangle, so that about the light's share of `photons` starts."""
         return max(1, round(photons * self.share / self.lattices / self.domain.active_share))
 
-    def slice(
-        self, seed: int, number: int, lattice: int, first: int, stride: int, points: int, weight: float
-    ) -> LatticeSlice:
-        """Points first, first + stride, … of pass `number`'s lattices of `lattice` points each."""
+    def part(self, seed: int, number: int, photons: int, weight: float | None = None) -> Part:
+        """All of pass `number`'s lattices for about `photons`, the pass's `weight` by default."""
+        lattice = self.lattice_count(photons)
         u, v, light_u, light_v, spectral = (shift(seed, self.index, number, dimension) for dimension in PASS_GENERATORS)
         key = random_word(seed, self.index, number, Dimension.BRANCH)
-        return LatticeSlice(
+        piece = LatticeSlice(
             self.index,
             self.bands,
             lattice,
-            first,
-            stride,
-            points,
+            0,
+            1,
+            lattice,
             (u, v),
             (light_u, light_v),
             spectral,
             key,
             self.light_points,
-            weight=weight,
+            weight=float(photons) if weight is None else weight,
             beam_objects=self.beam_objects,
             lamp_step=self.lamp_step / self.light_points**0.5,
         )
+        return piece, self.domain
 
 
 def spans_of(plans: Iterable[LightPlan], lights: int) -> list[list[tuple[float, float]]]:

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..base.random_words import Dimension, random_word, shift
 from ..passes.beam_emission import BeamEmission
+from ..passes.lattice_slice import Part, every
 from .light_plan import LightPlan
 from .light_stats import PassStep
 from .light_survey import LightSurvey
@@ -55,8 +56,11 @@ class PassRounds:
         """Into how many rounds the pass is divided."""
         if not self.plans:
             return -(-self.photons // BEAM_ROUND) if self.survey.has_beams else 0
-        batch = self.batches.trace.batch
-        return max(-(-plan.lattice_count(self.photons) // (batch // plan.lattices)) for plan in self.plans)
+        return self.batches.trace.rounds(self._parts)
+
+    @property
+    def _parts(self) -> list[Part]:
+        return [plan.part(self.seed, self.number, self.photons, self.weight) for plan in self.plans]
 
     @property
     def together(self) -> int:
@@ -96,18 +100,10 @@ class PassRounds:
             yield PassStep((j + 1) / rounds, True)
 
     def _photons(self, j: int, rounds: int) -> Iterator[PassStep]:
-        """Photons of round `j`, light by light."""
-        lights = len(self.plans)
-        for i, plan in enumerate(self.plans):
-            done, lattice = j * lights + i, plan.lattice_count(self.photons)
-            points = len(range(j, lattice, rounds))
-            if points:
-                part = plan.slice(self.seed, self.number, lattice, j, rounds, points, self.weight)
-                of = RoundOf(self.number, j, rounds, i + 1 == lights)
-                for _ in self.batches.lattice(part, plan.domain, of, self.into):
-                    yield PassStep(done / (rounds * lights), False)
-            if i + 1 < lights:
-                yield PassStep((done + 1) / (rounds * lights), False)
+        """Photons of round `j`."""
+        parts, of = every(rounds, j, self._parts), RoundOf(self.number, j, rounds, True)
+        for _ in self.batches.lattice(parts, of, self.into):
+            yield PassStep(j / rounds, False)
 
     def _beams(self, of: RoundOf, done: float = 0.0, rounds: int = 1) -> Iterator[PassStep]:
         """The beams of so many `rounds` from one on, and the photons that carry on what those left."""

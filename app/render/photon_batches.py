@@ -11,7 +11,8 @@ import numpy as np
 
 from ..base.memory import available_bytes
 from ..gpu.dispatch_budget import DISPATCH_S, DispatchBudget
-from ..passes.trace import Batch, LatticeSlice, Sent, TracePass, queue_class
+from ..passes.lattice_slice import Parts, every, points_of
+from ..passes.trace import Batch, Sent, TracePass, queue_class
 from .light_plan import SMALLEST_BATCH, LightPlan
 from .photon_records import PhotonRecords, RoundOf
 from .splatting import Splatting
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
 
     from ..features.features import Features
     from ..gpu.context import Context
-    from ..passes.emission_domain import EmissionDomain
     from ..passes.map_atlas import MapAtlas
     from .light_maps import LightMaps
     from .light_stats import LightStats
@@ -68,10 +68,10 @@ class PhotonBatches:
         """The first event of all includes compiling."""
         self._is_timed = False
         """A batch has been waited for, and held by the queue."""
-        self._sent: list[tuple[Sent, LatticeSlice, EmissionDomain, RoundOf, Deposit]] = []
+        self._sent: list[tuple[Sent, Parts, RoundOf, Deposit]] = []
         """Batches whose photons are drawn and not counted yet."""
         self._held: dict[int, int] = {}
-        """Rays of a batch, by light, whose paths branch so often that the queues hold no more."""
+        """Rays of a batch, by its first light, whose paths branch so often that the queues hold no more."""
 
     @property
     def tables(self) -> ShownTables:
@@ -83,30 +83,34 @@ class PhotonBatches:
         self._held.clear()
         self._sent.clear()
 
-    def lattice(self, part: LatticeSlice, domain: EmissionDomain, of: RoundOf, into: Deposit) -> Iterator[None]:
-        """Trace `part`, keep, splat and count what landed, in slices that the device has shown to manage in time and
+    def lattice(self, parts: Parts, of: RoundOf, into: Deposit) -> Iterator[None]:
+        """Trace `parts`, keep, splat and count what landed, in slices that the device has shown to manage in time and
         whose paths the queues hold."""
-        lattices, first, left = part.count // part.points, part.first, part.points
-        while left:
-            most = min(self.budget.units, self.portion, self._held.get(part.light, self.budget.units))
-            points = min(left, max(most // lattices, 1))
-            piece = replace(part, first=first, points=points)
-            self.trace.order(piece)  # the processor's work, which would pass for the device's below
-            its = replace(of, is_last_light=of.is_last_light and left == points)
-            sent = self.trace.send(piece, domain) if self._counts_late else None
-            if sent is not None:
-                yield
-                yield from self.splat(self.trace.photons, sent.most, into, held=sent.held)
-                self._sent.append((sent, piece, domain, its, into))
-                yield from self.settle(1)
-            else:
-                batch = yield from self._traced(self.trace.steps(piece, domain), into.stats, piece.count)
-                if batch.overflow and points > 1:
-                    self._held[part.light] = piece.count // 2
-                    continue
-                self._is_timed = True
-                yield from self._landed(batch, its, into)
-            first, left = first + points * part.stride, left - points
+        while parts:
+            held = self._held.get(parts[0][0].light, self.trace.batch)
+            some, rest = self.trace.fill(parts, min(self.budget.units, self.portion, held))
+            its = replace(of, is_last_light=of.is_last_light and not rest)
+            parts = rest if (yield from self._batch(some, its, into)) else parts
+
+    def _batch(self, some: Parts, of: RoundOf, into: Deposit) -> Generator[None, None, bool]:
+        trace = self.trace
+        for piece, _ in some:
+            trace.order(piece)  # the processor's work, which would pass for the device's below
+        sent = trace.send(some) if self._counts_late else None
+        if sent is not None:
+            yield
+            yield from self.splat(trace.photons, sent.most, into, held=sent.held)
+            self._sent.append((sent, some, of, into))
+            yield from self.settle(1)
+            return True
+        rays = trace.rays_of(some)
+        batch = yield from self._traced(trace.steps(some), into.stats, rays)
+        if batch.overflow and points_of(some) > 1:
+            self._held[some[0][0].light] = rays // 2
+            return False
+        self._is_timed = True
+        yield from self._landed(batch, of, into)
+        return True
 
     @property
     def _counts_late(self) -> bool:
@@ -117,13 +121,13 @@ class PhotonBatches:
         """Count what was sent, but for the last `left` batches. Those that found no room, of which nothing was drawn,
         are traced again in parts."""
         while len(self._sent) > left:
-            sent, piece, domain, of, into = self._sent.pop(0)
+            sent, parts, of, into = self._sent.pop(0)
             started = time.perf_counter()
             batch = sent.batch()
             into.stats.trace_seconds += time.perf_counter() - started
             if batch.overflow:
                 self._is_timed = False
-                yield from self.lattice(piece, domain, of, into)
+                yield from self.lattice(parts, of, into)
             else:
                 self._count(batch, into)
 
@@ -220,22 +224,15 @@ class PhotonBatches:
 
 def traced_besides(trace: TracePass, seed: int, plans: Sequence[LightPlan], photons: int, keep: Keep) -> Iterator[None]:
     """Trace about `photons` by `plans` that belong to no map of a light pass, for `keep`, pausing after every batch."""
-    counts = [plan.lattice_count(photons) for plan in plans]
-    rounds = max((-(-n // (trace.batch // plan.lattices)) for n, plan in zip(counts, plans, strict=True)), default=0)
+    parts = [plan.part(seed, 0, photons) for plan in plans]
+    rounds = trace.rounds(parts)
     for j in range(rounds):
-        for i, (plan, lattice) in enumerate(zip(plans, counts, strict=True)):
-            points = len(range(j, lattice, rounds))
-            if points:
-                waiting = [plan.slice(seed, 0, lattice, j, rounds, points, float(photons))]
-                while waiting:
-                    part = waiting.pop()
-                    batch = yield from trace.steps(part, plan.domain)
-                    if batch.overflow and part.points > 1:
-                        waiting += part.halves
-                        continue
-                    of = RoundOf(0, j, rounds, i + 1 == len(plans) and not waiting)
-                    keep(trace.photons, batch.photons, trace.photon.stride, of)
-            yield
+
+        def kept(batch: Batch, is_last: bool, j: int = j) -> None:
+            keep(trace.photons, batch.photons, trace.photon.stride, RoundOf(0, j, rounds, is_last))
+
+        yield from trace.whole(every(rounds, j, parts), kept)
+        yield
 
 
 def batch_size(context: Context, features: Features, given: int | None) -> int:

@@ -44,8 +44,8 @@ void count_outcome(Outcome outcome) {
 }
 
 // Adds the group's tally to its own, which no other group touches. The last group of a dispatch makes its counts those
-// of the next one.
-void close_group() {
+// of the next one, in which all rays are new that were emitted (`emits`), by this light and by those before it.
+void close_group(bool emits) {
     uint lane = gl_LocalInvocationIndex;
     memoryBarrierBuffer();
     barrier();
@@ -57,13 +57,14 @@ void close_group() {
     if (lane < FALLBACK_COUNT) tallies[gl_WorkGroupID.x].fallbacks[lane] += group_falls[lane];
     if (lane == 0u) atomicAdd(state.flights, group_events);
     if (lane != 0u || atomicAdd(state.groups_done, 1u) + 1u < gl_NumWorkGroups.x) return;
-    uint taken = min(atomicAdd(state.taken, 0u), state.free_end);
-    state.born_first = state.taken_before;
+    uint wanted = atomicAdd(state.taken, 0u), taken = min(wanted, state.free_end);
+    if (emits) state.overflow += wanted - taken;
+    state.born_first = emits ? 0u : state.taken_before;
     state.taken = state.taken_before = taken;
     state.free_end = atomicAdd(state.returned, 0u);
     state.survivors = atomicExchange(state.next_survivors, 0u);
     state.alive = state.survivors + taken - state.born_first;
     state.trace_groups = uvec4((state.alive + 63u) / 64u, 1u, 1u, 0u);
     state.lent = state.groups_done = 0u;
-    state.dispatches += 1u;
+    state.dispatches += uint(!emits);
 }

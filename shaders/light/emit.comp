@@ -138,6 +138,7 @@ void main() {
     open_tally();
     alive = alive && is_there;
     slot = emitted_slot(alive);
+    alive = alive && slot < state.capacity;
 #endif
     if (alive) {
         RayRecord ray;
@@ -235,7 +236,7 @@ void main() {
     }
 #ifdef RAY_POOL
     count_watts(EMITTED_ROW, outcome.flux_w);
-    close_group();
+    close_group(true);
 #else
     uvec4 texels[Outcome_TEXELS];
     to_texels(outcome, texels);

@@ -345,6 +345,6 @@ void main() {
         hand_on_rays(lands);
     } while (find_held());
     if (!FLIGHTS) atomicAdd(group_events, events_done);
-    close_group();
+    close_group(false);
 #endif
 }

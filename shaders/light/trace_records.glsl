@@ -1,6 +1,7 @@
 // What one step of the light pass reads and writes: rays, photons, outcomes.
 
-layout(std140, binding = BIND_PARAMETERS) uniform Parameters { TraceParameters p; };
+layout(std140, binding = BIND_PARAMETERS) uniform Parameters { TraceParameters of_lights[LIGHTS]; };
+uint of_light = 0u;  // whose ray is followed: its place among these
 
 // `Outcome.what`: where flux went …
 #define DEPOSITED (0u << 16)
@@ -36,6 +37,8 @@ layout(std140, binding = BIND_PARAMETERS) uniform Parameters { TraceParameters p
 #define Walk RayRecord
 #include "path/event.glsl"
 
+#define p of_lights[of_light]
+
 #ifdef RAY_POOL
 #include "light/trace_pool.glsl"
 #else
@@ -64,6 +67,7 @@ Path load_path(uint slot) {
     uvec4 texels[RayRecord_TEXELS];
     for (uint i = 0u; i < uint(RayRecord_TEXELS); ++i) texels[i] = rays_in[slot * uint(RayRecord_TEXELS) + i];
     RayRecord ray = RayRecord_of(texels);
+    if (LIGHTS > 1u) of_light = (ray.light_and_source & 0xffu) % LIGHTS;
     Path path;
     path.walk = ray;
     path.walk.flags &= FLAG_FOOTPRINT_DROPPED;

@@ -45,7 +45,7 @@ def traced(context, name: str, seconds: float, method: str = "srd") -> LightPass
     light.begin(PHOTONS, 1)
     sizes: list[int] = []
     steps, splat = light.trace.steps, light.maps.splatter.run
-    light.trace.steps = lambda piece, *rest: (sizes.append(piece.count), steps(piece, *rest))[1]  # type: ignore[method-assign]
+    light.trace.steps = lambda parts, *rest: (sizes.append(light.trace.rays_of(parts)), steps(parts, *rest))[1]  # type: ignore[method-assign]
     light.maps.splatter.run = lambda photons, *rest: (sizes.append(photons.count), splat(photons, *rest))[1]  # type: ignore[method-assign]
     for _ in range(2):
         for _ in light.steps_until(0, PHOTONS, lambda: False):

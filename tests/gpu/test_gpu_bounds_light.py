@@ -9,17 +9,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from gl_counts import counted
+from spectrasplat.base.generators import finished
 from spectrasplat.base.paths import shipped_scenes
 from spectrasplat.features.features import Features
 from spectrasplat.gpu import device_traits
 from spectrasplat.gpu.context import Context, create_context
 from spectrasplat.gpu.device_traits import DeviceTraits
+from spectrasplat.gpu.scene_buffers import SceneBuffers
 from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes import ray_pool
 from spectrasplat.passes import trace as trace_pass
 from spectrasplat.passes.emission_domain import emission_domain
-from spectrasplat.passes.trace import Band, Batch, LatticeSlice, TracePass
+from spectrasplat.passes.lattice_slice import Band, LatticeSlice, Parts
+from spectrasplat.passes.trace import Batch, TracePass
 from spectrasplat.render.device_scene import scene_buffers
 from spectrasplat.render.light_pass import LightPass
 
@@ -41,50 +45,50 @@ def device(events: tuple[int, ...], packs: bool = False) -> Iterator[Context]:
         yield context
 
 
-def traced(context: Context, name: str, points: int, room: int = 4) -> Iterator[tuple[TracePass, Batch]]:
-    """Photons of each light, of two bands, in a batch with room for so many times more."""
-    scene = load_scene(shipped_scenes()[name])
-    buffers = scene_buffers(context, scene, RenderSettings(photons=points, method="srd-photons"))
-    trace = TracePass(context, buffers.features, buffers, room * points, 64, THRESHOLD)
+def parts_of(buffers: SceneBuffers, points: int) -> Parts:
+    """So many points of each light, of two bands."""
+    scene, parts = buffers.scene, []
     meshes = zip(buffers.world_meshes, scene.objects, strict=True)
     specular = [buffers.space.to_gpu(mesh.corners()) for mesh, item in meshes if item.material.is_specular]
     for index, light in enumerate(scene.lights):
         domain = emission_domain(light, scene, buffers.space, np.concatenate(specular)) if specular else None
-        if domain is None:
-            continue
-        power = buffers.light_power[index]
-        bands = (
-            Band(0.0, 0.5, 0.25, float(power.band(0.0, 0.5)[3])),
-            Band(0.5, 1.0, 0.75, float(power.band(0.5, 1.0)[3])),
-        )
-        count = points // 2
-        yield trace, trace.run(LatticeSlice(index, bands, count, 0, 1, count, (5, 7), (1, 2), 3, 11), domain)
+        if domain is not None:
+            power, count = buffers.light_power[index], points // 2
+            ends = ((0.0, 0.5), (0.5, 1.0))
+            bands = tuple(Band(lo, hi, 0.5 * (lo + hi), float(power.band(lo, hi)[3])) for lo, hi in ends)
+            parts.append((LatticeSlice(index, bands, count, 0, 1, count, (5, 7), (1, 2), 3, 11), domain))
+    return parts
+
+
+def traced(context: Context, scene: Scene, points: int, room: int = 4) -> Iterator[tuple[TracePass, Batch]]:
+    """Their photons, in batches with room for so many times more."""
+    buffers = scene_buffers(context, scene, RenderSettings(photons=points, method="srd-photons"))
+    trace = TracePass(context, buffers.features, buffers, room * points * max(len(scene.lights), 1), 64, THRESHOLD)
+    parts = parts_of(buffers, points)
+    while parts:
+        some, parts = trace.fill(parts, trace.batch)
+        yield trace, finished(trace.steps(some))
     trace.release()
     buffers.release()
 
 
-def photon_set(trace: TracePass, batch: Batch) -> np.ndarray:
-    """All bits of every photon, sorted."""
-    words = np.frombuffer(trace.photons.read(), np.uint32).reshape(-1, trace.photon.stride // 4)[: batch.photons]
+def photon_set(name: str, events: tuple[int, ...]) -> np.ndarray:
+    """All bits of every photon, sorted: light by light in order, else of all lights together."""
+    found = [np.zeros((0, 1), np.uint32)]
+    with device(events) as context:
+        for trace, batch in traced(context, load_scene(shipped_scenes()[name]), POINTS):
+            assert batch.overflow == 0 and batch.tally.imbalance < 3e-5
+            words = np.frombuffer(trace.photons.read(), np.uint32).reshape(-1, trace.photon.stride // 4)
+            found.append(words[: batch.photons])
+    words = np.concatenate(found[1:] or found)
     return words[np.lexsort(words.T)]
 
 
-def photon_sets(name: str, events: tuple[int, ...]) -> list[np.ndarray]:
-    """Of each light, sorted."""
-    found = []
-    with device(events) as context:
-        for trace, batch in traced(context, name, POINTS):
-            assert batch.overflow == 0 and batch.tally.imbalance < 3e-5
-            found.append(photon_set(trace, batch))
-    return found
-
-
-def compare(name: str, schedules: tuple[tuple[int, ...], ...]) -> list[np.ndarray]:
+def compare(name: str, schedules: tuple[tuple[int, ...], ...]) -> np.ndarray:
     """The photons, to the bit, of all of them."""
-    first = photon_sets(name, schedules[0])
+    first = photon_set(name, schedules[0])
     for events in schedules[1:]:
-        for mine, theirs in zip(first, photon_sets(name, events), strict=True):
-            assert np.array_equal(mine, theirs)
+        assert np.array_equal(first, photon_set(name, events))
     return first
 
 
@@ -104,8 +108,7 @@ def test_photons_are_the_same_however_many_events_are_followed_at_once(name: str
 def test_photons_are_the_same_in_every_shipped_scene(name: str) -> None:
     """To the bit, whatever the schedule; of one event at a time, which is another program, drivers round some values
     otherwise."""
-    for mine, theirs in zip(compare(name, SCHEDULES[1:]), photon_sets(name, SCHEDULES[0]), strict=True):
-        assert np.array_equal(identities(mine), identities(theirs))
+    assert np.array_equal(identities(compare(name, SCHEDULES[1:])), identities(photon_set(name, SCHEDULES[0])))
 
 
 def test_rays_without_room_wait_and_nothing_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -114,13 +117,22 @@ def test_rays_without_room_wait_and_nothing_is_lost(monkeypatch: pytest.MonkeyPa
     compare("prism", ((), (1,) * 60 + (4096,)))
 
 
-def test_a_batch_asks_for_few_dispatches_and_waits_for_nothing() -> None:
-    for name in ("prism", "ball", "brilliant", "default"):
-        features = Features.of(load_scene(shipped_scenes()[name]), RenderSettings(method="srd-photons"))
-        assert ray_pool.RayPool.bytes_of(features, DeviceTraits(), 1 << 20) <= BYTES_A_PHOTON << 20
+@pytest.mark.parametrize(
+    ("name", "lights"), [("prism", 2), ("ball", 2), ("brilliant", 2), ("default", 3), ("default", 10)]
+)
+def test_a_million_photons_ask_for_few_dispatches_and_wait_for_nothing(name: str, lights: int) -> None:
+    """All lights' together: one for each light, and nine whatever their number."""
+    scene = load_scene(shipped_scenes()[name])
+    scene = replace(scene, lights=tuple(scene.lights[i % len(scene.lights)] for i in range(lights)))
+    features = Features.of(scene, RenderSettings(method="srd-photons"))
+    assert ray_pool.RayPool.bytes_of(features, DeviceTraits(), 1 << 20) <= BYTES_A_PHOTON << 20
     with device(DeviceTraits().ray_events, packs=True) as context, counted() as counts:
-        batches = len(list(traced(context, "prism", POINTS)))
-    assert counts.dispatches <= 12 * batches and counts.finishes == 0 and counts.reads <= batches
+        ((trace, batch),) = traced(context, scene, POINTS)
+    assert counts.dispatches <= lights + 9 and counts.waits <= 1 and batch.photons > 0
+    trace.batch = DeviceTraits().photon_batch
+    rays = 1e6 / lights
+    parts = [(replace(s, points=int(rays / s.lattices / d.active_share)), d) for s, d in parts_of(trace.scene, 2)]
+    assert trace.rounds(parts) == 1
 
 
 @pytest.mark.parametrize("too_few", [False, True])

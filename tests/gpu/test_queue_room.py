@@ -11,7 +11,7 @@ from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.materials.grating import Grating
 from spectrasplat.model.scene import Scene
 from spectrasplat.passes import pilot, ray_pool
-from spectrasplat.passes.trace import Band, LatticeSlice
+from spectrasplat.passes.lattice_slice import Band, LatticeSlice
 from spectrasplat.stress.rigs.probe import SMALL, light_pass, probe
 
 ORDERS = 161
@@ -30,13 +30,14 @@ def crowded() -> Scene:
 
 def test_a_slice_is_both_of_its_halves() -> None:
     whole = LatticeSlice(0, (Band(0.0, 1.0, 0.5, 1.0),), 100, 3, 4, 17, (0, 0), (0, 0), 0, 1)
-    halves = whole.halves
+    halves = [whole.every(2, i) for i in range(2)]
 
     def points(part: LatticeSlice) -> list[int]:
         return list(range(part.first, part.first + part.stride * part.points, part.stride))
 
     assert sorted(points(halves[0]) + points(halves[1])) == points(whole)
     assert [half.points for half in halves] == [9, 8]
+    assert [*points(whole.split(5)[0]), *points(whole.split(5)[1])] == points(whole)
 
 
 @pytest.mark.slow
@@ -61,8 +62,7 @@ def test_a_slice_that_overflows_is_traced_again_in_parts(gl, crowded: Scene, mon
     with light_pass(gl, crowded, replace(SMALL, photons=2_560, batch=2_048, max_depth=FEW)) as (light, _):
         light.begin(2_560, 1)
         plan = light.plans[0]
-        part = plan.slice(1, 0, plan.lattice_count(2_560), 0, 1, plan.lattice_count(2_560), 2_560.0)
-        whole = light.trace.run(part, plan.domain)
+        whole = light.trace.run(*plan.part(1, 0, 2_560))
         assert whole.overflow > 0 and whole.tally.imbalance > 0.01
         for _ in light.pass_steps(0, 2_560):
             pass
@@ -72,8 +72,4 @@ def test_a_slice_that_overflows_is_traced_again_in_parts(gl, crowded: Scene, mon
 
 def _others(light, photons: int) -> float:
     """W of the lights after the first."""
-    emitted = 0.0
-    for plan in light.plans[1:]:
-        lattice = plan.lattice_count(photons)
-        emitted += light.trace.run(plan.slice(1, 0, lattice, 0, 1, lattice, float(photons)), plan.domain).tally.emitted
-    return emitted
+    return sum(light.trace.run(*plan.part(1, 0, photons)).tally.emitted for plan in light.plans[1:])

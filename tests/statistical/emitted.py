@@ -20,7 +20,8 @@ from spectrasplat.model.scene import (
 )
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes.emission_domain import emission_domain
-from spectrasplat.passes.trace import Band, LatticeSlice, TracePass
+from spectrasplat.passes.lattice_slice import Band, LatticeSlice
+from spectrasplat.passes.trace import TracePass
 from spectrasplat.render.device_scene import spectral_axis
 from spectrasplat.stress.rigs.gpu_paths import glass, screen
 

@@ -15,7 +15,7 @@ from reference.samplers import mirrored_lattice_point, radical_inverse
 from scipy.spatial import KDTree
 from spectrasplat.base import paths
 from spectrasplat.base.random_words import PASS_GENERATORS
-from spectrasplat.gpu.records import LATTICE_BIT, TRACE_PARAMETERS
+from spectrasplat.gpu.records import LATTICE_BIT, trace_parameters
 from spectrasplat.passes.pixel_lattice import cells_of, pixel_lattice
 from spectrasplat.reference.emission import GOLDEN, PLASTIC, lattice_point
 from spectrasplat.reference.random_numbers import hash_combine, hash_pcg, kronecker, unit_float
@@ -262,7 +262,7 @@ def play(
         body,
         inputs,
         outputs,
-        structs=[TRACE_PARAMETERS],
+        structs=[trace_parameters()],
         declarations=survives_source(lattice_count),
     )
 

@@ -54,6 +54,7 @@ NUMBERS: Defines = {
     "STACK_OBJECTS": "uint[](0u)",
     "PLANE_COUNT": 6,
     "PIECE_COUNT": 2,
+    "LIGHTS": 1,
     "TRIANGLE_COUNT": 9,
 }
 """Stand-ins for what only a scene's data give."""
@@ -67,7 +68,7 @@ def sources(features: Features) -> list[shader.Source]:
 def light_sources(features: Features) -> Iterator[shader.Source]:
     photon = records.photon_record(features.spectral_groups)
     structs = (*SCENE_STRUCTS, records.ray_record_of(features), photon, records.OUTCOME)
-    structs += (records.TRACE_PARAMETERS, records.EMIT_PARAMETERS, *((records.FLIGHT,) if features.flights else ()))
+    structs += (records.trace_parameters(), records.EMIT_PARAMETERS, *((records.FLIGHT,) if features.flights else ()))
     light = light_defines(features, DeviceTraits()) | NUMBERS
     yield shader.load_source("light/trace.comp", light, structs)
     yield shader.load_source("light/emit.comp", light | switched(LIGHT_POINT=True), structs)

@@ -19,15 +19,18 @@ from ...model.scene import Scene
 from ...passes.emission_domain import EmissionDomain, emission_domain
 from ...passes.footprint import Photons, SplatSpectra
 from ...passes.landings import ChosenLandings
+from ...passes.lattice_slice import every
 from ...passes.moving_layout import followed
 from ..light_maps import LightMaps
 from ..shown_spectra import PassTables
 
 if TYPE_CHECKING:
+    import moderngl
+
     from ...features.features import Features
     from ...gpu.context import Context
     from ...passes.map_layout import MapLayout
-    from ...passes.trace import Sent
+    from ...passes.trace import Batch, Sent
     from ..light_pass import LightPass
     from ..light_plan import LightPlan
     from .frame_plan import FramePlan
@@ -85,36 +88,36 @@ class MovedLight:
     def _trace(self, plans: list[LightPlan], photons: int, depth: int, maps: LightMaps | None, widening: float) -> None:
         """Trace about so many photons into `maps`, and choose some of them."""
         light_pass, trace = self._light_pass, self._light_pass.trace
-        pieces, seed = [], light_pass.settings.seed
-        for plan in plans:
-            lattice = plan.lattice_count(photons)
-            parts = min(-(-lattice // (trace.batch // plan.lattices)) * self._parts, lattice)
-            for i in range(parts):
-                points = len(range(i, lattice, parts))
-                pieces.append((plan.slice(seed, 0, lattice, i, parts, points, float(photons)), plan.domain))
-        for number, (piece, domain) in enumerate(pieces):
-            waiting = [piece]
-            while waiting:
-                part = waiting.pop()
-                with self._context.timers.timing("trace"):
-                    sent = trace.send(part, domain, depth)
-                    batch = finished(trace.steps(part, domain, depth)) if sent is None else None
-                if batch is not None and batch.overflow and part.points > 1:
-                    waiting += part.halves
-                    continue
-                if sent is not None:
-                    self._sent.append(sent)
-                    count, held = sent.most, sent.held
-                elif batch is not None:
-                    count, held = batch.photons, None
-                self._landed.choose(trace.photons, count, held, number, len(pieces))
-                if maps is not None:
-                    assert self._tables is not None
-                    tables, shown, smoothing = self._tables.preview, light_pass.shown, light_pass.smoothing * widening
-                    spectra = SplatSpectra(shown.variables, tables.tables, shown.gains, tables.reindex)
-                    landed = Photons(trace.photons, count, held=held)
-                    with self._context.timers.timing("splat"):
-                        maps.splatter.run(landed, spectra, maps.atlas, maps.receivers, smoothing)
+        pieces, parts = [], [plan.part(light_pass.settings.seed, 0, photons) for plan in plans]
+        rounds = trace.rounds(parts) * self._parts
+        for j in range(rounds):
+            rest = every(rounds, j, parts)
+            while rest:
+                some, rest = trace.fill(rest, trace.batch)
+                pieces.append(some)
+
+        def landed(number: int, count: int, held: tuple[moderngl.Buffer, int] | None = None) -> None:
+            self._landed.choose(trace.photons, count, held, number, len(pieces))
+            if maps is not None:
+                assert self._tables is not None
+                tables, shown, smoothing = self._tables.preview, light_pass.shown, light_pass.smoothing * widening
+                spectra = SplatSpectra(shown.variables, tables.tables, shown.gains, tables.reindex)
+                with self._context.timers.timing("splat"):
+                    photons = Photons(trace.photons, count, held=held)
+                    maps.splatter.run(photons, spectra, maps.atlas, maps.receivers, smoothing)
+
+        for number, some in enumerate(pieces):
+
+            def kept(batch: Batch, _: bool, number: int = number) -> None:
+                landed(number, batch.photons)
+
+            with self._context.timers.timing("trace"):
+                sent = trace.send(some, depth)
+            if sent is None:
+                finished(trace.whole(some, kept, depth))
+            else:
+                self._sent.append(sent)
+                landed(number, sent.most, sent.held)
 
     def _fitted(self, scene: Scene, side: float) -> LightMaps:
         """Maps for what was chosen of the last photons: those that there are, unless a curved receiver has moved."""

@@ -29,7 +29,8 @@ from ...model.scene import Camera, Dielectric, Diffuse, Light, Material, Mirror,
 from ...model.settings import RenderSettings
 from ...model.vectors import vec3
 from ...passes.emission_domain import emission_domain, orthonormal_frame
-from ...passes.trace import Band, FluxTally, LatticeSlice, TracePass
+from ...passes.lattice_slice import Band, LatticeSlice
+from ...passes.trace import FluxTally, TracePass
 from ...reference.emission import Emitter
 from ...reference.glasses import sellmeier_terms
 from ...reference.optics import unit
