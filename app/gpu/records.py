@@ -375,7 +375,7 @@ EMIT_PARAMETERS = Struct(
 )
 
 
-def trace_parameters(objects: int = 1) -> Struct:
+def trace_parameters(objects: int = 0) -> Struct:
     """What rays of one light are traced by, in a scene of so many objects."""
     return Struct(
         "TraceParameters",
@@ -407,7 +407,7 @@ def trace_parameters(objects: int = 1) -> Struct:
                 "beam_objects",
                 "uvec4",
                 "one bit an object: who meets it first is left to beams",
-                -(-max(objects, 1) // 128),
+                max(2, -(-objects // 128)),
             ),
         ),
     )
