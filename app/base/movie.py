@@ -8,10 +8,9 @@ import json
 import math
 import os
 from collections.abc import Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
@@ -64,22 +63,6 @@ FILMS = {
 _CLAIM = ".claim"
 _DIGITS = 4
 _PNG_BEGIN, _PNG_END = b"\x89PNG\r\n\x1a\n", b"IEND\xaeB`\x82"
-
-
-class Sink(Protocol):
-    """Takes frames in their order."""
-
-    def has(self, index: int) -> bool:
-        """Whether the frame is there already."""
-
-    def claimed(self, index: int) -> AbstractContextManager[bool]:
-        """Within the block: whether the frame is the caller's to make, being neither there nor in another's hands."""
-
-    def write(self, index: int, codes: np.ndarray) -> None:
-        """Take a frame, uint8 (H, W, 3) sRGB, row 0 on top."""
-
-    def close(self) -> None:
-        """Make what was written usable."""
 
 
 class Film:
@@ -220,7 +203,7 @@ class Frames:
 
     @contextmanager
     def claimed(self, index: int) -> Iterator[bool]:
-        """See `Sink`."""
+        """Within the block: whether the frame is the caller's to make, being neither there nor in another's hands."""
         claim = self._folder / f".{index:0{_DIGITS}}{_CLAIM}"
         if self.has(index):
             yield False
@@ -283,6 +266,10 @@ class Frames:
         self._manifest.unlink(missing_ok=True)
 
 
+Sink = Film | Frames
+"""Takes frames in their order."""
+
+
 def frame_name(index: int, suffix: str) -> str:
     """Of a frame's file."""
     return f"{index:0{_DIGITS}}{suffix}"
@@ -343,7 +330,7 @@ def _last_line(told: bytes) -> str:
 
 def open_sink(
     path: Path, size: tuple[int, int], fps: float, description: Mapping[str, object], overwrite: bool = False
-) -> Film | Frames:
+) -> Sink:
     """The sink that `path` asks for: one of `FILMS`, or a folder (a name without a suffix). Raises
     `UserError`."""
     if path.suffix.lower() in FILMS:

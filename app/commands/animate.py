@@ -35,18 +35,9 @@ class Plan:
 
 def plan_of(options: Animate) -> Plan:
     """Everything checked; what was assumed is noted. Raises `UserError`."""
-    from ..base.movie import FILMS
     from ..edit.parameters import Stage
     from ..render.animate import description
 
-    if options.skip_existing and options.overwrite:
-        raise UserError(
-            "--skip-existing and --overwrite exclude each other: keep the frames there are, or replace them"
-        )
-    if options.skip_existing and options.output.suffix.lower() in FILMS:
-        raise UserError(
-            f"--skip-existing is for a folder of frames: a film ({options.output.suffix}) is written in one go"
-        )
     scene = open_scene(options)
     settings = settings_for(options, scene)
     exposure = scene.render.exposure_ev if options.exposure is None else options.exposure

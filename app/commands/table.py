@@ -309,10 +309,6 @@ class Animate(OpensScene):
     method: str | None = shared(_METHOD)
     camera_method: str | None = shared(_CAMERA_METHOD)
     overwrite: bool = switch("Replace the frames of another animation in the folder.")
-    skip_existing: bool = switch(
-        "Make only frames that are neither in the folder nor being made by another process; what happens "
-        "anyway, for those who like to say it."
-    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -460,5 +456,3 @@ class FarmRender(ByWorkers, Render):
 @dataclass(frozen=True, kw_only=True)
 class FarmAnimate(ByWorkers, Animate):
     """Render an animation: a turntable, or any parameters over time, on a farm."""
-
-    without = ("skip_existing",)

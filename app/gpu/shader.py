@@ -53,8 +53,6 @@ class Source:
     name: str
     text: str
     origin: tuple[tuple[str, int], ...]
-    flattened_lines: int
-    """Lines there were before those that cannot run were left out."""
 
     def explain(self, compiler_log: str) -> str:
         """The compiler's log with flattened line numbers replaced by file:line."""
@@ -139,9 +137,8 @@ def load_source(
 
     flatten(name, "the program")
     kept = stripped(lines, _switches())
-    source = Source(
-        name, "\n".join(line.text for line in kept) + "\n", tuple((line.file, line.number) for line in kept), len(lines)
-    )
+    text = "\n".join(line.text for line in kept) + "\n"
+    source = Source(name, text, tuple((line.file, line.number) for line in kept))
     if _kept:
         _sources[identity] = source
         for old in list(_sources)[: -2 * KEPT_PROGRAMS]:

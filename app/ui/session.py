@@ -23,7 +23,6 @@ from ..edit.preferences import Settings, config_dir, load_settings, save_setting
 from ..edit.projection import View
 from ..edit.state import Brush, Display, Selection, State
 from ..gpu.context_thread import no_thread
-from ..gpu.shader_watch import ShaderWatch
 from ..model.staging import Staging
 from ..render.notices import loss_notices
 from . import layout
@@ -40,7 +39,7 @@ if TYPE_CHECKING:
 
 FRAMES_REMEMBERED = 120
 IDLE_S = 0.5
-"""How long the window may sleep when nothing moves: shaders on disk are checked then."""
+"""How long the window may sleep when nothing moves."""
 LAYOUT_FRAMES = 3
 """Frames until docked windows have their sizes: maps fitted to another view would have to be made anew."""
 
@@ -89,7 +88,6 @@ class Session:
         self.clock = clock
         self.input_waits: Callable[[], bool] = lambda: False
         """Whether there is input that the next frame will see."""
-        self._watch = ShaderWatch(clock=clock)
         self.awaited: dict[type, Callable[[], object]] = {}
         """Questions of requests to the renderer, by the type of the request: `NOT_YET` until there is an answer."""
         self.dropped: list[Path] = []
@@ -122,8 +120,6 @@ class Session:
         self.delta_s = min(max(now - self._last_start, 1e-4), 0.25)
         self._frame_started = self._last_start = now
         self.picture.resize(self.state, self.jobs.comparison)
-        if not self.was_interacting and self._watch.changed():  # looking takes some of a frame, and can wait
-            self.reload_shaders()
         if self.state.preferences.panels.start_page:
             self.jobs.gallery.step()
 

@@ -88,7 +88,7 @@ def test_the_viewers_programs_are_strict(device: Context) -> None:
 
 def built_of(name: str, *lines: str) -> Built:
     text = "\n".join(("#version 430 core", *lines)) + "\n"
-    return Built((Source(name, text, tuple((name, n) for n in range(1, len(lines) + 2)), 0),), 0.0)
+    return Built((Source(name, text, tuple((name, n) for n in range(1, len(lines) + 2))),), 0.0)
 
 
 @needs_tools

@@ -181,6 +181,6 @@ def test_a_shader_that_must_hold_sixteen_numbers_does() -> None:
     lines += ["box[gl_LocalInvocationIndex] = v0; barrier(); memoryBarrierBuffer();"]
     lines += [f"values[{n}] = v{n} * box[{n}];" for n in range(16)]
     text = "\n".join([*lines, "}"]) + "\n"
-    source = Source("some.comp", text, tuple(("some.comp", n) for n in range(1, text.count("\n") + 1)), 0)
+    source = Source("some.comp", text, tuple(("some.comp", n) for n in range(1, text.count("\n") + 1)))
     (state,) = strict_compilers.live_states(Built((source,), 0.0))
     assert 16 <= state.registers <= 20 and state.scratch == 0

@@ -99,7 +99,7 @@ def _shader_error(state: State, view_model: ViewModel) -> State:
     flags = imgui.WindowFlags_.no_docking | imgui.WindowFlags_.no_saved_settings | imgui.WindowFlags_.no_collapse
     shown, stays = imgui.begin(_SHADER_WINDOW, True, flags)
     if shown:
-        widgets.hint("A shader does not compile. The last good one draws on; saving the file compiles it again.")
+        widgets.hint("A shader does not compile. The last good one draws on; F5 compiles it again.")
         footer = imgui.get_frame_height_with_spacing()
         imgui.begin_child("##log", imgui.ImVec2(0, -footer), imgui.ChildFlags_.borders)
         imgui.push_text_wrap_pos(0.0)
