@@ -14,7 +14,7 @@ PROGRAM_SWITCHES = frozenset(
     # What the paths of a walk carry; the walk's own file defines them by features.
     + ("HAS_NORMAL_COLUMNS", "WIDENED_BY_LOBES")
     # Light of the environment and of other receivers, by way of glass.
-    + ("FOLLOWS_SPECULAR", "OF_RECEIVERS")
+    + ("FOLLOWS_SPECULAR", "OF_RECEIVERS", "GATHERED_SPECTRUM")
     # Kinds of splats, beams that no wavelength moves, sums by atomics, of pieces of splats, seams between charts.
     + ("SMALL", "SWEPT", "CUT", "EDGE", "CLIPPED", "FANS", "CONTACT_LINES", "STILL", "FLOAT_ATOMICS", "IN_PIECES")
     + ("FROM_SUMS", "FROM_SCRATCH", "SEAMS", "IN_BULK")

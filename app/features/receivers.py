@@ -191,6 +191,16 @@ class PictureFeatures:
         cost="up to six lookups a diffuse surface; a texture of some thousand texels a receiver",
     )
     """What lies beyond everything lights receivers: camera rays look up how much."""
+    environment_spectrum: bool = feature(
+        "environment spectrum",
+        lambda facts: facts.no_environment_light is None and bool(facts.dispersive),
+        why=lambda facts: f"{names(o.material.dispersion for o in facts.dispersive)} disperses what passes through it",
+        why_not=lambda facts: facts.no_environment_light or "nothing disperses",
+        names=("environment_by", "reflect_spectrum", "keep_anchor"),
+        cost="a dozen lookups of the environment a path through glass",
+        requires=("environment_lights",),
+    )
+    """Its light arrives on receivers with the colours of dispersion."""
     bounces: int = feature(
         "bounces",
         lambda facts: facts.scene.render.bounces if facts.no_bounces is None else 0,

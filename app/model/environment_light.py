@@ -23,7 +23,8 @@ import numpy as np
 from ..base.random_words import random_word
 from .environment import averaged_rows
 from .lights.directional import SUN_DIAMETER_DEG, DirectionalLight
-from .optics.colorimetry import daylight_per_lumen, rgb_basis
+from .optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz, daylight_per_lumen, rgb_basis, xyz_to_rgb709
+from .optics.spectral_tables import SpectralAxis
 from .optics.spectrum import Spectrum
 from .scene import Scene
 from .scene_checks import MAX_LIGHTS
@@ -189,6 +190,22 @@ def even_points(numbers: np.ndarray, seed: int, dimension: int) -> np.ndarray:
     sobol = [((d ^ np.uint64(word)).astype(float) + 0.5) * 2.0**-32 for d, word in zip(digits, words, strict=False)]
     within = (numbers[:, None] * _PLASTIC + np.array(words[2:]) * 2.0**-32) % 1.0
     return np.stack([*sobol, *within.T], axis=-1)
+
+
+def spectral_taps(axis: SpectralAxis, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """`count` bands of the spectrum: their ends as spectral coordinates, float64 (count + 1,), and what of an
+    environment's red, green and blue lies in each, linear Rec.709, float64 (count, 3, 3), which add up to those. Bands
+    are even half by brightness, half by the spectral coordinate."""
+    response = cmf_xyz() * daylight_per_lumen()[:, None]
+    bright = np.cumsum(response.sum(axis=1))
+    x = np.linspace(0.0, 1.0, 4096)
+    nm = axis.nm_of_x(x)
+    spread = np.interp(nm, VISIBLE_NM + 0.5, bright / bright[-1], left=0.0) + x
+    edges_x = np.interp(np.linspace(0.0, spread[-1], count + 1), spread, x)
+    until = np.cumsum(rgb_basis()[:, :, None] * K_M * xyz_to_rgb709(response)[:, None, :], axis=0).reshape(-1, 9)
+    edges_nm = np.concatenate([[0.0], axis.nm_of_x(edges_x[1:-1]), [1e4]])
+    sums = np.stack([np.interp(edges_nm, VISIBLE_NM + 0.5, column, left=0.0) for column in until.T], axis=1)
+    return edges_x, np.diff(sums, axis=0).reshape(count, 3, 3)
 
 
 def _interpolated(rgb: np.ndarray, height: int, width: int) -> np.ndarray:

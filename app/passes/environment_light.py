@@ -37,6 +37,8 @@ LEAST_DIRECTIONS = 64
 """Directions of a still, however little time it has."""
 MOST_ASKED = 24
 """Directions of one dispatch at most: Mesa's software renderer ends loops that run long."""
+_NEIGHBOURS = 25.0
+"""Texels whose directions, each its own, are averaged (`gathered_light.SMOOTHING`)."""
 _KEY = 70
 """First of the words that decide at surfaces of glass; those after it place directions towards glass."""
 
@@ -124,6 +126,8 @@ class EnvironmentLightPass(GatheredLight):
         for name, column in zip(("sky_x", "sky_y", "sky_z"), columns, strict=True):
             parameters[name][0, :3] = column
         wide = 2.0 * np.pi * PER_FOLLOWED / self.total
+        if self._buffers.features.environment_spectrum:  # colours are finer than what each path stands for
+            wide /= _NEIGHBOURS
         parameters["level_wide"][0, :3] = self._level(wide)
         parameters["level_narrow"][0, :3] = self._level(0.25 * wide)
         parameters["straight"], parameters["followed"] = count, followed

@@ -14,6 +14,7 @@ from ..gpu.dispatch_budget import DispatchBudget
 from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.scene_records import SCENE_STRUCTS
 from ..gpu.schema import Field, Struct
+from ..model.environment_light import spectral_taps
 from ..model.materials import Grating
 from .environment_places import PLACE, EnvironmentPlaces
 
@@ -29,6 +30,8 @@ RGB_NM = (612.0, 549.0, 465.0)
 """Wavelengths at which glass and mirrors tint linear red, green and blue."""
 SMOOTHING = 1.5
 """Texels over which what came by glass and mirrors is averaged: neighbours follow other paths."""
+TAPS = 12
+"""Wavelengths that a path of the environment's light represents where glass disperses it; three at a time."""
 _GROUP = 64
 _BIND_PLACES, _BIND_ASKED, _BIND_SUMS, _UNIT = 8, 9, 10, 0
 
@@ -60,6 +63,9 @@ PARAMETERS = Struct(
         Field("aims", "uint", "receivers: 1 where places are drawn as well"),
         Field("reserved", "uint", ""),
         Field("reserved_too", "vec2", ""),
+        Field(
+            "taps", "vec4", "of each three: the share of the environment's red, green, blue that it is; its ends", 36
+        ),
     ),
 )
 DIRECTION = Struct(
@@ -110,13 +116,19 @@ class GatheredLight:
         self._asked_buffer = self._ctx.buffer(reserve=most_asked * DIRECTION.stride)
         self._parameters = self._ctx.buffer(reserve=PARAMETERS.stride)
         self._sphere = specular_sphere(buffers)
+        edges_x, shares = spectral_taps(buffers.axis, TAPS)
+        ends = np.stack([edges_x[:-1], edges_x[1:], edges_x[1:]], axis=1)[..., None]
+        self._taps = np.concatenate([shares, ends], axis=2).reshape(3 * TAPS, 4)
         defines: Defines = {**buffers.features.defines(), **bindings.SCENE_DEFINES, **buffers.defines}
         defines |= {"BIND_PLACES": _BIND_PLACES, "BIND_ASKED": _BIND_ASKED, "BIND_SUMS": _BIND_SUMS}
         defines |= {"UNIT_RADIANCE": _UNIT, "MOST_ASKED": most_asked, "MAX_EVENTS": MAX_EVENTS}
+        disperses = buffers.features.environment_spectrum and not bounces
         defines |= switched(FOLLOWS_SPECULAR=self._sphere is not None, OF_RECEIVERS=bounces > 0)
-        defines["SPECTRAL_GROUPS"] = 0  # rays of one index carry no columns
-        for columns in ("NORMAL_DERIVATIVES", "LOBE_COLUMNS"):
-            defines.pop(columns, None)
+        defines |= switched(GATHERED_SPECTRUM=disperses) | {"GATHER_TAPS": TAPS}
+        defines.pop("LOBE_COLUMNS", None)
+        if not disperses:  # rays of one index carry no columns
+            defines["SPECTRAL_GROUPS"] = 0
+            defines.pop("NORMAL_DERIVATIVES", None)
         structs = (*SCENE_STRUCTS, PLACE, PARAMETERS, DIRECTION, SUM)
         self._program = shader.compute(self._ctx, "light/gather.comp", defines, structs)
 
@@ -132,6 +144,7 @@ class GatheredLight:
         if self._sphere is not None:
             parameters["specular"] = self._sphere
         parameters["x_of_rgb"] = self._buffers.axis.x_of_nm(np.array([*RGB_NM, ANCHOR_NM]))
+        parameters["taps"] = self._taps
         parameters["count"] = len(self.places.places)
         self._parameters.write(parameters.tobytes())
         self._asked_buffer.write(asked.tobytes())

@@ -1,12 +1,23 @@
 // A ray from a diffuse surface that meets glass or a mirror first, followed backwards to where its light comes from:
-// which lobe it takes is chance by Fresnel's reflectance, at one index; tints at three wavelengths.
+// which lobe it takes is chance by Fresnel's reflectance. At one index, with tints at three wavelengths; or, where
+// GATHERED_SPECTRUM, traced at the anchor, one of GATHER_TAPS wavelengths spread over the spectrum, all of which it
+// represents by its spectral columns as long as they are not reflected totally where it is refracted, or the reverse.
 
 #include "lib/random.glsl"
 
 #define SPATIAL 0
+#define HAS_NORMAL_COLUMNS (NORMAL_DERIVATIVES && SPECTRAL_GROUPS > 0)
+#if GATHERED_SPECTRUM
+#define PATH_COLUMNS SPECTRAL_GROUPS
+#define TINTS (GATHER_TAPS / 3)
+#else
 #define PATH_COLUMNS 0
+#define TINTS 1
+#endif
 struct Walk {
-    vec3 tint;  // share of the light that arrives: red, green, blue
+    vec3 x[TINTS];  // spectral coordinates: of red, green and blue; of the wavelengths represented
+    vec3 tint[TINTS];  // share of the light that arrives at these
+    uint taps;  // bits of the wavelengths that the anchor still represents
 };
 #include "path/event.glsl"
 
@@ -17,18 +28,64 @@ struct FollowedRay {
     uint met;  // 1: `hit` is where it ends; 0: it leaves the scene
 };
 
-// A spectral table's row for red, green and blue.
-vec3 at_rgb(uint row, vec4 x_of_rgb) {
-    return vec3(spectral_row(row, x_of_rgb.x), spectral_row(row, x_of_rgb.y), spectral_row(row, x_of_rgb.z));
+// Multiplies the tints by a spectral table's row, or where `depth` is not negative by exp(-depth * row).
+void tint_by(inout Walk walk, uint row, float depth) {
+    for (int t = 0; t < TINTS; ++t) {
+        vec3 x = walk.x[t], value = vec3(spectral_row(row, x.x), spectral_row(row, x.y), spectral_row(row, x.z));
+        walk.tint[t] *= depth >= 0.0 ? exp(-depth * value) : value;
+    }
 }
 
-// `x_of_rgb`: spectral coordinates of the tints, and of the index. `lost`: 1 where it was given up after MAX_EVENTS.
+// Which of three wavelengths are represented, as 1 or 0.
+vec3 represented(uint taps, int t) { return vec3((uvec3(taps) >> (uvec3(0u, 1u, 2u) + 3u * uint(t))) & 1u); }
+
+// The anchor alone remains of what a path represents, and stands for all of that.
+void keep_anchor(inout Path path) {
+    float all = float(bitCount(path.walk.taps));
+    uint kept = 0u;
+    for (int t = 0; t < TINTS; ++t) {
+        for (int c = 0; c < 3; ++c) kept |= path.walk.x[t][c] == path.band.y ? 1u << uint(3 * t + c) : 0u;
+        path.walk.tint[t] *= all;
+    }
+    path.walk.taps &= kept;
+    for (int t = 0; t < TINTS; ++t) path.walk.tint[t] *= represented(path.walk.taps, t);
+}
+
+// What glass reflects at all wavelengths that a path represents. Returns the probability of following the reflection:
+// the mean over those that are refracted with the anchor, `passing`.
+float reflect_spectrum(Path path, Event event, out vec3 reflected[TINTS], out uint passing) {
+    float sum = 0.0;
+    passing = 0u;
+    bool allowed = event.cosine2.y > 0.0 && event.reflectance.y < 1.0;
+    for (int t = 0; t < TINTS; ++t) {
+        vec3 reflectance = allowed || event.cosine2.y <= 0.0 ? reflectance_at(path, event, path.walk.x[t]) : vec3(1.0);
+        vec3 passes = represented(path.walk.taps, t) * vec3(lessThan(reflectance, vec3(1.0)));
+        passing |= (uint(passes.x) | uint(passes.y) << 1u | uint(passes.z) << 2u) << uint(3 * t);
+        sum += dot(passes, reflectance);
+        reflected[t] = reflectance;
+    }
+    return allowed ? sum / max(float(bitCount(passing)), 1.0) : 1.0;
+}
+
+// Weighs what a path represents by its shares in the lobe that is followed with probability `chance`. Each of n
+// wavelengths may have been the anchor: refracted ones are represented by those that are refracted.
+void weigh_spectrum(inout Path path, vec3 reflected[TINTS], uint passing, bool passes, float chance) {
+    float per_passing = float(bitCount(path.walk.taps)) / max(float(bitCount(passing)), 1.0);
+    for (int t = 0; t < TINTS; ++t)
+        path.walk.tint[t] *= passes ? represented(passing, t) * (1.0 - reflected[t]) * (per_passing / (1.0 - chance))
+                                    : reflected[t] / chance;
+    if (passes) path.walk.taps = passing;
+}
+
+// `walk`: with its wavelengths; `x_anchor`: one of them, or that of the index. `lost`: 1 where the ray was given up
+// after MAX_EVENTS.
 FollowedRay follow_specular(
-    vec3 position, vec3 direction, RayOrigin origin, uint key, vec4 x_of_rgb, inout float lost) {
+    vec3 position, vec3 direction, RayOrigin origin, uint key, Walk walk, float x_anchor, inout float lost) {
     FollowedRay ray;
     ray.events = ray.met = 0u;
-    Path path = path_at(position, direction, origin, MediumStack(0u, NONE), x_of_rgb.w);
-    path.walk.tint = vec3(1.0);
+    Path path = path_at(position, direction, origin, MediumStack(0u, NONE), x_anchor);
+    if (GATHERED_SPECTRUM) path.band = vec3(0.0, x_anchor, 1.0);
+    path.walk = walk;
     bool follows = true;
     for (uint number = 0u; number < uint(MAX_EVENTS) && follows; ++number) {
         Hit hit;
@@ -42,7 +99,7 @@ FollowedRay follow_specular(
             if (number == 0u && kind == KIND_DIELECTRIC && !entering && !is_inside(path.medium))
                 path.medium.object = hit.object;
             uint row = met ? medium_weight_row(path.medium) : NONE;
-            if (row != NONE) path.walk.tint *= exp(-hit.distance * at_rgb(uint(WEIGHT_ROW) + row, x_of_rgb));
+            if (row != NONE) tint_by(path.walk, uint(WEIGHT_ROW) + row, hit.distance);
         }
         if (!follows) {
             ray.met = uint(met);
@@ -50,26 +107,37 @@ FollowedRay follow_specular(
         } else {
             ray.events = number + 1u;
             Triangle facet = hit_triangle(hit);
+            if (GATHERED_SPECTRUM) {
+                transfer_columns(path, hit.normal_g, hit.distance);
+                if (!columns_hold(path)) keep_anchor(path);
+            }
             path.position = surface_point(hit, facet, path.position, path.direction);
             Event event = interact(path, hit, facet, thing, MicrofacetDraw(0u, number, hash_combine(key, 0x100u)));
             bool passes = false, changes = true, geometric;
             vec3 unhidden = vec3(1.0);
-            if (HAS_MIRROR && kind == KIND_MIRROR)
-                path.walk.tint *= at_rgb(uint(WEIGHT_ROW) + thing.weight_row, x_of_rgb);
+            if (HAS_MIRROR && kind == KIND_MIRROR) tint_by(path.walk, uint(WEIGHT_ROW) + thing.weight_row, -1.0);
             if (HAS_DIELECTRIC && IS_GLASS(kind)) {
                 changes = event.boundary.changes;
-                passes =
-                    !changes || (event.cosine2.y > 0.0 && unit_float(hash_combine(key, number)) >= event.reflectance.y);
+                float chance = event.reflectance.y;
+                vec3 reflected[TINTS];
+                uint passing;
+                if (GATHERED_SPECTRUM && changes) chance = reflect_spectrum(path, event, reflected, passing);
+                passes = !changes || (event.cosine2.y > 0.0 && unit_float(hash_combine(key, number)) >= chance);
+                if (GATHERED_SPECTRUM && changes) weigh_spectrum(path, reflected, passing, passes, chance);
                 if (!changes)
                     path.medium = event.boundary.behind;
                 else if (passes) {
+                    if (GATHERED_SPECTRUM && path.restricted == 0u && parts_wavelengths(event)) {
+                        path.restricted = 1u;
+                        if (SPECTRAL_GROUPS == 0) keep_anchor(path);
+                    }
                     unhidden = refract_path(path, event);
                     if (SURFACE_FILTERS && thing.texture != NONE)
-                        path.walk.tint *= at_rgb(uint(WEIGHT_ROW) + thing.texture, x_of_rgb);
+                        tint_by(path.walk, uint(WEIGHT_ROW) + thing.texture, -1.0);
                 }
             }
             if (!passes) unhidden = reflect_path(path, event, geometric);
-            path.walk.tint *= unhidden.x;
+            for (int t = 0; t < TINTS; ++t) path.walk.tint[t] *= unhidden.y;
             leave_surface(path, hit, passes ? entering : !entering);
             lost = float(number + 1u == uint(MAX_EVENTS));
         }

@@ -36,6 +36,43 @@ vec3 environment_at(vec3 direction, uvec4 level) {
     return mix(above, below, share.y);
 }
 
+// What arrives of the environment by a path: at each of its wavelengths from where that leaves the scene.
+vec3 environment_by(Path path, uvec4 level) {
+    vec3 found = vec3(0.0), radiance = environment_at(path.direction, level);
+    for (int tap = 0; tap < GATHER_TAPS; ++tap) {
+        if (((path.walk.taps >> uint(tap)) & 1u) == 0u) continue;
+        if (path.restricted != 0u) {
+            vec3 position, direction;
+            ray_at(path, path.walk.x[tap / 3][tap % 3], position, direction);
+            radiance = environment_at(direction, level);
+        }
+        vec3 arrived = path.walk.tint[tap / 3][tap % 3] * radiance;
+        found += arrived.r * p.taps[3 * tap].rgb + arrived.g * p.taps[3 * tap + 1].rgb
+            + arrived.b * p.taps[3 * tap + 2].rgb;
+    }
+    return found;
+}
+
+// The wavelengths that a path represents: one within each tap, all at the same share of it.
+Walk begin_walk(uint key, out float x_anchor) {
+    Walk walk;
+    walk.taps = (1u << uint(GATHER_TAPS)) - 1u;
+    if (GATHERED_SPECTRUM) {
+        float share = unit_float(hash_combine(key, 0x200u));
+        int anchor = int(unit_float(hash_combine(key, 0x201u)) * float(GATHER_TAPS));
+        for (int tap = 0; tap < GATHER_TAPS; ++tap) {
+            float x = mix(p.taps[3 * tap].w, p.taps[3 * tap + 1].w, share);
+            walk.x[tap / 3][tap % 3] = x;
+            x_anchor = tap == anchor ? x : x_anchor;
+        }
+    } else {
+        walk.x[0] = p.x_of_rgb.rgb;
+        x_anchor = p.x_of_rgb.w;
+    }
+    for (int t = 0; t < TINTS; ++t) walk.tint[t] = vec3(1.0);
+    return walk;
+}
+
 // What comes straight from the environment, in directions drawn by its brightness, where nothing hides it, not even
 // glass.
 void add_environment(GatherDirection asked, EnvironmentPlace place, RayOrigin origin, inout GatheredSum sum) {
@@ -118,15 +155,21 @@ void main() {
             vec3 toward =
                 toward_specular(p.specular, position, place.normal, fract(asked.target.xy + shift), weight, narrow);
             if (weight > 0.0) {
-                FollowedRay ray =
-                    follow_specular(position, toward, origin, hash_combine(asked.key, id), p.x_of_rgb, lost);
-                vec3 tint = weight * ray.path.walk.tint;
+                uint key = hash_combine(asked.key, id);
+                float x_anchor;
+                Walk walk = begin_walk(key, x_anchor);
+                FollowedRay ray = follow_specular(position, toward, origin, key, walk, x_anchor, lost);
+                vec3 tint = weight * ray.path.walk.tint[0];
+                uvec4 level = narrow ? p.level_narrow : p.level_wide;
                 if (OF_RECEIVERS) {
                     over_receiver = FAR_DISTANCE;
                     if (ray.events > 0u && ray.met != 0u)
                         sum.specular += tint * radiance_from(ray.hit, ray.path.position, ray.path.direction).rgb;
                 } else if (ray.events > 0u && ray.met == 0u) {
-                    sum.specular += tint * environment_at(ray.path.direction, narrow ? p.level_narrow : p.level_wide);
+                    if (GATHERED_SPECTRUM)
+                        sum.specular += weight * environment_by(ray.path, level);
+                    else
+                        sum.specular += tint * environment_at(ray.path.direction, level);
                 }
             }
             sum.lost += lost;

@@ -158,6 +158,25 @@ void share_out(Path path, inout Event event) {
     if (polished && !event.refracted.exists && event.cosine2.y > 0.0) event.reflectance = vec3(1.0);
 }
 
+// What the glass of an event reflects at three other wavelengths of the path: unpolarised, by the columns.
+vec3 reflectance_at(Path path, Event event, vec3 x) {
+    vec3 n_i, n_t, theta = vec3(dot(path.direction, event.frame.normal));
+    interface_indices(event.boundary, x, n_i, n_t);
+    if (SPECTRAL_GROUPS > 0 && path.restricted != 0u) {
+        for (int g = 0; g < SPECTRAL_GROUPS; ++g)
+            theta += incidence_column(path, event, g)
+                * vec3(variable_step(uint(g), x.x, path.band.y), variable_step(uint(g), x.y, path.band.y),
+                    variable_step(uint(g), x.z, path.band.y));
+        theta = clamp(theta, -1.0, -1e-6);
+    }
+    vec3 eta_it = n_i / n_t, cosine2 = transmitted_cosine2(theta, eta_it);
+    vec3 reflectance = fresnel_reflectance(theta, eta_it, cosine2);
+    return OF_SHEET(event.boundary, reflectance);
+}
+
+// Whether an event's glass refracts the ends of the band differently.
+bool parts_wavelengths(Event event) { return event.n_i.x * event.n_t.z != event.n_i.z * event.n_t.x; }
+
 // What a path meets, as far as no chance and no walk decides it: normals, media, shares. `draw`: which microfacet of a
 // ground surface it meets.
 Event interact(Path path, Hit hit, Triangle facet, Object thing, MicrofacetDraw draw) {

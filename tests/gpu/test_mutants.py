@@ -244,6 +244,18 @@ MUTANTS = {
     "light of the environment through what is in the way": Mutant(
         "light/gather.comp", "reaches = !intersect_any", "reaches = intersect_any", _SHADOW
     ),
+    "light of the environment lands as its anchor does": Mutant(
+        "light/gather.comp",
+        "ray_at(path, path.walk.x[tap / 3][tap % 3], position, direction);",
+        "ray_at(path, path.band.y, position, direction);",
+        "gpu/test_environment_spectrum.py::test_a_window_lands_behind_a_prism_where_snells_law_has_it",
+    ),
+    "wavelengths beside the anchor's count as if all were refracted": Mutant(
+        "light/followed.glsl",
+        "(per_passing / (1.0 - chance))",
+        "(1.0 / (1.0 - chance))",
+        "gpu/test_environment_spectrum.py::test_dispersive_glass_takes_no_light_out_of_a_furnace[mesh1]",
+    ),
     "columns: another glass's slope": Mutant(
         "lib/medium.glsl", "object_at(boundary.before).group == g", "true", f"{_COLUMNS}[doublet]"
     ),

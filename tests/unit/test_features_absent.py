@@ -84,7 +84,9 @@ def gathered_sources(features: Features) -> Iterator[shader.Source]:
     structs: tuple[Struct, ...] = (*SCENE_STRUCTS, PLACE, gathered_light.PARAMETERS, gathered_light.DIRECTION)
     for of_receivers, on in ((False, features.environment_lights), (True, features.bounces)):
         if on:
-            chosen = defines | switched(OF_RECEIVERS=of_receivers)
+            disperses = features.environment_spectrum and not of_receivers
+            chosen = defines | switched(OF_RECEIVERS=of_receivers, FOLLOWS_SPECULAR=True, GATHERED_SPECTRUM=disperses)
+            chosen |= {"GATHER_TAPS": gathered_light.TAPS}
             yield shader.load_source("light/gather.comp", chosen, (*structs, gathered_light.SUM))
     if features.haze:
         structs = (records.FLIGHT, CAMERA_PARAMETERS, HAZE_PARAMETERS)
