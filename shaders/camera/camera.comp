@@ -24,8 +24,6 @@ layout(rgba32f, binding = 0) uniform image2D picture[TARGETS];
 float cut_at;
 
 #include "camera/waiting.glsl"
-// On a software renderer; on a GPU they wait in the buffer.
-PathEnd ended[ENDS_HELD];
 
 #include "camera/cuts.glsl"
 #include "camera/survey.glsl"
@@ -178,12 +176,8 @@ void follow(uint entry, bool resumes) {
                      leaves = specular && (event_limit_reached || path.depth >= uint(MAX_DEPTH));
                 if (leaves) atomicAdd(fallbacks[FELL_DEPTH], 1u);
                 if (HAS_GRATING && leaves && kind == KIND_GRATING) path.throughput *= efficiency_left(path, hit.object);
-                if (ends || leaves) {
-                    if (HALTS)
-                        ended[found++] = PathEnd(path, hit, uint(met && ends), uint(same_hit || leaves));
-                    else
-                        waiting[place].ended[found++] = PathEnd(path, hit, uint(met && ends), uint(same_hit || leaves));
-                }
+                if (ends || leaves)
+                    ENDED(found++) = PathEnd(path, hit, uint(met && ends), uint(same_hit || leaves));
                 goes_on = specular && !leaves;
                 if (COATS) goes_on = goes_on || (coated && !event_limit_reached && path.depth < uint(MAX_DEPTH));
                 if (goes_on) meet_surface(path, hit, kind, pixel_key);
@@ -193,15 +187,8 @@ void follow(uint entry, bool resumes) {
             if (HALTS) halts = rounds >= uint(HALT_ROUNDS);
         }
         if (goes_on) push(path);
-        if (HALTS) {
-            for (int e = 0; e < found; ++e)
-                add_end(ended[e].path, ended[e].met != 0u, ended[e].hit, ended[e].same_hit != 0u, pixel_key);
-        } else {
-            for (int e = 0; e < found; ++e) {
-                PathEnd end = waiting[place].ended[e];
-                add_end(end.path, end.met != 0u, end.hit, end.same_hit != 0u, pixel_key);
-            }
-        }
+        for (int e = 0; e < found; ++e)
+            add_end(ENDED(e).path, ENDED(e).met != 0u, ENDED(e).hit, ENDED(e).same_hit != 0u, pixel_key);
     }
     if (HALTS) {
         if (!loops_run()) atomicAdd(fallbacks[FELL_LOOPS], 1u);

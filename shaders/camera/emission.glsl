@@ -19,7 +19,7 @@ vec4 emission_until(uint row, int target, int cell) {
 
 // What a path lets through at the wavelength x.
 float transmitted(Path path, float x) {
-    float kept = band_weights(path.band, path.throughput, vec3(x)).x;
+    float kept = band_weight(path.band, path.throughput, x);
     if (ABSORPTION) {
         float depth = 0.0;
         for (int i = 0; i < ABSORBERS; ++i)

@@ -69,8 +69,7 @@ void meet_grating(inout Path path, Path whole, Hit hit, Event event, uint pixel_
     if (SPECTRAL_SWEEP) {
         if (!all(passes) && path.recut == 0u) {
             float at = cell_border(evanescence_in_band(banded, event, met, order, passes));
-            Path start = whole;
-            if (start.restricted == 0u) restrict_to_band(start, pixel_key);
+            Path start = start_of_band(whole, banded);
             cut = may_cut_near(start, at, hit.distance);
             if (cut) {
                 // Both parts of the cut band meet this surface again, each from its own start. With orders pending,

@@ -16,6 +16,19 @@ void add_length(inout Path path, int absorber, float length) {
 
 #include "camera/coat.glsl"
 
+// A path at the start of its flight, `whole`, as the band that it stands for by now, `banded`.
+Path start_of_band(Path whole, Path banded) {
+    Path start = whole;
+    start.band = banded.band;
+    start.throughput = banded.throughput;
+    start.walk.inverse_pdf = banded.walk.inverse_pdf;
+    start.end_step = banded.end_step;
+    if (POLARISED) start.polarisation = banded.polarisation;
+    if (whole.restricted == 0u) gather_ends(start);
+    start.restricted = 1u;
+    return start;
+}
+
 // Whether a path's band may be cut at `at`, from where its flight to the surface ahead started.
 bool may_cut_near(Path start, float at, float distance) {
     if (!may_cut_at(start, at)) return false;
@@ -60,8 +73,7 @@ void cross_glass(inout Path path, Path whole, Hit hit, Event event, uint pixel_k
         float onset = path.restricted != 0u && path.recut == 0u ? total_reflection_in_band(path, event) : -1.0;
         if (onset >= 0.0) {
             onset = cell_border(onset);
-            Path start = whole;
-            if (start.restricted == 0u) restrict_to_band(start, pixel_key);
+            Path start = start_of_band(whole, path);
             if (may_cut_near(start, onset, hit.distance)) {
                 // Both parts meet this surface again, each from its own start.
                 path = start;
@@ -71,7 +83,11 @@ void cross_glass(inout Path path, Path whole, Hit hit, Event event, uint pixel_k
             }
         }
     }
-    if (!begins) {
+    // Only now: while a cut is sought little is held.
+    share_out(path, event);
+    if (begins) {
+        share_out(mirrored, mirror);
+    } else {
         mirrored = path;
         mirror = event;
     }

@@ -15,6 +15,15 @@ struct SurfaceInteraction {
     vec3 coat_normal;  // unit, against the ray: interpolated where the mesh is smooth
 };
 
+SurfaceInteraction nothing_seen() {
+    SurfaceInteraction seen;
+    seen.position = seen.direction = seen.normal_g = seen.reflectance = vec3(0.0);
+    for (int c = 0; c < 3; ++c) seen.dposition[c] = vec3(0.0);
+    seen.primitive = seen.object = seen.source = NONE;
+    if (COATS) seen.coat_normal = vec3(0.0);
+    return seen;
+}
+
 SurfaceInteraction seen_on(Path path, Hit hit, Triangle facet, vec3 position, vec3 direction) {
     SurfaceInteraction seen;
     seen.position = position;
@@ -141,15 +150,19 @@ vec3 base_response(SurfaceInteraction seen, vec3 from, bool is_plain) {
 
 struct Steady {
     uint lights;  // as bits
-    float gains[2 * STEADY_ROOM];
-    vec3 from;  // the sweep's beginning …
-    vec3 along;  // … and its way over its square
+    float gains[2 * STEADY_ROOM];  // of both ends
 };
+
+// Where `position` lies between both ends of a sweep.
+float share_of_sweep(vec3 position, vec3 lo, vec3 hi) {
+    vec3 way = hi - lo;
+    return clamp(dot(position - lo, way / max(dot(way, way), 1e-20)), 0.0, 1.0);
+}
 
 // Adds the direct light of one place; that of `steady` lights as their ends have it.
 void add_direct(Path path, SurfaceInteraction seen, WavelengthInterval interval, uint pixel_key, Steady steady) {
     uint reflectance_class = receivers[object_at(seen.object).receiver].reflectance_class;
-    float share = clamp(dot(seen.position - steady.from, steady.along), 0.0, 1.0);
+    float share = SPECTRAL_SWEEP ? share_of_sweep(seen.position, path.end_position[0], path.end_position[1]) : 0.0;
     for (uint i = 0u; i < uint(LIGHT_COUNT); ++i) {
         bool known = i < uint(STEADY_ROOM) && (steady.lights & (1u << (i & 31u))) != 0u;
         float gain = 0.0;
@@ -217,17 +230,14 @@ void add_coat_lights(Path path, SurfaceInteraction seen, WavelengthInterval inte
 Steady no_steady_lights() {
     Steady steady;
     steady.lights = 0u;
-    steady.from = steady.along = vec3(0.0);
     return steady;
 }
 
 // What both ends of a sweep over one facet, and its middle `seen`, tell of the direct light between them.
 Steady steady_lights(SurfaceInteraction seen, vec3 lo, vec3 hi, uint pixel_key) {
     Steady steady = no_steady_lights();
-    vec3 way = hi - lo, middle = seen.position;
-    steady.from = lo;
-    steady.along = way / max(dot(way, way), 1e-20);
-    float share = clamp(dot(middle - lo, steady.along), 0.0, 1.0);
+    vec3 middle = seen.position;
+    float share = share_of_sweep(middle, lo, hi);
     for (uint i = 0u; i < uint(min(LIGHT_COUNT, STEADY_LIGHTS)); ++i) {
         LightSample s;
         float gain_middle = unshadowed(i, seen, light_point(i, pixel_key), s);

@@ -132,43 +132,29 @@ void add_lights(Path path, float far) {
     }
 }
 
-// Where the rays of a band arrive on one facet: a parabola with the columns' slope, through both ends.
-struct ArrivalCurve {
-    vec3 middle;
-    vec3 columns[SPECTRAL_GROUPS];
-    float anchors[SPECTRAL_GROUPS];  // of the groups' variables, at the middle
-    vec3 lo;
-    vec3 hi;
-    vec3 bends[2];  // of both ends, off the columns
-};
-
-vec3 arrival(vec3 position, vec3 direction, Hit hit, vec3 middle) {
-    return position + dot(hit.normal_g, middle - position) / dot(hit.normal_g, direction) * direction;
-}
-
-ArrivalCurve arrival_curve(Path path, Hit hit) {
-    ArrivalCurve curve;
-    curve.middle = path.position + hit.distance * path.direction;
-    curve.lo = arrival(path.end_position[0], path.end_direction[0], hit, curve.middle);
-    curve.hi = arrival(path.end_position[1], path.end_direction[1], hit, curve.middle);
-    curve.bends[0] = curve.lo - curve.middle;
-    curve.bends[1] = curve.hi - curve.middle;
-    for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
-        curve.columns[g] = transfer_column(
+// Moves a path, its spectral columns and its band's ends along their flights to the facet that it has met; its sides and
+// directions stay as they are.
+void arrive(inout Path path, Hit hit) {
+    vec3 middle = path.position + hit.distance * path.direction;
+    for (int end = 0; end < 2; ++end)
+        path.end_position[end] += dot(hit.normal_g, middle - path.end_position[end])
+            / dot(hit.normal_g, path.end_direction[end]) * path.end_direction[end];
+    for (int g = 0; g < SPECTRAL_GROUPS; ++g)
+        path.dposition[SPATIAL + g] = transfer_column(
             path.dposition[SPATIAL + g], path.ddirection[SPATIAL + g], path.direction, hit.normal_g, hit.distance);
-        curve.anchors[g] = spectral_row(uint(VARIABLE_ROW) + g, path.band.y);
-        curve.bends[0] -= path.end_step[g].x * curve.columns[g];
-        curve.bends[1] -= path.end_step[g].y * curve.columns[g];
-    }
-    return curve;
+    path.position = middle;
 }
 
-vec3 arrival_at(Path path, ArrivalCurve curve, float x) {
+// Where a path that has arrived does so at the wavelength x: on a parabola with the columns' slope, through both ends.
+vec3 arrival_at(Path path, float x) {
     bool below = x < path.band.y;
     float reach = (x - path.band.y) / max(abs((below ? path.band.x : path.band.z) - path.band.y), 1e-9);
-    vec3 at = curve.middle + reach * reach * (below ? curve.bends[0] : curve.bends[1]);
+    vec3 bend = (below ? path.end_position[0] : path.end_position[1]) - path.position;
     for (int g = 0; g < SPECTRAL_GROUPS; ++g)
-        at += (spectral_row(uint(VARIABLE_ROW) + g, x) - curve.anchors[g]) * curve.columns[g];
+        bend -= (below ? path.end_step[g].x : path.end_step[g].y) * path.dposition[SPATIAL + g];
+    vec3 at = path.position + reach * reach * bend;
+    for (int g = 0; g < SPECTRAL_GROUPS; ++g)
+        at += variable_step(uint(g), x, path.band.y) * path.dposition[SPATIAL + g];
     return at;
 }
 
@@ -179,20 +165,15 @@ void add_end(Path path, bool met, Hit hit, bool same_hit, uint pixel_key) {
     int taps = 1;
     vec2 brightness;
     float per_x, hi = path.band.x;
-    vec3 p_lo, d_lo, p_hi, d_hi;
     if (SPECTRAL_SWEEP) {
         if (path.restricted != 0u) taps = taps_of(path, met ? hit.distance : FAR_DISTANCE);
         // Without a map the environment is the same all round.
         if (!HAS_ENVIRONMENT_MAP && same_hit && !met) taps = 1;
         brightness = brightness_of(path.band);
         per_x = 1.0 / (path.band.z - path.band.x);
-        p_lo = path.end_position[0];
-        d_lo = path.end_direction[0];
-        p_hi = path.end_position[1];
-        d_hi = path.end_direction[1];
     }
 #if HAS_RECEIVERS
-    SurfaceInteraction seen;
+    SurfaceInteraction seen = nothing_seen();
     Triangle facet;
 #if HAS_TEXTURES
     uint texture = NONE;
@@ -210,13 +191,10 @@ void add_end(Path path, bool met, Hit hit, bool same_hit, uint pixel_key) {
     }
     Steady steady = no_steady_lights();
     bool traced = SPECTRAL_SWEEP && taps > 1 && same_hit && met;
-#if SPECTRAL_SWEEP
-    ArrivalCurve curve;
-    if (traced) {
-        curve = arrival_curve(path, hit);
-        if (LAYER_BEAUTY) steady = steady_lights(seen, curve.lo, curve.hi, pixel_key);
+    if (SPECTRAL_SWEEP && traced) {
+        arrive(path, hit);
+        if (LAYER_BEAUTY) steady = steady_lights(seen, path.end_position[0], path.end_position[1], pixel_key);
     }
-#endif
 #endif
     for (int i = 0; i < taps; ++i) {
         COUNT_ROUNDS(16 + 8 * LIGHT_COUNT);
@@ -233,8 +211,8 @@ void add_end(Path path, bool met, Hit hit, bool same_hit, uint pixel_key) {
                 part = (hi - lo) * per_x;
             }
             if (HAS_RECEIVERS && traced) {
-                seen.position = arrival_at(path, curve, x);
-                seen.dposition[2] = part * (curve.hi - curve.lo);
+                seen.position = arrival_at(path, x);
+                seen.dposition[2] = part * (path.end_position[1] - path.end_position[0]);
             }
             if (taps > 1 && !(same_hit && met)) {
                 ray_at(path, x, position, direction);
@@ -253,7 +231,9 @@ void add_end(Path path, bool met, Hit hit, bool same_hit, uint pixel_key) {
                     if (ends) {
                         facet = triangle_at(found.primitive);
                         seen = seen_on(path, found, facet, position + found.distance * direction, direction);
-                        vec3 sweep = part * (p_hi - p_lo + found.distance * (d_hi - d_lo));
+                        vec3 sweep = part
+                            * (path.end_position[1] - path.end_position[0]
+                                + found.distance * (path.end_direction[1] - path.end_direction[0]));
                         seen.dposition[2] =
                             sweep - (dot(sweep, found.normal_g) / dot(direction, found.normal_g)) * direction;
                         if (HAS_TEXTURES) {
@@ -280,7 +260,8 @@ void add_end(Path path, bool met, Hit hit, bool same_hit, uint pixel_key) {
             }
         }
         if (LAYER_BEAUTY) {
-            vec3 direction_change = SPECTRAL_SWEEP ? part * (d_hi - d_lo) : vec3(0.0);
+            vec3 direction_change =
+                SPECTRAL_SWEEP ? part * (path.end_direction[1] - path.end_direction[0]) : vec3(0.0);
             if (!ends) add_sky(path, interval, direction, direction_change);
         }
     }

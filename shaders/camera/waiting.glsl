@@ -32,6 +32,13 @@ struct Waiting {
 layout(std430, binding = BIND_WAITING) restrict buffer WaitingPaths { Waiting waiting[]; };
 uint place;
 
+#if HALTS
+PathEnd ended[ENDS_HELD];
+#define ENDED(e) ended[e]
+#else
+#define ENDED(e) waiting[place].ended[e]
+#endif
+
 // Paths that wait while another is followed; global as `radiance` is.
 int stack_size;
 // Rays traced to find out where paths diverge.

@@ -12,11 +12,15 @@
 // Halvings of half a band: finer than float32 knows where cosines vanish.
 #define ONSET_HALVINGS 18
 
-// Weights at the places x of a band, straight between the three known ones.
+// Weight at a place x of a band, straight between the three known ones.
+float band_weight(vec3 band, vec3 weight, float x) {
+    float below = clamp((x - band.x) / max(band.y - band.x, 1e-9), 0.0, 1.0);
+    float above = clamp((x - band.y) / max(band.z - band.y, 1e-9), 0.0, 1.0);
+    return mix(mix(weight.x, weight.y, below), weight.z, above);
+}
+
 vec3 band_weights(vec3 band, vec3 weight, vec3 x) {
-    vec3 below = clamp((x - band.x) / max(band.y - band.x, 1e-9), 0.0, 1.0);
-    vec3 above = clamp((x - band.y) / max(band.z - band.y, 1e-9), 0.0, 1.0);
-    return mix(mix(vec3(weight.x), vec3(weight.y), below), vec3(weight.z), above);
+    return vec3(band_weight(band, weight, x.x), band_weight(band, weight, x.y), band_weight(band, weight, x.z));
 }
 
 // State of polarisation at the places x of a band: Stokes parameters times weights are straight between the three known

@@ -181,6 +181,9 @@ float box_entry(vec3 low, vec3 high, vec3 near_p, vec3 inverse_direction, float 
     return enter <= leave + abs(leave) * 4e-7 + 1e-7 ? enter : FAR_DISTANCE;
 }
 
+// One for all rays of an invocation.
+uint tree_stack[TREE_STACK + 1];
+
 // A node is four texels: both children's boxes, then their links. A link is the number of an inner
 // node, or LEAF_BIT | triangles << 28 | first triangle; NONE ends the stack. All rays of a group
 // first go down to a leaf each, then test triangles together: where both sides of a branch
@@ -191,8 +194,7 @@ void intersect_tree(
     vec3 safe = mix(direction, vec3(1e-20), lessThan(abs(direction), vec3(1e-20)));
     vec3 inverse_direction = 1.0 / safe;
     float start = -BEHIND - ahead;
-    uint stack[TREE_STACK + 1];
-    stack[0] = NONE;
+    tree_stack[0] = NONE;
     int top = 1;
     uint current = 0u;
     while (true) {
@@ -207,16 +209,16 @@ void intersect_tree(
                 uintBitsToFloat(uvec3(b.zw, c.x)), uintBitsToFloat(c.yzw), near_p, inverse_direction, start, far);
             bool hit0 = enter0 < FAR_DISTANCE, hit1 = enter1 < FAR_DISTANCE;
             bool swap = enter1 < enter0;
-            if (hit0 && hit1) stack[top++] = swap ? links.x : links.y;
+            if (hit0 && hit1) tree_stack[top++] = swap ? links.x : links.y;
             current = swap ? links.y : links.x;
-            if (!(hit0 || hit1)) current = stack[--top];
+            if (!(hit0 || hit1)) current = tree_stack[--top];
         }
         if (current == NONE) break;
         uint first = current & 0x0fffffffu, end = first + ((current >> 28u) & 7u);
         COUNT_ROUNDS(end - first + 1u);
         for (; first < end; ++first) try_triangle(first, near_p, ahead, direction, origin, best_key, hit);
         if (any_hit && hit.primitive != NONE) break;
-        current = stack[--top];
+        current = tree_stack[--top];
     }
 }
 

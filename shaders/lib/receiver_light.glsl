@@ -54,18 +54,19 @@ vec4 receiver_light(sampler2D map, uint source, RayOrigin origin, vec3 position,
                 // The covered parts, and how much of each texel is which, lie in the lower half. Windows reach beyond
                 // what stands over them: whatever a coarser one is asked about is open.
                 ivec2 below = ivec2(0, textureSize(map, 0).y >> 1);
-                vec4 e = texelFetch(map, low + below, 0), f = texelFetch(map, ivec2(high.x, low.y) + below, 0);
-                vec4 g = texelFetch(map, ivec2(low.x, high.y) + below, 0), h = texelFetch(map, high + below, 0);
-                vec4 both = vec4(e.a, f.a, g.a, h.a), parts = floor(both * 0.0078125);
-                if (level == 0
+                bool covered = level == 0
                     && is_covered(
-                        map, origin, position, normal, NEAR_TEXELS * inversesqrt(dot(row_u.xyz, row_u.xyz)))) {
-                    a = e;
-                    b = f;
-                    c = g;
-                    d = h;
-                    parts = both - 128.0 * parts;
-                }
+                        map, origin, position, normal, NEAR_TEXELS * inversesqrt(dot(row_u.xyz, row_u.xyz)));
+                vec4 both = vec4(texelFetch(map, low + below, 0).a, texelFetch(map, ivec2(high.x, low.y) + below, 0).a,
+                    texelFetch(map, ivec2(low.x, high.y) + below, 0).a, texelFetch(map, high + below, 0).a);
+                vec4 parts = floor(both * 0.0078125);
+                if (covered) parts = both - 128.0 * parts;
+                // Read again, not kept while a ray looked up.
+                if (!covered) below = ivec2(0);
+                a = texelFetch(map, low + below, 0);
+                b = texelFetch(map, ivec2(high.x, low.y) + below, 0);
+                c = texelFetch(map, ivec2(low.x, high.y) + below, 0);
+                d = texelFetch(map, high + below, 0);
                 vec4 known = weights * parts;
                 float sum = dot(known, vec4(1.0));
                 weights = sum > 0.0 ? known / sum : weights;

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from spectrasplat.base.paths import shipped_scenes
-from spectrasplat.gpu import shader, strict_compilers
 from spectrasplat.gpu.context import Context, create_context
 from spectrasplat.gpu.device_traits import DeviceTraits, assumed
 from spectrasplat.model.io.scene_file import load_scene
@@ -73,26 +72,6 @@ def test_rows_are_cut_up_after_samples_that_took_long(gpu: Context) -> None:
     assert cut.dispatches >= 2 * 2 * (SIZE[1] // 8) > whole.dispatches
     np.testing.assert_array_equal(camera_pass.read_rgb(), expected)
     released(camera_pass)
-
-
-LIVE_WORDS, ARRAY_WORDS = 280, 64
-"""At most; a GPU has some 255 registers for an invocation, and keeps 220 live words apart from its addresses in them.
-Arrays that unknown numbers index are in memory."""
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["prism", "default", "ball"])
-def test_what_programs_hold(gpu: Context, name: str) -> None:
-    if strict_compilers.missing():
-        pytest.skip(strict_compilers.missing())
-    with shader.recorded() as programs:
-        released(opened(gpu, name))
-    seen = [program for program in programs if program.name == "camera/camera.comp"]
-    assert len(seen) == 2
-    for program in seen:
-        [held] = strict_compilers.live_states(program)
-        assert held.registers <= LIVE_WORDS
-        assert held.scratch <= ARRAY_WORDS
 
 
 @pytest.mark.slow

@@ -18,8 +18,9 @@ from spectrasplat.model.settings import RenderSettings
 
 SCENES = sorted((assets_dir() / "scenes").glob("*.toml"), key=lambda path: path.stem)
 MOST_LIVE, MOST_ARRAY_WORDS, MOST_BYTES, MOST_SCENE_BYTES = 220, 64, 75_000, 500_000
-CAMERA = "camera/"
-"""Its programs have bounds of their own."""
+CAMERA, CAMERA_BYTES = "camera/camera.comp", 99_000
+"""The program that follows paths and shades their ends: more text than is wanted of any, which is not met since
+27 November 2026."""
 TRACE = "light/trace.comp"
 TRACE_LIVE, TRACE_ARRAY_WORDS, TRACE_BYTES = 320, 80, 85_000
 """The program that follows rays for several events holds two of their paths: more than is wanted of any, which is not
@@ -44,11 +45,12 @@ def programs_of(context: Context, path: Path) -> list[Built]:
 def check(programs: list[Built]) -> None:
     assert sum(len(text) for built in programs for text in built.texts) <= MOST_SCENE_BYTES
     for built in programs:
-        if built.name.startswith(CAMERA) or built.texts in _held:
+        if built.texts in _held:
             continue
         _held.add(built.texts)
         traces = built.name == TRACE
-        assert max(map(len, built.texts)) <= (TRACE_BYTES if traces else MOST_BYTES), built.name
+        most_bytes = {TRACE: TRACE_BYTES, CAMERA: CAMERA_BYTES}.get(built.name, MOST_BYTES)
+        assert max(map(len, built.texts)) <= most_bytes, built.name
         if strict_compilers.missing():
             continue
         for state in strict_compilers.live_states(built):

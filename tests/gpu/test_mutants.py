@@ -451,8 +451,8 @@ MUTANTS = {
     ),
     "camera: an undispersed path cut as the whole spectrum": Mutant(
         "camera/meet.glsl",
-        "if (start.restricted == 0u) restrict_to_band(start, pixel_key);\n            if (may_cut_near",
-        "if (may_cut_near",
+        "start_of_band(whole, path)",
+        "whole",
         "gpu/test_camera_furnace.py::test_nothing_is_counted_twice_from_under_water",
     ),
     "camera: wavelengths as a sequence of their own": Mutant(
