@@ -8,7 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from ..gpu.context import Context
     from ..gpu.shader import Built
 
+T = TypeVar("T")
 Figures = dict[str, float]
 Named = tuple[str, Figures]
 """What was measured, and its figures with units in their names."""
@@ -29,8 +30,8 @@ Named = tuple[str, Figures]
 CHANNELS = (1, 4, 12)
 _TEXELS = 1 << 20
 _GROUP = 64
-_PATIENCE_S = 0.5
-"""What one repetition of a measurement may take, about."""
+_RUNS, _PATIENCE_S = 21, 1.0
+"""Of each measurement at most; none is begun after so many seconds, but for the first three."""
 _EMPTY = """#version 430 core
 layout(local_size_x = 64) in;
 layout(std430, binding = 0) buffer Words { uint words[]; };
@@ -125,7 +126,7 @@ def addition_rates(context: Context, count: int) -> Iterator[Named]:
             )
             sums.clear()
             sums.bind_to_storage_buffer(0)
-            texels_s = count / best_s(ctx, partial(program.run, count // _GROUP))
+            texels_s = count / median_s(ctx, partial(program.run, count // _GROUP))
             program.release()
             yield (
                 f"{'float atomics' if is_atomic else 'compare and swap'}, {channels} channels, {pattern}",
@@ -139,18 +140,26 @@ def addition_rates(context: Context, count: int) -> Iterator[Named]:
         yield f"blending RGBA{8 * int(dtype[1])}F", {"texels_g_per_s": _significant(blending_rate(ctx, dtype) / 1e9)}
 
 
-def best_s(ctx: moderngl.Context, work: Callable[[], object]) -> float:
-    """The shortest of a few rounds, s; the first one only warms up."""
-    best, until = np.inf, time.perf_counter() + _PATIENCE_S
-    for round_number in range(6):
+def repeated(run: Callable[[int], T]) -> list[T]:
+    """What `run` of 1, 2, … gives; that of 0 only warms up."""
+    run(0)
+    found, started = [run(1)], time.perf_counter()
+    while len(found) < 3 or (len(found) < _RUNS and time.perf_counter() - started < _PATIENCE_S):
+        found.append(run(len(found) + 1))
+    return found
+
+
+def median_s(ctx: moderngl.Context, work: Callable[[], object]) -> float:
+    """What `work` takes the device, s."""
+
+    def run(_: int) -> float:
         ctx.finish()
         started = time.perf_counter()
         work()
         ctx.finish()
-        best = min(best, time.perf_counter() - started) if round_number else best
-        if round_number and time.perf_counter() > until:
-            break
-    return float(best)
+        return time.perf_counter() - started
+
+    return float(np.median(repeated(run)))
 
 
 def _significant(value: float) -> float:

@@ -6,6 +6,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,15 +18,12 @@ from ..passes.camera import CameraPass
 from ..render.device_scene import scene_buffers
 from ..render.light_pass import LightPass
 from ..render.photon_batches import traced_besides
+from .device_costs import repeated
 
 if TYPE_CHECKING:
     from ..gpu.context import Context
     from ..model.scene import Scene
 
-_FRAMES = 4
-"""The first one compiles."""
-_TRACES = 3
-"""Likewise."""
 SCHEDULES = {f"{each}, then all": (each,) * (32 // each) + (4096,) for each in (1, 4, 8)} | {"1, in order": ()}
 """By name: `DeviceTraits.ray_events`."""
 
@@ -42,6 +40,9 @@ class FrameCost:
     """Photons traced and in the maps."""
     camera: float
     """One sample a pixel."""
+    slow: float = 0.0
+    """A whole frame that a twentieth takes longer than."""
+    runs: int = 1
 
     @property
     def all(self) -> float:
@@ -52,11 +53,17 @@ class FrameCost:
     def figures(self) -> dict[str, float]:
         """With units in their names."""
         spent = {"frame_ms": self.all, "light_ms": self.light, "trace_ms": self.trace, "camera_ms": self.camera}
-        return {"photons": self.photons, "splats": self.splats} | {name: _ms(s) for name, s in spent.items()}
+        times = {name: _ms(s) for name, s in (spent | {"frame_p95_ms": self.slow}).items()}
+        return {"photons": self.photons, "splats": self.splats, **times, "runs": self.runs}
 
 
 def _ms(seconds: float) -> float:
     return round(1e3 * seconds, 3)
+
+
+def _spread(spent: Sequence[float]) -> dict[str, float]:
+    """Of seconds."""
+    return {"ms": _ms(float(np.median(spent))), "p95_ms": _ms(float(np.percentile(spent, 95))), "runs": len(spent)}
 
 
 def photons_within(costs: Sequence[FrameCost], seconds: float, with_camera: bool) -> int:
@@ -85,14 +92,16 @@ def _light(context: Context, scene: Scene, settings: RenderSettings) -> Iterator
 
 
 def measure(context: Context, scene: Scene, size: tuple[int, int], photons: Sequence[int]) -> Iterator[FrameCost]:
-    """For each number of `photons`, by photons alone: the best of a few frames with maps fitted to a picture of `size`
+    """For each number of `photons`, by photons alone: the median of frames with maps fitted to a picture of `size`
     and one camera sample a pixel. What is done once for a scene is left out."""
     with _light(context, scene, RenderSettings(width=size[0], height=size[1])) as light:
         camera = CameraPass(context, light.buffers, "beauty", light.shown.reflectances, light.shown.channels)
         try:
             for count in photons:
-                frames = [_frame(context, light, camera, size, count, seed) for seed in range(_FRAMES)]
-                yield min(frames[1:], key=lambda cost: cost.all)
+                frames = repeated(partial(_frame, context, light, camera, size, count))
+                frames.sort(key=lambda cost: cost.all)
+                slow = float(np.percentile([cost.all for cost in frames], 95))
+                yield replace(frames[len(frames) // 2], slow=slow, runs=len(frames))
         finally:
             camera.release()
 
@@ -100,7 +109,7 @@ def measure(context: Context, scene: Scene, size: tuple[int, int], photons: Sequ
 def trace_rates(
     context: Context, scene: Scene, photons: int, batches: Sequence[int]
 ) -> Iterator[tuple[str, dict[str, float]]]:
-    """Tracing `photons` alone, so many at once and by each of `SCHEDULES`: the best of a few, ms."""
+    """Tracing `photons` alone, so many at once and by each of `SCHEDULES`."""
     traits = context.traits
     try:
         for name, ray_events in {"the device's own": traits.ray_events, **SCHEDULES}.items():
@@ -108,14 +117,14 @@ def trace_rates(
             for batch in batches:
                 with _light(context, scene, RenderSettings(width=480, height=270, batch=batch)) as light:
                     light.begin(photons, 1)
-                    spent = [_trace(context, light, photons) for _ in range(_TRACES)]
-                figures = {"batch": batch, "photons": photons, "landed": spent[0][1], "ms": _ms(min(spent[1:])[0])}
-                yield f"events a dispatch: {name}", figures
+                    spent = repeated(partial(_trace, context, light, photons))
+                figures = {"batch": batch, "photons": photons, "landed": spent[0][1]}
+                yield f"events a dispatch: {name}", figures | _spread([seconds for seconds, _ in spent])
     finally:
         context.traits = traits
 
 
-def _trace(context: Context, light: LightPass, photons: int) -> tuple[float, int]:
+def _trace(context: Context, light: LightPass, photons: int, _run: int = 0) -> tuple[float, int]:
     landed = 0
 
     def keep(_buffer: object, count: int, *_: object) -> None:
@@ -133,23 +142,26 @@ def _trace(context: Context, light: LightPass, photons: int) -> tuple[float, int
 def camera_costs(
     context: Context, scene: Scene, size: tuple[int, int], caps_s: Sequence[float]
 ) -> Iterator[dict[str, float]]:
-    """A camera sample a pixel where no dispatch shall take longer than each of `caps_s`: the best of a few, ms."""
+    """A camera sample a pixel where no dispatch shall take longer than each of `caps_s`."""
     with _light(context, scene, RenderSettings(width=size[0], height=size[1])) as light:
         light.begin(1 << 14, 1)
         light.run_pass(0, 1 << 14, lambda _: True)
         light.maps.atlas.flush()
         camera = CameraPass(context, light.buffers, "beauty", light.shown.reflectances, light.shown.channels)
         try:
+            maps = light.caustic_maps()
+
+            def sample(seed: int) -> tuple[float, int]:
+                context.finish()
+                started = time.perf_counter()
+                pauses = sum(1 for _ in camera.samples(scene.camera, *size, 1, seed, maps, 1))
+                context.finish()
+                return time.perf_counter() - started, pauses
+
             for cap in caps_s:
                 camera.dispatch_seconds = cap
-                spent, pauses = [], 0
-                for seed in range(_FRAMES):
-                    started, pauses = time.perf_counter(), 0
-                    for _ in camera.samples(scene.camera, *size, 1, seed, light.caustic_maps(), 1):
-                        pauses += 1
-                    context.finish()
-                    spent.append(time.perf_counter() - started)
-                yield {"cap_ms": _ms(cap), "ms": _ms(min(spent[1:])), "first_ms": _ms(spent[0]), "pauses": pauses}
+                spent = repeated(sample)
+                yield {"cap_ms": _ms(cap), **_spread([seconds for seconds, _ in spent]), "pauses": spent[-1][1]}
         finally:
             camera.release()
 

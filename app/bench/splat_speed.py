@@ -16,7 +16,7 @@ from ..model.optics.spectral_tables import SpectralAxis
 from ..passes.footprint import Photons, SpectralVariables, SplatSpectra
 from ..passes.map_atlas import MapAtlas, placement_rows
 from ..passes.splat import Splatter
-from .device_costs import best_s
+from .device_costs import median_s
 
 if TYPE_CHECKING:
     import moderngl
@@ -28,8 +28,8 @@ _REACH = 3.0
 
 
 def measure(ctx: moderngl.Context, pixels: float, count: int) -> dict[str, float]:
-    """Rates for `count` splats that cover `pixels` texels each, swept, twice as long as wide: the best of a few rounds
-    by wall clock, M splats/s with their footprints and without (`draw`), G texels/s of the latter."""
+    """Rates for `count` splats that cover `pixels` texels each, swept, twice as long as wide: the median of a few
+    rounds by wall clock, M splats/s with their footprints and without (`draw`), G texels/s of the latter."""
     tiles, size = pack([(_SIDE, _SIDE)])
     rows = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]])
     atlas = MapAtlas(ctx, size, placement_rows(tiles[0], rows, 1.0))
@@ -46,7 +46,7 @@ def measure(ctx: moderngl.Context, pixels: float, count: int) -> dict[str, float
         for _ in range(-(-count // splatter.group)):
             splatter.draw(tables, atlas)
 
-    splat_s, draw_s = best_s(ctx, splat), best_s(ctx, draw)
+    splat_s, draw_s = median_s(ctx, splat), median_s(ctx, draw)
     shader.release(atlas, tables, splatter, receivers, variable, photons)
     drawn = -(-count // splatter.group) * min(count, splatter.group)
     rates = {"splat_m_per_s": count / splat_s / 1e6, "draw_m_per_s": drawn / draw_s / 1e6}

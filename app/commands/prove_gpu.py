@@ -21,9 +21,12 @@ from typing import Literal
 
 import msgspec
 
-from ..base.atomic import make_output_folder
+from ..base.atomic import atomic_output, make_output_folder
 from ..base.errors import UserError, plain
+from ..base.interrupts import exit_code_of
+from ..base.progress import ProgressReporter
 from ..base.version import __version__
+from ..bench.report.page import Table, render
 from .measuring_table import ProveGpu
 from .proof_steps import PARTS, Finding, Part
 
@@ -36,7 +39,8 @@ _LOOK_EVERY_S = 0.2
 _OF_DEVICE = ("machine ", "splats", "nvidia-smi", "limit storage_block_bytes")
 """What of the doctor's findings stands beside the figures."""
 
-State = Literal["holds", "broken", "crashed", "too slow", "stopped", "not begun"]
+State = Literal["holds", "cut", "broken", "crashed", "too slow", "stopped", "not begun"]
+"""`cut`: what is only measured was ended at its time."""
 
 
 class PartResult(msgspec.Struct):
@@ -84,13 +88,11 @@ class Proof(msgspec.Struct):
         for at, part in enumerate(self.parts):
             if part.is_wrong:
                 return FIRST_CODE + at
-        return 0 if all(part.state == "holds" for part in self.parts) else 130
+        return 0 if all(part.state in ("holds", "cut") for part in self.parts) else 130
 
 
 def prove_gpu(options: ProveGpu) -> int:
     """Run all parts, keep what they find; returns the exit code. Raises `UserError`."""
-    from ..base.progress import ProgressReporter
-
     chosen = chosen_parts(options.parts, options.quick)
     make_output_folder(options.output, JSON, HTML, LINES)
     started = time.monotonic()
@@ -101,6 +103,7 @@ def prove_gpu(options: ProveGpu) -> int:
         [PartResult(part.key, part.title) for part in chosen],
         options.quick,
     )
+    stopped = 130
     with ProgressReporter("proof") as progress, (options.output / LINES).open("wb", buffering=0) as lines:
 
         def say(line: object) -> None:
@@ -112,14 +115,15 @@ def prove_gpu(options: ProveGpu) -> int:
 
         try:
             _run_all(proof, chosen, options.output, progress, say, started)
-        except KeyboardInterrupt:
+        except KeyboardInterrupt as interrupt:
+            stopped = exit_code_of(interrupt)
             print("spectrasplat: stopped; what was found is kept", file=sys.stderr)
     proof.seconds = time.monotonic() - started
     _keep(proof, options.output)
     if not options.quick:
         print(summary(proof))
         print((options.output / HTML).resolve())
-    return proof.exit_code
+    return stopped if proof.exit_code == 130 else proof.exit_code
 
 
 def chosen_parts(names: Sequence[str] | None, quick: bool = False) -> list[Part]:
@@ -154,11 +158,14 @@ def _run_all(
     say: Callable[[object], None],
     started: float,
 ) -> None:
-    """`say` gets every figure when it is found, and how each part ended."""
+    """`say` gets the time that there is, every figure when it is found, and how each part ended."""
+    whole_s = QUICK_S if proof.quick else WHOLE_S
+    say({"part": "all", "limit_s": whole_s} | {f"{part.key}_limit_s": part.limit_s[proof.short] for part in parts})
     for at, (part, result) in enumerate(zip(parts, proof.parts, strict=True)):
-        left = (QUICK_S if proof.quick else WHOLE_S) - (time.monotonic() - started)
+        left = whole_s - (time.monotonic() - started)
         if left <= 0.0:
-            return
+            say({"part": part.key, "ended": result.state, "why": "the proof's time was over"})
+            continue
 
         def tell(share: float, at: int = at, name: str = part.title) -> None:
             progress((at + share) / len(parts), name)
@@ -170,7 +177,7 @@ def _run_all(
 
         tell(0.0)
         try:
-            _run(part, result, _Run(proof.short, folder, part.limit_s[proof.short], left, tell, note))
+            _run(part, result, _Run(proof.short, folder, part.limit_s[proof.short], part.measures, left, tell, note))
         finally:
             why = {"why": plain(result.detail)[-500:]} if result.detail else {}
             say({"part": part.key, "ended": result.state, "s": round(result.seconds, 1), **why})
@@ -188,7 +195,8 @@ class _Run:
     short: bool
     folder: Path
     limit_s: float
-    """The part's own; beyond it something is wrong."""
+    """The part's own; beyond it something is wrong, unless it only measures."""
+    measures: bool
     left_s: float
     """Of the whole."""
     tell: Callable[[float], None]
@@ -233,7 +241,7 @@ def _watched(process: subprocess.Popen, file: Path, result: PartResult, how: _Ru
     while (code := process.poll()) is None:
         if time.monotonic() - started > how.limit_s:
             result.detail = f"not done after {how.limit_s:.0f} s."
-            return "too slow"
+            return "cut" if how.measures else "too slow"
         if time.monotonic() - started > how.left_s:
             result.detail = "the proof's time was over."
             return "stopped"
@@ -283,9 +291,6 @@ def _end(process: subprocess.Popen) -> None:
 
 def _keep(proof: Proof, folder: Path) -> None:
     """Both files, each whole or not at all."""
-    from ..base.atomic import atomic_output
-    from ..bench.report.page import Table, render
-
     with atomic_output(folder / JSON) as temporary:
         temporary.write_bytes(msgspec.json.format(msgspec.json.encode(proof), indent=1))
     tables = {

@@ -6,6 +6,7 @@ compiles for seconds, a large picture is encoded at its end.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from typing import TYPE_CHECKING, Generic, TypeVar
@@ -20,6 +21,10 @@ BUSY_FRAME_S, BUSY_GPU_FRAME_S = 0.08, 0.005
 time."""
 
 
+SWITCH_S = 0.0005
+"""After which one thread's Python makes way for another's that waits: a frame of the window waits dozens of times."""
+
+
 def no_thread(*_name: str) -> None:
     """In place of what opens one: all work is done by the caller."""
 
@@ -30,6 +35,7 @@ class ContextThread:
     def __init__(self, begin: Callable[[], Context], end: Callable[[], None], name: str = "context") -> None:
         """Both are called on the new thread: `begin` makes a context current there, which shares objects with the
         window's, `end` leaves it."""
+        sys.setswitchinterval(min(SWITCH_S, sys.getswitchinterval()))
         self._end, self._is_closed = end, False
         self._pool = ThreadPoolExecutor(1, thread_name_prefix=name)
         self.context = self._pool.submit(begin).result()

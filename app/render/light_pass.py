@@ -114,14 +114,16 @@ class LightPass:
         yield None
         shows_map = self.settings.layer.startswith("map:")
         self.map_receiver = check_map_receiver(self.scene, self.buffers, self.settings.layer[4:]) if shows_map else None
-        self.lay_out(self.fit)
+        layout = self.layout_for(self.fit)
+        yield None
+        self.lay_out(self.fit, layout)
 
-    def lay_out(self, fit: MapFit) -> None:
-        """Maps fitted to where light lands and to `fit`; empty."""
+    def lay_out(self, fit: MapFit, layout: MapLayout | None = None) -> None:
+        """Maps fitted to where light lands and to `fit`, whose `layout` may be there already; empty."""
         if (before := self.give_maps()) is not None:
             before.release()
         self.fit = fit
-        layout = self.layout_for(fit)
+        layout = layout or self.layout_for(fit)
         self.before_maps(layout)
         words = None
         if self._has_contacts:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import moderngl
 import numpy as np
 import pytest
@@ -19,11 +21,12 @@ from spectrasplat.passes.camera_tables import CameraTables
 from spectrasplat.passes.picture_channels import Channels
 from spectrasplat.render.device_scene import scene_buffers
 from spectrasplat.render.shown_spectra import ShownSpectra
-from viewer_rig import MOVEMENTS, viewer, with_gains
+from viewer_rig import MOVEMENTS, doubled, dragging, roughened, viewer, with_gains
 
 MOST_BYTES = 64 << 10
 PYTHON_MS = {"orbit": 1.0, "drag": 6.0}
 """A drag is to take 3 ms; other work on the machine doubles what it takes."""
+STALL_MS = 50.0
 
 
 @pytest.mark.parametrize(
@@ -39,6 +42,20 @@ def test_a_viewer_makes_nothing_anew(name: str) -> None:
             assert frames[-1].version > frames[2].version, "nothing was shown"
             assert min(frame.python_ms for frame in frames[2:]) <= bound, movement
             rig.settle()
+
+
+@pytest.mark.slow
+def test_no_frame_stalls() -> None:
+    """While something is compiled, refitted or read back: whatever a driver does, it lets other threads go on."""
+    with viewer("prism") as rig:
+        rig.engine.refine_when_still = True
+        first = rig.wanted
+        for change in (partial(dragging, step=60.0), roughened, doubled):
+            for _ in range(2):  # the texts of programs and the table of a roughness are made once
+                rig.wanted = first
+                rig.settle()
+                longest = max(rig.python_ms(change(first), 30))
+            assert longest <= STALL_MS, change
 
 
 def test_tables_that_the_device_writes_are_those_of_numpy(gl: Context) -> None:

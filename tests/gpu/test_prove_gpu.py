@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
+import signal
+import subprocess
 import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -154,6 +157,37 @@ def test_a_device_that_lacks_something_is_measured_all_the_same(
     code, proof = proved(tmp_path, "--parts", "answers")
     assert code == prove_gpu.FIRST_CODE
     assert [part["state"] for part in proof["parts"]] == ["broken", "holds"]
+
+
+def test_what_only_measures_is_cut(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    told(monkeypatch, trace="time.sleep(60)")
+    impatient = [replace(part, limit_s=(1.0, 1.0) if part.key == "trace" else part.limit_s) for part in PARTS]
+    monkeypatch.setattr(prove_gpu, "PARTS", impatient)
+    code, _ = proved(tmp_path, "--quick")
+    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert code == 0 and lines[0]["limit_s"] == prove_gpu.QUICK_S and lines[0]["trace_limit_s"] == 1.0
+    assert {line["part"]: line["ended"] for line in lines if "ended" in line}["trace"] == "cut"
+    assert sum(part.limit_s[0] for part in prove_gpu.chosen_parts(None, quick=True)) <= prove_gpu.QUICK_S
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("after_s", [0.5, 6.0])
+def test_a_signal_leaves_whole_lines(tmp_path: Path, number: signal.Signals, after_s: float) -> None:
+    command = [sys.executable, "-P", "-m", "spectrasplat", "prove-gpu", "--quick", "--short", "-o", str(tmp_path)]
+    heeding = partial(signal.signal, number, signal.SIG_DFL)  # which shells' background jobs do not
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, preexec_fn=heeding) as process:
+        assert process.stdout is not None
+        first = process.stdout.readline()
+        time.sleep(after_s)
+        process.send_signal(number)
+        out, err = process.communicate(timeout=60)
+    lines = [json.loads(line) for line in (first + out).splitlines()]
+    assert process.returncode == 128 + number and "what was found is kept" in err and "Traceback" not in err
+    assert lines[-1]["ended"] == "stopped" and (tmp_path / "figures.jsonl").read_text() == first + out
+    assert json.loads((tmp_path / "proof.json").read_text())["quick"]
 
 
 def test_ctrl_c_keeps_what_was_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

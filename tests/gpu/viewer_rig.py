@@ -24,6 +24,7 @@ from spectrasplat.edit.state import Display as DisplaySettings
 from spectrasplat.gpu import device_traits
 from spectrasplat.gpu.context import Context, create_context
 from spectrasplat.gpu.device_traits import Budget, DeviceTraits
+from spectrasplat.gpu.linker import Linker
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.optics.glass import with_gain
 from spectrasplat.model.scene import Scene
@@ -42,6 +43,14 @@ _WORK = (
     (moderngl.Framebuffer, "clear"),
 )
 """What makes a software renderer draw, wait or copy."""
+_TEXTURES = moderngl.Texture, moderngl.TextureArray, moderngl.Texture3D, moderngl.TextureCube
+_DRIVER = (
+    *_WORK,
+    *((owner, "read") for owner in (moderngl.Buffer, *_TEXTURES, moderngl.Framebuffer)),
+    *((moderngl.Context, name) for name in ("buffer", "texture", "compute_shader", "program")),
+    *((Linker, name) for name in ("_begin", "adopted", "compiled_by")),
+)
+"""That and what it does in the caller's thread where a GPU's driver has threads, memory and a device of its own."""
 
 
 @dataclass
@@ -62,6 +71,29 @@ def without_work() -> Iterator[None]:
         for owner, name in _WORK:
             stack.enter_context(mock.patch.object(owner, name, lambda *_, **__: None))
         yield
+
+
+@contextmanager
+def beside_driver() -> Iterator[Callable[[], float]]:
+    """Gives a clock of the thread's own seconds that stands still in what a driver does."""
+    inside, depth = 0.0, 0
+
+    def apart(real: Callable[..., object]) -> Callable[..., object]:
+        def called(*arguments: object, **named: object) -> object:
+            nonlocal inside, depth
+            started, depth = time.thread_time(), depth + 1
+            try:
+                return real(*arguments, **named)
+            finally:
+                depth -= 1
+                inside += 0.0 if depth else time.thread_time() - started
+
+        return called
+
+    with ExitStack() as stack:
+        for owner, name in _DRIVER:
+            stack.enter_context(mock.patch.object(owner, name, apart(getattr(owner, name))))
+        yield lambda: time.thread_time() - inside
 
 
 class ViewerRig:
@@ -109,6 +141,21 @@ class ViewerRig:
                 self._frame()
             assert self.engine.problem is None, self.engine.problem
             yield counts
+
+    def python_ms(self, wanted: LiveInputs, frames: int) -> list[float]:
+        """Of the engine in each of so many frames while the camera goes round in what is `wanted` now, and then in each
+        until nothing is left to do."""
+        found: list[float] = []
+        with beside_driver() as clock:
+            while len(found) < frames or not self.engine.is_idle:
+                is_held = len(found) < frames
+                self.wanted = orbiting(wanted, min(len(found), frames))
+                started = clock()
+                self.engine.set(self.wanted)
+                self.engine.advance(FRAME_S, interacting=is_held)
+                found.append(QUIET_MS * (clock() - started) / _seconds(_same_work))
+                assert self.engine.problem is None and len(found) < 10_000, self.engine.problem
+        return found
 
     def _frame(self) -> None:
         self.engine.set(self.wanted)
@@ -177,6 +224,23 @@ def turning(before: LiveInputs, step: float) -> LiveInputs:
     matrix[:3, 3] = middle
     objects[at] = replace(objects[at], object_to_world=matrix)
     return replace(before, scene=replace(before.scene, objects=tuple(objects)))
+
+
+def roughened(before: LiveInputs) -> LiveInputs:
+    """The first glass is ground."""
+    objects = list(before.scene.objects)
+    at = next(i for i, o in enumerate(objects) if o.material.transmits)
+    objects[at] = replace(objects[at], material=replace(objects[at].material, roughness=0.2))
+    return replace(before, scene=replace(before.scene, objects=tuple(objects)))
+
+
+def doubled(before: LiveInputs) -> LiveInputs:
+    """There is another one like the first glass beside it."""
+    item = next(o for o in before.scene.objects if o.material.transmits)
+    matrix = item.object_to_world.copy()
+    matrix[0, 3] += 0.8
+    objects = (*before.scene.objects, replace(item, name=f"{item.name} 2", object_to_world=matrix))
+    return replace(before, scene=replace(before.scene, objects=objects))
 
 
 MOVEMENTS = {"orbit": orbiting, "drag": dragging, "turn": turning}

@@ -50,7 +50,7 @@ def _visible_normals(alpha: float, mu: np.ndarray, rounds: int, turn: np.ndarray
     """Quadrature over the normals that are visible from the cosine `mu`, in the form of a spherical cap [Heitz 2018;
     Dupuy and Benyoub 2023]: weights (rounds, 1), the normals' cosine to the direction of view, and their height and
     length before they are normalised (rounds, turns). `turn`: azimuths, rad."""
-    nodes, weights = np.polynomial.legendre.leggauss(rounds)
+    nodes, weights = _gauss_legendre(rounds)
     height = 0.5 * (nodes + 1.0)[:, None]
     sine = np.sqrt(np.maximum(1.0 - mu * mu, 0.0))
     length = np.hypot(alpha * sine, mu)
@@ -60,6 +60,9 @@ def _visible_normals(alpha: float, mu: np.ndarray, rounds: int, turn: np.ndarray
     hx, hy, hz = alpha * (flat * np.cos(turn) + vx), alpha * flat * np.sin(turn), np.maximum(z + vz, 0.0)
     size = np.maximum(np.sqrt(hx * hx + hy * hy + hz * hz), 1e-300)
     return 0.5 * weights[:, None], (hx * sine + hz * mu) / size, hz, size
+
+
+_gauss_legendre = lru_cache(np.polynomial.legendre.leggauss)
 
 
 # ---- a coat -------------------------------------------------------------------------------

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from ...gpu.shader import compiled_by
 from ...model.settings import RenderSettings
+from ..device_scene import scene_buffers
 from ..map_fit import preview_size
 from ..sampling import MovingBeams
 from .accumulation import Accumulation
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from ...edit.live_inputs import LiveInputs
     from ...gpu.context import Context
     from ...gpu.device_traits import Budget
+    from ...gpu.scene_buffers import SceneBuffers
 
 
 _ENVIRONMENT_S = 0.006
@@ -119,8 +121,10 @@ def build(
         any_view=True,
     )
     scene = replace(wanted.scene, camera=wanted.camera)
-    light = LiveLight(context, scene, settings, budget.store_bytes, moving)
+    made: SceneBuffers | LiveLight = (buffers := scene_buffers(context, scene, settings))
     try:
+        yield None
+        made = light = LiveLight(context, scene, settings, budget.store_bytes, moving, buffers)
         yield "following the first photons"
         yield from light.light_pass.preparing()
         light.light_pass.batches.portion = budget.portion
@@ -146,7 +150,7 @@ def build(
             yield None
         accumulation.publish = publish
     except BaseException:  # also when the generator is closed because this scene is no longer wanted
-        light.release()
+        made.release()
         raise
     yield "compiling the programs that see it, once for scenes of its kind"
     return Shown(wanted, light, accumulation, steps)

@@ -36,6 +36,7 @@ from .widening import needs_widening, widening
 if TYPE_CHECKING:
     from ...edit.live_inputs import LiveInputs
     from ...gpu.context import Context
+    from ...gpu.scene_buffers import SceneBuffers
     from ...model.scene import Scene
     from ...model.settings import RenderSettings
     from ...passes.caustic_maps import CausticMaps
@@ -55,11 +56,13 @@ class LiveLight:
         settings: RenderSettings,
         capacity_bytes: int,
         moving: MovingBeams | None = None,
+        buffers: SceneBuffers | None = None,
     ) -> None:
         """The first maps are fitted to the scene's camera and the size in `settings`, with the windows of a
-        preview. `moving`: how fine beams are while something is dragged."""
+        preview. `moving`: how fine beams are while something is dragged; `buffers`: the scene's, where they are made.
+        """
         self._context = context
-        self.buffers = scene_buffers(context, scene, settings)
+        self.buffers = buffers or scene_buffers(context, scene, settings)
         self.stored = StoredPasses(context.ctx, capacity_bytes, context.traits.work_is_queued)
         self._capacity_bytes = capacity_bytes
         self._sample: StoredPass | None = None
