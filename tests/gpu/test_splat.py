@@ -349,8 +349,10 @@ def test_tables_that_lie_below_others_in_a_layer_draw_the_same(gl, monkeypatch, 
         return rig.draw(np.concatenate(sweeps))
 
     whole = drawn()
+    # Atomics add a texel's splats, one a band at most, in any order.
+    rounding = 2.0 * (len(bands) - 1) * 2.0**-24 if by_compute else 0.0
     monkeypatch.setattr(splat_tables, "MOST_LAYERS", 3)
-    np.testing.assert_array_equal(drawn(), whole)
+    np.testing.assert_allclose(drawn(), whole, rtol=rounding, atol=0.0)
     monkeypatch.setattr(splat_tables, "MOST_BYTES", 1 << 20)
     narrow = drawn()
     assert 0.0 < relative_error(narrow, whole) < 0.03 and narrow.sum() == pytest.approx(whole.sum(), rel=2e-3)
