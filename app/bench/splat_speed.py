@@ -8,6 +8,7 @@ import numpy as np
 
 from ..features.features import Features
 from ..gpu import shader
+from ..gpu.packed_records import write_records
 from ..gpu.records import RECEIVER, photon_record
 from ..gpu.splat_tables import SplatTables
 from ..gpu.tiles import pack
@@ -37,7 +38,8 @@ def measure(ctx: moderngl.Context, pixels: float, count: int) -> dict[str, float
     splatter = Splatter(ctx, _FEATURES)
     receivers = ctx.buffer(RECEIVER.zeros(1))
     variable = SpectralVariables.build(ctx, np.linspace(0.0, 1.0, 1025)[None])
-    photons = ctx.buffer(_photons(pixels, count))
+    photons = ctx.buffer(reserve=count * splatter.footprints.photon.stride)
+    write_records(splatter.footprints.photon, photons, _photons(pixels, count))
 
     def splat() -> None:
         splatter.run(Photons(photons, count), SplatSpectra(variable, tables), atlas, receivers, 1.0)

@@ -32,15 +32,16 @@ class ReceiverFeatures:
         ),
     )
     """A receiver is curved and carries charts."""
-    nested_windows: bool = feature(
+    nested_windows: int = feature(
         "nested windows",
-        lambda facts: bool(facts.flat_receivers),
-        why="flat receivers may get a fine window inside a coarse one",
+        lambda facts: 2 if facts.flat_receivers else 0,
+        why="flat receivers may get a fine window inside coarse ones",
         why_not="no receiver has two windows",
         names=("is_only_fine", "outer"),
         cost=lambda facts, sizes: f"{sizes.splat} B a photon: a splat for each window",
+        off=0,
     )
-    """Flat receivers carry a fine window inside a coarse one."""
+    """Windows that flat receivers carry round their finest one, at most."""
     contact_lines: bool = feature(
         "contact lines",
         lambda facts: bool(standing(facts.scene)),

@@ -51,8 +51,8 @@ class DeviceTraits:
     ray_events: tuple[int, ...] = (4, 4, 8, 8, 64, 64, 64, 4096)
     """For how many events each dispatch of a batch follows a ray; the last one follows all that becomes of it. Empty: a
     dispatch is one event, after which rays are listed in order."""
-    packs_rays: bool = True
-    """Rays lie in memory with their columns rounded, where one waits longer for memory than packing takes."""
+    packs_records: bool = True
+    """Rays, photons and splats lie in memory rounded, where one waits longer for memory than packing takes."""
     photon_batch: int = 1 << 20
     """Lattice points whose photons are traced at once, where memory allows."""
     photon_queue_bytes: int = 1 << 30
@@ -103,7 +103,7 @@ class DeviceTraits:
             texels_as_images=llvmpipe,
             loops_may_end=True,
             ray_events=(),
-            packs_rays=False,
+            packs_records=False,
             photon_batch=1 << 16,
             photon_queue_bytes=64 << 20,
             work_is_queued=False,

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..features.features import Features
 from ..model.tint_levels import LEVELS
-from .packed_records import PackedStruct
+from .packed_records import packed
 from .schema import Field, Struct
 
 NONE = 0xFFFFFFFF
@@ -41,29 +41,30 @@ _COMPANIONS = (
 )
 
 
-def photon_record(groups: int, hero: bool = False) -> Struct:
+def photon_record(groups: int, hero: bool = False, packs: bool = False, charts: bool = True) -> Struct:
     """One landing on a receiver. `groups`: number of spectral groups (0 where nothing disperses); `hero`: with the
-    wavelengths that share its path.
+    wavelengths that share its path; `packs`: `DeviceTraits.packs_records`; `charts`: receivers may be curved.
 
     The photon covers the spectral band [x_lo, x_hi]; its path was traced at x_anchor. At spectral
     coordinate x it lies at position + sum_g dposition_dvar[g] (var_g(x) - var_g(x_anchor)).
     """
     spectral = tuple(
-        Field(f"dposition_dvar{g}", "vec4", "xyz: GPU space per unit of the group's variable") for g in range(groups)
+        Field(f"dposition_dvar{g}", "vec4", "xyz: GPU space per unit of the group's variable", 1, "columns 18 xyz")
+        for g in range(groups)
     )
-    return Struct(
+    record = Struct(
         "PhotonRecord",
         (
             Field("position", "vec3", "GPU space"),
-            Field("flux_w", "float", "accounted radiant flux of the band, W"),
-            Field("dposition_ds", "vec3", "GPU space per lattice spacing (footprint axis)"),
-            Field("x_lo", "float", "band start, spectral coordinate"),
-            Field("dposition_dt", "vec3", "GPU space per lattice spacing (footprint axis)"),
-            Field("x_hi", "float", "band end, spectral coordinate"),
-            Field("throughput", "vec3", "weight of the light's spectral power at x_lo, x_anchor, x_hi"),
-            Field("x_anchor", "float", "spectral coordinate of the traced path"),
-            Field("triangle", "uint", "global index of the receiver's triangle"),
-            Field("receiver", "uint", "index of the receiver"),
+            Field("flux_w", "float", "accounted radiant flux of the band, W", 1, "float 27"),
+            Field("dposition_ds", "vec3", "GPU space per lattice spacing (footprint axis)", 1, "columns 18"),
+            Field("x_lo", "float", "band start, spectral coordinate", 1, "unit 21"),
+            Field("dposition_dt", "vec3", "GPU space per lattice spacing (footprint axis)", 1, "columns 18"),
+            Field("x_hi", "float", "band end, spectral coordinate", 1, "unit 21"),
+            Field("throughput", "vec3", "weight of the light's power at x_lo, x_anchor, x_hi", 1, "columns 19"),
+            Field("x_anchor", "float", "spectral coordinate of the traced path", 1, "unit 21"),
+            Field("triangle", "uint", "global index of the receiver's triangle", 1, "" if charts else "= 0u"),
+            Field("receiver", "uint", "index of the receiver", 1, "whole 16"),
             Field("photon_id", "uint", "index on the emission lattice of the pass"),
             Field("light_and_source", "uint", "bits 0-7 light, 8-15 spectral band of the pass, 16-31 object first met"),
             Field("branch_key", "uint", "hash of the choices of the path"),
@@ -79,6 +80,12 @@ def photon_record(groups: int, hero: bool = False) -> Struct:
         ),
         texels=True,
     )
+    return packed(record, packs)
+
+
+def photon_record_of(features: Features, packs: bool = False) -> Struct:
+    """`photon_record` as a scene's programs have it."""
+    return photon_record(features.spectral_groups, features.hero, packs, features.charts)
 
 
 def specular_events(photons: np.ndarray) -> np.ndarray:
@@ -157,7 +164,7 @@ def ray_record(
 ) -> Struct:
     """State of one ray between two surfaces; `columns` derivative columns, spatial ones first; `hero` as above;
     `polarised`: with its state of polarisation; `flights`: with how far it has come through haze; `tinted`: and through
-    the glass whose tint has levels. `packs`: `DeviceTraits.packs_rays`."""
+    the glass whose tint has levels. `packs`: `DeviceTraits.packs_records`."""
     fields = [
         Field("position", "vec3", "GPU space"),
         Field("flux_w", "float", "accounted radiant flux of the band, W"),
@@ -175,10 +182,8 @@ def ray_record(
         Field("depth", "uint", "specular events so far"),
         Field("last_primitive", "uint", "facet the ray left, or NONE"),
         Field("inside_mask", "uint", "medium stack: one bit a solid the ray is inside of"),
-        Field("last_object", "uint", "its object, or NONE", packing="index"),
-        Field(
-            "inside_object", "uint", "without a medium stack: the solid the ray is inside of, or NONE", packing="index"
-        ),
+        Field("last_object", "uint", "its object, or NONE", 1, "index 16"),
+        Field("inside_object", "uint", "without a medium stack: the solid it is inside of, or NONE", 1, "index 16"),
     ]
     if columns:
         fields += [
@@ -188,16 +193,16 @@ def ray_record(
                 "xyz: GPU space per lattice spacing, or per unit of a group's variable; w of the first: where its light"
                 " ends (`packed_edge`), as a number",
                 columns,
-                "columns, w",
+                "columns 19 xyz, first 32 w",
             ),
-            Field("ddirection", "vec4", "xyz: per the same", columns, "columns"),
+            Field("ddirection", "vec4", "xyz: per the same", columns, "columns 19 xyz"),
         ]
     fields += _COMPANIONS if hero else ()
     fields += _POLARISATION if polarised else ()
     fields += _COMPANIONS_POLARISATION if hero and polarised else ()
     fields += (Field("flown", "vec4", "x: way outside glass so far, GPU units"),) if flights else ()
     fields += (Field("tinted", "vec4", "x: way through that glass so far, times its rate"),) if tinted else ()
-    return (PackedStruct if packs else Struct)("RayRecord", tuple(fields), texels=True)
+    return packed(Struct("RayRecord", tuple(fields), texels=True), packs)
 
 
 def ray_record_of(features: Features, packs: bool = False) -> Struct:

@@ -164,10 +164,6 @@ class Struct:
             ]
         )
 
-    def packed(self, records: np.ndarray) -> np.ndarray:
-        """Records as the device has them."""
-        return np.ascontiguousarray(records)
-
     def zeros(self, count: int) -> np.ndarray:
         """`count` records of zero bytes."""
         return np.zeros(count, self.dtype)

@@ -54,6 +54,8 @@ class SplatWay:
     """Extensions of GLSL that adding needs; without them it compares and swaps."""
     in_bulk: bool = False
     """Many photons at a time and in any order, as GPUs like it: sums are read where they are, and seldom moved."""
+    packs: bool = False
+    """`DeviceTraits.packs_records`."""
 
     def for_maps(self, size: tuple[int, int], targets: int) -> bool:
         """Whether splats go by compute shaders into maps of so many texels and textures."""
@@ -100,7 +102,7 @@ def _found(ctx: moderngl.Context) -> SplatWay:
     else:
         rate = blending_rate(ctx)
         by_compute, reason = rate < SLOW_BLENDING, f"it blends {rate / 1e9:.1f} G fragments/s"
-    return SplatWay(by_compute, reason, largest, extensions, traits.work_is_queued)
+    return SplatWay(by_compute, reason, largest, extensions, traits.work_is_queued, traits.packs_records)
 
 
 def _from_environment() -> str:

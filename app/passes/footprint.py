@@ -15,12 +15,8 @@ import numpy as np
 from ..features.program_switches import Defines, switched
 from ..gpu import shader
 from ..gpu.growing import filled
-from ..gpu.records import (
-    GAIN_BOX,
-    PLACEMENT,
-    RECEIVER,
-    photon_record,
-)
+from ..gpu.packed_records import packed
+from ..gpu.records import GAIN_BOX, PLACEMENT, RECEIVER, photon_record_of
 from ..gpu.schema import Field, Struct
 from .light_programs import footprint_defines, image_slots
 
@@ -62,54 +58,37 @@ UNIT_CONTACT = 1
 UNIT_BORDERS = 2
 """Texture unit of receivers' borders (`borders`), in the program that makes footprints."""
 
+_Y_EDGE = "3.0 * sqrt(0.5 + value.y_box * value.y_box / 3.0)"
+_INVERSE_SIGMA_XI = "2.1213203 / max(1.0 - value.xi_half, 1e-3)"
 SPLAT = Struct(
     "SplatRecord",
     (
-        Field("centre", "vec2", "middle of the swept chord, atlas texels"),
-        Field("along", "vec2", "swept: texels per unit of xi; small: half extents in texels"),
-        Field(
-            "across",
-            "vec2",
-            "swept: texels per unit of eta (edge at 1); small: 1 / (sqrt(2) sigma) along x, y, 1/texel",
-        ),
-        Field("amplitude", "float", "swept: 1/texel², all normalisation; small: mean throughput"),
-        Field("table_row", "float", "swept: texture coordinate of sigma over sweep length"),
-        Field("y_edge", "float", "swept: across half extent, units of sqrt(2) standard deviations"),
-        Field("y_box", "float", "swept: half width of the texel across, same units"),
-        Field("layer", "uint", "first layer of the spectral tables; bits 30, 31: side of a line of contact"),
         Field(
             "kind",
             "uint",
             "0 nothing, 1 small, 2 swept, 3 swept with a cut band, 4 swept over a line or fanning out; where compute "
             "shaders add it, bit 3: lines are columns; from bit 4 on: pieces",
         ),
-        Field(
-            "throughput",
-            "vec4",
-            "anchor, value there, slope below and above it; by xi (cut, point spectrum, small: by x)",
-        ),
-        Field(
-            "x_range",
-            "vec2",
-            "the photon's band, spectral coordinate; kind 4 with `LIGHT_EDGES`: change of `lit` per xi and eta",
-        ),
-        Field("xi_half", "float", "half of the band in xi (small: 1 where the band was cut, else 0)"),
-        Field("inverse_sigma_xi", "float", "1 / (sqrt(2) standard deviations along, in xi)"),
-        Field(
-            "waves",
-            "vec4",
-            "swept: cycles of two of its lattice's waves per unit of xi and of eta, one after the other",
-        ),
-        Field("ripple", "vec4", "swept: what is taken off by those two waves and, z, by their sum"),
-        Field("rect", "vec4", "x0, y0, x1, y1: nothing is drawn outside, atlas texels"),
-        Field(
-            "fan",
-            "vec2",
-            "swept: change of the W, 1 at the centre, by which places in it are divided, per unit of xi and of eta",
-        ),
         Field("images", "uint", "a photon's first: of so many splats behind its own, its images beyond borders"),
-        Field("lit", "float", "kind 4 with `LIGHT_EDGES`: lit share of a texel at the centre, not clamped"),
+        Field("centre", "vec2", "middle of the swept chord, atlas texels"),
+        Field("along", "vec2", "swept: texels per unit of xi; small: half extents in texels", 1, "columns 19"),
+        Field("across", "vec2", "swept: texels per unit of eta; small: 1 / (sqrt(2) sigma) of x, y", 1, "columns 19"),
+        Field("amplitude", "float", "swept: 1/texel², all normalisation; small: mean throughput", 1, "float 27"),
+        Field("table_row", "float", "swept: texture coordinate of sigma over sweep length", 1, "unit 16"),
+        Field("y_edge", "float", "swept: half extent across, sqrt(2) deviations", 1, f"= {_Y_EDGE}"),
+        Field("y_box", "float", "swept: half width of the texel across, same units", 1, "float 27"),
+        Field("layer", "uint", "first layer of the spectral tables; bits 30, 31: side of a line of contact"),
+        Field("lit", "float", "kind 4 with `LIGHT_EDGES`: lit share of a texel at the centre", 1, "float 25"),
+        Field("x_range", "vec2", "the photon's band, spectral coordinate; with `lit`: its change per xi and eta"),
+        Field("throughput", "vec4", "anchor, value there, slopes below and above; by xi, or by x", 1, "float 26"),
+        Field("xi_half", "float", "half of the band in xi (small: 1 where the band was cut, else 0)", 1, "unit 20"),
+        Field("inverse_sigma_xi", "float", "1 / (sqrt(2) standard deviations along)", 1, f"= {_INVERSE_SIGMA_XI}"),
+        Field("fan", "vec2", "swept: change per xi and eta of the W that divides places, 1 amid", 1, "columns 14"),
+        Field("waves", "vec4", "swept: cycles per unit of xi and of eta of two waves of its lattice", 1, "columns 14"),
+        Field("ripple", "vec4", "swept: what is taken off by those and, z, by their sum", 1, "columns 14 xyz"),
+        Field("rect", "vec4", "x0, y0, x1, y1: nothing is drawn outside, atlas texels", 1, "whole 16"),
     ),
+    texels=True,
 )
 """A splat, ready to be drawn. xi runs over [-1, 1] from end to end of the whole band's smeared sweep."""
 
@@ -220,15 +199,17 @@ class Footprints:
         group: int,
         by_compute: bool = False,
         in_bulk: bool = False,
+        packs: bool = False,
     ) -> None:
         """`group`: the most photons one dispatch covers. `by_compute`: compute shaders add the splats. `in_bulk`: in
-        any order, as they also do; there is room for as many photons as were given at once, and not for all before."""
+        any order, as they also do; there is room for as many photons as were given at once, and not for all before.
+        `packs`: `DeviceTraits.packs_records`."""
         self._ctx = ctx
-        groups = features.spectral_groups
+        self.photon, self.splat = photon_record_of(features, packs), packed(SPLAT, packs)
         kinds = len(VERTICES)
         pieces = switched(IN_PIECES=by_compute) | {"KINDS": f"{kinds}u", "PIECE_TEXELS": PIECE_TEXELS}
         defines = footprint_defines(features) | pieces | {"WORKGROUP": WORKGROUP}
-        structs = (photon_record(groups, features.hero), PLACEMENT, RECEIVER, SPLAT, GAIN_BOX)
+        structs = (self.photon, PLACEMENT, RECEIVER, self.splat, GAIN_BOX)
         self._program = shader.compute(ctx, "light/footprint.comp", defines, structs)
         self._parameters = ctx.buffer(reserve=PARAMETERS.stride)
         self._by_compute, self._in_any_order = by_compute, by_compute or in_bulk
@@ -260,7 +241,7 @@ class Footprints:
         if by_compute:
             counts |= {"MOST_GROUPS": f"{MOST_GROUPS}u", "TEAMS": TEAMS}
         list_shader = "light/splat_list_any.comp" if self._in_any_order else "light/splat_list.comp"
-        self._list = shader.compute(ctx, list_shader, counts, (SPLAT,))
+        self._list = shader.compute(ctx, list_shader, counts, (self.splat,))
 
     def make_room(self, photons: int) -> None:
         """For the splats of so many; what there was of others' is forgotten where there was none."""
@@ -271,7 +252,7 @@ class Footprints:
             shader.release(self.splats, self.lists)
             needed = min(max(needed, 2 * self.capacity), self._group * self.slots_per_photon)
         self.capacity = needed
-        self.splats = self._ctx.buffer(reserve=needed * SPLAT.stride)
+        self.splats = self._ctx.buffer(reserve=needed * self.splat.stride)
         self.lists = self._ctx.buffer(reserve=needed * (8 * ENTRIES_A_SLOT if self._by_compute else 4 * len(VERTICES)))
 
     @property

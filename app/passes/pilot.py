@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..gpu.packed_records import read_records
 from ..gpu.records import LATTICE_BIT, MAX_BANDS
 from ..model.scene import Scene
 from ..model.tint_bands import TOLERANCE as TINT_TOLERANCE
@@ -107,11 +108,11 @@ def pilot_steps(
         split_threshold: float | None = None,
         every: int = 1,
     ) -> Generator[None, None, tuple[np.ndarray, FluxTally, int, float]]:
-        raw, tally, flights, fullness = b"", FluxTally(), 0, 0.0
+        found, tally, flights, fullness = [trace.photon.zeros(0)], FluxTally(), 0, 0.0
 
         def keep(batch: Batch, _: bool) -> None:
-            nonlocal raw, flights, fullness
-            raw += trace.photons.read(size=batch.photons * trace.photon.stride) if batch.photons else b""
+            nonlocal flights, fullness
+            found.append(read_records(trace.photon, trace.photons, batch.photons))
             tally.merge(batch.tally)
             flights += batch.flights
             fullness = max(fullness, batch.fullness)
@@ -120,7 +121,7 @@ def pilot_steps(
         for i in range(slices):
             part = piece.every(every, 0).every(slices, i), domain
             yield from trace.whole([part], keep, depth, split_threshold)
-        return np.frombuffer(raw, trace.photon.dtype), tally, flights, fullness
+        return np.concatenate(found), tally, flights, fullness
 
     depth, everything = MAX_DEPTH, Band(0.0, 1.0, 0.5, power_w)
     whole, tally, flights, _ = yield from traced(everything, depth)

@@ -13,6 +13,7 @@ import numpy as np
 from ..features.features import Features
 from ..gpu import bindings, records, shader
 from ..gpu.device_traits import DeviceTraits
+from ..gpu.packed_records import write_records
 from .ray_queue import Followed, QueueParts, strides
 
 RAY_ROOM, PHOTON_ROOM = 1.5, 2.5
@@ -38,7 +39,7 @@ class RayPool:
             strides(parts.features, parts.traits),
         )
         self._context = parts.context
-        self._ray = records.ray_record_of(parts.features, parts.traits.packs_rays)
+        self._ray = records.ray_record_of(parts.features, parts.traits.packs_records)
         self._dispatches = len(parts.traits.ray_events)
         self._sum = shader.compute(ctx, "light/pool_tally.comp", parts.defines, parts.structs)
         self._state_zero = records.POOL_STATE.zeros(1)
@@ -82,7 +83,7 @@ class RayPool:
         state["alive"] = state["taken"] = state["taken_before"] = state["emitted"] = count
         state["trace_groups"] = (-(-count // _GROUP), 1, 1, 0)
         self.state.write(state.tobytes())
-        self.rays.write(self._ray.packed(rays))
+        write_records(self._ray, self.rays, rays)
 
     def send(self, trace: moderngl.ComputeShader, bind: Callable[[], None]) -> None:
         """Follow the rays; the last dispatch follows all that is left. Nothing is waited for."""

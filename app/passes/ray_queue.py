@@ -43,8 +43,8 @@ class QueueParts:
 
 def strides(features: Features, traits: DeviceTraits) -> tuple[int, int]:
     """Bytes of a ray's record and of a photon's."""
-    photon = records.photon_record(features.spectral_groups, features.hero)
-    return records.ray_record_of(features, traits.packs_rays).stride, photon.stride
+    packs = traits.packs_records
+    return records.ray_record_of(features, packs).stride, records.photon_record_of(features, packs).stride
 
 
 @dataclass(frozen=True)

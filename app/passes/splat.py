@@ -16,6 +16,7 @@ from ..features.program_switches import Defines, switched
 from ..gpu import shader
 from ..gpu.context import check_device
 from ..gpu.framebuffers import adding
+from ..gpu.packed_records import packed
 from ..gpu.schema import Field, Struct
 from ..gpu.splat_way import way_of
 from .footprint import (
@@ -78,8 +79,8 @@ class Splatter:
         self.group = GROUP
         if self._in_bulk:
             most_bytes = min(BULK_BYTES, way.largest_block)
-            self.group = min(BULK_GROUP, most_bytes // (SPLAT.stride * slots_per_photon(features)))
-        self.footprints = Footprints(ctx, features, self.group, self.by_compute, self._in_bulk)
+            self.group = min(BULK_GROUP, most_bytes // (packed(SPLAT, way.packs).stride * slots_per_photon(features)))
+        self.footprints = Footprints(ctx, features, self.group, self.by_compute, self._in_bulk, way.packs)
         self._indices: moderngl.Buffer | None = None
         self._draws: dict[int, moderngl.VertexArray] = {}
         self._adds: dict[int, moderngl.ComputeShader] = {}
@@ -96,7 +97,7 @@ class Splatter:
             self._indices = self._ctx.buffer(corners)
         for kind, (fragment, chosen) in draw_variants(self._features).items():
             defines = chosen | switched(IN_BULK=self._in_bulk) | {"KIND": kind}
-            program = shader.program(self._ctx, "light/splat.vert", fragment, defines, (SPLAT,))
+            program = shader.program(self._ctx, "light/splat.vert", fragment, defines, (self.footprints.splat,))
             indices = self._indices if VERTICES[kind - 1] == 6 else None
             self._draws[kind] = self._ctx.vertex_array(program, [], index_buffer=indices)
 
@@ -105,7 +106,9 @@ class Splatter:
         for kind, (_, chosen) in draw_variants(self._features).items():
             numbers: Defines = {"KIND": kind, "KINDS": f"{len(VERTICES)}u", "TEAM": TEAM, "TEAMS": TEAMS}
             defines = chosen | sum_defines(way) | numbers | {"LANES": TEAM * TEAMS}
-            self._adds[kind] = shader.compute(self._ctx, "light/splat_add.comp", defines, (SPLAT,), way.extensions)
+            self._adds[kind] = shader.compute(
+                self._ctx, "light/splat_add.comp", defines, (self.footprints.splat,), way.extensions
+            )
 
     def run(
         self, photons: Photons, spectra: SplatSpectra, atlas: MapAtlas, receivers: moderngl.Buffer, smoothing: float

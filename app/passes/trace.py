@@ -160,14 +160,14 @@ class TracePass:
         self.split_threshold = split_threshold
         self.widest_on_surface = widest_on_surface
         # Derivatives are wanted as they are.
-        packs = context.traits.packs_rays and widest_on_surface < UNBOUNDED
-        traits = self._traits = replace(context.traits, packs_rays=packs)
+        packs = context.traits.packs_records and widest_on_surface < UNBOUNDED
+        traits = self._traits = replace(context.traits, packs_records=packs)
         self.ray = records.ray_record_of(features, packs)
         self._parameters = records.trace_parameters(len(scene.scene.objects))
         shared = max(1, min(len(scene.scene.lights), context.limits.uniform_block_bytes // self._parameters.stride))
         self._lights = shared if context.traits.ray_events else 1
         """Lights whose rays are traced together: whose parameters a uniform block holds."""
-        self.photon = records.photon_record(features.spectral_groups, features.hero)
+        self.photon = records.photon_record_of(features, packs)
         ctx = context.ctx
         structs = (
             *(*SCENE_STRUCTS, self.ray, self.photon, *(POOL_STRUCTS if context.traits.ray_events else QUEUE_STRUCTS)),

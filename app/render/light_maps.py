@@ -42,10 +42,10 @@ class LightMaps:
         """`contact_words` (`passes.contact_lines`) becomes the maps' own."""
         self._ctx = ctx
         self.layout = layout
-        # Only the layout says whether a fine window pays: without one no splat is drawn twice.
+        # Only the layout says which windows pay: without them no splat is drawn twice.
         self.features = replace(
             features,
-            nested_windows=any(len(windows) > 1 for windows in layout.windows.values()),
+            nested_windows=max([1, *map(len, layout.windows.values())]) - 1,
             contact_lines=contact_words is not None,
             border_images=features.border_images and bool(layout.borders),
         )

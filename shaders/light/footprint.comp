@@ -13,8 +13,8 @@ layout(local_size_x = WORKGROUP) in;
 
 #include "light/footprint_parameters.glsl"
 #include "light/splat_pieces.glsl"
-layout(std430, binding = 0) readonly buffer Photons { PhotonRecord photons[]; };
-layout(std430, binding = 1) writeonly buffer Splats { SplatRecord splats[]; };
+layout(std430, binding = 0) readonly buffer Photons { uvec4 photon_texels[]; };
+layout(std430, binding = 1) writeonly buffer Splats { uvec4 splat_texels[]; };
 layout(std430, binding = 2) readonly buffer Placements { Placement placements[]; };
 layout(std430, binding = 3) readonly buffer Receivers { Receiver receivers[]; };
 layout(std430, binding = 4) readonly buffer VarTables { float var_table[]; };
@@ -64,6 +64,8 @@ const float MOST_FAN = 3.0;
 // Splats of one and a half texels' standard deviation at least go to a map with texels twice as wide.
 const float BROAD_VARIANCE = 2.25;
 const int WIDER_LEVELS = 6;
+// Three texels of a wider level that is chosen for a splat, over its larger half extent, at most.
+const float LEVEL_REACH = 2.5;
 // What texels twice as wide add to the variance of what is drawn, in their own area: the bilinear interpolation on the
 // way back (1/6) and their box (1/12) in place of the narrow texels' (1/48).
 const float LEVEL_BLUR = 11.0 / 48.0;
@@ -255,6 +257,9 @@ shared uint splats_of[KINDS];
 shared uint pieces_of[KINDS];
 #endif
 
+#define LOAD_PHOTON(at) photon_texels[at]
+#define STORE_SPLAT(at, texel) splat_texels[at] = texel
+
 void put(uint slot, SplatRecord splat) {
 #if IN_PIECES
     if (splat.kind != 0u) {
@@ -264,14 +269,15 @@ void put(uint slot, SplatRecord splat) {
         splat.kind |= bits;
     }
 #endif
-    splats[slot] = splat;
+    SplatRecord_TO(STORE_SPLAT, slot * uint(SplatRecord_TEXELS), splat)
 }
 
 #include "light/footprint_images.glsl"
 
 void make_splats(uint i) {
     uint own = gl_GlobalInvocationID.x;
-    PhotonRecord photon = photons[first_photon + i * stride];
+    uint record = (first_photon + i * stride) * uint(PhotonRecord_TEXELS);
+    PhotonRecord photon = PhotonRecord_FROM(LOAD_PHOTON, record);
     Receiver receiver = receivers[photon.receiver];
     uint at = receiver.placement;
     if (CHARTS) at += receiver.kind == RECEIVER_CHARTS ? photon.triangle - receiver.first_triangle : 0u;
@@ -404,38 +410,39 @@ void make_splats(uint i) {
         Depicted depicted = Depicted(photon, middle, sweep, power_w, mean, table, table_band, side, thin);
         bool has_images = true;
         if (REINDEXED) has_images = carries;
-        splats[slot].images = has_images ? put_images(depicted, at, slot + uint(SLOTS)) : 0u;
+        splat_texels[slot * uint(SplatRecord_TEXELS)].y = has_images ? put_images(depicted, at, slot + uint(SLOTS)) : 0u;
     }
 
-    if (SLOTS == 2) {
-        SplatRecord coarse = empty_splat();
-        uint next = placements[at].next;
-        if (next != NONE) {
-            Placement outer = placements[next];
-            // Far from the camera, texels of its pixels are the larger ones.
-            Footprint g = footprint_in(outer, photon, middle, sweep);
-            float held_there = held_size(outer, photon, g);
-            if (held_there < 1.0) {
-                shrink(photon, middle, sweep, held_there);
-                g = footprint_in(outer, photon, middle, sweep);
-            }
-            within |= steps_within(outer.rect, g, photon);
-            next = choose_level(next, g, photon, middle, sweep);
-            outer = placements[next];
-            if (!shown || !is_only_fine(fine_centre, fine_extent, drawn_in, outer, photon.position)) {
-                coarse = splat_of(photon, power_w, mean, g, table, table_band);
-                coarse.rect = placements[next].rect;
-                if (!touches(coarse.rect, coarse.centre, half_extent(coarse))) {
-                    coarse.kind = 0u;
-                }
-                if (REINDEXED && !carries) {
-                    coarse.kind = 0u;
-                }
-            }
+    // In the coarser windows round it, as far as what is drawn reaches over a finer one's border.
+    vec2 centre = fine_centre, extent = fine_extent;
+    int level = 1;
+    uint next = placements[at].next;
+    for (; level < SLOTS && next != NONE; ++level) {
+        Placement outer = placements[next];
+        if (shown && is_only_fine(centre, extent + LEVEL_REACH * max(extent.x, extent.y), drawn_in, outer, photon.position)) break;
+        // Far from the camera, texels of its pixels are the larger ones.
+        Footprint g = footprint_in(outer, photon, middle, sweep);
+        float held_there = held_size(outer, photon, g);
+        if (held_there < 1.0) {
+            shrink(photon, middle, sweep, held_there);
+            g = footprint_in(outer, photon, middle, sweep);
         }
+        within |= steps_within(outer.rect, g, photon);
+        uint wide = choose_level(next, g, photon, middle, sweep);
+        if (shown && is_only_fine(centre, extent, drawn_in, placements[wide], photon.position)) break;
+        SplatRecord coarse = splat_of(photon, power_w, mean, g, table, table_band);
+        coarse.rect = placements[wide].rect;
+        centre = coarse.centre;
+        extent = half_extent(coarse);
+        if (!touches(coarse.rect, centre, extent)) coarse.kind = 0u;
+        if (REINDEXED && !carries) coarse.kind = 0u;
         keep_within_lines(coarse, 0u, 1.0);
-        put(slot + 1u, coarse);
+        put(slot + uint(level), coarse);
+        shown = true;
+        drawn_in = wide;
+        next = outer.next;
     }
+    for (; level < SLOTS; ++level) splat_texels[(slot + uint(level)) * uint(SplatRecord_TEXELS)] = uvec4(0u);
 
     sums[own].x += power_w * (1.0 - share_within(photon, within));
 }

@@ -113,11 +113,11 @@ Depicted image_of(Depicted of, Beside first, Beside second, uint bit) {
 // Their number is found first, so that a software renderer, which runs the body of an `if` for all, goes through the
 // loop only with photons that have any; what makes a splat stands there once.
 uint put_images(Depicted of, uint at, uint slot) {
-    Placement place = placements[at], read_in = place;
-    if (SLOTS == 2) {
-        vec3 at = homogeneous_texel(place, of.photon.position + of.middle);
-        if (place.next != NONE && (at.z <= 0.0 || !contains(place.rect, at.xy / at.z, 0.0)))
-            read_in = placements[place.next];
+    Placement read_in = placements[at];
+    for (int level = 1; level < SLOTS && read_in.next != NONE; ++level) {
+        vec3 middle = homogeneous_texel(read_in, of.photon.position + of.middle);
+        if (middle.z > 0.0 && contains(read_in.rect, middle.xy / middle.z, 0.0)) break;
+        read_in = placements[read_in.next];
     }
     // The two borders of those that it reaches over to which it is nearest.
     Beside first = Beside(vec4(0.0), -1, 1e30, -1.0, vec3(0.0), 0.0), second = first;
@@ -156,7 +156,7 @@ uint put_images(Depicted of, uint at, uint slot) {
             splat.rect = placements[drawn_in].rect;
             vec2 extent = half_extent(splat);
             shown = shown && touches(splat.rect, splat.centre, extent);
-            if (SLOTS == 2 && next != NONE) {
+            if (SLOTS > 1 && next != NONE) {
                 Placement outer = placements[next];
                 bool is_fine = is_only_fine(splat.centre, extent, drawn_in, outer, image.photon.position);
                 next = shown && is_fine ? NONE : next;

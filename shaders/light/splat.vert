@@ -64,7 +64,7 @@ vec4 part_inside(SplatRecord splat) {
 
 void main() {
 #if SMALL
-    SplatRecord splat = splats[lists[uint(KIND - 1) * capacity + uint(gl_VertexID / 3)]];
+    SplatRecord splat = splat_at(lists[uint(KIND - 1) * capacity + uint(gl_VertexID / 3)]);
     if (CONTACT_LINES) side = side_taken_off(splat);
     int third = gl_VertexID % 3;
     vec2 corner = vec2(third == 1 ? 3.0 : -1.0, third == 2 ? 3.0 : -1.0);
@@ -79,7 +79,7 @@ void main() {
 #else
     int vertex = gl_VertexID;
 #endif
-    SplatRecord splat = splats[lists[uint(KIND - 1) * capacity + uint(vertex >> 2)]];
+    SplatRecord splat = splat_at(lists[uint(KIND - 1) * capacity + uint(vertex >> 2)]);
     if (CONTACT_LINES) side = side_taken_off(splat);
     vec2 corner = vec2(float(vertex & 1), float((vertex >> 1) & 1)) * 2.0 - 1.0;
     if (CLIPPED) {

@@ -37,7 +37,7 @@ void main() {
     for (uint done = gl_WorkGroupID.x * uint(TEAMS); done < count; done += gl_NumWorkGroups.x * uint(TEAMS)) {
         uint index = done + uint(team);
         uvec2 entry = entries[first_of_kind + min(index, count - 1u)];
-        SplatRecord splat = splats[entry.x];
+        SplatRecord splat = splat_at(entry.x);
         int pieces = max(int(splat.kind >> PIECES_BIT), 1);
 #if CONTACT_LINES
         uint side = side_taken_off(splat);

@@ -3,7 +3,7 @@
 // atomics: the order in which splats are added is a function of the photons alone.
 layout(local_size_x = WORKGROUP) in;
 
-layout(std430, binding = 1) readonly buffer Splats { SplatRecord splats[]; };
+layout(std430, binding = 1) readonly buffer Splats { uvec4 splat_texels[]; };
 layout(std430, binding = 7) buffer Commands { uint draw_words[5 * KINDS]; };
 layout(std430, binding = 8) writeonly buffer Lists { uint lists[]; };  // `capacity` a kind
 
@@ -24,7 +24,7 @@ void main() {
     for (uint photon = first; photon < last; ++photon) {
         uint end = end_of(photon);
         for (uint slot = photon * PHOTON_SLOTS; slot < end; ++slot) {
-            uint kind = splats[slot].kind;
+            uint kind = kind_at(slot);
             for (uint k = 0u; k < KINDS; ++k) mine[k] += kind == k + 1u ? 1u : 0u;
         }
     }
@@ -44,7 +44,7 @@ void main() {
     for (uint photon = first; photon < last; ++photon) {
         uint end = end_of(photon);
         for (uint slot = photon * PHOTON_SLOTS; slot < end; ++slot) {
-            uint kind = splats[slot].kind;
+            uint kind = kind_at(slot);
             for (uint k = 0u; k < KINDS; ++k) {
                 if (kind == k + 1u) {
                     lists[mine[k]] = slot;

@@ -3,7 +3,7 @@
 // compute shaders add them (splat_add.comp), a splat has an entry a piece.
 layout(local_size_x = WORKGROUP) in;
 
-layout(std430, binding = 1) readonly buffer Splats { SplatRecord splats[]; };
+layout(std430, binding = 1) readonly buffer Splats { uvec4 splat_texels[]; };
 layout(std430, binding = 7) buffer Commands { uint kind_words[]; };
 
 #include "light/footprint_parameters.glsl"
@@ -31,7 +31,7 @@ void main() {
 #endif
     uint slot = photon * PHOTON_SLOTS, end = photon < photons_there() ? end_of(photon) : slot;
     for (uint s = slot; s < end; ++s) {
-        uint word = splats[s].kind;
+        uint word = kind_at(s);
 #if IN_PIECES
         if (word > 0u) atomicAdd(listed[(word & 7u) - 1u], entries_of(word >> PIECES_BIT, at_once));
 #else
@@ -54,7 +54,7 @@ void main() {
     }
     barrier();
     for (uint s = slot; s < end; ++s) {
-        uint word = splats[s].kind;
+        uint word = kind_at(s);
         if (word == 0u) continue;
 #if IN_PIECES
         uint kind = (word & 7u) - 1u, pieces = word >> PIECES_BIT, count = entries_of(pieces, at_once);

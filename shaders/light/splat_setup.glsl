@@ -3,11 +3,14 @@
 #include "light/splat_parameters.glsl"
 #include "lib/swept.glsl"
 
-layout(std430, binding = 1) readonly buffer Splats { SplatRecord splats[]; };
+layout(std430, binding = 1) readonly buffer Splats { uvec4 splat_texels[]; };
+#define LOAD_SPLAT(at) splat_texels[at]
 layout(std430, binding = 5) readonly buffer Bands { vec4 table_bands[]; };
 layout(std430, binding = 6) readonly buffer Integrals {
     vec4 band_integral[];
 };  // by layer: energy, its mean place in the band (0–1), its standard deviation there
+
+SplatRecord splat_at(uint slot) { return SplatRecord_FROM(LOAD_SPLAT, slot * uint(SplatRecord_TEXELS)); }
 
 // On which side of a line of contact the splat's light landed; its record then holds the layer alone.
 uint side_taken_off(inout SplatRecord splat) {

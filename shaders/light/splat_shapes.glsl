@@ -374,8 +374,3 @@ SplatRecord swept_splat(PhotonRecord photon, float power_w, float mean, Footprin
     flatten_lattice(splat, drawn, f, lattice_of(photon));
     return splat;
 }
-
-SplatRecord empty_splat() {
-    return SplatRecord(vec2(0.0), vec2(0.0), vec2(0.0), 0.0, 0.0, 0.0, 0.0, 0u, 0u, vec4(0.0), vec2(0.0), 0.0, 0.0,
-        vec4(0.0), vec4(0.0), vec4(0.0), vec2(0.0), 0u, 0.0);
-}

@@ -147,7 +147,7 @@ def test_what_lands_beyond_a_border_is_not_mirrored(gl, place: tuple[float, floa
 
 
 def test_images_keep_to_their_photons_slots(gl, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also where a receiver has three windows: a photon has splats in two."""
+    """Also where a receiver has three windows."""
     found: list[int] = []
     real = Footprints.run
 
@@ -160,4 +160,4 @@ def test_images_keep_to_their_photons_slots(gl, monkeypatch: pytest.MonkeyPatch)
     render(
         load_scene(shipped_scenes()["lens_text"]), RenderSettings(width=64, height=36, photons=6000, spp=1), context=gl
     )
-    assert 0 < max(found) <= MOST_IMAGES * 2
+    assert 0 < max(found) <= MOST_IMAGES * 3

@@ -40,7 +40,7 @@ BYTES_A_PHOTON = 600
 def device(events: tuple[int, ...], packs: bool = False) -> Iterator[Context]:
     """This one, with rays followed like that."""
     with create_context() as context:
-        traits = replace(context.traits, ray_events=events, packs_rays=packs)
+        traits = replace(context.traits, ray_events=events, packs_records=packs)
     with device_traits.assumed(traits), create_context() as context:
         yield context
 

@@ -15,11 +15,12 @@ from spectrasplat.features.features import Features
 from spectrasplat.gpu import device_traits, splat_way
 from spectrasplat.gpu.context import Context, create_context
 from spectrasplat.gpu.device_traits import DeviceTraits
+from spectrasplat.gpu.packed_records import read_records
 from spectrasplat.gpu.splat_way import way_of
 from spectrasplat.gpu.tiles import pack
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.passes.footprint import KIND_WORDS, PIECE_TEXELS, SPLAT, TEAMS, Footprints, Photons
+from spectrasplat.passes.footprint import KIND_WORDS, PIECE_TEXELS, TEAMS, Footprints, Photons
 from spectrasplat.passes.map_atlas import MapAtlas
 from spectrasplat.passes.resolve import Resolve
 from spectrasplat.render.device_scene import scene_buffers
@@ -91,7 +92,7 @@ def test_no_work_group_takes_more_than_sixteen_rounds(gl: Context) -> None:
     rig = Rig(gl.ctx, FEATURES, (300, 300), by_compute=True)
     rig.draw(broad(400))
     footprints = rig.splatter.footprints
-    splats = np.frombuffer(footprints.splats.read(400 * SPLAT.stride), SPLAT.dtype)
+    splats = read_records(footprints.splat, footprints.splats, 400)
     splats = splats[splats["kind"] > 0]
     words = np.frombuffer(footprints.commands.read(16 * KIND_WORDS), np.uint32).reshape(4, KIND_WORDS)
     pieces, kinds = (splats["kind"] >> 4).astype(int), splats["kind"] & 7

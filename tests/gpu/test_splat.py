@@ -253,37 +253,43 @@ def test_too_large_ones_are_drawn_as_large_as_can_be_and_counted(gl, far: float,
     along, across = frame(0.7, far, 1.0)
     rows = np.array([[0.25, 0.0, 0.0, 24.0], [0.0, 0.25, 0.0, 24.0]])
     for features, chord in ((PLAIN, [0.0, 0.0]), (CUTS, [0.3 * far, 0.2 * far])):
-        coarse = None if window == "one" else ((64, 64), rows, 16.0)
-        own = replace(features, nested_windows=window == "coarse")
-        rig = Rig(gl.ctx, own, coarse=coarse)
+        coarser = [((64, 64), rows, 16.0)] * (window == "coarse")
+        own = replace(features, nested_windows=len(coarser))
+        rig = Rig(gl.ctx, own, coarser=coarser)
         records = photons(own, [[20.5, 20.5], [40.5, 41.5]], along + 1e-3 * across, along - 1e-3 * across, chord)
         records["x_hi"][1] = 0.8
-        for tile in range(1 if coarse is None else 2):
+        for tile in range(1 + len(coarser)):
             image = rig.draw(records, tile=tile)
             assert np.isfinite(image).all() and image.max() < 0.05 * rig.light.power_w()
         assert image.sum() > 0.0 and (rig.splatter.footprints.counts()["footprints_dropped"] > 0) == (far > 1e5)
 
 
-def test_nested_windows_are_complete_where_they_are_read(gl) -> None:
-    features = Features(spectral_groups=1, nested_windows=True)
-    rows = np.array([[0.25, 0.0, 0.0, 24.0], [0.0, 0.25, 0.0, 24.0]])
-    rig = Rig(gl.ctx, features, coarse=((64, 64), rows, 16.0))
+@pytest.mark.parametrize("by_compute", [False, True])
+def test_nested_windows_are_complete_where_they_are_read(gl, by_compute: bool) -> None:
+    """Three, one in the other: texels of each hold all light, once, but for those deep inside of the finer one."""
+    features = Features(spectral_groups=1, nested_windows=2)
+    rows = [np.array([[scale, 0.0, 0.0, at], [0.0, scale, 0.0, at]]) for scale, at in ((0.25, 24.0), (0.0625, 26.0))]
+    coarser = [((64, 64), rows[0], 16.0), ((64, 64), rows[1], 256.0)]
+    rig = Rig(gl.ctx, features, coarser=coarser, by_compute=by_compute)
     rng = np.random.default_rng(5)
-    records = photons(features, rng.uniform(-60.0, 124.0, (20000, 2)), [1.2, 0.3], [-0.2, 1.0], [3.0, 1.0])
-    fine = rig.draw(records)
-    coarse = rig.draw(records, tile=1)
-    alone = Rig(gl.ctx, Features(spectral_groups=1), size=(64, 64))
-    expected = alone.draw(records)
-    np.testing.assert_allclose(fine, expected, rtol=2e-3, atol=2e-3 * expected.max())
-    # Coarse texels 24..39 are under the fine window; those outside and their neighbours must hold everything.
-    records["position"][:, :2] = 0.25 * records["position"][:, :2] + 24.0
-    for name in ("dposition_ds", "dposition_dt", "dposition_dvar0"):
-        records[name] *= 0.25
-    full = alone.draw(records)
-    read = np.ones((64, 64), bool)
-    read[25:39, 25:39] = False
-    np.testing.assert_allclose(coarse[read], full[read], rtol=1e-3, atol=2e-3 * full.max())
-    assert coarse[31, 31, 3] < 0.1 * full[31, 31, 3]
+    records = photons(features, rng.uniform(-220.0, 284.0, (40000, 2)), [1.2, 0.3], [-0.2, 1.0], [3.0, 1.0])
+    broad = photons(features, rng.uniform(-220.0, 284.0, (2000, 2)), [30.0, 3.0], [-9.0, 40.0], [3.0, 1.0])
+    records = np.concatenate([records, broad])
+    alone = Rig(gl.ctx, Features(spectral_groups=1), size=(64, 64), by_compute=by_compute)
+    scale, offset = 1.0, 0.0
+    for tile in range(3):
+        of_tile = records.copy()
+        of_tile["position"][:, :2] = scale * records["position"][:, :2] + offset
+        for name in ("dposition_ds", "dposition_dt", "dposition_dvar0"):
+            of_tile[name] *= scale
+        got, want = rig.draw(records, tile=tile), alone.draw(of_tile)
+        # Texels 24 to 39 of the second, 22 to 37 of the third are under finer ones, which are read there.
+        read, first = np.ones((64, 64), bool), (0, 24, 22)[tile]
+        read[first + 1 : first + 15, first + 1 : first + 15] = tile == 0
+        np.testing.assert_allclose(got[read], want[read], rtol=2e-3, atol=2e-3 * want.max())
+        assert tile == 0 or got[first + 8, first + 8, 3] < 0.3 * want[first + 8, first + 8, 3]
+        scale, offset = ((0.25, 24.0), (0.0625, 26.0), (0.0, 0.0))[tile]
+    assert rig.splatter.footprints.counts()["outside_map_w"] < 1e-6 * rig.splatter.footprints.counts()["splats_w"]
 
 
 def test_picture_does_not_depend_on_batches(rig: Rig) -> None:

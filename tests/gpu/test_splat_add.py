@@ -248,8 +248,8 @@ def mixed(features: Features, count: int) -> np.ndarray:
 def test_photons_come_to_the_same_maps(gl: Context, nested: bool) -> None:
     """By their own lists, in groups and flushes of their own, into both of two windows."""
     features = Features(spectral_groups=1, band_cuts=True, nested_windows=nested)
-    coarse = ((64, 64), np.array([[0.25, 0.0, 0.0, 16.0], [0.0, 0.25, 0.0, 16.0]]), 16.0) if nested else None
-    raster, compute = (Rig(gl.ctx, features, SIZE, coarse=coarse, by_compute=way) for way in (False, True))
+    coarser = [((64, 64), np.array([[0.25, 0.0, 0.0, 16.0], [0.0, 0.25, 0.0, 16.0]]), 16.0)] * nested
+    raster, compute = (Rig(gl.ctx, features, SIZE, coarser=coarser, by_compute=way) for way in (False, True))
     records = mixed(features, 6000)
     for tile in range(1 + nested):
         want, got = raster.draw(records, 0.6, tile=tile), compute.draw(records, 0.6, tile=tile)

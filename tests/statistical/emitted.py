@@ -70,7 +70,7 @@ def emit(
     scene = Scene("emission", Camera((0, 0, 9), (0, 0, 0), up=(0, 1, 0)), (light,), objects)
     features = Features.of(scene, RenderSettings(method="stochastic-point"))
     buffers = SceneBuffers(gl.ctx, scene, features, spectral_axis(scene, features))
-    with mock.patch.object(gl, "traits", replace(gl.traits, packs_rays=False)):
+    with mock.patch.object(gl, "traits", replace(gl.traits, packs_records=False)):
         trace = TracePass(gl, features, buffers, batch=BATCH, max_depth=1)
     rng = np.random.default_rng(seed)
     try:

@@ -14,6 +14,7 @@ import pytest
 from reference.textbook_optics import fresnel_reflectance
 from spectrasplat.features.features import Features
 from spectrasplat.gpu import records as records_of_the_device
+from spectrasplat.gpu.packed_records import read_records
 from spectrasplat.gpu.scene_buffers import SceneBuffers
 from spectrasplat.model.geometry.mesh import make_mesh
 from spectrasplat.model.lights import CollimatedLight
@@ -68,7 +69,7 @@ def landed(gl) -> tuple[np.ndarray, float]:
             patch.setattr(records_of_the_device, "LATTICE_BIT", 32)  # too few bits for any lattice's size
             batch = trace.run(piece, domain)
         assert batch.tally.imbalance < 1e-5
-        records = np.frombuffer(trace.photons.read(), trace.photon.dtype, batch.photons)
+        records = read_records(trace.photon, trace.photons, batch.photons)
         # The beam's softened rim is left out: there a ray starts with less, and less is a smaller chance.
         whole = records["flux_w"] > 0.5 * domain.measure / BATCH
         events = records_of_the_device.specular_events(records)

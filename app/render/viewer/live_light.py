@@ -402,8 +402,8 @@ class LiveLight:
 
     def stored_records(self, limit: int) -> np.ndarray:
         """About `limit` stored records (`gpu.records.photon_record`) of all light, beams' too."""
-        dtype = self.light_pass.trace.photon.dtype
-        return np.zeros(0, dtype) if self._asked is None else self._asked.store.read(limit, dtype)
+        photon = self.light_pass.trace.photon
+        return photon.zeros(0) if self._asked is None else self._asked.store.read(limit, photon)
 
     def stored_weight(self, limit: int) -> float:
         """What the flux of `stored_records(limit)` is power times."""

@@ -11,10 +11,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...gpu.packed_records import read_records
 from ..photon_records import RoundOf
 
 if TYPE_CHECKING:
     import moderngl
+
+    from ...gpu.schema import Struct
 
 
 @dataclass(frozen=True)
@@ -116,7 +119,8 @@ class PhotonStore:
                 found[slab.buffer] = slab if before is None else replace(slab, count=before.count + slab.count)
         return list(found.values())
 
-    def read(self, limit: int, dtype: np.dtype) -> np.ndarray:
-        """About `limit` records at most, in whole rounds (one at least), as a numpy array of `dtype`."""
+    def read(self, limit: int, photon: Struct) -> np.ndarray:
+        """About `limit` records at most, in whole rounds (one at least)."""
         slabs = self.first_slabs(self.first_rounds(limit))
-        return np.frombuffer(b"".join(slab.buffer.read(slab.count * self._stride) for slab in slabs), dtype)
+        found = [read_records(photon, slab.buffer, slab.count) for slab in slabs]
+        return np.concatenate([np.zeros(0, photon.dtype), *found])

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...gpu import records
+from ...gpu.packed_records import read_records
 from ...model.settings import RenderSettings
 from ...passes.camera import CameraPass
 from ...render.device_scene import scene_buffers
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
     from ...gpu.context import Context
     from ...gpu.reindex import Spans
+    from ...gpu.schema import Struct
     from ...model.scene import Scene
     from ...passes.trace import Batch
     from ...render.photon_records import RoundOf
@@ -57,8 +59,8 @@ class WatchedRecords:
 
     keeps = takes_tails = True
 
-    def __init__(self, groups: int) -> None:
-        self._dtype = records.photon_record(groups).dtype
+    def __init__(self, photon: Struct) -> None:
+        self._photon = photon
         self._forgotten = NoRecords()
         self.nonfinite_photons = 0
         self.dropped = 0
@@ -80,7 +82,7 @@ class WatchedRecords:
     def keep(self, photons: moderngl.Buffer, batch: Batch, stride: int, of: RoundOf) -> None:
         """Check the batch; nothing is kept."""
         if batch.photons:
-            self._watch(np.frombuffer(photons.read(batch.photons * stride), self._dtype))
+            self._watch(read_records(self._photon, photons, batch.photons))
 
     def _watch(self, photons: np.ndarray) -> None:
         self.watched += len(photons)
@@ -128,7 +130,7 @@ class Probe:
 def light_pass(context: Context, scene: Scene, settings: RenderSettings) -> Iterator[tuple[LightPass, WatchedRecords]]:
     """The prepared light pass of `scene` and the checks of its photons; everything is freed afterwards."""
     buffers = scene_buffers(context, scene, settings)
-    watched = WatchedRecords(buffers.features.spectral_groups)
+    watched = WatchedRecords(records.photon_record_of(buffers.features, context.traits.packs_records))
     light = LightPass(context, scene, settings, buffers.features, buffers, photon_records=watched)
     try:
         light.prepare()

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from ...features.features import Features
 from ...gpu.map_channels import MapChannels
+from ...gpu.packed_records import write_records
 from ...gpu.records import NONE, RECEIVER, photon_record
 from ...gpu.splat_tables import SplatTables
 from ...gpu.tiles import Tile, pack
@@ -36,20 +37,18 @@ class Rig:
     bands: Sequence[tuple[float, float]] = WHOLE_BAND
     channels: MapChannels = field(default_factory=MapChannels)
     axis: SpectralAxis = field(default_factory=lambda: SpectralAxis.build([]))
-    coarse: tuple[tuple[int, int], np.ndarray, float] | None = None
-    """Size, rows (2, 4) and texel area of a coarser window."""
+    coarser: Sequence[tuple[tuple[int, int], np.ndarray, float]] = ()
+    """Size, rows (2, 4) and texel area of windows, each round the one before."""
     by_compute: bool | None = None
     """Whether compute shaders add the splats; None as the device likes it."""
 
     def __post_init__(self) -> None:
         self.tables = SplatTables.build(self.ctx, self.axis, [self.light], [None], [self.bands], self.channels)
-        sizes = [self.size] if self.coarse is None else [self.size, self.coarse[0]]
-        self.tiles, atlas_size = pack(sizes)
-        placements = placement_rows(self.tiles[0], IDENTITY_ROWS, 1.0)
-        if self.coarse is not None:
-            placements["next"] = 1
-            placements = np.concatenate([placements, placement_rows(self.tiles[1], self.coarse[1], self.coarse[2])])
-            assert placements["next"][1] == NONE
+        windows = [(self.size, IDENTITY_ROWS, 1.0), *self.coarser]
+        self.tiles, atlas_size = pack([size for size, _, _ in windows])
+        placed = zip(self.tiles, windows, strict=True)
+        placements = np.concatenate([placement_rows(tile, rows, area) for tile, (_, rows, area) in placed])
+        placements["next"] = [*range(1, len(windows)), NONE]
         self.atlas = MapAtlas(self.ctx, atlas_size, placements, self.features.targets)
         self.receivers = self.ctx.buffer(RECEIVER.zeros(1))
         self.variable = SpectralVariables.build(self.ctx, np.linspace(0.0, 1.0, 1025)[None])
@@ -61,7 +60,9 @@ class Rig:
         self.atlas.clear()
         self.splatter.footprints.reset_counts()
         for part in np.array_split(photons, np.arange(batch, len(photons), batch)) if batch else [photons]:
-            buffer = self.ctx.buffer(part)
+            struct = self.splatter.footprints.photon
+            buffer = self.ctx.buffer(reserve=len(part) * struct.stride)
+            write_records(struct, buffer, part)
             self.splatter.run(Photons(buffer, len(part)), self.spectra, self.atlas, self.receivers, smoothing)
             buffer.release()
         return self.atlas.read_tile(self.tiles[tile]).astype(np.float64)
