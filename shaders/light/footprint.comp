@@ -410,39 +410,45 @@ void make_splats(uint i) {
         Depicted depicted = Depicted(photon, middle, sweep, power_w, mean, table, table_band, side, thin);
         bool has_images = true;
         if (REINDEXED) has_images = carries;
-        splat_texels[slot * uint(SplatRecord_TEXELS)].y = has_images ? put_images(depicted, at, slot + uint(SLOTS)) : 0u;
+        splat_texels[slot * uint(SplatRecord_TEXELS)].y =
+            has_images ? put_images(depicted, at, slot + uint(SLOTS)) : 0u;
     }
 
-    // In the coarser windows round it, as far as what is drawn reaches over a finer one's border.
-    vec2 centre = fine_centre, extent = fine_extent;
-    int level = 1;
-    uint next = placements[at].next;
-    for (; level < SLOTS && next != NONE; ++level) {
-        Placement outer = placements[next];
-        if (shown && is_only_fine(centre, extent + LEVEL_REACH * max(extent.x, extent.y), drawn_in, outer, photon.position)) break;
-        // Far from the camera, texels of its pixels are the larger ones.
-        Footprint g = footprint_in(outer, photon, middle, sweep);
-        float held_there = held_size(outer, photon, g);
-        if (held_there < 1.0) {
-            shrink(photon, middle, sweep, held_there);
-            g = footprint_in(outer, photon, middle, sweep);
+    if (SLOTS > 1) {
+        // In the coarser windows round it, as far as what is drawn reaches over a finer one's border.
+        vec2 centre = fine_centre, extent = fine_extent;
+        int level = 1;
+        uint next = placements[at].next;
+        for (; level < SLOTS && next != NONE; ++level) {
+            Placement outer = placements[next];
+            if (shown
+                && is_only_fine(
+                    centre, extent + LEVEL_REACH * max(extent.x, extent.y), drawn_in, outer, photon.position))
+                break;
+            // Far from the camera, texels of its pixels are the larger ones.
+            Footprint g = footprint_in(outer, photon, middle, sweep);
+            float held_there = held_size(outer, photon, g);
+            if (held_there < 1.0) {
+                shrink(photon, middle, sweep, held_there);
+                g = footprint_in(outer, photon, middle, sweep);
+            }
+            within |= steps_within(outer.rect, g, photon);
+            uint wide = choose_level(next, g, photon, middle, sweep);
+            if (shown && is_only_fine(centre, extent, drawn_in, placements[wide], photon.position)) break;
+            SplatRecord coarse = splat_of(photon, power_w, mean, g, table, table_band);
+            coarse.rect = placements[wide].rect;
+            centre = coarse.centre;
+            extent = half_extent(coarse);
+            if (!touches(coarse.rect, centre, extent)) coarse.kind = 0u;
+            if (REINDEXED && !carries) coarse.kind = 0u;
+            keep_within_lines(coarse, 0u, 1.0);
+            put(slot + uint(level), coarse);
+            shown = true;
+            drawn_in = wide;
+            next = outer.next;
         }
-        within |= steps_within(outer.rect, g, photon);
-        uint wide = choose_level(next, g, photon, middle, sweep);
-        if (shown && is_only_fine(centre, extent, drawn_in, placements[wide], photon.position)) break;
-        SplatRecord coarse = splat_of(photon, power_w, mean, g, table, table_band);
-        coarse.rect = placements[wide].rect;
-        centre = coarse.centre;
-        extent = half_extent(coarse);
-        if (!touches(coarse.rect, centre, extent)) coarse.kind = 0u;
-        if (REINDEXED && !carries) coarse.kind = 0u;
-        keep_within_lines(coarse, 0u, 1.0);
-        put(slot + uint(level), coarse);
-        shown = true;
-        drawn_in = wide;
-        next = outer.next;
+        for (; level < SLOTS; ++level) splat_texels[(slot + uint(level)) * uint(SplatRecord_TEXELS)] = uvec4(0u);
     }
-    for (; level < SLOTS; ++level) splat_texels[(slot + uint(level)) * uint(SplatRecord_TEXELS)] = uvec4(0u);
 
     sums[own].x += power_w * (1.0 - share_within(photon, within));
 }

@@ -10,13 +10,14 @@ from spectrasplat.base.paths import shipped_scenes
 from spectrasplat.features import facts
 from spectrasplat.features.features import Features
 from spectrasplat.features.receivers import MOST_IMAGES
+from spectrasplat.gpu.packed_records import read_records
 from spectrasplat.model.geometry.primitives import box, plane
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.optics.glass import constant
 from spectrasplat.model.scene import Camera, Diffuse, Scene, SceneObject
 from spectrasplat.model.scene_camera import camera_frame
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.passes.footprint import SPLAT, Footprints
+from spectrasplat.passes.footprint import Footprints
 from spectrasplat.render.still import render
 from spectrasplat.stress.rigs.probe import light_pass
 from spectrasplat.stress.rigs.scene_parts import SUN, solid, stage, turn
@@ -153,7 +154,7 @@ def test_images_keep_to_their_photons_slots(gl, monkeypatch: pytest.MonkeyPatch)
 
     def run(self: Footprints, *arguments: object) -> None:
         real(self, *arguments)  # type: ignore[arg-type]
-        splats = np.frombuffer(self.splats.read(), SPLAT.dtype)[:: self.slots_per_photon]
+        splats = read_records(self.splat, self.splats, self.capacity)[:: self.slots_per_photon]
         found.append(int(splats["images"].max()))
 
     monkeypatch.setattr(Footprints, "run", run)
