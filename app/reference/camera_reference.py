@@ -24,7 +24,6 @@ from ..model.scene_key import picture_key
 from .code_key import code_key
 from .rounds import (
     PARTS,
-    Cancelled,
     Kind,
     Limits,
     PartsRun,
@@ -127,7 +126,6 @@ class CameraRun(PartsRun):
         self.units[part] += count
 
 
-_SEED = 1
 _CAUSTIC_SHARE = 0.5
 """Share of the progress bar for the caustic, where one must be made."""
 
@@ -143,25 +141,17 @@ def render_camera_reference(
     width: int,
     height: int,
     *,
-    samples: int | None = None,
-    seconds: float | None = None,
-    target_relmse: float | None = None,
+    samples: int,
     seed: int = 1,
     max_depth: int = MAX_DEPTH,
     caustic: SpectralCaustic | None = None,
-    progress: Progress = lambda fraction, text: None,
-    cancelled: Cancelled = lambda: False,
 ) -> Picture:
-    """What the camera of `scene` sees, until `samples` a pixel, `seconds` or `target_relmse` is reached, whichever
-    comes first.
+    """What the camera of `scene` sees, of `samples` a pixel.
 
     `caustic` (`spectral_caustic.build_caustic`, made of the same scene) adds the light that came by glass and mirrors;
-    without it such light is missing. What was done when `cancelled()` turned true is kept. Raises ValueError without
-    any limit, UserError without numba or where too many solids nest.
+    without it such light is missing. Raises UserError without numba or where too many solids nest.
     """
-    progress(0.0, "preparing")
-    limits = Limits(samples, seconds, target_relmse)
-    return continue_run(CameraRun(scene, width, height, max_depth, seed, caustic), limits, progress, cancelled)
+    return continue_run(CameraRun(scene, width, height, max_depth, seed, caustic), Limits(samples))
 
 
 def cached_camera_reference(
@@ -175,12 +165,11 @@ def cached_camera_reference(
     max_depth: int = MAX_DEPTH,
     caustic: CausticPlan | None = None,
     progress: Progress = lambda fraction, text: None,
-    cancelled: Cancelled = lambda: False,
     folder: Path | None = None,
 ) -> Picture:
     """The stored picture where it is good enough, otherwise what is stored and more samples, stored again.
 
-    Limits as in `render_camera_reference`; `samples` counts those that are stored, `seconds` only the time spent now,
+    Limits as in `cached_reference`; `samples` counts those that are stored, `seconds` only the time spent now,
     the caustic's not counted. That is given as a plan and loaded, or made, only when samples are needed. A damaged file
     is ignored; a folder that cannot be written costs only the saving; an interrupt stores what is done.
     """
@@ -190,7 +179,7 @@ def cached_camera_reference(
         tables, noise = None, 0.0
         if caustic is not None:
             tables, noise = _caustic(scene, width, height, max_depth, caustic, folder, progress)
-        return CameraRun(scene, width, height, max_depth, _SEED, tables, noise)
+        return CameraRun(scene, width, height, max_depth, caustic=tables, caustic_relmse=noise)
 
     path = kept_path(camera_reference_key(scene, width, height, max_depth, caustic), folder)
     first = 0.0 if caustic is None else _CAUSTIC_SHARE
@@ -201,7 +190,6 @@ def cached_camera_reference(
         begin,
         Limits(samples, seconds, target_relmse),
         lambda done, text: progress(first + (1.0 - first) * done, text),
-        cancelled,
     )
 
 

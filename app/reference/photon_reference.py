@@ -27,7 +27,6 @@ from .rounds import (
     PARTS,
     RELMSE_EPSILON,
     TALLY_SIZE,
-    Cancelled,
     Kind,
     Limits,
     Pace,
@@ -59,7 +58,6 @@ _PILOT_BLOCK = 8
 _MAX_A_UNIT = 16
 """Points of the most important domain in a unit; every domain has at least one."""
 _LAST_POINT = 2**31
-_SEED = 1
 
 
 class ReferenceRun(PartsRun):
@@ -184,26 +182,11 @@ def reference_key(scene: Scene, width: int, height: int, max_depth: int) -> str:
 
 
 def render_reference(
-    scene: Scene,
-    width: int,
-    height: int,
-    *,
-    max_depth: int = 64,
-    photons: int | None = None,
-    seconds: float | None = None,
-    target_relmse: float | None = None,
-    seed: int = 1,
-    progress: Progress = lambda fraction, text: None,
-    cancelled: Cancelled = lambda: False,
+    scene: Scene, width: int, height: int, *, photons: int, max_depth: int = 64, seed: int = 1
 ) -> Picture:
-    """The caustic layer of `scene`, until `photons`, `seconds` or `target_relmse` is reached, whichever comes first.
-
-    What was done when `cancelled()` turned true is kept. Raises ValueError without any limit, UserError
-    without numba or where too many solids nest.
-    """
-    progress(0.0, "preparing")
-    limits = Limits(photons, seconds, target_relmse)
-    return continue_run(ReferenceRun(scene, width, height, max_depth, seed), limits, progress, cancelled)
+    """The caustic layer of `scene`, of so many photons. Raises UserError without numba or where too many solids
+    nest."""
+    return continue_run(ReferenceRun(scene, width, height, max_depth, seed), Limits(photons))
 
 
 def cached_reference(
@@ -216,20 +199,20 @@ def cached_reference(
     seconds: float | None = None,
     target_relmse: float | None = None,
     progress: Progress = lambda fraction, text: None,
-    cancelled: Cancelled = lambda: False,
     folder: Path | None = None,
 ) -> Picture:
     """The stored picture where it is good enough, otherwise what is stored and more photons, stored again.
 
-    Limits as in `render_reference`; `photons` counts those that are stored, `seconds` only the time spent
-    now: with `seconds` alone every call adds. A damaged file is ignored; a folder that cannot be written
-    costs only the saving. An interrupt (KeyboardInterrupt) stores what is done and is raised again.
+    It ends where `photons`, `seconds` or `target_relmse` is reached, whichever comes first; `photons` counts those that
+    are stored, `seconds` only the time spent now: with `seconds` alone every call adds. A damaged file is ignored; a
+    folder that cannot be written costs only the saving. An interrupt (KeyboardInterrupt) stores what is done and is
+    raised again. Raises ValueError without any limit.
     """
 
     def begin() -> ReferenceRun:
         progress(0.0, "preparing")
-        return ReferenceRun(scene, width, height, max_depth, _SEED)
+        return ReferenceRun(scene, width, height, max_depth)
 
     path = kept_path(reference_key(scene, width, height, max_depth), folder)
     limits = Limits(photons, seconds, target_relmse)
-    return continue_kept(path, KIND, (width, height), begin, limits, progress, cancelled)
+    return continue_kept(path, KIND, (width, height), begin, limits, progress)

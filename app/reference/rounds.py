@@ -35,7 +35,6 @@ _CHECK_SHARE = 0.1
 """Share of the time that may pass until the error is worked out again."""
 
 Progress = Callable[[float, str], None]
-Cancelled = Callable[[], bool]
 
 
 TALLY_SIZE = 9
@@ -236,11 +235,8 @@ def summed(kept: Mapping[str, ArrayLike], kind: Kind) -> Picture:
     return Picture(mean, variance, amount, float(seconds), names, kind.black_amount, int(photons), float(relmse))
 
 
-def continue_run(run: PartsRun, limits: Limits, progress: Progress, cancelled: Cancelled) -> Picture:
-    """Add rounds to `run` up to the first limit.
-
-    What was done when `cancelled()` turned true is kept. Raises ValueError without any limit.
-    """
+def continue_run(run: PartsRun, limits: Limits, progress: Progress = lambda fraction, text: None) -> Picture:
+    """Add rounds to `run` up to the first limit. Raises ValueError without any."""
     amount, seconds, target_relmse = limits.amount, limits.seconds, limits.target_relmse
     if amount is None and seconds is None and target_relmse is None:
         raise ValueError("a reference needs a limit: an amount, seconds or target_relmse")
@@ -261,7 +257,7 @@ def continue_run(run: PartsRun, limits: Limits, progress: Progress, cancelled: C
         done = max(reached)
         known = f", relMSE {error:.1e}" if np.isfinite(error) else ""
         progress(min(done, 1.0), f"{run.amount / one:{'.1f' if one > 1 else '.0f'}} {words}{known}")
-        if done >= 1.0 or run.exhausted or cancelled():
+        if done >= 1.0 or run.exhausted:
             return run.picture()
         run.advance(None if amount is None else amount - run.amount, None if seconds is None else seconds - spent)
 
@@ -331,7 +327,6 @@ def continue_kept(
     begin: Callable[[], PartsRun],
     limits: Limits,
     progress: Progress,
-    cancelled: Cancelled,
 ) -> Picture:
     """The picture (`size`: width, height) of what `path` holds, where that is good enough, otherwise of that and more,
     stored again.
@@ -348,7 +343,7 @@ def continue_kept(
         run.restore(stored)
     before = run.amount
     try:
-        return continue_run(run, limits, progress, cancelled)
+        return continue_run(run, limits, progress)
     finally:
         if run.amount > before:
             save_kept(path, **run.kept())

@@ -1,15 +1,12 @@
-"""What a stress run measured, and the same as JSON, which has no word for NaN."""
+"""What a stress run measured, and the same as JSON, in which numbers that are not finite are null."""
 
 from __future__ import annotations
 
-import json
-import math
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
+from operator import methodcaller
 from pathlib import Path
-from typing import Any
 
-import numpy as np
+import msgspec
 
 from ..base.atomic import atomic_output
 from .case import FLUX_CLOSURE, Case, Measurement
@@ -76,19 +73,15 @@ class StressResult:
 
 def write_json(result: StressResult, path: Path) -> None:
     """The whole result, in one piece or not at all. Raises `UserError` where it cannot be written."""
-    text = json.dumps(_plain(_record(result)), indent=1, ensure_ascii=False, allow_nan=False)
+    text = msgspec.json.encode(_record(result), enc_hook=methodcaller("item"))  # of numpy's numbers
     with atomic_output(path) as temporary:
-        temporary.write_text(text + "\n", encoding="utf-8")
+        temporary.write_bytes(msgspec.json.format(text, indent=1) + b"\n")
 
 
-def _record(result: StressResult) -> dict[str, Any]:
+def _record(result: StressResult) -> dict[str, object]:
     return {
-        "version": result.version,
-        "date": result.date,
-        "command": result.command,
-        "machine": result.machine,
+        **{name: value for name, value in vars(result).items() if name not in ("cases", "asked")},
         "partial": result.partial,
-        "seconds": result.seconds,
         "cases_asked": result.asked,
         "flux_closure": FLUX_CLOSURE,
         "broken": result.broken(),
@@ -107,19 +100,3 @@ def _record(result: StressResult) -> dict[str, Any]:
             for found in result.cases
         ],
     }
-
-
-def _plain(value: Any) -> Any:
-    """What JSON can say; numbers that it cannot are "NaN", "Infinity", "-Infinity"."""
-    if isinstance(value, Mapping):
-        return {name: _plain(inner) for name, inner in value.items()}
-    if isinstance(value, list):
-        return [_plain(inner) for inner in value]
-    if value is None or isinstance(value, str | int):
-        return value
-    if isinstance(value, np.integer):
-        return int(value)
-    value = float(value)
-    if math.isfinite(value):
-        return value
-    return "NaN" if math.isnan(value) else ("Infinity" if value > 0.0 else "-Infinity")

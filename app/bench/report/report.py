@@ -1,7 +1,7 @@
 """Writes what a bench run has found: plots as PNG and SVG, and one page that needs no other file.
 
     DIR/plots/SCENE_error_time.png .svg    DIR/plots/SCENE_error_photons.png .svg (the camera pass: _samples)
-    DIR/plots/speed_up.png .svg            DIR/plots/scenes.png .svg (the README's figure)
+    DIR/plots/scenes.png .svg (the README's figure)
     DIR/report.html, DIR/tables.md
 
 A run that was stopped can be reported as well: what is missing is named in its place.
@@ -12,9 +12,6 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
-
-from markupsafe import Markup
 
 from ...base.atomic import atomic_output
 from ...base.errors import UserError
@@ -23,9 +20,6 @@ from ..measured_passes import MEASURED_PASSES
 from ..results import BenchResult, SceneResult
 from . import curve_plots, pictures, run_plots, style, tables, text
 from .page import PROSE, inlined, render
-
-if TYPE_CHECKING:
-    pass
 
 
 def write_report(result: BenchResult, directory: Path) -> None:
@@ -44,14 +38,10 @@ def write_report(result: BenchResult, directory: Path) -> None:
         for index, (scene, name) in enumerate(zip(result.scenes, names, strict=True)):
             progress(index / (len(names) + 1), scene.scene)
             scenes.append(_scene(scene, name, plots))
-        headline, curve = run_plots.speed_up_over_error(result), None
-        if headline is not None:
-            label = "speed-up of srd over the best baseline against target error, by scene"
-            curve = inlined(style.save(headline, plots / "speed_up"), "speed-up", label)
         readme_plot(result, plots / "scenes")
         progress(1.0, "page")
     with atomic_output(directory / "report.html") as temporary:
-        temporary.write_text(document(result, scenes, curve), encoding="utf-8")
+        temporary.write_text(document(result, scenes), encoding="utf-8")
     with atomic_output(directory / "tables.md") as temporary:
         temporary.write_text(tables.markdown(result), encoding="utf-8")
 
@@ -69,7 +59,7 @@ def file_names(scenes: list[str]) -> list[str]:
     for scene in scenes:
         base = re.sub(r"[^A-Za-z0-9_-]+", "_", scene)[:60].strip("_") or "scene"
         name, count = base, 1
-        while name in taken or name in ("speed_up", "scenes"):
+        while name in taken or name == "scenes":
             count += 1
             name = f"{base}_{count}"
         taken.append(name)
@@ -79,8 +69,8 @@ def file_names(scenes: list[str]) -> list[str]:
 # -- the page -----------------------------------------------------------------------------
 
 
-def document(result: BenchResult, scenes: Sequence[dict[str, object]], speed_up: Markup | None) -> str:
-    """The whole page; `speed_up`: over the best baseline in all scenes, drawn."""
+def document(result: BenchResult, scenes: Sequence[dict[str, object]]) -> str:
+    """The whole page."""
     prose, settings, count = PROSE[result.settings.measured_pass], result.settings, len(result.scenes)
     measured = MEASURED_PASSES[settings.measured_pass]
     used = style.by_rank(sorted({curve.method for scene in result.scenes for curve in scene.curves}))
@@ -98,7 +88,6 @@ def document(result: BenchResult, scenes: Sequence[dict[str, object]], speed_up:
             f"{text.seeds_text(settings.seeds)}, {count} scene{'' if count == 1 else 's'}",
         },
         scenes=scenes,
-        speed_up=speed_up,
         speed_ups=tables.summary_table(result),
         methods={name: prose.methods.get(name, "Not described.") for name in used},
         doubts=[(scene.scene, warning) for scene in result.scenes for warning in text.warnings_of(scene)],

@@ -191,17 +191,16 @@ def log_axis(
     name: str,
     limits: tuple[float, float],
     words: Callable[[float], str] = plain,
-    places: Sequence[float] = (),
 ) -> None:
-    """Makes axis "x" or "y" logarithmic, without minor ticks: ticks at `places`, or at powers of ten and, where these
-    are few, at three times them."""
-    from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
+    """Makes axis "x" or "y" logarithmic, without minor ticks: ticks at powers of ten and, where these are few, at three
+    times them."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
     axes.set(**{f"{name}scale": "log", f"{name}lim": limits})
     axis = axes.xaxis if name == "x" else axes.yaxis
     decades = math.log10(limits[1] / limits[0])
-    locator = LogLocator(subs=(1.0, 3.0) if decades < 3.2 else (1.0,), numticks=30 if decades < 15.0 else 9)
-    axis.set_major_locator(FixedLocator(places) if places else locator)
+    subs = (1.0, 3.0) if decades < 3.2 else (1.0,)
+    axis.set_major_locator(LogLocator(subs=subs, numticks=30 if decades < 15.0 else 9))
     axis.set_major_formatter(FuncFormatter(lambda value, _: words(value)))
     axis.set_minor_locator(NullLocator())
 
