@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 from .glsl_folding import end_of_statement
 
-MOST_ROUNDS = 4
+MOST_ROUNDS = 6
 _LOOP = re.compile(r"\bfor \(int (\w+) = 0; \1 < (\w+); \+\+\1\)\s*")
 
 
