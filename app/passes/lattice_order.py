@@ -7,12 +7,15 @@ shift; what a photon is does not depend on it, only its place in the buffer."""
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 GOLDEN = 2654435769
 """2^32 / golden ratio: the lattice's second coordinate (shaders/lib/lattice.glsl)."""
 _BITS = 12
 """Bits of each coordinate: 4096² cells are more than a batch has points."""
+_LEAST_BLOCK, _MOST_BLOCK = 1 << 7, 1 << 12
 
 
 def morton_order(points: int, stride: int, lattice_count: int) -> np.ndarray:
@@ -22,6 +25,19 @@ def morton_order(points: int, stride: int, lattice_count: int) -> np.ndarray:
     across = (index * np.uint64(GOLDEN) & np.uint64(0xFFFFFFFF)) >> np.uint64(32 - _BITS)
     key = _spread(along.astype(np.uint32)) | _spread(across.astype(np.uint32)) << np.uint32(1)
     return np.argsort(key, kind="stable").astype(np.uint32)
+
+
+def block_of(points: int) -> int:
+    """How many points that follow each other are put in order together: those of a work group then lie in a patch as
+    wide as it is high."""
+    return min(max(1 << round(0.5 * math.log2(32 * points)), _LEAST_BLOCK), _MOST_BLOCK)
+
+
+def block_orders(stride: int) -> np.ndarray:
+    """`morton_order` within blocks of every size, uint32; that of `block` points begins at its number. A block is a
+    narrow strip of the lattice, so its points are ordered along it alone."""
+    sizes = [1 << k for k in range(_LEAST_BLOCK.bit_length() - 1, _MOST_BLOCK.bit_length())]
+    return np.concatenate([np.zeros(sizes[0], np.uint32), *(morton_order(size, stride, 1 << 32) for size in sizes)])
 
 
 def _spread(value: np.ndarray) -> np.ndarray:

@@ -22,7 +22,7 @@ from ..gpu.device_traits import DeviceTraits
 from ..gpu.scene_buffers import UNBOUNDED, SceneBuffers
 from ..gpu.scene_records import SCENE_STRUCTS
 from .emission_domain import EmissionDomain
-from .lattice_order import morton_order
+from .lattice_order import block_of, block_orders, morton_order
 from .lattice_slice import LatticeSlice, Parts, points_of
 from .light_programs import light_defines
 from .ray_pool import STRUCTS as POOL_STRUCTS
@@ -178,7 +178,7 @@ class TracePass:
         self._defines = defines
         self._structs = structs
         self._emission: dict[tuple[str, bool], moderngl.ComputeShader] = {}
-        self._orders: dict[tuple[int, int, int], moderngl.Buffer] = {}
+        self._orders: dict[tuple[int, ...], moderngl.Buffer] = {}
         self._reports: list[moderngl.Buffer] = []
         self._photons_a_ray: dict[tuple[int, ...], float] = {}
         """Room that batches of some lights are given, as the last one needed it."""
@@ -321,7 +321,8 @@ class TracePass:
         self._emit_parameters.bind_to_storage_buffer(bindings.PARAMETERS)
         for piece, domain in parts:
             self._emit_parameters.write(self._emission_of(piece, domain).tobytes())
-            self.order(piece).bind_to_storage_buffer(bindings.INDICES)
+            order, first, count = self.order(piece)
+            order.bind_to_storage_buffer(bindings.INDICES, 4 * first, 4 * count)
             self._emit_program(domain).run(-(-piece.count // _GROUP))
             self._queue.emitted(piece.count)
 
@@ -443,14 +444,18 @@ class TracePass:
             p["tint_halfway"] = self.scene.tint_halfway[light]
         return p
 
-    def order(self, piece: LatticeSlice) -> moderngl.Buffer:
-        """The order in which `piece` is emitted, uint32 (points,); made by the processor where it is a new one."""
-        key = (piece.points, piece.stride, piece.lattice_count)
+    def order(self, piece: LatticeSlice) -> tuple[moderngl.Buffer, int, int]:
+        """The order in which `piece` is emitted, uint32: where it begins, and of how many points it is; made by the
+        processor where it is a new one. In a pool of rays it is of one block of points after the other, as another
+        number of points asks for no other order then."""
+        pooled = isinstance(self._queue, RayPool)
+        key = (piece.stride,) if pooled else (piece.points, piece.stride, piece.lattice_count)
         if key not in self._orders:
             if len(self._orders) >= _MAX_ORDERS * max(1, len(self.scene.scene.lights)):
                 self._orders.pop(next(iter(self._orders))).release()
-            self._orders[key] = self.context.ctx.buffer(morton_order(*key).tobytes())
-        return self._orders[key]
+            self._orders[key] = self.context.ctx.buffer(block_orders(*key) if pooled else morton_order(*key))
+        block = block_of(piece.points)
+        return (self._orders[key], block, block) if pooled else (self._orders[key], 0, piece.points)
 
     def _emit_program(self, domain: EmissionDomain) -> moderngl.ComputeShader:
         variant = domain.kind, domain.thinned is not None

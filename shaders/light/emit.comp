@@ -49,7 +49,9 @@ void main() {
     // One sub-lattice after the other, its points along a curve that keeps neighbours together.
     uint points = p.count / lattices;
     uint sub = k / points;
-    uint point = p.first + order[k % points] * p.stride;
+    // The points of a last block that is not whole keep their places.
+    uint at = k % points, block = uint(order.length()), within = at % block;
+    uint point = p.first + (at - within + block <= points ? at - within + order[within] : at) * p.stride;
     uint id = point * lattices + sub;
     uint band_index = sub % p.band_count;
     vec4 band = p.bands[band_index];

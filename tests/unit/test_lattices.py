@@ -10,7 +10,7 @@ import pytest
 from spectrasplat.gpu.dispatch_budget import DispatchBudget
 from spectrasplat.passes.beam_records import hull_areas
 from spectrasplat.passes.beam_splat import TEXELS, portion_end
-from spectrasplat.passes.lattice_order import GOLDEN, morton_order
+from spectrasplat.passes.lattice_order import GOLDEN, block_of, block_orders, morton_order
 from spectrasplat.passes.pixel_lattice import LOOKS, cells_of, looks_lattice, pixel_lattice
 from spectrasplat.render.pass_sizes import (
     ALPHA,
@@ -50,6 +50,10 @@ def test_eight_in_a_row_are_close(shift: tuple[float, float], stride: int) -> No
         apart -= np.round(apart)
         return float(np.median(np.linalg.norm(apart, axis=2).max(axis=1)) * np.sqrt(points))
 
+    block = block_of(points)
+    of_block = block_orders(stride)[block : 2 * block]
+    np.testing.assert_array_equal(np.sort(of_block), np.arange(block))
+    assert spread((np.arange(0, points, block)[:, None] + of_block).ravel()) < 6.0
     assert spread(morton_order(points, stride, lattice)) < 5.0
     assert spread(np.arange(points)) > 20.0
 
