@@ -296,14 +296,11 @@ class LightPass:
         count: int,
         coarsening: float = 1.0,
         tables: ShownTables | None = None,
-        maps: LightMaps | None = None,
-        stride: int = 1,
     ) -> Iterator[None]:
-        """Add every `stride`-th photon record to the maps, with footprints `coarsening` times as wide, see
-        `Splatting.steps`. `tables` of another plan than the one begun, `maps` of another layout than the light pass's
-        own."""
-        into = Deposit(maps or self.maps, self.stats, self.smoothing * coarsening)
-        yield from self.batches.splat(photons, count, into, tables, stride)
+        """Add photon records to the maps, with footprints `coarsening` times as wide, see `Splatting.steps`. `tables`
+        of another plan than the one begun."""
+        into = Deposit(self.maps, self.stats, self.smoothing * coarsening)
+        yield from self.batches.splat(photons, count, into, tables)
 
     def settling(self) -> Iterator[None]:
         """Sum up what is pending, so that the maps can be shown at once."""

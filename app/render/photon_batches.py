@@ -51,7 +51,7 @@ class PhotonBatches:
     def __init__(
         self, context: Context, trace: TracePass, shown: ShownSpectra, records: PhotonRecords, in_frames: bool
     ) -> None:
-        """`in_frames`: see `Splatting`."""
+        """`in_frames`: it takes little of every frame, and waits for the device at every pause."""
         self.trace = trace
         self.records = records
         self.splatting = Splatting(context, shown, in_frames)
@@ -197,23 +197,27 @@ class PhotonBatches:
         count: int,
         into: Deposit,
         tables: ShownTables | None = None,
-        stride: int = 1,
         held: tuple[moderngl.Buffer, int] | None = None,
     ) -> Iterator[None]:
-        """Add every `stride`-th photon record to maps, see `Splatting.steps`. `tables` of another plan than the one
-        begun."""
-        before, stats = self.splatting.seconds, into.stats
-        for _ in self.splatting.steps(photons, count, into.maps, tables or self.tables, into.smoothing, stride, held):
-            stats.splat_seconds += self.splatting.seconds - before
-            yield
-            before = self.splatting.seconds
-        stats.splat_seconds += self.splatting.seconds - before
+        """Add photon records to maps, see `Splatting.steps`. `tables` of another plan than the one begun."""
+        steps = self.splatting.steps(photons, count, into.maps, tables or self.tables, into.smoothing, held=held)
+        yield from self._timed(steps, into.stats)
 
     def settling(self, atlas: MapAtlas, stats: LightStats) -> Iterator[None]:
         """Sum up what is pending, so that maps can be shown at once."""
-        before = self.splatting.seconds
-        yield from self.splatting.summing(atlas)
-        stats.splat_seconds += self.splatting.seconds - before
+        yield from self._timed(self.splatting.summing(atlas), stats)
+
+    def _timed(self, steps: Iterator[None], stats: LightStats) -> Iterator[None]:
+        """`steps` of splatting, which are waited for where frames have to be in time."""
+        goes_on = True
+        while goes_on:
+            started = time.perf_counter()
+            goes_on = next(steps, self) is not self
+            if self._waits:
+                self._context.finish()
+            stats.splat_seconds += time.perf_counter() - started
+            if goes_on:
+                yield
 
     def release(self) -> None:
         """Free everything."""

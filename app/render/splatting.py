@@ -36,20 +36,18 @@ SUMMING_SECONDS = 0.01
 
 
 class Splatting:
-    """Adds photons to maps as `shown` has them; `seconds` counts what it took."""
+    """Adds photons to maps as `shown` has them."""
 
     def __init__(self, context: Context, shown: ShownSpectra, in_frames: bool) -> None:
-        """`in_frames`: it takes little of every frame, and waits for the device at every pause."""
+        """`in_frames`: it takes little of every frame."""
         self._context = context
         self._shown = shown
         queued = context.traits.work_is_queued
-        self._waits = in_frames or not queued
         in_parts = in_frames and not queued
         self._accumulate = Accumulate(context.ctx) if in_parts else None
         """Where maps of several textures are summed up one by one before they have to be, as all together take longer
         than a frame."""
         self._most = SOFTWARE_PART if in_parts else 1 << 30
-        self.seconds = 0.0
         self.dispatch_seconds = DISPATCH_S if in_frames else UNSEEN_S
         """What a part may take where the device queues work, as the last ones have shown. Elsewhere parts stay, as sums
         in another order are rounded otherwise."""
@@ -79,13 +77,9 @@ class Splatting:
         spectra = SplatSpectra(self._shown.variables, tables.tables, self._shown.gains, tables.reindex)
         start = 0
         while start < count:
-            started = time.perf_counter()
             part = min(self._part.units if self._part else self._most, count - start)
             with self._context.timers.timing("splat", partial(self._learn, part) if self._part else None):
                 maps.splatter.run(all_photons.part(start, part), spectra, atlas, maps.receivers, smoothing)
-            if self._waits:
-                self._context.finish()
-            self.seconds += time.perf_counter() - started
             start += part
             if start < count:
                 yield
@@ -108,11 +102,8 @@ class Splatting:
                 started = time.perf_counter()
                 rows = min(dispatch_budget.units, height - row)
                 self._accumulate.run_rows(scratch, total, row, rows)
-                if self._waits:
-                    self._context.finish()
-                took = time.perf_counter() - started
-                dispatch_budget.learn(rows, took, SUMMING_SECONDS)
-                self.seconds += took
+                self._context.finish()
+                dispatch_budget.learn(rows, time.perf_counter() - started, SUMMING_SECONDS)
                 row += rows
                 yield
         atlas.pending = 0

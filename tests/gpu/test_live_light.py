@@ -130,8 +130,11 @@ def into(light: LiveLight, fresh: LiveLight) -> np.ndarray:
     running, into_maps = fresh.stored.running, light.light_pass.maps
     assert running is not None
     into_maps.clear()
+    batches = fresh.light_pass.batches
     for slab in running.store.slabs:
-        for _ in fresh.light_pass.splat_steps(slab.buffer, slab.count, maps=into_maps):
+        for _ in batches.splatting.steps(
+            slab.buffer, slab.count, into_maps, batches.tables, fresh.light_pass.smoothing
+        ):
             pass
     into_maps.photon_weight = float(running.pass_photons)
     return maps(light)

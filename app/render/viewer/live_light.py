@@ -304,12 +304,13 @@ class LiveLight:
         stride = max(1, sum(slab.count for slab in slabs) // photons)
         share = rounds / kept.store.rounds_of_pass / stride
         wider = share**-0.5 * self.widening(kept.pass_photons * share)
+        steps, smoothing = self.light_pass.batches.splatting.steps, self.light_pass.smoothing * wider
         for slab in slabs:
             self.preview_photons += -(-slab.count // stride)
-            for _ in self.light_pass.splat_steps(
-                slab.buffer, -(-slab.count // stride), wider, kept.tables.preview, maps, stride
-            ):
+            for _ in steps(slab.buffer, -(-slab.count // stride), maps, kept.tables.preview, smoothing, stride):
                 pass
+        if not self._context.traits.work_is_queued:
+            self._context.finish()  # how long it took decides how many are splatted next time
         maps.photon_weight = kept.pass_photons * share
 
     # ---- the environment, and what receivers give each other ---------------------------------
