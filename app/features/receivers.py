@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..model.contacts import standing
-from ..model.environment_light import with_sun
+from ..model.panorama_lights import with_panorama_lights
 from ..model.scene import Camera, SceneObject
 from ..model.texture import Environment, Texture
 from . import facts as of_scenes
@@ -185,7 +185,7 @@ class PictureFeatures:
         lambda facts: facts.no_environment_light is None,
         why=lambda facts: (
             "every diffuse surface is lit by it, with visibility, also through glass and over mirrors"
-            + ("; its sun is a light of its own" if with_sun(facts.scene) is not facts.scene else "")
+            + ("; what is small and bright in it is a light of its own" if with_panorama_lights(facts.scene) is not facts.scene else "")
         ),
         why_not=lambda facts: facts.no_environment_light or "",
         names=("add_environment",),

@@ -355,7 +355,11 @@ EMIT_PARAMETERS = Struct(
         Field("aperture_centre", "vec3", "GPU space"),
         Field("first", "uint", "first lattice point of the batch"),
         Field("rect", "vec4", "domain corner and size"),
-        Field("cone", "vec2", "spot: inner, outer half angle; directional: tangent of the angular radius in x; rad"),
+        Field(
+            "cone",
+            "vec2",
+            "spot: inner, outer half angle, rad; plane: tangents of half a disc's angle, 0; of a rectangle's",
+        ),
         Field("shift", "uvec2", "lattice shift modulo 2^32"),
         Field("shift_light", "uvec2", "shift of the points on the light"),
         Field("light_place", "vec2", "where on the light in [0, 1]² when there is a single point"),

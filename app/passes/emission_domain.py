@@ -23,6 +23,8 @@ _MAX_SUBDIVIDED = 400_000
 _NEAR_ANTIPODE = 3.0 * _COARSE_ANGLE
 """Triangles this close (rad) to the point behind a light are bent too much on the plane to be held by their corners'
 box."""
+_FAR, _FACING = 100.0, 0.9999
+"""Distance of an area light in radii of the glass, and cosine to its axis, from which on its points are directions."""
 _SOFT_EDGE = 1.0 / 48.0
 """Room about an aperture, as a share of its size: emission spreads its edge over a lattice spacing on both sides
 (`lib/edge.glsl`), and what does not fit is lost. Enough for lattices of 2304 points; of 576, 0.4 % is lost."""
@@ -99,9 +101,16 @@ def emission_domain(
     direction = light.axes()[:, 2]
     corners = specular_triangles.reshape(-1, 3)
     middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
-    if light.is_parallel:
+    if light.is_parallel or _is_far(light, position, direction, corners - middle, middle):
         return _plane_domain(light, scene, space, specular_triangles, position, direction, middle)
     return _diverging_domain(light, space, specular_triangles, position, direction, middle)
+
+
+def _is_far(light: Light, position: np.ndarray, axis: np.ndarray, around: np.ndarray, middle: np.ndarray) -> bool:
+    """Whether an area light that faces the glass is so far away that its points are directions: all of them see all of
+    the glass alike, and a domain of directions would hardly hit it."""
+    distance, radius = float(np.linalg.norm(middle - position)), float(np.linalg.norm(around, axis=1).max())
+    return light.has_outline and distance > _FAR * radius and float((middle - position) @ axis) > _FACING * distance
 
 
 def _plane_domain(
@@ -114,20 +123,30 @@ def _plane_domain(
     middle: np.ndarray,
 ) -> EmissionDomain | None:
     tangent, bitangent, _ = light.axes().T
+    is_far, measure, tilt = not light.is_parallel, 1.0, np.full(2, np.tan(light.angular_radius))
+    cone = float(tilt[0]), 0.0
+    if is_far:
+        distance = float(np.linalg.norm(middle - position))
+        direction = (middle - position) / distance
+        bitangent = np.cross(direction, tangent) / np.linalg.norm(np.cross(direction, tangent))
+        tangent = np.cross(bitangent, direction)
+        tilt = np.array(light.half_extent) * space.scale / distance
+        cone = float(tilt[0]), 0.0 if light.is_disc else float(tilt[1])
+        # Of a rectangle each direction is weighted by itself.
+        measure = float(np.pi * tilt[0] ** 2 / (1.0 + tilt[0] ** 2) if light.is_disc else 4.0 * tilt.prod())
     frame = np.stack([tangent, bitangent])
-    if light.has_place:
+    if light.has_place and not is_far:
         # About the beam's own axis, where float32 resolves the thinnest beam.
         middle = middle + ((position - middle) @ frame.T) @ frame
     relative = triangles - middle
-    tilt = np.tan(light.angular_radius)
     low, high = _bounds(_in_frame(relative, frame))
-    if tilt > 0.0:
+    if tilt.any():
         near, far = _bounds(_in_frame(relative, direction[None, :]))
         grow = tilt * np.maximum(-near, far)
         low, high = low - grow, high + grow
     box_low, box_high = low.min(axis=0), high.max(axis=0)
     centre, light_u, light_v, is_disc, rim = middle, np.zeros(3), np.zeros(3), False, np.zeros(2)
-    if light.has_place:
+    if light.has_place and not is_far:
         half = np.array(light.half_extent) * space.scale
         light_u, light_v, is_disc = tangent / half[0], bitangent / half[1], light.is_disc
         rim = _SOFT_EDGE * 2.0 * half
@@ -143,7 +162,7 @@ def _plane_domain(
         mask &= _disc_mask(rect, np.zeros(2), half[0] + rim[0])
     if not mask.any():  # the beam misses
         return None
-    area = rect[2] * rect[3] / space.scale**2
+    area = measure * rect[2] * rect[3] / space.scale**2
     return EmissionDomain(
         "plane",
         centre,
@@ -158,7 +177,7 @@ def _plane_domain(
         light_v,
         middle,
         is_disc,
-        (float(tilt), 0.0),
+        cone,
     )
 
 

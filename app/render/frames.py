@@ -20,8 +20,8 @@ from ..features.features import Features
 from ..gpu import shader
 from ..gpu.context import Context
 from ..gpu.scene_buffers import SceneBuffers
-from ..model.environment_light import with_sun
 from ..model.optics.spectral_tables import SpectralAxis
+from ..model.panorama_lights import with_panorama_lights
 from ..model.scene import Camera, Scene
 from ..model.settings import RenderSettings
 from ..passes.bounce_light import LEAST_DIRECTIONS as LEAST_OF_BOUNCES
@@ -116,7 +116,7 @@ class FrameRenderer:
 
         Where light changes, `shader.keep_programs` on the context spares compiling every frame's programs."""
         self._context = context
-        stages = [_with_sun(s) for s in stages]
+        stages = [_with_lights(s) for s in stages]
         moves = any(s.camera != stages[0].camera for s in stages)
         # Light is traced once for all views, so no single one may decide what the programs leave out.
         self._settings = settings = replace(settings, any_view=settings.any_view or moves)
@@ -143,7 +143,7 @@ class FrameRenderer:
         """Render a frame, pausing with the share done. What was done when `stop()` turned true is a picture too."""
         self.seconds, self.phase, self._progress = FrameSeconds(), _PREPARING, self._progress_of_camera()
         yield from self._survey()
-        stage = _with_sun(stage)
+        stage = _with_lights(stage)
         if self.traced is None or not share_light(self.traced.inputs, inputs_of(stage, self._settings)):
             yield from self._trace(stage, stop)
         if not self._shows_map:
@@ -153,7 +153,7 @@ class FrameRenderer:
         """Make the light pass of `stage` ready to be traced by the caller: `light`, whose maps are empty."""
         yield from self._survey()
         self.release()
-        stage = _with_sun(stage)
+        stage = _with_lights(stage)
         self.traced = self._made(stage, inputs_of(stage, self._settings))
         for _ in self.traced.light.preparing():
             yield 0.0
@@ -298,7 +298,7 @@ class FrameRenderer:
         assert traced is not None and traced.camera_pass is not None, "steps() comes first, and not of a map"
         traced.camera_pass.release()
         traced.camera_pass = self._pass_of(traced, layer)
-        yield from self._see(_with_sun(stage), stop)
+        yield from self._see(_with_lights(stage), stop)
 
     def run(self, stage: Stage) -> np.ndarray:
         """The whole frame at once: `rgb` of it."""
@@ -375,6 +375,6 @@ class FrameRenderer:
         return SpectralAxis.build(glasses) if own.glasses and glasses else own
 
 
-def _with_sun(stage: Stage) -> Stage:
-    scene = with_sun(stage.scene)
+def _with_lights(stage: Stage) -> Stage:
+    scene = with_panorama_lights(stage.scene)
     return stage if scene is stage.scene else replace(stage, scene=scene)

@@ -17,7 +17,7 @@ from ..base.errors import UserError
 from ..edit.live_inputs import LiveInputs
 from ..edit.state import Compare, Selection
 from ..gpu.context_thread import no_thread
-from ..model.environment_light import with_sun
+from ..model.panorama_lights import with_panorama_lights
 from ..render.solo import scene_seen
 from ..render.viewer.dirty_level import DirtyLevel
 from ..render.viewer.invalidation import dirty_level
@@ -261,7 +261,7 @@ class Comparison:
         return not self._shows_reference and self._compare.method != FILE
 
     def _start_reference(self, begun: LiveInputs) -> None:
-        scene = scene_seen(with_sun(begun.scene), begun.camera, begun.solo_nm)
+        scene = scene_seen(with_panorama_lights(begun.scene), begun.camera, begun.solo_nm)
         self._thread = ReferenceThread(scene, begun.width, begun.height)
         self._direct = DirectPicture(self._context, self._find_thread(), scene, begun)
 

@@ -106,8 +106,11 @@ void main() {
             weight *= max(dot(direction, p.light_axis), 0.0);
         }
     } else {
-        vec2 tilt = concentric_disc(on_disc) * p.cone.x;
+        bool is_window = p.cone.y > 0.0;
+        vec2 tilt = is_window ? (2.0 * on_disc - 1.0) * p.cone : concentric_disc(on_disc) * p.cone.x;
         direction = normalize(p.axis + tilt.x * p.tangent + tilt.y * p.bitangent);
+        // Solid angle per area of the rectangle, and the cosine to the plane.
+        if (is_window) weight *= pow(dot(direction, p.axis), 4.0);
         vec3 across = q.x * p.tangent + q.y * p.bitangent;
         position = p.origin + across - p.back * direction;
         dposition_ds = p.spacing.x * p.tangent;
@@ -227,9 +230,9 @@ void main() {
             ray.dposition[COLUMNS - 1].xyz = reach * p.light_v;
 #endif
             if (LIGHT_PLANE) {
-                float reach = 0.5 * p.lamp_step * p.cone.x;
-                ray.ddirection[COLUMNS - 2].xyz = reach * (p.tangent - dot(p.tangent, direction) * direction);
-                ray.ddirection[COLUMNS - 1].xyz = reach * (p.bitangent - dot(p.bitangent, direction) * direction);
+                vec2 reach = p.lamp_step * (p.cone.y > 0.0 ? inversesqrt(3.0) * p.cone : vec2(0.5 * p.cone.x));
+                ray.ddirection[COLUMNS - 2].xyz = reach.x * (p.tangent - dot(p.tangent, direction) * direction);
+                ray.ddirection[COLUMNS - 1].xyz = reach.y * (p.bitangent - dot(p.bitangent, direction) * direction);
                 for (int c = COLUMNS - 2; c < COLUMNS; ++c) ray.dposition[c].xyz = -p.back * ray.ddirection[c].xyz;
             }
         }

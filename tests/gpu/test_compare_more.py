@@ -11,8 +11,8 @@ import pytest
 from spectrasplat.base.image_io import write_image
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.edit.state import Compare, Selection, State
-from spectrasplat.model.environment_light import with_sun
 from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.panorama_lights import with_panorama_lights
 from spectrasplat.ui.compare import Comparison
 from spectrasplat.ui.compared_with import GlassSwap, of_height, resized
 from spectrasplat.ui.direct_picture import DirectPicture
@@ -172,7 +172,7 @@ def test_the_reference_has_the_light_of_the_environment(gl, tmp_path: Path) -> N
     engine.target_photons = 20_000
     engine.set(state.live_inputs)
     until(lambda: engine.picture is not None and engine.is_idle, lambda: engine.advance(0.1))
-    direct = DirectPicture(gl, None, with_sun(scene), state.live_inputs)
+    direct = DirectPicture(gl, None, with_panorama_lights(scene), state.live_inputs)
     until(lambda: direct.is_done, lambda: direct.advance(0.1))
     live = read(engine.picture)
     assert np.median(np.abs(direct.rgb - live)) < 0.01 * live.mean()

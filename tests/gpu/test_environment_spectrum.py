@@ -4,11 +4,13 @@ paths of single wavelengths (`reference.gathered`), by blocks of 8 × 8 texels."
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 from reference.gathered import irradiance
+from spectrasplat.edit.parameters import Stage
 from spectrasplat.features.features import Features
 from spectrasplat.gpu.context import Context
 from spectrasplat.model.environment import constant
@@ -19,12 +21,14 @@ from spectrasplat.model.materials import Absorption
 from spectrasplat.model.optics.colorimetry import VISIBLE_NM
 from spectrasplat.model.optics.glass import from_abbe
 from spectrasplat.model.optics.spectral_tables import SpectralAxis
+from spectrasplat.model.panorama_lights import with_panorama_lights
 from spectrasplat.model.placement import rotation_about
-from spectrasplat.model.scene import Camera, Dielectric, Diffuse, Scene, SceneObject
+from spectrasplat.model.scene import Black, Camera, Dielectric, Diffuse, Scene, SceneObject
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.model.texture import Environment
 from spectrasplat.passes.environment_light import EnvironmentLightPass
 from spectrasplat.render.device_scene import scene_buffers
+from spectrasplat.render.frames import FrameRenderer
 
 FLINT = from_abbe(1.7847, 25.7)
 APEX_DEG, ELEVATION_DEG, HEIGHT, BLOCK = 30.0, 15.0, 0.9, 8
@@ -149,3 +153,35 @@ def test_only_dispersive_glass_has_it() -> None:
     settings = RenderSettings()
     assert Features.of(lit, settings).environment_spectrum
     assert not Features.of(plain, settings).environment_spectrum
+
+
+@pytest.mark.parametrize("method", ["srd", "srd-photons"])
+def test_a_window_is_a_light_whose_caustic_is_that_of_single_wavelengths(gl: Context, method: str) -> None:
+    """A narrow window's spectrum behind a prism, by beams and by photons, seen from straight above; what else arrives
+    is that of a black prism."""
+    lit, size, extent, block = scene_of(prism(), window(10.0, 1.5, 300.0)), (48, 32), 1.6, 4
+    camera = Camera((-0.8, 0.0, 5.0), (-0.8, 0.0, 0.0), (0.0, 1.0, 0.0), "orthographic", vertical_extent=extent)
+    assert [light.kind for light in with_panorama_lights(lit).lights] == ["area"]
+    lit = replace(lit, camera=camera)
+    dark = replace(lit, objects=(replace(lit.objects[0], material=Black()), lit.objects[1]))
+    light = np.zeros((size[1], size[0], 3))
+    for scene, sign in ((lit, 1.0), (dark, -1.0)):
+        stage = Stage(scene, camera)
+        renderer = FrameRenderer(gl, RenderSettings(*size, spp=4, photons=10000, method=method), [stage])
+        try:
+            light += sign * math.pi / 0.7 * renderer.run(stage).astype(float)
+        finally:
+            renderer.release()
+    shown = light.reshape(size[1] // block, block, size[0] // block, block, 3).mean(axis=(1, 3))
+    side = block * extent / size[1]
+    x, y = np.meshgrid(
+        -0.8 + side * (np.arange(size[0] // block) - 0.5 * size[0] // block), side * np.arange(4, -4, -1)
+    )
+    corners = np.stack([x, y - side, 0.0 * x], axis=-1)
+    bright = (shown.sum(axis=2) > 0.1 * shown.sum(axis=2).max()) & (x < -0.4)
+    sides = np.broadcast_to(side * np.eye(3)[:2], (bright.sum(), 2, 3))
+    expected, got = irradiance(lit, corners[bright], sides, 20000), shown[bright]
+    error = np.sqrt(((got - expected) ** 2).sum() / (expected**2).sum())
+    print(method, bright.sum(), "error", error, got.mean(axis=0) / expected.mean(axis=0))
+    np.testing.assert_allclose(got.mean(axis=0), expected.mean(axis=0), rtol=0.04)
+    assert error < 0.1

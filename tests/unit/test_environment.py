@@ -28,14 +28,15 @@ from spectrasplat.model.environment import (
 from spectrasplat.model.environment_light import (
     EnvironmentLight,
     lighting_environment,
-    sun_of,
     why_no_environment_light,
-    with_sun,
 )
 from spectrasplat.model.geometry import primitives
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.io.scene_save import save_scene
+from spectrasplat.model.lights.light import Light
+from spectrasplat.model.lights.outlined import AreaLight
 from spectrasplat.model.optics.colorimetry import xyz_to_rgb709
+from spectrasplat.model.panorama_lights import PanoramaWindow, lights_of, with_panorama_lights
 from spectrasplat.model.scene import Black, Camera, Diffuse, Scene, SceneObject
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.model.texture import Environment
@@ -309,9 +310,7 @@ def sunny(elevation_deg: float, azimuth_deg: float, radius_deg: float = 1.0, sun
 @pytest.mark.parametrize("azimuth_deg", [30.0, 180.0, -179.5])
 def test_the_sun_of_a_panorama_is_found_where_it_stands(azimuth_deg: float) -> None:
     panorama = sunny(35.0, azimuth_deg)
-    found = sun_of(panorama)
-    assert found is not None
-    light, rest = found
+    (light,), rest = lights_of(panorama)
     elevation, azimuth = math.radians(35.0), math.radians(azimuth_deg)
     expected = math.cos(elevation) * math.cos(azimuth), math.cos(elevation) * math.sin(azimuth), math.sin(elevation)
     assert np.dot(light.direction, expected) < -math.cos(math.radians(0.3))
@@ -322,14 +321,73 @@ def test_the_sun_of_a_panorama_is_found_where_it_stands(azimuth_deg: float) -> N
     np.testing.assert_allclose(left + xyz_to_rgb709(light.spectral_power.xyz()), whole, rtol=4e-3)
 
 
-def test_soft_boxes_and_weak_spots_are_no_sun() -> None:
-    assert sun_of(sunny(35.0, 10.0, radius_deg=6.0)) is None
-    assert sun_of(sunny(35.0, 10.0, sun=15.0)) is None
+def test_wide_glows_and_weak_spots_are_no_lights() -> None:
+    assert lights_of(sunny(35.0, 10.0, radius_deg=14.0))[0] == ()
+    assert lights_of(sunny(35.0, 10.0, sun=15.0))[0] == ()
     scene = Scene("s", Camera((0, -1, 1), (0, 0, 0)), (), (), environment=sunny(35.0, 10.0))
-    lit = with_sun(scene)
-    assert len(lit.lights) == 1 and with_sun(scene) is lit and with_sun(lit) is lit
+    lit = with_panorama_lights(scene)
+    assert len(lit.lights) == 1 and with_panorama_lights(scene) is lit and with_panorama_lights(lit) is lit
     unlit = replace(scene, environment=replace(scene.environment, lights=False))
-    assert with_sun(unlit) is unlit
+    assert with_panorama_lights(unlit) is unlit
+
+
+def several() -> tuple[Environment, list[PanoramaWindow]]:
+    """A room with a sun, an upright and a tilted window and a round lamp, each all of one radiance."""
+    height, width, fine = 256, 512, 4
+    u, v = ((np.arange(fine * n) + 0.5) / (fine * n) for n in (width, height))
+    toward = direction_of(Environment(np.zeros((1, 1, 3), np.float32)), *np.meshgrid(u, v))
+    rgb, made = np.full((*toward.shape[:2], 3), 0.05), []
+    for azimuth_deg, up, roll_deg, half, is_disc, radiance in (
+        (40.0, 0.3, 0.0, (0.012, 0.012), True, (4e3, 3e3, 2e3)),
+        (150.0, 0.2, 0.0, (0.10, 0.15), False, (20.0, 22.0, 25.0)),
+        (-178.0, 0.9, 25.0, (0.06, 0.14), False, (30.0, 30.0, 30.0)),
+        (-70.0, -0.3, 0.0, (0.08, 0.08), True, (60.0, 40.0, 20.0)),
+    ):
+        azimuth, roll = math.radians(azimuth_deg), math.radians(roll_deg)
+        middle = np.array([math.cos(azimuth), math.sin(azimuth), up]) / math.hypot(1.0, up)
+        level = np.array([-math.sin(azimuth), math.cos(azimuth), 0.0])
+        tangent = math.cos(roll) * level + math.sin(roll) * np.cross(middle, level)
+        made.append(PanoramaWindow(middle, tangent, half, is_disc, np.array(radiance)))
+        rgb += made[-1].covers(toward)[..., None] * made[-1].radiance
+    texels = rgb.reshape(height, fine, width, fine, 3).mean(axis=(1, 3)).astype(np.float32)
+    return Environment(texels, lights=True), made
+
+
+def received(light: Light, toward: np.ndarray) -> float:
+    """Irradiance at the origin over a light's own quantity, on a plane across `toward`."""
+    if not isinstance(light, AreaLight):
+        return max(-float(np.array(light.direction) @ toward), 0.0)
+    u, v = (g.ravel() for g in np.meshgrid(*2 * [(np.arange(200) + 0.5) / 100.0 - 1.0]))
+    u, v = (c[u * u + v * v < 1.0] if light.is_disc else c for c in (u, v))
+    tangent, across, axis = light.axes().T
+    half = light.half_extent
+    way = np.array(light.position) + half[0] * u[:, None] * tangent + half[1] * v[:, None] * across
+    distance = np.linalg.norm(way, axis=1)
+    return float((np.maximum(way @ toward, 0.0) * -(way @ axis) / distance**4).mean()) * light.area
+
+
+def test_a_panorama_holds_several_lights_and_their_sum_is_the_panorama() -> None:
+    panorama, made = several()
+    found, rest = lights_of(panorama)
+    assert len(found) == len(made) and abs(rest.rgb).max() < 0.2 * panorama.rgb.max()
+    for expected in made[1:]:
+        like = [each for each in found if isinstance(each, PanoramaWindow) and each.toward @ expected.toward > 0.9999]
+        assert len(like) == 1 and like[0].is_disc == expected.is_disc
+        assert sorted(like[0].half) == pytest.approx(sorted(expected.half), rel=0.03)
+        np.testing.assert_allclose(like[0].radiance, expected.radiance, rtol=0.01)
+        assert (
+            expected.is_disc
+            or abs(like[0].tangent @ expected.tangent) % 1.0 == pytest.approx(0.0, abs=0.02)
+            or (abs(like[0].tangent @ expected.tangent) > 0.999)
+        )
+    # Their light on planes across each of them.
+    scene = with_panorama_lights(Scene("s", Camera((0, -1, 1), (0, 0, 0)), (), (), environment=panorama))
+    assert len({light.name for light in scene.lights}) == 4
+    for toward in (each.toward for each in made):
+        whole, left = (irradiance(EnvironmentLight(e), toward, 1 << 14) for e in (panorama, rest))
+        for light in scene.lights:
+            left = left + xyz_to_rgb709(light.spectral_power.xyz()) * received(light, toward)
+        np.testing.assert_allclose(left, whole, rtol=0.01)
 
 
 SCENE = """

@@ -19,7 +19,7 @@ import numpy as np
 from ...base.errors import UserError
 from ...edit.live_inputs import LiveInputs
 from ...gpu import shader
-from ...model.environment_light import with_sun
+from ...model.panorama_lights import with_panorama_lights
 from ...passes.caustic_maps import CausticMaps
 from ..light_maps import LightMaps
 from ..sampling import MovingBeams
@@ -121,7 +121,7 @@ class LiveEngine(EngineAnswers):
 
     def set(self, inputs: LiveInputs) -> DirtyLevel:
         """Want `inputs` from now on; returns what has to be redone. The work is done by `advance`."""
-        if (scene := with_sun(inputs.scene)) is not inputs.scene:
+        if (scene := with_panorama_lights(inputs.scene)) is not inputs.scene:
             inputs = replace(inputs, scene=scene)
         before, self._wanted = self._wanted, inputs
         if before is not None and dirty_level(before, before, inputs) == DirtyLevel.NOTHING:
