@@ -185,7 +185,11 @@ class PictureFeatures:
         lambda facts: facts.no_environment_light is None,
         why=lambda facts: (
             "every diffuse surface is lit by it, with visibility, also through glass and over mirrors"
-            + ("; what is small and bright in it is a light of its own" if with_panorama_lights(facts.scene) is not facts.scene else "")
+            + (
+                "; what is small and bright in it is a light of its own"
+                if with_panorama_lights(facts.scene) is not facts.scene
+                else ""
+            )
         ),
         why_not=lambda facts: facts.no_environment_light or "",
         names=("add_environment",),

@@ -25,6 +25,7 @@ from .optics.spectrum import Spectrum
 from .scene import Scene
 from .scene_checks import MAX_LIGHTS
 from .texture import Environment
+from .vectors import Vec3
 
 SUN, WINDOW = "sun of the panorama", "window of the panorama"
 _MOST = 8
@@ -74,12 +75,12 @@ class PanoramaWindow:
 
     def light(self, name: str, centre: np.ndarray, distance: float) -> AreaLight:
         """Seen from `centre` (3,): so far away that it looks the same from everywhere near."""
-        x, y, z = (float(c) for c in centre + distance * self.toward)
         width, height = (2.0 * distance * half for half in self.half)
-        shape = {"shape": "disc", "radius": 0.5 * width} if self.is_disc else {"width": width, "height": height}
-        values = {"shape": "rectangle"} | shape
-        tangent, direction = (tuple(float(c) for c in axis) for axis in (self.tangent, -self.toward))
-        return AreaLight(name, _spectrum(self.radiance), (x, y, z), direction, tangent, **values)
+        tangent, direction = _vector(self.tangent), _vector(-self.toward)
+        position, radiance = _vector(centre + distance * self.toward), _spectrum(self.radiance)
+        if self.is_disc:
+            return AreaLight(name, radiance, position, direction, tangent, "disc", 0.5 * width)
+        return AreaLight(name, radiance, position, direction, tangent, "rectangle", width=width, height=height)
 
 
 _found: WeakKeyDictionary[Environment, tuple[tuple[DirectionalLight | PanoramaWindow, ...], Environment]] = (
@@ -129,7 +130,7 @@ def lights_of(environment: Environment) -> tuple[tuple[DirectionalLight | Panora
     rgb = np.asarray(environment.rgb, float)
     edges = np.cos(np.pi * np.arange(rgb.shape[0] + 1) / rgb.shape[0])
     solid = np.broadcast_to(((edges[:-1] - edges[1:]) * 2.0 * np.pi / rgb.shape[1])[:, None], rgb.shape[:2])
-    total, found = float((rgb.mean(axis=2) * solid).sum()), []
+    total, found = float((rgb.mean(axis=2) * solid).sum()), list[DirectionalLight | PanoramaWindow]()
     for spot, ring in _regions(rgb.mean(axis=2)):
         around = np.median(rgb[ring], axis=0)
         excess = np.maximum(rgb[spot] - around, 0.0)
@@ -174,15 +175,16 @@ def _regions(bright: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         left[spot] = 0.0
 
 
-def _sun(environment: Environment, spot: np.ndarray, excess: np.ndarray, flux: np.ndarray, solid: np.ndarray):
+def _sun(
+    environment: Environment, spot: np.ndarray, excess: np.ndarray, flux: np.ndarray, solid: np.ndarray
+) -> DirectionalLight:
     weights = excess.mean(axis=1) * solid
     toward = weights @ _directions(environment, spot)
     toward /= np.linalg.norm(toward)
     # A disc of the brightest texel's radiance has the same light.
     size = flux.mean() / excess.mean(axis=1).max()
     diameter = max(SUN_DIAMETER_DEG, 2.0 * math.degrees(math.asin(math.sqrt(min(size / math.pi, 1.0)))))
-    x, y, z = (float(-v) for v in toward)
-    return DirectionalLight(SUN, _spectrum(flux), (x, y, z), diameter)
+    return DirectionalLight(SUN, _spectrum(flux), _vector(-toward), diameter)
 
 
 def _window(
@@ -251,6 +253,11 @@ def _directions(environment: Environment, chosen: np.ndarray) -> np.ndarray:
     rows, columns = np.nonzero(chosen)
     height, width = chosen.shape
     return direction_of(environment, (columns + 0.5) / width, (rows + 0.5) / height)
+
+
+def _vector(values: np.ndarray) -> Vec3:
+    x, y, z = (float(v) for v in values)
+    return x, y, z
 
 
 def _spectrum(rgb: np.ndarray) -> Spectrum:
