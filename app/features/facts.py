@@ -95,6 +95,10 @@ class Facts:
         return self.having(lambda material: material.is_mirror)
 
     @cached_property
+    def films(self) -> list[SceneObject]:
+        return self.having(lambda material: material.film)
+
+    @cached_property
     def is_coloured(self) -> bool:
         """Some surface of glass or a mirror has a colour."""
         return bool(self.having(lambda m: (m.is_mirror or m.transmits) and m.is_coloured))
@@ -192,7 +196,7 @@ class Facts:
 
         if not (self.settings.editable or self.is_painted) or not divides_spectrum(self.settings.method):
             return False
-        if self.groups != 1 or self.absorbing or self.is_coloured or self.having(lambda m: m.is_grating):
+        if self.groups != 1 or self.absorbing or self.is_coloured or self.films or self.having(lambda m: m.is_grating):
             return False
         (turning,) = SpectralAxis.build([item.material.dispersion for item in self.glass]).turning_nm
         return len(turning) == 2

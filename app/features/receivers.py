@@ -198,8 +198,12 @@ class PictureFeatures:
     """What lies beyond everything lights receivers: camera rays look up how much."""
     environment_spectrum: bool = feature(
         "environment spectrum",
-        lambda facts: facts.no_environment_light is None and bool(facts.dispersive),
-        why=lambda facts: f"{names(o.material.dispersion for o in facts.dispersive)} disperses what passes through it",
+        lambda facts: facts.no_environment_light is None and bool(facts.dispersive or facts.films),
+        why=lambda facts: (
+            f"{names(o.material.dispersion for o in facts.dispersive)} disperses what passes through it"
+            if facts.dispersive
+            else f"films part its colours on {names(facts.films)}"
+        ),
         why_not=lambda facts: facts.no_environment_light or "nothing disperses",
         names=("environment_by", "reflect_spectrum", "keep_anchor"),
         cost="a dozen lookups of the environment a path through glass",

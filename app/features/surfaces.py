@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..model.contacts import contacts, overlapping_solids
+from ..model.optics.thin_films import ABOVE
 from ..model.settings import has_beams
 from .facts import Facts, beam_objects, listed, names, why_no_beams
 from .row import feature, size_words
@@ -50,6 +51,18 @@ class SurfaceFeatures:
         requires=("dielectrics",),
     )
     """Some surface of glass lets through only a share of what enters."""
+    films: bool = feature(
+        "thin films",
+        lambda facts: bool(facts.films),
+        symbol="HAS_FILM",
+        why=lambda facts: f"on {names(facts.films)}",
+        why_not="no surface has a film, and no mirror is of metal",
+        names=("film_mean", "meet_film", "light: share_by_film"),
+        cost=lambda facts, sizes: (
+            f"{size_words((ABOVE + 1) * sizes.spectrum)} and more a film; 16 lookups an event and lobe"
+        ),
+    )
+    """Some surface carries thin films, or is of metal: its shares are looked up by wavelength and angle."""
     absorption: bool = feature(
         "absorption",
         lambda facts: bool(facts.absorbing),
@@ -72,11 +85,11 @@ class SurfaceFeatures:
     """Some glass has a ground surface, whose microfacets turn paths by chance."""
     polarised: bool = feature(
         "polarisation",
-        lambda facts: facts.scene.render.polarisation and bool(facts.glass),
+        lambda facts: facts.scene.render.polarisation and bool(facts.glass or facts.films),
         symbol="POLARISED",
-        why="the scene asks for it, and there is glass to part s and p",
+        why="the scene asks for it, and there is glass or metal to part s and p",
         why_not=lambda facts: (
-            "there is no glass to part s and p"
+            "there is no glass or metal to part s and p"
             if facts.scene.render.polarisation
             else "[render] polarisation is not set"
         ),

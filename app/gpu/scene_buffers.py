@@ -14,6 +14,7 @@ import numpy as np
 from ..base.errors import UserError
 from ..features.features import Features
 from ..model.contacts import overlapping_solids
+from ..model.film_stacks import film_tables
 from ..model.optics import rough_surfaces
 from ..model.optics.colorimetry import VISIBLE_NM, mirror_reflectance
 from ..model.optics.glass import Dispersion
@@ -56,6 +57,8 @@ class SpectraLayout:
     """Likewise, where wavelengths are drawn at random: share of the draws below x (`wavelength_cdf`)."""
     rough_row: int
     """`rough_surfaces.glass_tables`."""
+    film_row: int
+    """`film_stacks.film_tables`."""
     rows: int
 
 
@@ -257,6 +260,7 @@ class SceneBuffers:
         """Row of each curve."""
         widths = rough_surfaces.distinct_widths(item.material.microfacet_width for item in self.scene.objects)
         nm, x = samples_of(self.axis)
+        films = film_tables(self.scene, nm, self.features.polarised)
         stack_bits = _stack_bits(self.scene) if self.features.medium_stack else {}
         records = OBJECT.zeros(len(self.scene.objects))
         for name in ("medium", "weight_row", "stack_bit", "receiver", "group", "texture"):
@@ -274,6 +278,7 @@ class SceneBuffers:
             if material.is_specular and (material.is_rough or not item.mesh.is_faceted):
                 size = self.space.scale * 0.5 * float(np.linalg.norm(np.ptp(self.world_meshes[index].vertices, axis=0)))
             if material.is_mirror:
+                record["colour"][1] = films.number.get(index, 0.0)
                 record["colour"][3] = size
                 record["weight_row"] = len(weights)
                 weights.append(mirror_reflectance(material.reflectance_rgb, nm))
@@ -286,7 +291,7 @@ class SceneBuffers:
                 if material.dispersion not in media:
                     media.append(material.dispersion)
                 record["medium"] = media.index(material.dispersion)
-                record["colour"][2:] = size, material.dispersion.n_d
+                record["colour"][1:] = films.number.get(index, 0.0), size, material.dispersion.n_d
                 if material.is_rough:
                     width = material.microfacet_width
                     record["colour"][:2] = width, rough_surfaces.GLASS_ROWS * widths.index(width)
@@ -335,7 +340,7 @@ class SceneBuffers:
             powers = [cumulative(self.axis, spectrum) for spectrum in behind]
             self.tint_halfway = [levels.halfway(light.spectral_power).reshape(-1, 4) for light in self.scene.lights]
         rows.append(np.array([power.at(x)[:, 3] for power in powers]).reshape(-1, SAMPLES))
-        rows += [self._draws(), rough_surfaces.glass_tables(widths, SAMPLES)]
+        rows += [self._draws(), rough_surfaces.glass_tables(widths, SAMPLES), films.rows]
         counts = np.cumsum([0] + [len(r) for r in rows])
         self.layout = SpectraLayout(*counts.tolist())
         self.variables = variables
@@ -352,6 +357,8 @@ class SceneBuffers:
             "STACK_SIZE": max(1, len(self.stack_objects)),
             "STACK_OBJECTS": "uint[](" + ", ".join(f"{o}u" for o in (self.stack_objects or [0])) + ")",
         }
+        if self.features.films:
+            self.defines |= {**films.defines, "FILM_ROW": self.layout.film_row}
         if self.features.rough:
             self.defines |= rough_surfaces.glass_defines(self.layout.rough_row)
 

@@ -62,8 +62,8 @@ OBJECT = Struct(
         Field(
             "colour",
             "vec4",
-            "linear Rec.709 reflectance (diffuse; mirror, w: its size); dielectric: GGX's width, its table's row, size "
-            "(half of its bounds' diagonal, GPU units), n_d",
+            "linear Rec.709 reflectance (diffuse); mirror, y: film, w: size; dielectric: GGX's width, its table's row "
+            "(polished: its film, 1 + its first row; 0: none), size (half of its bounds' diagonal, GPU units), n_d",
         ),
     ),
     texels=True,

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..base.errors import UserError
+from .contacts import overlapping_solids
 from .geometry.mesh import Mesh
 from .geometry.mesh_health import forms_of
 from .naming import listed
@@ -57,6 +58,7 @@ def check_scene(scene: Scene, file_name: str) -> list[str]:
     return (
         _glass_notes(glasses)
         + _sheet_notes(glasses)
+        + _film_notes(scene)
         + [
             f"light '{light.name}' has no power: it gives no light"
             for light in scene.lights
@@ -210,7 +212,7 @@ def check_lines(light: Light, glasses: Sequence[SceneObject], file_name: str) ->
 
 
 def _sheet_notes(glasses: list[SceneObject]) -> list[str]:
-    """What of thin sheets has no effect; sheets that are to be solid."""
+    """What of thin sheets and of films has no effect; sheets that are to be solid."""
     sheets = [o for o in glasses if o.material.thin]
     # Meshes from files got a note about open edges when they were read.
     open_ones = [o for o in glasses if o.material.is_solid and not o.mesh.source and not o.mesh.is_closed]
@@ -218,11 +220,22 @@ def _sheet_notes(glasses: list[SceneObject]) -> list[str]:
     notes = {
         "absorption has no effect in a thin sheet": [o for o in sheets if o.material.absorption is not None],
         "roughness has no effect in a thin sheet": [o for o in sheets if o.material.roughness],
+        "coating and film_nm have no effect on rough glass": [
+            o for o in glasses if o.material.is_rough and (o.material.coating or o.material.film_nm)
+        ],
         "an open sheet is taken as the face of a solid; thin = true makes it a pane": [
             o for o, form in zip(open_ones, opens, strict=True) if form == "sheet"
         ],
     }
     return [f"{listed([o.name for o in of])}: {what}" for what, of in notes.items() if of]
+
+
+def _film_notes(scene: Scene) -> list[str]:
+    """Where a coated solid touches another, it has no coating."""
+    coated = [o.name for o in (scene.objects[i] for i in overlapping_solids(scene)) if o.material.film is not None]
+    return (
+        [f"{listed(coated)}: a coating is one in air; where it touches other glass, light meets none"] if coated else []
+    )
 
 
 def _glass_notes(glasses: list[SceneObject]) -> list[str]:

@@ -12,6 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from .film_stacks import film_curves
 from .optics.colorimetry import VISIBLE_NM, cmf_xyz, mirror_reflectance
 from .optics.spectral_tables import SpectralAxis
 from .optics.spectrum import Spectrum
@@ -27,6 +28,8 @@ _PATHS = (0.5, 1.0, 2.0)
 """Lengths of glass, in mean chords of the solid."""
 _MIRRORS = (1, 4)
 """Reflections by a coloured mirror, or passages of a coloured surface of glass."""
+_LEAST_RIPPLE = 1e-3
+"""Of a film's curve: what it reflects, however little, is a colour."""
 _BRIGHTENED = 0.5
 """Share of the wanted tolerance by which the light's brightness may be off where footprints are so broad that all
 wavelengths of a band have one weight; twice `TOLERANCE` at least, for few are.
@@ -40,9 +43,9 @@ _WIDER = 1.0 + 1e-9
 
 
 def tint_curves(scene: Scene, but: np.ndarray | None = None) -> np.ndarray:
-    """(N, 401): what gets through each glass that absorbs, or is left by each mirror, on `VISIBLE_NM`; none twice.
-    `but`: coefficient (401,) of a glass that is left out."""
-    curves: dict[bytes, np.ndarray] = {}
+    """(N, 401): what gets through each glass that absorbs, or is left by each mirror or film, on `VISIBLE_NM`; none
+    twice. `but`: coefficient (401,) of a glass that is left out."""
+    curves = {curve.round(6).tobytes(): curve for curve in film_curves(scene) if np.ptp(curve) > _LEAST_RIPPLE}
     for item in scene.objects:
         material = item.material
         found: list[np.ndarray] = []

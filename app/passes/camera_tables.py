@@ -23,6 +23,7 @@ from ..gpu.running_sums import BIND_KNOTS, KNOTS, RunningSums, SumRow
 from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.scene_texels import spectra_texels
 from ..gpu.spectral_groups import SAMPLES, index_slope, samples_of
+from ..model.film_stacks import film_parts, film_tables
 from ..model.materials.diffuse import SMOOTH_ROUGHNESS
 from ..model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz, daylight_per_lumen, rgb_basis
 from ..model.optics.glass import Dispersion
@@ -170,6 +171,11 @@ class _Values:
             defines |= glass_defines(starts[-1] + 1)
         quantiles = np.interp(np.linspace(0.0, 1.0, SAMPLES), cell_cdf, np.linspace(0.0, 1.0, EMISSION_CELLS + 1))
         sampled = np.concatenate([quantiles[None], glass_tables(widths, SAMPLES)])
+        if scene.features.films:
+            films = film_tables(shown, axis.nm_of_samples(SAMPLES), scene.features.polarised)
+            parts_row = starts[-1] + len(sampled)
+            defines |= {**films.defines, "PARTS_ROW": parts_row, "FILM_ROW": parts_row + 2}
+            sampled = np.concatenate([sampled, film_parts(axis, SAMPLES), films.rows])
         emission = partial(_emission_rows, shown, channels, reflectances, maps, scene.space.scale)
         rows = _emission_defines(len(shown.lights), len(reflectances), maps)
         finishes, coats = _finishes(shown, starts[-1] + len(sampled))

@@ -21,6 +21,7 @@ from ..model.optics.spectrum import Spectrum, cmf_at
 from ..model.scene import Grating, Scene
 from .rough_albedo import albedo_tables
 from .scene_surfaces import Surfaces
+from .thin_films import Films, films_of
 
 BLACK, DIFFUSE, MIRROR, DIELECTRIC, GRATING, SHEET = range(6)
 OUTSIDE = -1
@@ -97,6 +98,7 @@ class PhotonScene(NamedTuple):
     """Nearer than this, what is no glass is silver, black or paint on what it touches."""
     polarised: bool
     """Paths carry their light's polarisation."""
+    films: Films
 
 
 class Colours(NamedTuple):
@@ -181,6 +183,7 @@ def photon_scene(scene: Scene) -> tuple[PhotonScene, np.ndarray]:
         _NEAR * size,
         _CONTACT * 2.0 ** round(float(np.log2(size))),
         scene.render.polarisation,
+        films_of(scene, TABLE_NM),
     ), centre
 
 

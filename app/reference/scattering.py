@@ -20,6 +20,7 @@ from .photon_scene import GRATING, MIRROR, SHEET
 from .polarised import amplitudes, senkrecht, share_of, turn_fields
 from .rough_albedo import masking, sent_on
 from .sampling import word_number
+from .thin_films import film_amplitudes
 from .vectors import across, combined, cross, dot, length, mixed_of, moved, negated, over
 
 AIR = -1
@@ -173,6 +174,12 @@ def _both_faces(a_s, a_p):
 
 
 @inlined
+def _film_share(scene, field, d, s, a_s, a_p):
+    """Share of the power that amplitudes leave, of a path's own state in a polarised scene."""
+    return share_of(field, d, s, a_s, a_p) if scene.polarised else 0.5 * (abs(a_s) ** 2 + abs(a_p) ** 2)
+
+
+@inlined
 def scatter(scene, triangle, place, u, v, d, mask, alone, nm, draw, noise, event, field):
     """One event at a place of glass, a mirror or a grating, met along `d`: (direction, mask, alone, on the object's
     inner side, is an event, share kept, whether `draw` mattered).
@@ -220,8 +227,14 @@ def scatter(scene, triangle, place, u, v, d, mask, alone, nm, draw, noise, event
     s, a_s, a_p = (0.0, 0.0, 0.0), complex(-1.0), complex(1.0)
     if scene.polarised:
         s = senkrecht(d, n)
+    has_film = scene.films.has[thing] and (mirror or sheet or before == AIR or after == AIR)
     if mirror:
         kept = table(scene.weights, scene.weight[thing], nm)
+        if has_film:
+            n_i = _refractive_index(scene, medium(scene, mask, alone), nm)
+            sine = math.sqrt(max(1.0 - cosine * cosine, 0.0))
+            a_s, a_p, t_s, t_p = film_amplitudes(scene.films, thing, 1.0, 1.0, n_i * sine, False, nm)
+            kept *= _film_share(scene, field, d, s, a_s, a_p)
     else:
         eta_it = _refractive_index(scene, before, nm) / _refractive_index(scene, after, nm)
         reflectance, cosine_t = fresnel(cosine, eta_it)
@@ -236,11 +249,23 @@ def scatter(scene, triangle, place, u, v, d, mask, alone, nm, draw, noise, event
                 a_s, a_p = t_s, t_p
         elif sheet:
             reflectance = 2.0 * reflectance / (1.0 + reflectance)
+        if has_film:
+            n_i, n_t = _refractive_index(scene, before, nm), _refractive_index(scene, after, nm)
+            sine = n_i * math.sqrt(max(1.0 - cosine * cosine, 0.0))
+            back = not entering
+            if back and not sheet:
+                n_i, n_t = n_t, n_i
+            a_s, a_p, t_s, t_p = film_amplitudes(scene.films, thing, n_i, n_t, sine, back, nm)
+            reflected, passed = _film_share(scene, field, d, s, a_s, a_p), _film_share(scene, field, d, s, t_s, t_p)
+            kept = reflected + passed if cosine_t > 0.0 or sheet else reflected
+            reflectance = reflected / kept
+            if draw >= reflectance:
+                a_s, a_p = t_s, t_p
         reflects, drawn = draw < reflectance, reflectance < 1.0
         if sheet:
             eta_it, cosine_t = 1.0, cosine
         if not reflects and scene.filter[thing] >= 0:
-            kept = table(scene.weights, scene.filter[thing], nm)
+            kept *= table(scene.weights, scene.filter[thing], nm)
     if reflects:
         r = moved(d, 2.0 * cosine, n)
         if width <= 0.0 and dot(r, g) <= 0.0:  # into the facet

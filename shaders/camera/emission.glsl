@@ -20,6 +20,13 @@ vec4 emission_until(uint row, int target, int cell) {
 // What a path lets through at the wavelength x.
 float transmitted(Path path, float x) {
     float kept = band_weight(path.band, path.throughput, x);
+#if HAS_FILM
+    // The mean over the part, as steep as from neighbour to neighbour.
+    float at = spectral_row(uint(PARTS_ROW + 1), x) * float(FILM_PARTS);
+    int part = min(int(at), FILM_PARTS - 1);
+    float slope = path.walk.films[min(part + 1, FILM_PARTS - 1)] - path.walk.films[max(part - 1, 0)];
+    kept *= max(path.walk.films[part] + 0.5 * slope * (at - float(part) - 0.5), 0.0);
+#endif
     if (ABSORPTION) {
         float depth = 0.0;
         for (int i = 0; i < ABSORBERS; ++i)
@@ -50,7 +57,7 @@ WavelengthInterval wavelength_interval(Path path, float lo, float hi) {
     interval.cell_lo = emission_cell(lo);
     interval.cell_hi = emission_cell(hi);
     interval.through = path.walk.inverse_pdf * transmitted(path, 0.5 * (lo + hi));
-    if (ABSORPTION) {
+    if (ABSORPTION || HAS_FILM) {
         interval.steps = max(1, int(ceil((hi - lo) * float(TINT_STEPS))));
     } else {
         interval.steps =

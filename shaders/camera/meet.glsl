@@ -50,6 +50,20 @@ void send_on(inout Path path, Event event, vec3 share, vec3 unhidden) {
     }
 }
 
+#if HAS_FILM
+// Leaves a path what a film reflects or lets through of each part of the spectrum.
+void leave_film_share(inout Path path, Event event, bool reflects) {
+    float from = 0.0;
+    for (int k = 0; k < FILM_PARTS; ++k) {
+        float to = spectral_row(uint(PARTS_ROW), float(k + 1) / float(FILM_PARTS)), x = 0.5 * (from + to);
+        float cosine = band_weights(path.band, event.film.cosine, vec3(x)).x, q = 0.0;
+        if (POLARISED) q = band_weights(path.band, event.seen.q, vec3(x)).x;
+        path.walk.films[k] *= film_between(event.film, reflects, cosine, q, from, to);
+        from = to;
+    }
+}
+#endif
+
 // One glass surface: `path` goes on, the other part is put on the stack or, if weak, one of them is chosen.
 void cross_glass(inout Path path, Path whole, Hit hit, Event event, uint pixel_key) {
     bool entering = dot(whole.direction, hit.normal_g) < 0.0, geometric;
@@ -99,25 +113,42 @@ void cross_glass(inout Path path, Path whole, Hit hit, Event event, uint pixel_k
     }
     bool reflects = total;
     float likely = total ? 1.0 : dot(event.reflectance, vec3(0.25, 0.5, 0.25));
+    vec3 let_through = transmittance_of(event);
+    if (FILM_MET(event) && !total) {
+        // What absorbs leaves less than all to both.
+        float onward = dot(let_through, vec3(0.25, 0.5, 0.25));
+        likely = clamp(likely / max(likely + onward, 1e-9), 0.05, 0.95);
+    }
     bool strong = !total
         && (begins || path.depth <= 1u || path.walk.branch_weight * min(likely, 1.0 - likely) > p.split_threshold);
     bool splits = strong && stack_size < STACK;
     if (strong && !splits) atomicAdd(fallbacks[FELL_STACK], 1u);
-    if (splits && mirror.reflectance.y > 0.0) {
+    if (splits && (FILM_MET(event) || mirror.reflectance.y > 0.0)) {
         mirrored.walk.branch_weight *= likely;
         mirrored.walk.key = hash_combine(mirrored.walk.key, 1u);
         leave_surface(mirrored, hit, !entering);
         vec3 unhidden = reflect_path(mirrored, mirror, geometric);
+#if HAS_FILM
+        if (FILM_MET(event)) {
+            leave_film_share(mirrored, mirror, true);
+            mirror.reflectance = vec3(1.0);
+        }
+#endif
         send_on(mirrored, mirror, mirror.reflectance, unhidden);
         if (mirrored.walk.inverse_pdf > 0.0) push(mirrored);
     }
-    vec3 share = total ? vec3(1.0) : 1.0 - event.reflectance;
+    vec3 share = total ? vec3(1.0) : let_through, reflected = event.reflectance;
+    if (FILM_MET(event)) share = reflected = vec3(1.0);
     if (!total && !splits) {
         reflects = choice(path, pixel_key) < likely;
-        share = (reflects ? event.reflectance : share) / (reflects ? likely : 1.0 - likely);
+        share = (reflects ? reflected : share) / (reflects ? likely : 1.0 - likely);
         path.walk.key = hash_combine(path.walk.key, reflects ? 3u : 4u);
     } else
         path.walk.branch_weight *= total ? 1.0 : 1.0 - likely;
+#if HAS_FILM
+    // Where only the facet's normal forbids it to go on, all of it is reflected.
+    if (FILM_MET(event) && (!total || event.cosine2.y <= 0.0)) leave_film_share(path, event, reflects);
+#endif
     vec3 unhidden;
     if (reflects)
         unhidden = reflect_path(path, event, geometric);
@@ -162,6 +193,9 @@ void meet_surface(inout Path path, Hit hit, uint kind, uint pixel_key) {
         MicrofacetDraw(p.sample_index, path.depth, hash_combine(pixel_key, 80u)));
     if (HAS_MIRROR && kind == KIND_MIRROR) {
         bool geometric;
+#if HAS_FILM
+        if (FILM_MET(event)) leave_film_share(path, event, true);
+#endif
         reflect_path(path, event, geometric);
         leave_surface(path, hit, dot(path.direction, hit.normal_g) < 0.0);
         vec3 colour = object_colours[hit.object].rgb;

@@ -22,6 +22,10 @@ struct Walk {
     uint ground;  // 1: a rough surface has turned it, and its pixel's columns are as broad as the lobe, which samples
                   // share out
     float coat_pdf;  // of its direction, where it comes from a coat: density by steradian; else 0
+#if HAS_FILM
+    // What thin films have left of as many parts of the spectrum.
+    float films[FILM_PARTS];
+#endif
     float lengths[ABSORBERS];  // way through each absorbing glass, GPU units; reflections by each coloured mirror
 };
 

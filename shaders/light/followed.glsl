@@ -51,14 +51,33 @@ void keep_anchor(inout Path path) {
     for (int t = 0; t < TINTS; ++t) path.walk.tint[t] *= represented(path.walk.taps, t);
 }
 
+#if HAS_FILM
+// What a film reflects or lets through at three wavelengths of a path; where they stand for red, green and blue, about
+// these.
+vec3 film_lobe(Path path, Event event, bool reflects, int t) {
+    vec3 x = path.walk.x[t], low = x, high = x, found;
+    if (!GATHERED_SPECTRUM) {
+        high = vec3(1.0, 0.5 * (x.xy + x.yz));
+        low = vec3(high.yz, 0.0);
+    }
+    float q = 0.0;
+    if (POLARISED) q = event.seen.q.y;
+    for (int c = 0; c < 3; ++c) found[c] = film_between(event.film, reflects, event.film.cosine.y, q, low[c], high[c]);
+    return found;
+}
+#endif
+
 // What glass reflects at all wavelengths that a path represents. Returns the probability of following the reflection:
 // the mean over those that are refracted with the anchor, `passing`.
 float reflect_spectrum(Path path, Event event, out vec3 reflected[TINTS], out uint passing) {
     float sum = 0.0;
     passing = 0u;
-    bool allowed = event.cosine2.y > 0.0 && event.reflectance.y < 1.0;
+    bool allowed = event.cosine2.y > 0.0 && (FILM_MET(event) || event.reflectance.y < 1.0);
     for (int t = 0; t < TINTS; ++t) {
         vec3 reflectance = allowed || event.cosine2.y <= 0.0 ? reflectance_at(path, event, path.walk.x[t]) : vec3(1.0);
+#if HAS_FILM
+        if (FILM_MET(event) && allowed) reflectance = min(film_lobe(path, event, true, t), 0.9999);
+#endif
         vec3 passes = represented(path.walk.taps, t) * vec3(lessThan(reflectance, vec3(1.0)));
         passing |= (uint(passes.x) | uint(passes.y) << 1u | uint(passes.z) << 2u) << uint(3 * t);
         sum += dot(passes, reflectance);
@@ -69,11 +88,16 @@ float reflect_spectrum(Path path, Event event, out vec3 reflected[TINTS], out ui
 
 // Weighs what a path represents by its shares in the lobe that is followed with probability `chance`. Each of n
 // wavelengths may have been the anchor: refracted ones are represented by those that are refracted.
-void weigh_spectrum(inout Path path, vec3 reflected[TINTS], uint passing, bool passes, float chance) {
+void weigh_spectrum(inout Path path, Event event, vec3 reflected[TINTS], uint passing, bool passes, float chance) {
     float per_passing = float(bitCount(path.walk.taps)) / max(float(bitCount(passing)), 1.0);
-    for (int t = 0; t < TINTS; ++t)
-        path.walk.tint[t] *= passes ? represented(passing, t) * (1.0 - reflected[t]) * (per_passing / (1.0 - chance))
-                                    : reflected[t] / chance;
+    for (int t = 0; t < TINTS; ++t) {
+        vec3 let_through = 1.0 - reflected[t];
+#if HAS_FILM
+        if (FILM_MET(event)) let_through = film_lobe(path, event, false, t);
+#endif
+        path.walk.tint[t] *=
+            passes ? represented(passing, t) * let_through * (per_passing / (1.0 - chance)) : reflected[t] / chance;
+    }
     if (passes) path.walk.taps = passing;
 }
 
@@ -116,14 +140,25 @@ FollowedRay follow_specular(
             bool passes = false, changes = true, geometric;
             vec3 unhidden = vec3(1.0);
             if (HAS_MIRROR && kind == KIND_MIRROR) tint_by(path.walk, uint(WEIGHT_ROW) + thing.weight_row, -1.0);
+#if HAS_FILM
+            for (int t = 0; t < TINTS && kind == KIND_MIRROR && FILM_MET(event); ++t)
+                path.walk.tint[t] *= film_lobe(path, event, true, t);
+#endif
             if (HAS_DIELECTRIC && IS_GLASS(kind)) {
                 changes = event.boundary.changes;
                 float chance = event.reflectance.y;
                 vec3 reflected[TINTS];
                 uint passing;
+#if HAS_FILM
+                bool by_film = FILM_MET(event) && !GATHERED_SPECTRUM && event.cosine2.y > 0.0;
+                if (by_film) chance = clamp(dot(film_lobe(path, event, true, 0), vec3(1.0 / 3.0)), 0.05, 0.95);
+#endif
                 if (GATHERED_SPECTRUM && changes) chance = reflect_spectrum(path, event, reflected, passing);
                 passes = !changes || (event.cosine2.y > 0.0 && unit_float(hash_combine(key, number)) >= chance);
-                if (GATHERED_SPECTRUM && changes) weigh_spectrum(path, reflected, passing, passes, chance);
+#if HAS_FILM
+                if (by_film) path.walk.tint[0] *= film_lobe(path, event, !passes, 0) / (passes ? 1.0 - chance : chance);
+#endif
+                if (GATHERED_SPECTRUM && changes) weigh_spectrum(path, event, reflected, passing, passes, chance);
                 if (!changes)
                     path.medium = event.boundary.behind;
                 else if (passes) {

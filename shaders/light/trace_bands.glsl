@@ -90,6 +90,17 @@ PassingPart passing_part(Path path, inout Event event, float onset) {
 #else
     float anchors = 1.0 - fresnel_reflectance(theta, eta.y, transmitted_cosine2(theta, eta.y));
 #endif
+#if HAS_FILM
+    if (FILM_MET(event)) {
+        Event of_part = event;
+        of_part.film.cosine = vec3(sqrt(max(transmitted_cosine2(theta, eta.y), 0.0)));
+        share_by_film(part.band, false, of_part);
+        anchors = of_part.transmittance.y;
+#ifdef POLARISED
+        event.transmission = of_part.transmission;
+#endif
+    }
+#endif
     part.let_through = event.refracted.exists
         ? vec3(low ? 1.0 - reflected.x : 0.0, anchors, low ? 0.0 : 1.0 - reflected.z)
         : vec3(0.0);

@@ -36,7 +36,7 @@ void leave_companions(inout Path path) {
 
 // What glass makes of the companions.
 struct Companions {
-    vec3 reflectance;
+    vec3 reflectance, transmittance;
     bool stay;  // with the hero where it is refracted: nothing disperses
 #if defined(HERO) && defined(POLARISED)
     vec3 s[3];
@@ -57,10 +57,29 @@ void keep_companions(inout Path path, Polarisation state) {
     path.walk.companion_v.xyz = state.v;
 }
 
+// A film's shares of theirs.
+void companions_by_film(Path path, Event event, inout Companions companions) {
+#if defined(HERO) && HAS_FILM
+    if (!FILM_MET(event)) return;
+#ifdef POLARISED
+    event.seen = companions.seen;
+#endif
+    event.film.cosine = event.film.cosine.yyy;
+    share_by_film(path.walk.companion_x.xyz, true, event);
+    companions.reflectance = event.reflectance;
+    companions.transmittance = event.transmittance;
+#ifdef POLARISED
+    companions.reflection = event.reflection;
+    companions.transmission = event.transmission;
+#endif
+#endif
+}
+
 // `is_glass`: it has met glass; else what turns the hero turns them.
 Companions companions_at(Path path, Event event, bool is_glass) {
     Companions companions;
     companions.reflectance = vec3(event.reflectance.y);
+    companions.transmittance = transmittance_of(event).yyy;
     companions.stay = true;
 #ifdef HERO
     if (POLARISED) {
@@ -69,7 +88,10 @@ Companions companions_at(Path path, Event event, bool is_glass) {
         companions.reflection = companions.transmission = event.reflection;
     }
 #ifdef HAS_DIELECTRIC
-    if (!is_glass) return companions;
+    if (!is_glass) {
+        companions_by_film(path, event, companions);
+        return companions;
+    }
     vec3 n_i, n_t;
     interface_indices(event.boundary, path.walk.companion_x.xyz, n_i, n_t);
     vec3 eta_it = n_i / n_t, theta = vec3(event.theta.y), cosine2 = transmitted_cosine2(theta, eta_it);
@@ -85,8 +107,11 @@ Companions companions_at(Path path, Event event, bool is_glass) {
     bool polished = true;
     if (ROUGH_SURFACES) polished = event.ground.width <= 0.0;
     if (polished && !event.refracted.exists && event.cosine2.y > 0.0) companions.reflectance = vec3(1.0);
+    companions.transmittance = 1.0 - companions.reflectance;
     companions.stay = IS_THIN(event.boundary) || all(lessThan(abs(eta_it - event.n_i.y / event.n_t.y), vec3(1e-7)));
+    if (!event.refracted.exists && event.cosine2.y > 0.0) return companions;
 #endif
+    companions_by_film(path, event, companions);
 #endif
     return companions;
 }

@@ -24,6 +24,7 @@ void send_on(inout Path child, Event event, vec3 share_over_band, vec3 companion
         outcome.absorbed_w -= carried_w(child);
         return;
     }
+    if (FILM_MET(event)) outcome.absorbed_w -= carried_w(child);
     outcome.what |= geometric ? FELL_NORMAL : 0u;
 }
 
@@ -55,7 +56,11 @@ void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object t
     if (HAS_MIRROR && kind == KIND_MIRROR) {
         vec3 kept = spectral_row(uint(WEIGHT_ROW) + thing.weight_row, path.band),
              of_companions = companion_row(path, uint(WEIGHT_ROW) + thing.weight_row);
-        float share = common_share(path, kept.y, of_companions);
+        if (HAS_FILM) {
+            kept *= FILM_MET(event) ? event.reflectance : vec3(1.0);
+            of_companions *= FILM_MET(event) ? companions.reflectance : vec3(1.0);
+        }
+        float share = common_share(path, share_of_lobe(event, kept), of_companions);
         outcome.what |= ABSORBED;
         send_on(child, event, kept, of_companions, unhidden, geometric, share, outcome);
         polarise_companions(child, companions, false);
@@ -69,11 +74,11 @@ void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object t
 #endif
 #ifdef HAS_DIELECTRIC
     bool splits = IS_GLASS(kind) && event.boundary.changes;
-    float reflected_share = common_share(path, event.reflectance.y, companions.reflectance);
+    vec3 let_through = transmittance_of(event);
+    float reflected_share = common_share(path, share_of_lobe(event, event.reflectance), companions.reflectance);
     // Refracted they stay together only where nothing disperses.
-    float refracted_share = companions.stay
-        ? common_share(path, 1.0 - event.reflectance.y, 1.0 - companions.reflectance)
-        : 1.0 - event.reflectance.y;
+    float refracted_share = share_of_lobe(event, let_through);
+    if (companions.stay) refracted_share = common_share(path, refracted_share, companions.transmittance);
     float at = -1.0, below = 0.0;
 #ifdef BAND_CUTS
     float onset = -1.0;
@@ -94,7 +99,7 @@ void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object t
 #endif
     if (splits) {
         // What neither of both parts has in the end, the surface keeps.
-        if (ROUGH_SURFACES && event.ground.width > 0.0) outcome.absorbed_w += carried_w(path);
+        if ((ROUGH_SURFACES && event.ground.width > 0.0) || FILM_MET(event)) outcome.absorbed_w += carried_w(path);
         float share = reflected_share;
         send_on(child, event, event.reflectance, companions.reflectance, unhidden, geometric, share, outcome);
         polarise_companions(child, companions, false);
@@ -132,7 +137,6 @@ void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object t
         lives = true;
     }
 #ifdef HAS_DIELECTRIC
-    vec3 let_through = 1.0 - event.reflectance;
     if (BAND_CUTS) {
         if (at >= 0.0) {
             child = part_of_band(start, at, start.band.z, 1.0 - below, 6u);
@@ -152,7 +156,7 @@ void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object t
     }
     if (splits && event.refracted.exists) {
         unhidden = refract_path(child, event);
-        send_on(child, event, let_through, 1.0 - companions.reflectance, unhidden, event.refracted.geometric,
+        send_on(child, event, let_through, companions.transmittance, unhidden, event.refracted.geometric,
             refracted_share, outcome);
         polarise_companions(child, companions, true);
         if (!companions.stay) leave_companions(child);

@@ -5,6 +5,9 @@
 
 #include "path/path.glsl"
 #include "path/microfacet.glsl"
+#if HAS_FILM
+#include "lib/film.glsl"
+#endif
 
 struct Event {
     ShadingFrame frame;
@@ -17,6 +20,10 @@ struct Event {
     Deflection refracted;
     vec3 theta;  // cosines of incidence there, below 0
     vec3 reflectance;
+#if HAS_FILM
+    Film film;
+    vec3 transmittance;  // of a film
+#endif
     vec3 s[3];  // of the planes of incidence there
     Polarisation seen;  // the path's state, counted from these
     FresnelPair reflection;
@@ -131,6 +138,58 @@ void see_polarised(Path path, inout Event event) {
     event.transmission = event.reflection;
 }
 
+#if HAS_FILM
+#define FILM_MET(event) (event.film.row != 0u)
+
+// The film that light meets, if any: between other media than it was made for, there is none.
+Film film_met(Path path, Hit hit, Object thing) {
+    bool ground = ROUGH_SURFACES && thing.kind == KIND_DIELECTRIC && thing.colour.x > 0.0;
+    return Film(ground ? 0u : uint(thing.colour.y), uint(dot(path.direction, hit.normal_g) > 0.0), vec3(1.0));
+}
+
+// What a film makes of light over a band, or `single`, of three wavelengths.
+void share_by_film(vec3 x, bool single, inout Event event) {
+    if (POLARISED) {
+        event.reflection = film_pair(event.film, event.film.back, x, single);
+        event.transmission = film_pair(event.film, FILM_PASSED, x, single);
+        event.reflectance = polarised_share(event.seen, event.reflection);
+        event.transmittance = polarised_share(event.seen, event.transmission);
+    } else {
+        event.reflectance = film_share(event.film, event.film.back, x, single);
+        event.transmittance = film_share(event.film, FILM_PASSED, x, single);
+        if (uint(FILM_TABLES) == 1u) {
+            event.reflectance = mix(event.reflectance, vec3(1.0), lessThan(event.film.cosine, vec3(0.0)));
+            event.transmittance = 1.0 - event.reflectance;
+        }
+    }
+}
+
+// A film's shares take the place of Fresnel's.
+void meet_film(Path path, bool solid, inout Event event) {
+    if (solid && event.boundary.before != NONE && event.boundary.after != NONE) event.film.row = 0u;
+    if (!FILM_MET(event)) return;
+    event.film.cosine = -event.theta;
+    if (solid && event.film.back == FILM_BACK) {
+        vec3 beyond = sqrt(max(-event.cosine2, 0.0) / max(event.n_i * event.n_i - 1.0, 1e-6));
+        event.film.cosine = mix(sqrt(max(event.cosine2, 0.0)), -beyond, lessThan(event.cosine2, vec3(0.0)));
+    }
+    share_by_film(path.band, false, event);
+}
+#else
+#define FILM_MET(event) false
+#endif
+
+// What a surface of glass lets through.
+vec3 transmittance_of(Event event) {
+#if HAS_FILM
+    if (FILM_MET(event)) return event.transmittance;
+#endif
+    return 1.0 - event.reflectance;
+}
+
+// The share of a lobe by which it is followed or not: its anchor's; in a film's ripples, of all the band.
+float share_of_lobe(Event event, vec3 share) { return FILM_MET(event) ? dot(share, vec3(0.25, 0.5, 0.25)) : share.y; }
+
 // What glass reflects of a path over its band, by Fresnel's equations, and where the rest goes.
 void share_out(Path path, inout Event event) {
     interface_indices(event.boundary, path.band, event.n_i, event.n_t);
@@ -150,12 +209,20 @@ void share_out(Path path, inout Event event) {
         event.reflectance = fresnel_reflectance(event.theta, eta_it, event.cosine2);
         event.reflectance = OF_SHEET(event.boundary, event.reflectance);
     }
+#if HAS_FILM
+    meet_film(path, !IS_THIN(event.boundary), event);
+#endif
     GO_STRAIGHT(event.boundary, event.theta, event.n_i, event.n_t, event.cosine2)
     event.refracted = refract_at(event.frame, path.direction, event.n_i.y / event.n_t.y);
     // Where only the facet's normal forbids it, nothing is transmitted at any wavelength; at total reflection each has
     // its own share. A microfacet's share is its own, also where the light that it lets through does not leave the
     // surface.
-    if (polished && !event.refracted.exists && event.cosine2.y > 0.0) event.reflectance = vec3(1.0);
+    if (polished && !event.refracted.exists && event.cosine2.y > 0.0) {
+        event.reflectance = vec3(1.0);
+#if HAS_FILM
+        event.transmittance = vec3(0.0);
+#endif
+    }
 }
 
 // What the glass of an event reflects at three other wavelengths of the path: unpolarised, by the columns.
@@ -182,12 +249,22 @@ bool parts_wavelengths(Event event) { return event.n_i.x * event.n_t.z != event.
 Event interact(Path path, Hit hit, Triangle facet, Object thing, MicrofacetDraw draw) {
     Event event = event_at(path, hit, facet);
     if (ROUGH_SURFACES && thing.kind == KIND_DIELECTRIC) meet_microfacet(path, thing, draw, event);
+#if HAS_FILM
+    event.film = film_met(path, hit, thing);
+#endif
     if (HAS_DIELECTRIC && IS_GLASS(thing.kind)) {
         event.boundary = cross_boundary(path.medium, hit.object, dot(path.direction, hit.normal_g) < 0.0);
         share_out(path, event);
         return event;
     }
     if (POLARISED) see_polarised(path, event);
+#if HAS_FILM
+    if (FILM_MET(event)) {
+        event.theta = incidence_over_band(path, event);
+        event.film.back = FILM_FRONT;
+        meet_film(path, false, event);
+    }
+#endif
     return event;
 }
 

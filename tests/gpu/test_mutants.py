@@ -211,6 +211,18 @@ MUTANTS = {
         "return distance;",
         "gpu/test_known_answers_gpu.py::test_t12_amici_prism_of_three_touching_solids[light]",
     ),
+    "a film's shares at a band's ends and anchor alone": Mutant(
+        "lib/film.glsl",
+        "if (!single) {",
+        "if (false) {",
+        "gpu/test_thin_films.py::test_a_patch_of_sun_behind_a_film[soap of 3 µm-srd]",
+    ),
+    "a camera's films not left out of what they pass": Mutant(
+        "camera/meet.glsl",
+        "path.walk.films[k] *= film_between",
+        "path.walk.films[k] = film_between",
+        "gpu/test_thin_films.py::test_films_as_the_reference_sees_them[False]",
+    ),
     "orders of a grating to the other side": Mutant(
         "lib/grating.glsl",
         "return side * normalize",

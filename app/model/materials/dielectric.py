@@ -10,9 +10,11 @@ from ..fields import Animated, Colour, Flag, Integer, Number, Row
 from ..optics import catalogue
 from ..optics.colorimetry import VISIBLE_NM
 from ..optics.glass import Dispersion
+from ..optics.thin_films import Film
 from ..optics.tints import tint_of
 from ..vectors import Vec3
 from .absorption import Absorption, AbsorptionPart
+from .coating import FILM_INDEX, FILM_NM, Coating, CoatingPart, film_of, film_words
 from .dispersion_file import DispersionPart
 from .material import Material, colour_words
 
@@ -65,6 +67,9 @@ class Dielectric(Material):
     """A sheet, both of whose faces are met at once: without inside, absorption and roughness."""
     transmittance_rgb: Vec3 = CLEAR
     """Linear Rec.709 share of what enters that leaves a sheet, or a solid on its other side."""
+    coating: Coating | None = None
+    film_nm: float = 0.0
+    film_index: float = 1.33
 
     kind: ClassVar = "glass"
     title: ClassVar = "Glass"
@@ -76,6 +81,9 @@ class Dielectric(Material):
         ROUGHNESS,
         THIN,
         Colour("transmittance_rgb", CLEAR, "colour", optional=True),
+        CoatingPart(),
+        FILM_NM,
+        FILM_INDEX,
     )
     is_specular: ClassVar = True
     transmits: ClassVar = True
@@ -86,12 +94,19 @@ class Dielectric(Material):
         return SHEET_CODE if self.thin else self.gpu_code
 
     @property
+    def film(self) -> Film | None:
+        """On its surface, if that is polished; a thin sheet may be one itself."""
+        return None if self.is_rough else film_of(self, self.dispersion if self.thin else None)
+
+    @property
     def why_no_beams(self) -> str | None:  # type: ignore[override]
         """Beams know clear polished solids alone."""
         if self.thin:
             return "it is a thin sheet"
         if self.filters:
             return "its surface is coloured"
+        if self.film is not None:
+            return "a thin film lies on it"
         return "its surface is rough" if self.is_rough else None
 
     @classmethod
@@ -109,7 +124,8 @@ class Dielectric(Material):
         """Its index on the visible grid, its priority, what it absorbs and lets through, how rough and thin it is."""
         absorbed = None if self.absorption is None else self.absorption.coefficient
         index = self.dispersion.index(VISIBLE_NM)
-        return index, self.priority, absorbed, self.thin, *self.transmittance_rgb, self.roughness
+        film = () if self.film is None else (self.film,)
+        return index, self.priority, absorbed, self.thin, *self.transmittance_rgb, self.roughness, *film
 
     def words(self) -> str:
         """Its glass, and what sets it apart from it."""
@@ -119,5 +135,6 @@ class Dielectric(Material):
         tint = None if self.absorption is None else tint_of(self.absorption.coefficient)
         words += "" if self.absorption is None else ", absorbing" if tint is None else f", tinted {tint[0].name}"
         words += "" if self.transmittance_rgb == CLEAR else f", surface {colour_words(self.transmittance_rgb)}"
+        words += film_words(self)
         words += ", thin" if self.thin else f", roughness {self.roughness:g}" if self.is_rough else ""
         return words + (f", priority {self.priority}" if self.priority else "")

@@ -47,6 +47,11 @@ class Material:
     """Linear Rec.709."""
     reflectance = cast(Any, None)
     """Spectral reflectance, (401,) on the visible grid (380 to 780 nm), which replaces `reflectance_rgb`; or None."""
+    film = cast(Any, None)
+    """The thin film on it, `optics.thin_films.Film`."""
+    coating = cast(Any, None)
+    film_nm = 0.0
+    metal = ""
     texture = cast(Any, None)
     absorption = cast(Any, None)
     roughness = cast(Any, None)

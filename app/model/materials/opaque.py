@@ -3,29 +3,86 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from pathlib import Path
+from typing import Any, ClassVar, Self
 
-from ..fields import Colour
+from ..fields import Colour, Number, Part
+from ..io.scene_table import SceneTable
+from ..optics.metals import find_metal, metals
+from ..optics.thin_films import Film
+from ..texture import TextureReader
 from ..vectors import Vec3
+from .coating import FILM_INDEX, FILM_NM, Coating, CoatingPart, film_of, film_words
 from .material import Material, colour_words
+
+
+class MetalPart(Part):
+    """`metal`: one whose index is known, or none: an ideal mirror."""
+
+    def read(self, table: SceneTable) -> dict[str, Any]:
+        """Its name."""
+        if not table.has("metal"):
+            return {"metal": ""}
+        return {"metal": find_metal(table.string("metal"), table.where("metal")).name}
+
+    def write(self, value: Any, path: Path | None) -> dict[str, Any]:
+        """The name."""
+        return {"metal": value.metal} if value.metal else {}
 
 
 @dataclass(frozen=True)
 class Mirror(Material):
-    """A perfect specular reflector with linear Rec.709 reflectance."""
+    """A specular reflector: ideal, with linear Rec.709 reflectance; or of polished metal, times that."""
 
     reflectance_rgb: Vec3 = (1.0, 1.0, 1.0)
+    metal: str = ""
+    coating: Coating | None = None
+    film_nm: float = 0.0
+    film_index: float = 1.33
 
     kind: ClassVar = "mirror"
     title: ClassVar = "Mirror"
     gpu_code: ClassVar = 2
-    parts: ClassVar = (Colour("reflectance_rgb", (1.0, 1.0, 1.0), "reflectance"),)
+    parts: ClassVar = (
+        Colour("reflectance_rgb", (1.0, 1.0, 1.0), "reflectance"),
+        MetalPart(),
+        CoatingPart(),
+        FILM_NM,
+        FILM_INDEX,
+    )
     is_specular: ClassVar = True
     is_mirror: ClassVar = True
 
+    @classmethod
+    def read(cls, table: SceneTable, textures: TextureReader) -> Self:
+        """An ideal mirror reflects all, whatever film lies on it."""
+        found = super().read(table, textures)
+        for key in ("coating", "film_nm"):
+            if not found.metal and table.has(key):
+                table.fail(key, f"has no effect on an ideal mirror: give 'metal' as well, one of {', '.join(metals())}")
+        return found
+
+    @property
+    def film(self) -> Film | None:
+        """Polished metal is one of no layers."""
+        return (film_of(self) or Film(())) if self.metal else None
+
+    @property
+    def why_no_beams(self) -> str | None:  # type: ignore[override]
+        """Beams know a mirror's colour, whatever the angle."""
+        return "it is of metal" if self.metal else None
+
+    def shown_numbers(self) -> tuple[Number, ...]:
+        """Those of a film have no effect on an ideal mirror."""
+        return super().shown_numbers() if self.metal else ()
+
+    def content(self) -> tuple[object, ...]:
+        """With its metal and what lies on it."""
+        return super().content() + (() if self.film is None else (self.metal, self.film))
+
     def words(self) -> str:
-        """With its colour."""
-        return f"mirror {colour_words(self.reflectance_rgb)}"
+        """With its metal and its colour."""
+        return f"mirror {self.metal or colour_words(self.reflectance_rgb)}{film_words(self)}"
 
 
 @dataclass(frozen=True)

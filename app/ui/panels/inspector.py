@@ -13,7 +13,9 @@ from ...edit.matrices import decompose
 from ...edit.objects import rename, set_diffuse_colour, set_material, set_position, set_rotation, set_scale
 from ...edit.state import Selection, State
 from ...model.materials import MATERIAL_KINDS
+from ...model.materials.coating import TITLES, preset
 from ...model.materials.diffuse import USUAL_COAT_INDEX, USUAL_ROUGHNESS
+from ...model.optics.metals import metals
 from ...model.scene import (
     Diffuse,
     Grating,
@@ -33,6 +35,7 @@ from .glass_values import abbe_text, own_numbers
 _KINDS = {cls.title: cls for cls in MATERIAL_KINDS.values()}
 _UNITS = "units"
 _MOST_HAZE = 1.0
+_OWN_LAYERS = "own"
 """On the slider: thicker haze is not thin."""
 _WRAPS = {"repeat": "Repeats", "clamp": "Its border continues"}
 
@@ -134,7 +137,7 @@ def _material(state: State, view_model: ViewModel, index: int) -> State:
         usual = _KINDS[wanted].usual()
         return edits.attempt(state, f"Make {thing.name} {wanted.lower()}", set_material, index, usual)
     if material.transmits:
-        return _surface_colour(_glass(_declared(state, index, material), material), index)
+        return _surface_colour(_films(_glass(_declared(state, index, material), material), index), index)
     if material.is_black:
         widgets.hint("Absorbs all light that meets it.")
         return state
@@ -142,6 +145,9 @@ def _material(state: State, view_model: ViewModel, index: int) -> State:
         state = _coat(state, index, material)
         material = state.scene.objects[index].material
     state = _declared(state, index, material)
+    if material.is_mirror:
+        state = _films(state, index)
+        material = state.scene.objects[index].material
     if isinstance(material, Grating):
         _orders(material)
     if material.receives:
@@ -179,6 +185,27 @@ def _coat(state: State, index: int, material: Diffuse) -> State:
     coated = material.changed(roughness=USUAL_ROUGHNESS if on else None, coat_index=USUAL_COAT_INDEX)
     label = f"Coat of {state.scene.objects[index].name}"
     return edits.attempt(state, label, set_material, index, coated)
+
+
+def _films(state: State, index: int) -> State:
+    """Of what metal a mirror is, and what coats it or glass."""
+    thing = state.scene.objects[index]
+    changed = thing.material
+    if changed.is_mirror:
+        tip = "What it is made of: a metal reflects as measured, at every wavelength and angle."
+        metal = widgets.combo("Metal", {"": "Ideal"} | {m: m.capitalize() for m in metals()}, changed.metal, tip=tip)
+        if metal != changed.metal:
+            changed = changed.changed(metal=metal, **({} if metal else {"coating": None, "film_nm": 0.0}))
+    if (changed.transmits and not changed.is_rough) or changed.metal:
+        present = "" if changed.coating is None else changed.coating.preset or _OWN_LAYERS
+        own = {_OWN_LAYERS: "Layers of its own"} if present == _OWN_LAYERS else {}
+        tip = "Thin layers on its surface. Layers of one's own are written in the scene file."
+        chosen = widgets.combo("Coating", {"": "None", **TITLES, **own}, present, tip=tip)
+        if chosen != present:
+            changed = changed.changed(coating=preset(chosen) if chosen else None)
+    if changed is thing.material:
+        return state
+    return edits.attempt(state, f"Coating of {thing.name}", set_material, index, changed)
 
 
 def _orders(material: Grating) -> None:

@@ -1,0 +1,114 @@
+"""Thin films and metals against exact integrals over the spectrum, through photons, camera and references."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from spectrasplat.gpu.context import Context
+from spectrasplat.model.film_stacks import film_stacks
+from spectrasplat.model.geometry.primitives import box, plane
+from spectrasplat.model.lights import DirectionalLight
+from spectrasplat.model.materials.coating import Coating, preset
+from spectrasplat.model.optics.colorimetry import VISIBLE_NM
+from spectrasplat.model.optics.glass import constant
+from spectrasplat.model.optics.metals import metals
+from spectrasplat.model.optics.spectrum import illuminant
+from spectrasplat.model.optics.thin_films import Film, Layer, power
+from spectrasplat.model.scene import Camera, Dielectric, Diffuse, Material, Mirror, Scene, SceneObject
+from spectrasplat.model.settings import RenderSettings
+from spectrasplat.reference.camera_reference import cached_camera_reference
+from spectrasplat.render.still import render
+from spectrasplat.stress.rigs.camera_probe import PROBE, daylight_mean, render_probe, resized, slope_sky, with_sky
+from spectrasplat.stress.rigs.probe import blocks
+
+from tests.gpu.camera_rig import at
+from tests.gpu.test_thin_sheets import tilted
+
+LUX = 1000.0
+GLASS = constant(1.5)
+WINDOW = Coating(Film((Layer(metals()["silver"], 15.0), Layer(constant(2.0), 60.0))))
+
+
+def soap(nm: float) -> Dielectric:
+    return Dielectric(constant(1.33), thin=True, film_nm=nm)
+
+
+COATED = Dielectric(GLASS, coating=preset("ar"))
+SHEETS = {
+    "soap of 1 nm": soap(1.0),
+    "soap of 400 nm": soap(400.0),
+    "soap of 3 µm": soap(3000.0),
+    "soap of 100 µm": soap(1e5),
+    "dichroic": Dielectric(GLASS, thin=True, coating=preset("dichroic-blue")),
+    "silvered": Dielectric(GLASS, thin=True, coating=WINDOW),
+    "half": Dielectric(GLASS, thin=True, coating=preset("beam-splitter")),
+}
+
+
+def shares(material: Material, cosine: float) -> tuple[np.ndarray, np.ndarray]:
+    """(401,) each: means over every nanometre of what it reflects and lets through."""
+    scene = Scene("one", Camera((0, 0, 1), (0, 0, 0)), (), (SceneObject("one", plane(1.0, 1.0), material),))
+    nm = VISIBLE_NM[:, None] + (np.arange(64) + 0.5) / 64.0 - 0.5
+    reflected, passed = power(film_stacks(scene)[0], cosine, nm.ravel())
+    return reflected.reshape(nm.shape).mean(axis=1), passed.reshape(nm.shape).mean(axis=1)
+
+
+def patch(above: SceneObject) -> Scene:
+    sun = DirectionalLight("sun", illuminant("D65").scaled_to_luminous(LUX), direction=(0.0, 0.0, -1.0))
+    floor = SceneObject("floor", plane(6.0, 6.0), Diffuse((0.5, 0.5, 0.5)))
+    camera = Camera((0.0, -6.0, 5.0), (0.0, 0.0, 0.0), vertical_fov_deg=2.0)
+    return Scene("patch", camera, (sun,), (floor, above))
+
+
+@pytest.mark.parametrize(
+    ("name", "method"),
+    [*((name, "srd") for name in SHEETS), ("soap of 400 nm", "hero"), ("silvered", "stochastic-even")],
+)
+def test_a_patch_of_sun_behind_a_film(gl: Context, name: str, method: str) -> None:
+    scene = patch(SceneObject("sheet", plane(1.0, 1.0), SHEETS[name], at(0.0, 0.0, 1.5)))
+    settings = RenderSettings(8, 8, photons=40_000, spp=16, method=method)
+    seen = render(scene, settings, context=gl).rgb.mean(axis=(0, 1))
+    expected = daylight_mean(shares(SHEETS[name], 1.0)[1])
+    assert seen == pytest.approx(LUX * 0.5 / np.pi * expected, rel=0.01, abs=1e-3 * LUX / np.pi)
+
+
+def test_a_coated_block_lets_more_through(gl: Context) -> None:
+    scene = patch(SceneObject("block", box((1.0, 1.0, 0.2)), COATED, at(0.0, 0.0, 1.5)))
+    seen = render(scene, RenderSettings(8, 8, photons=40_000, spp=16), context=gl).rgb.mean(axis=(0, 1))
+    reflected, passed = shares(COATED, 1.0)
+    expected = daylight_mean(passed**2 / (1.0 - reflected**2))
+    assert seen == pytest.approx(LUX * 0.5 / np.pi * expected, rel=3e-3)
+
+
+@pytest.mark.parametrize("degrees", [0.0, 50.0, 80.0])
+@pytest.mark.parametrize("polarised", [False, True])
+@pytest.mark.parametrize("name", [*SHEETS, "gold", "oiled aluminium"])
+def test_a_film_in_a_furnace(gl: Context, name: str, degrees: float, polarised: bool) -> None:
+    """All that comes back of white light: all of it, but for what metal absorbs."""
+    others = {"gold": Mirror(metal="gold"), "oiled aluminium": Mirror(metal="aluminium", film_nm=200.0, film_index=1.5)}
+    material = others.get(name) or SHEETS[name]
+    camera = Camera((0.0, 0.0, 4.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), "orthographic", vertical_extent=0.05)
+    sheet = SceneObject("sheet", plane(1.0, 1.0), material, tilted(degrees))
+    scene = Scene("furnace", camera, (), (sheet,), background_rgb=(1.0, 1.0, 1.0))
+    scene = replace(scene, render=replace(scene.render, polarisation=polarised))
+    reflected, passed = shares(material, float(np.cos(np.radians(degrees))))
+    expected = daylight_mean(reflected + (0.0 if material.is_mirror else passed))
+    assert render_probe(gl, scene, PROBE).mean == pytest.approx(expected, rel=5e-3)
+
+
+@pytest.mark.parametrize("polarised", [False, True])
+def test_films_as_the_reference_sees_them(gl: Context, polarised: bool) -> None:
+    """A soap film, a coated prism and gold before a sky that changes in every direction."""
+    camera = Camera((0.2, -0.3, 4.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), vertical_fov_deg=22.0)
+    film = SceneObject("film", plane(1.4, 1.4), soap(350.0), at(0.0, 0.0, 0.3) @ tilted(50.0))
+    coated = Dielectric(GLASS, coating=Coating(Film((Layer(constant(2.3), 60.0), Layer(metals()["gold"], 8.0)))))
+    solid = SceneObject("solid", box((0.5, 0.5, 0.5)), coated, at(-0.6, 0.2, 1.0) @ tilted(58.0))
+    gold = SceneObject("gold", plane(0.8, 0.8), Mirror(metal="gold", film_nm=120.0, film_index=2.0), at(0.5, -0.4, 0.7))
+    scene = with_sky(film, solid, gold, camera=camera, environment=slope_sky())
+    scene = replace(scene, render=replace(scene.render, polarisation=polarised))
+    found = render_probe(gl, scene, resized(PROBE, 24, 18, 64)).picture
+    reference = cached_camera_reference(scene, 24, 18, samples=1024).rgb
+    assert found.mean(axis=(0, 1)) == pytest.approx(reference.mean(axis=(0, 1)), rel=5e-3)
+    assert np.abs(blocks(found, 6) - blocks(reference, 6)).max() < 0.03
