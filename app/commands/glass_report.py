@@ -80,17 +80,15 @@ def plot(chosen: Entry | Sequence[Entry], path: str | os.PathLike[str]) -> None:
         raise UserError(f"the plot {os.fspath(path)} must end in .png; choose such a name")
     if not shown:
         raise UserError("there is no glass to plot; name one, such as N-BK7")
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
+    from ..bench.report.style import new_figure, plot_style
 
-    # A figure of its own, not pyplot: no global state, no window system.
-    figure = Figure(figsize=(12.0, 5.2), dpi=110, layout="constrained", facecolor="white")
-    FigureCanvasAgg(figure)
-    left, right = figure.subplots(1, 2, width_ratios=(1.15, 1.0))
-    colours = _palette(len(shown))
-    _draw_dispersion(left, shown, colours)
-    _draw_abbe_diagram(right, shown, colours)
-    with atomic_output(path) as temporary:
+    with plot_style(), atomic_output(path) as temporary:
+        figure = new_figure(12.0, 5.2)
+        figure.set_layout_engine("constrained")
+        left, right = figure.subplots(1, 2, width_ratios=(1.15, 1.0))
+        colours = _palette(len(shown))
+        _draw_dispersion(left, shown, colours)
+        _draw_abbe_diagram(right, shown, colours)
         figure.savefig(temporary, format="png")
 
 
@@ -123,13 +121,10 @@ def _draw_dispersion(axes: Axes, shown: Sequence[Entry], colours: Sequence[str])
     axes.ticklabel_format(axis="y", useOffset=False)
     if len(shown) == 1:
         glass = shown[0].dispersion
-        axes.set_title(
-            f"{shown[0].qualified_name}    $n_d$ = {glass.n_d:.5f}    $V_d$ = {_abbe(glass.V_d)}", loc="left"
-        )
+        axes.set_title(f"{shown[0].qualified_name}    n_d = {glass.n_d:.5f}    V_d = {_abbe(glass.V_d)}", loc="left")
     else:
         axes.set_title("refractive index", loc="left")
-        axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.12), ncols=3, frameon=False, fontsize=9)
-    _quiet(axes)
+        axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.12), ncols=3)
 
 
 def _draw_rainbow(axes: Axes) -> None:
@@ -172,16 +167,9 @@ def _draw_abbe_diagram(axes: Axes, shown: Sequence[Entry], colours: Sequence[str
         )
         v_limits = [min(v_limits[0], glass.V_d - 5.0), max(v_limits[1], glass.V_d + 5.0)]
         n_limits = [min(n_limits[0], glass.n_d - 0.05), max(n_limits[1], glass.n_d + 0.1)]
-    axes.set(xlim=v_limits[::-1], ylim=n_limits, xlabel="Abbe number $V_d$", ylabel="$n_d$")
+    axes.set(xlim=v_limits[::-1], ylim=n_limits, xlabel="Abbe number V_d", ylabel="n_d")
     axes.set_title("Abbe diagram", loc="left")
-    axes.legend(frameon=False, fontsize=9, loc="upper left", markerscale=1.5)
-    _quiet(axes)
-
-
-def _quiet(axes: Axes) -> None:
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.grid(color="#e6e6e6", lw=0.7)
-    axes.set_axisbelow(True)
+    axes.legend(loc="upper left", markerscale=1.5)
 
 
 def _palette(count: int) -> list[str]:

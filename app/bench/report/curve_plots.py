@@ -16,7 +16,7 @@ import numpy as np
 from ..measured_passes import MEASURED_PASSES
 from ..results import Point, SceneResult
 from . import style
-from .text import count, number, seeds_text
+from .text import count, number, seeds_text, superscript
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -88,7 +88,7 @@ def set_limits(axes: Axes, drawn: Sequence[Series], abscissa: str = "seconds", o
     # Neither a single lucky seed nor a very good reference may stretch the axis over empty decades.
     kept = [least, *spans[spans > least / 10], *([own_error] if least / 300 < own_error < math.inf else [])]
     style.log_axis(axes, "x", (x.min() / 1.25, x.max() * 1.12), style.plain if abscissa == "seconds" else count)
-    style.error_axis(axes, (min(kept) / 1.8, max(least * 3, *means, *kept) * 1.6))
+    style.log_axis(axes, "y", (min(kept) / 1.8, max(least * 3, *means, *kept) * 1.6), superscript)
 
 
 def draw_series(axes: Axes, one: Series, markers: bool = True) -> None:

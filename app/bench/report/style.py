@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...base.atomic import atomic_output
-from .text import superscript
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -186,12 +185,7 @@ def plain(value: float) -> str:
     return f"{value:.3g}"
 
 
-def log_axis(
-    axes: Axes,
-    name: str,
-    limits: tuple[float, float],
-    words: Callable[[float], str] = plain,
-) -> None:
+def log_axis(axes: Axes, name: str, limits: tuple[float, float], words: Callable[[float], str]) -> None:
     """Makes axis "x" or "y" logarithmic, without minor ticks: ticks at powers of ten and, where these are few, at three
     times them."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
@@ -203,11 +197,6 @@ def log_axis(
     axis.set_major_locator(LogLocator(subs=subs, numticks=30 if decades < 15.0 else 9))
     axis.set_major_formatter(FuncFormatter(lambda value, _: words(value)))
     axis.set_minor_locator(NullLocator())
-
-
-def error_axis(axes: Axes, limits: tuple[float, float]) -> None:
-    """A logarithmic y axis with ticks such as 3·10⁻³."""
-    log_axis(axes, "y", limits, superscript)
 
 
 def note(axes: Axes, words: str, at: tuple[float, float], rise_pt: float = 0.0, **more: Any) -> None:
