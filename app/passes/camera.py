@@ -334,7 +334,7 @@ class CameraPass:
         yield from self._portions(parameters, maps)
         if not self.listed.may_halt:
             self.bind(maps, parameters)
-            self._run_listed(self._program_beyond())
+            self.listed.run(self._program_beyond())
 
     # ---- private ---------------------------------------------------------------------------
 
@@ -386,9 +386,9 @@ class CameraPass:
                     self._run(self._programs.of("direct"), *groups)
                 else:
                     self._run(self._programs.of("kept"), *groups)
-                    self._run_listed(self._programs.of("direct"), uneven=True)
+                    self.listed.run(self._programs.of("direct"), uneven=True)
                 if follows and not self.listed.may_halt:
-                    self._run_listed(self._program_beyond())
+                    self.listed.run(self._program_beyond())
             yield row, rows
             row += rows
 
@@ -425,10 +425,6 @@ class CameraPass:
 
     def _run(self, program: moderngl.ComputeShader, groups_x: int, groups_y: int = 1) -> None:
         program.run(groups_x, groups_y)
-        self._ctx.memory_barrier()
-
-    def _run_listed(self, program: moderngl.ComputeShader, *, uneven: bool = False) -> None:
-        self.listed.run(program, uneven=uneven)
         self._ctx.memory_barrier()
 
     def _program_beyond(self) -> moderngl.ComputeShader:

@@ -32,11 +32,9 @@ ENDS_HELD = 8
 CUT_THRESHOLD = 0.004
 """Share of a sample's power above which both parts of a cut band are followed."""
 HALT_ROUNDS = 5000
-"""Rounds of its loops after which a sample halts on a software renderer; see camera/halts.glsl. Eight side by side that
+"""Rounds of its loops after which a sample halts on a software renderer (camera/waiting.glsl). Eight side by side that
 have nothing in common then take 40,000 of the driver's 65,535, and what is left is for the surface they are at and the
 ends of paths they hold."""
-SPARE_ROUNDS = 0
-"""Rounds that must be left when it halts or ends; where they are not, it is counted."""
 TINT_STEPS = 48
 """Stretches that the whole spectrum is cut into behind coloured glass."""
 FILM_PARTS = 24
@@ -154,8 +152,7 @@ def single_defines(beyond: Defines) -> Defines:
 
 def halting_defines(beyond: Defines) -> Defines:
     """Defines for listed pixels whose samples halt when their loops have run long."""
-    numbers = {"HALT_ROUNDS": HALT_ROUNDS, "SPARE_ROUNDS": SPARE_ROUNDS}
-    return beyond | switched(HALTS=True) | numbers
+    return beyond | switched(HALTS=True) | {"HALT_ROUNDS": HALT_ROUNDS}
 
 
 def lens_defines(shown: Defines) -> Defines:

@@ -78,6 +78,7 @@ class ListedPixels:
         """Run `program` over all that is listed, or over the pixels that a survey found uneven."""
         assert self._list is not None
         program.run_indirect(self._list, _UNEVEN_GROUPS_AT if uneven else _GROUPS_AT)
+        self._ctx.memory_barrier()
 
     def clear(self) -> None:
         """Nothing is listed and nothing has halted."""

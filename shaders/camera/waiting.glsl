@@ -32,7 +32,7 @@ struct Waiting {
 layout(std430, binding = BIND_WAITING) restrict buffer WaitingPaths { Waiting waiting[]; };
 uint place;
 
-#if HALTS
+#if HALTS  // on a software renderer; on a GPU they wait in the buffer
 PathEnd ended[ENDS_HELD];
 #define ENDED(e) ended[e]
 #else
@@ -77,7 +77,7 @@ void resume(out int events) {
 
 // Whether loops still run, and so many rounds. How many, the compiler does not know.
 bool loops_run() {
-    uint ran = 0u, wanted = p.primary_samples + 2u + uint(SPARE_ROUNDS);
+    uint ran = 0u, wanted = p.primary_samples + 2u;
     for (uint i = 0u; i < wanted; ++i) ran += hash_pcg(ran + i) == 77u ? 2u : 1u;
     return ran >= wanted;
 }
