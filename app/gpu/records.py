@@ -8,11 +8,12 @@ Flux stays in watts of the scene; only lengths are scaled.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..features.features import Features
 from ..model.tint_levels import LEVELS
-from .packed_records import packed
 from .schema import Field, Struct
 
 NONE = 0xFFFFFFFF
@@ -80,7 +81,7 @@ def photon_record(groups: int, hero: bool = False, packs: bool = False, charts: 
         ),
         texels=True,
     )
-    return packed(record, packs)
+    return replace(record, packs=packs)
 
 
 def photon_record_of(features: Features, packs: bool = False) -> Struct:
@@ -202,7 +203,7 @@ def ray_record(
     fields += _COMPANIONS_POLARISATION if hero and polarised else ()
     fields += (Field("flown", "vec4", "x: way outside glass so far, GPU units"),) if flights else ()
     fields += (Field("tinted", "vec4", "x: way through that glass so far, times its rate"),) if tinted else ()
-    return packed(Struct("RayRecord", tuple(fields), texels=True), packs)
+    return Struct("RayRecord", tuple(fields), True, packs)
 
 
 def ray_record_of(features: Features, packs: bool = False) -> Struct:

@@ -15,7 +15,6 @@ import numpy as np
 from ..features.program_switches import Defines, switched
 from ..gpu import shader
 from ..gpu.growing import filled
-from ..gpu.packed_records import packed
 from ..gpu.records import GAIN_BOX, PLACEMENT, RECEIVER, photon_record_of
 from ..gpu.schema import Field, Struct
 from .light_programs import footprint_defines, image_slots
@@ -205,7 +204,7 @@ class Footprints:
         any order, as they also do; there is room for as many photons as were given at once, and not for all before.
         `packs`: `DeviceTraits.packs_records`."""
         self._ctx = ctx
-        self.photon, self.splat = photon_record_of(features, packs), packed(SPLAT, packs)
+        self.photon, self.splat = photon_record_of(features, packs), replace(SPLAT, packs=packs)
         kinds = len(VERTICES)
         pieces = switched(IN_PIECES=by_compute) | {"KINDS": f"{kinds}u", "PIECE_TEXELS": PIECE_TEXELS}
         defines = footprint_defines(features) | pieces | {"WORKGROUP": WORKGROUP}
@@ -273,40 +272,17 @@ class Footprints:
             scale, x_reference = reindex.reindexing.scale, reindex.reindexing.y_reference
             offset = reindex.reindexing.y(variables.base[0])
             reindex.bind()
-        values[0] = (
-            photons.start,
-            photons.count,
-            tables.classes,
-            tables.bands,
-            variables.samples,
-            tables.rows,
-            smoothing,
-            EXTENT_LIMIT,
-            variables.traced_row,
-            x_reference,
-            photons.stride,
-            tables.first_power,
-            scale,
-            offset,
-            NARROWED if smoothing < _WIDEST_NARROWED else 1.0,
-            ALL_RECORDS,
-        )
+        narrowed = NARROWED if smoothing < _WIDEST_NARROWED else 1.0
+        sizes = photons.start, photons.count, tables.classes, tables.bands, variables.samples, tables.rows
+        widths = smoothing, EXTENT_LIMIT, variables.traced_row, x_reference, photons.stride, tables.first_power
+        values[0] = (*sizes, *widths, scale, offset, narrowed, ALL_RECORDS)
         self._parameters.write(values.tobytes())
         if photons.held is not None:
             held, offset_bytes = photons.held
             self._ctx.copy_buffer(self._parameters, held, 4, read_offset=offset_bytes, write_offset=_RECORDS_AT)
         self._parameters.bind_to_uniform_block(0)
-        for binding, buffer in enumerate(
-            (
-                photons.buffer,
-                self.splats,
-                atlas.placements,
-                receivers,
-                variables.buffer,
-                tables.band_buffer,
-                self._sums,
-            )
-        ):
+        buffers = photons.buffer, self.splats, atlas.placements, receivers, variables.buffer, tables.band_buffer
+        for binding, buffer in enumerate((*buffers, self._sums)):
             buffer.bind_to_storage_buffer(binding)
         if gains is not None:
             gains.bind()
@@ -319,10 +295,8 @@ class Footprints:
         self._ctx.memory_barrier()
         self.commands.bind_to_storage_buffer(7)
         self.lists.bind_to_storage_buffer(8)
-        if self._by_compute:
-            self._list["entries_room"].value = self.entries
-        else:
-            self._list["capacity"].value = self.capacity
+        room, name = (self.entries, "entries_room") if self._by_compute else (self.capacity, "capacity")
+        self._list[name].value = room
         self._list.run(-(-photons.count // LIST_WORKGROUP) if self._in_any_order else 1)
 
     def counts(self) -> dict[str, float]:
@@ -346,13 +320,5 @@ class Footprints:
         self._ctx.copy_buffer(self._sums, self._no_sums, self._no_sums.size, write_offset=self._sums_at)
 
     def release(self) -> None:
-        shader.release(
-            self._program,
-            self._list,
-            self.lists,
-            self._parameters,
-            self._sums,
-            self._no_sums,
-            *(() if self._by_compute else (self.commands,)),
-            self.splats,
-        )
+        shader.release(self._program, self._list, self.lists, self._parameters, self._sums, self._no_sums, self.splats)
+        shader.release(None if self._by_compute else self.commands)

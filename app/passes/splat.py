@@ -8,6 +8,7 @@ sums is the photons' own. A GPU takes all of a pass at once, in any order.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +17,6 @@ from ..features.program_switches import Defines, switched
 from ..gpu import shader
 from ..gpu.context import check_device
 from ..gpu.framebuffers import adding
-from ..gpu.packed_records import packed
 from ..gpu.schema import Field, Struct
 from ..gpu.splat_way import way_of
 from .footprint import (
@@ -78,8 +78,8 @@ class Splatter:
         self._in_bulk = way.in_bulk
         self.group = GROUP
         if self._in_bulk:
-            most_bytes = min(BULK_BYTES, way.largest_block)
-            self.group = min(BULK_GROUP, most_bytes // (packed(SPLAT, way.packs).stride * slots_per_photon(features)))
+            slot = replace(SPLAT, packs=way.packs).stride
+            self.group = min(BULK_GROUP, min(BULK_BYTES, way.largest_block) // (slot * slots_per_photon(features)))
         self.footprints = Footprints(ctx, features, self.group, self.by_compute, self._in_bulk, way.packs)
         self._indices: moderngl.Buffer | None = None
         self._draws: dict[int, moderngl.VertexArray] = {}
@@ -140,13 +140,8 @@ class Splatter:
         self._parameters.write(values.tobytes())
         self._parameters.bind_to_uniform_block(0)
         curve = tables.density_buffer if self._features.point_spectrum else tables.cumulative_buffer
-        for binding, buffer in (
-            (1, self.footprints.splats),
-            (5, tables.band_buffer),
-            (6, tables.integral_buffer),
-            (7, curve),
-            (8, self.footprints.lists),
-        ):
+        buffers = self.footprints.splats, tables.band_buffer, tables.integral_buffer, curve, self.footprints.lists
+        for binding, buffer in zip((1, 5, 6, 7, 8), buffers, strict=True):
             buffer.bind_to_storage_buffer(binding)
         tables.texture.use(0)
         if atlas.contact_words is not None:

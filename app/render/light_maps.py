@@ -89,12 +89,8 @@ class LightMaps:
     def take(self, features: Features) -> None:
         """Splat from now on with other features of the same layout (the brush came or went)."""
         self.splatter.release()
-        self.features = replace(
-            features,
-            nested_windows=self.features.nested_windows,
-            contact_lines=self.features.contact_lines,
-            border_images=self.features.border_images,
-        )
+        known = {name: getattr(self.features, name) for name in ("nested_windows", "contact_lines", "border_images")}
+        self.features = features.changed(**known)
         self.splatter = self._new_splatter()
 
     def _new_splatter(self) -> Splatter:

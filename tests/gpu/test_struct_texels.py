@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from spectrasplat.gpu.packed_records import packed, read_records, write_records
+from spectrasplat.gpu.packed_records import read_records, write_records
 from spectrasplat.gpu.records import NONE, OUTCOME, photon_record, ray_record
 from spectrasplat.gpu.schema import Field, Struct
 from spectrasplat.passes.footprint import SPLAT
@@ -92,7 +94,7 @@ def test_a_packed_record_keeps_what_it_says(gl, name: str) -> None:
     """Within half a step of every field's packing, the mean of many within a thirtieth (half a bit is rounded up), and
     what needs no rounding to the bit."""
     structs = {
-        s.name: s for s in (ray_record(4, packs=True), photon_record(1, False, True, False), packed(SPLAT, True))
+        s.name: s for s in (ray_record(4, packs=True), photon_record(1, False, True, False), replace(SPLAT, packs=True))
     }
     struct, random, count = structs[name], np.random.default_rng(3), 4000
     records = struct.zeros(count)
