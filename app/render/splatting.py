@@ -75,6 +75,7 @@ class Splatting:
             yield from self.summing(atlas)
         all_photons = Photons(photons, count, stride=stride, held=held)
         spectra = SplatSpectra(self._shown.variables, tables.tables, self._shown.gains, tables.reindex)
+        maps.splatter.footprints.make_room(count)  # at once, as parts become larger
         start = 0
         while start < count:
             part = min(self._part.units if self._part else self._most, count - start)
