@@ -1,4 +1,4 @@
-"""What single things cost on a device: a dispatch, a wait, a read, a program to compile.
+"""What single things cost on a device: a dispatch, a wait, a read, an addition to memory, a program to compile.
 
 Schedules are chosen by these. All times are the wall clock's about work that is waited for.
 """
@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
 from ..gpu import shader
 from ..gpu.linker import linker_of
+from ..gpu.splat_way import FLOAT_ATOMICS, blending_rate
 
 if TYPE_CHECKING:
     import moderngl
@@ -25,6 +27,9 @@ Figures = dict[str, float]
 Named = tuple[str, Figures]
 """What was measured, and its figures with units in their names."""
 
+CHANNELS = (1, 4, 12)
+_TEXELS = 1 << 20
+_GROUP = 64
 _RUNS, _PATIENCE_S = 21, 1.0
 """Of each measurement at most; none is begun after so many seconds, but for the first three."""
 _EMPTY = """#version 430 core
@@ -32,6 +37,29 @@ layout(local_size_x = 64) in;
 layout(std430, binding = 0) buffer Words { uint words[]; };
 void main() { if (words[0] == 0xffffffffu) words[1] = 1u; }
 """
+_ADDING = """#version 430 core
+{extension}
+layout(local_size_x = 64) in;
+layout(std430, binding = 0) buffer Sums {{ {kind} sums[]; }};
+uint hash(uint x) {{
+    x = (x ^ (x >> 16)) * 0x7feb352du;
+    x = (x ^ (x >> 15)) * 0x846ca68bu;
+    return x ^ (x >> 16);
+}}
+void add(uint at) {{ {add} }}
+void main() {{
+    uint texel = {texel} % {texels}u;
+    for (uint channel = 0u; channel < {channels}u; ++channel) add(texel * {channels}u + channel);
+}}
+"""
+_SWAPPED = """uint seen = sums[at], before;
+    do { before = seen; seen = atomicCompSwap(sums[at], before, floatBitsToUint(uintBitsToFloat(before) + 1.0)); }
+    while (seen != before);"""
+_TEXEL = {
+    "scattered": "hash(gl_GlobalInvocationID.x)",
+    "side by side": "hash(gl_WorkGroupID.x) + gl_LocalInvocationIndex",
+}
+"""Texel of an invocation: its own by chance, or those of a group next to each other, as in a splat."""
 
 
 def dispatch_costs(context: Context, repeats: int) -> Iterator[Named]:
@@ -79,6 +107,39 @@ def _each_s(context: Context, work: Callable[[], object], repeats: int) -> float
     return (time.perf_counter() - started) / repeats
 
 
+def addition_rates(context: Context, count: int) -> Iterator[Named]:
+    """Additions of a float to memory, and texels blended, by channels of a texel; `count` texels at a time."""
+    ctx = context.ctx
+    is_atomic = FLOAT_ATOMICS in ctx.extensions
+    sums = ctx.buffer(reserve=4 * _TEXELS * max(CHANNELS))
+    for pattern, texel in _TEXEL.items():
+        for channels in CHANNELS:
+            program = ctx.compute_shader(
+                _ADDING.format(
+                    extension=f"#extension {FLOAT_ATOMICS} : require" if is_atomic else "",
+                    kind="float" if is_atomic else "uint",
+                    add="atomicAdd(sums[at], 1.0);" if is_atomic else _SWAPPED,
+                    texel=texel,
+                    texels=_TEXELS,
+                    channels=channels,
+                )
+            )
+            sums.clear()
+            sums.bind_to_storage_buffer(0)
+            texels_s = count / median_s(ctx, partial(program.run, count // _GROUP))
+            program.release()
+            yield (
+                f"{'float atomics' if is_atomic else 'compare and swap'}, {channels} channels, {pattern}",
+                {
+                    "texels_g_per_s": _significant(texels_s / 1e9),
+                    "adds_g_per_s": _significant(channels * texels_s / 1e9),
+                },
+            )
+    sums.release()
+    for dtype in ("f4", "f2"):
+        yield f"blending RGBA{8 * int(dtype[1])}F", {"texels_g_per_s": _significant(blending_rate(ctx, dtype) / 1e9)}
+
+
 def repeated(run: Callable[[int], T]) -> list[T]:
     """What `run` of 1, 2, … gives; that of 0 only warms up."""
     run(0)
@@ -99,6 +160,10 @@ def median_s(ctx: moderngl.Context, work: Callable[[], object]) -> float:
         return time.perf_counter() - started
 
     return float(np.median(repeated(run)))
+
+
+def _significant(value: float) -> float:
+    return float(f"{value:.3g}")
 
 
 def compile_times(programs: Sequence[Built], make: Callable[[], Context]) -> Iterator[Named]:

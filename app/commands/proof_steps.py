@@ -331,6 +331,14 @@ def _compile(short: bool, _folder: Path) -> Iterator[Finding]:
             yield from _measured((f"{name}, {what}", figures) for what, figures in found)
 
 
+def _additions(short: bool, _folder: Path) -> Iterator[Finding]:
+    from ..bench.device_costs import addition_rates
+    from ..gpu.context import create_context
+
+    with create_context() as context:
+        yield from _measured(addition_rates(context, 1 << (14 if short else 21)))
+
+
 def _splats(short: bool, _folder: Path) -> Iterator[Finding]:
     from ..bench import splat_speed
     from ..gpu import shader
@@ -377,6 +385,7 @@ PARTS = (
     Part("viewer", "Viewer while something moves", _viewer, (80, 120), True),
     Part("start", "First picture, with an empty cache and with a full one", _start, (60, 90), True),
     Part("compile", "Programs alone, and together", _compile, (50, 90), True),
+    Part("additions", "Additions to memory", _additions, (10, 15), True),
     Part("splats", "Splats, by area", _splats, (30, 30), True),
 )
 """In this order: what must hold first, then what is only measured, the most important first."""
