@@ -322,7 +322,7 @@ def _compile(short: bool, _folder: Path) -> Iterator[Finding]:
     from ..gpu.context import create_context
 
     os.environ |= _NO_CACHE
-    for name in ("prism",) if short else ("default", "prism"):
+    for name in ("prism",) if short else ("prism", "default"):
         with tempfile.TemporaryDirectory() as first, tempfile.TemporaryDirectory() as second:
             os.environ["XDG_CACHE_HOME"] = first
             compiled = _compiled(shipped_scenes()[name])
@@ -379,12 +379,12 @@ PARTS = (
     Part("pictures", "Pictures against stored ones", _pictures, (240, 240)),
     Part("stress", "Stress", _stress, (120, 240)),
     Part("dispatch", "Dispatches, waits, reads", _dispatch, (10, 15), True),
-    Part("frames", "Photons of a frame", _frames, (130, 200), True),
-    Part("trace", "Tracing, by events a dispatch and rays in flight", _trace, (90, 90), True),
+    Part("frames", "Photons of a frame", _frames, (110, 200), True),
+    Part("trace", "Tracing, by events a dispatch and rays in flight", _trace, (80, 90), True),
     Part("camera", "Camera samples, by the longest dispatch allowed", _camera, (50, 90), True),
-    Part("viewer", "Viewer while something moves", _viewer, (80, 120), True),
+    Part("viewer", "Viewer while something moves", _viewer, (70, 120), True),
     Part("start", "First picture, with an empty cache and with a full one", _start, (60, 90), True),
-    Part("compile", "Programs alone, and together", _compile, (50, 90), True),
+    Part("compile", "Programs alone, and together", _compile, (90, 90), True),
     Part("additions", "Additions to memory", _additions, (10, 15), True),
     Part("splats", "Splats, by area", _splats, (30, 30), True),
 )

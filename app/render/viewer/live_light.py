@@ -298,11 +298,7 @@ class LiveLight:
         return self._preview
 
     def _splat_some(self, kept: StoredPass, photons: int, maps: LightMaps) -> None:
-        rounds = kept.store.first_rounds(photons)
-        slabs = kept.store.first_slabs(rounds)
-        # Records follow a space-filling curve over the lattice: every n-th of them is nearly a lattice again.
-        stride = max(1, sum(slab.count for slab in slabs) // photons)
-        share = rounds / kept.store.rounds_of_pass / stride
+        slabs, stride, share = kept.store.some(photons)
         wider = share**-0.5 * self.widening(kept.pass_photons * share)
         steps, smoothing = self.light_pass.batches.splatting.steps, self.light_pass.smoothing * wider
         for slab in slabs:
@@ -408,9 +404,7 @@ class LiveLight:
 
     def stored_weight(self, limit: int) -> float:
         """What the flux of `stored_records(limit)` is power times."""
-        if (asked := self._asked) is None:
-            return 0.0
-        return asked.pass_photons * asked.store.first_rounds(limit) / asked.store.rounds_of_pass
+        return 0.0 if self._asked is None else self._asked.pass_photons * self._asked.store.some(limit)[2]
 
     @property
     def bytes(self) -> int:

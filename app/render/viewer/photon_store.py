@@ -104,11 +104,14 @@ class PhotonStore:
         """Records of whole rounds."""
         return sum(slab.count for slab in self.slabs if slab.round < self.rounds)
 
-    def first_rounds(self, photons: int) -> int:
-        """How many rounds hold about so many photons: one at least, if there is one."""
-        if not self.rounds:
-            return 0
-        return int(np.clip(photons * self.rounds // max(self.photons, 1), 1, self.rounds))
+    def some(self, photons: int) -> tuple[list[Slab], int, float]:
+        """About so many records: slabs of whole rounds, of which every n-th record is taken where one round holds more,
+        this n, and the share of the pass's photons that they are."""
+        rounds = min(max(photons * self.rounds // max(self.photons, 1), 1), self.rounds)
+        slabs = self.first_slabs(rounds)
+        # Records follow a space-filling curve over the lattice: every n-th of them is nearly a lattice again.
+        stride = max(1, sum(slab.count for slab in slabs) // photons)
+        return slabs, stride, rounds / self.rounds_of_pass / stride
 
     def first_slabs(self, rounds: int) -> list[Slab]:
         """Slabs of the first so many rounds, one for all that lie in one buffer."""
@@ -120,7 +123,7 @@ class PhotonStore:
         return list(found.values())
 
     def read(self, limit: int, photon: Struct) -> np.ndarray:
-        """About `limit` records at most, in whole rounds (one at least)."""
-        slabs = self.first_slabs(self.first_rounds(limit))
-        found = [read_records(photon, slab.buffer, slab.count) for slab in slabs]
+        """About `limit` records, those of `some`."""
+        slabs, every, _ = self.some(limit)
+        found = [read_records(photon, slab.buffer, slab.count)[::every] for slab in slabs]
         return np.concatenate([np.zeros(0, photon.dtype), *found])
