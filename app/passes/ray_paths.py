@@ -128,10 +128,9 @@ class RayPaths:
 
     def _read(self, count: int, origins: np.ndarray) -> list[Path]:
         ends = np.frombuffer(self._paths.read(count * PATH_END.stride), PATH_END.dtype)
-        points = np.frombuffer(self._points.read(count * _MAX_POINTS * 16), np.float32).reshape(count, _MAX_POINTS, 4)[
-            ..., :3
-        ]
-        world = self.scene.space.to_world(points.astype(float))
+        points = np.frombuffer(self._points.read(count * _MAX_POINTS * 16), np.float32).reshape(count, _MAX_POINTS, 4)
+        is_met = np.arange(_MAX_POINTS) < ends["points"][:, None]  # memory may hold anything behind these
+        world = self.scene.space.to_world(np.where(is_met[..., None], points[..., :3], 0.0).astype(float))
         world[:, 0] = origins
         return [Path(world[i, : int(end["points"])]) for i, end in enumerate(ends)]
 
