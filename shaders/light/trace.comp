@@ -121,7 +121,7 @@ void land(Arrival at, uint slot, inout Outcome outcome) {
     if (FOOTPRINTS) {
         photon.dposition_ds = path.dposition[0] * path.walk.footprint_scale;
         photon.dposition_dt = path.dposition[1] * path.walk.footprint_scale;
-        photon.fan = fan_where_it_landed(path, at.start, hit);
+        photon.fan = fan_where_it_landed(path, START(at.start, slot), hit);
     }
     uint lattice_bits = p.lattice_bits;
     if (LAMP_COLUMNS) {
@@ -227,9 +227,7 @@ Flight flight;
 // Up to what the ray in `slot` meets next: whether it has ended there as `outcome` says, lands on a receiver, or
 // `go_past` tells.
 uint arrive(uint slot, out Arrival at, out Outcome outcome) {
-    Path path = load_path(slot);
-    if (SPECTRAL_GROUPS > 0) keep_sweeps_within(path);
-    Path start = path;
+    Path path = start_in(slot), start = path;
     Hit hit;
     outcome = Outcome(0u, 0.0, 0.0, 0.0);
     if (!POINT_SPECTRUM) band_w = band_powers(power_row(path), path.band);

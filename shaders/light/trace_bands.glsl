@@ -12,6 +12,16 @@ void keep_sweeps_within(inout Path path) {
     }
 }
 
+// The path of the ray in `slot` as it sets out.
+Path start_in(uint slot) {
+    Path path = load_path(slot);
+    if (SPECTRAL_GROUPS > 0) keep_sweeps_within(path);
+    return path;
+}
+
+// On a GPU it is read again where it is wanted, and takes no registers before.
+#define START(start, slot) (RAY_POOL ? start_in(slot) : start)
+
 // Whether `at` leaves a band too little on one side of it to be worth a path of its own.
 bool leaves_sliver(Path path, float at) { return min(at - path.band.x, path.band.z - at) <= 0.01 * MIN_CUT_BAND; }
 
@@ -41,11 +51,11 @@ float power_below(Path path, float at) {
 }
 
 // Where the band is cut because total internal reflection sets in inside it, at `onset`; negative: nowhere. `start`:
-// the path before its flight, from which both parts set out again.
-float cut_of_band(Path path, Path start, Event event, float distance, out float onset) {
+// the path before its flight, in `slot`, from which both parts set out again.
+float cut_of_band(Path path, Path start, uint slot, Event event, float distance, out float onset) {
     onset = total_reflection_in_band(path, event);
     bool is_final = path.recut != 0u || path.band.z - path.band.x <= MIN_CUT_BAND;
-    return onset < 0.0 || is_final ? -1.0 : clear_cut(path, start, onset, distance);
+    return onset < 0.0 || is_final ? -1.0 : clear_cut(path, START(start, slot), onset, distance);
 }
 
 // The part of a path's band that goes through a surface which its anchor does not pass, where that band may not be cut:

@@ -39,6 +39,25 @@ void filter_by(uint row, inout Path child, inout float share, inout Outcome outc
     share *= common_share(child, kept.y, companions);
 }
 
+#ifdef RAY_POOL
+// Both parts of the band of the ray in `slot`, from where it set out.
+void send_parts(uint slot, float at, inout Outcome outcome) {
+    uint place = first_place(slot, true, false);
+    if (place == NONE) {
+        outcome.what = WAITS;
+        return;
+    }
+    for (uint above = 0u; above < 2u; ++above) {
+        Path part = start_in(slot);
+        float below = power_below(part, at);
+        vec2 band = above == 0u ? vec2(part.band.x, at) : vec2(at, part.band.z);
+        store_path(above == 0u ? place : second_place(slot),
+            part_of_band(part, band.x, band.y, above == 0u ? below : 1.0 - below, 5u + above));
+    }
+    outcome.what |= LEFT_FIRST | LEFT_SECOND;
+}
+#endif
+
 #include "light/trace_grating.glsl"
 
 // Each child is stored in one place, whichever event made it: where every branch is executed, every
@@ -68,7 +87,7 @@ void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object t
         lives = survives(child, outcome.roulette_w, share, 3u);
     }
 #ifdef HAS_GRATING
-    Path rest = start;
+    Path rest = START(start, slot);
     bool rest_lives = false;
     if (kind == KIND_GRATING) lives = diffract(path, hit, event, thing.weight_row, child, rest, rest_lives, outcome);
 #endif
@@ -82,12 +101,16 @@ void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object t
     float at = -1.0, below = 0.0;
 #ifdef BAND_CUTS
     float onset = -1.0;
-    at = splits ? cut_of_band(path, start, event, hit.distance, onset) : border;
+    at = splits ? cut_of_band(path, start, slot, event, hit.distance, onset) : border;
     if (at >= 0.0) {
         // Back to the start of the flight.
         splits = false;
         outcome.absorbed_w = 0.0;
         outcome.what |= FELL_BAND;
+        if (RAY_POOL) {
+            send_parts(slot, at, outcome);
+            return;
+        }
         below = power_below(start, at);
         child = part_of_band(start, start.band.x, at, below, 5u);
         lives = true;
@@ -138,7 +161,7 @@ void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object t
     }
 #ifdef HAS_DIELECTRIC
     if (BAND_CUTS) {
-        if (at >= 0.0) {
+        if (!RAY_POOL && at >= 0.0) {
             child = part_of_band(start, at, start.band.z, 1.0 - below, 6u);
             lives = true;
         }
