@@ -137,7 +137,7 @@ def load_source(
 
     flatten(name, "the program")
     kept = stripped(lines, _switches())
-    text = "\n".join(line.text for line in kept) + "\n"
+    text = "\n".join(line.text.lstrip() for line in kept) + "\n"
     source = Source(name, text, tuple((line.file, line.number) for line in kept))
     if _kept:
         _sources[identity] = source

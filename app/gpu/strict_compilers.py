@@ -69,8 +69,8 @@ def live_states(built: Built) -> tuple[LiveState, ...]:
 
 
 def _unrolled(text: str) -> str:
-    """Loops marked that drivers unroll: over elements of arrays, of known length and few, which become values so. Where
-    the driver is told not to, there are none."""
+    """Loops marked that drivers unroll: over elements of arrays, here or in a function that is called, of known length
+    and few, which become values so. Where the driver is told not to, there are none."""
     if "unroll none" in text:
         return text
     macros = macros_of([(Line(line, "", 0),) for line in text.splitlines() if line.startswith("#define")])
@@ -78,7 +78,7 @@ def _unrolled(text: str) -> str:
     def marked(found: re.Match[str]) -> str:
         body = _BODY.match(text, found.end())
         rounds = value_of(found[2], macros)
-        indexes = body is not None and re.search(rf"\[[^\]]*\b{found[1]}\b", body[0])
+        indexes = body is not None and re.search(rf"\[[^\]]*\b{found[1]}\b|, {found[1]}\)", body[0])
         return f"[[unroll]] {found[0]}" if indexes and rounds and rounds <= _MOST_UNROLLED else found[0]
 
     version, _, rest = _LOOP.sub(marked, text).partition("\n")

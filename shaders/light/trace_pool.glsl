@@ -30,10 +30,9 @@ void find_ray(uint k) {
     events = schedule[dispatch];
     ends_all = dispatch == uint(DISPATCHES) - 1u;
     ray_goes_on = k < state.alive;
-    ray_slot = NONE;
-    if (ray_goes_on)
-        ray_slot =
-            k < state.survivors ? pool_slots[listed_at(0u, k)] : free_slot(state.born_first + k - state.survivors);
+    ray_slot = !ray_goes_on   ? NONE
+        : k < state.survivors ? pool_slots[listed_at(0u, k)]
+                              : free_slot(state.born_first + k - state.survivors);
 }
 
 // Where the second child goes.

@@ -43,18 +43,14 @@ void filter_by(uint row, inout Path child, inout float share, inout Outcome outc
 // Both parts of the band of the ray in `slot`, from where it set out.
 void send_parts(uint slot, float at, inout Outcome outcome) {
     uint place = first_place(slot, true, false);
-    if (place == NONE) {
-        outcome.what = WAITS;
-        return;
+    if (place == NONE) outcome.what = WAITS;
+    for (uint i = 0u; i < 2u && place != NONE; ++i) {
+        Path ray = start_in(slot);
+        float low = power_below(ray, at);
+        ray =
+            i == 0u ? part_of_band(ray, ray.band.x, at, low, 5u) : part_of_band(ray, at, ray.band.z, 1.0 - low, 6u);
+        store_path(i == 0u ? place : second_place(slot), ray);
     }
-    for (uint above = 0u; above < 2u; ++above) {
-        Path part = start_in(slot);
-        float below = power_below(part, at);
-        vec2 band = above == 0u ? vec2(part.band.x, at) : vec2(at, part.band.z);
-        store_path(above == 0u ? place : second_place(slot),
-            part_of_band(part, band.x, band.y, above == 0u ? below : 1.0 - below, 5u + above));
-    }
-    outcome.what |= LEFT_FIRST | LEFT_SECOND;
 }
 #endif
 

@@ -30,7 +30,7 @@ from spectrasplat.render.light_pass import LightPass
 POINTS, PHOTONS = 2_000, 12_000
 THRESHOLD = 0.003
 """Few rays play roulette: paths branch often."""
-SCHEDULES: tuple[tuple[int, ...], ...] = ((), (1,) * 12 + (4096,), (4,) * 6 + (4096,), (8, 8, 8, 4096), (1, 4096))
+SCHEDULES: tuple[tuple[int, ...], ...] = ((), (1,) * 12 + (4096,), (4,) * 6 + (4096,), (8, 8, 8, 4096), (1, 24, 4096))
 """One event at a time, in order; then so many at once, and at last whatever is left."""
 FAST = ("prism", "spectrometer")
 BYTES_A_PHOTON = 600

@@ -21,10 +21,6 @@ MOST_LIVE, MOST_ARRAY_WORDS, MOST_BYTES, MOST_SCENE_BYTES = 220, 64, 75_000, 500
 CAMERA, CAMERA_BYTES = "camera/camera.comp", 99_000
 """The program that follows paths and shades their ends: more text than is wanted of any, which is not met since
 27 November 2026."""
-TRACE = "light/trace.comp"
-TRACE_LIVE, TRACE_ARRAY_WORDS, TRACE_BYTES = 320, 80, 85_000
-"""The program that follows rays for several events holds two of their paths: more than is wanted of any, which is not
-met since 27 November 2026."""
 _held: set[tuple[str, ...]] = set()
 """Texts that were looked at."""
 
@@ -48,14 +44,13 @@ def check(programs: list[Built]) -> None:
         if built.texts in _held:
             continue
         _held.add(built.texts)
-        traces = built.name == TRACE
-        most_bytes = {TRACE: TRACE_BYTES, CAMERA: CAMERA_BYTES}.get(built.name, MOST_BYTES)
+        most_bytes = CAMERA_BYTES if built.name == CAMERA else MOST_BYTES
         assert max(map(len, built.texts)) <= most_bytes, built.name
         if strict_compilers.missing():
             continue
         for state in strict_compilers.live_states(built):
-            assert state.registers <= (TRACE_LIVE if traces else MOST_LIVE), (built.name, state)
-            assert state.scratch <= (TRACE_ARRAY_WORDS if traces else MOST_ARRAY_WORDS), (built.name, state)
+            assert state.registers <= MOST_LIVE, (built.name, state)
+            assert state.scratch <= MOST_ARRAY_WORDS, (built.name, state)
 
 
 def test_a_scenes_programs_are_small(device: Context) -> None:

@@ -250,7 +250,7 @@ def test_messages_still_name_file_and_line(tmp_path: Path) -> None:
         "#version 430 core",
         "float used() { return 1.0; }",
         "void main() {",
-        "    wrong = used();",
+        "wrong = used();",
         "}",
     ]
     assert source.explain("0:4(5): error") == "main.comp:6 (5): error"
