@@ -22,7 +22,6 @@ from ..model.optics.spectral_tables import (
     CumulativeSpectrum,
     SpectralAxis,
     cumulative,
-    index_table,
     wavelength_cdf,
 )
 from ..model.scene import Grating, Light, Scene, SceneObject
@@ -317,14 +316,13 @@ class SceneBuffers:
         by_bit = {bit: index for index, bit in stack_bits.items()}
         self.stack_objects: list[int] = [by_bit[bit] for bit in range(len(by_bit))]
 
-        index_rows = index_table(self.axis, media, SAMPLES) if media else np.ones((0, SAMPLES))
         variables = self.groups.variables(nm, x)
         slopes = [
             index_slope(self.groups, self.groups.glasses.index(g) if g in self.groups.glasses else None, nm, x)
             for g in media
         ]
         rows = [
-            np.asarray(index_rows, float),
+            np.array([glass.index(nm) for glass in media]).reshape(-1, SAMPLES),
             np.array(slopes).reshape(-1, SAMPLES),
             variables,
             np.array(weights).reshape(-1, SAMPLES),

@@ -8,7 +8,7 @@ Where the shown glass is an edit of the one that photons were traced through, th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -160,7 +160,8 @@ class _Values:
         """As of `CameraTables.build`."""
         shown = scene.scene
         glasses = _shown_media(scene)
-        axis = _axis(scene, list(glasses.values()))
+        by_glass = scene.groups.count and not scene.groups.by_wavelength
+        axis = SpectralAxis.build(list(glasses.values()) if by_glass else [])
         absorptions = _distinct_absorptions(shown, scene.space.scale)
         cell_cdf = _cell_cdf(axis, channels)
         sections = _curves(scene, glasses, absorptions, maps)
@@ -192,7 +193,7 @@ class _Values:
                 if coefficient is not None:
                     row[column] = next(i for i, known in enumerate(absorptions) if np.array_equal(known, coefficient))
         return cls(
-            lambda nm, x: np.concatenate([rows_of(nm, x) for _, rows_of in sections.values()]),
+            lambda nm, x: np.array([row for _, rows_of in sections.values() for row in rows_of(nm, x)]),
             sampled,
             axis,
             tuple(light.spectral_power for light in shown.lights),
@@ -211,17 +212,8 @@ class _Values:
 
 def _shown_media(scene: SceneBuffers) -> dict[Dispersion, Dispersion]:
     """Each glass that the records number, in their order, and the one that is shown in its stead."""
-    shown = {}
-    for traced in scene.media:
-        owner = next(i for i, material in enumerate(scene.traced_glasses) if material == traced)
-        material = scene.scene.objects[owner].material
-        shown[traced] = material.dispersion
-    return shown
-
-
-def _axis(scene: SceneBuffers, shown: list[Dispersion]) -> SpectralAxis:
-    by_glass = scene.groups.count and not scene.groups.by_wavelength
-    return SpectralAxis.build(shown if by_glass else [])
+    owners = {traced: scene.traced_glasses.index(traced) for traced in scene.media}
+    return {traced: scene.scene.objects[owner].material.dispersion for traced, owner in owners.items()}
 
 
 def _distinct_absorptions(scene: Scene, scale: float) -> list[np.ndarray]:
@@ -268,28 +260,18 @@ def _finishes(scene: Scene, first_row: int) -> tuple[np.ndarray | None, np.ndarr
 
 def _curves(
     scene: SceneBuffers, glasses: dict[Dispersion, Dispersion], absorptions: list[np.ndarray], maps: MapChannels
-) -> dict[str, tuple[int, Callable[[np.ndarray, np.ndarray], np.ndarray]]]:
+) -> dict[str, tuple[int, Callable[[np.ndarray, np.ndarray], Iterable[np.ndarray]]]]:
     """Rows over wavelength as `lib/scene.glsl` reads them, by the symbol of their first: how many, and `_Values.curves`
     of these."""
     groups = replace(scene.groups, glasses=tuple(glasses[g] for g in scene.groups.glasses))
     numbers = [scene.groups.glasses.index(g) if g in scene.groups.glasses else None for g in glasses]
-
-    def sampled(curves: Sequence[np.ndarray]) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
-        return lambda nm, _x: np.array([np.interp(nm, VISIBLE_NM, curve) for curve in curves]).reshape(-1, len(nm))
-
-    def indices(nm: np.ndarray, _x: np.ndarray) -> np.ndarray:
-        return np.array([shown.index(nm) for shown in glasses.values()]).reshape(-1, len(nm))
-
-    def slopes(nm: np.ndarray, x: np.ndarray) -> np.ndarray:
-        return np.array([index_slope(groups, number, nm, x) for number in numbers]).reshape(-1, len(nm))
-
     return {
-        "INDEX_ROW": (len(glasses), indices),
-        "SLOPE_ROW": (len(glasses), slopes),
+        "INDEX_ROW": (len(glasses), lambda nm, _x: [shown.index(nm) for shown in glasses.values()]),
+        "SLOPE_ROW": (len(glasses), lambda nm, x: [index_slope(groups, number, nm, x) for number in numbers]),
         "VARIABLE_ROW": (groups.count, groups.variables),
-        "ABSORPTION_ROW": (len(absorptions), sampled(absorptions)),
-        "BASIS_ROW": (3, sampled(list(rgb_basis().T))),
-        "BIN_ROW": (1, lambda nm, _x: maps.coordinate(nm)[None]),
+        "ABSORPTION_ROW": (len(absorptions), lambda nm, _x: [np.interp(nm, VISIBLE_NM, row) for row in absorptions]),
+        "BASIS_ROW": (3, lambda nm, _x: [np.interp(nm, VISIBLE_NM, column) for column in rgb_basis().T]),
+        "BIN_ROW": (1, lambda nm, _x: [maps.coordinate(nm)]),
     }
 
 

@@ -200,18 +200,6 @@ def _variation(
     return total
 
 
-def index_table(axis: SpectralAxis, dispersions: Sequence[Dispersion], samples: int = 1025) -> np.ndarray:
-    """n_j at `samples` equally spaced x from 0 to 1: float32 (M, samples).
-
-    Linear interpolation in it is good to 2e-7 with 1025 samples where the fits reach over the
-    visible range; at the wavelength where one of several glasses is clamped n has a kink, and
-    the error there may reach a quarter of that glass's step from sample to sample.
-    """
-    wavelength = axis.nm_of_samples(samples)
-    rows = [dispersion.index(wavelength) for dispersion in dispersions]
-    return np.array(rows, dtype=np.float32).reshape(len(rows), samples)
-
-
 class CumulativeSpectrum(NamedTuple):
     """Integrals of a spectrum from x = 0 on: a polyline, with a step at each emission line."""
 
