@@ -65,7 +65,7 @@ def test_nor_does_it_whatever_is_dragged_how_far(name: str, count: int) -> None:
         asked = list(rig.steps(leaping(rig.wanted, count)))
     assert len(asked) > count / 2
     assert not any(counts.made or counts.programs or counts.waits for counts in asked)
-    assert max(counts.written_bytes for counts in asked) <= MOST_BYTES / 2
+    assert max(counts.written_bytes for counts in asked) <= 2 * MOST_BYTES / 3
 
 
 @pytest.mark.slow
