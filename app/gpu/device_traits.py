@@ -94,7 +94,8 @@ class DeviceTraits:
         if _assumed:
             return _assumed[-1]
         if _is_gpu_wanted():
-            return DeviceTraits(splats_by_compute=is_software_renderer(renderer))
+            is_software = is_software_renderer(renderer)
+            return DeviceTraits(splats_by_compute=is_software, loops_may_end=is_software)
         if not is_software_renderer(renderer):
             return DeviceTraits()
         llvmpipe = "llvmpipe" in renderer.casefold()

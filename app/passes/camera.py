@@ -114,7 +114,7 @@ class CameraPass:
         shown |= {"PATHS_GROUP": context.traits.paths_group, "PATHS_AT_ONCE": context.traits.camera_paths}
         self.follows = "CAMERA_SPECULAR" in shown
         """Some paths go on beyond glass or mirrors."""
-        if self.follows and context.traits.loops_may_end:
+        if self.follows and context.traits.is_software:
             shown = halting_defines(shown)
         # A viewer may open the lens later.
         self.listed = ListedPixels(self._ctx, context.traits, waiting_bytes(lens_defines(shown)) if self.follows else 0)

@@ -39,7 +39,7 @@ class ListedPixels:
     def __init__(self, ctx: moderngl.Context, traits: DeviceTraits, bytes_of_waiting: int) -> None:
         """`bytes_of_waiting`: room of one sample's paths; 0 where none are followed."""
         self._ctx = ctx
-        self.may_halt = bytes_of_waiting > 0 and traits.loops_may_end
+        self.may_halt = bytes_of_waiting > 0 and traits.is_software
         """It is followed a portion at a time (`follow`)."""
         self._places, self._bytes_of_waiting = traits.camera_paths, bytes_of_waiting
         self._waiting: moderngl.Buffer | None = None

@@ -51,7 +51,9 @@ void close_group(bool emits) {
     barrier();
     if (lane < TALLY_ROWS) {
         float sum = 0.0;
-        for (uint i = 0u; i < 64u; ++i) sum += group_watts[lane * 64u + i];
+        // Two short loops, which are unrolled: llvmpipe ends loops that run once others have run too long.
+        for (uint i = 0u; i < 64u; i += 8u)
+            for (uint j = 0u; j < 8u; ++j) sum += group_watts[lane * 64u + i + j];
         tallies[gl_WorkGroupID.x].watts[lane] += sum;
     }
     if (lane < FALLBACK_COUNT) tallies[gl_WorkGroupID.x].fallbacks[lane] += group_falls[lane];
