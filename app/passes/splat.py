@@ -75,12 +75,12 @@ class Splatter:
         self._features = features
         way = way_of(ctx)
         self.by_compute = way.by_compute if by_compute is None else by_compute
-        self._in_bulk = way.in_bulk
+        self.in_bulk = way.in_bulk
         self.group = GROUP
-        if self._in_bulk:
+        if self.in_bulk:
             slot = replace(SPLAT, packs=way.packs).stride
             self.group = min(BULK_GROUP, min(BULK_BYTES, way.largest_block) // (slot * slots_per_photon(features)))
-        self.footprints = Footprints(ctx, features, self.group, self.by_compute, self._in_bulk, way.packs)
+        self.footprints = Footprints(ctx, features, self.group, self.by_compute, self.in_bulk, way.packs)
         self._indices: moderngl.Buffer | None = None
         self._draws: dict[int, moderngl.VertexArray] = {}
         self._adds: dict[int, moderngl.ComputeShader] = {}
@@ -91,12 +91,12 @@ class Splatter:
         self._parameters = ctx.buffer(reserve=PARAMETERS.stride)
 
     def _build_draws(self) -> None:
-        if not self._in_bulk:
+        if not self.in_bulk:
             slots = self.group * self.footprints.slots_per_photon
             corners = np.array([0, 1, 2, 2, 1, 3], np.uint32) + 4 * np.arange(slots, dtype=np.uint32)[:, None]
             self._indices = self._ctx.buffer(corners)
         for kind, (fragment, chosen) in draw_variants(self._features).items():
-            defines = chosen | switched(IN_BULK=self._in_bulk) | {"KIND": kind}
+            defines = chosen | switched(IN_BULK=self.in_bulk) | {"KIND": kind}
             program = shader.program(self._ctx, "light/splat.vert", fragment, defines, (self.footprints.splat,))
             indices = self._indices if VERTICES[kind - 1] == 6 else None
             self._draws[kind] = self._ctx.vertex_array(program, [], index_buffer=indices)
@@ -115,9 +115,7 @@ class Splatter:
     ) -> None:
         """Deposit `photons` (photon_record(groups)). `receivers`: RECEIVER records; `smoothing`: standard deviation of
         a footprint in lattice spacings."""
-        chunk = int(np.clip(atlas.size[0] * atlas.size[1] // FLUSH_SHARE, SMALLEST_CHUNK, CHUNK))
-        if self._in_bulk:
-            chunk = BULK_CHUNK
+        chunk = self.chunk(atlas)
         group = min(self.group, chunk)
         for done in range(0, photons.count, group):
             part = photons.part(done, min(group, photons.count - done))
@@ -129,6 +127,11 @@ class Splatter:
             if atlas.pending >= chunk:
                 atlas.flush()
         check_device(self._ctx, f"splatting {photons.count} photons into a {atlas.size[0]} x {atlas.size[1]} atlas")
+
+    def chunk(self, atlas: MapAtlas) -> int:
+        """Photons between two flushes of these maps, within which a sum is a plain float32's."""
+        share = atlas.size[0] * atlas.size[1] // FLUSH_SHARE
+        return BULK_CHUNK if self.in_bulk else int(np.clip(share, SMALLEST_CHUNK, CHUNK))
 
     def draw(self, tables: SplatTables, atlas: MapAtlas) -> None:
         """Add the splats of the last group of photons to the atlas: to its scratch textures, or to its sums."""

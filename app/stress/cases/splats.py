@@ -21,10 +21,10 @@ import numpy as np
 
 from ...features.features import Features
 from ...gpu.context import Context
+from ...gpu.packed_records import write_records
 from ...gpu.records import FLAG_FOOTPRINT_DROPPED
 from ...passes.footprint import EXTENT_LIMIT, Photons
 from ...passes.light_programs import FAR_TOO_LARGE
-from ...passes.splat import CHUNK
 from ..case import EPSILON, Held, Measured, Measurement, case, judged, measured, not_finite
 from ..rigs.splat_rig import Rig, photons
 
@@ -200,19 +200,24 @@ def one_texel(context: Context, counts: Sequence[int]) -> Measured:
             image = rig.draw(tiny(np.repeat(at, count, axis=0), each))[..., 3]
             error = np.abs(np.array([image.max(), image.sum()]) / (count * single) - 1.0)
             # Recursive summation: one rounding an addition, of at most a chunk of photons; and one of the total.
-            bound, note = min(count, 2048) * HALF + EPSILON, "every photon splatted"
+            bound, note = min(count, rig.splatter.chunk(rig.atlas)) * HALF + EPSILON, "every photon splatted"
         else:
             blocks = count // BLOCK
             error = np.array([abs(flushed(rig, tiny(at, BLOCK * each), blocks) - 1.0)])
-            # The flush carries over what it rounded off: the total is right to its own last place.
-            bound, note = EPSILON, f"{blocks} flushes of a block of {BLOCK:,}"
+            # The flush carries over what it rounded off: the total is right to its own last place. A GPU's rounds off.
+            bound, note = (
+                blocks * HALF if rig.splatter.in_bulk else EPSILON,
+                f"{blocks} flushes of a block of {BLOCK:,}",
+            )
         yield measured(count, f"{count:,} photons", {"energy in the texel": (error, bound)}, [error], note)
 
 
 def flushed(rig: Rig, records: np.ndarray, times: int) -> float:
     """The map's sum after so many flushes of these photons, over as many times their energy."""
     once = rig.draw(records)[..., 3].sum()
-    buffer = rig.ctx.buffer(records)
+    struct = rig.splatter.footprints.photon
+    buffer = rig.ctx.buffer(reserve=len(records) * struct.stride)
+    write_records(struct, buffer, records)
     rig.atlas.clear()
     for _ in range(times):
         rig.splatter.run(Photons(buffer, len(records)), rig.spectra, rig.atlas, rig.receivers, 1.0)
@@ -230,7 +235,7 @@ def one_chunk(context: Context, sides: Sequence[int]) -> Measured:
     lose its root."""
     for side in sides:
         rig = Rig(context.ctx, PLAIN, size=(side, side))
-        count, power = int(np.clip((side + 2) ** 2 // 16, 2048, CHUNK)), rig.light.power_w()
+        count, power = rig.splatter.chunk(rig.atlas), rig.light.power_w()
         rng = np.random.default_rng(7)
         records = tiny(20.5 + rng.uniform(-0.3, 0.3, (count, 2)))
         same = rig.draw(tiny(np.full((count, 2), 20.5), DEPOSIT / power))[..., 3].sum()

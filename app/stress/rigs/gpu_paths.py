@@ -150,7 +150,7 @@ def trace_light(
     # What a photon's weights hold is examined: all of a tint.
     features = replace(Features.of(scene, RenderSettings(method=method)), tint_levels=0)
     buffers = SceneBuffers(gl.ctx, scene, features, spectral_axis(scene, features))
-    room = max(2 * count * len(bands_nm), 1024)
+    room = max(2 * count * len(bands_nm), 1 << 13)
     # Few rays, whose footprints are as wide as the light: columns are derivatives.
     trace = TracePass(gl, features, buffers, room, max_depth, split_threshold=0.0, widest_on_surface=UNBOUNDED)
     try:
