@@ -176,8 +176,7 @@ void follow(uint entry, bool resumes) {
                      leaves = specular && (event_limit_reached || path.depth >= uint(MAX_DEPTH));
                 if (leaves) atomicAdd(fallbacks[FELL_DEPTH], 1u);
                 if (HAS_GRATING && leaves && kind == KIND_GRATING) path.throughput *= efficiency_left(path, hit.object);
-                if (ends || leaves)
-                    ENDED(found++) = PathEnd(path, hit, uint(met && ends), uint(same_hit || leaves));
+                if (ends || leaves) ENDED(found++) = PathEnd(path, hit, uint(met && ends), uint(same_hit || leaves));
                 goes_on = specular && !leaves;
                 if (COATS) goes_on = goes_on || (coated && !event_limit_reached && path.depth < uint(MAX_DEPTH));
                 if (goes_on) meet_surface(path, hit, kind, pixel_key);

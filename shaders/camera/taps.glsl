@@ -132,8 +132,8 @@ void add_lights(Path path, float far) {
     }
 }
 
-// Moves a path, its spectral columns and its band's ends along their flights to the facet that it has met; its sides and
-// directions stay as they are.
+// Moves a path, its spectral columns and its band's ends along their flights to the facet that it has met; its sides
+// and directions stay as they are.
 void arrive(inout Path path, Hit hit) {
     vec3 middle = path.position + hit.distance * path.direction;
     for (int end = 0; end < 2; ++end)
@@ -260,8 +260,7 @@ void add_end(Path path, bool met, Hit hit, bool same_hit, uint pixel_key) {
             }
         }
         if (LAYER_BEAUTY) {
-            vec3 direction_change =
-                SPECTRAL_SWEEP ? part * (path.end_direction[1] - path.end_direction[0]) : vec3(0.0);
+            vec3 direction_change = SPECTRAL_SWEEP ? part * (path.end_direction[1] - path.end_direction[0]) : vec3(0.0);
             if (!ends) add_sky(path, interval, direction, direction_change);
         }
     }

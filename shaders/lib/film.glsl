@@ -52,16 +52,25 @@ vec3 film_over(uint rows, vec3 cosine, vec3 x, bool single) {
     return single ? mean.xyz : nearest * mean;
 }
 
+// Shares over a band, none below 0 or above 1: nearer to their mean where some were, which clamping would move.
+vec3 within_shares(vec3 shares, bool single) {
+    if (single) return clamp(shares, 0.0, 1.0);
+    float mean = clamp(dot(shares, vec3(0.25, 0.5, 0.25)), 0.0, 1.0);
+    vec3 off = shares - mean;
+    float above = max(max(off.x, off.y), off.z), below = -min(min(off.x, off.y), off.z);
+    return mean + off * min(1.0, min((1.0 - mean) / max(above, 1e-9), mean / max(below, 1e-9)));
+}
+
 // Shares of the power of unpolarised light.
 vec3 film_share(Film film, uint what, vec3 x, bool single) {
-    return clamp(film_over(film_rows(film, what), film.cosine, x, single), 0.0, 1.0);
+    return within_shares(film_over(film_rows(film, what), film.cosine, x, single), single);
 }
 
 // The same for s and p.
 FresnelPair film_pair(Film film, uint what, vec3 x, bool single) {
     uint rows = film_rows(film, what), step = uint(FILM_STEPS);
-    return FresnelPair(clamp(film_over(rows, film.cosine, x, single), 0.0, 1.0),
-        clamp(film_over(rows + step, film.cosine, x, single), 0.0, 1.0),
+    return FresnelPair(within_shares(film_over(rows, film.cosine, x, single), single),
+        within_shares(film_over(rows + step, film.cosine, x, single), single),
         film_over(rows + 2u * step, film.cosine, x, single), film_over(rows + 3u * step, film.cosine, x, single));
 }
 

@@ -55,8 +55,7 @@ vec4 receiver_light(sampler2D map, uint source, RayOrigin origin, vec3 position,
                 // what stands over them: whatever a coarser one is asked about is open.
                 ivec2 below = ivec2(0, textureSize(map, 0).y >> 1);
                 bool covered = level == 0
-                    && is_covered(
-                        map, origin, position, normal, NEAR_TEXELS * inversesqrt(dot(row_u.xyz, row_u.xyz)));
+                    && is_covered(map, origin, position, normal, NEAR_TEXELS * inversesqrt(dot(row_u.xyz, row_u.xyz)));
                 vec4 both = vec4(texelFetch(map, low + below, 0).a, texelFetch(map, ivec2(high.x, low.y) + below, 0).a,
                     texelFetch(map, ivec2(low.x, high.y) + below, 0).a, texelFetch(map, high + below, 0).a);
                 vec4 parts = floor(both * 0.0078125);

@@ -47,8 +47,8 @@ vec3 environment_by(Path path, uvec4 level) {
             radiance = environment_at(direction, level);
         }
         vec3 arrived = path.walk.tint[tap / 3][tap % 3] * radiance;
-        found += arrived.r * p.taps[3 * tap].rgb + arrived.g * p.taps[3 * tap + 1].rgb
-            + arrived.b * p.taps[3 * tap + 2].rgb;
+        found +=
+            arrived.r * p.taps[3 * tap].rgb + arrived.g * p.taps[3 * tap + 1].rgb + arrived.b * p.taps[3 * tap + 2].rgb;
     }
     return found;
 }

@@ -47,8 +47,7 @@ void send_parts(uint slot, float at, inout Outcome outcome) {
     for (uint i = 0u; i < 2u && place != NONE; ++i) {
         Path ray = start_in(slot);
         float low = power_below(ray, at);
-        ray =
-            i == 0u ? part_of_band(ray, ray.band.x, at, low, 5u) : part_of_band(ray, at, ray.band.z, 1.0 - low, 6u);
+        ray = i == 0u ? part_of_band(ray, ray.band.x, at, low, 5u) : part_of_band(ray, at, ray.band.z, 1.0 - low, 6u);
         store_path(i == 0u ? place : second_place(slot), ray);
     }
 }

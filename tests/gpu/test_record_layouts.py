@@ -20,7 +20,7 @@ import spectrasplat.gpu
 import spectrasplat.passes
 from spectrasplat.base import paths
 from spectrasplat.gpu import shader
-from spectrasplat.gpu.records import photon_record, ray_record
+from spectrasplat.gpu.records import photon_record, ray_record, trace_parameters
 from spectrasplat.gpu.schema import Struct
 from spectrasplat.passes import beam_splat, footprint, splat
 
@@ -47,7 +47,7 @@ def structs() -> list[Struct]:
             for value in vars(importlib.import_module(f"{package.__name__}.{module.name}")).values():
                 if isinstance(value, Struct):
                     found[value.name, value.stride] = value
-    for sized in (*map(photon_record, (0, 1, 4)), *map(ray_record, (0, 2, 3, 6))):
+    for sized in (*map(photon_record, (0, 1, 4)), *map(ray_record, (0, 2, 3, 6)), trace_parameters(200)):
         found[sized.name, sized.stride] = sized
     return list(found.values())
 

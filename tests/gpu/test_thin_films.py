@@ -28,6 +28,8 @@ from tests.gpu.test_thin_sheets import tilted
 
 LUX = 1000.0
 GLASS = constant(1.5)
+_SILVER = Layer(metals()["silver"], 25.0)
+ETALON = Coating(Film((_SILVER, Layer(constant(1.5), 20_000.0), _SILVER)))
 WINDOW = Coating(Film((Layer(metals()["silver"], 15.0), Layer(constant(2.0), 60.0))))
 
 
@@ -39,10 +41,11 @@ COATED = Dielectric(GLASS, coating=preset("ar"))
 SHEETS = {
     "soap of 1 nm": soap(1.0),
     "soap of 400 nm": soap(400.0),
-    "soap of 3 µm": soap(3000.0),
-    "soap of 100 µm": soap(1e5),
+    "soap of 3000 nm": soap(3000.0),
+    "soap of 0.1 mm": soap(1e5),
     "dichroic": Dielectric(GLASS, thin=True, coating=preset("dichroic-blue")),
     "silvered": Dielectric(GLASS, thin=True, coating=WINDOW),
+    "etalon": Dielectric(GLASS, thin=True, coating=ETALON),
     "half": Dielectric(GLASS, thin=True, coating=preset("beam-splitter")),
 }
 
