@@ -18,8 +18,8 @@ from spectrasplat.model.settings import RenderSettings
 
 SCENES = sorted((assets_dir() / "scenes").glob("*.toml"), key=lambda path: path.stem)
 MOST_LIVE, MOST_ARRAY_WORDS, MOST_BYTES, MOST_SCENE_BYTES = 220, 64, 75_000, 500_000
-LARGE = {"camera/camera.comp": (MOST_LIVE, 99_000), "light/trace.comp": (226, 87_000)}
-"""Programs that follow paths: more live words, or more text, than is wanted of any, which is not met since
+LARGE = {"camera/camera.comp": (MOST_LIVE, 76, 99_000), "light/trace.comp": (226, MOST_ARRAY_WORDS, 87_000)}
+"""Programs that follow paths: more live words, array words or text than is wanted of any, which is not met since
 27 November 2026."""
 _held: set[tuple[str, ...]] = set()
 """Texts that were looked at."""
@@ -44,13 +44,13 @@ def check(programs: list[Built]) -> None:
         if built.texts in _held:
             continue
         _held.add(built.texts)
-        most_live, most_bytes = LARGE.get(built.name, (MOST_LIVE, MOST_BYTES))
+        most_live, most_array_words, most_bytes = LARGE.get(built.name, (MOST_LIVE, MOST_ARRAY_WORDS, MOST_BYTES))
         assert max(map(len, built.texts)) <= most_bytes, built.name
         if strict_compilers.missing():
             continue
         for state in strict_compilers.live_states(built):
             assert state.registers <= most_live, (built.name, state)
-            assert state.scratch <= MOST_ARRAY_WORDS, (built.name, state)
+            assert state.scratch <= most_array_words, (built.name, state)
 
 
 def test_a_scenes_programs_are_small(device: Context) -> None:
