@@ -98,7 +98,7 @@ def test_features_that_are_in_tell_what_they_add(tmp_path: Path) -> None:
     # Both glasses stand before the camera: the maps hold eight spectral channels beside XYZ.
     assert "32 B a texel" in row(text, "spectral maps") and "a second program" in row(text, "camera refraction")
     assert (
-        "A ray is 240 bytes with 4 derivative column(s), a photon record 128, its splats 288, a map's texel 48."
+        "A ray is 240 bytes with 4 derivative column(s), a photon record 128, its splats 432, a map's texel 48."
         in " ".join(text.split())
     )
 
