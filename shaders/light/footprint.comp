@@ -434,9 +434,10 @@ void make_splats(uint i) {
             }
             within |= steps_within(outer.rect, g, photon);
             uint wide = choose_level(next, g, photon, middle, sweep);
-            if (shown && is_only_fine(centre, extent, drawn_in, placements[wide], photon.position)) break;
+            Placement widest = placements[wide];
+            if (shown && is_only_fine(centre, extent, drawn_in, widest, photon.position)) break;
             SplatRecord coarse = splat_of(photon, power_w, mean, g, table, table_band);
-            coarse.rect = placements[wide].rect;
+            coarse.rect = widest.rect;
             centre = coarse.centre;
             extent = half_extent(coarse);
             if (!touches(coarse.rect, centre, extent)) coarse.kind = 0u;
