@@ -256,8 +256,8 @@ class LightPass:
     def steps_until(self, number: int, photons: int, stop: Callable[[], bool]) -> Generator[float, None, bool]:
         """A pass, pausing with the share done; returns False when `stop` left part of it undone.
 
-        It is traced in rounds, each an even sub-lattice of the whole, so that a pass that is stopped between rounds is
-        complete everywhere, only coarser."""
+        It is traced in rounds, each an even sub-lattice of the whole, so that a pass that is stopped between rounds has
+        light everywhere, but rows of points of its lattice are missing."""
         for step in self.pass_steps(number, photons):
             yield step.fraction
             if step.round_done and step.fraction < 1.0 and stop():

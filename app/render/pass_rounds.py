@@ -1,6 +1,6 @@
 """One pass of the light pass, in rounds: each is an even sub-lattice of the whole, traced as beams and as photons.
 
-A pass that is stopped between rounds is complete everywhere, only coarser.
+A pass that is stopped between rounds has light everywhere, but rows of points of its lattice are missing.
 """
 
 from __future__ import annotations

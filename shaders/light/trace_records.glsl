@@ -127,11 +127,9 @@ void store_path(uint slot, Path path) {
     RayRecord_TO(STORE_RAY, slot * uint(RayRecord_TEXELS), ray)
 }
 
-void store_photon(uint slot, PhotonRecord photon){PhotonRecord_TO(STORE_PHOTON, slot *uint(PHOTON_STRIDE), photon)}
+void store_photon(uint slot, PhotonRecord photon) { PhotonRecord_TO(STORE_PHOTON, slot * uint(PHOTON_STRIDE), photon); }
 
-layout(std430, binding = BIND_FLIGHTS) writeonly restrict buffer Flights {
-    uvec4 flights[];
-};
+layout(std430, binding = BIND_FLIGHTS) writeonly restrict buffer Flights { uvec4 flights[]; };
 
 void store_flight(uint slot, Flight flight) {
     uvec4 texels[Flight_TEXELS];
