@@ -9,8 +9,6 @@ from reference import crystals
 from spectrasplat.reference import optics
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
-from tests.reference import polarisation
-
 LIBRARY = ["lib/optics.glsl", "lib/polarisation.glsl", "lib/crystal.glsl"]
 SHARES = """
     vec4 back, onward;
