@@ -169,7 +169,7 @@ def beam_scene(
         tint_curves(scene),
         tuple(i for i in outlines if scene.objects[i].material.is_specular),
         why_not,
-        scene.render.polarisation,
+        scene.polarised,
     )
 
 

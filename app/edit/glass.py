@@ -9,7 +9,6 @@ from typing import Any
 from ..base.errors import UserError
 from ..model.materials.absorption import MAX_ATTENUATION
 from ..model.materials.dielectric import MAX_PRIORITY
-from ..model.optics import glass
 from ..model.optics.glass import Dispersion
 from ..model.optics.tints import Tint
 from ..model.scene import Absorption, Dielectric, Scene, Vec3
@@ -22,7 +21,7 @@ def set_dispersion(scene: Scene, index: int, dispersion: Dispersion) -> Scene:
 
     Raises UserError where the object is not glass, or a light has a line outside the glass's data.
     """
-    after = _with_glass(scene, index, dispersion=dispersion)
+    after = _with_glass(scene, index, dispersion=dispersion, extraordinary=None)
     if dispersion.range_nm != _glass(scene, index).dispersion.range_nm:
         for light in scene.lights:
             check_lines(light, [after.objects[index]], scene.name)
@@ -31,8 +30,7 @@ def set_dispersion(scene: Scene, index: int, dispersion: Dispersion) -> Scene:
 
 def set_dispersion_gain(scene: Scene, index: int, gain: float) -> Scene:
     """Factor on n(λ) − n_d of object `index`: 0 none, 1 as in nature."""
-    gained = glass.with_gain(_glass(scene, index).dispersion, gain, scene.objects[index].name)
-    return set_dispersion(scene, index, gained)
+    return changed(scene, index, material=_glass(scene, index).with_gain(gain, scene.objects[index].name))
 
 
 def abbe_numbers(dispersion: Dispersion) -> tuple[float, float]:

@@ -21,6 +21,7 @@ from ..model.optics.spectrum import Spectrum
 from ..model.placement import rotation_about
 from ..model.scene import (
     Camera,
+    Dielectric,
     Light,
     Material,
     Scene,
@@ -103,13 +104,20 @@ def paths(scene: Scene, camera: Camera) -> dict[str, Parameter]:
     own = {**_PLACE, **_TARGET, **_ORBIT}
     found |= {f"camera.{name}": parameter for name, parameter in own.items() if name != skipped}
     for item in scene.objects:
-        parts = {**_PLACE, **_TURN} | (_GLASS if item.material.transmits else {}) | _of_numbers(item.material)
+        parts = {**_PLACE, **_TURN} | _of_glass(item.material) | _of_numbers(item.material)
         found |= {f"objects.{item.name}.{name}": parameter for name, parameter in parts.items()}
     for light in scene.lights:
         parts = {"power": _POWER} | _of_numbers(light)
         parts |= (_PLACE if light.has_place else {}) | (_TURN if light.has_direction else {})
         found |= {f"lights.{light.name}.{name}": parameter for name, parameter in parts.items()}
     return found
+
+
+def _of_glass(material: Material) -> dict[str, Parameter]:
+    """Of a crystal, which has two indices, the gain alone."""
+    if not material.transmits:
+        return {}
+    return {name: each for name, each in _GLASS.items() if name == "dispersion_gain" or not material.is_crystal}
 
 
 def parameter(stage: Stage, path: str, where: str = "") -> Parameter:
@@ -258,13 +266,14 @@ def _with_object(item: SceneObject, name: str, value: float) -> SceneObject:
     numbers = _animated_numbers(item.material)
     if field in numbers:
         return replace(item, material=replace(item.material, **{numbers[field].attribute: value}))
-    dispersion = _with_glass(item.material.dispersion, name, value)
-    return replace(item, material=item.material.changed(dispersion=dispersion))
+    material = item.material
+    assert isinstance(material, Dielectric)
+    if name == "dispersion_gain":
+        return replace(item, material=material.with_gain(value))
+    return replace(item, material=material.changed(dispersion=_with_glass(material.dispersion, name, value)))
 
 
 def _with_glass(dispersion: Dispersion, name: str, value: float) -> Dispersion:
-    if name == "dispersion_gain":
-        return glass.with_gain(dispersion, value)
     plain = dispersion.natural
     n_d, v_d = (value, plain.V_d) if name == "n_d" else (plain.n_d, value)
     return glass.with_gain(glass.from_abbe(n_d, v_d, dispersion.name), dispersion.gain)

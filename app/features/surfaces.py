@@ -85,12 +85,12 @@ class SurfaceFeatures:
     """Some glass has a ground surface, whose microfacets turn paths by chance."""
     polarised: bool = feature(
         "polarisation",
-        lambda facts: facts.scene.render.polarisation and bool(facts.glass or facts.films),
+        lambda facts: facts.scene.polarised and bool(facts.glass or facts.films),
         symbol="POLARISED",
         why="the scene asks for it, and there is glass or metal to part s and p",
         why_not=lambda facts: (
             "there is no glass or metal to part s and p"
-            if facts.scene.render.polarisation
+            if facts.scene.polarised
             else "[render] polarisation is not set"
         ),
         names=("stokes_q", "incidence_axis", "fresnel_reflection", "behind_interface", "see_polarised"),

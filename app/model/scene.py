@@ -15,7 +15,7 @@ import numpy as np
 
 from .geometry.mesh import Mesh
 from .lights import Light
-from .materials import Absorption, Black, Dielectric, Diffuse, Grating, Material, Mirror
+from .materials import Absorption, Black, Dielectric, Diffuse, Grating, Material, Mirror, Polariser
 from .texture import Environment
 from .vectors import Vec3
 
@@ -30,6 +30,7 @@ __all__ = [
     "Light",
     "Material",
     "Mirror",
+    "Polariser",
     "RenderDefaults",
     "Scene",
     "SceneObject",
@@ -135,6 +136,11 @@ class Scene:
     """What was assumed while loading, one sentence each; shown to the user."""
     units: str = ""
     """What people call the unit of length ("mm"); converts nothing. Empty: unknown."""
+
+    @property
+    def polarised(self) -> bool:
+        """Light keeps its polarisation from surface to surface: as asked, or because an object polarises it."""
+        return self.render.polarisation or any(item.material.polarises for item in self.objects)
 
     @property
     def receiver_names(self) -> list[str]:

@@ -39,7 +39,7 @@ def scene_key(scene: Scene, *more: object) -> str:
     Names, notes, textures and the background do not count.
     """
     key = ContentKey()
-    rules = (("polarised", scene.render.polarisation), (f"bounces {scene.render.bounces}", scene.render.bounces))
+    rules = (("polarised", scene.polarised), (f"bounces {scene.render.bounces}", scene.render.bounces))
     key.add("scene", *more, *(name for name, holds in rules if holds))
     camera = astuple(scene.camera)
     # Without a lens there is no plane of focus.

@@ -182,7 +182,7 @@ def photon_scene(scene: Scene) -> tuple[PhotonScene, np.ndarray]:
         albedo_tables(widths),
         _NEAR * size,
         _CONTACT * 2.0 ** round(float(np.log2(size))),
-        scene.render.polarisation,
+        scene.polarised,
         films_of(scene, TABLE_NM),
     ), centre
 

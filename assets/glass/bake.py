@@ -73,8 +73,10 @@ MATERIALS: dict[str, tuple[str, list[str]]] = {
     "germania": ("main/GeO2/nk/Fleming.yml", ["GeO2"]),
     "glycerol": ("organic/C3H8O3 - glycerol/nk/Gupta.yml", ["glycerin", "glycerine"]),
     "lithium fluoride": ("main/LiF/nk/Li.yml", ["LiF"]),
+    "lithium niobate (extraordinary)": ("main/LiNbO3/nk/Zelmon-e.yml", []),
     "lithium niobate (ordinary)": ("main/LiNbO3/nk/Zelmon-o.yml", ["lithium niobate", "LiNbO3"]),
     "magnesia": ("main/MgO/nk/Stephens-vis.yml", ["MgO", "magnesium oxide", "periclase"]),
+    "magnesium fluoride (extraordinary)": ("main/MgF2/nk/Dodge-e.yml", []),
     "magnesium fluoride (ordinary)": ("main/MgF2/nk/Dodge-o.yml", ["magnesium fluoride", "MgF2"]),
     "moissanite (extraordinary)": ("main/SiC/nk/Wang-6H-e.yml", []),
     "moissanite (ordinary)": ("main/SiC/nk/Wang-6H-o.yml", ["moissanite", "silicon carbide"]),
@@ -97,6 +99,7 @@ MATERIALS: dict[str, tuple[str, list[str]]] = {
     "salt": ("main/NaCl/nk/Li.yml", ["NaCl", "sodium chloride", "rock salt"]),
     "sapphire (extraordinary)": ("main/Al2O3/nk/Malitson-e.yml", []),
     "sapphire (ordinary)": ("main/Al2O3/nk/Malitson-o.yml", ["sapphire", "Al2O3", "corundum", "padparadscha", "ruby"]),
+    "scheelite (extraordinary)": ("main/CaWO4/nk/Bond-e.yml", []),
     "scheelite (ordinary)": ("main/CaWO4/nk/Bond-o.yml", ["scheelite", "CaWO4"]),
     "soda-lime glass": ("glass/misc/soda-lime/nk/Rubin-clear.yml", ["window glass", "float glass", "soda glass"]),
     "spinel": ("main/MgAl2O4/nk/Tropf.yml", ["MgAl2O4"]),
@@ -177,6 +180,16 @@ def ice(data: Path) -> dict[str, Any]:
     return {"c": coefficients, "f": 5, "n": note, "r": [390.0, 790.0], "s": plain(record["REFERENCES"]), "a": []}
 
 
+ICE_BIREFRINGENCE = 0.0014
+
+
+def across(frozen: dict[str, Any]) -> dict[str, Any]:
+    """Ice's extraordinary index: above the ordinary one by what was measured at 589 nm, 1.3104 − 1.3090."""
+    coefficients = [frozen["c"][0] + ICE_BIREFRINGENCE, *frozen["c"][1:]]
+    note = f"ice and {ICE_BIREFRINGENCE:g} at every wavelength (A. Ehringhaus, N. Jb. Min. B 41, 342, 1917)"
+    return frozen | {"c": coefficients, "n": note}
+
+
 GEM_LICENCE = "numbers of published tables, put together for this project (MIT)"
 GEM_SOURCE = "gem tables: W. Schumann, Gemstones of the World (2009); R. Webster, Gems (1994)"
 LINES_UM = {"B": 0.6867, "D": 0.5893, "G": 0.4308}
@@ -186,9 +199,16 @@ def gems() -> dict[str, Any]:
     """Two terms of Cauchy's formula for each stone of gems.toml."""
     d, inverse_square = LINES_UM["D"], LINES_UM["G"] ** -2 - LINES_UM["B"] ** -2
     entries = {}
-    for gem in tomllib.loads((HERE / "gems.toml").read_text(encoding="utf-8"))["gems"]:
+    listed = tomllib.loads((HERE / "gems.toml").read_text(encoding="utf-8"))["gems"]
+    others = [
+        {**gem, "name": f"{gem['name']} (extraordinary)", "n_D": gem["extraordinary"], "also": []}
+        for gem in listed
+        if "extraordinary" in gem
+    ]
+    for gem in listed + others:
         entry = {"a": gem.get("also", []), "l": GEM_LICENCE, "r": [380.0, 780.0], "s": GEM_SOURCE}
-        remarks = [gem["note"]] if "note" in gem else []
+        remarks = ["uniaxial"] if "extraordinary" in gem else []
+        remarks += [gem["note"]] if "note" in gem else []
         if "dispersion" in gem:
             b = gem["dispersion"] / inverse_square
             entry |= {"f": 5, "c": [round(gem["n_D"] - b / d**2, 9), round(b, 9), -2.0]}
@@ -205,7 +225,8 @@ def bake() -> dict[str, Any]:
     from spectrasplat.model.optics.catalogue import search_key
 
     data = database()
-    makers: dict[str, dict[str, Any]] = {"Materials": gems() | {"ice": ice(data)}}
+    frozen = ice(data)
+    makers: dict[str, dict[str, Any]] = {"Materials": gems() | {"ice": frozen, "ice (extraordinary)": across(frozen)}}
     for name, (file, aliases) in MATERIALS.items():
         entry = read_entry(data / file)
         assert entry is not None, file

@@ -23,7 +23,16 @@ from spectrasplat.model.io.toml_text import toml_text
 from spectrasplat.model.lights import LIGHT_KINDS, Light, PointLight
 from spectrasplat.model.lights.light import made
 from spectrasplat.model.lights.light_file import light_values, read_light
-from spectrasplat.model.materials import MATERIAL_KINDS, Absorption, Dielectric, Diffuse, Grating, Material, Mirror
+from spectrasplat.model.materials import (
+    MATERIAL_KINDS,
+    Absorption,
+    Dielectric,
+    Diffuse,
+    Grating,
+    Material,
+    Mirror,
+    Polariser,
+)
 from spectrasplat.model.materials.material_file import read_material
 from spectrasplat.model.optics import catalogue
 from spectrasplat.model.optics.colorimetry import VISIBLE_NM
@@ -117,6 +126,7 @@ MATERIALS: dict[str, Material] = {
     "diffuse": Diffuse((0.1, 0.2, 0.3)),
     "black": MATERIAL_KINDS["black"](),
     "grating": Grating(1234.5, (2, -1), (0.25, 0.5), True, (0.6, 0.0, 0.8)),
+    "polariser": Polariser(0.9, 0.25, 140.0, (0.6, 0.8, 0.0)),
 }
 
 
@@ -143,9 +153,11 @@ def test_a_measured_reflectance_is_read_back(tmp_path: Path) -> None:
 @pytest.mark.parametrize("kind", MATERIAL_KINDS)
 def test_light_goes_on_lands_or_ends(kind: str) -> None:
     material = MATERIALS[kind]
-    assert material.is_specular == (material.transmits or material.is_mirror or material.is_grating)
+    assert material.is_specular == (
+        material.transmits or material.is_mirror or material.is_grating or material.is_polariser
+    )
     assert sum((material.is_specular, material.receives, material.is_black)) == 1
-    assert sorted(cls.gpu_code for cls in MATERIAL_KINDS.values()) == [0, 1, 2, 3, 4]
+    assert sorted(cls.gpu_code for cls in MATERIAL_KINDS.values()) == [0, 1, 2, 3, 4, 6]
 
 
 # -- saving over what a person wrote --------------------------------------------------------

@@ -13,8 +13,20 @@ from .diffuse import Diffuse
 from .grating import Grating
 from .material import Material
 from .opaque import Black, Mirror
+from .polariser import Polariser
 
-MATERIAL_KINDS: dict[str, type[Material]] = {cls.kind: cls for cls in (Dielectric, Mirror, Diffuse, Black, Grating)}
+_KINDS = (Dielectric, Mirror, Diffuse, Black, Grating, Polariser)
+MATERIAL_KINDS: dict[str, type[Material]] = {cls.kind: cls for cls in _KINDS}
 """By their word in a scene file."""
 
-__all__ = ["MATERIAL_KINDS", "Absorption", "Black", "Dielectric", "Diffuse", "Grating", "Material", "Mirror"]
+__all__ = [
+    "MATERIAL_KINDS",
+    "Absorption",
+    "Black",
+    "Dielectric",
+    "Diffuse",
+    "Grating",
+    "Material",
+    "Mirror",
+    "Polariser",
+]

@@ -1,13 +1,17 @@
-"""Glass, water, gems: a transparent solid."""
+"""Glass, water, gems, crystals: a transparent solid."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
-from ..fields import Animated, Colour, Flag, Integer, Number, Row
-from ..optics import catalogue
+import numpy as np
+
+from ...base.errors import UserError
+from ..fields import Animated, Colour, Direction, Flag, Integer, Number, Row
+from ..io.scene_table import SceneTable
+from ..optics import catalogue, crystals, glass
 from ..optics.colorimetry import VISIBLE_NM
 from ..optics.glass import Dispersion
 from ..optics.thin_films import Film
@@ -17,6 +21,9 @@ from .absorption import Absorption, AbsorptionPart
 from .coating import FILM_INDEX, FILM_NM, Coating, CoatingPart, film_of, film_words
 from .dispersion_file import DispersionPart
 from .material import Material, colour_words
+
+if TYPE_CHECKING:
+    from ..geometry.mesh import Mesh
 
 DEFAULT_GLASS = "N-BK7"
 MAX_PRIORITY = 1_000_000
@@ -48,9 +55,20 @@ THIN = Flag(
         "its roughness have no effect then; its colour has.",
     ),
 )
+Z_AXIS = (0.0, 0.0, 1.0)
 CLEAR = (1.0, 1.0, 1.0)
 SHEET_CODE = 5
 """KIND_SHEET of shaders/lib/scene.glsl."""
+
+
+class _Axis(Direction):
+    """`axis`, of crystals alone."""
+
+    def read(self, table: SceneTable) -> dict[str, Any]:
+        """The unit vector."""
+        if table.has(self.attribute) and not table.given(("crystal", "ordinary")):
+            table.fail(self.attribute, "is a crystal's: give 'crystal', or 'ordinary' and 'extraordinary'")
+        return super().read(table)
 
 
 @dataclass(frozen=True)
@@ -70,6 +88,10 @@ class Dielectric(Material):
     coating: Coating | None = None
     film_nm: float = 0.0
     film_index: float = 1.33
+    extraordinary: Dispersion | None = None
+    """Of a uniaxial crystal, whose `dispersion` is the ordinary one; None: it is isotropic."""
+    axis: Vec3 = Z_AXIS
+    """A crystal's optic axis, a unit vector in the object's own coordinates."""
 
     kind: ClassVar = "glass"
     title: ClassVar = "Glass"
@@ -84,6 +106,7 @@ class Dielectric(Material):
         CoatingPart(),
         FILM_NM,
         FILM_INDEX,
+        _Axis("axis", Z_AXIS, optional=True),
     )
     is_specular: ClassVar = True
     transmits: ClassVar = True
@@ -101,6 +124,8 @@ class Dielectric(Material):
     @property
     def why_no_beams(self) -> str | None:  # type: ignore[override]
         """Beams know clear polished solids alone."""
+        if self.is_crystal:
+            return "it is a crystal, which parts light in two"
         if self.thin:
             return "it is a thin sheet"
         if self.filters:
@@ -108,6 +133,39 @@ class Dielectric(Material):
         if self.film is not None:
             return "a thin film lies on it"
         return "its surface is rough" if self.is_rough else None
+
+    @property
+    def is_crystal(self) -> bool:
+        """Its indices differ."""
+        return self.extraordinary is not None and crystals.is_birefringent(self.dispersion, self.extraordinary)
+
+    def axis_in_world(self, object_to_world: np.ndarray) -> np.ndarray:
+        """Unit vector (3,) along the optic axis, of an object placed so."""
+        along = np.asarray(object_to_world)[:3, :3] @ np.asarray(self.axis, float)
+        return along / np.linalg.norm(along)
+
+    def with_gain(self, gain: float, where: str = "") -> Self:
+        """A copy whose dispersion, of a crystal both, is `gain` times the material's own. Raises UserError."""
+        pair = (self.dispersion, self.extraordinary)
+        ordinary, other = (None if d is None else glass.with_gain(d, gain, where) for d in pair)
+        return self.changed(dispersion=ordinary, extraordinary=other)
+
+    def check_on(self, mesh: Mesh, name: str, file_name: str) -> None:
+        """Crystals are solid, polished and bare."""
+        faults = {
+            "thin": self.thin,
+            "roughness": self.roughness > 0.0,
+            "coating": self.coating is not None,
+            "film_nm": self.film_nm > 0.0,
+        }
+        key = next((key for key, holds in faults.items() if holds), None)
+        if self.is_crystal and key is not None:
+            raise UserError(
+                f"{file_name}: object '{name}' is a crystal with '{key}', and light is followed through polished bare "
+                f"solids of crystal alone; leave '{key}' out, or take a glass"
+            )
+        if self.is_crystal:
+            raise UserError(f"{file_name}: object '{name}' is a crystal, which is not traced yet; take a glass")
 
     @classmethod
     def usual(cls) -> Self:
@@ -125,13 +183,16 @@ class Dielectric(Material):
         absorbed = None if self.absorption is None else self.absorption.coefficient
         index = self.dispersion.index(VISIBLE_NM)
         film = () if self.film is None else (self.film,)
-        return index, self.priority, absorbed, self.thin, *self.transmittance_rgb, self.roughness, *film
+        other = (self.extraordinary.index(VISIBLE_NM), *self.axis) if self.extraordinary is not None else ()
+        return index, self.priority, absorbed, self.thin, *self.transmittance_rgb, self.roughness, *film, *other
 
     def words(self) -> str:
         """Its glass, and what sets it apart from it."""
-        glass = self.dispersion
-        words = glass.name or f"glass of n_d {glass.n_d:.4f}"
-        words += "" if glass.gain == 1.0 else f", {glass.gain:g} times as dispersive"
+        own, other = self.dispersion, self.extraordinary
+        words = own.name or f"glass of n_d {own.n_d:.4f}"
+        if other is not None:
+            words = crystals.named(own, other) or f"crystal of n_o {own.n_d:.4f} and n_e {other.n_d:.4f}"
+        words += "" if own.gain == 1.0 else f", {own.gain:g} times as dispersive"
         tint = None if self.absorption is None else tint_of(self.absorption.coefficient)
         words += "" if self.absorption is None else ", absorbing" if tint is None else f", tinted {tint[0].name}"
         words += "" if self.transmittance_rgb == CLEAR else f", surface {colour_words(self.transmittance_rgb)}"

@@ -10,27 +10,56 @@ from typing import Any
 from ...base.errors import UserError
 from ..fields import Part
 from ..io.scene_table import SceneTable
-from ..optics import catalogue, glass, index_file
+from ..optics import catalogue, crystals, glass, index_file
 from ..optics.glass import Dispersion
 
 GAIN = "dispersion_gain"
 _INDEX_KEYS = ("glass", "n_d", "sellmeier", "cauchy", "formula", "table", "csv")
+_CRYSTAL_KEYS = ("crystal", "ordinary")
 _FITS_WITH_RANGE = ("sellmeier", "cauchy", "formula")
 _LEAST_NM2, _MOST_NM2 = 50.0, 2e5
 """First coefficients in this range are in nm²: in µm² they are below 1, and in Å² larger."""
 
 
 class DispersionPart(Part):
-    """The keys of a refractive index, and `dispersion_gain`, as `dispersion`."""
+    """The keys of a refractive index, or of the two of a crystal, and `dispersion_gain`, as `dispersion` and
+    `extraordinary`."""
 
     def read(self, table: SceneTable) -> dict[str, Any]:
-        """The dispersion."""
-        dispersion = _read_index(table)
-        return {"dispersion": with_gain(table, dispersion) if table.has(GAIN) else dispersion}
+        """The dispersion, of a crystal the ordinary one; and the extraordinary one or None."""
+        key = table.one_of((*_INDEX_KEYS, *_CRYSTAL_KEYS), "the refractive index")
+        found: dict[str, Dispersion | None] = {"dispersion": None, "extraordinary": None}
+        if key == "crystal":
+            crystal = crystals.find_crystal(table.string(key), table.where(key))
+            found = {"dispersion": crystal.ordinary, "extraordinary": crystal.extraordinary}
+        elif key == "ordinary":
+            found = {"dispersion": _read_own(table, key), "extraordinary": _read_own(table, "extraordinary")}
+        else:
+            found["dispersion"] = _read_index(table)
+        if table.has(GAIN):
+            found = {name: None if each is None else with_gain(table, each) for name, each in found.items()}
+        return found
 
     def write(self, value: Any, path: Path | None) -> dict[str, Any]:
-        """Its glass by name where it has one, else its data."""
-        return describe_dispersion(value.dispersion)
+        """Its glass or crystal by name where it has one, else its data."""
+        if value.extraordinary is None:
+            return describe_dispersion(value.dispersion)
+        gain = {} if value.dispersion.gain == 1.0 else {GAIN: value.dispersion.gain}
+        if name := crystals.named(value.dispersion, value.extraordinary):
+            return {"crystal": name} | gain
+        own = {"ordinary": value.dispersion, "extraordinary": value.extraordinary}
+        return {key: describe_dispersion(each.natural) for key, each in own.items()} | gain
+
+
+def _read_own(table: SceneTable, key: str) -> Dispersion:
+    """One of the two indices of a crystal: the name of a glass, or a table with the keys of one."""
+    if isinstance(table.raw(key), str):
+        return named_glass(table, key, table.string(key))
+    inner = table.table(key)
+    assert inner is not None
+    found = _read_index(inner)
+    inner.finish("an index of a crystal")
+    return found
 
 
 def with_gain(table: SceneTable, dispersion: Dispersion) -> Dispersion:
@@ -56,9 +85,12 @@ def _from_file(table: SceneTable, key: str) -> Dispersion:
 def _read_index(table: SceneTable) -> Dispersion:
     key = table.one_of(_INDEX_KEYS, "the refractive index")
     if key is None:
-        if table.has("V_d"):
-            table.fail("V_d", "needs 'n_d' beside it")
-        table.fail("", f"has no refractive index: give one of {', '.join(_INDEX_KEYS)}, or another kind")
+        for lone, partner in (("V_d", "n_d"), ("extraordinary", "ordinary")):
+            if table.has(lone):
+                table.fail(lone, f"needs '{partner}' beside it")
+        table.fail(
+            "", f"has no refractive index: give one of {', '.join((*_INDEX_KEYS, *_CRYSTAL_KEYS))}, or another kind"
+        )
     if key == "glass":
         return named_glass(table, key, table.string(key))
     name = table.string("name", "")

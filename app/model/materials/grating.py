@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 MAX_ORDER = 50
 MIN_LINES, MAX_LINES = 1.0, 10_000.0
 _SUM_SLACK = 1e-9
-_MIN_SINE = 1e-3
+MIN_SINE = 1e-3
 """Sine of the angle between lines and normal below which the lines have no direction in the surface."""
 
 WAVELENGTH = Dispersion("wavelength", "formula 5", (0.0, 1.0, 1.0))
@@ -139,7 +139,7 @@ class Grating(Material):
         normals = mesh.face_normals()
         normals = normals[normals.any(axis=1)]
         sines = np.linalg.norm(np.cross(normals, np.asarray(self.direction, float)), axis=1)
-        if np.any(sines < _MIN_SINE):
+        if np.any(sines < MIN_SINE):
             raise UserError(
                 f"{file_name}: the lines of grating '{name}' run along the normal of its surface; "
                 "choose a 'direction' that lies in the surface"

@@ -38,6 +38,7 @@ class Material:
     """Light is refracted into it: a dielectric."""
     is_mirror: ClassVar[bool] = False
     is_grating: ClassVar[bool] = False
+    is_polariser: ClassVar[bool] = False
     receives: ClassVar[bool] = False
     """It is diffuse, so caustics are visible on it."""
     why_no_beams: ClassVar[str | None] = None
@@ -60,6 +61,8 @@ class Material:
     diffuse_roughness = 0.0
     dispersion = cast(Any, None)
     """The function of wavelength that it deflects light by: a glass's index, for a grating the wavelength itself."""
+    extraordinary = cast(Any, None)
+    """A crystal's second dispersion."""
     priority = 0
     thin = False
     transmittance_rgb = (1.0, 1.0, 1.0)
@@ -79,6 +82,16 @@ class Material:
     def disperses(self) -> bool:
         """It deflects different wavelengths into different directions."""
         return self.dispersion is not None and not self.thin and bool(self.dispersion.is_dispersive)
+
+    @property
+    def is_crystal(self) -> bool:
+        """It is birefringent: it parts light into an ordinary and an extraordinary ray."""
+        return False
+
+    @property
+    def polarises(self) -> bool:
+        """What it does is polarised in the first place, so that a scene with it keeps light's polarisation."""
+        return self.is_crystal or self.is_polariser
 
     @property
     def has_coat(self) -> bool:

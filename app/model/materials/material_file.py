@@ -7,7 +7,7 @@ from ..io.scene_table import SceneTable
 from ..texture import TextureReader
 from . import MATERIAL_KINDS
 from .dielectric import DEFAULT_GLASS, PRIORITY, ROUGHNESS, THIN, Dielectric
-from .dispersion_file import GAIN, named_glass, with_gain
+from .dispersion_file import GAIN, named_glass
 from .material import Material
 
 _OF_GLASS = {
@@ -51,7 +51,8 @@ def read_object_material(
     if table.has(GAIN):
         if not material.transmits:
             table.fail(GAIN, "is for glass; this object has none")
-        material = material.changed(dispersion=with_gain(table, material.dispersion))
+        assert isinstance(material, Dielectric)
+        material = material.with_gain(table.number(GAIN, at_least=0.0), table.where(GAIN))
     for field, what in _OF_GLASS.items():
         if table.has(field.attribute):
             if not material.transmits:
