@@ -23,6 +23,8 @@ MAX_FAR_RATIO = 1e9
 """Distance from the origin to the largest object's size: float64 then tells a millionth of it."""
 ON_SURFACE = 1e-9
 """Share of a mesh's longest side: a point so near to a facet is on it."""
+_CONTACT, _MOST_TRIED = 1e-3, 64
+"""Share of a crystal's size that a sheet on it may be away, and how many of its facets are tried."""
 MIN_SIZE = 1e-12
 """Least size of the largest object, and one over its greatest: inverse squares of areas are then numbers in float32."""
 
@@ -50,6 +52,7 @@ def check_scene(scene: Scene, file_name: str) -> list[str]:
         check_texture(item, file_name)
         item.material.check_on(item.mesh, item.name, file_name)
     _check_sizes(scene, file_name)
+    _check_crystals(scene, file_name)
     glasses = [o for o in scene.objects if o.material.transmits]
     for light in scene.lights:
         if light.has_place:
@@ -65,6 +68,24 @@ def check_scene(scene: Scene, file_name: str) -> list[str]:
             if not light.spectral_power.power_w() > 0.0
         ]
     )
+
+
+def _check_crystals(scene: Scene, file_name: str) -> None:
+    """Raise UserError for a sheet, or metal, within a crystal or on it: they would have to know its two waves."""
+    crystals = [o for o in scene.objects if o.material.is_crystal]
+    sheets = [o for o in scene.objects if o.material.is_specular and not o.material.is_solid] if crystals else []
+    for item in (o for o in sheets if not o.material.is_mirror or o.material.film is not None):
+        corners = item.world_vertices[item.mesh.triangles[:_MOST_TRIED]]
+        across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300)
+        for crystal in crystals:
+            off = _CONTACT * _size(crystal) * across
+            tried = np.concatenate([corners.mean(axis=1) + off, corners.mean(axis=1) - off])
+            if any(contains(crystal, point) for point in tried):
+                raise UserError(
+                    f"{file_name}: '{item.name}' lies in the crystal of '{crystal.name}' or on it, where light is not "
+                    "followed through it; move it away"
+                )
 
 
 def contains(item: SceneObject, point: np.ndarray) -> bool:
@@ -203,7 +224,8 @@ def check_lines(light: Light, glasses: Sequence[SceneObject], file_name: str) ->
     """Raise UserError for an emission line outside the data of one of `glasses`."""
     for wavelength_nm, power in light.spectral_power.lines:
         for item in glasses:
-            low, high = item.material.dispersion.range_nm
+            ranges = [dispersion.range_nm for dispersion in item.material.dispersions]
+            low, high = max(low for low, _ in ranges), min(high for _, high in ranges)
             if power > 0.0 and not low <= wavelength_nm <= high:
                 raise UserError(
                     f"{file_name}: the line at {wavelength_nm:g} nm of light '{light.name}' lies outside the data of "
@@ -239,5 +261,5 @@ def _film_notes(scene: Scene) -> list[str]:
 
 
 def _glass_notes(glasses: list[SceneObject]) -> list[str]:
-    dispersions = dict.fromkeys(o.material.dispersion for o in glasses)
+    dispersions = dict.fromkeys(dispersion for o in glasses for dispersion in o.material.dispersions)
     return [note for dispersion in dispersions for note in dispersion.notes()]

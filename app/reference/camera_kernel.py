@@ -24,9 +24,8 @@ from .compiling import compiled, inlined
 from .photon_emit import search
 from .photon_intersect import blocked, nearest, normal_at
 from .photon_scene import BLACK, DIFFUSE
-from .polarised import begin_unpolarised
 from .sampling import DIMENSIONS, FIRST_CHOICE, choice, mixed, sobol_next, sobol_start, unit, word_number
-from .scattering import AIR, scatter, side_met, transmitted
+from .scattering import AIR, begin_light, scatter, side_met, transmitted
 from .vectors import dot, moved, negated
 from .viewpoint import lens_ray
 from .worn_textures import worn_at
@@ -269,10 +268,10 @@ def sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_dept
     state, shift, xyz = scratch.state, scratch.shift, scratch.xyz
     last, within, mask, alone, events = -1, False, start.mask, start.alone, 0
     atom, nm, found, weight, surfaces = -1, 0.0, 0.0, 1.0, 0
-    if scene.polarised:  # by reciprocity a path loses what light that came along it would
-        begin_unpolarised(scratch.field, d)
     if mask != np.uint64(0) or alone != AIR:  # in glass wavelengths part at once
         atom, nm = _wavelength(spectra, unit(state[2] ^ shift[2]))
+    if scene.polarised:  # by reciprocity a path loses what light that came along it would
+        begin_light(scene, scratch.field, d, mask, alone, nm, _of_coat(noise, -1, 0))
     while True:
         t, triangle, u, v = nearest(scene, place, d, last, within, mask, scratch)
         far = t if triangle >= 0 else np.inf
@@ -323,7 +322,7 @@ def sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_dept
                     d, share = reflected_by_coat(made, thing, d, n, facet_a, facet_b)
                     weight *= share / by_coat
                     if scene.polarised:  # a coat takes light as unpolarised, and leaves it so
-                        begin_unpolarised(scratch.field, d)
+                        begin_light(scene, scratch.field, d, mask, alone, nm, _of_coat(noise, events, 3))
                     last, within, events = triangle, side == 1, events + 1
                     if weight <= 0.0 or events >= max_depth:
                         break
@@ -345,7 +344,7 @@ def sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_dept
             else:
                 weight *= _plain(scene, pictures, spectra, atom, triangle, u, v)
             if scene.polarised:  # a diffuse surface depolarises
-                begin_unpolarised(scratch.field, d)
+                begin_light(scene, scratch.field, d, mask, alone, nm, _of_coat(noise, events, 3))
             weight *= share
             last, within, surfaces = triangle, side == 1, surfaces + 1
             continue
@@ -424,7 +423,7 @@ def seen_points(scene, camera, start, sequence, count, nm, max_depth, bounces, s
         place, d = _start_ray(camera, unit(state[0]) * camera.width, unit(state[1]) * camera.height, noise)
         last, within, mask, alone, events, way, surfaces = -1, False, start.mask, start.alone, 0, 0.0, 0
         if scene.polarised:
-            begin_unpolarised(scratch.field, d)
+            begin_light(scene, scratch.field, d, mask, alone, nm, _of_coat(noise, -1, 0))
         while events <= max_depth:
             t, triangle, u, v = nearest(scene, place, d, last, within, mask, scratch)
             if triangle < 0:
@@ -449,7 +448,7 @@ def seen_points(scene, camera, start, sequence, count, nm, max_depth, bounces, s
                 a, b = _at_diffuse(state, shift, noise, surfaces)
                 d = draw_by_cosine(n if met == 0 else negated(n), a, b)
                 if scene.polarised:
-                    begin_unpolarised(scratch.field, d)
+                    begin_light(scene, scratch.field, d, mask, alone, nm, _of_coat(noise, events, 3))
                 within = met == 1
                 continue
             draw = choice(state, shift, FIRST_CHOICE + events, noise, events)

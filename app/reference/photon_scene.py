@@ -18,12 +18,12 @@ from ..model.geometry.bvh import Bvh, build_bvh
 from ..model.geometry.mesh import Mesh
 from ..model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz, rgb_basis, xyz_to_rgb709_matrix
 from ..model.optics.spectrum import Spectrum, cmf_at
-from ..model.scene import Grating, Scene
+from ..model.scene import Grating, Polariser, Scene
 from .rough_albedo import albedo_tables
 from .scene_surfaces import Surfaces
 from .thin_films import Films, films_of
 
-BLACK, DIFFUSE, MIRROR, DIELECTRIC, GRATING, SHEET = range(6)
+BLACK, DIFFUSE, MIRROR, DIELECTRIC, GRATING, SHEET, POLARISER = range(7)
 OUTSIDE = -1
 """In place of an object: air."""
 
@@ -66,6 +66,14 @@ class PhotonScene(NamedTuple):
     """int32 (O,)."""
     medium: np.ndarray
     """int32 (O,): row of `refractive_index`, or −1."""
+    extraordinary: np.ndarray
+    """int32 (O,): row of `refractive_index` of a crystal's second index, or −1."""
+    axis: np.ndarray
+    """float64 (O, 3): unit optic axis, or that of a polariser."""
+    sheet: np.ndarray
+    """float64 (O, 3): amplitudes that a polariser lets through along its axis and across, and its retardance, nm."""
+    birefringent: bool
+    """There are crystals."""
     weight: np.ndarray
     """int32 (O,): row of `weights` (absorption per unit, or a mirror's reflectance), or −1."""
     filter: np.ndarray
@@ -132,11 +140,12 @@ def photon_scene(scene: Scene) -> tuple[PhotonScene, np.ndarray]:
     normals, smooth, corner_normals = surfaces.normals(order)
     rank = _ranks(scene)
     media, weights = _Rows(), _Rows()
-    kinds, medium, weight, filters = [], [], [], []
+    kinds, medium, other, weight, filters = [], [], [], [], []
     for item in scene.objects:
         material = item.material
         kinds.append(material.met_as)
         medium.append(media.add(material.dispersion.index(TABLE_NM)) if material.transmits else -1)
+        other.append(media.add(material.extraordinary.index(TABLE_NM)) if material.is_crystal else -1)
         weight.append(-1)
         filters.append(-1)
         if material.filters:
@@ -169,6 +178,9 @@ def photon_scene(scene: Scene) -> tuple[PhotonScene, np.ndarray]:
         corner_normals,
         np.array(kinds, np.int32),
         np.array(medium, np.int32),
+        np.array(other, np.int32),
+        *_axes(scene),
+        any(row >= 0 for row in other),
         np.array(weight, np.int32),
         np.array(filters, np.int32),
         np.array([rank.get(i, -1) for i in range(len(meshes))], np.int32),
@@ -185,6 +197,19 @@ def photon_scene(scene: Scene) -> tuple[PhotonScene, np.ndarray]:
         scene.polarised,
         films_of(scene, TABLE_NM),
     ), centre
+
+
+def _axes(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    """`axis` and `sheet` of a `PhotonScene`."""
+    axis, sheet = np.zeros((len(scene.objects), 3)), np.zeros((len(scene.objects), 3))
+    for index, item in enumerate(scene.objects):
+        material = item.material
+        if isinstance(material, Polariser):
+            along, across = np.sqrt([material.transmittance, material.crossed_transmittance])
+            sheet[index] = along, across, material.retardance_nm
+        if material.polarises:
+            axis[index] = material.axis_in_world(item.object_to_world)
+    return axis, sheet
 
 
 def _gratings(scene: Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .compiling import compiled, inlined
+from .crystals import FIELD_SHAPE
 from .photon_intersect import STACK_SIZE
 
 DIMENSIONS = 10
@@ -82,7 +83,7 @@ class Scratch(NamedTuple):
     xyz: np.ndarray
     """float64 (3,)."""
     field: np.ndarray
-    """complex128 (2, 3): a path's electric fields (`polarised`)."""
+    """complex128 `crystals.FIELD_SHAPE`: a path's electric fields (`polarised`), and what crystals need."""
 
 
 def scratch() -> Scratch:
@@ -95,7 +96,7 @@ def scratch() -> Scratch:
         state,
         shift,
         np.zeros(3),
-        np.zeros((2, 3), complex),
+        np.zeros(FIELD_SHAPE, complex),
     )
 
 

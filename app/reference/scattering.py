@@ -14,10 +14,11 @@ import math
 import numpy as np
 
 from .compiling import compiled, inlined
+from .crystals import begin_in_crystal, solve_interface, take_wave, through_sheet
 from .curved_surfaces import turned_normal
 from .photon_intersect import normal_at
-from .photon_scene import GRATING, MIRROR, SHEET
-from .polarised import amplitudes, senkrecht, share_of, turn_fields
+from .photon_scene import GRATING, MIRROR, POLARISER, SHEET
+from .polarised import amplitudes, begin_unpolarised, senkrecht, share_of, turn_fields
 from .rough_albedo import masking, sent_on
 from .sampling import word_number
 from .thin_films import film_amplitudes
@@ -143,6 +144,57 @@ def _diffract(scene, triangle, place, u, v, d, mask, alone, nm, draw, field):
     return r, mask, alone, entering != reflects, True, efficiency if real else 0.0, True
 
 
+_MIRROR_INDEX = 1e9
+
+
+@compiled
+def _optics(scene, thing, nm):
+    """(n_o, n_e, axis, whether it is a crystal) of an object's substance."""
+    if thing == AIR or scene.extraordinary[thing] < 0:
+        n = _refractive_index(scene, thing, nm)
+        return n, n, (0.0, 0.0, 1.0), False
+    axis = scene.axis[thing]
+    n_e = table(scene.refractive_index, scene.extraordinary[thing], nm)
+    return _refractive_index(scene, thing, nm), n_e, (axis[0], axis[1], axis[2]), True
+
+
+@compiled
+def begin_light(scene, field, d, mask, alone, nm, number):
+    """Unpolarised light that begins along `d`; in a crystal `number` in [0, 1) chooses which of its kinds."""
+    n_o, n_e, axis, is_crystal = _optics(scene, medium(scene, mask, alone), nm)
+    if is_crystal:
+        begin_in_crystal(field, d, n_o, n_e, axis, number < 0.5)
+    else:
+        begin_unpolarised(field, d)
+
+
+@compiled
+def _meet_crystal(scene, before, after, n, g, d, nm, draw, field, is_mirror):
+    """(direction, whether it is reflected) of one wave of an interface with a crystal, drawn by its share of the power;
+    a normal that sends it to the wrong side of the facet `g` gives way to that. A mirror is dense beyond measure."""
+    first, second = _optics(scene, before, nm), _optics(scene, after, nm)
+    if is_mirror:
+        second = _MIRROR_INDEX, _MIRROR_INDEX, (0.0, 0.0, 1.0), False
+    for attempt in range(2):
+        shares = solve_interface(field, d, n if attempt == 0 else g, first, second)
+        last = 1 if is_mirror else 3
+        left, wave = draw * (shares[0] + shares[1] + (0.0 if is_mirror else shares[2] + shares[3])), 0
+        while wave < last and left >= shares[wave]:
+            left -= shares[wave]
+            wave += 1
+        while shares[wave] <= 0.0 and wave > 0:  # rounding went past the last of them
+            wave -= 1
+        reflects = wave < 2
+        kept = field[0, 0], field[0, 1], field[0, 2], field[1, 0], field[1, 1], field[1, 2]
+        waves = field[2, 0], field[2, 1], field[2, 2]
+        r = take_wave(field, wave, first if reflects else second)
+        if attempt == 1 or (dot(r, g) > 0.0) == reflects:
+            break
+        for k in range(3):
+            field[0, k], field[1, k], field[2, k] = kept[k], kept[3 + k], waves[k]
+    return r, reflects
+
+
 _TILT, _TURN = np.uint64(0xA24BAED4963EE407), np.uint64(0x9FB21C651E98DF25)
 """Make the numbers for a microfacet independent of those of Fresnel choices."""
 
@@ -187,7 +239,7 @@ def scatter(scene, triangle, place, u, v, d, mask, alone, nm, draw, noise, event
     `draw` in [0, 1) decides by Fresnel's reflectance, unless all is reflected. "Is an event" is false where the same
     substance is on both sides; a mirror keeps its reflectance, glass what its surface lets through, and rough glass
     also the weight of a microfacet that words `event` of the hash `noise` draw (its mean is 1). In a polarised scene
-    `field` complex (2, 3), the two of `polarised`, turns with the ray.
+    `field`, of the shape `crystals.FIELD_SHAPE`, turns with the ray.
     """
     if scene.kind[scene.owner[triangle]] == GRATING:
         return _diffract(scene, triangle, place, u, v, d, mask, alone, nm, draw, field)
@@ -195,6 +247,11 @@ def scatter(scene, triangle, place, u, v, d, mask, alone, nm, draw, noise, event
     cosine_g = -dot(d, g)
     entering = cosine_g > 0.0
     thing = scene.owner[triangle]
+    if scene.kind[thing] == POLARISER:
+        kept = through_sheet(
+            field, d, scene.axis[thing], scene.sheet[thing, 0], scene.sheet[thing, 1], scene.sheet[thing, 2] / nm
+        )
+        return d, mask, alone, entering, True, kept, False
     mirror, sheet = scene.kind[thing] == MIRROR, scene.kind[thing] == SHEET
     before, after, mask_after, alone_after = AIR, AIR, mask, alone
     if sheet:
@@ -216,6 +273,16 @@ def scatter(scene, triangle, place, u, v, d, mask, alone, nm, draw, noise, event
         g, cosine_g = negated(g), -cosine_g
     n = _shading_normal(scene, triangle, place, u, v, d, g, entering)
     cosine = -dot(d, n)
+    if scene.birefringent and not sheet:
+        if mirror:
+            before = medium(scene, mask, alone)
+        if (before != AIR and scene.extraordinary[before] >= 0) or (after != AIR and scene.extraordinary[after] >= 0):
+            r, reflects = _meet_crystal(scene, before, after, n, g, d, nm, draw, field, mirror)
+            row = scene.weight[thing] if mirror else scene.filter[thing]
+            kept = table(scene.weights, row, nm) if row >= 0 and (mirror or not reflects) else 1.0
+            if reflects:
+                return r, mask, alone, not entering, True, kept, True
+            return r, mask_after, alone_after, entering, True, kept, True
     width, whole, facing = scene.microfacet_width[thing], n, cosine
     if width > 0.0:
         word = noise + np.uint64(event + 1) * np.uint64(0x9E3779B97F4A7C15)

@@ -18,7 +18,18 @@ from spectrasplat.model.materials.material_file import read_material
 from spectrasplat.model.optics.catalogue import find
 from spectrasplat.model.optics.crystals import crystals, find_crystal
 from spectrasplat.model.optics.spectrum import illuminant
-from spectrasplat.model.scene import Camera, Dielectric, Diffuse, Material, Polariser, Scene, SceneObject
+from spectrasplat.model.scene import (
+    Camera,
+    Dielectric,
+    Diffuse,
+    Grating,
+    Material,
+    Mirror,
+    Polariser,
+    Scene,
+    SceneObject,
+)
+from spectrasplat.model.scene_checks import check_scene
 from spectrasplat.model.scene_key import scene_key
 
 
@@ -114,6 +125,22 @@ def test_a_polariser_is_a_sheet_with_its_axis_in_it() -> None:
         Polariser().check_on(box((1.0, 1.0, 1.0)), "thing", "scene.toml")
     with pytest.raises(UserError, match="runs along the normal of its surface"):
         Polariser(axis=(0.0, 0.0, 1.0)).check_on(plane(1.0, 1.0), "thing", "scene.toml")
+
+
+def test_sheets_in_and_on_crystals_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Dielectric, "check_on", lambda *_: None)
+    monkeypatch.setattr(Polariser, "check_on", lambda *_: None)
+    crystal = scene_of(read({"crystal": "calcite"}))
+    for height, fits in ((0.0, False), (0.5, False), (0.5001, False), (0.7, True)):
+        place = np.eye(4)
+        place[2, 3] = height
+        for sheet in (Polariser(), Grating(), Dielectric(find("N-BK7"), thin=True), Mirror(metal="gold")):
+            scene = replace(crystal, objects=(*crystal.objects, SceneObject("sheet", plane(0.5, 0.5), sheet, place)))
+            if fits:
+                check_scene(scene, "scene.toml")
+            else:
+                with pytest.raises(UserError, match="'sheet' lies in the crystal of 'thing' or on it"):
+                    check_scene(scene, "scene.toml")
 
 
 def test_equal_indices_are_glass() -> None:

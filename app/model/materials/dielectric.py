@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
-import numpy as np
-
 from ...base.errors import UserError
 from ..fields import Animated, Colour, Direction, Flag, Integer, Number, Row
 from ..io.scene_table import SceneTable
@@ -138,11 +136,6 @@ class Dielectric(Material):
     def is_crystal(self) -> bool:
         """Its indices differ."""
         return self.extraordinary is not None and crystals.is_birefringent(self.dispersion, self.extraordinary)
-
-    def axis_in_world(self, object_to_world: np.ndarray) -> np.ndarray:
-        """Unit vector (3,) along the optic axis, of an object placed so."""
-        along = np.asarray(object_to_world)[:3, :3] @ np.asarray(self.axis, float)
-        return along / np.linalg.norm(along)
 
     def with_gain(self, gain: float, where: str = "") -> Self:
         """A copy whose dispersion, of a crystal both, is `gain` times the material's own. Raises UserError."""

@@ -19,6 +19,7 @@ from ..vectors import Vec3
 
 if TYPE_CHECKING:
     from ..geometry.mesh import Mesh
+    from ..optics.glass import Dispersion
 
 
 @dataclass(frozen=True)
@@ -63,6 +64,8 @@ class Material:
     """The function of wavelength that it deflects light by: a glass's index, for a grating the wavelength itself."""
     extraordinary = cast(Any, None)
     """A crystal's second dispersion."""
+    axis = (0.0, 0.0, 1.0)
+    """A crystal's optic axis or a polariser's, a unit vector in the object's own coordinates."""
     priority = 0
     thin = False
     transmittance_rgb = (1.0, 1.0, 1.0)
@@ -87,6 +90,11 @@ class Material:
     def is_crystal(self) -> bool:
         """It is birefringent: it parts light into an ordinary and an extraordinary ray."""
         return False
+
+    @property
+    def dispersions(self) -> tuple[Dispersion, ...]:
+        """`dispersion`, and a crystal's second one; none where it has none."""
+        return tuple(each for each in (self.dispersion, self.extraordinary) if each is not None)
 
     @property
     def polarises(self) -> bool:
@@ -151,6 +159,11 @@ class Material:
     def changed(self, **values: Any) -> Self:
         """A copy in which these fields have other values."""
         return replace(self, **values)
+
+    def axis_in_world(self, object_to_world: np.ndarray) -> np.ndarray:
+        """Unit vector (3,) along the axis, of an object placed so."""
+        along = np.asarray(object_to_world)[:3, :3] @ np.asarray(self.axis, float)
+        return along / np.linalg.norm(along)
 
     def check_on(self, mesh: Mesh, name: str, file_name: str) -> None:
         """Raise UserError if object `name` of this file cannot have this material on its mesh."""

@@ -74,11 +74,6 @@ class Polariser(Material):
     is_polariser: ClassVar = True
     why_no_beams: ClassVar = "it polarises"
 
-    def axis_in_world(self, object_to_world: np.ndarray) -> np.ndarray:
-        """Unit vector (3,) along the axis, of an object placed so."""
-        along = np.asarray(object_to_world)[:3, :3] @ np.asarray(self.axis, float)
-        return along / np.linalg.norm(along)
-
     def words(self) -> str:
         """What it does to light."""
         along, across, late = self.transmittance, self.crossed_transmittance, self.retardance_nm
