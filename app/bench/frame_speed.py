@@ -173,7 +173,7 @@ def _frame(
     trace, _ = _trace(context, light, photons)
     before = light.stats.photons, light.stats.splats
     started = time.perf_counter()
-    for _ in light.steps_until(0, photons, lambda: False):
+    for _ in light.pass_steps(0, photons):
         pass
     light.maps.atlas.flush()
     context.finish()

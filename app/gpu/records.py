@@ -380,7 +380,9 @@ EMIT_PARAMETERS = Struct(
         ),
         Field("thinned", "uint", "one bit a cell: are only some of its points emitted?", MASK_SIZE * MASK_SIZE // 32),
         Field("thinned_chance", "float", "of a point in such a cell to be emitted"),
-        Field("reserved", "uint", "", 3),
+        Field("row_s", "float", "what the first side of a footprint gains along itself where a point stands for a row"),
+        Field("row_t", "float", "the second"),
+        Field("row_st", "float", "each along the other"),
     ),
 )
 

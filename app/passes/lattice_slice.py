@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from .emission_domain import EmissionDomain
+from .lattice_order import GOLDEN
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,10 @@ class LatticeSlice:
     lamp_step: float = 0.0
     """Sides of a footprint over the extent of what each point represents on a lamp (`Features.lamp_columns`);
     0: footprints know of none."""
+    stands_for: int = 1
+    """Points of the lattice, in a row, whose light each of this slice has."""
+    row: tuple[float, float] = (0.0, 0.0)
+    """Along it, as long as the standard deviation of their places over that of a footprint."""
 
     @property
     def lattices(self) -> int:
@@ -62,10 +68,45 @@ class LatticeSlice:
         points = len(range(first, self.points, n))
         return replace(self, first=self.first + first * self.stride, stride=n * self.stride, points=points)
 
+    def row_of(self, n: int, first: int, length: int, smoothing: float) -> LatticeSlice:
+        """Of the `n` even sub-lattices into which rows of neighbours fall, one after the other: one in the middle of
+        the `length` from the `first` on, which stands for all of them."""
+        number, step = self._neighbour(n)
+        turns = _wrapped(number * GOLDEN)
+        middle = length - 1  # in halves of a step
+        index, along, across = first * number + middle * number // 2, self.shift[0], self.shift[1]
+        if middle % 2:
+            along += number % 2 << 31
+            across += turns // 2 - number // 2 * GOLDEN
+            index, across = index + (along >> 32), across - (along >> 32) * GOLDEN
+        piece = self.every(n, index % n)
+        spread = math.sqrt((length**2 - 1) / 12.0) / smoothing
+        return replace(
+            piece,
+            shift=(along % (1 << 32), across % (1 << 32)),
+            stands_for=length,
+            row=(spread * step[0], spread * step[1]),
+        )
+
+    def _neighbour(self, n: int) -> tuple[int, tuple[float, float]]:
+        """How many points after another its neighbour is, with no factor in common with `n`, and the step to it."""
+        root, before, number, best = math.sqrt(self.lattice_count), 1, 1, (1, (math.inf, 0.0))
+        while number <= self.lattice_count:
+            step = number / root, root * _wrapped(number * GOLDEN) / 2.0**32
+            if math.gcd(number, n) == 1 and math.hypot(*step) < math.hypot(*best[1]):
+                best = number, step
+            before, number = number, before + number
+        return best
+
     def split(self, points: int) -> tuple[LatticeSlice, LatticeSlice]:
         """So many points, and those behind them."""
         behind = replace(self, first=self.first + points * self.stride, points=self.points - points)
         return replace(self, points=points), behind
+
+
+def _wrapped(turns: int) -> int:
+    """Modulo 2³², about 0."""
+    return (turns + (1 << 31)) % (1 << 32) - (1 << 31)
 
 
 Part = tuple[LatticeSlice, EmissionDomain]
@@ -76,6 +117,12 @@ Parts = Sequence[Part]
 def every(n: int, first: int, parts: Parts) -> Parts:
     """Every n-th point of each from one on."""
     pieces = [(piece.every(n, first), domain) for piece, domain in parts]
+    return [part for part in pieces if part[0].points]
+
+
+def row_of(n: int, first: int, length: int, smoothing: float, parts: Parts) -> Parts:
+    """`LatticeSlice.row_of` of each; `smoothing`: standard deviation of footprints, spacings."""
+    pieces = [(piece.row_of(n, first, length, smoothing), domain) for piece, domain in parts]
     return [part for part in pieces if part[0].points]
 
 

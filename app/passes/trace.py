@@ -208,6 +208,11 @@ class TracePass:
         )
 
     @property
+    def has_footprints(self) -> bool:
+        """Photons stand for what is round them."""
+        return self._features.footprints
+
+    @property
     def bytes(self) -> int:
         """Device memory that the queue takes while photons are traced."""
         return self._queue.bytes_of(self._features, self._traits, self.batch)
@@ -376,7 +381,7 @@ class TracePass:
             domain.tangent,
             domain.bitangent,
         )
-        p["weight"] = domain.measure * piece.weight / (piece.lattice_count * piece.light_points)
+        p["weight"] = domain.measure * piece.weight * piece.stands_for / (piece.lattice_count * piece.light_points)
         p["spacing"] = domain.spacing(piece.lattice_count)
         p["back"] = domain.back
         p["light_axis"] = np.asarray(self.scene.scene.lights[piece.light].direction, float)
@@ -401,6 +406,10 @@ class TracePass:
             p["thinned"] = np.packbits(domain.thinned.ravel(), bitorder="little").view("<u4")
         p["thinned_chance"] = domain.thinned_chance
         p["lamp_step"] = piece.lamp_step
+        if (length := math.hypot(*piece.row)) > 0.0:
+            gain = (math.hypot(1.0, length) - 1.0) / length**2
+            s, t = piece.row
+            p["row_s"], p["row_t"], p["row_st"] = gain * s * s, gain * t * t, gain * s * t
         return p
 
     def _parameters_of(
@@ -408,7 +417,7 @@ class TracePass:
     ) -> np.ndarray:
         p = self._carried_on(piece.light, max_depth)
         p["lattices"], p["split_threshold"] = piece.lattices, threshold
-        if piece.lattice_count < 1 << (32 - records.LATTICE_BIT):
+        if piece.lattice_count < 1 << (32 - records.LATTICE_BIT) and piece.stands_for == 1:
             p["lattice_bits"] = piece.lattice_count << records.LATTICE_BIT
         paths = piece.lattice_count * piece.lattices * domain.active_share
         p["paths"], p["widest_turn"] = paths, self._widest_turn(paths)

@@ -15,7 +15,6 @@ from dataclasses import replace
 import moderngl
 import numpy as np
 
-from ..base.generators import finished
 from ..features.features import Features
 from ..gpu import shader
 from ..gpu.context import Context
@@ -241,28 +240,11 @@ class LightPass:
         pilots = yield from self.survey.sample_pilots()
         return self._planner(pilots).plans(photons, self._texel_size())
 
-    def run_pass(self, number: int, photons: int, proceed: Callable[[float], bool]) -> bool:
-        """One shifted set of lattices with about `photons` points over all lights. `proceed(fraction)` is called after
-        every slice; returns False when that returned False, see `steps_until`."""
-        goes_on, done = True, 0.0
-
-        def paused(fraction: float) -> None:
-            nonlocal goes_on, done
-            if fraction > done:
-                done, goes_on = fraction, proceed(fraction)
-
-        return finished(self.steps_until(number, photons, lambda: not goes_on), paused)
-
-    def steps_until(self, number: int, photons: int, stop: Callable[[], bool]) -> Generator[float, None, bool]:
-        """A pass, pausing with the share done; returns False when `stop` left part of it undone.
-
-        It is traced in rounds, each an even sub-lattice of the whole, so that a pass that is stopped between rounds has
-        light everywhere, but rows of points of its lattice are missing."""
+    def run_pass(self, number: int, photons: int, paused: Callable[[float], object]) -> None:
+        """One shifted set of lattices with about `photons` points over all lights. `paused(fraction)` is called after
+        every slice."""
         for step in self.pass_steps(number, photons):
-            yield step.fraction
-            if step.round_done and step.fraction < 1.0 and stop():
-                return False
-        return True
+            paused(step.fraction)
 
     def pass_of(self, number: int, photons: int) -> PassRounds:
         """Pass `number` of about `photons`, as it is planned now."""

@@ -1,19 +1,20 @@
 """One pass of the light pass, in rounds: each is an even sub-lattice of the whole, traced as beams and as photons.
 
-A pass that is stopped between rounds has light everywhere, but rows of points of its lattice are missing.
+Rounds that there is no time for are traced together: one of them with the light of all, its footprints as long as the
+row of points that it stands for.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..base.random_words import Dimension, random_word, shift
 from ..passes.beam_emission import BeamEmission
-from ..passes.lattice_slice import Part, every
+from ..passes.lattice_slice import Part, every, row_of
 from .light_plan import LightPlan
 from .light_stats import PassStep
 from .light_survey import LightSurvey
@@ -69,28 +70,49 @@ class PassRounds:
             return 1
         return max(1, -(-MIN_BEAM_PHOTONS * self.count // self.photons))
 
-    def steps(self, first_round: int = 0, first_group: int = 0, stride: int = 1) -> Iterator[PassStep]:
+    def steps(
+        self,
+        first_round: int = 0,
+        first_group: int = 0,
+        stride: int = 1,
+        seconds_left: Callable[[], float] | None = None,
+    ) -> Iterator[PassStep]:
         """The whole pass, pausing after every event of the rays and after every splatting.
 
         `first_round`: where a pass continues that was stopped before. `first_group`, `stride`: of the groups of rounds
-        that have their beams together, this one and every `stride`-th after it, where others trace the rest."""
+        that have their beams together, this one and every `stride`-th after it, where others trace the rest.
+        `seconds_left`: until it should be over; it takes one more round if need be, and ends early where light is not
+        missing between photons anyway. Its rounds go along rows of neighbours; those of a pass without an end leave
+        what is there as even as can be."""
         if not self.plans:
-            yield from self._only_beams(range(first_round + first_group, self.count, stride))
+            yield from self._only_beams(range(first_round + first_group, self.count, stride), seconds_left)
             return
-        rounds, together = self.count, self.together
-        for j in range(first_round, rounds):
+        rounds, together, smoothing = self.count, self.together, self.into.smoothing
+        j = has_beams = first_round
+        started, traced = time.perf_counter(), 0
+        while j < rounds:
             if (j // together - first_group) % stride:
+                j += 1
                 continue
-            if j == first_round or j % together == 0:
-                end = min((j // together + 1) * together, rounds)
-                yield from self._beams(RoundOf(self.number, j, rounds, False), j / rounds, end - j)
-            yield from self._photons(j, rounds)
-            for _ in self.batches.settle() if j + 1 == rounds else ():
+            length, parts = 1, self._parts
+            if seconds_left and traced:
+                affordable = seconds_left() * traced / (time.perf_counter() - started)
+                if affordable <= 0.0 and not self.batches.trace.has_footprints:
+                    return
+                length = (rounds - j) // min(max(round(affordable), 1), rounds - j)
+            if j + length > has_beams:
+                first, has_beams = max(j, has_beams), min(-(-(j + length) // together) * together, rounds)
+                yield from self._beams(RoundOf(self.number, first, rounds, False), j / rounds, has_beams - first)
+            some = row_of(rounds, j, length, smoothing, parts) if seconds_left else every(rounds, j, parts)
+            for _ in self.batches.lattice(some, RoundOf(self.number, j, rounds, True), self.into):
                 yield PassStep(j / rounds, False)
-            self.into.maps.photon_weight += self.weight / rounds
-            yield PassStep((j + 1) / rounds, (j + 1) % together == 0 or j + 1 == rounds)
+            for _ in self.batches.settle() if j + length == rounds else ():
+                yield PassStep(j / rounds, False)
+            j, traced = j + length, traced + 1
+            self.into.maps.photon_weight += length * self.weight / rounds
+            yield PassStep(j / rounds, j == has_beams)
 
-    def _only_beams(self, numbers: Sequence[int]) -> Iterator[PassStep]:
+    def _only_beams(self, numbers: Sequence[int], seconds_left: Callable[[], float] | None) -> Iterator[PassStep]:
         rounds, photons = self.count, self.photons
         for j in numbers:
             for step in self._beams(RoundOf(self.number, j, rounds, True)):
@@ -98,12 +120,8 @@ class PassRounds:
             self.into.maps.photon_weight += self.weight / rounds
             self.into.stats.photons += photons * (j + 1) // rounds - photons * j // rounds
             yield PassStep((j + 1) / rounds, True)
-
-    def _photons(self, j: int, rounds: int) -> Iterator[PassStep]:
-        """Photons of round `j`."""
-        parts, of = every(rounds, j, self._parts), RoundOf(self.number, j, rounds, True)
-        for _ in self.batches.lattice(parts, of, self.into):
-            yield PassStep(j / rounds, False)
+            if seconds_left and seconds_left() <= 0.0:
+                return
 
     def _beams(self, of: RoundOf, done: float = 0.0, rounds: int = 1) -> Iterator[PassStep]:
         """The beams of so many `rounds` from one on, and the photons that carry on what those left."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator
 
@@ -11,6 +12,8 @@ from .sampling import LightSampling
 
 _TRIALS_SHARE = 0.1
 """Share of the time for doubling passes that measure how fast a scene is traced."""
+_AFTER_STOP = 0.2
+"""Share of the time that a pass took until it was stopped in which what it lacks is traced coarsely."""
 _SMALLEST_PASS = FIRST_PHOTONS // 2
 """Photons; what time is left for fewer is given back."""
 
@@ -24,8 +27,8 @@ def traced_light(light: LightPass, sampling: LightSampling, stop: Callable[[], b
     light.begin(sizes[0], sampling.seed)
     for number, photons in enumerate(sizes):
         light.plan(photons, number)
-        for share in light.steps_until(number, photons, stop):
-            yield (sum(sizes[:number]) + share * photons) / sum(sizes)
+        for step in light.pass_of(number, photons).steps(seconds_left=_seconds_left(stop)):
+            yield (sum(sizes[:number]) + step.fraction * photons) / sum(sizes)
         if number + 1 < len(sizes) and stop():
             return
 
@@ -46,7 +49,7 @@ def _traced_for(light: LightPass, seconds: float, seed: int, stop: Callable[[], 
     while light.plans or light.survey.has_beams:
         started = time.perf_counter()
         light.plan(photons, number)
-        for _ in light.steps_until(number, photons, lambda: spent() >= 1.0 or stop()):
+        for _ in light.pass_of(number, photons).steps(seconds_left=_seconds_left(stop, begun + seconds)):
             yield spent()
         if spent() >= 1.0 or stop():
             return
@@ -58,3 +61,17 @@ def _traced_for(light: LightPass, seconds: float, seed: int, stop: Callable[[], 
             if affordable < _SMALLEST_PASS:
                 return
             photons = int(affordable)
+
+
+def _seconds_left(stop: Callable[[], bool], ends: float = math.inf) -> Callable[[], float]:
+    """Of a pass that begins now, until `ends` (`time.perf_counter()`), or until soon after `stop()` turned true."""
+    begun = time.perf_counter()
+
+    def left() -> float:
+        nonlocal ends
+        now = time.perf_counter()
+        if stop():
+            ends = min(ends, now + _AFTER_STOP * (now - begun))
+        return ends - now
+
+    return left

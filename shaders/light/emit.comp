@@ -215,11 +215,16 @@ void main() {
             }
         }
         if (FOOTPRINTS) {
-            ray.dposition[0] = vec4(dposition_ds, 0.0);
-            if (LIGHT_EDGES) ray.dposition[0].w = float(packed_edge(spacings, to_lit));
-            ray.dposition[1].xyz = dposition_dt;
-            ray.ddirection[0].xyz = ddirection_ds;
-            ray.ddirection[1].xyz = ddirection_dt;
+            // Longer along the row of points that this one stands for. Edges are told for one of a lattice alone.
+            bool is_row = p.row_s + p.row_t > 0.0;
+            mat2 longer = mat2(1.0 + p.row_s, p.row_st, p.row_st, 1.0 + p.row_t);
+            mat2x3 dposition = mat2x3(dposition_ds, dposition_dt) * longer;
+            mat2x3 ddirection = mat2x3(ddirection_ds, ddirection_dt) * longer;
+            ray.dposition[0] = vec4(dposition[0], 0.0);
+            if (LIGHT_EDGES) ray.dposition[0].w = float(packed_edge(is_row ? EDGE_REACH : spacings, to_lit));
+            ray.dposition[1].xyz = dposition[1];
+            ray.ddirection[0].xyz = ddirection[0];
+            ray.ddirection[1].xyz = ddirection[1];
         }
         if (LAMP_COLUMNS) {
             // Two axes of a normal distribution with the variance of the places that this point stands for on the

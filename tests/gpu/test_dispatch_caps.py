@@ -48,7 +48,7 @@ def traced(context, name: str, seconds: float, method: str = "srd") -> LightPass
     light.trace.steps = lambda parts, *rest: (sizes.append(light.trace.rays_of(parts)), steps(parts, *rest))[1]  # type: ignore[method-assign]
     light.maps.splatter.run = lambda photons, *rest: (sizes.append(photons.count), splat(photons, *rest))[1]  # type: ignore[method-assign]
     for _ in range(2):
-        for _ in light.steps_until(0, PHOTONS, lambda: False):
+        for _ in light.pass_steps(0, PHOTONS):
             pass
     light.finish()
     light.sizes = sizes  # type: ignore[attr-defined]

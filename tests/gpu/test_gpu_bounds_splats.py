@@ -172,7 +172,7 @@ def test_a_pass_is_eight_dispatches_one_clear_and_one_resolve(gpu: Context) -> N
         return splat(photons, most, into, **further)
 
     with mock.patch.object(light.batches, "splat", noted):
-        for _ in light.steps_until(0, 4000, lambda: False):
+        for _ in light.pass_steps(0, 4000):
             pass
     want = [np.frombuffer(texture.read(), np.float32) for texture in light.maps.resolved_textures()]
     for _ in range(2):

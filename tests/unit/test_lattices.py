@@ -11,6 +11,7 @@ from spectrasplat.gpu.dispatch_budget import DispatchBudget
 from spectrasplat.passes.beam_records import hull_areas
 from spectrasplat.passes.beam_splat import TEXELS, portion_end
 from spectrasplat.passes.lattice_order import GOLDEN, block_of, block_orders, morton_order
+from spectrasplat.passes.lattice_slice import LatticeSlice
 from spectrasplat.passes.pixel_lattice import LOOKS, cells_of, looks_lattice, pixel_lattice
 from spectrasplat.render.pass_sizes import (
     ALPHA,
@@ -34,6 +35,32 @@ def test_every_point_once(points: int, stride: int, lattice: int) -> None:
     order = morton_order(points, stride, lattice)
     assert order.dtype == np.uint32
     np.testing.assert_array_equal(np.sort(order), np.arange(points))
+
+
+@pytest.mark.parametrize(("points", "rounds"), [(1000, 7), (4096, 12), (33_333, 22)])
+def test_a_point_stands_in_the_middle_of_its_row(points: int, rounds: int) -> None:
+    """Rows of neighbours as long as there are rounds hold every point of the lattice once, and whatever length of them
+    one point stands for, it has their mean place and their spread."""
+
+    def places(piece: LatticeSlice) -> np.ndarray:
+        index = piece.first + piece.stride * np.arange(piece.points)
+        across = (index * GOLDEN + piece.shift[1]) % 2**32 / 2**32
+        return np.stack([(index + piece.shift[0] / 2**32) / points, across], axis=1) * points**0.5
+
+    whole = LatticeSlice(0, (), points, 0, 1, points, (3_000_000_000, 123_456_789), (0, 0), 0, 0)
+    single = [whole.row_of(rounds, j, 1, 0.5) for j in range(rounds)]
+    numbers = np.concatenate([piece.first + rounds * np.arange(piece.points) for piece in single])
+    np.testing.assert_array_equal(np.sort(numbers), np.arange(points))
+    for first, length in ((0, 2), (1, 3), (2, rounds - 2)):
+        piece = whole.row_of(rounds, first, length, 0.5)
+        step = np.array(piece.row) * 0.5 / ((length**2 - 1) / 12) ** 0.5
+        assert piece.stands_for == length and 0.5 < np.hypot(*step) < 1.3
+        for nth in range(length):
+            row = places(single[first + nth])
+            for at in places(piece)[:20] + (nth - 0.5 * (length - 1)) * step:
+                away = (row - at) / points**0.5
+                nearest = np.abs(away - np.round(away)).max(axis=1).min() * points**0.5
+                assert nearest < 1e-3 or not 1.0 < at[0] < points**0.5 - 1.0
 
 
 @pytest.mark.parametrize(("shift", "stride"), [((0.0, 0.0), 1), ((0.37, 0.81), 1), ((0.123, 0.456), 4)])
