@@ -143,6 +143,10 @@ class Dielectric(Material):
         ordinary, other = (None if d is None else glass.with_gain(d, gain, where) for d in pair)
         return self.changed(dispersion=ordinary, extraordinary=other)
 
+    def shown_numbers(self) -> tuple[Number, ...]:
+        """Those of films and of rough surfaces are no crystal's."""
+        return () if self.is_crystal else super().shown_numbers()
+
     def check_on(self, mesh: Mesh, name: str, file_name: str) -> None:
         """Crystals are solid, polished and bare."""
         faults = {

@@ -19,9 +19,10 @@ _FLAT = 1e-7
 
 @dataclass(frozen=True)
 class Crystal:
-    """A name and both indices."""
+    """Both indices, and the names it was asked by and is listed under."""
 
     name: str
+    substance: str
     ordinary: Dispersion
     extraordinary: Dispersion
 
@@ -36,7 +37,7 @@ def crystals() -> dict[str, Crystal]:
             plain = {other.name: other for other in catalogue.entries() if other.maker == entry.maker}
             ordinary = plain.get(name + _ORDINARY) or plain[name]
             for called in dict.fromkeys((name, *ordinary.aliases)):
-                found[called] = Crystal(called, ordinary.dispersion, entry.dispersion)
+                found[called] = Crystal(called, name, ordinary.dispersion, entry.dispersion)
     return found
 
 

@@ -28,6 +28,7 @@ from .. import theme
 from ..view_model import ViewModel
 from . import outliner, picture_choice, widgets
 from .camera_rows import draw_camera_rows
+from .crystal_rows import draw_axis, draw_crystal
 from .declared_rows import draw_flags, draw_numbers
 from .environment_rows import draw_environment
 from .glass_values import abbe_text, own_numbers
@@ -35,8 +36,8 @@ from .glass_values import abbe_text, own_numbers
 _KINDS = {cls.title: cls for cls in MATERIAL_KINDS.values()}
 _UNITS = "units"
 _MOST_HAZE = 1.0
-_OWN_LAYERS = "own"
 """On the slider: thicker haze is not thin."""
+_OWN_LAYERS = "own"
 _WRAPS = {"repeat": "Repeats", "clamp": "Its border continues"}
 
 _keeps_proportions = {"on": True}
@@ -137,7 +138,8 @@ def _material(state: State, view_model: ViewModel, index: int) -> State:
         usual = _KINDS[wanted].usual()
         return edits.attempt(state, f"Make {thing.name} {wanted.lower()}", set_material, index, usual)
     if material.transmits:
-        return _surface_colour(_films(_glass(_declared(state, index, material), material), index), index)
+        state = draw_crystal(_glass(_declared(state, index, material), material), index)
+        return _surface_colour(_films(state, index), index)
     if material.is_black:
         widgets.hint("Absorbs all light that meets it.")
         return state
@@ -150,6 +152,8 @@ def _material(state: State, view_model: ViewModel, index: int) -> State:
         material = state.scene.objects[index].material
     if isinstance(material, Grating):
         _orders(material)
+    if material.is_polariser:
+        return draw_axis(state, index, "Axis", "Light polarised along it passes, in the object's own coordinates.")
     if material.receives:
         state = _texture(state, view_model, index, material)
     return _colour(state, index, material) if material.receives or material.is_mirror else state
@@ -169,7 +173,8 @@ def _glass(state: State, material: Material) -> State:
 
 def _declared(state: State, index: int, material: Material) -> State:
     """What the kind declares with a row."""
-    changed = draw_flags(draw_numbers(material, material.shown_numbers()), material.parts)
+    parts = () if material.is_crystal else material.parts
+    changed = draw_flags(draw_numbers(material, material.shown_numbers()), parts)
     if changed is material:
         return state
     label = f"{material.title} of {state.scene.objects[index].name}"
@@ -196,7 +201,7 @@ def _films(state: State, index: int) -> State:
         metal = widgets.combo("Metal", {"": "Ideal"} | {m: m.capitalize() for m in metals()}, changed.metal, tip=tip)
         if metal != changed.metal:
             changed = changed.changed(metal=metal, **({} if metal else {"coating": None, "film_nm": 0.0}))
-    if (changed.transmits and not changed.is_rough) or changed.metal:
+    if (changed.transmits and not (changed.is_rough or changed.is_crystal)) or changed.metal:
         present = "" if changed.coating is None else changed.coating.preset or _OWN_LAYERS
         own = {_OWN_LAYERS: "Layers of its own"} if present == _OWN_LAYERS else {}
         tip = "Thin layers on its surface. Layers of one's own are written in the scene file."

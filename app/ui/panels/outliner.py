@@ -14,6 +14,7 @@ from ...edit.lights import add_light
 from ...edit.requests import CopyMaterial, FrameSelection
 from ...edit.state import Selection, State
 from ...model.lights import LIGHT_KINDS
+from ...model.optics.crystals import named
 from ...model.scene import Light, Material, SceneObject
 from .. import item_rects, theme
 from ..view_model import ViewModel
@@ -199,6 +200,8 @@ def _aside(thing: SceneObject | Light, low: imgui.ImVec2, high: imgui.ImVec2) ->
 def _material_words(material: Material) -> str:
     if material.dispersion is None or material.is_grating:
         return material.kind
+    if material.is_crystal:
+        return named(material.dispersion, material.extraordinary) or "crystal"
     return material.dispersion.name or material.kind
 
 
