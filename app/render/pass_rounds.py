@@ -99,7 +99,7 @@ class PassRounds:
                 affordable = seconds_left() * traced / (time.perf_counter() - started)
                 if affordable <= 0.0 and not self.batches.trace.has_footprints:
                     return
-                length = (rounds - j) // min(max(round(affordable), 1), rounds - j)
+                length = (rounds - j) // max(round(min(affordable, rounds - j)), 1)
             if j + length > has_beams:
                 first, has_beams = max(j, has_beams), min(-(-(j + length) // together) * together, rounds)
                 yield from self._beams(RoundOf(self.number, first, rounds, False), j / rounds, has_beams - first)
