@@ -13,6 +13,7 @@ from ..model.contacts import world_bounds
 from ..model.curved_solids import Face, curved_solids
 from ..model.environment_light import why_no_bounces, why_no_environment_light
 from ..model.geometry.outline import convex_outline
+from ..model.optics.glass import Dispersion
 from ..model.scene import Camera, Material, Scene, SceneObject
 from ..model.scene_camera import camera_frame
 from ..model.settings import RANDOM_METHODS, RenderSettings, divides_spectrum, has_beams
@@ -78,13 +79,13 @@ class Facts:
         return [item for item in self.receivers if item.mesh.is_flat]
 
     @cached_property
-    def dispersive(self) -> list[SceneObject]:
-        """The first object of each dispersive glass, or a grating."""
-        return [self.scene.objects[i] for i in dispersive_materials(self.scene)]
+    def dispersive(self) -> list[Dispersion]:
+        """What light is dispersed by, each once: glasses, both indices of crystals, wavelengths at gratings."""
+        return dispersive_glasses(self.scene)
 
     @property
     def distinct_glasses(self) -> int:
-        return len({item.material.dispersion for item in self.glass})
+        return len({dispersion for item in self.glass for dispersion in item.material.dispersions})
 
     @cached_property
     def absorbing(self) -> list[SceneObject]:
@@ -97,6 +98,14 @@ class Facts:
     @cached_property
     def films(self) -> list[SceneObject]:
         return self.having(lambda material: material.film)
+
+    @cached_property
+    def crystals(self) -> list[SceneObject]:
+        return self.having(lambda material: material.is_crystal)
+
+    @cached_property
+    def polarisers(self) -> list[SceneObject]:
+        return self.having(lambda material: material.is_polariser)
 
     @cached_property
     def is_coloured(self) -> bool:
@@ -196,7 +205,8 @@ class Facts:
 
         if not (self.settings.editable or self.is_painted) or not divides_spectrum(self.settings.method):
             return False
-        if self.groups != 1 or self.absorbing or self.is_coloured or self.films or self.having(lambda m: m.is_grating):
+        weighed = self.absorbing or self.is_coloured or self.films or self.crystals or self.polarisers
+        if self.groups != 1 or weighed or self.having(lambda m: m.is_grating):
             return False
         (turning,) = SpectralAxis.build([item.material.dispersion for item in self.glass]).turning_nm
         return len(turning) == 2
@@ -253,7 +263,7 @@ def camera_needs(scene: Scene, settings: RenderSettings) -> tuple[bool, bool]:
     if settings.layer != "beauty":
         return False, False
     mirrors = any(o.material.is_mirror or o.material.has_coat for o in scene.objects)
-    glass = [o for o in scene.objects if o.material.transmits or o.material.is_grating]
+    glass = [o for o in scene.objects if o.material.transmits or o.material.is_grating or o.material.is_polariser]
     if not (settings.any_view or mirrors):
         # What is refracted or reflected first must be seen first; all else follows from it.
         glass = glass if any(in_view(o, scene.camera, settings.width / settings.height) for o in glass) else []
@@ -280,13 +290,10 @@ def in_view(item: SceneObject, camera: Camera, aspect: float) -> bool:
     return not any(side.all() for side in outside)
 
 
-def dispersive_materials(scene: Scene) -> list[int]:
-    """Object indices that first show each distinct dispersive glass, or a grating, in order."""
-    first: dict[object, int] = {}
-    for index, item in enumerate(scene.objects):
-        if item.material.disperses:
-            first.setdefault(item.material.dispersion, index)
-    return list(first.values())
+def dispersive_glasses(scene: Scene) -> list[Dispersion]:
+    """Each distinct dispersion of glasses, crystals and gratings, in order of the objects."""
+    dispersing = (item.material for item in scene.objects if item.material.disperses)
+    return list(dict.fromkeys(d for material in dispersing for d in material.dispersions if d.is_dispersive))
 
 
 def half_spaces(scene: Scene) -> dict[int, np.ndarray]:

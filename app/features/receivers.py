@@ -200,7 +200,7 @@ class PictureFeatures:
         "environment spectrum",
         lambda facts: facts.no_environment_light is None and bool(facts.dispersive or facts.films),
         why=lambda facts: (
-            f"{names(o.material.dispersion for o in facts.dispersive)} disperses what passes through it"
+            f"{names(facts.dispersive)} disperses what passes through it"
             if facts.dispersive
             else f"films part its colours on {names(facts.films)}"
         ),

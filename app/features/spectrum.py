@@ -38,7 +38,7 @@ class SpectrumFeatures:
     spectral_groups: int = feature(
         "spectral columns",
         lambda facts: facts.groups,
-        why=lambda facts: f"{facts.groups} column(s): {names(o.material.dispersion for o in facts.dispersive)}",
+        why=lambda facts: f"{facts.groups} column(s): {names(facts.dispersive)}",
         why_not=lambda facts: "one wavelength a photon" if facts.is_single else "nothing disperses",
         names=(
             "variable_step",

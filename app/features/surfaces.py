@@ -83,9 +83,30 @@ class SurfaceFeatures:
         requires=("dielectrics",),
     )
     """Some glass has a ground surface, whose microfacets turn paths by chance."""
+    crystals: bool = feature(
+        "crystals",
+        lambda facts: bool(facts.crystals),
+        symbol="HAS_CRYSTAL",
+        why=lambda facts: f"{names(facts.crystals)} part(s) light into ordinary and extraordinary rays",
+        why_not="all glass is isotropic",
+        names=("crystal_event", "cross_interface", "uniaxial_at"),
+        cost="up to four rays a surface, each a step of the queue; two complex 2 × 2 systems a place of the band",
+        requires=("polarised",),
+    )
+    """Some solids are uniaxial crystals."""
+    polarisers: bool = feature(
+        "polarisers",
+        lambda facts: bool(facts.polarisers),
+        symbol="HAS_POLARISER",
+        why=lambda facts: f"of {names(facts.polarisers)}",
+        why_not="there is no polariser and no wave plate",
+        names=("pass_polariser", "FRINGE_FADES"),
+        requires=("polarised",),
+    )
+    """Some sheets are polarisers or wave plates."""
     polarised: bool = feature(
         "polarisation",
-        lambda facts: facts.scene.polarised and bool(facts.glass or facts.films),
+        lambda facts: facts.scene.polarised and bool(facts.glass or facts.films or facts.polarisers),
         symbol="POLARISED",
         why="the scene asks for it, and there is glass or metal to part s and p",
         why_not=lambda facts: (

@@ -26,6 +26,8 @@ FLAG_BAND_FINAL = 2
 """The band was just cut at total internal reflection: do not cut again at this surface."""
 FLAG_INSIDE = 4
 """The ray travels on the inner side of `last_object`."""
+FLAG_EXTRAORDINARY = 8
+"""In a crystal, the ray is the extraordinary wave."""
 TINT_BIT = 3
 """From here on, up to the next, a photon's flags are its level (`model.tint_levels`)."""
 LATTICE_BIT = 8

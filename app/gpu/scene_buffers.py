@@ -15,6 +15,7 @@ from ..base.errors import UserError
 from ..features.features import Features
 from ..model.contacts import overlapping_solids
 from ..model.film_stacks import film_tables
+from ..model.materials.grating import WAVELENGTH
 from ..model.optics import rough_surfaces
 from ..model.optics.colorimetry import VISIBLE_NM, mirror_reflectance
 from ..model.optics.glass import Dispersion
@@ -33,7 +34,7 @@ from .gpu_space import GpuSpace
 from .records import NONE
 from .scene_geometry import SceneGeometry
 from .scene_motion import MovingTriangles, ObjectPlaces, WorldMeshes
-from .scene_records import GRATING, GRATING_ORDER, OBJECT, PIECE
+from .scene_records import CRYSTAL, GRATING, GRATING_ORDER, OBJECT, PIECE
 from .scene_texels import SceneTexels, spectra_texture
 from .spectral_groups import SAMPLES, Groups, index_slope, samples_of
 from .texture_store import textured_objects
@@ -61,6 +62,11 @@ class SpectraLayout:
     rows: int
 
 
+_CRYSTAL_TEXELS = CRYSTAL.stride // 16
+_LOBES = 4
+"""MOST_LOBES of shaders/path/crystal.glsl."""
+
+
 class SceneBuffers:
     """Owns the scene's textures and storage buffers; `bind()` before every dispatch that reads them."""
 
@@ -78,8 +84,8 @@ class SceneBuffers:
         self.space = GpuSpace.of(scene)
         self.groups = Groups.of(scene, features)
         self.receivers = [i for i, o in enumerate(scene.objects) if o.material.receives]
-        self.traced_glasses = [o.material.dispersion for o in scene.objects]
-        """Each object's glass as the records number it, whatever `scene` is replaced by to be shown."""
+        self.traced_glasses = [o.material.dispersions for o in scene.objects]
+        """Each object's glasses as the records number them, whatever `scene` is replaced by to be shown."""
         self.world_meshes = WorldMeshes(scene)
         self.places = ObjectPlaces(ctx, scene, self.space)
         self._motion: MovingTriangles | None = None
@@ -230,6 +236,10 @@ class SceneBuffers:
             self.texels.write(
                 "GRATINGS", int(record["weight_row"][0]), _grating_texels(item.material, item.object_to_world)
             )
+        if item.material.polarises:
+            number = int(record["receiver"][0]) // _CRYSTAL_TEXELS
+            self._crystals["axis"][number] = item.material.axis_in_world(item.object_to_world)
+            self.texels.write("CRYSTALS", _CRYSTAL_TEXELS * number, self._crystals[number : number + 1])
 
     def _pack_geometry(self) -> None:
         solids, tree = self.geometry.solids, self.geometry.triangles.tree
@@ -255,6 +265,8 @@ class SceneBuffers:
         media: list[Dispersion] = []
         weights: list[np.ndarray] = []
         gratings: list[np.ndarray] = []
+        self._crystals = CRYSTAL.zeros(sum(item.material.polarises for item in self.scene.objects))
+        crystals = 0
         absorbers: dict[bytes, int] = {}
         """Row of each curve."""
         widths = rough_surfaces.distinct_widths(item.material.microfacet_width for item in self.scene.objects)
@@ -296,8 +308,12 @@ class SceneBuffers:
                     record["colour"][:2] = width, rough_surfaces.GLASS_ROWS * widths.index(width)
                 if index in stack_bits:
                     record["stack_bit"] = stack_bits[index]
-                if material.disperses and self.groups.count:
+                if material.dispersion in self.groups.glasses and self.groups.count and not material.thin:
                     record["group"] = self.groups.group[self.groups.glasses.index(material.dispersion)]
+            if material.polarises:
+                record["receiver"] = _CRYSTAL_TEXELS * crystals
+                self._pack_crystal(self._crystals[crystals], item, media)
+                crystals += 1
             if material.filters:
                 record["texture"] = len(weights)
                 weights.append(np.interp(nm, VISIBLE_NM, material.surface_filter))
@@ -310,8 +326,12 @@ class SceneBuffers:
         self._sections["OBJECTS"] = self._records = records
         if gratings:
             self._sections["GRATINGS"] = np.concatenate(gratings)
+        if crystals:
+            self._sections["CRYSTALS"] = self._crystals
         self.most_orders = max((len(texels) - 1 for texels in gratings), default=0)
-        """Orders of the grating that has most."""
+        """Orders of the grating that has most; lobes of a crystal."""
+        if self.features.crystals:
+            self.most_orders = max(self.most_orders, _LOBES)
         # bit -> (medium, weight row) for the medium stack.
         by_bit = {bit: index for index, bit in stack_bits.items()}
         self.stack_objects: list[int] = [by_bit[bit] for bit in range(len(by_bit))]
@@ -359,6 +379,20 @@ class SceneBuffers:
             self.defines |= {**films.defines, "FILM_ROW": self.layout.film_row}
         if self.features.rough:
             self.defines |= rough_surfaces.glass_defines(self.layout.rough_row)
+
+    def _pack_crystal(self, record: np.ndarray, item: SceneObject, media: list[Dispersion]) -> None:
+        """What a crystal, or a polariser, has besides an object's record."""
+        material = item.material
+        other = material.extraordinary if material.is_crystal else WAVELENGTH
+        if other not in media:
+            media.append(other)
+        record["axis"] = material.axis_in_world(item.object_to_world)
+        record["extraordinary"], record["group"] = media.index(other), NONE
+        if material.is_polariser:
+            record["passed_along"], record["passed_across"] = material.transmittance, material.crossed_transmittance
+            record["retardance_um"] = material.retardance_nm / 1000.0
+        elif other.is_dispersive and self.groups.count:
+            record["group"] = self.groups.group[self.groups.glasses.index(other)]
 
     def _draws(self) -> np.ndarray:
         """Each light's density of random wavelengths as a running integral, (lights, SAMPLES); none where none are

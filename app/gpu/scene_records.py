@@ -39,7 +39,7 @@ PIECE = Struct(
 OBJECT = Struct(
     "Object",
     (
-        Field("kind", "uint", "0 black, 1 diffuse, 2 mirror, 3 dielectric, 4 grating, 5 thin sheet"),
+        Field("kind", "uint", "0 black, 1 diffuse, 2 mirror, 3 dielectric, 4 grating, 5 thin sheet, 6 polariser"),
         Field(
             "medium",
             "uint",
@@ -51,7 +51,7 @@ OBJECT = Struct(
         Field(
             "stack_bit", "uint", "bit of this solid in a ray's inside mask, by priority; NONE where it overlaps nothing"
         ),
-        Field("receiver", "uint", "receiver index, or NONE"),
+        Field("receiver", "uint", "receiver index; dielectric, polariser: texel of its Crystal; or NONE"),
         Field("group", "uint", "spectral group of the glass, or NONE"),
         Field("first_triangle", "uint", "global source index of its first triangle"),
         Field(
@@ -86,4 +86,16 @@ GRATING_ORDER = Struct(
     ),
     texels=True,
 )
-SCENE_STRUCTS = (TRIANGLE, SOLID, PIECE, OBJECT, GRATING, GRATING_ORDER)
+CRYSTAL = Struct(
+    "Crystal",
+    (
+        Field("axis", "vec3", "unit, in the world: of the optic axis; of a polariser"),
+        Field("extraordinary", "uint", "row of the index table: n_e; of a polariser the wavelength, um"),
+        Field("passed_along", "float", "polariser: share of what is polarised along its axis"),
+        Field("passed_across", "float", "likewise across it"),
+        Field("retardance_um", "float", "how far that is behind"),
+        Field("group", "uint", "spectral group of n_e, or NONE"),
+    ),
+    texels=True,
+)
+SCENE_STRUCTS = (TRIANGLE, SOLID, PIECE, OBJECT, GRATING, GRATING_ORDER, CRYSTAL)

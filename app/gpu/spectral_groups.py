@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..features.facts import MAX_GROUPS, dispersive_materials
+from ..features.facts import MAX_GROUPS, dispersive_glasses
 from ..features.features import Features
 from ..model.optics.glass import Dispersion
 from ..model.optics.spectral_tables import SpectralAxis
@@ -30,7 +30,7 @@ class Groups:
 
     @staticmethod
     def of(scene: Scene, features: Features) -> Groups:
-        glasses = tuple(scene.objects[i].material.dispersion for i in dispersive_materials(scene))
+        glasses = tuple(dispersive_glasses(scene))
         count = features.spectral_groups
         group = tuple(min(i, count - 1) for i in range(len(glasses))) if count else ()
         return Groups(glasses, group, count, features.merged_groups and len(glasses) <= MAX_GROUPS)

@@ -62,6 +62,7 @@ _BEYOND_ONLY = (
     "ABSORPTION",
     "NORMAL_DERIVATIVES",
     "POLARISED",
+    "HAS_CRYSTAL",
 )
 """What only rays beyond glass and mirrors need."""
 

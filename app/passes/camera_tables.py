@@ -212,8 +212,9 @@ class _Values:
 
 def _shown_media(scene: SceneBuffers) -> dict[Dispersion, Dispersion]:
     """Each glass that the records number, in their order, and the one that is shown in its stead."""
-    owners = {traced: scene.traced_glasses.index(traced) for traced in scene.media}
-    return {traced: scene.scene.objects[owner].material.dispersion for traced, owner in owners.items()}
+    pairs = zip(scene.traced_glasses, scene.scene.objects, strict=True)
+    shown = [pair for traced, item in pairs for pair in zip(traced, item.material.dispersions, strict=True)]
+    return {traced: next((new for old, new in shown if old == traced), traced) for traced in scene.media}
 
 
 def _distinct_absorptions(scene: Scene, scale: float) -> list[np.ndarray]:

@@ -79,7 +79,7 @@ def trace_flights(
 ) -> Flights:
     """Trace about `photons`; `observer` (401, channels): what a watt at each nanometre adds to a picture."""
     features = replace(Features.of(scene, RenderSettings()), flights=True, beams=False)
-    glasses = [o.material.dispersion for o in scene.objects if o.material.dispersion is not None]
+    glasses = [glass for item in scene.objects for glass in item.material.dispersions]
     axis = SpectralAxis.build(glasses if features.spectral_groups and not features.merged_groups else [])
     buffers = SceneBuffers(context.ctx, scene, features, axis)
     trace = TracePass(context, features, buffers, _BATCH, max_depth, SPLIT_THRESHOLD)

@@ -14,7 +14,7 @@ def spectral_axis(scene: Scene, features: Features) -> SpectralAxis:
     """The spectral coordinate: from the scene's glasses, or λ without spectral columns or with a single shared one."""
     if not features.spectral_groups or (features.merged_groups and features.spectral_groups == 1):
         return SpectralAxis.build([])
-    return SpectralAxis.build([o.material.dispersion for o in scene.objects if o.material.dispersion is not None])
+    return SpectralAxis.build([glass for item in scene.objects for glass in item.material.dispersions])
 
 
 def scene_buffers(context: Context, scene: Scene, settings: RenderSettings) -> SceneBuffers:

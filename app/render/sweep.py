@@ -120,4 +120,5 @@ def _dispersion(stage: Stage) -> float:
 
 
 def _glasses(stage: Stage) -> list[Dispersion]:
-    return [item.material.dispersion for item in stage.scene.objects if item.material.transmits]
+    glass = (item.material for item in stage.scene.objects if item.material.transmits)
+    return [dispersion for material in glass for dispersion in material.dispersions]

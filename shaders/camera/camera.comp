@@ -180,7 +180,8 @@ void follow(uint entry, bool resumes) {
                 goes_on = specular && !leaves;
                 if (COATS) goes_on = goes_on || (coated && !event_limit_reached && path.depth < uint(MAX_DEPTH));
                 if (goes_on) meet_surface(path, hit, kind, pixel_key);
-                if (HAS_GRATING || COATS || ROUGH_SURFACES) goes_on = goes_on && path.walk.inverse_pdf > 0.0;
+                if (HAS_GRATING || COATS || ROUGH_SURFACES || HAS_CRYSTAL || HAS_POLARISER)
+                    goes_on = goes_on && path.walk.inverse_pdf > 0.0;
             }
             if (SPECTRAL_SWEEP && cut_at >= 0.0) cut_band(path, cut_at, pixel_key);
             if (HALTS) halts = rounds >= uint(HALT_ROUNDS);

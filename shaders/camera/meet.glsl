@@ -165,6 +165,10 @@ void cross_glass(inout Path path, Path whole, Hit hit, Event event, uint pixel_k
     leave_surface(path, hit, reflects != entering);
 }
 
+#if HAS_CRYSTAL || HAS_POLARISER
+#include "camera/crystal.glsl"
+#endif
+
 // A specular surface, or a coat.
 void meet_surface(inout Path path, Hit hit, uint kind, uint pixel_key) {
     Path whole = path;
@@ -209,6 +213,10 @@ void meet_surface(inout Path path, Hit hit, uint kind, uint pixel_key) {
         }
         path.walk.branch_weight *= max(colour.r, max(colour.g, colour.b));
     }
-    if (HAS_DIELECTRIC && IS_GLASS(kind)) cross_glass(path, whole, hit, event, pixel_key);
+    bool parts_waves = HAS_CRYSTAL && IS_GLASS(kind) && meets_crystal(event.boundary);
+    if (HAS_DIELECTRIC && IS_GLASS(kind) && !parts_waves) cross_glass(path, whole, hit, event, pixel_key);
+    if (HAS_CRYSTAL && parts_waves) cross_crystal(path, hit, event, pixel_key);
+    if (HAS_POLARISER && kind == KIND_POLARISER)
+        cross_polariser(path, hit, object_at(hit.object).receiver, pixel_key);
     if (HAS_GRATING && kind == KIND_GRATING) meet_grating(path, whole, hit, event, pixel_key);
 }

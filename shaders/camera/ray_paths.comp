@@ -10,6 +10,12 @@ struct Walk {
 #define PATH_COLUMNS 0
 #include "path/event.glsl"
 #include "path/grating.glsl"
+#if HAS_CRYSTAL
+#include "path/crystal.glsl"
+#endif
+#if HAS_POLARISER
+#include "path/polariser.glsl"
+#endif
 
 layout(std430, binding = BIND_PARAMETERS) readonly restrict buffer Parameters { PathParameters p; };
 layout(std430, binding = BIND_STARTS) readonly restrict buffer Starts { PathStart starts[]; };
@@ -40,7 +46,31 @@ void main() {
         if (!is_specular(kind)) break;
         bool entering = dot(path.direction, hit.normal_g) < 0.0, reflects = true, goes_on = true, geometric;
         Event event = interact(path, hit, facet, thing, MicrofacetDraw(0u, 0u, 0u));
-        if (HAS_DIELECTRIC && IS_GLASS(kind)) {
+        bool parts_waves = HAS_CRYSTAL && IS_GLASS(kind) && meets_crystal(event.boundary);
+#if HAS_CRYSTAL
+        if (parts_waves) {
+            // The stronger of both waves that go on, if one does.
+            CrystalEvent met_crystal = crystal_event(path, event);
+            uint sent = 0u;
+            float strongest = 0.0;
+            for (uint turn = 0u; turn < MOST_LOBES; ++turn) {
+                uint lobe = turn ^ LOBE_ONWARD;
+                float share = lobe_share(met_crystal, lobe).y;
+                if (share <= strongest || (turn >= LOBE_ONWARD && (sent & LOBE_ONWARD) != 0u)) continue;
+                sent = lobe;
+                strongest = share;
+            }
+            turn_crystal(path, event, met_crystal, sent, geometric);
+            reflects = (sent & LOBE_ONWARD) == 0u;
+        }
+#endif
+#if HAS_POLARISER
+        if (kind == KIND_POLARISER) {
+            pass_polariser(path, crystal_at(thing.receiver));
+            reflects = false;
+        }
+#endif
+        if (HAS_DIELECTRIC && IS_GLASS(kind) && !parts_waves) {
             reflects = event.boundary.changes
                 && (!event.refracted.exists || (path.walk.reflections > 0u && !entering && !IS_THIN(event.boundary)));
             if (reflects && !entering) path.walk.reflections -= min(path.walk.reflections, 1u);
@@ -70,7 +100,7 @@ void main() {
             } else
         }
         {
-            if (reflects) reflect_path(path, event, geometric);
+            if (reflects && !parts_waves) reflect_path(path, event, geometric);
             leave_surface(path, hit, reflects != entering);
         }
         if (!goes_on) break;

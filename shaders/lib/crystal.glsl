@@ -42,8 +42,9 @@ vec3 wave_column(Uniaxial m, vec2 slopes, bool extraordinary, vec3 ray, vec3 dra
 vec3 energy_of_wave(Uniaxial m, bool extraordinary, vec3 wave) { return extraordinary ? of_wave(m, wave) : wave; }
 
 // The part along `way` (unit, the normal on the side that it goes to) of the wave vector that shares the tangential
-// part of `wave`, an incident wave of length `n`. False: it is evanescent.
-bool normal_part(Uniaxial m, bool extraordinary, vec3 wave, float n, vec3 way, out float part) {
+// part of `wave`, an incident wave of length `n`; `mirrored`: which is one of the same medium and kind. False: it is
+// evanescent.
+bool normal_part(Uniaxial m, bool extraordinary, bool mirrored, vec3 wave, float n, vec3 way, out float part) {
     float incident = dot(wave, way);
     if (!extraordinary) {
         float left = (m.n_o - n) * (m.n_o + n) + incident * incident;
@@ -52,7 +53,7 @@ bool normal_part(Uniaxial m, bool extraordinary, vec3 wave, float n, vec3 way, o
     }
     vec3 tangential = wave - incident * way, turned = of_wave(m, way);
     float a = dot(way, turned), b = dot(tangential, turned), c = dot(tangential, of_wave(m, tangential)) - 1.0;
-    float left = b * b - a * c;
+    float left = mirrored ? dot(wave, turned) * dot(wave, turned) : b * b - a * c;
     part = (sqrt(max(left, 1e-12)) - b) / a;
     return left > 0.0;
 }

@@ -108,6 +108,24 @@ void interface_indices(MediumInterface boundary, vec3 x, out vec3 n_i, out vec3 
 #define GO_STRAIGHT(boundary, theta, n_i, n_t, cosine2)
 #endif
 
+// Of a crystal, or of a polariser.
+Crystal crystal_at(uint texel) {
+    uint at = uint(CRYSTALS_AT) + texel;
+    return Crystal_FROM(scene_texel, at);
+}
+
+// Texel of the crystal that an object is of; NONE: it is isotropic.
+uint crystal_of(uint object) {
+    if (object == NONE) return NONE;
+    Object thing = object_at(object);
+    return thing.kind == KIND_DIELECTRIC ? thing.receiver : NONE;
+}
+
+bool meets_crystal(MediumInterface boundary) {
+    bool solid = boundary.changes && !IS_THIN(boundary);
+    return solid && (crystal_of(boundary.before) != NONE || crystal_of(boundary.after) != NONE);
+}
+
 // dn/dvar of an object's glass: 1 where the variable is its own index.
 float medium_slope(uint object, float x) {
     if (MERGED_GROUPS) {

@@ -9,6 +9,7 @@
 #define KIND_DIELECTRIC 3u
 #define KIND_GRATING 4u
 #define KIND_SHEET 5u
+#define KIND_POLARISER 6u
 #if HAS_SHEET
 #define IS_GLASS(kind) (kind == KIND_DIELECTRIC || kind == KIND_SHEET)
 #else
@@ -16,7 +17,9 @@
 #endif
 
 // Paths go on from it.
-bool is_specular(uint kind) { return kind == KIND_MIRROR || IS_GLASS(kind) || kind == KIND_GRATING; }
+bool is_specular(uint kind) {
+    return kind == KIND_MIRROR || IS_GLASS(kind) || kind == KIND_GRATING || (HAS_POLARISER && kind == KIND_POLARISER);
+}
 
 // Tree, triangles, corner normals and objects, one after the other, in rows of 4096 texels.
 #if SCENE_IMAGE

@@ -20,6 +20,12 @@ struct Walk {
     uint taps;  // bits of the wavelengths that the anchor still represents
 };
 #include "path/event.glsl"
+#if HAS_CRYSTAL
+#include "path/crystal.glsl"
+#endif
+#if HAS_POLARISER
+#include "path/polariser.glsl"
+#endif
 
 struct FollowedRay {
     Path path;
@@ -101,6 +107,25 @@ void weigh_spectrum(inout Path path, Event event, vec3 reflected[TINTS], uint pa
     if (passes) path.walk.taps = passing;
 }
 
+#if HAS_CRYSTAL
+// A ray into one of a crystal's lobes, by chance; the anchor alone goes on. Whether it went through.
+bool follow_lobe(inout Path path, Event event, uint filter_row, float draw) {
+    if (GATHERED_SPECTRUM) keep_anchor(path);
+    CrystalEvent met = crystal_event(path, event);
+    uint chosen = 0u;
+    float below = 0.0;
+    for (uint lobe = 0u; lobe < MOST_LOBES; ++lobe) {
+        float share = lobe_share(met, lobe).y;
+        if (share > 0.0 && below <= draw) chosen = lobe;
+        below += share;
+    }
+    bool onward = (chosen & LOBE_ONWARD) != 0u, geometric;
+    turn_crystal(path, event, met, chosen, geometric);
+    if (SURFACE_FILTERS && onward && filter_row != NONE) tint_by(path.walk, uint(WEIGHT_ROW) + filter_row, -1.0);
+    return onward;
+}
+#endif
+
 // `walk`: with its wavelengths; `x_anchor`: one of them, or that of the index. `lost`: 1 where the ray was given up
 // after MAX_EVENTS.
 FollowedRay follow_specular(
@@ -116,7 +141,7 @@ FollowedRay follow_specular(
         bool met = intersect_closest(path.position, path.direction, FAR_DISTANCE, path.origin, hit);
         Object thing = object_at(met ? hit.object : 0u);
         uint kind = met ? thing.kind : NONE;
-        follows = kind == KIND_MIRROR || IS_GLASS(kind);
+        follows = kind == KIND_MIRROR || IS_GLASS(kind) || (HAS_POLARISER && kind == KIND_POLARISER);
         bool entering = dot(path.direction, hit.normal_g) < 0.0;
         if (ABSORPTION) {
             // A place in a liquid learns so where it leaves it.
@@ -144,7 +169,19 @@ FollowedRay follow_specular(
             for (int t = 0; t < TINTS && kind == KIND_MIRROR && FILM_MET(event); ++t)
                 path.walk.tint[t] *= film_lobe(path, event, true, t);
 #endif
-            if (HAS_DIELECTRIC && IS_GLASS(kind)) {
+            bool parts_waves = HAS_CRYSTAL && IS_GLASS(kind) && meets_crystal(event.boundary);
+#if HAS_CRYSTAL
+            if (parts_waves) passes = follow_lobe(path, event, thing.texture, unit_float(hash_combine(key, number)));
+#endif
+#if HAS_POLARISER
+            if (kind == KIND_POLARISER) {
+                if (GATHERED_SPECTRUM && thing.medium != NONE) keep_anchor(path);
+                float share = pass_polariser(path, crystal_at(thing.receiver)).y;
+                for (int t = 0; t < TINTS; ++t) path.walk.tint[t] *= share;
+                passes = true;
+            }
+#endif
+            if (HAS_DIELECTRIC && IS_GLASS(kind) && !parts_waves) {
                 changes = event.boundary.changes;
                 float chance = event.reflectance.y;
                 vec3 reflected[TINTS];
@@ -171,7 +208,7 @@ FollowedRay follow_specular(
                         tint_by(path.walk, uint(WEIGHT_ROW) + thing.texture, -1.0);
                 }
             }
-            if (!passes) unhidden = reflect_path(path, event, geometric);
+            if (!passes && !parts_waves) unhidden = reflect_path(path, event, geometric);
             for (int t = 0; t < TINTS; ++t) path.walk.tint[t] *= unhidden.y;
             leave_surface(path, hit, passes ? entering : !entering);
             lost = float(number + 1u == uint(MAX_EVENTS));

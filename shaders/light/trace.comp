@@ -185,8 +185,8 @@ bool is_beam_object(uint object) {
 // The ray's way to what it meets; it has come so far through haze then.
 Flight flight_of(inout Path path, float distance) {
     bool outside = !is_inside(path.medium);
-    if (HAS_GRATING) {
-        // What is left of a grating's orders has flown here before.
+    if (HAS_GRATING || HAS_CRYSTAL) {
+        // What is left of a grating's orders, or a crystal's lobes, has flown here before.
         outside = outside && path.order == 0u;
     }
     Flight flight;

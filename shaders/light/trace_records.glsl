@@ -57,7 +57,8 @@ uint second_place(uint slot) { return 2u * slot + 1u; }
 uint most_depth() { return p.max_depth; }
 #endif
 
-// Bits of a record's flags from which on the order of a grating stands that is to be sent on next.
+// Bits of a record's flags from which on the order of a grating, or the lobe of a crystal, stands that is to be sent on
+// next.
 #define ORDER_BIT 8
 
 #define STORE_RAY(at, texel) rays_out[at] = texel
@@ -87,7 +88,8 @@ Path load_path(uint slot) {
             path.ddirection[c] = ray.ddirection[c].xyz;
         }
     }
-    if (HAS_GRATING) path.order = ray.flags >> ORDER_BIT;
+    if (HAS_GRATING || HAS_CRYSTAL) path.order = ray.flags >> ORDER_BIT;
+    if (HAS_CRYSTAL) path.extraordinary = uint((ray.flags & FLAG_EXTRAORDINARY) != 0u);
     if (POLARISED) {
         path.polarisation =
             Polarisation(vec3(ray.axis_x, ray.axis_y, ray.axis_z), ray.stokes_q, ray.stokes_u, ray.stokes_v);
@@ -115,7 +117,8 @@ void store_path(uint slot, Path path) {
             ray.ddirection[c].xyz = path.ddirection[c];
         }
     }
-    if (HAS_GRATING) ray.flags |= path.order << ORDER_BIT;
+    if (HAS_GRATING || HAS_CRYSTAL) ray.flags |= path.order << ORDER_BIT;
+    if (HAS_CRYSTAL) ray.flags |= path.extraordinary * FLAG_EXTRAORDINARY;
     if (POLARISED) {
         ray.axis_x = path.polarisation.axis.x;
         ray.axis_y = path.polarisation.axis.y;

@@ -54,6 +54,12 @@ void send_parts(uint slot, float at, inout Outcome outcome) {
 #endif
 
 #include "light/trace_grating.glsl"
+#if HAS_CRYSTAL
+#include "light/trace_crystal.glsl"
+#endif
+#if HAS_POLARISER
+#include "path/polariser.glsl"
+#endif
 
 // Each child is stored in one place, whichever event made it: where every branch is executed, every
 // store costs even when no path takes it. `border`: where the band is cut before it lands; negative: nowhere.
@@ -66,7 +72,8 @@ void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object t
     outcome.what |= event.frame.refused != 0u ? FELL_NORMAL : 0u;
     Path child = child_of(path, hit, !entering);
     vec3 unhidden = reflect_path(child, event, geometric);
-    Companions companions = companions_at(path, event, IS_GLASS(kind));
+    bool parts_waves = HAS_CRYSTAL && IS_GLASS(kind) && meets_crystal(event.boundary);
+    Companions companions = companions_at(path, event, IS_GLASS(kind) && !parts_waves);
     if (HAS_MIRROR && kind == KIND_MIRROR) {
         vec3 kept = spectral_row(uint(WEIGHT_ROW) + thing.weight_row, path.band),
              of_companions = companion_row(path, uint(WEIGHT_ROW) + thing.weight_row);
@@ -81,13 +88,29 @@ void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object t
         outcome.flux_w = carried_w(path) - carried_w(child);
         lives = survives(child, outcome.roulette_w, share, 3u);
     }
-#ifdef HAS_GRATING
+#if HAS_POLARISER
+    if (kind == KIND_POLARISER) {
+        child = child_of(path, hit, entering);
+        vec3 share = pass_polariser(child, crystal_at(thing.receiver));
+        weaken(child, share, share);
+        leave_companions(child);
+        outcome.what |= ABSORBED;
+        outcome.flux_w = carried_w(path) - carried_w(child);
+        lives = survives(child, outcome.roulette_w, share.y, 2u);
+    }
+#endif
+#if HAS_GRATING || HAS_CRYSTAL
     Path rest = START(start, slot);
     bool rest_lives = false;
+#endif
+#if HAS_GRATING
     if (kind == KIND_GRATING) lives = diffract(path, hit, event, thing.weight_row, child, rest, rest_lives, outcome);
 #endif
+#if HAS_CRYSTAL
+    if (parts_waves) lives = part_in_crystal(path, hit, event, thing.texture, child, rest, rest_lives, outcome);
+#endif
 #ifdef HAS_DIELECTRIC
-    bool splits = IS_GLASS(kind) && event.boundary.changes;
+    bool splits = IS_GLASS(kind) && event.boundary.changes && !parts_waves;
     vec3 let_through = transmittance_of(event);
     float reflected_share = common_share(path, share_of_lobe(event, event.reflectance), companions.reflectance);
     // Refracted they stay together only where nothing disperses.
@@ -136,7 +159,7 @@ void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object t
     both = at >= 0.0 || splits && event.refracted.exists;
     stays = splits && reflected_share > refracted_share;
 #endif
-    if (HAS_GRATING) both = both || rest_lives;
+    if (HAS_GRATING || HAS_CRYSTAL) both = both || rest_lives;
     if (lives) {
         uint place = first_place(slot, both, stays);
         if (RAY_POOL && place == NONE) {
@@ -150,7 +173,7 @@ void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object t
 #if defined(HAS_DIELECTRIC) || defined(HAS_GRATING)
     child = child_of(path, hit, entering);
     lives = false;
-    if (HAS_GRATING && rest_lives) {
+    if ((HAS_GRATING || HAS_CRYSTAL) && rest_lives) {
         child = rest;
         lives = true;
     }

@@ -254,7 +254,7 @@ Event interact(Path path, Hit hit, Triangle facet, Object thing, MicrofacetDraw 
 #endif
     if (HAS_DIELECTRIC && IS_GLASS(thing.kind)) {
         event.boundary = cross_boundary(path.medium, hit.object, dot(path.direction, hit.normal_g) < 0.0);
-        share_out(path, event);
+        if (!(HAS_CRYSTAL && meets_crystal(event.boundary))) share_out(path, event);
         return event;
     }
     if (POLARISED) see_polarised(path, event);

@@ -31,7 +31,8 @@ struct Path {
     uint depth;  // surfaces met
     uint restricted;  // 1: represents one band; 0: the whole spectrum, not dispersed yet
     uint recut;  // 1: its band was already cut at the surface ahead, and is not cut there again
-    uint order;  // the next order to follow at the grating ahead (camera/grating.glsl)
+    uint order;  // the next order to follow at the grating ahead (camera/grating.glsl), or lobe at the crystal
+    uint extraordinary;  // 1: in a crystal, it is the extraordinary wave
     Polarisation polarisation;  // on a camera path: of light sent along it from the camera; by reciprocity
                                 // the throughput is the same
     // The rays of the band's lowest and highest wavelength, traced through the same facets: they hold the nonlinear
@@ -80,7 +81,8 @@ Path path_at(vec3 position, vec3 direction, RayOrigin origin, MediumStack medium
     path.band = vec3(x);
     path.throughput = vec3(1.0);
     path.depth = path.restricted = path.recut = 0u;
-    if (HAS_GRATING) path.order = 0u;
+    if (HAS_GRATING || HAS_CRYSTAL) path.order = 0u;
+    if (HAS_CRYSTAL) path.extraordinary = 0u;
     if (POLARISED) path.polarisation = unpolarised(direction);
     if (SPECTRAL_SWEEP) {
         gather_ends(path);
@@ -197,5 +199,5 @@ bool columns_hold(inout Path path) {
 void leave_surface(inout Path path, Hit hit, bool inside) {
     path.origin = RayOrigin(hit.primitive, hit.object, uint(inside), path.medium.mask);
     path.recut = 0u;
-    if (HAS_GRATING) path.order = 0u;
+    if (HAS_GRATING || HAS_CRYSTAL) path.order = 0u;
 }

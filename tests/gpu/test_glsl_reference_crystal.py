@@ -158,7 +158,7 @@ COLUMN = """
     bool first = modes.x > 0.0, second = modes.y > 0.0;
     vec3 unit = normalize(ray), up = normalize(normal), wave = wave_of_ray(before, first, unit), way = -up;
     float part, length_n = first ? length(wave) : before.n_o;
-    passes = float(normal_part(behind, second, wave, length_n, way, part));
+    passes = float(normal_part(behind, second, false, wave, length_n, way, part));
     vec3 turned_wave = wave - dot(wave, way) * way + part * way;
     turned = normalize(energy_of_wave(behind, second, turned_wave));
     vec3 dwave = wave_column(before, slopes_1, first, unit, dray);
@@ -217,7 +217,7 @@ def test_calcite_walks_off(gl) -> None:
     body = """
         Uniaxial crystal = Uniaxial(axis, 1.6584, 1.4864);
         float part;
-        bool unused = normal_part(crystal, true, vec3(0.0, 0.0, 1.0), 1.0, vec3(0.0, 0.0, 1.0), part);
+        bool unused = normal_part(crystal, true, false, vec3(0.0, 0.0, 1.0), 1.0, vec3(0.0, 0.0, 1.0), part);
         vec3 ray = normalize(energy_of_wave(crystal, true, vec3(0.0, 0.0, part)));
         off = degrees(acos(min(ray.z, 1.0)));
     """

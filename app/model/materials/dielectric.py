@@ -161,8 +161,6 @@ class Dielectric(Material):
                 f"{file_name}: object '{name}' is a crystal with '{key}', and light is followed through polished bare "
                 f"solids of crystal alone; leave '{key}' out, or take a glass"
             )
-        if self.is_crystal:
-            raise UserError(f"{file_name}: object '{name}' is a crystal, which is not traced yet; take a glass")
 
     @classmethod
     def usual(cls) -> Self:

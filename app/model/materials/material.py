@@ -84,7 +84,13 @@ class Material:
     @property
     def disperses(self) -> bool:
         """It deflects different wavelengths into different directions."""
-        return self.dispersion is not None and not self.thin and bool(self.dispersion.is_dispersive)
+        return not self.thin and any(dispersion.is_dispersive for dispersion in self.dispersions)
+
+    @property
+    def dispersions(self) -> tuple[Dispersion, ...]:
+        """None, its one, or both of a crystal."""
+        other = (self.extraordinary,) if self.is_crystal else ()
+        return () if self.dispersion is None else (self.dispersion, *other)
 
     @property
     def is_crystal(self) -> bool:

@@ -10,8 +10,9 @@ import numpy as np
 
 from ...base.errors import UserError
 from ..fields import Animated, Direction, Number, Row
+from ..optics.glass import Dispersion
 from ..vectors import Vec3
-from .grating import MIN_SINE
+from .grating import MIN_SINE, WAVELENGTH
 from .material import Material
 
 if TYPE_CHECKING:
@@ -74,6 +75,11 @@ class Polariser(Material):
     is_polariser: ClassVar = True
     why_no_beams: ClassVar = "it polarises"
 
+    @property
+    def dispersion(self) -> Dispersion | None:  # type: ignore[override]
+        """The wavelength, where that decides what passes."""
+        return WAVELENGTH if self.retardance_nm else None
+
     def words(self) -> str:
         """What it does to light."""
         along, across, late = self.transmittance, self.crossed_transmittance, self.retardance_nm
@@ -84,8 +90,8 @@ class Polariser(Material):
         return (self.transmittance, self.crossed_transmittance, self.retardance_nm, *self.axis)
 
     def is_like(self, other: Material) -> bool:
-        """Numbers may differ."""
-        return isinstance(other, Polariser)
+        """Numbers may differ, but for what needs bands of the spectrum."""
+        return isinstance(other, Polariser) and (self.retardance_nm != 0.0) == (other.retardance_nm != 0.0)
 
     def check_on(self, mesh: Mesh, name: str, file_name: str) -> None:
         """Thin sheets only, in which the axis lies."""
@@ -101,4 +107,3 @@ class Polariser(Material):
                 f"{file_name}: the axis of polariser '{name}' runs along the normal of its surface; "
                 "choose an 'axis' that lies in the surface"
             )
-        raise UserError(f"{file_name}: object '{name}' is a polariser, which is not traced yet; leave it out")
