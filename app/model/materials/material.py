@@ -98,11 +98,6 @@ class Material:
         return False
 
     @property
-    def dispersions(self) -> tuple[Dispersion, ...]:
-        """`dispersion`, and a crystal's second one; none where it has none."""
-        return tuple(each for each in (self.dispersion, self.extraordinary) if each is not None)
-
-    @property
     def polarises(self) -> bool:
         """What it does is polarised in the first place, so that a scene with it keeps light's polarisation."""
         return self.is_crystal or self.is_polariser
