@@ -25,7 +25,7 @@ from ..model.optics.spectral_tables import (
     cumulative,
     wavelength_cdf,
 )
-from ..model.scene import Grating, Light, Scene, SceneObject
+from ..model.scene import Grating, Light, Polariser, Scene, SceneObject
 from ..model.scene_checks import contains
 from ..model.tint_bands import tint_curves
 from ..model.tint_levels import TintLevels, tint_levels
@@ -388,7 +388,7 @@ class SceneBuffers:
             media.append(other)
         record["axis"] = material.axis_in_world(item.object_to_world)
         record["extraordinary"], record["group"] = media.index(other), NONE
-        if material.is_polariser:
+        if isinstance(material, Polariser):
             record["passed_along"], record["passed_across"] = material.transmittance, material.crossed_transmittance
             record["retardance_um"] = material.retardance_nm / 1000.0
         elif other.is_dispersive and self.groups.count:

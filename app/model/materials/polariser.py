@@ -76,7 +76,7 @@ class Polariser(Material):
     why_no_beams: ClassVar = "it polarises"
 
     @property
-    def dispersion(self) -> Dispersion | None:  # type: ignore[override]
+    def dispersion(self) -> Dispersion | None:
         """The wavelength, where that decides what passes."""
         return WAVELENGTH if self.retardance_nm else None
 
