@@ -136,6 +136,17 @@ class SurfaceFeatures:
         names=("grating_at", "diffract_direction", "GRATINGS_AT"),
         cost=lambda facts, sizes: f"{sizes.texel} B an order; a step of the queue for each",
     )
+    grating_profiles: bool = feature(
+        "profiles of gratings",
+        lambda facts: bool(facts.having(lambda material: bool(material.profile_code))),
+        symbol="GRATING_PROFILES",
+        why=lambda facts: f"of {names(facts.having(lambda material: bool(material.profile_code)))}",
+        why_not="no grating's efficiencies depend on wavelength and angle",
+        names=("groove_waves", "profile_share"),
+        cost="a sine or a lookup an order, three times a band",
+        requires=("gratings",),
+    )
+    """Some grating's grooves share light out by wavelength and angle."""
     smooth_normals: bool = feature(
         "interpolated normals",
         lambda facts: bool(facts.smooth),

@@ -31,10 +31,11 @@ from ..model.tint_bands import tint_curves
 from ..model.tint_levels import TintLevels, tint_levels
 from . import bindings, shader
 from .gpu_space import GpuSpace
+from .grating_records import grating_tables, grating_texels
 from .records import NONE
 from .scene_geometry import SceneGeometry
 from .scene_motion import MovingTriangles, ObjectPlaces, WorldMeshes
-from .scene_records import CRYSTAL, GRATING, GRATING_ORDER, OBJECT, PIECE
+from .scene_records import CRYSTAL, OBJECT, PIECE
 from .scene_texels import SceneTexels, spectra_texture
 from .spectral_groups import SAMPLES, Groups, index_slope, samples_of
 from .texture_store import textured_objects
@@ -59,6 +60,8 @@ class SpectraLayout:
     """`rough_surfaces.glass_tables`."""
     film_row: int
     """`film_stacks.film_tables`."""
+    grating_row: int
+    """`grating_tables`."""
     rows: int
 
 
@@ -234,7 +237,7 @@ class SceneBuffers:
             self.texels.write("OBJECTS", OBJECT.stride // 16 * index, record)
         if isinstance(item.material, Grating):
             self.texels.write(
-                "GRATINGS", int(record["weight_row"][0]), _grating_texels(item.material, item.object_to_world)
+                "GRATINGS", int(record["weight_row"][0]), grating_texels(item, self.grating_rows.get(index))
             )
         if item.material.polarises:
             number = int(record["receiver"][0]) // _CRYSTAL_TEXELS
@@ -272,6 +275,7 @@ class SceneBuffers:
         widths = rough_surfaces.distinct_widths(item.material.microfacet_width for item in self.scene.objects)
         nm, x = samples_of(self.axis)
         films = film_tables(self.scene, nm, self.features.polarised)
+        self.grating_rows, of_gratings = grating_tables(self.scene, SAMPLES)
         stack_bits = _stack_bits(self.scene) if self.features.medium_stack else {}
         records = OBJECT.zeros(len(self.scene.objects))
         for name in ("medium", "weight_row", "stack_bit", "receiver", "group", "texture"):
@@ -297,7 +301,7 @@ class SceneBuffers:
                 record["medium"] = 0 if item.mesh.is_closed else NONE
             if isinstance(material, Grating):
                 record["weight_row"] = sum(len(texels) for texels in gratings)
-                gratings.append(_grating_texels(material, item.object_to_world))
+                gratings.append(grating_texels(item, self.grating_rows.get(index)))
             if material.dispersion is not None:
                 if material.dispersion not in media:
                     media.append(material.dispersion)
@@ -328,10 +332,9 @@ class SceneBuffers:
             self._sections["GRATINGS"] = np.concatenate(gratings)
         if crystals:
             self._sections["CRYSTALS"] = self._crystals
-        self.most_orders = max((len(texels) - 1 for texels in gratings), default=0)
+        orders = [len(item.material.orders) for item in self.scene.objects if isinstance(item.material, Grating)]
+        self.most_orders = max([_LOBES * self.features.crystals, *orders])
         """Orders of the grating that has most; lobes of a crystal."""
-        if self.features.crystals:
-            self.most_orders = max(self.most_orders, _LOBES)
         # bit -> (medium, weight row) for the medium stack.
         by_bit = {bit: index for index, bit in stack_bits.items()}
         self.stack_objects: list[int] = [by_bit[bit] for bit in range(len(by_bit))]
@@ -358,7 +361,7 @@ class SceneBuffers:
             powers = [cumulative(self.axis, spectrum) for spectrum in behind]
             self.tint_halfway = [levels.halfway(light.spectral_power).reshape(-1, 4) for light in self.scene.lights]
         rows.append(np.array([power.at(x)[:, 3] for power in powers]).reshape(-1, SAMPLES))
-        rows += [self._draws(), rough_surfaces.glass_tables(widths, SAMPLES), films.rows]
+        rows += [self._draws(), rough_surfaces.glass_tables(widths, SAMPLES), films.rows, of_gratings]
         counts = np.cumsum([0] + [len(r) for r in rows])
         self.layout = SpectraLayout(*counts.tolist())
         self.variables = variables
@@ -377,6 +380,8 @@ class SceneBuffers:
         }
         if self.features.films:
             self.defines |= {**films.defines, "FILM_ROW": self.layout.film_row}
+        if self.features.gratings:
+            self.defines["GRATING_ROW"] = self.layout.grating_row
         if self.features.rough:
             self.defines |= rough_surfaces.glass_defines(self.layout.rough_row)
 
@@ -404,17 +409,6 @@ class SceneBuffers:
             support = float(self.axis.x_of_nm(lo_nm - 0.5)), float(self.axis.x_of_nm(hi_nm + 0.5))
             rows.append(wavelength_cdf(power, SAMPLES, support, self.features.draws_by_power))
         return np.array(rows if self.features.random_wavelength else []).reshape(-1, SAMPLES)
-
-
-def _grating_texels(grating: Grating, object_to_world: np.ndarray) -> np.ndarray:
-    """A GRATING and one GRATING_ORDER an order: uint32 (1 + orders, 4)."""
-    head = GRATING.zeros(1)
-    head["lines"] = grating.lines_in_world(object_to_world)
-    head["orders"] = len(grating.orders)
-    orders = GRATING_ORDER.zeros(len(grating.orders))
-    orders["shift_per_um"], orders["efficiency"] = grating.shift_per_um, grating.efficiency
-    orders["left"], orders["reflects"] = grating.left, grating.reflects
-    return np.concatenate([record.view("<u4").reshape(-1, 4) for record in (head, orders)])
 
 
 def _stack_bits(scene: Scene) -> dict[int, int]:

@@ -73,6 +73,14 @@ GRATING = Struct(
     (
         Field("lines", "vec3", "unit, along the lines"),
         Field("orders", "uint", "how many follow it in the same section, one GratingOrder each"),
+        Field("lines_per_um", "float"),
+        Field("spread_per_um", "float", "one over the width that light covers, 1/µm; 0: its lines have no width"),
+        Field("relief", "float", "of its grooves (`gratings.waves_of`)"),
+        Field("index", "float", "of what they are in; 0: the grating reflects"),
+        Field("profile", "uint", "PROFILE_…"),
+        Field("row", "uint", "of a sine's first order's shares, from GRATING_ROW on"),
+        Field("most_waves", "float", "where those rows end"),
+        Field("reserved", "float"),
     ),
     texels=True,
 )
@@ -80,9 +88,9 @@ GRATING_ORDER = Struct(
     "GratingOrder",
     (
         Field("shift_per_um", "float", "added to a direction's tangential part, per micrometre of wavelength: m / Λ"),
-        Field("efficiency", "float", "share of the light"),
+        Field("efficiency", "float", "share of the light, or with a profile a factor of it"),
         Field("left", "float", "share that the orders before have left"),
-        Field("reflects", "uint"),
+        Field("number", "float", "m"),
     ),
     texels=True,
 )

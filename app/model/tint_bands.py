@@ -28,6 +28,8 @@ _PATHS = (0.5, 1.0, 2.0)
 """Lengths of glass, in mean chords of the solid."""
 _MIRRORS = (1, 4)
 """Reflections by a coloured mirror, or passages of a coloured surface of glass."""
+_ONTO_GRATINGS = ((0.0, 0.0, -1.0), (0.5, 0.0, -0.866), (-0.5, 0.0, -0.866))
+"""Directions that light meets a grating in, as of `Grating.shares`."""
 _LEAST_RIPPLE = 1e-3
 """Of a film's curve: what it reflects, however little, is a colour."""
 _BRIGHTENED = 0.5
@@ -57,6 +59,8 @@ def tint_curves(scene: Scene, but: np.ndarray | None = None) -> np.ndarray:
             paths = (*_PATHS, long / chord) if long > 4.0 * max(broad, chord) else _PATHS
             with np.errstate(under="ignore"):
                 found += [np.exp(-share * absorption.coefficient * chord) for share in paths]
+        if material.profile_code:
+            found += [share for light in _ONTO_GRATINGS for share in material.shares(VISIBLE_NM, np.array(light))]
         if material.is_mirror:
             found += [mirror_reflectance(material.reflectance_rgb, VISIBLE_NM) ** times for times in _MIRRORS]
         if material.filters:

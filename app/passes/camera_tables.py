@@ -18,6 +18,7 @@ import numpy as np
 from ..features.program_switches import Defines, switched
 from ..gpu import shader
 from ..gpu.device_traits import DeviceTraits
+from ..gpu.grating_records import grating_tables
 from ..gpu.map_channels import MapChannels
 from ..gpu.running_sums import BIND_KNOTS, KNOTS, RunningSums, SumRow
 from ..gpu.scene_buffers import SceneBuffers
@@ -177,6 +178,9 @@ class _Values:
             parts_row = starts[-1] + len(sampled)
             defines |= {**films.defines, "PARTS_ROW": parts_row, "FILM_ROW": parts_row + 2}
             sampled = np.concatenate([sampled, film_parts(axis, SAMPLES), films.rows])
+        if scene.features.gratings:
+            defines["GRATING_ROW"] = starts[-1] + len(sampled)
+            sampled = np.concatenate([sampled, grating_tables(shown, SAMPLES)[1]])
         emission = partial(_emission_rows, shown, channels, reflectances, maps, scene.space.scale)
         rows = _emission_defines(len(shown.lights), len(reflectances), maps)
         finishes, coats = _finishes(shown, starts[-1] + len(sampled))

@@ -85,6 +85,7 @@ class CameraRun(PartsRun):
             ) from error
         self._kernel, self._scratch = camera_kernel, sampling.scratch
         photons, centre = photon_scene.photon_scene(scene)
+        photons = photons._replace(backwards=True)
         self._scene = camera_scene.with_upsampled_mirrors(photons, scene)
         self._camera = viewpoint.viewpoint(scene.camera, width, height, centre)
         self._start = camera_scene.camera_start(scene, photons)

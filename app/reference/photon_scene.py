@@ -18,7 +18,8 @@ from ..model.geometry.bvh import Bvh, build_bvh
 from ..model.geometry.mesh import Mesh
 from ..model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz, rgb_basis, xyz_to_rgb709_matrix
 from ..model.optics.spectrum import Spectrum, cmf_at
-from ..model.scene import Grating, Polariser, Scene
+from ..model.scene import Polariser, Scene
+from .gratings import gratings
 from .rough_albedo import albedo_tables
 from .scene_surfaces import Surfaces
 from .thin_films import Films, films_of
@@ -95,7 +96,7 @@ class PhotonScene(NamedTuple):
     first_order: np.ndarray
     """int32 (O + 1,): where the orders of each object's grating begin, and the last's end."""
     orders: np.ndarray
-    """float64 (R, 3): order / line spacing in 1/µm, efficiency, whether it is reflected."""
+    """float64 (R, `gratings.COLUMNS`)."""
     microfacet_width: np.ndarray
     """float64 (O,): GGX's α of an object's surface; 0: it is polished."""
     albedo: np.ndarray
@@ -107,6 +108,8 @@ class PhotonScene(NamedTuple):
     polarised: bool
     """Paths carry their light's polarisation."""
     films: Films
+    backwards: bool = False
+    """Paths go from the camera, against the light."""
 
 
 class Colours(NamedTuple):
@@ -189,7 +192,7 @@ def photon_scene(scene: Scene) -> tuple[PhotonScene, np.ndarray]:
         reflectance_class,
         media.array(),
         weights.array(),
-        *_gratings(scene),
+        *gratings(scene),
         widths,
         albedo_tables(widths),
         _NEAR * size,
@@ -210,21 +213,6 @@ def _axes(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
         if material.polarises:
             axis[index] = material.axis_in_world(item.object_to_world)
     return axis, sheet
-
-
-def _gratings(scene: Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """`lines`, `first_order` and `orders` of a `PhotonScene`."""
-    lines = np.zeros((len(scene.objects), 3))
-    counts, orders = [0], [np.zeros((0, 3))]
-    for index, item in enumerate(scene.objects):
-        material = item.material
-        counts.append(0)
-        if isinstance(material, Grating):
-            lines[index] = material.lines_in_world(item.object_to_world)
-            reflects = np.full(len(material.orders), float(material.reflects))
-            orders.append(np.column_stack([material.shift_per_um, material.efficiency, reflects]))
-            counts[-1] = len(material.orders)
-    return lines, np.cumsum(counts).astype(np.int32), np.concatenate([*orders, np.zeros((1, 3))])
 
 
 def colours(spectrum: Spectrum, classes: list[np.ndarray | None]) -> Colours:

@@ -16,6 +16,7 @@ import numpy as np
 from .compiling import compiled, inlined
 from .crystals import begin_in_crystal, solve_interface, take_wave, through_sheet
 from .curved_surfaces import turned_normal
+from .gratings import diffracted, order_share
 from .photon_intersect import normal_at
 from .photon_scene import GRATING, MIRROR, POLARISER, SHEET
 from .polarised import amplitudes, begin_unpolarised, senkrecht, share_of, turn_fields
@@ -98,23 +99,14 @@ def _shading_normal(scene, triangle, place, u, v, d, g, entering):
     return n if -dot(d, n) > 1e-6 else g
 
 
-@inlined
-def _diffracted(d, n, lines, step, reflects):
-    """(direction, whether it is real) of an order: `step` = m λ / (Λ n) across `lines`, along lines × n, is added
-    to the direction's part in the surface; `n` is the outward normal."""
-    a = cross(lines, n)
-    size = length(a)
-    theta = dot(d, n)
-    t = (
-        d[0] - theta * n[0] + step * a[0] / size,
-        d[1] - theta * n[1] + step * a[1] / size,
-        d[2] - theta * n[2] + step * a[2] / size,
-    )
-    cosine2 = 1.0 - dot(t, t)
-    cosine = math.sqrt(max(cosine2, 0.0))
-    if (theta < 0.0) != reflects:
-        cosine = -cosine
-    return moved(t, cosine, n), cosine2 > 0.0
+@compiled
+def _share_of_order(scene, row, d, n, lines, index, nm):
+    """Of the light that comes along `d`, or of what comes back along the order to a camera's ray."""
+    orders = scene.orders[row]
+    if scene.backwards:
+        r, _ = diffracted(d, n, lines, orders[0] * nm * 1e-3 / index, orders[6] == 0.0)
+        return order_share(orders, negated(r), n, lines, index, nm)
+    return order_share(orders, d, n, lines, index, nm)
 
 
 @compiled
@@ -125,20 +117,23 @@ def _diffract(scene, triangle, place, u, v, d, mask, alone, nm, draw, field):
     g = normal_at(scene, triangle, place)
     entering = dot(d, g) < 0.0
     n = _shading_normal(scene, triangle, place, u, v, d, g if entering else negated(g), entering)
+    outward = n if entering else negated(n)
+    index = _refractive_index(scene, medium(scene, mask, alone), nm)
     first, end = scene.first_order[thing], scene.first_order[thing + 1]
-    efficiency = 0.0
-    for row in range(first, end):
-        efficiency += scene.orders[row, 1]
-    chosen, below = first, 0.0
-    for row in range(first, end):
-        if below <= draw * efficiency:
-            chosen = row
-        below += scene.orders[row, 1]
-    reflects = scene.orders[chosen, 2] > 0.0
-    step = scene.orders[chosen, 0] * nm * 1e-3 / _refractive_index(scene, medium(scene, mask, alone), nm)
-    r, real = _diffracted(d, n if entering else negated(n), scene.lines[thing], step, reflects)
+    efficiency, chosen = 0.0, first
+    # Twice: their sum, and where the draw falls in it.
+    for count in range(2):
+        wanted, below = draw * efficiency, 0.0
+        for row in range(first, end):
+            if count == 1 and below <= wanted:
+                chosen = row
+            below += _share_of_order(scene, row, d, outward, scene.lines[thing], index, nm)
+        efficiency = below
+    reflects = scene.orders[chosen, 6] == 0.0
+    step = scene.orders[chosen, 0] * nm * 1e-3 / index
+    r, real = diffracted(d, outward, scene.lines[thing], step, reflects)
     if (dot(r, g) * (1.0 if entering else -1.0) > 0.0) != reflects:  # to the wrong side of the facet
-        r, real = _diffracted(d, g, scene.lines[thing], step, reflects)
+        r, real = diffracted(d, g, scene.lines[thing], step, reflects)
     if scene.polarised and real:
         turn_fields(field, d, r, senkrecht(d, r), complex(-1.0 if reflects else 1.0), complex(1.0))
     return r, mask, alone, entering != reflects, True, efficiency if real else 0.0, True

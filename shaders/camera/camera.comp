@@ -175,7 +175,7 @@ void follow(uint entry, bool resumes) {
                 bool specular = !ends && kind != KIND_BLACK,
                      leaves = specular && (event_limit_reached || path.depth >= uint(MAX_DEPTH));
                 if (leaves) atomicAdd(fallbacks[FELL_DEPTH], 1u);
-                if (HAS_GRATING && leaves && kind == KIND_GRATING) path.throughput *= efficiency_left(path, hit.object);
+                if (HAS_GRATING && leaves && kind == KIND_GRATING) path.throughput *= shares_left(path, hit);
                 if (ends || leaves) ENDED(found++) = PathEnd(path, hit, uint(met && ends), uint(same_hit || leaves));
                 goes_on = specular && !leaves;
                 if (COATS) goes_on = goes_on || (coated && !event_limit_reached && path.depth < uint(MAX_DEPTH));

@@ -9,41 +9,72 @@
 // exceed the sample's limit of events.
 #define MIN_ORDER_SHARE 0.02
 
-// Samples one of the orders from `first` on in proportion to efficiency; its path then represents all of them.
-uint chosen_order(inout Path path, uint row, uint first, uint count, uint pixel_key) {
+// Direction of the light that comes back along an order of a camera path, as of `in_lines`; `step`: of the order.
+vec3 light_along(GratingEvent met, vec3 direction, float step) {
+    vec3 sent = in_lines(met, direction) + vec3(step, 0.0, 0.0);
+    float cosine = met.side * sqrt(max(1.0 - dot(sent.xy, sent.xy), 0.0));
+    return vec3(-sent.xy, is_reflective(met.grating) ? -cosine : cosine);
+}
+
+// Shares that light has left over the band of a path which goes on in an order, met the other way round.
+vec3 order_shares(GratingEvent met, GratingOrder order, uint number, Path path, vec3 steps) {
+    if (!has_profile(met)) return vec3(order.efficiency);
+    vec3 low = light_along(met, direction_at_end(path, 0), steps.x);
+    vec3 high = light_along(met, direction_at_end(path, 1), steps.z);
+    return vec3(order_share(met, order, number, low, path.band.x),
+        order_share(met, order, number, light_along(met, path.direction, steps.y), path.band.y),
+        order_share(met, order, number, high, path.band.z));
+}
+
+// The same of order `k` of a path that has not chosen one yet.
+vec3 order_shares(GratingEvent met, uint k, Path path) {
+    GratingOrder order = order_at(met.row, k);
+    return order_shares(met, order, k, path, order_steps(order, met.object, met.medium, path.band));
+}
+
+// How likely an order is chosen, in proportion: none that carries light at some wavelength is left out.
+float order_odds(GratingEvent met, uint k, Path path) {
+    vec3 shares = order_shares(met, k, path);
+    return has_profile(met) ? dot(shares, vec3(0.25, 0.5, 0.25)) + 0.02 * order_at(met.row, k).efficiency : shares.y;
+}
+
+// Samples one of the orders from `first` on in proportion to what they leave; its path then represents all of them.
+uint chosen_order(inout Path path, GratingEvent met, uint first, uint count, uint pixel_key) {
     float all = 0.0;
-    for (uint k = first; k < count; ++k) all += order_at(row, k).efficiency;
+    for (uint k = first; k < count; ++k) all += order_odds(met, k, path);
     float draw = choice(path, pixel_key) * all, below = 0.0;
     uint chosen = first;
     for (uint k = first; k < count; ++k) {
         if (below <= draw) chosen = k;
-        below += order_at(row, k).efficiency;
+        below += order_odds(met, k, path);
     }
-    path.walk.inverse_pdf *= all / max(order_at(row, chosen).efficiency, 1e-9);
+    path.walk.inverse_pdf *= all / max(order_odds(met, chosen, path), 1e-9);
     return chosen;
 }
 
-// Summed efficiency of the orders a path has yet to follow at the grating ahead: its share of light if it ends there.
-float efficiency_left(Path path, uint object) {
-    uint row = object_at(object).weight_row, first = path.order & ~ONLY_ORDER;
-    uint end = (path.order & ONLY_ORDER) != 0u ? first + 1u : grating_at(row).orders;
-    float left = 0.0;
-    for (uint k = first; k < end; ++k) left += order_at(row, k).efficiency;
+// Summed shares of the orders a path has yet to follow at the grating ahead: of its light if it ends there.
+vec3 shares_left(Path path, Hit hit) {
+    vec3 normal = dot(path.direction, hit.normal_g) < 0.0 ? hit.normal_g : -hit.normal_g;
+    GratingEvent met = grating_event(path, normal, hit, object_at(hit.object).weight_row);
+    uint first = path.order & ~ONLY_ORDER;
+    uint end = (path.order & ONLY_ORDER) != 0u ? first + 1u : met.grating.orders;
+    vec3 left = vec3(0.0);
+    for (uint k = first; k < end; ++k) left += order_shares(met, k, path);
     return left;
 }
 
 // The event at a grating. `whole`: the path before its flight to here. A path that ends gets `inverse_pdf` 0.
 void meet_grating(inout Path path, Path whole, Hit hit, Event event, uint pixel_key) {
     uint row = object_at(hit.object).weight_row;
-    GratingEvent met = grating_event(path, event, hit, row);
+    GratingEvent met = grating_event(path, event.frame.normal, hit, row);
     bool alone = (path.order & ONLY_ORDER) != 0u, geometric;
     uint number = path.order & ~ONLY_ORDER, orders = met.grating.orders;
     if (!alone && number + 1u < orders) {
         bool strong = path.depth <= 1u
-            || path.walk.branch_weight * order_at(row, number).efficiency > max(p.split_threshold, MIN_ORDER_SHARE);
+            || path.walk.branch_weight * order_odds(met, number, whole) > max(p.split_threshold, MIN_ORDER_SHARE);
         if (strong && stack_size >= STACK) atomicAdd(fallbacks[FELL_STACK], 1u);
         if (!strong || stack_size >= STACK) {
-            number = chosen_order(whole, row, number, orders, pixel_key);
+            number = chosen_order(whole, met, number, orders, pixel_key);
             path.walk.inverse_pdf = whole.walk.inverse_pdf;
             alone = true;
         }
@@ -92,9 +123,10 @@ void meet_grating(inout Path path, Path whole, Hit hit, Event event, uint pixel_
         if (!here) path.walk.inverse_pdf = 0.0;
         return;
     }
-    if (order.shift_per_um != 0.0) path = banded;
-    path.throughput *= order.efficiency;
-    path.walk.branch_weight *= order.efficiency;
+    if (order.shift_per_um != 0.0 || has_profile(met)) path = banded;
+    vec3 shares = order_shares(met, order, number, banded, steps);
+    path.throughput *= shares;
+    path.walk.branch_weight *= has_profile(met) ? dot(shares, vec3(0.25, 0.5, 0.25)) : shares.y;
     path.walk.key = hash_combine(path.walk.key, 16u + number);
     diffract_path(path, event, met, order, steps, geometric);
     leave_surface(path, hit, dot(path.direction, hit.normal_g) < 0.0);

@@ -82,14 +82,18 @@ void main() {
         if (HAS_GRATING) {
             if (kind == KIND_GRATING) {
                 // The strongest order that leaves.
-                GratingEvent met_grating = grating_event(path, event, hit, thing.weight_row);
+                GratingEvent met_grating = grating_event(path, event.frame.normal, hit, thing.weight_row);
                 Path sent = path;
                 float strongest = 0.0;
                 for (uint order_number = 0u; order_number < met_grating.grating.orders; ++order_number) {
                     GratingOrder order = order_at(thing.weight_row, order_number);
                     vec3 steps = order_steps(order, hit.object, met_grating.medium, path.band);
-                    if (!order_passes(path, event, met_grating, steps).y || order.efficiency <= strongest) continue;
-                    strongest = order.efficiency;
+                    float share = order.efficiency;
+                    if (has_profile(met_grating))
+                        share = order_share(
+                            met_grating, order, order_number, in_lines(met_grating, path.direction), path.band.y);
+                    if (!order_passes(path, event, met_grating, steps).y || share <= strongest) continue;
+                    strongest = share;
                     sent = path;
                     diffract_path(sent, event, met_grating, order, steps, geometric);
                 }

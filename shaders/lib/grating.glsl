@@ -12,8 +12,48 @@ Grating grating_at(uint row) {
 }
 
 GratingOrder order_at(uint row, uint number) {
-    uint at = uint(GRATINGS_AT) + row + 1u + number;
+    uint at = uint(GRATINGS_AT) + row + uint(Grating_TEXELS) + number;
     return GratingOrder_FROM(scene_texel, at);
+}
+
+bool is_reflective(Grating grating) { return grating.index == 0.0; }
+
+// How grooves share light out among orders, by scalar theory (app/model/optics/gratings.py).
+#define PROFILE_BLAZED 1u
+#define PROFILE_LAMELLAR 2u
+#define PROFILE_SINUSOIDAL 3u
+#define GROOVE_PI 3.14159265
+
+// What an order's share is a function of: the depth of the grooves in waves; of a sawtooth, the number of the order that
+// single facets would send light in. `light`: direction that light comes in, across the lines, along them and along the
+// outward normal, in a medium of index n; a wavelength in vacuum.
+float groove_waves(Grating grating, vec3 light, float n, float wavelength_um) {
+    vec3 k = n * light;
+    float inner2 = grating.index * grating.index, inside = sqrt(max(inner2 - dot(k.xy, k.xy), 0.0));
+    if (grating.profile != PROFILE_BLAZED)
+        return grating.relief * (is_reflective(grating) ? 2.0 * abs(k.z) : inside - abs(k.z)) / wavelength_um;
+    vec2 facet = vec2(sin(grating.relief), cos(grating.relief));
+    float change = -2.0 * dot(k.xz, facet) * facet.x;
+    if (!is_reflective(grating)) {
+        // The flat side is the outward one: from there light is in the sheet before it meets facets.
+        bool onward = k.z < 0.0;
+        float met = -dot(vec2(k.x, onward ? -inside : k.z), facet);
+        float turned2 = (onward ? n * n - inner2 : inner2 - n * n) + met * met;
+        change = -facet.x * ((onward ? 1.0 : -1.0) * sqrt(max(turned2, 0.0)) - met);
+    }
+    return change / (grating.lines_per_um * wavelength_um);
+}
+
+// An order's share of light whose `groove_waves` are these.
+float profile_share(Grating grating, GratingOrder order, uint number, float waves) {
+    if (grating.profile == PROFILE_SINUSOIDAL)
+        return spectral_row(uint(GRATING_ROW) + grating.row + number, waves / max(grating.most_waves, 1e-9));
+    bool blazed = grating.profile == PROFILE_BLAZED;
+    float m = order.number, phase = GROOVE_PI * (blazed ? m - waves : waves);
+    if (!blazed && m == 0.0) return cos(phase) * cos(phase);
+    float across = blazed ? phase : 0.5 * GROOVE_PI * m;
+    float share = abs(phase) < 1e-3 && blazed ? 1.0 : sin(phase) / across;
+    return blazed || fract(0.5 * m) != 0.0 ? share * share : 0.0;
 }
 
 // The steps m λ / (Λ n) of an order at three places of a band, in the medium that the ray is in.

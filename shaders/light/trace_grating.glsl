@@ -4,13 +4,53 @@
 // A grating of up to so many orders sends each on as a whole lattice where it is met first.
 #define MAX_WHOLE_ORDERS 3u
 
+// Shares of a path's light in an order, over x. `single`: of three wavelengths that are with the anchor.
+vec3 order_shares(GratingEvent met, GratingOrder order, uint number, Path path, vec3 x, bool single) {
+    if (!has_profile(met)) return vec3(order.efficiency);
+    vec3 light = in_lines(met, path.direction), low = light, high = light;
+    if (SPECTRAL_GROUPS > 0 && !single) {
+        low = in_lines(met, direction_at_end(path, 0));
+        high = in_lines(met, direction_at_end(path, 1));
+    }
+    return vec3(order_share(met, order, number, low, x.x), order_share(met, order, number, light, x.y),
+        order_share(met, order, number, high, x.z));
+}
+
+// What the orders before `number` leave of a path's light, over x.
+vec3 left_by_orders(GratingEvent met, uint number, Path path, vec3 x, bool single) {
+    if (!has_profile(met)) return vec3(order_at(met.row, number).left);
+    vec3 left = vec3(1.0);
+    for (uint k = 0u; k < number; ++k) left -= order_shares(met, order_at(met.row, k), k, path, x, single);
+    return max(left, 0.0);
+}
+
+// Shares of the light of a path that comes to the orders from `first` on: of order `number`, and what is left before it.
+struct OrderShares {
+    vec3 kept, own;
+};
+
+OrderShares shares_from(GratingEvent met, uint first, uint number, Path path, vec3 x, bool single) {
+    vec3 per_left = 1.0 / max(left_by_orders(met, first, path, x, single), 1e-9);
+    GratingOrder order = order_at(met.row, number);
+    return OrderShares(left_by_orders(met, number, path, x, single) * per_left,
+        order_shares(met, order, number, path, x, single) * per_left);
+}
+
+// Share of a path's power, by which roulette judges, where it keeps these shares of its band and of its companions.
+float share_of_power(Path path, vec3 share, vec3 companions) {
+    if (!GRATING_PROFILES) return share.y;
+    Path some = path;
+    weaken(some, share, companions);
+    return common_share(path, carried_w(some) / max(carried_w(path), 1e-30), companions);
+}
+
 // A grating's orders leave one after the other. The first one that carries light goes on as `child`; for the others the
 // path meets the surface again
 // (`rest`, the path before its flight). `rest` is also the other part of a band that is cut because this order becomes
 // evanescent inside it. Whether `child` lives.
 bool diffract(Path path, Hit hit, Event event, uint row, out Path child, inout Path rest, out bool rest_lives,
     inout Outcome outcome) {
-    GratingEvent met = grating_event(path, event, hit, row);
+    GratingEvent met = grating_event(path, event.frame.normal, hit, row);
     uint orders = met.grating.orders, first = min(path.order, orders - 1u), number = first;
     child = child_of(path, hit, dot(path.direction, hit.normal_g) >= 0.0);
     GratingOrder order;
@@ -29,21 +69,24 @@ bool diffract(Path path, Hit hit, Event event, uint row, out Path child, inout P
         }
         if (passes.y || at >= 0.0) break;
     }
-    // Of the light that is here, what the orders from `first` on have left when this one, and the next one, has its
-    // turn.
-    float per_left = 1.0 / max(order_at(row, first).left, 1e-9);
-    bool found = number < orders, more = found && number + 1u < orders;
-    float kept = found ? order.left * per_left : 0.0, share = found ? order.efficiency * per_left : 0.0;
-    float left = at >= 0.0 ? kept : (more ? kept - share : 0.0);
+    bool found = number < orders, more = found && number + 1u < orders, cut = at >= 0.0;
+    OrderShares shares = OrderShares(vec3(0.0), vec3(0.0)), companions = shares;
+    if (found) shares = companions = shares_from(met, first, number, path, path.band, false);
+    if (found && HERO && GRATING_PROFILES)
+        companions = shares_from(met, first, number, path, path.walk.companion_x.xyz, true);
+    vec3 left = cut ? shares.kept : more ? max(shares.kept - shares.own, 0.0) : vec3(0.0);
+    vec3 left_companions =
+        cut ? companions.kept : more ? max(companions.kept - companions.own, 0.0) : vec3(0.0);
+    float kept = share_of_power(path, left, left_companions), share = share_of_power(path, shares.own, companions.own);
     outcome.what |= ABSORBED;
-    outcome.flux_w = carried_w(path) * max(1.0 - left - (at >= 0.0 ? 0.0 : share), 0.0);
-    outcome.absorbed_w *= 1.0 - left;
-    weaken(rest, vec3(left), vec3(left));
-    rest.walk.survival *= left;
+    outcome.flux_w = carried_w(path) * max(1.0 - kept - (cut ? 0.0 : share), 0.0);
+    outcome.absorbed_w *= 1.0 - kept;
+    weaken(rest, left, left_companions);
+    rest.walk.survival *= kept;
     rest.recut = 0u;
-    rest.order = at >= 0.0 ? number : number + 1u;
-    rest_lives = left > 0.0;
-    if (BAND_CUTS && at >= 0.0) {
+    rest.order = cut ? number : number + 1u;
+    rest_lives = kept > 0.0;
+    if (BAND_CUTS && cut) {
         outcome.what |= FELL_BAND;
         float below = power_below(rest, at);
         child = part_of_band(rest, rest.band.x, at, below, 5u);
@@ -52,13 +95,13 @@ bool diffract(Path path, Hit hit, Event event, uint row, out Path child, inout P
     }
     if (share <= 0.0) return false;
     bool geometric;
-    if (order.reflects == 0u) child.origin.inside ^= 1u;
+    if (!is_reflective(met.grating)) child.origin.inside ^= 1u;
     diffract_path(child, event, met, order, steps, geometric);
     if (HERO && POLARISED) {
         keep_companions(
-            child, behind_grating(companions_of(path), path.direction, child.direction, order.reflects != 0u));
+            child, behind_grating(companions_of(path), path.direction, child.direction, is_reflective(met.grating)));
     }
-    weaken(child, vec3(share), vec3(share));
+    weaken(child, shares.own, companions.own);
     if (steps.y != 0.0) leave_companions(child);
     outcome.what |= geometric ? FELL_NORMAL : 0u;
     return survives(child, outcome.roulette_w, share, 16u + number, child.depth == 1u && orders <= MAX_WHOLE_ORDERS);

@@ -12,17 +12,33 @@ struct GratingEvent {
     uint medium;  // that the path is in
     float side;  // 1 where the frame's normal is the outward one, else -1
     vec3 across;  // unit, in the surface across the lines
+    vec3 normal;
 };
 
-GratingEvent grating_event(Path path, Event event, Hit hit, uint row) {
+GratingEvent grating_event(Path path, vec3 normal, Hit hit, uint row) {
     GratingEvent met;
     met.grating = grating_at(row);
     met.row = row;
     met.object = hit.object;
     met.medium = current_medium(path.medium);
     met.side = dot(path.direction, hit.normal_g) < 0.0 ? 1.0 : -1.0;
-    met.across = across_lines(event.frame.normal, met.grating.lines, met.side);
+    met.across = across_lines(normal, met.grating.lines, met.side);
+    met.normal = normal;
     return met;
+}
+
+// A direction across the lines, along them and along the outward normal.
+vec3 in_lines(GratingEvent met, vec3 direction) {
+    vec3 outward = met.side * met.normal;
+    return vec3(dot(direction, met.across), dot(direction, cross(outward, met.across)), dot(direction, outward));
+}
+
+bool has_profile(GratingEvent met) { return GRATING_PROFILES && met.grating.profile != 0u; }
+
+// Share of light that comes in the direction `light`, as of `in_lines`, in an order at x.
+float order_share(GratingEvent met, GratingOrder order, uint number, vec3 light, float x) {
+    float waves = groove_waves(met.grating, light, medium_index(met.medium, x), medium_index(met.object, x));
+    return order.efficiency * profile_share(met.grating, order, number, waves);
 }
 
 // Where over its band a path is not evanescent in an order of these steps.
@@ -54,7 +70,7 @@ float evanescence_in_band(Path path, Event event, GratingEvent met, GratingOrder
 
 // The path turned into an order. `geometric`: the facet's normal had to judge.
 void diffract_path(inout Path path, Event event, GratingEvent met, GratingOrder order, vec3 steps, out bool geometric) {
-    bool reflects = order.reflects != 0u;
+    bool reflects = is_reflective(met.grating);
     Deflection turned = diffract_at(event.frame, path.direction, met.grating.lines, met.side, steps.y, reflects);
     geometric = turned.geometric;
     if (SPECTRAL_SWEEP) {

@@ -81,6 +81,18 @@ OF_LIBRARY = {
         "return side * normalize(lines)",
         "gpu/test_grating_gpu.py::test_lines_of_mercury",
     ),
+    "facets that light meets before the sheet": Mutant(
+        "lib/grating.glsl",
+        "bool onward = k.z < 0.0;",
+        "bool onward = k.z > 0.0;",
+        "gpu/test_grating_profiles_gpu.py::test_each_order_carries_its_share[blazed-srd]",
+    ),
+    "a camera's own ray taken for the light at a grating": Mutant(
+        "camera/grating.glsl",
+        "return vec3(-sent.xy, is_reflective",
+        "return vec3(sent.xy, is_reflective",
+        "gpu/test_grating_profiles_gpu.py::test_the_camera_sees_the_shares_of_light_that_comes_back[blazed]",
+    ),
     "polarisation without its power": Mutant(
         "lib/band.glsl",
         "weight * state.q",

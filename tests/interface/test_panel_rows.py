@@ -54,6 +54,18 @@ def test_lines_are_typed_and_orders_thrown_back(gl: Context) -> None:
         assert material(rig).lines_per_mm >= 1.0
 
 
+def test_a_grating_is_given_a_profile(gl: Context) -> None:
+    with PanelRig(gl, draw_inspector, scene_state("spectrometer", Grating)) as rig:
+        assert "Blaze" not in rig.items.items
+        rig.click("Profile##combo" if "Profile##combo" in rig.items.items else "Profile")
+        rig.frame(2)
+        rig.click("Blazed")
+        rig.frame(2)
+        assert material(rig).profile == "blazed" and set(material(rig).efficiency) == {1.0}
+        rig.type_into("Blaze", "480")
+        assert material(rig).blaze_nm == pytest.approx(480.0)
+
+
 def test_a_screen_can_be_made_a_grating(gl: Context) -> None:
     with PanelRig(gl, draw_inspector, scene_state("spectrometer", Diffuse)) as rig:
         rig.click("Kind##combo" if "Kind##combo" in rig.items.items else "Kind")

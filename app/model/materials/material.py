@@ -49,6 +49,8 @@ class Material:
     """Linear Rec.709."""
     reflectance = cast(Any, None)
     """Spectral reflectance, (401,) on the visible grid (380 to 780 nm), which replaces `reflectance_rgb`; or None."""
+    profile_code = 0
+    """How a grating's grooves share out light (`Grating.profile_code`)."""
     film = cast(Any, None)
     """The thin film on it, `optics.thin_films.Film`."""
     coating = cast(Any, None)

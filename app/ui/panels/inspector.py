@@ -15,6 +15,7 @@ from ...edit.state import Selection, State
 from ...model.materials import MATERIAL_KINDS
 from ...model.materials.coating import TITLES, preset
 from ...model.materials.diffuse import USUAL_COAT_INDEX, USUAL_ROUGHNESS
+from ...model.materials.grating import PROFILES
 from ...model.optics.metals import metals
 from ...model.scene import (
     Diffuse,
@@ -35,6 +36,8 @@ from .glass_values import abbe_text, own_numbers
 
 _KINDS = {cls.title: cls for cls in MATERIAL_KINDS.values()}
 _UNITS = "units"
+_SHOWN_NM = 550.0
+"""Wavelength for which the shares of a grating's orders are shown."""
 _MOST_HAZE = 1.0
 """On the slider: thicker haze is not thin."""
 _OWN_LAYERS = "own"
@@ -151,7 +154,7 @@ def _material(state: State, view_model: ViewModel, index: int) -> State:
         state = _films(state, index)
         material = state.scene.objects[index].material
     if isinstance(material, Grating):
-        _orders(material)
+        state = _profile(state, index, material)
     if material.is_polariser:
         return draw_axis(state, index, "Axis", "Light polarised along it passes, in the object's own coordinates.")
     if material.receives:
@@ -213,9 +216,21 @@ def _films(state: State, index: int) -> State:
     return edits.attempt(state, f"Coating of {thing.name}", set_material, index, changed)
 
 
-def _orders(material: Grating) -> None:
-    orders = ", ".join(f"{m:+d}: {e:.0%}" for m, e in zip(material.orders, material.efficiency, strict=True))
-    widgets.read_out("Orders", orders, tip="Orders that light is sent on in, and the share of it that each gets.")
+def _profile(state: State, index: int, material: Grating) -> State:
+    """What shape its grooves have, and what that leaves to each order."""
+    tip = "Shape of the grooves, which shares out light among the orders by wavelength and angle."
+    titles = {"": "Given shares"} | {profile: profile.capitalize() for profile in PROFILES}
+    chosen = widgets.combo("Profile", titles, material.profile, tip=tip)
+    shares = material.shares(np.array(_SHOWN_NM), np.array([0.0, 0.0, -1.0]))
+    orders = ", ".join(f"{m:+d}: {share:.0%}" for m, share in zip(material.orders, shares, strict=True))
+    tip = f"Share of upright light of {_SHOWN_NM:g} nm that each order gets."
+    widgets.read_out("Orders", orders, tip=tip)
+    if chosen == material.profile:
+        return state
+    count = len(material.orders)
+    whole = 1.0 if chosen else min(Grating.efficiency[0], 1.0 / count)
+    changed = material.changed(profile=chosen, efficiency=(whole,) * count)
+    return edits.attempt(state, f"Profile of {state.scene.objects[index].name}", set_material, index, changed)
 
 
 def _texture(state: State, view_model: ViewModel, index: int, material: Material) -> State:
