@@ -18,12 +18,14 @@ vec3 light_along(GratingEvent met, vec3 direction, float step) {
 
 // Shares that light has left over the band of a path which goes on in an order, met the other way round.
 vec3 order_shares(GratingEvent met, GratingOrder order, uint number, Path path, vec3 steps) {
-    if (!has_profile(met)) return vec3(order.efficiency);
-    vec3 low = light_along(met, direction_at_end(path, 0), steps.x);
-    vec3 high = light_along(met, direction_at_end(path, 1), steps.z);
-    return vec3(order_share(met, order, number, low, path.band.x),
-        order_share(met, order, number, light_along(met, path.direction, steps.y), path.band.y),
-        order_share(met, order, number, high, path.band.z));
+    if (GRATING_PROFILES && met.grating.profile != 0u) {
+        vec3 low = light_along(met, direction_at_end(path, 0), steps.x);
+        vec3 high = light_along(met, direction_at_end(path, 1), steps.z);
+        return vec3(order_share(met, order, number, low, path.band.x),
+            order_share(met, order, number, light_along(met, path.direction, steps.y), path.band.y),
+            order_share(met, order, number, high, path.band.z));
+    }
+    return vec3(order.efficiency);
 }
 
 // The same of order `k` of a path that has not chosen one yet.
@@ -35,7 +37,8 @@ vec3 order_shares(GratingEvent met, uint k, Path path) {
 // How likely an order is chosen, in proportion: none that carries light at some wavelength is left out.
 float order_odds(GratingEvent met, uint k, Path path) {
     vec3 shares = order_shares(met, k, path);
-    return has_profile(met) ? dot(shares, vec3(0.25, 0.5, 0.25)) + 0.02 * order_at(met.row, k).efficiency : shares.y;
+    if (GRATING_PROFILES && met.grating.profile != 0u) return dot(shares, vec3(0.25, 0.5, 0.25)) + 0.02 * order_at(met.row, k).efficiency;
+    return shares.y;
 }
 
 // Samples one of the orders from `first` on in proportion to what they leave; its path then represents all of them.
@@ -123,10 +126,15 @@ void meet_grating(inout Path path, Path whole, Hit hit, Event event, uint pixel_
         if (!here) path.walk.inverse_pdf = 0.0;
         return;
     }
-    if (order.shift_per_um != 0.0 || has_profile(met)) path = banded;
     vec3 shares = order_shares(met, order, number, banded, steps);
+    float share = shares.y;
+    if (order.shift_per_um != 0.0) path = banded;
+    if (GRATING_PROFILES && met.grating.profile != 0u) {
+        path = banded;
+        share = dot(shares, vec3(0.25, 0.5, 0.25));
+    }
     path.throughput *= shares;
-    path.walk.branch_weight *= has_profile(met) ? dot(shares, vec3(0.25, 0.5, 0.25)) : shares.y;
+    path.walk.branch_weight *= share;
     path.walk.key = hash_combine(path.walk.key, 16u + number);
     diffract_path(path, event, met, order, steps, geometric);
     leave_surface(path, hit, dot(path.direction, hit.normal_g) < 0.0);

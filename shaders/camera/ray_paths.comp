@@ -89,7 +89,7 @@ void main() {
                     GratingOrder order = order_at(thing.weight_row, order_number);
                     vec3 steps = order_steps(order, hit.object, met_grating.medium, path.band);
                     float share = order.efficiency;
-                    if (has_profile(met_grating))
+                    if (GRATING_PROFILES && met_grating.grating.profile != 0u)
                         share = order_share(
                             met_grating, order, order_number, in_lines(met_grating, path.direction), path.band.y);
                     if (!order_passes(path, event, met_grating, steps).y || share <= strongest) continue;

@@ -6,21 +6,25 @@
 
 // Shares of a path's light in an order, over x. `single`: of three wavelengths that are with the anchor.
 vec3 order_shares(GratingEvent met, GratingOrder order, uint number, Path path, vec3 x, bool single) {
-    if (!has_profile(met)) return vec3(order.efficiency);
-    vec3 light = in_lines(met, path.direction), low = light, high = light;
-    if (SPECTRAL_GROUPS > 0 && !single) {
-        low = in_lines(met, direction_at_end(path, 0));
-        high = in_lines(met, direction_at_end(path, 1));
+    if (GRATING_PROFILES && met.grating.profile != 0u) {
+        vec3 light = in_lines(met, path.direction), low = light, high = light;
+        if (SPECTRAL_GROUPS > 0 && !single) {
+            low = in_lines(met, direction_at_end(path, 0));
+            high = in_lines(met, direction_at_end(path, 1));
+        }
+        return vec3(order_share(met, order, number, low, x.x), order_share(met, order, number, light, x.y),
+            order_share(met, order, number, high, x.z));
     }
-    return vec3(order_share(met, order, number, low, x.x), order_share(met, order, number, light, x.y),
-        order_share(met, order, number, high, x.z));
+    return vec3(order.efficiency);
 }
 
 // What the orders before `number` leave of a path's light, over x.
 vec3 left_by_orders(GratingEvent met, uint number, Path path, vec3 x, bool single) {
-    if (!has_profile(met)) return vec3(order_at(met.row, number).left);
-    vec3 left = vec3(1.0);
-    for (uint k = 0u; k < number; ++k) left -= order_shares(met, order_at(met.row, k), k, path, x, single);
+    vec3 left = vec3(order_at(met.row, number).left);
+    if (GRATING_PROFILES && met.grating.profile != 0u) {
+        left = vec3(1.0);
+        for (uint k = 0u; k < number; ++k) left -= order_shares(met, order_at(met.row, k), k, path, x, single);
+    }
     return max(left, 0.0);
 }
 

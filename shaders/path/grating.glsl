@@ -33,8 +33,6 @@ vec3 in_lines(GratingEvent met, vec3 direction) {
     return vec3(dot(direction, met.across), dot(direction, cross(outward, met.across)), dot(direction, outward));
 }
 
-bool has_profile(GratingEvent met) { return GRATING_PROFILES && met.grating.profile != 0u; }
-
 // Share of light that comes in the direction `light`, as of `in_lines`, in an order at x.
 float order_share(GratingEvent met, GratingOrder order, uint number, vec3 light, float x) {
     float waves = groove_waves(met.grating, light, medium_index(met.medium, x), medium_index(met.object, x));
