@@ -13,6 +13,7 @@ from functools import lru_cache
 import numpy as np
 
 from .film_stacks import film_curves
+from .materials import Grating
 from .optics.colorimetry import VISIBLE_NM, cmf_xyz, mirror_reflectance
 from .optics.spectral_tables import SpectralAxis
 from .optics.spectrum import Spectrum
@@ -59,7 +60,7 @@ def tint_curves(scene: Scene, but: np.ndarray | None = None) -> np.ndarray:
             paths = (*_PATHS, long / chord) if long > 4.0 * max(broad, chord) else _PATHS
             with np.errstate(under="ignore"):
                 found += [np.exp(-share * absorption.coefficient * chord) for share in paths]
-        if material.profile_code:
+        if isinstance(material, Grating) and material.profile_code:
             found += [share for light in _ONTO_GRATINGS for share in material.shares(VISIBLE_NM, np.array(light))]
         if material.is_mirror:
             found += [mirror_reflectance(material.reflectance_rgb, VISIBLE_NM) ** times for times in _MIRRORS]

@@ -203,7 +203,7 @@ class Grating(Material):
 
     @property
     def profile_code(self) -> int:
-        """PROFILE_… of shaders/lib/grating.glsl; 0 where shares do not depend on wavelength and angle."""
+        """0 where shares do not depend on wavelength and angle."""
         return 1 + list(gratings.SHARES).index(self.profile) if self.profile in gratings.SHARES else 0
 
     @property

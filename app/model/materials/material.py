@@ -49,8 +49,6 @@ class Material:
     """Linear Rec.709."""
     reflectance = cast(Any, None)
     """Spectral reflectance, (401,) on the visible grid (380 to 780 nm), which replaces `reflectance_rgb`; or None."""
-    profile_code = 0
-    """How a grating's grooves share out light (`Grating.profile_code`)."""
     film = cast(Any, None)
     """The thin film on it, `optics.thin_films.Film`."""
     coating = cast(Any, None)
@@ -77,6 +75,11 @@ class Material:
     def met_as(self) -> int:
         """KIND_… of shaders/lib/scene.glsl that its surface is treated as: `gpu_code`, but a thin sheet has its own."""
         return self.gpu_code
+
+    @property
+    def profile_code(self) -> int:
+        """How a grating's grooves share light out (PROFILE_… of shaders/lib/grating.glsl); 0: its shares are given."""
+        return 0
 
     @property
     def is_solid(self) -> bool:
