@@ -1,4 +1,4 @@
-"""Scenes for other renderers (integrations/peers): what is written is what SpectraSplat reads; it needs none of them."""
+"""Scenes for other renderers (integrations/peers): what is written is what SpectraSplat reads; none is needed here."""
 
 from __future__ import annotations
 
