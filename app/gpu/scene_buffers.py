@@ -14,7 +14,7 @@ import numpy as np
 from ..base.errors import UserError
 from ..features.features import Features
 from ..model.contacts import overlapping_solids
-from ..model.film_stacks import film_tables
+from ..model.film_stacks import film_tables, scene_media
 from ..model.materials.grating import WAVELENGTH
 from ..model.optics import rough_surfaces
 from ..model.optics.colorimetry import VISIBLE_NM, mirror_reflectance
@@ -265,7 +265,7 @@ class SceneBuffers:
         }
 
     def _pack_objects(self) -> None:
-        media: list[Dispersion] = []
+        self.media = media = scene_media(self.scene)
         weights: list[np.ndarray] = []
         gratings: list[np.ndarray] = []
         self._crystals = CRYSTAL.zeros(sum(item.material.polarises for item in self.scene.objects))
@@ -303,8 +303,6 @@ class SceneBuffers:
                 record["weight_row"] = sum(len(texels) for texels in gratings)
                 gratings.append(grating_texels(item, self.grating_rows.get(index)))
             if material.dispersion is not None:
-                if material.dispersion not in media:
-                    media.append(material.dispersion)
                 record["medium"] = media.index(material.dispersion)
                 record["colour"][1:] = films.number.get(index, 0.0), size, material.dispersion.n_d
                 if material.is_rough:
@@ -367,7 +365,6 @@ class SceneBuffers:
         self.variables = variables
         """Each spectral group's variable over x, float64 (groups, SAMPLES)."""
         self.variable_table = variables.astype("f4")
-        self.media = media
         self._spectra = spectra_texture(self.ctx, np.concatenate(rows) if counts[-1] else np.ones((1, SAMPLES)))
         self.defines |= {
             "INDEX_ROW": self.layout.index_row,

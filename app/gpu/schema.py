@@ -195,9 +195,11 @@ class Struct:
                 pack.append(f"    {texels[word]} = {code};")
                 unpack.append("    " + value.format(c=texels[word]))
                 continue
-            pack.append(f"    code = {code};")
-            pack.append(f"    {texels[word]} {'|=' if shift else '='} code << {shift}u;")
-            found = f"{texels[word]} >> {shift}u"
+            found = f"{texels[word]} >> {shift}u" if shift else texels[word]
+            if shift + bits > 32:
+                pack.append(f"    code = {code};")
+                code = "code"
+            pack.append(f"    {texels[word]} |= ({code}) << {shift}u;" if shift else f"    {texels[word]} = {code};")
             if shift + bits > 32:
                 pack.append(f"    {texels[word + 1]} = code >> {32 - shift}u;")
                 found = f"({found} | {texels[word + 1]} << {32 - shift}u)"

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.errors import UserError
+from .contacts import contacts, nested_pairs
 from .optics.colorimetry import VISIBLE_NM
+from .optics.glass import Dispersion
 from .optics.metals import find_metal
 from .optics.spectral_tables import SpectralAxis
 from .optics.thin_films import ABOVE, AIR, BELOW, Stack, power
 from .scene import Scene
-from .scene_checks import contains
 
 _COSINES = (1.0, 0.75, 0.5)
 _BLUR_NM = 12
@@ -21,22 +22,31 @@ _MOST_ROWS = 12_000
 """Textures have 16384, and other tables lie beside."""
 
 
-def film_stacks(scene: Scene) -> dict[int, Stack]:
-    """By object. Solids and mirrors stand in air; sheets in whatever solid holds their middle."""
-    found = {}
-    for index, item in enumerate(scene.objects):
-        film, material = item.material.film, item.material
-        if film is None:
-            continue
-        before = AIR
-        if material.thin:
-            corners = item.mesh.vertices[item.mesh.triangles[0]].mean(axis=0)
-            middle = item.object_to_world[:3, :3] @ corners + item.object_to_world[:3, 3]
-            for other in scene.objects:
-                if other.material.is_solid and contains(other, middle):
-                    before = other.material.dispersion
-        behind = before if film.alone else material.dispersion if material.transmits else find_metal(material.metal, "")
-        found[index] = Stack(before, film, behind)
+def scene_media(scene: Scene) -> list[Dispersion]:
+    """Each once, in the order of the objects that are of it."""
+    found = (item.material.dispersion for item in scene.objects)
+    return list(dict.fromkeys(medium for medium in found if medium is not None))
+
+
+def film_stacks(scene: Scene) -> dict[int, tuple[Stack | None, ...]]:
+    """Of each object that has a film: in air, and in each medium that some film touches or lies in, in the order of
+    `scene_media` (None: not this one)."""
+    films = {i: item.material for i, item in enumerate(scene.objects) if item.material.film is not None}
+    touched = {i: set[Dispersion]() for i in films}
+    for pair in nested_pairs(scene) + contacts(scene) if films else ():
+        for i, j in (pair, pair[::-1]):
+            if i in films and scene.objects[j].material.is_solid:
+                touched[i].add(scene.objects[j].material.dispersion)
+    media = [medium for medium in scene_media(scene) if any(medium in of for of in touched.values())]
+    found: dict[int, tuple[Stack | None, ...]] = {}
+    for index, material in films.items():
+        film, metal = material.film, find_metal(material.metal, "") if material.metal else None
+        found[index] = tuple(
+            Stack(outside, film, outside if film.alone else metal or material.dispersion)
+            if outside is AIR or outside in touched[index]
+            else None
+            for outside in (AIR, *media)
+        )
     return found
 
 
@@ -45,33 +55,43 @@ class FilmTables:
     """As shaders read them (`shaders/lib/film.glsl`)."""
 
     number: dict[int, int]
-    """1 + the first row of each object's film, those without left out."""
+    """1 + the first row of each object's film in air, those without left out. FILM_MEDIUM_ROWS times FILM_SLOTS[medium]
+    further on begin those in a medium of `scene_media`."""
     rows: np.ndarray
-    """`Stack.table` of each film, one after the other."""
-    defines: dict[str, int]
+    """`Stack.table` of each film in each medium, one after the other."""
+    defines: dict[str, int | str]
 
 
 def film_tables(scene: Scene, nm: np.ndarray, polarised: bool) -> FilmTables:
     """Of wavelengths at even steps of x. Raises UserError where there are too many."""
     stacks = film_stacks(scene)
-    absorbs = any(stack.film.absorbs for stack in stacks.values())
+    absorbs = any(stack.film.absorbs for of in stacks.values() for stack in of if stack)
     below, is_alone = absorbs or polarised, not (absorbs or polarised)
-    first: dict[Stack, int] = {}
+    first: dict[tuple[Stack | None, ...], int] = {}
     tables = [np.zeros((0, len(nm)), np.float32)]
     steps = ABOVE + 1 + BELOW * below
-    for stack in stacks.values():
-        if stack not in first:
-            first[stack] = 1 + sum(map(len, tables))
-            table = stack.table(nm, polarised, below)
-            tables.append(table[:steps] if is_alone else table)
+    for of in stacks.values():
+        if of not in first:
+            first[of] = 1 + sum(map(len, tables))
+            count = steps * (1 if is_alone else 12 if polarised else 3)
+            none = np.zeros((count, len(nm)), np.float32)
+            tables += [none if stack is None else stack.table(nm, polarised, below)[:count] for stack in of]
     rows = np.concatenate(tables)
     if len(rows) > _MOST_ROWS:
         raise UserError(
             f"scene '{scene.name}': its {len(first)} different films take {len(rows)} rows of tables and there is room "
             f"for {_MOST_ROWS}; give some objects the same film, or leave polarisation out"
         )
-    defines = {"FILM_STEPS": steps, "FILM_BELOW": BELOW * below, "FILM_TABLES": 1 if is_alone else 3}
-    return FilmTables({index: first[stack] for index, stack in stacks.items()}, rows, defines)
+    slots = list(dict.fromkeys(stack.before for of in zip(*stacks.values(), strict=True) for stack in of if stack))
+    known = [slots.index(medium) if medium in slots else 0 for medium in scene_media(scene)] if len(slots) > 1 else []
+    defines: dict[str, int | str] = {
+        "FILM_STEPS": steps,
+        "FILM_BELOW": BELOW * below,
+        "FILM_TABLES": 1 if is_alone else 3,
+        "FILM_MEDIUM_ROWS": len(tables[1]) if known else 0,
+        "FILM_SLOTS": f"uint[]({', '.join(f'{slot}u' for slot in known or [0])})",
+    }
+    return FilmTables({index: first[of] for index, of in stacks.items()}, rows, defines)
 
 
 def film_parts(axis: SpectralAxis, samples: int) -> np.ndarray:
@@ -86,7 +106,7 @@ def film_curves(scene: Scene) -> list[np.ndarray]:
     """(401,) each on `VISIBLE_NM`: what each film reflects and lets through, met at a few angles, as the eye tells its
     colours."""
     curves = []
-    for stack in film_stacks(scene).values():
+    for stack in dict.fromkeys(stack for of in film_stacks(scene).values() for stack in of if stack):
         for cosine in _COSINES:
             curves += [_blurred(curve) for curve in power(stack, cosine, VISIBLE_NM)]
     return curves

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..base.errors import UserError
-from .contacts import overlapping_solids
 from .geometry.mesh import Mesh
 from .geometry.mesh_health import forms_of
 from .naming import listed
@@ -61,7 +60,6 @@ def check_scene(scene: Scene, file_name: str) -> list[str]:
     return (
         _glass_notes(glasses)
         + _sheet_notes(glasses)
-        + _film_notes(scene)
         + [
             f"light '{light.name}' has no power: it gives no light"
             for light in scene.lights
@@ -250,14 +248,6 @@ def _sheet_notes(glasses: list[SceneObject]) -> list[str]:
         ],
     }
     return [f"{listed([o.name for o in of])}: {what}" for what, of in notes.items() if of]
-
-
-def _film_notes(scene: Scene) -> list[str]:
-    """Where a coated solid touches another, it has no coating."""
-    coated = [o.name for o in (scene.objects[i] for i in overlapping_solids(scene)) if o.material.film is not None]
-    return (
-        [f"{listed(coated)}: a coating is one in air; where it touches other glass, light meets none"] if coated else []
-    )
 
 
 def _glass_notes(glasses: list[SceneObject]) -> list[str]:

@@ -37,8 +37,6 @@ have nothing in common then take 40,000 of the driver's 65,535, and what is left
 ends of paths they hold."""
 TINT_STEPS = 48
 """Stretches that the whole spectrum is cut into behind coloured glass."""
-FILM_PARTS = 24
-"""Parts of the spectrum of which a path knows what thin films have left."""
 
 (
     BIND_LIGHTS,
@@ -117,7 +115,6 @@ def camera_defines(scene: SceneBuffers, channels: Channels, layer: str, maps: Ma
             "MAX_EVENTS": MAX_EVENTS if specular else 1,
             "STACK": STACK,
             "CUT_THRESHOLD": CUT_THRESHOLD,
-            "FILM_PARTS": FILM_PARTS,
             "ENDS_HELD": ENDS_HELD,
         }
         | switched(
@@ -165,7 +162,7 @@ def waiting_bytes(beyond: Defines) -> int:
     """Room that surely holds what a sample lets wait: its paths, their ends, and what it knows besides."""
     columns = int(beyond["SPECTRAL_GROUPS"]) + 2 * int("LENS" in beyond)
     path = 312 + 40 * columns + 4 * int(beyond.get("ABSORBERS", 0)) + 64 * int("POLARISED" in beyond)
-    path += 16 * int("COATS" in beyond) + 4 * FILM_PARTS * int("HAS_FILM" in beyond)
+    path += 16 * int("COATS" in beyond) + 48 * int("HAS_FILM" in beyond)
     ends = 0 if "HALTS" in beyond else ENDS_HELD * (path + 64)
     return (STACK + 1) * path + ends + 16 * int(beyond["TARGETS"]) + 64
 

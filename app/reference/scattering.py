@@ -289,13 +289,13 @@ def scatter(scene, triangle, place, u, v, d, mask, alone, nm, draw, noise, event
     s, a_s, a_p = (0.0, 0.0, 0.0), complex(-1.0), complex(1.0)
     if scene.polarised:
         s = senkrecht(d, n)
-    has_film = scene.films.has[thing] and (mirror or sheet or before == AIR or after == AIR)
+    has_film = scene.films.has[thing]
     if mirror:
         kept = table(scene.weights, scene.weight[thing], nm)
         if has_film:
             n_i = _refractive_index(scene, medium(scene, mask, alone), nm)
             sine = math.sqrt(max(1.0 - cosine * cosine, 0.0))
-            a_s, a_p, t_s, t_p = film_amplitudes(scene.films, thing, 1.0, 1.0, n_i * sine, False, nm)
+            a_s, a_p, t_s, t_p = film_amplitudes(scene.films, thing, n_i, 1.0, n_i * sine, False, nm)
             kept *= _film_share(scene, field, d, s, a_s, a_p)
     else:
         eta_it = _refractive_index(scene, before, nm) / _refractive_index(scene, after, nm)

@@ -21,11 +21,7 @@ vec4 emission_until(uint row, int target, int cell) {
 float transmitted(Path path, float x) {
     float kept = band_weight(path.band, path.throughput, x);
 #if HAS_FILM
-    // The mean over the part, as steep as from neighbour to neighbour.
-    float at = spectral_row(uint(PARTS_ROW + 1), x) * float(FILM_PARTS);
-    int part = min(int(at), FILM_PARTS - 1);
-    float slope = path.walk.films[min(part + 1, FILM_PARTS - 1)] - path.walk.films[max(part - 1, 0)];
-    kept *= max(path.walk.films[part] + 0.5 * slope * (at - float(part) - 0.5), 0.0);
+    kept *= left_by_films(path.walk, x);
 #endif
     if (ABSORPTION) {
         float depth = 0.0;

@@ -54,18 +54,22 @@ void send_on(inout Path path, Event event, vec3 share, vec3 unhidden) {
 // Leaves a path what a film reflects or lets through of each part of the spectrum.
 void leave_film_share(inout Path path, Event event, bool reflects) {
     float from = 0.0;
-    for (int k = 0; k < FILM_PARTS; ++k) {
-        float to = spectral_row(uint(PARTS_ROW), float(k + 1) / float(FILM_PARTS)), x = 0.5 * (from + to);
-        float cosine = band_weights(path.band, event.film.cosine, vec3(x)).x, q = 0.0;
-        if (POLARISED) q = band_weights(path.band, event.seen.q, vec3(x)).x;
-        path.walk.films[k] *= film_between(event.film, reflects, cosine, q, from, to);
-        from = to;
+    for (int k = 0; k < FILM_PARTS; k += 2) {
+        vec3 ends = vec3(from, spectral_row(uint(PARTS_ROW), float(k + 1) / float(FILM_PARTS)),
+            spectral_row(uint(PARTS_ROW), float(k + 2) / float(FILM_PARTS)));
+        vec3 middles = 0.5 * (ends + ends.yzz), cosine = band_weights(path.band, event.film.cosine, middles),
+             q = vec3(0.0);
+        if (POLARISED) q = band_weights(path.band, event.seen.q, middles);
+        weaken_films(path.walk,
+            vec2(film_between(event.film, reflects, cosine.x, q.x, ends.x, ends.y),
+                film_between(event.film, reflects, cosine.y, q.y, ends.y, ends.z)));
+        from = ends.z;
     }
 }
 #endif
 
 // One glass surface: `path` goes on, the other part is put on the stack or, if weak, one of them is chosen.
-void cross_glass(inout Path path, Path whole, Hit hit, Event event, uint pixel_key) {
+void cross_glass(inout Path path, Path whole, Hit hit, uint kind, Event event, uint pixel_key) {
     bool entering = dot(whole.direction, hit.normal_g) < 0.0, geometric;
     if (!event.boundary.changes) {
         path.medium = event.boundary.behind;
@@ -81,7 +85,7 @@ void cross_glass(inout Path path, Path whole, Hit hit, Event event, uint pixel_k
     bool begins = disperses && all(greaterThan(event.cosine2, vec3(0.0)));
     if (HAS_DISPERSION && disperses) {
         restrict_to_band(path, pixel_key);
-        share_out(path, event);
+        share_out(path, kind, event);
     }
     if (SPECTRAL_SWEEP && !begins) {
         float onset = path.restricted != 0u && path.recut == 0u ? total_reflection_in_band(path, event) : -1.0;
@@ -98,9 +102,9 @@ void cross_glass(inout Path path, Path whole, Hit hit, Event event, uint pixel_k
         }
     }
     // Only now: while a cut is sought little is held.
-    share_out(path, event);
+    share_out(path, kind, event);
     if (begins) {
-        share_out(mirrored, mirror);
+        share_out(mirrored, kind, mirror);
     } else {
         mirrored = path;
         mirror = event;
@@ -214,9 +218,8 @@ void meet_surface(inout Path path, Hit hit, uint kind, uint pixel_key) {
         path.walk.branch_weight *= max(colour.r, max(colour.g, colour.b));
     }
     bool parts_waves = HAS_CRYSTAL && IS_GLASS(kind) && meets_crystal(event.boundary);
-    if (HAS_DIELECTRIC && IS_GLASS(kind) && !parts_waves) cross_glass(path, whole, hit, event, pixel_key);
+    if (HAS_DIELECTRIC && IS_GLASS(kind) && !parts_waves) cross_glass(path, whole, hit, kind, event, pixel_key);
     if (HAS_CRYSTAL && parts_waves) cross_crystal(path, hit, event, pixel_key);
-    if (HAS_POLARISER && kind == KIND_POLARISER)
-        cross_polariser(path, hit, object_at(hit.object).receiver, pixel_key);
+    if (HAS_POLARISER && kind == KIND_POLARISER) cross_polariser(path, hit, object_at(hit.object).receiver, pixel_key);
     if (HAS_GRATING && kind == KIND_GRATING) meet_grating(path, whole, hit, event, pixel_key);
 }

@@ -23,13 +23,43 @@ struct Walk {
                   // share out
     float coat_pdf;  // of its direction, where it comes from a coat: density by steradian; else 0
 #if HAS_FILM
-    // What thin films have left of as many parts of the spectrum.
-    float films[FILM_PARTS];
+    // What thin films have left of FILM_PARTS parts of the spectrum, two halves a word: an array would lie in memory.
+    uvec4 films_a, films_b, films_c;
 #endif
     float lengths[ABSORBERS];  // way through each absorbing glass, GPU units; reflections by each coloured mirror
 };
 
 #include "path/path.glsl"
+
+#if HAS_FILM
+#define FILM_PARTS 24
+
+void begin_films(inout Walk walk) { walk.films_a = walk.films_b = walk.films_c = uvec4(packHalf2x16(vec2(1.0))); }
+
+float film_part(Walk walk, int part) {
+    int word = part >> 1;
+    uvec4 words = word < 4 ? walk.films_a : word < 8 ? walk.films_b : walk.films_c;
+    uvec2 two = (word & 2) == 0 ? words.xy : words.zw;
+    vec2 pair = unpackHalf2x16((word & 1) == 0 ? two.x : two.y);
+    return (part & 1) == 0 ? pair.x : pair.y;
+}
+
+// Multiplies the next two parts; after twelve times all are in their places again.
+void weaken_films(inout Walk walk, vec2 shares) {
+    uint word = packHalf2x16(unpackHalf2x16(walk.films_a.x) * shares);
+    walk.films_a = uvec4(walk.films_a.yzw, walk.films_b.x);
+    walk.films_b = uvec4(walk.films_b.yzw, walk.films_c.x);
+    walk.films_c = uvec4(walk.films_c.yzw, word);
+}
+
+// What films have left at the wavelength x: the mean over its part, as steep as from neighbour to neighbour.
+float left_by_films(Walk walk, float x) {
+    float at = spectral_row(uint(PARTS_ROW + 1), x) * float(FILM_PARTS);
+    int part = min(int(at), FILM_PARTS - 1);
+    float slope = film_part(walk, min(part + 1, FILM_PARTS - 1)) - film_part(walk, max(part - 1, 0));
+    return max(film_part(walk, part) + 0.5 * slope * (at - float(part) - 0.5), 0.0);
+}
+#endif
 
 // Counts the looks of a pixel: each sees another point of a light.
 uint look_index;

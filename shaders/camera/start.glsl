@@ -58,7 +58,7 @@ Path path_from(uvec2 pixel, vec2 within_pixel, float gain) {
     if (ROUGH_SURFACES) path.walk.ground = 0u;
     if (COATS) path.walk.coat_pdf = 0.0;
 #if HAS_FILM
-    for (int k = 0; k < FILM_PARTS; ++k) path.walk.films[k] = 1.0;
+    begin_films(path.walk);
 #endif
     if (ABSORPTION) {
         for (int i = 0; i < ABSORBERS; ++i) path.walk.lengths[i] = 0.0;

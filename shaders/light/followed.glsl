@@ -58,14 +58,9 @@ void keep_anchor(inout Path path) {
 }
 
 #if HAS_FILM
-// What a film reflects or lets through at three wavelengths of a path; where they stand for red, green and blue, about
-// these.
-vec3 film_lobe(Path path, Event event, bool reflects, int t) {
-    vec3 x = path.walk.x[t], low = x, high = x, found;
-    if (!GATHERED_SPECTRUM) {
-        high = vec3(1.0, 0.5 * (x.xy + x.yz));
-        low = vec3(high.yz, 0.0);
-    }
+// What a film reflects or lets through about red, green and blue.
+vec3 film_lobe(Path path, Event event, bool reflects) {
+    vec3 x = path.walk.x[0], high = vec3(1.0, 0.5 * (x.xy + x.yz)), low = vec3(high.yz, 0.0), found;
     float q = 0.0;
     if (POLARISED) q = event.seen.q.y;
     for (int c = 0; c < 3; ++c) found[c] = film_between(event.film, reflects, event.film.cosine.y, q, low[c], high[c]);
@@ -73,38 +68,37 @@ vec3 film_lobe(Path path, Event event, bool reflects, int t) {
 }
 #endif
 
-// What glass reflects at all wavelengths that a path represents. Returns the probability of following the reflection:
-// the mean over those that are refracted with the anchor, `passing`.
-float reflect_spectrum(Path path, Event event, out vec3 reflected[TINTS], out uint passing) {
+// What glass reflects and lets through at all wavelengths that a path represents.
+struct Spectrum {
+    vec3 reflected[TINTS], let_through[TINTS];
+    uint passing;  // those that are refracted with the anchor
+};
+
+// Returns the probability of following the reflection: the mean over those that are refracted with the anchor.
+float reflect_spectrum(Path path, Event event, uint kind, out Spectrum spectrum) {
     float sum = 0.0;
-    passing = 0u;
-    bool allowed = event.cosine2.y > 0.0 && (FILM_MET(event) || event.reflectance.y < 1.0);
+    spectrum.passing = 0u;
+    bool refused = event.cosine2.y > 0.0 && event.reflectance.y >= 1.0;  // by the facet's normal, for all
     for (int t = 0; t < TINTS; ++t) {
-        vec3 reflectance = allowed || event.cosine2.y <= 0.0 ? reflectance_at(path, event, path.walk.x[t]) : vec3(1.0);
-#if HAS_FILM
-        if (FILM_MET(event) && allowed) reflectance = min(film_lobe(path, event, true, t), 0.9999);
-#endif
-        vec3 passes = represented(path.walk.taps, t) * vec3(lessThan(reflectance, vec3(1.0)));
-        passing |= (uint(passes.x) | uint(passes.y) << 1u | uint(passes.z) << 2u) << uint(3 * t);
-        sum += dot(passes, reflectance);
-        reflected[t] = reflectance;
+        Event of_three = event_for(path, event, kind, path.walk.x[t]);
+        spectrum.reflected[t] = refused ? vec3(1.0) : of_three.reflectance;
+        spectrum.let_through[t] = refused ? vec3(0.0) : transmittance_of(of_three);
+        vec3 passes = represented(path.walk.taps, t) * vec3(greaterThan(of_three.cosine2, vec3(0.0)));
+        spectrum.passing |= (uint(passes.x) | uint(passes.y) << 1u | uint(passes.z) << 2u) << uint(3 * t);
+        sum += dot(passes, spectrum.reflected[t]);
     }
-    return allowed ? sum / max(float(bitCount(passing)), 1.0) : 1.0;
+    return event.cosine2.y <= 0.0 || refused ? 1.0 : sum / max(float(bitCount(spectrum.passing)), 1.0);
 }
 
 // Weighs what a path represents by its shares in the lobe that is followed with probability `chance`. Each of n
 // wavelengths may have been the anchor: refracted ones are represented by those that are refracted.
-void weigh_spectrum(inout Path path, Event event, vec3 reflected[TINTS], uint passing, bool passes, float chance) {
-    float per_passing = float(bitCount(path.walk.taps)) / max(float(bitCount(passing)), 1.0);
-    for (int t = 0; t < TINTS; ++t) {
-        vec3 let_through = 1.0 - reflected[t];
-#if HAS_FILM
-        if (FILM_MET(event)) let_through = film_lobe(path, event, false, t);
-#endif
-        path.walk.tint[t] *=
-            passes ? represented(passing, t) * let_through * (per_passing / (1.0 - chance)) : reflected[t] / chance;
-    }
-    if (passes) path.walk.taps = passing;
+void weigh_spectrum(inout Path path, Spectrum spectrum, bool passes, float chance) {
+    float per_passing = float(bitCount(path.walk.taps)) / max(float(bitCount(spectrum.passing)), 1.0);
+    for (int t = 0; t < TINTS; ++t)
+        path.walk.tint[t] *= passes
+            ? represented(spectrum.passing, t) * spectrum.let_through[t] * (per_passing / (1.0 - chance))
+            : spectrum.reflected[t] / chance;
+    if (passes) path.walk.taps = spectrum.passing;
 }
 
 #if HAS_CRYSTAL
@@ -166,8 +160,11 @@ FollowedRay follow_specular(
             vec3 unhidden = vec3(1.0);
             if (HAS_MIRROR && kind == KIND_MIRROR) tint_by(path.walk, uint(WEIGHT_ROW) + thing.weight_row, -1.0);
 #if HAS_FILM
-            for (int t = 0; t < TINTS && kind == KIND_MIRROR && FILM_MET(event); ++t)
-                path.walk.tint[t] *= film_lobe(path, event, true, t);
+            if (HAS_MIRROR && kind == KIND_MIRROR && FILM_MET(event)) {
+                for (int t = 0; t < TINTS; ++t)
+                    path.walk.tint[t] *= GATHERED_SPECTRUM ? event_for(path, event, kind, path.walk.x[t]).reflectance
+                                                           : film_lobe(path, event, true);
+            }
 #endif
             bool parts_waves = HAS_CRYSTAL && IS_GLASS(kind) && meets_crystal(event.boundary);
 #if HAS_CRYSTAL
@@ -184,18 +181,17 @@ FollowedRay follow_specular(
             if (HAS_DIELECTRIC && IS_GLASS(kind) && !parts_waves) {
                 changes = event.boundary.changes;
                 float chance = event.reflectance.y;
-                vec3 reflected[TINTS];
-                uint passing;
+                Spectrum spectrum;
 #if HAS_FILM
-                bool by_film = FILM_MET(event) && !GATHERED_SPECTRUM && event.cosine2.y > 0.0;
-                if (by_film) chance = clamp(dot(film_lobe(path, event, true, 0), vec3(1.0 / 3.0)), 0.05, 0.95);
+                bool by_film = FILM_MET(event) && !GATHERED_SPECTRUM && event.refracted.exists;
+                if (by_film) chance = clamp(dot(film_lobe(path, event, true), vec3(1.0 / 3.0)), 0.05, 0.95);
 #endif
-                if (GATHERED_SPECTRUM && changes) chance = reflect_spectrum(path, event, reflected, passing);
+                if (GATHERED_SPECTRUM && changes) chance = reflect_spectrum(path, event, kind, spectrum);
                 passes = !changes || (event.cosine2.y > 0.0 && unit_float(hash_combine(key, number)) >= chance);
 #if HAS_FILM
-                if (by_film) path.walk.tint[0] *= film_lobe(path, event, !passes, 0) / (passes ? 1.0 - chance : chance);
+                if (by_film) path.walk.tint[0] *= film_lobe(path, event, !passes) / (passes ? 1.0 - chance : chance);
 #endif
-                if (GATHERED_SPECTRUM && changes) weigh_spectrum(path, event, reflected, passing, passes, chance);
+                if (GATHERED_SPECTRUM && changes) weigh_spectrum(path, spectrum, passes, chance);
                 if (!changes)
                     path.medium = event.boundary.behind;
                 else if (passes) {

@@ -72,12 +72,11 @@ struct PassingPart {
 // the path did.
 PassingPart passing_part(Path path, inout Event event, float onset) {
     bool low = event.cosine2.x > 0.0;
-    vec3 normal = event.frame.normal, reflected = event.reflectance;
+    vec3 normal = event.frame.normal;
     PassingPart part;
     part.band = low ? vec3(path.band.x, 0.5 * (path.band.x + onset), onset)
                     : vec3(onset, 0.5 * (onset + path.band.z), path.band.z);
     part.throughput = band_weights(path.band, path.throughput, part.band);
-    interface_indices(event.boundary, part.band, event.n_i, event.n_t);
     float theta = dot(path.direction, normal);
     vec3 moved = path.direction;
     for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
@@ -86,33 +85,21 @@ PassingPart passing_part(Path path, inout Event event, float onset) {
         moved += change * path.ddirection[SPATIAL + g];
     }
     theta = clamp(theta, -1.0, -1e-6);
-    vec3 tangential = moved - dot(moved, normal) * normal, eta = event.n_i / event.n_t;
+    vec3 tangential = moved - dot(moved, normal) * normal;
     float sine2 = (1.0 - theta) * (1.0 + theta);
     part.direction = theta * normal + sqrt(sine2 / max(dot(tangential, tangential), 1e-20)) * tangential;
-    event.refracted = refract_at(event.frame, part.direction, eta.y);
-#ifdef POLARISED
     // At the onset nothing passes, and its state does not matter.
-    vec3 cosines = low ? vec3(event.theta.x, theta, theta) : vec3(theta, theta, event.theta.z);
-    eta = low ? eta.xyy : eta.yyz;
-    event.seen = band_polarisation(event.seen, path.band, path.throughput, part.band);
-    event.transmission = fresnel_transmission(fresnel_reflection(cosines, eta, transmitted_cosine2(cosines, eta)));
-    float anchors = polarised_share(event.seen, event.transmission).y;
-#else
-    float anchors = 1.0 - fresnel_reflectance(theta, eta.y, transmitted_cosine2(theta, eta.y));
-#endif
-#if HAS_FILM
-    if (FILM_MET(event)) {
-        Event of_part = event;
-        of_part.film.cosine = vec3(sqrt(max(transmitted_cosine2(theta, eta.y), 0.0)));
-        share_by_film(part.band, false, of_part);
-        anchors = of_part.transmittance.y;
-#ifdef POLARISED
-        event.transmission = of_part.transmission;
-#endif
-    }
-#endif
+    Event passing = event;
+    passing.theta = low ? vec3(event.theta.x, theta, theta) : vec3(theta, theta, event.theta.z);
+    if (POLARISED) passing.seen = event.seen = band_polarisation(event.seen, path.band, path.throughput, part.band);
+    share_at(part.band, false, KIND_DIELECTRIC, passing);
+    event.n_i = passing.n_i;
+    event.n_t = passing.n_t;
+    event.refracted = refract_at(event.frame, part.direction, event.n_i.y / event.n_t.y);
+    if (POLARISED) event.transmission = passing.transmission;
+    vec3 whole = transmittance_of(event);
     part.let_through = event.refracted.exists
-        ? vec3(low ? 1.0 - reflected.x : 0.0, anchors, low ? 0.0 : 1.0 - reflected.z)
+        ? vec3(low ? whole.x : 0.0, transmittance_of(passing).y, low ? 0.0 : whole.z)
         : vec3(0.0);
     vec3 density_w = band_powers(power_row(path), part.band);
     part.power_w = dot(density_w, part.throughput * part.let_through);

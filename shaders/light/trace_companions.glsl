@@ -57,26 +57,8 @@ void keep_companions(inout Path path, Polarisation state) {
     path.walk.companion_v.xyz = state.v;
 }
 
-// A film's shares of theirs.
-void companions_by_film(Path path, Event event, inout Companions companions) {
-#if defined(HERO) && HAS_FILM
-    if (!FILM_MET(event)) return;
-#ifdef POLARISED
-    event.seen = companions.seen;
-#endif
-    event.film.cosine = event.film.cosine.yyy;
-    share_by_film(path.walk.companion_x.xyz, true, event);
-    companions.reflectance = event.reflectance;
-    companions.transmittance = event.transmittance;
-#ifdef POLARISED
-    companions.reflection = event.reflection;
-    companions.transmission = event.transmission;
-#endif
-#endif
-}
-
-// `is_glass`: it has met glass; else what turns the hero turns them.
-Companions companions_at(Path path, Event event, bool is_glass) {
+// `kind`: of the surface that the hero's path has met.
+Companions companions_at(Path path, Event event, uint kind) {
     Companions companions;
     companions.reflectance = vec3(event.reflectance.y);
     companions.transmittance = transmittance_of(event).yyy;
@@ -84,34 +66,28 @@ Companions companions_at(Path path, Event event, bool is_glass) {
 #ifdef HERO
     if (POLARISED) {
         companions.s = event.s;
-        companions.seen = in_plane(companions_of(path), path.direction, event.s);
-        companions.reflection = companions.transmission = event.reflection;
+        companions.seen = event.seen = in_plane(companions_of(path), path.direction, event.s);
     }
-#ifdef HAS_DIELECTRIC
-    if (!is_glass) {
-        companions_by_film(path, event, companions);
-        return companions;
+    Event of = event;
+    of.theta = event.theta.yyy;
+    share_at(path.walk.companion_x.xyz, true, kind, of);
+    if (IS_GLASS(kind) || FILM_MET(event)) {
+        companions.reflectance = of.reflectance;
+        companions.transmittance = transmittance_of(of);
     }
-    vec3 n_i, n_t;
-    interface_indices(event.boundary, path.walk.companion_x.xyz, n_i, n_t);
-    vec3 eta_it = n_i / n_t, theta = vec3(event.theta.y), cosine2 = transmitted_cosine2(theta, eta_it);
+    if (HAS_DIELECTRIC && IS_GLASS(kind)) {
+        bool polished = true;
+        if (ROUGH_SURFACES) polished = event.ground.width <= 0.0;
+        if (polished && !event.refracted.exists && event.cosine2.y > 0.0) {
+            companions.reflectance = vec3(1.0);
+            companions.transmittance = vec3(0.0);
+        }
+        companions.stay = all(lessThan(abs(of.n_i / of.n_t - event.n_i.y / event.n_t.y), vec3(1e-7)));
+    }
     if (POLARISED) {
-        companions.reflection = fresnel_reflection(theta, eta_it, cosine2);
-        companions.reflection = OF_SHEET(event.boundary, companions.reflection);
-        companions.transmission = fresnel_transmission(companions.reflection);
-        companions.reflectance = polarised_share(companions.seen, companions.reflection);
-    } else {
-        companions.reflectance = fresnel_reflectance(theta, eta_it, cosine2);
-        companions.reflectance = OF_SHEET(event.boundary, companions.reflectance);
+        companions.reflection = of.reflection;
+        companions.transmission = of.transmission;
     }
-    bool polished = true;
-    if (ROUGH_SURFACES) polished = event.ground.width <= 0.0;
-    if (polished && !event.refracted.exists && event.cosine2.y > 0.0) companions.reflectance = vec3(1.0);
-    companions.transmittance = 1.0 - companions.reflectance;
-    companions.stay = IS_THIN(event.boundary) || all(lessThan(abs(eta_it - event.n_i.y / event.n_t.y), vec3(1e-7)));
-    if (!event.refracted.exists && event.cosine2.y > 0.0) return companions;
-#endif
-    companions_by_film(path, event, companions);
 #endif
     return companions;
 }

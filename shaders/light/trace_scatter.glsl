@@ -73,14 +73,12 @@ void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object t
     Path child = child_of(path, hit, !entering);
     vec3 unhidden = reflect_path(child, event, geometric);
     bool parts_waves = HAS_CRYSTAL && IS_GLASS(kind) && meets_crystal(event.boundary);
-    Companions companions = companions_at(path, event, IS_GLASS(kind) && !parts_waves);
+    Companions companions = companions_at(path, event, parts_waves ? NONE : kind);
     if (HAS_MIRROR && kind == KIND_MIRROR) {
         vec3 kept = spectral_row(uint(WEIGHT_ROW) + thing.weight_row, path.band),
              of_companions = companion_row(path, uint(WEIGHT_ROW) + thing.weight_row);
-        if (HAS_FILM) {
-            kept *= FILM_MET(event) ? event.reflectance : vec3(1.0);
-            of_companions *= FILM_MET(event) ? companions.reflectance : vec3(1.0);
-        }
+        kept *= event.reflectance;
+        of_companions *= companions.reflectance;
         float share = common_share(path, share_of_lobe(event, kept), of_companions);
         outcome.what |= ABSORBED;
         send_on(child, event, kept, of_companions, unhidden, geometric, share, outcome);

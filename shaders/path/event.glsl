@@ -141,78 +141,91 @@ void see_polarised(Path path, inout Event event) {
 #if HAS_FILM
 #define FILM_MET(event) (event.film.row != 0u)
 
-// The film that light meets, if any: between other media than it was made for, there is none.
-Film film_met(Path path, Hit hit, Object thing) {
+const uint film_slots[] = FILM_SLOTS;
+
+// The film that light meets, if any, as it is in the medium outside of it. `boundary`: of glass.
+Film film_met(Path path, Hit hit, Object thing, MediumInterface boundary) {
+    bool glass = HAS_DIELECTRIC && IS_GLASS(thing.kind), back = glass && dot(path.direction, hit.normal_g) > 0.0;
     bool ground = ROUGH_SURFACES && thing.kind == KIND_DIELECTRIC && thing.colour.x > 0.0;
-    return Film(ground ? 0u : uint(thing.colour.y), uint(dot(path.direction, hit.normal_g) > 0.0), vec3(1.0));
-}
-
-// What a film makes of light over a band, or `single`, of three wavelengths.
-void share_by_film(vec3 x, bool single, inout Event event) {
-    if (POLARISED) {
-        event.reflection = film_pair(event.film, event.film.back, x, single);
-        event.transmission = film_pair(event.film, FILM_PASSED, x, single);
-        event.reflectance = polarised_share(event.seen, event.reflection);
-        event.transmittance = polarised_share(event.seen, event.transmission);
-    } else {
-        event.reflectance = film_share(event.film, event.film.back, x, single);
-        event.transmittance = film_share(event.film, FILM_PASSED, x, single);
-        if (uint(FILM_TABLES) == 1u) {
-            event.reflectance = mix(event.reflectance, vec3(1.0), lessThan(event.film.cosine, vec3(0.0)));
-            event.transmittance = 1.0 - event.reflectance;
-        }
+    uint row = ground ? 0u : uint(thing.colour.y);
+    if (FILM_MEDIUM_ROWS > 0 && row != 0u) {
+        uint outside = back && !IS_THIN(boundary) ? boundary.after
+            : glass                               ? boundary.before
+                                                  : current_medium(path.medium);
+        if (outside != NONE) row += uint(FILM_MEDIUM_ROWS) * film_slots[object_at(outside).medium];
     }
-}
-
-// A film's shares take the place of Fresnel's.
-void meet_film(Path path, bool solid, inout Event event) {
-    if (solid && event.boundary.before != NONE && event.boundary.after != NONE) event.film.row = 0u;
-    if (!FILM_MET(event)) return;
-    event.film.cosine = -event.theta;
-    if (solid && event.film.back == FILM_BACK) {
-        vec3 beyond = sqrt(max(-event.cosine2, 0.0) / max(event.n_i * event.n_i - 1.0, 1e-6));
-        event.film.cosine = mix(sqrt(max(event.cosine2, 0.0)), -beyond, lessThan(event.cosine2, vec3(0.0)));
-    }
-    share_by_film(path.band, false, event);
+    return Film(row, back ? FILM_BACK : FILM_FRONT, vec3(1.0));
 }
 #else
 #define FILM_MET(event) false
 #endif
 
-// What a surface of glass lets through.
-vec3 transmittance_of(Event event) {
+// What a surface makes of light at three wavelengths `x` that meets it at the cosines event.theta, in the state
+// event.seen: over a band, or `single`, each by itself. `kind`: of the surface.
+void share_at(vec3 x, bool single, uint kind, inout Event event) {
+    bool glass = HAS_DIELECTRIC && IS_GLASS(kind), solid = glass && !IS_THIN(event.boundary);
+    if (glass) {
+        interface_indices(event.boundary, x, event.n_i, event.n_t);
+        vec3 eta_it = event.n_i / event.n_t;
+        event.cosine2 = transmitted_cosine2(event.theta, eta_it);
+        if (POLARISED) {
+            event.reflection = fresnel_reflection(event.theta, eta_it, event.cosine2);
+            event.reflection = OF_SHEET(event.boundary, event.reflection);
+            event.transmission = fresnel_transmission(event.reflection);
+            event.reflectance = polarised_share(event.seen, event.reflection);
+        } else {
+            event.reflectance = fresnel_reflectance(event.theta, eta_it, event.cosine2);
+            event.reflectance = OF_SHEET(event.boundary, event.reflectance);
+        }
+    }
 #if HAS_FILM
-    if (FILM_MET(event)) return event.transmittance;
+    // A film's shares take the place of Fresnel's.
+    event.transmittance = 1.0 - event.reflectance;
+    if (FILM_MET(event)) {
+        event.film.cosine = -event.theta;
+        if (solid && event.film.back == FILM_BACK) {
+            event.film.cosine = sqrt(max(event.cosine2, 0.0));
+            if (FILM_BELOW > 0)
+                event.film.cosine -= event.n_t
+                    * sqrt(max(-event.cosine2, 0.0) / max(event.n_i * event.n_i - event.n_t * event.n_t, 1e-6));
+        }
+        if (POLARISED) {
+            event.reflection = film_pair(event.film, event.film.back, x, single);
+            event.transmission = film_pair(event.film, FILM_PASSED, x, single);
+            event.reflectance = polarised_share(event.seen, event.reflection);
+            event.transmittance = polarised_share(event.seen, event.transmission);
+        } else {
+            event.reflectance = film_share(event.film, event.film.back, x, single);
+            if (FILM_TABLES == 1 && solid) event.reflectance = max(event.reflectance, step(event.cosine2, vec3(0.0)));
+            event.transmittance =
+                FILM_TABLES == 1 ? 1.0 - event.reflectance : film_share(event.film, FILM_PASSED, x, single);
+        }
+    }
 #endif
-    return 1.0 - event.reflectance;
+    if (glass) {
+        GO_STRAIGHT(event.boundary, event.theta, event.n_i, event.n_t, event.cosine2)
+    }
 }
+
+// What a surface of glass lets through.
+#if HAS_FILM
+#define transmittance_of(event) (event.transmittance)
+#else
+#define transmittance_of(event) (1.0 - event.reflectance)
+#endif
 
 // The share of a lobe by which it is followed or not: its anchor's; in a film's ripples, of all the band.
 float share_of_lobe(Event event, vec3 share) { return FILM_MET(event) ? dot(share, vec3(0.25, 0.5, 0.25)) : share.y; }
 
-// What glass reflects of a path over its band, by Fresnel's equations, and where the rest goes.
-void share_out(Path path, inout Event event) {
-    interface_indices(event.boundary, path.band, event.n_i, event.n_t);
+// What glass reflects of a path over its band, and where the rest goes.
+void share_out(Path path, uint kind, inout Event event) {
     event.theta = incidence_over_band(path, event);
-    vec3 eta_it = event.n_i / event.n_t;
-    event.cosine2 = transmitted_cosine2(event.theta, eta_it);
+    if (POLARISED) see_polarised(path, event);
+    share_at(path.band, false, kind, event);
     bool polished = !ROUGH_SURFACES || event.ground.width <= 0.0;
     if (ROUGH_SURFACES && !polished)
-        event.ground.regained = regained(event.ground.table, -dot(path.direction, event.ground.normal), eta_it);
-    if (POLARISED) {
-        see_polarised(path, event);
-        event.reflection = fresnel_reflection(event.theta, eta_it, event.cosine2);
-        event.reflection = OF_SHEET(event.boundary, event.reflection);
-        event.transmission = fresnel_transmission(event.reflection);
-        event.reflectance = polarised_share(event.seen, event.reflection);
-    } else {
-        event.reflectance = fresnel_reflectance(event.theta, eta_it, event.cosine2);
-        event.reflectance = OF_SHEET(event.boundary, event.reflectance);
-    }
-#if HAS_FILM
-    meet_film(path, !IS_THIN(event.boundary), event);
-#endif
-    GO_STRAIGHT(event.boundary, event.theta, event.n_i, event.n_t, event.cosine2)
+        event.ground.regained =
+            regained(event.ground.table, -dot(path.direction, event.ground.normal), event.n_i / event.n_t);
     event.refracted = refract_at(event.frame, path.direction, event.n_i.y / event.n_t.y);
     // Where only the facet's normal forbids it, nothing is transmitted at any wavelength; at total reflection each has
     // its own share. A microfacet's share is its own, also where the light that it lets through does not leave the
@@ -225,20 +238,19 @@ void share_out(Path path, inout Event event) {
     }
 }
 
-// What the glass of an event reflects at three other wavelengths of the path: unpolarised, by the columns.
-vec3 reflectance_at(Path path, Event event, vec3 x) {
-    vec3 n_i, n_t, theta = vec3(dot(path.direction, event.frame.normal));
-    interface_indices(event.boundary, x, n_i, n_t);
+// The event as three other wavelengths of the path see it, by the columns.
+Event event_for(Path path, Event event, uint kind, vec3 x) {
+    event.theta = vec3(dot(path.direction, event.frame.normal));
     if (SPECTRAL_GROUPS > 0 && path.restricted != 0u) {
         for (int g = 0; g < SPECTRAL_GROUPS; ++g)
-            theta += incidence_column(path, event, g)
+            event.theta += incidence_column(path, event, g)
                 * vec3(variable_step(uint(g), x.x, path.band.y), variable_step(uint(g), x.y, path.band.y),
                     variable_step(uint(g), x.z, path.band.y));
-        theta = clamp(theta, -1.0, -1e-6);
+        event.theta = clamp(event.theta, -1.0, -1e-6);
     }
-    vec3 eta_it = n_i / n_t, cosine2 = transmitted_cosine2(theta, eta_it);
-    vec3 reflectance = fresnel_reflectance(theta, eta_it, cosine2);
-    return OF_SHEET(event.boundary, reflectance);
+    if (POLARISED) event.seen = band_polarisation(event.seen, path.band, path.throughput, x);
+    share_at(x, true, kind, event);
+    return event;
 }
 
 // Whether an event's glass refracts the ends of the band differently.
@@ -249,22 +261,20 @@ bool parts_wavelengths(Event event) { return event.n_i.x * event.n_t.z != event.
 Event interact(Path path, Hit hit, Triangle facet, Object thing, MicrofacetDraw draw) {
     Event event = event_at(path, hit, facet);
     if (ROUGH_SURFACES && thing.kind == KIND_DIELECTRIC) meet_microfacet(path, thing, draw, event);
+    bool glass = HAS_DIELECTRIC && IS_GLASS(thing.kind);
+    if (glass) event.boundary = cross_boundary(path.medium, hit.object, dot(path.direction, hit.normal_g) < 0.0);
 #if HAS_FILM
-    event.film = film_met(path, hit, thing);
+    event.film = film_met(path, hit, thing, event.boundary);
 #endif
-    if (HAS_DIELECTRIC && IS_GLASS(thing.kind)) {
-        event.boundary = cross_boundary(path.medium, hit.object, dot(path.direction, hit.normal_g) < 0.0);
-        if (!(HAS_CRYSTAL && meets_crystal(event.boundary))) share_out(path, event);
-        return event;
+    if (glass) {
+        if (!(HAS_CRYSTAL && meets_crystal(event.boundary))) share_out(path, thing.kind, event);
+    } else {
+        if (POLARISED) see_polarised(path, event);
+        if (FILM_MET(event)) {
+            event.theta = incidence_over_band(path, event);
+            share_at(path.band, false, thing.kind, event);
+        }
     }
-    if (POLARISED) see_polarised(path, event);
-#if HAS_FILM
-    if (FILM_MET(event)) {
-        event.theta = incidence_over_band(path, event);
-        event.film.back = FILM_FRONT;
-        meet_film(path, false, event);
-    }
-#endif
     return event;
 }
 

@@ -161,8 +161,8 @@ MUTANTS = {
     ),
     "camera band ends with the anchor's index": Mutant(
         "path/event.glsl",
-        "interface_indices(event.boundary, path.band, event.n_i, event.n_t);",
-        "interface_indices(event.boundary, path.band.yyy, event.n_i, event.n_t);",
+        "interface_indices(event.boundary, x, event.n_i, event.n_t);",
+        "interface_indices(event.boundary, x.yyy, event.n_i, event.n_t);",
         "gpu/test_camera_cuts.py::test_parted_colours_go_their_own_ways",
     ),
     "one polarisation": Mutant("lib/optics.glsl", "0.5 * (rs * rs + rp * rp)", "rs * rs", f"{_PATHS}[steep Fresnel]"),
@@ -213,15 +213,21 @@ MUTANTS = {
     ),
     "a film's shares at a band's ends and anchor alone": Mutant(
         "lib/film.glsl",
-        "if (!single) {",
-        "if (false) {",
+        "from = to = x.xyzz;",
+        "from = to = x.xyzz;\n    } else {\n        from = to = x.xyzz;",
         "gpu/test_thin_films.py::test_a_patch_of_sun_behind_a_film[etalon-srd]",
     ),
     "a camera's films not left out of what they pass": Mutant(
-        "camera/meet.glsl",
-        "path.walk.films[k] *= film_between",
-        "path.walk.films[k] = film_between",
+        "camera/path.glsl",
+        "unpackHalf2x16(walk.films_a.x) * shares",
+        "shares",
         "gpu/test_thin_films.py::test_films_as_the_reference_sees_them[False]",
+    ),
+    "films in air, whatever they touch": Mutant(
+        "path/event.glsl",
+        "row += uint(FILM_MEDIUM_ROWS)",
+        "row += 0u * uint(FILM_MEDIUM_ROWS)",
+        "gpu/test_thin_films.py::test_gold_behind_glass_is_paler_than_in_air[False]",
     ),
     "orders of a grating to the other side": Mutant(
         "lib/grating.glsl",

@@ -15,7 +15,7 @@ from spectrasplat.model.optics.colorimetry import VISIBLE_NM
 from spectrasplat.model.optics.glass import constant
 from spectrasplat.model.optics.metals import metals
 from spectrasplat.model.optics.spectrum import illuminant
-from spectrasplat.model.optics.thin_films import Film, Layer, power
+from spectrasplat.model.optics.thin_films import AIR, Film, Layer, Stack, power
 from spectrasplat.model.scene import Camera, Dielectric, Diffuse, Material, Mirror, Scene, SceneObject
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.reference.camera_reference import cached_camera_reference
@@ -54,7 +54,7 @@ def shares(material: Material, cosine: float) -> tuple[np.ndarray, np.ndarray]:
     """(401,) each: means over every nanometre of what it reflects and lets through."""
     scene = Scene("one", Camera((0, 0, 1), (0, 0, 0)), (), (SceneObject("one", plane(1.0, 1.0), material),))
     nm = VISIBLE_NM[:, None] + (np.arange(64) + 0.5) / 64.0 - 0.5
-    reflected, passed = power(film_stacks(scene)[0], cosine, nm.ravel())
+    reflected, passed = power(film_stacks(scene)[0][0], cosine, nm.ravel())
     return reflected.reshape(nm.shape).mean(axis=1), passed.reshape(nm.shape).mean(axis=1)
 
 
@@ -83,6 +83,40 @@ def test_a_coated_block_lets_more_through(gl: Context) -> None:
     reflected, passed = shares(COATED, 1.0)
     expected = daylight_mean(passed**2 / (1.0 - reflected**2))
     assert seen == pytest.approx(LUX * 0.5 / np.pi * expected, rel=3e-3)
+
+
+def _faces(*reflected: np.ndarray) -> np.ndarray:
+    """What faces one behind the other let through together, with all that goes to and fro between them."""
+    return np.asarray(1.0 / (1.0 + sum(r / (1.0 - r) for r in reflected)))
+
+
+def test_a_coating_in_water_is_one_in_water(gl: Context) -> None:
+    """A coated block within another of lower rank."""
+    film, water = Film((Layer(constant(2.3), 60.0),)), constant(1.33)
+    scene = patch(SceneObject("water", box((1.2, 1.2, 0.4)), Dielectric(water), at(0.0, 0.0, 1.5)))
+    coated = Dielectric(GLASS, priority=1, coating=Coating(film))
+    block = SceneObject("block", box((1.0, 1.0, 0.2)), coated, at(0.0, 0.0, 1.5))
+    scene = replace(scene, objects=(*scene.objects, block))
+    seen = render(scene, RenderSettings(8, 8, photons=40_000, spp=16), context=gl).rgb.mean(axis=(0, 1))
+    inner, _ = power(Stack(water, film, GLASS), 1.0, VISIBLE_NM)
+    outer = np.full(401, (0.33 / 2.33) ** 2)
+    expected, in_air = (
+        daylight_mean(_faces(outer, r, r, outer)) for r in (inner, power(Stack(AIR, film, GLASS), 1.0, VISIBLE_NM)[0])
+    )
+    assert seen == pytest.approx(LUX * 0.5 / np.pi * expected, rel=5e-3)
+    assert abs(in_air / expected - 1.0).min() > 0.03
+
+
+@pytest.mark.parametrize("polarised", [False, True])
+def test_gold_behind_glass_is_paler_than_in_air(gl: Context, polarised: bool) -> None:
+    camera = Camera((0.0, 0.0, 4.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), "orthographic", vertical_extent=0.05)
+    block = SceneObject("block", box((1.0, 1.0, 0.2)), Dielectric(GLASS))
+    gold = SceneObject("gold", plane(0.9, 0.9), Mirror(metal="gold"))
+    scene = Scene("gilt", camera, (), (block, gold), background_rgb=(1.0, 1.0, 1.0))
+    scene = replace(scene, render=replace(scene.render, polarisation=polarised))
+    metal, _ = power(Stack(GLASS, Film(()), metals()["gold"]), 1.0, VISIBLE_NM)
+    expected = daylight_mean(0.04 + 0.96**2 * metal / (1.0 - 0.04 * metal))
+    assert render_probe(gl, scene, PROBE).mean == pytest.approx(expected, rel=3e-3)
 
 
 @pytest.mark.parametrize("degrees", [0.0, 50.0, 80.0])

@@ -119,12 +119,27 @@ def test_the_reference_has_the_same_by_another_way() -> None:
             np.testing.assert_allclose([a[0] for a in wanted], found, atol=1e-8)
 
 
-def test_a_soap_film_in_glass_lies_between_glass() -> None:
-    sheet = SceneObject("sheet", plane(0.5, 0.5), Dielectric(constant(1.33), thin=True, film_nm=300.0))
-    solid = SceneObject("solid", box((1.0, 1.0, 1.0)), Dielectric(GLASS))
-    found = film_stacks(Scene("in", Camera((0, 0, 5), (0, 0, 0)), (), (solid, sheet)))
-    assert found[1].before == found[1].behind == GLASS
-    assert list(found) == [1]
+def test_films_know_the_media_that_they_touch() -> None:
+    soap = Dielectric(constant(1.33), thin=True, film_nm=300.0)
+    things = (
+        SceneObject("solid", box((1.0, 1.0, 1.0)), Dielectric(GLASS)),
+        SceneObject("within", plane(0.5, 0.5), soap),
+        SceneObject("far", plane(0.5, 0.5), soap, translated(4.0)),
+        SceneObject("below", plane(1.0, 1.0), Mirror(metal="gold"), translated(-0.5)),
+    )
+    found = film_stacks(Scene("in", Camera((0, 0, 5), (0, 0, 0)), (), things))
+    media = [
+        [None if stack is None else (stack.before.name, stack.behind.name) for stack in of] for of in found.values()
+    ]
+    assert media == [
+        [("air", "air"), (GLASS.name, GLASS.name)],
+        [("air", "air"), None],
+        [("air", "gold"), (GLASS.name, "gold")],
+    ]
+
+
+def translated(z: float) -> np.ndarray:
+    return np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, z], [0.0, 0.0, 0.0, 1.0]])
 
 
 def test_tables_hold_running_means() -> None:
@@ -132,7 +147,7 @@ def test_tables_hold_running_means() -> None:
     scene = one(Dielectric(GLASS, film_nm=5000.0))
     nm = np.linspace(380.0, 780.0, 1025)
     tables = film_tables(scene, nm, False)
-    reflected, _ = power(film_stacks(scene)[0], 1.0, nm)
+    reflected, _ = power(film_stacks(scene)[0][0], 1.0, nm)
     assert tables.rows.shape == (129, 1025)
     expected = np.trapezoid(reflected[256:513], nm[256:513]) / (nm[512] - nm[256])
     assert (tables.rows[-1, 512] - tables.rows[-1, 256]) * 4.0 == pytest.approx(expected, abs=1e-6)
