@@ -9,7 +9,7 @@ from imgui_bundle import imgui
 from spectrasplat.edit.state import Selection, State
 from spectrasplat.gpu.context import Context
 from spectrasplat.model.contacts import world_bounds
-from spectrasplat.model.scene import Diffuse, Grating
+from spectrasplat.model.scene import Dielectric, Diffuse, Grating, Polariser
 from spectrasplat.model.scene_camera import camera_frame
 from spectrasplat.ui.panels.inspector import draw_inspector
 from spectrasplat.ui.panels.spectrum import axis_labels
@@ -73,6 +73,30 @@ def test_a_screen_can_be_made_a_grating(gl: Context) -> None:
         rig.click("Grating")
         rig.frame(2)
         assert material(rig) == Grating()
+
+
+def test_a_prism_is_made_of_calcite_and_turned(gl: Context) -> None:
+    with PanelRig(gl, draw_inspector, scene_state("prism", Dielectric), (420, 1500)) as rig:
+        rig.click("Crystal")
+        rig.frame(2)
+        rig.click("Calcite")
+        rig.frame(2)
+        assert material(rig).values() == {"crystal": "calcite"}
+        assert "Roughness" not in rig.items.items and "Coating" not in rig.items.items
+        rig.drag_slider("Optic axis", 0.1, 0.2)
+        x, y, z = material(rig).axis
+        assert x > 0.0 and y == 0.0 and x * x + z * z == pytest.approx(1.0)
+
+
+def test_a_screen_can_be_made_a_polariser(gl: Context) -> None:
+    with PanelRig(gl, draw_inspector, scene_state("spectrometer", Grating), (420, 1500)) as rig:
+        rig.click("Kind##combo" if "Kind##combo" in rig.items.items else "Kind")
+        rig.frame(2)
+        rig.click("Polariser")
+        rig.frame(2)
+        assert material(rig) == Polariser()
+        rig.type_into("Retardance", "140")
+        assert material(rig).retardance_nm == 140.0
 
 
 def test_the_lens_is_opened_and_focused(gl) -> None:

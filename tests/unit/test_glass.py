@@ -271,7 +271,7 @@ def test_an_impossible_gain_is_refused(gain: float) -> None:
 
 
 def test_distinct_gains_are_distinct_glasses_to_the_renderer() -> None:
-    from spectrasplat.features.facts import dispersive_materials
+    from spectrasplat.features.facts import dispersive_glasses
     from spectrasplat.features.features import Features
     from spectrasplat.gpu.spectral_groups import Groups
     from spectrasplat.model.geometry import primitives
@@ -291,7 +291,7 @@ def test_distinct_gains_are_distinct_glasses_to_the_renderer() -> None:
         return Scene("s", Camera((0, -3, 1), (0, 0, 0)), (default_light(),), (*balls, floor))
 
     two = scene(1.0, 2.0)
-    assert dispersive_materials(two) == [0, 1] and dispersive_materials(scene(2.0, 2.0)) == [0]
+    assert len(dispersive_glasses(two)) == 2 and len(dispersive_glasses(scene(2.0, 2.0))) == 1
     features = Features.of(two, RenderSettings())
     assert Groups.of(two, features).glasses == tuple(o.material.dispersion for o in two.objects[:2])
     axis = SpectralAxis.build(Groups.of(two, features).glasses)

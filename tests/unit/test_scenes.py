@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from spectrasplat.base.paths import assets_dir
-from spectrasplat.features.facts import dispersive_materials
+from spectrasplat.features.facts import dispersive_glasses
 from spectrasplat.features.features import Features
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.scene import Black, Dielectric, Diffuse, Scene
@@ -39,7 +39,7 @@ def test_the_collection_is_complete() -> None:
         "water",
         "wine_glass",
     }
-    wanted |= {"brilliant_studio", "prism_edge", "lens_text", "ball_caustic"}
+    wanted |= {"brilliant_studio", "prism_edge", "lens_text", "ball_caustic", "calcite"}
     assert wanted <= names
 
 
@@ -217,7 +217,7 @@ def test_the_slit_of_the_prism_scene_meets_it_near_minimum_deviation() -> None:
     # Apex towards +y: minimum deviation enters at half the deviation above the x axis.
     half_deviation = math.asin(glass.n_d * 0.5) - math.radians(30.0)
     assert plan == pytest.approx(half_deviation, abs=math.radians(2.0))
-    assert len(dispersive_materials(scene)) == 1
+    assert len(dispersive_glasses(scene)) == 1
 
 
 def test_the_wine_reaches_into_the_wall_and_the_glass_has_priority() -> None:
