@@ -42,6 +42,8 @@ _CORE = 0.5
 """Share of its median above which texels of a region show the outline of a window."""
 _LIKENESS = 0.85
 """Least share of a window's region and of its outline together that both cover."""
+_RING = 3
+"""Texels from a region to the outer end of what is round it."""
 _FINER = 4
 """Places along a texel's side by which its covered share is counted."""
 _FAR = 300.0
@@ -157,18 +159,23 @@ def _regions(bright: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Bright regions and what is round them, bool (H, W) each, the one with the brightest texel first."""
     from scipy import ndimage
 
-    width, left = bright.shape[1], bright.copy()
+    width, left, dim = bright.shape[1], bright.copy(), _CONTRAST * np.median(bright)
     for _ in range(2 * _MOST):
         row, column = np.unravel_index(int(left.argmax()), left.shape)
         peak = left[row, column]
-        if peak <= _CONTRAST * np.median(bright) or peak <= 0.0:
+        if peak <= dim or peak <= 0.0:
             return
         # The seam of the columns is turned away from the region.
         turn = width // 2 - int(column)
-        turned = np.roll(left, turn, axis=1)
-        labels, _ = ndimage.label(turned > _EDGE * peak)
-        spot = labels == labels[row, width // 2]
-        ring = ndimage.binary_dilation(spot, iterations=3) & ~ndimage.binary_dilation(spot, iterations=1)
+        labels, _ = ndimage.label(np.roll(left > _EDGE * peak, turn, axis=1))
+        spot, ring = labels == labels[row, width // 2], np.zeros(left.shape, bool)
+        (rows, columns), room = ndimage.find_objects(spot.astype(np.uint8))[0], _RING + 1
+        box = (
+            slice(max(rows.start - room, 0), rows.stop + room),
+            slice(max(columns.start - room, 0), columns.stop + room),
+        )
+        near, far = (ndimage.binary_dilation(spot[box], iterations=reach) for reach in (1, _RING))
+        ring[box] = far & ~near
         spot, ring = np.roll(spot, -turn, axis=1), np.roll(ring, -turn, axis=1)
         if ring.any():
             yield spot, ring
