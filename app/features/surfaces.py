@@ -147,6 +147,17 @@ class SurfaceFeatures:
         requires=("gratings",),
     )
     """Some grating's grooves share light out by wavelength and angle."""
+    line_widths: bool = feature(
+        "widths of spectral lines",
+        lambda facts: bool(facts.having(lambda material: material.spread_per_um > 0.0)),
+        symbol="LINE_WIDTHS",
+        why=lambda facts: f"behind {names(facts.having(lambda material: material.spread_per_um > 0.0))}",
+        why_not="there is no slit, and no grating says how many of its lines light covers",
+        names=("place_on_line", "line_draw", "light: FLAG_OFF_LATTICE"),
+        cost="a lookup an order",
+        requires=("gratings",),
+    )
+    """Some slit, or the end of some grating, spreads light of one wavelength."""
     smooth_normals: bool = feature(
         "interpolated normals",
         lambda facts: bool(facts.smooth),

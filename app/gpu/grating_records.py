@@ -8,7 +8,7 @@ import numpy as np
 
 from ..model.materials import Grating
 from ..model.optics.colorimetry import VISIBLE_NM
-from ..model.optics.gratings import sinusoidal_shares
+from ..model.optics.gratings import line_quantiles, sinusoidal_shares
 from ..model.scene import Scene, SceneObject
 from .scene_records import GRATING, GRATING_ORDER
 
@@ -22,9 +22,11 @@ class GratingRows(NamedTuple):
 
 
 def grating_tables(scene: Scene, samples: int) -> tuple[dict[int, GratingRows], np.ndarray]:
-    """By object, and the tables (rows, samples): of sinusoidal gratings one row an order, its share over `waves_of`."""
+    """By object, and the tables (rows, samples): `line_quantiles` if some light is spread, then of sinusoidal gratings
+    one row an order, its share over `waves_of`."""
     found: dict[int, GratingRows] = {}
-    tables = [np.zeros((0, samples))]
+    spreads = any(item.material.spread_per_um for item in scene.objects)
+    tables = [line_quantiles(samples)[None] if spreads else np.zeros((0, samples))]
     indices = [item.material.dispersion.index(VISIBLE_NM[0]) for item in scene.objects if item.material.transmits]
     for index, item in enumerate(scene.objects):
         material = item.material
@@ -43,7 +45,7 @@ def grating_texels(item: SceneObject, rows: GratingRows | None) -> np.ndarray:
     head = GRATING.zeros(1)
     head["lines"] = grating.lines_in_world(item.object_to_world)
     head["orders"] = len(grating.orders)
-    head["lines_per_um"] = 1e-3 * grating.lines_per_mm
+    head["lines_per_um"], head["spread_per_um"] = 1e-3 * grating.lines_per_mm, grating.spread_per_um
     head["relief"], head["index"], head["profile"] = grating.relief, grating.relief_index, grating.profile_code
     if rows is not None:
         head["row"], head["most_waves"] = rows

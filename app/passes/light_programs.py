@@ -19,6 +19,7 @@ _FLAGS: Defines = {
     "FLAG_FOOTPRINT_DROPPED": f"{records.FLAG_FOOTPRINT_DROPPED}u",
     "FLAG_BAND_FINAL": f"{records.FLAG_BAND_FINAL}u",
     "FLAG_INSIDE": f"{records.FLAG_INSIDE}u",
+    "FLAG_OFF_LATTICE": f"{records.FLAG_OFF_LATTICE}u",
     "FLAG_EXTRAORDINARY": f"{records.FLAG_EXTRAORDINARY}u",
     "LATTICE_BIT": records.LATTICE_BIT,
     "TINT_BIT": records.TINT_BIT,

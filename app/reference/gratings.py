@@ -14,10 +14,10 @@ from ..model.scene import Grating, Scene
 from .compiling import compiled, inlined
 from .vectors import combined, cross, dot, length, mixed_of, moved, negated, over
 
-COLUMNS = 7
+COLUMNS = 8
 """Of the table `orders`: order / line spacing in 1/µm, factor of its share, order, lines per µm, profile, relief, index
-of what is ruled (0: it reflects)."""
-_SHIFT, _FACTOR, _ORDER, _LINES, _PROFILE, _RELIEF, _INDEX = range(7)
+of what is ruled (0: it reflects), one over the width that light covers in 1/µm."""
+_SHIFT, _FACTOR, _ORDER, _LINES, _PROFILE, _RELIEF, _INDEX, _SPREAD = range(8)
 _BLAZED, _LAMELLAR = 1, 2
 
 
@@ -34,7 +34,7 @@ def gratings(scene: Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
             rows[:, _SHIFT], rows[:, _FACTOR] = material.shift_per_um, material.fixed_shares
             rows[:, _ORDER], rows[:, _LINES] = material.orders, 1e-3 * material.lines_per_mm
             rows[:, _PROFILE], rows[:, _RELIEF] = material.profile_code, material.relief
-            rows[:, _INDEX] = material.relief_index
+            rows[:, _INDEX], rows[:, _SPREAD] = material.relief_index, material.spread_per_um
             orders.append(rows)
             counts[-1] = len(rows)
     return lines, np.cumsum(counts).astype(np.int32), np.concatenate([*orders, np.zeros((1, COLUMNS))])

@@ -21,7 +21,7 @@ from .photon_intersect import normal_at
 from .photon_scene import GRATING, MIRROR, POLARISER, SHEET
 from .polarised import amplitudes, begin_unpolarised, senkrecht, share_of, turn_fields
 from .rough_albedo import masking, sent_on
-from .sampling import word_number
+from .sampling import mixed, word_number
 from .thin_films import film_amplitudes
 from .vectors import across, combined, cross, dot, length, mixed_of, moved, negated, over
 
@@ -110,7 +110,22 @@ def _share_of_order(scene, row, d, n, lines, index, nm):
 
 
 @compiled
-def _diffract(scene, triangle, place, u, v, d, mask, alone, nm, draw, field):
+def _shift_drawn(row, word):
+    """Order / line spacing of an order, in 1/µm, and off it as light behind an opening is: by sinc² of the place, drawn
+    by rejection from Cauchy's distribution, of which it is 1.48 times at most."""
+    if row[7] == 0.0:
+        return row[0]
+    while True:
+        word = mixed(word + np.uint64(0x9E3779B97F4A7C15))
+        turn = math.tan(math.pi * (word_number(word) - 0.5))
+        word = mixed(word + np.uint64(0x9E3779B97F4A7C15))
+        ratio = 1.0 if abs(turn) < 1e-9 else math.sin(turn) ** 2 * (1.0 + 1.0 / turn**2)
+        if 1.48 * word_number(word) < ratio:
+            return row[0] + row[7] * turn / math.pi
+
+
+@compiled
+def _diffract(scene, triangle, place, u, v, d, mask, alone, nm, draw, word, field):
     """`scatter` at a grating: `draw` chooses an order as they are strong; what they leave, and an order that is
     evanescent, is absorbed. Both polarisations fare alike."""
     thing = scene.owner[triangle]
@@ -130,7 +145,7 @@ def _diffract(scene, triangle, place, u, v, d, mask, alone, nm, draw, field):
             below += _share_of_order(scene, row, d, outward, scene.lines[thing], index, nm)
         efficiency = below
     reflects = scene.orders[chosen, 6] == 0.0
-    step = scene.orders[chosen, 0] * nm * 1e-3 / index
+    step = _shift_drawn(scene.orders[chosen], word) * nm * 1e-3 / index
     r, real = diffracted(d, outward, scene.lines[thing], step, reflects)
     if (dot(r, g) * (1.0 if entering else -1.0) > 0.0) != reflects:  # to the wrong side of the facet
         r, real = diffracted(d, g, scene.lines[thing], step, reflects)
@@ -190,8 +205,8 @@ def _meet_crystal(scene, before, after, n, g, d, nm, draw, field, is_mirror):
     return r, reflects
 
 
-_TILT, _TURN = np.uint64(0xA24BAED4963EE407), np.uint64(0x9FB21C651E98DF25)
-"""Make the numbers for a microfacet independent of those of Fresnel choices."""
+_TILT, _TURN, _LINE = np.uint64(0xA24BAED4963EE407), np.uint64(0x9FB21C651E98DF25), np.uint64(0xD6E8FEB86659FD93)
+"""Make the numbers for a microfacet, and for the place on a grating's line, independent of those of Fresnel choices."""
 
 
 @compiled
@@ -237,7 +252,8 @@ def scatter(scene, triangle, place, u, v, d, mask, alone, nm, draw, noise, event
     `field`, of the shape `crystals.FIELD_SHAPE`, turns with the ray.
     """
     if scene.kind[scene.owner[triangle]] == GRATING:
-        return _diffract(scene, triangle, place, u, v, d, mask, alone, nm, draw, field)
+        word = (noise ^ _LINE) + np.uint64(event + 1) * np.uint64(0x9E3779B97F4A7C15)
+        return _diffract(scene, triangle, place, u, v, d, mask, alone, nm, draw, word, field)
     g = normal_at(scene, triangle, place)
     cosine_g = -dot(d, g)
     entering = cosine_g > 0.0

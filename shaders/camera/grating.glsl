@@ -90,7 +90,7 @@ void meet_grating(inout Path path, Path whole, Hit hit, Event event, uint pixel_
     vec3 steps;
     bvec3 passes = bvec3(false);
     for (; number < end; ++number) {
-        order = order_at(row, number);
+        order = order_drawn(met, number, p.sample_index, path.depth, hash_combine(pixel_key, 90u));
         steps = order_steps(order, hit.object, met.medium, banded.band);
         passes = order_passes(banded, event, met, steps);
         if (any(passes) && order.efficiency > 0.0) break;

@@ -5,6 +5,7 @@
 #include "lib/band.glsl"
 #include "lib/interface.glsl"
 #include "lib/medium.glsl"
+#include "lib/random.glsl"
 
 Grating grating_at(uint row) {
     uint at = uint(GRATINGS_AT) + row;
@@ -54,6 +55,21 @@ float profile_share(Grating grating, GratingOrder order, uint number, float wave
     float across = blazed ? phase : 0.5 * GROOVE_PI * m;
     float share = abs(phase) < 1e-3 && blazed ? 1.0 : sin(phase) / across;
     return blazed || fract(0.5 * m) != 0.0 ? share * share : 0.0;
+}
+
+// A number in [0, 1) for the place on a line: Kronecker sequences over paths, of the square roots of primes that no other
+// dimension uses. Deeper ones are hashed.
+float line_draw(uint i, uint depth, uint key) {
+    const uint generators[4] = uint[](3479995859u, 796084093u, 1830299338u, 2336478295u);
+    return kronecker(i, depth < 4u ? generators[depth] : hash_pcg(depth + 0x2545f491u) | 1u, hash_combine(key, depth));
+}
+
+// Where on a line light leaves, in parts λ / W of a direction's sine off its middle: distributed as sinc², as behind an
+// opening as wide as what light covers (`line_quantiles` of app/model/optics/gratings.py).
+float place_on_line(float draw) {
+    float share = abs(2.0 * draw - 1.0), beyond = (1.0 - share) * GROOVE_PI * GROOVE_PI;
+    float place = beyond < 0.125 ? 1.0 / max(beyond, 1e-6) : spectral_row(uint(GRATING_ROW), share);
+    return draw < 0.5 ? -place : place;
 }
 
 // The steps m λ / (Λ n) of an order at three places of a band, in the medium that the ray is in.

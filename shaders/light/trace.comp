@@ -139,6 +139,10 @@ void land(Arrival at, uint slot, inout Outcome outcome) {
         lattice_bits = 0u;
         photon.fan = 0u;
     }
+    if (LINE_WIDTHS && (path.walk.flags & FLAG_OFF_LATTICE) != 0u) {
+        lattice_bits = 0u;
+        path.walk.flags &= ~FLAG_OFF_LATTICE;
+    }
     photon.x_lo = path.band.x;
     photon.x_hi = path.band.z;
     photon.throughput = path.throughput;

@@ -63,7 +63,8 @@ bool diffract(Path path, Hit hit, Event event, uint row, out Path child, inout P
     float at = -1.0;
     rest_lives = false;
     for (; number < orders; ++number) {
-        order = order_at(row, number);
+        order = order_drawn(met, number, path.walk.photon_id / p.lattices, path.depth,
+            hash_combine(p.surface_key, path.walk.photon_id % p.lattices));
         steps = order_steps(order, hit.object, met.medium, path.band);
         passes = order_passes(path, event, met, steps);
         if (BAND_CUTS) {
@@ -107,6 +108,8 @@ bool diffract(Path path, Hit hit, Event event, uint row, out Path child, inout P
     }
     weaken(child, shares.own, companions.own);
     if (steps.y != 0.0) leave_companions(child);
+    // Neighbours on the lattice have gone elsewhere.
+    if (LINE_WIDTHS && met.grating.spread_per_um > 0.0) child.walk.flags |= FLAG_OFF_LATTICE;
     outcome.what |= geometric ? FELL_NORMAL : 0u;
     return survives(child, outcome.roulette_w, share, 16u + number, child.depth == 1u && orders <= MAX_WHOLE_ORDERS);
 }

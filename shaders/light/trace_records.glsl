@@ -33,7 +33,7 @@ uint of_light = 0u;  // whose ray is followed: its place among these
 #define HAS_NORMAL_COLUMNS (NORMAL_DERIVATIVES || LOBE_COLUMNS)
 
 // What a photon's path carries besides is in its record (`ray_record` in app/gpu/records.py); of the flags there,
-// FLAG_FOOTPRINT_DROPPED.
+// FLAG_FOOTPRINT_DROPPED and FLAG_OFF_LATTICE.
 #define Walk RayRecord
 #include "path/event.glsl"
 
@@ -71,7 +71,7 @@ Path load_path(uint slot) {
     if (LIGHTS > 1u) of_light = (ray.light_and_source & 0xffu) % LIGHTS;
     Path path;
     path.walk = ray;
-    path.walk.flags &= FLAG_FOOTPRINT_DROPPED;
+    path.walk.flags &= FLAG_FOOTPRINT_DROPPED | (LINE_WIDTHS ? FLAG_OFF_LATTICE : 0u);
     path.position = ray.position;
     path.direction = ray.direction;
     path.medium = MediumStack(ray.inside_mask, ray.inside_object);

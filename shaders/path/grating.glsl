@@ -27,6 +27,16 @@ GratingEvent grating_event(Path path, vec3 normal, Hit hit, uint row) {
     return met;
 }
 
+// An order as a path leaves in it, at a place on its line that `number` of a sequence draws.
+GratingOrder order_drawn(GratingEvent met, uint order_number, uint number, uint depth, uint key) {
+    GratingOrder order = order_at(met.row, order_number);
+    if (LINE_WIDTHS) {
+        float draw = line_draw(number, depth, hash_combine(key, order_number));
+        order.shift_per_um += met.grating.spread_per_um * place_on_line(draw);
+    }
+    return order;
+}
+
 // A direction across the lines, along them and along the outward normal.
 vec3 in_lines(GratingEvent met, vec3 direction) {
     vec3 outward = met.side * met.normal;

@@ -87,6 +87,12 @@ OF_LIBRARY = {
         "bool onward = k.z > 0.0;",
         "gpu/test_grating_profiles_gpu.py::test_each_order_carries_its_share[blazed-srd]",
     ),
+    "a slit that spreads light to one side": Mutant(
+        "lib/grating.glsl",
+        "draw < 0.5 ? -place : place",
+        "draw < 0.5 ? place : place",
+        "gpu/test_line_widths_gpu.py::test_a_slits_minima_and_maxima[srd]",
+    ),
     "a camera's own ray taken for the light at a grating": Mutant(
         "camera/grating.glsl",
         "return vec3(-sent.xy, is_reflective",

@@ -136,6 +136,26 @@ def test_keys_and_the_way_back() -> None:
     assert read(BLAZED + "efficiency = 0.8").efficiency == (0.8,) * 3
 
 
+def test_a_slit_is_an_opening_of_its_width() -> None:
+    from spectrasplat.model.io.toml_text import toml_text
+
+    slit = read('kind = "slit"\nwidth_um = 25')
+    assert slit.spread_per_um == pytest.approx(1.0 / 25.0) and slit.orders == (0,) and slit.efficiency == (1.0,)
+    assert read(toml_text(slit.values())) == slit and slit.changed(width_um=50.0).spread_per_um == pytest.approx(0.02)
+    assert not slit.is_like(Grating(orders=(0,), efficiency=(1.0,)))
+    for keys, told in (
+        ("width_um = 0.4", "depends on its edges"),
+        ("width_um = -3", "above 0"),
+        ("grooves = 3", "grooves"),
+    ):
+        with pytest.raises(UserError, match="s.toml") as error:
+            read('kind = "slit"\n' + keys)
+        assert told in str(error.value)
+    assert read(GRATING + "grooves = 500").spread_per_um == pytest.approx(0.6 / 500.0)
+    with pytest.raises(UserError, match="at least 0"):
+        read(GRATING + "grooves = -1")
+
+
 def test_a_blaze_beyond_the_lines_is_refused() -> None:
     spectrometer = shipped("spectrometer")
     assert np.isnan(facet_angle(1.5, 0.6, 1.5)) and np.isfinite(facet_angle(1.5, 0.6, 0.0))

@@ -14,8 +14,9 @@ from .grating import Grating
 from .material import Material
 from .opaque import Black, Mirror
 from .polariser import Polariser
+from .slit import Slit
 
-_KINDS = (Dielectric, Mirror, Diffuse, Black, Grating, Polariser)
+_KINDS = (Dielectric, Mirror, Diffuse, Black, Grating, Slit, Polariser)
 MATERIAL_KINDS: dict[str, type[Material]] = {cls.kind: cls for cls in _KINDS}
 """By their word in a scene file."""
 
@@ -29,4 +30,5 @@ __all__ = [
     "Material",
     "Mirror",
     "Polariser",
+    "Slit",
 ]

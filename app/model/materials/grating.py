@@ -45,6 +45,24 @@ _LINES = Number(
     ),
     animated=Animated("Lines of a grating to the millimetre", MIN_LINES, MAX_LINES),
 )
+_GROOVES = Number(
+    "grooves",
+    0.0,
+    optional=True,
+    at_least=0.0,
+    at_most=1e7,
+    row=Row(
+        "Grooves lit",
+        "How many lines the light covers, N: order m resolves wavelengths that differ by a part in m N. 0: so many "
+        "that spectral lines have no width.",
+        0.0,
+        5000.0,
+        0.0,
+        "%.0f",
+        is_slider=True,
+    ),
+    animated=Animated("Lines of a grating that light covers", 1.0, 1e7),
+)
 _REFLECTS = Flag("reflects", False, optional=True, row=Row("Reflects", "Orders are reflected instead of transmitted."))
 
 
@@ -185,11 +203,14 @@ class Grating(Material):
     open: float = 0.5
     groove_index: float = 1.5
     """Refractive index of what the grooves are ruled in, where it transmits."""
+    grooves: float = 0.0
+    """How many of the lines light covers, which gives each order the width of light behind a slit as wide as they are
+    together; 0: none."""
 
     kind: ClassVar = "grating"
     title: ClassVar = "Grating"
     gpu_code: ClassVar = 4
-    parts: ClassVar = (_LINES, _Orders(), _REFLECTS, Direction("direction", (0.0, 1.0, 0.0)), _Profile())
+    parts: ClassVar = (_LINES, _Orders(), _REFLECTS, Direction("direction", (0.0, 1.0, 0.0)), _GROOVES, _Profile())
     is_specular: ClassVar = True
     is_grating: ClassVar = True
     why_no_beams: ClassVar = "a grating sends light into several orders"
@@ -218,6 +239,11 @@ class Grating(Material):
             f"no facet sends {self.blaze_nm:g} nm into order 1 of a grating whose lines are "
             f"{1e6 / self.lines_per_mm:.4g} nm apart; choose a smaller 'blaze_nm' or fewer lines"
         )
+
+    @property
+    def spread_per_um(self) -> float:
+        """One over the width that light covers."""
+        return self.lines_per_mm * 1e-3 / self.grooves if self.grooves else 0.0
 
     @property
     def relief_index(self) -> float:
@@ -268,13 +294,14 @@ class Grating(Material):
     def content(self) -> tuple[object, ...]:
         """All its numbers."""
         own = (self.profile, self.blaze_nm, self.depth_nm, self.open, self.groove_index) if self.profile else ()
-        return (self.lines_per_mm, *self.orders, *self.efficiency, self.reflects, *self.direction, *own)
+        return (self.lines_per_mm, *self.orders, *self.efficiency, self.reflects, *self.direction, self.grooves, *own)
 
     def is_like(self, other: Material) -> bool:
         """Numbers may differ, not how many there are."""
         if not isinstance(other, Grating):
             return False
-        return (len(self.orders), self.profile_code) == (len(other.orders), other.profile_code)
+        kinds = [(type(one), len(one.orders), one.profile_code, one.grooves > 0.0) for one in (self, other)]
+        return kinds[0] == kinds[1]
 
     def check_on(self, mesh: Mesh, name: str, file_name: str) -> None:
         """Thin sheets only, whose lines lie in them."""

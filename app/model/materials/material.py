@@ -82,6 +82,11 @@ class Material:
         return 0
 
     @property
+    def spread_per_um(self) -> float:
+        """One over the width of the opening that its light is diffracted by, 1/µm; 0: it is not."""
+        return 0.0
+
+    @property
     def is_solid(self) -> bool:
         """It is transparent with an inside, unlike a thin sheet."""
         return self.transmits and not self.thin
