@@ -210,7 +210,14 @@ class Grating(Material):
     kind: ClassVar = "grating"
     title: ClassVar = "Grating"
     gpu_code: ClassVar = 4
-    parts: ClassVar = (_LINES, _Orders(), _REFLECTS, Direction("direction", (0.0, 1.0, 0.0)), _GROOVES, _Profile())
+    parts: ClassVar[tuple[Part, ...]] = (
+        _LINES,
+        _Orders(),
+        _REFLECTS,
+        Direction("direction", (0.0, 1.0, 0.0)),
+        _GROOVES,
+        _Profile(),
+    )
     is_specular: ClassVar = True
     is_grating: ClassVar = True
     why_no_beams: ClassVar = "a grating sends light into several orders"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, Self
 
-from ..fields import Animated, Direction, Number, Row
+from ..fields import Animated, Direction, Number, Part, Row
 from ..io.scene_table import SceneTable
 from ..texture import TextureReader
 from .grating import Grating
@@ -41,7 +41,7 @@ class Slit(Grating):
 
     kind: ClassVar = "slit"
     title: ClassVar = "Slit"
-    parts: ClassVar = (_WIDTH, Direction("direction", (0.0, 1.0, 0.0)))
+    parts: ClassVar[tuple[Part, ...]] = (_WIDTH, Direction("direction", (0.0, 1.0, 0.0)))
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "lines_per_mm", 1e3 / self.width_um)

@@ -153,7 +153,7 @@ def _material(state: State, view_model: ViewModel, index: int) -> State:
     if material.is_mirror:
         state = _films(state, index)
         material = state.scene.objects[index].material
-    if material.kind == Grating.kind:
+    if isinstance(material, Grating) and material.kind == Grating.kind:
         state = _profile(state, index, material)
     if material.is_polariser:
         return draw_axis(state, index, "Axis", "Light polarised along it passes, in the object's own coordinates.")
