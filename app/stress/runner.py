@@ -24,7 +24,7 @@ Keep = Callable[[StressResult], None]
 
 
 FILES = (
-    *("optics", "materials", "caustics", "chains", "meshes", "splats"),
+    *("optics", "materials", "crystals", "caustics", "chains", "meshes", "splats"),
     *("camera_surfaces", "camera_solids", "camera_lights"),
     *("contacts", "lights", "losses", "crowds", "scenes"),
 )
