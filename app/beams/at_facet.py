@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .compiling import part
-from .current import ALL, CURRENT, LAY, SOME, UNKNOWN, distance_at, faint_share, halve, push_both
+from .current import ALL, CURRENT, FAINT, LAY, SOME, UNKNOWN, distance_at, halve, push_both
 from .facets import MAX_CORNERS
 from .leaves import passes
 from .nodes import (
@@ -43,9 +43,6 @@ from .search import (
 _GRAZING = 1e-9
 """Squared cosines of transmission smaller than this may have either sign: total reflection is just setting in."""
 
-_DRIFTING = 0.03
-"""Share of `work.threshold` below which a beam is not halved, however far its outline moves over its band."""
-
 
 @part
 def at_facet(nodes, facets, solids, tables, sources, work):
@@ -63,12 +60,12 @@ def at_facet(nodes, facets, solids, tables, sources, work):
         work.sums[SUM_ABSORBED] += flux_of(beam, tables, work)
         return
     power = power_as(beam, beam, tables, work)
-    if power > _DRIFTING * work.threshold and drifts(beam, power, work):
+    if power > FAINT * work.threshold and drifts(beam, power, work):
         halve(nodes, 0.5 * (beam.x[0] + beam.x[2]), facets, solids, tables, sources, work)
         return
     if not is_parallel and beam.bend >= 0.0:
         bend = is_curved(beam, facets, solids, tables, source, work.tolerance, work)
-        if bend > 1.0 and power_as(beam, beam, tables, work) > faint_share(work) * work.threshold:
+        if bend > 1.0 and power_as(beam, beam, tables, work) > FAINT * work.threshold:
             low, high = halve_space(beam, nodes[work.top], work)
             beam.total = nodes[work.top].total = LAY
             push_both(nodes, low, high, work)

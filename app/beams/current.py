@@ -15,14 +15,8 @@ START = -3
 LAY, UNKNOWN, SOME, ALL = -2, -1, 0, 1
 """States of a beam's `total`, whether its facet reflects everything; START: a source's whole light; LAY: rays are those
 of a larger outline."""
-_FAINT, _FAINT_WITH_TAILS = 0.02, 0.25
-"""Share of the threshold below which a beam is not halved; where what is weak is left to photons."""
-
-
-@part
-def faint_share(work):
-    """Share of the threshold below which a beam is not halved."""
-    return _FAINT_WITH_TAILS if work.faint > 0.0 else _FAINT
+FAINT = 0.03
+"""Share of the threshold below which a beam is not halved, nor a polygon that misplaces less light."""
 
 
 @part

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .compiling import part
-from .current import CURRENT, SPARE, faint_share, halve, push_both
+from .current import CURRENT, FAINT, SPARE, halve, push_both
 from .leaves import anchor_density, density_slope, lay_leaf, passes, plane_map
 from .nodes import HALF, LINES, STATIC, area_of, copy, first_place, last_place, lay_out
 from .rays import PARALLEL, REFLECT
@@ -50,16 +50,18 @@ def outline_of(beam, corner, place, work):
 
 
 @part
-def is_crooked(beam, bent, corner, work):
-    """Whether edges that miss by `bent` miss much of the width of the polygon just laid, in the middle of its band."""
+def misplaced(beam, bent, corner, work):
+    """Share of the light of the polygon just laid, in the middle of its band, that edges which miss by `bent`
+    misplace."""
     if first_place(beam) > 0:
-        return False
+        return 0.0
     outline, _ = outline_of(beam, corner, 1, work)
     length = 0.0
     for c in range(1, len(outline)):
         u, v = outline[c, 0] - outline[0, 0], outline[c, 1] - outline[0, 1]
         length = max(length, np.sqrt(u * u + v * v))
-    return bent * length > _CROOKED * area_of(outline, len(outline))
+    area = area_of(outline, len(outline))
+    return bent * length / area if bent * length < area else 1.0
 
 
 @part
@@ -110,8 +112,9 @@ def end(nodes, facets, solids, tables, sources, leaf, edge, corner, work):
     if (not is_parallel or work.absorbing) and not lay_out(beam, facets, solids, tables, source, work):
         return
     # Where rays graze, and where a cone fades away, there is no end to halving: what is faint is straight enough.
-    faint = work.threshold if kind == LEAF_TAIL else faint_share(work) * work.threshold
-    room = work.top + 2 < len(nodes) and power_as(beam, beam, tables, work) > faint
+    faint = work.threshold if kind == LEAF_TAIL else FAINT * work.threshold
+    power = power_as(beam, beam, tables, work)
+    room = work.top + 2 < len(nodes) and power > faint
     tolerance = facets[beam.facet].texel if kind == LEAF_RECEIVER else work.tolerance
     bend = 0.0
     if room and not is_parallel and kind == LEAF_RECEIVER:
@@ -129,7 +132,8 @@ def end(nodes, facets, solids, tables, sources, leaf, edge, corner, work):
     # What photons carry on where nothing disperses, they carry over their own bands (`passes.beam_emission`).
     uneven = uneven if work.disperses or kind == LEAF_RECEIVER else 0.0
     bent = bent if work.disperses else 0.0
-    if room and beam.x[2] - beam.x[0] > NARROWEST and (bent > tolerance or uneven > most):
+    missed = misplaced(beam, bent, corner, work) if bent > tolerance else 0.0
+    if room and beam.x[2] - beam.x[0] > NARROWEST and (missed * power > faint or uneven > most):
         halve(nodes, 0.5 * (beam.x[0] + beam.x[2]), facets, solids, tables, sources, work)
         return
     row, first = work.count[0], work.count[2]
@@ -153,7 +157,7 @@ def end(nodes, facets, solids, tables, sources, leaf, edge, corner, work):
     anchor_density(beam, new, work)
     # What is too faint to be halved and yet neither straight nor even must hold its own flux at least.
     if kind == LEAF_RECEIVER:
-        crooked = bent > tolerance and is_crooked(beam, bent, corner, work)
+        crooked = missed > _CROOKED
         if crooked or steepest > 1.0:
             even_out(beam, new, corner, work)
         if crooked:

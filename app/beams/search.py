@@ -33,9 +33,10 @@ LEAF_RECEIVER, LEAF_PIECE, LEAF_TAIL = 0, 1, 2
 photons."""
 NARROWEST = 1.0 / 256.0
 """Bands are not halved below this."""
-_STEADY = 3.0
+_STEADY = 10.0
 """Widths of itself that an outline of the threshold's power may move over a band, for a `drift` of 1: a beam that moves
-past a facet between the three places of its band loses what that facet takes."""
+past a facet between the three places of its band loses what that facet takes, and one that is halved is sooner too weak
+to be followed."""
 FRAGMENTS = 192
 """Most facets that a beam is cut by in one flight."""
 (

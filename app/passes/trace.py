@@ -331,16 +331,15 @@ class TracePass:
             self._emit_program(domain).run(-(-piece.count // _GROUP))
             self._queue.emitted(piece.count)
 
-    def carry_on(self, rays: np.ndarray, light: int, max_depth: int | None = None) -> Generator[None, None, Batch]:
+    def carry_on(self, rays: np.ndarray, light: int, split_threshold: float) -> Generator[None, None, Batch]:
         """`steps` for `rays` of one light that are on their way already: records (n,) of `ray` with n ≤ `batch`. Their
         flux counts as carried on."""
-        max_depth = self.max_depth if max_depth is None else min(max_depth, self.max_depth)
         count = len(rays)
         if count > self.batch:
             raise ValueError(f"{count} rays in a batch of {self.batch}")
         self._queue.load(rays)
-        self._set_parameters({light: self._carried_on(light, max_depth)})
-        batch = yield from self._follow(max_depth)
+        self._set_parameters({light: self._carried_on(light, self.max_depth, split_threshold)})
+        batch = yield from self._follow(self.max_depth)
         batch.tally.handed = float(rays["flux_w"].sum(dtype=float))
         return batch
 
@@ -415,8 +414,8 @@ class TracePass:
     def _parameters_of(
         self, piece: LatticeSlice, domain: EmissionDomain, max_depth: int, threshold: float
     ) -> np.ndarray:
-        p = self._carried_on(piece.light, max_depth)
-        p["lattices"], p["split_threshold"] = piece.lattices, threshold
+        p = self._carried_on(piece.light, max_depth, threshold)
+        p["lattices"] = piece.lattices
         if piece.lattice_count < 1 << (32 - records.LATTICE_BIT) and piece.stands_for == 1:
             p["lattice_bits"] = piece.lattice_count << records.LATTICE_BIT
         paths = piece.lattice_count * piece.lattices * domain.active_share
@@ -439,9 +438,9 @@ class TracePass:
         """Radians a side, in a pass of so many photons of a light."""
         return WIDEST_TURN * max(photons, 1.0) ** (-1.0 / 6.0) if self.widest_on_surface < UNBOUNDED else UNBOUNDED
 
-    def _carried_on(self, light: int, max_depth: int) -> np.ndarray:
+    def _carried_on(self, light: int, max_depth: int, split_threshold: float) -> np.ndarray:
         p = self._parameters.zeros(1)
-        p["max_depth"], p["split_threshold"], p["lattices"] = max_depth, self.split_threshold, 1
+        p["max_depth"], p["split_threshold"], p["lattices"] = max_depth, split_threshold, 1
         p["lattices_together"], p["widest_on_surface"] = 1, self.widest_on_surface
         p["paths"], p["widest_turn"] = CARRIED_ON_POINTS, self._widest_turn(CARRIED_ON_POINTS)
         p["bounded"] = self.widest_on_surface < UNBOUNDED

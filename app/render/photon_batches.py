@@ -12,7 +12,7 @@ import numpy as np
 from ..base.memory import available_bytes
 from ..gpu.dispatch_budget import DISPATCH_S, DispatchBudget
 from ..passes.lattice_slice import Parts, every, points_of
-from ..passes.trace import Batch, Sent, TracePass, queue_class
+from ..passes.trace import SPLIT_THRESHOLD, Batch, Sent, TracePass, queue_class
 from .light_plan import SMALLEST_BATCH, LightPlan
 from .photon_records import PhotonRecords, RoundOf
 from .splatting import Splatting
@@ -140,11 +140,11 @@ class PhotonBatches:
         self, rays: np.ndarray, light: int, of: RoundOf, into: Deposit, *, of_tails: bool = False
     ) -> Iterator[None]:
         """`lattice` for `rays` that are on their way already (`TracePass.carry_on`). `of_tails`: photons that carry on
-        weak beams, for which a pass has photons besides."""
-        waiting = [rays]
+        weak beams, for which a pass has photons besides, and on no lattice of their own that roulette would tear."""
+        waiting, threshold = [rays], SPLIT_THRESHOLD if of_tails else self.trace.split_threshold
         while waiting:
             some = waiting.pop()
-            batch = yield from self._traced(self.trace.carry_on(some, light), into.stats, 0)
+            batch = yield from self._traced(self.trace.carry_on(some, light, threshold), into.stats, 0)
             if batch.overflow and len(some) > 1:
                 waiting += [some[1::2], some[::2]]
                 continue
