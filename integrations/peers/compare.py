@@ -35,7 +35,7 @@ COMPILE = ["-O3", "-march=native", "-ffast-math", "-fno-finite-math-only", "-fop
 TIMEOUT_S = 200.0
 REFERENCE_SAMPLES, REFERENCE_PHOTONS = (
     256,
-    {"prism": 200_000_000, "ball": 200_000_000, "brilliant": 150_000_000, "goblet": 40_000_000},
+    {"prism": 200_000_000, "ball": 200_000_000, "brilliant": 150_000_000, "goblet": 30_000_000},
 )
 
 Rungs = list[tuple[Any, ...]]
@@ -48,12 +48,16 @@ LADDERS: dict[str, dict[str, Rungs]] = {
         "goblet": [(1_000_000, 8), (4_000_000, 16), (16_000_000, 64)],
     },
     # wavelengths, samples a pixel, and how
-    "mitsuba": {"": [(12, 16, "ptracer"), (16, 48, "ptracer"), (24, 128, "ptracer")]},
+    "mitsuba": {
+        "": [(12, 16, "ptracer"), (16, 48, "ptracer"), (24, 128, "ptracer")],
+        "brilliant": [(12, 16, "ptracer"), (16, 48, "ptracer")],
+        "goblet": [(12, 8, "ptracer"), (12, 24, "ptracer"), (16, 48, "ptracer")],
+    },
     "luxcore": {"": [(8, 8, "BIDIRCPU"), (12, 24, "BIDIRCPU"), (16, 48, "BIDIRCPU")]},
     "luxcore-own": {"": [(0, 64, "BIDIRCPU"), (0, 256, "BIDIRCPU"), (0, 768, "BIDIRCPU")]},
     "cycles": {
         "": [(4, 16, "mnee"), (6, 32, "mnee"), (8, 64, "mnee")],
-        "goblet": [(4, 16, "mnee"), (6, 32, "mnee")],
+        "goblet": [(4, 16, "mnee")],
         "prism": [(4, 16, "mnee")],
         "brilliant": [(4, 16, "mnee")],
     },
@@ -155,14 +159,14 @@ def read(path: Path) -> np.ndarray:
 
 
 def reference(scene: str, folder: Path, program: Path, runs: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Mean X, Y, Z of the long runs, that mean's variance, and where the receiver is seen, a pixel off the glass."""
+    """Mean X, Y, Z of the long runs, that mean's variance, and where the receiver is seen, a pixel off all else."""
     for number in range(1, runs + 1):
         out = folder / f"reference_{number}.bin"
         if not out.exists():
             counts = [str(REFERENCE_PHOTONS[scene]), str(REFERENCE_SAMPLES), str(1000 + number)]
             subprocess.run([str(program), str(folder / "scene.bin"), str(out), *counts], check=True)
     pictures = np.array([read(path) for path in sorted(folder.glob("reference_*.bin"))])
-    shown = np.pad(pictures[0, ..., 3] == 1, 1, constant_values=True)
+    shown = np.pad(pictures[0, ..., 3] == 1, 1, constant_values=False)
     side = len(shown) - 2
     mask = np.all([shown[i : i + side, j : j + side] for i in range(3) for j in range(3)], axis=0)
     return pictures[..., :3].mean(axis=0), pictures[..., :3].var(axis=0, ddof=1) / len(pictures), mask

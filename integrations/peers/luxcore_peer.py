@@ -2,8 +2,8 @@
 
     python luxcore_peer.py FOLDER OUT.npy WAVELENGTHS SAMPLES_A_PIXEL [ENGINE]
 
-ENGINE: `BIDIRCPU` (bidirectional) or `HYBRID` (path tracing whose caustics come from light tracing). LuxCore's own
-dispersion is Cauchy's formula; the colours that it gives single wavelengths are its own, not those of the CIE observer.
+ENGINE: `BIDIRCPU`, bidirectional path tracing. LuxCore's own dispersion is Cauchy's formula; the colours that it gives
+single wavelengths are its own, not those of the CIE observer.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ import numpy as np
 import pyluxcore
 
 MAX_DEPTH = 66
-RGB_TO_XYZ = np.array([[0.41239, 0.35758, 0.18048], [0.21264, 0.71517, 0.07219], [0.01933, 0.11919, 0.95053]])
 
 
 def scene_of(scene: dict, glass: bool = True) -> dict[str, object]:
@@ -74,22 +73,14 @@ def properties(values: dict[str, object]) -> pyluxcore.Properties:
 
 
 def config_of(scene: dict, engine: str, samples: int, seed: int) -> dict[str, object]:
-    """Settings of one rendering; sampler and eye share are those that had the least error."""
-    depth = {"path.pathdepth.total": MAX_DEPTH, "path.pathdepth.diffuse": 2, "path.pathdepth.glossy": MAX_DEPTH}
-    engines: dict[str, dict[str, object]] = {
-        "BIDIRCPU": {"path.maxdepth": MAX_DEPTH, "light.maxdepth": MAX_DEPTH, "sampler.type": "RANDOM"},
-        "HYBRID": depth
-        | {
-            "path.pathdepth.specular": MAX_DEPTH,
-            "sampler.type": "SOBOL",
-            "path.hybridbackforward.enable": True,
-            "path.hybridbackforward.partition": 0.2,
-        },
-    }
+    """Settings of one rendering."""
     width, height = scene["size"]
-    return engines[engine] | {
-        "renderengine.type": "PATHCPU" if engine == "HYBRID" else engine,
+    return {
+        "renderengine.type": engine,
         "renderengine.seed": seed + 1,
+        "sampler.type": "RANDOM",
+        "path.maxdepth": MAX_DEPTH,
+        "light.maxdepth": MAX_DEPTH,
         "path.russianroulette.depth": MAX_DEPTH,
         "light.russianroulette.depth": MAX_DEPTH,
         "path.clamping.variance.maxvalue": 0.0,
@@ -135,7 +126,7 @@ def render(
     width, height = scene["size"]
     picture = np.zeros((height, width, 3), dtype=np.float32)
     film.GetOutputFloat(pyluxcore.FilmOutputType.RGB, picture, 0)
-    return picture[::-1].astype(float)
+    return np.roll(picture[::-1], -1, axis=0).astype(float)  # its pictures lie one row below everybody else's
 
 
 def glass_of(n: float, b: float = 0.0) -> dict[str, object]:
@@ -167,7 +158,7 @@ def main() -> None:
     else:
         rgb = render(scene, built, glass_of(*scene["cauchy"]), engine, samples, 0)
         white = 683.002 * np.sum(scene["cmf"], axis=0)
-        picture = scene["lamp"]["strength"] * (rgb @ RGB_TO_XYZ.T) / RGB_TO_XYZ.sum(axis=1) * white
+        picture = scene["lamp"]["strength"] * (rgb @ neutral.RGB_TO_XYZ.T) / neutral.RGB_TO_XYZ.sum(axis=1) * white
     np.save(out, picture.astype(np.float32))
     sys.stdout.flush()
     os._exit(0)  # what LuxCore 2.11 does at a process's end crashes

@@ -15,8 +15,6 @@ from pathlib import Path
 import neutral
 import numpy as np
 
-RGB_TO_XYZ = np.array([[0.41239, 0.35758, 0.18048], [0.21264, 0.71517, 0.07219], [0.01933, 0.11919, 0.95053]])
-
 
 def numbers(values: object) -> str:
     """A list of pbrt's."""
@@ -83,7 +81,7 @@ def main() -> None:
     _, size, order, pixels = film.read_bytes().split(b"\n", 3)
     width, height = map(int, size.split())
     rgb = np.frombuffer(pixels, dtype="<f4" if float(order) < 0 else ">f4").reshape(height, width, 3)[::-1]
-    np.save(out, (683.002 * (rgb @ RGB_TO_XYZ.T)).astype(np.float32))
+    np.save(out, (683.002 * (rgb @ neutral.RGB_TO_XYZ.T)).astype(np.float32))
 
 
 if __name__ == "__main__":
