@@ -232,8 +232,11 @@ def strip(scene: str, out: Path, rows: list[dict[str, Any]], truth: np.ndarray) 
 
 
 def sooner(ours: list[dict[str, Any]], theirs: list[dict[str, Any]], metric: str) -> str:
-    """How many times sooner the first has the error that the second ends with, along its curve in log and log."""
+    """How many times sooner the first has the error that the second ends with, along its curve; "–" where the
+    second lacks a tenth of the light."""
     end = theirs[-1]
+    if end["light"] < 0.9:
+        return "–"
     curve = sorted((row["seconds"], row[metric]) for row in ours)
     seconds, values = np.log([s for s, _ in curve]), np.log([max(v, 1e-12) for _, v in curve])
     goal = np.log(max(end[metric], 1e-12))
@@ -257,7 +260,7 @@ def table(results: list[dict[str, Any]]) -> str:
         for peer in LADDERS:
             rows = sorted((r for r in done if (r["scene"], r["peer"]) == (scene, peer)), key=lambda r: r["rung"])
             if rows:
-                cells = "; ".join(f"{r['seconds']:.1f}: {r['nrmse']:.3f}, {r['relmse']:.2g}" for r in rows)
+                cells = "; ".join(f"{r['seconds']:.1f}: {r['nrmse']:.3g}, {r['relmse']:.2g}" for r in rows)
                 ratio = ", ".join(sooner(mine, rows, m) for m in ("nrmse", "relmse")) if mine and peer != "srd" else ""
                 lines.append(f"| `{scene}` | `{peer}` | {cells} | {rows[-1]['light']:.3f} | {ratio} |")
     return "\n".join(lines) + "\n"
