@@ -18,6 +18,7 @@ SCHOTT = {  # n of the lines, from the catalogue's data sheets (five decimals)
     "F2": (1.61503, 1.62004, 1.63208, 1.64202),
     "N-SF11": (1.77596, 1.78472, 1.80651, 1.82533),
 }
+# cos² i = (n² − 1) / k (k + 2), with the indices of water that Daimon and Masumura measured (2007).
 RAINBOWS_DEG = {
     "first, red": (700.0, 42.4),
     "first, violet": (400.0, 40.6),
@@ -85,7 +86,7 @@ def main() -> None:
             expected = 2 * np.degrees(np.arcsin(n * np.sin(half))) - APEX_DEG
             index = np.sin(np.radians(found) / 2 + half) / np.sin(half)
             print(f"| {glass} | {line} | {n:.5f} | {expected:.3f}° | {found:.3f}° | {index:.5f} |")
-    print("\n| rainbow | wavelength | angle, published | photons pile up at |\n| --- | --- | --- | --- |")
+    print("\n| rainbow | wavelength | by Descartes' formula | photons pile up at |\n| --- | --- | --- | --- |")
     for name, (nm, angle) in RAINBOWS_DEG.items():
         print(f"| {name} | {nm:.0f} nm | {angle:.1f}° | {bow_deg(nm, angle - 2, angle + 2, 400_000):.2f}° |")
 
