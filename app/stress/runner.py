@@ -26,7 +26,7 @@ Keep = Callable[[StressResult], None]
 FILES = (
     *("optics", "materials", "crystals", "caustics", "chains", "meshes", "splats"),
     *("camera_surfaces", "camera_solids", "camera_lights"),
-    *("contacts", "lights", "losses", "crowds", "scenes"),
+    *("films", "contacts", "lights", "losses", "crowds", "scenes"),
 )
 """Files of `cases`, in the order of the report: light, then the camera, then whole scenes."""
 
