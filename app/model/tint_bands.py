@@ -17,7 +17,7 @@ from .materials import Grating
 from .optics.colorimetry import VISIBLE_NM, cmf_xyz, mirror_reflectance
 from .optics.spectral_tables import SpectralAxis
 from .optics.spectrum import Spectrum
-from .scene import Scene, SceneObject
+from .scene import Polariser, Scene, SceneObject
 
 TOLERANCE = 0.01
 """Share of the light that straight weights may miss or put elsewhere, root mean square over the spectrum; and what they
@@ -46,8 +46,8 @@ _WIDER = 1.0 + 1e-9
 
 
 def tint_curves(scene: Scene, but: np.ndarray | None = None) -> np.ndarray:
-    """(N, 401): what gets through each glass that absorbs, or is left by each mirror or film, on `VISIBLE_NM`; none
-    twice. `but`: coefficient (401,) of a glass that is left out."""
+    """(N, 401): what gets through each glass that absorbs or wave plate, or is left by each mirror or film, on
+    `VISIBLE_NM`; none twice. `but`: coefficient (401,) of a glass that is left out."""
     curves = {curve.round(6).tobytes(): curve for curve in film_curves(scene) if np.ptp(curve) > _LEAST_RIPPLE}
     for item in scene.objects:
         material = item.material
@@ -64,6 +64,9 @@ def tint_curves(scene: Scene, but: np.ndarray | None = None) -> np.ndarray:
             found += [share for light in _ONTO_GRATINGS for share in material.shares(VISIBLE_NM, np.array(light))]
         if material.is_mirror:
             found += [mirror_reflectance(material.reflectance_rgb, VISIBLE_NM) ** times for times in _MIRRORS]
+        if isinstance(material, Polariser):
+            # What of it a second polariser lets through.
+            found.append(0.5 + 0.5 * np.cos(2.0 * np.pi * material.retardance_nm / VISIBLE_NM))
         if material.filters:
             found += [material.surface_filter**times for times in _MIRRORS]
         curves |= {curve.round(6).tobytes(): curve for curve in found if np.ptp(curve) > TOLERANCE}

@@ -3,18 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from spectrasplat.gpu.context import Context
+from spectrasplat.edit.live_inputs import LiveInputs
+from spectrasplat.gpu import device_traits
+from spectrasplat.gpu.context import Context, create_context
+from spectrasplat.gpu.device_traits import DeviceTraits
 from spectrasplat.model.geometry.primitives import box, plane
 from spectrasplat.model.geometry.primitives_gem import brilliant
+from spectrasplat.model.optics import crystals
+from spectrasplat.model.optics.colorimetry import VISIBLE_NM
 from spectrasplat.model.optics.glass import Dispersion, cauchy, constant
-from spectrasplat.model.scene import Dielectric, Polariser, SceneObject
+from spectrasplat.model.scene import Camera, Dielectric, Polariser, Scene, SceneObject
+from spectrasplat.model.settings import RenderSettings
 from spectrasplat.reference.optics import unit
+from spectrasplat.render.still import render
+from spectrasplat.render.viewer.dirty_level import DirtyLevel
+from spectrasplat.render.viewer.invalidation import dirty_level, shown_glasses
+from spectrasplat.stress.rigs.camera_probe import (
+    FEW,
+    daylight_mean,
+    render_probe,
+    white_furnace,
+)
 from spectrasplat.stress.rigs.gpu_paths import Photons, extruded, placed, screen, trace_beam
 
 from tests.gpu.camera_rig import at
+from tests.gpu.test_thin_films import LUX, patch
 
 DOWN = np.array([0.0, 0.0, -1.0])
 N_O, N_E = 1.6584, 1.4864
@@ -56,6 +73,12 @@ def test_a_rhomb_doubles_an_image(gl: Context) -> None:
     assert np.abs(places - [[0.0, 0.0], [0.5 * aside, 0.0]]).max() < 2e-6
     along = np.sqrt(1.0 / (np.sin(angle) ** 2 / N_E**2 + np.cos(angle) ** 2 / N_O**2))
     assert powers == pytest.approx([0.5 * (4.0 * n / (n + 1.0) ** 2) ** 2 for n in (N_O, along)], rel=2e-5)
+
+
+def test_a_pool_of_rays_doubles_it_as_well() -> None:
+    """As a GPU follows rays: packed, in slots of their own."""
+    with device_traits.assumed(DeviceTraits(splats_by_compute=True)), create_context() as context:
+        test_a_rhomb_doubles_an_image(context)
 
 
 def halves(first: Sequence[float], second: Sequence[float], angle: float) -> list[SceneObject]:
@@ -145,15 +168,13 @@ def test_next_to_no_birefringence_is_glass(gl: Context) -> None:
 
 @pytest.mark.parametrize("method", ["srd", "srd-lambda"])
 def test_columns_follow_both_indices(gl: Context, method: str) -> None:
-    """d(landing)/dλ by two columns, n_o's and n_e's, and by the shared one, against landings of other wavelengths;
-    spatial columns against neighbours. Askew, with total reflection inside."""
+    """d(landing)/dλ by two columns, n_o's and n_e's, and by the shared one, against landings of other wavelengths."""
     n_o, n_e = cauchy([1.62, 0.012]), cauchy([1.46, 0.006])
     block = placed("block", box((3.0, 3.0, 0.5)), crystal((0.4, 0.3, 0.8), n_o, n_e))
     direction = unit(np.array([0.5, 0.2, -1.0]))
 
-    def landed(nm: float, off: float = 0.0) -> Photons:
-        start = -0.6 * direction + np.array([off, 0.0, 0.0])
-        found = shone(gl, [block], nm, start=start, direction=direction, method=method, max_depth=4)
+    def landed(nm: float) -> Photons:
+        found = shone(gl, [block], nm, start=-0.6 * direction, direction=direction, method=method, max_depth=4)
         order = np.lexsort((found.records["photon_id"], found.records["branch_key"]))
         return found.where(order)
 
@@ -168,3 +189,53 @@ def test_columns_follow_both_indices(gl: Context, method: str) -> None:
     wanted = high.position - low.position
     assert np.abs(wanted).max() > 5e-4
     assert np.abs(slope - wanted).max() < 1e-5
+
+
+CALCITE = crystals.find_crystal("calcite", "here")
+AWAY = Camera((0.6, 0.7, 4.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), vertical_fov_deg=14.0)
+UPRIGHT = Camera((0.0, 0.0, 4.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), "orthographic", vertical_extent=0.05)
+
+
+def test_a_stone_of_calcite_is_not_seen_in_a_furnace(gl: Context) -> None:
+    """Camera paths: whatever a facet does to them, their shares are one."""
+    stone = placed("stone", brilliant(), crystal((0.6, 0.0, 0.8), CALCITE.ordinary, CALCITE.extraordinary))
+    assert render_probe(gl, white_furnace(stone, camera=AWAY), FEW).mean == pytest.approx(1.0, abs=2e-3)
+
+
+@pytest.mark.parametrize("retardance_nm", [None, 280.0])
+def test_sheets_before_white(gl: Context, retardance_nm: float | None) -> None:
+    """Crossed polarisers with a third between at 30°, or a wave plate: seen by the camera, and as the sun's light lies
+    behind them."""
+    turn = np.radians(30.0)
+    passed = np.full(401, 0.5 * np.cos(turn) ** 2 * np.sin(turn) ** 2)
+    between = sheet(2.0, 30.0)
+    if retardance_nm is not None:
+        passed = 0.5 * np.sin(2.0 * turn) ** 2 * np.sin(np.pi * retardance_nm / VISIBLE_NM) ** 2
+        between = sheet(2.0, 30.0, crossed_transmittance=1.0, retardance_nm=retardance_nm)
+    sheets, expected = (sheet(2.5, 0.0), between, sheet(1.5, 90.0)), daylight_mean(passed)
+    seen = render_probe(gl, white_furnace(*sheets, camera=UPRIGHT), FEW).mean
+    assert seen == pytest.approx(expected, rel=0.01, abs=2e-3)
+    lit = patch(between)
+    lit = replace(lit, objects=(lit.objects[0], *sheets))
+    floor = render(lit, RenderSettings(8, 8, photons=20_000, spp=16), context=gl).rgb.mean(axis=(0, 1))
+    assert floor == pytest.approx(LUX * 0.5 / np.pi * expected, rel=0.015, abs=2e-3 * LUX / np.pi)
+
+
+def test_what_edits_of_a_crystal_cost() -> None:
+    """In the viewer photons follow both indices where n_d stays; for another axis they are traced anew, and glass takes
+    other programs."""
+    material = crystal((0.4, 0.3, 0.8), cauchy([1.62, 0.012]), cauchy([1.46, 0.006]))
+    scene = patch(placed("block", box((1.0, 1.0, 0.2)), material))
+
+    def edited(other: Dielectric) -> Scene:
+        return replace(scene, objects=(scene.objects[0], replace(scene.objects[1], material=other)))
+
+    def cost(other: Dielectric) -> DirtyLevel:
+        old, new = (LiveInputs(s, s.camera, 64, 36) for s in (scene, edited(other)))
+        return dirty_level(old, old, new)
+
+    gained = material.with_gain(1.5)
+    assert cost(gained) == DirtyLevel.SPLAT
+    assert shown_glasses(scene, edited(gained)) == dict(zip(material.dispersions, gained.dispersions, strict=True))
+    assert cost(material.changed(axis=(1.0, 0.0, 0.0))) == DirtyLevel.TRACE
+    assert cost(material.changed(extraordinary=None)) == DirtyLevel.BUILD

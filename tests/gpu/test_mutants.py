@@ -56,6 +56,24 @@ MUTANTS = {
         "splat.ripple = vec4(0.0);",
         "gpu/test_emission_lattice.py::test_splats_about_a_lattice_add_up_to_an_even_plane[0]",
     ),
+    "an extraordinary wave that forgets what it is": Mutant(
+        "path/crystal.glsl",
+        "path.extraordinary = uint(in_crystal && extraordinary);",
+        "path.extraordinary = 0u;",
+        "gpu/test_crystals.py::test_a_rhomb_doubles_an_image",
+    ),
+    "the extraordinary wave on the other side of the ordinary one": Mutant(
+        "lib/crystal.glsl",
+        "float c = -length2 * ellipticity,",
+        "float c = length2 * ellipticity,",
+        "gpu/test_glsl_reference_crystal.py::test_shares_are_those_of_the_continuous_fields[in]",
+    ),
+    "a wave plate that is late along its axis": Mutant(
+        "path/polariser.glsl",
+        "joint * cos(phase), -joint * sin(phase)",
+        "joint * sin(phase), -joint * cos(phase)",
+        "gpu/test_crystals.py::test_a_wave_plate_between_polarisers[147.25-45.0]",
+    ),
     "what is refracted was reflected as well": Mutant(
         "light/trace_scatter.glsl",
         "send_on(child, event, let_through,",

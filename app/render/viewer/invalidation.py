@@ -167,9 +167,10 @@ def _object(old: SceneObject, new: SceneObject) -> DirtyLevel:
         )
         if not same_absorption:
             return DirtyLevel.BUILD if (a.absorption is None) != (b.absorption is None) else max(cost, DirtyLevel.TRACE)
-        if (a.is_rough, a.thin, a.transmittance_rgb) != (b.is_rough, b.thin, b.transmittance_rgb):
+        kinds = [(m.is_rough, m.thin, m.transmittance_rgb, m.is_crystal) for m in (a, b)]
+        if kinds[0] != kinds[1]:
             return DirtyLevel.BUILD
-        same = a.priority == b.priority and a.microfacet_width == b.microfacet_width
+        same = a.priority == b.priority and a.microfacet_width == b.microfacet_width and a.axis == b.axis
         return cost if same else max(cost, DirtyLevel.TRACE)
     if a == b:
         return cost
@@ -178,9 +179,10 @@ def _object(old: SceneObject, new: SceneObject) -> DirtyLevel:
 
 def _glasses(old: Scene, new: Scene) -> DirtyLevel:
     pairs = [
-        (a.material.dispersion, b.material.dispersion)
+        pair
         for a, b in zip(old.objects, new.objects, strict=True)
         if a.material.transmits and b.material.transmits
+        for pair in zip(a.material.dispersions, b.material.dispersions, strict=False)
     ]
     if all(a == b for a, b in pairs):
         return DirtyLevel.NOTHING
@@ -210,11 +212,13 @@ def shown_glasses(traced: Scene, shown: Scene) -> Mapping[Dispersion, Dispersion
     for a, b in zip(traced.objects, shown.objects, strict=True):
         if not (a.material.transmits and b.material.transmits):
             continue
-        before, after = a.material.dispersion, b.material.dispersion
-        if found.setdefault(before, after) != after:
+        if a.material.is_crystal != b.material.is_crystal:
             return None
-        if before != after and (abs(before.n_d - after.n_d) > SAME_INDEX or not before.is_dispersive):
-            return None
+        for before, after in zip(a.material.dispersions, b.material.dispersions, strict=True):
+            if found.setdefault(before, after) != after:
+                return None
+            if before != after and (abs(before.n_d - after.n_d) > SAME_INDEX or not before.is_dispersive):
+                return None
     return found
 
 
@@ -258,5 +262,5 @@ def _material_differs(old: Material, new: Material) -> bool:
         return False
     if old.transmits and new.transmits:
         # For all else of a glass light is traced anew before the camera sees it.
-        return old.dispersion != new.dispersion
+        return old.dispersions != new.dispersions
     return True
