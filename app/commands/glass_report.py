@@ -15,6 +15,7 @@ import numpy as np
 from ..base.atomic import atomic_output
 from ..base.errors import UserError
 from ..model.optics.catalogue import Entry, entries, is_guess, search
+from ..model.optics.crystals import crystals
 from ..model.optics.glass import LINE_C_NM, LINE_D_NM, LINE_F_NM
 from .printing import table
 
@@ -47,6 +48,7 @@ def describe(entry: Entry) -> str:
     """Everything known of one glass, several lines of plain text."""
     glass = entry.dispersion
     n_f, n_c = float(glass.index(LINE_F_NM)), float(glass.index(LINE_C_NM))
+    crystal = next((each for each in crystals().values() if each.ordinary == glass), None)
     lines = [entry.qualified_name]
     facts = {
         "maker": entry.maker if entry.maker != "Materials" else "",
@@ -59,6 +61,7 @@ def describe(entry: Entry) -> str:
         f"n_C  {LINE_C_NM:.2f} nm": f"{n_c:.6f}",
         "n_F - n_C": f"{n_f - n_c:.6f}",
         "V_d": _abbe(glass.V_d, digits=3),
+        "as a crystal": f'crystal = "{crystal.substance}", n_e {crystal.extraordinary.n_d:.6f} at d' if crystal else "",
         "dn/dλ at d": f"{float(glass.derivative(LINE_D_NM)):.6f} per µm",
         "source": entry.source,
         "licence": entry.licence,

@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 from spectrasplat.base.errors import UserError
+from spectrasplat.commands.glass_report import describe
 from spectrasplat.edit.glass import set_dispersion, set_dispersion_gain
 from spectrasplat.edit.parameters import paths
 from spectrasplat.model.geometry.primitives import box, plane
 from spectrasplat.model.io.scene_table import SceneTable
 from spectrasplat.model.lights import PointLight
 from spectrasplat.model.materials.material_file import read_material
-from spectrasplat.model.optics.catalogue import find
+from spectrasplat.model.optics.catalogue import find, find_entry
 from spectrasplat.model.optics.crystals import crystals, find_crystal
 from spectrasplat.model.optics.spectrum import illuminant
 from spectrasplat.model.scene import (
@@ -66,6 +67,11 @@ def test_a_crystal_has_all_names_of_its_substance() -> None:
     for one, other in (("Ruby", "sapphire"), ("emerald", "beryl"), ("citrine", "quartz"), ("TiO2", "rutile")):
         assert find_crystal(one).extraordinary == find_crystal(other).extraordinary
     assert all(crystal.ordinary != crystal.extraordinary for crystal in crystals().values())
+
+
+def test_the_glass_command_says_what_is_a_crystal() -> None:
+    assert 'crystal = "beryl", n_e 1.577' in describe(find_entry("emerald"))
+    assert "crystal" not in describe(find_entry("N-BK7"))
 
 
 @pytest.mark.parametrize(
