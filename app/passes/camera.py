@@ -15,6 +15,7 @@ from contextlib import contextmanager
 import moderngl
 import numpy as np
 
+from ..features.program_switches import switched
 from ..gpu import shader
 from ..gpu.context import Context
 from ..gpu.dispatch_budget import DispatchBudget
@@ -24,7 +25,7 @@ from ..gpu.schema import Struct
 from ..gpu.texture_store import TextureStore
 from ..model.scene import Camera
 from .camera_inputs import CameraInputs
-from .camera_programs import CameraPrograms, camera_defines, halting_defines, lens_defines, waiting_bytes
+from .camera_programs import CameraPrograms, camera_defines, waiting_bytes
 from .camera_records import camera_parameters
 from .caustic_maps import CausticMaps
 from .haze import Haze
@@ -115,9 +116,8 @@ class CameraPass:
         self.follows = "CAMERA_SPECULAR" in shown
         """Some paths go on beyond glass or mirrors."""
         if self.follows and context.traits.is_software:
-            shown = halting_defines(shown)
-        # A viewer may open the lens later.
-        self.listed = ListedPixels(self._ctx, context.traits, waiting_bytes(lens_defines(shown)) if self.follows else 0)
+            shown |= switched(HALTS=True)
+        self.listed = ListedPixels(self._ctx, context.traits, waiting_bytes(shown) if self.follows else 0)
         self._programs = CameraPrograms(self._ctx, shown, self._inputs.structs, features.lens)
         self._haze = Haze(context, scene, self.channels) if features.haze and layer == "beauty" else None
         self._is_hazy = False

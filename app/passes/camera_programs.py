@@ -31,10 +31,12 @@ ENDS_HELD = 8
 """Ends of a sample's paths that are evaluated together."""
 CUT_THRESHOLD = 0.004
 """Share of a sample's power above which both parts of a cut band are followed."""
+ROULETTE_WEIGHT = 0.05
+"""Share of a sample's power below which a path of one wavelength goes on by chance only."""
 HALT_ROUNDS = 5000
 """Rounds of its loops after which a sample halts on a software renderer (camera/waiting.glsl). Eight side by side that
 have nothing in common then take 40,000 of the driver's 65,535, and what is left is for the surface they are at and the
-ends of paths they hold."""
+ends of paths they hold. Those of one wavelength, which vary most in length, find others as long after a third."""
 TINT_STEPS = 48
 """Stretches that the whole spectrum is cut into behind coloured glass."""
 
@@ -115,6 +117,8 @@ def camera_defines(scene: SceneBuffers, channels: Channels, layer: str, maps: Ma
             "MAX_EVENTS": MAX_EVENTS if specular else 1,
             "STACK": STACK,
             "CUT_THRESHOLD": CUT_THRESHOLD,
+            "ROULETTE_WEIGHT": ROULETTE_WEIGHT,
+            "HALT_ROUNDS": HALT_ROUNDS,
             "ENDS_HELD": ENDS_HELD,
         }
         | switched(
@@ -148,19 +152,9 @@ def single_defines(beyond: Defines) -> Defines:
     }
 
 
-def halting_defines(beyond: Defines) -> Defines:
-    """Defines for listed pixels whose samples halt when their loops have run long."""
-    return beyond | switched(HALTS=True) | {"HALT_ROUNDS": HALT_ROUNDS}
-
-
-def lens_defines(shown: Defines) -> Defines:
-    """Defines for a camera with a lens."""
-    return shown | switched(LENS=True)
-
-
 def waiting_bytes(beyond: Defines) -> int:
-    """Room that surely holds what a sample lets wait: its paths, their ends, and what it knows besides."""
-    columns = int(beyond["SPECTRAL_GROUPS"]) + 2 * int("LENS" in beyond)
+    """Room that surely holds what a sample lets wait, also with a lens: its paths, their ends, the rest."""
+    columns = int(beyond["SPECTRAL_GROUPS"]) + 2
     path = 312 + 40 * columns + 4 * int(beyond.get("ABSORBERS", 0)) + 64 * int("POLARISED" in beyond)
     path += 16 * int("COATS" in beyond) + 48 * int("HAS_FILM" in beyond)
     ends = 0 if "HALTS" in beyond else ENDS_HELD * (path + 64)
@@ -193,7 +187,7 @@ class CameraPrograms:
         """One of `_VARIANTS`."""
         key = variant, self.has_lens
         if key not in self._compiled:
-            shown = lens_defines(self.defines) if self.has_lens else self.defines
+            shown = self.defines | switched(LENS=self.has_lens)
             variants = _VARIANTS[variant](shown)
             file = variant if variant in ("kept", "even") else "camera"
             self._compiled[key] = shader.compute(self._ctx, f"camera/{file}.comp", variants, self.structs)

@@ -52,12 +52,6 @@ Path camera_path(uvec2 pixel, uint primary_sample, float gain) {
     return path_from(pixel, look_place, gain);
 }
 
-// What a camera ray meets that nothing specular is in the way of.
-void see_directly(Path path, bool met, Hit hit, uint kind, uint pixel_key) {
-    if (LAYER_BEAUTY && VISIBLE_LIGHTS) add_lights(path, met ? hit.distance : FAR_DISTANCE);
-    if (!met || kind == KIND_DIFFUSE) add_end(path, met, hit, true, pixel_key);
-}
-
 void begin_sample(uvec2 pixel) {
     if (RGB_CHANNELS) {
         turn = p.counts_turns != 0u ? uint(imageLoad(picture[0], ivec2(pixel)).w) : p.sample_index;
@@ -107,7 +101,8 @@ void see_pixel() {
             draw = hash_pcg(draw);
             if (unit_float(draw) * float(specular_samples) < 1.0) chosen = k;
         }
-        if (!is_specular(kind)) see_directly(path, met, hit, kind, pixel_key);
+        if (LAYER_BEAUTY && VISIBLE_LIGHTS && !is_specular(kind)) add_lights(path, met ? hit.distance : FAR_DISTANCE);
+        if (!met || kind == KIND_DIFFUSE) add_end(path, met, hit, true, pixel_key);
         if (p.survey == SURVEY_TAKES) survey_look(survey, k, sees, met, hit, lights_seen);
     }
     if (p.survey == SURVEY_TAKES) {
@@ -180,11 +175,11 @@ void follow(uint entry, bool resumes) {
                 goes_on = specular && !leaves;
                 if (COATS) goes_on = goes_on || (coated && !event_limit_reached && path.depth < uint(MAX_DEPTH));
                 if (goes_on) meet_surface(path, hit, kind, pixel_key);
-                if (HAS_GRATING || COATS || ROUGH_SURFACES || HAS_CRYSTAL || HAS_POLARISER)
+                if (HAS_GRATING || COATS || ROUGH_SURFACES || HAS_CRYSTAL || HAS_POLARISER || RANDOM_WAVELENGTH)
                     goes_on = goes_on && path.walk.inverse_pdf > 0.0;
             }
             if (SPECTRAL_SWEEP && cut_at >= 0.0) cut_band(path, cut_at, pixel_key);
-            if (HALTS) halts = rounds >= uint(HALT_ROUNDS);
+            if (HALTS) halts = rounds >= uint(RANDOM_WAVELENGTH ? HALT_ROUNDS / 3 : HALT_ROUNDS);
         }
         if (goes_on) push(path);
         for (int e = 0; e < found; ++e)

@@ -68,6 +68,15 @@ void leave_film_share(inout Path path, Event event, bool reflects) {
 }
 #endif
 
+// Ends a weak path by chance; one that goes on stands for those that have ended.
+void play_roulette(inout Path path, uint pixel_key) {
+    float likely = path.walk.branch_weight / ROULETTE_WEIGHT;
+    uint key = hash_combine(pixel_key, path.walk.key + path.depth * 2654435769u);
+    if (likely >= 1.0) return;
+    path.walk.inverse_pdf *= unit_float(hash_combine(key, p.sample_index)) < likely ? 1.0 / likely : 0.0;
+    path.walk.branch_weight = ROULETTE_WEIGHT;
+}
+
 // One glass surface: `path` goes on, the other part is put on the stack or, if weak, one of them is chosen.
 void cross_glass(inout Path path, Path whole, Hit hit, uint kind, Event event, uint pixel_key) {
     bool entering = dot(whole.direction, hit.normal_g) < 0.0, geometric;
@@ -139,6 +148,7 @@ void cross_glass(inout Path path, Path whole, Hit hit, uint kind, Event event, u
         }
 #endif
         send_on(mirrored, mirror, mirror.reflectance, unhidden);
+        if (RANDOM_WAVELENGTH) play_roulette(mirrored, pixel_key);
         if (mirrored.walk.inverse_pdf > 0.0) push(mirrored);
     }
     vec3 share = total ? vec3(1.0) : let_through, reflected = event.reflectance;
@@ -166,6 +176,7 @@ void cross_glass(inout Path path, Path whole, Hit hit, uint kind, Event event, u
         }
     }
     send_on(path, event, share, unhidden);
+    if (RANDOM_WAVELENGTH) play_roulette(path, pixel_key);
     leave_surface(path, hit, reflects != entering);
 }
 

@@ -31,7 +31,7 @@ from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes import gathered_light
-from spectrasplat.passes.camera_programs import camera_defines, direct_defines, lens_defines
+from spectrasplat.passes.camera_programs import camera_defines, direct_defines
 from spectrasplat.passes.camera_records import CAMERA_LIGHT, CAMERA_PARAMETERS
 from spectrasplat.passes.environment_places import PLACE
 from spectrasplat.passes.footprint import SPLAT
@@ -100,7 +100,7 @@ def camera_sources(features: Features, images: dict[str, int] | None = None) -> 
     maps = MapChannels(tents_nm=(550.0,) * features.map_tents)
     shown = camera_defines(cast(Any, buffers), Channels(), "beauty", maps)
     shown |= NUMBERS | switched(VISIBLE_LIGHTS=True) | (images or {})
-    shown = lens_defines(shown) if features.lens else shown
+    shown |= switched(LENS=features.lens)
     structs = (*SCENE_STRUCTS, CAMERA_LIGHT, CAMERA_PARAMETERS, records.RECEIVER, records.PLACEMENT)
     structs += (PICTURE,) if images else ()
     programs = [direct_defines(shown), *([shown] if features.camera_specular else [])]
