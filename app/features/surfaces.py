@@ -57,7 +57,7 @@ class SurfaceFeatures:
         symbol="HAS_FILM",
         why=lambda facts: f"on {names(facts.films)}",
         why_not="no surface has a film, and no mirror is of metal",
-        names=("film_mean", "meet_film", "light: share_by_film"),
+        names=("film_mean", "film_met", "film_over"),
         cost=lambda facts, sizes: (
             f"{size_words((ABOVE + 1) * sizes.spectrum)} and more a film; 16 lookups an event and lobe"
         ),
