@@ -164,7 +164,7 @@ Film film_met(Path path, Hit hit, Object thing, MediumInterface boundary) {
 // event.seen: over a band, or `single`, each by itself. `kind`: of the surface.
 void share_at(vec3 x, bool single, uint kind, inout Event event) {
     bool glass = HAS_DIELECTRIC && IS_GLASS(kind), solid = glass && !IS_THIN(event.boundary);
-    if (glass) {
+    if (HAS_DIELECTRIC && glass) {
         interface_indices(event.boundary, x, event.n_i, event.n_t);
         vec3 eta_it = event.n_i / event.n_t;
         event.cosine2 = transmitted_cosine2(event.theta, eta_it);
@@ -202,7 +202,7 @@ void share_at(vec3 x, bool single, uint kind, inout Event event) {
         }
     }
 #endif
-    if (glass) {
+    if (HAS_DIELECTRIC && glass) {
         GO_STRAIGHT(event.boundary, event.theta, event.n_i, event.n_t, event.cosine2)
     }
 }
@@ -262,11 +262,12 @@ Event interact(Path path, Hit hit, Triangle facet, Object thing, MicrofacetDraw 
     Event event = event_at(path, hit, facet);
     if (ROUGH_SURFACES && thing.kind == KIND_DIELECTRIC) meet_microfacet(path, thing, draw, event);
     bool glass = HAS_DIELECTRIC && IS_GLASS(thing.kind);
-    if (glass) event.boundary = cross_boundary(path.medium, hit.object, dot(path.direction, hit.normal_g) < 0.0);
+    if (HAS_DIELECTRIC && glass)
+        event.boundary = cross_boundary(path.medium, hit.object, dot(path.direction, hit.normal_g) < 0.0);
 #if HAS_FILM
     event.film = film_met(path, hit, thing, event.boundary);
 #endif
-    if (glass) {
+    if (HAS_DIELECTRIC && glass) {
         if (!(HAS_CRYSTAL && meets_crystal(event.boundary))) share_out(path, thing.kind, event);
     } else {
         if (POLARISED) see_polarised(path, event);

@@ -128,11 +128,11 @@ CASES = {
 }
 """Scene, method, normalised root mean square error of blocks, largest error of a bright one's colour.
 
-Bounds are 1.35 times (ball: 1.7) the root of the sum of three squares: of the reference's chance, by 20,000 directions against
-80,000 (0.017, tinted 0.014, ball 0.009); of that of 512 directions, against 2,048 (0.024, tinted 0.025, ball 0.016,
-single wavelengths 0.077); and of what is left at 2,048, of first derivatives and of edges as sharp as texels (0.023,
-0.019, 0.011, 0.025). Of the colour of 14 to 29 blocks' channels, four times the standard deviation of both (0.0065,
-0.0055, 0.002, 0.034)."""
+Bounds are 1.35 times (ball: 1.7) the root of the sum of three squares: of the reference's chance, by 20,000
+directions against 80,000 (0.017, tinted 0.014, ball 0.009); of that of 512 directions, against 2,048 (0.024, tinted
+0.025, ball 0.016, single wavelengths 0.077); and of what is left at 2,048, of first derivatives and of edges as sharp
+as texels (0.023, 0.019, 0.011, 0.025). Of the colour of 14 to 29 blocks' channels, four times the standard deviation of
+both (0.0065, 0.0055, 0.002, 0.034)."""
 
 
 @pytest.mark.parametrize("case", CASES)
