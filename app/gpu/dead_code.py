@@ -3,8 +3,8 @@
 "What a scene does not need is absent" is only worth saying of the text that is compiled. So
 conditionals are resolved here by the defines at hand, comments go, and of what is left only
 the macros, constants, structs, functions, global variables, bindings and blocks stay that `main` can reach, without
-the statements that constants decide (`glsl_folding`), and of a struct only the members that are mentioned. A library
-may then be written without guards, and a test can search for a symbol instead of trusting an #ifdef.
+the statements that constants decide (`glsl_folding`), and of a struct its first member and those that are mentioned. A
+library may then be written without guards, and a test can search for a symbol instead of trusting an #ifdef.
 (A full preprocessor, pcpp, does the first part only, expands every macro on the way, and takes 0.1 s a
 program; a dozen programs have to start within a second.)
 
@@ -228,10 +228,11 @@ def _whole_structs(structs: set[str], units: Sequence[Unit], statements: Sequenc
 
 
 def _struct_parts(name: str, indices: tuple[int, ...], units: Sequence[Unit], *, is_whole: bool) -> list[_Definition]:
-    """A struct, and apart from it its members (one a line), which stay where their names are used."""
+    """A struct with its first member, and apart from it the others (one a line), which stay where their names are
+    used."""
     lines = {index: "\n".join(line.text for line in units[index]) for index in indices}
     members = {i: frozenset(f".{m}" for m in _MEMBER.findall(lines[i])) for i in indices[1:-1] if not is_whole}
-    members = {i: names for i, names in members.items() if names}
+    members = dict([(i, names) for i, names in members.items() if names][1:])
     shell = [i for i in indices if i not in members]
     itself = _Definition(frozenset({name}), tuple(shell), _MEMBER_NAME.sub("", "\n".join(lines[i] for i in shell)))
     needed = frozenset({name})
