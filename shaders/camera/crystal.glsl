@@ -1,5 +1,5 @@
-// A camera path at a crystal and at a polariser, for camera/meet.glsl. Each lobe is a path of its own; if they are weak,
-// one is sampled for all.
+// A camera path at a crystal and at a polariser, for camera/meet.glsl. Each lobe is a path of its own; if they are
+// weak, one is sampled for all.
 
 #include "path/crystal.glsl"
 #if HAS_POLARISER

@@ -37,7 +37,8 @@ vec3 order_shares(GratingEvent met, uint k, Path path) {
 // How likely an order is chosen, in proportion: none that carries light at some wavelength is left out.
 float order_odds(GratingEvent met, uint k, Path path) {
     vec3 shares = order_shares(met, k, path);
-    if (GRATING_PROFILES && met.grating.profile != 0u) return dot(shares, vec3(0.25, 0.5, 0.25)) + 0.02 * order_at(met.row, k).efficiency;
+    if (GRATING_PROFILES && met.grating.profile != 0u)
+        return dot(shares, vec3(0.25, 0.5, 0.25)) + 0.02 * order_at(met.row, k).efficiency;
     return shares.y;
 }
 

@@ -60,8 +60,8 @@ bool normal_part(Uniaxial m, bool extraordinary, bool mirrored, vec3 wave, float
 
 // Derivatives of the ray that goes on with the wave vector `turned` = `wave` plus something along the normal, by those
 // of the incident wave vector and of the normal.
-vec3 turned_column(Uniaxial m, vec2 slopes, bool extraordinary, vec3 wave, vec3 dwave, vec3 turned, vec3 normal,
-    vec3 dnormal) {
+vec3 turned_column(
+    Uniaxial m, vec2 slopes, bool extraordinary, vec3 wave, vec3 dwave, vec3 turned, vec3 normal, vec3 dnormal) {
     vec3 energy = energy_of_wave(m, extraordinary, turned), dmatrix = vec3(0.0);
     float surface = m.n_o * slopes.x;
     if (extraordinary) {
@@ -104,8 +104,8 @@ vec2 power_between(Tangential a, Tangential b) {
 
 // From a complex vector `w` across wave and axis, whose parts are along the tangential part of the wave vector, s and
 // forwards: electric field, and the wave vector's product with it.
-Tangential unit_wave(vec2 w[3], float tangential, vec2 forward, vec2 along, float ellipticity, bool extraordinary,
-    bool passes) {
+Tangential unit_wave(
+    vec2 w[3], float tangential, vec2 forward, vec2 along, float ellipticity, bool extraordinary, bool passes) {
     vec2 product_t = -times(forward, w[1]), product_s = times(forward, w[0]) - tangential * w[2];
     vec2 e_t = w[0], e_s = w[1], h_t = product_t, h_s = product_s;
     if (extraordinary) {
@@ -132,8 +132,8 @@ WavePair waves(Uniaxial m, float tangential, float left, float side) {
     float across = 1.0 / (m.n_e * m.n_e), ellipticity = 1.0 / (m.n_o * m.n_o) - across;
     float a = across + ellipticity * axis.z * axis.z, b = ellipticity * tangential * axis.x * axis.z;
     vec2 forward = side * (left > 0.0 ? vec2(sqrt(left), 0.0) : vec2(0.0, sqrt(-left)));
-    vec2 w[3] = vec2[](
-        -axis.y * forward, axis.x * forward - vec2(tangential * axis.z, 0.0), vec2(tangential * axis.y, 0.0));
+    vec2 w[3] =
+        vec2[](-axis.y * forward, axis.x * forward - vec2(tangential * axis.z, 0.0), vec2(tangential * axis.y, 0.0));
     vec2 w_e[3], forward_e;
     bool passes_e;
     if (left > 0.0) {
@@ -190,8 +190,8 @@ void cross_interface(Uniaxial before, Uniaxial behind, float tangential, vec2 le
          in_eo = power_between(second, onward.ordinary), in_ee = power_between(second, onward.extraordinary);
     vec2 determinant = times(in_oo, in_ee) - times(in_oe, in_eo);
     vec2 inverse = conjugate(determinant) / max(dot(determinant, determinant), 1e-30);
-    vec2 through[4] = vec2[](
-        times(in_ee, inverse), -times(in_oe, inverse), -times(in_eo, inverse), times(in_oo, inverse));
+    vec2 through[4] =
+        vec2[](times(in_ee, inverse), -times(in_oe, inverse), -times(in_eo, inverse), times(in_oo, inverse));
     vec2 out_oo = -power_between(back.ordinary, onward.ordinary),
          out_oe = -power_between(back.ordinary, onward.extraordinary),
          out_eo = -power_between(back.extraordinary, onward.ordinary),

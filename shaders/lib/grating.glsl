@@ -25,9 +25,9 @@ bool is_reflective(Grating grating) { return grating.index == 0.0; }
 #define PROFILE_SINUSOIDAL 3u
 #define GROOVE_PI 3.14159265
 
-// What an order's share is a function of: the depth of the grooves in waves; of a sawtooth, the number of the order that
-// single facets would send light in. `light`: direction that light comes in, across the lines, along them and along the
-// outward normal, in a medium of index n; a wavelength in vacuum.
+// What an order's share is a function of: the depth of the grooves in waves; of a sawtooth, the number of the order
+// that single facets would send light in. `light`: direction that light comes in, across the lines, along them and
+// along the outward normal, in a medium of index n; a wavelength in vacuum.
 float groove_waves(Grating grating, vec3 light, float n, float wavelength_um) {
     vec3 k = n * light;
     float inner2 = grating.index * grating.index, inside = sqrt(max(inner2 - dot(k.xy, k.xy), 0.0));
@@ -57,8 +57,8 @@ float profile_share(Grating grating, GratingOrder order, uint number, float wave
     return blazed || fract(0.5 * m) != 0.0 ? share * share : 0.0;
 }
 
-// A number in [0, 1) for the place on a line: Kronecker sequences over paths, of the square roots of primes that no other
-// dimension uses. Deeper ones are hashed.
+// A number in [0, 1) for the place on a line: Kronecker sequences over paths, of the square roots of primes that no
+// other dimension uses. Deeper ones are hashed.
 float line_draw(uint i, uint depth, uint key) {
     const uint generators[4] = uint[](3479995859u, 796084093u, 1830299338u, 2336478295u);
     return kronecker(i, depth < 4u ? generators[depth] : hash_pcg(depth + 0x2545f491u) | 1u, hash_combine(key, depth));

@@ -1,6 +1,6 @@
-// A photon's path at a crystal, for `trace.comp`: its lobes leave one after the other, as a grating's orders do. `child`
-// is the first that there is of those yet to come, `rest` the path before its flight for the others. Whether `child`
-// lives.
+// A photon's path at a crystal, for `trace.comp`: its lobes leave one after the other, as a grating's orders do.
+// `child` is the first that there is of those yet to come, `rest` the path before its flight for the others. Whether
+// `child` lives.
 #include "path/crystal.glsl"
 
 bool part_in_crystal(Path path, Hit hit, Event event, uint filter_row, out Path child, inout Path rest,

@@ -28,7 +28,8 @@ vec3 left_by_orders(GratingEvent met, uint number, Path path, vec3 x, bool singl
     return max(left, 0.0);
 }
 
-// Shares of the light of a path that comes to the orders from `first` on: of order `number`, and what is left before it.
+// Shares of the light of a path that comes to the orders from `first` on: of order `number`, and what is left before
+// it.
 struct OrderShares {
     vec3 kept, own;
 };
@@ -80,8 +81,7 @@ bool diffract(Path path, Hit hit, Event event, uint row, out Path child, inout P
     if (found && HERO && GRATING_PROFILES)
         companions = shares_from(met, first, number, path, path.walk.companion_x.xyz, true);
     vec3 left = cut ? shares.kept : more ? max(shares.kept - shares.own, 0.0) : vec3(0.0);
-    vec3 left_companions =
-        cut ? companions.kept : more ? max(companions.kept - companions.own, 0.0) : vec3(0.0);
+    vec3 left_companions = cut ? companions.kept : more ? max(companions.kept - companions.own, 0.0) : vec3(0.0);
     float kept = share_of_power(path, left, left_companions), share = share_of_power(path, shares.own, companions.own);
     outcome.what |= ABSORBED;
     outcome.flux_w = carried_w(path) * max(1.0 - kept - (cut ? 0.0 : share), 0.0);

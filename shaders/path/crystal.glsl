@@ -135,8 +135,7 @@ CrystalEvent crystal_event(Path path, Event event) {
         before.axis = along_plane(before.axis, met.s[i], -normals[i]);
         behind.axis = along_plane(behind.axis, met.s[i], -normals[i]);
         if (!met.from_crystal) light = 0.5 * vec4(1.0 + seen.q[i], 1.0 - seen.q[i], seen.u[i], seen.v[i]);
-        cross_interface(
-            before, behind, length(waves[i] - ahead * normals[i]), left, light, met.back[i], met.onward[i]);
+        cross_interface(before, behind, length(waves[i] - ahead * normals[i]), left, light, met.back[i], met.onward[i]);
     }
     for (uint lobe = 0u; lobe < MOST_LOBES; ++lobe) {
         if (turn_wave(met, event, lobe, path.direction, met.normal, path.band.y).exists) continue;
@@ -168,8 +167,7 @@ void turn_crystal(inout Path path, Event event, CrystalEvent met, uint lobe, out
             slopes_before = uniaxial_slopes(before, uint(c - SPATIAL), path.band.y);
             slopes_behind = uniaxial_slopes(behind, uint(c - SPATIAL), path.band.y);
         }
-        vec3 dwave =
-            wave_column(wave.before, slopes_before, met.is_extraordinary, path.direction, path.ddirection[c]);
+        vec3 dwave = wave_column(wave.before, slopes_before, met.is_extraordinary, path.direction, path.ddirection[c]);
         path.ddirection[c] = turned_column(wave.behind, slopes_behind, extraordinary, wave.incident, dwave, wave.turned,
             wave.normal, geometric ? vec3(0.0) : NORMAL_COLUMN(event, c));
     }

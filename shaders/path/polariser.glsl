@@ -16,8 +16,8 @@ vec3 pass_polariser(inout Path path, Crystal sheet) {
     vec3 phase = vec3(0.0);
     if (sheet.retardance_um != 0.0) {
         for (int i = 0; i < 3; ++i)
-            phase[i] = 6.28318530718 * sheet.retardance_um
-                / spectral_row(uint(INDEX_ROW) + sheet.extraordinary, path.band[i]);
+            phase[i] =
+                6.28318530718 * sheet.retardance_um / spectral_row(uint(INDEX_ROW) + sheet.extraordinary, path.band[i]);
     }
     float step = max(abs(phase.x - phase.y), abs(phase.z - phase.y)),
           joint = sqrt(sheet.passed_along * sheet.passed_across) * (1.0 - smoothstep(FRINGE_FADES, FRINGE_GONE, step));
