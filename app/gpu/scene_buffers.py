@@ -290,7 +290,7 @@ class SceneBuffers:
             if material.receives:
                 record["receiver"] = self.receivers.index(index)
             size = UNBOUNDED
-            if material.is_specular and (material.is_rough or not item.mesh.is_faceted):
+            if material.is_specular and (material.is_rough or material.polarises or not item.mesh.is_faceted):
                 size = self.space.scale * 0.5 * float(np.linalg.norm(np.ptp(self.world_meshes[index].vertices, axis=0)))
             if material.is_mirror:
                 record["colour"][1] = films.number.get(index, 0.0)

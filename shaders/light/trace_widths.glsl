@@ -30,7 +30,9 @@ void keep_columns_within(inout Path path, Path start, float size, float distance
         own_s -= dot(own_s, path.direction) * path.direction;
         own_t -= dot(own_t, path.direction) * path.direction;
     }
-    float widest = max(p.widest_on_surface * size / max(path.walk.footprint_scale, 1e-30), longest_side(own_s, own_t));
+    // Both waves of a crystal part at every surface, and lattices that roulette thins grow by as much: without end.
+    float scale = max(path.walk.footprint_scale, 1e-30), own = longest_side(own_s, own_t) / (HAS_CRYSTAL ? scale : 1.0);
+    float widest = max(p.widest_on_surface * size / scale, own);
     vec3 s = path.dposition[0], t = path.dposition[1], turn_s = path.ddirection[0], turn_t = path.ddirection[1];
     keep_within(widest, s, t, turn_s, turn_t);
     // Made smaller, it no longer says where its neighbours and the edge are.
