@@ -22,6 +22,8 @@ from ..passes.pilot import MAX_LIGHT_POINTS, Pilot, PilotFit
 
 SMALLEST_BATCH = MAX_BANDS * MAX_LIGHT_POINTS
 """One point of every sub-lattice a light may have."""
+CRYSTAL_BANDS = 6
+"""Of light that meets crystals, at least: a wave that part of a band has not is wrong in all of it."""
 SPECTRUM_CELLS = 512
 """Even cells of x in which it is known where each channel's light is."""
 
@@ -193,6 +195,8 @@ class Planner:
             middles = axis.x_of_nm(0.5 * (edges_nm[:-1] + edges_nm[1:]))
         else:
             count = fit.band_count() if divides_spectrum(method) and self.features.spectral_groups else 1
+            if self.features.crystals and self.features.spectral_groups:
+                count = max(count, CRYSTAL_BANDS)
             ends = ends_of(self.scene.lights[light].spectral_power, axis)
             edges = np.linspace(*ends, count + 1)
             edges[1:-1] += aside * (edges[1] - edges[0])
