@@ -61,10 +61,8 @@ const float LEAST_FAN = 0.015;
 // Texels: the texel's own blur knows no perspective, and of shorter footprints it is most of what is drawn.
 const float LEAST_FANNED = 0.75;
 const float MOST_FAN = 3.0;
-// Texels²: broader splats go to a map with texels twice as wide; longer ones too, thin as they may be, in windows round
-// finer ones, which are hardly seen directly.
-const float BROAD_VARIANCE = 1.25;
-const float LONG_VARIANCE = 64.0;
+// Splats of one and a half texels' standard deviation at least go to a map with texels twice as wide.
+const float BROAD_VARIANCE = 2.25;
 const int WIDER_LEVELS = 6;
 // Three texels of a wider level that is chosen for a splat, over its larger half extent, at most.
 const float LEVEL_REACH = 2.5;
@@ -160,13 +158,13 @@ bool in_front(Placement place, PhotonRecord photon, vec3 sweep_middle, vec3 swee
     return min(homogeneous_texel(place, from).z, homogeneous_texel(place, to).z) > 0.0;
 }
 
-// A broad splat is as well drawn in texels twice as wide, for a quarter of the fragments; the maps are put together
-// again when they are read (resolve.comp, bilinearly). Returns the index of the placement with these texels.
-uint choose_level(uint at, inout Footprint f, PhotonRecord photon, vec3 middle, vec3 sweep, bool is_outer) {
+// A splat broad in every direction is as well drawn in texels twice as wide, for a quarter of the
+// fragments; the maps are put together again when they are read (resolve.comp, bilinearly).
+// Returns the index of the placement with these texels.
+uint choose_level(uint at, inout Footprint f, PhotonRecord photon, vec3 middle, vec3 sweep) {
     Placement place = placements[at];
     for (int step = 0; step < WIDER_LEVELS; ++step) {
-        float thin = thin_variance(f), variance = dot(f.axis_s, f.axis_s) + dot(f.axis_t, f.axis_t) - thin;
-        if (place.blurred != NONE && (thin > BROAD_VARIANCE || (is_outer && variance > LONG_VARIANCE))) {
+        if (place.blurred != NONE && thin_variance(f) > BROAD_VARIANCE) {
             float taken = 0.25 * f.taken + LEVEL_BLUR;
             at = place.blurred;
             place = placements[at];
@@ -394,14 +392,16 @@ void make_splats(uint i) {
         sums[own].x += lost * power_w;
     }
     uint drawn_in = at;
-    if (side == 0u) drawn_in = choose_level(at, f, photon, middle, sweep, false);
+    if (side == 0u) drawn_in = choose_level(at, f, photon, middle, sweep);
     // Written at once, and held no longer: a GPU has room for few words an invocation.
     SplatRecord fine = splat_of(photon, power_w, mean, f, table, table_band);
     fine.rect = placements[drawn_in].rect;
     vec2 fine_centre = fine.centre, fine_extent = half_extent(fine);
     bool drawn = shown && touches(fine.rect, fine_centre, fine_extent);
     if (REINDEXED) drawn = drawn && carries;
-    if (!drawn) fine.kind = 0u;
+    if (!drawn) {
+        fine.kind = 0u;
+    }
     keep_within_lines(fine, side, kept);
     uint slot = i * uint(SLOTS + IMAGE_SLOTS);
     put(slot, fine);
@@ -433,7 +433,7 @@ void make_splats(uint i) {
                 g = footprint_in(outer, photon, middle, sweep);
             }
             within |= steps_within(outer.rect, g, photon);
-            uint wide = choose_level(next, g, photon, middle, sweep, true);
+            uint wide = choose_level(next, g, photon, middle, sweep);
             Placement widest = placements[wide];
             if (shown && is_only_fine(centre, extent, drawn_in, widest, photon.position)) break;
             SplatRecord coarse = splat_of(photon, power_w, mean, g, table, table_band);

@@ -151,7 +151,7 @@ uint put_images(Depicted of, uint at, uint slot) {
             Footprint f = footprint_in(window, image.photon, image.middle, image.sweep);
             bool shown =
                 in_front(window, image.photon, image.middle, image.sweep) && held_size(window, image.photon, f) >= 1.0;
-            if (!keeps_side) drawn_in = choose_level(drawn_in, f, image.photon, image.middle, image.sweep, level > 0);
+            if (!keeps_side) drawn_in = choose_level(drawn_in, f, image.photon, image.middle, image.sweep);
             SplatRecord splat = splat_of(image.photon, image.power_w, image.mean, f, image.table, image.band);
             splat.rect = placements[drawn_in].rect;
             vec2 extent = half_extent(splat);
