@@ -34,6 +34,7 @@ from spectrasplat.model.materials import (
     Polariser,
 )
 from spectrasplat.model.materials.material_file import read_material
+from spectrasplat.model.materials.slit import Slit
 from spectrasplat.model.optics import catalogue
 from spectrasplat.model.optics.colorimetry import VISIBLE_NM
 from spectrasplat.model.optics.spectrum import illuminant
@@ -126,6 +127,7 @@ MATERIALS: dict[str, Material] = {
     "diffuse": Diffuse((0.1, 0.2, 0.3)),
     "black": MATERIAL_KINDS["black"](),
     "grating": Grating(1234.5, (2, -1), (0.25, 0.5), True, (0.6, 0.0, 0.8)),
+    "slit": Slit(width_um=50.0, direction=(0.6, 0.0, 0.8)),
     "polariser": Polariser(0.9, 0.25, 140.0, (0.6, 0.8, 0.0)),
 }
 
@@ -157,7 +159,8 @@ def test_light_goes_on_lands_or_ends(kind: str) -> None:
         material.transmits or material.is_mirror or material.is_grating or material.is_polariser
     )
     assert sum((material.is_specular, material.receives, material.is_black)) == 1
-    assert sorted(cls.gpu_code for cls in MATERIAL_KINDS.values()) == [0, 1, 2, 3, 4, 6]
+    # (A slit is a grating of one line.)
+    assert sorted(cls.gpu_code for cls in MATERIAL_KINDS.values()) == [0, 1, 2, 3, 4, 4, 6]
 
 
 # -- saving over what a person wrote --------------------------------------------------------
