@@ -194,9 +194,8 @@ class Planner:
             edges = axis.x_of_nm(edges_nm)
             middles = axis.x_of_nm(0.5 * (edges_nm[:-1] + edges_nm[1:]))
         else:
-            count = fit.band_count() if divides_spectrum(method) and self.features.spectral_groups else 1
-            if self.features.crystals and self.features.spectral_groups:
-                count = max(count, CRYSTAL_BANDS)
+            least = CRYSTAL_BANDS if self.features.crystals else 1
+            count = max(fit.band_count(), least) if divides_spectrum(method) and self.features.spectral_groups else 1
             ends = ends_of(self.scene.lights[light].spectral_power, axis)
             edges = np.linspace(*ends, count + 1)
             edges[1:-1] += aside * (edges[1] - edges[0])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -31,11 +31,11 @@ class Crystal:
 def crystals() -> dict[str, Crystal]:
     """All by name, those that are called otherwise too ("ruby") under each of their names."""
     found: dict[str, Crystal] = {}
+    plain = {(entry.maker, entry.name): entry for entry in catalogue.entries()}
     for entry in catalogue.entries():
         if entry.name.endswith(_EXTRAORDINARY):
             name = entry.name.removesuffix(_EXTRAORDINARY)
-            plain = {other.name: other for other in catalogue.entries() if other.maker == entry.maker}
-            ordinary = plain.get(name + _ORDINARY) or plain[name]
+            ordinary = plain.get((entry.maker, name + _ORDINARY)) or plain[entry.maker, name]
             for called in dict.fromkeys((name, *ordinary.aliases)):
                 found[called] = Crystal(called, name, ordinary.dispersion, entry.dispersion)
     return found
@@ -57,6 +57,7 @@ def named(ordinary: Dispersion, extraordinary: Dispersion) -> str:
     return next((name for name, c in crystals().items() if (c.ordinary, c.extraordinary) == pair), "")
 
 
+@lru_cache(256)
 def is_birefringent(ordinary: Dispersion, extraordinary: Dispersion) -> bool:
     """Whether both differ by more than 1e-7 anywhere in the visible range."""
     return bool(np.abs(ordinary.index(VISIBLE_NM) - extraordinary.index(VISIBLE_NM)).max() > _FLAT)
