@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 MAX_ORDER = 50
 MIN_LINES, MAX_LINES = 1.0, 10_000.0
 _SUM_SLACK = 1e-9
-MIN_SINE = 1e-3
+_MIN_SINE = 1e-3
 """Sine of the angle between lines and normal below which the lines have no direction in the surface."""
 
 WAVELENGTH = Dispersion("wavelength", "formula 5", (0.0, 1.0, 1.0))
@@ -183,6 +183,13 @@ class _Orders(Part):
         return {"orders": list(value.orders), "efficiency": efficiency}
 
 
+def leaves_sheet(mesh: Mesh, direction: Vec3) -> bool:
+    """Whether it runs along the normal of some face, where nothing of it lies in the sheet."""
+    normals = mesh.face_normals()
+    normals = normals[normals.any(axis=1)]
+    return bool(np.any(np.linalg.norm(np.cross(normals, np.asarray(direction, float)), axis=1) < _MIN_SINE))
+
+
 @dataclass(frozen=True)
 class Grating(Material):
     """Parallel lines on a thin sheet, with the same medium on both sides."""
@@ -317,10 +324,7 @@ class Grating(Material):
                 f"{file_name}: object '{name}' is a closed solid and a grating a thin sheet; "
                 "give it an open shape such as 'plane' or 'disc', before the solid if need be"
             )
-        normals = mesh.face_normals()
-        normals = normals[normals.any(axis=1)]
-        sines = np.linalg.norm(np.cross(normals, np.asarray(self.direction, float)), axis=1)
-        if np.any(sines < MIN_SINE):
+        if leaves_sheet(mesh, self.direction):
             raise UserError(
                 f"{file_name}: the lines of grating '{name}' run along the normal of its surface; "
                 "choose a 'direction' that lies in the surface"

@@ -6,13 +6,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
-import numpy as np
-
 from ...base.errors import UserError
 from ..fields import Animated, Direction, Number, Row
 from ..optics.glass import Dispersion
 from ..vectors import Vec3
-from .grating import MIN_SINE, WAVELENGTH
+from .grating import WAVELENGTH, leaves_sheet
 from .material import Material
 
 if TYPE_CHECKING:
@@ -100,9 +98,7 @@ class Polariser(Material):
                 f"{file_name}: object '{name}' is a closed solid and a polariser a thin sheet; "
                 "give it an open shape such as 'plane' or 'disc'"
             )
-        normals = mesh.face_normals()
-        normals = normals[normals.any(axis=1)]
-        if np.any(np.linalg.norm(np.cross(normals, np.asarray(self.axis, float)), axis=1) < MIN_SINE):
+        if leaves_sheet(mesh, self.axis):
             raise UserError(
                 f"{file_name}: the axis of polariser '{name}' runs along the normal of its surface; "
                 "choose an 'axis' that lies in the surface"
