@@ -1,0 +1,49 @@
+// The page's data: a head in JSON, and arrays of numbers in one block of bytes (docs/page-format.md).
+
+// Bytes of the block: base64, deflated where the head says so.
+async function bytesOf(text, compressed) {
+  const letters = atob(text.trim());
+  const bytes = new Uint8Array(letters.length);
+  for (let i = 0; i < letters.length; i++) bytes[i] = letters.charCodeAt(i);
+  if (!compressed) return bytes;
+  const inflated = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+  return new Uint8Array(await new Response(inflated).arrayBuffer());
+}
+
+// Value of every half float, by its bits.
+function halfFloats() {
+  const values = new Float32Array(65536);
+  for (let bits = 0; bits < 65536; bits++) {
+    const exponent = (bits >> 10) & 31, fraction = (bits & 1023) / 1024;
+    const size = exponent === 0 ? fraction * 2 ** -14 : exponent === 31 ? (fraction ? NaN : Infinity) : (1 + fraction) * 2 ** (exponent - 15);
+    values[bits] = bits & 32768 ? -size : size;
+  }
+  return values;
+}
+
+const KINDS = { f4: Float32Array, f2: Uint16Array, u4: Uint32Array, i4: Int32Array, u2: Uint16Array, u1: Uint8Array };
+
+// `head`, and `array(name)`: its numbers as they are meant (scaled), or null where there is none.
+export async function readData(page) {
+  const head = JSON.parse(page.getElementById("head").textContent);
+  const bytes = await bytesOf(page.getElementById("blob").textContent, head.compressed);
+  let halves = null;
+  const shapeOf = (name) => head.arrays[name]?.shape ?? [0];
+  const raw = (name) => {
+    const { dtype, shape, offset } = head.arrays[name];
+    return new KINDS[dtype](bytes.buffer, bytes.byteOffset + offset, shape.reduce((a, b) => a * b, 1));
+  };
+  const array = (name) => {
+    const about = head.arrays[name];
+    if (!about) return null;
+    const stored = raw(name), columns = about.shape.at(-1) ?? 1;
+    if (about.dtype === "f2") halves ??= halfFloats();
+    if (about.dtype !== "f2" && about.scale === undefined && about.origin === undefined) return stored;
+    const at = (value, k, otherwise) => (value === undefined ? otherwise : Array.isArray(value) ? value[k % columns] : value);
+    return Float32Array.from(stored, (value, k) =>
+      at(about.origin, k, 0) + at(about.scale, k, 1) * (about.dtype === "f2" ? halves[value] : value));
+  };
+  const picture = (name, type) =>
+    createImageBitmap(new Blob([raw(name)], { type }), { colorSpaceConversion: "none", premultiplyAlpha: "none" });
+  return { head, array, shapeOf, picture };
+}

@@ -1,0 +1,222 @@
+// WebGL2: the receiver's map, and pictures of it. One draw adds up the photons, one the beams, one makes the picture.
+
+import { BEAM_FRAGMENT, BEAM_VERTEX, SOLID_FRAGMENT, SOLID_VERTEX, SPLAT_FRAGMENT, SPLAT_VERTEX, VIEW_FRAGMENT, WHOLE_VERTEX } from "./shaders.js";
+import { SAMPLES } from "./spectra.js";
+
+// What is missing for it, as a sentence; null where nothing is.
+export function lackOf(gl) {
+  if (!gl) return "This browser shows no WebGL2, which the live picture needs: below is a still. Any current Firefox, Chrome, Edge or Safari has it, if hardware acceleration is switched on.";
+  if (!gl.getExtension("EXT_color_buffer_float") && !gl.getExtension("EXT_color_buffer_half_float"))
+    return "This device cannot draw into floating-point pictures (EXT_color_buffer_float), which adding up light needs: below is a still.";
+  return null;
+}
+
+export class Light {
+  // `records`: rows of photons and beams (records.js).
+  constructor(gl, head, array, { photons, beams }) {
+    this.gl = gl;
+    this.head = head;
+    // Sums in 32 bits where they can be blended; in 16 otherwise, less exact in bright places.
+    this.isFull = Boolean(gl.getExtension("EXT_color_buffer_float") && gl.getExtension("EXT_float_blend"));
+    gl.getExtension("EXT_color_buffer_half_float");
+    const bent = `const bool BENT = ${head.mode !== "index"};\n`;
+    this.splats = this.program(SPLAT_VERTEX, SPLAT_FRAGMENT, bent);
+    this.beams = this.program(BEAM_VERTEX, BEAM_FRAGMENT, bent);
+    this.view = this.program(WHOLE_VERTEX, VIEW_FRAGMENT, "");
+    this.solid = this.program(SOLID_VERTEX, SOLID_FRAGMENT, "");
+    this.paths = this.texture();
+    this.light = this.texture();
+    this.edges = this.texture();
+    this.base = this.texture(gl.LINEAR);
+    this.weight = this.texture(gl.LINEAR);
+    this.map = this.target();
+    this.glass = this.target();
+    this.whole = gl.createVertexArray();
+    this.counts = { draws: 0, bytes: 0 };
+    this.photons = this.instances(photons, [4, 4, 4, 4, 3, 4]);
+    this.polygons = this.instances(beams, [4, 4, 4, 4, 4]);
+    if (beams.count) this.fill(this.edges, 1024, beams.edges.length / 4096, beams.edges);
+    this.meshes = this.solids(head, array);
+  }
+
+  // ---- what is uploaded -----------------------------------------------------------------------
+
+  program(vertex, fragment, more) {
+    const { gl } = this, program = gl.createProgram();
+    for (const [kind, text] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
+      const shader = gl.createShader(kind);
+      gl.shaderSource(shader, text.replace("precision highp float;\n", `precision highp float;\n${more}`));
+      gl.compileShader(shader);
+      gl.attachShader(program, shader);
+    }
+    gl.linkProgram(program);
+    if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost())
+      throw new Error([gl.getProgramInfoLog(program), ...gl.getAttachedShaders(program).map((s) => gl.getShaderInfoLog(s))].join("\n"));
+    const places = new Map();
+    return { program, at: (name) => (places.has(name) || places.set(name, gl.getUniformLocation(program, name)), places.get(name)) };
+  }
+
+  texture(filter = this.gl.NEAREST) {
+    const { gl } = this, texture = gl.createTexture();
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    for (const [name, value] of [[gl.TEXTURE_MIN_FILTER, filter], [gl.TEXTURE_MAG_FILTER, filter], [gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE], [gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE]])
+      gl.texParameteri(gl.TEXTURE_2D, name, value);
+    return texture;
+  }
+
+  // Floats, four a texel.
+  fill(texture, width, height, values) {
+    const { gl } = this;
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32F, width, height, 0, gl.RGBA, gl.FLOAT, values);
+    this.counts.bytes += values.byteLength;
+  }
+
+  picture(texture, bitmap) {
+    const { gl } = this;
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    gl.pixelStorei(gl.UNPACK_COLORSPACE_CONVERSION_WEBGL, gl.NONE);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, gl.RGBA, gl.UNSIGNED_BYTE, bitmap);
+  }
+
+  target() {
+    const { gl } = this, texture = this.texture(), framebuffer = gl.createFramebuffer();
+    return { texture, framebuffer, width: 0, height: 0 };
+  }
+
+  resize(target, width, height, format) {
+    const { gl } = this;
+    if (target.width === width && target.height === height) return;
+    Object.assign(target, { width, height });
+    gl.bindTexture(gl.TEXTURE_2D, target.texture);
+    gl.texImage2D(gl.TEXTURE_2D, 0, format.internal, width, height, 0, gl.RGBA, format.type, null);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, target.texture, 0);
+  }
+
+  instances({ rows, count }, sizes) {
+    const { gl } = this, vertices = gl.createVertexArray(), stride = 4 * sizes.reduce((a, b) => a + b, 0);
+    gl.bindVertexArray(vertices);
+    gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ARRAY_BUFFER, rows, gl.STATIC_DRAW);
+    let offset = 0;
+    sizes.forEach((size, place) => {
+      gl.enableVertexAttribArray(place);
+      gl.vertexAttribPointer(place, size, gl.FLOAT, false, stride, offset);
+      gl.vertexAttribDivisor(place, 1);
+      offset += 4 * size;
+    });
+    return { vertices, count };
+  }
+
+  solids(head, array) {
+    const { gl } = this, values = [];
+    head.meshes.forEach(({ kind, colour, vertices, triangles }) => {
+      const points = array(vertices), tint = kind === "glass" ? [0.8, 0.9, 1, 0.5] : [...colour, 1];
+      for (const corner of array(triangles)) values.push(points[3 * corner], points[3 * corner + 1], points[3 * corner + 2], ...tint);
+    });
+    const vertices = gl.createVertexArray();
+    gl.bindVertexArray(vertices);
+    gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(values), gl.STATIC_DRAW);
+    for (const [place, size, offset] of [[0, 3, 0], [1, 4, 12]]) {
+      gl.enableVertexAttribArray(place);
+      gl.vertexAttribPointer(place, size, gl.FLOAT, false, 28, offset);
+    }
+    return { vertices, count: values.length / 7 };
+  }
+
+  // Spectra and glasses: `lightTable` and `indexTable` of spectra.js.
+  setTables(light, paths) {
+    this.tables = light;
+    this.fill(this.light, light.width, light.height, light.table);
+    this.fill(this.paths, SAMPLES, 2, paths);
+  }
+
+  // ---- draws ----------------------------------------------------------------------------------
+
+  use({ program, at }, textures) {
+    const { gl } = this;
+    gl.useProgram(program);
+    Object.entries(textures).forEach(([name, texture], unit) => {
+      gl.activeTexture(gl.TEXTURE0 + unit);
+      gl.bindTexture(gl.TEXTURE_2D, texture);
+      gl.uniform1i(at(name), unit);
+    });
+    gl.activeTexture(gl.TEXTURE7);
+    gl.uniform2i(at("size"), this.size[0], this.size[1]);
+    gl.uniform4f(at("area"), this.head.window.u0, this.head.window.v0, this.perUnit, 0);
+  }
+
+  // Add up all light in a map whose longer side has `texels`.
+  gather(texels) {
+    const { gl, head } = this, { u0, v0, u1, v1 } = head.window;
+    this.perUnit = texels / Math.max(u1 - u0, v1 - v0);
+    // Even sizes: levels halve them.
+    this.size = [u1 - u0, v1 - v0].map((side) => Math.max(16, 16 * Math.ceil((side * this.perUnit) / 16)));
+    const format = this.isFull ? gl.RGBA32F : gl.RGBA16F;
+    this.resize(this.map, 1.5 * this.size[0], this.size[1], { internal: format, type: this.isFull ? gl.FLOAT : gl.HALF_FLOAT });
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.map.framebuffer);
+    gl.viewport(0, 0, this.map.width, this.map.height);
+    gl.clearColor(0, 0, 0, 0);
+    gl.clear(gl.COLOR_BUFFER_BIT);
+    gl.enable(gl.BLEND);
+    gl.blendFunc(gl.ONE, gl.ONE);
+    const tables = { paths: this.paths, light: this.light };
+    for (const [kind, things] of [[this.splats, this.photons], [this.beams, this.polygons]]) {
+      if (!things.count) continue;
+      this.use(kind, kind === this.beams ? { ...tables, edges: this.edges } : tables);
+      gl.uniform2f(kind.at("support"), ...this.tables.support);
+      gl.uniform1i(kind.at("lines"), this.tables.lineCount);
+      if (kind === this.splats) gl.uniform1f(kind.at("smoothing"), head.photons.smoothing);
+      gl.bindVertexArray(things.vertices);
+      gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, things.count);
+      this.counts.draws++;
+    }
+    gl.disable(gl.BLEND);
+  }
+
+  // The glass as `camera` (views.js) sees it, kept until it moves.
+  drawGlass(camera, width, height) {
+    const { gl } = this;
+    this.resize(this.glass, width, height, { internal: gl.RGBA8, type: gl.UNSIGNED_BYTE });
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.glass.framebuffer);
+    gl.viewport(0, 0, width, height);
+    gl.clearColor(0, 0, 0, 0);
+    gl.clear(gl.COLOR_BUFFER_BIT);
+    gl.enable(gl.BLEND);
+    gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+    gl.useProgram(this.solid.program);
+    gl.uniformMatrix4fv(this.solid.at("to_clip"), true, camera.toClip);
+    gl.uniform3f(this.solid.at("eye"), ...camera.eye);
+    gl.bindVertexArray(this.meshes.vertices);
+    gl.drawArrays(gl.TRIANGLES, 0, this.meshes.count);
+    this.counts.draws++;
+    gl.disable(gl.BLEND);
+  }
+
+  // The picture, into the canvas. `mode`: 0 camera, 1 from above, 2 in space.
+  show(mode, toUv, exposure, mark, width, height) {
+    const { gl, head } = this;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    gl.viewport(0, 0, width, height);
+    this.use(this.view, { map: this.map.texture, base: this.base, weight: this.weight, glass: this.glass.texture });
+    gl.uniform2f(this.view.at("pixels"), width, height);
+    gl.uniform1i(this.view.at("view"), mode);
+    gl.uniformMatrix3fv(this.view.at("to_uv"), true, toUv);
+    gl.uniform4f(this.view.at("whites"), head.camera?.base_white ?? 0, head.camera?.weight_white ?? 0, 2 ** exposure, 0);
+    gl.uniform3f(this.view.at("diffuse"), ...(head.reflectance_rgb ?? [1, 1, 1]).map((r) => r / Math.PI));
+    gl.uniform4f(this.view.at("mark"), ...(mark ?? [0, 0]), mark ? 1 : 0, Math.max(4, width / 90));
+    gl.bindVertexArray(this.whole);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+    this.counts.draws++;
+  }
+
+  // Irradiance at the level-0 texels (linear Rec.709 and 0), coarser levels added, row 0 at v0: for tests and saving.
+  readMap() {
+    const { gl } = this, [width, height] = this.size, all = new Float32Array(4 * this.map.width * height);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.map.framebuffer);
+    gl.readPixels(0, 0, this.map.width, height, gl.RGBA, gl.FLOAT, all);
+    return { width, height, stride: this.map.width, values: all };
+  }
+}

@@ -1,0 +1,86 @@
+// Photons and beams as the shaders take them: a row of floats each.
+
+// Rows of 23: place, change with the third index; sides; change with two indices; x and row; throughput; waves.
+export function photonRows(head, array, shapeOf) {
+  const count = shapeOf("photons.position")[0], rows = new Float32Array(23 * count);
+  if (!count) return { rows, count };
+  const [position, s, t, change, x, throughput, light, lattice] =
+    ["position", "axis_s", "axis_t", "dposition_dn", "x", "throughput", "light", "lattice"].map((name) => array(`photons.${name}`));
+  const groups = change.length / (2 * count), unit = head.photons.unit ?? 1, known = new Map();
+  for (let i = 0; i < count; i++) {
+    const at = 23 * i;
+    rows.set([position[2 * i], position[2 * i + 1]], at);
+    rows.set([s[2 * i], s[2 * i + 1], t[2 * i], t[2 * i + 1]], at + 4);
+    for (let g = 0; g < Math.min(groups, 3); g++)
+      rows.set([change[2 * (groups * i + g)], change[2 * (groups * i + g) + 1]], g === 2 ? at + 2 : at + 8 + 2 * g);
+    rows.set([x[3 * i], x[3 * i + 1], x[3 * i + 2], light?.[i] ?? 0], at + 12);
+    for (let k = 0; k < 3; k++) rows[at + 16 + k] = throughput[3 * i + k] * unit;
+    const points = lattice?.[i] ?? 0;
+    if (!points) continue;
+    if (!known.has(points)) known.set(points, lowestFrequencies(points));
+    // From cycles a spacing to cycles a unit.
+    const area = s[2 * i] * t[2 * i + 1] - s[2 * i + 1] * t[2 * i];
+    if (Math.abs(area) < 1e-30) continue;
+    known.get(points).forEach(([p, q], k) => {
+      rows[at + 19 + 2 * k] = (p * t[2 * i + 1] - q * s[2 * i + 1]) / area;
+      rows[at + 20 + 2 * k] = (q * s[2 * i] - p * t[2 * i]) / area;
+    });
+  }
+  return { rows, count };
+}
+
+// Rows of 20: a rectangle that holds the polygon; edges and row; density; slope; x. Edges about its middle, two texels each.
+export function beamRows(array) {
+  const x = array("beams.x"), count = x ? x.length / 2 : 0, rows = new Float32Array(20 * count);
+  if (!count) return { rows, count, edges: new Float32Array(0) };
+  const [density, slope, centre, light, first, edge, hullFirst, hull] =
+    ["density", "slope", "centre", "light", "first", "edge", "hull_first", "hull"].map((name) => array(`beams.${name}`));
+  const edges = new Float32Array(4096 * Math.ceil(edge.length / 4096));
+  for (let i = 0; i < count; i++) {
+    const { middle, along, half } = rectangle(hull, hullFirst[i], hullFirst[i + 1]), [a, b, c] = density.subarray(3 * i);
+    rows.set([...middle, along[0] * half[0], along[1] * half[0], half[1], first[i], first[i + 1] - first[i], light?.[i] ?? 0,
+      a, 4 * b - 3 * a - c, 2 * (a - 2 * b + c), 0, slope[2 * i], slope[2 * i + 1], centre[2 * i], centre[2 * i + 1], x[2 * i], x[2 * i + 1], 0, 0], 20 * i);
+    for (let e = first[i]; e < first[i + 1]; e++) {
+      const line = edge.subarray(8 * e, 8 * e + 8);
+      const scale = 2 / (Math.hypot(line[0], line[1]) + Math.hypot(line[4], line[5]));
+      const [from, to] = [0, 4].map((k) =>
+        [line[k] * scale, line[k + 1] * scale, (line[k + 2] + line[k] * middle[0] + line[k + 1] * middle[1]) * scale, line[k + 3]]);
+      edges.set(from, 8 * e);
+      edges.set(to.map((value, k) => value - from[k]), 8 * e + 4);
+    }
+  }
+  return { rows, count, edges };
+}
+
+// The rectangle of least area along a side of a convex polygon, corners `from` to `to`.
+function rectangle(hull, from, to) {
+  let best = null, least = Infinity;
+  for (let i = from; i < to; i++) {
+    const j = i + 1 < to ? i + 1 : from, dx = hull[2 * j] - hull[2 * i], dy = hull[2 * j + 1] - hull[2 * i + 1], length = Math.hypot(dx, dy);
+    if (length < 1e-12 && best) continue;
+    const [ex, ey] = length < 1e-12 ? [1, 0] : [dx / length, dy / length], low = [Infinity, Infinity], high = [-Infinity, -Infinity];
+    for (let k = from; k < to; k++)
+      [hull[2 * k] * ex + hull[2 * k + 1] * ey, hull[2 * k + 1] * ex - hull[2 * k] * ey].forEach((place, axis) => {
+        low[axis] = Math.min(low[axis], place);
+        high[axis] = Math.max(high[axis], place);
+      });
+    const half = [0, 1].map((axis) => (high[axis] - low[axis]) / 2), [p, q] = [0, 1].map((axis) => (high[axis] + low[axis]) / 2);
+    const area = (half[0] + 1e-6 * half[1]) * (half[1] + 1e-6 * half[0]);
+    if (area >= least) continue;
+    least = area;
+    best = { middle: [p * ex - q * ey, p * ey + q * ex], along: [ex, ey], half };
+  }
+  return best;
+}
+
+// The emission lattice's two lowest frequencies, in cycles a spacing; the third is their sum (shaders/lib/lattice.glsl of
+// the desktop program).
+const GOLDEN_RATIO = (1 + Math.sqrt(5)) / 2;
+
+export function lowestFrequencies(points) {
+  const k = Math.max(Math.round((0.5 * Math.log(Math.sqrt(5) * points)) / Math.log(GOLDEN_RATIO)), 2);
+  return [k, k - 1].map((step) => {
+    const sign = step % 2 ? -1 : 1, power = GOLDEN_RATIO ** step;
+    return [(Math.sqrt(points) * sign) / power, (power - sign / power) / Math.sqrt(5 * points)];
+  });
+}

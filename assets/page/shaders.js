@@ -1,0 +1,436 @@
+// The page's shaders: light of photons and beams added up in a map of the receiver, and pictures made of the map.
+// The map holds irradiance, linear Rec.709. Level 0 has the finest texels; broad photons are drawn in coarser ones, to
+// its right. A photon is drawn as the desktop program draws it (shaders/light/splat_shapes.glsl there).
+
+export const LEVELS = 4;
+
+const COMMON = `#version 300 es
+precision highp float;
+precision highp int;
+precision highp sampler2D;
+#define LEVELS ${LEVELS}
+uniform ivec2 size;         // texels of level 0
+uniform vec4 area;          // its lower corner, texels per unit, 0
+vec4 rect_of(int level) {
+  vec2 s = vec2(size), low = level == 0 ? vec2(0.0) : vec2(s.x, s.y - s.y * exp2(float(1 - level)));
+  return vec4(low, low + s * exp2(float(-level)));
+}
+`;
+
+const TABLES = `
+uniform sampler2D paths;    // indices over x: as shown, as traced
+uniform sampler2D light;    // by row: energy below each place of the support; lines
+uniform vec2 support;       // x of the light's ends
+uniform int lines;
+const int SAMPLES = 2048;
+vec3 energy_below(int row, float x) {
+  float at = clamp((x - support.x) / (support.y - support.x), 0.0, 1.0) * float(SAMPLES - 1);
+  int i = min(int(at), SAMPLES - 2);
+  vec3 below = texelFetch(light, ivec2(i, row), 0).rgb;
+  return below + (at - float(i)) * (texelFetch(light, ivec2(i + 1, row), 0).rgb - below);
+}
+vec4 line_of(int row, int k) { return texelFetch(light, ivec2(SAMPLES + k, row), 0); }
+`;
+
+const GAUSSIAN = `
+const float SQRT_HALF = 0.70710678, TWO_PI = 6.2831853;
+// To 3e-7 (Abramowitz and Stegun 1964, 7.1.28).
+float error_function(float x) {
+  float a = abs(x);
+  float p = 1.0 + a * (0.0705230784 + a * (0.0422820123 + a * (0.0092705272 + a * (0.0001520143 + a * (0.0002765672
+    + a * 0.0000430638)))));
+  p *= p; p *= p; p *= p; p *= p;
+  return sign(x) * (1.0 - 1.0 / p);
+}
+float normal(float z) { return 0.39894228 * exp(-0.5 * z * z); }
+float below_normal(float z) { return 0.5 + 0.5 * error_function(clamp(z, -8.0, 8.0) * SQRT_HALF); }
+float excess(float z) { return normal(z) - z * (1.0 - below_normal(z)); }
+`;
+
+export const SPLAT_VERTEX = COMMON + TABLES + GAUSSIAN + `
+uniform float smoothing;
+layout(location = 0) in vec4 place_v2;  // where the anchor lands; change with the third index
+layout(location = 1) in vec4 sides;     // of a lattice cell
+layout(location = 2) in vec4 v01;       // change with the first and the second index
+layout(location = 3) in vec4 span;      // x: from, anchor, to; row of the light's table
+layout(location = 4) in vec3 carried;   // throughput there
+layout(location = 5) in vec4 waves;     // the lattice's two lowest frequencies, cycles a unit
+flat out vec4 band;       // x: from, anchor, to; standard deviation
+flat out vec4 weights;    // throughput at the anchor, its slopes below and above; bend of the sweep
+flat out vec4 shape;      // half a texel across; 0; 1 / standard deviation along; row
+flat out vec3 ripple;
+flat out vec4 rect;
+out vec4 at;              // across, along (0 to 1), cycles
+
+const float TEXEL = 1.0 / 12.0;
+vec2 shift_to(float x) {
+  float place = clamp(x, 0.0, 1.0) * float(SAMPLES - 1);
+  int i = min(int(place), SAMPLES - 2);
+  vec4 below = texelFetch(paths, ivec2(i, 0), 0);
+  vec4 n = below + (place - float(i)) * (texelFetch(paths, ivec2(i + 1, 0), 0) - below);
+  place = clamp(span.y, 0.0, 1.0) * float(SAMPLES - 1);
+  i = min(int(place), SAMPLES - 2);
+  below = texelFetch(paths, ivec2(i, 1), 0);
+  n -= below + (place - float(i)) * (texelFetch(paths, ivec2(i + 1, 1), 0) - below);
+  return n.x * v01.xy + n.y * v01.zw + n.z * place_v2.zw;
+}
+float sinc(float x) { float a = 3.14159265 * x; return abs(a) < 1e-2 ? 1.0 - a * a / 6.0 : sin(a) / a; }
+// What is drawn, in its own frame, texels: its Fourier transform at k cycles a texel.
+vec2 along, across;
+float shear, box, across2, along2;
+float damping(vec2 k, float swept) {
+  float ka = dot(k, along), kc = dot(k, across) + shear * ka;
+  return exp(-0.5 * TWO_PI * TWO_PI * (across2 * kc * kc + along2 * ka * ka)) * sinc(box * kc) * sinc(swept * ka);
+}
+float kept(float edge, float wide, float s) {
+  return 1.0 - 2.0 * s / wide * (excess((edge - 0.5 * wide) / s) - excess((edge + 0.5 * wide) / s));
+}
+void main() {
+  gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
+  float x_lo = max(span.x, support.x), x_hi = min(span.z, support.y);
+  if (x_hi <= x_lo) return;
+  vec2 to_lo = shift_to(x_lo), to_hi = shift_to(x_hi);
+  vec2 chord = area.z * (to_hi - to_lo), centre = area.z * (place_v2.xy - area.xy + 0.5 * (to_lo + to_hi));
+  vec2 s = smoothing * area.z * sides.xy, t = smoothing * area.z * sides.zw;
+  float bend = 0.0;
+  if (BENT) {
+    vec2 half_way = area.z * (shift_to(0.5 * (x_lo + x_hi)) - to_lo);
+    bend = clamp(4.0 * dot(half_way, chord) / max(dot(chord, chord), 1e-12) - 2.0, -0.9, 0.9);
+  }
+  // Broad photons go to coarser texels, whose bilinear reading blurs them too.
+  vec3 cov = vec3(s.x * s.x + t.x * t.x, s.x * s.y + t.x * t.y, s.y * s.y + t.y * t.y);
+  float difference = 0.5 * (cov.x - cov.z), radius = sqrt(difference * difference + cov.y * cov.y);
+  float thin = 0.5 * (cov.x + cov.z) - radius, taken = 0.0, finer = 1.0;
+  int level = 0;
+  for (int k = 1; k < LEVELS; ++k)
+    if (thin * finer * finer > 2.25) { level = k; finer *= 0.5; taken = 0.25 * taken + 11.0 / 48.0; }
+  s *= finer; t *= finer; chord *= finer; centre *= finer; cov *= finer * finer; radius *= finer * finer;
+  difference *= finer * finer; thin *= finer * finer;
+  // Along the sweep; or along what is too thin for that, if its sweep leaves it by less than half a texel.
+  vec2 e = difference >= 0.0 ? vec2(radius + difference, cov.y) : vec2(cov.y, radius - difference);
+  e = dot(e, e) > 0.0 ? normalize(e) : vec2(1.0, 0.0);
+  e *= dot(e, chord) < 0.0 ? -1.0 : 1.0;
+  float sweep = length(chord), aside = abs(e.x * chord.y - e.y * chord.x), blur = 0.0;
+  if (sweep < 1e-4 || (thin < 0.15 && aside < 0.5 && radius > aside * aside * TEXEL)) {
+    sweep = dot(e, chord);
+    blur = aside * aside * TEXEL;
+  } else e = chord / sweep;
+  vec2 m = vec2(-e.y, e.x), sa = vec2(dot(s, e), dot(s, m)), ta = vec2(dot(t, e), dot(t, m));
+  float a = sa.x * sa.x + ta.x * ta.x, b = sa.x * sa.y + ta.x * ta.y, c = sa.y * sa.y + ta.y * ta.y;
+  float cell = sa.x * ta.y - sa.y * ta.x, determinant = cell * cell - taken * (a + c - taken);
+  a -= taken;
+  c -= taken;
+  // Across: a box as wide as a texel there, and the rest of the texel as a Gaussian.
+  box = max(abs(m.x), abs(m.y));
+  float narrow = min(abs(m.x), abs(m.y));
+  across2 = max(c + blur, 0.01) + narrow * narrow * TEXEL;
+  float total = across2 + box * box * TEXEL;
+  shear = b / total;
+  along2 = max(TEXEL + (a * (total - c) + determinant) / total, 0.12 * (1.0 + shear * shear));
+  along = e;
+  across = m;
+  float sigma = sqrt(along2), root = sqrt(across2);
+  sweep = max(sweep, 0.03 * sigma);
+  float reach = 0.5 * sweep + 3.0 * sigma, edge = 3.0 * sqrt(total);
+  vec2 long_side = e * reach, short_side = (m + shear * e) * edge;
+  // The texels' centres see some of its harmonics too (Poisson).
+  float grid = 1.0;
+  for (int i = 0; i < 4; ++i) {
+    vec2 k = i == 0 ? vec2(1, 0) : i == 1 ? vec2(0, 1) : i == 2 ? vec2(1, 1) : vec2(1, -1);
+    grid += 2.0 * damping(k, sweep) * cos(TWO_PI * dot(k, centre - 0.5));
+  }
+  float amplitude = area.z * area.z * finer * finer
+    / (box * kept(edge, box, root) * kept(reach, sweep, sigma) * clamp(grid, 0.7, 1.4));
+  vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0 - 1.0;
+  // Splats about a lattice's points add up to 1 and a ripple, which each takes off.
+  ripple = vec3(0.0);
+  at.zw = vec2(0.0);
+  if (waves != vec4(0.0)) {
+    vec2 k[3];
+    k[0] = waves.xy / (area.z * finer); k[1] = waves.zw / (area.z * finer); k[2] = k[0] + k[1];
+    float swept = sweep * sweep * TEXEL, share = swept / (along2 + swept);
+    vec3 heights, seen;
+    for (int i = 0; i < 3; ++i) {
+      float coarse = max(abs(k[i].x), abs(k[i].y)), ka = TWO_PI * dot(k[i], e);
+      vec2 turns = vec2(dot(k[i], s), dot(k[i], t));
+      float most = 2.0 * exp(-0.5 * TWO_PI * TWO_PI * max(dot(turns, turns) - taken * dot(k[i], k[i]), 0.0));
+      heights[i] = clamp(damping(k[i], 0.0), 0.0, most) * clamp(5.0 - 5.0 * coarse, 0.0, 1.0);
+      seen[i] = 2.0 * exp(-0.5 * ka * ka * share * along2);
+    }
+    vec3 less = heights - 2.0 * heights.yxx * heights.zzy;
+    ripple = less * seen;
+    amplitude /= 1.0 - 2.0 * dot(heights, less);
+    at.zw = corner.x * (1.0 - share) * vec2(dot(k[0], long_side), dot(k[1], long_side))
+      + corner.y * vec2(dot(k[0], short_side), dot(k[1], short_side));
+  }
+  at.xy = vec2(corner.y * edge * SQRT_HALF / root, 0.5 + corner.x * reach / sweep);
+  band = vec4(x_lo, span.y, x_hi, sigma / sweep);
+  weights = amplitude * vec4(carried.y, (carried.y - carried.x) / max(span.y - span.x, 1e-6),
+    (carried.z - carried.y) / max(span.z - span.y, 1e-6), 0.0);
+  weights.w = bend;
+  shape = vec4(0.5 * box * SQRT_HALF / root, 0.0, 1.0 / sigma, span.w);
+  rect = rect_of(level);
+  vec2 texel = rect.xy + centre + corner.x * long_side + corner.y * short_side;
+  gl_Position = vec4(texel / vec2(1.5 * float(size.x), size.y) * 2.0 - 1.0, 0.0, 1.0);
+}`;
+
+export const SPLAT_FRAGMENT = COMMON + TABLES + GAUSSIAN + `
+flat in vec4 band, weights, shape, rect;
+flat in vec3 ripple;
+in vec4 at;
+out vec4 deposited;
+// Where in the band, 0 to 1, what lands a share of the way along the sweep is.
+float in_band(float way) {
+  if (!BENT || abs(weights.w) < 1e-3) return way;
+  float c = weights.w, b = 1.0 + c, root = b * b - 4.0 * c * clamp(way, 0.0, 1.0);
+  return (b - sqrt(max(root, 0.0))) / (2.0 * c);
+}
+float carried_at(float x) {
+  return max(weights.x + min(x - band.y, 0.0) * weights.y + max(x - band.y, 0.0) * weights.z, 0.0);
+}
+void main() {
+  if (any(lessThan(gl_FragCoord.xy, rect.xy)) || any(greaterThanEqual(gl_FragCoord.xy, rect.zw))) discard;
+  float share = 0.5 * (error_function(min(at.x + shape.x, 6.0)) - error_function(max(at.x - shape.x, -6.0)));
+  vec3 away = abs(fract(vec3(at.zw, at.z + at.w)) * 2.0 - 1.0);
+  share *= 1.0 - dot(ripple, 2.0 * away * away * (3.0 - 2.0 * away) - 1.0);
+  int row = int(shape.w);
+  // What lands within three standard deviations, in parts: their light times a normal density at their middles, less
+  // wide by what a part's own width adds.
+  float s = band.w, from = clamp(at.y - 3.0 * s, 0.0, 1.0), to = clamp(at.y + 3.0 * s, 0.0, 1.0);
+  int parts = clamp(int(ceil(1.3 * (to - from) / s)), 3, 8);
+  float step_way = (to - from) / float(parts), own = sqrt(s * s - step_way * step_way / 12.0);
+  float x_from = mix(band.x, band.z, in_band(from));
+  vec3 sum = vec3(0.0), before = energy_below(row, x_from);
+  for (int i = 1; i <= parts; ++i) {
+    float way = from + float(i) * step_way, x = mix(band.x, band.z, in_band(way));
+    vec3 now = energy_below(row, x);
+    sum += (now - before) * normal((way - 0.5 * step_way - at.y) / own) * carried_at(0.5 * (x_from + x));
+    before = now;
+    x_from = x;
+  }
+  sum *= shape.z * s / own;
+  for (int k = 0; k < lines; ++k) {
+    vec4 line = line_of(row, k);
+    if (line.w < band.x || line.w >= band.z) continue;
+    float f = (line.w - band.x) / (band.z - band.x);
+    if (BENT) f += weights.w * f * (1.0 - f);
+    sum += line.rgb * normal((f - at.y) / s) * shape.z * carried_at(line.w);
+  }
+  deposited = vec4(share * sum, 0.0);
+}`;
+
+export const BEAM_VERTEX = COMMON + TABLES + `
+layout(location = 0) in vec4 quad;      // middle, half of its long side
+layout(location = 1) in vec4 more;      // half of its short side (length), first edge, edges, row
+layout(location = 2) in vec4 density;   // 1, t, t²; 0
+layout(location = 3) in vec4 slope;     // relative, per unit; about
+layout(location = 4) in vec4 span;      // x: from, to; least and most that edges reach out, texels: 0
+flat out vec4 parabola, tilt, band;
+flat out ivec3 list;
+out vec2 place;
+void main() {
+  gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
+  if (span.y <= support.x || span.x >= support.y) return;
+  vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0 - 1.0;
+  float reach = length(quad.zw);
+  vec2 e = reach > 0.0 ? quad.zw / reach : vec2(1.0, 0.0);
+  float margin = 0.75 / area.z;
+  place = corner.x * e * (reach + margin) + corner.y * vec2(-e.y, e.x) * (more.x + margin);
+  parabola = density;
+  tilt = vec4(slope.xy, slope.zw - quad.xy);
+  band = vec4(span.xy, 0.0, 0.0);
+  list = ivec3(more.yzw);
+  gl_Position = vec4((quad.xy + place - area.xy) * area.z / vec2(1.5 * float(size.x), size.y) * 2.0 - 1.0, 0.0, 1.0);
+}`;
+
+export const BEAM_FRAGMENT = COMMON + TABLES + `
+uniform sampler2D edges;    // two texels an edge: x, y, c, softness at the band's start; their change
+flat in vec4 parabola, tilt, band;
+flat in ivec3 list;
+in vec2 place;              // about the quad's middle
+out vec4 deposited;
+vec4 edge_texel(int i) { return texelFetch(edges, ivec2(i & 1023, i >> 10), 0); }
+// Half the side of the square over which an edge is averaged, units: a texel and the penumbra.
+float window(float softness) { return sqrt(1.0 + 4.0 * area.z * area.z * max(softness, 0.0) * max(softness, 0.0)) / area.z; }
+// Part of the texel within all edges at t: what borders it, by lengths times distances (shaders/light/beam_coverage.glsl
+// of the desktop program).
+vec4 line_at(int e, float t) {
+  vec4 line = edge_texel(2 * e) + t * edge_texel(2 * e + 1);
+  float per = inversesqrt(max(dot(line.xy, line.xy), 1e-30));
+  return vec4(line.xy * per, (dot(line.xy, place) + line.z) * per / window(line.w), 0.0);
+}
+vec2 in_texel(vec2 n, float h) {
+  vec2 foot = -h * n, d = vec2(-n.y, n.x);
+  d = mix(d, vec2(1e-9), lessThan(abs(d), vec2(1e-9)));
+  vec2 p = (-0.5 - foot) / d, q = (0.5 - foot) / d, low = min(p, q), high = max(p, q);
+  return vec2(max(low.x, low.y), min(high.x, high.y));
+}
+float covered(float t) {
+  float twice = 0.0;
+  vec4 low = vec4(-0.5), high = vec4(0.5);
+  for (int i = 0; i < list.y; ++i) {
+    vec4 own = line_at(list.x + i, t);
+    float reach = 0.5 * (abs(own.x) + abs(own.y));
+    if (own.z <= -reach) return 0.0;
+    if (own.z >= reach) continue;
+    vec2 interval = in_texel(own.xy, own.z);
+    for (int j = 0; j < list.y; ++j) {
+      if (j == i) continue;
+      vec4 other = line_at(list.x + j, t);
+      float turn = dot(own.xy, other.xy), along = own.x * other.y - own.y * other.x;
+      if (abs(along) < 1e-6) {
+        float inside = other.z - own.z * turn;
+        if (inside < 0.0 || (inside == 0.0 && turn > 0.0 && j < i)) interval.y = interval.x;
+        continue;
+      }
+      float s = (own.z * turn - other.z) / along;
+      if (along > 0.0) interval.x = max(interval.x, s); else interval.y = min(interval.y, s);
+    }
+    twice += own.z * max(interval.y - interval.x, 0.0);
+    vec4 inside = vec4(own.z) + 0.5 * vec4(-own.x, own.x, -own.y, own.y), d = vec4(own.y, own.y, own.x, own.x);
+    d = mix(d, vec4(1e-9), lessThan(abs(d), vec4(1e-9)));
+    vec4 s = -inside / d;
+    low = mix(low, max(low, s), greaterThan(d, vec4(0.0)));
+    high = mix(min(high, s), high, greaterThan(d, vec4(0.0)));
+  }
+  vec4 sides = max(high - low, 0.0);
+  return clamp(0.5 * twice + 0.25 * (sides.x + sides.y + sides.z + sides.w), 0.0, 1.0);
+}
+vec2 positive(float start, float change) {
+  float end = start + change, t = start / (start - end);
+  return vec2(start > 0.0 ? 0.0 : end > 0.0 ? t : 2.0, end > 0.0 ? 1.0 : start > 0.0 ? t : -1.0);
+}
+vec3 sum = vec3(0.0);
+void add(vec2 interval, int parts, bool whole) {
+  vec3 before = energy_below(list.z, mix(band.x, band.y, interval.x));
+  for (int i = 0; i < parts; ++i) {
+    float to = mix(interval.x, interval.y, float(i + 1) / float(parts)), t = to - 0.5 * (interval.y - interval.x) / float(parts);
+    vec3 now = energy_below(list.z, mix(band.x, band.y, to));
+    sum += (whole ? 1.0 : covered(t)) * (parabola.x + t * (parabola.y + t * parabola.z)) * (now - before);
+    before = now;
+  }
+}
+void main() {
+  float wide = band.y - band.x;
+  vec2 lit = wide > 0.0 ? (clamp(support, band.xx, band.yy) - band.x) / wide : vec2(0.0, 1.0), touched = lit, whole = lit;
+  for (int i = 0; i < list.y; ++i) {
+    vec4 start = edge_texel(2 * (list.x + i)), change = edge_texel(2 * (list.x + i) + 1);
+    float h = dot(start.xy, place) + start.z, dh = dot(change.xy, place) + change.z;
+    float r = 0.5 * (abs(start.x) + abs(start.y)) * window(start.w);
+    vec2 end = start.xy + change.xy;
+    float dr = 0.5 * (abs(end.x) + abs(end.y)) * window(start.w + change.w) - r;
+    vec2 touches = positive(h + r, dh + dr), covers = positive(h - r, dh - dr);
+    touched = vec2(max(touched.x, touches.x), min(touched.y, touches.y));
+    whole = vec2(max(whole.x, covers.x), min(whole.y, covers.y));
+  }
+  if (touched.x > touched.y) discard;
+  if (whole.x < whole.y) {
+    add(whole, 3, true);
+    if (whole.x > touched.x) add(vec2(touched.x, whole.x), 4, false);
+    if (whole.y < touched.y) add(vec2(whole.y, touched.y), 4, false);
+  } else add(touched, 8, false);
+  for (int k = 0; k < lines; ++k) {
+    vec4 line = line_of(list.z, k);
+    if (line.w < band.x || line.w >= band.y) continue;
+    float t = (line.w - band.x) / wide;
+    if (t >= touched.x && t <= touched.y) sum += covered(t) * (parabola.x + t * (parabola.y + t * parabola.z)) * line.rgb;
+  }
+  deposited = vec4(max(1.0 + dot(tilt.xy, place - tilt.zw), 0.0) * sum, 0.0);
+}`;
+
+export const WHOLE_VERTEX = `#version 300 es
+void main() { gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0); }`;
+
+export const VIEW_FRAGMENT = COMMON + `
+uniform sampler2D map;
+uniform sampler2D base;     // camera: the picture without the caustic
+uniform sampler2D weight;   // camera: share of the receiver's light in each pixel
+uniform sampler2D glass;    // in space: the glass as it is seen
+uniform vec2 pixels;
+uniform int view;           // 0 camera, 1 from above, 2 in space
+uniform mat3 to_uv;         // of (pixel right, pixel down, 1)
+uniform vec4 whites;        // of base, of weight; 2^exposure; 0
+uniform vec3 diffuse;       // reflectance / pi
+uniform vec4 mark;          // where the finger is: pixels right, down; 1 if it is
+out vec4 shown;
+vec3 bilinear(int level, vec2 place) {
+  vec4 r = rect_of(level);
+  vec2 q = clamp(place, vec2(0.5), r.zw - r.xy - 0.5) + r.xy - 0.5;
+  ivec2 i = ivec2(q);
+  vec2 f = q - vec2(i);
+  vec3 low = mix(texelFetch(map, i, 0).rgb, texelFetch(map, i + ivec2(1, 0), 0).rgb, f.x);
+  return mix(low, mix(texelFetch(map, i + ivec2(0, 1), 0).rgb, texelFetch(map, i + 1, 0).rgb, f.x), f.y);
+}
+// The mean of the map over a pixel of sides dx, dy about a place, in texels.
+vec3 irradiance(vec2 place, vec2 dx, vec2 dy) {
+  if (any(lessThan(place, vec2(0.0))) || any(greaterThan(place, vec2(size)))) return vec3(0.0);
+  vec3 sum = vec3(0.0);
+  for (int level = 1; level < LEVELS; ++level) sum += bilinear(level, place * exp2(float(-level)));
+  int across = clamp(int(ceil(length(dx))), 1, 4), up = clamp(int(ceil(length(dy))), 1, 4);
+  vec3 fine = vec3(0.0);
+  for (int j = 0; j < up; ++j)
+    for (int i = 0; i < across; ++i)
+      fine += bilinear(0, place + ((float(i) + 0.5) / float(across) - 0.5) * dx + ((float(j) + 0.5) / float(up) - 0.5) * dy);
+  return sum + fine / float(across * up);
+}
+float fifth_powers(vec3 c) { vec3 q = c * c; return dot(q * q, c); }
+float norm(vec3 c) { float most = max(max(max(c.r, c.g), c.b), 1e-30); return most * pow(fifth_powers(c / most), 0.2); }
+// The desktop program's tone curve (shaders/lib/tone.glsl there).
+vec3 tone(vec3 rgb) {
+  float grey = max(dot(rgb, vec3(0.212639, 0.7151687, 0.0721923)), 1e-30), depth = norm(max(1.0 - rgb / grey, 0.0));
+  float over = max(depth - 0.8, 0.0) / 0.2, limited = min(depth, 0.8) + 0.2 * (over / (1.0 + over));
+  rgb = max(grey + limited / max(depth, 1e-30) * (rgb - grey), 0.0);
+  float n = norm(rgb) * pow(3.0, -0.2), above = max(n - 0.5, 0.0) / 0.5, share = above / (above + 12.0);
+  float kept = min(n, 0.5) + 0.5 * (above / (1.0 + above));
+  vec3 chroma = rgb * (kept / max(n, 1e-30));
+  vec3 display = chroma + share * sqrt(share) * (kept - chroma);
+  return display / max(max(max(display.r, display.g), display.b), 1.0);
+}
+vec3 encoded(vec3 c) {
+  return mix(1.055 * pow(max(c, 0.0031308), vec3(1.0 / 2.4)) - 0.055, 12.92 * c, lessThanEqual(c, vec3(0.0031308)));
+}
+void main() {
+  vec2 pixel = vec2(gl_FragCoord.x, pixels.y - gl_FragCoord.y);
+  vec3 uvw = to_uv * vec3(pixel, 1.0), right = to_uv * vec3(pixel + vec2(1.0, 0.0), 1.0), down = to_uv * vec3(pixel + vec2(0.0, 1.0), 1.0);
+  vec2 texel = (uvw.xy / uvw.z - area.xy) * area.z;
+  vec2 dx = (right.xy / right.z - area.xy) * area.z - texel, dy = (down.xy / down.z - area.xy) * area.z - texel;
+  vec3 rgb = uvw.z > 0.0 ? irradiance(texel, dx, dy) : vec3(0.0);
+  if (view == 0) {
+    vec2 at = pixel / pixels;
+    rgb = whites.x * pow(texture(base, at).rgb, vec3(2.4)) + whites.y * texture(weight, at).rgb * rgb;
+  } else {
+    // A faint light shows where the receiver is: its window brighter than what is beyond.
+    bool inside = uvw.z > 0.0 && all(greaterThan(texel, vec2(0.0))) && all(lessThan(texel, vec2(size)));
+    rgb = diffuse * rgb + (inside ? 0.012 : view == 2 && uvw.z > 0.0 ? 0.006 : 0.002) / whites.z;
+  }
+  vec3 display = encoded(tone(rgb * whites.z));
+  if (view == 2) {
+    vec4 solid = texelFetch(glass, ivec2(gl_FragCoord.xy), 0);
+    display = display * (1.0 - solid.a) + solid.rgb;
+  }
+  float ring = abs(length(pixel - mark.xy) - mark.w) / max(0.12 * mark.w, 0.6);
+  if (mark.z > 0.0 && ring < 1.5) display = mix(vec3(1.0), display, smoothstep(0.5, 1.5, ring));
+  shown = vec4(display, 1.0);
+}`;
+
+export const SOLID_VERTEX = `#version 300 es
+precision highp float;
+uniform mat4 to_clip;
+layout(location = 0) in vec3 position;
+layout(location = 1) in vec4 colour;
+out vec3 world;
+flat out vec4 tint;
+void main() { world = position; tint = colour; gl_Position = to_clip * vec4(position, 1.0); }`;
+
+export const SOLID_FRAGMENT = `#version 300 es
+precision highp float;
+uniform vec3 eye;
+in vec3 world;
+flat in vec4 tint;
+out vec4 shown;
+void main() {
+  vec3 n = normalize(cross(dFdx(world), dFdy(world))), toward = normalize(eye - world);
+  float slant = pow(1.0 - abs(dot(n, toward)), 3.0), lit = 0.55 + 0.45 * abs(dot(n, toward));
+  float alpha = tint.a < 1.0 ? 0.1 + 0.5 * slant : 1.0;
+  shown = vec4(tint.rgb * lit * alpha, alpha);
+}`;

@@ -1,0 +1,123 @@
+// What a light of some spectrum sends to which place of the traced interval of paths: tables for the shaders.
+// Wavelengths are in nm, one value a nanometre from 380 to 780. x is the coordinate of the paths, 0 to 1: affine in the
+// index of the one glass that disperses, or in the wavelength where there are several.
+
+export const FIRST_NM = 380, LAST_NM = 780, COUNT = 401, D_NM = 587.5618;
+export const SAMPLES = 2048, MOST_LINES = 16;
+
+export const valueAt = (values, nm) => {
+  const place = Math.min(Math.max(nm - FIRST_NM, 0), COUNT - 1), i = Math.min(Math.floor(place), COUNT - 2);
+  return values[i] + (place - i) * (values[i + 1] - values[i]);
+};
+
+// n(λ) with `gain` times the dispersion and the same index at the d line.
+export function indexOf(glass, gain) {
+  const d = valueAt(glass, D_NM);
+  return Float64Array.from(glass, (n) => d + gain * (n - d));
+}
+
+// (n_d - 1) / (n_F - n_C).
+export function abbeNumber(glass) {
+  return (valueAt(glass, D_NM) - 1) / (valueAt(glass, 486.1327) - valueAt(glass, 656.2725));
+}
+
+// x of every nanometre, and whether all of it was traced. `nm`: the wavelength at equal steps of x, where x is not affine
+// in the index.
+export function placesOf(head, index, nm) {
+  const span = head.n_at_1 - head.n_at_0, free = new Float64Array(COUNT);
+  for (let i = 0, k = 0; i < COUNT; i++) {
+    while (k < nm.length - 2 && nm[k + 1] < FIRST_NM + i) k++;
+    free[i] = head.mode === "index" ? (index[i] - head.n_at_0) / span : (k + (FIRST_NM + i - nm[k]) / (nm[k + 1] - nm[k])) / (nm.length - 1);
+  }
+  return { x: free.map((x) => Math.min(Math.max(x, 0), 1)), isWithin: free.every((x) => x > -1e-4 && x < 1 + 1e-4) };
+}
+
+// Luminous flux of a spectrum, up to a factor: { density (401,), lines [[nm, W]] }.
+export function luminous({ density, lines }, observer) {
+  const y = (i) => observer[3 * i] * 0.212639 + observer[3 * i + 1] * 0.7151687 + observer[3 * i + 2] * 0.0721923;
+  let sum = 0;
+  for (let i = 0; i < COUNT; i++) sum += density[i] * y(i) * (i % (COUNT - 1) ? 1 : 0.5);
+  for (const [nm, watts] of lines) sum += watts * y(Math.round(nm) - FIRST_NM);
+  return sum;
+}
+
+// One spectrum with the luminous flux of another.
+export function asBright(spectrum, other, observer) {
+  const scale = luminous(other, observer) / luminous(spectrum, observer);
+  return { density: spectrum.density.map((w) => w * scale), lines: spectrum.lines.map(([nm, w]) => [nm, w * scale]) };
+}
+
+// A single wavelength in place of a spectrum: what 10 nm of an even one as bright would have there.
+export function single(nm, spectrum) {
+  let power = spectrum.lines.reduce((sum, [, watts]) => sum + watts, 0);
+  for (const watts of spectrum.density) power += watts;
+  return { density: new Float32Array(COUNT), lines: [[nm, power / 12]] };
+}
+
+// Rows of the shaders' table: (red, green, blue, 0) below each place between the ends of the light, then its lines
+// (red, green, blue, x). A row a spectrum; `reflectance` (401,) or null.
+export function lightTable(rows, x, observer, reflectance) {
+  let low = 1, high = 0;
+  const reach = (from, to) => {
+    low = Math.min(low, from);
+    high = Math.max(high, to);
+  };
+  for (const spectrum of rows) {
+    for (let i = 0; i < COUNT; i++) if (spectrum.density[i] > 0) reach(x[Math.max(i - 1, 0)], x[Math.min(i + 1, COUNT - 1)]);
+    for (const [nm] of spectrum.lines) reach(valueAt(x, nm) - 2e-4, valueAt(x, nm) + 2e-4);
+  }
+  const middle = (low + high) / 2, half = Math.max((high - low) / 2, 2e-4);
+  const support = [middle - half, middle + half];
+  const width = SAMPLES + MOST_LINES, table = new Float32Array(4 * width * rows.length);
+  let lineCount = 0;
+  rows.forEach((spectrum, r) => {
+    const energy = (i, watts) => {
+      const share = watts * (reflectance ? valueAt(reflectance, i + FIRST_NM) : 1);
+      return [0, 1, 2].map((c) => share * valueOf(observer, i, c));
+    };
+    const base = 4 * width * r;
+    // Cells of a nanometre, half ones at the ends; even within.
+    const below = [0, 0, 0], step = (support[1] - support[0]) / (SAMPLES - 1);
+    let sample = 0;
+    const put = (share, cell) => {
+      for (let c = 0; c < 3; c++) table[base + 4 * sample + c] = below[c] + share * cell[c];
+      sample++;
+    };
+    for (let i = 0; i < COUNT; i++) {
+      const from = valueAt(x, FIRST_NM + Math.max(i - 0.5, 0)), to = valueAt(x, FIRST_NM + Math.min(i + 0.5, COUNT - 1));
+      if (to <= 0 || from >= 1) continue; // beyond what was traced
+      const cell = energy(i, spectrum.density[i] * (i % (COUNT - 1) ? 1 : 0.5));
+      while (sample < SAMPLES && support[0] + sample * step < to)
+        put(Math.max(support[0] + sample * step - from, 0) / Math.max(to - from, 1e-12), cell);
+      for (let c = 0; c < 3; c++) below[c] += cell[c];
+    }
+    while (sample < SAMPLES) put(0, below);
+    spectrum.lines.slice(0, MOST_LINES).forEach(([nm, watts], k) => {
+      table.set([...energy(nm - FIRST_NM, watts), valueAt(x, nm)], base + 4 * (SAMPLES + k));
+      lineCount = Math.max(lineCount, k + 1);
+    });
+  });
+  return { table, width, height: rows.length, support, lineCount };
+}
+
+// One channel of the observer (401, 3) at a place between its rows.
+function valueOf(observer, i, channel) {
+  const k = Math.min(Math.max(Math.floor(i), 0), COUNT - 2), share = i - k;
+  return observer[3 * k + channel] * (1 - share) + observer[3 * (k + 1) + channel] * share;
+}
+
+// Two rows of the paths' table over x: each group's variable (its glass's index) as shown, and as traced; three groups
+// and 0. `variable` (groups, samples), `nm` (samples,): as traced, at equal steps of x.
+export function indexTable(head, shown, variable, nm) {
+  const table = new Float32Array(8 * SAMPLES), last = nm.length - 1, groups = variable.length / nm.length;
+  for (let k = 0; k < SAMPLES; k++) {
+    const x = k / (SAMPLES - 1), place = x * last, i = Math.min(Math.floor(place), last - 1);
+    const at = (values, from) => values[from + i] + (place - i) * (values[from + i + 1] - values[from + i]);
+    for (let g = 0; g < Math.min(groups, 3); g++) {
+      const n = head.mode === "index" ? head.n_at_0 + x * (head.n_at_1 - head.n_at_0) : at(variable, g * nm.length);
+      table[4 * k + g] = head.mode === "index" || !shown[g] ? n : valueAt(shown[g], at(nm, 0));
+      table[4 * (SAMPLES + k) + g] = n;
+    }
+  }
+  return table;
+}
