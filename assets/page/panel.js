@@ -46,7 +46,7 @@ export function bindPanel(head, glasses, set, act) {
     const row = document.createElement("label"), name = document.createElement("span"), select = document.createElement("select");
     row.className = "row";
     name.textContent = head.groups.length > 1 || !group.name ? `Glass of ${(group.objects ?? [group.name]).join(", ")}` : "Glass";
-    for (const choice of [...new Set([group.row, ...(group.choices ?? [])])])
+    for (const choice of group.choices)
       option(select, choice, `${head.glasses[choice].name} (V ${abbeNumber(glasses(choice)).toFixed(1)})`);
     select.dataset.group = g;
     select.addEventListener("change", () => set({ glass: [g, Number(select.value)] }));
