@@ -35,6 +35,7 @@ _OFFERED = (
     "glass",
     "glasses",
     "load",
+    "page",
     "render",
     "scenes",
     "sweep",

@@ -13,6 +13,7 @@ from ..base.errors import UserError
 from ..base.paths import shipped_scenes
 from ..edit.stored_photons import StoredPhotons as Photons
 from .catalogue import Glass, glass, glasses
+from .pages import page
 from .picture import CausticMap, Picture, Statistics
 from .rendering import caustic, render
 from .scene import Scene
@@ -41,6 +42,7 @@ __all__ = [
     "glass",
     "glasses",
     "load",
+    "page",
     "render",
     "scenes",
     "sweep",

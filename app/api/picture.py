@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.errors import UserError, suggestion
-from ..base.image_io import png_bytes, write_image
+from ..base.image_io import shown_bytes, write_image
 from ..model.scene import Scene
 from .arguments import in_python
 
@@ -113,7 +113,7 @@ class Picture(_Image):
 
     def _repr_png_(self) -> bytes:
         """As notebooks show it."""
-        return png_bytes(self.rgb, self.exposure_ev, self.glare, self.antialias_highlights)
+        return shown_bytes(self.rgb, self.exposure_ev, self.glare, self.antialias_highlights)
 
     def _layer(self, name: str | None) -> Floats:
         if name is None:
@@ -168,7 +168,7 @@ class CausticMap(_Image):
 
     def _repr_png_(self) -> bytes:
         """As notebooks show it."""
-        return png_bytes(self.rgb)
+        return shown_bytes(self.rgb)
 
     def __repr__(self) -> str:
         width, height = self.size

@@ -158,12 +158,14 @@ def check_finite(name: str, *pictures: np.ndarray | None) -> None:
     raise BrokenPictureError(own_fault(what))
 
 
-def png_bytes(rgb: np.ndarray, exposure_ev: float = 0.0, glare: float = 0.0, antialias: bool = True) -> bytes:
-    """The .png that `write_image` would write of `rgb`, float32 (H, W, 3)."""
+def shown_bytes(
+    rgb: np.ndarray, exposure_ev: float = 0.0, glare: float = 0.0, antialias: bool = True, suffix: str = ".png"
+) -> bytes:
+    """The file, .png or .jpg, that `write_image` would write of `rgb`, float32 (H, W, 3)."""
     check_finite("the picture", rgb)
     buffer = io.BytesIO()
     codes, texts = _developed(rgb, exposure_ev, glare, antialias)
-    _write_png(buffer, codes, Extras(texts))
+    _BY_SUFFIX[suffix].write(buffer, codes, Extras(texts))
     return buffer.getvalue()
 
 

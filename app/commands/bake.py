@@ -5,18 +5,21 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
-from ..base.interrupts import interrupt_flag
+from ..base.interrupts import Interruption, interrupt_flag
 from .opened import note_assumptions, open_scene, settings_for
 from .printing import note
+from .scenes import find_scene
 from .table import Bake, Export
 
 if TYPE_CHECKING:
     from ..model.scene import Scene
     from ..render.bake import BakedMap
+
+T = TypeVar("T")
 
 
 def bake_texture(options: Bake) -> int:
@@ -37,8 +40,11 @@ def bake_texture(options: Bake) -> int:
 
 def export(options: Export) -> int:
     """Bake and write; returns the exit code. Raises `UserError`."""
-    from ..render.export_caustic import check_export, write_export
+    from ..render.export_caustic import PAGE_SUFFIXES, check_export, write_export
 
+    if options.output.suffix.lower() in PAGE_SUFFIXES:
+        check_export(options.output, options.plane, options.source)
+        return _page(options)
     outputs = check_export(options.output, options.plane, options.source)
 
     def write(scene: Scene, baked: BakedMap) -> None:
@@ -47,6 +53,48 @@ def export(options: Export) -> int:
 
     others = ", ".join(path.name for path in outputs[1:])
     return _baked(options, outputs, write, f"the caustic on '{options.receiver}'", f"next to it {others}")
+
+
+def _page(options: Export) -> int:
+    """Make a page; returns the exit code. Raises `UserError` as `_baked`."""
+    from ..base.progress import ProgressReporter
+    from ..edit.parameters import Stage
+    from ..gpu.context import create_context
+    from ..render.page.page import check_page, check_page_path, page_size, page_steps, words_of
+
+    check_page_path(options.output)
+    scene = open_scene(options)
+    check_page(scene, options.receiver)
+    note_assumptions(scene)
+    width, height = page_size(scene)
+    settings = settings_for(options, scene, width=width, height=height, exposure_ev=scene.render.exposure_ev)
+    started = time.perf_counter()
+    words = words_of(scene, find_scene(options.scene))
+    with create_context() as context, interrupt_flag() as interrupted, ProgressReporter(scene.name) as progress:
+        steps = page_steps(context, Stage(scene, scene.camera), settings, options.receiver, words)
+        page = _finished(steps, progress, "making the page", interrupted)
+        if page is None:
+            return interrupted.exit_code
+        page.to_html(options.output)
+    megabytes = options.output.stat().st_size / 1e6
+    took = time.perf_counter() - started
+    print(f"{options.output.resolve()}: a page of {megabytes:.1f} MB in {took:.1f} s; any browser opens it")
+    return 0
+
+
+def _finished(
+    steps: Generator[float, None, T], progress: Callable[[float, str], None], what: str, interrupted: Interruption
+) -> T | None:
+    """What `steps` return; None, said to the user, where the work was interrupted."""
+    while True:
+        try:
+            progress(next(steps), what)
+        except StopIteration as finished:
+            value: T = finished.value
+            return value
+        if interrupted():
+            print("spectrasplat: nothing was written: it is whole or not at all", file=sys.stderr)
+            return None
 
 
 def _baked(
@@ -70,15 +118,9 @@ def _baked(
     started = time.perf_counter()
     with create_context() as context, interrupt_flag() as interrupted, ProgressReporter(scene.name) as progress:
         steps = bake.bake_map(context, Stage(scene, scene.camera), settings, options.receiver)
-        while True:
-            try:
-                progress(next(steps), "baking")
-            except StopIteration as finished:
-                baked: BakedMap = finished.value
-                break
-            if interrupted():
-                print("spectrasplat: nothing was written: a map is whole or not at all", file=sys.stderr)
-                return interrupted.exit_code
+        baked = _finished(steps, progress, "baking", interrupted)
+        if baked is None:
+            return interrupted.exit_code
     for notice in baked.notices:
         note(notice)
     write(scene, baked)

@@ -379,7 +379,10 @@ class BakesCaustic(OpensScene):
     """Options of the commands that bake a caustic map."""
 
     size: tuple[int, int] | None = setting(
-        "WxH", "Texels; default: 1024x1024.", options.size, fields=("width", "height")
+        "WxH",
+        "Texels, of a page pixels; default: 1024x1024, of a page as the scene.",
+        options.size,
+        fields=("width", "height"),
     )
     photons: int | None = shared(_PHOTONS)
     seed: int | None = shared(_SEED)
@@ -399,13 +402,13 @@ class Bake(BakesCaustic):
 
 @dataclass(frozen=True, kw_only=True)
 class Export(BakesCaustic):
-    """Export the caustic on an object to glTF or USD, or as a cookie for game engines."""
+    """Export the caustic on an object to glTF or USD, as a cookie for game engines, or as a page for browsers."""
 
     receiver: str = argument("RECEIVER", "The diffuse object whose caustic is exported.", complete=completion.receivers)
     output: Path = target(
         "OUT",
         "The receiver with its caustic as emission: .glb, .gltf, .usda, .usdc, .usd; or a spot light's cookie: "
-        ".png, .exr. Numbers are written to a .json next to it.",
+        ".png, .exr. Numbers are written to a .json next to it. Or a page whose dispersion can be dragged: .html.",
     )
     plane: bool = switch("Only the rectangle that is lit, as bright as on a white receiver.")
     source: tuple[float, float, float] | None = option(

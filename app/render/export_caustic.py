@@ -1,5 +1,5 @@
 """A baked caustic as files that other programs open: glTF, USD, or a spot light's cookie; numbers in a `.json` next
-to it."""
+to it. A page for a browser is not baked: `render/page`."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ from .lit_receiver import lit_receiver, up_of
 GLTF_SUFFIXES = (".glb", ".gltf")
 USD_SUFFIXES = (".usda", ".usdc", ".usd")
 COOKIE_SUFFIXES = (".png", ".exr")
-SUFFIXES = GLTF_SUFFIXES + USD_SUFFIXES + COOKIE_SUFFIXES
+PAGE_SUFFIXES = (".html",)
+SUFFIXES = GLTF_SUFFIXES + USD_SUFFIXES + COOKIE_SUFFIXES + PAGE_SUFFIXES
 
 
 def check_export(path: Path, plane: bool = False, source: Sequence[float] | None = None) -> list[Path]:
@@ -32,8 +33,11 @@ def check_export(path: Path, plane: bool = False, source: Sequence[float] | None
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
         raise UserError(
-            f"cannot export to {path}: use .glb or .gltf, .usda, .usdc or .usd, or .png or .exr for a spot's cookie"
+            f"cannot export to {path}: use .glb or .gltf, .usda, .usdc or .usd, .png or .exr for a spot's cookie, or "
+            ".html for a page"
         )
+    if suffix in PAGE_SUFFIXES and plane:
+        raise UserError(f"--plane does not go with a page, {path.name}: it belongs to .glb and .usd files")
     if suffix in COOKIE_SUFFIXES and plane:
         raise UserError(f"--plane does not go with a cookie, {path.name}: it belongs to .glb and .usd files")
     if suffix not in COOKIE_SUFFIXES and source is not None:
@@ -41,7 +45,7 @@ def check_export(path: Path, plane: bool = False, source: Sequence[float] | None
     if suffix in USD_SUFFIXES:
         check_usd()
         return [path, texture_path(path), placement_path(path)]
-    return [path, placement_path(path)]
+    return [path] if suffix in PAGE_SUFFIXES else [path, placement_path(path)]
 
 
 def write_export(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -39,19 +39,24 @@ def still_engine(context: Context, settings: RenderSettings, exact: bool, coarse
 
 def finish(engine: LiveEngine, photons: int, report: Callable[[float, str], None], stopped: Callable[[], bool]) -> None:
     """Work until what is wanted is shown, or `stopped()`. Raises `UserError` where it cannot be."""
+    for share in finishing(engine, photons):
+        if stopped():
+            break
+        report(share, "taking camera samples" if engine.stats.photons >= photons else "tracing photons")
+    report(1.0, "done")
+
+
+def finishing(engine: LiveEngine, photons: int) -> Iterator[float]:
+    """Work until what is wanted is shown, pausing with the share done. Raises `UserError` where it cannot be."""
     samples = engine.camera_samples
-    while not stopped():
+    while True:
         engine.advance(_STEP_S)
         if engine.problem is not None:
             raise UserError(engine.problem)
         if engine.is_idle:
             break
         stats = engine.stats
-        report(
-            min(0.8 * stats.photons / photons + 0.2 * stats.camera_samples / samples, 0.99),
-            "taking camera samples" if stats.photons >= photons else "tracing photons",
-        )
-    report(1.0, "done")
+        yield min(0.8 * stats.photons / photons + 0.2 * stats.camera_samples / samples, 0.99)
 
 
 def picture_of(engine: LiveEngine) -> np.ndarray | None:

@@ -1,0 +1,71 @@
+"""Pages: a caustic in one file, whose dispersion is dragged in any browser."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from ..base.generators import finished
+from .arguments import Count, Size, check_scene, settings_of
+from .device import Cancel, Device, Progress
+from .scene import Scene
+
+if TYPE_CHECKING:
+    from ..gpu.context import Context
+    from ..render.page.page import Page
+
+
+def page(
+    scene: Scene,
+    receiver: str | None = None,
+    *,
+    size: Size | None = None,
+    photons: Count | None = None,
+    seed: int | None = None,
+    title: str | None = None,
+    description: str | None = None,
+    progress: Progress | None = None,
+    cancel: Cancel | None = None,
+) -> Page:
+    """The light on `receiver` (default: that on which most lands) as a page: `page(scene).to_html("page.html")`.
+
+    `size`: pixels of its picture. `photons`: how many it is made of, 100,000 by default. `title`, `description`: words
+    of the page; default: the scene's name and what its file begins by saying. Once `cancel()` returns true, `UserError`
+    says so. Raises `UserError`.
+    """
+    check_scene(scene)
+    with Device() as device:
+        return device.run(page_work(scene, receiver, size, photons, seed, title, description), progress, cancel)
+
+
+def page_work(
+    scene: Scene,
+    receiver: str | None,
+    size: Size | None = None,
+    photons: Count | None = None,
+    seed: int | None = None,
+    title: str | None = None,
+    description: str | None = None,
+) -> Callable[[Context, Callable[[float, str], None], Callable[[], bool]], Page]:
+    """What a device does for `page`. Raises `UserError` for arguments that are none."""
+    from ..base.errors import UserError
+    from ..edit.parameters import Stage
+    from ..render.page.page import DEFAULT_PHOTONS, page_size, page_steps, words_of
+
+    model = scene._model
+    settings = settings_of(scene, size=size or page_size(model), photons=photons or DEFAULT_PHOTONS, seed=seed)
+    words = words_of(model, scene._file)
+    words = replace(
+        words, title=title or words.title, description=words.description if description is None else description
+    )
+
+    def work(context: Context, report: Callable[[float, str], None], stopped: Callable[[], bool]) -> Page:
+        def told(share: float) -> None:
+            if stopped():
+                raise UserError("the page was given up before it was whole")
+            report(share, "making the page")
+
+        return finished(page_steps(context, Stage(model, model.camera), settings, receiver, words), told)
+
+    return work

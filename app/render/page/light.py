@@ -1,0 +1,185 @@
+"""The light of a page: stored photons and beams' polygons of one flat receiver, in coordinates of its plane.
+
+Both own intervals of one spectral coordinate x, 0 to 1. Where one glass disperses, x is affine in its index: what lands
+where depends on the index alone, and another dispersion moves wavelengths along x (docs/pages.md).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...base.errors import UserError
+from ...beams.facets import convex_hull
+from ...gpu.records import LATTICE_BIT
+from ...gpu.spectral_groups import samples_of
+from ...model.optics.colorimetry import VISIBLE_NM
+from ...passes.plane_frame import PlaneFrame, plane_frame
+
+if TYPE_CHECKING:
+    from ..viewer.live_light import LiveLight
+    from .spectra import Glasses
+
+_LIT = 0.998
+"""Share of the light that a page's window holds."""
+_MARGIN = 0.04
+"""Of the window's side, round it."""
+
+
+@dataclass(frozen=True)
+class PageLight:
+    """What lands on one receiver."""
+
+    arrays: dict[str, np.ndarray]
+    """By the names of docs/pages.md."""
+    head: dict[str, Any]
+    frame: PlaneFrame
+    """Of the receiver's plane, GPU space."""
+    item: int
+    """The receiver in the scene's objects."""
+
+
+def page_light(light: LiveLight, receiver: int, glasses: Glasses) -> PageLight:
+    """The light of `light`, traced through `glasses.traced`, on receiver number `receiver`. Raises `UserError` where
+    there is none."""
+    buffers = light.buffers
+    item = buffers.receivers[receiver]
+    frame = plane_frame(buffers.space.to_gpu(buffers.world_meshes[item].vertices))
+    scale = buffers.space.scale
+    nm, samples = samples_of(buffers.axis)
+    arrays: dict[str, np.ndarray] = {"nm": nm.astype("f4"), "variable": buffers.variables.astype("f4")}
+    head: dict[str, Any] = {"mode": "wavelength"}
+    page_x = samples
+    if glasses.traced is not None:
+        first, last = glasses.traced.index(VISIBLE_NM[[0, -1]])
+        head = {"mode": "index", "n_at_0": float(first), "n_at_1": float(last)}
+        page_x = (buffers.variables[0] - first) / (last - first)
+
+    def to_page(x: np.ndarray) -> np.ndarray:
+        return np.interp(x, samples, page_x)
+
+    photons = _photons(light, receiver, frame, to_page)
+    beams = _beams(light, receiver, frame, to_page)
+    if not len(photons["x"]) and not len(beams["x"]):
+        name = light.light_pass.scene.objects[item].name
+        raise UserError(f"no caustic falls on '{name}': choose another receiver, or aim a light at glass near it")
+    head["window"] = _window(photons, beams)
+    unit = float(photons["throughput"].max(initial=0.0)) or 1.0
+    photons["throughput"] = (photons["throughput"] / unit).astype("f2")
+    photons["x"] = np.rint(np.clip(photons["x"], 0.0, 1.0) * 65535.0).astype("u2")
+    head["photons"] = {"unit": unit, "smoothing": light.light_pass.smoothing, "count": len(photons["x"])}
+    arrays |= {f"photons.{name}": values for name, values in photons.items()}
+    if len(beams["x"]):
+        arrays |= {f"beams.{name}": values for name, values in beams.items()}
+    outline = frame.project(buffers.space.to_gpu(buffers.world_meshes[item].vertices)) / scale
+    outline = outline[convex_hull(outline)]
+    head["plane"] = {
+        "origin": buffers.space.to_world(frame.origin).tolist(),
+        "u": frame.axes[0].tolist(),
+        "v": frame.axes[1].tolist(),
+        "outline": outline.tolist(),
+    }
+    return PageLight(arrays, head, frame, item)
+
+
+def landed(light: LiveLight, receiver: int) -> float:
+    """Light that lands on a receiver, about, by photons and polygons."""
+    beams, weights = light.light_pass.survey.beams, light.buffers.light_power
+    watts = np.array([float(power.band(0.0, 1.0)[3]) for power in weights])
+    total = 0.0
+    if (stored := light.stored.fullest) is not None:
+        records = stored.store.read(1 << 16, light.light_pass.trace.photon)
+        mine = records[records["receiver"] == receiver]
+        total += float(mine["flux_w"].sum()) / max(stored.pass_photons * stored.store.some(1 << 16)[2], 1e-300)
+    if beams is not None and beams.found is not None and beams.found.polygons is not None:
+        polygons = beams.found.polygons
+        total += float((polygons.flux * watts[polygons.light])[polygons.receiver == receiver].sum())
+    return total
+
+
+def _photons(light: LiveLight, receiver: int, frame: PlaneFrame, to_page: Any) -> dict[str, np.ndarray]:
+    stored, photon = light.stored.fullest, light.light_pass.trace.photon
+    records = photon.zeros(0) if stored is None else stored.store.read(1 << 30, photon)
+    records = records[records["receiver"] == receiver]
+    scale, groups = light.buffers.space.scale, light.buffers.groups.count
+    weight = 1.0 if stored is None else stored.pass_photons * stored.store.rounds / stored.store.rounds_of_pass
+
+    def along(name: str) -> np.ndarray:
+        return (records[name][:, :3].astype(float) @ frame.axes.T / scale).astype("f2")
+
+    columns = [along(f"dposition_dvar{g}") for g in range(groups)]
+    return {
+        "position": (frame.project(records["position"].astype(float)) / scale).astype("f4"),
+        "axis_s": along("dposition_ds"),
+        "axis_t": along("dposition_dt"),
+        "dposition_dn": np.stack(columns, axis=1) if columns else np.zeros((len(records), 0, 2), "f2"),
+        "x": to_page(np.stack([records[name] for name in ("x_lo", "x_anchor", "x_hi")], axis=1)),
+        "throughput": records["throughput"].astype(float) / max(weight, 1e-300),
+        "light": (records["light_and_source"] & 255).astype("u1"),
+        "lattice": (records["flags"] >> LATTICE_BIT).astype("u4"),
+    }
+
+
+def _beams(light: LiveLight, receiver: int, frame: PlaneFrame, to_page: Any) -> dict[str, np.ndarray]:
+    beams = light.light_pass.survey.beams
+    polygons = None if beams is None or beams.found is None else beams.found.polygons
+    if polygons is None:
+        return {"x": np.zeros((0, 2))}
+    assert beams is not None
+    own, scale = beams.frames[receiver], light.buffers.space.scale
+    assert np.allclose(own.axes, frame.axes), "beams lie in the frame of their receiver"
+    polygons = polygons.where(polygons.receiver == receiver)
+    shift = (own.origin - frame.origin) @ frame.axes.T
+    edges = polygons.edges.copy().reshape(-1, 2, 4)
+    edges[..., 2] -= edges[..., :2] @ shift
+    edges[..., 2:] /= scale
+    return {
+        "x": to_page(np.stack([polygons.x_lo, polygons.x_hi], axis=1)).astype("f4"),
+        "density": polygons.density.astype("f4"),
+        "slope": (polygons.slope * scale).astype("f4"),
+        "centre": ((polygons.centre + shift) / scale).astype("f4"),
+        "light": polygons.light.astype("u1"),
+        "first": polygons.edge_start.astype("u4"),
+        "edge": edges.reshape(-1, 8).astype("f4"),
+        "hull_first": polygons.hull_start.astype("u4"),
+        "hull": ((polygons.hulls + shift) / scale).astype("f4"),
+    }
+
+
+def _window(photons: dict[str, np.ndarray], beams: dict[str, np.ndarray]) -> dict[str, float]:
+    """The rectangle of the plane that holds nearly all of the light."""
+    places = [photons["position"].astype(float)]
+    weights = [photons["throughput"][:, 1] * (photons["x"][:, 2] - photons["x"][:, 0])]
+    if len(beams["x"]):
+        corners = np.diff(beams["hull_first"].astype(int))
+        places.append(beams["hull"].astype(float))
+        weights.append(np.repeat(_areas(beams) / np.maximum(corners, 1), corners))
+    place, weight = np.concatenate(places), np.concatenate([w / max(float(w.sum()), 1e-300) for w in weights])
+    low, high = np.zeros(2), np.zeros(2)
+    for k in range(2):
+        order = np.argsort(place[:, k])
+        running = np.cumsum(weight[order])
+        ends = np.searchsorted(running, running[-1] * np.array([0.5 - 0.5 * _LIT, 0.5 + 0.5 * _LIT]))
+        low[k], high[k] = place[order[np.minimum(ends, len(order) - 1)], k]
+    side = np.maximum(high - low, 1e-3 * float((high - low).max()) + 1e-9)
+    low, high = low - _MARGIN * side, high + _MARGIN * side
+    return {
+        "u0": float(low[0]),
+        "v0": float(low[1]),
+        "u1": float(high[0]),
+        "v1": float(high[1]),
+        "texel": float(side.max()) / 512.0,
+    }
+
+
+def _areas(beams: dict[str, np.ndarray]) -> np.ndarray:
+    """Light of each polygon's hull, relative, (M,)."""
+    hull, first = beams["hull"].astype(float), beams["hull_first"].astype(int)
+    owner = np.repeat(np.arange(len(first) - 1), np.diff(first))
+    following = np.arange(len(hull)) + 1
+    following[first[1:] - 1] = first[:-1]
+    twice = hull[:, 0] * hull[following, 1] - hull[following, 0] * hull[:, 1]
+    areas = np.bincount(owner, twice, len(first) - 1)
+    return np.abs(areas) * beams["density"].mean(axis=1) * np.ptp(beams["x"], axis=1)

@@ -1,0 +1,319 @@
+"""A caustic as one page: what is traced for it, step by step, and what it says."""
+
+from __future__ import annotations
+
+import html
+import itertools
+import os
+from collections.abc import Generator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...base import files
+from ...base.atomic import atomic_output, check_writable
+from ...base.errors import UserError
+from ...base.image_io import shown_bytes
+from ...base.tone_map import auto_exposure
+from ...base.version import __version__
+from ...edit.parameters import Stage
+from ...gpu.context import Context
+from ...model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz, xyz_to_rgb709
+from ...model.optics.spectrum import Spectrum
+from ...model.scene import Scene, SceneObject
+from ...model.settings import RenderSettings
+from ..bake import check_receiver
+from ..frame_fit import inputs_of
+from ..frames import FrameRenderer
+from ..lit_receiver import up_of
+from ..viewer.still_engine import finishing, still_engine
+from .document import document
+from .light import landed, page_light
+from .picture import page_picture, pixels_to_plane, weight_of
+from .spectra import GAIN_MAX, Glasses, offered_spectra
+
+if TYPE_CHECKING:
+    from ..viewer.live_light import LiveLight
+
+DEFAULT_PHOTONS = 100_000
+DEFAULT_WIDTH = 720
+"""Pixels."""
+MOST_TRIANGLES = 6000
+"""Of all that is drawn of the scene's objects."""
+_STAYS = (
+    "What is seen of the caustic in mirrors and through glass stays as it was rendered, and so does all other light: "
+    "only what falls on the receiver follows the controls."
+)
+_LIGHT_SHARE = 0.5
+"""Of the time, for what is traced to be kept."""
+
+
+@dataclass(frozen=True)
+class PageWords:
+    """What a page says besides what its scene does."""
+
+    title: str
+    description: str = ""
+    steps: Sequence[Mapping[str, Any]] = field(default=())
+    """`title`, `text` and what a step sets."""
+
+
+def words_of(scene: Scene, path: Path | None = None) -> PageWords:
+    """The scene's name, and what its file begins by saying."""
+    said = ""
+    if path is not None and path.suffix.lower() == ".toml":
+        lines = files.read_text(path, files.SETTINGS_BYTES).splitlines()
+        said = " ".join(line.lstrip("# ") for line in itertools.takewhile(lambda line: line.startswith("#"), lines))
+    title = scene.name.replace("_", " ")
+    return PageWords(title[:1].upper() + title[1:], said)
+
+
+def page_size(scene: Scene) -> tuple[int, int]:
+    """Pixels of a page's picture, in the scene's own shape."""
+    return DEFAULT_WIDTH, max(round(DEFAULT_WIDTH * scene.render.height / scene.render.width), 1)
+
+
+@dataclass(frozen=True)
+class Page:
+    """A caustic for a browser; a notebook shows it where it is a cell's last value."""
+
+    arrays: Mapping[str, np.ndarray]
+    """By the names of docs/pages.md."""
+    head: Mapping[str, Any]
+
+    @cached_property
+    def html(self) -> str:
+        """The file's text."""
+        return document(self.arrays, self.head)
+
+    def to_html(self, path: str | os.PathLike[str]) -> Path:
+        """Write it. Raises `UserError` where it cannot be written."""
+        target = check_page_path(Path(path))
+        with atomic_output(target) as temporary:
+            temporary.write_text(self.html, encoding="utf-8")
+        return target
+
+    def _repr_html_(self) -> str:
+        return framed(self.html)
+
+    def __repr__(self) -> str:
+        return f"Page of '{self.head['title']}': the light on '{self.head['receiver']}'"
+
+
+def framed(page: str) -> str:
+    """An element that shows a page within another one."""
+    return f'<iframe srcdoc="{html.escape(page)}" title="A caustic" style="width:100%;height:640px;border:0"></iframe>'
+
+
+def check_page_path(path: Path) -> Path:
+    """`path`; raises `UserError` where it cannot be a page's."""
+    if path.suffix.lower() != ".html":
+        raise UserError(f"cannot write {path}: the name of a page must end in .html")
+    check_writable(path)
+    return path
+
+
+def check_page(scene: Scene, receiver: str) -> None:
+    """Raise `UserError` where no page can show the light on `receiver`."""
+    check_receiver(scene, receiver)
+    item = next(o for o in scene.objects if o.name == receiver and o.material.receives)
+    if (why := _why_not(item)) is not None:
+        raise UserError(f"{why}: choose another receiver, or export a .glb")
+
+
+def _why_not(item: SceneObject) -> str | None:
+    """Why no page can show the light on a receiver; None: one can."""
+    if not item.mesh.is_flat:
+        return f"'{item.name}' is curved, and a page shows light on flat receivers only"
+    if item.material.texture is not None:
+        return f"'{item.name}' wears a picture, and a page shows light on receivers of one colour only"
+    return None
+
+
+def page_steps(
+    context: Context, stage: Stage, settings: RenderSettings, receiver: str | None, words: PageWords
+) -> Generator[float, None, Page]:
+    """Make a page of the light on `receiver` (None: the one with most of it), pausing with the share done.
+    `settings.photons`: those that it holds; its picture has the settings' size. Raises `UserError`."""
+    scene = stage.scene
+    if receiver is not None:
+        check_page(scene, receiver)
+    glasses = Glasses.of(scene)
+    settings = replace(settings, photons=settings.photons or DEFAULT_PHOTONS)
+    if glasses.own is None:  # beams have no columns by which another glass moves them
+        settings = replace(settings, method="srd-photons")
+    engine = still_engine(context, replace(settings, spp=1), exact=False)
+    try:
+        engine.set(inputs_of(Stage(glasses.widened(scene), stage.camera), settings))
+        for share in finishing(engine, settings.photons or 1):
+            yield _LIGHT_SHARE * share
+        live = engine.live_light
+        assert live is not None
+        light = page_light(live, _receiver(live, receiver), glasses)
+        groups = _groups(live, glasses)
+        size = settings.width, settings.height
+        item = light.item
+        to_plane = pixels_to_plane(stage.camera, *size, light.frame, live.buffers)
+        weight = weight_of(context, live.buffers, stage.camera, size, item, to_plane)
+    finally:
+        engine.release()
+    rgb, caustic = yield from _still(context, stage, settings)
+    exposure = auto_exposure(rgb) + (settings.exposure_ev or 0.0)
+    still = shown_bytes(rgb, settings.exposure_ev or 0.0, settings.glare, scene.render.antialias_highlights, ".jpg")
+    picture = page_picture(rgb, caustic, weight, exposure, still)
+    camera = picture.head | {"pixel_to_uv": to_plane.tolist()} | _camera(stage)
+    meshes, shapes = _meshes(scene, item)
+    tables, spectra = _spectra(scene)
+    arrays = {**light.arrays, **picture.arrays, **shapes, **tables, **groups.arrays}
+    head = light.head | groups.head | spectra | _said(scene, item, words)
+    head |= {"camera": camera, "meshes": meshes, "exposure_ev": exposure, "photons_emitted": settings.photons}
+    material = scene.objects[item].material
+    if material.reflectance is not None:
+        arrays["reflectance"] = np.asarray(material.reflectance, "f4")
+    head["reflectance_rgb"] = [1.0] * 3 if material.reflectance is not None else list(material.reflectance_rgb)
+    yield 1.0
+    return Page(arrays, head)
+
+
+def _receiver(live: LiveLight, name: str | None) -> int:
+    """Number of the receiver called so, or of that on which most light lands."""
+    objects = live.light_pass.scene.objects
+    numbers = [
+        r
+        for r, i in enumerate(live.buffers.receivers)
+        if name == objects[i].name or (name is None and _why_not(objects[i]) is None)
+    ]
+    if not numbers:
+        whys = "; ".join(filter(None, (_why_not(objects[i]) for i in live.buffers.receivers)))
+        raise UserError(f"no caustic of this scene can be on a page: {whys or 'nothing in it is diffuse'}")
+    return max(numbers, key=lambda r: landed(live, r))
+
+
+def _still(
+    context: Context, stage: Stage, settings: RenderSettings
+) -> Generator[float, None, tuple[np.ndarray, np.ndarray]]:
+    """The picture, and the caustics in it alone."""
+    frames = FrameRenderer(context, settings, [stage])
+    try:
+        for share in frames.steps(stage):
+            yield _LIGHT_SHARE + 0.45 * share
+        rgb = frames.picture.rgb
+        for share in frames.steps_of_layer("caustic", stage, lambda: False):
+            yield 0.95 + 0.05 * share
+        return rgb, frames.picture.rgb
+    finally:
+        frames.release()
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Entries of a page."""
+
+    arrays: dict[str, np.ndarray]
+    head: dict[str, Any]
+
+
+def _groups(live: LiveLight, glasses: Glasses) -> _Part:
+    """Glasses whose dispersion may be edited, and what may be shown instead of each."""
+    groups, traced = live.buffers.groups, live.light_pass.scene
+    rows, listed, edited = [], [], []
+    alone = groups.count == len(groups.glasses) and not groups.by_wavelength
+    for g in range(groups.count if alone else 0):
+        own = glasses.own or groups.glasses[g]
+        choices = [own, *glasses.others]
+        first = len(rows)
+        rows += [glass.index(VISIBLE_NM) for glass in choices]
+        listed += [
+            {"name": glass.name or "its own glass", "n_d": glass.n_d, "V_d": glass.V_d, "choice": glass is not own}
+            for glass in choices
+        ]
+        objects = [item.name for item in traced.objects if item.material.dispersion == groups.glasses[g]]
+        names = list(dict.fromkeys(objects))
+        edited.append(
+            {"name": own.name or names[0], "objects": names, "row": first, "choices": [*range(first, len(rows))]}
+        )
+    array = np.array(rows, "f4").reshape(-1, len(VISIBLE_NM))
+    limits = {"gain_max": GAIN_MAX}
+    return _Part({"glass_n": array}, {"glasses": listed, "groups": edited, "limits": limits})
+
+
+def _spectra(scene: Scene) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    spectra: list[tuple[str, Spectrum, bool]] = [(light.name, light.spectral_power, False) for light in scene.lights]
+    spectra += [(name, spectrum, True) for name, spectrum in offered_spectra().items()]
+    arrays = {
+        "spectra.density": np.array([spectrum.density for _, spectrum, _ in spectra], "f4"),
+        "observer": xyz_to_rgb709(K_M * cmf_xyz()).astype("f4"),
+        "cmf": cmf_xyz().astype("f4"),
+    }
+    listed = [{"name": n, "lines": [list(line) for line in s.lines], "choice": choice} for n, s, choice in spectra]
+    lights = []
+    for i, light in enumerate(scene.lights):
+        entry: dict[str, Any] = {"name": light.name, "kind": light.kind, "spectrum": i}
+        if light.has_place:
+            entry["position"] = list(light.position)
+        if light.has_direction:
+            entry["direction"] = list(light.direction)
+        lights.append(entry)
+    return arrays, {"spectra": listed, "lights": lights}
+
+
+def _camera(stage: Stage) -> dict[str, Any]:
+    camera = stage.camera
+    return {
+        "kind": camera.kind,
+        "eye": list(camera.position),
+        "target": list(camera.target),
+        "up": list(camera.up),
+        "vertical_fov_deg": camera.vertical_fov_deg,
+        "vertical_extent": camera.vertical_extent,
+    }
+
+
+def _meshes(scene: Scene, receiver: int) -> tuple[list[dict[str, Any]], dict[str, np.ndarray]]:
+    """All objects but the receiver, glass first, with few triangles."""
+    listed, arrays = [], {}
+    others = [i for i in range(len(scene.objects)) if i != receiver]
+    others.sort(key=lambda i: not scene.objects[i].material.transmits)
+    total = sum(len(scene.objects[i].mesh.triangles) for i in others)
+    for number, i in enumerate(others):
+        item = scene.objects[i]
+        mesh = item.mesh.transformed(item.object_to_world)
+        share = MOST_TRIANGLES * len(mesh.triangles) / max(total, 1)
+        vertices, triangles = decimated(mesh.vertices, mesh.triangles, max(int(share), 64))
+        names = {part: f"mesh.{number}.{part}" for part in ("vertices", "triangles")}
+        arrays |= {names["vertices"]: vertices.astype("f4"), names["triangles"]: triangles.astype("u4")}
+        kind = "glass" if item.material.transmits else "opaque"
+        listed.append({"name": item.name, "kind": kind, "colour": list(item.material.reflectance_rgb), **names})
+    return listed, arrays
+
+
+def decimated(vertices: np.ndarray, triangles: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
+    """About `most` triangles of the same shape: corners that share a cell of a grid become one."""
+    low, size = vertices.min(axis=0), float(np.ptp(vertices, axis=0).max()) or 1.0
+    cells = 256
+    while len(triangles) > most and cells > 4:
+        _, first, owner = np.unique(
+            np.rint((vertices - low) / size * cells), axis=0, return_index=True, return_inverse=True
+        )
+        joined = owner.reshape(-1)[triangles]
+        kept = joined[(joined[:, 0] != joined[:, 1]) & (joined[:, 1] != joined[:, 2]) & (joined[:, 2] != joined[:, 0])]
+        if len(kept) <= most or cells <= 6:
+            return vertices[first], kept
+        cells = int(cells / 1.4)
+    return vertices, triangles
+
+
+def _said(scene: Scene, receiver: int, words: PageWords) -> dict[str, Any]:
+    return {
+        "title": words.title,
+        "description": words.description,
+        "steps": [dict(step) for step in words.steps],
+        "scene": scene.name,
+        "receiver": scene.objects[receiver].name,
+        "version": __version__,
+        "up": up_of(scene),
+        "notes": [_STAYS],
+    }
