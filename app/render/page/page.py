@@ -219,7 +219,9 @@ class _Part:
 def _groups(live: LiveLight, glasses: Glasses) -> _Part:
     """Glasses whose dispersion may be edited, and what may be shown instead of each."""
     groups, traced = live.buffers.groups, live.light_pass.scene
-    rows, listed, edited = [], [], []
+    rows: list[np.ndarray] = []
+    listed: list[dict[str, Any]] = []
+    edited: list[dict[str, Any]] = []
     alone = groups.count == len(groups.glasses) and not groups.by_wavelength
     for g in range(groups.count if alone else 0):
         own = glasses.own or groups.glasses[g]
@@ -274,7 +276,8 @@ def _camera(stage: Stage) -> dict[str, Any]:
 
 def _meshes(scene: Scene, receiver: int) -> tuple[list[dict[str, Any]], dict[str, np.ndarray]]:
     """All objects but the receiver, glass first, with few triangles."""
-    listed, arrays = [], {}
+    listed: list[dict[str, Any]] = []
+    arrays: dict[str, np.ndarray] = {}
     others = [i for i in range(len(scene.objects)) if i != receiver]
     others.sort(key=lambda i: not scene.objects[i].material.transmits)
     total = sum(len(scene.objects[i].mesh.triangles) for i in others)

@@ -70,7 +70,7 @@ class Glasses:
             for light in scene.lights
         )
         objects = tuple(
-            replace(item, material=replace(item.material, dispersion=self.traced))
+            replace(item, material=replace(item.material, dispersion=self.traced))  # type: ignore[call-arg]
             if self.own is not None and item.material.dispersion == self.own
             else item
             for item in scene.objects
@@ -92,5 +92,5 @@ def others_like(own: Dispersion, traced: Dispersion) -> tuple[Dispersion, ...]:
         if blue <= high and red >= low and all(abs(glass.V_d / known - 1.0) > _APART for known in (own.V_d, *held)):
             held[glass.V_d] = glass
     values = sorted(held, reverse=True)
-    chosen = np.unique(np.linspace(0, len(values) - 1, CHOICES).round().astype(int)) if values else []
-    return tuple(held[values[i]] for i in chosen)
+    chosen = {round(i) for i in np.linspace(0, len(values) - 1, CHOICES)} if values else set()
+    return tuple(held[values[i]] for i in sorted(chosen))
