@@ -70,7 +70,7 @@ class Glasses:
             for light in scene.lights
         )
         objects = tuple(
-            replace(item, material=replace(item.material, dispersion=self.traced))  # type: ignore[call-arg]
+            replace(item, material=item.material.changed(dispersion=self.traced))
             if self.own is not None and item.material.dispersion == self.own
             else item
             for item in scene.objects
