@@ -417,6 +417,21 @@ class Export(BakesCaustic):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Gallery:
+    """Make a static site of shipped scenes and lessons, each a page whose dispersion can be dragged."""
+
+    scenes: tuple[str, ...] = argument(
+        "[NAME]...",
+        "Scenes and lessons; default: all.",
+        complete=completion.scenes,
+        repeated=True,
+        default=(),
+    )
+    output: Path = target("DIR", "Folder of the site; pages that are there already are kept.")
+    photons: int = option("N", "Of each page; default: 100k.", options.photons, default=100_000)
+
+
+@dataclass(frozen=True, kw_only=True)
 class Inspect(ReadsScenes):
     """Show what a scene holds, its glasses and mesh health, and which features its programs need."""
 

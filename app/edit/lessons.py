@@ -8,12 +8,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any, TypedDict
 
 import msgspec
 
 from ..base import files
 from ..base.errors import UserError, suggestion
 from ..base.paths import assets_dir, shipped_scenes
+
+
+class PageStep(TypedDict):
+    """What to try on a page, and what it sets there (docs/pages.md)."""
+
+    text: str
+    set: dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -34,6 +42,8 @@ class Lesson:
     ray_count: int = 5
     reflections: int = 0
     """Reflections of the rays within the object, before they leave it."""
+    page: tuple[PageStep, ...] = ()
+    """Steps of its page for browsers, instead of `steps`."""
 
     @property
     def path(self) -> Path:
