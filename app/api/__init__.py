@@ -13,6 +13,7 @@ from ..base.errors import UserError
 from ..base.paths import shipped_scenes
 from ..edit.stored_photons import StoredPhotons as Photons
 from .catalogue import Glass, glass, glasses
+from .gradient import Gradient, gradient, gradients
 from .pages import page
 from .picture import CausticMap, Picture, Statistics
 from .rendering import caustic, render
@@ -28,6 +29,7 @@ __all__ = [
     "Entries",
     "Fan",
     "Glass",
+    "Gradient",
     "Photons",
     "Picture",
     "Scene",
@@ -41,6 +43,8 @@ __all__ = [
     "fan",
     "glass",
     "glasses",
+    "gradient",
+    "gradients",
     "load",
     "page",
     "render",

@@ -129,16 +129,18 @@ def layout_maps(
     reflectance_class: dict[int, int],
     map_receiver: int | None = None,
     fineness: Fineness = STILL,
+    window: np.ndarray | None = None,
 ) -> MapLayout:
     """Fit windows and charts, as fine as `fineness` says or as fit a texture.
 
     `picture`: (width, height) whose camera decides resolution and what is in view; with `map_receiver`
-    that receiver's one window has exactly this size instead and the camera is ignored.
+    that receiver's one window has exactly this size instead and the camera is ignored; `window` (2, 3), GPU space, are
+    then opposite corners of it.
     Raises `UserError` where even coarse maps do not fit.
     """
     while True:
         try:
-            return _layout_maps(scene, buffers, landings, picture, reflectance_class, map_receiver, fineness)
+            return _layout_maps(scene, buffers, landings, picture, reflectance_class, map_receiver, fineness, window)
         except UserError:
             fineness = fineness.times(_SHRINK)
             if map_receiver is not None or fineness.texels_per_pixel < _LEAST_TEXELS_PER_PIXEL:
@@ -153,6 +155,7 @@ def _layout_maps(
     reflectance_class: dict[int, int],
     map_receiver: int | None,
     fineness: Fineness,
+    window: np.ndarray | None,
 ) -> MapLayout:
     sizes: list[tuple[int, int]] = []
     seen: dict[int, Window | None] = {}
@@ -165,7 +168,9 @@ def _layout_maps(
             frame = plane_frame(points)
             extent = extent_of(frame.project(points))
             windows: list[Window | PictureWindow]
-            if receiver == map_receiver:
+            if receiver == map_receiver and window is not None:
+                windows = [extent_of(frame.project(window))]
+            elif receiver == map_receiver:
                 around = extent if landed is None else _at_least(known_windows(frame, extent, landed)[0], 0.0, extent)
                 windows = [_with_aspect(around, picture)]
             else:

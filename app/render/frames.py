@@ -109,10 +109,11 @@ class FrameRenderer:
         stages: Sequence[Stage],
         begun: float | None = None,
         fill: Fill | None = None,
+        window: np.ndarray | None = None,
     ) -> None:
         """`stages`: what will be rendered; maps and lattices are fitted to some of them. `begun`: the
         `time.perf_counter()` from which `settings.seconds` count, which are those of one picture. `fill`: where light
-        comes from, instead of `traced_light`.
+        comes from, instead of `traced_light`. `window`: `MapFit.window` of a map's frames; None: the first one's own.
 
         Where light changes, `shader.keep_programs` on the context spares compiling every frame's programs."""
         self._context = context
@@ -122,6 +123,7 @@ class FrameRenderer:
         self._settings = settings = replace(settings, any_view=settings.any_view or moves)
         self._fit = FrameFit.of(stages, settings)
         self._unsurveyed = list(stages_to_survey(stages, settings))
+        self._window = window
         self.traced: Traced | None = None
         """Light and passes of the last frame."""
         self._budget: TimeBudget | None = None
@@ -157,6 +159,7 @@ class FrameRenderer:
         self.traced = self._made(stage, inputs_of(stage, self._settings))
         for _ in self.traced.light.preparing():
             yield 0.0
+        self._window = self.traced.light.map_window
         self.seconds.prepare = time.perf_counter() - self.seconds.started
 
     def _trace(self, stage: Stage, stop: Stop) -> Iterator[float]:
@@ -358,7 +361,7 @@ class FrameRenderer:
         scene = scene_seen(stage.scene, stage.camera, stage.solo_nm)
         features = Features.of(scene, settings)
         buffers = SceneBuffers(self._context.ctx, scene, features, self._axis(scene, features))
-        fit, division = self._fit.maps(scene.camera), self._fit.division
+        fit, division = replace(self._fit.maps(scene.camera), window=self._window), self._fit.division
         light = LightPass(self._context, scene, settings, features, buffers, fit=fit, division=division)
 
         def look_at_memory(layout: MapLayout) -> None:

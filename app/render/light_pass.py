@@ -79,13 +79,13 @@ class LightPass:
         self.stats = LightStats()
         self._elsewhere = LightStats()
         """What others counted whose sums were taken over (`take`)."""
-        self._division = division or Division()
+        self.division = division or Division()
         in_frames = moving is not None
         # With fewer than `SMALLEST_BATCH` rays in flight the plan depends on their number.
         batch = max(batch_size(context, features, settings.batch), _LEAST_IN_FRAMES if in_frames else SMALLEST_BATCH)
         self.trace = TracePass(context, features, buffers, batch, settings.max_depth)
         self.shown = ShownSpectra(context.ctx, scene, buffers, settings.bins)
-        self.survey = LightSurvey(context, scene, features, buffers, self.trace, self.shown, self._division, moving)
+        self.survey = LightSurvey(context, scene, features, buffers, self.trace, self.shown, self.division, moving)
         self.batches = PhotonBatches(context, self.trace, self.shown, photon_records or NoRecords(), in_frames)
         self._shrinks = features.method == SHRINKING
         self.smoothing = settings.smoothing * (FIRST_KERNEL if self._shrinks else 1.0)
@@ -151,6 +151,7 @@ class LightPass:
             self.shown.reflectance_class,
             self.map_receiver,
             fineness=fit.fineness_for(self.features.targets),
+            window=None if fit.window is None else self.buffers.space.to_gpu(fit.window),
         )
         if not fit.avoids_powers_of_two:
             return layout
@@ -175,6 +176,14 @@ class LightPass:
     def layout(self) -> MapLayout:
         """Places of the maps in the atlas."""
         return self.maps.layout
+
+    @property
+    def map_window(self) -> np.ndarray | None:
+        """What the map of the settings' layer shows, as `MapFit.window`; None for charts and for pictures."""
+        if self.map_receiver is None or not (windows := self.layout.windows[self.map_receiver]):
+            return None
+        corners = np.stack([windows[0].low, windows[0].high])
+        return self.buffers.space.to_world(self.layout.frames[self.map_receiver].at(corners))
 
     def caustic_maps(self, textures: Sequence[moderngl.Texture] | None = None) -> CausticMaps:
         """The summed maps as the camera reads them; `textures` where they are not `resolved_textures`."""
@@ -232,7 +241,7 @@ class LightPass:
             self.survey.domains,
             pilots,
             self.trace.batch,
-            self._division,
+            self.division,
         )
 
     def sample_plans(self, photons: int) -> Generator[str | None, None, list[LightPlan]]:

@@ -30,6 +30,8 @@ class MapFit:
     fineness: Fineness = STILL
     others: tuple[tuple[GpuSpace, Pilot], ...] = ()
     """Where light lands in other frames that the maps must serve as well, each in its own GPU space."""
+    window: np.ndarray | None = None
+    """World points (2, 3): opposite corners of what the map of the settings' layer shows; None: where light lands."""
     is_shared: bool = False
     """Other views see the same maps: no window is laid out on this one's pixels."""
     avoids_powers_of_two: bool = False

@@ -1,0 +1,174 @@
+"""Derivatives of caustic maps and pictures by the numbers of a scene."""
+
+from __future__ import annotations
+
+import io
+import os
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.errors import UserError
+from ..base.image_io import save_codes
+from ..base.tone_map import luminance
+from .arguments import Count, Size, settings_of
+from .device import Cancel, Device, Progress
+from .picture import Floats
+from .rendering import check_receiver
+from .scene import Scene
+
+if TYPE_CHECKING:
+    from ..gpu.context import Context
+
+DEFAULT_SIZE = (256, 256)
+_BRIGHTEST = 0.998
+"""Share of a picture whose colours are not full yet."""
+
+
+@dataclass(frozen=True)
+class Gradient:
+    """How a map or a picture changes with one number of the scene; arrays go to others by NumPy or DLPack."""
+
+    of: str
+    """The parameter's path."""
+    rgb: Floats
+    """float32 (H, W, 3): what changes per unit of the parameter, linear Rec.709, top row first."""
+    spectral: Floats | None
+    """float32 (H, W, bins), or None without `bins`."""
+    base: Floats
+    """What `rgb` is the derivative of."""
+    base_spectral: Floats | None
+    """What `spectral` is the derivative of."""
+    bin_edges_nm: np.ndarray | None
+    """float64 (bins + 1,), rising."""
+    step: float
+    """Change of the parameter to either side by which it was found."""
+    traced: int
+    """How often photons were traced: once where stored ones were moved."""
+    placement: Mapping[str, object] | None
+    """Where a map lies, see `CausticMap.placement`."""
+    seconds: float
+    """From the call to the result, shared by all that were found together."""
+
+    @property
+    def codes(self) -> NDArray[np.uint8]:
+        """uint8 (H, W, 3), sRGB, to look at: what becomes brighter is red, what becomes darker blue."""
+        change = luminance(self.rgb)
+        share = change / max(float(np.quantile(np.abs(change), _BRIGHTEST)), 1e-30)
+        left = 1.0 - np.sqrt(np.clip(np.abs(share), 0.0, 1.0))
+        up, down = np.where(share > 0.0, 1.0, left), np.where(share < 0.0, 1.0, left)
+        return np.round(255.0 * np.stack([up, left, down], axis=-1)).astype(np.uint8)
+
+    def to_png(self, path: str | os.PathLike[str]) -> Path:
+        """Write `codes`. Raises `UserError` where it cannot be written."""
+        target = Path(path)
+        if target.suffix.lower() != ".png":
+            raise UserError(f"cannot write {target}: the name must end in .png")
+        save_codes(target, self.codes)
+        return target
+
+    def _repr_png_(self) -> bytes:
+        """As notebooks show it."""
+        from PIL import Image
+
+        file = io.BytesIO()
+        Image.fromarray(self.codes).save(file, "PNG")
+        return file.getvalue()
+
+    def __repr__(self) -> str:
+        height, width, _ = self.rgb.shape
+        return f"Gradient('{self.of}', {width}×{height}, step {self.step:.3g}, {self.seconds:.1f} s)"
+
+
+def gradients(
+    scene: Scene,
+    of: Sequence[str],
+    receiver: str | None = None,
+    *,
+    size: Size = DEFAULT_SIZE,
+    photons: Count | None = None,
+    seed: int | None = None,
+    bins: int | None = None,
+    spp: int | None = None,
+    step: float | None = None,
+    progress: Progress | None = None,
+    cancel: Cancel | None = None,
+) -> list[Gradient]:
+    """`gradient` by several parameters; photons that are moved for glasses are traced once for all of them."""
+    settings = settings_of(scene, size=size, photons=photons, seed=seed, bins=bins, spp=spp)
+    if receiver is not None:
+        check_receiver(scene, receiver)
+        settings = replace(settings, layer=f"map:{receiver}")
+    if isinstance(of, str) or not of:
+        raise UserError("of must be a list of paths, such as ['objects.prism.n_d']")
+    if step is not None and not (isinstance(step, int | float) and 0.0 < step < float("inf")):
+        raise UserError(f"step {step!r} is no change of a parameter: give a number above 0")
+    model, started = scene._model, time.perf_counter()
+
+    def work(context: Context, report: Callable[[float, str], None], stopped: Callable[[], bool]) -> list[Gradient]:
+        from ..edit.parameters import Stage
+        from ..render.gradient import gradient
+
+        found = gradient(context, Stage(model, model.camera), settings, list(of), step, report, stopped)
+        if found is None:
+            raise UserError("the gradient was stopped before it was found: let it go on for longer")
+        base, seconds = found.base, time.perf_counter() - started
+        return [
+            Gradient(
+                each.path,
+                each.picture.rgb,
+                each.picture.spectral,
+                base.rgb,
+                base.spectral,
+                base.bin_edges_nm,
+                each.step,
+                each.traced,
+                found.placement,
+                seconds,
+            )
+            for each in found.derivatives
+        ]
+
+    with Device() as device:
+        return device.run(work, progress, cancel)
+
+
+def gradient(
+    scene: Scene,
+    of: str,
+    receiver: str | None = None,
+    *,
+    size: Size = DEFAULT_SIZE,
+    photons: Count | None = None,
+    seed: int | None = None,
+    bins: int | None = None,
+    spp: int | None = None,
+    step: float | None = None,
+    progress: Progress | None = None,
+    cancel: Cancel | None = None,
+) -> Gradient:
+    """∂/∂`of` of the caustic map on `receiver`, or of the picture where that is None.
+
+    `of`: a parameter's path as `spectrasplat animate` has it ("objects.prism.n_d", "lights.sun.rotation.x"), or
+    "objects.prism.index" for the glass's whole curve n(λ): with `bins`, each bin is then the derivative by the index
+    in that bin. `step`: change of the parameter to either side; found where it is not given. Raises `UserError`, also
+    where `cancel` stopped it.
+    """
+    return gradients(
+        scene,
+        [of],
+        receiver,
+        size=size,
+        photons=photons,
+        seed=seed,
+        bins=bins,
+        spp=spp,
+        step=step,
+        progress=progress,
+        cancel=cancel,
+    )[0]

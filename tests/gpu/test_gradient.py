@@ -1,0 +1,119 @@
+"""Derivatives of caustic maps against central differences of renderings by other random numbers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import spectrasplat as ss
+from scipy.ndimage import gaussian_filter
+from spectrasplat.edit.parameters import Stage
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.scene import Scene
+from spectrasplat.model.settings import RenderSettings
+from spectrasplat.render.frames import FrameRenderer
+from spectrasplat.render.gradient import Gradient, gradient, nudged
+
+BALL = """
+[[lights]]
+kind = "directional"
+direction = [0.1, 0.0, -1.0]
+illuminance_lx = 1000.0
+[[objects]]
+name = "ball"
+shape = "sphere"
+radius = 0.5
+triangles = 20_000
+glass = "N-SF11"
+position = [0.0, 0.0, 0.8]
+[[objects]]
+name = "table"
+shape = "plane"
+width = 6.0
+height = 6.0
+material = { kind = "diffuse", colour = 0.8 }
+"""
+
+
+def settings(photons: int, receiver: str = "table", seed: int = 1, bins: int | None = None) -> RenderSettings:
+    return RenderSettings(width=48, height=48, photons=photons, seed=seed, bins=bins, layer=f"map:{receiver}")
+
+
+def gradient_of(gl, scene: Scene, path: str, its: RenderSettings) -> Gradient:
+    found = gradient(gl, Stage(scene, scene.camera), its, [path])
+    assert found is not None
+    return found
+
+
+def difference(gl, scene: Scene, path: str, found: Gradient, its: RenderSettings) -> np.ndarray:
+    """The central difference of two renderings on the texels of `found`."""
+    stage, step = Stage(scene, scene.camera), found.derivatives[0].step
+    corners = found.placement["corners_world"]
+    window = np.array([corners["bottom_left"], corners["top_right"]])
+    either = [nudged(stage, path, -step), nudged(stage, path, step)]
+    frames = FrameRenderer(gl, its, either, window=window)
+    try:
+        low, high = [frames.run(each).astype(float) for each in either]
+    finally:
+        frames.release()
+    return (high - low) / (2.0 * step)
+
+
+def relative(found: np.ndarray, expected: np.ndarray, blur: float) -> float:
+    """Norm of what two pictures differ by, over the second one's, both blurred by so many texels."""
+    a, b = (gaussian_filter(picture.astype(float), (blur, blur, 0.0)) for picture in (found, expected))
+    return float(np.linalg.norm(a - b) / np.linalg.norm(b))
+
+
+def loaded(tmp_path: Path) -> Scene:
+    (tmp_path / "ball.toml").write_text(BALL)
+    return load_scene(tmp_path / "ball.toml")
+
+
+@pytest.mark.parametrize(
+    ("path", "traced", "most"), [("objects.ball.n_d", 1, 0.05), ("objects.ball.position.x", 2, 0.02)]
+)
+def test_of_a_ball(gl, tmp_path: Path, path: str, traced: int, most: float) -> None:
+    """Stored photons that are moved and weighed anew for a glass, photons traced twice for a place."""
+    scene = loaded(tmp_path)
+    found = gradient_of(gl, scene, path, settings(60_000))
+    (of_path,) = found.derivatives
+    assert of_path.traced == traced
+    expected = difference(gl, scene, path, found, settings(120_000, seed=7))
+    assert relative(of_path.picture.rgb, expected, 1.0) < most
+
+
+def test_what_photons_weigh_changes_too(gl, tmp_path: Path) -> None:
+    """A ball of higher index passes less light: two thirds of a third per unit, and nothing leaves the map."""
+    scene = loaded(tmp_path)
+    found = gradient_of(gl, scene, "objects.ball.index", settings(20_000))
+    lost = float(found.derivatives[0].picture.rgb.sum() / found.base.rgb.sum())
+    assert -0.5 < lost < -0.1
+
+
+def test_bins_add_up_to_the_colour(gl, tmp_path: Path) -> None:
+    """The derivative's spectrum is as large as that of the whole, bin by bin of one sign with it."""
+    found = gradient_of(gl, loaded(tmp_path), "objects.ball.n_d", settings(20_000, bins=8))
+    spectral = found.derivatives[0].picture.spectral
+    assert spectral is not None and spectral.shape == (48, 48, 8)
+    assert np.isfinite(spectral).all() and np.abs(spectral).max() > 0.0
+
+
+def test_from_python(tmp_path: Path) -> None:
+    """Arrays, a picture of red and blue, and sentences for what has no derivative."""
+    (tmp_path / "ball.toml").write_text(BALL)
+    scene = ss.load(tmp_path / "ball.toml")
+    found = ss.gradient(scene, "objects.ball.n_d", "table", size=(32, 32), photons=8192)
+    assert np.from_dlpack(found.rgb).shape == found.base.shape == (32, 32, 3)
+    target = found.to_png(tmp_path / "gradient.png")
+    brighter, darker = found.rgb[..., 1] > 0.0, found.rgb[..., 1] < 0.0
+    assert target.exists() and brighter.any() and darker.any()
+    codes = found.codes.astype(int)
+    assert (codes[..., 0] >= codes[..., 2])[brighter & (found.rgb > 0.0).all(axis=-1)].all()
+    with pytest.raises(ss.UserError, match="did you mean 'objects.ball.n_d'"):
+        ss.gradient(scene, "objects.ball.n_e", "table")
+    with pytest.raises(ss.UserError, match="changes no light"):
+        ss.gradient(scene, "camera.position.x", "table")
+    with pytest.raises(ss.UserError, match="no receiver"):
+        ss.gradient(scene, "objects.ball.n_d", "ball")
