@@ -155,7 +155,7 @@ def _layout_maps(
     reflectance_class: dict[int, int],
     map_receiver: int | None,
     fineness: Fineness,
-    window: np.ndarray | None,
+    given: np.ndarray | None,
 ) -> MapLayout:
     sizes: list[tuple[int, int]] = []
     seen: dict[int, Window | None] = {}
@@ -168,8 +168,8 @@ def _layout_maps(
             frame = plane_frame(points)
             extent = extent_of(frame.project(points))
             windows: list[Window | PictureWindow]
-            if receiver == map_receiver and window is not None:
-                windows = [extent_of(frame.project(window))]
+            if receiver == map_receiver and given is not None:
+                windows = [extent_of(frame.project(given))]
             elif receiver == map_receiver:
                 around = extent if landed is None else _at_least(known_windows(frame, extent, landed)[0], 0.0, extent)
                 windows = [_with_aspect(around, picture)]
