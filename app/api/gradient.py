@@ -48,8 +48,6 @@ class Gradient:
     """float64 (bins + 1,), rising."""
     step: float
     """Change of the parameter to either side by which it was found."""
-    traced: int
-    """How often photons were traced: once where stored ones were moved."""
     placement: Mapping[str, object] | None
     """Where a map lies, see `CausticMap.placement`."""
     seconds: float
@@ -99,7 +97,7 @@ def gradients(
     progress: Progress | None = None,
     cancel: Cancel | None = None,
 ) -> list[Gradient]:
-    """`gradient` by several parameters; photons that are moved for glasses are traced once for all of them."""
+    """`gradient` by several parameters, whose picture is traced once."""
     settings = settings_of(scene, size=size, photons=photons, seed=seed, bins=bins, spp=spp)
     if receiver is not None:
         check_receiver(scene, receiver)
@@ -114,7 +112,8 @@ def gradients(
         from ..edit.parameters import Stage
         from ..render.gradient import gradient
 
-        found = gradient(context, Stage(model, model.camera), settings, list(of), step, report, stopped)
+        steps = dict.fromkeys(of, float(step)) if step is not None else None
+        found = gradient(context, Stage(model, model.camera), settings, list(of), steps, report, stopped)
         if found is None:
             raise UserError("the gradient was stopped before it was found: let it go on for longer")
         base, seconds = found.base, time.perf_counter() - started
@@ -127,7 +126,6 @@ def gradients(
                 base.spectral,
                 base.bin_edges_nm,
                 each.step,
-                each.traced,
                 found.placement,
                 seconds,
             )

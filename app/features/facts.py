@@ -201,14 +201,9 @@ class Facts:
     def is_reindexed(self) -> bool:
         """An edit of the dispersion, or the brush, moves wavelengths between paths: the refractive index alone says
         what a path is and what it weighs."""
-        return (self.settings.editable or self.is_painted) and self.index_says_all
-
-    @cached_property
-    def index_says_all(self) -> bool:
-        """One glass disperses, its index falls or rises throughout, and a photon's weight depends on nothing else."""
         from ..model.optics.spectral_tables import SpectralAxis
 
-        if not divides_spectrum(self.settings.method):
+        if not (self.settings.editable or self.is_painted) or not divides_spectrum(self.settings.method):
             return False
         weighed = self.absorbing or self.is_coloured or self.films or self.crystals or self.polarisers
         if self.groups != 1 or weighed or self.having(lambda m: m.is_grating):

@@ -114,13 +114,6 @@ class SpectrumFeatures:
     )
     """Photons stand for intervals of the one index that disperses, and carry whatever wavelengths an edit puts
     there."""
-    weighed_by_index: bool = feature(
-        "",
-        lambda facts: facts.settings.nudged and not facts.is_reindexed and facts.index_says_all,
-        symbol="WEIGHED_BY_INDEX",
-        requires=("spectral_groups",),
-    )
-    """Glass of slightly another index changes what a photon weighs as its index does along the band."""
     tint_levels: int = feature(
         "tint levels",
         lambda facts: LEVELS if facts.has_tint_levels else 0,

@@ -74,8 +74,6 @@ class RenderSettings:
     """Whether the dispersion brush's dabs count; False is the physical picture."""
     editable: bool = False
     """Photons are kept and drawn again when dispersion and lights are edited: in the viewer."""
-    nudged: bool = False
-    """Photons are kept and drawn again through glass of slightly other indices: for derivatives."""
     any_view: bool = False
     """The camera may go anywhere (viewer, animation): what a scene needs is not judged by what its camera sees."""
     tally: bool = False

@@ -134,8 +134,8 @@ def layout_maps(
     """Fit windows and charts, as fine as `fineness` says or as fit a texture.
 
     `picture`: (width, height) whose camera decides resolution and what is in view; with `map_receiver`
-    that receiver's one window has exactly this size instead and the camera is ignored; `window` (2, 3), GPU space, are
-    then opposite corners of it.
+    that receiver's one window has exactly this size instead and the camera is ignored; it just holds `window`
+    (n, 3), GPU space, then.
     Raises `UserError` where even coarse maps do not fit.
     """
     while True:

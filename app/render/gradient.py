@@ -1,38 +1,25 @@
 """Derivatives of a caustic map, or of a picture, by the numbers of a scene.
 
-Each is the difference of two pictures of the same photons on the same texels, over twice a small step. Where one glass
-is nudged and its index says all about a path, photons are traced once and drawn through glass of two other indices:
-their spectral columns move them, and the slope of their weight along their band weighs them. For everything else, and
-where beams carry light, it is traced twice by the same random numbers.
+Each is the difference of two pictures over twice a small step. Both have the same random numbers, the same lattices of
+light and the same texels: what does not depend on the parameter is the same in both to the bit, and what does changes
+smoothly, so that chance, which would be divided by the step, drops out.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..base.errors import UserError
 from ..edit.parameters import Stage, apply, parameter, parts, value_of
-from ..features.features import Features
-from ..gpu import shader
 from ..gpu.context import Context
-from ..gpu.records import MAX_BANDS
 from ..model.optics import glass
 from ..model.optics.glass import Dispersion
 from ..model.settings import RenderSettings
 from .bake import placement
-from .device_scene import scene_buffers
 from .frames import FrameRenderer, Picture
-from .light_pass import LightPass
-from .light_plan import Division
-from .map_fit import MapFit
-from .map_picture import map_picture
-from .pass_sizes import pass_sizes
-from .sampling import LightSampling
-from .traced_light import traced_light
-from .viewer.stored_passes import StoredPasses
 
 Report = Callable[[float, str], None]
 Stop = Callable[[], bool]
@@ -42,9 +29,8 @@ _CURVE_NM = np.arange(380.0, 781.0, 4.0)
 _CHANGE, _LEAST_CHANGE, _MOST_CHANGE = 0.03, 0.01, 0.08
 """Change of the picture, as a share of its norm, that a step is to make: much less is lost in rounding, and more is no
 derivative."""
-_FINER_BANDS = 4
-_RECORD_BYTES = 1024
-"""What one photon leaves at most, nearly: several landings."""
+_LARGEST, _TRIES, _TRIED = 8.0, 3, 1 << 15
+"""A step over the first one at most; pictures by so many photons until it is found."""
 
 
 @dataclass(frozen=True)
@@ -55,8 +41,6 @@ class Derivative:
     picture: Picture
     step: float
     """The parameter's change to either side."""
-    traced: int
-    """How often photons were traced for it."""
 
 
 @dataclass(frozen=True)
@@ -74,55 +58,70 @@ def gradient(
     stage: Stage,
     settings: RenderSettings,
     paths: Sequence[str],
-    step: float | None = None,
+    steps: Mapping[str, float] | None = None,
     report: Report = lambda share, text: None,
     stopped: Stop = lambda: False,
+    window: np.ndarray | None = None,
 ) -> Gradient | None:
     """Of what `settings.layer` shows, by each of `paths` (`edit.parameters`, and `INDEX`); None once `stopped()`.
 
-    `step`: of all parameters; None finds one for each. Raises `UserError`."""
+    `steps`: of parameters; those of others are found by a few photons. `window`: `MapFit.window` of a map. Raises
+    `UserError`."""
     for path in paths:
         check_path(stage, path)
-    glasses = [path for path in paths if _is_glass(stage, path)]
-    kept = None
-    if KeptMap.follows(stage, settings, glasses):
-        kept = KeptMap(context, stage, settings)
+    few = replace(settings, photons=min(settings.photons or stage.scene.render.photons, _TRIED), seconds=None, spp=1)
     found: list[Derivative] = []
     base, where = None, None
-    try:
-        if kept is not None:
-            for share in kept.tracing(stopped):
-                report(0.5 * share, "tracing photons")
-        for number, path in enumerate(paths):
+    for number, path in enumerate(paths):
 
-            def reported(share: float, text: str, number: int = number) -> None:
-                report((number + share) / len(paths), text)
+        def reported(share: float, text: str, number: int = number) -> None:
+            report((number + share) / len(paths), text)
 
-            if kept is not None and path in glasses:
-                base, where = kept.base, kept.placement
-                found.append(_derivative(kept.picture, stage, path, step, 1))
-                continue
-            h = step or first_step(stage, path)
-            twice = FrameRenderer(context, settings, [nudged(stage, path, -h), nudged(stage, path, h)])
-            try:
+        h = (steps or {}).get(path) or _step(context, stage, few, path, window, stopped)
+        either = [nudged(stage, path, -h), nudged(stage, path, h)]
+        renderer = FrameRenderer(context, settings, either, window=window)
+        try:
+            low, high = (_drawn(renderer, each, stopped, reported) for each in either)
+            if base is None:
+                base = _drawn(renderer, stage, stopped, reported)
+                where = placement(renderer.light) if settings.layer.startswith("map:") else None
+        finally:
+            renderer.release()
+        if stopped():
+            return None
+        spectral = None
+        if high.spectral is not None and low.spectral is not None:
+            spectral = (high.spectral - low.spectral) / (2.0 * h)
+        found.append(Derivative(path, Picture((high.rgb - low.rgb) / (2.0 * h), spectral, high.bin_edges_nm), h))
+    assert base is not None, "there are paths"
+    return Gradient(base, tuple(found), where)
 
-                def traced(nudge: Stage, twice: FrameRenderer = twice, say: Report = reported) -> Picture:
-                    for share in twice.steps(nudge, stopped):
-                        say(share, twice.phase)
-                    return twice.picture
 
-                found.append(_derivative(traced, stage, path, step, 2, stopped))
-                if base is None:
-                    base = traced(stage)
-                    where = placement(twice.light) if settings.layer.startswith("map:") else None
-            finally:
-                twice.release()
-            if stopped():
-                return None
-    finally:
-        shader.release(kept)
-    assert base is not None
-    return None if stopped() else Gradient(base, tuple(found), where)
+def _drawn(renderer: FrameRenderer, stage: Stage, stopped: Stop, report: Report) -> Picture:
+    for share in renderer.steps(stage, stopped):
+        report(share, renderer.phase)
+    return renderer.picture
+
+
+def _step(
+    context: Context, stage: Stage, settings: RenderSettings, path: str, window: np.ndarray | None, stopped: Stop
+) -> float:
+    """A change of a parameter that changes the picture as much as it should."""
+    first = h = first_step(stage, path)
+    for _ in range(_TRIES):
+        either = [nudged(stage, path, -h), nudged(stage, path, h)]
+        renderer = FrameRenderer(context, settings, either, window=window)
+        try:
+            low, high = (_drawn(renderer, each, stopped, lambda share, text: None).rgb for each in either)
+        finally:
+            renderer.release()
+        norm, moved = (float(np.linalg.norm(picture)) for picture in (high + low, high - low))
+        if not moved > 0.0 or _LEAST_CHANGE <= moved / norm <= _MOST_CHANGE or stopped():
+            break
+        h = float(np.clip(h * _CHANGE * norm / moved, first / 64.0, _LARGEST * first))
+        if h == _LARGEST * first:
+            break
+    return h
 
 
 def check_path(stage: Stage, path: str) -> None:
@@ -179,103 +178,3 @@ def _bent(dispersion: Dispersion, path: str, change: float) -> Dispersion:
         shift = glass.from_abbe(*other).index(_CURVE_NM) - glass.from_abbe(n_d, v_d).index(_CURVE_NM)
         n = n + dispersion.gain * shift + (1.0 - dispersion.gain) * (other[0] - n_d)
     return glass.table(_CURVE_NM, n, dispersion.name)
-
-
-def _derivative(
-    picture: Callable[[Stage], Picture],
-    stage: Stage,
-    path: str,
-    step: float | None,
-    traced: int,
-    stopped: Stop = lambda: False,
-) -> Derivative:
-    h = step or first_step(stage, path)
-    for _ in range(3):
-        low, high = picture(nudged(stage, path, -h)), picture(nudged(stage, path, h))
-        norm = float(np.linalg.norm(high.rgb + low.rgb))
-        change = float(np.linalg.norm(high.rgb - low.rgb)) / norm if norm > 0.0 else 0.0
-        if step is not None or change == 0.0 or _LEAST_CHANGE <= change <= _MOST_CHANGE or stopped():
-            break
-        h = float(np.clip(h * _CHANGE / change, first_step(stage, path) / 64.0, 8.0 * first_step(stage, path)))
-    else:
-        low, high = picture(nudged(stage, path, -h)), picture(nudged(stage, path, h))
-    spectral = None
-    if high.spectral is not None and low.spectral is not None:
-        spectral = (high.spectral - low.spectral) / (2.0 * h)
-    return Derivative(path, Picture((high.rgb - low.rgb) / (2.0 * h), spectral, high.bin_edges_nm), h, traced)
-
-
-class KeptMap:
-    """A receiver's map by photons that are kept, to be drawn again through other glass."""
-
-    def __init__(self, context: Context, stage: Stage, settings: RenderSettings) -> None:
-        """For stages that it `follows`."""
-        self._stage = stage
-        self._sampling = LightSampling.of(stage.scene, settings)
-        settings = replace(settings, nudged=True)
-        self._buffers = scene_buffers(context, stage.scene, settings)
-        self._stored = StoredPasses(context.ctx, self._sampling.photons * _RECORD_BYTES)
-        fit, features = MapFit(stage.camera, settings.width, settings.height), self._buffers.features
-        self.light = LightPass(
-            context, stage.scene, settings, features, self._buffers, fit=fit, photon_records=self._stored
-        )
-        self.base: Picture
-        """Once they are traced."""
-
-    @staticmethod
-    def follows(stage: Stage, settings: RenderSettings, paths: Sequence[str]) -> bool:
-        """Whether photons of the map of `settings.layer` serve changes of `paths`, all of glass."""
-        features = Features.of(stage.scene, replace(settings, nudged=True))
-        one_pass = settings.seconds is None and len(pass_sizes(settings.method, 1 << 20)) == 1
-        is_map = settings.layer.startswith("map:")
-        if not (paths and is_map and one_pass and features.weighed_by_index) or features.beams:
-            return False
-        return all(_changed(stage, nudged(stage, path, 1e-6)) is not None for path in paths)
-
-    def tracing(self, stopped: Stop) -> Iterator[float]:
-        """Trace, pausing with the share done. Bands are narrower than the picture needs: a column is exact at its
-        band's anchor only, and where light lands is one order better than how that changes."""
-        light, sampling = self.light, self._sampling
-        light.prepare()
-        light.begin(sampling.photons, sampling.seed)
-        counts = {p.index: (min(_FINER_BANDS * len(p.bands), MAX_BANDS), p.light_points) for p in light.plans}
-        light.division = Division(counts)
-        yield from traced_light(light, sampling, stopped)
-        self.base = self._read()
-
-    @property
-    def placement(self) -> Mapping[str, object]:
-        """Of the map, as `bake` writes it."""
-        return placement(self.light)
-
-    def picture(self, stage: Stage) -> Picture:
-        """The map as `stage` has it."""
-        glasses, light, kept = _changed(self._stage, stage), self.light, self._stored.fullest
-        assert glasses is not None and kept is not None
-        if light.shown.show_glass(glasses):
-            self._stored.forget_tables()
-        light.maps.clear()
-        share = kept.store.rounds / kept.store.rounds_of_pass
-        for slab in kept.store.first_slabs(kept.store.rounds):
-            for _ in light.splat_steps(slab.buffer, slab.count, share**-0.5, kept.tables.full):
-                pass
-        light.maps.photon_weight = kept.pass_photons * share
-        return self._read()
-
-    def _read(self) -> Picture:
-        self.light.batches.settled()
-        return Picture(*map_picture(self.light), self.light.bin_edges_nm)
-
-    def release(self) -> None:
-        """Free everything."""
-        shader.release(self.light, self._buffers)
-
-
-def _changed(traced: Stage, shown: Stage) -> Mapping[Dispersion, Dispersion] | None:
-    """The glasses that differ; None where objects of one glass are no longer of one."""
-    found: dict[Dispersion, Dispersion] = {}
-    for a, b in zip(traced.scene.objects, shown.scene.objects, strict=True):
-        for before, after in zip(a.material.dispersions, b.material.dispersions, strict=True):
-            if found.setdefault(before, after) != after:
-                return None
-    return {before: after for before, after in found.items() if before != after}

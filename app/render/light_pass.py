@@ -79,13 +79,13 @@ class LightPass:
         self.stats = LightStats()
         self._elsewhere = LightStats()
         """What others counted whose sums were taken over (`take`)."""
-        self.division = division or Division()
+        self._division = division or Division()
         in_frames = moving is not None
         # With fewer than `SMALLEST_BATCH` rays in flight the plan depends on their number.
         batch = max(batch_size(context, features, settings.batch), _LEAST_IN_FRAMES if in_frames else SMALLEST_BATCH)
         self.trace = TracePass(context, features, buffers, batch, settings.max_depth)
         self.shown = ShownSpectra(context.ctx, scene, buffers, settings.bins)
-        self.survey = LightSurvey(context, scene, features, buffers, self.trace, self.shown, self.division, moving)
+        self.survey = LightSurvey(context, scene, features, buffers, self.trace, self.shown, self._division, moving)
         self.batches = PhotonBatches(context, self.trace, self.shown, photon_records or NoRecords(), in_frames)
         self._shrinks = features.method == SHRINKING
         self.smoothing = settings.smoothing * (FIRST_KERNEL if self._shrinks else 1.0)
@@ -241,7 +241,7 @@ class LightPass:
             self.survey.domains,
             pilots,
             self.trace.batch,
-            self.division,
+            self._division,
         )
 
     def sample_plans(self, photons: int) -> Generator[str | None, None, list[LightPlan]]:

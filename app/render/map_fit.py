@@ -31,7 +31,7 @@ class MapFit:
     others: tuple[tuple[GpuSpace, Pilot], ...] = ()
     """Where light lands in other frames that the maps must serve as well, each in its own GPU space."""
     window: np.ndarray | None = None
-    """World points (2, 3): opposite corners of what the map of the settings' layer shows; None: where light lands."""
+    """World points (n, 3) that the map of the settings' layer just holds; None: where light lands."""
     is_shared: bool = False
     """Other views see the same maps: no window is laid out on this one's pixels."""
     avoids_powers_of_two: bool = False

@@ -355,17 +355,6 @@ void make_splats(uint i) {
         to_hi += photon.dposition_dvar##g.xyz * (spectral_variable(uint(g), photon.x_hi) - anchor); \
     }
     ALL_GROUPS(ADD_GROUP)
-    if (WEIGHED_BY_INDEX) {
-        // As the weight changes with the index along the band, it changes with the glass.
-        vec3 at = vec3(photon.x_lo, x_traced, photon.x_hi);
-        vec3 v_path, v_now;
-        for (int i = 0; i < 3; ++i) {
-            v_path[i] = spectral_variable(traced_row, at[i]);
-            v_now[i] = spectral_variable(0u, at[i]);
-        }
-        float slope = v_path.z == v_path.x ? 0.0 : (photon.throughput.z - photon.throughput.x) / (v_path.z - v_path.x);
-        photon.throughput = max(photon.throughput + slope * (v_now - v_path), 0.0);
-    }
 #if LOCAL_GAIN
     float gain = local_gain(photon.receiver, photon.position + to_reference);
     to_lo = mix(to_reference, to_lo, gain);

@@ -71,17 +71,13 @@ def loaded(tmp_path: Path) -> Scene:
     return load_scene(tmp_path / "ball.toml")
 
 
-@pytest.mark.parametrize(
-    ("path", "traced", "most"), [("objects.ball.n_d", 1, 0.05), ("objects.ball.position.x", 2, 0.02)]
-)
-def test_of_a_ball(gl, tmp_path: Path, path: str, traced: int, most: float) -> None:
-    """Stored photons that are moved and weighed anew for a glass, photons traced twice for a place."""
+@pytest.mark.parametrize("path", ["objects.ball.n_d", "objects.ball.position.x"])
+def test_of_a_ball(gl, tmp_path: Path, path: str) -> None:
+    """Within 2 % of the norm by 60,000 photons, most of which is what the other numbers' lattice differs by."""
     scene = loaded(tmp_path)
     found = gradient_of(gl, scene, path, settings(60_000))
-    (of_path,) = found.derivatives
-    assert of_path.traced == traced
     expected = difference(gl, scene, path, found, settings(120_000, seed=7))
-    assert relative(of_path.picture.rgb, expected, 1.0) < most
+    assert relative(found.derivatives[0].picture.rgb, expected, 1.0) < 0.02
 
 
 def test_what_photons_weigh_changes_too(gl, tmp_path: Path) -> None:

@@ -1,0 +1,380 @@
+"""Which glass, and which numbers of a scene, cast the light that is wanted: least squares by derivatives of its map.
+
+How bright it is is never compared, only how it is spread over places and colours. Far from the answer both pictures are
+blurred, so that a colour is still drawn to its place from several widths away.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..base.errors import UserError
+from ..edit.glass import set_dispersion
+from ..edit.parameters import Stage
+from ..gpu.context import Context
+from ..model.optics import catalogue, glass
+from ..model.optics.glass import Dispersion
+from ..model.settings import RenderSettings
+from ..passes.picture_channels import Channels
+from .frames import FrameRenderer, Picture
+from .gradient import INDEX, Gradient, Report, Stop, gradient, nudged
+
+BINS = 16
+"""Of maps that are compared in colour only."""
+_TEXELS, _FEWEST = 192, 8
+"""Of a map's longer and shorter side."""
+_PARTS = 3
+"""Along a side of one cell of a target, between which its mean is taken."""
+_SCANNED = 20
+_BLURS = (0.12, 0.04, 0.0)
+"""Standard deviations, of the target's longer side."""
+_STEPS = 8
+"""With each blur, at most."""
+_TRUST = 0.5
+"""Largest change, as a share of the picture's norm, that a linear prediction is believed."""
+_SAYS_NOTHING = 1e-3
+"""Share of the picture's norm that five Abbe numbers must change."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """Light that is wanted on a flat receiver."""
+
+    receiver: str
+    corners: np.ndarray
+    """(3, 3), world: of the first row its beginning and its end, of the last row its beginning."""
+    values: np.ndarray
+    """(h, w, channels), in any unit."""
+    bin_edges_nm: np.ndarray | None = None
+    """(bins + 1,), of even bins from 380 to 780 nm; None: linear Rec.709."""
+
+    def __post_init__(self) -> None:
+        values, edges = self.values, self.bin_edges_nm
+        channels = 3 if edges is None else len(edges) - 1
+        if values.ndim != 3 or values.shape[2] != channels or not values.size or np.shape(self.corners) != (3, 3):
+            raise UserError(
+                f"a target of shape {values.shape} is none: give rows, columns and "
+                f"{channels} {'colours' if edges is None else 'bins'}, and three corners"
+            )
+        if not np.isfinite(values).all() or not np.abs(values).max() > 0.0:
+            raise UserError("the target is dark or not finite: give light that is to be matched")
+
+    @property
+    def bins(self) -> int:
+        """Spectral bins of maps that are compared with it."""
+        return BINS if self.bin_edges_nm is None else len(self.bin_edges_nm) - 1
+
+    @property
+    def window(self) -> np.ndarray:
+        """All four corners."""
+        first, end, last = self.corners
+        return np.stack([first, end, last, end + last - first])
+
+    def settings(self, settings: RenderSettings) -> RenderSettings:
+        """Of the maps."""
+        size = np.linalg.norm(self.corners[1:] - self.corners[0], axis=1)
+        width, height = np.maximum(np.round(_TEXELS * size / size.max()), _FEWEST).astype(int)
+        return replace(
+            settings,
+            layer=f"map:{self.receiver}",
+            bins=self.bins,
+            width=int(width),
+            height=int(height),
+            exposure_ev=None,
+        )
+
+    def seen(self, spectral: np.ndarray, placement: object) -> np.ndarray:
+        """Means over the target's cells (h, w, bins) of a map (H, W, bins) of such a placement."""
+        assert isinstance(placement, dict)
+        origin, right, top = (
+            np.array(placement["corners_world"][k]) for k in ("bottom_left", "bottom_right", "top_left")
+        )
+        h, w, _ = self.values.shape
+        rows, columns = ((np.arange(n * _PARTS) + 0.5) / (n * _PARTS) for n in (h, w))
+        first, end, last = self.corners
+        points = first + columns[None, :, None] * (end - first) + rows[:, None, None] * (last - first) - origin
+        x, y = (
+            points @ (axis / (axis @ axis)) * side - 0.5
+            for axis, side in ((right - origin, spectral.shape[1]), (top - origin, spectral.shape[0]))
+        )
+        found = _between(spectral[::-1].astype(float), x, y)
+        return found.reshape(h, _PARTS, w, _PARTS, -1).mean(axis=(1, 3))
+
+
+def _between(texels: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Texels (H, W, c) at places in texels, bilinear, those at the border going on."""
+    limits = np.array(texels.shape[:2]) - 1
+    x, y = np.clip(x, 0.0, limits[1]), np.clip(y, 0.0, limits[0])
+    i, j = np.minimum(x.astype(int), max(limits[1] - 1, 0)), np.minimum(y.astype(int), max(limits[0] - 1, 0))
+    i1, j1 = np.minimum(i + 1, limits[1]), np.minimum(j + 1, limits[0])
+    u, v = (x - i)[..., None], (y - j)[..., None]
+    low = (1.0 - u) * texels[j, i] + u * texels[j, i1]
+    return (1.0 - v) * low + v * ((1.0 - u) * texels[j1, i] + u * texels[j1, i1])
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """A glass of the catalogue."""
+
+    name: str
+    n_d: float
+    V_d: float
+    error: float
+    """Norm of what its light differs by from the target, over the target's."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Numbers of a scene."""
+
+    values: dict[str, float]
+    deviations: dict[str, float]
+    """Standard deviations, by what is left over between the target and the light that was found."""
+    covariance: np.ndarray
+    error: float
+    """Norm of what is left over, over the target's."""
+    steps: int
+
+
+@dataclass(frozen=True)
+class Match:
+    """What glasses come near a target."""
+
+    glasses: tuple[Ranked, ...]
+    """Nearest first."""
+    fit: Fit
+    """n_d and V_d, of no particular glass."""
+
+
+@dataclass
+class Solver:
+    """Light of one scene compared with a target."""
+
+    context: Context
+    stage: Stage
+    settings: RenderSettings
+    """Of the rendering."""
+    target: Target
+    report: Report = lambda share, text: None
+    stopped: Stop = lambda: False
+    _steps: dict[str, float] = field(default_factory=dict)
+    """Found for parameters so far."""
+
+    # ---- numbers of the scene ----------------------------------------------------------------
+
+    def fit(self, paths: Sequence[str], steps: int = _STEPS) -> Fit | None:
+        """Gauss and Newton's method from the scene as it is; None once stopped."""
+        at, taken, error = np.zeros(len(paths)), 0, np.inf
+        found: tuple[np.ndarray, np.ndarray, float] | None = None
+        for blur in _BLURS:
+            for _ in range(steps):
+                self.report(min(taken / (len(_BLURS) * steps), 0.99), f"step {taken + 1}")
+                columns = self._columns(at, paths, blur)
+                if columns is None:
+                    return None
+                move, covariance, error = _least_squares(columns, self._wanted(blur))
+                taken += 1
+                size = float(np.linalg.norm(columns[:, 1:] @ move) / np.linalg.norm(columns[:, 0]))
+                at = at + move * min(1.0, _TRUST / max(size, 1e-12))
+                found = at, covariance, error
+                if size < 1e-3 or (blur and size < 0.05):
+                    break
+        assert found is not None
+        at, covariance, error = found
+        start = {path: _value(self.stage, path) for path in paths}
+        values = {path: start[path] + float(change) for path, change in zip(paths, at, strict=True)}
+        deviations = dict(zip(paths, np.sqrt(np.diag(covariance)).tolist(), strict=True))
+        return Fit(values, deviations, covariance, error, taken)
+
+    def _columns(self, at: np.ndarray, paths: Sequence[str], blur: float) -> np.ndarray | None:
+        """The light (n, 1 + paths) of the scene moved by `at`, and its derivatives."""
+        stage = self.stage
+        for path, change in zip(paths, at, strict=True):
+            stage = nudged(stage, path, float(change)) if change else stage
+        found = self._gradient(stage, paths)
+        if found is None:
+            return None
+        pictures = [found.base, *(each.picture for each in found.derivatives)]
+        return np.stack([self._shown(p, found, blur).ravel() for p in pictures], axis=-1)
+
+    # ---- glasses -----------------------------------------------------------------------------
+
+    def match(self, index: int, count: int = 10) -> Match | None:
+        """The glasses that object `index` may be of; None once stopped. Raises `UserError` where the target says
+        nothing."""
+        entries = [e for e in catalogue.entries() if e.dispersion.is_dispersive]
+        start = self._scanned(index, entries)
+        if start is None:
+            return None
+        known: dict[str, Gradient] = {}
+        curves = np.stack([_at_bins(entry.dispersion, self._edges) for entry in entries])
+        names = [entry.qualified_name for entry in entries]
+        best, errors, columns = start, np.zeros(0), np.zeros((0, 0))
+        for blur in _BLURS:
+            seen: set[int] = set()
+            while best not in seen and len(seen) < _STEPS:
+                seen.add(best)
+                self.report(min(0.4 + 0.05 * len(known), 0.99), f"trying {names[best]}")
+                if names[best] not in known:
+                    its = set_dispersion(self.stage.scene, index, entries[best].dispersion)
+                    path = f"objects.{its.objects[index].name}.{INDEX}"
+                    found = self._gradient(replace(self.stage, scene=its), [path])
+                    if found is None:
+                        return None
+                    known[names[best]] = found
+                columns = self._by_bin(known[names[best]], blur)
+                if not errors.size:
+                    self._check(columns, entries[best].dispersion)
+                errors = _errors(columns, self._wanted(blur), curves - curves[best])
+                last, best = best, int(np.argmin(errors))
+            best = last if len(seen) == _STEPS else best
+        order = np.argsort(errors, kind="stable")[:count]
+        ranked = tuple(
+            Ranked(names[i], entries[i].dispersion.n_d, entries[i].dispersion.V_d, float(errors[i])) for i in order
+        )
+        return Match(ranked, self._around(columns, entries[best].dispersion))
+
+    def _scanned(self, index: int, entries: Sequence[catalogue.Entry]) -> int | None:
+        """Of glasses evenly spread over n_d, the one whose blurred light is nearest."""
+        by_index = np.argsort([entry.dispersion.n_d for entry in entries])
+        chosen = by_index[(np.linspace(0.01, 0.99, _SCANNED) * (len(entries) - 1)).astype(int)]
+        stages = [
+            replace(self.stage, scene=set_dispersion(self.stage.scene, index, entries[i].dispersion)) for i in chosen
+        ]
+        renderer = FrameRenderer(self.context, self._settings, stages, window=self.target.window)
+        errors = []
+        try:
+            for number, stage in enumerate(stages):
+                for _ in renderer.steps(stage, self.stopped):
+                    pass
+                if self.stopped():
+                    return None
+                self.report(0.4 * (number + 1) / len(stages), "looking through n_d")
+                from .bake import placement
+
+                shown = self._colours(renderer.picture, placement(renderer.light), _BLURS[0]).ravel()
+                errors.append(_errors(shown[:, None], self._wanted(_BLURS[0]), np.zeros((1, 0)))[0])
+        finally:
+            renderer.release()
+        return int(chosen[int(np.argmin(errors))])
+
+    def _by_bin(self, found: Gradient, blur: float) -> np.ndarray:
+        """The light (n, 1 + bins) and its derivatives by the index in each bin."""
+        derivative = found.derivatives[0].picture
+        assert derivative.spectral is not None
+        alone = derivative.spectral[..., None, :] * np.eye(self.target.bins, dtype=np.float32)
+        columns = [self._shown(found.base, found, blur).ravel()]
+        for b in range(self.target.bins):
+            its = Picture(derivative.rgb, np.ascontiguousarray(alone[..., b, :]), derivative.bin_edges_nm)
+            columns.append(self._shown(its, found, blur).ravel())
+        return np.stack(columns, axis=-1)
+
+    def _check(self, columns: np.ndarray, dispersion: Dispersion) -> None:
+        """Raise `UserError` where another dispersion would look the same."""
+        shapes = _shapes(dispersion, self._edges)
+        others = np.stack([columns[:, 0], columns[:, 1:] @ shapes[0]], axis=1)
+        moved = 5.0 * columns[:, 1:] @ shapes[1]
+        rest = moved - others @ np.linalg.lstsq(others, moved, rcond=None)[0]
+        if not np.linalg.norm(rest) > _SAYS_NOTHING * np.linalg.norm(columns[:, 0]):
+            raise UserError(
+                "the target says nothing about a glass, for no dispersed light falls there: give a place where "
+                "colours spread"
+            )
+
+    def _around(self, columns: np.ndarray, dispersion: Dispersion) -> Fit:
+        """n_d and V_d near those of a glass."""
+        shapes = _shapes(dispersion, self._edges)
+        both = np.stack([columns[:, 0], *(columns[:, 1:] @ shape for shape in shapes)], axis=1)
+        move, covariance, error = _least_squares(both, self._wanted(0.0))
+        values = {"n_d": dispersion.n_d + float(move[0]), "V_d": dispersion.V_d + float(move[1])}
+        deviations = dict(zip(values, np.sqrt(np.diag(covariance)).tolist(), strict=True))
+        return Fit(values, deviations, covariance, error, 1)
+
+    # ---- light -------------------------------------------------------------------------------
+
+    @property
+    def _settings(self) -> RenderSettings:
+        return self.target.settings(self.settings)
+
+    @property
+    def _edges(self) -> np.ndarray:
+        return np.linspace(380.0, 780.0, self.target.bins + 1)
+
+    def _gradient(self, stage: Stage, paths: Sequence[str]) -> Gradient | None:
+        found = gradient(
+            self.context, stage, self._settings, paths, self._steps, stopped=self.stopped, window=self.target.window
+        )
+        if found is not None:
+            self._steps |= {each.path: each.step for each in found.derivatives}
+        return found
+
+    def _shown(self, picture: Picture, of: Gradient, blur: float) -> np.ndarray:
+        return self._colours(picture, of.placement, blur)
+
+    def _colours(self, picture: Picture, placement: object, blur: float) -> np.ndarray:
+        """A picture in the target's cells and channels."""
+        assert picture.spectral is not None
+        cells = self.target.seen(picture.spectral, placement)
+        if self.target.bin_edges_nm is None:
+            cells = Channels(tuple(self._edges.tolist())).to_rgb709(cells).astype(float)
+        return _blurred(cells, blur)
+
+    def _wanted(self, blur: float) -> np.ndarray:
+        return _blurred(self.target.values.astype(float), blur).ravel()
+
+
+def _value(stage: Stage, path: str) -> float:
+    from ..edit.parameters import value_of
+
+    return value_of(stage, path) if not path.endswith(f".{INDEX}") else 0.0
+
+
+def _blurred(cells: np.ndarray, share: float) -> np.ndarray:
+    from scipy.ndimage import gaussian_filter
+
+    sigma = share * max(cells.shape[:2])
+    return gaussian_filter(cells, (sigma, sigma, 0.0), mode="nearest") if sigma > 0.0 else cells
+
+
+def _at_bins(dispersion: Dispersion, edges: np.ndarray) -> np.ndarray:
+    """Mean index in every bin."""
+    within = (np.arange(4) + 0.5) / 4.0
+    return dispersion.index(edges[:-1, None] + within * np.diff(edges)[:, None]).mean(axis=1)
+
+
+def _shapes(dispersion: Dispersion, edges: np.ndarray) -> np.ndarray:
+    """How the index in every bin changes with n_d and with V_d (2, bins)."""
+    n_d, v_d = dispersion.n_d, dispersion.V_d
+    h = 1e-4, 1e-3 * v_d
+    either = [(glass.from_abbe(n_d + s * h[0], v_d), glass.from_abbe(n_d, v_d + s * h[1])) for s in (-1.0, 1.0)]
+    return np.stack([(_at_bins(either[1][i], edges) - _at_bins(either[0][i], edges)) / (2.0 * h[i]) for i in range(2)])
+
+
+def _errors(columns: np.ndarray, wanted: np.ndarray, moves: np.ndarray) -> np.ndarray:
+    """What remains of `wanted` (n,), as a share of its norm, beside columns[:, 0] + columns[:, 1:] moves, for each of
+    `moves` (m, k), at the brightness that leaves least; infinite where a prediction is not believed."""
+    gram, along = columns.T @ columns, columns.T @ wanted
+    at = np.concatenate([np.ones((len(moves), 1)), moves], axis=1)
+    square = np.einsum("mi,ij,mj->m", at, gram, at)
+    size = np.einsum("mi,ij,mj->m", at[:, 1:], gram[1:, 1:], at[:, 1:])
+    total = float(wanted @ wanted)
+    rest = total - np.maximum(at @ along, 0.0) ** 2 / np.maximum(square, 1e-300)
+    errors = np.sqrt(np.maximum(rest, 0.0) / total)
+    return np.where(size <= _TRUST**2 * gram[0, 0], errors, np.inf)
+
+
+def _least_squares(columns: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    """Moves (k,) with which brightness · (columns[:, 0] + columns[:, 1:] moves) is nearest to `wanted`, their
+    covariance and what is left over as a share."""
+    solved = np.linalg.lstsq(columns, wanted, rcond=1e-9)[0]
+    rest = wanted - columns @ solved
+    spread = float(rest @ rest) / max(len(wanted) - columns.shape[1], 1)
+    scale = solved[0] if abs(solved[0]) > 0.0 else 1.0
+    covariance = spread * np.linalg.pinv(columns.T @ columns, rcond=1e-18)
+    # Of a quotient: moves are solved[1:] / solved[0].
+    turn = np.concatenate([-(solved[1:] / scale)[:, None], np.eye(len(solved) - 1)], axis=1) / scale
+    error = float(np.linalg.norm(rest) / np.linalg.norm(wanted))
+    return solved[1:] / scale, turn @ covariance @ turn.T, error
