@@ -14,6 +14,7 @@ from ..base.paths import shipped_scenes
 from ..edit.stored_photons import StoredPhotons as Photons
 from .catalogue import Glass, glass, glasses
 from .gradient import Gradient, gradient, gradients
+from .lenses import LensTable, lens_table
 from .pages import page
 from .picture import CausticMap, Picture, Statistics
 from .rendering import caustic, render
@@ -30,6 +31,7 @@ __all__ = [
     "Fan",
     "Glass",
     "Gradient",
+    "LensTable",
     "Photons",
     "Picture",
     "Scene",
@@ -45,6 +47,7 @@ __all__ = [
     "glasses",
     "gradient",
     "gradients",
+    "lens_table",
     "load",
     "page",
     "render",
@@ -55,8 +58,8 @@ __all__ = [
 
 
 def load(source: str | os.PathLike[str] | Mapping[str, Any]) -> Scene:
-    """The scene in a file (.toml, .glb, .gltf, or a mesh: .ply, .obj, .stl), a shipped one by its name ("prism"), or
-    one from its tables in a dictionary.
+    """The scene in a file (.toml, .glb, .gltf, a mesh: .ply, .obj, .stl, or a lens: .zmx, .csv), a shipped one by its
+    name ("prism"), or one from its tables in a dictionary.
 
     Raises `UserError`, in one sentence with file, key and remedy, for anything that cannot be rendered.
     """

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import platformdirs
 
-SCENE_SUFFIXES = (".toml", ".glb", ".gltf", ".ply", ".obj", ".stl")
+SCENE_SUFFIXES = (".toml", ".glb", ".gltf", ".ply", ".obj", ".stl", ".zmx", ".csv")
 CONFIG_ENVIRONMENT = "SPECTRASPLAT_CONFIG"
 _PACKAGE = Path(__file__).resolve().parents[1]
 

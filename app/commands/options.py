@@ -310,6 +310,19 @@ def names(flag: str, text: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(part.strip() for part in text.split(",")))
 
 
+def wavelengths(flag: str, text: str) -> tuple[float, ...]:
+    """ "486.13,587.56" in nm."""
+    try:
+        nm = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        nm = ()
+    if not nm or not all(100.0 <= each <= 100_000.0 for each in nm):
+        raise UserError(
+            f"{flag} '{text}' is no list of wavelengths in nm: give for example {flag} 486.13,587.56,656.27"
+        )
+    return nm
+
+
 def place(flag: str, text: str) -> tuple[float, float, float]:
     """ "1,2,3" as a place."""
     try:

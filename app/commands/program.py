@@ -30,6 +30,7 @@ COMMANDS = {
     "gallery": ("table:Gallery", "gallery:gallery"),
     "inspect": ("table:Inspect", "inspect_report:inspect"),
     "glass": ("table:Glass", "glass:glass"),
+    "lens table": ("table:LensTable", "lens:lens_table"),
     "doctor": ("table:Doctor", "doctor:doctor"),
     "bench": ("measuring_table:Bench", "bench:bench"),
     "stress": ("measuring_table:Stress", "stress:stress"),
@@ -41,6 +42,11 @@ COMMANDS = {
 }
 """By name: the class of a command's values, and the function that gets them and returns the exit code, both with their
 modules."""
+_GROUPS = {
+    "farm": "Render on many workers, here or on a Dask cluster; needs the extra 'farm'.",
+    "lens": "Figures of lenses.",
+}
+"""Commands of two words, by their first: its help."""
 _HELP = {"help_option_names": ["-h", "--help"], "max_content_width": 120}
 
 
@@ -120,12 +126,10 @@ def program(names: Iterable[str] = COMMANDS) -> click.Group:
             _ends("--show-completion", "Print the script that does so.", lambda: print(completion.script())),
         ],
     )
-    on_farm = "Render on many workers, here or on a Dask cluster; needs the extra 'farm'."
-    farm = _Commands("farm", help=on_farm, short_help=on_farm)
     for name in names:
-        group, own = (farm, name.removeprefix("farm ")) if name.startswith("farm ") else (app, name)
+        group, _, own = name.rpartition(" ")
+        if group and group not in app.commands:
+            app.add_command(_Commands(group, help=_GROUPS[group], short_help=_GROUPS[group]))
         values, runs = COMMANDS[name]
-        group.add_command(_command(own, named(values), runs))
-    if farm.commands:
-        app.add_command(farm)
+        (app.commands[group] if group else app).add_command(_command(own, named(values), runs))  # type: ignore[attr-defined]
     return app

@@ -452,6 +452,26 @@ class Glass:
 
 
 @dataclass(frozen=True, kw_only=True)
+class LensTable(ReadsScenes):
+    """Show a lens's focal lengths, chromatic shift and spots by wavelength."""
+
+    file: str = argument(
+        "FILE", "A prescription (.csv, .zmx), or a scene with objects of shape lens.", complete=completion.scenes
+    )
+    object: str | None = option(
+        "NAME", "One of the scene's lenses; those on its axis belong to it; default: the first."
+    )
+    beam: float | None = option(
+        "D",
+        "Diameter of the parallel light that enters; default: the file's, or all that passes.",
+        options.number(lambda value: 0.0 < value < 1e9, "more than 0", _A_LENGTH),
+    )
+    wavelengths: tuple[float, ...] | None = option(
+        "NM,NM", "Wavelengths; default: the file's, or the lines g, F, e, d and C.", options.wavelengths
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
 class Doctor:
     """Check OpenGL, its limits and the packages, with a remedy for what is missing."""
 

@@ -101,6 +101,7 @@ class Panels:
     compare: bool = False
     history: bool = False
     rays: bool = False
+    lens: bool = False
     lesson: bool = False
     shortcuts: bool = False
     start_page: bool = False

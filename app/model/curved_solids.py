@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .contacts import contacts, nested_pairs
+from .geometry.primitives_lens import vertices_of
 from .scene import Scene, SceneObject
 
 MOST_FACES = 24
@@ -101,21 +102,24 @@ def _ball(recipe: Mapping[str, Any]) -> Iterator[Face]:
 def _lens(recipe: Mapping[str, Any]) -> Iterator[Face]:
     if recipe.get("conic1", 0.0) or recipe.get("conic2", 0.0):
         return
-    half, aperture = 0.5 * float(recipe.get("thickness", 0.3)), 0.5 * float(recipe.get("diameter", 1.0))
+    (start, end), aperture = (
+        vertices_of(recipe.get("thickness", 0.3), recipe.get("front")),
+        0.5 * float(recipe.get("diameter", 1.0)),
+    )
     # Curvatures, positive where a face bulges.
     first, second = _curvature(recipe.get("radius1", 1.0)), -_curvature(recipe.get("radius2", -1.0))
     if min(first, second) < 0.0:
         return
     r = aperture * np.linspace(0.0, 1.0, 65)
-    low, high = -half + _sag(first, r), half - _sag(second, r)
+    low, high = start + _sag(first, r), end - _sag(second, r)
     # Each face's sphere has a second half, which must not cut the lens.
     slack = _ROUNDING * aperture
-    if first and (high > _other_half(first, r) - half + slack).any():
+    if first and (high > start + _other_half(first, r) + slack).any():
         return
-    if second and (-low > _other_half(second, r) - half + slack).any():
+    if second and (low < end - _other_half(second, r) - slack).any():
         return
     up = np.array([0.0, 0.0, 1.0])
-    for curvature, vertex, inward in ((first, -half, up), (second, half, -up)):
+    for curvature, vertex, inward in ((first, start, up), (second, end, -up)):
         yield Face(math.sqrt(curvature) * np.eye(3), vertex * up, inward, 0.0)
     if high[-1] - low[-1] > slack:
         yield _tube(aperture)

@@ -164,7 +164,6 @@ SHAPES = (
     "prism",
     "polygon_prism",
     "lens",
-    "doublet",
     "brilliant",
     "step_cut",
     "torus",
@@ -180,7 +179,7 @@ _HIDDEN = {"name", "names", "gradient"}
 
 
 @cache
-def _parameters(shape: str) -> dict[str, tuple[str, bool]]:
+def parameters_of(shape: str) -> dict[str, tuple[str, bool]]:
     """Key -> (annotation, required) of a shape, in the order of its function.
 
     A file leaves out a parameter that may be None to mean None; a key that is given has the other type.
@@ -188,12 +187,11 @@ def _parameters(shape: str) -> dict[str, tuple[str, bool]]:
     if shape == INLINE:
         return {"vertices": ("rows3", True), "triangles": ("rows3", True), "uv": ("rows2", False)}
     signature = inspect.signature(_function(shape))
-    keys = {
+    return {
         key: (str(parameter.annotation).removesuffix(" | None"), parameter.default is inspect.Parameter.empty)
         for key, parameter in signature.parameters.items()
         if key not in _HIDDEN
     }
-    return keys | ({"part": ("part", True)} if shape == "doublet" else {})
 
 
 def _function(shape: str) -> Callable[..., Any]:
@@ -203,14 +201,14 @@ def _function(shape: str) -> Callable[..., Any]:
 def _shape_recipe(table: SceneTable) -> dict[str, Any]:
     shape = table.choice("shape", SHAPES)
     recipe: dict[str, Any] = {"shape": shape}
-    for key, (annotation, required) in _parameters(shape).items():
+    for key, (annotation, required) in parameters_of(shape).items():
         if required or table.has(key):
             recipe[key] = _read_parameter(table, key, annotation)
     return recipe
 
 
 def _read_parameter(table: SceneTable, key: str, annotation: str) -> Any:
-    if annotation == "part":
+    if key == "part":
         return table.choice(key, ("front", "back"))
     if annotation in ("rows2", "rows3"):
         return [list(row) for row in table.rows(key, int(annotation[-1]), at_least=1)]
@@ -245,14 +243,13 @@ def make_shape(shape: str, notes: list[str] | None = None, **parameters: Any) ->
     """
     if shape in primitives.SPECIAL:
         return make_shape(**_function(shape)(**parameters))
-    arguments = {key: value for key, value in parameters.items() if key != "part"}
+    arguments = dict(parameters)
     if "heights" in arguments:
         arguments["heights"] = _load_heights(arguments["heights"])
     if shape == INLINE:
         mesh = checked_mesh(_inline_mesh(**arguments), [] if notes is None else notes)
     else:
-        made = _function(shape)(**arguments)
-        mesh = made[("front", "back").index(parameters["part"])] if shape == "doublet" else made
+        mesh = _function(shape)(**arguments)
     note_recipe(mesh, {"shape": shape} | parameters)
     return mesh
 

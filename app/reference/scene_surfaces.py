@@ -1,7 +1,7 @@
 """What the rays of a reference can meet, gathered from a scene's objects: triangles, and curved surfaces where known.
 
 A mesh with a recipe (`geometry.mesh`) is met as the surface that it names, a sphere, an ellipsoid, a lens, half a
-doublet, a torus or a solid of revolution: tessellation is then an error of the renderer, which is measured, and no part
+lens, a torus or a solid of revolution: tessellation is then an error of the renderer, which is measured, and no part
 of the truth. Everything else, what shows a picture (whose place is known on triangles only), and all of
 `as_triangles(scene)` is met as triangles.
 """
@@ -17,6 +17,7 @@ import numpy as np
 
 from ..model.geometry import primitives
 from ..model.geometry.mesh import Mesh
+from ..model.geometry.primitives_lens import vertices_of
 from ..model.geometry.primitives_round import in_rows, profile_with_normals
 from ..model.scene import Scene, SceneObject
 
@@ -60,11 +61,8 @@ def pieces(item: SceneObject) -> list[Piece]:
     if make is None:
         return []
     function = getattr(primitives, _FUNCTIONS.get(recipe["shape"], recipe["shape"]))
-    given = {key: value for key, value in recipe.items() if key not in ("shape", "part")}
-    bound = inspect.signature(function).bind(**given)
+    bound = inspect.signature(function).bind(**{key: value for key, value in recipe.items() if key != "shape"})
     bound.apply_defaults()
-    if "part" in recipe:
-        bound.arguments["part"] = recipe["part"]
     return list(make(bound.arguments))
 
 
@@ -127,19 +125,9 @@ def _torus(shape: dict[str, Any]) -> Iterator[Piece]:
 
 
 def _lens(shape: dict[str, Any]) -> Iterator[Piece]:
-    half = 0.5 * float(shape["thickness"])
-    first = (-half, shape["radius1"], shape["conic1"])
-    second = (half, shape["radius2"], shape["conic2"])
-    return _between(first, second, 0.5 * float(shape["diameter"]))
-
-
-def _doublet(shape: dict[str, Any]) -> Iterator[Piece]:
-    surfaces = [
-        (-float(shape["thickness1"]), shape["radius1"], 0.0),
-        (0.0, shape["radius2"], 0.0),
-        (float(shape["thickness2"]), shape["radius3"], 0.0),
-    ]
-    first, second = surfaces[:2] if shape["part"] == "front" else surfaces[1:]
+    low, high = vertices_of(shape["thickness"], shape["front"])
+    first = (low, shape["radius1"], shape["conic1"])
+    second = (high, shape["radius2"], shape["conic2"])
     return _between(first, second, 0.5 * float(shape["diameter"]))
 
 
@@ -222,7 +210,6 @@ _SHAPES: dict[str, Callable[[dict[str, Any]], Iterator[Piece]]] = {
     "sphere": _sphere,
     "ellipsoid": _sphere,
     "lens": _lens,
-    "doublet": _doublet,
     "torus": _torus,
     "revolution": _revolution,
 }

@@ -183,7 +183,7 @@ COMMANDS: tuple[Command, ...] = (
             "Open…",
             "Ctrl+O",
             dialogs.open_file,
-            "Open a scene (.toml), glTF (.glb, .gltf) or a bare mesh (.obj, .ply, .stl).",
+            "Open a scene (.toml), glTF (.glb, .gltf), a bare mesh (.obj, .ply, .stl) or a lens (.zmx, .csv).",
         ),
         _row(
             "Import…",
@@ -322,6 +322,7 @@ PANELS = _group(
     _panel("Timing", "", "timing", "Frame time by pass, photons, memory, fall-backs."),
     _panel("Spectrum", "", "spectrum", "The spectrum under the cursor."),
     _panel("Compare", "", "compare", "Reference, wipe, error map."),
+    _panel("Lens", "", "lens", "Focal lengths, chromatic shift and spots of the selected lens, by wavelength."),
     _panel("Rays", "", "rays", "Deviation and focal length of the ray overlay, by wavelength."),
     _panel("Lesson", "", "lesson", "Six lessons: a scene each, a few sentences, what to try."),
     _panel("History", "", "history", "All steps that can be undone."),

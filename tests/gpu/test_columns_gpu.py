@@ -17,7 +17,7 @@ from reference.path_check import ReferenceScene, choices_of
 from spectrasplat.gpu.context import Context
 from spectrasplat.model.geometry.mesh import make_mesh
 from spectrasplat.model.geometry.primitives import box
-from spectrasplat.model.geometry.primitives_lens import doublet
+from spectrasplat.model.geometry.primitives_lens import lens
 from spectrasplat.model.geometry.primitives_round import sphere
 from spectrasplat.model.lights import AreaLight, CollimatedLight, DirectionalLight, PointLight, SpotLight
 from spectrasplat.model.optics.spectrum import constant
@@ -66,7 +66,7 @@ def blocks(*names: str) -> tuple[SceneObject, ...]:
 def cemented() -> tuple[SceneObject, ...]:
     """A coarse doublet, its axis turned to x."""
     turn = np.eye(4)[[2, 1, 0, 3]] * np.array([1, -1, 1, 1])[:, None]
-    crown, flint = doublet(2.0, -1.6, 9.0, 0.5, 0.25, 1.4, triangles=600)
+    crown, flint = lens(2.0, -1.6, 0.5, 1.4, 300, front=-0.5), lens(-1.6, 9.0, 0.25, 1.4, 300, front=0.0)
     return placed("crown", crown.transformed(turn), glass("N-BK7")), placed(
         "flint", flint.transformed(turn), glass("F2")
     )

@@ -119,8 +119,11 @@ def test_lens_surfaces_follow_the_conic_and_its_normal(conic: float) -> None:
     assert set(np.unique(mesh.corner_normals[~front][:, 2].round(12))) == {0.0, 1.0}
 
 
-def test_doublet_shares_its_cemented_surface_exactly() -> None:
-    front, back = primitives.doublet(0.6, -0.45, -1.6, 0.2, 0.08, 0.5, 3_000)
+def test_cemented_lenses_share_their_surface_exactly() -> None:
+    front, back = (
+        primitives.lens(0.6, -0.45, 0.2, 0.5, 1_500, front=-0.2),
+        primitives.lens(-0.45, -1.6, 0.08, 0.5, 1_500, front=0.0),
+    )
 
     def cemented(mesh: Mesh, sign: float) -> set[frozenset[tuple[float, ...]]]:
         faces = np.flatnonzero((sign * mesh.corner_normals[:, :, 2] > 1e-9).all(axis=1))

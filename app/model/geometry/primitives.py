@@ -15,7 +15,7 @@ import numpy as np
 
 from .mesh import Mesh, make_mesh
 from .primitives_gem import brilliant, step_cut
-from .primitives_lens import doublet, lens
+from .primitives_lens import lens
 from .primitives_parts import count, in_range, positive, with_box_uv
 from .primitives_round import ellipsoid, solid_of_revolution, sphere, torus
 from .primitives_water import height_field, rippled_water
@@ -24,7 +24,6 @@ __all__ = [
     "box",
     "brilliant",
     "disc",
-    "doublet",
     "ellipsoid",
     "height_field",
     "lens",
@@ -127,7 +126,7 @@ def extruded(name: str, outline: np.ndarray, length: float, upright: bool = True
     return make_mesh(name, vertices, triangles)
 
 
-SPECIAL = ("cylinder", "cone", "dome")
+SPECIAL = ("cylinder", "cone", "dome", "doublet")
 
 
 def cylinder(radius: float = 0.5, length: float = 1.0) -> dict[str, Any]:
@@ -146,3 +145,22 @@ def dome(radius: float = 0.5) -> dict[str, Any]:
     """Half a ball, its flat side down."""
     radius = positive("dome", "radius", radius)
     return {"shape": "lens", "radius1": math.inf, "radius2": -radius, "thickness": radius, "diameter": 2.0 * radius}
+
+
+def doublet(
+    part: str,
+    radius1: float,
+    radius2: float,
+    radius3: float,
+    thickness1: float,
+    thickness2: float,
+    diameter: float,
+    triangles: int = 40_000,
+) -> dict[str, Any]:
+    """One of two cemented lenses, the vertex that they share at the origin; `triangles`: of both."""
+    front = -positive("doublet", "thickness1", thickness1)
+    first, second, thickness, place = (
+        (radius1, radius2, thickness1, front) if part == "front" else (radius2, radius3, thickness2, 0.0)
+    )
+    sizes = {"thickness": thickness, "diameter": diameter, "triangles": triangles // 2, "front": place}
+    return {"shape": "lens", "radius1": first, "radius2": second, **sizes}

@@ -25,46 +25,27 @@ def lens(
     triangles: int = 20_000,
     conic1: float = 0.0,
     conic2: float = 0.0,
+    front: float | None = None,
     name: str = "lens",
 ) -> Mesh:
-    """A lens on the z axis, its centre (half way between the vertices) at the origin.
+    """A lens on the z axis, its first vertex at z = `front`, by default as far before the origin as the second behind.
 
     `radius1` and `radius2` are the signed radii of the first and second surface (infinite
-    = plane), `conic1` and `conic2` their conic constants (0 sphere, -1 paraboloid). Raises
-    UserError when a surface does not reach the rim or the two cross.
+    = plane), `conic1` and `conic2` their conic constants (0 sphere, -1 paraboloid). Lenses with a vertex, a
+    diameter, a number of triangles and the radius between them in common are cemented: the surface has the same
+    vertices in both, to the last bit. Raises UserError when a surface does not reach the rim or the two cross.
     """
-    half = 0.5 * positive("lens", "thickness", thickness)
-    rings = _ring_count("lens", triangles)
-    return _lens_between(name, (-half, radius1, conic1), (half, radius2, conic2), diameter, rings)
+    low, high = vertices_of(thickness, front)
+    rings = max(1, round(math.sqrt(count("lens", "triangles", triangles, 24) / 12.0 + 0.25) - 0.5))
+    return _lens_between(name, (low, radius1, conic1), (high, radius2, conic2), diameter, rings)
 
 
-def doublet(
-    radius1: float,
-    radius2: float,
-    radius3: float,
-    thickness1: float,
-    thickness2: float,
-    diameter: float,
-    triangles: int = 40_000,
-    names: tuple[str, str] = ("doublet front", "doublet back"),
-) -> tuple[Mesh, Mesh]:
-    """Two cemented lenses on the z axis, the common vertex at the origin.
-
-    The cemented surface of both has the same vertices to the last bit, and the same
-    triangles turned round, so that no gap and no overlap lies between the glasses.
-    """
-    rings = _ring_count("doublet", count("doublet", "triangles", triangles, 96) // 2)
-    front = -positive("doublet", "thickness1", thickness1)
-    back = positive("doublet", "thickness2", thickness2)
-    return (
-        _lens_between(names[0], (front, radius1, 0.0), (0.0, radius2, 0.0), diameter, rings),
-        _lens_between(names[1], (0.0, radius2, 0.0), (back, radius3, 0.0), diameter, rings),
-    )
-
-
-def _ring_count(shape: str, triangles: int) -> int:
-    # Two caps of 6 k² and a rim of 12 k.
-    return max(1, round(math.sqrt(count(shape, "triangles", triangles, 24) / 12.0 + 0.25) - 0.5))
+def vertices_of(thickness: float, front: float | None) -> tuple[float, float]:
+    """Places of a lens's vertices on its axis."""
+    low = -0.5 * positive("lens", "thickness", thickness) if front is None else front
+    if not math.isfinite(low):
+        raise UserError(f"lens: front must be a finite number, not {low:g}")
+    return low, -low if front is None else low + positive("lens", "thickness", thickness)
 
 
 def _lens_between(

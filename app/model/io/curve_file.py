@@ -56,7 +56,9 @@ class Curve(NamedTuple):
     """float64 (n,), finite."""
 
 
-class _Row(NamedTuple):
+class Row(NamedTuple):
+    """A line of a text table."""
+
     line: int
     cells: list[str]
     numbers: list[float | None]
@@ -64,6 +66,7 @@ class _Row(NamedTuple):
 
     @property
     def is_data(self) -> bool:
+        """Whether it begins with a number and has more."""
         first, *others = self.numbers or [None]
         return first is not None and not math.isnan(first) and any(number is not None for number in others)
 
@@ -91,7 +94,7 @@ def read_curves(path: Path, notes: list[str], part: str = "") -> list[Curve]:
     try:
         text = files.read_any_text(path, _MAX_BYTES).replace("\0", "").lstrip("\ufeff \t\r\n")
         is_xml = text.startswith("<")
-        rows = [] if is_xml else _rows(text.splitlines())
+        rows = [] if is_xml else rows_of(text.splitlines())
     except (OSError, csv.Error) as error:
         reason = f"cannot read the curve {path}: {files.reason_of(error)}"
         raise UserError(f"{reason}; give a table of wavelength_nm, value") from error
@@ -145,13 +148,13 @@ def share(path: PathLike, curve: Curve, what: str, notes: list[str]) -> np.ndarr
     return np.maximum(values, LEAST_TRANSMITTANCE) if what == "transmittance" else values
 
 
-def _rows(lines: list[str]) -> list[_Row]:
+def rows_of(lines: list[str]) -> list[Row]:
     """Lines that are not blank, in the dialect in which most of them are numbers."""
 
-    def parsed(some: list[tuple[int, str]], delimiter: str, comma: bool | None = None) -> list[_Row]:
+    def parsed(some: list[tuple[int, str]], delimiter: str, comma: bool | None = None) -> list[Row]:
         split = [(i, _cells(line, delimiter)) for i, line in some]
         comma = _has_decimal_comma([cell for _, cells in split for cell in cells]) if comma is None else comma
-        return [_Row(i, cells, _numbers(cells, comma)) for i, cells in split]
+        return [Row(i, cells, _numbers(cells, comma)) for i, cells in split]
 
     numbered = [(i, line) for i, line in enumerate(lines, start=1) if line.strip(" \t;,")]
     sample = [each for each in numbered if re.search(r"\d", each[1])]
@@ -194,7 +197,7 @@ def _number(cell: str, comma: bool) -> float | None:
     return float(text.lower().replace("d", "e")) if _NUMBER.fullmatch(text) else None
 
 
-def _across(rows: list[_Row]) -> Iterator[_Table]:
+def _across(rows: list[Row]) -> Iterator[_Table]:
     """Curves in rows below a row of wavelengths, as CGATS files and spreadsheets of samples have them."""
     for i, row in enumerate(rows):
         headed = [(column, found[1]) for column, cell in enumerate(row.cells) if (found := _HEADED.fullmatch(cell))]
@@ -215,9 +218,9 @@ def _across(rows: list[_Row]) -> Iterator[_Table]:
         return
 
 
-def _down(path: PathLike, rows: list[_Row], notes: list[str]) -> Iterator[_Table]:
+def _down(path: PathLike, rows: list[Row], notes: list[str]) -> Iterator[_Table]:
     """Curves in columns, of all stretches of rows that begin with a number."""
-    above: list[_Row] = []
+    above: list[Row] = []
     width = 0
     for is_data, group in itertools.groupby(rows, key=lambda row: row.is_data):
         stretch = list(group)
@@ -240,7 +243,7 @@ def _down(path: PathLike, rows: list[_Row], notes: list[str]) -> Iterator[_Table
         above = []
 
 
-def _columns(path: PathLike, block: list[_Row], above: list[_Row], width: int) -> Iterator[_Table]:
+def _columns(path: PathLike, block: list[Row], above: list[Row], width: int) -> Iterator[_Table]:
     titles = [
         [cell.strip("#!/* ") for cell in row.cells] + [""] * width
         for row in above[-_NEAR:]
@@ -266,7 +269,7 @@ def _columns(path: PathLike, block: list[_Row], above: list[_Row], width: int) -
             yield names[column] or f"column {column + 1}", names[at], [p[1] for p in pairs], [p[2] for p in pairs]
 
 
-def _fail_line(path: PathLike, row: _Row) -> NoReturn:
+def _fail_line(path: PathLike, row: Row) -> NoReturn:
     raise UserError(f"{path}, line {row.line}: expected numbers, wavelength_nm and a value, as in the rows above it")
 
 

@@ -14,6 +14,7 @@ from typing import Any
 
 from ...base import files
 from ...base.errors import UserError
+from ...base.paths import SCENE_SUFFIXES
 from ..geometry.mesh import Mesh
 from ..lights.light_file import read_light
 from ..materials.material_file import read_materials
@@ -38,13 +39,16 @@ from ..scene_render import read_render
 from ..staging import AS_FOUND, Staging, with_glass
 from ..texture import Environment, TextureReader
 from ..vectors import Vec3
+from .prescription_file import SUFFIXES as LENS_SUFFIXES
+from .prescription_file import read_prescription
 from .scene_table import SceneTable
 
 GLTF_SUFFIXES = (".glb", ".gltf")
 
 
 def load_scene(path: str | os.PathLike[str], staging: Staging = AS_FOUND) -> Scene:
-    """The scene in `path` (.toml, .glb, .gltf, or a mesh: .ply, .obj, .stl), with what `staging` asks for.
+    """The scene in `path` (.toml, .glb, .gltf, a mesh: .ply, .obj, .stl, or a lens: .zmx, .csv), with what `staging`
+    asks for.
 
     Raises UserError, in one sentence with file, key and remedy, for anything that cannot be
     rendered as it stands.
@@ -54,7 +58,7 @@ def load_scene(path: str | os.PathLike[str], staging: Staging = AS_FOUND) -> Sce
         problem = "is a folder, not a scene file" if os.path.isdir(path) else "does not exist"
         if os.path.exists(path) and not os.path.isdir(path):
             problem = "is a device or a pipe, not a scene file"
-        raise UserError(f"{path} {problem}; give a .toml, .glb or .gltf scene or a .ply, .obj or .stl mesh")
+        raise UserError(f"{path} {problem}; give one of {', '.join(SCENE_SUFFIXES)}")
     suffix = path.suffix.lower()
     if suffix == ".toml":
         if staging.up is not None:
@@ -71,10 +75,14 @@ def load_scene(path: str | os.PathLike[str], staging: Staging = AS_FOUND) -> Sce
         objects = objects_of_mesh(path, staging, notes)
         lights, camera, environment = _studio(objects, notes, len(parts_of(objects)) == len(objects))
         scene = Scene(path.stem, camera, lights, tuple(objects), environment=environment, notes=tuple(notes))
+    elif suffix in LENS_SUFFIXES:
+        from ..lens_scene import scene_of_lens
+
+        if staging != AS_FOUND:
+            raise UserError(f"{path.name}: --up, --glass and --smooth are for meshes; a lens file names its glasses")
+        scene = scene_of_lens(read_prescription(path))
     else:
-        raise UserError(
-            f"{path}: '{path.suffix}' is not a kind of scene; use .toml, {', '.join(GLTF_SUFFIXES + MESH_SUFFIXES)}"
-        )
+        raise UserError(f"{path}: '{path.suffix}' is not a kind of scene; use {', '.join(SCENE_SUFFIXES)}")
     return _checked(scene, path)
 
 

@@ -27,7 +27,7 @@ from ..scene import Scene, SceneObject
 from ..scene_camera import camera_values
 from ..scene_defaults import environment_of
 from ..scene_environment import ENVIRONMENT, environment_values
-from ..scene_objects import INLINE
+from ..scene_objects import INLINE, parameters_of
 from ..scene_render import render_values
 from ..texture import Environment
 from .kept_words import kept_light, kept_placement, merged
@@ -190,8 +190,10 @@ def _kept_object(
     if old.name != new.name:
         values["name"] = new.name
     if not _same_mesh(old.mesh, new.mesh):
-        for key in (*(old.mesh.recipe or ("vertices", "triangles", "uv", "mesh")), "shape", "radius", "length"):
-            values.pop(key, None)  # radius and length: of one of `primitives.SPECIAL`
+        # Those of the entry's own shape are others where it is one of `primitives.SPECIAL`.
+        written = parameters_of(entry["shape"]) if "shape" in entry else ()
+        for key in (*(old.mesh.recipe or ("vertices", "triangles", "uv", "mesh")), "shape", *written):
+            values.pop(key, None)
         values |= _mesh(new.mesh, path)
     if old.material.values() != new.material.values():
         values = _kept_material(values, old, new, materials, path)

@@ -17,7 +17,7 @@ import numpy as np
 from ...gpu.context import Context
 from ...model.geometry.mesh import Mesh, make_mesh
 from ...model.geometry.primitives import box, prism
-from ...model.geometry.primitives_lens import doublet, lens
+from ...model.geometry.primitives_lens import lens
 from ...model.geometry.primitives_round import sphere
 from ...model.optics.glass import Dispersion, constant
 from ...model.scene import Camera, Scene, SceneObject
@@ -101,7 +101,7 @@ def _carved_out() -> Scene:
 
 
 def _doublet() -> Scene:
-    front, back = doublet(2.0, -2.0, -6.0, 0.25, 0.1, 1.0, triangles=4800)
+    front, back = lens(2.0, -2.0, 0.25, 1.0, 2400, front=-0.25), lens(-2.0, -6.0, 0.1, 1.0, 2400, front=0.0)
     return _lit(solid("front", front, FLINT), solid("back", back, FLINT))
 
 

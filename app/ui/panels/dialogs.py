@@ -11,7 +11,7 @@ from pathlib import Path
 
 from imgui_bundle import imgui
 
-from ...base.paths import assets_dir, shipped_scenes
+from ...base.paths import SCENE_SUFFIXES, assets_dir, shipped_scenes
 from ...edit import edits, requests
 from ...edit.importing import import_objects
 from ...edit.state import Selection, State
@@ -19,7 +19,6 @@ from .. import theme
 from ..view_model import JobInfo, ViewModel
 from . import file_browser, picture_choice, widgets
 
-OPENABLE = (".toml", ".glb", ".gltf", ".obj", ".ply", ".stl")
 COMPARABLE = (".exr", ".npy")
 """Dropped while the compare panel is open, these are compared with."""
 _SAVE_AS = "Save as"
@@ -47,14 +46,14 @@ def reset() -> None:
 def open_file(state: State, view_model: ViewModel) -> State:
     """Ask which file to open."""
     start = _folder(view_model)
-    file_browser.ask(file_browser.Question("Open", OPENABLE, start, open_path, known=shipped_scenes()))
+    file_browser.ask(file_browser.Question("Open", SCENE_SUFFIXES, start, open_path, known=shipped_scenes()))
     return state
 
 
 def import_file(state: State, view_model: ViewModel) -> State:
     """Ask which file's objects are to join the scene."""
     title, start = "Import into this scene", _folder(view_model)
-    file_browser.ask(file_browser.Question(title, OPENABLE, start, _imported, known=shipped_scenes()))
+    file_browser.ask(file_browser.Question(title, SCENE_SUFFIXES, start, _imported, known=shipped_scenes()))
     return state
 
 

@@ -7,26 +7,21 @@ from collections.abc import Sequence
 from imgui_bundle import imgui
 
 from ...edit.state import State
-from .. import item_rects, theme
 from ..ray_readings import RayReading
 from ..view_model import ViewModel
 from . import widgets
-from .spectrum_strip import colour_of_nm
+from .wavelength_table import draw_wavelength_table
 
-_COLUMNS: tuple[tuple[str, str], ...] = (
-    ("nm", "Vacuum wavelength."),
-    ("n", "Refractive index of the glass."),
-    (
-        "Deviation",
-        "Angle between the middle ray before and behind the glass; with inner reflections the least turn of all rays.",
-    ),
-    (
-        "Minimum",
-        "Minimum deviation of a prism with these two faces: 2 asin(n sin(A/2)) - A, for rays in its principal section.",
-    ),
-    ("Focal length", "Of a thin bundle of parallel light about the middle ray; negative where the focus is virtual."),
-    ("Behind", "From the last surface to the focus, along the middle ray; scene units."),
-)
+_COLUMNS = {
+    "nm": "Vacuum wavelength.",
+    "n": "Refractive index of the glass.",
+    "Deviation": "Angle between the middle ray before and behind the glass; with inner reflections the least turn of "
+    "all rays.",
+    "Minimum": "Minimum deviation of a prism with these two faces: 2 asin(n sin(A/2)) - A, for rays in its principal "
+    "section.",
+    "Focal length": "Of a thin bundle of parallel light about the middle ray; negative where the focus is virtual.",
+    "Behind": "From the last surface to the focus, along the middle ray; scene units.",
+}
 
 
 def draw_rays_panel(state: State, view_model: ViewModel) -> State:
@@ -46,21 +41,8 @@ def draw_rays_panel(state: State, view_model: ViewModel) -> State:
     apex = view_model.readings[0].apex_deg
     if apex is not None:
         imgui.text_unformatted(f"Prism: the faces that the rays go through make {apex:.2f}°.")
-    flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.sizing_stretch_prop | imgui.TableFlags_.scroll_y
-    if not imgui.begin_table("##readings", len(_COLUMNS), flags):
-        return state
-    imgui.table_setup_scroll_freeze(0, 1)
-    for title, _ in _COLUMNS:
-        imgui.table_setup_column(title)
-    imgui.table_next_row(imgui.TableRowFlags_.headers)
-    for title, tip in _COLUMNS:
-        imgui.table_next_column()
-        imgui.table_header(title)
-        item_rects.note(f"Rays: {title}")
-        widgets.tooltip(tip)
-    for reading in view_model.readings:
-        _row(reading)
-    imgui.end_table()
+    rows = [(reading.wavelength_nm, texts(reading)) for reading in view_model.readings]
+    draw_wavelength_table("Rays", _COLUMNS, rows)
     return state
 
 
@@ -68,20 +50,6 @@ def _bow(readings: Sequence[RayReading]) -> str:
     ends = ((abs((r.deviation_deg + 180.0) % 360.0 - 180.0), r.wavelength_nm) for r in (readings[0], readings[-1]))
     bow = " and ".join(f"{180.0 - turn:.1f}° ({nm:.0f} nm)" for turn, nm in ends)
     return f"Rays crowd where they turn least: a bow at {bow} from the point opposite the light."
-
-
-def _row(reading: RayReading) -> None:
-    imgui.table_next_row()
-    imgui.table_next_column()
-    at, height = imgui.get_cursor_screen_pos(), imgui.get_text_line_height()
-    imgui.get_window_draw_list().add_rect_filled(
-        at, imgui.ImVec2(at.x + theme.em(0.25), at.y + height), colour_of_nm(reading.wavelength_nm)
-    )
-    imgui.set_cursor_screen_pos(imgui.ImVec2(at.x + theme.em(0.5), at.y))
-    imgui.text_unformatted(f"{reading.wavelength_nm:.1f}")
-    for text in texts(reading):
-        imgui.table_next_column()
-        imgui.text_unformatted(text)
 
 
 def texts(reading: RayReading) -> tuple[str, ...]:
