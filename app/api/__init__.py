@@ -12,9 +12,10 @@ from typing import Any
 from ..base.errors import UserError
 from ..base.paths import shipped_scenes
 from ..edit.stored_photons import StoredPhotons as Photons
+from ..model.optics.lens_design import LensTable
 from .catalogue import Glass, glass, glasses
 from .gradient import Gradient, gradient, gradients
-from .lenses import LensTable, lens_table
+from .lenses import lens_table
 from .pages import page
 from .picture import CausticMap, Picture, Statistics
 from .rendering import caustic, render

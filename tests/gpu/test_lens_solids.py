@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
 import spectrasplat as ss
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.gpu.context import Context
