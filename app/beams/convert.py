@@ -141,7 +141,8 @@ def pieces_of(leaves: list[Leaves], scene: BeamScene, light: int, measure: float
 
 def of_kind(leaves: list[Leaves], *kinds: int) -> Leaves:
     """Leaves of some kinds (`search.LEAF_…`)."""
-    return Leaves.joined([part.where(np.isin(part.leaf["kind"], kinds)) for part in leaves])
+    chosen = ((part, np.logical_or.reduce([part.leaf["kind"] == kind for kind in kinds])) for part in leaves)
+    return Leaves.joined([part.where(keep) for part, keep in chosen if keep.any()])
 
 
 def hulls_around(corners: np.ndarray, counts: np.ndarray, grow: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -142,8 +142,11 @@ def search(
 
     from concurrent.futures import ThreadPoolExecutor
 
-    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
-        done = list(pool.map(one, jobs))
+    if len(jobs) == 1:
+        done = [one(jobs[0])]
+    else:
+        with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
+            done = list(pool.map(one, jobs))
     for _, work in jobs:
         sums += work["sums"][0]
     return done, sums, blocked

@@ -16,6 +16,7 @@ from ..model.scene import Scene
 from .convert import pieces_of, polygons_of
 from .facets import beam_scene, in_gpu_space, shown_as
 from .find import Emission, GoOn, Search, search
+from .leaves import Leaves
 from .polygons import BeamPieces, BeamPolygons, joined
 from .search import SUM_BEAMS, SUMS
 from .sources import emissions, is_near_facets, mask_at, why_no_beams
@@ -139,6 +140,7 @@ class BeamFinder:
             sums, blocked = np.zeros(SUMS), set()
             cast: list[BeamPolygons] = []
             left: list[BeamPieces] = []
+            leaves: list[Leaves] = []
             measure = self._unit**2 if scene.lights[i].is_parallel else 1.0
             for number, part in enumerate(parts):
                 how = Search(
@@ -149,12 +151,15 @@ class BeamFinder:
                     power=total / watts[i] if watts[i] > 0.0 else None,
                     faint=0.0 if i in plays else _TAILS_PLAY * threshold,
                 )
-                leaves, part_sums, part_blocked = search(beams, part, how, threads, go_on)
-                cast.append(polygons_of(leaves, beams, i, self._unit))
-                left.append(pieces_of(leaves, beams, i, measure))
+                found, part_sums, part_blocked = search(beams, part, how, threads, go_on)
+                leaves += found
                 sums += part_sums
                 blocked |= part_blocked
                 done += 1
+                if part is parts[-1] or sum(len(some.leaf) for some in leaves) > _TOGETHER:
+                    cast.append(polygons_of(leaves, beams, i, self._unit))
+                    left.append(pieces_of(leaves, beams, i, measure))
+                    leaves = []
                 yield done / steps
             if blocked:
                 # Photons carry what these objects cast: all of it, whichever point of the light it comes from.
@@ -171,6 +176,8 @@ class BeamFinder:
 
 _TAILS_PLAY = 1.0 / 16.0
 """Share of the threshold below which what is left to photons plays roulette."""
+_TOGETHER = 10_000
+"""Leaves, about, of an extended light's points that are converted at once."""
 _TOLERANCE = 0.25
 """Texels."""
 _THINNEST = 1e-3

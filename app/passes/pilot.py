@@ -61,6 +61,7 @@ _FULL = 0.8
 """Share of a queue's room that a pilot may fill: its few points are not every batch."""
 _FLIGHTS_OF_EVERY = 8
 """Only one in so many points is traced to count flights: weak branches are many, and this is but a ratio."""
+_FOR_MAPS_OF_EVERY = 4
 MAX_LIGHT_POINTS = 256
 FEWEST_COPIES = 3.4
 """With fewer, a single one from the lamp's middle errs by less: it lacks the lamp's variance r²/4 but for its own
@@ -93,10 +94,11 @@ class Pilot:
 
 
 def pilot_steps(
-    trace: TracePass, scene: Scene, light: int, domain: EmissionDomain, power_w: float, spectral: bool
+    trace: TracePass, scene: Scene, light: int, domain: EmissionDomain, power_w: float, spectral: bool, *, for_maps: bool
 ) -> Generator[None, None, Pilot]:
     """Trace the pilots of one light, pausing after every event of the rays; `power_w`: its whole power per unit
-    weight."""
+    weight. `for_maps`: all that is asked is where light lands, which a quarter of the points tells, and the spectrum's
+    ends."""
     count = min(max(1, int(PHOTONS / domain.active_share)), MAX_POINTS)
     # In as many slices as the batch needs: what a pilot finds must not depend on it.
     slices = -(-count // trace.batch)
@@ -106,7 +108,7 @@ def pilot_steps(
         depth: int,
         place: tuple[float, float] = (0.5, 0.5),
         split_threshold: float | None = None,
-        every: int = 1,
+        every: int = _FOR_MAPS_OF_EVERY if for_maps else 1,
     ) -> Generator[None, None, tuple[np.ndarray, FluxTally, int, float]]:
         found, tally, flights, fullness = [trace.photon.zeros(0)], FluxTally(), 0, 0.0
 
@@ -129,12 +131,12 @@ def pilot_steps(
         depth = trace.max_depth
         whole, _, flights, _ = yield from traced(everything, depth)
     kept, fullness = [], []
-    for threshold in KEPT_THRESHOLDS:
+    for threshold in () if for_maps else KEPT_THRESHOLDS:
         _, _, some, full = yield from traced(everything, depth, split_threshold=threshold, every=_FLIGHTS_OF_EVERY)
         kept.append(some * _FLIGHTS_OF_EVERY)
         fullness.append(full)
     at_places, from_rim = [], []
-    for x in PLACES if spectral else ():
+    for x in (PLACES[:: len(PLACES) - 1] if for_maps else PLACES) if spectral else ():
         record, *_ = yield from traced(Band(x, x, x, power_w), depth)
         at_places.append(record)
     for place in RIM if scene.lights[light].has_extent else ():

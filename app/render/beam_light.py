@@ -59,7 +59,7 @@ _GROWTH, _GROWTH_WITH_TAILS = 0.8, 1.0
 weak beams play roulette, and where they are left to photons."""
 _ENOUGH = 4.0
 """A search that followed this many times fewer beams than there is time for is done again."""
-_DEAREST = 1e8
+_DEAREST = 3e7
 """Steps of a survey, each times `_STEP_FACETS` and the scene's facets, after which photons are taken to be cheaper.
 Counted, not timed: a scene is rendered alike on every machine."""
 MANY = 800.0
@@ -187,7 +187,6 @@ class BeamLight:
     def surveying(self, moving: MovingBeams | None = None) -> Iterator[str | None]:
         """Find out which objects' light beams carry, and whether that pays, pausing with the name of what is done now
         (None: as before); afterwards `found` holds the strongest beams, or those of `moving`."""
-        threshold = SURVEY if moving is None else moving.threshold
         light_parts = SURVEY_PARTS if moving is None else MOVING_PARTS
         if not _compiled:
             # The first search of a process may have to be compiled, which says nothing about the scene.
@@ -206,15 +205,14 @@ class BeamLight:
             search = partial(self.finder.find, at, self._depth, _MOVING_WORD, light_parts, tails=tails)
             return (yield from mapped(self._worker.searched(search, pays, None), lambda share: None))
 
-        found = yield from surveyed(threshold, tails=False)
-        strongest = LightBeams({})
-        if pays(0):
-            strongest = yield from surveyed(SURVEY, tails=True)
+        strongest = yield from surveyed(SURVEY, tails=True)
+        # In motion weak beams play roulette, and none is left to photons.
+        found = strongest if moving is None else (yield from surveyed(moving.threshold, tails=False))
         if not pays(0):
             self.why_not = "the strongest beams alone are so many that photons are cheaper"
             return
         # As many as there would be at the survey's own threshold.
-        to_survey = (threshold / SURVEY) ** _GROWTH
+        to_survey = 1.0 if moving is None else (moving.threshold / SURVEY) ** _GROWTH
         if sum(found.followed(light) for light in strongest.plays) * to_survey > MANY:
             self.why_not = (
                 "weak beams of lights with emission lines over a continuum are so many that photons leave less noise"
@@ -223,6 +221,12 @@ class BeamLight:
         self.found, self._survey_polygons = found, found.polygons
         self.carried = {light: objects for light, objects in found.carried.items() if objects}
         self._surveyed, self._with_tails = max(1.0, found.followed() * to_survey), max(1.0, strongest.followed())
+
+    @property
+    def leaves_strong(self) -> bool:
+        """Photons carry on more of what was found last than weak beams."""
+        pieces = self.found.pieces if self.found is not None else None
+        return pieces is not None and not pieces.is_tail.all()
 
     @property
     def finder(self) -> BeamFinder:

@@ -218,9 +218,9 @@ class LightPass:
         if self._planned == (photons, anchors):
             return
         self._planned = photons, anchors
-        # Without pilots beams carry everything.
-        pilots, beams = self.survey.pilots, self.survey.beam_light
-        self.plans = self._planner(pilots).plans(photons, self._texel_size(), anchors) if pilots else []
+        # Where they do not say it, beams carry everything.
+        tells, pilots, beams = self.survey.tells_lattices, self.survey.pilots, self.survey.beam_light
+        self.plans = self._planner(pilots).plans(photons, self._texel_size(), anchors) if tells else []
         for plan in self.plans:
             name = self.scene.lights[plan.index].name
             self.stats.bands[name], self.stats.light_points[name] = len(plan.bands), plan.light_points

@@ -52,6 +52,8 @@ class LightSurvey:
         """Domains of lights that may meet glass or mirrors."""
         self.pilots: dict[int, Pilot] = {}
         """Pilots of those; empty where beams carry everything and maps are fitted to them."""
+        self.tells_lattices = False
+        """Pilots say how lattices of photons are to be divided; else beams draw all but what is weak."""
         self.beam_light: BeamLight | None = None
         """Also where it has found that beams do not pay."""
         self._sample_pilots: dict[int, Pilot] = {}
@@ -85,7 +87,10 @@ class LightSurvey:
             yield from self.beam_light.surveying(self._moving)
             yield "following the first photons"
         if self._moving is None or not self.only_beams:
-            self.pilots = yield from self._pilot_steps()
+            # Photons that carry on what is weak take any part of the spectrum.
+            beams = self.beams if self.only_beams and self._features.band_cuts else None
+            self.tells_lattices = beams is None or beams.leaves_strong
+            self.pilots = yield from self._pilot_steps(for_maps=not self.tells_lattices)
 
     def _domains(self) -> dict[int, EmissionDomain]:
         space = self.buffers.space
@@ -98,15 +103,17 @@ class LightSurvey:
         found = {i: emission_domain(li, self._scene, space, triangles) for i, li in enumerate(self._scene.lights)}
         return {i: domain for i, domain in found.items() if domain is not None}
 
-    def _pilot_steps(self) -> Generator[str | None, None, dict[int, Pilot]]:
+    def _pilot_steps(self, *, for_maps: bool = False) -> Generator[str | None, None, dict[int, Pilot]]:
         pilots: dict[int, Pilot] = {}
         spectral = bool(self._features.spectral_groups) or self._features.point_spectrum
         for i, domain in self.domains.items():
             yield None
             # Radiant power of the whole spectrum per unit weight, W.
             power_w = float(self.buffers.light_power[i].band(0.0, 1.0)[3])
-            pilots[i] = yield from pilot_steps(self._trace, self._scene, i, domain, power_w, spectral)
-        if not self._division.counts:
+            pilots[i] = yield from pilot_steps(
+                self._trace, self._scene, i, domain, power_w, spectral, for_maps=for_maps
+            )
+        if not (for_maps or self._division.counts):
             # Frames of an animation have to agree about it.
             self._trace.split_threshold = split_threshold(pilots.values())
             self.domains = {i: guided(domain, pilots[i]) for i, domain in self.domains.items()}
@@ -114,7 +121,9 @@ class LightSurvey:
 
     def sample_pilots(self) -> Generator[str | None, None, dict[int, Pilot]]:
         """Pilots also where beams carry everything."""
-        self._sample_pilots = self.pilots or self._sample_pilots or (yield from self._pilot_steps())
+        if self.tells_lattices:
+            return self.pilots
+        self._sample_pilots = self._sample_pilots or (yield from self._pilot_steps())
         return self._sample_pilots
 
     # ---- what was found ----------------------------------------------------------------------
