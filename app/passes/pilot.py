@@ -94,7 +94,14 @@ class Pilot:
 
 
 def pilot_steps(
-    trace: TracePass, scene: Scene, light: int, domain: EmissionDomain, power_w: float, spectral: bool, *, for_maps: bool
+    trace: TracePass,
+    scene: Scene,
+    light: int,
+    domain: EmissionDomain,
+    power_w: float,
+    spectral: bool,
+    *,
+    for_maps: bool,
 ) -> Generator[None, None, Pilot]:
     """Trace the pilots of one light, pausing after every event of the rays; `power_w`: its whole power per unit
     weight. `for_maps`: all that is asked is where light lands, which a quarter of the points tells, and the spectrum's

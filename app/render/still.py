@@ -87,7 +87,7 @@ class RenderStats:
             ),
             f"fall-backs          {_counted(tally.fallbacks)}, splat_footprint_dropped {dropped}",
             *self._beam_lines(),
-            f"bands × points      {', '.join(bands)}",
+            *([f"bands × points      {', '.join(bands)}"] if light.bands else []),
             (
                 f"camera              {camera.samples} samples a pixel, {camera.spectrum.words}; "
                 f"{_counted(camera.fallbacks)}"
