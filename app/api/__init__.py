@@ -21,6 +21,7 @@ from .picture import CausticMap, Picture, Statistics
 from .rendering import caustic, render
 from .scene import Scene
 from .session import Session
+from .solving import Fit, Match, Ranked, fit, match
 from .sweeping import SweepPoint, sweep
 from .tables import Entries, Table
 from .tracing import Fan, fan, trace
@@ -30,11 +31,14 @@ __all__ = [
     "CausticMap",
     "Entries",
     "Fan",
+    "Fit",
     "Glass",
     "Gradient",
     "LensTable",
+    "Match",
     "Photons",
     "Picture",
+    "Ranked",
     "Scene",
     "Session",
     "Statistics",
@@ -44,12 +48,14 @@ __all__ = [
     "View",
     "caustic",
     "fan",
+    "fit",
     "glass",
     "glasses",
     "gradient",
     "gradients",
     "lens_table",
     "load",
+    "match",
     "page",
     "render",
     "scenes",

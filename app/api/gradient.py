@@ -5,15 +5,16 @@ from __future__ import annotations
 import io
 import os
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..base.errors import UserError
+from ..base.generators import finished
 from ..base.image_io import save_codes
 from ..base.tone_map import luminance
 from .arguments import Count, Size, settings_of
@@ -25,6 +26,7 @@ from .scene import Scene
 if TYPE_CHECKING:
     from ..gpu.context import Context
 
+T = TypeVar("T")
 DEFAULT_SIZE = (256, 256)
 _BRIGHTEST = 0.998
 """Share of a picture whose colours are not full yet."""
@@ -83,6 +85,17 @@ class Gradient:
         return f"Gradient('{self.of}', {width}×{height}, step {self.step:.3g}, {self.seconds:.1f} s)"
 
 
+def solved(steps: Generator[float, None, T], report: Callable[[float, str], None], stopped: Callable[[], bool]) -> T:
+    """What `steps` return. Raises `UserError` where they were stopped."""
+
+    def paused(share: float) -> None:
+        report(share, "solving")
+        if stopped():
+            raise UserError("it was stopped before there was an answer: let it go on for longer")
+
+    return finished(steps, paused)
+
+
 def gradients(
     scene: Scene,
     of: Sequence[str],
@@ -112,10 +125,8 @@ def gradients(
         from ..edit.parameters import Stage
         from ..render.gradient import gradient
 
-        steps = dict.fromkeys(of, float(step)) if step is not None else None
-        found = gradient(context, Stage(model, model.camera), settings, list(of), steps, report, stopped)
-        if found is None:
-            raise UserError("the gradient was stopped before it was found: let it go on for longer")
+        given = dict.fromkeys(of, float(step)) if step is not None else None
+        found = solved(gradient(context, Stage(model, model.camera), settings, list(of), given), report, stopped)
         base, seconds = found.base, time.perf_counter() - started
         return [
             Gradient(

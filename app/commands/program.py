@@ -27,6 +27,7 @@ COMMANDS = {
     "lesson": ("table:Lesson", "view:lesson"),
     "bake": ("table:Bake", "bake:bake_texture"),
     "export": ("table:Export", "bake:export"),
+    "match": ("table:Match", "match:match"),
     "gallery": ("table:Gallery", "gallery:gallery"),
     "inspect": ("table:Inspect", "inspect_report:inspect"),
     "glass": ("table:Glass", "glass:glass"),

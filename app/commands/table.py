@@ -417,6 +417,29 @@ class Export(BakesCaustic):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Match(OpensScene):
+    """Rank the catalogue's glasses by how near the light that an object of each casts comes to what is wanted."""
+
+    through: str = argument("OBJECT", "The object of glass.")
+    receiver: str = argument("RECEIVER", "The flat object that is lit.", complete=completion.receivers)
+    target: Path | None = option(
+        "FILE",
+        "The light that is wanted: a picture, or a .csv of spectra, a line a place, of 4 to 32 even bins from 380 to "
+        "780 nm; default: the scene's own light, for a dispersion gain that nature does not offer.",
+    )
+    begin: tuple[float, float, float] | None = option(
+        "X,Y,Z", "Where the target's first row begins on the receiver (of a picture, its upper left).", options.place
+    )
+    end: tuple[float, float, float] | None = option("X,Y,Z", "Where its first row ends.", options.place)
+    last: tuple[float, float, float] | None = option(
+        "X,Y,Z", "Where its last row begins; default: the target is a line.", options.place
+    )
+    count: int | None = option("N", "Glasses that are listed; default: 10.", options.integer(1, 2000))
+    photons: int | None = shared(_PHOTONS)
+    seed: int | None = shared(_SEED)
+
+
+@dataclass(frozen=True, kw_only=True)
 class Gallery:
     """Make a static site of shipped scenes and lessons, each a page whose dispersion can be dragged."""
 

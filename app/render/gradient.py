@@ -7,12 +7,13 @@ smoothly, so that chance, which would be divided by the step, drops out.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..base.errors import UserError
+from ..base.generators import mapped
 from ..edit.parameters import Stage, apply, parameter, parts, value_of
 from ..gpu.context import Context
 from ..model.optics import glass
@@ -21,8 +22,6 @@ from ..model.settings import RenderSettings
 from .bake import placement
 from .frames import FrameRenderer, Picture
 
-Report = Callable[[float, str], None]
-Stop = Callable[[], bool]
 INDEX = "index"
 """Parameter of an object of glass: n(λ), raised alike at all wavelengths."""
 _CURVE_NM = np.arange(380.0, 781.0, 4.0)
@@ -59,11 +58,9 @@ def gradient(
     settings: RenderSettings,
     paths: Sequence[str],
     steps: Mapping[str, float] | None = None,
-    report: Report = lambda share, text: None,
-    stopped: Stop = lambda: False,
     window: np.ndarray | None = None,
-) -> Gradient | None:
-    """Of what `settings.layer` shows, by each of `paths` (`edit.parameters`, and `INDEX`); None once `stopped()`.
+) -> Generator[float, None, Gradient]:
+    """Of what `settings.layer` shows, by each of `paths` (`edit.parameters`, and `INDEX`), pausing with the share done.
 
     `steps`: of parameters; those of others are found by a few photons. `window`: `MapFit.window` of a map. Raises
     `UserError`."""
@@ -73,23 +70,21 @@ def gradient(
     found: list[Derivative] = []
     base, where = None, None
     for number, path in enumerate(paths):
-
-        def reported(share: float, text: str, number: int = number) -> None:
-            report((number + share) / len(paths), text)
-
-        h = (steps or {}).get(path) or _step(context, stage, few, path, window, stopped)
+        h = (steps or {}).get(path) or (yield from mapped(_step(context, stage, few, path, window), lambda share: 0.0))
         either = [nudged(stage, path, -h), nudged(stage, path, h)]
         renderer = FrameRenderer(context, settings, either, window=window)
         try:
-            low, high = (_drawn(renderer, each, stopped, reported) for each in either)
+            drawn = []
+            for one in (*either, stage)[: 3 if base is None else 2]:
+                for share in renderer.steps(one):
+                    yield (number + (len(drawn) + share) / 3.0) / len(paths)
+                drawn.append(renderer.picture)
             if base is None:
-                base = _drawn(renderer, stage, stopped, reported)
+                base = drawn[2]
                 where = placement(renderer.light) if settings.layer.startswith("map:") else None
         finally:
             renderer.release()
-        if stopped():
-            return None
-        spectral = None
+        low, high, spectral = drawn[0], drawn[1], None
         if high.spectral is not None and low.spectral is not None:
             spectral = (high.spectral - low.spectral) / (2.0 * h)
         found.append(Derivative(path, Picture((high.rgb - low.rgb) / (2.0 * h), spectral, high.bin_edges_nm), h))
@@ -97,26 +92,23 @@ def gradient(
     return Gradient(base, tuple(found), where)
 
 
-def _drawn(renderer: FrameRenderer, stage: Stage, stopped: Stop, report: Report) -> Picture:
-    for share in renderer.steps(stage, stopped):
-        report(share, renderer.phase)
-    return renderer.picture
-
-
 def _step(
-    context: Context, stage: Stage, settings: RenderSettings, path: str, window: np.ndarray | None, stopped: Stop
-) -> float:
+    context: Context, stage: Stage, settings: RenderSettings, path: str, window: np.ndarray | None
+) -> Generator[float, None, float]:
     """A change of a parameter that changes the picture as much as it should."""
     first = h = first_step(stage, path)
     for _ in range(_TRIES):
         either = [nudged(stage, path, -h), nudged(stage, path, h)]
         renderer = FrameRenderer(context, settings, either, window=window)
         try:
-            low, high = (_drawn(renderer, each, stopped, lambda share, text: None).rgb for each in either)
+            drawn = []
+            for one in either:
+                yield from renderer.steps(one)
+                drawn.append(renderer.picture.rgb)
         finally:
             renderer.release()
-        norm, moved = (float(np.linalg.norm(picture)) for picture in (high + low, high - low))
-        if not moved > 0.0 or _LEAST_CHANGE <= moved / norm <= _MOST_CHANGE or stopped():
+        norm, moved = float(np.linalg.norm(drawn[0] + drawn[1])), float(np.linalg.norm(drawn[1] - drawn[0]))
+        if not moved > 0.0 or _LEAST_CHANGE <= moved / norm <= _MOST_CHANGE:
             break
         h = float(np.clip(h * _CHANGE * norm / moved, first / 64.0, _LARGEST * first))
         if h == _LARGEST * first:

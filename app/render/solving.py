@@ -6,21 +6,29 @@ blurred, so that a colour is still drawn to its place from several widths away.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import io
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 
-from ..base.errors import UserError
+from ..base.errors import UserError, suggestion
+from ..base.files import TABLE_BYTES, read_text, reason_of
+from ..base.generators import mapped
+from ..base.image_io import read_image
 from ..edit.glass import set_dispersion
-from ..edit.parameters import Stage
+from ..edit.parameters import Stage, value_of
 from ..gpu.context import Context
 from ..model.optics import catalogue, glass
 from ..model.optics.glass import Dispersion
+from ..model.scene import Scene
 from ..model.settings import RenderSettings
 from ..passes.picture_channels import Channels
+from ..passes.plane_frame import plane_frame
+from .bake import placement
 from .frames import FrameRenderer, Picture
-from .gradient import INDEX, Gradient, Report, Stop, gradient, nudged
+from .gradient import INDEX, Gradient, gradient, nudged
 
 BINS = 16
 """Of maps that are compared in colour only."""
@@ -29,6 +37,8 @@ _TEXELS, _FEWEST = 192, 8
 _PARTS = 3
 """Along a side of one cell of a target, between which its mean is taken."""
 _SCANNED = 20
+_CELLS, _NARROW = 64, 32.0
+"""Along a side of a target that is the scene as it is; length of a line over the breadth of its strip."""
 _BLURS = (0.12, 0.04, 0.0)
 """Standard deviations, of the target's longer side."""
 _STEPS = 8
@@ -115,6 +125,96 @@ def _between(texels: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return (1.0 - v) * low + v * ((1.0 - u) * texels[j1, i] + u * texels[j1, i1])
 
 
+def glass_called(scene: Scene, name: str) -> int:
+    """Index of an object whose glass may be another one. Raises `UserError`."""
+    glasses = [o.name for o in scene.objects if o.material.transmits and not o.material.is_crystal]
+    if name not in glasses:
+        listed = ", ".join(f"'{known}'" for known in glasses) or "none"
+        raise UserError(
+            f"scene '{scene.name}' has no object of glass called '{name}'{suggestion(name, glasses)}; it has {listed}"
+        )
+    return [item.name for item in scene.objects].index(name)
+
+
+def line(scene: Scene, receiver: str, start: Sequence[float], end: Sequence[float]) -> np.ndarray:
+    """Corners of a target that is a narrow strip about a line on a receiver."""
+    item = scene.objects[[item.name for item in scene.objects].index(receiver)]
+    axes = plane_frame(item.world_vertices).axes
+    first, last = np.asarray(start, float), np.asarray(end, float)
+    across = np.cross(np.cross(*axes), last - first) / _NARROW
+    return np.stack([first - 0.5 * across, last - 0.5 * across, first + 0.5 * across])
+
+
+def as_it_is(
+    context: Context, stage: Stage, settings: RenderSettings, receiver: str, corners: np.ndarray | None = None
+) -> Generator[float, None, Target]:
+    """The light that the scene casts on a receiver, all of it or what is within `corners`, as a target."""
+    edges = np.linspace(380.0, 780.0, BINS + 1)
+    target = Target(receiver, np.eye(3) if corners is None else corners, np.ones((_CELLS, _CELLS, BINS)), edges)
+    settings, window = target.settings(settings), None if corners is None else target.window
+    if corners is None:
+        settings = replace(settings, width=_TEXELS, height=_TEXELS)
+    renderer = FrameRenderer(context, settings, [stage], window=window)
+    try:
+        yield from renderer.steps(stage)
+        where, spectral = placement(renderer.light), renderer.picture.spectral
+    finally:
+        renderer.release()
+    assert spectral is not None
+    if corners is None:
+        found = where["corners_world"]
+        assert isinstance(found, dict)
+        target = replace(target, corners=np.array([found[k] for k in ("top_left", "top_right", "bottom_left")]))
+    return replace(target, values=target.seen(spectral, where))
+
+
+def wanted(
+    context: Context,
+    stage: Stage,
+    settings: RenderSettings,
+    receiver: str,
+    values: np.ndarray | None,
+    between: Sequence[Sequence[float]] | None,
+) -> Generator[float, None, Target]:
+    """The target of `values` (see `spectrasplat.match`), or the light as it is, on a line or a field of a receiver.
+    Raises `UserError`."""
+    scene = stage.scene
+    if not scene.objects[[item.name for item in scene.objects].index(receiver)].mesh.is_flat:
+        raise UserError(f"'{receiver}' is curved: light is compared on a flat receiver only, so name one")
+    corners = None
+    if between is not None:
+        points = np.asarray(between, float)
+        if points.shape not in ((2, 3), (3, 3)) or not np.isfinite(points).all() or np.ptp(points, axis=0).max() == 0.0:
+            raise UserError("the target's place is given by two ends of a line or three corners, three numbers each")
+        corners = points if len(points) == 3 else line(scene, receiver, *points)
+    if values is None:
+        return (yield from as_it_is(context, stage, settings, receiver, corners))
+    if corners is None:
+        raise UserError("where the target lies is not given: give two ends of a line or three corners, on the receiver")
+    if values.ndim not in (1, 2, 3):
+        raise UserError(
+            f"a target of shape {values.shape} is none: give (bins,), (places, bins) or (rows, columns, bins)"
+        )
+    cells = values.reshape((1,) * (3 - values.ndim) + values.shape)
+    bins = cells.shape[-1]
+    if bins != 3 and not 4 <= bins <= 32:
+        raise UserError(f"a target of {bins} channels is none: give 3 (linear Rec.709) or 4 to 32 spectral bins")
+    return Target(receiver, corners, cells, None if bins == 3 else np.linspace(380.0, 780.0, bins + 1))
+
+
+def read_target(path: Path) -> np.ndarray:
+    """A picture (rows, columns, 3), or lines of numbers from a .csv (places, bins). Raises `UserError`."""
+    if path.suffix.lower() != ".csv":
+        return read_image(path).rgb.astype(float)
+    try:
+        found: np.ndarray = np.atleast_2d(np.loadtxt(io.StringIO(read_text(path, TABLE_BYTES)), delimiter=","))
+    except OSError as error:
+        raise UserError(f"cannot read {path}: {reason_of(error)}") from error
+    except ValueError as error:
+        raise UserError(f"{path}: {error}; give lines of as many numbers each, with commas between") from error
+    return found
+
+
 @dataclass(frozen=True)
 class Ranked:
     """A glass of the catalogue."""
@@ -158,23 +258,19 @@ class Solver:
     settings: RenderSettings
     """Of the rendering."""
     target: Target
-    report: Report = lambda share, text: None
-    stopped: Stop = lambda: False
     _steps: dict[str, float] = field(default_factory=dict)
     """Found for parameters so far."""
 
     # ---- numbers of the scene ----------------------------------------------------------------
 
-    def fit(self, paths: Sequence[str], steps: int = _STEPS) -> Fit | None:
-        """Gauss and Newton's method from the scene as it is; None once stopped."""
+    def fit(self, paths: Sequence[str]) -> Generator[float, None, Fit]:
+        """Gauss and Newton's method from the scene as it is, pausing with the share done."""
         at, taken, error = np.zeros(len(paths)), 0, np.inf
         found: tuple[np.ndarray, np.ndarray, float] | None = None
-        for blur in _BLURS:
-            for _ in range(steps):
-                self.report(min(taken / (len(_BLURS) * steps), 0.99), f"step {taken + 1}")
-                columns = self._columns(at, paths, blur)
-                if columns is None:
-                    return None
+        for number, blur in enumerate(_BLURS):
+            for step in range(_STEPS):
+                begun = (number + step / _STEPS) / len(_BLURS)
+                columns = yield from mapped(self._columns(at, paths, blur), lambda share, at=begun: at)
                 move, covariance, error = _least_squares(columns, self._wanted(blur))
                 taken += 1
                 size = float(np.linalg.norm(columns[:, 1:] @ move) / np.linalg.norm(columns[:, 0]))
@@ -184,31 +280,27 @@ class Solver:
                     break
         assert found is not None
         at, covariance, error = found
-        start = {path: _value(self.stage, path) for path in paths}
+        start = {path: 0.0 if path.endswith(f".{INDEX}") else value_of(self.stage, path) for path in paths}
         values = {path: start[path] + float(change) for path, change in zip(paths, at, strict=True)}
         deviations = dict(zip(paths, np.sqrt(np.diag(covariance)).tolist(), strict=True))
         return Fit(values, deviations, covariance, error, taken)
 
-    def _columns(self, at: np.ndarray, paths: Sequence[str], blur: float) -> np.ndarray | None:
+    def _columns(self, at: np.ndarray, paths: Sequence[str], blur: float) -> Generator[float, None, np.ndarray]:
         """The light (n, 1 + paths) of the scene moved by `at`, and its derivatives."""
         stage = self.stage
         for path, change in zip(paths, at, strict=True):
             stage = nudged(stage, path, float(change)) if change else stage
-        found = self._gradient(stage, paths)
-        if found is None:
-            return None
+        found = yield from self._gradient(stage, paths)
         pictures = [found.base, *(each.picture for each in found.derivatives)]
         return np.stack([self._shown(p, found, blur).ravel() for p in pictures], axis=-1)
 
     # ---- glasses -----------------------------------------------------------------------------
 
-    def match(self, index: int, count: int = 10) -> Match | None:
-        """The glasses that object `index` may be of; None once stopped. Raises `UserError` where the target says
-        nothing."""
+    def match(self, index: int, count: int = 10) -> Generator[float, None, Match]:
+        """The glasses that object `index` may be of, pausing with the share done. Raises `UserError` where the target
+        says nothing."""
         entries = [e for e in catalogue.entries() if e.dispersion.is_dispersive]
-        start = self._scanned(index, entries)
-        if start is None:
-            return None
+        start = yield from self._scanned(index, entries)
         known: dict[str, Gradient] = {}
         curves = np.stack([_at_bins(entry.dispersion, self._edges) for entry in entries])
         names = [entry.qualified_name for entry in entries]
@@ -217,14 +309,12 @@ class Solver:
             seen: set[int] = set()
             while best not in seen and len(seen) < _STEPS:
                 seen.add(best)
-                self.report(min(0.4 + 0.05 * len(known), 0.99), f"trying {names[best]}")
+                begun = min(0.4 + 0.05 * len(known), 0.95)
                 if names[best] not in known:
                     its = set_dispersion(self.stage.scene, index, entries[best].dispersion)
                     path = f"objects.{its.objects[index].name}.{INDEX}"
-                    found = self._gradient(replace(self.stage, scene=its), [path])
-                    if found is None:
-                        return None
-                    known[names[best]] = found
+                    steps = self._gradient(replace(self.stage, scene=its), [path])
+                    known[names[best]] = yield from mapped(steps, lambda share, at=begun: at + 0.05 * share)
                 columns = self._by_bin(known[names[best]], blur)
                 if not errors.size:
                     self._check(columns, entries[best].dispersion)
@@ -237,7 +327,7 @@ class Solver:
         )
         return Match(ranked, self._around(columns, entries[best].dispersion))
 
-    def _scanned(self, index: int, entries: Sequence[catalogue.Entry]) -> int | None:
+    def _scanned(self, index: int, entries: Sequence[catalogue.Entry]) -> Generator[float, None, int]:
         """Of glasses evenly spread over n_d, the one whose blurred light is nearest."""
         by_index = np.argsort([entry.dispersion.n_d for entry in entries])
         chosen = by_index[(np.linspace(0.01, 0.99, _SCANNED) * (len(entries) - 1)).astype(int)]
@@ -248,13 +338,8 @@ class Solver:
         errors = []
         try:
             for number, stage in enumerate(stages):
-                for _ in renderer.steps(stage, self.stopped):
-                    pass
-                if self.stopped():
-                    return None
-                self.report(0.4 * (number + 1) / len(stages), "looking through n_d")
-                from .bake import placement
-
+                for share in renderer.steps(stage):
+                    yield 0.4 * (number + share) / len(stages)
                 shown = self._colours(renderer.picture, placement(renderer.light), _BLURS[0]).ravel()
                 errors.append(_errors(shown[:, None], self._wanted(_BLURS[0]), np.zeros((1, 0)))[0])
         finally:
@@ -303,12 +388,9 @@ class Solver:
     def _edges(self) -> np.ndarray:
         return np.linspace(380.0, 780.0, self.target.bins + 1)
 
-    def _gradient(self, stage: Stage, paths: Sequence[str]) -> Gradient | None:
-        found = gradient(
-            self.context, stage, self._settings, paths, self._steps, stopped=self.stopped, window=self.target.window
-        )
-        if found is not None:
-            self._steps |= {each.path: each.step for each in found.derivatives}
+    def _gradient(self, stage: Stage, paths: Sequence[str]) -> Generator[float, None, Gradient]:
+        found = yield from gradient(self.context, stage, self._settings, paths, self._steps, self.target.window)
+        self._steps |= {each.path: each.step for each in found.derivatives}
         return found
 
     def _shown(self, picture: Picture, of: Gradient, blur: float) -> np.ndarray:
@@ -324,12 +406,6 @@ class Solver:
 
     def _wanted(self, blur: float) -> np.ndarray:
         return _blurred(self.target.values.astype(float), blur).ravel()
-
-
-def _value(stage: Stage, path: str) -> float:
-    from ..edit.parameters import value_of
-
-    return value_of(stage, path) if not path.endswith(f".{INDEX}") else 0.0
 
 
 def _blurred(cells: np.ndarray, share: float) -> np.ndarray:

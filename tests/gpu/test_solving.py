@@ -1,0 +1,115 @@
+"""A hidden glass is found among all, numbers of a scene with their uncertainty, and what says nothing is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import spectrasplat as ss
+from spectrasplat.model.optics import catalogue
+from spectrasplat.render.solving import Target, _at_bins, _errors, _least_squares
+
+EDGES = np.linspace(380.0, 780.0, 17)
+
+
+def light_of(scene: ss.Scene, receiver: str, seed: int) -> tuple[np.ndarray, list[list[float]]]:
+    """Spectra of what falls on a receiver (rows, columns, bins), and where they are."""
+    found = ss.caustic(scene, receiver, size=(96, 96), photons=60_000, seed=seed, bins=16)
+    corners = found.placement["corners_world"]
+    return found.spectral, [corners["top_left"], corners["top_right"], corners["bottom_left"]]
+
+
+def test_least_squares_know_how_sure_they_are() -> None:
+    """Moves and brightness are found; their scatter over many noises is what is said of it."""
+    rng = np.random.default_rng(5)
+    columns = rng.normal(size=(400, 3))
+    moves, said = [], None
+    for _ in range(300):
+        wanted = 2.5 * (columns @ [1.0, 0.2, -0.3]) + 0.1 * rng.normal(size=400)
+        move, covariance, _ = _least_squares(columns, wanted)
+        moves.append(move)
+        said = covariance if said is None else said + covariance
+    assert np.mean(moves, axis=0) == pytest.approx([0.2, -0.3], abs=5e-4)
+    assert np.std(moves, axis=0) == pytest.approx(np.sqrt(np.diag(said / 300)), rel=0.2)
+
+
+def test_predictions_are_believed_near_by_only() -> None:
+    """The error of a move is what remains at the best brightness; a large move is no candidate."""
+    columns = np.array([[1.0, 0.0], [1.0, 0.1], [0.0, 0.2]])
+    wanted = 3.0 * (columns @ [1.0, 0.5])
+    errors = _errors(columns, wanted, np.array([[0.5], [0.0], [50.0]]))
+    assert errors[0] == pytest.approx(0.0, abs=1e-7) and 0.0 < errors[1] < 0.2 and np.isinf(errors[2])
+
+
+def test_a_target_reads_the_map_where_it_lies() -> None:
+    """Cells of an oblique field of a map that rises linearly."""
+    x, y = np.meshgrid((np.arange(64) + 0.5) / 64.0, 1.0 - (np.arange(32) + 0.5) / 32.0)
+    spectral = np.stack([x, y, x + y, 2.0 * x], axis=-1)
+    placement = {"corners_world": {"bottom_left": [0, 0, 1], "bottom_right": [1, 0, 1], "top_left": [0, 1, 1]}}
+    corners = np.array([[0.2, 0.3, 1.0], [0.6, 0.4, 1.0], [0.1, 0.7, 1.0]])
+    target = Target("floor", corners, np.ones((2, 4, 4)), np.linspace(380.0, 780.0, 5))
+    seen = target.seen(spectral, placement)
+    first = corners[0] + 0.125 * (corners[1] - corners[0]) + 0.25 * (corners[2] - corners[0])
+    assert seen[0, 0] == pytest.approx([first[0], first[1], first[0] + first[1], 2.0 * first[0]], abs=1e-9)
+
+
+def test_index_of_a_bin() -> None:
+    """The mean over a bin, between the indices at its ends."""
+    glass = catalogue.find("N-SF11")
+    found = _at_bins(glass, EDGES)
+    assert (found < glass.index(EDGES[:-1])).all() and (found > glass.index(EDGES[1:])).all()
+
+
+def test_what_is_no_target_is_refused(tmp_path: Path) -> None:
+    """In one sentence each, before anything is rendered."""
+    scene, ends = ss.load("spectrum"), [[3.9, 0.0, -1.1], [3.7, 0.0, -1.4]]
+    with pytest.raises(ss.UserError, match="no object of glass called 'screen'"):
+        ss.match(scene, "screen", "screen", np.ones((4, 16)), ends)
+    with pytest.raises(ss.UserError, match="where the target lies"):
+        ss.match(scene, "prism", "screen", np.ones((4, 16)))
+    with pytest.raises(ss.UserError, match="dark"):
+        ss.match(scene, "prism", "screen", np.zeros((4, 16)), ends)
+    with pytest.raises(ss.UserError, match="a target of 2 channels"):
+        ss.match(scene, "prism", "screen", np.ones((4, 2)), ends)
+    (tmp_path / "lines.csv").write_text("1,2,3,4\n1,2,x,4\n")
+    with pytest.raises(ss.UserError, match="lines of as many numbers"):
+        ss.match(scene, "prism", "screen", tmp_path / "lines.csv", ends)
+
+
+@pytest.mark.slow
+def test_a_hidden_glass_is_found_among_all() -> None:
+    """By the spectra that it casts: first of all, n_d within 1e-4 and V_d within 0.5."""
+    scene = ss.load("spectrum")
+    hidden = scene.copy()
+    hidden.objects["prism"].update(glass="Ohara S-LAH64")
+    target, between = light_of(hidden, "screen", seed=3)
+    found = ss.match(scene, "prism", "screen", target, between, photons=60_000)
+    glass = ss.glass("Ohara S-LAH64")
+    assert found.glasses[0].error < 0.02 and abs(found.glasses[0].n_d - glass.n_d) < 1e-4
+    assert found.fit.values["n_d"] == pytest.approx(glass.n_d, abs=1e-4)
+    assert found.fit.values["V_d"] == pytest.approx(glass.V_d, abs=0.5)
+
+
+@pytest.mark.slow
+def test_numbers_are_fitted_through_noise() -> None:
+    """n_d, V_d and the prism's turn at once, each within four of its standard deviations."""
+    true = ss.load("spectrum")
+    true.objects["prism"].update(glass=None, material={"n_d": 1.70, "V_d": 30.0})
+    target, between = light_of(true, "screen", seed=3)
+    noisy = target + 0.02 * target.max() * np.random.default_rng(1).normal(size=target.shape)
+    start = true.copy()
+    start.objects["prism"].update(material={"n_d": 1.703, "V_d": 32.0})
+    paths = ["objects.prism.n_d", "objects.prism.V_d", "objects.prism.rotation.y"]
+    found = ss.fit(start, paths, "screen", noisy, between, photons=60_000)
+    for path, wanted in zip(paths, (1.70, 30.0, 0.0), strict=True):
+        assert abs(found.values[path] - wanted) < 4.0 * found.deviations[path] + 1e-4
+
+
+@pytest.mark.slow
+def test_light_without_colours_says_nothing() -> None:
+    """Light that no glass disperses cannot tell one from another."""
+    scene = ss.load("spectrum")
+    scene.objects.add(name="wall", shape="plane", width=1.0, height=1.0, position=[0, 40, 0], material="diffuse")
+    with pytest.raises(ss.UserError, match="says nothing about a glass|is dark"):
+        ss.match(scene, "prism", "wall", np.ones((1, 8, 16)), [[-0.4, 40, 0], [0.4, 40, 0]], photons=20_000)
