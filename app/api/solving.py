@@ -113,7 +113,7 @@ def _values(target: ArrayLike | str | os.PathLike[str]) -> NDArray[np.float64]:
 
         return read_target(Path(target))
     if hasattr(target, "__dlpack__") and not isinstance(target, np.ndarray):
-        target = np.from_dlpack(target)
+        target = np.from_dlpack(target)  # type: ignore[arg-type]
     try:
         return np.asarray(target, np.float64)
     except (TypeError, ValueError) as error:

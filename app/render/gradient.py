@@ -74,7 +74,7 @@ def gradient(
         either = [nudged(stage, path, -h), nudged(stage, path, h)]
         renderer = FrameRenderer(context, settings, either, window=window)
         try:
-            drawn = []
+            drawn: list[Picture] = []
             for one in (*either, stage)[: 3 if base is None else 2]:
                 for share in renderer.steps(one):
                     yield (number + (len(drawn) + share) / 3.0) / len(paths)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -270,7 +271,9 @@ class Solver:
         for number, blur in enumerate(_BLURS):
             for step in range(_STEPS):
                 begun = (number + step / _STEPS) / len(_BLURS)
-                columns = yield from mapped(self._columns(at, paths, blur), lambda share, at=begun: at)
+                columns = yield from mapped(
+                    self._columns(at, paths, blur), partial(_within, begun, 1.0 / (len(_BLURS) * _STEPS))
+                )
                 move, covariance, error = _least_squares(columns, self._wanted(blur))
                 taken += 1
                 size = float(np.linalg.norm(columns[:, 1:] @ move) / np.linalg.norm(columns[:, 0]))
@@ -314,7 +317,7 @@ class Solver:
                     its = set_dispersion(self.stage.scene, index, entries[best].dispersion)
                     path = f"objects.{its.objects[index].name}.{INDEX}"
                     steps = self._gradient(replace(self.stage, scene=its), [path])
-                    known[names[best]] = yield from mapped(steps, lambda share, at=begun: at + 0.05 * share)
+                    known[names[best]] = yield from mapped(steps, partial(_within, begun, 0.05))
                 columns = self._by_bin(known[names[best]], blur)
                 if not errors.size:
                     self._check(columns, entries[best].dispersion)
@@ -406,6 +409,10 @@ class Solver:
 
     def _wanted(self, blur: float) -> np.ndarray:
         return _blurred(self.target.values.astype(float), blur).ravel()
+
+
+def _within(begun: float, part: float, share: float) -> float:
+    return begun + part * share
 
 
 def _blurred(cells: np.ndarray, share: float) -> np.ndarray:
